@@ -1,0 +1,26 @@
+// Numbers in and out of text, independent of the locale.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace unflex {
+
+// Reads the whole of `text` as a decimal number as printers and slicers write it: "1", "+1", ".5",
+// "-.8", "3.". Exponents, "inf", "nan", hexadecimal, and anything left over give nullopt.
+[[nodiscard]] std::optional<double> parse_number(std::string_view text);
+
+// Appends `scaled / 10^decimals` without trailing zeros or a needless point: (12500, 4) is "1.25",
+// (-3, 1) is "-0.3", (0, 5) is "0". There is no "-0".
+void append_scaled(std::string& out, std::int64_t scaled, int decimals);
+
+// Rounds half away from zero to an integer multiple of 10^-decimals, for append_scaled.
+// decimals in [0, 9]; |value| * 10^decimals must fit in an int64.
+[[nodiscard]] std::int64_t to_scaled(double value, int decimals);
+
+// 10^decimals, decimals in [0, 9].
+[[nodiscard]] double power_of_ten(int decimals);
+
+}  // namespace unflex

@@ -1,0 +1,48 @@
+// One axis of the machine as two points joined by a spring and a damper: the base, which the motor
+// moves, and the nozzle, which hangs on it.
+//
+//   p̈ = 2ζω(ḃ − ṗ) + ω²(b − p)
+//
+//   b   base position, mm        p   nozzle position, mm
+//   ω   natural frequency, rad/s  ζ   damping ratio
+//
+// Cisalpino (UFLA, 2023) eq. 3.17 and 3.18 with ζ = c/(2√(mk)); docs/theory.md lists where the
+// printed forms differ.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace unflex::dynamics {
+
+struct FlexibleAxis {
+  double omega_rad_s = 282.743338823;  // 45 Hz
+  double zeta = 0.06;
+};
+
+[[nodiscard]] FlexibleAxis from_frequency(double freq_hz, double damping_ratio);
+// mass in g, stiffness in N/mm, damping in N·s/mm.
+[[nodiscard]] FlexibleAxis from_mass(double mass_g, double stiffness_n_mm, double damping_n_s_mm);
+
+// Position and velocity of the nozzle on one axis, mm and mm/s.
+struct NozzleState {
+  double position = 0.0;
+  double velocity = 0.0;
+};
+
+// Motion of the base over one step of constant acceleration: b(t) = b0 + v0 t + a t²/2.
+struct BaseSegment {
+  double position = 0.0;      // b0, mm
+  double velocity = 0.0;      // v0, mm/s
+  double acceleration = 0.0;  // a, mm/s²
+};
+
+// One step of the classical fourth-order Runge–Kutta method, h seconds.
+[[nodiscard]] NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state,
+                                   const BaseSegment& base, double h);
+
+// The exact state h seconds later for the same input, from the closed form of the damped
+// oscillator (any ζ ≥ 0).
+[[nodiscard]] NozzleState exact_step(const FlexibleAxis& axis, NozzleState state,
+                                     const BaseSegment& base, double h);
+
+}  // namespace unflex::dynamics

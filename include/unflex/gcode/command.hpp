@@ -1,0 +1,61 @@
+// One line of G-code, taken apart.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace unflex::gcode {
+
+// A letter and what follows it, e.g. X12.5, or a bare letter as in "G28 X".
+struct Word {
+  char letter = '\0';           // upper case
+  std::optional<double> value;  // nullopt for a bare letter
+};
+
+enum class CommandKind {
+  none,         // blank or comment only
+  traditional,  // letter and number: G1, M204, T0, M862.3
+  extended,     // NAME KEY=VALUE … : Klipper's own commands and macros
+  malformed,    // neither: `problem` says why
+};
+
+// The parsed line. Views point into the text handed to parse(), which must outlive the command.
+struct Command {
+  CommandKind kind = CommandKind::none;
+  char letter = '\0';  // traditional: 'G', 'M', 'T' …, upper case
+  int number = -1;     // traditional: 1 for G1
+  int subnumber = -1;  // traditional: 3 for M862.3, otherwise -1
+  std::vector<Word> words;   // traditional, in the order of the line; without N and checksum
+  std::string name;          // extended: the command's name in upper case
+  std::string_view arguments;  // what follows the command's name or number, comment cut off, trimmed
+  std::string_view comment;  // text after ';', without it; empty when there is none
+  std::optional<std::int64_t> line_number;  // N word
+  std::optional<int> checksum;              // after '*'
+  std::string problem;                      // malformed: what is wrong, for a message
+
+  // True for letter and number, e.g. is('G', 1).
+  [[nodiscard]] bool is(char a_letter, int a_number) const {
+    return kind == CommandKind::traditional && letter == a_letter && number == a_number;
+  }
+  // The value of the last word with this letter (a later word overrides an earlier one, as in
+  // Klipper), if the word is there and has a value.
+  [[nodiscard]] std::optional<double> value(char a_letter) const;
+  // Whether a word with this letter is there, with or without a value.
+  [[nodiscard]] bool has(char a_letter) const;
+  // extended: the value of KEY=VALUE, key in upper case, shell-style quotes taken off.
+  [[nodiscard]] std::optional<std::string> parameter(std::string_view key) const;
+};
+
+// Takes one line (without its line ending) apart. Never fails: what cannot be understood is
+// `malformed`, and it is for the caller to let it pass as it stands.
+//
+// Read as printers do: lower case; words with or without spaces between them and between letter and
+// value ("G1X1 Y 2"); numbers like ".5", "+1", "-.8"; ';' and '(' ')' comments; a leading N word
+// and a trailing '*' checksum (checked: a wrong one is malformed). M117, M118 and M23 take the rest
+// of the line as text, so no words are read from it.
+[[nodiscard]] Command parse(std::string_view line);
+
+}  // namespace unflex::gcode

@@ -1,0 +1,109 @@
+// The modal interpreter: commands to absolute machine positions in mm and speeds in mm/s.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/gcode/line.hpp"
+
+namespace unflex::gcode {
+
+enum Axis : std::size_t { X = 0, Y = 1, Z = 2, E = 3 };
+
+// X, Y, Z and filament, mm.
+using Position = std::array<double, 4>;
+
+// One straight piece of motion in machine coordinates. A G1 gives one, an arc several.
+struct Segment {
+  Position start_mm{};
+  Position end_mm{};
+  double feed_mm_s = 0.0;  // what the file asks for, after M220
+  std::size_t line = 0;    // line number in the input
+  // False when the machine's X, Y or Z at the start is not known from the text (beginning of the
+  // file, after homing, a macro or a tool change): such a motion must not be rewritten.
+  bool start_known = true;
+
+  [[nodiscard]] double delta(Axis axis) const { return end_mm[axis] - start_mm[axis]; }
+  [[nodiscard]] double length_xy_mm() const;
+  // Length in X, Y and Z.
+  [[nodiscard]] double length_mm() const;
+  // Lays filament while it moves in X or Y.
+  [[nodiscard]] bool extruding() const { return delta(E) > 0.0 && length_xy_mm() > 0.0; }
+};
+
+// New planner limits; those not set stay as they are.
+struct LimitChange {
+  std::optional<double> max_velocity_mm_s;
+  std::optional<double> max_accel_mm_s2;
+  std::optional<double> square_corner_velocity_mm_s;
+  std::optional<double> minimum_cruise_ratio;
+};
+
+enum class EventKind {
+  passive,  // neither moves nor stops the machine: comments, modes, fans, M73, G1 with F alone …
+  limits,   // changes the planner's limits from here on; does not stop
+  barrier,  // all motion is finished first: G4, G28, M400, T, unknown commands and macros
+  move,     // one or more segments
+};
+
+// What one line of the input means for the machine.
+struct Event {
+  EventKind kind = EventKind::passive;
+  Line line;
+  std::vector<Segment> segments;  // move
+  LimitChange limits;             // limits
+  double dwell_s = 0.0;           // barrier: G4's pause
+  // barrier: the machine may be anywhere afterwards, in any mode (homing, macro, tool change).
+  bool position_lost = false;
+  std::vector<std::string> warnings;  // remarks for the user about this line
+};
+
+// What the firmware's configuration decides about the meaning of a line.
+struct InterpreterOptions {
+  // [firmware_retraction] is configured: G10 and G11 move the filament (and so stop the machine);
+  // otherwise Klipper ignores them.
+  bool firmware_retraction = true;
+  double retract_length_mm = 0.0;
+  double retract_speed_mm_s = 20.0;
+  double unretract_extra_length_mm = 0.0;
+  double unretract_speed_mm_s = 10.0;
+  // Klipper's [gcode_arcs] resolution: arcs become straight pieces about this long.
+  double arc_resolution_mm = 1.0;
+};
+
+// The state a line is read in.
+struct ModalState {
+  Position position_mm{};     // machine
+  std::array<bool, 4> known{};  // whether the axis' machine position is known from the text
+  Position base_mm{};         // machine position of the G-code zero (G92, offsets)
+  bool absolute_xyz = true;   // G90 / G91
+  bool absolute_e = true;     // M82 / M83
+  double unit_mm = 1.0;       // 25.4 after G20
+  double feed_mm_s = 25.0;    // modal F, before M220
+  double speed_factor = 1.0;  // M220
+  double flow_factor = 1.0;   // M221
+  int plane = 17;             // G17, G18, G19
+  bool retracted = false;     // firmware retraction
+};
+
+// Reads lines in the order of the file and says what each means to a Klipper printer
+// (klippy/extras/gcode_move.py, gcode_arcs.py, firmware_retraction.py, toolhead.py).
+class Interpreter {
+ public:
+  explicit Interpreter(InterpreterOptions options = {});
+
+  // Never fails: a line that cannot be understood passes as a barrier with a warning.
+  [[nodiscard]] Event interpret(Line line);
+
+  [[nodiscard]] const ModalState& state() const { return state_; }
+
+ private:
+  InterpreterOptions options_;
+  ModalState state_;
+};
+
+}  // namespace unflex::gcode

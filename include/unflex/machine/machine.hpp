@@ -1,0 +1,144 @@
+// The printer and how unflex should treat it: validated values, where each came from, and the TOML
+// they are read from.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+
+namespace unflex::machine {
+
+enum class Firmware { klipper, marlin, rrf };
+[[nodiscard]] std::string_view to_string(Firmware firmware);
+
+struct Range {
+  double min = 0.0;
+  double max = 0.0;
+};
+
+struct PrinterSettings {
+  Firmware firmware = Firmware::klipper;
+  // Where the base may be. Unset: not limited (the input's own extent is all that is known).
+  std::optional<Range> travel_x_mm;
+  std::optional<Range> travel_y_mm;
+  // [firmware_retraction] is configured; lengths as in the printer's configuration.
+  bool firmware_retraction = true;
+  double retract_length_mm = 0.0;
+  double retract_speed_mm_s = 20.0;
+  double unretract_extra_length_mm = 0.0;
+  double unretract_speed_mm_s = 10.0;
+  double arc_resolution_mm = 1.0;  // [gcode_arcs] resolution
+  // Frequencies the printer's own [input_shaper] is set back to after the print (its type stays).
+  // 0: the printer has none. Unset: the frequency of the axis' dynamics.
+  std::optional<double> input_shaper_freq_x_hz;
+  std::optional<double> input_shaper_freq_y_hz;
+};
+
+struct LimitSettings {
+  double max_velocity_mm_s = 300.0;
+  double max_accel_mm_s2 = 5000.0;
+  double square_corner_velocity_mm_s = 5.0;
+  double minimum_cruise_ratio = 0.5;
+  std::optional<double> max_z_velocity_mm_s;  // unset: max_velocity_mm_s, as in Klipper
+  std::optional<double> max_z_accel_mm_s2;    // unset: max_accel_mm_s2, as in Klipper
+};
+
+struct ExtruderSettings {
+  double nozzle_diameter_mm = 0.4;
+  double filament_diameter_mm = 1.75;
+  std::optional<double> max_extrude_cross_section_mm2;   // unset: 4 · nozzle², as in Klipper
+  std::optional<double> max_extrude_only_velocity_mm_s;  // unset: Klipper's formula
+  std::optional<double> max_extrude_only_accel_mm_s2;    // unset: Klipper's formula
+  double instantaneous_corner_velocity_mm_s = 1.0;
+};
+
+// Either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and damping_n_s_mm; the latter are
+// turned into the former when read.
+struct AxisDynamics {
+  double freq_hz = 45.0;
+  double damping_ratio = 0.06;
+};
+
+// What the motors can do, per axis.
+struct BaseSettings {
+  std::optional<double> max_velocity_mm_s;  // unset: 2 · limits.max_velocity_mm_s
+  std::optional<double> max_accel_mm_s2;    // unset: 4 · limits.max_accel_mm_s2
+  double max_jerk_mm_s3 = 0.0;              // 0: not limited
+};
+
+struct SolveSettings {
+  double window_s = 2.0;        // core of a window in a run too long for one
+  double overlap_s = 0.06;      // pre-roll and post-roll of such a window
+  double lead_in_ms = 0.0;      // the base may start this much before the plan does
+  std::optional<double> tail_ms;  // the base may settle this much longer; unset: max(8ζ/ω, 2 ms)
+  double travel_weight = 0.1;   // of the tracking error where nothing is extruded
+  double jerk_weight = 1e-7;    // regularisation, in units of the node period (docs/theory.md)
+};
+
+struct EmitSettings {
+  double period_ms = 1.0;           // node period
+  double tolerance_um = 2.0;        // of merging nodes into one line
+  double max_lines_per_s = 1000.0;  // hard limit
+  double accel_mm_s2 = 1e6;         // planner limits inside a compensated run
+  double square_corner_velocity_mm_s = 1000.0;
+};
+
+struct VerifySettings {
+  double step_ms = 0.1;
+  double hold_s = 0.5;
+};
+
+struct Settings {
+  PrinterSettings printer;
+  LimitSettings limits;
+  ExtruderSettings extruder;
+  AxisDynamics dynamics_x;
+  AxisDynamics dynamics_y;
+  BaseSettings base;
+  SolveSettings solve;
+  EmitSettings emit;
+  VerifySettings verify;
+  // Where each key in force came from ("limits.max_accel_mm_s2" → "printer.toml:7", "--set",
+  // "default"), one entry for every known key, in the order of the documentation.
+  std::vector<std::pair<std::string, std::string>> origins;
+
+  // The values behind unset options, by Klipper's formulas.
+  [[nodiscard]] double max_z_velocity_mm_s() const;
+  [[nodiscard]] double max_z_accel_mm_s2() const;
+  [[nodiscard]] double max_extrude_cross_section_mm2() const;
+  [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
+  [[nodiscard]] double max_extrude_only_accel_mm_s2() const;
+  [[nodiscard]] double base_max_velocity_mm_s() const;
+  [[nodiscard]] double base_max_accel_mm_s2() const;
+  [[nodiscard]] double tail_s() const;
+  [[nodiscard]] double shaper_freq_x_hz() const;
+  [[nodiscard]] double shaper_freq_y_hz() const;
+};
+
+// Reads the settings: defaults, then the TOML text (if any), then the overrides "key=value" in
+// their order, then validation. Unknown keys, wrong types and values out of range are errors of
+// kind usage with their place ("printer.toml:7: …", or the text of the override) and a remedy.
+[[nodiscard]] Result<Settings> load(const std::optional<std::filesystem::path>& toml_file,
+                                    const std::vector<std::string>& overrides);
+
+// The same for a text; name stands for the file in messages.
+[[nodiscard]] Result<Settings> parse(std::string_view toml_text, const std::string& name,
+                                     const std::vector<std::string>& overrides);
+
+// Every key with its value in force as TOML text, for inspect and the report.
+[[nodiscard]] std::string to_toml(const Settings& settings);
+
+// (key, value in force as TOML writes it, origin) for every key, in the order of the documentation.
+struct SettingRow {
+  std::string key;
+  std::string value;
+  std::string origin;
+};
+[[nodiscard]] std::vector<SettingRow> rows(const Settings& settings);
+
+}  // namespace unflex::machine

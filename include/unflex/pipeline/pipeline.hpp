@@ -1,0 +1,62 @@
+// The stages wired together: what the program's commands do, without the command line.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::pipeline {
+
+struct Job {
+  std::filesystem::path input;   // a seekable file
+  std::string input_name;        // as the user calls it, for messages ("-" for stdin)
+  std::filesystem::path output;  // compensate: written here, not atomically
+  std::string output_name;
+  machine::Settings settings;
+  unsigned workers = 1;          // solver processes
+};
+
+// Reads the input, compensates it, writes the output and verifies what was written.
+// Forks its workers first: call it before any thread exists.
+[[nodiscard]] Result<report::Report> compensate(const Job& job, Progress& progress);
+
+// Verifies `job.output` against `job.input`.
+[[nodiscard]] Result<report::Report> verify(const Job& job, Progress& progress);
+
+// What was understood of a file.
+struct Inspection {
+  std::string dialect;            // "PrusaSlicer 2.5.0 …" from the file's first or last comments
+  std::size_t lines = 0;
+  std::size_t bytes = 0;
+  std::size_t moves = 0;          // segments that move X, Y or Z
+  std::size_t extruding_moves = 0;
+  std::size_t extrude_only_moves = 0;
+  std::size_t arcs = 0;           // G2 and G3 lines
+  std::size_t passive_lines = 0;
+  std::size_t limit_lines = 0;
+  std::size_t barrier_lines = 0;
+  std::map<std::string, std::size_t> commands;  // "G1", "M204", "PRINT_START" → lines
+  std::size_t runs = 0;           // stretches that can be compensated
+  std::size_t windows = 0;
+  double run_time_s = 0.0;        // in those runs
+  std::map<std::string, std::size_t> kept_moves;  // reason → moves outside runs
+  double reference_time_s = 0.0;
+  double moving_time_s = 0.0;
+  double filament_mm = 0.0;
+  double path_length_mm = 0.0;
+  double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0, z_max_mm = 0.0;
+  bool absolute_e = false;        // M82 in force at the first extrusion
+  double lowest_accel_mm_s2 = 0.0, highest_accel_mm_s2 = 0.0;  // in force during moves
+  std::vector<std::string> warnings;
+};
+
+[[nodiscard]] Result<Inspection> inspect(const Job& job, Progress& progress);
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,96 @@
+// What a run of the program has to tell, as plain data, and its JSON.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+
+namespace unflex::report {
+
+struct DeviationRow {
+  double contour_max_mm = 0.0;
+  double contour_p99_mm = 0.0;
+  double contour_rms_mm = 0.0;
+  double tracking_max_mm = 0.0;
+  double tracking_rms_mm = 0.0;
+  double duration_s = 0.0;
+  std::size_t contour_max_line = 0;
+};
+
+struct DeviationRows {
+  DeviationRow extruding;
+  DeviationRow all;
+};
+
+// A run that kept its original moves, and why.
+struct Fallback {
+  std::size_t first_line = 0;
+  std::size_t last_line = 0;
+  std::string reason;
+};
+
+struct Setting {
+  std::string key;
+  std::string value;
+  std::string origin;
+};
+
+struct Report {
+  std::string command;  // "compensate", "verify"
+  std::string version;
+  std::string input;
+  std::string output;
+  std::string firmware;
+  std::vector<Setting> printer;  // every setting in force
+
+  double reference_time_s = 0.0;
+  double emitted_time_s = 0.0;
+
+  DeviationRows uncompensated;
+  DeviationRows compensated;
+
+  double base_max_velocity_mm_s = 0.0;
+  double base_max_accel_mm_s2 = 0.0;
+
+  std::size_t runs_total = 0;        // stretches between stops that could be compensated
+  std::size_t runs_compensated = 0;
+  std::size_t runs_fallback = 0;
+  std::size_t windows_total = 0;
+  std::size_t windows_solved = 0;
+  std::size_t windows_fallback = 0;  // windows of runs that kept their original moves
+  std::vector<Fallback> fallbacks;   // at most 1000 are listed
+  std::map<std::string, std::size_t> kept_moves;  // reason → moves outside runs ("wipe", "Z move" …)
+
+  std::string solver_engine;         // "ipopt 3.11.9"
+  std::size_t solver_iterations = 0;
+
+  std::size_t output_lines = 0;
+  std::size_t output_bytes = 0;
+  double max_lines_per_s = 0.0;
+  double segment_ms_median = 0.0;
+  double worst_run_drift_ms = 0.0;
+
+  double input_extrusion_mm = 0.0;
+  double output_extrusion_mm = 0.0;
+  double worst_move_extrusion_error_mm = 0.0;
+
+  double wall_s = 0.0;
+  double cpu_s = 0.0;
+  double print_s_per_wall_s = 0.0;
+  double peak_rss_mb = 0.0;
+
+  std::vector<std::string> violations;  // "file:line: message"
+  std::size_t violation_count = 0;
+  std::vector<std::string> warnings;
+};
+
+// The report as JSON with the keys of docs/report.md, two spaces of indentation, final newline.
+[[nodiscard]] std::string to_json(const Report& report);
+
+// A summary for people, a dozen lines.
+[[nodiscard]] std::string to_text(const Report& report);
+
+}  // namespace unflex::report

@@ -1,0 +1,80 @@
+// How far a nozzle strays from a path.
+//
+// Notation (docs/theory.md):
+//   r(t)  reference: the firmware's plan of the sliced file     b(t)  base     p(t)  nozzle
+//   contour error   distance in the XY plane from p(t) to the part of the sliced path that the
+//                   reference passes within ±τ of t (a part passes close to itself elsewhere)
+//   tracking error  |p(t) − r(t)| in the XY plane, at the same time
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::verify {
+
+// Weighted by time: every sample counts for the time it stands for.
+struct DeviationStats {
+  double contour_max_mm = 0.0;
+  double contour_p99_mm = 0.0;  // from a histogram with cells 1 % apart
+  double contour_rms_mm = 0.0;
+  double tracking_max_mm = 0.0;
+  double tracking_rms_mm = 0.0;
+  double duration_s = 0.0;            // time the statistics are over
+  std::size_t contour_max_line = 0;   // line of the sliced file nearest to the largest contour error
+};
+
+struct Deviation {
+  DeviationStats extruding;  // while the reference lays filament
+  DeviationStats all;        // while the reference moves in X or Y
+};
+
+// Gathers samples; two accumulators can be merged.
+class DeviationAccumulator {
+ public:
+  void add(double contour_mm, double tracking_mm, double weight_s, std::size_t line);
+  void merge(const DeviationAccumulator& other);
+  [[nodiscard]] DeviationStats stats() const;
+
+ private:
+  std::vector<double> histogram_s_;  // time per cell of the logarithm of the contour error
+  double sum_contour2_ = 0.0;
+  double sum_tracking2_ = 0.0;
+  double weight_s_ = 0.0;
+  double contour_max_ = 0.0;
+  double tracking_max_ = 0.0;
+  std::size_t line_ = 0;
+};
+
+// The model the nozzle hangs on and how finely it is integrated.
+struct NozzleModel {
+  dynamics::FlexibleAxis x;
+  dynamics::FlexibleAxis y;
+  double step_s = 1e-4;  // longest RK4 step; steps also end at every change of acceleration
+  double hold_s = 0.5;   // how long the base is held after the end of the file
+};
+
+struct NozzleXY {
+  dynamics::NozzleState x;
+  dynamics::NozzleState y;
+};
+
+struct RunDeviation {
+  DeviationAccumulator extruding;
+  DeviationAccumulator all;
+  NozzleXY end;            // nozzle at the end of the base's motion
+  double base_end_x_mm = 0.0;
+  double base_end_y_mm = 0.0;
+};
+
+// Integrates the nozzle while the base makes `base`, and measures it against the path and plan of
+// `reference`; both start at the same moment and `start` is the nozzle then. Where the base takes
+// longer than the reference, the reference rests at its end.
+[[nodiscard]] RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
+                                   const std::vector<planner::PlannedMove>& base, NozzleXY start,
+                                   const NozzleModel& model);
+
+}  // namespace unflex::verify

@@ -1,0 +1,73 @@
+// The judge: replays an emitted file by the firmware's rules and measures it against its input.
+// Shares no code with the optimiser or the emitter.
+#pragma once
+
+#include <istream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/verify/deviation.hpp"
+
+namespace unflex::verify {
+
+struct TravelLimits {
+  double x_min_mm = -1e9;
+  double x_max_mm = 1e9;
+  double y_min_mm = -1e9;
+  double y_max_mm = 1e9;
+};
+
+struct Rules {
+  gcode::InterpreterOptions interpreter;
+  planner::Limits limits;
+  planner::FixedLimits fixed;
+  double max_extrude_ratio = 0.266080;  // mm of filament per mm of path a firmware accepts
+  double nozzle_diameter_mm = 0.4;
+  NozzleModel nozzle;
+  TravelLimits travel;
+  double base_max_velocity_mm_s = 600.0;
+  double base_max_accel_mm_s2 = 20000.0;
+};
+
+// One broken rule of the emitted file.
+struct Violation {
+  SourcePlace place;
+  std::string message;
+};
+
+struct VerifyReport {
+  Deviation uncompensated;
+  Deviation compensated;
+  double reference_time_s = 0.0;  // duration of the input by the firmware's plan, dwells included
+  double emitted_time_s = 0.0;    // of the output
+  double base_max_velocity_mm_s = 0.0;  // of the replayed base, larger axis, compensated runs only
+  // Of the replayed base, larger axis, compensated runs only: change of mean velocity between
+  // neighbouring moves over the time between their middles.
+  double base_max_accel_mm_s2 = 0.0;
+  double input_extrusion_mm = 0.0;   // net filament
+  double output_extrusion_mm = 0.0;
+  double worst_move_extrusion_error_mm = 0.0;  // of one move or stretch between two anchors
+  double worst_run_drift_s = 0.0;    // longest lag or lead of the output within one run
+  double max_lines_per_s = 0.0;      // most moves started in any 100 ms of the output, × 10
+  double segment_ms_median = 0.0;    // of the output's moves inside compensated runs
+  std::size_t runs = 0;
+  std::size_t output_lines = 0;
+  std::size_t output_bytes = 0;
+  std::vector<Violation> violations;  // at most 100 are kept …
+  std::size_t violation_count = 0;    // … all are counted
+};
+
+// Replays both texts and compares them. Errors: unreadable input. A file that breaks a rule is no
+// error but a report with violations: a line lost, changed or moved; filament not conserved; a
+// position outside the travel (and further out than the input itself goes); base velocity or
+// acceleration above its limit; a move the firmware refuses (extrusion ratio); limits not restored.
+[[nodiscard]] Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
+                                          std::istream& output, const std::string& output_name,
+                                          const Rules& rules, Progress& progress);
+
+}  // namespace unflex::verify
