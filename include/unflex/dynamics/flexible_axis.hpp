@@ -10,8 +10,6 @@
 // printed forms differ.
 #pragma once
 
-#include <Eigen/Core>
-
 namespace unflex::dynamics {
 
 struct FlexibleAxis {
@@ -19,9 +17,12 @@ struct FlexibleAxis {
   double zeta = 0.06;
 };
 
+// ω = 2πf.
 [[nodiscard]] FlexibleAxis from_frequency(double freq_hz, double damping_ratio);
-// mass in g, stiffness in N/mm, damping in N·s/mm.
+// ω = √(k/m), ζ = c/(2√(mk)); mass in g, stiffness in N/mm, damping in N·s/mm.
 [[nodiscard]] FlexibleAxis from_mass(double mass_g, double stiffness_n_mm, double damping_n_s_mm);
+// ω√(1−ζ²) in rad/s, at which the nozzle rings; 0 from critical damping on.
+[[nodiscard]] double damped_frequency(const FlexibleAxis& axis);
 
 // Position and velocity of the nozzle on one axis, mm and mm/s.
 struct NozzleState {
@@ -36,7 +37,8 @@ struct BaseSegment {
   double acceleration = 0.0;  // a, mm/s²
 };
 
-// One step of the classical fourth-order Runge–Kutta method, h seconds.
+// One step of the classical fourth-order Runge–Kutta method, h seconds. The base is sampled exactly
+// at the beginning, the middle and the end of the step.
 [[nodiscard]] NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state,
                                    const BaseSegment& base, double h);
 

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "unflex/gcode/interpreter.hpp"
@@ -22,8 +23,8 @@ struct Limits {
   double minimum_cruise_ratio = 0.5;
 };
 
-// Limits only the firmware's configuration sets. Defaults are Klipper's for a 0.4 mm nozzle, 1.75 mm
-// filament, max_velocity 300 and max_accel 5000.
+// Limits only the firmware's configuration sets. Defaults are Klipper's for a 0.4 mm nozzle, 1.75
+// mm filament, max_velocity 300 and max_accel 5000.
 struct FixedLimits {
   double max_z_velocity_mm_s = 300.0;
   double max_z_accel_mm_s2 = 5000.0;
@@ -58,7 +59,8 @@ struct PlannedMove {
 
 // Klipper's planner: junction speeds by square-corner velocity, approximated centripetal speed and
 // the extruder's instantaneous corner velocity; forward and backward pass; minimum cruise ratio.
-// Moves come out in order once nothing that follows can change them.
+// Moves come out in order once nothing that follows can change them. The plan does not depend on
+// when, or how often, take() is called.
 class KlipperPlanner {
  public:
   KlipperPlanner(Limits limits, FixedLimits fixed);
@@ -67,7 +69,8 @@ class KlipperPlanner {
   void apply(const gcode::LimitChange& change);
   [[nodiscard]] const Limits& limits() const { return limits_; }
 
-  // Queues a segment. False, and nothing queued, if it has no length at all.
+  // Queues a segment, whose feed must be above zero. False, and nothing queued, if it has no length
+  // at all.
   bool add(const gcode::Segment& segment);
 
   // The machine comes to rest after the last queued move.
@@ -81,9 +84,34 @@ class KlipperPlanner {
   [[nodiscard]] std::size_t pending() const;
 
  private:
+  // What the lookahead keeps of a queued move. Speeds are squared, mm²/s², because v² changes
+  // linearly along a ramp. "Smooth" is the same motion at the lower acceleration that
+  // minimum_cruise_ratio leaves, (1 − ratio)·a.
+  struct Junction {
+    double max_start_v2 = 0.0;         // at the start: the junction's limit, or what is reachable
+    double max_smooth_start_v2 = 0.0;  // the same with smooth acceleration
+    double max_cruise_v2 = 0.0;
+    double delta_v2 = 0.0;  // 2aL: the most by which v² can change within the move
+    double smooth_delta_v2 = 0.0;
+    double junction_deviation_mm = 0.0;
+    // Written by the backward pass. No cruise speed: that of the move before is carried over.
+    double start_v2 = 0.0;
+    double end_v2 = 0.0;
+    std::optional<double> cruise_v2;
+  };
+
+  void limit_speed(double velocity_mm_s, double accel_mm_s2);
+  void limit_by_axes();
+  void join_to_previous();
+  std::size_t backward_pass(bool lazy);
+  void forward_pass(std::size_t count);
+  void plan(bool lazy);
+
   Limits limits_;
   FixedLimits fixed_;
-  std::vector<PlannedMove> planned_;
+  std::vector<PlannedMove> moves_;   // final ones first, then those in lookahead_
+  std::vector<Junction> lookahead_;  // of the last lookahead_.size() entries of moves_
+  double until_plan_s_;  // shortest time of moves still to be queued before the next lazy planning
 };
 
 }  // namespace unflex::planner

@@ -1,0 +1,74 @@
+// The trapezoid of one move as a function of time and back.
+//
+// Notation:
+//   v_s, v_c, v_e   speeds at the start, in the cruise and at the end      a   acceleration
+//   T_a, T_c, T_d   durations of the three phases                          L   length
+// The decelerating phase is measured from the end of the move, so that both ends are exact.
+#include <algorithm>
+#include <cmath>
+
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::planner {
+namespace {
+
+// Time to cover d from the speed v under the acceleration a: the root of a t²/2 + v t = d in the
+// form without cancellation.
+double time_to_cover(double d, double v, double a) {
+  if (d <= 0.0) return 0.0;
+  return 2.0 * d / (v + std::sqrt(v * v + 2.0 * a * d));
+}
+
+double ramp_distance(double v, double a, double t) { return t * (v + 0.5 * a * t); }
+
+}  // namespace
+
+double PlannedMove::distance_mm(double t) const {
+  const double duration = duration_s();
+  if (t <= 0.0) return 0.0;
+  if (t >= duration) return length_mm;
+  double d = 0.0;
+  if (t < accel_s) {
+    d = ramp_distance(start_v_mm_s, accel_mm_s2, t);
+  } else if (t < accel_s + cruise_s) {
+    d = 0.5 * (start_v_mm_s + cruise_v_mm_s) * accel_s + cruise_v_mm_s * (t - accel_s);
+  } else {
+    d = length_mm - ramp_distance(end_v_mm_s, accel_mm_s2, duration - t);
+  }
+  return std::clamp(d, 0.0, length_mm);
+}
+
+double PlannedMove::velocity_mm_s(double t) const {
+  const double duration = duration_s();
+  if (t <= 0.0) return start_v_mm_s;
+  if (t >= duration) return end_v_mm_s;
+  if (t < accel_s) return std::min(start_v_mm_s + accel_mm_s2 * t, cruise_v_mm_s);
+  if (t < accel_s + cruise_s) return cruise_v_mm_s;
+  return std::min(end_v_mm_s + accel_mm_s2 * (duration - t), cruise_v_mm_s);
+}
+
+gcode::Position PlannedMove::position_mm(double t) const {
+  if (t <= 0.0) return segment.start_mm;
+  if (t >= duration_s()) return segment.end_mm;
+  const double d = distance_mm(t);
+  gcode::Position position = segment.start_mm;
+  for (std::size_t axis = 0; axis < position.size(); ++axis) position[axis] += direction[axis] * d;
+  return position;
+}
+
+double PlannedMove::time_s(double distance_mm) const {
+  const double duration = duration_s();
+  if (distance_mm <= 0.0) return 0.0;
+  if (distance_mm >= length_mm) return duration;
+  const double accel_d = 0.5 * (start_v_mm_s + cruise_v_mm_s) * accel_s;
+  if (distance_mm < accel_d) {
+    return std::min(time_to_cover(distance_mm, start_v_mm_s, accel_mm_s2), accel_s);
+  }
+  const double remaining = length_mm - distance_mm;
+  if (remaining < 0.5 * (end_v_mm_s + cruise_v_mm_s) * decel_s) {
+    return duration - std::min(time_to_cover(remaining, end_v_mm_s, accel_mm_s2), decel_s);
+  }
+  return accel_s + std::min((distance_mm - accel_d) / cruise_v_mm_s, cruise_s);
+}
+
+}  // namespace unflex::planner
