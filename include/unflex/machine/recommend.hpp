@@ -1,0 +1,14 @@
+// Settings that are allowed but not wise.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "unflex/machine/machine.hpp"
+
+namespace unflex::machine {
+
+// One line per setting that could be better, with what would be; to be shown as warnings.
+[[nodiscard]] std::vector<std::string> recommendations(const Settings& settings);
+
+}  // namespace unflex::machine

@@ -1,0 +1,28 @@
+// The settings while they are being read: the values, the alternative form of the dynamics, and the
+// place each key was given at.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/machine/machine.hpp"
+
+namespace unflex::machine {
+
+// An axis as mass, spring and damper; complete or absent once validated.
+struct MassSpringDamper {
+  std::optional<double> mass_g;
+  std::optional<double> stiffness_n_mm;
+  std::optional<double> damping_n_s_mm;
+};
+
+struct Draft {
+  Settings settings;
+  MassSpringDamper mass_x;
+  MassSpringDamper mass_y;
+  // Parallel to key_table(): where the key was given last; empty while it has its default.
+  std::vector<std::optional<SourcePlace>> places;
+};
+
+}  // namespace unflex::machine

@@ -1,0 +1,51 @@
+// The table of all keys: name, member, bounds, unit, meaning.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <variant>
+
+#include "draft.hpp"
+
+namespace unflex::machine {
+
+// Interval a number must lie in; an open end does not belong to it.
+struct Bounds {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool min_open = false;
+  bool max_open = false;
+
+  [[nodiscard]] bool contains(double value) const;
+};
+
+// The member behind a key. The alternative held says what type of value the key takes.
+using Member =
+    std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&), bool& (*)(Draft&),
+                 Firmware& (*)(Draft&), std::optional<Range>& (*)(Draft&)>;
+
+struct Key {
+  std::string_view name;
+  Member member;
+  Bounds bounds;  // of numbers
+  std::string_view unit;
+  std::string_view meaning;
+  // For optional members: what holds while unset, in words, and as a number where there is one.
+  std::string_view if_unset = {};
+  double (*in_force)(const Settings&) = nullptr;
+  // Another form of other keys: read, turned into those, and not kept.
+  bool converted = false;
+};
+
+[[nodiscard]] std::span<const Key> key_table();
+
+// Position of a key in the table.
+[[nodiscard]] std::optional<std::size_t> find_key(std::string_view name);
+
+// Whether keys start with "name.".
+[[nodiscard]] bool is_section(std::string_view name);
+
+}  // namespace unflex::machine

@@ -1,0 +1,83 @@
+#include "key_values.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "unflex/machine/keys.hpp"
+
+namespace unflex::machine {
+namespace {
+
+template <class T>
+std::optional<std::string> text_of(const T& value) {
+  return to_toml_value(value);
+}
+
+template <class T>
+std::optional<std::string> text_of(const std::optional<T>& value) {
+  return value ? std::optional(to_toml_value(*value)) : std::nullopt;
+}
+
+std::string bounds_text(const Bounds& bounds) {
+  const std::string low = std::isfinite(bounds.min)
+                              ? fmt::format("{}{}", bounds.min_open ? "> " : "≥ ", bounds.min)
+                              : std::string{};
+  const std::string high = std::isfinite(bounds.max)
+                               ? fmt::format("{}{}", bounds.max_open ? "< " : "≤ ", bounds.max)
+                               : std::string{};
+  return low.empty() || high.empty() ? low + high : low + ", " + high;
+}
+
+}  // namespace
+
+std::string to_toml_value(double value) { return fmt::format("{}", value); }
+
+std::string to_toml_value(bool value) { return value ? "true" : "false"; }
+
+std::string to_toml_value(Firmware value) { return fmt::format("\"{}\"", to_string(value)); }
+
+std::string to_toml_value(const Range& value) {
+  return fmt::format("[{}, {}]", value.min, value.max);
+}
+
+std::optional<std::string> own_value(const Key& key, Draft& draft) {
+  return std::visit([&](auto member) { return text_of(member(draft)); }, key.member);
+}
+
+std::optional<std::string> value_in_force(const Key& key, Draft& draft) {
+  std::optional<std::string> own = own_value(key, draft);
+  if (!own && key.in_force != nullptr) {
+    return to_toml_value(key.in_force(draft.settings));
+  }
+  return own;
+}
+
+std::string range_text(const Key& key) {
+  if (std::holds_alternative<bool& (*)(Draft&)>(key.member)) {
+    return "true, false";
+  }
+  if (std::holds_alternative<Firmware& (*)(Draft&)>(key.member)) {
+    return "\"klipper\", \"marlin\", \"rrf\"";
+  }
+  if (std::holds_alternative<std::optional<Range>& (*)(Draft&)>(key.member)) {
+    return "min < max";
+  }
+  return bounds_text(key.bounds);
+}
+
+std::vector<KeyDescription> describe_keys() {
+  std::vector<KeyDescription> descriptions;
+  Draft defaults;
+  for (const Key& key : key_table()) {
+    descriptions.push_back(
+        {.name = std::string(key.name),
+         .unit = std::string(key.unit),
+         .range = range_text(key),
+         .default_value = own_value(key, defaults).value_or(std::string(key.if_unset)),
+         .meaning = std::string(key.meaning)});
+  }
+  return descriptions;
+}
+
+}  // namespace unflex::machine

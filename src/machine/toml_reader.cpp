@@ -1,0 +1,239 @@
+#include "toml_reader.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+#include <vector>
+
+#include "key_table.hpp"
+#include "key_values.hpp"
+#include "suggestion.hpp"
+#include "unflex/core/number.hpp"
+
+namespace unflex::machine {
+namespace {
+
+constexpr int kSchemaVersion = 1;
+constexpr std::string_view kSchemaKey = "schema_version";
+
+std::string kind_of(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::table:
+      return "a table";
+    case toml::node_type::array:
+      return "an array";
+    case toml::node_type::string:
+      return fmt::format("the text \"{}\"", node.as_string()->get());
+    case toml::node_type::integer:
+    case toml::node_type::floating_point:
+      return "a number";
+    case toml::node_type::boolean:
+      return "true or false";
+    default:
+      return "a date or time";
+  }
+}
+
+std::optional<double> number_of(const toml::node& node) {
+  if (const auto* integer = node.as_integer()) {
+    return static_cast<double>(integer->get());
+  }
+  if (const auto* floating = node.as_floating_point()) {
+    return floating->get();
+  }
+  return std::nullopt;
+}
+
+// One overload per type a member can have. Each returns what is wrong, or nothing.
+std::string store(const toml::node& node, const Key& key, double& target) {
+  const std::optional<double> value = number_of(node);
+  if (!value) {
+    return fmt::format("{} must be a number, not {}", key.name, kind_of(node));
+  }
+  if (!std::isfinite(*value)) {
+    return fmt::format("{} must be a finite number", key.name);
+  }
+  if (!key.bounds.contains(*value)) {
+    return fmt::format("{} is {}, but must be {}", key.name, *value, range_text(key));
+  }
+  target = *value;
+  return {};
+}
+
+std::string store(const toml::node& node, const Key& key, std::optional<double>& target) {
+  double value = 0.0;
+  std::string wrong = store(node, key, value);
+  if (wrong.empty()) {
+    target = value;
+  }
+  return wrong;
+}
+
+std::string store(const toml::node& node, const Key& key, bool& target) {
+  const auto* value = node.as_boolean();
+  if (value == nullptr) {
+    return fmt::format("{} must be true or false, not {}", key.name, kind_of(node));
+  }
+  target = value->get();
+  return {};
+}
+
+std::string store(const toml::node& node, const Key& key, Firmware& target) {
+  if (const auto* text = node.as_string()) {
+    for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
+      if (text->get() == to_string(firmware)) {
+        target = firmware;
+        return {};
+      }
+    }
+  }
+  return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), kind_of(node));
+}
+
+std::string store(const toml::node& node, const Key& key, std::optional<Range>& target) {
+  const auto* array = node.as_array();
+  if (array == nullptr || array->size() != 2) {
+    return fmt::format("{} must be two numbers, as in [0, 250]", key.name);
+  }
+  Range range;
+  for (std::string wrong :
+       {store(*array->get(0), key, range.min), store(*array->get(1), key, range.max)}) {
+    if (!wrong.empty()) {
+      return wrong;
+    }
+  }
+  if (!(range.min < range.max)) {
+    return fmt::format("{} is [{}, {}], but the first number must be the smaller", key.name,
+                       range.min, range.max);
+  }
+  target = range;
+  return {};
+}
+
+std::string check_schema(const toml::node& node) {
+  const auto* version = node.as_integer();
+  if (version != nullptr && version->get() == kSchemaVersion) {
+    return {};
+  }
+  return fmt::format("{} must be {}, the only one this version of unflex reads", kSchemaKey,
+                     kSchemaVersion);
+}
+
+// Stores the value of a key, or says what is wrong.
+std::string store(const toml::node& node, const std::string& name, const SourcePlace& place,
+                  Draft& draft) {
+  if (name == kSchemaKey) {
+    return check_schema(node);
+  }
+  const std::optional<std::size_t> index = find_key(name);
+  if (!index) {
+    return is_section(name) ? fmt::format("'{}' is a section, not a key", name)
+                            : fmt::format("unknown key '{}'{}", name, suggest_key(name));
+  }
+  const Key& key = key_table()[*index];
+  draft.places[*index] = place;
+  return std::visit([&](auto member) { return store(node, key, member(draft)); }, key.member);
+}
+
+// A value or an empty table of the file with its dotted name.
+struct Entry {
+  std::string name;
+  const toml::node* node = nullptr;
+};
+
+std::string check_section(const std::string& name) {
+  return is_section(name) ? std::string{}
+                          : fmt::format("unknown section '{}'{}", name, suggest_section(name));
+}
+
+void flatten(const toml::table& table, const std::string& prefix, std::vector<Entry>& entries) {
+  for (const auto& [key, node] : table) {
+    const std::string name = prefix + std::string(key.str());
+    entries.push_back({name, &node});
+    const toml::table* const inner = node.as_table();
+    if (inner != nullptr && is_section(name)) {
+      flatten(*inner, name + ".", entries);
+    }
+  }
+}
+
+std::size_t line_of(const toml::node& node) { return node.source().begin.line; }
+
+Status store_all(const toml::table& table, const std::string& name, Draft& draft) {
+  std::vector<Entry> entries;
+  flatten(table, "", entries);
+  // The library sorts by name; the user reads from the top.
+  std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+    return line_of(*a.node) < line_of(*b.node);
+  });
+  for (const Entry& entry : entries) {
+    const SourcePlace place{name, line_of(*entry.node)};
+    const bool section = entry.node->is_table() && !find_key(entry.name);
+    std::string wrong =
+        section ? check_section(entry.name) : store(*entry.node, entry.name, place, draft);
+    if (!wrong.empty()) {
+      return fail(ErrorKind::usage, place, std::move(wrong));
+    }
+  }
+  return {};
+}
+
+std::string_view trim(std::string_view text) {
+  constexpr std::string_view kBlank = " \t";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) {
+    return {};
+  }
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+// The value of an override as a table with the one key "value".
+toml::table parse_override_value(std::string_view text) {
+  if (const std::optional<double> number = parse_number(text)) {
+    return toml::table{{"value", *number}};
+  }
+  try {
+    toml::table table = toml::parse(fmt::format("value = {}", text));
+    if (table.size() == 1) {
+      return table;
+    }
+  } catch (const toml::parse_error&) {
+    // Not TOML: a bare word, which the caller takes or rejects by the key's type.
+  }
+  return toml::table{{"value", std::string(text)}};
+}
+
+}  // namespace
+
+Status read_toml(std::string_view text, const std::string& name, Draft& draft) {
+  try {
+    return store_all(toml::parse(text), name, draft);
+  } catch (const toml::parse_error& error) {
+    return fail(ErrorKind::usage, {name, error.source().begin.line},
+                fmt::format("not valid TOML: {}", error.description()));
+  }
+}
+
+Status apply_override(const std::string& text, Draft& draft) {
+  const SourcePlace place{fmt::format("--set {}", text), 0};
+  const std::size_t equals = text.find('=');
+  const std::string key(trim(std::string_view(text).substr(0, equals)));
+  if (equals == std::string::npos || key.empty()) {
+    return fail(ErrorKind::usage, place, "must have the form key=value");
+  }
+  const std::string_view value = trim(std::string_view(text).substr(equals + 1));
+  if (value.empty()) {
+    return fail(ErrorKind::usage, place, fmt::format("{} needs a value", key));
+  }
+  const toml::table table = parse_override_value(value);
+  std::string wrong = store(*table.get("value"), key, place, draft);
+  if (!wrong.empty()) {
+    return fail(ErrorKind::usage, place, std::move(wrong));
+  }
+  return {};
+}
+
+}  // namespace unflex::machine

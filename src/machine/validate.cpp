@@ -1,0 +1,214 @@
+#include "validate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <initializer_list>
+#include <numbers>
+#include <utility>
+
+#include "key_table.hpp"
+#include "unflex/machine/recommend.hpp"
+
+namespace unflex::machine {
+namespace {
+
+// A firmware needs some room above the base's acceleration to follow dense lines.
+constexpr double kEmitAccelFactor = 5.0;
+// Fewer nodes per period of resonance than this and the optimum is worse than a ZV shaper's.
+constexpr double kLeastNodesPerPeriod = 10.0;
+constexpr double kGoodNodesPerPeriod = 20.0;
+
+std::optional<SourcePlace> place_of(const Draft& draft, std::string_view key) {
+  const std::optional<std::size_t> index = find_key(key);
+  return index ? draft.places[*index] : std::nullopt;
+}
+
+// An error at the first of the keys that was given anywhere; with defaults alone it has no place.
+tl::unexpected<Error> conflict(const Draft& draft, std::initializer_list<std::string_view> keys,
+                               std::string message) {
+  for (const std::string_view key : keys) {
+    if (const std::optional<SourcePlace> place = place_of(draft, key)) {
+      return fail(ErrorKind::usage, *place, std::move(message));
+    }
+  }
+  return fail(ErrorKind::usage, std::move(message));
+}
+
+constexpr std::array<std::string_view, 2> kModalKeys = {"freq_hz", "damping_ratio"};
+constexpr std::array<std::string_view, 3> kMassKeys = {"mass_g", "stiffness_n_mm",
+                                                       "damping_n_s_mm"};
+
+// ω = √(k/m), ζ = c/(2√(km)), with the prefixes of g, N/mm and N·s/mm.
+AxisDynamics from_mass(double mass_g, double stiffness_n_mm, double damping_n_s_mm) {
+  const double m = mass_g * 1e-3;
+  const double k = stiffness_n_mm * 1e3;
+  const double c = damping_n_s_mm * 1e3;
+  return {.freq_hz = std::sqrt(k / m) / (2.0 * std::numbers::pi),
+          .damping_ratio = c / (2.0 * std::sqrt(k * m))};
+}
+
+Status check_mass_keys(const Draft& draft, const std::string& section) {
+  std::optional<std::string> given;
+  std::optional<std::string> missing;
+  for (const std::string_view key : kMassKeys) {
+    std::string name = fmt::format("{}.{}", section, key);
+    (place_of(draft, name) ? given : missing) = std::move(name);
+  }
+  if (given && missing) {
+    return conflict(draft, {*given},
+                    fmt::format("{} is missing: mass_g, stiffness_n_mm and damping_n_s_mm go "
+                                "together",
+                                *missing));
+  }
+  for (const std::string_view key : kModalKeys) {
+    const std::string name = fmt::format("{}.{}", section, key);
+    if (given && place_of(draft, name)) {
+      return conflict(draft, {name},
+                      fmt::format("{} cannot stand beside mass_g, stiffness_n_mm and "
+                                  "damping_n_s_mm; give one form only",
+                                  name));
+    }
+  }
+  return {};
+}
+
+Status resolve_axis(Draft& draft, const std::string& section, const MassSpringDamper& mass,
+                    AxisDynamics& axis) {
+  if (Status checked = check_mass_keys(draft, section); !checked) {
+    return checked;
+  }
+  if (!mass.mass_g || !mass.stiffness_n_mm || !mass.damping_n_s_mm) {
+    return {};
+  }
+  axis = from_mass(*mass.mass_g, *mass.stiffness_n_mm, *mass.damping_n_s_mm);
+  const std::string mass_key = fmt::format("{}.{}", section, kMassKeys[0]);
+  const std::array<double, 2> values = {axis.freq_hz, axis.damping_ratio};
+  for (std::size_t i = 0; i < kModalKeys.size(); ++i) {
+    const std::size_t index = *find_key(fmt::format("{}.{}", section, kModalKeys[i]));
+    if (!key_table()[index].bounds.contains(values[i])) {
+      return conflict(draft, {mass_key},
+                      fmt::format("mass, stiffness and damping give {} = {:.4g}, which is out of "
+                                  "range; check their units",
+                                  key_table()[index].name, values[i]));
+    }
+    draft.places[index] = place_of(draft, mass_key);
+  }
+  return {};
+}
+
+Status check_firmware(const Draft& draft) {
+  const Firmware firmware = draft.settings.printer.firmware;
+  if (firmware != Firmware::klipper) {
+    return conflict(draft, {"printer.firmware"},
+                    fmt::format("firmware \"{}\" is not supported by this version, only "
+                                "\"klipper\" is",
+                                to_string(firmware)));
+  }
+  return {};
+}
+
+Status check_printer(const Draft& draft) {
+  const Settings& s = draft.settings;
+  if (s.max_z_velocity_mm_s() > s.limits.max_velocity_mm_s) {
+    return conflict(draft, {"limits.max_z_velocity_mm_s", "limits.max_velocity_mm_s"},
+                    "limits.max_z_velocity_mm_s must not exceed limits.max_velocity_mm_s");
+  }
+  if (s.max_z_accel_mm_s2() > s.limits.max_accel_mm_s2) {
+    return conflict(draft, {"limits.max_z_accel_mm_s2", "limits.max_accel_mm_s2"},
+                    "limits.max_z_accel_mm_s2 must not exceed limits.max_accel_mm_s2");
+  }
+  if (s.extruder.filament_diameter_mm < s.extruder.nozzle_diameter_mm) {
+    return conflict(draft, {"extruder.filament_diameter_mm", "extruder.nozzle_diameter_mm"},
+                    "extruder.filament_diameter_mm must not be below nozzle_diameter_mm");
+  }
+  return {};
+}
+
+Status check_base(const Draft& draft) {
+  const Settings& s = draft.settings;
+  if (s.base_max_velocity_mm_s() < s.limits.max_velocity_mm_s) {
+    return conflict(draft, {"base.max_velocity_mm_s", "limits.max_velocity_mm_s"},
+                    fmt::format("base.max_velocity_mm_s is {}, but must be at least "
+                                "limits.max_velocity_mm_s, {}",
+                                s.base_max_velocity_mm_s(), s.limits.max_velocity_mm_s));
+  }
+  if (s.base_max_accel_mm_s2() < s.limits.max_accel_mm_s2) {
+    return conflict(draft, {"base.max_accel_mm_s2", "limits.max_accel_mm_s2"},
+                    fmt::format("base.max_accel_mm_s2 is {}, but must be at least "
+                                "limits.max_accel_mm_s2, {}; 2 to 10 times that is usual",
+                                s.base_max_accel_mm_s2(), s.limits.max_accel_mm_s2));
+  }
+  return {};
+}
+
+Status check_emission(const Draft& draft) {
+  const Settings& s = draft.settings;
+  const double least_accel = kEmitAccelFactor * s.base_max_accel_mm_s2();
+  if (s.emit.accel_mm_s2 < least_accel) {
+    return conflict(draft, {"emit.accel_mm_s2", "base.max_accel_mm_s2", "limits.max_accel_mm_s2"},
+                    fmt::format("emit.accel_mm_s2 is {}, but must be at least {} ({} × "
+                                "base.max_accel_mm_s2); raise it or lower base.max_accel_mm_s2",
+                                s.emit.accel_mm_s2, least_accel, kEmitAccelFactor));
+  }
+  if (s.emit.square_corner_velocity_mm_s < s.limits.square_corner_velocity_mm_s) {
+    return conflict(
+        draft, {"emit.square_corner_velocity_mm_s", "limits.square_corner_velocity_mm_s"},
+        "emit.square_corner_velocity_mm_s must not be below limits.square_corner_velocity_mm_s");
+  }
+  return {};
+}
+
+double fastest_freq_hz(const Settings& settings) {
+  return std::max(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
+}
+
+Status check_grid(const Draft& draft) {
+  const Settings& s = draft.settings;
+  const double longest_ms = 1e3 / (kLeastNodesPerPeriod * fastest_freq_hz(s));
+  if (s.emit.period_ms > longest_ms) {
+    return conflict(draft, {"emit.period_ms", "dynamics.x.freq_hz", "dynamics.y.freq_hz"},
+                    fmt::format("emit.period_ms is {}, too long for a resonance at {:.4g} Hz; "
+                                "at most {:.3g}, better {:.3g}",
+                                s.emit.period_ms, fastest_freq_hz(s), longest_ms,
+                                longest_ms * kLeastNodesPerPeriod / kGoodNodesPerPeriod));
+  }
+  if (s.solve.overlap_s > s.solve.window_s) {
+    return conflict(draft, {"solve.overlap_s", "solve.window_s"},
+                    "solve.overlap_s must not exceed solve.window_s");
+  }
+  return {};
+}
+
+}  // namespace
+
+Status resolve_dynamics(Draft& draft) {
+  if (Status x = resolve_axis(draft, "dynamics.x", draft.mass_x, draft.settings.dynamics_x); !x) {
+    return x;
+  }
+  return resolve_axis(draft, "dynamics.y", draft.mass_y, draft.settings.dynamics_y);
+}
+
+Status check_consistency(const Draft& draft) {
+  for (auto* check : {check_firmware, check_printer, check_base, check_emission, check_grid}) {
+    if (Status checked = check(draft); !checked) {
+      return checked;
+    }
+  }
+  return {};
+}
+
+std::vector<std::string> recommendations(const Settings& settings) {
+  std::vector<std::string> remarks;
+  const double good_ms = 1e3 / (kGoodNodesPerPeriod * fastest_freq_hz(settings));
+  if (settings.emit.period_ms > good_ms) {
+    remarks.push_back(
+        fmt::format("emit.period_ms is {}; at {:.4g} Hz {:.3g} or less follows the path better",
+                    settings.emit.period_ms, fastest_freq_hz(settings), good_ms));
+  }
+  return remarks;
+}
+
+}  // namespace unflex::machine
