@@ -1,0 +1,107 @@
+// The keys are documented in docs/report.md; a test holds the two together.
+
+#include <nlohmann/json.hpp>
+
+#include "unflex/report/report.hpp"
+
+namespace unflex::report {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kSchemaVersion = 1;
+constexpr int kIndentation = 2;
+
+// Settings come as TOML literals (numbers, switches, quoted words, pairs), which JSON shares.
+Json literal(const std::string& text) {
+  if (text.empty()) {
+    return nullptr;
+  }
+  Json value = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+  return value.is_discarded() ? Json(text) : value;
+}
+
+Json settings_json(const std::vector<Setting>& settings) {
+  Json object = Json::object();
+  for (const Setting& setting : settings) {
+    object[setting.key] = {{"value", literal(setting.value)}, {"origin", setting.origin}};
+  }
+  return object;
+}
+
+Json row_json(const DeviationRow& row) {
+  return {{"contour_max_mm", row.contour_max_mm},    {"contour_p99_mm", row.contour_p99_mm},
+          {"contour_rms_mm", row.contour_rms_mm},    {"tracking_max_mm", row.tracking_max_mm},
+          {"tracking_rms_mm", row.tracking_rms_mm},  {"duration_s", row.duration_s},
+          {"contour_max_line", row.contour_max_line}};
+}
+
+Json rows_json(const DeviationRows& rows) {
+  return {{"extruding", row_json(rows.extruding)}, {"all", row_json(rows.all)}};
+}
+
+Json fallbacks_json(const std::vector<Fallback>& fallbacks) {
+  Json array = Json::array();
+  for (const Fallback& fallback : fallbacks) {
+    array.push_back({{"first_line", fallback.first_line},
+                     {"last_line", fallback.last_line},
+                     {"reason", fallback.reason}});
+  }
+  return array;
+}
+
+void add_motion(const Report& r, Json& json) {
+  json["print_time_s"] = {{"reference", r.reference_time_s}, {"emitted", r.emitted_time_s}};
+  json["deviation"] = {{"uncompensated", rows_json(r.uncompensated)},
+                       {"compensated", rows_json(r.compensated)}};
+  json["base"] = {{"max_velocity_mm_s", r.base_max_velocity_mm_s},
+                  {"max_accel_mm_s2", r.base_max_accel_mm_s2}};
+}
+
+void add_work(const Report& r, Json& json) {
+  json["windows"] = {
+      {"total", r.windows_total}, {"solved", r.windows_solved}, {"fallback", r.windows_fallback}};
+  json["runs"] = {
+      {"total", r.runs_total}, {"compensated", r.runs_compensated}, {"fallback", r.runs_fallback}};
+  json["fallbacks"] = fallbacks_json(r.fallbacks);
+  json["kept_moves"] = Json(r.kept_moves);
+  json["solver"] = {{"engine", r.solver_engine}, {"iterations", r.solver_iterations}};
+}
+
+void add_output(const Report& r, Json& json) {
+  json["output_stats"] = {{"lines", r.output_lines},
+                          {"bytes", r.output_bytes},
+                          {"max_lines_per_s", r.max_lines_per_s},
+                          {"segment_ms_median", r.segment_ms_median},
+                          {"worst_run_drift_ms", r.worst_run_drift_ms}};
+  json["extrusion"] = {{"input_mm", r.input_extrusion_mm},
+                       {"output_mm", r.output_extrusion_mm},
+                       {"worst_move_error_mm", r.worst_move_extrusion_error_mm}};
+  json["performance"] = {{"wall_s", r.wall_s},
+                         {"cpu_s", r.cpu_s},
+                         {"print_s_per_wall_s", r.print_s_per_wall_s},
+                         {"peak_rss_mb", r.peak_rss_mb}};
+  json["violation_count"] = r.violation_count;
+  json["violations"] = r.violations;
+  json["warnings"] = r.warnings;
+}
+
+}  // namespace
+
+std::string to_json(const Report& report) {
+  Json json;
+  json["schema_version"] = kSchemaVersion;
+  json["command"] = report.command;
+  json["version"] = report.version;
+  json["input"] = report.input;
+  json["output"] = report.output;
+  json["firmware"] = report.firmware;
+  json["printer"] = settings_json(report.printer);
+  add_motion(report, json);
+  add_work(report, json);
+  add_output(report, json);
+  // File names are bytes, not text; what is not UTF-8 is replaced rather than refused.
+  return json.dump(kIndentation, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace unflex::report

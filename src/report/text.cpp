@@ -1,0 +1,104 @@
+#include <fmt/format.h>
+
+#include <iterator>
+#include <string_view>
+
+#include "unflex/report/report.hpp"
+
+namespace unflex::report {
+namespace {
+
+constexpr double kMicrometresPerMm = 1e3;
+constexpr std::size_t kListedFallbacks = 3;
+
+using Sink = std::back_insert_iterator<std::string>;
+
+// 3725.4 → "1h 02m 05s"; below a minute with tenths.
+std::string duration_text(double seconds) {
+  if (!(seconds >= 60.0)) {
+    return fmt::format("{:.1f}s", seconds);
+  }
+  const auto whole = static_cast<long long>(seconds + 0.5);
+  const long long hours = whole / 3600;
+  const long long minutes = whole / 60 % 60;
+  return hours > 0 ? fmt::format("{}h {:02}m {:02}s", hours, minutes, whole % 60)
+                   : fmt::format("{}m {:02}s", minutes, whole % 60);
+}
+
+// Three figures, so that 1234 µm and 0.05 µm fit the same column.
+std::string micrometres(double mm) {
+  const double um = mm * kMicrometresPerMm;
+  if (um >= 100.0) {
+    return fmt::format("{:.0f}", um);
+  }
+  return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
+}
+
+void write_deviation(Sink out, std::string_view moves, const DeviationRow& before,
+                     const DeviationRow& after) {
+  const auto cell = [](double from_mm, double to_mm) {
+    return fmt::format("{} → {}", micrometres(from_mm), micrometres(to_mm));
+  };
+  fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", moves,
+                 cell(before.contour_max_mm, after.contour_max_mm),
+                 cell(before.contour_p99_mm, after.contour_p99_mm),
+                 cell(before.contour_rms_mm, after.contour_rms_mm));
+}
+
+void write_times(Sink out, const Report& r) {
+  const double change = r.reference_time_s > 0.0
+                            ? 100.0 * (r.emitted_time_s - r.reference_time_s) / r.reference_time_s
+                            : 0.0;
+  fmt::format_to(out, "print time    {} planned, {} emitted ({:+.2f} %)\n",
+                 duration_text(r.reference_time_s), duration_text(r.emitted_time_s), change);
+  fmt::format_to(out, "base          at most {:.0f} mm/s and {:.0f} mm/s²\n",
+                 r.base_max_velocity_mm_s, r.base_max_accel_mm_s2);
+}
+
+void write_runs(Sink out, const Report& r) {
+  if (r.runs_total == 0 && r.windows_total == 0) {
+    return;
+  }
+  fmt::format_to(out, "runs          {} of {} compensated, {} kept their original moves\n",
+                 r.runs_compensated, r.runs_total, r.runs_fallback);
+  for (std::size_t i = 0; i < r.fallbacks.size() && i < kListedFallbacks; ++i) {
+    const Fallback& kept = r.fallbacks[i];
+    fmt::format_to(out, "              lines {}-{}: {}\n", kept.first_line, kept.last_line,
+                   kept.reason);
+  }
+  if (r.runs_fallback > kListedFallbacks) {
+    fmt::format_to(out, "              and {} more, listed by --report\n",
+                   r.runs_fallback - kListedFallbacks);
+  }
+  fmt::format_to(out, "solver        {}, {} windows, {} iterations\n", r.solver_engine,
+                 r.windows_total, r.solver_iterations);
+}
+
+void write_output(Sink out, const Report& r) {
+  fmt::format_to(out, "output        {} lines, {:.1f} MB, {:.0f} lines/s at peak\n", r.output_lines,
+                 static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s);
+  fmt::format_to(out, "filament      {:.2f} mm in, {:.2f} mm out\n", r.input_extrusion_mm,
+                 r.output_extrusion_mm);
+  fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",
+                 r.print_s_per_wall_s, duration_text(r.wall_s), r.peak_rss_mb);
+}
+
+}  // namespace
+
+std::string to_text(const Report& report) {
+  std::string text;
+  const Sink out = std::back_inserter(text);
+  fmt::format_to(out, "{} → {}\n", report.input, report.output);
+  fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "contour, µm", "max", "p99", "RMS");
+  write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
+  write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
+  write_times(out, report);
+  write_runs(out, report);
+  write_output(out, report);
+  if (report.violation_count > 0) {
+    fmt::format_to(out, "violations    {}\n", report.violation_count);
+  }
+  return text;
+}
+
+}  // namespace unflex::report
