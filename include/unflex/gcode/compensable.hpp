@@ -1,0 +1,26 @@
+// Which motion may be rewritten.
+#pragma once
+
+#include <string_view>
+
+#include "unflex/gcode/interpreter.hpp"
+
+namespace unflex::gcode {
+
+// Largest |ΔZ| per mm of travel in X and Y of a motion that counts as drawn in the plane. A spiral
+// vase climbs one layer per turn, far less; a Z hop far more.
+inline constexpr double kMaxSlope = 0.02;
+
+// Whether unflex may replace this motion: it starts at a known place, moves in X or Y, hardly in Z,
+// and does not pull filament back.
+[[nodiscard]] bool compensable(const Segment& segment);
+
+// The same for a whole line: a move all of whose segments are compensable. A line is rewritten as a
+// whole or not at all.
+[[nodiscard]] bool compensable(const Event& event);
+
+// Why a motion that is not compensable stays as it is: "start unknown", "extrude only",
+// "retracting move" or "Z move". Empty for a compensable one.
+[[nodiscard]] std::string_view kept_reason(const Segment& segment);
+
+}  // namespace unflex::gcode
