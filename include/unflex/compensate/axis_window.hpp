@@ -1,0 +1,78 @@
+// The optimal-control problem of one axis over one window, as plain data, and the interface behind
+// which its solvers stand.
+//
+//   min ∫ w(t) (p − r)² dt + ρ ∫ (d b̈/dt)² dt
+//   s.t.  p̈ = 2ζω(ḃ − ṗ) + ω²(b − p),   b̈ piecewise linear,
+//         |ḃ| ≤ V,  |b̈| ≤ A,  |d b̈/dt| ≤ J,  b_min ≤ b ≤ b_max
+//
+//   r  reference, mm       p  nozzle, mm       b  base, mm       w  weight       h  node period, s
+//
+// Nozzle and base are both unknown: with the nozzle fixed to the plan the problem is
+// overdetermined (docs/theory.md).
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+
+namespace unflex::compensate {
+
+struct BaseLimits {
+  double max_velocity_mm_s = std::numeric_limits<double>::infinity();  // V
+  double max_accel_mm_s2 = std::numeric_limits<double>::infinity();    // A
+  double max_jerk_mm_s3 = std::numeric_limits<double>::infinity();     // J
+  double min_position_mm = -std::numeric_limits<double>::infinity();
+  double max_position_mm = std::numeric_limits<double>::infinity();
+};
+
+struct AxisWindow {
+  dynamics::FlexibleAxis axis;
+  double period_s = 1e-3;  // h
+  // r and w at the nodes and in the middles between them: 2n − 1 values for n nodes, n ≥ 2.
+  std::vector<double> reference_mm;
+  std::vector<double> weight;
+  // ρ in units of h and hundredths of a millimetre, so that one value serves all periods.
+  double jerk_weight = 1e-4;
+  BaseLimits limits;
+  // At the first node: the nozzle as given, the base at rest there. Unset: free.
+  struct Start {
+    dynamics::NozzleState nozzle;
+    double base_mm = 0.0;
+  };
+  std::optional<Start> start;
+  // At the last node: the base at rest there. Unset: free.
+  std::optional<double> end_base_mm;
+
+  [[nodiscard]] std::size_t nodes() const { return (reference_mm.size() + 1) / 2; }
+};
+
+struct AxisSolution {
+  dynamics::AxisTrajectory base;
+  double objective = 0.0;  // mm²·s
+  int iterations = 0;
+};
+
+// A solver of axis windows.
+class Engine {
+ public:
+  Engine() = default;
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+  virtual ~Engine() = default;
+
+  // An error when the window has no solution or the solver does not find it.
+  [[nodiscard]] virtual Result<AxisSolution> solve(const AxisWindow& window) const = 0;
+  [[nodiscard]] virtual std::string name() const = 0;
+};
+
+// Hargraves–Paris transcription solved by Ipopt. Not thread-safe (see nlp/ipopt_solver.hpp).
+[[nodiscard]] std::unique_ptr<Engine> make_ipopt_engine();
+
+}  // namespace unflex::compensate

@@ -1,0 +1,71 @@
+// The axis window as an OptimalControlProblem, in units that bring the unknowns to about 1: time in
+// node periods, lengths in hundredths of a millimetre from the window's first reference point.
+#pragma once
+
+#include "unflex/collocation/optimal_control_problem.hpp"
+#include "unflex/compensate/axis_window.hpp"
+
+namespace unflex::compensate {
+
+inline constexpr double kLengthUnitMm = 0.01;
+
+// Which limits the program carries. Bounds that the solution keeps anyway only cost iterations.
+struct ActiveLimits {
+  bool velocity = false;
+  bool accel = false;
+  bool jerk = false;
+  bool position = false;
+};
+
+// States p, ṗ, b, ḃ; control b̈.
+class AxisProblem final : public collocation::OptimalControlProblem {
+ public:
+  enum Component : int { kNozzle = 0, kNozzleRate, kBase, kBaseRate, kBaseAccel };
+
+  // The window must outlive the problem.
+  AxisProblem(const AxisWindow& window, ActiveLimits active);
+
+  int states() const override { return 4; }
+  int controls() const override { return 1; }
+
+  void dynamics(double t, const collocation::PointVector& z,
+                collocation::StateVector& f) const override;
+  void dynamics_jacobian(double t, const collocation::PointVector& z,
+                         collocation::StateByPoint& fz) const override;
+  void dynamics_hessian(double t, const collocation::PointVector& z,
+                        const collocation::StateVector& mu,
+                        collocation::PointByPoint& h) const override;
+  collocation::StateByPointPattern dynamics_pattern() const override;
+  bool linear_dynamics() const override { return true; }
+
+  double cost(double t, const collocation::PointVector& z) const override;
+  void cost_gradient(double t, const collocation::PointVector& z,
+                     collocation::PointVector& gradient) const override;
+  void cost_hessian(double t, const collocation::PointVector& z,
+                    collocation::PointByPoint& h) const override;
+  collocation::PointByPointPattern cost_pattern() const override;
+  bool quadratic_cost() const override { return true; }
+
+  collocation::ControlVector slope_weight() const override;
+  collocation::ControlVector slope_limit() const override;
+  void node_bounds(int k, int n, collocation::PointVector& lower,
+                   collocation::PointVector& upper) const override;
+  void guess(int k, double t, collocation::PointVector& z) const override;
+  std::string name(int component) const override;
+
+  // Between scaled and physical values of a component, mm and s.
+  [[nodiscard]] double to_physical(Component component, double scaled) const;
+  [[nodiscard]] double to_scaled(Component component, double physical) const;
+
+ private:
+  // r and w at time t, which is a node or a middle.
+  [[nodiscard]] std::size_t sample(double t) const;
+
+  const AxisWindow* window_;
+  ActiveLimits active_;
+  double origin_mm_;
+  double damping_;    // 2ζωh
+  double stiffness_;  // (ωh)²
+};
+
+}  // namespace unflex::compensate

@@ -1,0 +1,162 @@
+#include "unflex/compensate/run.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace unflex::compensate {
+namespace {
+
+// Half the number of nodes over which two windows are blended.
+constexpr std::size_t kBlendNodes = 10;
+
+// Walks along the plan; times must not decrease from call to call.
+class Reference {
+ public:
+  Reference(const std::vector<planner::PlannedMove>& moves, const Setup& setup)
+      : moves_(&moves), setup_(&setup), start_s_(setup.lead_in_s) {}
+
+  struct Sample {
+    double x_mm;
+    double y_mm;
+    double weight;
+  };
+
+  // t since the beginning of the lead-in.
+  Sample at(double t) {
+    while (index_ + 1 < moves_->size() && t >= start_s_ + (*moves_)[index_].duration_s()) {
+      start_s_ += (*moves_)[index_].duration_s();
+      ++index_;
+    }
+    const planner::PlannedMove& move = (*moves_)[index_];
+    const gcode::Position p = move.position_mm(t - start_s_);
+    const bool moving = t >= start_s_ && t <= start_s_ + move.duration_s();
+    return {p[gcode::X], p[gcode::Y],
+            moving && move.segment.extruding() ? 1.0 : setup_->travel_weight};
+  }
+
+ private:
+  const std::vector<planner::PlannedMove>* moves_;
+  const Setup* setup_;
+  std::size_t index_ = 0;
+  double start_s_;
+};
+
+double duration_s(const std::vector<planner::PlannedMove>& moves) {
+  double sum = 0.0;
+  for (const planner::PlannedMove& move : moves) {
+    sum += move.duration_s();
+  }
+  return sum;
+}
+
+std::size_t to_nodes(double time_s, double period_s) {
+  return static_cast<std::size_t>(std::ceil(time_s / period_s - 1e-9));
+}
+
+// The axis' part of a window without its ends.
+AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, std::vector<double> reference,
+                     std::vector<double> weight) {
+  AxisWindow window;
+  window.axis = axis.axis;
+  window.period_s = setup.period_s;
+  window.jerk_weight = setup.jerk_weight;
+  window.limits = axis.limits;
+  // Where the sliced path itself leaves the travel, the base may go as far but no further.
+  const auto [low, high] = std::ranges::minmax(reference);
+  window.limits.min_position_mm = std::min(window.limits.min_position_mm, low);
+  window.limits.max_position_mm = std::max(window.limits.max_position_mm, high);
+  window.reference_mm = std::move(reference);
+  window.weight = std::move(weight);
+  return window;
+}
+
+}  // namespace
+
+std::size_t node_count(const std::vector<planner::PlannedMove>& moves, const Setup& setup) {
+  // Four nodes are the fewest that leave the base's acceleration any freedom between its ends.
+  return std::max<std::size_t>(
+      to_nodes(setup.lead_in_s + duration_s(moves) + setup.tail_s, setup.period_s) + 1, 4);
+}
+
+std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
+  const std::size_t core = std::max<std::size_t>(to_nodes(setup.window_s, setup.period_s), 4);
+  const std::size_t overlap =
+      std::max(to_nodes(setup.overlap_s, setup.period_s), kBlendNodes + 1);
+  if (nodes <= core + 2 * overlap) {
+    return {{0, nodes - 1, 0, nodes - 1}};
+  }
+  const std::size_t count = (nodes + core - 1) / core;
+  std::vector<WindowSpan> spans(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    WindowSpan& span = spans[i];
+    span.core_first = i * (nodes - 1) / count;
+    span.core_last = (i + 1) * (nodes - 1) / count;
+    span.first = span.core_first > overlap ? span.core_first - overlap : 0;
+    span.last = std::min(span.core_last + overlap, nodes - 1);
+  }
+  return spans;
+}
+
+std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
+                               const std::vector<WindowSpan>& spans, const NozzleXY& nozzle,
+                               const Setup& setup) {
+  const std::size_t last_node = spans.back().last;
+  std::vector<double> x;
+  std::vector<double> y;
+  std::vector<double> weight;
+  Reference reference(moves, setup);
+  for (std::size_t i = 0; i <= 2 * last_node; ++i) {
+    const Reference::Sample sample =
+        reference.at(0.5 * static_cast<double>(i) * setup.period_s);
+    x.push_back(sample.x_mm);
+    y.push_back(sample.y_mm);
+    weight.push_back(sample.weight);
+  }
+  std::vector<RunWindow> result;
+  for (const WindowSpan& span : spans) {
+    const auto slice = [&](const std::vector<double>& all) {
+      return std::vector<double>(all.begin() + static_cast<std::ptrdiff_t>(2 * span.first),
+                                 all.begin() + static_cast<std::ptrdiff_t>(2 * span.last + 1));
+    };
+    RunWindow window{make_axis(setup.x, setup, slice(x), slice(weight)),
+                     make_axis(setup.y, setup, slice(y), slice(weight))};
+    if (span.first == 0) {
+      window.x.start = AxisWindow::Start{nozzle.x, x.front()};
+      window.y.start = AxisWindow::Start{nozzle.y, y.front()};
+    }
+    if (span.last == last_node) {
+      window.x.end_base_mm = x.back();
+      window.y.end_base_mm = y.back();
+    }
+    result.push_back(std::move(window));
+  }
+  return result;
+}
+
+dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,
+                              const std::vector<dynamics::AxisTrajectory>& solutions) {
+  dynamics::AxisTrajectory joined = solutions.front();
+  for (std::size_t i = 1; i < spans.size(); ++i) {
+    const std::size_t seam = spans[i].core_first;
+    const dynamics::AxisTrajectory& next = solutions[i];
+    joined.position_mm.resize(spans[i].last + 1);
+    joined.velocity_mm_s.resize(spans[i].last + 1);
+    joined.accel_mm_s2.resize(spans[i].last + 1);
+    for (std::size_t k = seam - kBlendNodes; k <= spans[i].last; ++k) {
+      const double s = std::min(static_cast<double>(k - (seam - kBlendNodes)) /
+                                    static_cast<double>(2 * kBlendNodes),
+                                1.0);
+      const double share = s * s * (3.0 - 2.0 * s);  // of the next window
+      const auto blend = [&](std::vector<double>& into, const std::vector<double>& from) {
+        const double other = from[k - spans[i].first];
+        into[k] = s < 1.0 ? into[k] + share * (other - into[k]) : other;
+      };
+      blend(joined.position_mm, next.position_mm);
+      blend(joined.velocity_mm_s, next.velocity_mm_s);
+      blend(joined.accel_mm_s2, next.accel_mm_s2);
+    }
+  }
+  return joined;
+}
+
+}  // namespace unflex::compensate
