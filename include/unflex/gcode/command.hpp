@@ -25,13 +25,14 @@ enum class CommandKind {
 // The parsed line. Views point into the text handed to parse(), which must outlive the command.
 struct Command {
   CommandKind kind = CommandKind::none;
-  char letter = '\0';  // traditional: 'G', 'M', 'T' …, upper case
-  int number = -1;     // traditional: 1 for G1
-  int subnumber = -1;  // traditional: 3 for M862.3, otherwise -1
-  std::vector<Word> words;   // traditional, in the order of the line; without N and checksum
-  std::string name;          // extended: the command's name in upper case
-  std::string_view arguments;  // what follows the command's name or number, comment cut off, trimmed
-  std::string_view comment;  // text after ';', without it; empty when there is none
+  char letter = '\0';       // traditional: 'G', 'M', 'T' …, upper case
+  int number = -1;          // traditional: 1 for G1
+  int subnumber = -1;       // traditional: 3 for M862.3, otherwise -1
+  std::vector<Word> words;  // traditional, in the order of the line; without N and checksum
+  std::string name;         // extended: the command's name in upper case
+  // What follows the command's name or number, comment and checksum cut off, trimmed.
+  std::string_view arguments;
+  std::string_view comment;  // text after ';' (or Klipper's '#'), without it; else empty
   std::optional<std::int64_t> line_number;  // N word
   std::optional<int> checksum;              // after '*'
   std::string problem;                      // malformed: what is wrong, for a message
@@ -55,7 +56,12 @@ struct Command {
 // Read as printers do: lower case; words with or without spaces between them and between letter and
 // value ("G1X1 Y 2"); numbers like ".5", "+1", "-.8"; ';' and '(' ')' comments; a leading N word
 // and a trailing '*' checksum (checked: a wrong one is malformed). M117, M118 and M23 take the rest
-// of the line as text, so no words are read from it.
+// of the line as text, so no words are read from it. M-codes carry names and messages (M486
+// ACube-1, M862.3 P "MK3S"): what is no number there leaves its word without a value; elsewhere it
+// makes the line malformed.
 [[nodiscard]] Command parse(std::string_view line);
+
+// The same into an existing command, whose storage is used again.
+void parse(std::string_view line, Command& command);
 
 }  // namespace unflex::gcode

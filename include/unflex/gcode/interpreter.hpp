@@ -3,11 +3,14 @@
 
 #include <array>
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/gcode/command.hpp"
 #include "unflex/gcode/line.hpp"
 
 namespace unflex::gcode {
@@ -24,7 +27,8 @@ struct Segment {
   double feed_mm_s = 0.0;  // what the file asks for, after M220
   std::size_t line = 0;    // line number in the input
   // False when the machine's X, Y or Z at the start is not known from the text (beginning of the
-  // file, after homing, a macro or a tool change): such a motion must not be rewritten.
+  // file, after homing, a macro or a tool change), or when the filament it takes is not (absolute E
+  // after a macro): such a motion must not be rewritten.
   bool start_known = true;
 
   [[nodiscard]] double delta(Axis axis) const { return end_mm[axis] - start_mm[axis]; }
@@ -77,9 +81,12 @@ struct InterpreterOptions {
 
 // The state a line is read in.
 struct ModalState {
-  Position position_mm{};     // machine
-  std::array<bool, 4> known{};  // whether the axis' machine position is known from the text
-  Position base_mm{};         // machine position of the G-code zero (G92, offsets)
+  Position position_mm{};  // machine
+  // Whether the axis' machine position is known from the text. E counts from the file's beginning.
+  std::array<bool, 4> known{false, false, false, true};
+  Position base_mm{};  // machine position of the G-code zero (G92, offsets)
+  std::array<bool, 4> base_known{true, true, true, true};
+  Position offset_mm{};       // SET_GCODE_OFFSET: the zero that homing restores
   bool absolute_xyz = true;   // G90 / G91
   bool absolute_e = true;     // M82 / M83
   double unit_mm = 1.0;       // 25.4 after G20
@@ -102,8 +109,39 @@ class Interpreter {
   [[nodiscard]] const ModalState& state() const { return state_; }
 
  private:
+  // One handler per command or family of commands; each reads command_ and fills the event.
+  void traditional(Event& event);
+  void g_code(Event& event);
+  void m_code(Event& event);
+  void extended(Event& event);
+  void linear_move(Event& event);
+  void arc_move(Event& event, bool clockwise);
+  void firmware_retraction(Event& event, bool retract);
+  void dwell(Event& event);
+  void home(Event& event);
+  void set_position(Event& event);
+  void acceleration(Event& event);
+  void speed_factor(Event& event);
+  void flow_factor(Event& event);
+  void velocity_limit(Event& event);
+  void pressure_advance(Event& event);
+  void retraction_settings(Event& event);
+  void gcode_offset(Event& event);
+  void restore_state(Event& event);
+
+  void set_feed(Event& event, std::optional<double> feed_word);
+  // Adds the straight piece to `target`, unless it has no length, and moves the state there.
+  void append_segment(Event& event, const Position& target, double feed_mm_s, bool start_known);
+  void lose_position(Event& event);
+  void not_understood(Event& event, std::string_view problem);
+
   InterpreterOptions options_;
   ModalState state_;
+  std::map<std::string, ModalState, std::less<>> saved_states_;  // SAVE_GCODE_STATE, by name
+  // Whether the last SET_PRESSURE_ADVANCE switched it on, and on which extruder.
+  std::optional<bool> pressure_advance_on_;
+  std::string pressure_advance_extruder_;
+  Command command_;  // of the line being read; kept for its storage
 };
 
 }  // namespace unflex::gcode

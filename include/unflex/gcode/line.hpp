@@ -13,7 +13,7 @@ namespace unflex::gcode {
 
 // One line of the input, byte for byte.
 struct Line {
-  std::string text;        // with its line ending ("\n", "\r\n"), without one at the end of the file
+  std::string text;  // with its line ending ("\n", "\r\n"), without one at the end of the file
   std::size_t number = 0;  // 1-based
 
   // The text without its line ending.

@@ -1,0 +1,66 @@
+#include "arc.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace unflex::gcode {
+namespace {
+
+constexpr double kMostPieces = 1e6;
+
+double angle_travelled(const Arc& arc) {
+  const auto [i, j] = arc.centre_offset_mm;
+  const double end_alpha = arc.end_mm[0] - (arc.start_mm[0] + i);
+  const double end_beta = arc.end_mm[1] - (arc.start_mm[1] + j);
+  double angle = std::atan2(-i * end_beta + j * end_alpha, -i * end_alpha - j * end_beta);
+  if (angle < 0.0) {
+    angle += 2.0 * std::numbers::pi;
+  }
+  if (arc.clockwise) {
+    angle -= 2.0 * std::numbers::pi;
+  }
+  const bool closed = arc.start_mm[0] == arc.end_mm[0] && arc.start_mm[1] == arc.end_mm[1];
+  return angle == 0.0 && closed ? 2.0 * std::numbers::pi : angle;
+}
+
+}  // namespace
+
+std::optional<std::vector<std::array<double, 3>>> plan_arc(const Arc& arc, double resolution_mm) {
+  const auto [i, j] = arc.centre_offset_mm;
+  const double angle = angle_travelled(arc);
+  const double rise = arc.end_mm[2] - arc.start_mm[2];
+  const double travel = std::hypot(std::hypot(i, j) * angle, rise);
+  const double count = std::max(1.0, std::floor(travel / resolution_mm));
+  if (!(count <= kMostPieces)) {
+    return std::nullopt;
+  }
+  std::vector<std::array<double, 3>> ends(static_cast<std::size_t>(count));
+  for (std::size_t n = 1; n < ends.size(); ++n) {
+    const double turned = static_cast<double>(n) * (angle / count);
+    const double c = std::cos(turned);
+    const double s = std::sin(turned);
+    ends[n - 1] = {arc.start_mm[0] + i - i * c + j * s, arc.start_mm[1] + j - i * s - j * c,
+                   arc.start_mm[2] + static_cast<double>(n) * (rise / count)};
+  }
+  ends.back() = arc.end_mm;
+  return ends;
+}
+
+std::optional<std::array<double, 2>> centre_from_radius(const std::array<double, 3>& start_mm,
+                                                        const std::array<double, 3>& end_mm,
+                                                        double radius_mm, bool clockwise) {
+  const double half_alpha = 0.5 * (end_mm[0] - start_mm[0]);
+  const double half_beta = 0.5 * (end_mm[1] - start_mm[1]);
+  const double half_chord = std::hypot(half_alpha, half_beta);
+  if (half_chord == 0.0) {
+    return std::nullopt;
+  }
+  const double height =
+      std::sqrt(std::max(0.0, (radius_mm - half_chord) * (radius_mm + half_chord)));
+  const double side = clockwise != (radius_mm < 0.0) ? -1.0 : 1.0;
+  const double scale = side * height / half_chord;
+  return std::array<double, 2>{half_alpha - half_beta * scale, half_beta + half_alpha * scale};
+}
+
+}  // namespace unflex::gcode

@@ -1,0 +1,214 @@
+// Klipper's extended commands, NAME KEY=VALUE.
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "firmware_commands.hpp"
+#include "unflex/core/number.hpp"
+#include "unflex/gcode/interpreter.hpp"
+
+namespace unflex::gcode {
+namespace {
+
+// A parameter's number; unlike a word's it may have an exponent ("ACCEL=1e5").
+std::optional<double> parse_parameter_number(std::string_view text) {
+  const std::size_t exponent = text.find_first_of("eE");
+  if (exponent == std::string_view::npos || !parse_number(text.substr(0, exponent))) {
+    return parse_number(text);
+  }
+  if (text.front() == '+') {
+    text.remove_prefix(1);
+  }
+  double value = 0.0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, failure] = std::from_chars(text.data(), end, value, std::chars_format::general);
+  if (failure != std::errc{} || stop != end || !std::isfinite(value)) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+struct Parameter {
+  bool given = false;
+  std::optional<double> value;
+
+  [[nodiscard]] bool unreadable() const { return given && !value; }
+};
+
+Parameter number_of(const Command& command, std::string_view key) {
+  const std::optional<std::string> text = command.parameter(key);
+  if (!text) {
+    return {};
+  }
+  return {true, parse_parameter_number(*text)};
+}
+
+std::string state_name(const Command& command) {
+  return command.parameter("NAME").value_or("default");
+}
+
+}  // namespace
+
+void Interpreter::extended(Event& event) {
+  const std::string_view name = command_.name;
+  if (name == "SET_VELOCITY_LIMIT") {
+    return velocity_limit(event);
+  }
+  if (name == "SET_PRESSURE_ADVANCE") {
+    return pressure_advance(event);
+  }
+  if (name == "SET_RETRACTION") {
+    return retraction_settings(event);
+  }
+  if (name == "SET_GCODE_OFFSET") {
+    return gcode_offset(event);
+  }
+  if (name == "SAVE_GCODE_STATE") {
+    saved_states_.insert_or_assign(state_name(command_), state_);
+    return;
+  }
+  if (name == "RESTORE_GCODE_STATE") {
+    return restore_state(event);
+  }
+  switch (extended_effect(name)) {
+    case Effect::passive:
+      return;
+    case Effect::stop:
+      event.kind = EventKind::barrier;
+      return;
+    case Effect::unknown:
+      return lose_position(event);
+  }
+}
+
+// toolhead.py, cmd_SET_VELOCITY_LIMIT: one invalid value and nothing is set.
+void Interpreter::velocity_limit(Event& event) {
+  const Parameter velocity = number_of(command_, "VELOCITY");
+  const Parameter accel = number_of(command_, "ACCEL");
+  const Parameter corner = number_of(command_, "SQUARE_CORNER_VELOCITY");
+  const Parameter cruise = number_of(command_, "MINIMUM_CRUISE_RATIO");
+  const bool invalid = (velocity.given && !(velocity.value.value_or(0.0) > 0.0)) ||
+                       (accel.given && !(accel.value.value_or(0.0) > 0.0)) ||
+                       (corner.given && !(corner.value.value_or(-1.0) >= 0.0)) ||
+                       (cruise.given && !(cruise.value.value_or(-1.0) >= 0.0)) ||
+                       (cruise.given && !(cruise.value.value_or(1.0) < 1.0));
+  if (invalid) {
+    event.warnings.emplace_back("SET_VELOCITY_LIMIT with an invalid value is ignored");
+    return;
+  }
+  if (velocity.given || accel.given || corner.given || cruise.given) {
+    event.kind = EventKind::limits;
+    event.limits = {velocity.value, accel.value, corner.value, cruise.value};
+  }
+}
+
+// kinematics/extruder.py, _set_pressure_advance: a new smoothing time stops the machine, and
+// switching the advance on or off changes the smoothing time too.
+void Interpreter::pressure_advance(Event& event) {
+  const Parameter advance = number_of(command_, "ADVANCE");
+  const bool smooth_time_given = command_.parameter("SMOOTH_TIME").has_value();
+  const std::string extruder = command_.parameter("EXTRUDER").value_or("");
+  if (extruder != pressure_advance_extruder_) {
+    pressure_advance_extruder_ = extruder;
+    pressure_advance_on_.reset();
+  }
+  bool stops = smooth_time_given;
+  if (advance.value) {
+    const bool on = *advance.value > 0.0;
+    stops = stops || pressure_advance_on_ != on;
+    pressure_advance_on_ = on;
+  }
+  if (stops) {
+    event.kind = EventKind::barrier;
+  }
+}
+
+// firmware_retraction.py, cmd_SET_RETRACTION.
+void Interpreter::retraction_settings(Event& event) {
+  struct Setting {
+    std::string_view key;
+    double least;
+    double* target;
+  };
+  InterpreterOptions changed = options_;
+  const std::array<Setting, 4> settings = {
+      {{"RETRACT_LENGTH", 0.0, &changed.retract_length_mm},
+       {"RETRACT_SPEED", 1.0, &changed.retract_speed_mm_s},
+       {"UNRETRACT_EXTRA_LENGTH", 0.0, &changed.unretract_extra_length_mm},
+       {"UNRETRACT_SPEED", 1.0, &changed.unretract_speed_mm_s}}};
+  for (const Setting& setting : settings) {
+    const Parameter parameter = number_of(command_, setting.key);
+    if (parameter.unreadable() || parameter.value.value_or(setting.least) < setting.least) {
+      event.warnings.push_back(
+          fmt::format("SET_RETRACTION with an invalid {} is ignored", setting.key));
+      return;
+    }
+    *setting.target = parameter.value.value_or(*setting.target);
+  }
+  options_ = changed;
+  state_.retracted = false;
+}
+
+// gcode_move.py, cmd_SET_GCODE_OFFSET: the zero moves, the machine only with MOVE=1.
+void Interpreter::gcode_offset(Event& event) {
+  constexpr std::array<std::string_view, 4> kKeys = {"X", "Y", "Z", "E"};
+  constexpr std::array<std::string_view, 4> kAdjustKeys = {"X_ADJUST", "Y_ADJUST", "Z_ADJUST",
+                                                           "E_ADJUST"};
+  Position shift_mm{};
+  for (const Axis axis : {X, Y, Z, E}) {
+    const Parameter offset = number_of(command_, kKeys[axis]);
+    const Parameter adjust = number_of(command_, kAdjustKeys[axis]);
+    if (offset.unreadable() || (!offset.given && adjust.unreadable())) {
+      return not_understood(event, "SET_GCODE_OFFSET with a value that is no number");
+    }
+    shift_mm[axis] =
+        offset.given ? *offset.value - state_.offset_mm[axis] : adjust.value.value_or(0.0);
+  }
+  const Parameter move = number_of(command_, "MOVE");
+  const bool moves = move.given && move.value != 0.0;
+  event.kind = EventKind::barrier;
+  for (const Axis axis : {X, Y, Z, E}) {
+    state_.offset_mm[axis] += shift_mm[axis];
+    state_.base_mm[axis] += shift_mm[axis];
+    if (moves) {
+      state_.position_mm[axis] += shift_mm[axis];
+    }
+  }
+  if (moves) {
+    lose_position(event);
+  }
+}
+
+// gcode_move.py, cmd_RESTORE_GCODE_STATE: E goes on from where it is; X, Y and Z return only with
+// MOVE=1.
+void Interpreter::restore_state(Event& event) {
+  const auto saved = saved_states_.find(state_name(command_));
+  if (saved == saved_states_.end()) {
+    return not_understood(event, "RESTORE_GCODE_STATE of a state this file does not save");
+  }
+  const ModalState& state = saved->second;
+  state_.absolute_xyz = state.absolute_xyz;
+  state_.absolute_e = state.absolute_e;
+  state_.base_mm = state.base_mm;
+  state_.base_mm[E] += state_.position_mm[E] - state.position_mm[E];
+  state_.base_known = state.base_known;
+  state_.offset_mm = state.offset_mm;
+  state_.feed_mm_s = state.feed_mm_s;
+  state_.speed_factor = state.speed_factor;
+  state_.flow_factor = state.flow_factor;
+  event.kind = EventKind::barrier;
+  const Parameter move = number_of(command_, "MOVE");
+  if (move.given && move.value != 0.0) {
+    for (const Axis axis : {X, Y, Z}) {
+      state_.position_mm[axis] = state.position_mm[axis];
+    }
+    lose_position(event);
+  }
+}
+
+}  // namespace unflex::gcode

@@ -1,0 +1,70 @@
+#include <cstring>
+#include <utility>
+
+#include "unflex/gcode/line.hpp"
+
+namespace unflex::gcode {
+namespace {
+
+constexpr std::size_t kBlockBytes = 256 * 1024;
+constexpr std::size_t kLongestLineBytes = 1024 * 1024;
+
+}  // namespace
+
+std::string_view Line::content() const {
+  std::string_view view = text;
+  if (view.ends_with('\n')) {
+    view.remove_suffix(1);
+    if (view.ends_with('\r')) {
+      view.remove_suffix(1);
+    }
+  }
+  return view;
+}
+
+LineReader::LineReader(std::istream& stream, std::string name)
+    : stream_(&stream), name_(std::move(name)), block_(kBlockBytes) {}
+
+Result<bool> LineReader::next(Line& line) {
+  line.text.clear();
+  line.number = line_number_ + 1;
+  while (!line.text.ends_with('\n')) {
+    if (cursor_ == filled_) {
+      stream_->read(block_.data(), static_cast<std::streamsize>(block_.size()));
+      filled_ = static_cast<std::size_t>(stream_->gcount());
+      cursor_ = 0;
+      if (stream_->bad()) {
+        return fail(ErrorKind::internal, {name_, line.number},
+                    "cannot read on: input/output error");
+      }
+      if (filled_ == 0) {
+        break;
+      }
+    }
+    const char* const begin = block_.data() + cursor_;
+    const std::size_t left = filled_ - cursor_;
+    const void* const newline = std::memchr(begin, '\n', left);
+    const std::size_t taken =
+        newline == nullptr
+            ? left
+            : static_cast<std::size_t>(static_cast<const char*>(newline) - begin) + 1;
+    if (std::memchr(begin, '\0', taken) != nullptr) {
+      return fail(ErrorKind::input, {name_, line.number},
+                  "not a text file (NUL byte); pass G-code as plain text");
+    }
+    if (line.text.size() + taken > kLongestLineBytes) {
+      return fail(ErrorKind::input, {name_, line.number},
+                  "line longer than 1 MiB; pass G-code as plain text");
+    }
+    line.text.append(begin, taken);
+    cursor_ += taken;
+  }
+  if (line.text.empty()) {
+    return false;
+  }
+  ++line_number_;
+  bytes_read_ += line.text.size();
+  return true;
+}
+
+}  // namespace unflex::gcode
