@@ -28,8 +28,8 @@ struct Limits {
 struct FixedLimits {
   double max_z_velocity_mm_s = 300.0;
   double max_z_accel_mm_s2 = 5000.0;
-  double max_extrude_only_velocity_mm_s = 79.8242;
-  double max_extrude_only_accel_mm_s2 = 1330.4033;
+  double max_extrude_only_velocity_mm_s = 79.8243241107433;
+  double max_extrude_only_accel_mm_s2 = 1330.40540184572;
   double instantaneous_corner_velocity_mm_s = 1.0;
 };
 
