@@ -114,7 +114,10 @@ enum class Taking { always, at_stops, at_the_end };
 
 // The plan with all speeds `factor` times as high and all accelerations factor² times.
 std::vector<PlannedMove> run(const std::vector<Step>& program, Taking taking, double factor = 1.0) {
-  KlipperPlanner planner(scaled(Limits{}, factor), scaled(FixedLimits{}, factor));
+  FixedLimits slow_z;
+  slow_z.max_z_velocity_mm_s = 15.0;
+  slow_z.max_z_accel_mm_s2 = 150.0;
+  KlipperPlanner planner(scaled(Limits{}, factor), scaled(slow_z, factor));
   std::vector<PlannedMove> result;
   for (const Step& step : program) {
     if (const auto* segment = std::get_if<gcode::Segment>(&step)) {
