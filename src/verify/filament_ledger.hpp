@@ -1,0 +1,59 @@
+// Compares the filament of a rewritten run with the sliced file's, move by move.
+//
+// Notation:
+//   Q(t), F(t)   filament the sliced and the emitted file have laid since the run's start, mm
+//   t_i          end of the i-th move of the sliced file
+//
+// Lines of the emitted file span the ends of moves, and how much of such a line belongs to which
+// move cannot be said. So at each t_i, Q(t_i) is compared with the interval from F at the start to
+// F at the end of the lines at t_i; outside of it, the distance counts. The error of a move is the
+// difference of the distances at its two ends. At the end of the run the interval has no width.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+
+#include "reference_path.hpp"
+
+namespace unflex::verify {
+
+class FilamentLedger {
+ public:
+  // The path must outlive the ledger.
+  explicit FilamentLedger(const ReferencePath& path) : path_(&path) {}
+
+  void begin_run();
+  // A move of the emitted file that starts at time start_s of the path, which is known beyond the
+  // move's end.
+  void play(const planner::PlannedMove& move, double start_s);
+  // The whole run is known, in both files.
+  void end_run();
+
+  // Of the last run, mm.
+  [[nodiscard]] double input_mm() const { return q_mm_; }
+  [[nodiscard]] double output_mm() const { return f_mm_; }
+  // The largest error of one move so far, mm.
+  [[nodiscard]] double worst_move_error_mm() const { return worst_mm_; }
+
+ private:
+  // The end of a move of the sliced file.
+  struct Border {
+    double time_s = 0.0;
+    double q_mm = 0.0;
+    bool reached = false;
+    double lowest_f_mm = 0.0;
+  };
+
+  void collect_borders();
+  void close(const Border& border, double lowest_f_mm, double highest_f_mm);
+
+  const ReferencePath* path_;
+  std::size_t next_piece_ = 0;
+  std::deque<Border> borders_;
+  double q_mm_ = 0.0;
+  double f_mm_ = 0.0;
+  double last_distance_mm_ = 0.0;
+  double worst_mm_ = 0.0;
+};
+
+}  // namespace unflex::verify

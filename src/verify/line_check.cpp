@@ -1,0 +1,121 @@
+#include "line_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+namespace unflex::verify {
+namespace {
+
+// The base rests at the rounded end of the path before it.
+constexpr double kRestTolerance_mm = 1e-4 + 1e-9;
+
+std::string_view text_end(const gcode::Line& line) {
+  return std::string_view(line.text).substr(line.content().size());
+}
+
+}  // namespace
+
+bool same_line(const gcode::Line& input, const gcode::Line& output) {
+  return input.text == output.text || (text_end(input).empty() && input.text == output.content());
+}
+
+// The next line of the current run that has to be compared.
+PlacedLine* LineCheck::front(Replay& file) const {
+  std::deque<PlacedLine>& lines = file.lines();
+  while (!lines.empty() && lines.front().section <= file.section().id) {
+    if (!(lines.front().motion && output_->section().compensated)) {
+      return &lines.front();
+    }
+    lines.pop_front();
+  }
+  return nullptr;
+}
+
+void LineCheck::compare(bool complete) {
+  for (;;) {
+    const PlacedLine* const input = front(*input_);
+    const PlacedLine* const output = front(*output_);
+    if (input != nullptr && output != nullptr) {
+      compare(*input, *output);
+    } else if (complete && input != nullptr) {
+      lost(*input);
+      input_->lines().pop_front();
+    } else if (complete && output != nullptr) {
+      if (!is_known_addition(output->line.content())) {
+        unknown(*output);
+      }
+      output_->lines().pop_front();
+    } else {
+      return;
+    }
+  }
+}
+
+// Lines of the forms unflex adds may stand in the sliced file as well. Such a line is the sliced
+// file's if it stands where that one does; otherwise it was added.
+void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
+  const bool same = same_line(input.line, output.line);
+  const bool placed = same && at_same_place(input, output);
+  if (placed || (same && !is_known_addition(output.line.content()))) {
+    match(input, output);
+    input_->lines().pop_front();
+    output_->lines().pop_front();
+  } else {
+    if (!is_known_addition(output.line.content())) {
+      resynchronise(output);
+    }
+    output_->lines().pop_front();
+  }
+}
+
+bool LineCheck::at_same_place(const PlacedLine& input, const PlacedLine& output) const {
+  const double tolerance = output_->section().compensated ? place_tolerance_mm_ : kRestTolerance_mm;
+  return std::hypot(input.x_mm - output.x_mm, input.y_mm - output.y_mm) <= tolerance;
+}
+
+void LineCheck::match(const PlacedLine& input, const PlacedLine& output) {
+  if (!at_same_place(input, output)) {
+    violations_->in_output(
+        output.line.number,
+        fmt::format("'{}' moved along the path by {:.3f} mm (line {} of the sliced file)",
+                    output.line.content(),
+                    std::hypot(input.x_mm - output.x_mm, input.y_mm - output.y_mm),
+                    input.line.number));
+  }
+}
+
+// The output's line is not the one expected: either that one and perhaps more are lost, or this one
+// does not belong here.
+void LineCheck::resynchronise(const PlacedLine& output) {
+  std::deque<PlacedLine>& lines = input_->lines();
+  const auto found = std::find_if(lines.begin(), lines.end(), [&](const PlacedLine& input) {
+    return input.section <= input_->section().id && same_line(input.line, output.line);
+  });
+  if (found == lines.end()) {
+    unknown(output);
+    return;
+  }
+  while (front(*input_) != &*found) {
+    lost(*front(*input_));
+    lines.pop_front();
+  }
+  match(*found, output);
+  lines.pop_front();
+}
+
+void LineCheck::lost(const PlacedLine& input) {
+  violations_->in_input(input.line.number,
+                        fmt::format("line '{}' is lost or changed", input.line.content()));
+}
+
+void LineCheck::unknown(const PlacedLine& output) {
+  violations_->in_output(
+      output.line.number,
+      fmt::format("line '{}' is neither the sliced file's nor one that unflex adds",
+                  output.line.content()));
+}
+
+}  // namespace unflex::verify

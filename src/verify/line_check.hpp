@@ -1,0 +1,40 @@
+// Checks that the lines of the sliced file stand in the emitted one: all, unchanged, in their
+// order, where they stood along the path, and none but lines of known forms between them.
+#pragma once
+
+#include "replay.hpp"
+#include "violations.hpp"
+
+namespace unflex::verify {
+
+// Equal byte for byte; an input that ends without a line ending may have got one.
+[[nodiscard]] bool same_line(const gcode::Line& input, const gcode::Line& output);
+
+class LineCheck {
+ public:
+  LineCheck(Replay& input, Replay& output, double place_tolerance_mm, Violations& violations)
+      : input_(&input),
+        output_(&output),
+        place_tolerance_mm_(place_tolerance_mm),
+        violations_(&violations) {}
+
+  // Compares and removes what both files have read of the current run. complete: both have read
+  // all of it, so that what is left over on one side is an error.
+  void compare(bool complete);
+
+ private:
+  [[nodiscard]] PlacedLine* front(Replay& file) const;
+  [[nodiscard]] bool at_same_place(const PlacedLine& input, const PlacedLine& output) const;
+  void compare(const PlacedLine& input, const PlacedLine& output);
+  void match(const PlacedLine& input, const PlacedLine& output);
+  void resynchronise(const PlacedLine& output);
+  void lost(const PlacedLine& input);
+  void unknown(const PlacedLine& output);
+
+  Replay* input_;
+  Replay* output_;
+  double place_tolerance_mm_;
+  Violations* violations_;
+};
+
+}  // namespace unflex::verify

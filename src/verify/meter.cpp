@@ -1,0 +1,238 @@
+// Notation:
+//   r, p, b   reference, nozzle and base      h   step of the integration
+//   τ         reach_s_: the contour error is the distance from p(t) to r([t − τ, t + τ])
+#include "meter.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace unflex::verify {
+namespace {
+
+// Times closer together than this are the same; the time axis of a print of days resolves 1e-11 s.
+constexpr double kSameTime_s = 1e-10;
+// The nozzle lags by less than half a period of its slower axis; the constant covers a base whose
+// clock runs off.
+constexpr double kClockReach_s = 0.02;
+
+constexpr double kLagMemory_s = 0.1;
+constexpr double kLagLeastMemory_s = 0.05;
+constexpr double kLagLeastSpeed_mm_s = 5.0;
+
+dynamics::NozzleState shifted(dynamics::NozzleState state, double by) {
+  state.position += by;
+  return state;
+}
+
+// The state of the base h seconds later.
+void advance(dynamics::BaseSegment& base, double h) {
+  base.position += h * (base.velocity + 0.5 * base.acceleration * h);
+  base.velocity += base.acceleration * h;
+}
+
+}  // namespace
+
+void LagEstimate::add(double error_dot_velocity, double velocity2, double h) {
+  const double keep = std::exp(-h / kLagMemory_s);
+  error_dot_velocity_ = keep * error_dot_velocity_ + h * error_dot_velocity;
+  velocity2_ = keep * velocity2_ + h * velocity2;
+  weight_s_ = keep * weight_s_ + h;
+  if (weight_s_ >= kLagLeastMemory_s &&
+      velocity2_ >= kLagLeastSpeed_mm_s * kLagLeastSpeed_mm_s * weight_s_) {
+    worst_s_ = std::max(worst_s_, std::abs(error_dot_velocity_) / velocity2_);
+  }
+}
+
+void LagEstimate::restart() {
+  error_dot_velocity_ = 0.0;
+  velocity2_ = 0.0;
+  weight_s_ = 0.0;
+}
+
+Meter::Meter(const NozzleModel& model, ReferencePath& path)
+    : model_(model),
+      path_(&path),
+      reach_s_(kClockReach_s +
+               std::numbers::pi / std::min(model.x.omega_rad_s, model.y.omega_rad_s)) {}
+
+void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm) {
+  nozzle_ = nozzle;
+  base_x_mm_ = base_x_mm;
+  base_y_mm_ = base_y_mm;
+}
+
+void Meter::follow_lag(bool on) {
+  lag_.restart();
+  follow_lag_ = on;
+}
+
+void Meter::play(const planner::PlannedMove& move) {
+  const double x = move.segment.start_mm[gcode::X];
+  const double y = move.segment.start_mm[gcode::Y];
+  nozzle_.x = shifted(nozzle_.x, x - base_x_mm_);
+  nozzle_.y = shifted(nozzle_.y, y - base_y_mm_);
+
+  struct Ramp {
+    double velocity;
+    double acceleration;
+    double duration_s;
+  };
+  const std::array<Ramp, 3> ramps = {
+      Ramp{move.start_v_mm_s, move.accel_mm_s2, move.accel_s},
+      Ramp{move.cruise_v_mm_s, 0.0, move.cruise_s},
+      Ramp{move.cruise_v_mm_s, -move.accel_mm_s2, move.decel_s},
+  };
+  const double along_x = move.direction[gcode::X];
+  const double along_y = move.direction[gcode::Y];
+  const double start_s = time_s_;
+  double elapsed = 0.0;
+  for (const Ramp& ramp : ramps) {
+    if (ramp.duration_s <= 0.0) {
+      continue;
+    }
+    const double distance = move.distance_mm(elapsed);
+    play(Phase{{x + along_x * distance, along_x * ramp.velocity, along_x * ramp.acceleration},
+               {y + along_y * distance, along_y * ramp.velocity, along_y * ramp.acceleration},
+               ramp.duration_s});
+    elapsed += ramp.duration_s;
+    time_s_ = start_s + elapsed;
+  }
+  base_x_mm_ = move.segment.end_mm[gcode::X];
+  base_y_mm_ = move.segment.end_mm[gcode::Y];
+}
+
+// Splits a phase of the base where the reference changes its acceleration or its move.
+void Meter::play(Phase phase) {
+  const double end_s = time_s_ + phase.duration_s;
+  while (end_s - time_s_ > kSameTime_s) {
+    const double change_s = next_reference_change();
+    const bool measured = current_ < path_->end() && (*path_)[current_].measured &&
+                          (*path_)[current_].start_s <= time_s_ + kSameTime_s;
+    const double until_s = change_s < end_s - kSameTime_s ? change_s : end_s;
+    integrate(phase, until_s - time_s_, measured);
+    time_s_ = until_s;
+  }
+}
+
+// The first time after now at which the reference begins another phase or move; infinity once its
+// section has ended.
+double Meter::next_reference_change() {
+  path_->extend_to(time_s_ + reach_s_);
+  current_ = std::max(current_, path_->first());
+  while (current_ < path_->end() && (*path_)[current_].end_s <= time_s_ + kSameTime_s) {
+    ++current_;
+  }
+  if (current_ == path_->end()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const PathPiece& piece = (*path_)[current_];
+  const double cruise_s = piece.start_s + piece.move.accel_s;
+  const double decel_s = cruise_s + piece.move.cruise_s;
+  for (const double change_s : {piece.start_s, cruise_s, decel_s}) {
+    if (change_s > time_s_ + kSameTime_s) {
+      return change_s;
+    }
+  }
+  return piece.end_s;
+}
+
+void Meter::integrate(Phase& phase, double duration_s, bool measured) {
+  const double steps = std::max(1.0, std::ceil(duration_s / model_.step_s - 1e-9));
+  const double h = duration_s / steps;
+  const double start_s = time_s_;
+  for (double step = 1.0; step <= steps; step += 1.0) {
+    nozzle_.x = dynamics::rk4_step(model_.x, nozzle_.x, phase.x, h);
+    nozzle_.y = dynamics::rk4_step(model_.y, nozzle_.y, phase.y, h);
+    advance(phase.x, h);
+    advance(phase.y, h);
+    if (measured) {
+      time_s_ = start_s + step * h;
+      sample(h);
+    }
+  }
+}
+
+void Meter::sample(double h) {
+  path_->extend_to(time_s_ + reach_s_);
+  const PathPiece& reference = (*path_)[current_];
+  const double local_s = time_s_ - reference.start_s;
+  const double covered = reference.covered_xy_mm(time_s_);
+  const double error_x = reference.x_mm + reference.direction_x * covered - nozzle_.x.position;
+  const double error_y = reference.y_mm + reference.direction_y * covered - nozzle_.y.position;
+  const double tracking = std::sqrt(error_x * error_x + error_y * error_y);
+
+  slide_window();
+  std::size_t nearest = current_;
+  const double contour = std::sqrt(squared_contour_error(nearest));
+  const std::size_t line = (*path_)[nearest].move.segment.line;
+  all_.add(contour, tracking, h, line);
+  if (reference.extruding) {
+    extruding_.add(contour, tracking, h, line);
+  }
+  if (follow_lag_) {
+    const double speed = reference.move.velocity_mm_s(local_s);
+    const double v_x = reference.move.direction[gcode::X] * speed;
+    const double v_y = reference.move.direction[gcode::Y] * speed;
+    lag_.add(error_x * v_x + error_y * v_y, v_x * v_x + v_y * v_y, h);
+  }
+}
+
+void Meter::slide_window() {
+  near_first_ = std::max(near_first_, path_->first());
+  while (near_first_ < current_ && (*path_)[near_first_].end_s < time_s_ - reach_s_) {
+    ++near_first_;
+  }
+  near_end_ = std::max(near_end_, current_ + 1);
+  while (near_end_ < path_->end() && (*path_)[near_end_].start_s <= time_s_ + reach_s_) {
+    ++near_end_;
+  }
+}
+
+// Distance to the part of the path between r(t − τ) and r(t + τ): whole pieces, the first and the
+// last one cut.
+double Meter::squared_contour_error(std::size_t& nearest) const {
+  const double p_x = nozzle_.x.position;
+  const double p_y = nozzle_.y.position;
+  const double from_s = time_s_ - reach_s_;
+  const double to_s = time_s_ + reach_s_;
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t number = near_first_; number < near_end_; ++number) {
+    const PathPiece& piece = (*path_)[number];
+    const double x = p_x - piece.x_mm;
+    const double y = p_y - piece.y_mm;
+    const double low = piece.start_s < from_s ? piece.covered_xy_mm(from_s) : 0.0;
+    const double high = piece.end_s > to_s ? piece.covered_xy_mm(to_s) : piece.length_xy_mm;
+    const double along = std::clamp(x * piece.direction_x + y * piece.direction_y, low, high);
+    const double across_x = x - along * piece.direction_x;
+    const double across_y = y - along * piece.direction_y;
+    const double distance2 = across_x * across_x + across_y * across_y;
+    if (distance2 < best) {
+      best = distance2;
+      nearest = number;
+    }
+  }
+  return best;
+}
+
+void Meter::wait_for_reference() {
+  const NozzleXY nozzle = nozzle_;
+  const double time_s = time_s_;
+  // Bounded stretches, so that a reference far ahead need not be known to its end at once.
+  path_->extend_to(time_s_);
+  while (path_->end_s() - time_s_ > kSameTime_s) {
+    play(Phase{{base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, path_->end_s() - time_s_});
+    path_->extend_to(time_s_);
+  }
+  nozzle_ = nozzle;
+  time_s_ = time_s;
+}
+
+void Meter::hold(double duration_s) {
+  nozzle_.x = dynamics::exact_step(model_.x, nozzle_.x, {base_x_mm_, 0.0, 0.0}, duration_s);
+  nozzle_.y = dynamics::exact_step(model_.y, nozzle_.y, {base_y_mm_, 0.0, 0.0}, duration_s);
+}
+
+}  // namespace unflex::verify

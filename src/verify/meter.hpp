@@ -1,0 +1,87 @@
+// Hangs the nozzle on a base that is moved, and measures it against the reference.
+#pragma once
+
+#include <cstddef>
+
+#include "reference_path.hpp"
+#include "unflex/verify/deviation.hpp"
+
+namespace unflex::verify {
+
+// Estimates by how much the nozzle lags behind the reference, by regression of the tracking error
+// on the reference's velocity with a fading memory: lag = Σ (r − p)·ṙ / Σ |ṙ|². Errors across the
+// path and errors that change sign with the curve of the path cancel; a late clock does not.
+class LagEstimate {
+ public:
+  void add(double error_dot_velocity, double velocity2, double h);
+  // Starts afresh, keeping the largest lag found.
+  void restart();
+  [[nodiscard]] double worst_s() const { return worst_s_; }
+
+ private:
+  double error_dot_velocity_ = 0.0;
+  double velocity2_ = 0.0;
+  double weight_s_ = 0.0;
+  double worst_s_ = 0.0;
+};
+
+class Meter {
+ public:
+  // The path must outlive the meter.
+  Meter(const NozzleModel& model, ReferencePath& path);
+
+  // The nozzle and base at the very start.
+  void set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm);
+  // Puts the clock to the start of the path's section.
+  void begin_section() { time_s_ = path_->section_start_s(); }
+  // Moves the base. If it does not start where the base stands, base and nozzle are shifted there.
+  void play(const planner::PlannedMove& move);
+  // The base stands still until the reference has ended, and the nozzle is measured meanwhile;
+  // the nozzle's state afterwards is the one from before, since the machine does not wait.
+  void wait_for_reference();
+  // The base stands still; nothing is measured.
+  void hold(double duration_s);
+
+  void follow_lag(bool on);
+  [[nodiscard]] double worst_lag_s() const { return lag_.worst_s(); }
+
+  [[nodiscard]] double time_s() const { return time_s_; }
+  [[nodiscard]] const NozzleXY& nozzle() const { return nozzle_; }
+  [[nodiscard]] double base_x_mm() const { return base_x_mm_; }
+  [[nodiscard]] double base_y_mm() const { return base_y_mm_; }
+  [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
+  [[nodiscard]] const DeviationAccumulator& all() const { return all_; }
+  // How far from its time the reference's path counts as near, s.
+  [[nodiscard]] double reach_s() const { return reach_s_; }
+
+ private:
+  struct Phase {
+    dynamics::BaseSegment x;
+    dynamics::BaseSegment y;
+    double duration_s = 0.0;
+  };
+
+  void play(Phase phase);
+  void integrate(Phase& phase, double duration_s, bool measured);
+  [[nodiscard]] double next_reference_change();
+  void sample(double h);
+  void slide_window();
+  [[nodiscard]] double squared_contour_error(std::size_t& nearest) const;
+
+  NozzleModel model_;
+  ReferencePath* path_;
+  double reach_s_;
+  double time_s_ = 0.0;
+  NozzleXY nozzle_;
+  double base_x_mm_ = 0.0;
+  double base_y_mm_ = 0.0;
+  std::size_t current_ = 0;     // piece of the reference at time_s_
+  std::size_t near_first_ = 0;  // pieces that reach into [t − reach, t + reach]
+  std::size_t near_end_ = 0;
+  DeviationAccumulator extruding_;
+  DeviationAccumulator all_;
+  LagEstimate lag_;
+  bool follow_lag_ = false;
+};
+
+}  // namespace unflex::verify

@@ -1,0 +1,79 @@
+// The planned moves of the sliced file on one time axis, as much of them as is needed at a time.
+//
+// Time starts at 0 with the first move of the file and runs through all moves and rests. Sections
+// (runs and single moves that are kept as they are) follow each other without a gap.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::verify {
+
+// A move that stays where it is.
+[[nodiscard]] planner::PlannedMove resting(double x_mm, double y_mm, double duration_s);
+
+// Hands out the next planned move of a section; false at the section's end.
+using MoveSource = std::function<bool(planner::PlannedMove&)>;
+
+struct PathPiece {
+  double start_s = 0.0;
+  double end_s = 0.0;
+  double x_mm = 0.0;  // start
+  double y_mm = 0.0;
+  double direction_x = 0.0;  // unit vector in the XY plane, or 0 0
+  double direction_y = 0.0;
+  double length_xy_mm = 0.0;
+  bool measured = false;  // deviations count here
+  bool extruding = false;
+  planner::PlannedMove move;
+
+  // Length of the XY path the move has covered at time t, in [0, length_xy_mm].
+  [[nodiscard]] double covered_xy_mm(double t) const;
+};
+
+class ReferencePath {
+ public:
+  explicit ReferencePath(MoveSource source) : source_(std::move(source)) {}
+
+  // Starts the next section where the last one ended.
+  void begin_section();
+  [[nodiscard]] double section_start_s() const { return section_start_s_; }
+
+  // Pulls moves until the path reaches beyond t or the section ends. References to pieces do not
+  // survive this.
+  void extend_to(double t);
+  // Whether all moves of the section are known.
+  [[nodiscard]] bool section_complete() const { return section_complete_; }
+  // Where the known part ends, s.
+  [[nodiscard]] double end_s() const { return end_s_; }
+
+  // The machine stands still for a while; only between sections. Nothing is measured …
+  void rest(double duration_s) { end_s_ += duration_s; }
+  // … or deviations count although nothing moves, as after the end of the file.
+  void hold(double x_mm, double y_mm, double duration_s);
+
+  // Pieces have numbers that stay the same when old ones are dropped.
+  [[nodiscard]] std::size_t first() const { return dropped_; }
+  [[nodiscard]] std::size_t end() const { return dropped_ + pieces_.size(); }
+  [[nodiscard]] const PathPiece& operator[](std::size_t number) const {
+    return pieces_[number - dropped_];
+  }
+
+  // Forgets pieces that end before t.
+  void discard_before(double t);
+
+ private:
+  void append(planner::PlannedMove move, bool measured);
+
+  MoveSource source_;
+  std::vector<PathPiece> pieces_;
+  std::size_t dropped_ = 0;
+  double end_s_ = 0.0;
+  double section_start_s_ = 0.0;
+  bool section_complete_ = false;
+};
+
+}  // namespace unflex::verify

@@ -1,0 +1,19 @@
+// Compares the state two files leave the machine in.
+#pragma once
+
+#include <string>
+
+#include "replay.hpp"
+
+namespace unflex::verify {
+
+// What differs between the sliced and the emitted file's state at the same place, in words; empty
+// when nothing does. Where the machine stands is compared to one rounding step of coordinates; the
+// filament coordinate only where the next E word depends on it.
+[[nodiscard]] std::string modal_difference(const gcode::ModalState& input,
+                                           const gcode::ModalState& output);
+
+[[nodiscard]] std::string limits_difference(const planner::Limits& input,
+                                            const planner::Limits& output);
+
+}  // namespace unflex::verify

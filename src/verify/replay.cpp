@@ -1,0 +1,250 @@
+#include "replay.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "unflex/gcode/command.hpp"
+#include "unflex/gcode/compensable.hpp"
+
+namespace unflex::verify {
+namespace {
+
+constexpr std::string_view kOwnComment = ";unflex";
+constexpr std::string_view kRunComment = ";unflex run";
+
+// Asking the planner for finished moves costs a little; so many moves are queued before.
+constexpr std::size_t kTakeEvery = 32;
+
+// In emitted text a move of a few µm can rise by one rounding step of Z, which makes it steep.
+constexpr double kHeightRounding_mm = 3e-4;
+
+bool has_axis_word(const gcode::Command& command) {
+  return std::any_of(command.words.begin(), command.words.end(), [](const gcode::Word& word) {
+    return std::string_view("XYZE").find(word.letter) != std::string_view::npos;
+  });
+}
+
+bool only_word(const gcode::Command& command, char letter) {
+  return command.words.size() == 1 && command.words.front().letter == letter &&
+         command.words.front().value.has_value();
+}
+
+bool is_motion_command(const gcode::Command& command) {
+  return command.kind == gcode::CommandKind::traditional && command.letter == 'G' &&
+         command.number >= 0 && command.number <= 3 && has_axis_word(command);
+}
+
+// Whether a line without effect on the machine is nevertheless a move, one of no length.
+bool is_empty_move(std::string_view content) {
+  const std::size_t first = content.find_first_not_of(" \t");
+  return first != std::string_view::npos &&
+         std::string_view("GgNn").find(content[first]) != std::string_view::npos &&
+         is_motion_command(gcode::parse(content));
+}
+
+}  // namespace
+
+bool is_known_addition(std::string_view content) {
+  if (content.starts_with(kOwnComment)) {
+    return true;
+  }
+  const gcode::Command command = gcode::parse(content);
+  if (command.kind == gcode::CommandKind::extended) {
+    return command.name == "SET_VELOCITY_LIMIT" || command.name == "SET_INPUT_SHAPER";
+  }
+  if (command.is('G', 92)) {
+    return only_word(command, 'E');
+  }
+  if (command.is('G', 1)) {
+    return only_word(command, 'F');
+  }
+  constexpr std::array<std::pair<char, int>, 6> kModes = {
+      {{'M', 82}, {'M', 83}, {'G', 90}, {'G', 91}, {'G', 20}, {'G', 21}}};
+  return command.words.empty() && std::any_of(kModes.begin(), kModes.end(), [&](const auto& mode) {
+           return command.is(mode.first, mode.second);
+         });
+}
+
+Replay::Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
+               const planner::Limits& limits, const planner::FixedLimits& fixed, bool in_output)
+    : reader_(stream, std::move(name)),
+      interpreter_(interpreter),
+      planner_(limits, fixed),
+      in_output_(in_output) {
+  sections_.push_back(Section{});
+}
+
+bool Replay::has_move() {
+  for (;;) {
+    if (!items_.empty() && items_.front() == Item::section_end) {
+      return false;
+    }
+    if (!items_.empty() && planned_used_ < planned_.size()) {
+      return true;
+    }
+    // The current section is the end of the file: nothing follows.
+    if (at_end_ && items_.empty()) {
+      return false;
+    }
+    read_line();
+  }
+}
+
+bool Replay::next(planner::PlannedMove& move) {
+  if (!has_move()) {
+    return false;
+  }
+  items_.pop_front();
+  move = planned_[planned_used_++];
+  if (planned_used_ == planned_.size()) {
+    planned_.clear();
+    planned_used_ = 0;
+  }
+  return true;
+}
+
+void Replay::next_section() {
+  items_.pop_front();
+  sections_.pop_front();
+}
+
+void Replay::join_over_barrier() {
+  const Section before = section();
+  next_section();
+  next_section();
+  Section& joined = sections_.front();
+  joined.compensated = joined.compensated || before.compensated;
+  if (before.regime.has_value()) {
+    joined.regime = before.regime;
+  }
+}
+
+void Replay::read_line() {
+  gcode::Line line;
+  const Result<bool> more = reader_.next(line);
+  if (!more) {
+    error_ = more.error();
+  }
+  const Regime before{interpreter_.state(), planner_.limits()};
+  if (more && *more) {
+    ++lines_read_;
+    read_event(interpreter_.interpret(std::move(line)), before);
+  } else {
+    planner_.stop();
+    planner_.take(planned_);
+    at_end_ = true;
+    Section end;
+    end.kind = SectionKind::end;
+    end.line.number = lines_read_;
+    end.regime = before;
+    push_section(std::move(end));
+  }
+}
+
+void Replay::read_event(gcode::Event event, const Regime& before) {
+  switch (event.kind) {
+    case gcode::EventKind::passive: {
+      const bool motion = is_empty_move(event.line.content());
+      place(std::move(event.line), before, motion);
+      break;
+    }
+    case gcode::EventKind::limits:
+      planner_.apply(event.limits);
+      place(std::move(event.line), before, false);
+      break;
+    case gcode::EventKind::move:
+      if (stays_in_run(event)) {
+        read_run_moves(std::move(event), before);
+      } else {
+        read_section(SectionKind::move, std::move(event), before);
+      }
+      break;
+    case gcode::EventKind::barrier:
+      planner_.stop();
+      planner_.take(planned_);
+      read_section(SectionKind::barrier, std::move(event), before);
+      break;
+  }
+}
+
+bool Replay::stays_in_run(const gcode::Event& event) const {
+  if (gcode::compensable(event)) {
+    return true;
+  }
+  return sections_.back().compensated &&
+         std::all_of(event.segments.begin(), event.segments.end(), [](const auto& segment) {
+           gcode::Segment level = segment;
+           const double rise = segment.delta(gcode::Z);
+           level.end_mm[gcode::Z] -=
+               std::copysign(std::min(std::abs(rise), kHeightRounding_mm), rise);
+           return gcode::compensable(level);
+         });
+}
+
+void Replay::read_run_moves(gcode::Event event, const Regime& before) {
+  Section& run = sections_.back();
+  if (!run.regime.has_value()) {
+    run.regime = before;
+  }
+  if (!run.compensated) {
+    place(std::move(event.line), before, true);
+  }
+  queue_segments(event.segments);
+}
+
+void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& before) {
+  Section section;
+  section.kind = kind;
+  section.regime = before;
+  section.dwell_s = event.dwell_s;
+  section.moves_xy = std::any_of(event.segments.begin(), event.segments.end(),
+                                 [](const auto& segment) { return segment.length_xy_mm() > 0.0; });
+  section.may_be_added = kind == SectionKind::barrier && is_known_addition(event.line.content());
+  section.line = std::move(event.line);
+
+  // An announcement holds although unflex stops the machine before the first move.
+  const Section& ended = sections_.back();
+  Section run;
+  run.compensated = section.may_be_added && ended.compensated && !ended.regime.has_value();
+
+  push_section(std::move(section));
+  queue_segments(event.segments);
+  push_section(std::move(run));
+}
+
+void Replay::place(gcode::Line line, const Regime& before, bool motion) {
+  if (in_output_ && line.content().starts_with(kRunComment)) {
+    sections_.back().compensated = true;
+  }
+  PlacedLine placed;
+  placed.line = std::move(line);
+  placed.x_mm = before.modal.position_mm[gcode::X];
+  placed.y_mm = before.modal.position_mm[gcode::Y];
+  placed.motion = motion;
+  placed.section = sections_.back().id;
+  lines_.push_back(std::move(placed));
+}
+
+void Replay::queue_segments(const std::vector<gcode::Segment>& segments) {
+  for (const gcode::Segment& segment : segments) {
+    if (planner_.add(segment)) {
+      items_.push_back(Item::move);
+      ++untaken_;
+    }
+  }
+  if (untaken_ >= kTakeEvery) {
+    planner_.take(planned_);
+    untaken_ = 0;
+  }
+}
+
+void Replay::push_section(Section section) {
+  section.id = sections_.back().id + 1;
+  items_.push_back(Item::section_end);
+  sections_.push_back(std::move(section));
+}
+
+}  // namespace unflex::verify

@@ -1,0 +1,117 @@
+// A file as the firmware sees it: planned moves, cut into sections, and the other lines between
+// them with the place where they stand.
+//
+// A run section is a stretch of motion that may be rewritten; sections of the other kinds are
+// single lines that end it. Runs (possibly empty) and other sections alternate, beginning with a
+// run:
+//
+//   run | barrier | run | retraction | run | Z move | run | … | end
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/gcode/line.hpp"
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::verify {
+
+// The mode a line is read in and the limits in force there.
+struct Regime {
+  gcode::ModalState modal;
+  planner::Limits limits;
+};
+
+enum class SectionKind {
+  run,
+  move,     // a move that is kept as it is
+  barrier,  // the machine stops: homing, tool change, macro, pause …
+  end,      // of the file
+};
+
+struct Section {
+  SectionKind kind = SectionKind::run;
+  std::size_t id = 0;
+  // Not for runs: the line, and the regime it is read in (at the end: the final one).
+  gcode::Line line;
+  std::optional<Regime> regime;  // runs: at the first move
+  double dwell_s = 0.0;
+  bool moves_xy = false;
+  // barrier: of a form unflex adds, so that it may be no section at all of the sliced file.
+  bool may_be_added = false;
+  // run: announced as compensated.
+  bool compensated = false;
+};
+
+// A line that is no section, and where the machine is when it comes.
+struct PlacedLine {
+  gcode::Line line;
+  double x_mm = 0.0;
+  double y_mm = 0.0;
+  bool motion = false;  // G0 to G3 with an axis or E
+  std::size_t section = 0;
+};
+
+// Whether unflex adds lines of this form to a file.
+[[nodiscard]] bool is_known_addition(std::string_view content);
+
+class Replay {
+ public:
+  // in_output: runs may be announced as compensated, which is ignored in the sliced file.
+  Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
+         const planner::Limits& limits, const planner::FixedLimits& fixed, bool in_output);
+
+  // The next move of the current section; false at its end.
+  [[nodiscard]] bool next(planner::PlannedMove& move);
+  // Whether next() would give one. Every line before it has then been read.
+  [[nodiscard]] bool has_move();
+
+  // The current section. `compensated` and `regime` of a run are known once has_move() was asked.
+  [[nodiscard]] const Section& section() const { return sections_.front(); }
+  // The section after the current one, all of whose moves must have been taken.
+  [[nodiscard]] const Section& following() const { return sections_[1]; }
+  void next_section();
+  // Makes one run of the current one, the barrier that follows it, and the run after that.
+  void join_over_barrier();
+
+  // Lines read so far, oldest first; the user removes those it has dealt with.
+  [[nodiscard]] std::deque<PlacedLine>& lines() { return lines_; }
+
+  [[nodiscard]] const gcode::LineReader& reader() const { return reader_; }
+  [[nodiscard]] std::size_t lines_read() const { return lines_read_; }
+  // Set when the file could not be read to its end; the sections then stop there.
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+
+ private:
+  enum class Item { move, section_end };
+
+  void read_line();
+  void read_event(gcode::Event event, const Regime& before);
+  void read_run_moves(gcode::Event event, const Regime& before);
+  void read_section(SectionKind kind, gcode::Event event, const Regime& before);
+  void place(gcode::Line line, const Regime& before, bool motion);
+  void queue_segments(const std::vector<gcode::Segment>& segments);
+  void push_section(Section section);
+  [[nodiscard]] bool stays_in_run(const gcode::Event& event) const;
+
+  gcode::LineReader reader_;
+  gcode::Interpreter interpreter_;
+  planner::KlipperPlanner planner_;
+  bool in_output_;
+  bool at_end_ = false;
+  std::optional<Error> error_;
+  std::size_t lines_read_ = 0;
+  std::size_t untaken_ = 0;  // moves queued since the planner was last asked for finished ones
+
+  std::deque<Item> items_;        // what comes next, in the order of the file
+  std::deque<Section> sections_;  // from the current one to the one being read
+  std::vector<planner::PlannedMove> planned_;
+  std::size_t planned_used_ = 0;
+  std::deque<PlacedLine> lines_;
+};
+
+}  // namespace unflex::verify

@@ -1,0 +1,112 @@
+#include "run_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "log_histogram.hpp"
+
+namespace unflex::verify {
+namespace {
+
+// Emitted coordinates have four decimals.
+constexpr double kRounding_mm = 1e-4;
+constexpr double kLimitTolerance = 1e-3;
+
+}  // namespace
+
+void Excursion::add(const gcode::Segment& segment) {
+  const double x = segment.end_mm[gcode::X];
+  const double y = segment.end_mm[gcode::Y];
+  const std::array<double, 4> beyond = {travel_->x_min_mm - x, x - travel_->x_max_mm,
+                                        travel_->y_min_mm - y, y - travel_->y_max_mm};
+  for (std::size_t side = 0; side < sides_.size(); ++side) {
+    if (beyond[side] > sides_[side].beyond_mm) {
+      sides_[side] = {beyond[side], segment.line, x, y};
+    }
+  }
+}
+
+const Excursion::Side* Excursion::worse_than(const Excursion& input) const {
+  for (std::size_t side = 0; side < sides_.size(); ++side) {
+    if (sides_[side].beyond_mm > input.sides_[side].beyond_mm + kRounding_mm) {
+      return &sides_[side];
+    }
+  }
+  return nullptr;
+}
+
+void BaseCheck::Excess::offer(double a_value, double limit, std::size_t a_line) {
+  if (a_value > ratio * limit) {
+    value = a_value;
+    ratio = a_value / limit;
+    line = a_line;
+  }
+}
+
+void BaseCheck::begin_run() {
+  last_velocity_ = {};
+  last_duration_s_ = 0.0;
+  velocity_excess_ = Excess{0.0, 1.0 + kLimitTolerance, 0};
+  accel_excess_ = velocity_excess_;
+}
+
+void BaseCheck::add(const planner::PlannedMove& move) {
+  const double duration = move.duration_s();
+  if (duration <= 0.0) {
+    return;
+  }
+  const gcode::Segment& segment = move.segment;
+  const std::array<double, 2> velocity = {segment.delta(gcode::X) / duration,
+                                          segment.delta(gcode::Y) / duration};
+  for (const double v : velocity) {
+    max_velocity_ = std::max(max_velocity_, std::abs(v));
+    velocity_excess_.offer(std::abs(v) - kRounding_mm / duration, rules_->base_max_velocity_mm_s,
+                           segment.line);
+  }
+  change_of_velocity(velocity, duration, segment.line);
+  last_velocity_ = velocity;
+  last_duration_s_ = duration;
+  last_line_ = segment.line;
+  add_to_histogram(durations_, duration, 1.0);
+}
+
+void BaseCheck::change_of_velocity(const std::array<double, 2>& velocity, double duration_s,
+                                   std::size_t line) {
+  const double between_s = 0.5 * (last_duration_s_ + duration_s);
+  if (between_s <= 0.0) {
+    return;
+  }
+  const auto uncertainty = [](double move_s) { return move_s > 0.0 ? kRounding_mm / move_s : 0.0; };
+  const double uncertain = (uncertainty(last_duration_s_) + uncertainty(duration_s)) / between_s;
+  for (std::size_t axis = 0; axis < velocity.size(); ++axis) {
+    const double accel = std::abs(velocity[axis] - last_velocity_[axis]) / between_s;
+    max_accel_ = std::max(max_accel_, accel);
+    accel_excess_.offer(accel - uncertain, rules_->base_max_accel_mm_s2, line);
+  }
+}
+
+void BaseCheck::end_run() {
+  change_of_velocity({}, 0.0, last_line_);
+  report(velocity_excess_, "velocity", "mm/s", rules_->base_max_velocity_mm_s);
+  report(accel_excess_, "acceleration", "mm/s²", rules_->base_max_accel_mm_s2);
+}
+
+void BaseCheck::report(const Excess& excess, std::string_view what, std::string_view unit,
+                       double limit) {
+  if (excess.line != 0) {
+    violations_->in_output(excess.line, fmt::format("base {} {:.4g} {} is above the limit {:.4g}",
+                                                    what, excess.value, unit, limit));
+  }
+}
+
+double BaseCheck::median_duration_s() const { return histogram_quantile(durations_, 0.5); }
+
+bool refused(const planner::PlannedMove& move, const Rules& rules) {
+  const bool draws = move.segment.length_xy_mm() > 0.0;
+  return draws && move.direction[gcode::E] > rules.max_extrude_ratio &&
+         move.segment.delta(gcode::E) > rules.nozzle_diameter_mm * rules.max_extrude_ratio;
+}
+
+}  // namespace unflex::verify

@@ -1,0 +1,83 @@
+// Checks the motion of the base in the runs against what the machine can do.
+//
+// Notation, for neighbouring moves 1 and 2 of the emitted file, per axis:
+//   Δ, T   travel and duration        v̄ = Δ/T
+//   a = (v̄₂ − v̄₁) / ((T₁ + T₂)/2); before the first and after the last move the base rests: T/2
+//   q      rounding step of coordinates: Δ is uncertain by q, a by q (1/T₁ + 1/T₂) / ((T₁ + T₂)/2)
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+#include <vector>
+
+#include "unflex/verify/verify.hpp"
+#include "violations.hpp"
+
+namespace unflex::verify {
+
+// The furthest a file goes beyond the travel on each side in one section, and where.
+class Excursion {
+ public:
+  explicit Excursion(const TravelLimits& travel) : travel_(&travel) {}
+  void add(const gcode::Segment& segment);
+  void clear() { sides_ = {}; }
+
+  // A line of the emitted file that goes out of the travel, and further than the sliced file does
+  // in this section; nullptr if there is none.
+  struct Side {
+    double beyond_mm = 0.0;
+    std::size_t line = 0;
+    double x_mm = 0.0;
+    double y_mm = 0.0;
+  };
+  [[nodiscard]] const Side* worse_than(const Excursion& input) const;
+
+ private:
+  const TravelLimits* travel_;
+  std::array<Side, 4> sides_{};
+};
+
+// Velocity and acceleration of the base in compensated runs.
+class BaseCheck {
+ public:
+  BaseCheck(const Rules& rules, Violations& violations)
+      : rules_(&rules), violations_(&violations) {}
+
+  void begin_run();
+  void add(const planner::PlannedMove& move);
+  void end_run();
+
+  [[nodiscard]] double max_velocity_mm_s() const { return max_velocity_; }
+  [[nodiscard]] double max_accel_mm_s2() const { return max_accel_; }
+  [[nodiscard]] double median_duration_s() const;
+
+ private:
+  // What is over the limit by most in the current run.
+  struct Excess {
+    double value = 0.0;
+    double ratio = 1.0;
+    std::size_t line = 0;
+    void offer(double a_value, double limit, std::size_t a_line);
+  };
+  void change_of_velocity(const std::array<double, 2>& velocity, double duration_s,
+                          std::size_t line);
+  void report(const Excess& excess, std::string_view what, std::string_view unit, double limit);
+
+  const Rules* rules_;
+  Violations* violations_;
+  std::array<double, 2> last_velocity_{};
+  double last_duration_s_ = 0.0;  // 0: at rest
+  std::size_t last_line_ = 0;
+  Excess velocity_excess_;
+  Excess accel_excess_;
+  double max_velocity_ = 0.0;
+  double max_accel_ = 0.0;
+  std::vector<double> durations_;  // histogram, by number
+};
+
+// Whether the firmware refuses the move because it lays too much filament (Klipper:
+// klippy/kinematics/extruder.py, "Move exceeds maximum extrusion").
+[[nodiscard]] bool refused(const planner::PlannedMove& move, const Rules& rules);
+
+}  // namespace unflex::verify

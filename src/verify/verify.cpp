@@ -1,0 +1,377 @@
+#include "unflex/verify/verify.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "filament_ledger.hpp"
+#include "line_check.hpp"
+#include "meter.hpp"
+#include "move_rate.hpp"
+#include "reference_path.hpp"
+#include "regime_check.hpp"
+#include "replay.hpp"
+#include "run_check.hpp"
+#include "violations.hpp"
+
+namespace unflex::verify {
+namespace {
+
+// One rounding step of filament, and half of one for a remainder carried in.
+constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
+// A line inside a compensated run stands this near to its place: the base leads the nozzle, by up
+// to a/ω² when it accelerates.
+constexpr double kLeastPlaceTolerance_mm = 0.5;
+constexpr std::size_t kMovesPerUpdate = 1024;
+
+double place_tolerance_mm(const Rules& rules) {
+  const double omega = std::min(rules.nozzle.x.omega_rad_s, rules.nozzle.y.omega_rad_s);
+  return std::max(kLeastPlaceTolerance_mm, rules.base_max_accel_mm_s2 / (omega * omega));
+}
+
+// Length of a seekable stream in bytes, otherwise 0.
+double stream_bytes(std::istream& stream) {
+  const std::istream::pos_type here = stream.tellg();
+  if (here == std::istream::pos_type(-1)) {
+    stream.clear();
+    return 0.0;
+  }
+  stream.seekg(0, std::ios::end);
+  const auto length = static_cast<double>(stream.tellg() - here);
+  stream.seekg(here);
+  return length;
+}
+
+Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), meter.all().stats()}; }
+
+// Both files side by side, section by section. `original_` is the nozzle if the sliced file were
+// printed as it is, `emitted_` the nozzle of the emitted file; both are measured against `path_`.
+class Verifier {
+ public:
+  Verifier(std::istream& input, const std::string& input_name, std::istream& output,
+           const std::string& output_name, const Rules& rules, Progress& progress)
+      : rules_(rules),
+        progress_(&progress),
+        output_bytes_(stream_bytes(output)),
+        violations_(input_name, output_name),
+        input_(input, input_name, rules.interpreter, rules.limits, rules.fixed, false),
+        output_(output, output_name, rules.interpreter, rules.limits, rules.fixed, true),
+        lines_(input_, output_, place_tolerance_mm(rules), violations_),
+        path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
+        original_(rules.nozzle, path_),
+        emitted_(rules.nozzle, path_),
+        filament_(path_),
+        base_(rules, violations_),
+        input_excursion_(rules_.travel),
+        output_excursion_(rules_.travel) {}
+
+  Verifier(const Verifier&) = delete;
+  Verifier& operator=(const Verifier&) = delete;
+
+  Result<VerifyReport> verify();
+
+ private:
+  bool next_input_move(planner::PlannedMove& move);
+  void begin_section();
+  void play_run();
+  void skip_added_barriers();
+  void play_run_moves(bool compensated);
+  void play(const planner::PlannedMove& move);
+  void end_section();
+  void let_original_follow(double until_s);
+  void finish_reference();
+  void check_run(bool compensated);
+  bool sections_agree();
+  void check_regime(const Section& input, const Section& output);
+  void play_kept_line();
+  void hold();
+  void report_progress();
+  [[nodiscard]] VerifyReport report();
+
+  Rules rules_;
+  Progress* progress_;
+  double output_bytes_;
+  Violations violations_;
+  Replay input_;
+  Replay output_;
+  LineCheck lines_;
+  ReferencePath path_;
+  Meter original_;
+  Meter emitted_;
+  FilamentLedger filament_;
+  BaseCheck base_;
+  Excursion input_excursion_;
+  Excursion output_excursion_;
+  bool input_refused_ = false;    // a move of the section is refused by the firmware
+  std::size_t refused_line_ = 0;  // the same in the output; 0: none
+  MoveRate rate_;
+  std::size_t section_first_ = 0;  // first piece of the path in this section
+  std::size_t original_next_ = 0;  // the one the original plays next
+  std::size_t moves_ = 0;
+  VerifyReport totals_;
+};
+
+Result<VerifyReport> Verifier::verify() {
+  for (;;) {
+    play_run();
+    if (input_.error() || output_.error()) {
+      return tl::unexpected(input_.error() ? *input_.error() : *output_.error());
+    }
+    if (progress_->cancelled()) {
+      return fail(ErrorKind::internal, "cancelled");
+    }
+    input_.next_section();
+    output_.next_section();
+    if (!sections_agree() || input_.section().kind == SectionKind::end) {
+      break;
+    }
+    play_kept_line();
+    input_.next_section();
+    output_.next_section();
+  }
+  hold();
+  return report();
+}
+
+bool Verifier::next_input_move(planner::PlannedMove& move) {
+  if (!input_.next(move)) {
+    return false;
+  }
+  totals_.reference_time_s += move.duration_s();
+  totals_.input_extrusion_mm += move.segment.delta(gcode::E);
+  input_excursion_.add(move.segment);
+  input_refused_ = input_refused_ || refused(move, rules_);
+  return true;
+}
+
+void Verifier::begin_section() {
+  path_.begin_section();
+  original_.begin_section();
+  emitted_.begin_section();
+  filament_.begin_run();
+  section_first_ = path_.end();
+  original_next_ = path_.end();
+  input_excursion_.clear();
+  output_excursion_.clear();
+  input_refused_ = false;
+  refused_line_ = 0;
+}
+
+void Verifier::play_run() {
+  begin_section();
+  skip_added_barriers();
+  const bool compensated = output_.has_move() && output_.section().compensated;
+  if (!compensated && input_.has_move() && output_.has_move()) {
+    check_regime(input_.section(), output_.section());
+  }
+  base_.begin_run();
+  emitted_.follow_lag(compensated);
+  totals_.runs += compensated ? 1 : 0;
+  play_run_moves(compensated);
+  emitted_.follow_lag(false);
+  if (progress_->cancelled()) {
+    return;
+  }
+  end_section();
+  filament_.end_run();
+  lines_.compare(true);
+  check_run(compensated);
+}
+
+// unflex stops the machine before a run to set it up; the sliced file has no such stop.
+void Verifier::skip_added_barriers() {
+  while (!output_.has_move() && output_.following().may_be_added &&
+         (input_.has_move() || !same_line(input_.following().line, output_.following().line))) {
+    output_.join_over_barrier();
+  }
+}
+
+void Verifier::play_run_moves(bool compensated) {
+  planner::PlannedMove move;
+  for (;;) {
+    if (output_.next(move)) {
+      play(move);
+      if (compensated) {
+        base_.add(move);
+      }
+      if (++moves_ % kMovesPerUpdate == 0) {
+        lines_.compare(false);
+        report_progress();
+        if (progress_->cancelled()) {
+          return;
+        }
+      }
+      continue;
+    }
+    if (!output_.following().may_be_added) {
+      return;
+    }
+    // After a run unflex stops the machine once more.
+    finish_reference();
+    if (same_line(input_.following().line, output_.following().line)) {
+      return;
+    }
+    output_.join_over_barrier();
+  }
+}
+
+void Verifier::play(const planner::PlannedMove& move) {
+  rate_.add(totals_.emitted_time_s);
+  const double start_s = emitted_.time_s();
+  emitted_.play(move);
+  filament_.play(move, start_s);
+  totals_.emitted_time_s += move.duration_s();
+  totals_.output_extrusion_mm += move.segment.delta(gcode::E);
+  output_excursion_.add(move.segment);
+  if (refused_line_ == 0 && refused(move, rules_)) {
+    refused_line_ = move.segment.line;
+  }
+  let_original_follow(emitted_.time_s());
+}
+
+void Verifier::let_original_follow(double until_s) {
+  while (original_next_ < path_.end() && path_[original_next_].end_s <= until_s) {
+    // Playing makes the path grow, which moves its pieces.
+    const planner::PlannedMove move = path_[original_next_++].move;
+    original_.play(move);
+  }
+  path_.discard_before(std::min(original_.time_s(), emitted_.time_s()) - emitted_.reach_s());
+}
+
+void Verifier::end_section() {
+  emitted_.wait_for_reference();
+  finish_reference();
+}
+
+void Verifier::finish_reference() {
+  while (!path_.section_complete()) {
+    path_.extend_to(path_.end_s());
+    let_original_follow(path_.end_s());
+  }
+  let_original_follow(std::numeric_limits<double>::infinity());
+}
+
+void Verifier::check_run(bool compensated) {
+  if (const Excursion::Side* const side = output_excursion_.worse_than(input_excursion_)) {
+    violations_.in_output(
+        side->line, fmt::format("X{:.4f} Y{:.4f} is out of the travel by {:.4f} mm", side->x_mm,
+                                side->y_mm, side->beyond_mm));
+  }
+  if (refused_line_ != 0 && !input_refused_) {
+    violations_.in_output(refused_line_, "the firmware refuses so much filament on so short a way");
+  }
+  const double difference_mm = filament_.output_mm() - filament_.input_mm();
+  if (std::abs(difference_mm) > kFilamentTolerance_mm) {
+    violations_.in_output(
+        output_.following().line.number,
+        fmt::format("the run before lays {:.5f} mm of filament instead of {:.5f} mm",
+                    filament_.output_mm(), filament_.input_mm()));
+  }
+  totals_.worst_move_extrusion_error_mm =
+      std::max({totals_.worst_move_extrusion_error_mm, filament_.worst_move_error_mm(),
+                std::abs(difference_mm)});
+  if (compensated) {
+    base_.end_run();
+    if (path_.end() == section_first_) {
+      violations_.in_output(output_.following().line.number,
+                            "the run before is not in the sliced file");
+    }
+  }
+}
+
+bool Verifier::sections_agree() {
+  const Section& input = input_.section();
+  const Section& output = output_.section();
+  if (input.kind != output.kind || !same_line(input.line, output.line)) {
+    const auto name = [](const Section& section) {
+      return section.kind == SectionKind::end ? std::string("the end of the file")
+                                              : fmt::format("'{}'", section.line.content());
+    };
+    violations_.in_output(
+        output.line.number,
+        fmt::format(
+            "structure differs: {} instead of {} (line {} of the sliced file); not compared "
+            "any further",
+            name(output), name(input), input.line.number));
+    return false;
+  }
+  check_regime(input, output);
+  return true;
+}
+
+void Verifier::check_regime(const Section& input, const Section& output) {
+  const std::size_t line = output.line.number;
+  const Regime& before = *input.regime;
+  const Regime& after = *output.regime;
+  if (const std::string difference = modal_difference(before.modal, after.modal);
+      !difference.empty()) {
+    violations_.in_output(line, fmt::format("state before this line: {}", difference));
+  }
+  // A retraction or a lift between two compensated runs may pass with the limits of those: the
+  // firmware has others for it.
+  const bool limits_matter = input.kind != SectionKind::move || input.moves_xy;
+  if (const std::string difference = limits_difference(before.limits, after.limits);
+      limits_matter && !difference.empty()) {
+    violations_.in_output(line, fmt::format("limits not restored: {}", difference));
+  }
+}
+
+void Verifier::play_kept_line() {
+  begin_section();
+  planner::PlannedMove move;
+  while (output_.next(move)) {
+    play(move);
+  }
+  end_section();
+  const double dwell_s = input_.section().dwell_s;
+  if (dwell_s > 0.0) {
+    path_.rest(dwell_s);
+    original_.hold(dwell_s);
+    emitted_.hold(dwell_s);
+    totals_.reference_time_s += dwell_s;
+    totals_.emitted_time_s += dwell_s;
+  }
+}
+
+// After the end of the file the base is held: what the nozzle still does then counts as well.
+void Verifier::hold() {
+  begin_section();
+  const double hold_s = rules_.nozzle.hold_s;
+  path_.hold(original_.base_x_mm(), original_.base_y_mm(), hold_s);
+  original_.play(resting(original_.base_x_mm(), original_.base_y_mm(), hold_s));
+  emitted_.play(resting(emitted_.base_x_mm(), emitted_.base_y_mm(), hold_s));
+}
+
+void Verifier::report_progress() {
+  const auto read = static_cast<double>(output_.reader().bytes_read());
+  progress_->update("verifying", output_bytes_ > 0.0 ? std::min(1.0, read / output_bytes_) : -1.0);
+}
+
+VerifyReport Verifier::report() {
+  VerifyReport report = totals_;
+  report.uncompensated = deviation(original_);
+  report.compensated = deviation(emitted_);
+  report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
+  report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
+  report.worst_run_drift_s = emitted_.worst_lag_s();
+  report.max_lines_per_s = rate_.max_per_s();
+  report.segment_ms_median = 1e3 * base_.median_duration_s();
+  report.output_lines = output_.lines_read();
+  report.output_bytes = output_.reader().bytes_read();
+  report.violation_count = violations_.count();
+  report.violations = violations_.take();
+  return report;
+}
+
+}  // namespace
+
+Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
+                            std::istream& output, const std::string& output_name,
+                            const Rules& rules, Progress& progress) {
+  return Verifier(input, input_name, output, output_name, rules, progress).verify();
+}
+
+}  // namespace unflex::verify
