@@ -1,15 +1,10 @@
 // The keys are documented in docs/report.md; a test holds the two together.
 
-#include <nlohmann/json.hpp>
-
-#include "unflex/report/report.hpp"
+#include "unflex/report/format.hpp"
 
 namespace unflex::report {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-constexpr int kSchemaVersion = 1;
 constexpr int kIndentation = 2;
 
 // Settings come as TOML literals (numbers, switches, quoted words, pairs), which JSON shares.
@@ -19,14 +14,6 @@ Json literal(const std::string& text) {
   }
   Json value = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   return value.is_discarded() ? Json(text) : value;
-}
-
-Json settings_json(const std::vector<Setting>& settings) {
-  Json object = Json::object();
-  for (const Setting& setting : settings) {
-    object[setting.key] = {{"value", literal(setting.value)}, {"origin", setting.origin}};
-  }
-  return object;
 }
 
 Json row_json(const DeviationRow& row) {
@@ -88,6 +75,19 @@ void add_output(const Report& r, Json& json) {
 
 }  // namespace
 
+Json settings_json(const std::vector<Setting>& settings) {
+  Json object = Json::object();
+  for (const Setting& setting : settings) {
+    object[setting.key] = {{"value", literal(setting.value)}, {"origin", setting.origin}};
+  }
+  return object;
+}
+
+std::string dump(const Json& json) {
+  return json.dump(kIndentation, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace) +
+         "\n";
+}
+
 std::string to_json(const Report& report) {
   Json json;
   json["schema_version"] = kSchemaVersion;
@@ -100,8 +100,7 @@ std::string to_json(const Report& report) {
   add_motion(report, json);
   add_work(report, json);
   add_output(report, json);
-  // File names are bytes, not text; what is not UTF-8 is replaced rather than refused.
-  return json.dump(kIndentation, ' ', false, Json::error_handler_t::replace) + "\n";
+  return dump(json);
 }
 
 }  // namespace unflex::report

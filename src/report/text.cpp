@@ -3,7 +3,7 @@
 #include <iterator>
 #include <string_view>
 
-#include "unflex/report/report.hpp"
+#include "unflex/report/format.hpp"
 
 namespace unflex::report {
 namespace {
@@ -12,18 +12,6 @@ constexpr double kMicrometresPerMm = 1e3;
 constexpr std::size_t kListedFallbacks = 3;
 
 using Sink = std::back_insert_iterator<std::string>;
-
-// 3725.4 → "1h 02m 05s"; below a minute with tenths.
-std::string duration_text(double seconds) {
-  if (!(seconds >= 60.0)) {
-    return fmt::format("{:.1f}s", seconds);
-  }
-  const auto whole = static_cast<long long>(seconds + 0.5);
-  const long long hours = whole / 3600;
-  const long long minutes = whole / 60 % 60;
-  return hours > 0 ? fmt::format("{}h {:02}m {:02}s", hours, minutes, whole % 60)
-                   : fmt::format("{}m {:02}s", minutes, whole % 60);
-}
 
 // Three figures, so that 1234 µm and 0.05 µm fit the same column.
 std::string micrometres(double mm) {
@@ -84,6 +72,17 @@ void write_output(Sink out, const Report& r) {
 }
 
 }  // namespace
+
+std::string duration_text(double seconds) {
+  if (!(seconds >= 60.0)) {
+    return fmt::format("{:.1f}s", seconds);
+  }
+  const auto whole = static_cast<long long>(seconds + 0.5);
+  const long long hours = whole / 3600;
+  const long long minutes = whole / 60 % 60;
+  return hours > 0 ? fmt::format("{}h {:02}m {:02}s", hours, minutes, whole % 60)
+                   : fmt::format("{}m {:02}s", minutes, whole % 60);
+}
 
 std::string to_text(const Report& report) {
   std::string text;

@@ -1,0 +1,51 @@
+// What the user asked for, as plain data.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+
+namespace unflex::app {
+
+enum class Command { compensate, verify, inspect };
+
+// The codes the program exits with, see docs/cli.md.
+enum class ExitCode : int {
+  done = 0,
+  usage = 1,
+  input = 2,
+  deviation = 3,
+  internal = 4,
+};
+
+// The name that stands for stdin or stdout.
+inline constexpr std::string_view kStandardStream = "-";
+
+struct RunConfig {
+  Command command = Command::compensate;
+  std::string input;   // compensate, inspect: IN; verify: the file given to --against
+  std::string output;  // compensate: -o, or the input with --in-place; verify: OUT
+  bool in_place = false;
+  std::optional<std::string> printer_file;
+  std::vector<std::string> overrides;  // "key=value"
+  std::optional<std::string> report;   // a file ending in .json, or "-"
+  std::optional<double> max_deviation_mm;
+  unsigned workers = 1;
+  bool quiet = false;
+};
+
+// The command line understood: either work to do, or a text to print instead (--help, --version).
+struct CommandLine {
+  std::optional<RunConfig> config;
+  std::string text;
+};
+
+// Reads the command line, without the program's name. Errors are of kind usage, one line.
+[[nodiscard]] Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments);
+
+[[nodiscard]] std::string_view version();
+
+}  // namespace unflex::app

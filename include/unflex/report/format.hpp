@@ -1,0 +1,25 @@
+// The parts that every report of the program shares.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "unflex/report/report.hpp"
+
+namespace unflex::report {
+
+using Json = nlohmann::ordered_json;
+
+inline constexpr int kSchemaVersion = 1;
+
+// {"limits.max_accel_mm_s2": {"value": 5000, "origin": "printer.toml:7"}, …}
+[[nodiscard]] Json settings_json(const std::vector<Setting>& settings);
+
+// Two spaces of indentation, final newline. What is not UTF-8 (file names are bytes) is replaced.
+[[nodiscard]] std::string dump(const Json& json);
+
+// 3725.4 → "1h 02m 05s"; below a minute with tenths, "5.3s".
+[[nodiscard]] std::string duration_text(double seconds);
+
+}  // namespace unflex::report

@@ -1,0 +1,199 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <thread>
+
+#include "console.hpp"
+#include "unflex/app/run_config.hpp"
+
+namespace unflex::app {
+namespace {
+
+constexpr unsigned kMaxWorkers = 256;
+
+CLI::Validator positive_mm() {
+  return {[](std::string& text) {
+            double value = 0.0;
+            const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
+            return good && value > 0.0 ? std::string{}
+                                       : fmt::format("'{}' is not a number above 0", text);
+          },
+          ""};
+}
+
+void add_common_options(CLI::App& command, RunConfig& config) {
+  command
+      .add_option("--printer", config.printer_file, "Printer file (TOML), docs/configuration.md")
+      ->type_name("FILE");
+  // One value for each --set: more would swallow the input's name.
+  command.add_option("--set", config.overrides, "Override a key of the printer file; repeatable")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command.add_option("--report", config.report, "Write a report, FILE.json, or - for stdout")
+      ->type_name("FILE");
+  command.add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
+}
+
+void add_max_deviation(CLI::App& command, RunConfig& config) {
+  command
+      .add_option("--max-deviation", config.max_deviation_mm,
+                  "Fail with exit code 3 if extruding moves stray further from the path")
+      ->type_name("MM")
+      ->check(positive_mm());
+}
+
+void add_compensate(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "compensate", "Write G-code whose motion makes the nozzle draw the sliced path");
+  command->add_option("IN", config.input, "Sliced G-code, - for stdin")->type_name("")->required();
+  command->add_option("-o,--output", config.output, "Where to write, - for stdout")
+      ->type_name("OUT");
+  command->add_flag("--in-place", config.in_place, "Replace IN");
+  add_common_options(*command, config);
+  add_max_deviation(*command, config);
+  command->add_option("-j,--jobs", config.workers, "Solver processes, all processors by default")
+      ->type_name("N")
+      ->check(CLI::Range(1U, kMaxWorkers));
+  command->callback([&config] { config.command = Command::compensate; });
+}
+
+void add_verify(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "verify", "Measure how far the nozzle strays when a compensated file is printed");
+  command->add_option("OUT", config.output, "Compensated G-code, - for stdin")
+      ->type_name("")
+      ->required();
+  command->add_option("--against", config.input, "The sliced G-code it was made from")
+      ->type_name("IN")
+      ->required();
+  add_common_options(*command, config);
+  add_max_deviation(*command, config);
+  command->callback([&config] { config.command = Command::verify; });
+}
+
+void add_inspect(CLI::App& program, RunConfig& config) {
+  CLI::App* const command =
+      program.add_subcommand("inspect", "Show what is understood of a G-code file");
+  command->add_option("IN", config.input, "G-code, - for stdin")->type_name("")->required();
+  add_common_options(*command, config);
+  command->callback([&config] { config.command = Command::inspect; });
+}
+
+tl::unexpected<Error> usage(std::string message) {
+  return fail(ErrorKind::usage, std::move(message));
+}
+
+Status check_output(const RunConfig& config) {
+  if (config.in_place && !config.output.empty()) {
+    return usage("give either --in-place or -o, not both");
+  }
+  if (config.in_place && config.input == kStandardStream) {
+    return usage("--in-place needs a file, not stdin; write to stdout with -o -");
+  }
+  if (!config.in_place && config.output.empty()) {
+    return usage("where to write? give -o OUT, -o - for stdout, or --in-place");
+  }
+  return {};
+}
+
+Status check_report(const RunConfig& config) {
+  const std::string& name = *config.report;
+  if (name == kStandardStream) {
+    const bool taken = config.command == Command::compensate && config.output == kStandardStream;
+    return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
+  }
+  if (name.ends_with(".html")) {
+    return usage(fmt::format("--report {}: HTML comes with a later version, use .json", name));
+  }
+  if (!name.ends_with(".json")) {
+    return usage(fmt::format("--report {}: the name must end in .json", name));
+  }
+  return {};
+}
+
+Status complete(RunConfig& config) {
+  if (config.command == Command::compensate) {
+    if (Status checked = check_output(config); !checked) {
+      return checked;
+    }
+    if (config.in_place) {
+      config.output = config.input;
+    }
+  }
+  if (config.command == Command::verify && config.input == kStandardStream &&
+      config.output == kStandardStream) {
+    return usage("only one of OUT and --against can be stdin");
+  }
+  return config.report ? check_report(config) : Status{};
+}
+
+// The library's messages start with a capital and may have several lines.
+std::string parser_message(const CLI::App& program, const CLI::Error& error) {
+  std::string message = one_line(error.what());
+  const auto is_lower = [](char c) { return c >= 'a' && c <= 'z'; };
+  if (message.size() > 1 && (is_lower(message[1]) || message[1] == ' ')) {
+    message.front() = static_cast<char>(std::tolower(static_cast<unsigned char>(message.front())));
+  }
+  const std::vector<const CLI::App*> chosen =
+      program.get_subcommands([](const CLI::App* command) { return command->parsed(); });
+  const std::string help = chosen.empty()
+                               ? "unflex --help"
+                               : fmt::format("unflex {} --help", chosen.front()->get_name());
+  return fmt::format("{}; run '{}'", message, help);
+}
+
+// The library would call an unknown command an unexpected argument, or a missing command.
+Status check_command(const CLI::App& program, const std::vector<std::string>& arguments) {
+  if (arguments.empty() || arguments.front().starts_with("-")) {
+    return {};
+  }
+  std::string known;
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->get_name() == arguments.front()) {
+      return {};
+    }
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", command->get_name());
+  }
+  return usage(
+      fmt::format("unknown command '{}'; there are {}", one_line(arguments.front()), known));
+}
+
+}  // namespace
+
+std::string_view version() { return UNFLEX_VERSION; }
+
+Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments) {
+  RunConfig config;
+  config.workers = std::clamp(std::thread::hardware_concurrency(), 1U, kMaxWorkers);
+  CLI::App program("Takes the flex out of a 3D printer: pre-compensated G-code from sliced G-code",
+                   "unflex");
+  program.set_version_flag("--version", fmt::format("unflex {}", version()));
+  program.require_subcommand(1);
+  add_compensate(program, config);
+  add_verify(program, config);
+  add_inspect(program, config);
+  program.footer(
+      "Exit codes: 0 done, 1 usage or configuration, 2 bad input, 3 deviation above\n"
+      "--max-deviation or a rule broken, 4 internal. More: docs/cli.md");
+  if (Status known = check_command(program, arguments); !known) {
+    return tl::unexpected(known.error());
+  }
+  try {
+    program.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  } catch (const CLI::CallForHelp&) {
+    return CommandLine{std::nullopt, program.help()};
+  } catch (const CLI::CallForVersion& text) {
+    return CommandLine{std::nullopt, fmt::format("{}\n", text.what())};
+  } catch (const CLI::Error& error) {
+    return usage(parser_message(program, error));
+  }
+  if (Status completed = complete(config); !completed) {
+    return tl::unexpected(completed.error());
+  }
+  return CommandLine{std::move(config), {}};
+}
+
+}  // namespace unflex::app

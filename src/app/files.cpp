@@ -1,0 +1,124 @@
+#include "files.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <system_error>
+#include <utility>
+
+#include "signals.hpp"
+
+namespace unflex::app {
+namespace {
+
+constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
+
+// A signal that does not end the program (a resized window) must not end a read either.
+bool try_again() { return errno == EINTR && ending_signal() == 0; }
+
+}  // namespace
+
+FileDescriptor::FileDescriptor(FileDescriptor&& other) noexcept
+    : fd_(std::exchange(other.fd_, -1)) {}
+
+FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  return *this;
+}
+
+FileDescriptor::~FileDescriptor() {
+  if (valid()) {
+    ::close(fd_);
+  }
+}
+
+tl::expected<TemporaryFile, int> TemporaryFile::create(const std::filesystem::path& directory) {
+  std::string name = (directory / ".unflex-XXXXXX").string();
+  const int fd = ::mkostemp(name.data(), O_CLOEXEC);
+  if (fd < 0) {
+    return tl::unexpected(errno);
+  }
+  return TemporaryFile(name, fd, ::getpid());
+}
+
+TemporaryFile::TemporaryFile(std::filesystem::path path, int fd, pid_t owner)
+    : path_(std::move(path)), fd_(fd), owner_(owner) {}
+
+TemporaryFile::TemporaryFile(TemporaryFile&& other) noexcept
+    : path_(std::exchange(other.path_, {})),
+      fd_(std::move(other.fd_)),
+      owner_(std::exchange(other.owner_, 0)) {}
+
+TemporaryFile::~TemporaryFile() {
+  if (owner_ == ::getpid()) {
+    unlink();
+  }
+}
+
+void TemporaryFile::unlink() {
+  if (!path_.empty()) {
+    ::unlink(path_.c_str());
+    path_.clear();
+  }
+}
+
+int write_all(int fd, std::string_view data) {
+  while (!data.empty()) {
+    const ssize_t written = ::write(fd, data.data(), data.size());
+    if (written >= 0) {
+      data.remove_prefix(static_cast<std::size_t>(written));
+    } else if (!try_again()) {
+      return errno;
+    }
+  }
+  return 0;
+}
+
+int copy_all(int from, int to) {
+  std::array<char, kBlockBytes> block;
+  for (;;) {
+    const ssize_t got = ::read(from, block.data(), block.size());
+    if (got == 0) {
+      return 0;
+    }
+    if (got < 0) {
+      if (!try_again()) {
+        return errno;
+      }
+      continue;
+    }
+    const std::string_view data(block.data(), static_cast<std::size_t>(got));
+    if (const int error = write_all(to, data); error != 0) {
+      return error;
+    }
+    if (ending_signal() != 0) {
+      return EINTR;
+    }
+  }
+}
+
+std::filesystem::path temporary_directory() {
+  const char* const chosen = std::getenv("TMPDIR");
+  return chosen != nullptr && *chosen != '\0' ? chosen : "/tmp";
+}
+
+std::string errno_text(int error) { return std::generic_category().message(error); }
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code failed;
+  if (std::filesystem::equivalent(a, b, failed)) {
+    return true;
+  }
+  const std::filesystem::path path_a = std::filesystem::weakly_canonical(a, failed);
+  if (failed) {
+    return false;
+  }
+  const std::filesystem::path path_b = std::filesystem::weakly_canonical(b, failed);
+  return !failed && path_a == path_b;
+}
+
+}  // namespace unflex::app

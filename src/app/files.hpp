@@ -1,0 +1,70 @@
+// Files as the program needs them: descriptors that close themselves, temporary files that remove
+// themselves, and writing that does not stop half way.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "unflex/core/error.hpp"
+
+namespace unflex::app {
+
+class FileDescriptor {
+ public:
+  FileDescriptor() = default;
+  explicit FileDescriptor(int fd) : fd_(fd) {}
+  FileDescriptor(FileDescriptor&& other) noexcept;
+  FileDescriptor& operator=(FileDescriptor&& other) noexcept;
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
+  ~FileDescriptor();
+
+  [[nodiscard]] int get() const { return fd_; }
+  [[nodiscard]] bool valid() const { return fd_ >= 0; }
+
+ private:
+  int fd_ = -1;
+};
+
+// A file with a name of its own in `directory`, removed on destruction unless released. Only the
+// process that made it removes it: copies in forked workers leave it alone.
+class TemporaryFile {
+ public:
+  [[nodiscard]] static tl::expected<TemporaryFile, int> create(
+      const std::filesystem::path& directory);
+  TemporaryFile(TemporaryFile&& other) noexcept;
+  TemporaryFile& operator=(TemporaryFile&& other) = delete;
+  ~TemporaryFile();
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] int fd() const { return fd_.get(); }
+  // Removes the name now; the contents live on behind fd().
+  void unlink();
+  // The name is someone else's from here on.
+  void release() { path_.clear(); }
+
+ private:
+  TemporaryFile(std::filesystem::path path, int fd, pid_t owner);
+
+  std::filesystem::path path_;
+  FileDescriptor fd_;
+  pid_t owner_ = 0;
+};
+
+// Both return 0 or the errno of what went wrong; EINTR only if a signal asked the program to end.
+[[nodiscard]] int write_all(int fd, std::string_view data);
+[[nodiscard]] int copy_all(int from, int to);
+
+// $TMPDIR or /tmp.
+[[nodiscard]] std::filesystem::path temporary_directory();
+
+// "No such file or directory".
+[[nodiscard]] std::string errno_text(int error);
+
+// Whether both names lead to one file, existing or not.
+[[nodiscard]] bool same_file(const std::string& a, const std::string& b);
+
+}  // namespace unflex::app

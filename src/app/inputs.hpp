@@ -1,0 +1,33 @@
+// Input files, and streams made into files.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "files.hpp"
+#include "unflex/core/error.hpp"
+
+namespace unflex::app {
+
+class Input {
+ public:
+  // Checks that the input can be read. A missing file, a directory and the like are errors of
+  // kind input.
+  [[nodiscard]] static Result<Input> open(const std::string& name);
+
+  // Copies what cannot be read twice (stdin, pipes) to a temporary file without a name.
+  [[nodiscard]] Status make_seekable();
+
+  // Where to read it, and what the user calls it.
+  [[nodiscard]] std::filesystem::path path() const;
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+ private:
+  Input(std::string name, FileDescriptor stream) : name_(std::move(name)), fd_(std::move(stream)) {}
+
+  std::string name_;
+  FileDescriptor fd_;
+  bool is_stream_ = false;
+};
+
+}  // namespace unflex::app

@@ -1,0 +1,118 @@
+#include "inspection.hpp"
+
+#include <fmt/format.h>
+
+#include <iterator>
+#include <string_view>
+
+#include "unflex/app/run_config.hpp"
+#include "unflex/report/format.hpp"
+
+namespace unflex::app {
+namespace {
+
+using pipeline::Inspection;
+using report::Json;
+using Sink = std::back_insert_iterator<std::string>;
+
+Json lines_json(const Inspection& i) {
+  return {{"total", i.lines},
+          {"bytes", i.bytes},
+          {"passive", i.passive_lines},
+          {"limits", i.limit_lines},
+          {"barriers", i.barrier_lines}};
+}
+
+Json moves_json(const Inspection& i) {
+  return {{"total", i.moves},
+          {"extruding", i.extruding_moves},
+          {"extrude_only", i.extrude_only_moves},
+          {"arcs", i.arcs},
+          {"path_length_mm", i.path_length_mm},
+          {"lowest_accel_mm_s2", i.lowest_accel_mm_s2},
+          {"highest_accel_mm_s2", i.highest_accel_mm_s2},
+          {"absolute_extrusion", i.absolute_e}};
+}
+
+void write_counts(Sink out, const Inspection& i) {
+  fmt::format_to(out, "dialect       {}\n", i.dialect.empty() ? "unknown" : i.dialect);
+  fmt::format_to(out, "lines         {} ({:.1f} MB), {} of them stop the machine\n", i.lines,
+                 static_cast<double>(i.bytes) * 1e-6, i.barrier_lines);
+  fmt::format_to(out, "moves         {}, {} extruding, {} of filament alone, {} arcs\n", i.moves,
+                 i.extruding_moves, i.extrude_only_moves, i.arcs);
+  fmt::format_to(out, "extent        X {:.3f} to {:.3f}, Y {:.3f} to {:.3f}, Z to {:.3f} mm\n",
+                 i.x_min_mm, i.x_max_mm, i.y_min_mm, i.y_max_mm, i.z_max_mm);
+  fmt::format_to(out, "path          {:.0f} mm, filament {:.2f} mm ({} extrusion)\n",
+                 i.path_length_mm, i.filament_mm, i.absolute_e ? "absolute" : "relative");
+}
+
+void write_time(Sink out, const Inspection& i) {
+  fmt::format_to(out, "print time    {}, {} of it moving\n",
+                 report::duration_text(i.reference_time_s), report::duration_text(i.moving_time_s));
+  fmt::format_to(out, "runs          {} in {} windows, {} can be compensated\n", i.runs, i.windows,
+                 report::duration_text(i.run_time_s));
+  for (const auto& [reason, moves] : i.kept_moves) {
+    fmt::format_to(out, "              {} moves stay as they are: {}\n", moves, reason);
+  }
+}
+
+void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
+  fmt::format_to(out, "accelerations {:.0f} to {:.0f} mm/s² in force during moves\n",
+                 i.lowest_accel_mm_s2, i.highest_accel_mm_s2);
+  fmt::format_to(out, "printer       {}, {} mm/s, {} mm/s², corners {} mm/s\n",
+                 machine::to_string(s.printer.firmware), s.limits.max_velocity_mm_s,
+                 s.limits.max_accel_mm_s2, s.limits.square_corner_velocity_mm_s);
+  fmt::format_to(out, "dynamics      X {:.4g} Hz, ζ {:.3g}; Y {:.4g} Hz, ζ {:.3g}\n",
+                 s.dynamics_x.freq_hz, s.dynamics_x.damping_ratio, s.dynamics_y.freq_hz,
+                 s.dynamics_y.damping_ratio);
+}
+
+}  // namespace
+
+std::string inspection_text(const Inspection& inspection, const std::string& input,
+                            const machine::Settings& settings) {
+  std::string text = input + "\n";
+  const Sink out = std::back_inserter(text);
+  write_counts(out, inspection);
+  write_time(out, inspection);
+  write_limits(out, inspection, settings);
+  return text;
+}
+
+std::string inspection_json(const Inspection& i, const std::string& input,
+                            const machine::Settings& settings) {
+  Json json;
+  json["schema_version"] = report::kSchemaVersion;
+  json["command"] = "inspect";
+  json["version"] = version();
+  json["input"] = input;
+  json["firmware"] = machine::to_string(settings.printer.firmware);
+  json["printer"] = report::settings_json(settings_in_force(settings));
+  json["dialect"] = i.dialect;
+  json["print_time_s"] = {
+      {"reference", i.reference_time_s}, {"moving", i.moving_time_s}, {"runs", i.run_time_s}};
+  json["lines"] = lines_json(i);
+  json["commands"] = Json(i.commands);
+  json["moves"] = moves_json(i);
+  json["runs"] = {{"total", i.runs}};
+  json["windows"] = {{"total", i.windows}};
+  json["kept_moves"] = Json(i.kept_moves);
+  json["extrusion"] = {{"input_mm", i.filament_mm}};
+  json["extent_mm"] = {{"x_min", i.x_min_mm},
+                       {"x_max", i.x_max_mm},
+                       {"y_min", i.y_min_mm},
+                       {"y_max", i.y_max_mm},
+                       {"z_max", i.z_max_mm}};
+  json["warnings"] = i.warnings;
+  return report::dump(json);
+}
+
+std::vector<report::Setting> settings_in_force(const machine::Settings& settings) {
+  std::vector<report::Setting> list;
+  for (machine::SettingRow& row : machine::rows(settings)) {
+    list.push_back({std::move(row.key), std::move(row.value), std::move(row.origin)});
+  }
+  return list;
+}
+
+}  // namespace unflex::app

@@ -1,0 +1,24 @@
+// What `unflex inspect` tells, for people and for programs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "unflex/machine/machine.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::app {
+
+[[nodiscard]] std::string inspection_text(const pipeline::Inspection& inspection,
+                                          const std::string& input,
+                                          const machine::Settings& settings);
+
+// The keys are those of docs/report.md.
+[[nodiscard]] std::string inspection_json(const pipeline::Inspection& inspection,
+                                          const std::string& input,
+                                          const machine::Settings& settings);
+
+[[nodiscard]] std::vector<report::Setting> settings_in_force(const machine::Settings& settings);
+
+}  // namespace unflex::app

@@ -1,0 +1,77 @@
+#include "progress.hpp"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "files.hpp"
+#include "signals.hpp"
+
+namespace unflex::app {
+namespace {
+
+constexpr std::chrono::milliseconds kRedrawInterval{100};
+constexpr std::size_t kDefaultColumns = 80;
+constexpr std::size_t kMostColumns = 100;
+constexpr std::size_t kLeastBar = 8;
+constexpr std::string_view kClearLine = "\r\033[K";
+
+std::size_t columns_of(int fd) {
+  winsize size{};
+  const bool known = ::ioctl(fd, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : kDefaultColumns;
+}
+
+}  // namespace
+
+bool SignalledProgress::cancelled() const { return ending_signal() != 0; }
+
+ProgressBar::~ProgressBar() {
+  if (drawn_) {
+    static_cast<void>(write_all(fd_, kClearLine));
+  }
+}
+
+void ProgressBar::update(std::string_view stage, double fraction) {
+  const auto now = clock_();
+  if (drawn_ && now - last_drawn_ < kRedrawInterval) {
+    return;
+  }
+  last_drawn_ = now;
+  drawn_ = true;
+  static_cast<void>(
+      write_all(fd_, fmt::format("{}{}", kClearLine, bar_text(stage, fraction, columns_of(fd_)))));
+}
+
+std::string bar_text(std::string_view stage, double fraction, std::size_t columns) {
+  // The last column stays free: a cursor beyond it would wrap.
+  const std::size_t room = std::min(columns, kMostColumns) - std::min<std::size_t>(columns, 1);
+  if (!(fraction >= 0.0)) {
+    return std::string(stage.substr(0, room));
+  }
+  const double part = std::min(fraction, 1.0);
+  const std::string percent = fmt::format(" {:3.0f} %", std::floor(100.0 * part));
+  const std::size_t taken = stage.size() + percent.size() + 3;
+  if (room < taken + kLeastBar) {
+    return fmt::format("{}{}", stage, percent).substr(0, room);
+  }
+  const std::size_t length = room - taken;
+  const auto filled = static_cast<std::size_t>(part * static_cast<double>(length));
+  return fmt::format("{} [{}{}]{}", stage, std::string(filled, '#'),
+                     std::string(length - filled, '-'), percent);
+}
+
+std::unique_ptr<Progress> make_progress(bool quiet) {
+  const char* const terminal = std::getenv("TERM");
+  const bool dumb = terminal != nullptr && std::string_view(terminal) == "dumb";
+  if (!quiet && !dumb && ::isatty(STDERR_FILENO) == 1) {
+    return std::make_unique<ProgressBar>(STDERR_FILENO);
+  }
+  return std::make_unique<SignalledProgress>();
+}
+
+}  // namespace unflex::app

@@ -1,0 +1,316 @@
+#include "unflex/app/run.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <exception>
+#include <optional>
+
+#include "console.hpp"
+#include "inputs.hpp"
+#include "inspection.hpp"
+#include "outputs.hpp"
+#include "progress.hpp"
+#include "signals.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/machine/recommend.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::app {
+namespace {
+
+constexpr int kSignalExitBase = 128;
+
+ExitCode exit_code(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::usage:
+      return ExitCode::usage;
+    case ErrorKind::input:
+      return ExitCode::input;
+    case ErrorKind::internal:
+      return ExitCode::internal;
+  }
+  return ExitCode::internal;
+}
+
+tl::unexpected<Error> interrupted() {
+  return fail(ErrorKind::internal, "interrupted, nothing was written");
+}
+
+// Two names for one file would have the result destroy what it was made from.
+Status check_distinct(const RunConfig& config) {
+  const std::string& report = config.report.value_or(std::string(kStandardStream));
+  const auto clash = [](const std::string& a, const std::string& b) {
+    return a != kStandardStream && b != kStandardStream && same_file(a, b);
+  };
+  if (config.command == Command::compensate && !config.in_place &&
+      clash(config.output, config.input)) {
+    return fail(ErrorKind::usage, {config.output, 0},
+                "is the input too; to replace it give --in-place");
+  }
+  for (const std::string& other :
+       {config.input, config.output, config.printer_file.value_or(std::string(kStandardStream))}) {
+    if (!other.empty() && clash(report, other)) {
+      return fail(ErrorKind::usage, {report, 0},
+                  "is read or written already; give the report a name of its own");
+    }
+  }
+  return {};
+}
+
+// Everything a command works with, opened and checked before the long work begins.
+struct Workspace {
+  machine::Settings settings;
+  Input input;
+  std::optional<Input> compensated;  // verify
+  std::optional<Output> output;      // compensate
+  std::optional<Output> report;
+};
+
+Status open_outputs(const RunConfig& config, Workspace& space) {
+  if (config.command == Command::compensate) {
+    Result<Output> output = Output::open(config.output);
+    if (!output) {
+      return tl::unexpected(output.error());
+    }
+    space.output.emplace(std::move(*output));
+  }
+  if (config.report) {
+    Result<Output> report = Output::open(*config.report);
+    if (!report) {
+      return tl::unexpected(report.error());
+    }
+    space.report.emplace(std::move(*report));
+  }
+  return {};
+}
+
+Status spool(Workspace& space) {
+  if (Status copied = space.input.make_seekable(); !copied) {
+    return copied;
+  }
+  return space.compensated ? space.compensated->make_seekable() : Status{};
+}
+
+Result<Workspace> prepare(const RunConfig& config) {
+  Result<machine::Settings> settings = machine::load(config.printer_file, config.overrides);
+  if (!settings) {
+    return tl::unexpected(settings.error());
+  }
+  Result<Input> input = Input::open(config.input);
+  if (!input) {
+    return tl::unexpected(input.error());
+  }
+  Workspace space{std::move(*settings), std::move(*input), {}, {}, {}};
+  if (config.command == Command::verify) {
+    Result<Input> compensated = Input::open(config.output);
+    if (!compensated) {
+      return tl::unexpected(compensated.error());
+    }
+    space.compensated.emplace(std::move(*compensated));
+  }
+  const Status ready =
+      check_distinct(config).and_then([&] { return open_outputs(config, space); }).and_then([&] {
+        return spool(space);
+      });
+  if (!ready) {
+    return tl::unexpected(ready.error());
+  }
+  return space;
+}
+
+pipeline::Job job_of(const RunConfig& config, const Workspace& space) {
+  pipeline::Job job;
+  job.input = space.input.path();
+  job.input_name = space.input.name();
+  job.output_name = config.output;
+  if (space.output) {
+    job.output = space.output->path();
+  } else if (space.compensated) {
+    job.output = space.compensated->path();
+  }
+  job.settings = space.settings;
+  job.workers = config.workers;
+  return job;
+}
+
+// Runs one of the pipeline's commands with a progress bar that is gone when it returns.
+template <class Work>
+auto with_progress(const RunConfig& config, Work work)
+    -> decltype(work(std::declval<Progress&>())) {
+  const std::unique_ptr<Progress> progress = make_progress(config.quiet);
+  auto result = work(*progress);
+  if (ending_signal() != 0) {
+    return interrupted();
+  }
+  return result;
+}
+
+// Remarks about the settings come before those about the print.
+void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings) {
+  std::vector<std::string> remarks;
+  for (const std::string& remark : machine::recommendations(settings)) {
+    remarks.push_back(fmt::format("unflex: warning: {}", remark));
+  }
+  warnings.insert(warnings.begin(), remarks.begin(), remarks.end());
+}
+
+void print_warnings(const std::vector<std::string>& warnings) {
+  print_lines(warnings, warnings.size(), "warnings");
+}
+
+// The summary goes to stdout, unless a result is there; then to stderr if someone is looking.
+Status print_summary(const RunConfig& config, std::string_view text) {
+  if (config.quiet) {
+    return {};
+  }
+  const bool stdout_taken =
+      config.report == kStandardStream ||
+      (config.command == Command::compensate && config.output == kStandardStream);
+  if (stdout_taken) {
+    if (::isatty(STDERR_FILENO) == 1) {
+      static_cast<void>(write_all(STDERR_FILENO, text));
+    }
+    return {};
+  }
+  const int error = write_all(STDOUT_FILENO, text);
+  return error == 0 ? Status{}
+                    : Status(fail(ErrorKind::internal, {"stdout", 0},
+                                  fmt::format("cannot write: {}", errno_text(error))));
+}
+
+Status write_report(Workspace& space, std::string_view text) {
+  if (!space.report) {
+    return {};
+  }
+  if (Status written = space.report->write(text); !written) {
+    return written;
+  }
+  return space.report->commit();
+}
+
+// What the results say about success: broken rules before deviation.
+ExitCode judge(const RunConfig& config, const report::Report& report) {
+  print_lines(report.violations, report.violation_count, "violations");
+  if (report.violation_count > 0 && config.command == Command::compensate) {
+    print_line("unflex: the result breaks rules, which is a fault of unflex; nothing was written");
+    return ExitCode::internal;
+  }
+  if (report.violation_count > 0) {
+    return ExitCode::deviation;
+  }
+  const double deviation_mm = report.compensated.extruding.contour_max_mm;
+  if (config.max_deviation_mm && !(deviation_mm <= *config.max_deviation_mm)) {
+    print_line(
+        fmt::format("{}: extruding moves stray up to {:.4g} mm, more than --max-deviation {}{}",
+                    config.output, deviation_mm, *config.max_deviation_mm,
+                    config.command == Command::compensate ? "; nothing was written" : ""));
+    return ExitCode::deviation;
+  }
+  return ExitCode::done;
+}
+
+// An output that failed is not handed on, but what is known about it is.
+Status deliver(const RunConfig& config, Workspace& space, ExitCode verdict,
+               const report::Report& report) {
+  if (space.output && verdict == ExitCode::done) {
+    if (Status committed = space.output->commit(); !committed) {
+      return committed;
+    }
+  }
+  return write_report(space, report::to_json(report)).and_then([&] {
+    return print_summary(config, report::to_text(report));
+  });
+}
+
+Result<ExitCode> run_on_prints(const RunConfig& config) {
+  Result<Workspace> space = prepare(config);
+  if (!space) {
+    return tl::unexpected(space.error());
+  }
+  const pipeline::Job job = job_of(config, *space);
+  Result<report::Report> report = with_progress(config, [&](Progress& progress) {
+    return config.command == Command::compensate ? pipeline::compensate(job, progress)
+                                                 : pipeline::verify(job, progress);
+  });
+  if (!report) {
+    return tl::unexpected(report.error());
+  }
+  report->command = config.command == Command::compensate ? "compensate" : "verify";
+  report->version = version();
+  report->printer = settings_in_force(space->settings);
+  add_setting_warnings(space->settings, report->warnings);
+  print_warnings(report->warnings);
+  const ExitCode verdict = judge(config, *report);
+  return deliver(config, *space, verdict, *report).map([&] { return verdict; });
+}
+
+Result<ExitCode> run_inspect(const RunConfig& config) {
+  Result<Workspace> space = prepare(config);
+  if (!space) {
+    return tl::unexpected(space.error());
+  }
+  const pipeline::Job job = job_of(config, *space);
+  Result<pipeline::Inspection> inspection =
+      with_progress(config, [&](Progress& progress) { return pipeline::inspect(job, progress); });
+  if (!inspection) {
+    return tl::unexpected(inspection.error());
+  }
+  add_setting_warnings(space->settings, inspection->warnings);
+  print_warnings(inspection->warnings);
+  const std::string json = inspection_json(*inspection, config.input, space->settings);
+  const std::string text = inspection_text(*inspection, config.input, space->settings);
+  return write_report(*space, json).and_then([&] { return print_summary(config, text); }).map([] {
+    return ExitCode::done;
+  });
+}
+
+// A descriptor 0, 1 or 2 that was closed would be given to the next file opened, and messages
+// would land in it. /dev/null is opened the wrong way round, so that using it is still an error.
+void reserve_standard_descriptors() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) < 0) {
+      static_cast<void>(::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY));
+    }
+  }
+}
+
+}  // namespace
+
+int run(const RunConfig& config) {
+  catch_signals();
+  const Result<ExitCode> result =
+      config.command == Command::inspect ? run_inspect(config) : run_on_prints(config);
+  if (!result) {
+    const bool ended = ending_signal() != 0;
+    print_error(ended ? interrupted().value() : result.error());
+    return ended ? kSignalExitBase + ending_signal()
+                 : static_cast<int>(exit_code(result.error().kind));
+  }
+  return static_cast<int>(*result);
+}
+
+int run_program(const std::vector<std::string>& arguments) {
+  reserve_standard_descriptors();
+  try {
+    const Result<CommandLine> command_line = parse_command_line(arguments);
+    if (!command_line) {
+      print_error(command_line.error());
+      return static_cast<int>(exit_code(command_line.error().kind));
+    }
+    if (command_line->config) {
+      return run(*command_line->config);
+    }
+    const int error = write_all(STDOUT_FILENO, command_line->text);
+    return static_cast<int>(error == 0 ? ExitCode::done : ExitCode::internal);
+  } catch (const std::exception& failure) {
+    // Out of memory, mostly; the temporary files are gone with the stack.
+    print_line(fmt::format("unflex: internal error: {}", failure.what()));
+    return static_cast<int>(ExitCode::internal);
+  }
+}
+
+}  // namespace unflex::app

@@ -1,0 +1,243 @@
+// Mistakes are named with their place and a remedy.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "unflex/machine/machine.hpp"
+
+namespace unflex::machine {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Mistake {
+  std::string name;
+  std::string text;
+  std::vector<std::string> overrides;
+  std::string message;  // the whole of it
+};
+
+void PrintTo(const Mistake& mistake, std::ostream* out) { *out << mistake.name; }
+
+class Mistakes : public ::testing::TestWithParam<Mistake> {};
+
+TEST_P(Mistakes, AreUsageErrorsWithTheirPlace) {
+  const Mistake& mistake = GetParam();
+  const Result<Settings> settings = parse(mistake.text, "printer.toml", mistake.overrides);
+  ASSERT_FALSE(settings);
+  EXPECT_EQ(settings.error().kind, ErrorKind::usage);
+  EXPECT_EQ(to_string(settings.error()), mistake.message);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    InTheFile, Mistakes,
+    ::testing::Values(
+        Mistake{"UnknownKey",
+                "schema_version = 1\n\n[limits]\nmax_acel_mm_s2 = 1\n",
+                {},
+                "printer.toml:4: unknown key 'limits.max_acel_mm_s2', did you mean "
+                "'limits.max_accel_mm_s2'?"},
+        Mistake{"KeyWithoutUnit",
+                "[limits]\nmax_accel = 1\n",
+                {},
+                "printer.toml:2: unknown key 'limits.max_accel', did you mean "
+                "'limits.max_accel_mm_s2'?"},
+        Mistake{"KeyInWrongSection",
+                "[base]\nperiod_ms = 1\n",
+                {},
+                "printer.toml:2: unknown key 'base.period_ms', did you mean 'emit.period_ms'?"},
+        Mistake{"KeyLikeNoOther",
+                "[base]\nxyzzy = 1\n",
+                {},
+                "printer.toml:2: unknown key 'base.xyzzy'"},
+        Mistake{"UnknownSection",
+                "\n[limit]\nmax_accel_mm_s2 = 1\n",
+                {},
+                "printer.toml:2: unknown section 'limit', did you mean 'limits'?"},
+        Mistake{"EmptyUnknownSection",
+                "[dynamics.z]\n",
+                {},
+                "printer.toml:1: unknown section 'dynamics.z', did you mean 'dynamics.x'?"},
+        Mistake{
+            "SectionAsKey", "limits = 5\n", {}, "printer.toml:1: 'limits' is a section, not a key"},
+        Mistake{"TopmostMistakeFirst",
+                "[verify]\nbad = 1\n[emit]\nworse = 1\n",
+                {},
+                "printer.toml:2: unknown key 'verify.bad'"},
+        Mistake{"TextForNumber",
+                "[emit]\nperiod_ms = \"1\"\n",
+                {},
+                "printer.toml:2: emit.period_ms must be a number, not the text \"1\""},
+        Mistake{"NumberForSwitch",
+                "[printer]\nfirmware_retraction = 1\n",
+                {},
+                "printer.toml:2: printer.firmware_retraction must be true or false, not a number"},
+        Mistake{"NotANumber",
+                "[emit]\nperiod_ms = nan\n",
+                {},
+                "printer.toml:2: emit.period_ms must be a finite number"},
+        Mistake{"Infinity",
+                "[limits]\nmax_accel_mm_s2 = inf\n",
+                {},
+                "printer.toml:2: limits.max_accel_mm_s2 must be a finite number"},
+        Mistake{"OutOfRange",
+                "[limits]\nminimum_cruise_ratio = 1\n",
+                {},
+                "printer.toml:2: limits.minimum_cruise_ratio is 1, but must be ≥ 0, < 1"},
+        Mistake{"Negative",
+                "[limits]\nmax_velocity_mm_s = -300\n",
+                {},
+                "printer.toml:2: limits.max_velocity_mm_s is -300, but must be > 0"},
+        Mistake{"ReversedTravel",
+                "[printer]\ntravel_x_mm = [250, 0]\n",
+                {},
+                "printer.toml:2: printer.travel_x_mm is [250, 0], but the first number must be "
+                "the smaller"},
+        Mistake{"TravelOfThree",
+                "[printer]\ntravel_x_mm = [0, 1, 2]\n",
+                {},
+                "printer.toml:2: printer.travel_x_mm must be two numbers, as in [0, 250]"},
+        Mistake{"UnknownFirmware",
+                "[printer]\nfirmware = \"kliper\"\n",
+                {},
+                "printer.toml:2: printer.firmware must be one of \"klipper\", \"marlin\", "
+                "\"rrf\", not the text \"kliper\""},
+        Mistake{"FirmwareOfALaterVersion",
+                "[printer]\nfirmware = \"marlin\"\n",
+                {},
+                "printer.toml:2: firmware \"marlin\" is not supported by this version, only "
+                "\"klipper\" is"},
+        Mistake{"SchemaOfALaterVersion",
+                "schema_version = 2\n",
+                {},
+                "printer.toml:1: schema_version must be 1, the only one this version of unflex "
+                "reads"}),
+    [](const auto& mistake) { return mistake.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    InOverrides, Mistakes,
+    ::testing::Values(
+        Mistake{"UnknownKey",
+                "",
+                {"emit.perod_ms=1"},
+                "--set emit.perod_ms=1: unknown key 'emit.perod_ms', did you mean "
+                "'emit.period_ms'?"},
+        Mistake{"KeyWithoutSection",
+                "",
+                {"period_ms=1"},
+                "--set period_ms=1: unknown key 'period_ms', did you mean 'emit.period_ms'?"},
+        Mistake{"NoEquals",
+                "",
+                {"emit.period_ms"},
+                "--set emit.period_ms: must have the form key=value"},
+        Mistake{"NoKey", "", {"=3"}, "--set =3: must have the form key=value"},
+        Mistake{"NoValue",
+                "",
+                {"emit.period_ms="},
+                "--set emit.period_ms=: emit.period_ms needs a value"},
+        Mistake{"BareWord",
+                "",
+                {"emit.period_ms=fast"},
+                "--set emit.period_ms=fast: emit.period_ms must be a number, not the text "
+                "\"fast\""},
+        Mistake{"Table",
+                "",
+                {"emit.period_ms={a=1}"},
+                "--set emit.period_ms={a=1}: emit.period_ms must be a number, not a table"}),
+    [](const auto& mistake) { return mistake.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    BetweenKeys, Mistakes,
+    ::testing::Values(
+        Mistake{"BothFormsOfDynamics",
+                "[dynamics.x]\nfreq_hz = 40\nmass_g = 1\nstiffness_n_mm = 1\ndamping_n_s_mm = 0\n",
+                {},
+                "printer.toml:2: dynamics.x.freq_hz cannot stand beside mass_g, stiffness_n_mm "
+                "and damping_n_s_mm; give one form only"},
+        Mistake{"HalfAForm",
+                "[dynamics.y]\nmass_g = 500\ndamping_n_s_mm = 0\n",
+                {},
+                "printer.toml:3: dynamics.y.stiffness_n_mm is missing: mass_g, stiffness_n_mm and "
+                "damping_n_s_mm go together"},
+        Mistake{"MassInKilograms",
+                "[dynamics.x]\nmass_g = 0.0005\nstiffness_n_mm = 40\ndamping_n_s_mm = 0.01\n",
+                {},
+                "printer.toml:2: mass, stiffness and damping give dynamics.x.freq_hz = 4.502e+04, "
+                "which is out of range; check their units"},
+        Mistake{"PeriodTooLong",
+                "[emit]\nperiod_ms = 5\n",
+                {},
+                "printer.toml:2: emit.period_ms is 5, too long for a resonance at 45 Hz; at most "
+                "2.22, better 1.11"},
+        Mistake{"BaseWeakerThanThePlan",
+                "[base]\nmax_accel_mm_s2 = 4000\n",
+                {},
+                "printer.toml:2: base.max_accel_mm_s2 is 4000, but must be at least "
+                "limits.max_accel_mm_s2, 5000; 2 to 10 times that is usual"},
+        Mistake{"BaseSlowerThanThePlan",
+                "[base]\nmax_velocity_mm_s = 100\n",
+                {},
+                "printer.toml:2: base.max_velocity_mm_s is 100, but must be at least "
+                "limits.max_velocity_mm_s, 300"},
+        Mistake{"EmittedAccelerationTooLow",
+                "[limits]\nmax_accel_mm_s2 = 60000\n",
+                {},
+                "printer.toml:2: emit.accel_mm_s2 is 1000000, but must be at least 1200000 (5 × "
+                "base.max_accel_mm_s2); raise it or lower base.max_accel_mm_s2"},
+        Mistake{"FastZ",
+                "[limits]\nmax_z_velocity_mm_s = 400\n",
+                {},
+                "printer.toml:2: limits.max_z_velocity_mm_s must not exceed "
+                "limits.max_velocity_mm_s"},
+        Mistake{"FilamentThinnerThanNozzle",
+                "[extruder]\nfilament_diameter_mm = 0.3\n",
+                {},
+                "printer.toml:2: extruder.filament_diameter_mm must not be below "
+                "nozzle_diameter_mm"}),
+    [](const auto& mistake) { return mistake.param.name; });
+
+TEST(Periods, UpToATenthOfTheResonanceAreAllowed) {
+  EXPECT_TRUE(parse("", "", {"emit.period_ms=2.22"}));
+  EXPECT_FALSE(parse("", "", {"emit.period_ms=2.23"}));
+}
+
+TEST(Overrides, CanMendWhatTheFileGotWrong) {
+  EXPECT_TRUE(parse("[printer]\nfirmware = \"marlin\"\n", "", {"printer.firmware=klipper"}));
+}
+
+TEST(TomlErrors, NameTheLine) {
+  const Result<Settings> settings = parse("[limits]\nmax_accel_mm_s2 = = 3\n", "p.toml", {});
+  ASSERT_FALSE(settings);
+  EXPECT_THAT(to_string(settings.error()), ::testing::StartsWith("p.toml:2: not valid TOML: "));
+}
+
+TEST(TomlErrors, IncludeDuplicateKeys) {
+  const Result<Settings> settings = parse("[emit]\nperiod_ms = 1\nperiod_ms = 2\n", "p.toml", {});
+  ASSERT_FALSE(settings);
+  EXPECT_EQ(settings.error().place.line, 3U);
+}
+
+TEST(MissingFile, IsAUsageError) {
+  const Result<Settings> settings = load("/nonexistent/printer.toml", {});
+  ASSERT_FALSE(settings);
+  EXPECT_EQ(settings.error().kind, ErrorKind::usage);
+  EXPECT_THAT(to_string(settings.error()),
+              HasSubstr("/nonexistent/printer.toml: cannot read the printer file"));
+}
+
+TEST(DirectoryAsFile, IsAUsageError) {
+  const Result<Settings> settings = load(::testing::TempDir(), {});
+  ASSERT_FALSE(settings);
+  EXPECT_THAT(to_string(settings.error()), HasSubstr("is a directory"));
+}
+
+TEST(EndlessFile, IsAUsageError) {
+  const Result<Settings> settings = load("/dev/zero", {});
+  ASSERT_FALSE(settings);
+  EXPECT_THAT(to_string(settings.error()), HasSubstr("too large"));
+}
+
+}  // namespace
+}  // namespace unflex::machine

@@ -1,0 +1,226 @@
+// What a printer file says arrives, and what it does not say follows from the rest.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "unflex/machine/machine.hpp"
+#include "unflex/machine/recommend.hpp"
+
+namespace unflex::machine {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+Settings read(std::string_view text, const std::vector<std::string>& overrides = {}) {
+  Result<Settings> settings = parse(text, "printer.toml", overrides);
+  EXPECT_TRUE(settings) << to_string(settings.error());
+  return settings.value_or(Settings{});
+}
+
+std::string origin(const Settings& settings, std::string_view key) {
+  for (const auto& [name, from] : settings.origins) {
+    if (name == key) {
+      return from;
+    }
+  }
+  return "no such key";
+}
+
+TEST(Settings, WithoutAFileAreTheDefaults) {
+  const Result<Settings> settings = load(std::nullopt, {});
+  ASSERT_TRUE(settings);
+  EXPECT_EQ(settings->printer.firmware, Firmware::klipper);
+  EXPECT_FALSE(settings->printer.travel_x_mm);
+  EXPECT_DOUBLE_EQ(settings->limits.max_velocity_mm_s, 300.0);
+  EXPECT_DOUBLE_EQ(settings->dynamics_y.freq_hz, 45.0);
+  EXPECT_EQ(origin(*settings, "limits.max_velocity_mm_s"), "default");
+}
+
+TEST(Settings, OfEverySectionAreRead) {
+  const Settings s = read(R"(
+schema_version = 1
+[printer]
+firmware = "klipper"
+travel_x_mm = [-5, 250.5]
+travel_y_mm = [0.0, 210]
+firmware_retraction = false
+[limits]
+max_accel_mm_s2 = 3000
+[extruder]
+nozzle_diameter_mm = 0.6
+[dynamics.x]
+freq_hz = 52.5
+damping_ratio = 0.1
+[dynamics]
+y.freq_hz = 40
+[base]
+max_jerk_mm_s3 = 1e8
+[solve]
+tail_ms = 5
+[emit]
+period_ms = 0.5
+[verify]
+step_ms = 0.05
+)");
+  ASSERT_TRUE(s.printer.travel_x_mm && s.printer.travel_y_mm);
+  EXPECT_DOUBLE_EQ(s.printer.travel_x_mm->min, -5.0);
+  EXPECT_DOUBLE_EQ(s.printer.travel_x_mm->max, 250.5);
+  EXPECT_DOUBLE_EQ(s.printer.travel_y_mm->max, 210.0);
+  EXPECT_FALSE(s.printer.firmware_retraction);
+  EXPECT_DOUBLE_EQ(s.limits.max_accel_mm_s2, 3000.0);
+  EXPECT_DOUBLE_EQ(s.extruder.nozzle_diameter_mm, 0.6);
+  EXPECT_DOUBLE_EQ(s.dynamics_x.freq_hz, 52.5);
+  EXPECT_DOUBLE_EQ(s.dynamics_x.damping_ratio, 0.1);
+  EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 40.0);
+  EXPECT_DOUBLE_EQ(s.dynamics_y.damping_ratio, 0.06);
+  EXPECT_DOUBLE_EQ(s.base.max_jerk_mm_s3, 1e8);
+  EXPECT_DOUBLE_EQ(s.tail_s(), 0.005);
+  EXPECT_DOUBLE_EQ(s.emit.period_ms, 0.5);
+  EXPECT_DOUBLE_EQ(s.verify.step_ms, 0.05);
+}
+
+TEST(Settings, RememberWhereTheyCameFrom) {
+  const Settings s = read("[limits]\n\nmax_accel_mm_s2 = 3000\nmax_velocity_mm_s = 200\n",
+                          {"limits.max_velocity_mm_s=250"});
+  EXPECT_EQ(origin(s, "limits.max_accel_mm_s2"), "printer.toml:3");
+  EXPECT_EQ(origin(s, "limits.max_velocity_mm_s"), "--set");
+  EXPECT_EQ(origin(s, "emit.period_ms"), "default");
+}
+
+TEST(Overrides, WinOverTheFileAndOverEarlierOnes) {
+  const Settings s =
+      read("[emit]\nperiod_ms = 1\n", {"emit.period_ms=0.25", "emit.period_ms = .5"});
+  EXPECT_DOUBLE_EQ(s.emit.period_ms, 0.5);
+}
+
+TEST(Overrides, TakeEveryTypeOfValue) {
+  const Settings s = read("", {"printer.travel_x_mm=[0,250]", "printer.firmware=klipper",
+                               "printer.firmware_retraction=false", "emit.accel_mm_s2=2e6",
+                               "limits.max_velocity_mm_s=+200"});
+  ASSERT_TRUE(s.printer.travel_x_mm);
+  EXPECT_DOUBLE_EQ(s.printer.travel_x_mm->max, 250.0);
+  EXPECT_FALSE(s.printer.firmware_retraction);
+  EXPECT_DOUBLE_EQ(s.emit.accel_mm_s2, 2e6);
+  EXPECT_DOUBLE_EQ(s.limits.max_velocity_mm_s, 200.0);
+  EXPECT_EQ(read("", {"printer.firmware=\"klipper\""}).printer.firmware, Firmware::klipper);
+}
+
+// The source thesis' axis: ω = 100 rad/s, ζ = 0.5 from 1 kg, 10 N/mm and 0.1 N·s/mm.
+TEST(Dynamics, FollowFromMassStiffnessAndDamping) {
+  const Settings s =
+      read("[dynamics.x]\nmass_g = 1000\nstiffness_n_mm = 10\ndamping_n_s_mm = 0.1\n");
+  EXPECT_NEAR(s.dynamics_x.freq_hz, 100.0 / (2.0 * std::numbers::pi), 1e-12);
+  EXPECT_NEAR(s.dynamics_x.damping_ratio, 0.5, 1e-12);
+  EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 45.0);
+  EXPECT_EQ(origin(s, "dynamics.x.freq_hz"), "printer.toml:2");
+}
+
+TEST(UnsetKeys, FollowKlippersFormulas) {
+  const Settings s = read("");
+  EXPECT_DOUBLE_EQ(s.max_z_velocity_mm_s(), 300.0);
+  EXPECT_DOUBLE_EQ(s.max_z_accel_mm_s2(), 5000.0);
+  EXPECT_DOUBLE_EQ(s.max_extrude_cross_section_mm2(), 4.0 * 0.4 * 0.4);
+  const double ratio = 0.64 / (std::numbers::pi * 0.875 * 0.875);
+  EXPECT_NEAR(s.max_extrude_only_velocity_mm_s(), 300.0 * ratio, 1e-9);
+  EXPECT_NEAR(s.max_extrude_only_accel_mm_s2(), 5000.0 * ratio, 1e-9);
+}
+
+TEST(UnsetKeys, IgnoreAConfiguredCrossSectionForTheExtrudeOnlyLimitsAsKlipperDoes) {
+  const Settings s = read("[extruder]\nmax_extrude_cross_section_mm2 = 5\n");
+  EXPECT_DOUBLE_EQ(s.max_extrude_cross_section_mm2(), 5.0);
+  EXPECT_NEAR(s.max_extrude_only_velocity_mm_s(), read("").max_extrude_only_velocity_mm_s(), 1e-12);
+}
+
+TEST(UnsetKeys, FollowTheKeysTheyDependOn) {
+  const Settings s = read(
+      "[limits]\nmax_velocity_mm_s = 100\nmax_accel_mm_s2 = 2000\n"
+      "[dynamics.x]\nfreq_hz = 30\n");
+  EXPECT_DOUBLE_EQ(s.base_max_velocity_mm_s(), 200.0);
+  EXPECT_DOUBLE_EQ(s.base_max_accel_mm_s2(), 8000.0);
+  EXPECT_DOUBLE_EQ(s.shaper_freq_x_hz(), 30.0);
+  EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 45.0);
+}
+
+TEST(Tail, LastsForTheSlowerAxis) {
+  const Settings s = read("[dynamics.y]\nfreq_hz = 15.915494309189533\ndamping_ratio = 0.5\n");
+  EXPECT_NEAR(s.tail_s(), 0.04, 1e-12);
+}
+
+TEST(Tail, LastsTwoMillisecondsAtLeast) {
+  const Settings s = read("", {"dynamics.x.damping_ratio=0.01", "dynamics.y.damping_ratio=0"});
+  EXPECT_DOUBLE_EQ(s.tail_s(), 0.002);
+}
+
+TEST(ShaperFrequency, OfZeroStaysZero) {
+  EXPECT_DOUBLE_EQ(read("", {"printer.input_shaper_freq_x_hz=0"}).shaper_freq_x_hz(), 0.0);
+}
+
+TEST(ToToml, ReadsBackAsTheSameSettings) {
+  const Settings first =
+      read("", {"printer.travel_y_mm=[-1.25,200]", "limits.max_accel_mm_s2=3333.3",
+                "printer.firmware_retraction=false", "solve.jerk_weight=1e-9"});
+  const std::string text = to_toml(first);
+  const Settings second = read(text);
+  EXPECT_EQ(to_toml(second), text);
+  EXPECT_DOUBLE_EQ(second.limits.max_accel_mm_s2, 3333.3);
+  EXPECT_DOUBLE_EQ(second.solve.jerk_weight, 1e-9);
+  EXPECT_DOUBLE_EQ(second.printer.travel_y_mm->min, -1.25);
+  EXPECT_FALSE(second.printer.travel_x_mm);
+  EXPECT_FALSE(second.base.max_accel_mm_s2);
+}
+
+TEST(ToToml, ShowsWhatHoldsForUnsetKeys) {
+  EXPECT_THAT(to_toml(read("")),
+              HasSubstr("# max_accel_mm_s2 = 20000  (unset: 4 × limits.max_accel_mm_s2)"));
+}
+
+TEST(Rows, HoldOneRowPerOriginInTheSameOrder) {
+  const Settings s = read("[limits]\nmax_accel_mm_s2 = 3000\n");
+  const std::vector<SettingRow> table = rows(s);
+  ASSERT_EQ(table.size(), s.origins.size());
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    EXPECT_EQ(table[i].key, s.origins[i].first);
+    EXPECT_EQ(table[i].origin, s.origins[i].second);
+  }
+  EXPECT_EQ(table.front().key, "printer.firmware");
+  EXPECT_EQ(table.front().value, "\"klipper\"");
+}
+
+TEST(Rows, HoldTheValueInForce) {
+  const Settings s = read("[limits]\nmax_accel_mm_s2 = 3000\n[printer]\ntravel_x_mm = [0, 9.5]\n");
+  std::map<std::string, std::string> values;
+  for (const SettingRow& row : rows(s)) {
+    values[row.key] = row.value;
+  }
+  EXPECT_EQ(values["limits.max_accel_mm_s2"], "3000");
+  EXPECT_EQ(values["base.max_accel_mm_s2"], "12000");
+  EXPECT_EQ(values["printer.travel_x_mm"], "[0, 9.5]");
+  EXPECT_EQ(values["printer.travel_y_mm"], "");
+}
+
+TEST(Recommendations, AskForAShorterPeriodAboveFiftyHertz) {
+  EXPECT_THAT(recommendations(read("")), IsEmpty());
+  EXPECT_THAT(recommendations(read("", {"dynamics.y.freq_hz=60"})),
+              ElementsAre(HasSubstr("0.833 or less")));
+}
+
+TEST(Load, ReadsAFile) {
+  const std::filesystem::path file =
+      std::filesystem::path(::testing::TempDir()) / "unflex_machine_load.toml";
+  std::ofstream(file) << "[limits]\r\nmax_accel_mm_s2 = 1234\r\n";
+  const Result<Settings> settings = load(file, {});
+  std::filesystem::remove(file);
+  ASSERT_TRUE(settings) << to_string(settings.error());
+  EXPECT_DOUBLE_EQ(settings->limits.max_accel_mm_s2, 1234.0);
+  EXPECT_EQ(origin(*settings, "limits.max_accel_mm_s2"), file.string() + ":2");
+}
+
+}  // namespace
+}  // namespace unflex::machine
