@@ -8,20 +8,24 @@ namespace unflex::gcode {
 namespace {
 
 constexpr double kMostPieces = 1e6;
+// Klipper compares start and end exactly, after the angle has suffered from round-off, and so loses
+// some full circles; what the file asks for is the circle.
+constexpr double kClosedWithin_mm = 1e-9;
 
 double angle_travelled(const Arc& arc) {
+  const double chord_alpha = arc.end_mm[0] - arc.start_mm[0];
+  const double chord_beta = arc.end_mm[1] - arc.start_mm[1];
+  if (std::hypot(chord_alpha, chord_beta) < kClosedWithin_mm) {
+    return arc.clockwise ? -2.0 * std::numbers::pi : 2.0 * std::numbers::pi;
+  }
   const auto [i, j] = arc.centre_offset_mm;
-  const double end_alpha = arc.end_mm[0] - (arc.start_mm[0] + i);
-  const double end_beta = arc.end_mm[1] - (arc.start_mm[1] + j);
+  const double end_alpha = chord_alpha - i;  // from the centre to the end
+  const double end_beta = chord_beta - j;
   double angle = std::atan2(-i * end_beta + j * end_alpha, -i * end_alpha - j * end_beta);
   if (angle < 0.0) {
     angle += 2.0 * std::numbers::pi;
   }
-  if (arc.clockwise) {
-    angle -= 2.0 * std::numbers::pi;
-  }
-  const bool closed = arc.start_mm[0] == arc.end_mm[0] && arc.start_mm[1] == arc.end_mm[1];
-  return angle == 0.0 && closed ? 2.0 * std::numbers::pi : angle;
+  return arc.clockwise ? angle - 2.0 * std::numbers::pi : angle;
 }
 
 }  // namespace

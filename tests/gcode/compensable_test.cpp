@@ -1,0 +1,44 @@
+#include "unflex/gcode/compensable.hpp"
+
+#include <gtest/gtest.h>
+
+#include "interpreting.hpp"
+
+namespace unflex::gcode {
+namespace {
+
+Segment by(double dx, double dy, double dz, double de) {
+  return {{5, 5, 5, 5}, {5 + dx, 5 + dy, 5 + dz, 5 + de}, 10.0, 1, true};
+}
+
+TEST(Compensable, AreMovesInThePlane) {
+  EXPECT_TRUE(compensable(by(1, 0, 0, 0))) << "travel";
+  EXPECT_TRUE(compensable(by(0, -1, 0, 0.1))) << "extrusion";
+  EXPECT_TRUE(compensable(by(3, 4, 0.099, 0.1))) << "a spiral vase";
+  EXPECT_TRUE(compensable(by(1, 0, 0, -1e-12))) << "round-off of the running filament sum";
+  EXPECT_EQ(kept_reason(by(1, 0, 0, 0)), "");
+}
+
+TEST(Compensable, AreNotTheOthersForAReason) {
+  EXPECT_EQ(kept_reason(by(0, 0, 0, 1)), "extrude only");
+  EXPECT_EQ(kept_reason(by(0, 0, 1, 0)), "Z move");
+  EXPECT_EQ(kept_reason(by(3, 4, 0.101, 0)), "Z move");
+  EXPECT_EQ(kept_reason(by(1, 0, 0, -0.5)), "retracting move");
+  Segment unknown = by(1, 0, 0, 0);
+  unknown.start_known = false;
+  EXPECT_EQ(kept_reason(unknown), "start unknown");
+  EXPECT_FALSE(compensable(unknown));
+}
+
+TEST(Compensable, AreLinesAsAWhole) {
+  Session session;
+  session.read("G1 X1 Y1 Z1");
+  EXPECT_TRUE(compensable(session.read("G1 X5")));
+  EXPECT_TRUE(compensable(session.read("G2 X15 I5 E1")));
+  EXPECT_FALSE(compensable(session.read("G2 X25 Z9 I5 E1")));
+  EXPECT_FALSE(compensable(session.read("M105")));
+  EXPECT_FALSE(compensable(session.read("G1 X25")));
+}
+
+}  // namespace
+}  // namespace unflex::gcode

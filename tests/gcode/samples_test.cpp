@@ -1,0 +1,82 @@
+// Ten whole prints of five slicers, against the counts Klipper reports for them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "interpreting.hpp"
+
+namespace unflex::gcode {
+namespace {
+
+struct Sample {
+  const char* name;
+  std::size_t lines;
+  std::size_t moves_xyz;  // segments that move X, Y or Z
+  std::size_t moves_e;    // segments that move filament
+  std::size_t arcs;
+};
+
+void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
+
+class WholePrint : public ::testing::TestWithParam<Sample> {};
+
+TEST_P(WholePrint, IsReadAsKlipperReadsIt) {
+  const Sample& sample = GetParam();
+  const std::string path = std::string(UNFLEX_SHARED) + "/samples/" + sample.name + ".gcode";
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "the sample prints are not there: " << path;
+  }
+  const std::string bytes = file_text(path);
+  std::ifstream stream(path, std::ios::binary);
+  LineReader reader(stream, path);
+  // Klipper without a [firmware_retraction] section, as where the counts were taken.
+  Interpreter interpreter(InterpreterOptions{.firmware_retraction = false});
+  std::string joined;
+  std::size_t lines = 0;
+  std::size_t moves_xyz = 0;
+  std::size_t moves_e = 0;
+  std::size_t arcs = 0;
+  Position last{};
+  Line line;
+  while (*reader.next(line)) {
+    ++lines;
+    const Event event = interpreter.interpret(line);
+    joined += event.line.text;
+    EXPECT_EQ(event.line.number, lines);
+    EXPECT_THAT(event.warnings, ::testing::IsEmpty()) << line.text;
+    const Command command = parse(line.content());
+    arcs += command.is('G', 2) || command.is('G', 3) ? 1 : 0;
+    for (const Segment& segment : event.segments) {
+      ASSERT_EQ(segment.start_mm, last) << line.number;
+      last = segment.end_mm;
+      moves_xyz += segment.length_mm() > 0.0 ? 1 : 0;
+      moves_e += segment.delta(E) != 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(lines, sample.lines);
+  EXPECT_TRUE(joined == bytes) << "bytes were lost or changed";
+  EXPECT_EQ(reader.bytes_read(), bytes.size());
+  EXPECT_EQ(moves_xyz, sample.moves_xyz);
+  EXPECT_EQ(moves_e, sample.moves_e);
+  EXPECT_EQ(arcs, sample.arcs);
+}
+
+INSTANTIATE_TEST_SUITE_P(Samples, WholePrint,
+                         ::testing::Values(Sample{"bracket_mk3s_whole", 114223, 97114, 94625, 0},
+                                           Sample{"cube20_ender3_absE", 21912, 16835, 17058, 0},
+                                           Sample{"star_voron_klipper_fwretract", 44624, 24483,
+                                                  21852, 0},
+                                           Sample{"vase_rrf_spiral", 36421, 33189, 33184, 0},
+                                           Sample{"wallring_mini_marlin2", 49892, 28156, 27636, 0},
+                                           Sample{"pins_slic3r_zhop", 23605, 18375, 17387, 0},
+                                           Sample{"textplate_cura", 62194, 43044, 32568, 0},
+                                           Sample{"dome_snap_dense", 29310, 27325, 27090, 0},
+                                           Sample{"washer_ratrig_lines", 34055, 29122, 29135, 0},
+                                           Sample{"washer_ratrig_arcs", 13882, 14923, 14936, 3050}),
+                         [](const auto& parameter) { return std::string(parameter.param.name); });
+
+}  // namespace
+}  // namespace unflex::gcode
