@@ -98,7 +98,7 @@ std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
 }
 
 std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
-                               const std::vector<WindowSpan>& spans, const NozzleXY& nozzle,
+                               const std::vector<WindowSpan>& spans, const dynamics::NozzleXY& nozzle,
                                const Setup& setup) {
   const std::size_t last_node = spans.back().last;
   std::vector<double> x;

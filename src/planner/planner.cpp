@@ -62,16 +62,18 @@ double extruder_junction_v2(double e_per_mm_before, double e_per_mm_after, doubl
 
 }  // namespace
 
+void apply(const gcode::LimitChange& change, Limits& limits) {
+  limits.max_velocity_mm_s = change.max_velocity_mm_s.value_or(limits.max_velocity_mm_s);
+  limits.max_accel_mm_s2 = change.max_accel_mm_s2.value_or(limits.max_accel_mm_s2);
+  limits.square_corner_velocity_mm_s =
+      change.square_corner_velocity_mm_s.value_or(limits.square_corner_velocity_mm_s);
+  limits.minimum_cruise_ratio = change.minimum_cruise_ratio.value_or(limits.minimum_cruise_ratio);
+}
+
 KlipperPlanner::KlipperPlanner(Limits limits, FixedLimits fixed)
     : limits_(limits), fixed_(fixed), until_plan_s_(kFirstPlanInterval_s) {}
 
-void KlipperPlanner::apply(const gcode::LimitChange& change) {
-  limits_.max_velocity_mm_s = change.max_velocity_mm_s.value_or(limits_.max_velocity_mm_s);
-  limits_.max_accel_mm_s2 = change.max_accel_mm_s2.value_or(limits_.max_accel_mm_s2);
-  limits_.square_corner_velocity_mm_s =
-      change.square_corner_velocity_mm_s.value_or(limits_.square_corner_velocity_mm_s);
-  limits_.minimum_cruise_ratio = change.minimum_cruise_ratio.value_or(limits_.minimum_cruise_ratio);
-}
+void KlipperPlanner::apply(const gcode::LimitChange& change) { planner::apply(change, limits_); }
 
 bool KlipperPlanner::add(const gcode::Segment& segment) {
   PlannedMove& move = moves_.emplace_back();

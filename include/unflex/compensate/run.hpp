@@ -31,12 +31,6 @@ struct Setup {
   double jerk_weight = 1e-4;
 };
 
-// Nozzle on both axes.
-struct NozzleXY {
-  dynamics::NozzleState x;
-  dynamics::NozzleState y;
-};
-
 // Nodes of a run, from rest to rest.
 [[nodiscard]] std::size_t node_count(const std::vector<planner::PlannedMove>& moves,
                                      const Setup& setup);
@@ -63,7 +57,7 @@ struct RunWindow {
 // the nozzle is, and how fast, when the run begins (rest but for what earlier motion left behind).
 [[nodiscard]] std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
                                              const std::vector<WindowSpan>& spans,
-                                             const NozzleXY& nozzle, const Setup& setup);
+                                             const dynamics::NozzleXY& nozzle, const Setup& setup);
 
 // Joins the solutions of the windows, in the order of `spans`, blending over the middle of each
 // overlap.

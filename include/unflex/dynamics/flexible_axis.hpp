@@ -30,6 +30,12 @@ struct NozzleState {
   double velocity = 0.0;
 };
 
+// The nozzle on both axes.
+struct NozzleXY {
+  NozzleState x;
+  NozzleState y;
+};
+
 // Motion of the base over one step of constant acceleration: b(t) = b0 + v0 t + a t²/2.
 struct BaseSegment {
   double position = 0.0;      // b0, mm

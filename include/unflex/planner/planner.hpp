@@ -23,6 +23,9 @@ struct Limits {
   double minimum_cruise_ratio = 0.5;
 };
 
+// Puts the limits that the change sets in place of those in force.
+void apply(const gcode::LimitChange& change, Limits& limits);
+
 // Limits only the firmware's configuration sets. Defaults are Klipper's for a 0.4 mm nozzle, 1.75
 // mm filament, max_velocity 300 and max_accel 5000.
 struct FixedLimits {

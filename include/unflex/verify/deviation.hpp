@@ -57,10 +57,7 @@ struct NozzleModel {
   double hold_s = 0.5;   // how long the base is held after the end of the file
 };
 
-struct NozzleXY {
-  dynamics::NozzleState x;
-  dynamics::NozzleState y;
-};
+using dynamics::NozzleXY;
 
 struct RunDeviation {
   DeviationAccumulator extruding;

@@ -1,0 +1,241 @@
+#include "unflex/emit/emitter.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "strokes.hpp"
+#include "unflex/core/number.hpp"
+#include "unflex/gcode/command.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using gcode::E;
+using gcode::X;
+using gcode::Y;
+using gcode::Z;
+
+constexpr int kPositionDecimals = 4;
+constexpr int kExactDecimals = 6;  // where a run ends on a finer place than the grid
+constexpr int kFilamentDecimals = 5;
+
+// Digits of F: rounding then changes a line's duration by less than 0.05 %, which is some 10 nm.
+int speed_decimals(double feed_mm_min) {
+  if (feed_mm_min >= 1000.0) {
+    return 0;
+  }
+  return feed_mm_min >= 100.0 ? 1 : 3;
+}
+
+bool same(double a, double b) { return std::abs(a - b) < 1e-9; }
+
+void append_word(std::string& text, char letter, double value, int decimals) {
+  text += ' ';
+  text += letter;
+  append_scaled(text, to_scaled(value, decimals), decimals);
+}
+
+// A coordinate on the grid, or as fine as it takes.
+void append_coordinate(std::string& text, char letter, double value) {
+  const double on_grid = static_cast<double>(to_scaled(value, kPositionDecimals)) /
+                         power_of_ten(kPositionDecimals);
+  append_word(text, letter, value, same(on_grid, value) ? kPositionDecimals : kExactDecimals);
+}
+
+}  // namespace
+
+KlipperEmitter::KlipperEmitter(EmitOptions options)
+    : options_(std::move(options)),
+      input_(options_.interpreter),
+      printer_(options_.interpreter),
+      input_limits_(options_.printer_limits),
+      limits_(options_.printer_limits) {}
+
+void KlipperEmitter::write(std::string_view text, std::string& out) {
+  if (open_line_) {
+    // The input's last line has no line ending.
+    out += newline_;
+    open_line_ = false;
+  }
+  const std::size_t begin = out.size();
+  out += text;
+  out += newline_;
+  const gcode::Event event = printer_.interpret({out.substr(begin), 0});
+  planner::apply(event.limits, limits_);
+}
+
+void KlipperEmitter::copy(const gcode::Event& event, std::string& out) {
+  out += event.line.text;
+  open_line_ = !event.line.text.ends_with('\n');
+  newline_ = event.line.text.ends_with("\r\n") ? "\r\n" : "\n";
+  static_cast<void>(printer_.interpret(event.line));
+  planner::apply(event.limits, limits_);
+}
+
+void KlipperEmitter::follow_input(const gcode::Event& event) {
+  static_cast<void>(input_.interpret(event.line));
+  planner::apply(event.limits, input_limits_);
+}
+
+void KlipperEmitter::line(const gcode::Event& event, std::string& out) {
+  const bool leaves_our_hands = event.kind == gcode::EventKind::barrier && event.position_lost;
+  if (leaves_our_hands) {
+    set_shaper(true, out);
+  }
+  if (leaves_our_hands ||
+      (event.kind == gcode::EventKind::move &&
+       !gcode::parse(event.line.content()).value('F').has_value())) {
+    restore_speed(out);
+  }
+  copy(event, out);
+  follow_input(event);
+}
+
+bool KlipperEmitter::run(const Run& run, std::string& out) {
+  const gcode::ModalState& state = printer_.state();
+  const Grid grid{state.base_mm[X], state.base_mm[Y], state.base_mm[Z], kPositionDecimals};
+  const std::vector<Stroke> run_strokes = strokes(run, grid, options_);
+  if (run_strokes.empty()) {
+    return false;
+  }
+  const double filament_origin = input_.state().position_mm[E];
+  enter_run(out);
+  std::size_t written = 0;
+  const auto write_events = [&](std::size_t end) {
+    for (; written < end; ++written) {
+      const gcode::Event& event = (*run.events)[written];
+      follow_input(event);
+      if (event.kind != gcode::EventKind::move) {
+        copy(event, out);
+      }
+    }
+  };
+  for (const Stroke& stroke : run_strokes) {
+    write_events(stroke.events);
+    set_run_modes(out);
+    write_stroke(stroke, filament_origin, out);
+  }
+  write_events(run.events->size());
+  set_limits(input_limits_, out);
+  restore_modes(out);
+  return true;
+}
+
+void KlipperEmitter::finish(std::string& out) { set_shaper(true, out); }
+
+void KlipperEmitter::enter_run(std::string& out) {
+  if (!started_) {
+    started_ = true;
+    write(fmt::format("{} {}: compensated for Klipper, not to be compensated again", kComment,
+                      options_.version),
+          out);
+  }
+  set_shaper(false, out);
+  write(fmt::format("{} run", kComment), out);
+}
+
+// Whatever the input's lines have set inside the run.
+void KlipperEmitter::set_run_modes(std::string& out) {
+  set_limits(options_.run_limits, out);
+  const gcode::ModalState& state = printer_.state();
+  if (state.unit_mm != 1.0) {
+    write("G21", out);
+  }
+  if (!state.absolute_xyz) {
+    write("G90", out);
+  }
+  if (state.absolute_e) {
+    write("M83", out);
+  }
+}
+
+void KlipperEmitter::write_stroke(const Stroke& stroke, double filament_origin, std::string& out) {
+  const gcode::ModalState& state = printer_.state();
+  std::string text = "G1";
+  const auto axis = [&](gcode::Axis a, char letter, double position) {
+    if (!same(position, state.position_mm[a])) {
+      append_coordinate(text, letter, position - state.base_mm[a]);
+    }
+  };
+  axis(X, 'X', stroke.x_mm);
+  axis(Y, 'Y', stroke.y_mm);
+  axis(Z, 'Z', stroke.z_mm);
+  // What rounding left over so far is part of the difference.
+  const double filament =
+      (filament_origin + stroke.e_mm - state.position_mm[E]) / state.flow_factor;
+  if (to_scaled(filament, kFilamentDecimals) != 0) {
+    append_word(text, 'E', filament, kFilamentDecimals);
+  }
+  const double feed = stroke.speed_mm_s * 60.0 / state.speed_factor;
+  append_word(text, 'F', feed, speed_decimals(feed));
+  write(text, out);
+}
+
+void KlipperEmitter::restore_modes(std::string& out) {
+  const gcode::ModalState& wanted = input_.state();
+  const gcode::ModalState& state = printer_.state();
+  if (!same(wanted.base_mm[E], state.base_mm[E])) {
+    // A G92 E of the input fell between two lines that split its moment: put the zero right.
+    std::string text = "G92";
+    append_word(text, 'E',
+                (state.position_mm[E] - wanted.base_mm[E]) / (state.flow_factor * state.unit_mm),
+                9);
+    write(text, out);
+  }
+  if (wanted.absolute_e != state.absolute_e) {
+    write(wanted.absolute_e ? "M82" : "M83", out);
+  }
+  if (wanted.absolute_xyz != state.absolute_xyz) {
+    write(wanted.absolute_xyz ? "G90" : "G91", out);
+  }
+  if (wanted.unit_mm != state.unit_mm) {
+    write(wanted.unit_mm == 1.0 ? "G21" : "G20", out);
+  }
+}
+
+void KlipperEmitter::restore_speed(std::string& out) {
+  const double wanted = input_.state().feed_mm_s;
+  if (!same(wanted, printer_.state().feed_mm_s)) {
+    std::string text = "G1";
+    append_word(text, 'F', wanted * 60.0 / printer_.state().unit_mm, kExactDecimals);
+    write(text, out);
+  }
+}
+
+void KlipperEmitter::set_limits(const planner::Limits& limits, std::string& out) {
+  std::string text = "SET_VELOCITY_LIMIT";
+  const auto field = [&](std::string_view name, double wanted, double current) {
+    if (wanted != current) {
+      text += fmt::format(" {}={}", name, wanted);
+    }
+  };
+  field("VELOCITY", limits.max_velocity_mm_s, limits_.max_velocity_mm_s);
+  field("ACCEL", limits.max_accel_mm_s2, limits_.max_accel_mm_s2);
+  field("SQUARE_CORNER_VELOCITY", limits.square_corner_velocity_mm_s,
+        limits_.square_corner_velocity_mm_s);
+  field("MINIMUM_CRUISE_RATIO", limits.minimum_cruise_ratio, limits_.minimum_cruise_ratio);
+  if (text.find('=') != std::string::npos) {
+    write(text, out);
+  }
+}
+
+void KlipperEmitter::set_shaper(bool on, std::string& out) {
+  if (on == shaper_on_) {
+    return;
+  }
+  shaper_on_ = on;
+  std::string text = "SET_INPUT_SHAPER";
+  if (options_.shaper_freq_x_hz > 0.0) {
+    text += fmt::format(" SHAPER_FREQ_X={}", on ? options_.shaper_freq_x_hz : 0.0);
+  }
+  if (options_.shaper_freq_y_hz > 0.0) {
+    text += fmt::format(" SHAPER_FREQ_Y={}", on ? options_.shaper_freq_y_hz : 0.0);
+  }
+  if (text.find('=') != std::string::npos) {
+    write(text, out);
+  }
+}
+
+}  // namespace unflex::emit

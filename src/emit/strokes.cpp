@@ -1,0 +1,335 @@
+#include "strokes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "unflex/core/number.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using gcode::E;
+using gcode::Z;
+using planner::PlannedMove;
+
+// A move boundary must be a vertex when filament per mm changes there by so much that a typical line
+// (2 ms) laid across it would give either move more than this too much or too little.
+constexpr double kFilamentStepMm = 1e-5;
+constexpr double kTypicalLineS = 2e-3;
+
+// The run's moves in time, and the filament and height that belong to a moment.
+class Timetable {
+ public:
+  explicit Timetable(const Run& run) : run_(&run) {
+    double t = run.lead_in_s;
+    for (const PlannedMove& move : *run.moves) {
+      starts_s_.push_back(t);
+      t += move.duration_s();
+    }
+    starts_s_.push_back(t);
+    const dynamics::BaseTrajectory& base = *run.base;
+    travelled_mm_.push_back(0.0);
+    for (std::size_t k = 1; k < base.nodes(); ++k) {
+      travelled_mm_.push_back(travelled_mm_.back() +
+                              std::hypot(base.x.position_mm[k] - base.x.position_mm[k - 1],
+                                         base.y.position_mm[k] - base.y.position_mm[k - 1]));
+    }
+  }
+
+  // Start of move i; i may be the number of moves.
+  [[nodiscard]] double start_s(std::size_t i) const { return starts_s_[i]; }
+  [[nodiscard]] std::size_t moves() const { return run_->moves->size(); }
+
+  // The move at time t.
+  [[nodiscard]] std::size_t move_at(double t) const {
+    const auto after = std::upper_bound(starts_s_.begin(), starts_s_.end() - 1, t);
+    return after == starts_s_.begin() ? 0
+                                      : static_cast<std::size_t>(after - starts_s_.begin()) - 1;
+  }
+
+  // Filament since the start of the run: each move's is spread along the base's path while the move
+  // lasts, which keeps filament per mm constant where the firmware looks for jumps in it.
+  [[nodiscard]] double filament_mm(double t) const {
+    const double origin = run_->moves->front().segment.start_mm[E];
+    if (t >= starts_s_.back()) {
+      return run_->moves->back().segment.end_mm[E] - origin;
+    }
+    if (t <= starts_s_.front()) {
+      return 0.0;
+    }
+    const std::size_t i = move_at(t);
+    const PlannedMove& move = (*run_->moves)[i];
+    const double from = travelled_mm(starts_s_[i]);
+    const double length = travelled_mm(starts_s_[i + 1]) - from;
+    const double share = length > 0.0 ? (travelled_mm(t) - from) / length
+                                      : (t - starts_s_[i]) / move.duration_s();
+    return move.segment.start_mm[E] - origin + share * move.segment.delta(E);
+  }
+
+  [[nodiscard]] double height_mm(double t) const {
+    if (t >= starts_s_.back()) {
+      return run_->moves->back().segment.end_mm[Z];
+    }
+    const std::size_t i = move_at(t);
+    return (*run_->moves)[i].position_mm(t - starts_s_[i])[Z];
+  }
+
+ private:
+  [[nodiscard]] double travelled_mm(double t) const {
+    const double h = run_->base->period_s;
+    const double at = std::clamp(t / h, 0.0, static_cast<double>(travelled_mm_.size() - 1));
+    const auto k = std::min(static_cast<std::size_t>(at), travelled_mm_.size() - 2);
+    return travelled_mm_[k] +
+           (at - static_cast<double>(k)) * (travelled_mm_[k + 1] - travelled_mm_[k]);
+  }
+
+  const Run* run_;
+  std::vector<double> starts_s_;     // of each move, and the end of the last
+  std::vector<double> travelled_mm_;  // length of the base's path at the nodes
+};
+
+// Whether the boundary before move i has to be a vertex for the sake of the filament.
+bool filament_changes(const std::vector<PlannedMove>& moves, std::size_t i) {
+  const double jump = std::abs(moves[i].direction[E] - moves[i - 1].direction[E]);
+  return jump * std::max(moves[i].start_v_mm_s, 1.0) * kTypicalLineS / 4.0 > kFilamentStepMm;
+}
+
+// For each event the time it stands at: the end of the moves before it.
+std::vector<double> event_times(const Run& run, const Timetable& table) {
+  std::vector<double> times;
+  std::size_t move = 0;
+  for (const std::size_t count : *run.move_counts) {
+    times.push_back(table.start_s(move));
+    move += count;
+  }
+  return times;
+}
+
+// Moments at which a line must end: the ends of the run, lines that stand between moves, changes of
+// filament per mm. Closer ones than the shortest line allows fall together.
+std::vector<double> required_times(const Run& run, const Timetable& table,
+                                   const std::vector<double>& event_time_s, double min_line_s) {
+  std::vector<double> wanted;
+  for (std::size_t i = 0; i < event_time_s.size(); ++i) {
+    if ((*run.events)[i].kind != gcode::EventKind::move) {
+      wanted.push_back(event_time_s[i]);
+    }
+  }
+  for (std::size_t i = 1; i < table.moves(); ++i) {
+    if (filament_changes(*run.moves, i)) {
+      wanted.push_back(table.start_s(i));
+    }
+  }
+  wanted.push_back(table.start_s(0));
+  wanted.push_back(table.start_s(table.moves()));
+  std::ranges::sort(wanted);
+  const double end = run.base->duration_s();
+  std::vector<double> times = {0.0};
+  for (const double t : wanted) {
+    if (t - times.back() >= min_line_s && end - t >= min_line_s) {
+      times.push_back(t);
+    }
+  }
+  times.push_back(end);
+  return times;
+}
+
+// Grows lines from `from` towards `to` as long as the base stays within the tolerance of the chord
+// at equal time, and appends their ends, `to` included.
+void divide(const dynamics::BaseTrajectory& base, double from, double to,
+            const EmitOptions& options, std::vector<double>& times) {
+  const double h = base.period_s;
+  const auto within_tolerance = [&](double a, double b) {
+    const double x0 = base.x_at(a).position_mm;
+    const double y0 = base.y_at(a).position_mm;
+    const double slope_x = (base.x_at(b).position_mm - x0) / (b - a);
+    const double slope_y = (base.y_at(b).position_mm - y0) / (b - a);
+    const double tolerance2 = options.tolerance_mm * options.tolerance_mm;
+    for (double t = (std::floor(a / h + 1e-9) + 1.0) * h; t < b - 1e-12; t += h) {
+      const double dx = base.x_at(t).position_mm - x0 - slope_x * (t - a);
+      const double dy = base.y_at(t).position_mm - y0 - slope_y * (t - a);
+      if (dx * dx + dy * dy > tolerance2) {
+        return false;
+      }
+    }
+    return true;
+  };
+  double start = from;
+  while (to - start >= 2.0 * options.min_line_s) {
+    // Line ends lie on the nodes where they can; what is left must be long enough for a line.
+    double end = 0.0;
+    for (double node = std::floor(start / h + 1e-9) + 1.0;; node += 1.0) {
+      const double t = node * h;
+      if (t - start < options.min_line_s - 1e-12) {
+        continue;
+      }
+      const bool too_far = t - start > options.max_line_s || to - t < options.min_line_s;
+      if (end > 0.0 && (too_far || !within_tolerance(start, t))) {
+        break;
+      }
+      if (too_far) {
+        break;
+      }
+      end = t;
+    }
+    if (end == 0.0) {
+      break;
+    }
+    if (to - start <= options.max_line_s && within_tolerance(start, to)) {
+      break;
+    }
+    times.push_back(end);
+    start = end;
+  }
+  times.push_back(to);
+}
+
+// One axis at the vertices. A chord lies inside a curve: between vertices on the curve it is off by
+// b̈ T²/12 on average, which the nozzle follows. Vertices moved out by as much,
+//   δ = −b̈ (T₁² − T₁T₂ + T₂²)/12   (the mean of the error against the hat function vanishes),
+// leave only an error too quick for the machine to follow. Where that would break the limit on the
+// change of speed from line to line, the vertex stays on the curve.
+std::vector<double> vertices(const std::vector<double>& times,
+                             const std::vector<dynamics::AxisMotion>& motion,
+                             double max_accel_mm_s2) {
+  const std::size_t n = times.size();
+  std::vector<double> offset(n, 0.0);
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    const double t1 = times[i] - times[i - 1];
+    const double t2 = times[i + 1] - times[i];
+    offset[i] = -motion[i].accel_mm_s2 * (t1 * t1 - t1 * t2 + t2 * t2) / 12.0;
+  }
+  const auto accel = [&](std::size_t i) {
+    const double t1 = times[i] - times[i - 1];
+    const double t2 = times[i + 1] - times[i];
+    const auto at = [&](std::size_t j) { return motion[j].position_mm + offset[j]; };
+    return std::abs((at(i + 1) - at(i)) / t2 - (at(i) - at(i - 1)) / t1) / (0.5 * (t1 + t2));
+  };
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+      if (accel(i) > max_accel_mm_s2 &&
+          (offset[i - 1] != 0.0 || offset[i] != 0.0 || offset[i + 1] != 0.0)) {
+        offset[i - 1] = offset[i] = offset[i + 1] = 0.0;
+        changed = true;
+      }
+    }
+  }
+  std::vector<double> result(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    result[i] = motion[i].position_mm + offset[i];
+  }
+  return result;
+}
+
+double snap(double value_mm, double offset_mm, int decimals) {
+  return offset_mm + static_cast<double>(to_scaled(value_mm - offset_mm, decimals)) /
+                         power_of_ten(decimals);
+}
+
+// Speeds from the rounded distances and the times, with the time the firmware's ramps cost:
+//   v = (d + ((v − v_prev)₊² + (v − v_next)₊²) / 2A) / T
+// A line as fast as or slower than its neighbours has no ramp. Converges in a few rounds since the
+// ramps are short against the lines.
+void set_speeds(const Run& run, const EmitOptions& options, std::vector<Stroke>& strokes) {
+  constexpr int kRounds = 6;
+  const gcode::Position start = run.moves->front().segment.start_mm;
+  const std::size_t n = strokes.size();
+  std::vector<double> distance(n);
+  std::vector<double> accel(n, options.run_limits.max_accel_mm_s2);
+  std::vector<double> duration(n);
+  double x = start[gcode::X];
+  double y = start[gcode::Y];
+  double z = start[gcode::Z];
+  double t = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double dz = strokes[i].z_mm - z;
+    distance[i] = std::hypot(strokes[i].x_mm - x, strokes[i].y_mm - y, dz);
+    if (dz != 0.0) {
+      accel[i] = std::min(accel[i], options.fixed.max_z_accel_mm_s2 * distance[i] / std::abs(dz));
+    }
+    duration[i] = strokes[i].end_s - t;
+    strokes[i].speed_mm_s = distance[i] / duration[i];
+    x = strokes[i].x_mm;
+    y = strokes[i].y_mm;
+    z = strokes[i].z_mm;
+    t = strokes[i].end_s;
+  }
+  std::vector<double> speed(n);
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t i = 0; i < n; ++i) {
+      speed[i] = strokes[i].speed_mm_s;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      const double up = std::max(speed[i] - (i > 0 ? speed[i - 1] : 0.0), 0.0);
+      const double down = std::max(speed[i] - (i + 1 < n ? speed[i + 1] : 0.0), 0.0);
+      strokes[i].speed_mm_s =
+          (distance[i] + (up * up + down * down) / (2.0 * accel[i])) / duration[i];
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions& options) {
+  const Timetable table(run);
+  const dynamics::BaseTrajectory& base = *run.base;
+  const std::vector<double> event_time_s = event_times(run, table);
+  const std::vector<double> required =
+      required_times(run, table, event_time_s, options.min_line_s);
+  std::vector<double> times = {0.0};
+  for (std::size_t i = 1; i < required.size(); ++i) {
+    divide(base, required[i - 1], required[i], options, times);
+  }
+  std::vector<dynamics::AxisMotion> x_motion;
+  std::vector<dynamics::AxisMotion> y_motion;
+  for (const double t : times) {
+    x_motion.push_back(base.x_at(t));
+    y_motion.push_back(base.y_at(t));
+  }
+  const std::vector<double> x = vertices(times, x_motion, options.base_max_accel_mm_s2);
+  const std::vector<double> y = vertices(times, y_motion, options.base_max_accel_mm_s2);
+
+  const gcode::Position start = run.moves->front().segment.start_mm;
+  const gcode::Position end = run.moves->back().segment.end_mm;
+  std::vector<Stroke> result;
+  Stroke last{0.0, start[gcode::X], start[gcode::Y], start[gcode::Z]};
+  double dropped_s = 0.0;
+  std::size_t event = 0;
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    Stroke stroke;
+    stroke.end_s = times[i] - dropped_s;
+    const bool is_end = i + 1 == times.size();
+    stroke.x_mm = is_end ? end[gcode::X] : snap(x[i], grid.x_offset_mm, grid.decimals);
+    stroke.y_mm = is_end ? end[gcode::Y] : snap(y[i], grid.y_offset_mm, grid.decimals);
+    stroke.z_mm = is_end ? end[gcode::Z]
+                         : snap(table.height_mm(times[i]), grid.z_offset_mm, grid.decimals);
+    stroke.e_mm = table.filament_mm(times[i]);
+    // An event goes before the stroke that begins nearest to its moment.
+    while (event < event_time_s.size() &&
+           event_time_s[event] <= times[i] - 0.5 * options.min_line_s) {
+      ++event;
+    }
+    stroke.events = event;
+    const bool moves = std::hypot(stroke.x_mm - last.x_mm, stroke.y_mm - last.y_mm) >
+                       0.5 / power_of_ten(grid.decimals);
+    if (moves) {
+      result.push_back(stroke);
+      last = stroke;
+    } else if (result.empty()) {
+      dropped_s += times[i] - times[i - 1];
+    }
+  }
+  if (!result.empty()) {
+    Stroke& final = result.back();
+    final.e_mm = table.filament_mm(times.back());
+    final.x_mm = end[gcode::X];
+    final.y_mm = end[gcode::Y];
+    final.z_mm = end[gcode::Z];
+    set_speeds(run, options, result);
+  }
+  return result;
+}
+
+}  // namespace unflex::emit

@@ -1,0 +1,36 @@
+// From the base's continuous motion to the straight strokes that a run is written as.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "unflex/emit/emitter.hpp"
+
+namespace unflex::emit {
+
+// One line to be: where the machine shall be at its end, and when.
+struct Stroke {
+  double end_s = 0.0;  // since the start of the run
+  double x_mm = 0.0;
+  double y_mm = 0.0;
+  double z_mm = 0.0;
+  double e_mm = 0.0;          // filament since the start of the run
+  double speed_mm_s = 0.0;    // F, before M220
+  std::size_t events = 0;     // how many of the run's events stand before the stroke, in all
+};
+
+// The grid positions are written on: machine position = offset + integer / steps_per_mm.
+struct Grid {
+  double x_offset_mm = 0.0;
+  double y_offset_mm = 0.0;
+  double z_offset_mm = 0.0;
+  int decimals = 4;
+};
+
+// The strokes of a run. Positions lie on the grid, but the last one is exactly where the last move
+// ends. Strokes that would have no length after rounding are merged into their successor, at the
+// ends of the run dropped. Empty when nothing is left.
+[[nodiscard]] std::vector<Stroke> strokes(const Run& run, const Grid& grid,
+                                          const EmitOptions& options);
+
+}  // namespace unflex::emit

@@ -1,0 +1,295 @@
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <fstream>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "judge.hpp"
+#include "piece_reader.hpp"
+#include "report_rows.hpp"
+#include "stage_options.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/verify/verify.hpp"
+#include "worker_pool.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+constexpr std::size_t kMaxFallbacksListed = 1000;
+// Windows the reader may be ahead of the solvers, per worker.
+constexpr std::size_t kWindowsAhead = 24;
+
+// A piece on its way: a run waits for its windows.
+struct Pending {
+  Piece piece;
+  std::vector<compensate::WindowSpan> spans;
+  std::vector<dynamics::AxisTrajectory> x;  // solutions, one per span
+  std::vector<dynamics::AxisTrajectory> y;
+  std::size_t missing = 0;  // solutions not yet here
+  std::string failure;      // why a window has no solution
+  dynamics::NozzleXY nozzle;
+};
+
+// Which solution a ticket of the pool stands for.
+struct Ticket {
+  std::size_t piece;
+  std::size_t window;
+  bool is_y;
+};
+
+class Compensator {
+ public:
+  Compensator(const Job& job, WorkerPool pool, std::istream& input, std::ostream& output,
+              Progress& progress)
+      : job_(job),
+        setup_(compensate_setup(job.settings)),
+        rules_(verify_rules(job.settings)),
+        pool_(std::move(pool)),
+        reader_(input, job.input_name, rules_.interpreter, rules_.limits, rules_.fixed),
+        emitter_(emit_options(job.settings, UNFLEX_VERSION)),
+        output_(output),
+        progress_(progress),
+        input_bytes_(static_cast<double>(std::filesystem::file_size(job.input))) {}
+
+  Status work(report::Report& report) {
+    report_ = &report;
+    for (;;) {
+      Pending pending;
+      const Result<bool> more = reader_.next(pending.piece);
+      if (!more) {
+        return tl::unexpected(more.error());
+      }
+      if (!*more) {
+        break;
+      }
+      admit(std::move(pending));
+      if (Status status = drain(kWindowsAhead * std::max(job_.workers, 1U)); !status) {
+        return status;
+      }
+    }
+    if (Status status = drain(0); !status) {
+      return status;
+    }
+    std::string text;
+    emitter_.finish(text);
+    output_ << text;
+    for (const Diagnostic& warning : reader_.warnings()) {
+      report.warnings.push_back(to_string(warning));
+    }
+    return {};
+  }
+
+ private:
+  // Queues the piece, and the windows of a run with the solvers.
+  void admit(Pending pending) {
+    const std::size_t index = first_index_ + queue_.size();
+    if (pending.piece.is_run) {
+      pending.nozzle = nozzle_;
+      pending.spans = compensate::cut(compensate::node_count(pending.piece.moves, setup_), setup_);
+      const auto windows =
+          compensate::windows(pending.piece.moves, pending.spans, pending.nozzle, setup_);
+      pending.x.resize(windows.size());
+      pending.y.resize(windows.size());
+      pending.missing = 2 * windows.size();
+      for (std::size_t w = 0; w < windows.size(); ++w) {
+        submit({index, w, false}, windows[w].x);
+        submit({index, w, true}, windows[w].y);
+      }
+      report_->windows_total += windows.size();
+      ++report_->runs_total;
+      nozzle_ = at_rest(pending.piece.moves.back().segment.end_mm);
+    } else {
+      nozzle_ = after_motion(pending.piece, nozzle_, rules_.nozzle);
+    }
+    queue_.push_back(std::move(pending));
+  }
+
+  void submit(Ticket ticket, const compensate::AxisWindow& window) {
+    tickets_.push_back(ticket);
+    pool_.submit(first_ticket_ + tickets_.size() - 1, window);
+  }
+
+  // Takes solutions and writes pieces that are complete until at most `ahead` windows are under way.
+  Status drain(std::size_t ahead) {
+    for (;;) {
+      write_complete();
+      if (progress_.cancelled()) {
+        return fail(ErrorKind::internal, "cancelled, nothing was written");
+      }
+      if (!output_) {
+        return fail(ErrorKind::internal, {job_.output_name, 0},
+                    "cannot write the output; is the disk full?");
+      }
+      if (pool_.under_way() <= ahead && (ahead > 0 || queue_.empty())) {
+        return {};
+      }
+      if (std::optional<WorkerPool::Done> done = pool_.take(100)) {
+        place(std::move(*done));
+      }
+    }
+  }
+
+  void place(WorkerPool::Done done) {
+    const Ticket ticket = tickets_[done.ticket - first_ticket_];
+    Pending& pending = queue_[ticket.piece - first_index_];
+    --pending.missing;
+    if (done.solution) {
+      report_->solver_iterations += static_cast<std::size_t>(done.solution->iterations);
+      (ticket.is_y ? pending.y : pending.x)[ticket.window] = std::move(done.solution->base);
+    } else if (pending.failure.empty()) {
+      pending.failure = fmt::format("the solver failed on axis {}, window {}: {}",
+                                    ticket.is_y ? 'y' : 'x', ticket.window + 1,
+                                    done.solution.error().message);
+    }
+  }
+
+  void write_complete() {
+    while (!queue_.empty() && queue_.front().missing == 0) {
+      write(queue_.front());
+      const std::size_t tickets = 2 * queue_.front().spans.size();
+      tickets_.erase(tickets_.begin(), tickets_.begin() + static_cast<std::ptrdiff_t>(tickets));
+      first_ticket_ += tickets;
+      queue_.pop_front();
+      ++first_index_;
+      progress_.update("compensating", 0.8 * static_cast<double>(bytes_written_) / input_bytes_);
+    }
+  }
+
+  void write(Pending& pending) {
+    std::string text;
+    std::optional<std::string> failure;
+    if (pending.piece.is_run) {
+      failure = write_run(pending, text);
+    }
+    if (!pending.piece.is_run || failure) {
+      for (const gcode::Event& event : pending.piece.events) {
+        emitter_.line(event, text);
+      }
+    }
+    if (failure) {
+      note_fallback(pending, std::move(*failure));
+    }
+    for (const gcode::Event& event : pending.piece.events) {
+      bytes_written_ += event.line.text.size();
+    }
+    output_ << text;
+  }
+
+  // The run as compensated text, or why its original lines must stand.
+  std::optional<std::string> write_run(const Pending& pending, std::string& text) {
+    if (!pending.failure.empty()) {
+      return pending.failure;
+    }
+    const dynamics::BaseTrajectory base{setup_.period_s,
+                                        compensate::join(pending.spans, pending.x),
+                                        compensate::join(pending.spans, pending.y)};
+    const Piece& piece = pending.piece;
+    emit::KlipperEmitter trial = emitter_;
+    const std::size_t begin = text.size();
+    if (!trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s},
+                   text)) {
+      return "the motion is too small to be written";
+    }
+    if (std::optional<std::string> worse =
+            worse_than_original(piece.moves, std::string_view(text).substr(begin),
+                                emitter_.printer(), emitter_.printer_limits(), pending.nozzle,
+                                rules_)) {
+      text.resize(begin);
+      return worse;
+    }
+    emitter_ = std::move(trial);
+    ++report_->runs_compensated;
+    report_->windows_solved += pending.spans.size();
+    return std::nullopt;
+  }
+
+  void note_fallback(const Pending& pending, std::string reason) {
+    ++report_->runs_fallback;
+    report_->windows_fallback += pending.spans.size();
+    if (report_->fallbacks.size() < kMaxFallbacksListed) {
+      report_->fallbacks.push_back({pending.piece.events.front().line.number,
+                                    pending.piece.events.back().line.number, std::move(reason)});
+    }
+  }
+
+  const Job& job_;
+  compensate::Setup setup_;
+  verify::Rules rules_;
+  WorkerPool pool_;
+  PieceReader reader_;
+  emit::KlipperEmitter emitter_;
+  std::ostream& output_;
+  Progress& progress_;
+  double input_bytes_;
+  report::Report* report_ = nullptr;
+  // The nozzle where the reader is, if every run before was compensated: what motion left as it is
+  // has set ringing, the next run starts with.
+  dynamics::NozzleXY nozzle_;
+  std::deque<Pending> queue_;
+  std::size_t first_index_ = 0;   // of queue_'s front among all pieces
+  std::deque<Ticket> tickets_;    // of the windows of queue_
+  std::size_t first_ticket_ = 0;  // number of tickets_' front
+  std::size_t bytes_written_ = 0;
+};
+
+double cpu_s(int who) {
+  rusage usage{};
+  getrusage(who, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double peak_rss_mb(int who) {
+  rusage usage{};
+  getrusage(who, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+}  // namespace
+
+Result<report::Report> compensate(const Job& job, Progress& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  report::Report report = new_report("compensate", job);
+  {
+    Result<WorkerPool> pool = WorkerPool::start(job.workers, compensate::make_ipopt_engine);
+    if (!pool) {
+      return tl::unexpected(pool.error());
+    }
+    std::ifstream input(job.input, std::ios::binary);
+    std::ofstream output(job.output, std::ios::binary | std::ios::trunc);
+    if (!input) {
+      return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
+    }
+    if (!output) {
+      return fail(ErrorKind::internal, {job.output_name, 0}, "cannot write the output");
+    }
+    Compensator compensator(job, std::move(*pool), input, output, progress);
+    if (Status status = compensator.work(report); !status) {
+      return tl::unexpected(status.error());
+    }
+    output.flush();
+    if (!output) {
+      return fail(ErrorKind::internal, {job.output_name, 0},
+                  "cannot write the output; is the disk full?");
+    }
+  }
+  if (Status status = add_verification(job, progress, report); !status) {
+    return tl::unexpected(status.error());
+  }
+  report.wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.cpu_s = cpu_s(RUSAGE_SELF) + cpu_s(RUSAGE_CHILDREN);
+  report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
+  report.peak_rss_mb = std::max(peak_rss_mb(RUSAGE_SELF), peak_rss_mb(RUSAGE_CHILDREN));
+  return report;
+}
+
+}  // namespace unflex::pipeline

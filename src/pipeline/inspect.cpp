@@ -1,0 +1,179 @@
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "piece_reader.hpp"
+#include "stage_options.hpp"
+#include "unflex/compensate/run.hpp"
+#include "unflex/gcode/command.hpp"
+#include "unflex/gcode/compensable.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// Programs that name themselves in the comments they write.
+constexpr std::string_view kSlicers[] = {"PrusaSlicer", "SuperSlicer", "OrcaSlicer", "BambuStudio",
+                                         "Bambu Studio", "Slic3r", "Cura", "Simplify3D", "ideaMaker",
+                                         "KISSlicer", "Kiri:Moto", "ArcWelder"};
+
+// The comment in which a slicer names itself, if this is one.
+std::string slicer_named(std::string_view content) {
+  const std::size_t semicolon = content.find(';');
+  if (semicolon != 0) {
+    return {};
+  }
+  for (const std::string_view name : kSlicers) {
+    if (content.find(name) != std::string_view::npos) {
+      std::string_view text = content.substr(1);
+      text.remove_prefix(std::min(text.find_first_not_of("; \t"), text.size()));
+      return std::string(text);
+    }
+  }
+  return {};
+}
+
+std::string command_name(const gcode::Command& command) {
+  switch (command.kind) {
+    case gcode::CommandKind::traditional:
+      return command.subnumber >= 0
+                 ? fmt::format("{}{}.{}", command.letter, command.number, command.subnumber)
+                 : fmt::format("{}{}", command.letter, command.number);
+    case gcode::CommandKind::extended:
+      return command.name;
+    case gcode::CommandKind::malformed:
+      return "(not understood)";
+    case gcode::CommandKind::none:
+      break;
+  }
+  return {};
+}
+
+class Inspector {
+ public:
+  explicit Inspector(Inspection& result) : result_(&result) {
+    result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
+    result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
+    result_->lowest_accel_mm_s2 = std::numeric_limits<double>::infinity();
+  }
+
+  void add(const Piece& piece, const compensate::Setup& setup) {
+    for (const gcode::Event& event : piece.events) {
+      add_event(event);
+    }
+    double moving_s = 0.0;
+    for (const planner::PlannedMove& move : piece.moves) {
+      moving_s += move.duration_s();
+      add_move(move);
+    }
+    result_->reference_time_s += moving_s;
+    if (piece.is_run) {
+      ++result_->runs;
+      result_->run_time_s += moving_s;
+      result_->windows +=
+          compensate::cut(compensate::node_count(piece.moves, setup), setup).size();
+    }
+  }
+
+  void finish() {
+    if (result_->moves == 0) {
+      result_->x_min_mm = result_->x_max_mm = result_->y_min_mm = result_->y_max_mm = 0.0;
+      result_->lowest_accel_mm_s2 = 0.0;
+    }
+    result_->dialect = slicers_.empty() ? "unknown slicer" : slicers_;
+  }
+
+ private:
+  void add_event(const gcode::Event& event) {
+    ++result_->lines;
+    result_->bytes += event.line.text.size();
+    result_->passive_lines += event.kind == gcode::EventKind::passive ? 1 : 0;
+    result_->limit_lines += event.kind == gcode::EventKind::limits ? 1 : 0;
+    result_->barrier_lines += event.kind == gcode::EventKind::barrier ? 1 : 0;
+    result_->reference_time_s += event.dwell_s;
+    const gcode::Command command = gcode::parse(event.line.content());
+    if (command.kind != gcode::CommandKind::none) {
+      ++result_->commands[command_name(command)];
+    }
+    result_->arcs += command.is('G', 2) || command.is('G', 3) ? 1 : 0;
+    absolute_e_ = command.is('M', 82) || (absolute_e_ && !command.is('M', 83));
+    if (slicers_.empty()) {
+      slicers_ = slicer_named(event.line.content());
+    }
+    if (!gcode::compensable(event)) {
+      for (const gcode::Segment& segment : event.segments) {
+        const std::string_view reason = gcode::kept_reason(segment);
+        ++result_->kept_moves[std::string(reason.empty() ? "part of a kept arc" : reason)];
+      }
+    }
+  }
+
+  void add_move(const planner::PlannedMove& move) {
+    const gcode::Segment& segment = move.segment;
+    result_->filament_mm += segment.delta(gcode::E);
+    if (!move.kinematic) {
+      ++result_->extrude_only_moves;
+      return;
+    }
+    ++result_->moves;
+    result_->moving_time_s += move.duration_s();
+    result_->path_length_mm += move.length_mm;
+    if (segment.extruding()) {
+      if (result_->extruding_moves++ == 0) {
+        result_->absolute_e = absolute_e_;
+      }
+      result_->x_min_mm = std::min({result_->x_min_mm, segment.start_mm[0], segment.end_mm[0]});
+      result_->x_max_mm = std::max({result_->x_max_mm, segment.start_mm[0], segment.end_mm[0]});
+      result_->y_min_mm = std::min({result_->y_min_mm, segment.start_mm[1], segment.end_mm[1]});
+      result_->y_max_mm = std::max({result_->y_max_mm, segment.start_mm[1], segment.end_mm[1]});
+      result_->z_max_mm = std::max(result_->z_max_mm, segment.end_mm[gcode::Z]);
+    }
+    result_->lowest_accel_mm_s2 = std::min(result_->lowest_accel_mm_s2, move.accel_mm_s2);
+    result_->highest_accel_mm_s2 = std::max(result_->highest_accel_mm_s2, move.accel_mm_s2);
+  }
+
+  Inspection* result_;
+  std::string slicers_;
+  bool absolute_e_ = true;
+};
+
+}  // namespace
+
+Result<Inspection> inspect(const Job& job, Progress& progress) {
+  std::ifstream input(job.input, std::ios::binary);
+  if (!input) {
+    return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
+  }
+  const double bytes = static_cast<double>(std::filesystem::file_size(job.input));
+  const compensate::Setup setup = compensate_setup(job.settings);
+  PieceReader reader(input, job.input_name, interpreter_options(job.settings),
+                     planner_limits(job.settings), fixed_limits(job.settings));
+  Inspection result;
+  Inspector inspector(result);
+  for (;;) {
+    Piece piece;
+    const Result<bool> more = reader.next(piece);
+    if (!more) {
+      return tl::unexpected(more.error());
+    }
+    if (!*more) {
+      break;
+    }
+    inspector.add(piece, setup);
+    progress.update("reading", static_cast<double>(reader.bytes_read()) / bytes);
+    if (progress.cancelled()) {
+      return fail(ErrorKind::internal, "cancelled");
+    }
+  }
+  inspector.finish();
+  for (const Diagnostic& warning : reader.warnings()) {
+    result.warnings.push_back(to_string(warning));
+  }
+  return result;
+}
+
+}  // namespace unflex::pipeline

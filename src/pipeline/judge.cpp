@@ -1,0 +1,109 @@
+#include "judge.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace unflex::pipeline {
+namespace {
+
+// Deviations below the grid that positions are written on say nothing.
+constexpr double kResolutionMm = 1e-4;
+
+// What the nozzle does while the base makes the move, exactly, phase by phase.
+void follow(const planner::PlannedMove& move, const verify::NozzleModel& model,
+            dynamics::NozzleXY& nozzle) {
+  const double phases[] = {move.accel_s, move.cruise_s, move.decel_s};
+  const double accels[] = {move.accel_mm_s2, 0.0, -move.accel_mm_s2};
+  double t = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    if (phases[i] <= 0.0) {
+      continue;
+    }
+    const gcode::Position p = move.position_mm(t);
+    const double v = move.velocity_mm_s(t);
+    const auto step = [&](gcode::Axis axis, const dynamics::FlexibleAxis& flexible,
+                          dynamics::NozzleState state) {
+      const double ratio = move.kinematic ? move.direction[axis] : 0.0;
+      return dynamics::exact_step(flexible, state, {p[axis], v * ratio, accels[i] * ratio},
+                                  phases[i]);
+    };
+    nozzle.x = step(gcode::X, model.x, nozzle.x);
+    nozzle.y = step(gcode::Y, model.y, nozzle.y);
+    t += phases[i];
+  }
+}
+
+}  // namespace
+
+dynamics::NozzleXY at_rest(const gcode::Position& position) {
+  return {{position[gcode::X], 0.0}, {position[gcode::Y], 0.0}};
+}
+
+dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
+                                const verify::NozzleModel& model) {
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < piece.events.size(); ++i) {
+    const gcode::Event& event = piece.events[i];
+    for (std::size_t k = 0; k < piece.move_counts[i]; ++k, ++next) {
+      const planner::PlannedMove& move = piece.moves[next];
+      if (!move.segment.start_known) {
+        // From wherever the machine was: nothing is known but that it starts at rest.
+        nozzle = at_rest(move.segment.start_mm);
+      }
+      follow(move, model, nozzle);
+    }
+    if (event.position_lost) {
+      // Homing and macros take their time: the nozzle has come to rest.
+      nozzle.x.velocity = nozzle.y.velocity = 0.0;
+    } else if (event.dwell_s > 0.0) {
+      const auto rest = [&](const dynamics::FlexibleAxis& axis, dynamics::NozzleState state,
+                            double base) {
+        return dynamics::exact_step(axis, state, {base, 0.0, 0.0}, event.dwell_s);
+      };
+      if (next > 0) {
+        const gcode::Position& at = piece.moves[next - 1].segment.end_mm;
+        nozzle = {rest(model.x, nozzle.x, at[gcode::X]), rest(model.y, nozzle.y, at[gcode::Y])};
+      }
+    }
+  }
+  return nozzle;
+}
+
+std::optional<std::string> worse_than_original(const std::vector<planner::PlannedMove>& original,
+                                               std::string_view text, gcode::Interpreter printer,
+                                               const planner::Limits& printer_limits,
+                                               const dynamics::NozzleXY& nozzle,
+                                               const verify::Rules& rules) {
+  planner::KlipperPlanner planner(printer_limits, rules.fixed);
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
+    const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), 0});
+    text.remove_prefix(end);
+    planner.apply(event.limits);
+    for (const gcode::Segment& segment : event.segments) {
+      planner.add(segment);
+    }
+  }
+  planner.stop();
+  std::vector<planner::PlannedMove> replayed;
+  planner.take(replayed);
+
+  const verify::RunDeviation before = verify::measure(original, original, nozzle, rules.nozzle);
+  const verify::RunDeviation after = verify::measure(original, replayed, nozzle, rules.nozzle);
+  // Runs that lay nothing are judged by all of their motion.
+  const bool extrudes = before.extruding.stats().duration_s > 0.0;
+  const verify::DeviationStats b = (extrudes ? before.extruding : before.all).stats();
+  const verify::DeviationStats a = (extrudes ? after.extruding : after.all).stats();
+  if (a.contour_rms_mm <= std::max(b.contour_rms_mm, kResolutionMm) &&
+      a.contour_max_mm <= std::max(b.contour_max_mm, kResolutionMm)) {
+    return std::nullopt;
+  }
+  return fmt::format(
+      "compensation would be worse: contour RMS {:.3f} to {:.3f} µm, largest {:.3f} to {:.3f} µm",
+      b.contour_rms_mm * 1e3, a.contour_rms_mm * 1e3, b.contour_max_mm * 1e3,
+      a.contour_max_mm * 1e3);
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,32 @@
+// What the nozzle does during motion that is left alone, and whether a compensated run is better
+// than its original.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "piece_reader.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::pipeline {
+
+[[nodiscard]] dynamics::NozzleXY at_rest(const gcode::Position& position);
+
+// The nozzle after the piece's own moves and pauses, starting from `nozzle`.
+[[nodiscard]] dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
+                                              const verify::NozzleModel& model);
+
+// Replays the text of a compensated run as the printer would, in the state the printer is in before
+// it, and compares its deviation with that of the original moves: nullopt when it is at most as
+// large, otherwise the figures.
+[[nodiscard]] std::optional<std::string> worse_than_original(
+    const std::vector<planner::PlannedMove>& original, std::string_view text,
+    gcode::Interpreter printer, const planner::Limits& printer_limits,
+    const dynamics::NozzleXY& nozzle, const verify::Rules& rules);
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,117 @@
+#include "piece_reader.hpp"
+
+#include <utility>
+
+#include "unflex/emit/emitter.hpp"
+#include "unflex/gcode/compensable.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// Lines between runs are handed on in portions, so that a long file without motion stays small.
+constexpr std::size_t kMaxEventsOutsideRuns = 4096;
+constexpr std::size_t kMaxWarnings = 1000;
+
+bool stands_anywhere(const gcode::Event& event) {
+  return event.kind == gcode::EventKind::passive || event.kind == gcode::EventKind::limits;
+}
+
+}  // namespace
+
+PieceReader::PieceReader(std::istream& input, std::string name,
+                         gcode::InterpreterOptions interpreter, planner::Limits limits,
+                         planner::FixedLimits fixed)
+    : lines_(input, std::move(name)), interpreter_(interpreter), planner_(limits, fixed) {}
+
+Result<bool> PieceReader::next(Piece& piece) {
+  gcode::Event event;
+  for (;;) {
+    const Result<bool> more = read_event(event);
+    if (!more) {
+      return more;
+    }
+    if (!*more) {
+      break;
+    }
+    if (stands_anywhere(event)) {
+      if (open_.is_run) {
+        between_.push_back(std::move(event));
+      } else {
+        append(std::move(event));
+      }
+    } else {
+      const bool for_run = gcode::compensable(event);
+      if (!open_.events.empty() && open_.is_run != for_run) {
+        close(piece);
+        open_.is_run = for_run;
+        append(std::move(event));
+        return true;
+      }
+      open_.is_run = for_run;
+      append(std::move(event));
+    }
+    if (!open_.is_run && open_.events.size() >= kMaxEventsOutsideRuns) {
+      close(piece);
+      return true;
+    }
+  }
+  if (open_.events.empty() && between_.empty()) {
+    return false;
+  }
+  close(piece);
+  return true;
+}
+
+Result<bool> PieceReader::read_event(gcode::Event& event) {
+  gcode::Line line;
+  const Result<bool> more = lines_.next(line);
+  if (!more || !*more) {
+    return more;
+  }
+  if (line.content().starts_with(emit::kComment)) {
+    return fail(ErrorKind::input, {lines_.name(), line.number},
+                "this file was already compensated by unflex; give the file as it was sliced");
+  }
+  event = interpreter_.interpret(std::move(line));
+  for (std::string& warning : event.warnings) {
+    if (warnings_.size() < kMaxWarnings) {
+      warnings_.push_back({{lines_.name(), event.line.number}, std::move(warning)});
+    }
+  }
+  planner_.apply(event.limits);
+  return true;
+}
+
+// Puts the event into the open piece, after the lines that turned out to stand between.
+void PieceReader::append(gcode::Event event) {
+  append_between();
+  std::size_t count = 0;
+  for (const gcode::Segment& segment : event.segments) {
+    count += planner_.add(segment) ? 1 : 0;
+  }
+  if (event.kind == gcode::EventKind::barrier) {
+    planner_.stop();
+  }
+  open_.events.push_back(std::move(event));
+  open_.move_counts.push_back(count);
+}
+
+void PieceReader::append_between() {
+  for (gcode::Event& event : between_) {
+    open_.events.push_back(std::move(event));
+    open_.move_counts.push_back(0);
+  }
+  between_.clear();
+}
+
+// Hands out the open piece; the lines after a run's last move go to the next one.
+void PieceReader::close(Piece& piece) {
+  if (open_.events.empty()) {
+    append_between();
+  }
+  planner_.stop();
+  planner_.take(open_.moves);
+  piece = std::exchange(open_, Piece{});
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,52 @@
+// The input cut into what is handled as one: runs, and the lines between them.
+#pragma once
+
+#include <cstddef>
+#include <istream>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/gcode/line.hpp"
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::pipeline {
+
+struct Piece {
+  // A run: compensable moves and the lines between them that do not stop the machine. Its plan goes
+  // from rest to rest, since the base has to stand still where it meets motion left as it is.
+  bool is_run = false;
+  std::vector<gcode::Event> events;
+  std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
+  std::vector<planner::PlannedMove> moves;
+};
+
+class PieceReader {
+ public:
+  PieceReader(std::istream& input, std::string name, gcode::InterpreterOptions interpreter,
+              planner::Limits limits, planner::FixedLimits fixed);
+
+  // The next piece; false at the end of the input. An error of kind input when the text cannot be
+  // read or was written by unflex.
+  [[nodiscard]] Result<bool> next(Piece& piece);
+
+  [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
+  [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
+  [[nodiscard]] const planner::Limits& limits() const { return planner_.limits(); }
+
+ private:
+  Result<bool> read_event(gcode::Event& event);
+  void append(gcode::Event event);
+  void append_between();
+  void close(Piece& piece);
+
+  gcode::LineReader lines_;
+  gcode::Interpreter interpreter_;
+  planner::KlipperPlanner planner_;
+  Piece open_;                        // being filled
+  std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
+  std::vector<Diagnostic> warnings_;
+};
+
+}  // namespace unflex::pipeline

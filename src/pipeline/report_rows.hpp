@@ -1,0 +1,19 @@
+// From the stages' results to the report's plain rows.
+#pragma once
+
+#include <string>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::pipeline {
+
+// A report with what the job itself says.
+[[nodiscard]] report::Report new_report(std::string command, const Job& job);
+
+// Verifies the job's output against its input and puts the figures into the report.
+[[nodiscard]] Status add_verification(const Job& job, Progress& progress, report::Report& report);
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,121 @@
+#include "stage_options.hpp"
+
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "unflex/dynamics/flexible_axis.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// Rounding a line's ends to the grid of 10⁻⁴ mm changes the acceleration from line to line by up to
+// 4 · ½ · 10⁻⁴ / h²; the optimiser stays that far below the limit so that the text keeps it.
+constexpr double kGridMm = 1e-4;
+
+dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
+  return dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio);
+}
+
+compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
+                                 const std::optional<machine::Range>& travel,
+                                 const machine::Settings& settings) {
+  const double h = settings.emit.period_ms * 1e-3;
+  const double accel = settings.base_max_accel_mm_s2();
+  compensate::AxisSetup setup;
+  setup.axis = axis(dynamics);
+  setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
+  setup.limits.max_accel_mm_s2 = accel - std::min(2.0 * kGridMm / (h * h), 0.2 * accel);
+  if (settings.base.max_jerk_mm_s3 > 0.0) {
+    setup.limits.max_jerk_mm_s3 = settings.base.max_jerk_mm_s3;
+  }
+  if (travel) {
+    setup.limits.min_position_mm = travel->min;
+    setup.limits.max_position_mm = travel->max;
+  }
+  return setup;
+}
+
+}  // namespace
+
+gcode::InterpreterOptions interpreter_options(const machine::Settings& settings) {
+  gcode::InterpreterOptions options;
+  options.firmware_retraction = settings.printer.firmware_retraction;
+  options.retract_length_mm = settings.printer.retract_length_mm;
+  options.retract_speed_mm_s = settings.printer.retract_speed_mm_s;
+  options.unretract_extra_length_mm = settings.printer.unretract_extra_length_mm;
+  options.unretract_speed_mm_s = settings.printer.unretract_speed_mm_s;
+  options.arc_resolution_mm = settings.printer.arc_resolution_mm;
+  return options;
+}
+
+planner::Limits planner_limits(const machine::Settings& settings) {
+  return {settings.limits.max_velocity_mm_s, settings.limits.max_accel_mm_s2,
+          settings.limits.square_corner_velocity_mm_s, settings.limits.minimum_cruise_ratio};
+}
+
+planner::FixedLimits fixed_limits(const machine::Settings& settings) {
+  return {settings.max_z_velocity_mm_s(), settings.max_z_accel_mm_s2(),
+          settings.max_extrude_only_velocity_mm_s(), settings.max_extrude_only_accel_mm_s2(),
+          settings.extruder.instantaneous_corner_velocity_mm_s};
+}
+
+compensate::Setup compensate_setup(const machine::Settings& settings) {
+  compensate::Setup setup;
+  setup.x = axis_setup(settings.dynamics_x, settings.printer.travel_x_mm, settings);
+  setup.y = axis_setup(settings.dynamics_y, settings.printer.travel_y_mm, settings);
+  setup.period_s = settings.emit.period_ms * 1e-3;
+  setup.lead_in_s = settings.solve.lead_in_ms * 1e-3;
+  setup.tail_s = settings.tail_s();
+  setup.window_s = settings.solve.window_s;
+  setup.overlap_s = settings.solve.overlap_s;
+  setup.travel_weight = settings.solve.travel_weight;
+  setup.jerk_weight = settings.solve.jerk_weight;
+  return setup;
+}
+
+emit::EmitOptions emit_options(const machine::Settings& settings, std::string version) {
+  emit::EmitOptions options;
+  options.interpreter = interpreter_options(settings);
+  options.printer_limits = planner_limits(settings);
+  options.fixed = fixed_limits(settings);
+  // Room above the base's own limit, so that the firmware never slows a line down for it.
+  options.run_limits = {2.0 * settings.base_max_velocity_mm_s(), settings.emit.accel_mm_s2,
+                        settings.emit.square_corner_velocity_mm_s, 0.0};
+  options.tolerance_mm = settings.emit.tolerance_um * 1e-3;
+  options.min_line_s =
+      std::max(settings.emit.period_ms * 1e-3, 1.0 / settings.emit.max_lines_per_s);
+  options.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
+  options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
+  options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
+  options.version = std::move(version);
+  return options;
+}
+
+verify::Rules verify_rules(const machine::Settings& settings) {
+  verify::Rules rules;
+  rules.interpreter = interpreter_options(settings);
+  rules.limits = planner_limits(settings);
+  rules.fixed = fixed_limits(settings);
+  const double radius = settings.extruder.filament_diameter_mm / 2.0;
+  rules.max_extrude_ratio =
+      settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius * radius);
+  rules.nozzle_diameter_mm = settings.extruder.nozzle_diameter_mm;
+  rules.nozzle = {axis(settings.dynamics_x), axis(settings.dynamics_y),
+                  settings.verify.step_ms * 1e-3, settings.verify.hold_s};
+  const auto set_range = [](const std::optional<machine::Range>& travel, double& min,
+                            double& max) {
+    if (travel) {
+      min = travel->min;
+      max = travel->max;
+    }
+  };
+  set_range(settings.printer.travel_x_mm, rules.travel.x_min_mm, rules.travel.x_max_mm);
+  set_range(settings.printer.travel_y_mm, rules.travel.y_min_mm, rules.travel.y_max_mm);
+  rules.base_max_velocity_mm_s = settings.base_max_velocity_mm_s();
+  rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
+  return rules;
+}
+
+}  // namespace unflex::pipeline

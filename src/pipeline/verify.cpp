@@ -1,0 +1,88 @@
+#include <chrono>
+#include <fstream>
+#include <utility>
+
+#include "report_rows.hpp"
+#include "stage_options.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+report::DeviationRow row(const verify::DeviationStats& stats) {
+  return {stats.contour_max_mm,  stats.contour_p99_mm, stats.contour_rms_mm,
+          stats.tracking_max_mm, stats.tracking_rms_mm, stats.duration_s,
+          stats.contour_max_line};
+}
+
+report::DeviationRows rows(const verify::Deviation& deviation) {
+  return {row(deviation.extruding), row(deviation.all)};
+}
+
+}  // namespace
+
+report::Report new_report(std::string command, const Job& job) {
+  report::Report report;
+  report.command = std::move(command);
+  report.version = UNFLEX_VERSION;
+  report.input = job.input_name;
+  report.output = job.output_name;
+  report.firmware = machine::to_string(job.settings.printer.firmware);
+  for (machine::SettingRow& setting : machine::rows(job.settings)) {
+    report.printer.push_back(
+        {std::move(setting.key), std::move(setting.value), std::move(setting.origin)});
+  }
+  return report;
+}
+
+Status add_verification(const Job& job, Progress& progress, report::Report& report) {
+  std::ifstream input(job.input, std::ios::binary);
+  std::ifstream output(job.output, std::ios::binary);
+  if (!input) {
+    return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
+  }
+  if (!output) {
+    return fail(ErrorKind::input, {job.output_name, 0}, "cannot read the file");
+  }
+  const Result<verify::VerifyReport> result =
+      verify::verify(input, job.input_name, output, job.output_name, verify_rules(job.settings),
+                     progress);
+  if (!result) {
+    return tl::unexpected(result.error());
+  }
+  report.uncompensated = rows(result->uncompensated);
+  report.compensated = rows(result->compensated);
+  report.reference_time_s = result->reference_time_s;
+  report.emitted_time_s = result->emitted_time_s;
+  report.base_max_velocity_mm_s = result->base_max_velocity_mm_s;
+  report.base_max_accel_mm_s2 = result->base_max_accel_mm_s2;
+  report.output_lines = result->output_lines;
+  report.output_bytes = result->output_bytes;
+  report.max_lines_per_s = result->max_lines_per_s;
+  report.segment_ms_median = result->segment_ms_median;
+  report.worst_run_drift_ms = result->worst_run_drift_s * 1e3;
+  report.input_extrusion_mm = result->input_extrusion_mm;
+  report.output_extrusion_mm = result->output_extrusion_mm;
+  report.worst_move_extrusion_error_mm = result->worst_move_extrusion_error_mm;
+  report.violation_count = result->violation_count;
+  for (const verify::Violation& violation : result->violations) {
+    report.violations.push_back(
+        to_string(Error{ErrorKind::input, violation.place, violation.message}));
+  }
+  return {};
+}
+
+Result<report::Report> verify(const Job& job, Progress& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  report::Report report = new_report("verify", job);
+  if (Status status = add_verification(job, progress, report); !status) {
+    return tl::unexpected(status.error());
+  }
+  report.wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
+  return report;
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,156 @@
+#include "wire.hpp"
+
+#include <sys/socket.h>
+#include <sys/types.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <vector>
+
+namespace unflex::pipeline {
+namespace {
+
+class Writer {
+ public:
+  template <class T>
+  void value(const T& item) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    bytes_.append(reinterpret_cast<const char*>(&item), sizeof item);
+  }
+  void values(const std::vector<double>& items) {
+    value(items.size());
+    bytes_.append(reinterpret_cast<const char*>(items.data()), items.size() * sizeof(double));
+  }
+  void text(std::string_view item) {
+    value(item.size());
+    bytes_.append(item);
+  }
+  std::string take() { return std::move(bytes_); }
+
+ private:
+  std::string bytes_;
+};
+
+// Reads what a Writer of the same program wrote, so lengths are as they should be.
+class Reader {
+ public:
+  explicit Reader(std::string_view bytes) : bytes_(bytes) {}
+
+  template <class T>
+  T value() {
+    static_assert(std::is_trivially_copyable_v<T>);
+    T item;
+    std::memcpy(&item, bytes_.data(), sizeof item);
+    bytes_.remove_prefix(sizeof item);
+    return item;
+  }
+  std::vector<double> values() {
+    std::vector<double> items(value<std::size_t>());
+    std::memcpy(items.data(), bytes_.data(), items.size() * sizeof(double));
+    bytes_.remove_prefix(items.size() * sizeof(double));
+    return items;
+  }
+  std::string text() {
+    const auto size = value<std::size_t>();
+    std::string item(bytes_.substr(0, size));
+    bytes_.remove_prefix(size);
+    return item;
+  }
+
+ private:
+  std::string_view bytes_;
+};
+
+bool transfer(int socket, char* data, std::size_t size, bool sending) {
+  while (size > 0) {
+    // MSG_NOSIGNAL: a dead peer shall be an answer, not SIGPIPE.
+    const ssize_t count = sending ? send(socket, data, size, MSG_NOSIGNAL)
+                                  : recv(socket, data, size, 0);
+    if (count < 0 && errno == EINTR) {
+      continue;
+    }
+    if (count <= 0) {
+      return false;
+    }
+    data += count;
+    size -= static_cast<std::size_t>(count);
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string pack(const compensate::AxisWindow& window) {
+  Writer writer;
+  writer.value(window.axis);
+  writer.value(window.period_s);
+  writer.values(window.reference_mm);
+  writer.values(window.weight);
+  writer.value(window.jerk_weight);
+  writer.value(window.limits);
+  writer.value(window.start);
+  writer.value(window.end_base_mm);
+  return writer.take();
+}
+
+compensate::AxisWindow unpack_window(std::string_view bytes) {
+  Reader reader(bytes);
+  compensate::AxisWindow window;
+  window.axis = reader.value<dynamics::FlexibleAxis>();
+  window.period_s = reader.value<double>();
+  window.reference_mm = reader.values();
+  window.weight = reader.values();
+  window.jerk_weight = reader.value<double>();
+  window.limits = reader.value<compensate::BaseLimits>();
+  window.start = reader.value<std::optional<compensate::AxisWindow::Start>>();
+  window.end_base_mm = reader.value<std::optional<double>>();
+  return window;
+}
+
+std::string pack(const Result<compensate::AxisSolution>& solution) {
+  Writer writer;
+  writer.value(solution.has_value());
+  if (solution) {
+    writer.values(solution->base.position_mm);
+    writer.values(solution->base.velocity_mm_s);
+    writer.values(solution->base.accel_mm_s2);
+    writer.value(solution->objective);
+    writer.value(solution->iterations);
+  } else {
+    writer.text(solution.error().message);
+  }
+  return writer.take();
+}
+
+Result<compensate::AxisSolution> unpack_solution(std::string_view bytes) {
+  Reader reader(bytes);
+  if (!reader.value<bool>()) {
+    return fail(ErrorKind::internal, reader.text());
+  }
+  compensate::AxisSolution solution;
+  solution.base.position_mm = reader.values();
+  solution.base.velocity_mm_s = reader.values();
+  solution.base.accel_mm_s2 = reader.values();
+  solution.objective = reader.value<double>();
+  solution.iterations = reader.value<int>();
+  return solution;
+}
+
+bool send_message(int socket, std::string_view message) {
+  std::uint64_t size = message.size();
+  return transfer(socket, reinterpret_cast<char*>(&size), sizeof size, true) &&
+         transfer(socket, const_cast<char*>(message.data()), message.size(), true);
+}
+
+bool receive_message(int socket, std::string& message) {
+  std::uint64_t size = 0;
+  if (!transfer(socket, reinterpret_cast<char*>(&size), sizeof size, false)) {
+    return false;
+  }
+  message.resize(size);
+  return transfer(socket, message.data(), message.size(), false);
+}
+
+}  // namespace unflex::pipeline

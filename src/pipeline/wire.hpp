@@ -1,0 +1,22 @@
+// Axis windows and their solutions as bytes, between processes of one machine and one program.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "unflex/compensate/axis_window.hpp"
+#include "unflex/core/error.hpp"
+
+namespace unflex::pipeline {
+
+[[nodiscard]] std::string pack(const compensate::AxisWindow& window);
+[[nodiscard]] compensate::AxisWindow unpack_window(std::string_view bytes);
+
+[[nodiscard]] std::string pack(const Result<compensate::AxisSolution>& solution);
+[[nodiscard]] Result<compensate::AxisSolution> unpack_solution(std::string_view bytes);
+
+// A message is its length in eight bytes and its bytes. False when the other side is gone.
+[[nodiscard]] bool send_message(int socket, std::string_view message);
+[[nodiscard]] bool receive_message(int socket, std::string& message);
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,187 @@
+#include "worker_pool.hpp"
+
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "wire.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// The life of a worker: read a window, solve it, answer, until the parent hangs up. Leaves by _exit
+// so that nothing the parent has open is flushed twice.
+[[noreturn]] void work(int socket, const WorkerPool::EngineFactory& factory) {
+  // Ctrl-C reaches the whole group; the parent decides when its workers end.
+  std::signal(SIGINT, SIG_IGN);
+  std::signal(SIGTERM, SIG_DFL);
+  const auto engine = factory();
+  std::string message;
+  while (receive_message(socket, message)) {
+    if (!send_message(socket, pack(engine->solve(unpack_window(message))))) {
+      break;
+    }
+  }
+  _exit(0);
+}
+
+}  // namespace
+
+Result<WorkerPool> WorkerPool::start(unsigned workers, const EngineFactory& factory) {
+  WorkerPool pool(factory);
+  // All at once: a worker closes the sockets of those before it.
+  pool.workers_.resize(std::max(workers, 1U));
+  for (Worker& worker : pool.workers_) {
+    if (Status status = pool.spawn(worker); !status) {
+      return tl::unexpected(status.error());
+    }
+  }
+  return pool;
+}
+
+WorkerPool::WorkerPool(WorkerPool&& other) noexcept
+    : factory_(std::move(other.factory_)),
+      workers_(std::exchange(other.workers_, {})),
+      queue_(std::move(other.queue_)),
+      failed_(std::move(other.failed_)),
+      busy_(std::exchange(other.busy_, 0)) {}
+
+WorkerPool::~WorkerPool() {
+  for (Worker& worker : workers_) {
+    if (worker.socket >= 0) {
+      close(worker.socket);
+    }
+    if (worker.pid > 0) {
+      if (worker.ticket) {
+        kill(worker.pid, SIGKILL);
+      }
+      waitpid(worker.pid, nullptr, 0);
+    }
+  }
+}
+
+Status WorkerPool::spawn(Worker& worker) {
+  int pair[2];
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) {
+    return fail(ErrorKind::internal, fmt::format("cannot open a socket to a solver process: {}",
+                                                 std::strerror(errno)));
+  }
+  const pid_t parent = getpid();
+  const pid_t pid = fork();
+  if (pid < 0) {
+    const int reason = errno;
+    close(pair[0]);
+    close(pair[1]);
+    return fail(ErrorKind::internal,
+                fmt::format("cannot fork a solver process: {}", std::strerror(reason)));
+  }
+  if (pid == 0) {
+    close(pair[0]);
+    for (const Worker& other : workers_) {
+      if (other.socket >= 0) {
+        close(other.socket);
+      }
+    }
+    // Should the parent be killed, the workers go with it.
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) {
+      _exit(0);
+    }
+    work(pair[1], factory_);
+  }
+  close(pair[1]);
+  worker = {pid, pair[0], std::nullopt};
+  return {};
+}
+
+void WorkerPool::submit(std::size_t ticket, const compensate::AxisWindow& window) {
+  queue_.push_back({ticket, pack(window)});
+  feed();
+}
+
+// Gives every idle worker a window.
+void WorkerPool::feed() {
+  for (Worker& worker : workers_) {
+    if (queue_.empty()) {
+      return;
+    }
+    if (worker.ticket || worker.socket < 0) {
+      continue;
+    }
+    const Task task = std::move(queue_.front());
+    queue_.pop_front();
+    worker.ticket = task.ticket;
+    ++busy_;
+    if (!send_message(worker.socket, task.message)) {
+      failed_.push_back(*replace(worker, "a solver process died"));
+    }
+  }
+}
+
+std::optional<WorkerPool::Done> WorkerPool::replace(Worker& worker, std::string reason) {
+  Done done{worker.ticket.value_or(0), fail(ErrorKind::internal, std::move(reason))};
+  close(worker.socket);
+  kill(worker.pid, SIGKILL);
+  waitpid(worker.pid, nullptr, 0);
+  worker = {};
+  --busy_;
+  // Without a successor the remaining workers carry on; with none left the queue fails in take().
+  static_cast<void>(spawn(worker));
+  return done;
+}
+
+std::optional<WorkerPool::Done> WorkerPool::take(int timeout_ms) {
+  feed();
+  if (!failed_.empty()) {
+    Done done = std::move(failed_.front());
+    failed_.pop_front();
+    return done;
+  }
+  std::vector<pollfd> sockets;
+  std::vector<Worker*> owners;
+  for (Worker& worker : workers_) {
+    if (worker.ticket) {
+      sockets.push_back({worker.socket, POLLIN, 0});
+      owners.push_back(&worker);
+    }
+  }
+  if (sockets.empty()) {
+    if (queue_.empty()) {
+      return std::nullopt;
+    }
+    Done done{queue_.front().ticket, fail(ErrorKind::internal, "no solver process is left")};
+    queue_.pop_front();
+    return done;
+  }
+  if (poll(sockets.data(), sockets.size(), timeout_ms) <= 0) {
+    return std::nullopt;
+  }
+  for (std::size_t i = 0; i < sockets.size(); ++i) {
+    if (sockets[i].revents == 0) {
+      continue;
+    }
+    Worker& worker = *owners[i];
+    std::string message;
+    if (!receive_message(worker.socket, message)) {
+      return replace(worker, "a solver process died");
+    }
+    Done done{*worker.ticket, unpack_solution(message)};
+    worker.ticket.reset();
+    --busy_;
+    feed();
+    return done;
+  }
+  return std::nullopt;
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,69 @@
+// Processes that solve axis windows. MUMPS below Ipopt is not thread-safe, so each solver lives in a
+// process of its own, forked before the program has any thread.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unflex/compensate/axis_window.hpp"
+#include "unflex/core/error.hpp"
+
+namespace unflex::pipeline {
+
+class WorkerPool {
+ public:
+  using EngineFactory = std::function<std::unique_ptr<compensate::Engine>()>;
+
+  struct Done {
+    std::size_t ticket = 0;
+    Result<compensate::AxisSolution> solution;
+  };
+
+  // Forks `workers` processes (at least one), each with an engine of its own.
+  [[nodiscard]] static Result<WorkerPool> start(unsigned workers, const EngineFactory& factory);
+
+  WorkerPool(WorkerPool&& other) noexcept;
+  WorkerPool& operator=(WorkerPool&&) = delete;
+  // Ends the workers, at once if they are still busy.
+  ~WorkerPool();
+
+  // Queues a window; the ticket comes back with its solution.
+  void submit(std::size_t ticket, const compensate::AxisWindow& window);
+
+  // A solution that has arrived; waits up to timeout_ms for one. nullopt when none came or nothing
+  // is under way. A worker that died is replaced, and its window comes back as an error.
+  [[nodiscard]] std::optional<Done> take(int timeout_ms);
+
+  // Windows submitted and not yet taken.
+  [[nodiscard]] std::size_t under_way() const { return queue_.size() + busy_; }
+
+ private:
+  struct Worker {
+    pid_t pid = -1;
+    int socket = -1;
+    std::optional<std::size_t> ticket;  // of the window it is solving
+  };
+  struct Task {
+    std::size_t ticket;
+    std::string message;
+  };
+
+  explicit WorkerPool(EngineFactory factory) : factory_(std::move(factory)) {}
+  Status spawn(Worker& worker);
+  void feed();
+  std::optional<Done> replace(Worker& worker, std::string reason);
+
+  EngineFactory factory_;
+  std::vector<Worker> workers_;
+  std::deque<Task> queue_;
+  std::deque<Done> failed_;  // could not even be handed to a worker
+  std::size_t busy_ = 0;
+};
+
+}  // namespace unflex::pipeline
