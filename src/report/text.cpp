@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 #include <string_view>
 
@@ -49,14 +50,15 @@ void write_runs(Sink out, const Report& r) {
   }
   fmt::format_to(out, "runs          {} of {} compensated, {} kept their original moves\n",
                  r.runs_compensated, r.runs_total, r.runs_fallback);
-  for (std::size_t i = 0; i < r.fallbacks.size() && i < kListedFallbacks; ++i) {
+  const std::size_t listed = std::min(r.fallbacks.size(), kListedFallbacks);
+  for (std::size_t i = 0; i < listed; ++i) {
     const Fallback& kept = r.fallbacks[i];
     fmt::format_to(out, "              lines {}-{}: {}\n", kept.first_line, kept.last_line,
                    kept.reason);
   }
-  if (r.runs_fallback > kListedFallbacks) {
+  if (r.runs_fallback > listed) {
     fmt::format_to(out, "              and {} more, listed by --report\n",
-                   r.runs_fallback - kListedFallbacks);
+                   r.runs_fallback - listed);
   }
   fmt::format_to(out, "solver        {}, {} windows, {} iterations\n", r.solver_engine,
                  r.windows_total, r.solver_iterations);
@@ -74,7 +76,8 @@ void write_output(Sink out, const Report& r) {
 }  // namespace
 
 std::string duration_text(double seconds) {
-  if (!(seconds >= 60.0)) {
+  // Just below a minute tenths would round to 60.0.
+  if (!(seconds >= 59.95)) {
     return fmt::format("{:.1f}s", seconds);
   }
   const auto whole = static_cast<long long>(seconds + 0.5);

@@ -1,0 +1,118 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "report/documented_keys.hpp"
+#include "report/sample_report.hpp"
+#include "unflex/report/format.hpp"
+
+namespace unflex::report {
+namespace {
+
+nlohmann::json parsed(const Report& report) { return nlohmann::json::parse(to_json(report)); }
+
+TEST(JsonReport, HasEveryValueUnderItsKey) {
+  const nlohmann::json json = parsed(sample_report());
+  EXPECT_EQ(json["schema_version"], 1);
+  EXPECT_EQ(json["command"], "compensate");
+  EXPECT_EQ(json["input"], "cube.gcode");
+  EXPECT_EQ(json["output"], "out.gcode");
+  EXPECT_EQ(json["firmware"], "klipper");
+  EXPECT_EQ(json["print_time_s"], (nlohmann::json{{"reference", 3600.0}, {"emitted", 3618.0}}));
+  EXPECT_EQ(json["base"],
+            (nlohmann::json{{"max_velocity_mm_s", 123.0}, {"max_accel_mm_s2", 19999.0}}));
+  EXPECT_EQ(json["windows"], (nlohmann::json{{"total", 1000}, {"solved", 994}, {"fallback", 6}}));
+  EXPECT_EQ(json["runs"], (nlohmann::json{{"total", 900}, {"compensated", 895}, {"fallback", 5}}));
+  EXPECT_EQ(json["kept_moves"], (nlohmann::json{{"Z move", 12}}));
+  EXPECT_EQ(json["solver"], (nlohmann::json{{"engine", "ipopt 3.11.9"}, {"iterations", 4242}}));
+  EXPECT_EQ(json["output_stats"], (nlohmann::json{{"lines", 123456},
+                                                  {"bytes", 4500000},
+                                                  {"max_lines_per_s", 890.0},
+                                                  {"segment_ms_median", 2.5},
+                                                  {"worst_run_drift_ms", 0.04}}));
+  EXPECT_EQ(json["extrusion"],
+            (nlohmann::json{
+                {"input_mm", 1234.5}, {"output_mm", 1234.75}, {"worst_move_error_mm", 0.00001}}));
+  EXPECT_EQ(json["performance"], (nlohmann::json{{"wall_s", 90.0},
+                                                 {"cpu_s", 170.0},
+                                                 {"print_s_per_wall_s", 40.0},
+                                                 {"peak_rss_mb", 64.0}}));
+  EXPECT_EQ(json["violation_count"], 3);
+  EXPECT_EQ(json["violations"], nlohmann::json::array({"out.gcode:7: outside the travel"}));
+  EXPECT_EQ(json["warnings"], nlohmann::json::array({"cube.gcode:1: warning: no G28"}));
+}
+
+TEST(JsonReport, TellsTheFourDeviationsApart) {
+  const nlohmann::json deviation = parsed(sample_report())["deviation"];
+  EXPECT_EQ(deviation["uncompensated"]["extruding"]["contour_max_mm"], 0.8);
+  EXPECT_EQ(deviation["uncompensated"]["all"]["contour_p99_mm"], 0.8);
+  EXPECT_EQ(deviation["compensated"]["extruding"]["contour_rms_mm"], 0.25 * 0.0125);
+  EXPECT_EQ(deviation["compensated"]["all"]["tracking_max_mm"], 0.05);
+  EXPECT_EQ(deviation["compensated"]["all"]["tracking_rms_mm"], 0.75 * 0.025);
+  EXPECT_EQ(deviation["compensated"]["all"]["duration_s"], 2.5);
+  EXPECT_EQ(deviation["compensated"]["all"]["contour_max_line"], 17);
+}
+
+TEST(JsonReport, GivesSettingsTheirTypes) {
+  const nlohmann::json printer = parsed(sample_report())["printer"];
+  EXPECT_EQ(printer["printer.firmware"]["value"], "klipper");
+  EXPECT_EQ(printer["printer.travel_x_mm"]["value"], nlohmann::json::array({0, 250}));
+  EXPECT_EQ(printer["printer.travel_x_mm"]["origin"], "printer.toml:3");
+  EXPECT_TRUE(printer["printer.travel_y_mm"]["value"].is_null());
+  EXPECT_EQ(printer["limits.max_accel_mm_s2"]["value"], 5000);
+  EXPECT_EQ(printer["limits.max_accel_mm_s2"]["origin"], "--set");
+  EXPECT_EQ(printer["solve.jerk_weight"]["value"], 1e-7);
+}
+
+TEST(JsonReport, ListsFallbacksWithTheirLines) {
+  const nlohmann::json fallbacks = parsed(sample_report())["fallbacks"];
+  ASSERT_EQ(fallbacks.size(), 2U);
+  EXPECT_EQ(fallbacks[1],
+            (nlohmann::json{
+                {"first_line", 30}, {"last_line", 44}, {"reason", "worse than the original"}}));
+}
+
+TEST(JsonReport, HasEmptyListsRatherThanNone) {
+  const nlohmann::json json = parsed(Report{});
+  EXPECT_EQ(json["fallbacks"], nlohmann::json::array());
+  EXPECT_EQ(json["violations"], nlohmann::json::array());
+  EXPECT_EQ(json["warnings"], nlohmann::json::array());
+  EXPECT_EQ(json["kept_moves"], nlohmann::json::object());
+  EXPECT_EQ(json["printer"], nlohmann::json::object());
+}
+
+TEST(JsonReport, SurvivesNamesThatAreNotUtf8) {
+  Report report = sample_report();
+  report.input = "caf\xe9.gcode";
+  report.warnings = {"\xff\xfe"};
+  EXPECT_EQ(parsed(report)["input"], "caf\xef\xbf\xbd.gcode");
+}
+
+TEST(JsonReport, SurvivesQuotesAndControlCharacters) {
+  Report report = sample_report();
+  report.input = "a\"b\\c\nd\x01.gcode";
+  EXPECT_EQ(parsed(report)["input"], report.input);
+}
+
+TEST(JsonReport, WritesNullForWhatIsNotANumber) {
+  Report report = sample_report();
+  report.print_s_per_wall_s = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(parsed(report)["performance"]["print_s_per_wall_s"].is_null());
+}
+
+TEST(JsonReport, IsIndentedAndEndsWithANewline) {
+  const std::string text = to_json(sample_report());
+  EXPECT_THAT(text, ::testing::StartsWith("{\n  \"schema_version\": 1,\n  \"command\""));
+  EXPECT_THAT(text, ::testing::EndsWith("\n}\n"));
+}
+
+TEST(ReportPage, DocumentsExactlyTheKeysOfAReport) {
+  std::set<std::string> keys;
+  collect_keys(parsed(sample_report()), "", keys);
+  EXPECT_EQ(documented_keys(UNFLEX_DOCS "/report.md", "compensate and verify"), keys);
+}
+
+}  // namespace
+}  // namespace unflex::report

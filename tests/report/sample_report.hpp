@@ -1,0 +1,64 @@
+// A report in which every field has a value of its own.
+#pragma once
+
+#include "unflex/report/report.hpp"
+
+namespace unflex::report {
+
+inline DeviationRow sample_row(double scale) {
+  return {.contour_max_mm = 1.0 * scale,
+          .contour_p99_mm = 0.5 * scale,
+          .contour_rms_mm = 0.25 * scale,
+          .tracking_max_mm = 2.0 * scale,
+          .tracking_rms_mm = 0.75 * scale,
+          .duration_s = 100.0 * scale,
+          .contour_max_line = 17};
+}
+
+inline Report sample_report() {
+  Report r;
+  r.command = "compensate";
+  r.version = "0.1.0";
+  r.input = "cube.gcode";
+  r.output = "out.gcode";
+  r.firmware = "klipper";
+  r.printer = {{"printer.firmware", "\"klipper\"", "default"},
+               {"printer.travel_x_mm", "[0, 250]", "printer.toml:3"},
+               {"printer.travel_y_mm", "", "default"},
+               {"limits.max_accel_mm_s2", "5000", "--set"},
+               {"solve.jerk_weight", "1e-07", "default"}};
+  r.reference_time_s = 3600.0;
+  r.emitted_time_s = 3618.0;
+  r.uncompensated = {.extruding = sample_row(0.8), .all = sample_row(1.6)};
+  r.compensated = {.extruding = sample_row(0.0125), .all = sample_row(0.025)};
+  r.base_max_velocity_mm_s = 123.0;
+  r.base_max_accel_mm_s2 = 19999.0;
+  r.runs_total = 900;
+  r.runs_compensated = 895;
+  r.runs_fallback = 5;
+  r.windows_total = 1000;
+  r.windows_solved = 994;
+  r.windows_fallback = 6;
+  r.fallbacks = {{10, 20, "no solution"}, {30, 44, "worse than the original"}};
+  r.kept_moves = {{"Z move", 12}};
+  r.solver_engine = "ipopt 3.11.9";
+  r.solver_iterations = 4242;
+  r.output_lines = 123456;
+  r.output_bytes = 4500000;
+  r.max_lines_per_s = 890.0;
+  r.segment_ms_median = 2.5;
+  r.worst_run_drift_ms = 0.04;
+  r.input_extrusion_mm = 1234.5;
+  r.output_extrusion_mm = 1234.75;
+  r.worst_move_extrusion_error_mm = 0.00001;
+  r.wall_s = 90.0;
+  r.cpu_s = 170.0;
+  r.print_s_per_wall_s = 40.0;
+  r.peak_rss_mb = 64.0;
+  r.violations = {"out.gcode:7: outside the travel"};
+  r.violation_count = 3;
+  r.warnings = {"cube.gcode:1: warning: no G28"};
+  return r;
+}
+
+}  // namespace unflex::report

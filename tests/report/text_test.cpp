@@ -1,0 +1,60 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "report/sample_report.hpp"
+#include "unflex/report/format.hpp"
+
+namespace unflex::report {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Summary, IsExactlyThis) {
+  EXPECT_EQ(to_text(sample_report()),
+            "cube.gcode → out.gcode\n"
+            "  contour, µm     max                 p99                 RMS\n"
+            "  extruding       800 → 12.5          400 → 6.25          200 → 3.12\n"
+            "  all moves       1600 → 25.0         800 → 12.5          400 → 6.25\n"
+            "print time    1h 00m 00s planned, 1h 00m 18s emitted (+0.50 %)\n"
+            "base          at most 123 mm/s and 19999 mm/s²\n"
+            "runs          895 of 900 compensated, 5 kept their original moves\n"
+            "              lines 10-20: no solution\n"
+            "              lines 30-44: worse than the original\n"
+            "              and 3 more, listed by --report\n"
+            "solver        ipopt 3.11.9, 1000 windows, 4242 iterations\n"
+            "output        123456 lines, 4.5 MB, 890 lines/s at peak\n"
+            "filament      1234.50 mm in, 1234.75 mm out\n"
+            "speed         40 s of print per second, 1m 30s in all, 64 MB\n"
+            "violations    3\n");
+}
+
+TEST(Summary, DoesNotSpeakOfRunsWhereNothingWasSolved) {
+  Report report = sample_report();
+  report.command = "verify";
+  report.runs_total = 0;
+  report.windows_total = 0;
+  EXPECT_THAT(to_text(report), Not(HasSubstr("solver")));
+}
+
+TEST(Summary, OfAnEmptyPrintHasNoInfinities) {
+  const std::string text = to_text(Report{});
+  EXPECT_THAT(text, HasSubstr("0.0s planned, 0.0s emitted (+0.00 %)"));
+  EXPECT_THAT(text, Not(HasSubstr("nan")));
+  EXPECT_THAT(text, Not(HasSubstr("inf")));
+}
+
+TEST(Durations, AreReadable) {
+  EXPECT_EQ(duration_text(0.0), "0.0s");
+  EXPECT_EQ(duration_text(5.25), "5.2s");
+  EXPECT_EQ(duration_text(59.94), "59.9s");
+  EXPECT_EQ(duration_text(59.97), "1m 00s");
+  EXPECT_EQ(duration_text(60.0), "1m 00s");
+  EXPECT_EQ(duration_text(3599.6), "1h 00m 00s");
+  EXPECT_EQ(duration_text(3725.4), "1h 02m 05s");
+}
+
+}  // namespace
+}  // namespace unflex::report
