@@ -68,7 +68,9 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
   });
   path.begin_section();
   Meter meter(model, path);
-  if (!base.empty() || !reference.empty()) {
+  if (base.empty() && reference.empty()) {
+    meter.set_state(start, start.x.position, start.y.position);
+  } else {
     const planner::PlannedMove& first = base.empty() ? reference.front() : base.front();
     meter.set_state(start, first.segment.start_mm[gcode::X], first.segment.start_mm[gcode::Y]);
   }

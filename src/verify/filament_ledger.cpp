@@ -6,8 +6,8 @@
 namespace unflex::verify {
 namespace {
 
-// By how much the emitted run's clock may be off; a line this near to t_i counts as being there.
-constexpr double kClockTolerance_s = 1e-4;
+// δ: by how much the emitted run's clock may be off.
+constexpr double kClockTolerance_s = 5e-5;
 
 }  // namespace
 
@@ -32,18 +32,27 @@ void FilamentLedger::play(const planner::PlannedMove& move, double start_s) {
   const double end_s = start_s + move.duration_s();
   const double before_mm = f_mm_;
   f_mm_ += move.segment.delta(gcode::E);
+  const auto laid_until = [&](double t) {
+    return before_mm + (f_mm_ - before_mm) * (t - start_s) / (end_s - start_s);
+  };
   for (Border& border : borders_) {
-    if (border.time_s - kClockTolerance_s >= end_s) {
+    const double from_s = border.time_s - kClockTolerance_s;
+    if (from_s >= end_s) {
       break;
     }
     if (!border.reached) {
+      const bool line_ends_here = end_s < border.time_s + kClockTolerance_s;
       border.reached = true;
-      border.lowest_f_mm = before_mm;
+      border.from_f_mm = line_ends_here && from_s > start_s ? laid_until(from_s) : before_mm;
     }
   }
-  while (!borders_.empty() && borders_.front().time_s + kClockTolerance_s <= end_s) {
-    close(borders_.front(), borders_.front().lowest_f_mm, f_mm_);
-    borders_.pop_front();
+  // The last border known may be the run's last, which is closed when all has been laid.
+  for (; borders_.size() > 1 && borders_.front().time_s + kClockTolerance_s <= end_s;
+       borders_.pop_front()) {
+    const Border& border = borders_.front();
+    const bool line_begins_here = start_s > border.time_s - kClockTolerance_s;
+    close(border.q_mm, border.from_f_mm,
+          line_begins_here ? laid_until(border.time_s + kClockTolerance_s) : f_mm_);
   }
 }
 
@@ -51,16 +60,17 @@ void FilamentLedger::end_run() {
   collect_borders();
   for (; borders_.size() > 1; borders_.pop_front()) {
     const Border& border = borders_.front();
-    close(border, border.reached ? border.lowest_f_mm : f_mm_, f_mm_);
+    close(border.q_mm, border.reached ? border.from_f_mm : f_mm_, f_mm_);
   }
   // Whatever comes late still belongs to the last move.
-  close({0.0, q_mm_}, f_mm_, f_mm_);
+  close(q_mm_, f_mm_, f_mm_);
   borders_.clear();
 }
 
-void FilamentLedger::close(const Border& border, double lowest_f_mm, double highest_f_mm) {
+// The bounds change places where filament is pulled back.
+void FilamentLedger::close(double q_mm, double from_f_mm, double to_f_mm) {
   const double distance_mm =
-      std::min(0.0, border.q_mm - lowest_f_mm) + std::max(0.0, border.q_mm - highest_f_mm);
+      q_mm - std::clamp(q_mm, std::min(from_f_mm, to_f_mm), std::max(from_f_mm, to_f_mm));
   worst_mm_ = std::max(worst_mm_, std::abs(distance_mm - last_distance_mm_));
   last_distance_mm_ = distance_mm;
 }

@@ -4,9 +4,10 @@
 //   Q(t), F(t)   filament the sliced and the emitted file have laid since the run's start, mm
 //   t_i          end of the i-th move of the sliced file
 //
-// Lines of the emitted file span the ends of moves, and how much of such a line belongs to which
-// move cannot be said. So at each t_i, Q(t_i) is compared with the interval from F at the start to
-// F at the end of the lines at t_i; outside of it, the distance counts. The error of a move is the
+// Where a line of the emitted file spans the end of a move, it cannot be said how much of it
+// belongs to which move. So Q(t_i) is compared with the interval from F at the start to F at the
+// end of the line; outside of it, the distance counts. Where a line ends at t_i, to the tolerance δ
+// of the clock, the interval is that from F(t_i − δ) to F(t_i + δ). The error of a move is the
 // difference of the distances at its two ends. At the end of the run the interval has no width.
 #pragma once
 
@@ -40,12 +41,12 @@ class FilamentLedger {
   struct Border {
     double time_s = 0.0;
     double q_mm = 0.0;
-    bool reached = false;
-    double lowest_f_mm = 0.0;
+    bool reached = false;  // the line at time_s − δ has come
+    double from_f_mm = 0.0;
   };
 
   void collect_borders();
-  void close(const Border& border, double lowest_f_mm, double highest_f_mm);
+  void close(double q_mm, double from_f_mm, double to_f_mm);
 
   const ReferencePath* path_;
   std::size_t next_piece_ = 0;
