@@ -113,12 +113,12 @@ bool same_file(const std::string& a, const std::string& b) {
   if (std::filesystem::equivalent(a, b, failed)) {
     return true;
   }
-  const std::filesystem::path path_a = std::filesystem::weakly_canonical(a, failed);
-  if (failed) {
-    return false;
-  }
-  const std::filesystem::path path_b = std::filesystem::weakly_canonical(b, failed);
-  return !failed && path_a == path_b;
+  // At least one does not exist yet: compare where they would be.
+  const auto place = [&failed](const std::string& name) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(name, failed), failed);
+  };
+  const std::filesystem::path place_a = place(a);
+  return !failed && place_a == place(b) && !failed;
 }
 
 }  // namespace unflex::app

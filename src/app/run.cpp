@@ -239,9 +239,6 @@ Result<ExitCode> run_on_prints(const RunConfig& config) {
   if (!report) {
     return tl::unexpected(report.error());
   }
-  report->command = config.command == Command::compensate ? "compensate" : "verify";
-  report->version = version();
-  report->printer = settings_in_force(space->settings);
   add_setting_warnings(space->settings, report->warnings);
   print_warnings(report->warnings);
   const ExitCode verdict = judge(config, *report);

@@ -1,0 +1,77 @@
+// Words to a configuration.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "unflex/app/run_config.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::ElementsAre;
+
+RunConfig read(const std::vector<std::string>& arguments) {
+  const Result<CommandLine> line = parse_command_line(arguments);
+  EXPECT_TRUE(line) << to_string(line.error());
+  return line && line->config ? *line->config : RunConfig{};
+}
+
+TEST(CommandLine, OfCompensateIsRead) {
+  const RunConfig config =
+      read({"compensate", "--set", "emit.period_ms=0.5", "in.gcode", "-o", "out.gcode", "--set",
+            "printer.travel_x_mm=[0,250]", "--printer", "p.toml", "--report", "r.json",
+            "--max-deviation", "1e-2", "-j", "3", "--quiet"});
+  EXPECT_EQ(config.command, Command::compensate);
+  EXPECT_EQ(config.input, "in.gcode");
+  EXPECT_EQ(config.output, "out.gcode");
+  EXPECT_FALSE(config.in_place);
+  EXPECT_THAT(config.overrides, ElementsAre("emit.period_ms=0.5", "printer.travel_x_mm=[0,250]"));
+  EXPECT_EQ(config.printer_file, "p.toml");
+  EXPECT_EQ(config.report, "r.json");
+  EXPECT_EQ(config.max_deviation_mm, 0.01);
+  EXPECT_EQ(config.workers, 3U);
+  EXPECT_TRUE(config.quiet);
+}
+
+TEST(CommandLine, InPlaceMakesTheInputTheOutput) {
+  const RunConfig config = read({"compensate", "--in-place", "in.gcode"});
+  EXPECT_TRUE(config.in_place);
+  EXPECT_EQ(config.output, "in.gcode");
+  EXPECT_GE(config.workers, 1U);
+}
+
+TEST(CommandLine, TakesDashesAsStreams) {
+  const RunConfig config = read({"compensate", "-", "-o", "-"});
+  EXPECT_EQ(config.input, "-");
+  EXPECT_EQ(config.output, "-");
+}
+
+TEST(CommandLine, TakesNamesWithBracketsSpacesAndDashes) {
+  EXPECT_EQ(read({"inspect", "[a, b].gcode"}).input, "[a, b].gcode");
+  EXPECT_EQ(read({"inspect", "--", "-a.gcode"}).input, "-a.gcode");
+  EXPECT_EQ(read({"compensate", "in", "-o", "{x}.gcode"}).output, "{x}.gcode");
+}
+
+TEST(CommandLine, OfVerifyKeepsTheTwoFilesApart) {
+  const RunConfig config = read({"verify", "out.gcode", "--against", "in.gcode"});
+  EXPECT_EQ(config.command, Command::verify);
+  EXPECT_EQ(config.input, "in.gcode");
+  EXPECT_EQ(config.output, "out.gcode");
+}
+
+TEST(CommandLine, OfInspectHasNoOutput) {
+  const RunConfig config = read({"inspect", "in.gcode"});
+  EXPECT_EQ(config.command, Command::inspect);
+  EXPECT_EQ(config.output, "");
+  EXPECT_FALSE(parse_command_line({"inspect", "in.gcode", "-o", "x"}));
+}
+
+TEST(CommandLine, HelpAndVersionAreTexts) {
+  EXPECT_EQ(parse_command_line({"--version"})->text,
+            std::string("unflex ") + std::string(version()) + "\n");
+  EXPECT_THAT(parse_command_line({"--help"})->text, ::testing::HasSubstr("inspect"));
+  EXPECT_THAT(parse_command_line({"verify", "--help"})->text, ::testing::HasSubstr("--against"));
+}
+
+}  // namespace
+}  // namespace unflex::app

@@ -1,0 +1,227 @@
+// Whatever goes wrong: one clear line on stderr, the right exit code, nothing written.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "app/program.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+struct Failure {
+  std::string name;
+  std::vector<std::string> arguments;
+  int exit_code = 0;
+  std::string message;  // how the line begins
+};
+
+void PrintTo(const Failure& failure, std::ostream* out) { *out << failure.name; }
+
+class Failures : public ProgramTest, public ::testing::WithParamInterface<Failure> {
+ protected:
+  Failures() {
+    write_file(path("in.gcode"), small_print());
+    write_file(path("out.gcode"), "precious\n");
+    write_file(path("bad.toml"), "[limits]\nmax_acel_mm_s2 = 1\n");
+  }
+};
+
+TEST_P(Failures, AreOneLineAndLeaveEverythingAsItWas) {
+  const Failure& failure = GetParam();
+  const std::vector<std::string> before = names();
+  const Outcome outcome = run(failure.arguments);
+  EXPECT_EQ(outcome.exit_code, failure.exit_code);
+  EXPECT_THAT(outcome.err, StartsWith(failure.message));
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(names(), before);
+  EXPECT_EQ(read_file(path("in.gcode")), small_print());
+  EXPECT_EQ(read_file(path("out.gcode")), "precious\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OfUsage, Failures,
+    ::testing::Values(
+        Failure{"NoCommand", {}, 1, "unflex: a subcommand is required; run 'unflex --help'"},
+        Failure{"UnknownCommand",
+                {"frobnicate"},
+                1,
+                "unflex: unknown command 'frobnicate'; there are compensate, verify, inspect"},
+        Failure{"NoInput", {"compensate"}, 1, "unflex: IN is required; run 'unflex compensate"},
+        Failure{"NoOutput", {"compensate", "in.gcode"}, 1, "unflex: where to write? give -o OUT"},
+        Failure{"UnknownOption",
+                {"compensate", "in.gcode", "-o", "out.gcode", "--frob"},
+                1,
+                "unflex: the following argument was not expected: --frob"},
+        Failure{"OptionWithLineBreak",
+                {"compensate", "in.gcode", "-o", "out.gcode", "--a\nb"},
+                1,
+                "unflex: the following argument was not expected: --a b"},
+        Failure{"BothOutputs",
+                {"compensate", "in.gcode", "-o", "out.gcode", "--in-place"},
+                1,
+                "unflex: give either --in-place or -o, not both"},
+        Failure{"StdinInPlace",
+                {"compensate", "-", "--in-place"},
+                1,
+                "unflex: --in-place needs a file, not stdin"},
+        Failure{"OutputIsInput",
+                {"compensate", "in.gcode", "-o", "./in.gcode"},
+                1,
+                "./in.gcode: is the input too"},
+        Failure{"ReportIsOutput",
+                {"compensate", "in.gcode", "-o", "new.json", "--report", "./new.json"},
+                1,
+                "./new.json: is read or written already"},
+        Failure{"HtmlReport",
+                {"inspect", "in.gcode", "--report", "r.html"},
+                1,
+                "unflex: --report r.html: HTML comes with a later version, use .json"},
+        Failure{"ReportOfNoKind",
+                {"inspect", "in.gcode", "--report", "r.txt"},
+                1,
+                "unflex: --report r.txt: the name must end in .json"},
+        Failure{"TwoResultsOnStdout",
+                {"compensate", "in.gcode", "-o", "-", "--report", "-"},
+                1,
+                "unflex: the output and the report cannot both go to stdout"},
+        Failure{"NoWorkers",
+                {"compensate", "in.gcode", "-o", "out.gcode", "-j", "0"},
+                1,
+                "unflex: --jobs: "},
+        Failure{"WorkersInWords",
+                {"compensate", "in.gcode", "-o", "out.gcode", "-j", "two"},
+                1,
+                "unflex: "},
+        Failure{"DeviationNotANumber",
+                {"compensate", "in.gcode", "-o", "out.gcode", "--max-deviation", "nan"},
+                1,
+                "unflex: --max-deviation: 'nan' is not a number above 0"},
+        Failure{"NegativeDeviation",
+                {"compensate", "in.gcode", "-o", "out.gcode", "--max-deviation=-1"},
+                1,
+                "unflex: --max-deviation: '-1' is not a number above 0"},
+        Failure{"VerifyAgainstNothing",
+                {"verify", "out.gcode"},
+                1,
+                "unflex: --against is required; run 'unflex verify --help'"},
+        Failure{"VerifyStdinTwice",
+                {"verify", "-", "--against", "-"},
+                1,
+                "unflex: only one of OUT and --against can be stdin"}),
+    [](const auto& failure) { return failure.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    OfConfiguration, Failures,
+    ::testing::Values(
+        Failure{"UnknownKey",
+                {"compensate", "in.gcode", "-o", "out.gcode", "--set", "emit.perod_ms=1"},
+                1,
+                "--set emit.perod_ms=1: unknown key 'emit.perod_ms', did you mean "
+                "'emit.period_ms'?\n"},
+        Failure{"UnknownKeyInFile",
+                {"compensate", "in.gcode", "-o", "out.gcode", "--printer", "bad.toml"},
+                1,
+                "bad.toml:2: unknown key 'limits.max_acel_mm_s2', did you mean "
+                "'limits.max_accel_mm_s2'?\n"},
+        Failure{"ValueOutOfRange",
+                {"compensate", "in.gcode", "-o", "out.gcode", "--set", "emit.period_ms=-1"},
+                1,
+                "--set emit.period_ms=-1: emit.period_ms is -1, but must be"},
+        Failure{"PrinterFileMissing",
+                {"inspect", "in.gcode", "--printer", "none.toml"},
+                1,
+                "none.toml: cannot read the printer file: No such file or directory\n"},
+        Failure{"PrinterFileIsGcode",
+                {"inspect", "in.gcode", "--printer", "in.gcode"},
+                1,
+                "in.gcode:1: not valid TOML: "}),
+    [](const auto& failure) { return failure.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    OfInput, Failures,
+    ::testing::Values(
+        Failure{"Missing",
+                {"compensate", "none.gcode", "-o", "out.gcode"},
+                2,
+                "none.gcode: cannot read: No such file or directory\n"},
+        Failure{"MissingToInspect", {"inspect", "none.gcode"}, 2, "none.gcode: cannot read: "},
+        Failure{"MissingToVerify",
+                {"verify", "none.gcode", "--against", "in.gcode"},
+                2,
+                "none.gcode: cannot read: "},
+        Failure{"MissingToVerifyAgainst",
+                {"verify", "out.gcode", "--against", "none.gcode"},
+                2,
+                "none.gcode: cannot read: "},
+        Failure{"Directory",
+                {"compensate", ".", "-o", "out.gcode"},
+                2,
+                ".: is a directory, not a G-code file\n"},
+        Failure{"LineBreakInName", {"inspect", "a\nb.gcode"}, 2, "a b.gcode: cannot read: "}),
+    [](const auto& failure) { return failure.param.name; });
+
+// Permissions do not stop the superuser, so these are targets that nobody can create.
+INSTANTIATE_TEST_SUITE_P(
+    OfOutput, Failures,
+    ::testing::Values(Failure{"DirectoryMissing",
+                              {"compensate", "in.gcode", "-o", "none/out.gcode"},
+                              1,
+                              "none/out.gcode: the directory none does not exist; create it\n"},
+                      Failure{"ParentIsAFile",
+                              {"compensate", "in.gcode", "-o", "out.gcode/x"},
+                              1,
+                              "out.gcode/x: cannot write: Not a directory\n"},
+                      Failure{"TargetIsADirectory",
+                              {"compensate", "in.gcode", "-o", "."},
+                              1,
+                              ".: is a directory; name a file in it\n"},
+                      Failure{"NotWritable",
+                              {"compensate", "in.gcode", "-o", "/proc/out.gcode"},
+                              1,
+                              "/proc/out.gcode: cannot write"},
+                      Failure{
+                          "ReportNotWritable",
+                          {"compensate", "in.gcode", "-o", "out.gcode", "--report", "none/r.json"},
+                          1,
+                          "none/r.json: the directory none does not exist; create it\n"}),
+    [](const auto& failure) { return failure.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(OfDevices, Failures,
+                         ::testing::Values(Failure{
+                             "Full",
+                             {"compensate", "in.gcode", "-o", "/dev/full"},
+                             4,
+                             "/dev/full: cannot write: No space left on device\n"}),
+                         [](const auto& failure) { return failure.param.name; });
+
+TEST_F(ProgramTest, RefusesWhatIsNotGcode) {
+  const std::string bytes(4096, '\0');
+  write_file(path("in.gcode"), bytes);
+  write_file(path("out.gcode"), "precious\n");
+  const Outcome outcome = run({"compensate", "in.gcode", "-o", "out.gcode"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, StartsWith("in.gcode"));
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_EQ(read_file(path("out.gcode")), "precious\n");
+  EXPECT_THAT(names(), ElementsAre("in.gcode", "out.gcode"));
+}
+
+TEST_F(ProgramTest, NeedsSomewhereToKeepStdin) {
+  write_file(path("out.gcode"), "precious\n");
+  ASSERT_EQ(::setenv("TMPDIR", "/nonexistent", 1), 0);
+  const Outcome outcome = run({"compensate", "-", "-o", "out.gcode"}, small_print());
+  ::unsetenv("TMPDIR");
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr("set TMPDIR to another directory"));
+  EXPECT_EQ(read_file(path("out.gcode")), "precious\n");
+}
+
+}  // namespace
+}  // namespace unflex::app

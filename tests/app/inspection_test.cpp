@@ -1,0 +1,74 @@
+#include "inspection.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "report/documented_keys.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+pipeline::Inspection sample() {
+  pipeline::Inspection i;
+  i.dialect = "PrusaSlicer 2.5.0";
+  i.lines = 21912;
+  i.bytes = 790000;
+  i.moves = 16835;
+  i.extruding_moves = 15000;
+  i.extrude_only_moves = 754;
+  i.arcs = 3;
+  i.passive_lines = 11;
+  i.limit_lines = 12;
+  i.barrier_lines = 13;
+  i.commands = {{"G1", 18000}, {"M204", 12}};
+  i.runs = 400;
+  i.windows = 410;
+  i.run_time_s = 2400.0;
+  i.kept_moves = {{"Z move", 200}};
+  i.reference_time_s = 2488.0;
+  i.moving_time_s = 2450.0;
+  i.filament_mm = 1234.5;
+  i.path_length_mm = 99999.0;
+  i.x_max_mm = 120.0;
+  i.absolute_e = true;
+  i.lowest_accel_mm_s2 = 500.0;
+  i.highest_accel_mm_s2 = 1500.0;
+  i.warnings = {"in.gcode:3: warning: something"};
+  return i;
+}
+
+TEST(InspectionText, ShowsWhatWasUnderstood) {
+  const std::string text = inspection_text(sample(), "in.gcode", machine::Settings{});
+  EXPECT_THAT(text, ::testing::StartsWith("in.gcode\ndialect       PrusaSlicer 2.5.0\n"));
+  EXPECT_THAT(text, HasSubstr("16835, 15000 extruding, 754 of filament alone, 3 arcs"));
+  EXPECT_THAT(text, HasSubstr("print time    41m 28s, 40m 50s of it moving"));
+  EXPECT_THAT(text, HasSubstr("400 in 410 windows, 40m 00s can be compensated"));
+  EXPECT_THAT(text, HasSubstr("200 moves stay as they are: Z move"));
+  EXPECT_THAT(text, HasSubstr("500 to 1500 mm/s²"));
+  EXPECT_THAT(text, HasSubstr("X 45 Hz, ζ 0.06"));
+}
+
+TEST(InspectionJson, HoldsThePrintTimeAndTheSettings) {
+  const auto json =
+      nlohmann::json::parse(inspection_json(sample(), "in.gcode", *machine::load({}, {})));
+  EXPECT_EQ(json["print_time_s"]["reference"], 2488.0);
+  EXPECT_EQ(json["moves"]["extruding"], 15000);
+  EXPECT_EQ(json["commands"]["M204"], 12);
+  EXPECT_EQ(json["printer"]["emit.period_ms"]["value"], 1);
+  EXPECT_EQ(json["printer"]["emit.period_ms"]["origin"], "default");
+}
+
+TEST(ReportPage, DocumentsExactlyTheKeysOfAnInspection) {
+  const auto json =
+      nlohmann::json::parse(inspection_json(sample(), "in.gcode", *machine::load({}, {})));
+  std::set<std::string> keys;
+  report::collect_keys(json, "", keys);
+  EXPECT_EQ(report::documented_keys(UNFLEX_DOCS "/report.md", "inspect"), keys);
+}
+
+}  // namespace
+}  // namespace unflex::app

@@ -1,0 +1,124 @@
+// Files that appear whole or not at all.
+
+#include "outputs.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "app/program.hpp"
+#include "inputs.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+using Outputs = ProgramTest;
+
+TEST_F(Outputs, AppearOnCommitOnly) {
+  Result<Output> output = Output::open(path("new").string());
+  ASSERT_TRUE(output);
+  ASSERT_TRUE(output->write("text\n"));
+  EXPECT_FALSE(std::filesystem::exists(path("new")));
+  ASSERT_TRUE(output->commit());
+  EXPECT_EQ(read_file(path("new")), "text\n");
+  EXPECT_THAT(names(), ElementsAre("new"));
+}
+
+TEST_F(Outputs, VanishWithoutCommit) {
+  write_file(path("old"), "old\n");
+  {
+    Result<Output> output = Output::open(path("old").string());
+    ASSERT_TRUE(output);
+    ASSERT_TRUE(output->write("new\n"));
+  }
+  EXPECT_EQ(read_file(path("old")), "old\n");
+  EXPECT_THAT(names(), ElementsAre("old"));
+}
+
+TEST_F(Outputs, AreNotRemovedByForkedChildren) {
+  Result<Output> output = Output::open(path("new").string());
+  ASSERT_TRUE(output);
+  ASSERT_TRUE(output->write("text\n"));
+  const pid_t child = ::fork();
+  if (child == 0) {
+    { const Output taken = std::move(*output); }
+    ::_exit(0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(output->commit());
+  EXPECT_EQ(read_file(path("new")), "text\n");
+}
+
+TEST_F(Outputs, HaveThePermissionsTheUserGivesNewFiles) {
+  const mode_t mask = ::umask(027);
+  Result<Output> output = Output::open(path("new").string());
+  ASSERT_TRUE(output);
+  ASSERT_TRUE(output->commit());
+  ::umask(mask);
+  EXPECT_EQ(std::filesystem::status(path("new")).permissions(), std::filesystem::perms(0640));
+}
+
+TEST_F(Outputs, MayHaveNamesAsLongAsNamesCanBe) {
+  const std::string name(255, 'n');
+  Result<Output> output = Output::open(path(name).string());
+  ASSERT_TRUE(output);
+  ASSERT_TRUE(output->commit());
+  EXPECT_THAT(names(), ElementsAre(name));
+}
+
+TEST_F(Outputs, ToAPipeAreCopiedOnCommit) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  Result<Output> output = Output::open(path("pipe").string());
+  ASSERT_TRUE(output);
+  ASSERT_TRUE(output->write("text\n"));
+  const pid_t reader = ::fork();
+  if (reader == 0) {
+    ::_exit(read_file(path("pipe")) == "text\n" ? 0 : 1);
+  }
+  EXPECT_TRUE(output->commit());
+  int status = 0;
+  ::waitpid(reader, &status, 0);
+  EXPECT_EQ(status, 0);
+  EXPECT_TRUE(std::filesystem::is_fifo(path("pipe")));
+}
+
+TEST_F(Outputs, LeaveNothingWhereTheyCannotBe) {
+  EXPECT_FALSE(Output::open(path("none/new").string()));
+  EXPECT_THAT(names(), IsEmpty());
+}
+
+TEST_F(Outputs, AreTheSameFileByEveryName) {
+  write_file(path("a"), "");
+  std::filesystem::create_hard_link(path("a"), path("b"));
+  std::filesystem::create_symlink("a", path("c"));
+  EXPECT_TRUE(same_file(path("a").string(), path("b").string()));
+  EXPECT_TRUE(same_file(path("a").string(), path("c").string()));
+  EXPECT_TRUE(same_file(path("new").string(), path("./new").string()));
+  EXPECT_FALSE(same_file(path("a").string(), path("new").string()));
+}
+
+TEST_F(ProgramTest, ReadsAPipeAsASeekableFileWithoutAName) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  const pid_t writer = ::fork();
+  if (writer == 0) {
+    write_file(path("pipe"), small_print());
+    ::_exit(0);
+  }
+  Result<Input> input = Input::open(path("pipe").string());
+  ASSERT_TRUE(input);
+  const Status seekable = input->make_seekable();
+  ::waitpid(writer, nullptr, 0);
+  ASSERT_TRUE(seekable) << to_string(seekable.error());
+  EXPECT_EQ(read_file(input->path()), small_print());
+  EXPECT_EQ(read_file(input->path()), small_print());
+  EXPECT_EQ(input->name(), path("pipe").string());
+}
+
+}  // namespace
+}  // namespace unflex::app

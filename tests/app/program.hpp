@@ -1,0 +1,59 @@
+// Runs the program as a shell would, and gives every test a directory of its own.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace unflex::app {
+
+struct Outcome {
+  int exit_code = -1;  // 128 + signal if one killed it
+  std::string out;
+  std::string err;
+};
+
+// A started program whose stdout and stderr go to files.
+class Program {
+ public:
+  // `input` becomes stdin; the program runs in `directory`.
+  Program(const std::filesystem::path& directory, const std::vector<std::string>& arguments,
+          const std::string& input = "");
+  void signal(int number) const;
+  [[nodiscard]] Outcome wait();
+
+ private:
+  std::filesystem::path scratch_;
+  pid_t child_ = -1;
+};
+
+[[nodiscard]] std::string read_file(const std::filesystem::path& file);
+void write_file(const std::filesystem::path& file, const std::string& text);
+
+class ProgramTest : public ::testing::Test {
+ protected:
+  ProgramTest();
+  ~ProgramTest() override;
+
+  [[nodiscard]] std::filesystem::path path(const std::string& name) const {
+    return directory_ / name;
+  }
+  // The names in the test's directory, sorted.
+  [[nodiscard]] std::vector<std::string> names() const;
+  [[nodiscard]] Outcome run(const std::vector<std::string>& arguments,
+                            const std::string& input = "") const {
+    return Program(directory_, arguments, input).wait();
+  }
+  [[nodiscard]] const std::filesystem::path& directory() const { return directory_; }
+
+ private:
+  std::filesystem::path directory_;
+};
+
+// A print of two small squares, with everything a slicer does between moves.
+[[nodiscard]] std::string small_print();
+
+}  // namespace unflex::app

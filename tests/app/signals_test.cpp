@@ -1,0 +1,84 @@
+// A program that is asked to end leaves nothing behind.
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+#include "app/program.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::ElementsAre;
+
+// Long enough that it cannot be done before the signal comes.
+std::string long_print() {
+  std::string text = "G28\nG90\nM83\nG1 X20 Y20 F6000\n";
+  for (int i = 0; i < 3000; ++i) {
+    text += "G1 X40 Y20 E0.8 F3000\nG1 X40 Y40 E0.8\nG1 X20 Y40 E0.8\nG1 X20 Y20 E0.8\nG1 E-1\n";
+  }
+  return text;
+}
+
+// Waits until the work has begun, which its temporary file shows.
+bool wait_for_names(const std::filesystem::path& directory, std::ptrdiff_t count) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (std::chrono::steady_clock::now() < deadline) {
+    const auto entries = std::filesystem::directory_iterator(directory);
+    if (std::distance(begin(entries), end(entries)) >= count) {
+      return true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+class EndingSignal : public ProgramTest, public ::testing::WithParamInterface<int> {};
+
+TEST_P(EndingSignal, RemovesTheTemporaryFileAndKeepsTheTarget) {
+  write_file(path("in.gcode"), long_print());
+  write_file(path("out.gcode"), "precious\n");
+  Program program(directory(), {"compensate", "in.gcode", "-o", "out.gcode"});
+  ASSERT_TRUE(wait_for_names(directory(), 3));
+  program.signal(GetParam());
+  const Outcome outcome = program.wait();
+  EXPECT_EQ(outcome.exit_code, 128 + GetParam());
+  EXPECT_EQ(outcome.err, "unflex: interrupted, nothing was written\n");
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(read_file(path("out.gcode")), "precious\n");
+  EXPECT_THAT(names(), ElementsAre("in.gcode", "out.gcode"));
+}
+
+INSTANTIATE_TEST_SUITE_P(OfEveryKind, EndingSignal, ::testing::Values(SIGINT, SIGTERM, SIGHUP));
+
+TEST_F(ProgramTest, EndsWithoutASignalWhenNobodyReadsItsOutput) {
+  write_file(path("in.gcode"), small_print());
+  int ends[2] = {-1, -1};
+  ASSERT_EQ(::pipe(ends), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::close(ends[0]);
+    ::dup2(ends[1], STDOUT_FILENO);
+    ::close(ends[1]);
+    const int null = ::open(path("err").c_str(), O_WRONLY | O_CREAT, 0600);
+    ::dup2(null, STDERR_FILENO);
+    ::execl(UNFLEX_PROGRAM, "unflex", "compensate", path("in.gcode").c_str(), "-o", "-", nullptr);
+    ::_exit(127);
+  }
+  ::close(ends[0]);
+  ::close(ends[1]);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 4);
+  EXPECT_EQ(read_file(path("err")), "stdout: cannot write: Broken pipe\n");
+}
+
+}  // namespace
+}  // namespace unflex::app
