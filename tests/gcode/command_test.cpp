@@ -192,6 +192,7 @@ TEST(Parse, TakesQuotesOffAsAShellWould) {
   EXPECT_EQ(parse("RESPOND \"MSG=a b\"").parameter("MSG"), "a b");
   EXPECT_EQ(parse(R"(RESPOND MSG=a\ b\"c)").parameter("MSG"), "a b\"c");
   EXPECT_EQ(parse(R"(RESPOND MSG="a\"b\\c\d")").parameter("MSG"), R"(a"b\c\d)");
+  EXPECT_EQ(parse(R"(RESPOND MSG='a\\b')").parameter("MSG"), R"(a\\b)");
   EXPECT_EQ(parse("SET_LED LED=a # red").comment, " red");
   EXPECT_EQ(parse("RESPOND MSG=it's").problem, "a quote is not closed");
   EXPECT_EQ(parse("RESPOND MSG=\"a").problem, "a quote is not closed");

@@ -56,7 +56,7 @@ TEST(Coordinates, InchesScaleEveryLength) {
   EXPECT_DOUBLE_EQ(session.move("G21\nG1 X26.4").delta(X), 1.0);
   const Event arc = session.read("G20\nG1 X2 Y0\nG2 X0 Y0 I-1");
   EXPECT_EQ(arc.segments.size(), 79U) << "half a circle of 25.4 mm radius in pieces of a mm";
-  EXPECT_EQ(session.read("G1 X2\nG2 X0 R1").segments.size(), 79U);
+  EXPECT_EQ(session.read("G1 X2\nG2 X0 R2").segments.size(), 53U) << "a third of pi times 50.8";
 }
 
 TEST(Coordinates, G92ShiftsTheZeroOfTheNamedAxes) {
@@ -233,6 +233,8 @@ TEST(Coordinates, SavedStatesComeBack) {
   EXPECT_DOUBLE_EQ(session.state().flow_factor, 1.0);
   EXPECT_THAT(session.state().base_mm, ElementsAre(1, 0, 0, 1));
   EXPECT_THAT(session.move("M82\nG1 X7 E5").end_mm, ElementsAre(8, 1, 1, 6));
+  session.read("G28\nG92 X0\nRESTORE_GCODE_STATE NAME=a\nG1 X1 Y1 Z1");
+  EXPECT_TRUE(session.move("G1 X2").start_known) << "the zero is the saved one";
   event = session.read("RESTORE_GCODE_STATE NAME=a MOVE=1");
   EXPECT_TRUE(event.position_lost);
   event = session.read("RESTORE_GCODE_STATE");

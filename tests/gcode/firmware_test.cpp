@@ -138,6 +138,16 @@ TEST(FirmwareRetraction, OfUnknownLengthStopsTheMachine) {
   EXPECT_EQ(session.read("G11").kind, EventKind::barrier);
 }
 
+TEST(FirmwareRetraction, IsWrittenInKlippersDecimals) {
+  InterpreterOptions options = retracting();
+  options.retract_length_mm = 0.1234567;
+  options.retract_speed_mm_s = 35.51;
+  Session session(options);
+  const Segment segment = session.move("G10");
+  EXPECT_DOUBLE_EQ(segment.delta(E), -0.12346);
+  EXPECT_DOUBLE_EQ(segment.feed_mm_s, 2130.0 / 60.0);
+}
+
 TEST(FirmwareRetraction, IsNotWhatG10WithWordsMeans) {
   Session session(retracting());
   const Event event = session.read("G10 S210 P0");
