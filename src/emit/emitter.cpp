@@ -7,7 +7,6 @@
 
 #include "strokes.hpp"
 #include "unflex/core/number.hpp"
-#include "unflex/gcode/command.hpp"
 
 namespace unflex::emit {
 namespace {
@@ -80,14 +79,9 @@ void KlipperEmitter::follow_input(const gcode::Event& event) {
 }
 
 void KlipperEmitter::line(const gcode::Event& event, std::string& out) {
-  const bool leaves_our_hands = event.kind == gcode::EventKind::barrier && event.position_lost;
-  if (leaves_our_hands) {
+  if (event.kind == gcode::EventKind::barrier && event.position_lost) {
+    // Homing, macros and tool changes move the machine by themselves.
     set_shaper(true, out);
-  }
-  if (leaves_our_hands ||
-      (event.kind == gcode::EventKind::move &&
-       !gcode::parse(event.line.content()).value('F').has_value())) {
-    restore_speed(out);
   }
   copy(event, out);
   follow_input(event);
@@ -193,13 +187,9 @@ void KlipperEmitter::restore_modes(std::string& out) {
   if (wanted.unit_mm != state.unit_mm) {
     write(wanted.unit_mm == 1.0 ? "G21" : "G20", out);
   }
-}
-
-void KlipperEmitter::restore_speed(std::string& out) {
-  const double wanted = input_.state().feed_mm_s;
-  if (!same(wanted, printer_.state().feed_mm_s)) {
+  if (!same(wanted.feed_mm_s, state.feed_mm_s)) {
     std::string text = "G1";
-    append_word(text, 'F', wanted * 60.0 / printer_.state().unit_mm, kExactDecimals);
+    append_word(text, 'F', wanted.feed_mm_s * 60.0 / state.unit_mm, kExactDecimals);
     write(text, out);
   }
 }

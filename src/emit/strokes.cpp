@@ -145,7 +145,9 @@ void divide(const dynamics::BaseTrajectory& base, double from, double to,
     const double y0 = base.y_at(a).position_mm;
     const double slope_x = (base.x_at(b).position_mm - x0) / (b - a);
     const double slope_y = (base.y_at(b).position_mm - y0) / (b - a);
-    const double tolerance2 = options.tolerance_mm * options.tolerance_mm;
+    // What a line as long as a good part of the resonance's period leaves out, the nozzle follows.
+    const double slow = std::min(1.0, std::pow(options.quick_line_s / (b - a), 2));
+    const double tolerance2 = std::pow(options.tolerance_mm * slow, 2);
     for (double t = (std::floor(a / h + 1e-9) + 1.0) * h; t < b - 1e-12; t += h) {
       const double dx = base.x_at(t).position_mm - x0 - slope_x * (t - a);
       const double dy = base.y_at(t).position_mm - y0 - slope_y * (t - a);
@@ -185,25 +187,55 @@ void divide(const dynamics::BaseTrajectory& base, double from, double to,
   times.push_back(to);
 }
 
+// First moments of the base's distance from the chord of one line, mm·s, against the two halves of
+// the hat functions: ∫ (b − chord)(1 − s) dt and ∫ (b − chord) s dt, s from 0 to 1 along the line.
+struct ChordError {
+  double towards_start = 0.0;
+  double towards_end = 0.0;
+};
+
+using AxisAt = dynamics::AxisMotion (dynamics::BaseTrajectory::*)(double) const;
+
+ChordError chord_error(const dynamics::BaseTrajectory& base, AxisAt axis, double from, double to) {
+  // Two samples per node period; b is smooth, so the trapezoidal rule does.
+  const double duration = to - from;
+  const int steps = std::max(4, static_cast<int>(std::ceil(2.0 * duration / base.period_s)));
+  const double b0 = (base.*axis)(from).position_mm;
+  const double b1 = (base.*axis)(to).position_mm;
+  ChordError sum;
+  for (int i = 1; i < steps; ++i) {
+    const double s = static_cast<double>(i) / steps;
+    const double error = (base.*axis)(from + s * duration).position_mm - b0 - s * (b1 - b0);
+    sum.towards_start += error * (1.0 - s);
+    sum.towards_end += error * s;
+  }
+  const double weight = duration / steps;
+  return {sum.towards_start * weight, sum.towards_end * weight};
+}
+
 // One axis at the vertices. A chord lies inside a curve: between vertices on the curve it is off by
-// b̈ T²/12 on average, which the nozzle follows. Vertices moved out by as much,
-//   δ = −b̈ (T₁² − T₁T₂ + T₂²)/12   (the mean of the error against the hat function vanishes),
-// leave only an error too quick for the machine to follow. Where that would break the limit on the
-// change of speed from line to line, the vertex stays on the curve.
-std::vector<double> vertices(const std::vector<double>& times,
-                             const std::vector<dynamics::AxisMotion>& motion,
-                             double max_accel_mm_s2) {
+// b̈ T²/12 on average, which the nozzle follows. Vertices moved out so that the mean of the error
+// against each one's hat function vanishes leave only an error too quick for the machine to follow.
+// Where that would break the limit on the change of speed from line to line, the vertex stays on
+// the curve.
+std::vector<double> vertices(const dynamics::BaseTrajectory& base, AxisAt axis,
+                             const std::vector<double>& times, double max_accel_mm_s2) {
   const std::size_t n = times.size();
+  std::vector<double> on_curve(n);
   std::vector<double> offset(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    on_curve[i] = (base.*axis)(times[i]).position_mm;
+  }
+  ChordError before = chord_error(base, axis, times[0], times[1]);
   for (std::size_t i = 1; i + 1 < n; ++i) {
-    const double t1 = times[i] - times[i - 1];
-    const double t2 = times[i + 1] - times[i];
-    offset[i] = -motion[i].accel_mm_s2 * (t1 * t1 - t1 * t2 + t2 * t2) / 12.0;
+    const ChordError after = chord_error(base, axis, times[i], times[i + 1]);
+    offset[i] = (before.towards_end + after.towards_start) / (0.5 * (times[i + 1] - times[i - 1]));
+    before = after;
   }
   const auto accel = [&](std::size_t i) {
     const double t1 = times[i] - times[i - 1];
     const double t2 = times[i + 1] - times[i];
-    const auto at = [&](std::size_t j) { return motion[j].position_mm + offset[j]; };
+    const auto at = [&](std::size_t j) { return on_curve[j] + offset[j]; };
     return std::abs((at(i + 1) - at(i)) / t2 - (at(i) - at(i - 1)) / t1) / (0.5 * (t1 + t2));
   };
   for (bool changed = true; changed;) {
@@ -216,11 +248,10 @@ std::vector<double> vertices(const std::vector<double>& times,
       }
     }
   }
-  std::vector<double> result(n);
   for (std::size_t i = 0; i < n; ++i) {
-    result[i] = motion[i].position_mm + offset[i];
+    on_curve[i] += offset[i];
   }
-  return result;
+  return on_curve;
 }
 
 double snap(double value_mm, double offset_mm, int decimals) {
@@ -282,14 +313,10 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   for (std::size_t i = 1; i < required.size(); ++i) {
     divide(base, required[i - 1], required[i], options, times);
   }
-  std::vector<dynamics::AxisMotion> x_motion;
-  std::vector<dynamics::AxisMotion> y_motion;
-  for (const double t : times) {
-    x_motion.push_back(base.x_at(t));
-    y_motion.push_back(base.y_at(t));
-  }
-  const std::vector<double> x = vertices(times, x_motion, options.base_max_accel_mm_s2);
-  const std::vector<double> y = vertices(times, y_motion, options.base_max_accel_mm_s2);
+  const std::vector<double> x =
+      vertices(base, &dynamics::BaseTrajectory::x_at, times, options.base_max_accel_mm_s2);
+  const std::vector<double> y =
+      vertices(base, &dynamics::BaseTrajectory::y_at, times, options.base_max_accel_mm_s2);
 
   const gcode::Position start = run.moves->front().segment.start_mm;
   const gcode::Position end = run.moves->back().segment.end_mm;

@@ -258,6 +258,7 @@ double peak_rss_mb(int who) {
 Result<report::Report> compensate(const Job& job, Progress& progress) {
   const auto begin = std::chrono::steady_clock::now();
   report::Report report = new_report("compensate", job);
+  report.solver_engine = compensate::make_ipopt_engine()->name();
   {
     Result<WorkerPool> pool = WorkerPool::start(job.workers, compensate::make_ipopt_engine);
     if (!pool) {

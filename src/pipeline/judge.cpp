@@ -92,12 +92,13 @@ std::optional<std::string> worse_than_original(const std::vector<planner::Planne
 
   const verify::RunDeviation before = verify::measure(original, original, nozzle, rules.nozzle);
   const verify::RunDeviation after = verify::measure(original, replayed, nozzle, rules.nozzle);
-  // Runs that lay nothing are judged by all of their motion.
+  // Travel draws nothing: it is judged by the RMS of all of its motion alone, since its largest error
+  // is often what the motion before it left behind.
   const bool extrudes = before.extruding.stats().duration_s > 0.0;
   const verify::DeviationStats b = (extrudes ? before.extruding : before.all).stats();
   const verify::DeviationStats a = (extrudes ? after.extruding : after.all).stats();
   if (a.contour_rms_mm <= std::max(b.contour_rms_mm, kResolutionMm) &&
-      a.contour_max_mm <= std::max(b.contour_max_mm, kResolutionMm)) {
+      (!extrudes || a.contour_max_mm <= std::max(b.contour_max_mm, kResolutionMm))) {
     return std::nullopt;
   }
   return fmt::format(

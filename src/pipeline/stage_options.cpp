@@ -11,8 +11,10 @@ namespace unflex::pipeline {
 namespace {
 
 // Rounding a line's ends to the grid of 10⁻⁴ mm changes the acceleration from line to line by up to
-// 4 · ½ · 10⁻⁴ / h²; the optimiser stays that far below the limit so that the text keeps it.
+// 4 · ½ · 10⁻⁴ / h², rounding F and the firmware's ramps by a little more; the optimiser stays that
+// far below the limit so that the text keeps it.
 constexpr double kGridMm = 1e-4;
+constexpr double kAccelShare = 0.98;
 
 dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
   return dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio);
@@ -26,7 +28,7 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
   compensate::AxisSetup setup;
   setup.axis = axis(dynamics);
   setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
-  setup.limits.max_accel_mm_s2 = accel - std::min(2.0 * kGridMm / (h * h), 0.2 * accel);
+  setup.limits.max_accel_mm_s2 = kAccelShare * accel - std::min(2.0 * kGridMm / (h * h), 0.2 * accel);
   if (settings.base.max_jerk_mm_s3 > 0.0) {
     setup.limits.max_jerk_mm_s3 = settings.base.max_jerk_mm_s3;
   }
@@ -84,6 +86,8 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.run_limits = {2.0 * settings.base_max_velocity_mm_s(), settings.emit.accel_mm_s2,
                         settings.emit.square_corner_velocity_mm_s, 0.0};
   options.tolerance_mm = settings.emit.tolerance_um * 1e-3;
+  options.quick_line_s =
+      0.25 / std::max(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
   options.min_line_s =
       std::max(settings.emit.period_ms * 1e-3, 1.0 / settings.emit.max_lines_per_s);
   options.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();

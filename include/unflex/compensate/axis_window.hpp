@@ -39,7 +39,7 @@ struct AxisWindow {
   std::vector<double> reference_mm;
   std::vector<double> weight;
   // ρ in units of h and hundredths of a millimetre, so that one value serves all periods.
-  double jerk_weight = 1e-4;
+  double jerk_weight = 1e-2;
   BaseLimits limits;
   // At the first node: the nozzle as given, the base at rest there. Unset: free.
   struct Start {

@@ -28,7 +28,7 @@ struct Setup {
   double window_s = 2.0;      // core of a window where a run needs several
   double overlap_s = 0.06;    // pre-roll and post-roll of such windows
   double travel_weight = 0.1; // w where nothing is extruded; 1 where something is
-  double jerk_weight = 1e-4;
+  double jerk_weight = 1e-2;
 };
 
 // Nodes of a run, from rest to rest.

@@ -25,6 +25,8 @@ struct EmitOptions {
   planner::FixedLimits fixed;
   planner::Limits run_limits;       // inside a compensated run
   double tolerance_mm = 2e-3;       // of replacing the base's path by chords, at equal time
+  // Lines up to this long may use the whole tolerance, longer ones less by the square of their length.
+  double quick_line_s = 5e-3;
   double min_line_s = 1e-3;         // no line is shorter than this
   double max_line_s = 0.05;
   double base_max_accel_mm_s2 = 20000.0;  // of the change of speed from line to line
@@ -76,7 +78,6 @@ class KlipperEmitter {
   void set_run_modes(std::string& out);
   void write_stroke(const Stroke& stroke, double filament_origin, std::string& out);
   void restore_modes(std::string& out);
-  void restore_speed(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out);
   void set_shaper(bool on, std::string& out);
 
