@@ -67,7 +67,8 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
     return true;
   });
   path.begin_section();
-  Meter meter(model, path);
+  Meter meter(model);
+  meter.begin_section(path);
   if (base.empty() && reference.empty()) {
     meter.set_state(start, start.x.position, start.y.position);
   } else {

@@ -7,11 +7,12 @@ namespace unflex::verify {
 namespace {
 
 // δ: by how much the emitted run's clock may be off.
-constexpr double kClockTolerance_s = 5e-5;
+constexpr double kClockTolerance_s = 2e-4;
 
 }  // namespace
 
-void FilamentLedger::begin_run() {
+void FilamentLedger::begin_run(const ReferencePath& path) {
+  path_ = &path;
   next_piece_ = path_->end();
   borders_.clear();
   q_mm_ = 0.0;

@@ -20,10 +20,8 @@ namespace unflex::verify {
 
 class FilamentLedger {
  public:
-  // The path must outlive the ledger.
-  explicit FilamentLedger(const ReferencePath& path) : path_(&path) {}
-
-  void begin_run();
+  // The path, at the beginning of a section, must outlive the run.
+  void begin_run(const ReferencePath& path);
   // A move of the emitted file that starts at time start_s of the path, which is known beyond the
   // move's end.
   void play(const planner::PlannedMove& move, double start_s);
@@ -48,7 +46,7 @@ class FilamentLedger {
   void collect_borders();
   void close(double q_mm, double from_f_mm, double to_f_mm);
 
-  const ReferencePath* path_;
+  const ReferencePath* path_ = nullptr;
   std::size_t next_piece_ = 0;
   std::deque<Border> borders_;
   double q_mm_ = 0.0;

@@ -52,9 +52,8 @@ void LagEstimate::restart() {
   weight_s_ = 0.0;
 }
 
-Meter::Meter(const NozzleModel& model, ReferencePath& path)
+Meter::Meter(const NozzleModel& model)
     : model_(model),
-      path_(&path),
       reach_s_(kClockReach_s +
                std::numbers::pi / std::min(model.x.omega_rad_s, model.y.omega_rad_s)) {}
 
@@ -62,6 +61,16 @@ void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm
   nozzle_ = nozzle;
   base_x_mm_ = base_x_mm;
   base_y_mm_ = base_y_mm;
+}
+
+void Meter::begin_section(ReferencePath& path) {
+  if (path_ != &path) {
+    path_ = &path;
+    current_ = path.first();
+    near_first_ = path.first();
+    near_end_ = path.first();
+  }
+  time_s_ = path.section_start_s();
 }
 
 void Meter::follow_lag(bool on) {
@@ -221,10 +230,10 @@ void Meter::wait_for_reference() {
   const NozzleXY nozzle = nozzle_;
   const double time_s = time_s_;
   // Bounded stretches, so that a reference far ahead need not be known to its end at once.
-  path_->extend_to(time_s_);
+  path_->extend_to(time_s_ + kSameTime_s);
   while (path_->end_s() - time_s_ > kSameTime_s) {
     play(Phase{{base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, path_->end_s() - time_s_});
-    path_->extend_to(time_s_);
+    path_->extend_to(time_s_ + kSameTime_s);
   }
   nozzle_ = nozzle;
   time_s_ = time_s;

@@ -27,13 +27,13 @@ class LagEstimate {
 
 class Meter {
  public:
-  // The path must outlive the meter.
-  Meter(const NozzleModel& model, ReferencePath& path);
+  explicit Meter(const NozzleModel& model);
 
   // The nozzle and base at the very start.
   void set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm);
-  // Puts the clock to the start of the path's section.
-  void begin_section() { time_s_ = path_->section_start_s(); }
+  // From now on measures against this path, which must outlive that; the clock is put to the start
+  // of its current section.
+  void begin_section(ReferencePath& path);
   // Moves the base. If it does not start where the base stands, base and nozzle are shifted there.
   void play(const planner::PlannedMove& move);
   // The base stands still until the reference has ended, and the nozzle is measured meanwhile;
@@ -69,7 +69,7 @@ class Meter {
   [[nodiscard]] double squared_contour_error(std::size_t& nearest) const;
 
   NozzleModel model_;
-  ReferencePath* path_;
+  ReferencePath* path_ = nullptr;
   double reach_s_;
   double time_s_ = 0.0;
   NozzleXY nozzle_;

@@ -63,13 +63,9 @@ void ReferencePath::append(planner::PlannedMove move, bool measured) {
 }
 
 void ReferencePath::discard_before(double t) {
-  std::size_t old = 0;
-  while (old < pieces_.size() && pieces_[old].end_s < t) {
-    ++old;
-  }
-  if (old >= kDropBatch) {
-    pieces_.erase(pieces_.begin(), pieces_.begin() + static_cast<std::ptrdiff_t>(old));
-    dropped_ += old;
+  while (pieces_.size() > kDropBatch && pieces_[kDropBatch - 1].end_s < t) {
+    pieces_.erase(pieces_.begin(), pieces_.begin() + kDropBatch);
+    dropped_ += kDropBatch;
   }
 }
 

@@ -15,9 +15,6 @@ namespace {
 constexpr std::string_view kOwnComment = ";unflex";
 constexpr std::string_view kRunComment = ";unflex run";
 
-// Asking the planner for finished moves costs a little; so many moves are queued before.
-constexpr std::size_t kTakeEvery = 32;
-
 // In emitted text a move of a few µm can rise by one rounding step of Z, which makes it steep.
 constexpr double kHeightRounding_mm = 3e-4;
 
@@ -72,42 +69,43 @@ Replay::Replay(std::istream& stream, std::string name, const gcode::InterpreterO
                const planner::Limits& limits, const planner::FixedLimits& fixed, bool in_output)
     : reader_(stream, std::move(name)),
       interpreter_(interpreter),
-      planner_(limits, fixed),
+      plan_(limits, fixed),
+      resting_plan_(limits, fixed),
       in_output_(in_output) {
   sections_.push_back(Section{});
 }
 
-bool Replay::has_move() {
-  for (;;) {
-    if (!items_.empty() && items_.front() == Item::section_end) {
-      return false;
-    }
-    if (!items_.empty() && planned_used_ < planned_.size()) {
-      return true;
-    }
-    // The current section is the end of the file: nothing follows.
-    if (at_end_ && items_.empty()) {
+bool Replay::find_move(const PlanQueue& plan) {
+  while (!plan.has_move()) {
+    // The end of the file is a section in which nothing follows.
+    if (plan.at_section_end() || at_end_) {
       return false;
     }
     read_line();
   }
+  return true;
 }
 
+bool Replay::has_move() { return find_move(plan_); }
+
 bool Replay::next(planner::PlannedMove& move) {
-  if (!has_move()) {
+  if (!find_move(plan_)) {
     return false;
   }
-  items_.pop_front();
-  move = planned_[planned_used_++];
-  if (planned_used_ == planned_.size()) {
-    planned_.clear();
-    planned_used_ = 0;
+  move = plan_.take();
+  return true;
+}
+
+bool Replay::next_resting(planner::PlannedMove& move) {
+  if (!find_move(resting_plan_)) {
+    return false;
   }
+  move = resting_plan_.take();
   return true;
 }
 
 void Replay::next_section() {
-  items_.pop_front();
+  for_each_plan([](PlanQueue& plan) { plan.next_section(); });
   sections_.pop_front();
 }
 
@@ -128,13 +126,12 @@ void Replay::read_line() {
   if (!more) {
     error_ = more.error();
   }
-  const Regime before{interpreter_.state(), planner_.limits()};
+  const Regime before{interpreter_.state(), plan_.limits()};
   if (more && *more) {
     ++lines_read_;
     read_event(interpreter_.interpret(std::move(line)), before);
   } else {
-    planner_.stop();
-    planner_.take(planned_);
+    for_each_plan([](PlanQueue& plan) { plan.stop(); });
     at_end_ = true;
     Section end;
     end.kind = SectionKind::end;
@@ -152,7 +149,7 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
       break;
     }
     case gcode::EventKind::limits:
-      planner_.apply(event.limits);
+      for_each_plan([&](PlanQueue& plan) { plan.apply(event.limits); });
       place(std::move(event.line), before, false);
       break;
     case gcode::EventKind::move:
@@ -163,8 +160,7 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
       }
       break;
     case gcode::EventKind::barrier:
-      planner_.stop();
-      planner_.take(planned_);
+      for_each_plan([](PlanQueue& plan) { plan.stop(); });
       read_section(SectionKind::barrier, std::move(event), before);
       break;
   }
@@ -192,7 +188,7 @@ void Replay::read_run_moves(gcode::Event event, const Regime& before) {
   if (!run.compensated) {
     place(std::move(event.line), before, true);
   }
-  queue_segments(event.segments);
+  for_each_plan([&](PlanQueue& plan) { plan.add(event.segments); });
 }
 
 void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& before) {
@@ -211,7 +207,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   run.compensated = section.may_be_added && ended.compensated && !ended.regime.has_value();
 
   push_section(std::move(section));
-  queue_segments(event.segments);
+  for_each_plan([&](PlanQueue& plan) { plan.add(event.segments); });
   push_section(std::move(run));
 }
 
@@ -228,22 +224,10 @@ void Replay::place(gcode::Line line, const Regime& before, bool motion) {
   lines_.push_back(std::move(placed));
 }
 
-void Replay::queue_segments(const std::vector<gcode::Segment>& segments) {
-  for (const gcode::Segment& segment : segments) {
-    if (planner_.add(segment)) {
-      items_.push_back(Item::move);
-      ++untaken_;
-    }
-  }
-  if (untaken_ >= kTakeEvery) {
-    planner_.take(planned_);
-    untaken_ = 0;
-  }
-}
-
 void Replay::push_section(Section section) {
   section.id = sections_.back().id + 1;
-  items_.push_back(Item::section_end);
+  resting_plan_.stop();
+  for_each_plan([](PlanQueue& plan) { plan.end_section(); });
   sections_.push_back(std::move(section));
 }
 

@@ -12,8 +12,8 @@
 #include <deque>
 #include <optional>
 #include <string>
-#include <vector>
 
+#include "plan_queue.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/planner/planner.hpp"
@@ -61,7 +61,8 @@ struct PlacedLine {
 
 class Replay {
  public:
-  // in_output: runs may be announced as compensated, which is ignored in the sliced file.
+  // in_output: this is the emitted file. Then runs may be announced as compensated, which is
+  // ignored in the sliced file, and there is no resting plan.
   Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
          const planner::Limits& limits, const planner::FixedLimits& fixed, bool in_output);
 
@@ -69,6 +70,11 @@ class Replay {
   [[nodiscard]] bool next(planner::PlannedMove& move);
   // Whether next() would give one. Every line before it has then been read.
   [[nodiscard]] bool has_move();
+  // The moves of the sliced file by another plan, in which the machine rests at both ends of every
+  // section. The two plans are independent of each other; what is not asked for of this one is
+  // dropped at the section's end, or by skip_resting().
+  [[nodiscard]] bool next_resting(planner::PlannedMove& move);
+  void skip_resting() { resting_plan_.skip(); }
 
   // The current section. `compensated` and `regime` of a run are known once has_move() was asked.
   [[nodiscard]] const Section& section() const { return sections_.front(); }
@@ -87,30 +93,32 @@ class Replay {
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
  private:
-  enum class Item { move, section_end };
-
+  [[nodiscard]] bool find_move(const PlanQueue& plan);
   void read_line();
   void read_event(gcode::Event event, const Regime& before);
   void read_run_moves(gcode::Event event, const Regime& before);
   void read_section(SectionKind kind, gcode::Event event, const Regime& before);
   void place(gcode::Line line, const Regime& before, bool motion);
-  void queue_segments(const std::vector<gcode::Segment>& segments);
+  // Calls action with each plan that is kept.
+  template <class Action>
+  void for_each_plan(Action action) {
+    action(plan_);
+    if (!in_output_) {
+      action(resting_plan_);
+    }
+  }
   void push_section(Section section);
   [[nodiscard]] bool stays_in_run(const gcode::Event& event) const;
 
   gcode::LineReader reader_;
   gcode::Interpreter interpreter_;
-  planner::KlipperPlanner planner_;
+  PlanQueue plan_;
+  PlanQueue resting_plan_;
   bool in_output_;
   bool at_end_ = false;
   std::optional<Error> error_;
   std::size_t lines_read_ = 0;
-  std::size_t untaken_ = 0;  // moves queued since the planner was last asked for finished ones
-
-  std::deque<Item> items_;        // what comes next, in the order of the file
   std::deque<Section> sections_;  // from the current one to the one being read
-  std::vector<planner::PlannedMove> planned_;
-  std::size_t planned_used_ = 0;
   std::deque<PlacedLine> lines_;
 };
 

@@ -26,6 +26,7 @@ constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 // to a/ω² when it accelerates.
 constexpr double kLeastPlaceTolerance_mm = 0.5;
 constexpr std::size_t kMovesPerUpdate = 1024;
+constexpr double kApart_s = 10.0;
 
 double place_tolerance_mm(const Rules& rules) {
   const double omega = std::min(rules.nozzle.x.omega_rad_s, rules.nozzle.y.omega_rad_s);
@@ -48,7 +49,10 @@ double stream_bytes(std::istream& stream) {
 Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), meter.all().stats()}; }
 
 // Both files side by side, section by section. `original_` is the nozzle if the sliced file were
-// printed as it is, `emitted_` the nozzle of the emitted file; both are measured against `path_`.
+// printed as it is, measured against the plan of the whole file, `path_`. `emitted_` is the nozzle
+// of the emitted file. In compensated runs, which begin and end at rest, it is measured against the
+// plan of the run by itself, `run_path_`: where the sliced file passes from one section into the
+// next at speed, that plan takes some ms longer.
 class Verifier {
  public:
   Verifier(std::istream& input, const std::string& input_name, std::istream& output,
@@ -61,9 +65,9 @@ class Verifier {
         output_(output, output_name, rules.interpreter, rules.limits, rules.fixed, true),
         lines_(input_, output_, place_tolerance_mm(rules), violations_),
         path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
-        original_(rules.nozzle, path_),
-        emitted_(rules.nozzle, path_),
-        filament_(path_),
+        run_path_([this](planner::PlannedMove& move) { return input_.next_resting(move); }),
+        original_(rules.nozzle),
+        emitted_(rules.nozzle),
         base_(rules, violations_),
         input_excursion_(rules_.travel),
         output_excursion_(rules_.travel) {}
@@ -75,7 +79,7 @@ class Verifier {
 
  private:
   bool next_input_move(planner::PlannedMove& move);
-  void begin_section();
+  void begin_section(bool compensated);
   void play_run();
   void skip_added_barriers();
   void play_run_moves(bool compensated);
@@ -99,6 +103,8 @@ class Verifier {
   Replay output_;
   LineCheck lines_;
   ReferencePath path_;
+  ReferencePath run_path_;
+  ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
   Meter original_;
   Meter emitted_;
   FilamentLedger filament_;
@@ -147,11 +153,17 @@ bool Verifier::next_input_move(planner::PlannedMove& move) {
   return true;
 }
 
-void Verifier::begin_section() {
+void Verifier::begin_section(bool compensated) {
   path_.begin_section();
-  original_.begin_section();
-  emitted_.begin_section();
-  filament_.begin_run();
+  original_.begin_section(path_);
+  if (compensated) {
+    // Far from the run before, which is not the path that leads here.
+    run_path_.rest(kApart_s);
+    run_path_.begin_section();
+  }
+  emitted_path_ = compensated ? &run_path_ : &path_;
+  emitted_.begin_section(*emitted_path_);
+  filament_.begin_run(*emitted_path_);
   section_first_ = path_.end();
   original_next_ = path_.end();
   input_excursion_.clear();
@@ -161,9 +173,9 @@ void Verifier::begin_section() {
 }
 
 void Verifier::play_run() {
-  begin_section();
   skip_added_barriers();
   const bool compensated = output_.has_move() && output_.section().compensated;
+  begin_section(compensated);
   if (!compensated && input_.has_move() && output_.has_move()) {
     check_regime(input_.section(), output_.section());
   }
@@ -229,7 +241,10 @@ void Verifier::play(const planner::PlannedMove& move) {
   if (refused_line_ == 0 && refused(move, rules_)) {
     refused_line_ = move.segment.line;
   }
-  let_original_follow(emitted_.time_s());
+  // The original is as far in its section as the emitted one is in its own.
+  const double elapsed_s = emitted_.time_s() - emitted_path_->section_start_s();
+  path_.extend_to(path_.section_start_s() + elapsed_s);
+  let_original_follow(path_.section_start_s() + elapsed_s);
 }
 
 void Verifier::let_original_follow(double until_s) {
@@ -238,7 +253,13 @@ void Verifier::let_original_follow(double until_s) {
     const planner::PlannedMove move = path_[original_next_++].move;
     original_.play(move);
   }
-  path_.discard_before(std::min(original_.time_s(), emitted_.time_s()) - emitted_.reach_s());
+  if (emitted_path_ == &path_) {
+    path_.discard_before(std::min(original_.time_s(), emitted_.time_s()) - original_.reach_s());
+    input_.skip_resting();
+  } else {
+    path_.discard_before(original_.time_s() - original_.reach_s());
+    run_path_.discard_before(emitted_.time_s() - emitted_.reach_s());
+  }
 }
 
 void Verifier::end_section() {
@@ -320,7 +341,7 @@ void Verifier::check_regime(const Section& input, const Section& output) {
 }
 
 void Verifier::play_kept_line() {
-  begin_section();
+  begin_section(false);
   planner::PlannedMove move;
   while (output_.next(move)) {
     play(move);
@@ -338,7 +359,7 @@ void Verifier::play_kept_line() {
 
 // After the end of the file the base is held: what the nozzle still does then counts as well.
 void Verifier::hold() {
-  begin_section();
+  begin_section(false);
   const double hold_s = rules_.nozzle.hold_s;
   path_.hold(original_.base_x_mm(), original_.base_y_mm(), hold_s);
   original_.play(resting(original_.base_x_mm(), original_.base_y_mm(), hold_s));

@@ -1,4 +1,5 @@
-// A minimal emitter to test the judge with: it draws every run exactly as planned, in short lines.
+// A minimal emitter to test the judge with: it draws every run exactly as planned from rest to
+// rest, in short lines.
 #pragma once
 
 #include <fmt/format.h>
@@ -64,8 +65,15 @@ class PlainEmitter {
     gcode::Interpreter interpreter;
     planner::KlipperPlanner planner({}, {});
     gcode::Line line;
+    bool in_run = false;
     while (reader.next(line).value()) {
       gcode::Event event = interpreter.interpret(line);
+      if (event.kind == gcode::EventKind::barrier || !event.segments.empty()) {
+        if (gcode::compensable(event) != in_run) {
+          planner.stop();
+        }
+        in_run = gcode::compensable(event);
+      }
       for (const gcode::Segment& segment : event.segments) {
         planner.add(segment);
       }

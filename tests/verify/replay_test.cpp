@@ -138,6 +138,42 @@ TEST_F(Sections, TheMachineRestsAtEveryBarrier) {
   EXPECT_NEAR(duration_s_ - together_s, 0.02, 1e-9);
 }
 
+TEST_F(Sections, TheRestingPlanStopsBetweenSections) {
+  // A wipe in the direction of the line before it, which the machine enters at full speed.
+  std::istringstream stream(std::string(kStart) + "G4 P1\nG1 X60 E1\nG1 X70 E-.2\n");
+  Replay replay(stream, "file", {}, {}, {}, false);
+  std::vector<planner::PlannedMove> moves;
+  std::vector<planner::PlannedMove> resting;
+  for (; replay.section().kind != SectionKind::end; replay.next_section()) {
+    planner::PlannedMove move;
+    while (replay.next(move)) {
+      moves.push_back(move);
+    }
+    while (replay.next_resting(move)) {
+      resting.push_back(move);
+    }
+  }
+  ASSERT_EQ(moves.size(), 4U);
+  ASSERT_EQ(resting.size(), 4U);
+  EXPECT_GT(moves[2].end_v_mm_s, 1.0);
+  EXPECT_EQ(resting[2].start_v_mm_s, 0.0);
+  EXPECT_EQ(resting[2].end_v_mm_s, 0.0);
+  EXPECT_EQ(resting[2].segment.end_mm, moves[2].segment.end_mm);
+}
+
+TEST_F(Sections, WhatIsNotAskedForOfTheRestingPlanIsDropped) {
+  std::istringstream stream(std::string(kStart) + "G1 X20\nG1 X30\nM400\nG1 X40\n");
+  Replay replay(stream, "file", {}, {}, {}, false);
+  planner::PlannedMove move;
+  while (replay.section().id < 6) {
+    while (replay.next(move)) {
+    }
+    replay.next_section();
+  }
+  ASSERT_TRUE(replay.next_resting(move));
+  EXPECT_DOUBLE_EQ(move.segment.end_mm[gcode::X], 40.0);
+}
+
 TEST(KnownAddition, ComprisesTheFormsOfTheEmitterOnly) {
   for (const char* line :
        {";unflex run", ";unflex 0.1", "SET_VELOCITY_LIMIT ACCEL=1000000", "M83", "M82 ;unflex",

@@ -162,13 +162,15 @@ TEST_F(Emitted, AFaithfulCopyInShortLinesIsFaultless) {
   EXPECT_NEAR(report.base_max_velocity_mm_s, std::sqrt(1000.0 * travel_mm) * 9.5 / travel_mm, 1.0);
   EXPECT_GT(report.base_max_accel_mm_s2, 1900.0);
   EXPECT_LT(report.base_max_accel_mm_s2, 8000.0);
-  EXPECT_LT(report.worst_run_drift_s, 1e-3);
+  EXPECT_LT(report.worst_run_drift_s, 5e-4);
   // Compensated by nothing, it deviates as before.
   EXPECT_NEAR(report.compensated.extruding.contour_rms_mm,
               report.uncompensated.extruding.contour_rms_mm,
               0.05 * report.uncompensated.extruding.contour_rms_mm);
-  EXPECT_NEAR(report.compensated.extruding.duration_s, report.uncompensated.extruding.duration_s,
-              1e-9);
+  // The sliced file passes through a corner into its wipe, the other one rests there.
+  EXPECT_GT(report.compensated.extruding.duration_s, report.uncompensated.extruding.duration_s);
+  EXPECT_LT(report.compensated.extruding.duration_s,
+            report.uncompensated.extruding.duration_s + 0.01);
 }
 
 TEST_F(Emitted, ALostLineIsFound) {

@@ -23,13 +23,14 @@ struct DeviationStats {
   double contour_rms_mm = 0.0;
   double tracking_max_mm = 0.0;
   double tracking_rms_mm = 0.0;
-  double duration_s = 0.0;            // time the statistics are over
-  std::size_t contour_max_line = 0;   // line of the sliced file nearest to the largest contour error
+  double duration_s = 0.0;           // time the statistics are over
+  std::size_t contour_max_line = 0;  // line of the sliced file nearest to the largest contour error
 };
 
 struct Deviation {
   DeviationStats extruding;  // while the reference lays filament
-  DeviationStats all;        // while the reference moves in X or Y
+  // While the reference moves in X or Y; of a file also while the base is held after its end.
+  DeviationStats all;
 };
 
 // Gathers samples; two accumulators can be merged.
@@ -62,7 +63,7 @@ using dynamics::NozzleXY;
 struct RunDeviation {
   DeviationAccumulator extruding;
   DeviationAccumulator all;
-  NozzleXY end;            // nozzle at the end of the base's motion
+  NozzleXY end;  // nozzle at the end of the base's motion
   double base_end_x_mm = 0.0;
   double base_end_y_mm = 0.0;
 };

@@ -41,21 +41,29 @@ struct Violation {
 };
 
 struct VerifyReport {
+  // Measured against the firmware's plan of the input.
   Deviation uncompensated;
+  // In compensated runs, which begin and end at rest, measured against the plan of the run by
+  // itself; where the input passes from one stretch into the next at speed, that takes some ms
+  // longer.
   Deviation compensated;
   double reference_time_s = 0.0;  // duration of the input by the firmware's plan, dwells included
   double emitted_time_s = 0.0;    // of the output
-  double base_max_velocity_mm_s = 0.0;  // of the replayed base, larger axis, compensated runs only
+  // Of the replayed base, larger axis, compensated runs only: mean velocity of one move.
+  double base_max_velocity_mm_s = 0.0;
   // Of the replayed base, larger axis, compensated runs only: change of mean velocity between
   // neighbouring moves over the time between their middles.
   double base_max_accel_mm_s2 = 0.0;
-  double input_extrusion_mm = 0.0;   // net filament
+  double input_extrusion_mm = 0.0;  // net filament
   double output_extrusion_mm = 0.0;
-  double worst_move_extrusion_error_mm = 0.0;  // of one move or stretch between two anchors
-  double worst_run_drift_s = 0.0;    // longest lag or lead of the output within one run
-  double max_lines_per_s = 0.0;      // most moves started in any 100 ms of the output, × 10
-  double segment_ms_median = 0.0;    // of the output's moves inside compensated runs
-  std::size_t runs = 0;
+  // Of one move or one run of the input; what the resolution of the output's lines in time may
+  // explain is no error.
+  double worst_move_extrusion_error_mm = 0.0;
+  // Longest lag or lead of the nozzle behind the plan of its run, averaged over 0.1 s.
+  double worst_run_drift_s = 0.0;
+  double max_lines_per_s = 0.0;    // most moves started in any 100 ms of the output, × 10
+  double segment_ms_median = 0.0;  // of the output's moves inside compensated runs
+  std::size_t runs = 0;            // compensated ones
   std::size_t output_lines = 0;
   std::size_t output_bytes = 0;
   std::vector<Violation> violations;  // at most 100 are kept …
@@ -65,7 +73,9 @@ struct VerifyReport {
 // Replays both texts and compares them. Errors: unreadable input. A file that breaks a rule is no
 // error but a report with violations: a line lost, changed or moved; filament not conserved; a
 // position outside the travel (and further out than the input itself goes); base velocity or
-// acceleration above its limit; a move the firmware refuses (extrusion ratio); limits not restored.
+// acceleration above its limit (by more than 0.1 % and than the rounding of coordinates explains);
+// a move the firmware refuses (extrusion ratio); limits or modes not restored. Where the sequence
+// of stops differs, nothing can be compared any further; the figures are then of what came before.
 [[nodiscard]] Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
                                           std::istream& output, const std::string& output_name,
                                           const Rules& rules, Progress& progress);

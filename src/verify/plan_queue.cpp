@@ -1,0 +1,57 @@
+#include "plan_queue.hpp"
+
+#include <utility>
+
+namespace unflex::verify {
+namespace {
+
+// Asking the planner for finished moves costs a little; so many moves are queued before.
+constexpr std::size_t kTakeEvery = 32;
+
+}  // namespace
+
+void PlanQueue::add(const std::vector<gcode::Segment>& segments) {
+  for (const gcode::Segment& segment : segments) {
+    if (planner_.add(segment)) {
+      items_.push_back(Item::move);
+      ++untaken_;
+    }
+  }
+  if (untaken_ >= kTakeEvery) {
+    planner_.take(planned_);
+    untaken_ = 0;
+  }
+}
+
+void PlanQueue::stop() {
+  planner_.stop();
+  planner_.take(planned_);
+  untaken_ = 0;
+}
+
+bool PlanQueue::has_move() const {
+  return !items_.empty() && items_.front() == Item::move && used_ < planned_.size();
+}
+
+planner::PlannedMove PlanQueue::take() {
+  items_.pop_front();
+  planner::PlannedMove move = std::move(planned_[used_++]);
+  if (used_ == planned_.size()) {
+    planned_.clear();
+    used_ = 0;
+  }
+  return move;
+}
+
+void PlanQueue::skip() {
+  while (has_move()) {
+    static_cast<void>(take());
+  }
+}
+
+void PlanQueue::next_section() {
+  skip();
+  items_.pop_front();
+}
+
+}  // namespace unflex::verify
