@@ -117,8 +117,9 @@ class PlainEmitter {
           std::hypot(next[gcode::X] - last[gcode::X], next[gcode::Y] - last[gcode::Y]);
       const double laid =
           std::round((next[gcode::E] - move.segment.start_mm[gcode::E]) * 1e5) / 1e5;
-      text_ += fmt::format("G1 X{:.4f} Y{:.4f} E{:.5f} F{:.3f}\n", next[gcode::X], next[gcode::Y],
-                           laid - filament, 60.0 * length / (duration / lines));
+      text_ += fmt::format("G1 X{:.4f} Y{:.4f} Z{:.4f} E{:.5f} F{:.3f}\n", next[gcode::X],
+                           next[gcode::Y], next[gcode::Z], laid - filament,
+                           60.0 * length / (duration / lines));
       filament = laid;
       last = next;
     }
