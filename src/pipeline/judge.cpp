@@ -92,19 +92,28 @@ std::optional<std::string> worse_than_original(const std::vector<planner::Planne
 
   const verify::RunDeviation before = verify::measure(original, original, nozzle, rules.nozzle);
   const verify::RunDeviation after = verify::measure(original, replayed, nozzle, rules.nozzle);
-  // Travel draws nothing: it is judged by the RMS of all of its motion alone, since its largest error
-  // is often what the motion before it left behind.
-  const bool extrudes = before.extruding.stats().duration_s > 0.0;
-  const verify::DeviationStats b = (extrudes ? before.extruding : before.all).stats();
-  const verify::DeviationStats a = (extrudes ? after.extruding : after.all).stats();
-  if (a.contour_rms_mm <= std::max(b.contour_rms_mm, kResolutionMm) &&
-      (!extrudes || a.contour_max_mm <= std::max(b.contour_max_mm, kResolutionMm))) {
+  const auto no_worse = [](double a, double b) { return a <= std::max(b, kResolutionMm); };
+  if (before.extruding.stats().duration_s > 0.0) {
+    const verify::DeviationStats b = before.extruding.stats();
+    const verify::DeviationStats a = after.extruding.stats();
+    if (no_worse(a.contour_rms_mm, b.contour_rms_mm) &&
+        no_worse(a.contour_max_mm, b.contour_max_mm)) {
+      return std::nullopt;
+    }
+    return fmt::format(
+        "compensation would be worse: contour RMS {:.3f} to {:.3f} µm, largest {:.3f} to {:.3f} µm",
+        b.contour_rms_mm * 1e3, a.contour_rms_mm * 1e3, b.contour_max_mm * 1e3,
+        a.contour_max_mm * 1e3);
+  }
+  // Travel draws nothing, and a straight one has no contour error whatever it does: what counts is
+  // how well the nozzle keeps to where it should be, and so what it leaves to the next run.
+  const verify::DeviationStats b = before.all.stats();
+  const verify::DeviationStats a = after.all.stats();
+  if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm)) {
     return std::nullopt;
   }
-  return fmt::format(
-      "compensation would be worse: contour RMS {:.3f} to {:.3f} µm, largest {:.3f} to {:.3f} µm",
-      b.contour_rms_mm * 1e3, a.contour_rms_mm * 1e3, b.contour_max_mm * 1e3,
-      a.contour_max_mm * 1e3);
+  return fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",
+                     b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
 }
 
 }  // namespace unflex::pipeline

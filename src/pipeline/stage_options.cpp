@@ -1,6 +1,6 @@
 #include "stage_options.hpp"
 
-#include <limits>
+#include <algorithm>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -20,15 +20,20 @@ dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
   return dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio);
 }
 
+// What the base may be accelerated by so that the text stays within the limit.
+double planned_base_accel(const machine::Settings& settings) {
+  const double h = settings.emit.period_ms * 1e-3;
+  const double limit = settings.base_max_accel_mm_s2();
+  return kAccelShare * limit - std::min(2.0 * kGridMm / (h * h), 0.2 * limit);
+}
+
 compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
                                  const std::optional<machine::Range>& travel,
                                  const machine::Settings& settings) {
-  const double h = settings.emit.period_ms * 1e-3;
-  const double accel = settings.base_max_accel_mm_s2();
   compensate::AxisSetup setup;
   setup.axis = axis(dynamics);
   setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
-  setup.limits.max_accel_mm_s2 = kAccelShare * accel - std::min(2.0 * kGridMm / (h * h), 0.2 * accel);
+  setup.limits.max_accel_mm_s2 = planned_base_accel(settings);
   if (settings.base.max_jerk_mm_s3 > 0.0) {
     setup.limits.max_jerk_mm_s3 = settings.base.max_jerk_mm_s3;
   }
@@ -90,7 +95,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
       0.25 / std::max(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
   options.min_line_s =
       std::max(settings.emit.period_ms * 1e-3, 1.0 / settings.emit.max_lines_per_s);
-  options.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
+  options.base_max_accel_mm_s2 = planned_base_accel(settings);
   options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
   options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
   options.version = std::move(version);

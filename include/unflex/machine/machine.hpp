@@ -77,13 +77,13 @@ struct SolveSettings {
   double lead_in_ms = 0.0;      // the base may start this much before the plan does
   std::optional<double> tail_ms;  // the base may settle this much longer; unset: max(8ζ/ω, 2 ms)
   double travel_weight = 0.1;   // of the tracking error where nothing is extruded
-  double jerk_weight = 1e-7;    // regularisation, in units of the node period (docs/theory.md)
+  double jerk_weight = 1e-2;     // regularisation, in units of the node period (docs/theory.md)
 };
 
 struct EmitSettings {
   double period_ms = 1.0;           // node period
   double tolerance_um = 2.0;        // of merging nodes into one line
-  double max_lines_per_s = 1000.0;  // hard limit
+  double max_lines_per_s = 1100.0;  // hard limit
   double accel_mm_s2 = 1e6;         // planner limits inside a compensated run
   double square_corner_velocity_mm_s = 1000.0;
 };
