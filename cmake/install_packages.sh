@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# install_packages.sh [--tests]
+#
+# Installs what unflex is built from, on Debian 12, and with --tests what its tests need as well.
+# Does nothing where all is installed; otherwise it needs root or sudo.
+set -euo pipefail
+
+packages=(
+  g++ cmake ninja-build pkg-config
+  coinor-libipopt-dev libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev
+  nlohmann-json3-dev
+)
+test_packages=(libgmock-dev libgtest-dev)
+
+if [[ ${1:-} == --tests ]]; then
+  packages+=("${test_packages[@]}")
+fi
+
+if ! command -v dpkg-query >/dev/null; then
+  echo "This is not Debian: unflex needs what Debian calls ${packages[*]}" >&2
+  exit 0
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  if ! dpkg-query --show --showformat='${db:Status-Status}\n' "$package" 2>/dev/null |
+      grep --quiet --line-regexp installed; then
+    missing+=("$package")
+  fi
+done
+if ((${#missing[@]} == 0)); then
+  exit 0
+fi
+
+as_root=(env)
+if ((EUID != 0)); then
+  if ! command -v sudo >/dev/null; then
+    echo "Packages are missing. As root: apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo env)
+fi
+echo "Installing ${missing[*]}"
+apt_get=("${as_root[@]}" DEBIAN_FRONTEND=noninteractive
+         apt-get --quiet --yes --option DPkg::Lock::Timeout=120)
+"${apt_get[@]}" update
+"${apt_get[@]}" install --no-install-recommends "${missing[@]}"
