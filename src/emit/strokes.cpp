@@ -259,47 +259,80 @@ double snap(double value_mm, double offset_mm, int decimals) {
                          power_of_ten(decimals);
 }
 
-// Speeds from the rounded distances and the times, with the time the firmware's ramps cost:
-//   v = (d + ((v − v_prev)₊² + (v − v_next)₊²) / 2A) / T
-// A line as fast as or slower than its neighbours has no ramp. Converges in a few rounds since the
-// ramps are short against the lines.
-void set_speeds(const Run& run, const EmitOptions& options, std::vector<Stroke>& strokes) {
-  constexpr int kRounds = 6;
-  const gcode::Position start = run.moves->front().segment.start_mm;
-  const std::size_t n = strokes.size();
-  std::vector<double> distance(n);
-  std::vector<double> accel(n, options.run_limits.max_accel_mm_s2);
-  std::vector<double> duration(n);
-  double x = start[gcode::X];
-  double y = start[gcode::Y];
-  double z = start[gcode::Z];
-  double t = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const double dz = strokes[i].z_mm - z;
-    distance[i] = std::hypot(strokes[i].x_mm - x, strokes[i].y_mm - y, dz);
-    if (dz != 0.0) {
-      accel[i] = std::min(accel[i], options.fixed.max_z_accel_mm_s2 * distance[i] / std::abs(dz));
-    }
-    duration[i] = strokes[i].end_s - t;
-    strokes[i].speed_mm_s = distance[i] / duration[i];
-    x = strokes[i].x_mm;
-    y = strokes[i].y_mm;
-    z = strokes[i].z_mm;
-    t = strokes[i].end_s;
+// Digits of F in mm/min that keep a line's duration within 0.05 %.
+int speed_decimals(double feed_mm_min) {
+  if (feed_mm_min >= 1000.0) {
+    return 0;
   }
-  std::vector<double> speed(n);
-  for (int round = 0; round < kRounds; ++round) {
-    for (std::size_t i = 0; i < n; ++i) {
-      speed[i] = strokes[i].speed_mm_s;
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      const double up = std::max(speed[i] - (i > 0 ? speed[i - 1] : 0.0), 0.0);
-      const double down = std::max(speed[i] - (i + 1 < n ? speed[i + 1] : 0.0), 0.0);
-      strokes[i].speed_mm_s =
-          (distance[i] + (up * up + down * down) / (2.0 * accel[i])) / duration[i];
-    }
-  }
+  return feed_mm_min >= 100.0 ? 1 : 3;
 }
+
+// Distances and accelerations of the strokes, and their speeds: from the rounded distances and the
+// times, with the time the firmware's ramps cost,
+//   v = (d + ((v − v_prev)₊² + (v − v_next)₊²) / 2A) / T
+// A line as fast as or slower than its neighbours has no ramp.
+class SpeedSolver {
+ public:
+  SpeedSolver(const Run& run, const EmitOptions& options, std::vector<Stroke>& strokes)
+      : strokes_(&strokes),
+        distance_mm_(strokes.size()),
+        accel_mm_s2_(strokes.size(), options.run_limits.max_accel_mm_s2),
+        speed_mm_s_(strokes.size()) {
+    gcode::Position at = run.moves->front().segment.start_mm;
+    for (std::size_t i = 0; i < strokes.size(); ++i) {
+      const Stroke& stroke = strokes[i];
+      const double dz = stroke.z_mm - at[Z];
+      distance_mm_[i] =
+          std::hypot(stroke.x_mm - at[gcode::X], stroke.y_mm - at[gcode::Y], dz);
+      if (dz != 0.0) {
+        accel_mm_s2_[i] = std::min(
+            accel_mm_s2_[i], options.fixed.max_z_accel_mm_s2 * distance_mm_[i] / std::abs(dz));
+      }
+      at = {stroke.x_mm, stroke.y_mm, stroke.z_mm, 0.0};
+    }
+  }
+
+  void solve() {
+    // The ramps are short against the lines, so a few rounds over the neighbours settle them.
+    constexpr int kRounds = 6;
+    std::vector<double> next(strokes_->size());
+    for (int round = 0; round <= kRounds; ++round) {
+      double start_s = 0.0;
+      for (std::size_t i = 0; i < next.size(); ++i) {
+        const double end_s = (*strokes_)[i].end_s;
+        next[i] = (distance_mm_[i] + (round > 0 ? ramps_mm(i) : 0.0)) / (end_s - start_s);
+        start_s = end_s;
+      }
+      speed_mm_s_.swap(next);
+    }
+    // Last, rounded as F will be; what that does to the clock the next line makes up for.
+    double clock_s = 0.0;
+    for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
+      const double due_s = (*strokes_)[i].end_s - clock_s;
+      const double feed = 60.0 * (distance_mm_[i] + ramps_mm(i)) / due_s;
+      const int decimals = speed_decimals(feed);
+      (*strokes_)[i].feed_decimals = decimals;
+      speed_mm_s_[i] = (*strokes_)[i].speed_mm_s =
+          static_cast<double>(to_scaled(feed, decimals)) / power_of_ten(decimals) / 60.0;
+      clock_s += (distance_mm_[i] + ramps_mm(i)) / speed_mm_s_[i];
+    }
+  }
+
+ private:
+  // What the ramps of stroke i cost, as distance at its speed.
+  [[nodiscard]] double ramps_mm(std::size_t i) const {
+    const double v = speed_mm_s_[i];
+    const double up = std::max(v - (i > 0 ? speed_mm_s_[i - 1] : 0.0), 0.0);
+    const double down =
+        std::max(v - (i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : 0.0), 0.0);
+    return (up * up + down * down) / (2.0 * accel_mm_s2_[i]);
+  }
+
+  std::vector<Stroke>* strokes_;
+  std::vector<double> distance_mm_;
+  std::vector<double> accel_mm_s2_;
+  std::vector<double> speed_mm_s_;
+};
 
 }  // namespace
 
@@ -354,7 +387,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     final.x_mm = end[gcode::X];
     final.y_mm = end[gcode::Y];
     final.z_mm = end[gcode::Z];
-    set_speeds(run, options, result);
+    SpeedSolver(run, options, result).solve();
   }
   return result;
 }

@@ -16,6 +16,7 @@ struct Stroke {
   double z_mm = 0.0;
   double e_mm = 0.0;          // filament since the start of the run
   double speed_mm_s = 0.0;    // F, before M220
+  int feed_decimals = 0;      // digits F needs
   std::size_t events = 0;     // how many of the run's events stand before the stroke, in all
 };
 

@@ -91,7 +91,7 @@ std::optional<std::string> worse_than_original(const std::vector<planner::Planne
   planner.take(replayed);
 
   const verify::RunDeviation before = verify::measure(original, original, nozzle, rules.nozzle);
-  const verify::RunDeviation after = verify::measure(original, replayed, nozzle, rules.nozzle);
+  const verify::RunDeviation after = verify::measure(original, replayed, nozzle, rules.nozzle, rules.lead_in_s);
   const auto no_worse = [](double a, double b) { return a <= std::max(b, kResolutionMm); };
   if (before.extruding.stats().duration_s > 0.0) {
     const verify::DeviationStats b = before.extruding.stats();

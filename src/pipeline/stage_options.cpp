@@ -124,6 +124,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   set_range(settings.printer.travel_y_mm, rules.travel.y_min_mm, rules.travel.y_max_mm);
   rules.base_max_velocity_mm_s = settings.base_max_velocity_mm_s();
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
+  rules.lead_in_s = settings.solve.lead_in_ms * 1e-3;
   return rules;
 }
 

@@ -57,7 +57,7 @@ DeviationStats DeviationAccumulator::stats() const {
 
 RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                      const std::vector<planner::PlannedMove>& base, NozzleXY start,
-                     const NozzleModel& model) {
+                     const NozzleModel& model, double lead_in_s) {
   std::size_t taken = 0;
   ReferencePath path([&](planner::PlannedMove& move) {
     if (taken == reference.size()) {
@@ -66,7 +66,7 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
     move = reference[taken++];
     return true;
   });
-  path.begin_section();
+  path.begin_section(lead_in_s);
   Meter meter(model);
   meter.begin_section(path);
   if (base.empty() && reference.empty()) {

@@ -23,8 +23,9 @@ double PathPiece::covered_xy_mm(double t) const {
   return move.length_mm > 0.0 ? move.distance_mm(t - start_s) / move.length_mm * length_xy_mm : 0.0;
 }
 
-void ReferencePath::begin_section() {
+void ReferencePath::begin_section(double lead_in_s) {
   section_start_s_ = end_s_;
+  end_s_ += lead_in_s;
   section_complete_ = false;
 }
 

@@ -38,8 +38,8 @@ class ReferencePath {
  public:
   explicit ReferencePath(MoveSource source) : source_(std::move(source)) {}
 
-  // Starts the next section where the last one ended.
-  void begin_section();
+  // Starts the next section where the last one ended; its first move begins lead_in_s later.
+  void begin_section(double lead_in_s = 0.0);
   [[nodiscard]] double section_start_s() const { return section_start_s_; }
 
   // Pulls moves until the path reaches beyond t or the section ends. References to pieces do not

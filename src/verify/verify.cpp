@@ -159,7 +159,7 @@ void Verifier::begin_section(bool compensated) {
   if (compensated) {
     // Far from the run before, which is not the path that leads here.
     run_path_.rest(kApart_s);
-    run_path_.begin_section();
+    run_path_.begin_section(rules_.lead_in_s);
   }
   emitted_path_ = compensated ? &run_path_ : &path_;
   emitted_.begin_section(*emitted_path_);

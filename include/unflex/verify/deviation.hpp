@@ -69,10 +69,10 @@ struct RunDeviation {
 };
 
 // Integrates the nozzle while the base makes `base`, and measures it against the path and plan of
-// `reference`; both start at the same moment and `start` is the nozzle then. Where the base takes
+// `reference`; the base starts lead_in_s before the reference, and `start` is the nozzle then. Where the base takes
 // longer than the reference, the reference rests at its end.
 [[nodiscard]] RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                                    const std::vector<planner::PlannedMove>& base, NozzleXY start,
-                                   const NozzleModel& model);
+                                   const NozzleModel& model, double lead_in_s = 0.0);
 
 }  // namespace unflex::verify

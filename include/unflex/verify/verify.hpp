@@ -32,6 +32,7 @@ struct Rules {
   TravelLimits travel;
   double base_max_velocity_mm_s = 600.0;
   double base_max_accel_mm_s2 = 20000.0;
+  double lead_in_s = 0.0;  // by which compensated runs start before their plan
 };
 
 // One broken rule of the emitted file.
