@@ -84,6 +84,7 @@ class Inspector {
       result_->x_min_mm = result_->x_max_mm = result_->y_min_mm = result_->y_max_mm = 0.0;
       result_->lowest_accel_mm_s2 = 0.0;
     }
+    result_->absolute_e = extruded_absolute_ >= 0;
     result_->dialect = slicers_.empty() ? "unknown slicer" : slicers_;
   }
 
@@ -101,6 +102,9 @@ class Inspector {
     }
     result_->arcs += command.is('G', 2) || command.is('G', 3) ? 1 : 0;
     absolute_e_ = command.is('M', 82) || (absolute_e_ && !command.is('M', 83));
+    for (const gcode::Segment& segment : event.segments) {
+      extruded_absolute_ += segment.extruding() ? (absolute_e_ ? 1 : -1) : 0;
+    }
     if (slicers_.empty()) {
       slicers_ = slicer_named(event.line.content());
     }
@@ -123,9 +127,7 @@ class Inspector {
     result_->moving_time_s += move.duration_s();
     result_->path_length_mm += move.length_mm;
     if (segment.extruding()) {
-      if (result_->extruding_moves++ == 0) {
-        result_->absolute_e = absolute_e_;
-      }
+      ++result_->extruding_moves;
       result_->x_min_mm = std::min({result_->x_min_mm, segment.start_mm[0], segment.end_mm[0]});
       result_->x_max_mm = std::max({result_->x_max_mm, segment.start_mm[0], segment.end_mm[0]});
       result_->y_min_mm = std::min({result_->y_min_mm, segment.start_mm[1], segment.end_mm[1]});
@@ -139,6 +141,7 @@ class Inspector {
   Inspection* result_;
   std::string slicers_;
   bool absolute_e_ = true;
+  long extruded_absolute_ = 0;  // extruding moves in M82 less those in M83
 };
 
 }  // namespace

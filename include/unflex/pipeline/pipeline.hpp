@@ -52,7 +52,7 @@ struct Inspection {
   double filament_mm = 0.0;
   double path_length_mm = 0.0;
   double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0, z_max_mm = 0.0;
-  bool absolute_e = false;        // M82 in force at the first extrusion
+  bool absolute_e = false;        // M82 in force for most extrusions
   double lowest_accel_mm_s2 = 0.0, highest_accel_mm_s2 = 0.0;  // in force during moves
   std::vector<std::string> warnings;
 };
