@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -8,8 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include <fmt/format.h>
-
+#include "compensate_with.hpp"
 #include "judge.hpp"
 #include "piece_reader.hpp"
 #include "report_rows.hpp"
@@ -115,7 +115,8 @@ class Compensator {
     pool_.submit(first_ticket_ + tickets_.size() - 1, window);
   }
 
-  // Takes solutions and writes pieces that are complete until at most `ahead` windows are under way.
+  // Takes solutions and writes pieces that are complete until at most `ahead` windows are under
+  // way.
   Status drain(std::size_t ahead) {
     for (;;) {
       write_complete();
@@ -143,9 +144,9 @@ class Compensator {
       report_->solver_iterations += static_cast<std::size_t>(done.solution->iterations);
       (ticket.is_y ? pending.y : pending.x)[ticket.window] = std::move(done.solution->base);
     } else if (pending.failure.empty()) {
-      pending.failure = fmt::format("the solver failed on axis {}, window {}: {}",
-                                    ticket.is_y ? 'y' : 'x', ticket.window + 1,
-                                    done.solution.error().message);
+      pending.failure =
+          fmt::format("the solver failed on axis {}, window {}: {}", ticket.is_y ? 'y' : 'x',
+                      ticket.window + 1, done.solution.error().message);
     }
   }
 
@@ -186,8 +187,7 @@ class Compensator {
     if (!pending.failure.empty()) {
       return pending.failure;
     }
-    const dynamics::BaseTrajectory base{setup_.period_s,
-                                        compensate::join(pending.spans, pending.x),
+    const dynamics::BaseTrajectory base{setup_.period_s, compensate::join(pending.spans, pending.x),
                                         compensate::join(pending.spans, pending.y)};
     const Piece& piece = pending.piece;
     emit::KlipperEmitter trial = emitter_;
@@ -196,10 +196,9 @@ class Compensator {
                    text)) {
       return "the motion is too small to be written";
     }
-    if (std::optional<std::string> worse =
-            worse_than_original(piece.moves, std::string_view(text).substr(begin),
-                                emitter_.printer(), emitter_.printer_limits(), pending.nozzle,
-                                rules_)) {
+    if (std::optional<std::string> worse = worse_than_original(
+            piece.moves, std::string_view(text).substr(begin), emitter_.printer(),
+            emitter_.printer_limits(), pending.nozzle, rules_)) {
       text.resize(begin);
       return worse;
     }
@@ -256,11 +255,16 @@ double peak_rss_mb(int who) {
 }  // namespace
 
 Result<report::Report> compensate(const Job& job, Progress& progress) {
+  return compensate_with(job, compensate::make_ipopt_engine, progress);
+}
+
+Result<report::Report> compensate_with(const Job& job, const WorkerPool::EngineFactory& engine,
+                                       Progress& progress) {
   const auto begin = std::chrono::steady_clock::now();
   report::Report report = new_report("compensate", job);
-  report.solver_engine = compensate::make_ipopt_engine()->name();
+  report.solver_engine = engine()->name();
   {
-    Result<WorkerPool> pool = WorkerPool::start(job.workers, compensate::make_ipopt_engine);
+    Result<WorkerPool> pool = WorkerPool::start(job.workers, engine);
     if (!pool) {
       return tl::unexpected(pool.error());
     }
@@ -285,8 +289,7 @@ Result<report::Report> compensate(const Job& job, Progress& progress) {
   if (Status status = add_verification(job, progress, report); !status) {
     return tl::unexpected(status.error());
   }
-  report.wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.cpu_s = cpu_s(RUSAGE_SELF) + cpu_s(RUSAGE_CHILDREN);
   report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
   report.peak_rss_mb = std::max(peak_rss_mb(RUSAGE_SELF), peak_rss_mb(RUSAGE_CHILDREN));
