@@ -7,8 +7,9 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build pkg-config
-  coinor-libipopt-dev libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev
-  nlohmann-json3-dev
+  # Ipopt links LAPACK and BLAS, which its package merely recommends.
+  coinor-libipopt-dev libblas-dev liblapack-dev
+  libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev nlohmann-json3-dev
 )
 test_packages=(libgmock-dev libgtest-dev)
 
