@@ -2,6 +2,8 @@
 // node periods, lengths in hundredths of a millimetre from the window's first reference point.
 #pragma once
 
+#include <optional>
+
 #include "unflex/collocation/optimal_control_problem.hpp"
 #include "unflex/compensate/axis_window.hpp"
 
@@ -15,6 +17,10 @@ struct ActiveLimits {
   bool accel = false;
   bool jerk = false;
   bool position = false;
+  // Also keeps b within its travel between nodes, by a margin at the nodes.
+  bool position_between = false;
+
+  bool operator==(const ActiveLimits&) const = default;
 };
 
 // States p, ṗ, b, ḃ; control b̈.
@@ -58,6 +64,10 @@ class AxisProblem final : public collocation::OptimalControlProblem {
   [[nodiscard]] double to_scaled(Component component, double physical) const;
 
  private:
+  // Bounds of b and b̈ that keep the base within its travel at a node where it may rest at
+  // resting_mm.
+  void bound_position(std::optional<double> resting_mm, collocation::PointVector& lower,
+                      collocation::PointVector& upper) const;
   // r and w at time t, which is a node or a middle.
   [[nodiscard]] std::size_t sample(double t) const;
 

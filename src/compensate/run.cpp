@@ -79,9 +79,9 @@ std::size_t node_count(const std::vector<planner::PlannedMove>& moves, const Set
 }
 
 std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
-  const std::size_t core = std::max<std::size_t>(to_nodes(setup.window_s, setup.period_s), 4);
-  const std::size_t overlap =
-      std::max(to_nodes(setup.overlap_s, setup.period_s), kBlendNodes + 1);
+  // A core holds the halves of the blends at both its ends.
+  const std::size_t core = std::max(to_nodes(setup.window_s, setup.period_s), 2 * kBlendNodes);
+  const std::size_t overlap = std::max(to_nodes(setup.overlap_s, setup.period_s), kBlendNodes + 1);
   if (nodes <= core + 2 * overlap) {
     return {{0, nodes - 1, 0, nodes - 1}};
   }
@@ -98,16 +98,15 @@ std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
 }
 
 std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
-                               const std::vector<WindowSpan>& spans, const dynamics::NozzleXY& nozzle,
-                               const Setup& setup) {
+                               const std::vector<WindowSpan>& spans,
+                               const dynamics::NozzleXY& nozzle, const Setup& setup) {
   const std::size_t last_node = spans.back().last;
   std::vector<double> x;
   std::vector<double> y;
   std::vector<double> weight;
   Reference reference(moves, setup);
   for (std::size_t i = 0; i <= 2 * last_node; ++i) {
-    const Reference::Sample sample =
-        reference.at(0.5 * static_cast<double>(i) * setup.period_s);
+    const Reference::Sample sample = reference.at(0.5 * static_cast<double>(i) * setup.period_s);
     x.push_back(sample.x_mm);
     y.push_back(sample.y_mm);
     weight.push_back(sample.weight);
@@ -143,9 +142,9 @@ dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,
     joined.velocity_mm_s.resize(spans[i].last + 1);
     joined.accel_mm_s2.resize(spans[i].last + 1);
     for (std::size_t k = seam - kBlendNodes; k <= spans[i].last; ++k) {
-      const double s = std::min(static_cast<double>(k - (seam - kBlendNodes)) /
-                                    static_cast<double>(2 * kBlendNodes),
-                                1.0);
+      const double s = std::min(
+          static_cast<double>(k - (seam - kBlendNodes)) / static_cast<double>(2 * kBlendNodes),
+          1.0);
       const double share = s * s * (3.0 - 2.0 * s);  // of the next window
       const auto blend = [&](std::vector<double>& into, const std::vector<double>& from) {
         const double other = from[k - spans[i].first];

@@ -24,6 +24,8 @@
 
 namespace unflex::compensate {
 
+// Kept between nodes too; those of position and velocity as far as acceleration is limited, and
+// position within 10⁻⁵ mm.
 struct BaseLimits {
   double max_velocity_mm_s = std::numeric_limits<double>::infinity();  // V
   double max_accel_mm_s2 = std::numeric_limits<double>::infinity();    // A
@@ -38,7 +40,7 @@ struct AxisWindow {
   // r and w at the nodes and in the middles between them: 2n − 1 values for n nodes, n ≥ 2.
   std::vector<double> reference_mm;
   std::vector<double> weight;
-  // ρ in units of h and hundredths of a millimetre, so that one value serves all periods.
+  // ρ/h⁶: without dimension, so that one value serves all periods.
   double jerk_weight = 1e-2;
   BaseLimits limits;
   // At the first node: the nozzle as given, the base at rest there. Unset: free.
