@@ -162,6 +162,23 @@ TEST(AxisProblem, CarriesOnlyTheLimitsThatAreActive) {
               1e7, 1e-3);
 }
 
+TEST(AxisProblem, LetsABaseAtTheEndOfItsTravelSetOffInwardsOnly) {
+  std::mt19937_64 random(6);
+  AxisWindow window = random_window(random, 5);
+  window.start = AxisWindow::Start{{90.0, 0.0}, 90.0};
+  window.end_base_mm = 110.0;
+  PointVector lower(5);
+  PointVector upper(5);
+  const AxisProblem problem(window, {.position = true, .position_between = true});
+  problem.node_bounds(0, 5, lower, upper);
+  EXPECT_EQ(lower(AxisProblem::kBaseAccel), 0.0);
+  EXPECT_GE(upper(AxisProblem::kBaseAccel), nlp::kNoBound);
+  EXPECT_NEAR(problem.to_physical(AxisProblem::kBase, lower(AxisProblem::kBase)), 90.0, 1e-12);
+  problem.node_bounds(4, 5, lower, upper);
+  EXPECT_EQ(upper(AxisProblem::kBaseAccel), 0.0);
+  EXPECT_LE(lower(AxisProblem::kBaseAccel), -nlp::kNoBound);
+}
+
 TEST(AxisProblem, ItsSolutionIsWhatTheNozzleDoes) {
   // The nozzle's states of the program against those that the base's motion makes, exactly.
   const auto moves = testing::plan({{0.0, 0.0}, {10.0, 0.0}, {4.0, 3.0}, {4.0, 9.0}},
