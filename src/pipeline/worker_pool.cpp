@@ -1,5 +1,6 @@
 #include "worker_pool.hpp"
 
+#include <fmt/format.h>
 #include <poll.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -10,25 +11,35 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <exception>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "wire.hpp"
 
 namespace unflex::pipeline {
 namespace {
 
+// Whatever the solver throws is an answer too, such as memory that ran out.
+Result<compensate::AxisSolution> solve(const compensate::Engine& engine,
+                                       const compensate::AxisWindow& window) {
+  try {
+    return engine.solve(window);
+  } catch (const std::exception& exception) {
+    return fail(ErrorKind::internal, exception.what());
+  }
+}
+
 // The life of a worker: read a window, solve it, answer, until the parent hangs up. Leaves by _exit
-// so that nothing the parent has open is flushed twice.
-[[noreturn]] void work(int socket, const WorkerPool::EngineFactory& factory) {
+// so that nothing the parent has open is flushed twice, and lets no exception out, which would go
+// through the parent's code and clean up after the parent.
+[[noreturn]] void work(int socket, const WorkerPool::EngineFactory& factory) noexcept {
   // Ctrl-C reaches the whole group; the parent decides when its workers end.
   std::signal(SIGINT, SIG_IGN);
   std::signal(SIGTERM, SIG_DFL);
   const auto engine = factory();
   std::string message;
   while (receive_message(socket, message)) {
-    if (!send_message(socket, pack(engine->solve(unpack_window(message))))) {
+    if (!send_message(socket, pack(solve(*engine, unpack_window(message))))) {
       break;
     }
   }
@@ -73,8 +84,8 @@ WorkerPool::~WorkerPool() {
 Status WorkerPool::spawn(Worker& worker) {
   int pair[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) {
-    return fail(ErrorKind::internal, fmt::format("cannot open a socket to a solver process: {}",
-                                                 std::strerror(errno)));
+    return fail(ErrorKind::internal,
+                fmt::format("cannot open a socket to a solver process: {}", std::strerror(errno)));
   }
   const pid_t parent = getpid();
   const pid_t pid = fork();
