@@ -1,0 +1,159 @@
+#include "acceptance.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <string_view>
+#include <vector>
+
+#include "jobs.hpp"
+#include "unflex/gcode/interpreter.hpp"
+
+namespace unflex::pipeline::testing {
+namespace {
+
+// What one line of output may add: half a step of E in rounding, and noise of summing.
+constexpr double kFilamentStepMm = 1e-5 + 1e-8;
+// A line between two moves may be put where the nearest line of output begins, half of the shortest
+// line away; the base is ahead of the path by what bends the machine.
+constexpr double kPlaceMm = 0.6;
+constexpr double kPlaceFilamentMm = 0.02;
+
+// G0 to G3 with a word for X, Y, Z or E, told by the letters alone.
+bool is_motion(std::string_view line) {
+  std::string code;
+  bool in_parentheses = false;
+  for (const char c : line) {
+    if (c == ';') {
+      break;
+    }
+    in_parentheses = c == '(' || (in_parentheses && c != ')');
+    if (!in_parentheses && c != ')' && std::isspace(static_cast<unsigned char>(c)) == 0) {
+      code += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    }
+  }
+  const std::size_t number_end = code.find_first_not_of("0123456789", 1);
+  if (code.size() < 2 || code[0] != 'G' || number_end == std::string::npos || number_end == 1) {
+    return false;
+  }
+  const std::string number = code.substr(1, number_end - 1);
+  constexpr std::array<std::string_view, 8> kMotion = {"0", "1", "2", "3", "00", "01", "02", "03"};
+  return std::ranges::find(kMotion, number) != kMotion.end() &&
+         code.find_first_of("XYZE", number_end) != std::string::npos;
+}
+
+// A line that unflex adds to raise, restore and put right.
+bool is_own(std::string_view line) {
+  constexpr std::array<std::string_view, 10> kBeginnings = {";unflex",
+                                                            "SET_VELOCITY_LIMIT ",
+                                                            "SET_INPUT_SHAPER ",
+                                                            "G1 F",
+                                                            "G92 E",
+                                                            "G90",
+                                                            "G91",
+                                                            "M82",
+                                                            "M83",
+                                                            "G2"};
+  return std::ranges::any_of(kBeginnings,
+                             [&](std::string_view start) { return line.starts_with(start); });
+}
+
+// A line that is no motion, and where the machine was when it came.
+struct Standing {
+  std::string text;
+  gcode::Position at_mm{};
+};
+
+std::vector<Standing> standing_lines(const std::string& text) {
+  std::vector<Standing> lines;
+  gcode::Interpreter interpreter;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size() - 1) + 1;
+    const std::string line = text.substr(begin, end - begin);
+    if (!is_motion(line)) {
+      lines.push_back({line, interpreter.state().position_mm});
+    }
+    static_cast<void>(interpreter.interpret({line, 0}));
+    begin = end;
+  }
+  return lines;
+}
+
+void expect_same_place(const Standing& in, const Standing& out) {
+  EXPECT_NEAR(out.at_mm[gcode::X], in.at_mm[gcode::X], kPlaceMm) << in.text;
+  EXPECT_NEAR(out.at_mm[gcode::Y], in.at_mm[gcode::Y], kPlaceMm) << in.text;
+  EXPECT_NEAR(out.at_mm[gcode::Z], in.at_mm[gcode::Z], 0.02) << in.text;
+  EXPECT_NEAR(out.at_mm[gcode::E], in.at_mm[gcode::E], kPlaceFilamentMm) << in.text;
+}
+
+void expect_kept(const report::Report& report, const machine::Settings& settings) {
+  EXPECT_EQ(report.violation_count, 0U) << complaints(report);
+  EXPECT_GT(report.runs_total, 0U);
+  EXPECT_EQ(report.runs_total, report.runs_compensated + report.runs_fallback);
+  EXPECT_LE(report.runs_fallback, report.runs_total / 1000) << complaints(report);
+  EXPECT_EQ(report.fallbacks.size(), report.runs_fallback);
+  EXPECT_EQ(report.windows_total, report.windows_solved + report.windows_fallback);
+  EXPECT_LE(report.emitted_time_s, 1.01 * report.reference_time_s);
+  EXPECT_LE(report.base_max_accel_mm_s2, settings.base_max_accel_mm_s2());
+  EXPECT_LE(report.base_max_velocity_mm_s, settings.base_max_velocity_mm_s());
+  EXPECT_LE(report.max_lines_per_s, settings.emit.max_lines_per_s);
+  EXPECT_NEAR(report.output_extrusion_mm, report.input_extrusion_mm, kFilamentStepMm);
+  EXPECT_LE(report.worst_move_extrusion_error_mm, kFilamentStepMm);
+}
+
+void expect_true_path(const report::Report& report, double improvement) {
+  const report::DeviationRow& before = report.uncompensated.extruding;
+  const report::DeviationRow& after = report.compensated.extruding;
+  EXPECT_GT(after.duration_s, 0.0);
+  EXPECT_LE(after.contour_rms_mm, 0.8e-3);
+  EXPECT_LE(after.contour_p99_mm, 4e-3);
+  EXPECT_LE(after.contour_rms_mm, before.contour_rms_mm / improvement)
+      << "from " << before.contour_rms_mm;
+}
+
+}  // namespace
+
+void expect_lines_kept(const std::string& input, const std::string& output) {
+  const std::vector<Standing> in = standing_lines(input);
+  const std::vector<Standing> out = standing_lines(output);
+  std::size_t next = 0;
+  for (const Standing& line : in) {
+    while (next < out.size() && out[next].text != line.text) {
+      EXPECT_TRUE(is_own(out[next].text)) << out[next].text;
+      ++next;
+    }
+    ASSERT_LT(next, out.size()) << "lost: " << line.text;
+    expect_same_place(line, out[next]);
+    if (::testing::Test::HasFailure()) {
+      return;
+    }
+    ++next;
+  }
+  for (; next < out.size(); ++next) {
+    EXPECT_TRUE(is_own(out[next].text)) << out[next].text;
+  }
+}
+
+void expect_compensated(const std::string& input, const Expectation& expectation) {
+  const JobFolder folder(input);
+  const Job job = folder.job(expectation.workers);
+  SilentProgress progress;
+  const Result<report::Report> report = compensate(job, progress);
+  ASSERT_TRUE(report.has_value()) << to_string(report.error());
+  expect_kept(*report, job.settings);
+  expect_true_path(*report, expectation.improvement);
+  expect_lines_kept(input, folder.output());
+  for (const auto& [name, value] :
+       {std::pair{"before_rms_um", report->uncompensated.extruding.contour_rms_mm * 1e3},
+        std::pair{"rms_um", report->compensated.extruding.contour_rms_mm * 1e3},
+        std::pair{"p99_um", report->compensated.extruding.contour_p99_mm * 1e3},
+        std::pair{"max_um", report->compensated.extruding.contour_max_mm * 1e3}}) {
+    ::testing::Test::RecordProperty(name, fmt::format("{:.3f}", value));
+  }
+}
+
+}  // namespace unflex::pipeline::testing

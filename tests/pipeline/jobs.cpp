@@ -1,0 +1,59 @@
+#include "jobs.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+
+namespace unflex::pipeline::testing {
+
+std::string read_file(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  EXPECT_TRUE(stream) << file;
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void write_file(const std::filesystem::path& file, std::string_view text) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  EXPECT_TRUE(stream.flush()) << file;
+}
+
+machine::Settings settings(const std::vector<std::string>& overrides) {
+  Result<machine::Settings> loaded = machine::load(std::nullopt, overrides);
+  EXPECT_TRUE(loaded.has_value()) << to_string(loaded.error());
+  return *loaded;
+}
+
+JobFolder::JobFolder(std::string_view input, const std::vector<std::string>& overrides)
+    : settings_(settings(overrides)) {
+  std::string pattern = (std::filesystem::temp_directory_path() / "unflex_XXXXXX").string();
+  EXPECT_NE(mkdtemp(pattern.data()), nullptr);
+  folder_ = pattern;
+  write_file(folder_ / "in.gcode", input);
+}
+
+JobFolder::~JobFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_, ignored);
+}
+
+Job JobFolder::job(unsigned workers) const {
+  return {folder_ / "in.gcode", "in.gcode", folder_ / "out.gcode", "out.gcode", settings_, workers};
+}
+
+std::string complaints(const report::Report& report) {
+  std::string text;
+  for (const std::string& violation : report.violations) {
+    text += violation + "\n";
+  }
+  for (const report::Fallback& fallback : report.fallbacks) {
+    text += fmt::format("lines {} to {} kept: {}\n", fallback.first_line, fallback.last_line,
+                        fallback.reason);
+  }
+  return text;
+}
+
+}  // namespace unflex::pipeline::testing

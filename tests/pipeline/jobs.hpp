@@ -1,0 +1,39 @@
+// Jobs of the pipeline in a directory of their own.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "unflex/pipeline/pipeline.hpp"
+
+namespace unflex::pipeline::testing {
+
+[[nodiscard]] std::string read_file(const std::filesystem::path& file);
+void write_file(const std::filesystem::path& file, std::string_view text);
+
+// Settings with defaults but for the overrides "key=value".
+[[nodiscard]] machine::Settings settings(const std::vector<std::string>& overrides = {});
+
+// A directory that is gone with the object, holding one input and one output.
+class JobFolder {
+ public:
+  explicit JobFolder(std::string_view input, const std::vector<std::string>& overrides = {});
+  ~JobFolder();
+  JobFolder(const JobFolder&) = delete;
+  JobFolder& operator=(const JobFolder&) = delete;
+
+  [[nodiscard]] Job job(unsigned workers = 1) const;
+  [[nodiscard]] std::string output() const { return read_file(folder_ / "out.gcode"); }
+  void set_output(std::string_view text) const { write_file(folder_ / "out.gcode", text); }
+
+ private:
+  std::filesystem::path folder_;
+  machine::Settings settings_;
+};
+
+// What a report says of broken rules and of runs that kept their moves, one per line, for messages.
+[[nodiscard]] std::string complaints(const report::Report& report);
+
+}  // namespace unflex::pipeline::testing

@@ -1,0 +1,149 @@
+#include "judge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "piece_reader.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+verify::Rules rules() {
+  verify::Rules rules;
+  rules.nozzle = {dynamics::from_frequency(45.0, 0.06), dynamics::from_frequency(30.0, 0.1), 1e-4,
+                  0.5};
+  return rules;
+}
+
+// The pieces of a text.
+std::vector<Piece> pieces_of(const std::string& text) {
+  std::istringstream stream(text);
+  PieceReader reader(stream, "in.gcode", {}, {}, {});
+  std::vector<Piece> pieces(1);
+  while (reader.next(pieces.back()).value()) {
+    pieces.emplace_back();
+  }
+  pieces.pop_back();
+  return pieces;
+}
+
+// A run (a sharp corner, extruding or not) and the state the printer is in before it.
+struct Corner {
+  explicit Corner(bool extruding) {
+    const std::string head = "G90\nM83\nG1 X0 Y0 Z0.2 F6000\n";
+    const std::string filament = extruding ? " E0.5" : "";
+    run = pieces_of(head + "G1 X10" + filament + "\nG1 Y10" + filament + "\n")[1];
+    for (const char* line : {"G90\n", "M83\n", "G1 X0 Y0 Z0.2 F6000\n"}) {
+      static_cast<void>(printer.interpret({line, 0}));
+    }
+  }
+
+  [[nodiscard]] std::optional<std::string> judge(const std::string& text) const {
+    return worse_than_original(run.moves, text, printer, {}, at_rest({0.0, 0.0, 0.2, 0.0}),
+                               rules());
+  }
+
+  Piece run;
+  gcode::Interpreter printer;
+};
+
+TEST(Judge, TakesTheOriginalItselfAsNoWorse) {
+  EXPECT_EQ(Corner(true).judge("G1 X10 E0.5\nG1 Y10 E0.5\n"), std::nullopt);
+  EXPECT_EQ(Corner(false).judge("G1 X10\nG1 Y10"), std::nullopt);
+}
+
+TEST(Judge, RejectsACutCornerWithTheFigures) {
+  const std::optional<std::string> reason =
+      Corner(true).judge("G1 X8 E0.4\nG1 X10 Y2 E0.2\nG1 Y10 E0.4\n");
+  ASSERT_TRUE(reason.has_value());
+  EXPECT_TRUE(reason->starts_with("compensation would be worse: contour RMS ")) << *reason;
+}
+
+TEST(Judge, RejectsTheSamePathAtTheWrongTimeWhereNothingIsPrinted) {
+  const std::optional<std::string> reason = Corner(false).judge("G1 X10 F600\nG1 Y10 F6000\n");
+  ASSERT_TRUE(reason.has_value());
+  EXPECT_TRUE(reason->starts_with("compensation would be worse: tracking RMS in travel "))
+      << *reason;
+}
+
+TEST(Judge, ReplaysByTheLimitsInTheText) {
+  // The same lines, but the base creeps: the corner is late by far, and so is the nozzle.
+  EXPECT_TRUE(Corner(false).judge("SET_VELOCITY_LIMIT ACCEL=100\nG1 X10\nG1 Y10\n").has_value());
+}
+
+// x of the nozzle after the base went from 0 to 10 mm by the plan of the moves, by quadrature of
+// the oscillator's impulse response g: p(T) = ∫ g(T − t) (2ζω ḃ + ω² b) dt.
+double nozzle_by_convolution(const std::vector<planner::PlannedMove>& moves) {
+  const dynamics::FlexibleAxis axis = rules().nozzle.x;
+  const double damped = dynamics::damped_frequency(axis);
+  const auto impulse = [&](double t) {
+    return std::exp(-axis.zeta * axis.omega_rad_s * t) * std::sin(damped * t) / damped;
+  };
+  double sum = 0.0;
+  double end = 0.0;
+  for (const planner::PlannedMove& move : moves) {
+    end += move.duration_s();
+  }
+  const double start = 10.0;  // the nozzle hangs still at x = 10 before
+  double origin = 0.0;
+  constexpr int kSteps = 100000;
+  for (const planner::PlannedMove& move : moves) {
+    const double step = move.duration_s() / kSteps;
+    for (double t = 0.5 * step; t < move.duration_s(); t += step) {
+      const double b = move.position_mm(t)[gcode::X] - start;
+      const double v = move.velocity_mm_s(t) * move.direction[gcode::X];
+      sum += step * impulse(end - origin - t) *
+             (2.0 * axis.zeta * axis.omega_rad_s * v + axis.omega_rad_s * axis.omega_rad_s * b);
+    }
+    origin += move.duration_s();
+  }
+  return start + sum;
+}
+
+// x of the nozzle after the last piece of the text.
+dynamics::NozzleXY nozzle_after(const std::string& text) {
+  dynamics::NozzleXY nozzle = at_rest({});
+  for (const Piece& piece : pieces_of(text)) {
+    nozzle = after_motion(piece, nozzle, rules().nozzle);
+  }
+  return nozzle;
+}
+
+TEST(AfterMotion, TheNozzleIsWhereTheConvolutionPutsIt) {
+  const std::string text = "G90\nG1 X10 Y10 Z1 F6000\nM400\nG1 X12 Z5\nG1 X17.5 Z8\n";
+  const std::vector<Piece> pieces = pieces_of(text);
+  std::vector<planner::PlannedMove> moves(pieces.back().moves.end() - 2, pieces.back().moves.end());
+  dynamics::NozzleXY nozzle = at_rest({10.0, 10.0, 1.0, 0.0});
+  Piece last = pieces.back();
+  last.events.erase(last.events.begin(), last.events.end() - 2);
+  last.move_counts.assign(2, 1);
+  last.moves = moves;
+  nozzle = after_motion(last, nozzle, rules().nozzle);
+  EXPECT_NEAR(nozzle.x.position, nozzle_by_convolution(moves), 1e-6);
+  EXPECT_GT(std::abs(nozzle.x.position - 17.5), 1e-3) << "the case shows nothing";
+  EXPECT_NEAR(nozzle.y.position, 10.0, 1e-12);
+}
+
+TEST(AfterMotion, APauseLetsTheNozzleRingOn) {
+  const std::string moved = "G90\nG1 X10 Y10 Z1 F6000\nM400\nG1 X17.5 Z8\n";
+  const dynamics::NozzleXY before = nozzle_after(moved);
+  const dynamics::NozzleXY after = nozzle_after(moved + "G4 P7\n");
+  const dynamics::NozzleState expected =
+      dynamics::exact_step(rules().nozzle.x, before.x, {17.5, 0.0, 0.0}, 7e-3);
+  EXPECT_NEAR(after.x.position, expected.position, 1e-9);
+  EXPECT_NEAR(after.x.velocity, expected.velocity, 1e-6);
+  EXPECT_NE(after.x.velocity, before.x.velocity);
+}
+
+TEST(AfterMotion, HomingLetsTheNozzleComeToRest) {
+  const dynamics::NozzleXY after = nozzle_after("G90\nG1 X10 Y10 Z1 F6000\nG1 X17.5 Z8\nG28\n");
+  EXPECT_EQ(after.x.velocity, 0.0);
+  EXPECT_EQ(after.y.velocity, 0.0);
+}
+
+}  // namespace
+}  // namespace unflex::pipeline

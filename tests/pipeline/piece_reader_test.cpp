@@ -1,0 +1,170 @@
+#include "piece_reader.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "jobs.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class Reading {
+ public:
+  explicit Reading(const std::string& text)
+      : stream_(text), reader_(stream_, "in.gcode", {}, {}, {}) {
+    for (;;) {
+      Piece piece;
+      const Result<bool> more = reader_.next(piece);
+      if (!more) {
+        error = to_string(more.error());
+        return;
+      }
+      if (!*more) {
+        return;
+      }
+      pieces.push_back(std::move(piece));
+    }
+  }
+
+  // "run: …" or "rest: …" with the lines of each piece.
+  [[nodiscard]] std::vector<std::string> outline() const {
+    std::vector<std::string> result;
+    for (const Piece& piece : pieces) {
+      result.push_back((piece.is_run ? "run: " : "rest: ") + text(piece));
+    }
+    return result;
+  }
+
+  [[nodiscard]] std::string all() const {
+    std::string result;
+    for (const Piece& piece : pieces) {
+      result += text(piece);
+    }
+    return result;
+  }
+
+  std::vector<Piece> pieces;
+  std::string error;
+
+ private:
+  static std::string text(const Piece& piece) {
+    std::string result;
+    for (const gcode::Event& event : piece.events) {
+      result += event.line.text;
+    }
+    return result;
+  }
+
+  std::istringstream stream_;
+  PieceReader reader_;
+};
+
+constexpr const char* kKnown = "G90\nM83\nG1 X0 Y0 Z0.2 F6000\n";
+
+TEST(PieceReader, CutsRunsAtEverythingThatStopsOrMayNotBeRewritten) {
+  const Reading reading(std::string(kKnown) +
+                        "G1 X5 E1\n"
+                        "G1 Y5 E1\n"
+                        "G4 P0\n"
+                        "G1 X0 E1\n"
+                        "G1 E-1\n"
+                        "G1 Y0\n"
+                        "G1 X2 E-0.5\n"
+                        "G1 X5 E1\n"
+                        "G1 Z0.4\n");
+  EXPECT_THAT(reading.outline(),
+              ElementsAre("rest: " + std::string(kKnown), "run: G1 X5 E1\nG1 Y5 E1\n",
+                          "rest: G4 P0\n", "run: G1 X0 E1\n", "rest: G1 E-1\n", "run: G1 Y0\n",
+                          "rest: G1 X2 E-0.5\n", "run: G1 X5 E1\n", "rest: G1 Z0.4\n"));
+}
+
+TEST(PieceReader, KeepsLinesThatStopNothingInsideARun) {
+  const std::string run = "G1 X5 E1\nM204 S700\n; comment\nM106 S9\nG1 F1200\n\nG92 E0\nG1 Y5 E1\n";
+  EXPECT_THAT(Reading(kKnown + run).outline(),
+              ElementsAre("rest: " + std::string(kKnown), "run: " + run));
+}
+
+TEST(PieceReader, GivesLinesAfterTheLastMoveOfARunToTheNextPiece) {
+  const std::string head(kKnown);
+  EXPECT_THAT(Reading(head + "G1 X5 E1\nM204 S700\n;end\nG4 P0\n").outline(),
+              ElementsAre("rest: " + head, "run: G1 X5 E1\n", "rest: M204 S700\n;end\nG4 P0\n"));
+  EXPECT_THAT(Reading(head + "G1 X5 E1\n;end\nM104 S0").outline(),
+              ElementsAre("rest: " + head, "run: G1 X5 E1\n", "rest: ;end\nM104 S0"));
+}
+
+TEST(PieceReader, PlansEveryRunFromRestToRest) {
+  const Reading reading(std::string(kKnown) + "G1 X50 E1\nG1 X100 E1\nG1 X100.2 Z9\nG1 X150 E1\n");
+  ASSERT_EQ(reading.pieces.size(), 4U);
+  for (const Piece& piece : reading.pieces) {
+    EXPECT_EQ(piece.moves.front().start_v_mm_s, 0.0);
+    EXPECT_NEAR(piece.moves.back().end_v_mm_s, 0.0, 1e-9);
+  }
+  // Within a run there is no stop.
+  EXPECT_GT(reading.pieces[1].moves[0].end_v_mm_s, 50.0);
+}
+
+TEST(PieceReader, CountsTheMovesOfEveryLine) {
+  const Reading reading(std::string(kKnown) + "G1 X5\n;c\nG1 X5\nG2 X5 Y10 I0 J5 E1\nG1 X0\n");
+  const std::vector<std::size_t> counts = {1, 0, 0};
+  ASSERT_EQ(reading.pieces.size(), 2U);
+  const Piece& run = reading.pieces[1];
+  ASSERT_EQ(run.move_counts.size(), 5U);
+  EXPECT_THAT(std::vector(run.move_counts.begin(), run.move_counts.begin() + 3),
+              ::testing::ElementsAreArray(counts));
+  EXPECT_GT(run.move_counts[3], 5U);
+  EXPECT_EQ(run.move_counts[4], 1U);
+  EXPECT_EQ(run.moves.size(), 2 + run.move_counts[3]);
+}
+
+TEST(PieceReader, AppliesLimitsWhereTheyStand) {
+  const Reading reading(std::string(kKnown) + "G1 X50\nM204 S700\nG1 X100\nM204 S900\nG4 P1\n");
+  ASSERT_EQ(reading.pieces.size(), 3U);
+  EXPECT_EQ(reading.pieces[1].moves[0].accel_mm_s2, 5000.0);
+  EXPECT_EQ(reading.pieces[1].moves[1].accel_mm_s2, 700.0);
+}
+
+TEST(PieceReader, RefusesWhatUnflexWrote) {
+  const Reading reading(std::string(kKnown) + "G1 X5\n;unflex run\nG1 X6\n");
+  EXPECT_THAT(reading.error, HasSubstr("in.gcode:5: this file was already compensated"));
+}
+
+TEST(PieceReader, HandsLongStretchesWithoutMotionOutInPortions) {
+  std::string text;
+  for (int i = 0; i < 20000; ++i) {
+    text += "; line " + std::to_string(i) + "\n";
+  }
+  const Reading reading(text);
+  EXPECT_GT(reading.pieces.size(), 2U);
+  EXPECT_EQ(reading.all(), text);
+}
+
+TEST(PieceReader, MakesNothingOfNothing) {
+  EXPECT_TRUE(Reading("").pieces.empty());
+  EXPECT_EQ(Reading("").error, "");
+  EXPECT_EQ(Reading(" \t").all(), " \t");
+}
+
+TEST(PieceReader, LosesNoByteOfAnyFile) {
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(UNFLEX_TEST_DATA)) {
+    if (entry.path().extension() == ".gcode") {
+      const std::string text = testing::read_file(entry.path());
+      const Reading reading(text);
+      EXPECT_EQ(reading.all(), text) << entry.path();
+      EXPECT_EQ(reading.error, "");
+      ++files;
+    }
+  }
+  EXPECT_GE(files, 7U);
+}
+
+}  // namespace
+}  // namespace unflex::pipeline

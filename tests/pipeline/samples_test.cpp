@@ -1,0 +1,92 @@
+// Real prints through the whole pipeline: pieces that come with the tests, and, where the shared
+// samples are at hand, longer stretches of all ten.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "acceptance.hpp"
+#include "jobs.hpp"
+
+namespace unflex::pipeline::testing {
+namespace {
+
+struct Sample {
+  std::string name;
+  std::string_view layer_mark;  // the line that begins a layer
+  std::size_t layers;           // as many of them; 0: all
+  std::size_t lines;            // no more than this; 0: all
+  double improvement;
+};
+
+std::size_t line_end(const std::string& text, std::size_t begin) {
+  return std::min(text.find('\n', begin), text.size() - 1) + 1;
+}
+
+std::string cut(const std::string& text, const Sample& sample) {
+  std::size_t layers = 0;
+  std::size_t lines = 0;
+  for (std::size_t begin = 0; begin < text.size(); begin = line_end(text, begin)) {
+    const bool new_layer =
+        sample.layers > 0 && std::string_view(text).substr(begin).starts_with(sample.layer_mark);
+    if ((new_layer && layers++ == sample.layers) || (sample.lines > 0 && lines++ == sample.lines)) {
+      return text.substr(0, begin);
+    }
+  }
+  return text;
+}
+
+bool whole_samples() { return std::getenv("UNFLEX_WHOLE_SAMPLES") != nullptr; }
+
+// Names the test after the sample.
+std::string name_of(const ::testing::TestParamInfo<Sample>& tested) { return tested.param.name; }
+
+class RealPrint : public ::testing::TestWithParam<Sample> {};
+
+TEST_P(RealPrint, IsDrawnAsSliced) {
+  const Sample& sample = GetParam();
+  const std::filesystem::path path =
+      std::filesystem::path(UNFLEX_SHARED) / "samples" / (sample.name + ".gcode");
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "no shared samples beside the repository";
+  }
+  const std::string text = read_file(path);
+  expect_compensated(whole_samples() ? text : cut(text, sample), {2, sample.improvement});
+}
+
+// The first ten layers of five prints; of the others as much as takes about as long.
+INSTANTIATE_TEST_SUITE_P(
+    Shared, RealPrint,
+    ::testing::Values(Sample{"bracket_mk3s_whole", ";LAYER_CHANGE", 10, 0, 15.0},
+                      Sample{"cube20_ender3_absE", ";LAYER_CHANGE", 10, 0, 15.0},
+                      Sample{"star_voron_klipper_fwretract", ";LAYER_CHANGE", 10, 0, 15.0},
+                      Sample{"textplate_cura", ";LAYER:", 10, 0, 15.0},
+                      Sample{"wallring_mini_marlin2", ";LAYER_CHANGE", 10, 0, 15.0},
+                      Sample{"dome_snap_dense", "", 0, 8000, 1.0},
+                      Sample{"pins_slic3r_zhop", "", 0, 0, 1.0},
+                      Sample{"vase_rrf_spiral", "", 0, 8000, 1.0},
+                      Sample{"washer_ratrig_arcs", "", 0, 0, 1.0},
+                      Sample{"washer_ratrig_lines", "", 0, 0, 1.0}),
+    name_of);
+
+class PieceOfPrint : public ::testing::TestWithParam<Sample> {};
+
+TEST_P(PieceOfPrint, IsDrawnAsSliced) {
+  const std::filesystem::path path =
+      std::filesystem::path(UNFLEX_TEST_DATA) / ("pipeline_" + GetParam().name + ".gcode");
+  expect_compensated(read_file(path), {2, GetParam().improvement});
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Small, PieceOfPrint,
+    ::testing::Values(Sample{"bracket", "", 0, 0, 15.0}, Sample{"cube20", "", 0, 0, 15.0},
+                      Sample{"star", "", 0, 0, 15.0}, Sample{"textplate", "", 0, 0, 15.0},
+                      Sample{"wallring", "", 0, 0, 15.0}, Sample{"vase", "", 0, 0, 1.0},
+                      Sample{"washer_arcs", "", 0, 0, 1.0}),
+    name_of);
+
+}  // namespace
+}  // namespace unflex::pipeline::testing
