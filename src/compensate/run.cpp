@@ -59,7 +59,9 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, std::vector<doub
   AxisWindow window;
   window.axis = axis.axis;
   window.period_s = setup.period_s;
-  window.jerk_weight = setup.jerk_weight;
+  // What the base's jerk does to the nozzle's motion goes with (ωh)²: so weighted, one value serves
+  // all resonances.
+  window.jerk_weight = setup.jerk_weight * std::pow(axis.axis.omega_rad_s * setup.period_s, 4);
   window.limits = axis.limits;
   // Where the sliced path itself leaves the travel, the base may go as far but no further.
   const auto [low, high] = std::ranges::minmax(reference);
@@ -100,32 +102,43 @@ std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
 std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
                                const std::vector<WindowSpan>& spans,
                                const dynamics::NozzleXY& nozzle, const Setup& setup) {
-  const std::size_t last_node = spans.back().last;
+  return windows(moves, spans, 0, spans.size(), nozzle, setup);
+}
+
+std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
+                               const std::vector<WindowSpan>& spans, std::size_t first,
+                               std::size_t count, const dynamics::NozzleXY& nozzle,
+                               const Setup& setup) {
+  // Twice as many samples as nodes, from the first node of the first window.
+  const std::size_t first_sample = 2 * spans[first].first;
+  const std::size_t last_sample = 2 * spans[first + count - 1].last;
   std::vector<double> x;
   std::vector<double> y;
   std::vector<double> weight;
   Reference reference(moves, setup);
-  for (std::size_t i = 0; i <= 2 * last_node; ++i) {
+  for (std::size_t i = first_sample; i <= last_sample; ++i) {
     const Reference::Sample sample = reference.at(0.5 * static_cast<double>(i) * setup.period_s);
     x.push_back(sample.x_mm);
     y.push_back(sample.y_mm);
     weight.push_back(sample.weight);
   }
   std::vector<RunWindow> result;
-  for (const WindowSpan& span : spans) {
+  for (std::size_t w = first; w < first + count; ++w) {
+    const WindowSpan& span = spans[w];
     const auto slice = [&](const std::vector<double>& all) {
-      return std::vector<double>(all.begin() + static_cast<std::ptrdiff_t>(2 * span.first),
-                                 all.begin() + static_cast<std::ptrdiff_t>(2 * span.last + 1));
+      return std::vector<double>(
+          all.begin() + static_cast<std::ptrdiff_t>(2 * span.first - first_sample),
+          all.begin() + static_cast<std::ptrdiff_t>(2 * span.last + 1 - first_sample));
     };
     RunWindow window{make_axis(setup.x, setup, slice(x), slice(weight)),
                      make_axis(setup.y, setup, slice(y), slice(weight))};
     if (span.first == 0) {
-      window.x.start = AxisWindow::Start{nozzle.x, x.front()};
-      window.y.start = AxisWindow::Start{nozzle.y, y.front()};
+      window.x.start = AxisWindow::Start{nozzle.x, window.x.reference_mm.front()};
+      window.y.start = AxisWindow::Start{nozzle.y, window.y.reference_mm.front()};
     }
-    if (span.last == last_node) {
-      window.x.end_base_mm = x.back();
-      window.y.end_base_mm = y.back();
+    if (span.last == spans.back().last) {
+      window.x.end_base_mm = window.x.reference_mm.back();
+      window.y.end_base_mm = window.y.reference_mm.back();
     }
     result.push_back(std::move(window));
   }

@@ -1,9 +1,9 @@
 #include "unflex/emit/emitter.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "strokes.hpp"
 #include "unflex/core/number.hpp"
@@ -19,6 +19,7 @@ using gcode::Z;
 constexpr int kPositionDecimals = 4;
 constexpr int kExactDecimals = 6;  // where a run ends on a finer place than the grid
 constexpr int kFilamentDecimals = 5;
+constexpr double kFeedToleranceMmS = 1e-6;  // what restoring F with its decimals may leave
 
 bool same(double a, double b) { return std::abs(a - b) < 1e-9; }
 
@@ -30,8 +31,8 @@ void append_word(std::string& text, char letter, double value, int decimals) {
 
 // A coordinate on the grid, or as fine as it takes.
 void append_coordinate(std::string& text, char letter, double value) {
-  const double on_grid = static_cast<double>(to_scaled(value, kPositionDecimals)) /
-                         power_of_ten(kPositionDecimals);
+  const double on_grid =
+      static_cast<double>(to_scaled(value, kPositionDecimals)) / power_of_ten(kPositionDecimals);
   append_word(text, letter, value, same(on_grid, value) ? kPositionDecimals : kExactDecimals);
 }
 
@@ -72,16 +73,29 @@ void KlipperEmitter::follow_input(const gcode::Event& event) {
 
 void KlipperEmitter::line(const gcode::Event& event, std::string& out) {
   if (event.kind == gcode::EventKind::barrier && event.position_lost) {
-    // Homing, macros and tool changes move the machine by themselves.
-    set_shaper(true, out);
+    // Homing, macros and tool changes move the machine by themselves, and may leave other limits.
+    restore_shaper(out);
+    limits_known_ = false;
   }
   copy(event, out);
   follow_input(event);
+  if (event.kind == gcode::EventKind::barrier) {
+    // RESTORE_GCODE_STATE brings back what was saved, which is not always what the input has now.
+    restore_modes(out);
+  }
+}
+
+void KlipperEmitter::keep(const std::vector<gcode::Event>& events, std::string& out) {
+  restore_shaper(out);
+  for (const gcode::Event& event : events) {
+    line(event, out);
+  }
 }
 
 bool KlipperEmitter::run(const Run& run, std::string& out) {
   const gcode::ModalState& state = printer_.state();
-  const Grid grid{state.base_mm[X], state.base_mm[Y], state.base_mm[Z], kPositionDecimals};
+  const Grid grid{state.base_mm[X], state.base_mm[Y], state.base_mm[Z], kPositionDecimals,
+                  state.speed_factor};
   const std::vector<Stroke> run_strokes = strokes(run, grid, options_);
   if (run_strokes.empty()) {
     return false;
@@ -109,7 +123,7 @@ bool KlipperEmitter::run(const Run& run, std::string& out) {
   return true;
 }
 
-void KlipperEmitter::finish(std::string& out) { set_shaper(true, out); }
+void KlipperEmitter::finish(std::string& out) { restore_shaper(out); }
 
 void KlipperEmitter::enter_run(std::string& out) {
   if (!started_) {
@@ -118,7 +132,7 @@ void KlipperEmitter::enter_run(std::string& out) {
                       options_.version),
           out);
   }
-  set_shaper(false, out);
+  set_shaper(0.0, 0.0, out);
   write(fmt::format("{} run", kComment), out);
 }
 
@@ -178,7 +192,7 @@ void KlipperEmitter::restore_modes(std::string& out) {
   if (wanted.unit_mm != state.unit_mm) {
     write(wanted.unit_mm == 1.0 ? "G21" : "G20", out);
   }
-  if (!same(wanted.feed_mm_s, state.feed_mm_s)) {
+  if (std::abs(wanted.feed_mm_s - state.feed_mm_s) > kFeedToleranceMmS) {
     std::string text = "G1";
     append_word(text, 'F', wanted.feed_mm_s * 60.0 / state.unit_mm, kExactDecimals);
     write(text, out);
@@ -186,10 +200,10 @@ void KlipperEmitter::restore_modes(std::string& out) {
 }
 
 void KlipperEmitter::set_limits(const planner::Limits& limits, std::string& out) {
-  std::string text = "SET_VELOCITY_LIMIT";
+  std::string fields;
   const auto field = [&](std::string_view name, double wanted, double current) {
-    if (wanted != current) {
-      text += fmt::format(" {}={}", name, wanted);
+    if (!limits_known_ || wanted != current) {
+      fields += fmt::format(" {}={}", name, wanted);
     }
   };
   field("VELOCITY", limits.max_velocity_mm_s, limits_.max_velocity_mm_s);
@@ -197,25 +211,26 @@ void KlipperEmitter::set_limits(const planner::Limits& limits, std::string& out)
   field("SQUARE_CORNER_VELOCITY", limits.square_corner_velocity_mm_s,
         limits_.square_corner_velocity_mm_s);
   field("MINIMUM_CRUISE_RATIO", limits.minimum_cruise_ratio, limits_.minimum_cruise_ratio);
-  if (text.find('=') != std::string::npos) {
-    write(text, out);
+  limits_known_ = true;
+  if (!fields.empty()) {
+    write("SET_VELOCITY_LIMIT" + fields, out);
   }
 }
 
-void KlipperEmitter::set_shaper(bool on, std::string& out) {
-  if (on == shaper_on_) {
-    return;
+void KlipperEmitter::restore_shaper(std::string& out) {
+  set_shaper(input_.state().shaper_freq_x_hz, input_.state().shaper_freq_y_hz, out);
+}
+
+void KlipperEmitter::set_shaper(double x_hz, double y_hz, std::string& out) {
+  std::string fields;
+  if (x_hz != printer_.state().shaper_freq_x_hz) {
+    fields += fmt::format(" SHAPER_FREQ_X={}", x_hz);
   }
-  shaper_on_ = on;
-  std::string text = "SET_INPUT_SHAPER";
-  if (options_.shaper_freq_x_hz > 0.0) {
-    text += fmt::format(" SHAPER_FREQ_X={}", on ? options_.shaper_freq_x_hz : 0.0);
+  if (y_hz != printer_.state().shaper_freq_y_hz) {
+    fields += fmt::format(" SHAPER_FREQ_Y={}", y_hz);
   }
-  if (options_.shaper_freq_y_hz > 0.0) {
-    text += fmt::format(" SHAPER_FREQ_Y={}", on ? options_.shaper_freq_y_hz : 0.0);
-  }
-  if (text.find('=') != std::string::npos) {
-    write(text, out);
+  if (!fields.empty()) {
+    write("SET_INPUT_SHAPER" + fields, out);
   }
 }
 

@@ -69,11 +69,20 @@ void Interpreter::extended(Event& event) {
     return gcode_offset(event);
   }
   if (name == "SAVE_GCODE_STATE") {
+    // Klipper does not stop for it. But the modes it keeps must be those the file means, not those
+    // of rewritten motion, so nothing may be rewritten across it.
     saved_states_.insert_or_assign(state_name(command_), state_);
+    event.kind = EventKind::barrier;
     return;
   }
   if (name == "RESTORE_GCODE_STATE") {
     return restore_state(event);
+  }
+  if (name == "SET_INPUT_SHAPER") {
+    return input_shaper(event);
+  }
+  if (name == "EXCLUDE_OBJECT_START" || name == "EXCLUDE_OBJECT_END") {
+    return object_label(event);
   }
   switch (extended_effect(name)) {
     case Effect::passive:
@@ -105,6 +114,23 @@ void Interpreter::velocity_limit(Event& event) {
     event.kind = EventKind::limits;
     event.limits = {velocity.value, accel.value, corner.value, cruise.value};
   }
+}
+
+// extras/input_shaper.py, cmd_SET_INPUT_SHAPER.
+void Interpreter::input_shaper(Event& event) {
+  event.kind = EventKind::barrier;
+  state_.shaper_freq_x_hz =
+      number_of(command_, "SHAPER_FREQ_X").value.value_or(state_.shaper_freq_x_hz);
+  state_.shaper_freq_y_hz =
+      number_of(command_, "SHAPER_FREQ_Y").value.value_or(state_.shaper_freq_y_hz);
+}
+
+// extras/exclude_object.py: Klipper does not stop for it. But when the user has cancelled the
+// object, all motion in between is left out, and the next goes in one line from wherever the
+// machine then is.
+void Interpreter::object_label(Event& event) {
+  event.kind = EventKind::barrier;
+  state_.known[X] = state_.known[Y] = false;
 }
 
 // kinematics/extruder.py, _set_pressure_advance: a new smoothing time stops the machine, and

@@ -15,24 +15,22 @@ namespace {
 // Not known to Klipper, which ignores them, and not usually taken over by macros: 74 75 76 77 78
 // (job records), 92 (steps), 108, 113, 141 (chamber), 155 (reports), 200, 201 203 205 566 (limits),
 // 207 208 209 (retraction), 211 (end stops), 250 (contrast), 301 304 (PID), 302 (cold extrusion),
-// 355 (light), 413 (power loss), 486 (objects), 555 (print area), 569 (drivers), 572 900 (pressure
+// 355 (light), 413 (power loss), 555 (print area), 569 (drivers), 572 900 (pressure
 // advance), 591 (filament sensor), 592 593 (extrusion, shaping), 862 (printer check), 906 907
 // (currents).
 constexpr std::array kPassiveCodes = {73,  74,  75,  76,  77,  78,  92,  104, 105, 106, 107, 108,
                                       110, 113, 114, 115, 117, 118, 140, 141, 155, 200, 201, 203,
-                                      205, 207, 208, 209, 211, 250, 301, 302, 304, 355, 413, 486,
-                                      555, 566, 569, 572, 591, 592, 593, 862, 900, 906, 907};
+                                      205, 207, 208, 209, 211, 250, 301, 302, 304, 355, 413, 555,
+                                      566, 569, 572, 591, 592, 593, 862, 900, 906, 907};
 
 // 17 motors on; 109 116 190 191 wait for temperatures; 119 end stops; 300 beep (a macro with a
 // pause in Klipper's own examples); 400 wait.
 constexpr std::array kStoppingCodes = {17, 109, 116, 119, 190, 191, 300, 400};
 
-constexpr std::array<std::string_view, 26> kPassiveNames = {
+constexpr std::array<std::string_view, 24> kPassiveNames = {
     "ECHO",
     "EXCLUDE_OBJECT",
     "EXCLUDE_OBJECT_DEFINE",
-    "EXCLUDE_OBJECT_END",
-    "EXCLUDE_OBJECT_START",
     "GET_POSITION",
     "GET_RETRACTION",
     "HELP",
@@ -56,10 +54,9 @@ constexpr std::array<std::string_view, 26> kPassiveNames = {
     "TURN_OFF_HEATERS",
 };
 
-constexpr std::array<std::string_view, 9> kStoppingNames = {
-    "DUMP_TMC",         "INIT_TMC",        "QUERY_ENDSTOPS", "SET_EXTRUDER_ROTATION_DISTANCE",
-    "SET_INPUT_SHAPER", "SET_TMC_CURRENT", "SET_TMC_FIELD",  "SYNC_EXTRUDER_MOTION",
-    "TEMPERATURE_WAIT",
+constexpr std::array<std::string_view, 8> kStoppingNames = {
+    "DUMP_TMC",        "INIT_TMC",      "QUERY_ENDSTOPS",       "SET_EXTRUDER_ROTATION_DISTANCE",
+    "SET_TMC_CURRENT", "SET_TMC_FIELD", "SYNC_EXTRUDER_MOTION", "TEMPERATURE_WAIT",
 };
 
 template <class List, class Key>

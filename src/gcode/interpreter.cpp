@@ -17,7 +17,10 @@ constexpr double kMmPerInch = 25.4;
 
 }  // namespace
 
-Interpreter::Interpreter(InterpreterOptions options) : options_(options) {}
+Interpreter::Interpreter(InterpreterOptions options) : options_(options) {
+  state_.shaper_freq_x_hz = options.shaper_freq_x_hz;
+  state_.shaper_freq_y_hz = options.shaper_freq_y_hz;
+}
 
 Event Interpreter::interpret(Line line) {
   Event event;
@@ -108,6 +111,8 @@ void Interpreter::m_code(Event& event) {
       return speed_factor(event);
     case 221:
       return flow_factor(event);
+    case 486:
+      return object_label(event);
     default:
       break;
   }

@@ -254,7 +254,8 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
     for (const Axis axis : {X, Y, Z}) {
       segment.end_mm[axis] = segment.start_mm[axis];
     }
-    // Less is round-off between two ways to the same reading, not a move. (Klipper would stop for it.)
+    // Less is round-off between two ways to the same reading, not a move. (Klipper would stop for
+    // it.)
     if (std::abs(segment.delta(E)) < kShortestMove_mm) {
       return;
     }

@@ -146,8 +146,8 @@ constexpr std::array kKeys = {
         Bounds{.min = 0.0, .max = 1.0, .min_open = true}, "",
         "Weight of the tracking error where nothing is extruded, 1 where something is"},
     Key{"solve.jerk_weight", &setting<&S::solve, &O::jerk_weight>,
-        Bounds{.min = 0.0, .max = 1.0, .min_open = true}, "",
-        "Weight of the jerk, in units of the node period"},
+        Bounds{.min = 0.0, .max = 1e6, .min_open = true}, "",
+        "Weight of the base's jerk against the tracking error"},
 
     Key{"emit.period_ms", &setting<&S::emit, &T::period_ms>, Bounds{.min = 0.05, .max = 50.0}, "ms",
         "Node period: time between two points of the base's motion"},

@@ -22,8 +22,13 @@ namespace unflex::pipeline {
 namespace {
 
 constexpr std::size_t kMaxFallbacksListed = 1000;
-// Windows the reader may be ahead of the solvers, per worker.
+// Windows the reader may be ahead of the solvers, per worker, and those built at once.
 constexpr std::size_t kWindowsAhead = 24;
+constexpr std::size_t kWindowsAtOnce = 8;
+// A run's trajectory is held as a whole, 48 bytes per node; longer ones are left as they are.
+constexpr std::size_t kMaxRunNodes = 8'000'000;
+// Of the time of the whole job, for the progress bar.
+constexpr double kShareOfCompensation = 0.9;
 
 // A piece on its way: a run waits for its windows.
 struct Pending {
@@ -31,9 +36,10 @@ struct Pending {
   std::vector<compensate::WindowSpan> spans;
   std::vector<dynamics::AxisTrajectory> x;  // solutions, one per span
   std::vector<dynamics::AxisTrajectory> y;
-  std::size_t missing = 0;  // solutions not yet here
-  std::string failure;      // why a window has no solution
-  dynamics::NozzleXY nozzle;
+  std::size_t submitted = 0;  // windows given to the solvers
+  std::size_t missing = 0;    // solutions not yet here, two per window
+  std::string failure;        // why there is no solution
+  dynamics::NozzleXY nozzle;  // when the run begins, if every run before is compensated
 };
 
 // Which solution a ticket of the pool stands for.
@@ -59,6 +65,7 @@ class Compensator {
 
   Status work(report::Report& report) {
     report_ = &report;
+    const std::size_t ahead = 2 * kWindowsAhead * std::max(job_.workers, 1U);
     for (;;) {
       Pending pending;
       const Result<bool> more = reader_.next(pending.piece);
@@ -69,7 +76,7 @@ class Compensator {
         break;
       }
       admit(std::move(pending));
-      if (Status status = drain(kWindowsAhead * std::max(job_.workers, 1U)); !status) {
+      if (Status status = drain(ahead); !status) {
         return status;
       }
     }
@@ -86,28 +93,55 @@ class Compensator {
   }
 
  private:
-  // Queues the piece, and the windows of a run with the solvers.
+  // Queues the piece.
   void admit(Pending pending) {
-    const std::size_t index = first_index_ + queue_.size();
-    if (pending.piece.is_run) {
-      pending.nozzle = nozzle_;
-      pending.spans = compensate::cut(compensate::node_count(pending.piece.moves, setup_), setup_);
-      const auto windows =
-          compensate::windows(pending.piece.moves, pending.spans, pending.nozzle, setup_);
-      pending.x.resize(windows.size());
-      pending.y.resize(windows.size());
-      pending.missing = 2 * windows.size();
-      for (std::size_t w = 0; w < windows.size(); ++w) {
-        submit({index, w, false}, windows[w].x);
-        submit({index, w, true}, windows[w].y);
-      }
-      report_->windows_total += windows.size();
+    const Piece& piece = pending.piece;
+    if (piece.is_run) {
       ++report_->runs_total;
-      nozzle_ = at_rest(pending.piece.moves.back().segment.end_mm);
+      pending.nozzle = nozzle_;
+      nozzle_ = at_rest(piece.moves.back().segment.end_mm);
+      const std::size_t nodes = compensate::node_count(piece.moves, setup_);
+      if (nodes <= kMaxRunNodes) {
+        pending.spans = compensate::cut(nodes, setup_);
+      } else {
+        pending.failure =
+            fmt::format("{:.0f} s of motion without a stop are too long to be handled",
+                        static_cast<double>(nodes) * setup_.period_s);
+      }
+      pending.x.resize(pending.spans.size());
+      pending.y.resize(pending.spans.size());
+      pending.missing = 2 * pending.spans.size();
+      outstanding_ += pending.missing;
+      report_->windows_total += pending.spans.size();
     } else {
-      nozzle_ = after_motion(pending.piece, nozzle_, rules_.nozzle);
+      nozzle_ = after_motion(piece, nozzle_, rules_.nozzle);
+      for (const gcode::Event& event : piece.events) {
+        count_kept_moves(event, report_->kept_moves);
+      }
     }
     queue_.push_back(std::move(pending));
+  }
+
+  // Gives the solvers the next windows, in the order of the file, as long as they are not busy for
+  // some time already.
+  void feed() {
+    for (std::size_t piece = 0; piece < queue_.size(); ++piece) {
+      Pending& pending = queue_[piece];
+      while (pending.submitted < pending.spans.size()) {
+        if (pool_.under_way() >= kWindowsAhead * std::max(job_.workers, 1U)) {
+          return;
+        }
+        const std::size_t count =
+            std::min(kWindowsAtOnce, pending.spans.size() - pending.submitted);
+        const auto windows = compensate::windows(pending.piece.moves, pending.spans,
+                                                 pending.submitted, count, pending.nozzle, setup_);
+        for (std::size_t i = 0; i < count; ++i) {
+          submit({first_index_ + piece, pending.submitted + i, false}, windows[i].x);
+          submit({first_index_ + piece, pending.submitted + i, true}, windows[i].y);
+        }
+        pending.submitted += count;
+      }
+    }
   }
 
   void submit(Ticket ticket, const compensate::AxisWindow& window) {
@@ -115,10 +149,11 @@ class Compensator {
     pool_.submit(first_ticket_ + tickets_.size() - 1, window);
   }
 
-  // Takes solutions and writes pieces that are complete until at most `ahead` windows are under
-  // way.
+  // Takes solutions and writes pieces that are complete until at most `ahead` solutions are
+  // missing; for 0 until everything is written.
   Status drain(std::size_t ahead) {
     for (;;) {
+      feed();
       write_complete();
       if (progress_.cancelled()) {
         return fail(ErrorKind::internal, "cancelled, nothing was written");
@@ -127,7 +162,7 @@ class Compensator {
         return fail(ErrorKind::internal, {job_.output_name, 0},
                     "cannot write the output; is the disk full?");
       }
-      if (pool_.under_way() <= ahead && (ahead > 0 || queue_.empty())) {
+      if (outstanding_ <= ahead && (ahead > 0 || queue_.empty())) {
         return {};
       }
       if (std::optional<WorkerPool::Done> done = pool_.take(100)) {
@@ -140,6 +175,7 @@ class Compensator {
     const Ticket ticket = tickets_[done.ticket - first_ticket_];
     Pending& pending = queue_[ticket.piece - first_index_];
     --pending.missing;
+    --outstanding_;
     if (done.solution) {
       report_->solver_iterations += static_cast<std::size_t>(done.solution->iterations);
       (ticket.is_y ? pending.y : pending.x)[ticket.window] = std::move(done.solution->base);
@@ -158,25 +194,25 @@ class Compensator {
       first_ticket_ += tickets;
       queue_.pop_front();
       ++first_index_;
-      progress_.update("compensating", 0.8 * static_cast<double>(bytes_written_) / input_bytes_);
+      progress_.update("compensating",
+                       kShareOfCompensation * static_cast<double>(bytes_written_) / input_bytes_);
     }
   }
 
   void write(Pending& pending) {
+    const Piece& piece = pending.piece;
     std::string text;
-    std::optional<std::string> failure;
-    if (pending.piece.is_run) {
-      failure = write_run(pending, text);
-    }
-    if (!pending.piece.is_run || failure) {
-      for (const gcode::Event& event : pending.piece.events) {
+    if (!piece.is_run) {
+      for (const gcode::Event& event : piece.events) {
         emitter_.line(event, text);
       }
-    }
-    if (failure) {
+      true_nozzle_ = after_motion(piece, true_nozzle_, rules_.nozzle);
+    } else if (std::optional<std::string> failure = write_run(pending, text)) {
+      emitter_.keep(piece.events, text);
+      true_nozzle_ = after_motion(piece, true_nozzle_, rules_.nozzle);
       note_fallback(pending, std::move(*failure));
     }
-    for (const gcode::Event& event : pending.piece.events) {
+    for (const gcode::Event& event : piece.events) {
       bytes_written_ += event.line.text.size();
     }
     output_ << text;
@@ -191,17 +227,17 @@ class Compensator {
                                         compensate::join(pending.spans, pending.y)};
     const Piece& piece = pending.piece;
     emit::KlipperEmitter trial = emitter_;
-    const std::size_t begin = text.size();
     if (!trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s},
                    text)) {
       return "the motion is too small to be written";
     }
-    if (std::optional<std::string> worse = worse_than_original(
-            piece.moves, std::string_view(text).substr(begin), emitter_.printer(),
-            emitter_.printer_limits(), pending.nozzle, rules_)) {
-      text.resize(begin);
-      return worse;
+    Verdict verdict = judge(piece.moves, text, emitter_.printer(), emitter_.printer_limits(),
+                            true_nozzle_, rules_);
+    if (verdict.objection) {
+      text.clear();
+      return verdict.objection;
     }
+    true_nozzle_ = verdict.nozzle;
     emitter_ = std::move(trial);
     ++report_->runs_compensated;
     report_->windows_solved += pending.spans.size();
@@ -230,11 +266,27 @@ class Compensator {
   // The nozzle where the reader is, if every run before was compensated: what motion left as it is
   // has set ringing, the next run starts with.
   dynamics::NozzleXY nozzle_;
+  dynamics::NozzleXY true_nozzle_;  // where the writer is
   std::deque<Pending> queue_;
   std::size_t first_index_ = 0;   // of queue_'s front among all pieces
   std::deque<Ticket> tickets_;    // of the windows of queue_
   std::size_t first_ticket_ = 0;  // number of tickets_' front
+  std::size_t outstanding_ = 0;   // solutions missing in queue_, in all
   std::size_t bytes_written_ = 0;
+};
+
+// The second part of a job's progress.
+class Remaining final : public Progress {
+ public:
+  Remaining(Progress& whole, double done) : whole_(&whole), done_(done) {}
+  void update(std::string_view stage, double fraction) override {
+    whole_->update(stage, fraction < 0.0 ? fraction : done_ + (1.0 - done_) * fraction);
+  }
+  [[nodiscard]] bool cancelled() const override { return whole_->cancelled(); }
+
+ private:
+  Progress* whole_;
+  double done_;
 };
 
 double cpu_s(int who) {
@@ -286,7 +338,8 @@ Result<report::Report> compensate_with(const Job& job, const WorkerPool::EngineF
                   "cannot write the output; is the disk full?");
     }
   }
-  if (Status status = add_verification(job, progress, report); !status) {
+  Remaining remaining(progress, kShareOfCompensation);
+  if (Status status = add_verification(job, remaining, report); !status) {
     return tl::unexpected(status.error());
   }
   report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

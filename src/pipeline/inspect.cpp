@@ -1,10 +1,10 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <limits>
 #include <string_view>
-
-#include <fmt/format.h>
 
 #include "piece_reader.hpp"
 #include "stage_options.hpp"
@@ -17,9 +17,9 @@ namespace unflex::pipeline {
 namespace {
 
 // Programs that name themselves in the comments they write.
-constexpr std::string_view kSlicers[] = {"PrusaSlicer", "SuperSlicer", "OrcaSlicer", "BambuStudio",
-                                         "Bambu Studio", "Slic3r", "Cura", "Simplify3D", "ideaMaker",
-                                         "KISSlicer", "Kiri:Moto", "ArcWelder"};
+constexpr std::string_view kSlicers[] = {"PrusaSlicer",  "SuperSlicer", "OrcaSlicer", "BambuStudio",
+                                         "Bambu Studio", "Slic3r",      "Cura",       "Simplify3D",
+                                         "ideaMaker",    "KISSlicer",   "Kiri:Moto",  "ArcWelder"};
 
 // The comment in which a slicer names itself, if this is one.
 std::string slicer_named(std::string_view content) {
@@ -55,7 +55,8 @@ std::string command_name(const gcode::Command& command) {
 
 class Inspector {
  public:
-  explicit Inspector(Inspection& result) : result_(&result) {
+  Inspector(Inspection& result, const machine::Settings& settings)
+      : result_(&result), planner_(planner_limits(settings), fixed_limits(settings)) {
     result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
     result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
     result_->lowest_accel_mm_s2 = std::numeric_limits<double>::infinity();
@@ -65,21 +66,19 @@ class Inspector {
     for (const gcode::Event& event : piece.events) {
       add_event(event);
     }
-    double moving_s = 0.0;
-    for (const planner::PlannedMove& move : piece.moves) {
-      moving_s += move.duration_s();
-      add_move(move);
-    }
-    result_->reference_time_s += moving_s;
     if (piece.is_run) {
       ++result_->runs;
-      result_->run_time_s += moving_s;
-      result_->windows +=
-          compensate::cut(compensate::node_count(piece.moves, setup), setup).size();
+      for (const planner::PlannedMove& move : piece.moves) {
+        result_->run_time_s += move.duration_s();
+      }
+      result_->windows += compensate::cut(compensate::node_count(piece.moves, setup), setup).size();
     }
   }
 
   void finish() {
+    gcode::Event end;
+    end.kind = gcode::EventKind::barrier;
+    plan(end);
     if (result_->moves == 0) {
       result_->x_min_mm = result_->x_max_mm = result_->y_min_mm = result_->y_max_mm = 0.0;
       result_->lowest_accel_mm_s2 = 0.0;
@@ -108,17 +107,30 @@ class Inspector {
     if (slicers_.empty()) {
       slicers_ = slicer_named(event.line.content());
     }
-    if (!gcode::compensable(event)) {
-      for (const gcode::Segment& segment : event.segments) {
-        const std::string_view reason = gcode::kept_reason(segment);
-        ++result_->kept_moves[std::string(reason.empty() ? "part of a kept arc" : reason)];
-      }
+    count_kept_moves(event, result_->kept_moves);
+    plan(event);
+  }
+
+  // By the firmware's own plan, which unlike that of the pieces goes through lifts without a stop.
+  void plan(const gcode::Event& event) {
+    planner_.apply(event.limits);
+    for (const gcode::Segment& segment : event.segments) {
+      planner_.add(segment);
+    }
+    if (event.kind == gcode::EventKind::barrier) {
+      planner_.stop();
+    }
+    planned_.clear();
+    planner_.take(planned_);
+    for (const planner::PlannedMove& move : planned_) {
+      add_move(move);
     }
   }
 
   void add_move(const planner::PlannedMove& move) {
     const gcode::Segment& segment = move.segment;
     result_->filament_mm += segment.delta(gcode::E);
+    result_->reference_time_s += move.duration_s();
     if (!move.kinematic) {
       ++result_->extrude_only_moves;
       return;
@@ -139,6 +151,8 @@ class Inspector {
   }
 
   Inspection* result_;
+  planner::KlipperPlanner planner_;
+  std::vector<planner::PlannedMove> planned_;
   std::string slicers_;
   bool absolute_e_ = true;
   long extruded_absolute_ = 0;  // extruding moves in M82 less those in M83
@@ -156,7 +170,7 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
   PieceReader reader(input, job.input_name, interpreter_options(job.settings),
                      planner_limits(job.settings), fixed_limits(job.settings));
   Inspection result;
-  Inspector inspector(result);
+  Inspector inspector(result, job.settings);
   for (;;) {
     Piece piece;
     const Result<bool> more = reader.next(piece);

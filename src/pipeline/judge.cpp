@@ -1,9 +1,9 @@
 #include "judge.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-
-#include <fmt/format.h>
 
 namespace unflex::pipeline {
 namespace {
@@ -71,15 +71,14 @@ dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
   return nozzle;
 }
 
-std::optional<std::string> worse_than_original(const std::vector<planner::PlannedMove>& original,
-                                               std::string_view text, gcode::Interpreter printer,
-                                               const planner::Limits& printer_limits,
-                                               const dynamics::NozzleXY& nozzle,
-                                               const verify::Rules& rules) {
+Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_view text,
+              gcode::Interpreter printer, const planner::Limits& printer_limits,
+              const dynamics::NozzleXY& nozzle, const verify::Rules& rules) {
   planner::KlipperPlanner planner(printer_limits, rules.fixed);
+  std::size_t line = 0;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
-    const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), 0});
+    const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), ++line});
     text.remove_prefix(end);
     planner.apply(event.limits);
     for (const gcode::Segment& segment : event.segments) {
@@ -90,30 +89,41 @@ std::optional<std::string> worse_than_original(const std::vector<planner::Planne
   std::vector<planner::PlannedMove> replayed;
   planner.take(replayed);
 
+  Verdict verdict;
+  if (std::optional<std::string> broken = verify::broken_rule(original, replayed, rules)) {
+    verdict.objection = std::move(broken);
+    return verdict;
+  }
   const verify::RunDeviation before = verify::measure(original, original, nozzle, rules.nozzle);
-  const verify::RunDeviation after = verify::measure(original, replayed, nozzle, rules.nozzle, rules.lead_in_s);
+  const verify::RunDeviation after =
+      verify::measure(original, replayed, nozzle, rules.nozzle, rules.lead_in_s);
   const auto no_worse = [](double a, double b) { return a <= std::max(b, kResolutionMm); };
   if (before.extruding.stats().duration_s > 0.0) {
     const verify::DeviationStats b = before.extruding.stats();
     const verify::DeviationStats a = after.extruding.stats();
     if (no_worse(a.contour_rms_mm, b.contour_rms_mm) &&
         no_worse(a.contour_max_mm, b.contour_max_mm)) {
-      return std::nullopt;
+      verdict.nozzle = after.end;
+      return verdict;
     }
-    return fmt::format(
+    verdict.objection = fmt::format(
         "compensation would be worse: contour RMS {:.3f} to {:.3f} µm, largest {:.3f} to {:.3f} µm",
         b.contour_rms_mm * 1e3, a.contour_rms_mm * 1e3, b.contour_max_mm * 1e3,
         a.contour_max_mm * 1e3);
+    return verdict;
   }
   // Travel draws nothing, and a straight one has no contour error whatever it does: what counts is
   // how well the nozzle keeps to where it should be, and so what it leaves to the next run.
   const verify::DeviationStats b = before.all.stats();
   const verify::DeviationStats a = after.all.stats();
   if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm)) {
-    return std::nullopt;
+    verdict.nozzle = after.end;
+    return verdict;
   }
-  return fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",
-                     b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
+  verdict.objection =
+      fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",
+                  b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
+  return verdict;
 }
 
 }  // namespace unflex::pipeline

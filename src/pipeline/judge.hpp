@@ -21,12 +21,17 @@ namespace unflex::pipeline {
 [[nodiscard]] dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
                                               const verify::NozzleModel& model);
 
+struct Verdict {
+  std::optional<std::string> objection;  // why the original moves must stand
+  dynamics::NozzleXY nozzle;             // without objection: after the run
+};
+
 // Replays the text of a compensated run as the printer would, in the state the printer is in before
-// it, and compares its deviation with that of the original moves: nullopt when it is at most as
-// large, otherwise the figures.
-[[nodiscard]] std::optional<std::string> worse_than_original(
-    const std::vector<planner::PlannedMove>& original, std::string_view text,
-    gcode::Interpreter printer, const planner::Limits& printer_limits,
-    const dynamics::NozzleXY& nozzle, const verify::Rules& rules);
+// it. Objects where it breaks a hard rule, or where its deviation is larger than that of the
+// original moves.
+[[nodiscard]] Verdict judge(const std::vector<planner::PlannedMove>& original,
+                            std::string_view text, gcode::Interpreter printer,
+                            const planner::Limits& printer_limits, const dynamics::NozzleXY& nozzle,
+                            const verify::Rules& rules);
 
 }  // namespace unflex::pipeline

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "unflex/emit/emitter.hpp"
+#include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
 
 namespace unflex::pipeline {
@@ -16,7 +17,34 @@ bool stands_anywhere(const gcode::Event& event) {
   return event.kind == gcode::EventKind::passive || event.kind == gcode::EventKind::limits;
 }
 
+// ";unflex run" or ";unflex 1.2.3: …".
+bool is_own_comment(std::string_view content) {
+  if (!content.starts_with(emit::kComment)) {
+    return false;
+  }
+  content.remove_prefix(emit::kComment.size());
+  return content == " run" ||
+         (content.size() > 1 && content[0] == ' ' && content[1] >= '0' && content[1] <= '9');
+}
+
+// A letter that printers know and a number: enough to tell G-code from prose.
+bool looks_like_command(std::string_view content) {
+  const gcode::Command command = gcode::parse(content);
+  return command.kind == gcode::CommandKind::traditional &&
+         (command.letter == 'G' || command.letter == 'M' || command.letter == 'T');
+}
+
 }  // namespace
+
+void count_kept_moves(const gcode::Event& event, std::map<std::string, std::size_t>& kept) {
+  if (gcode::compensable(event)) {
+    return;
+  }
+  for (const gcode::Segment& segment : event.segments) {
+    const std::string_view reason = gcode::kept_reason(segment);
+    ++kept[std::string(reason.empty() ? "part of an arc that is kept" : reason)];
+  }
+}
 
 PieceReader::PieceReader(std::istream& input, std::string name,
                          gcode::InterpreterOptions interpreter, planner::Limits limits,
@@ -55,6 +83,10 @@ Result<bool> PieceReader::next(Piece& piece) {
       return true;
     }
   }
+  if (!any_command_) {
+    return fail(ErrorKind::input, {lines_.name(), 0},
+                "there is no G-code command in it; give a file as the slicer wrote it");
+  }
   if (open_.events.empty() && between_.empty()) {
     return false;
   }
@@ -68,10 +100,11 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
   if (!more || !*more) {
     return more;
   }
-  if (line.content().starts_with(emit::kComment)) {
+  if (is_own_comment(line.content())) {
     return fail(ErrorKind::input, {lines_.name(), line.number},
                 "this file was already compensated by unflex; give the file as it was sliced");
   }
+  any_command_ = any_command_ || looks_like_command(line.content());
   event = interpreter_.interpret(std::move(line));
   for (std::string& warning : event.warnings) {
     if (warnings_.size() < kMaxWarnings) {

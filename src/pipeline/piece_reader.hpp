@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <istream>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -22,13 +23,16 @@ struct Piece {
   std::vector<planner::PlannedMove> moves;
 };
 
+// Counts the event's moves that unflex leaves as they are, by reason.
+void count_kept_moves(const gcode::Event& event, std::map<std::string, std::size_t>& kept);
+
 class PieceReader {
  public:
   PieceReader(std::istream& input, std::string name, gcode::InterpreterOptions interpreter,
               planner::Limits limits, planner::FixedLimits fixed);
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
-  // read or was written by unflex.
+  // read, was written by unflex, or ends without a single G-code command in it.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
@@ -44,9 +48,10 @@ class PieceReader {
   gcode::LineReader lines_;
   gcode::Interpreter interpreter_;
   planner::KlipperPlanner planner_;
-  Piece open_;                        // being filled
+  Piece open_;                         // being filled
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;
+  bool any_command_ = false;
 };
 
 }  // namespace unflex::pipeline

@@ -54,6 +54,8 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   options.unretract_extra_length_mm = settings.printer.unretract_extra_length_mm;
   options.unretract_speed_mm_s = settings.printer.unretract_speed_mm_s;
   options.arc_resolution_mm = settings.printer.arc_resolution_mm;
+  options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
+  options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
   return options;
 }
 
@@ -91,13 +93,10 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.run_limits = {2.0 * settings.base_max_velocity_mm_s(), settings.emit.accel_mm_s2,
                         settings.emit.square_corner_velocity_mm_s, 0.0};
   options.tolerance_mm = settings.emit.tolerance_um * 1e-3;
-  options.quick_line_s =
-      0.25 / std::max(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
+  options.quick_line_s = 0.25 / std::max(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
   options.min_line_s =
       std::max(settings.emit.period_ms * 1e-3, 1.0 / settings.emit.max_lines_per_s);
   options.base_max_accel_mm_s2 = planned_base_accel(settings);
-  options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
-  options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
   options.version = std::move(version);
   return options;
 }
@@ -113,8 +112,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.nozzle_diameter_mm = settings.extruder.nozzle_diameter_mm;
   rules.nozzle = {axis(settings.dynamics_x), axis(settings.dynamics_y),
                   settings.verify.step_ms * 1e-3, settings.verify.hold_s};
-  const auto set_range = [](const std::optional<machine::Range>& travel, double& min,
-                            double& max) {
+  const auto set_range = [](const std::optional<machine::Range>& travel, double& min, double& max) {
     if (travel) {
       min = travel->min;
       max = travel->max;

@@ -196,8 +196,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   section.kind = kind;
   section.regime = before;
   section.dwell_s = event.dwell_s;
-  section.moves_xy = std::any_of(event.segments.begin(), event.segments.end(),
-                                 [](const auto& segment) { return segment.length_xy_mm() > 0.0; });
+  section.position_lost = event.position_lost;
   section.may_be_added = kind == SectionKind::barrier && is_known_addition(event.line.content());
   section.line = std::move(event.line);
 

@@ -103,6 +103,34 @@ void BaseCheck::report(const Excess& excess, std::string_view what, std::string_
 
 double BaseCheck::median_duration_s() const { return histogram_quantile(durations_, 0.5); }
 
+std::optional<std::string> broken_rule(const std::vector<planner::PlannedMove>& reference,
+                                       const std::vector<planner::PlannedMove>& base,
+                                       const Rules& rules) {
+  Violations violations("", "");
+  Excursion allowed(rules.travel);
+  bool refused_before = false;
+  for (const planner::PlannedMove& move : reference) {
+    allowed.add(move.segment);
+    refused_before = refused_before || refused(move, rules);
+  }
+  Excursion excursion(rules.travel);
+  BaseCheck check(rules, violations);
+  check.begin_run();
+  for (const planner::PlannedMove& move : base) {
+    check.add(move);
+    excursion.add(move.segment);
+    if (refused(move, rules) && !refused_before) {
+      return "the firmware would refuse so much filament on so short a way";
+    }
+  }
+  check.end_run();
+  if (const Excursion::Side* const side = excursion.worse_than(allowed)) {
+    return fmt::format("the base would leave the travel by {:.4f} mm", side->beyond_mm);
+  }
+  const std::vector<Violation> found = violations.take();
+  return found.empty() ? std::nullopt : std::optional(found.front().message);
+}
+
 bool refused(const planner::PlannedMove& move, const Rules& rules) {
   const bool draws = move.segment.length_xy_mm() > 0.0;
   return draws && move.direction[gcode::E] > rules.max_extrude_ratio &&

@@ -179,6 +179,13 @@ void Verifier::play_run() {
   if (!compensated && input_.has_move() && output_.has_move()) {
     check_regime(input_.section(), output_.section());
   }
+  if (compensated) {
+    const gcode::ModalState& modal = output_.section().regime->modal;
+    if (modal.shaper_freq_x_hz != 0.0 || modal.shaper_freq_y_hz != 0.0) {
+      violations_.in_output(output_.section().line.number,
+                            "the printer's input shaper is on in a compensated run");
+    }
+  }
   base_.begin_run();
   emitted_.follow_lag(compensated);
   totals_.runs += compensated ? 1 : 0;
@@ -331,12 +338,17 @@ void Verifier::check_regime(const Section& input, const Section& output) {
       !difference.empty()) {
     violations_.in_output(line, fmt::format("state before this line: {}", difference));
   }
-  // A retraction or a lift between two compensated runs may pass with the limits of those: the
-  // firmware has others for it.
-  const bool limits_matter = input.kind != SectionKind::move || input.moves_xy;
   if (const std::string difference = limits_difference(before.limits, after.limits);
-      limits_matter && !difference.empty()) {
+      !difference.empty()) {
     violations_.in_output(line, fmt::format("limits not restored: {}", difference));
+  }
+  // Between compensated runs a single kept move may pass without the shaper, which costs Klipper a
+  // stop to switch.
+  const bool shaper_matters = input.kind == SectionKind::run || input.kind == SectionKind::end ||
+                              (input.kind == SectionKind::barrier && input.position_lost);
+  if (shaper_matters && (before.modal.shaper_freq_x_hz != after.modal.shaper_freq_x_hz ||
+                         before.modal.shaper_freq_y_hz != after.modal.shaper_freq_y_hz)) {
+    violations_.in_output(line, "the printer's input shaper is not restored");
   }
 }
 

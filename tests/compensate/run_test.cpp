@@ -183,7 +183,8 @@ TEST(Windows, WidenTheTravelToThePathAndNoFurther) {
   EXPECT_NEAR(run.y.limits.min_position_mm, 20.0, 1e-12);
   EXPECT_EQ(run.y.limits.max_position_mm, 40.0);
   EXPECT_EQ(run.x.limits.max_accel_mm_s2, 2e4);
-  EXPECT_EQ(run.x.jerk_weight, setup.jerk_weight);
+  EXPECT_DOUBLE_EQ(run.x.jerk_weight,
+                   setup.jerk_weight * std::pow(setup.x.axis.omega_rad_s * setup.period_s, 4));
 }
 
 // ---- joining -----------------------------------------------------------------------------------

@@ -221,7 +221,7 @@ TEST(Coordinates, OffsetsThatMoveLoseThePosition) {
 TEST(Coordinates, SavedStatesComeBack) {
   Session session;
   session.read("G1 X1 Y1 Z1 E4 F600\nM83\nG92 X0");
-  EXPECT_EQ(session.read("SAVE_GCODE_STATE NAME=a").kind, EventKind::passive);
+  EXPECT_EQ(session.read("SAVE_GCODE_STATE NAME=a").kind, EventKind::barrier);
   session.read("G91\nM82\nM221 S50\nM220 S50\nG1 X5 E2 F1200\nG92 X3");
   Event event = session.read("RESTORE_GCODE_STATE NAME=a");
   EXPECT_EQ(event.kind, EventKind::barrier);

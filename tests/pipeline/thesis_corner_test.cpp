@@ -54,15 +54,9 @@ TEST(ThesisCorner, IsMissedBy464MicrometresWithoutCompensation) {
 
 // What is left is the grid of 0.1 µm that positions are written on.
 TEST(ThesisCorner, IsDrawnWithin50NanometresByTheEmittedText) {
-  const report::DeviationRow after = report_of({"solve.jerk_weight=1e-4"}).compensated.extruding;
+  const report::DeviationRow after = report_of().compensated.extruding;
   EXPECT_LE(after.contour_rms_mm, 0.05e-3);
   EXPECT_LE(after.contour_max_mm, 0.6e-3);
-}
-
-TEST(ThesisCorner, IsDrawnWithin100NanometresWithTheDefaultRegularisation) {
-  const report::DeviationRow after = report_of().compensated.extruding;
-  EXPECT_LE(after.contour_rms_mm, 0.1e-3);
-  EXPECT_LE(after.contour_max_mm, 1e-3);
 }
 
 }  // namespace

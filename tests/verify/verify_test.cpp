@@ -366,14 +366,42 @@ TEST_F(Emitted, StopsThatSetUpTheShaperAreNoSections) {
   EXPECT_EQ(check(shaped).runs, 3U);
 }
 
+// The printer's own shaper at 45 Hz on X, as the rules know it.
+class Shaped : public Emitted {
+ protected:
+  static VerifyReport check_shaped(const std::string& output) {
+    Rules rules = on_a_bed();
+    rules.interpreter.shaper_freq_x_hz = 45.0;
+    return verify_text(kPrint, output, rules);
+  }
+  // Switched off before the first run, and `restored` before the macro at the end.
+  [[nodiscard]] std::string shaped(const std::string& restored) const {
+    std::string text = good_;
+    text.insert(text.find(";unflex run\n"), "SET_INPUT_SHAPER SHAPER_FREQ_X=0\n");
+    return text.insert(text.find("PRINT_END\n"), restored);
+  }
+};
+
+TEST_F(Shaped, MustBeOffInACompensatedRun) {
+  EXPECT_THAT(violations_of(check_shaped(good_)), HasSubstr("shaper is on in a compensated run"));
+}
+
+TEST_F(Shaped, MustBeBackOnBeforeAMacro) {
+  EXPECT_EQ(violations_of(check_shaped(shaped("SET_INPUT_SHAPER SHAPER_FREQ_X=45\n"))), "");
+  EXPECT_THAT(violations_of(check_shaped(shaped(""))), HasSubstr("input shaper is not restored"));
+  EXPECT_THAT(violations_of(check_shaped(shaped("SET_INPUT_SHAPER SHAPER_FREQ_X=44\n"))),
+              HasSubstr("input shaper is not restored"));
+}
+
 TEST(Verify, AShaperCommandOfTheSlicedFileIsKept) {
-  const std::string input = replaced(kPrint, "M106 S128\n", "SET_INPUT_SHAPER SHAPER_FREQ_X=50\n");
+  const std::string input =
+      replaced(kPrint, "M106 S128\n", "SET_INPUT_SHAPER DAMPING_RATIO_X=0.1\n");
   const std::string output = PlainEmitter().emit(input);
   EXPECT_EQ(violations_of(verify_text(input, input)), "");
   EXPECT_EQ(violations_of(verify_text(input, output)), "");
   EXPECT_EQ(verify_text(input, output).runs, 4U);
-  EXPECT_THAT(violations_of(
-                  verify_text(input, replaced(output, "SET_INPUT_SHAPER SHAPER_FREQ_X=50\n", ""))),
+  EXPECT_THAT(violations_of(verify_text(
+                  input, replaced(output, "SET_INPUT_SHAPER DAMPING_RATIO_X=0.1\n", ""))),
               HasSubstr("structure differs"));
 }
 

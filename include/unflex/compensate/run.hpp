@@ -28,7 +28,7 @@ struct Setup {
   double window_s = 2.0;      // core of a window where a run needs several
   double overlap_s = 0.06;    // pre-roll and post-roll of such windows
   double travel_weight = 0.1; // w where nothing is extruded; 1 where something is
-  double jerk_weight = 1e-2;
+  double jerk_weight = 1.5;      // ρ / (h⁶ (ωh)⁴)
 };
 
 // Nodes of a run, from rest to rest.
@@ -57,6 +57,12 @@ struct RunWindow {
 // the nozzle is, and how fast, when the run begins (rest but for what earlier motion left behind).
 [[nodiscard]] std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
                                              const std::vector<WindowSpan>& spans,
+                                             const dynamics::NozzleXY& nozzle, const Setup& setup);
+
+// The same for `count` windows from number `first` on.
+[[nodiscard]] std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
+                                             const std::vector<WindowSpan>& spans,
+                                             std::size_t first, std::size_t count,
                                              const dynamics::NozzleXY& nozzle, const Setup& setup);
 
 // Joins the solutions of the windows, in the order of `spans`, blending over the middle of each

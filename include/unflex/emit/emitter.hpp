@@ -1,5 +1,5 @@
-// The base's motion as G-code that a Klipper printer, which plans everything it reads anew, executes
-// as it was meant (docs/firmware.md says why each rule is there).
+// The base's motion as G-code that a Klipper printer, which plans everything it reads anew,
+// executes as it was meant (docs/firmware.md says why each rule is there).
 //
 //   T  time a line shall take, s       d  its distance after rounding, mm
 //   v  its speed, mm/s                 A  the firmware's acceleration inside a run, mm/s²
@@ -21,18 +21,17 @@ inline constexpr std::string_view kComment = ";unflex";
 
 struct EmitOptions {
   gcode::InterpreterOptions interpreter;
-  planner::Limits printer_limits;   // in force when the file starts
+  planner::Limits printer_limits;  // in force when the file starts
   planner::FixedLimits fixed;
-  planner::Limits run_limits;       // inside a compensated run
-  double tolerance_mm = 2e-3;       // of replacing the base's path by chords, at equal time
-  // Lines up to this long may use the whole tolerance, longer ones less by the square of their length.
+  planner::Limits run_limits;  // inside a compensated run
+  double tolerance_mm = 2e-3;  // of replacing the base's path by chords, at equal time
+  // Lines up to this long may use the whole tolerance, longer ones less by the square of their
+  // length.
   double quick_line_s = 5e-3;
-  double min_line_s = 1e-3;         // no line is shorter than this
+  double min_line_s = 1e-3;  // no line is shorter than this
   double max_line_s = 0.05;
   double base_max_accel_mm_s2 = 20000.0;  // of the change of speed from line to line
-  double shaper_freq_x_hz = 45.0;   // what SET_INPUT_SHAPER restores; 0: the printer has no shaper
-  double shaper_freq_y_hz = 45.0;
-  std::string version;              // for the comment at the first run
+  std::string version;                    // for the comment at the first run
 };
 
 struct Stroke;  // a line to be, see src/emit/strokes.hpp
@@ -48,9 +47,9 @@ struct Run {
   double lead_in_s = 0.0;  // the first move starts this long after the base
 };
 
-// Writes the output in the order of the input. Follows both texts with an interpreter of its own, so
-// that whatever stands outside the runs finds the modes, positions and limits the input left there.
-// Copyable: a copy tries a run, and is kept or thrown away.
+// Writes the output in the order of the input. Follows both texts with an interpreter of its own,
+// so that whatever stands outside the runs finds the modes, positions and limits the input left
+// there. Copyable: a copy tries a run, and is kept or thrown away.
 class KlipperEmitter {
  public:
   explicit KlipperEmitter(EmitOptions options);
@@ -58,6 +57,10 @@ class KlipperEmitter {
   // An input line outside of compensated runs, byte for byte, with whatever has to be restored
   // before it.
   void line(const gcode::Event& event, std::string& out);
+
+  // Lines that were to be a compensated run but stand as they are: moved as the printer would have
+  // moved them, its own shaper included.
+  void keep(const std::vector<gcode::Event>& events, std::string& out);
 
   // A compensated run in place of its events. False, and nothing written, when its motion is too
   // small for a single line.
@@ -71,22 +74,23 @@ class KlipperEmitter {
   [[nodiscard]] const planner::Limits& printer_limits() const { return limits_; }
 
  private:
-  void write(std::string_view text, std::string& out);           // a line of ours
-  void copy(const gcode::Event& event, std::string& out);        // a line of the input
+  void write(std::string_view text, std::string& out);     // a line of ours
+  void copy(const gcode::Event& event, std::string& out);  // a line of the input
   void follow_input(const gcode::Event& event);
   void enter_run(std::string& out);
   void set_run_modes(std::string& out);
   void write_stroke(const Stroke& stroke, double filament_origin, std::string& out);
   void restore_modes(std::string& out);
+  void restore_shaper(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out);
-  void set_shaper(bool on, std::string& out);
+  void set_shaper(double x_hz, double y_hz, std::string& out);
 
   EmitOptions options_;
   gcode::Interpreter input_;      // has read the input so far
   gcode::Interpreter printer_;    // has read the output so far
   planner::Limits input_limits_;  // as the input has them
-  planner::Limits limits_;        // as the output has them
-  bool shaper_on_ = true;
+  planner::Limits limits_;        // as the output has them …
+  bool limits_known_ = true;      // … unless a macro may have changed them
   bool started_ = false;          // a run has been written
   std::string newline_ = "\n";    // as the input has it
   bool open_line_ = false;        // the last line written has no line ending

@@ -77,6 +77,9 @@ struct InterpreterOptions {
   double unretract_speed_mm_s = 10.0;
   // Klipper's [gcode_arcs] resolution: arcs become straight pieces about this long.
   double arc_resolution_mm = 1.0;
+  // [input_shaper] frequencies; 0: the printer has none.
+  double shaper_freq_x_hz = 0.0;
+  double shaper_freq_y_hz = 0.0;
 };
 
 // The state a line is read in.
@@ -86,15 +89,17 @@ struct ModalState {
   std::array<bool, 4> known{false, false, false, true};
   Position base_mm{};  // machine position of the G-code zero (G92, offsets)
   std::array<bool, 4> base_known{true, true, true, true};
-  Position offset_mm{};       // SET_GCODE_OFFSET: the zero that homing restores
-  bool absolute_xyz = true;   // G90 / G91
-  bool absolute_e = true;     // M82 / M83
-  double unit_mm = 1.0;       // 25.4 after G20
-  double feed_mm_s = 25.0;    // modal F, before M220
-  double speed_factor = 1.0;  // M220
-  double flow_factor = 1.0;   // M221
-  int plane = 17;             // G17, G18, G19
-  bool retracted = false;     // firmware retraction
+  Position offset_mm{};           // SET_GCODE_OFFSET: the zero that homing restores
+  bool absolute_xyz = true;       // G90 / G91
+  bool absolute_e = true;         // M82 / M83
+  double unit_mm = 1.0;           // 25.4 after G20
+  double feed_mm_s = 25.0;        // modal F, before M220
+  double speed_factor = 1.0;      // M220
+  double flow_factor = 1.0;       // M221
+  int plane = 17;                 // G17, G18, G19
+  bool retracted = false;         // firmware retraction
+  double shaper_freq_x_hz = 0.0;  // SET_INPUT_SHAPER; 0: off
+  double shaper_freq_y_hz = 0.0;
 };
 
 // Reads lines in the order of the file and says what each means to a Klipper printer
@@ -127,6 +132,8 @@ class Interpreter {
   void pressure_advance(Event& event);
   void retraction_settings(Event& event);
   void gcode_offset(Event& event);
+  void input_shaper(Event& event);
+  void object_label(Event& event);
   void restore_state(Event& event);
 
   void set_feed(Event& event, std::optional<double> feed_word);

@@ -77,7 +77,7 @@ struct SolveSettings {
   double lead_in_ms = 0.0;      // the base may start this much before the plan does
   std::optional<double> tail_ms;  // the base may settle this much longer; unset: max(8ζ/ω, 2 ms)
   double travel_weight = 0.1;   // of the tracking error where nothing is extruded
-  double jerk_weight = 1e-2;     // regularisation, in units of the node period (docs/theory.md)
+  double jerk_weight = 1.5;       // regularisation (docs/theory.md)
 };
 
 struct EmitSettings {

@@ -71,6 +71,13 @@ struct VerifyReport {
   std::size_t violation_count = 0;    // … all are counted
 };
 
+// The first hard rule that `base`, the replayed moves of one compensated run, breaks: the base's
+// velocity and acceleration, the travel (where `reference`, the run's own plan, does not go as far
+// itself), filament that the firmware refuses. nullopt when it keeps them all.
+[[nodiscard]] std::optional<std::string> broken_rule(
+    const std::vector<planner::PlannedMove>& reference,
+    const std::vector<planner::PlannedMove>& base, const Rules& rules);
+
 // Replays both texts and compares them. Errors: unreadable input. A file that breaks a rule is no
 // error but a report with violations: a line lost, changed or moved; filament not conserved; a
 // position outside the travel (and further out than the input itself goes); base velocity or
