@@ -13,8 +13,8 @@ using gcode::E;
 using gcode::Z;
 using planner::PlannedMove;
 
-// A move boundary must be a vertex when filament per mm changes there by so much that a typical line
-// (2 ms) laid across it would give either move more than this too much or too little.
+// A move boundary must be a vertex when filament per mm changes there by so much that a typical
+// line (2 ms) laid across it would give either move more than this too much or too little.
 constexpr double kFilamentStepMm = 1e-5;
 constexpr double kTypicalLineS = 2e-3;
 
@@ -44,8 +44,7 @@ class Timetable {
   // The move at time t.
   [[nodiscard]] std::size_t move_at(double t) const {
     const auto after = std::upper_bound(starts_s_.begin(), starts_s_.end() - 1, t);
-    return after == starts_s_.begin() ? 0
-                                      : static_cast<std::size_t>(after - starts_s_.begin()) - 1;
+    return after == starts_s_.begin() ? 0 : static_cast<std::size_t>(after - starts_s_.begin()) - 1;
   }
 
   // Filament since the start of the run: each move's is spread along the base's path while the move
@@ -62,8 +61,8 @@ class Timetable {
     const PlannedMove& move = (*run_->moves)[i];
     const double from = travelled_mm(starts_s_[i]);
     const double length = travelled_mm(starts_s_[i + 1]) - from;
-    const double share = length > 0.0 ? (travelled_mm(t) - from) / length
-                                      : (t - starts_s_[i]) / move.duration_s();
+    const double share =
+        length > 0.0 ? (travelled_mm(t) - from) / length : (t - starts_s_[i]) / move.duration_s();
     return move.segment.start_mm[E] - origin + share * move.segment.delta(E);
   }
 
@@ -85,7 +84,7 @@ class Timetable {
   }
 
   const Run* run_;
-  std::vector<double> starts_s_;     // of each move, and the end of the last
+  std::vector<double> starts_s_;      // of each move, and the end of the last
   std::vector<double> travelled_mm_;  // length of the base's path at the nodes
 };
 
@@ -255,8 +254,8 @@ std::vector<double> vertices(const dynamics::BaseTrajectory& base, AxisAt axis,
 }
 
 double snap(double value_mm, double offset_mm, int decimals) {
-  return offset_mm + static_cast<double>(to_scaled(value_mm - offset_mm, decimals)) /
-                         power_of_ten(decimals);
+  return offset_mm +
+         static_cast<double>(to_scaled(value_mm - offset_mm, decimals)) / power_of_ten(decimals);
 }
 
 // Digits of F in mm/min that keep a line's duration within 0.05 %.
@@ -273,8 +272,10 @@ int speed_decimals(double feed_mm_min) {
 // A line as fast as or slower than its neighbours has no ramp.
 class SpeedSolver {
  public:
-  SpeedSolver(const Run& run, const EmitOptions& options, std::vector<Stroke>& strokes)
+  SpeedSolver(const Run& run, const EmitOptions& options, double speed_factor,
+              std::vector<Stroke>& strokes)
       : strokes_(&strokes),
+        mm_s_per_feed_(speed_factor / 60.0),
         distance_mm_(strokes.size()),
         accel_mm_s2_(strokes.size(), options.run_limits.max_accel_mm_s2),
         speed_mm_s_(strokes.size()) {
@@ -282,8 +283,7 @@ class SpeedSolver {
     for (std::size_t i = 0; i < strokes.size(); ++i) {
       const Stroke& stroke = strokes[i];
       const double dz = stroke.z_mm - at[Z];
-      distance_mm_[i] =
-          std::hypot(stroke.x_mm - at[gcode::X], stroke.y_mm - at[gcode::Y], dz);
+      distance_mm_[i] = std::hypot(stroke.x_mm - at[gcode::X], stroke.y_mm - at[gcode::Y], dz);
       if (dz != 0.0) {
         accel_mm_s2_[i] = std::min(
             accel_mm_s2_[i], options.fixed.max_z_accel_mm_s2 * distance_mm_[i] / std::abs(dz));
@@ -309,11 +309,11 @@ class SpeedSolver {
     double clock_s = 0.0;
     for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
       const double due_s = (*strokes_)[i].end_s - clock_s;
-      const double feed = 60.0 * (distance_mm_[i] + ramps_mm(i)) / due_s;
+      const double feed = (distance_mm_[i] + ramps_mm(i)) / due_s / mm_s_per_feed_;
       const int decimals = speed_decimals(feed);
       (*strokes_)[i].feed_decimals = decimals;
       speed_mm_s_[i] = (*strokes_)[i].speed_mm_s =
-          static_cast<double>(to_scaled(feed, decimals)) / power_of_ten(decimals) / 60.0;
+          static_cast<double>(to_scaled(feed, decimals)) / power_of_ten(decimals) * mm_s_per_feed_;
       clock_s += (distance_mm_[i] + ramps_mm(i)) / speed_mm_s_[i];
     }
   }
@@ -323,12 +323,12 @@ class SpeedSolver {
   [[nodiscard]] double ramps_mm(std::size_t i) const {
     const double v = speed_mm_s_[i];
     const double up = std::max(v - (i > 0 ? speed_mm_s_[i - 1] : 0.0), 0.0);
-    const double down =
-        std::max(v - (i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : 0.0), 0.0);
+    const double down = std::max(v - (i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : 0.0), 0.0);
     return (up * up + down * down) / (2.0 * accel_mm_s2_[i]);
   }
 
   std::vector<Stroke>* strokes_;
+  double mm_s_per_feed_;
   std::vector<double> distance_mm_;
   std::vector<double> accel_mm_s2_;
   std::vector<double> speed_mm_s_;
@@ -340,8 +340,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const Timetable table(run);
   const dynamics::BaseTrajectory& base = *run.base;
   const std::vector<double> event_time_s = event_times(run, table);
-  const std::vector<double> required =
-      required_times(run, table, event_time_s, options.min_line_s);
+  const std::vector<double> required = required_times(run, table, event_time_s, options.min_line_s);
   std::vector<double> times = {0.0};
   for (std::size_t i = 1; i < required.size(); ++i) {
     divide(base, required[i - 1], required[i], options, times);
@@ -363,8 +362,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     const bool is_end = i + 1 == times.size();
     stroke.x_mm = is_end ? end[gcode::X] : snap(x[i], grid.x_offset_mm, grid.decimals);
     stroke.y_mm = is_end ? end[gcode::Y] : snap(y[i], grid.y_offset_mm, grid.decimals);
-    stroke.z_mm = is_end ? end[gcode::Z]
-                         : snap(table.height_mm(times[i]), grid.z_offset_mm, grid.decimals);
+    stroke.z_mm =
+        is_end ? end[gcode::Z] : snap(table.height_mm(times[i]), grid.z_offset_mm, grid.decimals);
     stroke.e_mm = table.filament_mm(times[i]);
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_time_s.size() &&
@@ -387,7 +386,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     final.x_mm = end[gcode::X];
     final.y_mm = end[gcode::Y];
     final.z_mm = end[gcode::Z];
-    SpeedSolver(run, options, result).solve();
+    SpeedSolver(run, options, grid.speed_factor, result).solve();
   }
   return result;
 }

@@ -14,18 +14,20 @@ struct Stroke {
   double x_mm = 0.0;
   double y_mm = 0.0;
   double z_mm = 0.0;
-  double e_mm = 0.0;          // filament since the start of the run
-  double speed_mm_s = 0.0;    // F, before M220
-  int feed_decimals = 0;      // digits F needs
-  std::size_t events = 0;     // how many of the run's events stand before the stroke, in all
+  double e_mm = 0.0;        // filament since the start of the run
+  double speed_mm_s = 0.0;  // after M220
+  int feed_decimals = 0;    // digits F needs
+  std::size_t events = 0;   // how many of the run's events stand before the stroke, in all
 };
 
-// The grid positions are written on: machine position = offset + integer / steps_per_mm.
+// What numbers are written in: machine position = offset + integer / 10^decimals, and speeds as F
+// before M220.
 struct Grid {
   double x_offset_mm = 0.0;
   double y_offset_mm = 0.0;
   double z_offset_mm = 0.0;
   int decimals = 4;
+  double speed_factor = 1.0;  // M220 when the run begins
 };
 
 // The strokes of a run. Positions lie on the grid, but the last one is exactly where the last move
