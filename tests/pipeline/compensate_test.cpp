@@ -60,12 +60,14 @@ Result<compensate::AxisSolution> solve_properly(const compensate::AxisWindow& wi
   return compensate::make_ipopt_engine()->solve(window);
 }
 
-// Solved, and then shaken by 50 µm.
-compensate::AxisSolution shaken(const compensate::AxisWindow& window) {
+// As planned, and shaken by 50 µm with this period.
+compensate::AxisSolution shaken(const compensate::AxisWindow& window, double period_nodes) {
   compensate::AxisSolution solution = testing::plain_solution(window);
+  const auto last = static_cast<double>(window.nodes() - 1);
   for (std::size_t k = 0; k < window.nodes(); ++k) {
-    solution.base.position_mm[k] +=
-        0.05 * std::sin(std::numbers::pi * static_cast<double>(k) / 11.0);
+    const auto at = static_cast<double>(k);
+    solution.base.position_mm[k] += 0.05 * std::sin(std::numbers::pi * at / last) *
+                                    std::sin(2.0 * std::numbers::pi * at / period_nodes);
   }
   return solution;
 }
@@ -129,9 +131,14 @@ INSTANTIATE_TEST_SUITE_P(
                 "the solver failed on axis x, window 1: no optimum"},
         Failing{"MakesItWorse",
                 [](const compensate::AxisWindow& window) -> Result<compensate::AxisSolution> {
-                  return is_bad(window) ? shaken(window) : solve_properly(window);
+                  return is_bad(window) ? shaken(window, 100.0) : solve_properly(window);
                 },
                 "compensation would be worse: "},
+        Failing{"BreaksALimit",
+                [](const compensate::AxisWindow& window) -> Result<compensate::AxisSolution> {
+                  return is_bad(window) ? shaken(window, 6.0) : solve_properly(window);
+                },
+                "base acceleration "},
         Failing{"Dies",
                 [](const compensate::AxisWindow& window) -> Result<compensate::AxisSolution> {
                   if (is_bad(window)) {

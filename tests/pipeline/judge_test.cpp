@@ -42,9 +42,9 @@ struct Corner {
     }
   }
 
-  [[nodiscard]] std::optional<std::string> judge(const std::string& text) const {
-    return worse_than_original(run.moves, text, printer, {}, at_rest({0.0, 0.0, 0.2, 0.0}),
-                               rules());
+  [[nodiscard]] std::optional<std::string> objection_to(const std::string& text) const {
+    return pipeline::judge(run.moves, text, printer, {}, at_rest({0.0, 0.0, 0.2, 0.0}), rules())
+        .objection;
   }
 
   Piece run;
@@ -52,19 +52,20 @@ struct Corner {
 };
 
 TEST(Judge, TakesTheOriginalItselfAsNoWorse) {
-  EXPECT_EQ(Corner(true).judge("G1 X10 E0.5\nG1 Y10 E0.5\n"), std::nullopt);
-  EXPECT_EQ(Corner(false).judge("G1 X10\nG1 Y10"), std::nullopt);
+  EXPECT_EQ(Corner(true).objection_to("G1 X10 E0.5\nG1 Y10 E0.5\n"), std::nullopt);
+  EXPECT_EQ(Corner(false).objection_to("G1 X10\nG1 Y10"), std::nullopt);
 }
 
 TEST(Judge, RejectsACutCornerWithTheFigures) {
   const std::optional<std::string> reason =
-      Corner(true).judge("G1 X8 E0.4\nG1 X10 Y2 E0.2\nG1 Y10 E0.4\n");
+      Corner(true).objection_to("G1 X8 E0.4\nG1 X10 Y2 E0.2\nG1 Y10 E0.4\n");
   ASSERT_TRUE(reason.has_value());
   EXPECT_TRUE(reason->starts_with("compensation would be worse: contour RMS ")) << *reason;
 }
 
 TEST(Judge, RejectsTheSamePathAtTheWrongTimeWhereNothingIsPrinted) {
-  const std::optional<std::string> reason = Corner(false).judge("G1 X10 F600\nG1 Y10 F6000\n");
+  const std::optional<std::string> reason =
+      Corner(false).objection_to("G1 X10 F600\nG1 Y10 F6000\n");
   ASSERT_TRUE(reason.has_value());
   EXPECT_TRUE(reason->starts_with("compensation would be worse: tracking RMS in travel "))
       << *reason;
@@ -72,7 +73,8 @@ TEST(Judge, RejectsTheSamePathAtTheWrongTimeWhereNothingIsPrinted) {
 
 TEST(Judge, ReplaysByTheLimitsInTheText) {
   // The same lines, but the base creeps: the corner is late by far, and so is the nozzle.
-  EXPECT_TRUE(Corner(false).judge("SET_VELOCITY_LIMIT ACCEL=100\nG1 X10\nG1 Y10\n").has_value());
+  EXPECT_TRUE(
+      Corner(false).objection_to("SET_VELOCITY_LIMIT ACCEL=100\nG1 X10\nG1 Y10\n").has_value());
 }
 
 // x of the nozzle after the base went from 0 to 10 mm by the plan of the moves, by quadrature of

@@ -137,7 +137,7 @@ TEST(PieceReader, RefusesWhatUnflexWrote) {
 }
 
 TEST(PieceReader, HandsLongStretchesWithoutMotionOutInPortions) {
-  std::string text;
+  std::string text = "G28\n";
   for (int i = 0; i < 20000; ++i) {
     text += "; line " + std::to_string(i) + "\n";
   }
@@ -146,10 +146,12 @@ TEST(PieceReader, HandsLongStretchesWithoutMotionOutInPortions) {
   EXPECT_EQ(reading.all(), text);
 }
 
-TEST(PieceReader, MakesNothingOfNothing) {
-  EXPECT_TRUE(Reading("").pieces.empty());
-  EXPECT_EQ(Reading("").error, "");
-  EXPECT_EQ(Reading(" \t").all(), " \t");
+TEST(PieceReader, RefusesWhatHoldsNoCommand) {
+  for (const char* text : {"", " \t", "; a comment\n", "Dear printer,\nplease print a cube\n"}) {
+    EXPECT_THAT(Reading(text).error, HasSubstr("in.gcode: there is no G-code command in it"))
+        << text;
+  }
+  EXPECT_EQ(Reading("T0").error, "");
 }
 
 TEST(PieceReader, LosesNoByteOfAnyFile) {

@@ -1,0 +1,232 @@
+// The text around and inside runs, line by line.
+#include "unflex/emit/emitter.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "plain_emission.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using ::testing::ElementsAre;
+using testing::emit;
+using ::testing::HasSubstr;
+using testing::lines_of;
+using ::testing::Not;
+using testing::options;
+using ::testing::StartsWith;
+
+const std::string kHead = "G90\nM83\nG1 X0 Y0 Z0.2 F6000\n";
+const std::string kRaise =
+    "SET_VELOCITY_LIMIT VELOCITY=1200 ACCEL=1000000 SQUARE_CORNER_VELOCITY=1000 "
+    "MINIMUM_CRUISE_RATIO=0\n";
+const std::string kRestore =
+    "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
+    "MINIMUM_CRUISE_RATIO=0.5\n";
+const std::string kShaperOff = "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\n";
+const std::string kShaperOn = "SET_INPUT_SHAPER SHAPER_FREQ_X=45 SHAPER_FREQ_Y=45\n";
+
+// The emitted lines but for strokes, which stand as one "~".
+std::vector<std::string> outline(const std::string& text) {
+  std::vector<std::string> result;
+  for (const std::string& line : lines_of(text)) {
+    if (!line.starts_with("G1 X") && !line.starts_with("G1 Y")) {
+      result.push_back(line);
+    } else if (result.empty() || result.back() != "~") {
+      result.emplace_back("~");
+    }
+  }
+  return result;
+}
+
+// The outline of what comes after the first mark of a run.
+std::vector<std::string> from_first_run(const std::string& input,
+                                        const EmitOptions& how = options()) {
+  const std::string text = emit(input, how).text;
+  const std::size_t mark = text.find(";unflex run");
+  EXPECT_NE(mark, std::string::npos);
+  return outline(text.substr(std::min(mark, text.size())));
+}
+
+TEST(Emitter, PutsLimitsSpeedAndShaperAroundARun) {
+  const std::string text = emit(kHead + "G1 X10 E1 F3000\nG1 Y10 E1\nM104 S0\n", options()).text;
+  ASSERT_THAT(text, StartsWith(kHead));
+  EXPECT_THAT(outline(text.substr(kHead.size())),
+              ElementsAre(";unflex test: compensated for Klipper, not to be compensated again\n",
+                          kShaperOff, ";unflex run\n", kRaise, "~", kRestore, "G1 F3000\n",
+                          "M104 S0\n", kShaperOn));
+}
+
+TEST(Emitter, MarksItsFirstRunOnly) {
+  const std::string text =
+      emit(kHead + "G1 X10 E1 F3000\nG4 P1\nG1 X0 E1\nG4 P1\nG1 X10 E1\n", options()).text;
+  const auto count = [&](const std::string& what) {
+    std::size_t found = 0;
+    for (const std::string& line : lines_of(text)) {
+      found += line.starts_with(what) ? 1 : 0;
+    }
+    return found;
+  };
+  EXPECT_EQ(count(";unflex test"), 1U);
+  EXPECT_EQ(count(";unflex run"), 3U);
+  EXPECT_EQ(count("SET_VELOCITY_LIMIT VELOCITY=1200"), 3U);
+  EXPECT_EQ(count("SET_VELOCITY_LIMIT VELOCITY=300"), 3U);
+  EXPECT_EQ(count("SET_INPUT_SHAPER"), 2U);
+}
+
+TEST(Emitter, CopiesAFileWithoutRunsByteForByte) {
+  const std::string input = "; nothing\r\nG28\nG1 Z5\n\n  M84 \n;last";
+  EXPECT_EQ(emit(input, options()).text, input);
+}
+
+TEST(Emitter, KeepsAnAccelerationInsideARunAndRaisesItAgainAtOnce) {
+  EXPECT_THAT(from_first_run(kHead + "G1 X10 E1\nM204 S700\nG1 Y10 E1\nG4 P1\n"),
+              ElementsAre(";unflex run\n", kRaise, "~", "M204 S700\n",
+                          "SET_VELOCITY_LIMIT ACCEL=1000000\n", "~",
+                          "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=700 SQUARE_CORNER_VELOCITY=5 "
+                          "MINIMUM_CRUISE_RATIO=0.5\n",
+                          "G1 F6000\n", "G4 P1\n", kShaperOn));
+}
+
+TEST(Emitter, KeepsVelocityLimitsInsideARunAndRaisesThemAgainAtOnce) {
+  EXPECT_THAT(
+      from_first_run(kHead + "G1 X10 E1\nset_velocity_limit velocity=80 square_corner_velocity=3\n"
+                             "G1 Y10 E1\nG4 P1\n"),
+      ElementsAre(";unflex run\n", kRaise, "~",
+                  "set_velocity_limit velocity=80 square_corner_velocity=3\n",
+                  "SET_VELOCITY_LIMIT VELOCITY=1200 SQUARE_CORNER_VELOCITY=1000\n", "~",
+                  "SET_VELOCITY_LIMIT VELOCITY=80 ACCEL=5000 SQUARE_CORNER_VELOCITY=3 "
+                  "MINIMUM_CRUISE_RATIO=0.5\n",
+                  "G1 F6000\n", "G4 P1\n", kShaperOn));
+}
+
+TEST(Emitter, RestoresLimitsThatWereSetBeforeTheRun) {
+  EXPECT_THAT(from_first_run("M204 S1234.5\n" + kHead + "G1 X10 E1\nG4 P1\n"),
+              ::testing::Contains("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=1234.5 "
+                                  "SQUARE_CORNER_VELOCITY=5 MINIMUM_CRUISE_RATIO=0.5\n"));
+}
+
+TEST(Emitter, GivesTheShaperBackBeforeTheMachineMovesByItself) {
+  for (const std::string line : {"G28\n", "PARK_HEAD\n", "T1\n", "M600\n"}) {
+    EXPECT_THAT(from_first_run(kHead + "G1 X10 E1\n" + line + kHead + "G1 X20 E1\n"),
+                ElementsAre(";unflex run\n", kRaise, "~", kRestore, "G1 F6000\n", kShaperOn, line,
+                            "G90\n", "M83\n", "~", kShaperOff, ";unflex run\n", kRaise, "~",
+                            kRestore, "G1 F6000\n", kShaperOn));
+  }
+}
+
+TEST(Emitter, LeavesTheShaperOffOverPausesAndRetractions) {
+  EXPECT_THAT(
+      from_first_run(kHead + "G1 X10 E1\nG4 P10\nM400\nG1 E-1 F2400\nG1 X20 F6000\nG1 E1\n"),
+      ElementsAre(";unflex run\n", kRaise, "~", kRestore, "G1 F6000\n", "G4 P10\n", "M400\n",
+                  "G1 E-1 F2400\n", ";unflex run\n", kRaise, "~", kRestore, "G1 F6000\n", "G1 E1\n",
+                  kShaperOn));
+}
+
+TEST(Emitter, LeavesOutTheAxisThatHasNoShaper) {
+  EmitOptions how = options();
+  how.interpreter.shaper_freq_x_hz = 0.0;
+  how.interpreter.shaper_freq_y_hz = 37.5;
+  const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
+  EXPECT_THAT(emit(input, how).text, HasSubstr("\nSET_INPUT_SHAPER SHAPER_FREQ_Y=0\n"));
+  EXPECT_THAT(emit(input, how).text, HasSubstr("\nSET_INPUT_SHAPER SHAPER_FREQ_Y=37.5\n"));
+  how.interpreter.shaper_freq_y_hz = 0.0;
+  EXPECT_THAT(emit(input, how).text, Not(HasSubstr("SET_INPUT_SHAPER")));
+}
+
+TEST(Emitter, WritesRelativeFilamentAndReturnsToAbsolute) {
+  const std::string input = "G90\nM82\nG92 E0\nG1 X0 Y0 Z0.2 F6000\nG1 X10 E1\nG1 Y10 E2\nG4 P1\n";
+  EXPECT_THAT(from_first_run(input), ElementsAre(";unflex run\n", kRaise, "M83\n", "~", kRestore,
+                                                 "M82\n", "G1 F6000\n", "G4 P1\n", kShaperOn));
+}
+
+TEST(Emitter, PutsTheZeroOfFilamentRightThatARunHasSplit) {
+  // A new zero in the middle of a run: what follows counts from there, exactly.
+  const std::string input =
+      "G90\nM82\nG92 E0\nG1 X0 Y0 Z0.2 F6000\nG1 X10 E0.123456\nG92 E0\nG1 Y10 E0.5\nG4 P1\n"
+      "G1 X3 E0.7\n";
+  double laid = 0.0;
+  gcode::Interpreter interpreter;
+  for (const std::string& line : lines_of(emit(input, options()).text)) {
+    for (const gcode::Segment& segment : interpreter.interpret({line, 0}).segments) {
+      laid += segment.delta(gcode::E);
+    }
+  }
+  EXPECT_NEAR(laid, 0.123456 + 0.7, 1e-5);
+  EXPECT_NEAR(interpreter.state().position_mm[gcode::E] - interpreter.state().base_mm[gcode::E],
+              0.7, 1e-5);
+}
+
+TEST(Emitter, WritesMillimetresAndAbsolutePlacesWhateverTheFileDoes) {
+  EXPECT_THAT(
+      from_first_run("G91\nG20\nM83\nG90\nG1 X0 Y0 Z0.01 F236\nG91\nG1 X0.4 E0.04\nG4 P1\n"),
+      ElementsAre(";unflex run\n", kRaise, "G21\n", "G90\n", "~", kRestore, "G91\n", "G20\n",
+                  "G1 F236\n", "G4 P1\n", kShaperOn));
+}
+
+TEST(Emitter, FollowsModesThatChangeInsideARun) {
+  const std::string input = kHead +
+                            "G1 X10 E1\nG91\nG1 Y10 E1\nG20\nG1 X0.1 E0.01\nG90\nM82\nG1 Y0 E0.2\n"
+                            "G21\nM400\n";
+  const std::vector<std::string> lines = from_first_run(input);
+  EXPECT_THAT(lines, ElementsAre(";unflex run\n", kRaise, "~", "G91\n", "G90\n", "~", "G20\n",
+                                 "G21\n", "~", "G90\n", "M82\n", "M83\n", "~", kRestore, "M82\n",
+                                 "G20\n", "G1 F236.220472\n", "G21\n", "M400\n", kShaperOn));
+}
+
+TEST(Emitter, KeepsTheLineEndingsOfTheFile) {
+  const std::string text =
+      emit("G90\r\nM83\r\nG1 X0 Y0 Z0.2 F6000\r\nG1 X10 E1\r\n;c\r\nG1 Y10 E1\r\nM84\r\n",
+           options())
+          .text;
+  for (const std::string& line : lines_of(text)) {
+    EXPECT_TRUE(line.ends_with("\r\n")) << line;
+  }
+}
+
+TEST(Emitter, ClosesTheLastLineBeforeItAddsOne) {
+  EXPECT_THAT(emit(kHead + "G1 X10 E1\nM104 S0", options()).text,
+              ::testing::EndsWith("\nM104 S0\n" + kShaperOn));
+  EXPECT_THAT(emit(kHead + "G1 X10 E1", options()).text,
+              ::testing::EndsWith("\nG1 F6000\n" + kShaperOn));
+}
+
+TEST(Emitter, WritesNothingOfARunTooSmallToBeWritten) {
+  const testing::Emission emission = emit(kHead + "G1 X0.00004 E0.00001\nG4 P1\n", options());
+  EXPECT_EQ(emission.runs, 0U);
+  EXPECT_EQ(emission.text, kHead + "G1 X0.00004 E0.00001\nG4 P1\n");
+}
+
+TEST(Emitter, EndsARunWhereTheFileDoesEvenBetweenGridPoints) {
+  const std::string text = emit(kHead + "G1 X10.12345678 E1\nG4 P1\n", options()).text;
+  EXPECT_THAT(text, HasSubstr("\nG1 X10.123457 "));
+}
+
+TEST(Emitter, TriesARunOnACopyWithoutATrace) {
+  const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
+  std::istringstream stream(input);
+  pipeline::PieceReader reader(stream, "in", {}, {}, {});
+  KlipperEmitter emitter(options());
+  std::string out;
+  for (pipeline::Piece piece; reader.next(piece).value();) {
+    if (piece.is_run) {
+      const dynamics::BaseTrajectory base = testing::plan_as_base(piece.moves);
+      KlipperEmitter trial = emitter;
+      std::string thrown_away;
+      EXPECT_TRUE(
+          trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, 0.0}, thrown_away));
+    }
+    for (const gcode::Event& event : piece.events) {
+      emitter.line(event, out);
+    }
+  }
+  emitter.finish(out);
+  EXPECT_EQ(out, input);
+}
+
+}  // namespace
+}  // namespace unflex::emit

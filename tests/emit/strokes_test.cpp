@@ -1,0 +1,344 @@
+#include "strokes.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "plain_base.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using gcode::E;
+using gcode::X;
+using gcode::Y;
+using gcode::Z;
+using testing::kPeriod_s;
+using testing::options;
+
+// Moves with their plan, and lines to go with them.
+struct Path {
+  explicit Path(const std::vector<gcode::Position>& points, double feed_mm_s = 60.0) {
+    planner::KlipperPlanner planner({}, {});
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      planner.add({points[i - 1], points[i], feed_mm_s, i, true});
+      gcode::Event event;
+      event.kind = gcode::EventKind::move;
+      events.push_back(event);
+      move_counts.push_back(1);
+    }
+    planner.stop();
+    planner.take(moves);
+  }
+
+  // A line that does not move, before event i.
+  void insert(std::size_t i, gcode::EventKind kind) {
+    gcode::Event event;
+    event.kind = kind;
+    events.insert(events.begin() + static_cast<std::ptrdiff_t>(i), event);
+    move_counts.insert(move_counts.begin() + static_cast<std::ptrdiff_t>(i), 0);
+  }
+
+  [[nodiscard]] std::vector<Stroke> draw(const dynamics::BaseTrajectory& base,
+                                         const EmitOptions& how = options(),
+                                         double lead_in_s = 0.0) const {
+    return strokes({&events, &move_counts, &moves, &base, lead_in_s}, {}, how);
+  }
+
+  std::vector<gcode::Event> events;
+  std::vector<std::size_t> move_counts;
+  std::vector<planner::PlannedMove> moves;
+};
+
+// Rising from rest to rest: 0 to 1 with the first two derivatives zero at both ends.
+double smooth(double s) {
+  s = std::clamp(s, 0.0, 1.0);
+  return s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
+}
+
+Path random_path(unsigned seed, std::size_t count) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> step(-4.0, 4.0);
+  std::uniform_real_distribution<double> filament(0.0, 0.2);
+  std::vector<gcode::Position> points = {{100.0, 100.0, 0.2, 3.0}};
+  while (points.size() <= count) {
+    gcode::Position next = points.back();
+    // Written to 10⁻³ mm, as slicers do.
+    next[X] = std::round((next[X] + step(random)) * 1e3) / 1e3;
+    next[Y] = std::round((next[Y] + step(random)) * 1e3) / 1e3;
+    next[E] += std::round(filament(random) * 1e5) / 1e5;
+    points.push_back(next);
+  }
+  return Path(points);
+}
+
+TEST(Strokes, EndExactlyWhereAndWithWhatTheMovesEnd) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const Path path = random_path(seed, 30);
+    const std::vector<Stroke> drawn = path.draw(testing::plan_as_base(path.moves));
+    ASSERT_FALSE(drawn.empty());
+    const gcode::Position& end = path.moves.back().segment.end_mm;
+    EXPECT_EQ(drawn.back().x_mm, end[X]);
+    EXPECT_EQ(drawn.back().y_mm, end[Y]);
+    EXPECT_EQ(drawn.back().z_mm, end[Z]);
+    EXPECT_EQ(drawn.back().e_mm, end[E] - path.moves.front().segment.start_mm[E]);
+    EXPECT_LE(drawn.back().events, path.events.size());
+  }
+}
+
+TEST(Strokes, LieOnTheGridAndTakeNoLessThanTheShortestTime) {
+  for (const double shortest : {1e-3, 2e-3, 5e-3}) {
+    EmitOptions how = options();
+    how.min_line_s = shortest;
+    const Path path = random_path(7, 40);
+    double last = 0.0;
+    for (const Stroke& stroke : path.draw(testing::plan_as_base(path.moves), how)) {
+      EXPECT_GE(stroke.end_s - last, shortest - 1e-9);
+      EXPECT_LE(stroke.end_s - last, how.max_line_s + 2.0 * shortest);
+      EXPECT_NEAR(stroke.x_mm * 1e4, std::round(stroke.x_mm * 1e4), 1e-5);
+      EXPECT_NEAR(stroke.y_mm * 1e4, std::round(stroke.y_mm * 1e4), 1e-5);
+      last = stroke.end_s;
+    }
+  }
+}
+
+TEST(Strokes, LieOnAGridThatBeginsAtTheZeroOfTheFile) {
+  const Path path = random_path(3, 10);
+  const dynamics::BaseTrajectory base = testing::plan_as_base(path.moves);
+  const emit::Run run{&path.events, &path.move_counts, &path.moves, &base, 0.0};
+  const std::vector<Stroke> drawn = strokes(run, {0.00003, -1.00007, 0.0, 4}, options());
+  for (std::size_t i = 0; i + 1 < drawn.size(); ++i) {
+    const double steps = (drawn[i].x_mm - 0.00003) * 1e4;
+    EXPECT_NEAR(steps, std::round(steps), 1e-5);
+  }
+}
+
+// Position of a polyline of strokes at a moment.
+std::array<double, 2> at(const std::vector<Stroke>& drawn, const gcode::Position& start, double t) {
+  Stroke from{0.0, start[X], start[Y]};
+  for (const Stroke& to : drawn) {
+    if (t <= to.end_s) {
+      const double s = (t - from.end_s) / (to.end_s - from.end_s);
+      return {from.x_mm + s * (to.x_mm - from.x_mm), from.y_mm + s * (to.y_mm - from.y_mm)};
+    }
+    from = to;
+  }
+  return {from.x_mm, from.y_mm};
+}
+
+// A full turn of radius 5 mm in 0.5 s, from rest to rest, for a move along its chord.
+class Turn : public ::testing::Test {
+ protected:
+  static constexpr double kRadius_mm = 5.0;
+  static constexpr double kDuration_s = 0.5;
+
+  static std::array<double, 2> circle(double t) {
+    const double angle = 2.0 * std::numbers::pi * smooth(t / kDuration_s);
+    return {100.0 + kRadius_mm * std::sin(angle), 100.0 - kRadius_mm * std::cos(angle)};
+  }
+
+  // There and back, so that the path ends where it begins; its plan plays no role here.
+  Turn()
+      : path_({{100.0, 95.0, 0.2, 0.0}, {110.0, 95.0, 0.2, 1.0}, {100.0, 95.0, 0.2, 2.0}}, 50.0) {}
+
+  Path path_;
+  dynamics::BaseTrajectory base_ = testing::sampled(circle, kDuration_s);
+};
+
+TEST_F(Turn, StaysWithinTheToleranceOfTheBase) {
+  for (const double tolerance_mm : {0.5e-3, 2e-3, 10e-3}) {
+    EmitOptions how = options();
+    how.tolerance_mm = tolerance_mm;
+    how.quick_line_s = 1.0;  // no line is too long for the whole of it
+    const std::vector<Stroke> drawn = path_.draw(base_, how);
+    double worst = 0.0;
+    for (double t = 0.0; t <= kDuration_s; t += 1e-4) {
+      const auto p = at(drawn, path_.moves.front().segment.start_mm, t);
+      worst = std::max(worst, std::hypot(p[0] - circle(t)[0], p[1] - circle(t)[1]));
+    }
+    // Vertices lie off the curve by up to half of what the chord is, and on the grid.
+    EXPECT_LE(worst, 1.5 * tolerance_mm + 1.5e-4);
+    EXPECT_GE(worst, 0.3 * tolerance_mm) << "lines could be longer";
+  }
+}
+
+TEST_F(Turn, LetsLongLinesDeviateLess) {
+  EmitOptions how = options();
+  how.tolerance_mm = 10e-3;
+  how.quick_line_s = 2e-3;
+  const std::vector<Stroke> drawn = path_.draw(base_, how);
+  double start = 0.0;
+  for (const Stroke& stroke : drawn) {
+    const double lasted = stroke.end_s - start;
+    const double allowed = how.tolerance_mm * std::min(1.0, std::pow(how.quick_line_s / lasted, 2));
+    const auto a = circle(start);
+    const auto b = circle(stroke.end_s);
+    const auto m = circle(start + 0.5 * lasted);
+    if (lasted > 2.5 * how.min_line_s) {
+      EXPECT_LE(std::hypot(m[0] - 0.5 * (a[0] + b[0]), m[1] - 0.5 * (a[1] + b[1])),
+                1.05 * allowed + 1e-6);
+    }
+    start = stroke.end_s;
+  }
+}
+
+TEST_F(Turn, IsAsWideAsTheBaseOnAverage) {
+  const std::vector<Stroke> drawn = path_.draw(base_);
+  double mean = 0.0;
+  double inscribed = 0.0;
+  int samples = 0;
+  double start = 0.1;
+  for (double t = 0.1; t < kDuration_s - 0.1; t += 1e-5, ++samples) {
+    const auto p = at(drawn, path_.moves.front().segment.start_mm, t);
+    mean += std::hypot(p[0] - 100.0, p[1] - 100.0) - kRadius_mm;
+    start = t;
+  }
+  mean /= samples;
+  for (std::size_t i = 1; i < drawn.size(); ++i) {
+    if (drawn[i - 1].end_s > 0.1 && drawn[i].end_s < start) {
+      const auto a = circle(drawn[i - 1].end_s);
+      const auto b = circle(drawn[i].end_s);
+      const double sagitta =
+          kRadius_mm - std::hypot(0.5 * (a[0] + b[0]) - 100.0, 0.5 * (a[1] + b[1]) - 100.0);
+      inscribed += 2.0 / 3.0 * sagitta * (drawn[i].end_s - drawn[i - 1].end_s);
+    }
+  }
+  inscribed /= kDuration_s - 0.2;
+  EXPECT_GT(inscribed, 0.5e-3) << "the case shows nothing";
+  EXPECT_LT(std::abs(mean), 0.05 * inscribed);
+}
+
+TEST_F(Turn, LeavesVerticesOnTheCurveWhereTheAccelerationHasNoRoom) {
+  EmitOptions how = options();
+  how.base_max_accel_mm_s2 = 1.0;
+  for (const Stroke& stroke : path_.draw(base_, how)) {
+    const auto p = circle(stroke.end_s);
+    EXPECT_NEAR(stroke.x_mm, p[0], 0.51e-4);
+    EXPECT_NEAR(stroke.y_mm, p[1], 0.51e-4);
+  }
+}
+
+TEST(Strokes, KeepTheAccelerationFromLineToLine) {
+  // Swinging as hard as allowed: b̈ = A sin(ωt).
+  constexpr double kAccel = 20000.0;
+  constexpr double kOmega = 2.0 * std::numbers::pi * 80.0;
+  const Path path({{0.0, 0.0, 0.2, 0.0}, {1.0, 0.0, 0.2, 0.0}, {0.0, 0.0, 0.2, 0.0}});
+  const auto swing = [](double t) {
+    return std::array<double, 2>{kAccel / (kOmega * kOmega) * (1.0 - std::cos(kOmega * t)), 0.0};
+  };
+  EmitOptions how = options();
+  how.base_max_accel_mm_s2 = kAccel;
+  const std::vector<Stroke> drawn = path.draw(testing::sampled(swing, 0.25), how);
+  double last_v = 0.0;
+  double last_t = 0.0;
+  Stroke from{0.0, 0.0, 0.0};
+  for (const Stroke& to : drawn) {
+    const double t = to.end_s - from.end_s;
+    const double v = (to.x_mm - from.x_mm) / t;
+    if (last_t > 0.0) {
+      // The grid adds up to 2·10⁻⁴ mm over the square of the shorter time.
+      EXPECT_LE(std::abs(v - last_v) / (0.5 * (t + last_t)),
+                kAccel + 2e-4 / std::pow(std::min(t, last_t), 2));
+    }
+    last_v = v;
+    last_t = t;
+    from = to;
+  }
+}
+
+TEST(Strokes, MergeWhatWouldHaveNoLength) {
+  const Path path({{0.0, 0.0, 0.2, 0.0}, {10.0, 0.0, 0.2, 1.0}});
+  // Rest, motion, rest, motion, rest; rests longer than any line.
+  const auto halting = [](double t) {
+    return std::array<double, 2>{5.0 * smooth((t - 0.13) / 0.05) + 5.0 * smooth((t - 0.35) / 0.05),
+                                 0.0};
+  };
+  const std::vector<Stroke> drawn = path.draw(testing::sampled(halting, 0.55));
+  Stroke from{0.0, 0.0, 0.0};
+  for (const Stroke& to : drawn) {
+    EXPECT_GE(std::abs(to.x_mm - from.x_mm), 0.5e-4);
+    EXPECT_GT(to.speed_mm_s, 0.0);
+    from = to;
+  }
+  // What is dropped before the motion and after it is missing from the clock; the rest between is
+  // not. Each end may lie within a line of up to 50 ms.
+  EXPECT_GE(drawn.back().end_s, 0.27);
+  EXPECT_LE(drawn.back().end_s, 0.27 + 0.1);
+  EXPECT_EQ(drawn.back().e_mm, 1.0);
+  EXPECT_EQ(drawn.back().x_mm, 10.0);
+}
+
+TEST(Strokes, AreNoneWhereNothingMoves) {
+  const Path path({{0.0, 0.0, 0.2, 0.0}, {0.00004, 0.0, 0.2, 0.0}});
+  EXPECT_TRUE(path.draw(testing::plan_as_base(path.moves)).empty());
+}
+
+TEST(Strokes, EndWhereALineStandsOrFilamentPerMillimetreChanges) {
+  Path path({{0.0, 0.0, 0.2, 0.0},
+             {20.0, 0.0, 0.2, 1.0},
+             {40.0, 0.0, 0.2, 2.0},
+             {60.0, 0.0, 0.2, 4.0},
+             {80.0, 0.0, 0.2, 6.0}});
+  path.insert(1, gcode::EventKind::passive);
+  const std::vector<Stroke> drawn = path.draw(testing::plan_as_base(path.moves));
+  const double first = path.moves[0].duration_s();
+  const double second = first + path.moves[1].duration_s();
+  const auto ends_at = [&](double t) {
+    return std::ranges::any_of(drawn,
+                               [&](const Stroke& s) { return std::abs(s.end_s - t) < 1e-9; });
+  };
+  EXPECT_TRUE(ends_at(first));
+  EXPECT_TRUE(ends_at(second));
+  EXPECT_FALSE(ends_at(second + path.moves[2].duration_s()));
+  // The passive line comes after what is drawn before its moment and before all else.
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    EXPECT_EQ(drawn[i].events >= 2, i > 0 && drawn[i - 1].end_s > first - 0.6e-3) << i;
+  }
+}
+
+TEST(Strokes, LayFilamentMoveByMove) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Path path = random_path(seed, 60);
+    const std::vector<Stroke> drawn = path.draw(testing::plan_as_base(path.moves));
+    double t = 0.0;
+    std::size_t i = 0;
+    for (const planner::PlannedMove& move : path.moves) {
+      t += move.duration_s();
+      const double laid = move.segment.end_mm[E] - path.moves.front().segment.start_mm[E];
+      // The line that spans the end of the move, or ends there.
+      while (i + 1 < drawn.size() && drawn[i].end_s < t - 1e-9) {
+        ++i;
+      }
+      EXPECT_LE(i > 0 ? drawn[i - 1].e_mm : 0.0, laid + 1e-9);
+      EXPECT_GE(drawn[i].e_mm, laid - 1e-9);
+    }
+  }
+}
+
+TEST(Strokes, CarryTheHeightOfASpiral) {
+  std::vector<gcode::Position> points;
+  for (int i = 0; i <= 200; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 100.0;
+    points.push_back({100.0 + 20.0 * std::cos(angle), 100.0 + 20.0 * std::sin(angle),
+                      0.2 + 0.003 * i, 0.05 * i});
+  }
+  const Path path(points);
+  const std::vector<Stroke> drawn = path.draw(testing::plan_as_base(path.moves));
+  double start = 0.0;
+  std::size_t i = 0;
+  for (const Stroke& stroke : drawn) {
+    while (i + 1 < path.moves.size() && stroke.end_s > start + path.moves[i].duration_s()) {
+      start += path.moves[i++].duration_s();
+    }
+    EXPECT_NEAR(stroke.z_mm, path.moves[i].position_mm(stroke.end_s - start)[Z], 0.51e-4);
+  }
+  EXPECT_EQ(drawn.back().z_mm, points.back()[Z]);
+  EXPECT_GT(drawn.size(), 200U);
+}
+
+}  // namespace
+}  // namespace unflex::emit
