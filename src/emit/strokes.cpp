@@ -66,6 +66,12 @@ class Timetable {
     return move.segment.start_mm[E] - origin + share * move.segment.delta(E);
   }
 
+  // Of move i, along the base's path.
+  [[nodiscard]] double filament_per_mm(std::size_t i) const {
+    const double length = travelled_mm(starts_s_[i + 1]) - travelled_mm(starts_s_[i]);
+    return length > 0.0 ? (*run_->moves)[i].segment.delta(E) / length : 0.0;
+  }
+
   [[nodiscard]] double height_mm(double t) const {
     if (t >= starts_s_.back()) {
       return run_->moves->back().segment.end_mm[Z];
@@ -89,9 +95,11 @@ class Timetable {
 };
 
 // Whether the boundary before move i has to be a vertex for the sake of the filament.
-bool filament_changes(const std::vector<PlannedMove>& moves, std::size_t i) {
-  const double jump = std::abs(moves[i].direction[E] - moves[i - 1].direction[E]);
-  return jump * std::max(moves[i].start_v_mm_s, 1.0) * kTypicalLineS / 4.0 > kFilamentStepMm;
+bool filament_changes(const Run& run, const Timetable& table, std::size_t i) {
+  const double t = table.start_s(i);
+  const double speed = std::hypot(run.base->x_at(t).velocity_mm_s, run.base->y_at(t).velocity_mm_s);
+  const double jump = std::abs(table.filament_per_mm(i) - table.filament_per_mm(i - 1));
+  return jump * std::max(speed, 1.0) * kTypicalLineS / 4.0 > kFilamentStepMm;
 }
 
 // For each event the time it stands at: the end of the moves before it.
@@ -116,7 +124,7 @@ std::vector<double> required_times(const Run& run, const Timetable& table,
     }
   }
   for (std::size_t i = 1; i < table.moves(); ++i) {
-    if (filament_changes(*run.moves, i)) {
+    if (filament_changes(run, table, i)) {
       wanted.push_back(table.start_s(i));
     }
   }
