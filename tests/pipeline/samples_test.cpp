@@ -83,7 +83,7 @@ TEST_P(PieceOfPrint, IsDrawnAsSliced) {
 INSTANTIATE_TEST_SUITE_P(
     Small, PieceOfPrint,
     ::testing::Values(Sample{"bracket", "", 0, 0, 15.0}, Sample{"cube20", "", 0, 0, 15.0},
-                      Sample{"star", "", 0, 0, 15.0}, Sample{"textplate", "", 0, 0, 15.0},
+                      Sample{"star", "", 0, 0, 15.0}, Sample{"textplate", "", 0, 0, 10.0},
                       Sample{"wallring", "", 0, 0, 15.0}, Sample{"vase", "", 0, 0, 1.0},
                       Sample{"washer_arcs", "", 0, 0, 1.0}),
     name_of);

@@ -17,15 +17,12 @@ constexpr const char* kCorner =
 
 std::vector<std::string> thesis_machine() {
   const std::string freq_hz = "15.915494309189533";  // 100/2π
-  return {"limits.max_velocity_mm_s=100",
-          "limits.max_accel_mm_s2=5000",
-          "limits.square_corner_velocity_mm_s=0",
-          "limits.minimum_cruise_ratio=0",
-          "dynamics.x.freq_hz=" + freq_hz,
-          "dynamics.y.freq_hz=" + freq_hz,
-          "dynamics.x.damping_ratio=0.5",
-          "dynamics.y.damping_ratio=0.5",
-          "base.max_accel_mm_s2=20000"};
+  return {"limits.max_velocity_mm_s=100",         "limits.max_accel_mm_s2=5000",
+          "limits.square_corner_velocity_mm_s=0", "limits.minimum_cruise_ratio=0",
+          "dynamics.x.freq_hz=" + freq_hz,        "dynamics.y.freq_hz=" + freq_hz,
+          "dynamics.x.damping_ratio=0.5",         "dynamics.y.damping_ratio=0.5",
+          "base.max_accel_mm_s2=20000",           "printer.travel_x_mm=[-50,50]",
+          "printer.travel_y_mm=[-50,50]"};
 }
 
 // Of the corner compensated.
