@@ -1,10 +1,10 @@
 #include "strokes.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "unflex/core/number.hpp"
+#include "vertices.hpp"
 
 namespace unflex::emit {
 namespace {
@@ -192,73 +192,6 @@ void divide(const dynamics::BaseTrajectory& base, double from, double to,
     start = end;
   }
   times.push_back(to);
-}
-
-// First moments of the base's distance from the chord of one line, mm·s, against the two halves of
-// the hat functions: ∫ (b − chord)(1 − s) dt and ∫ (b − chord) s dt, s from 0 to 1 along the line.
-struct ChordError {
-  double towards_start = 0.0;
-  double towards_end = 0.0;
-};
-
-using AxisAt = dynamics::AxisMotion (dynamics::BaseTrajectory::*)(double) const;
-
-ChordError chord_error(const dynamics::BaseTrajectory& base, AxisAt axis, double from, double to) {
-  // Two samples per node period; b is smooth, so the trapezoidal rule does.
-  const double duration = to - from;
-  const int steps = std::max(4, static_cast<int>(std::ceil(2.0 * duration / base.period_s)));
-  const double b0 = (base.*axis)(from).position_mm;
-  const double b1 = (base.*axis)(to).position_mm;
-  ChordError sum;
-  for (int i = 1; i < steps; ++i) {
-    const double s = static_cast<double>(i) / steps;
-    const double error = (base.*axis)(from + s * duration).position_mm - b0 - s * (b1 - b0);
-    sum.towards_start += error * (1.0 - s);
-    sum.towards_end += error * s;
-  }
-  const double weight = duration / steps;
-  return {sum.towards_start * weight, sum.towards_end * weight};
-}
-
-// One axis at the vertices. A chord lies inside a curve: between vertices on the curve it is off by
-// b̈ T²/12 on average, which the nozzle follows. Vertices moved out so that the mean of the error
-// against each one's hat function vanishes leave only an error too quick for the machine to follow.
-// Where that would break the limit on the change of speed from line to line, the vertex stays on
-// the curve.
-std::vector<double> vertices(const dynamics::BaseTrajectory& base, AxisAt axis,
-                             const std::vector<double>& times, double max_accel_mm_s2) {
-  const std::size_t n = times.size();
-  std::vector<double> on_curve(n);
-  std::vector<double> offset(n, 0.0);
-  for (std::size_t i = 0; i < n; ++i) {
-    on_curve[i] = (base.*axis)(times[i]).position_mm;
-  }
-  ChordError before = chord_error(base, axis, times[0], times[1]);
-  for (std::size_t i = 1; i + 1 < n; ++i) {
-    const ChordError after = chord_error(base, axis, times[i], times[i + 1]);
-    offset[i] = (before.towards_end + after.towards_start) / (0.5 * (times[i + 1] - times[i - 1]));
-    before = after;
-  }
-  const auto accel = [&](std::size_t i) {
-    const double t1 = times[i] - times[i - 1];
-    const double t2 = times[i + 1] - times[i];
-    const auto at = [&](std::size_t j) { return on_curve[j] + offset[j]; };
-    return std::abs((at(i + 1) - at(i)) / t2 - (at(i) - at(i - 1)) / t1) / (0.5 * (t1 + t2));
-  };
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (std::size_t i = 1; i + 1 < n; ++i) {
-      if (accel(i) > max_accel_mm_s2 &&
-          (offset[i - 1] != 0.0 || offset[i] != 0.0 || offset[i + 1] != 0.0)) {
-        offset[i - 1] = offset[i] = offset[i + 1] = 0.0;
-        changed = true;
-      }
-    }
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    on_curve[i] += offset[i];
-  }
-  return on_curve;
 }
 
 double snap(double value_mm, double offset_mm, int decimals) {
