@@ -175,7 +175,7 @@ TEST(Emitter, FollowsModesThatChangeInsideARun) {
   const std::vector<std::string> lines = from_first_run(input);
   EXPECT_THAT(lines, ElementsAre(";unflex run\n", kRaise, "~", "G91\n", "G90\n", "~", "G20\n",
                                  "G21\n", "~", "G90\n", "M82\n", "M83\n", "~", kRestore, "M82\n",
-                                 "G20\n", "G1 F236.220472\n", "G21\n", "M400\n", kShaperOn));
+                                 "G20\n", "G1 F236.220472441\n", "G21\n", "M400\n", kShaperOn));
 }
 
 TEST(Emitter, KeepsTheLineEndingsOfTheFile) {
@@ -203,7 +203,7 @@ TEST(Emitter, WritesNothingOfARunTooSmallToBeWritten) {
 
 TEST(Emitter, EndsARunWhereTheFileDoesEvenBetweenGridPoints) {
   const std::string text = emit(kHead + "G1 X10.12345678 E1\nG4 P1\n", options()).text;
-  EXPECT_THAT(text, HasSubstr("\nG1 X10.123457 "));
+  EXPECT_THAT(text, HasSubstr("\nG1 X10.12345678 "));
 }
 
 TEST(Emitter, TriesARunOnACopyWithoutATrace) {
