@@ -7,6 +7,7 @@
 
 #include "strokes.hpp"
 #include "unflex/core/number.hpp"
+#include "unflex/gcode/compensable.hpp"
 
 namespace unflex::emit {
 namespace {
@@ -17,7 +18,7 @@ using gcode::Y;
 using gcode::Z;
 
 constexpr int kPositionDecimals = 4;
-constexpr int kExactDecimals = 6;  // where a run ends on a finer place than the grid
+constexpr int kExactDecimals = 9;  // where a run ends on a finer place than the grid
 constexpr int kFilamentDecimals = 5;
 constexpr double kFeedToleranceMmS = 1e-6;  // what restoring F with its decimals may leave
 
@@ -107,7 +108,8 @@ bool KlipperEmitter::run(const Run& run, std::string& out) {
     for (; written < end; ++written) {
       const gcode::Event& event = (*run.events)[written];
       follow_input(event);
-      if (event.kind != gcode::EventKind::move) {
+      // Moves are replaced, those without length too: the base is not where they say.
+      if (event.kind != gcode::EventKind::move && !gcode::names_position(event.line.content())) {
         copy(event, out);
       }
     }

@@ -3,12 +3,25 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/gcode/command.hpp"
+
 namespace unflex::gcode {
 namespace {
 
 // Machine positions of filament are running sums of thousands of mm; an E word that repeats the
 // last one can leave a difference of their last digits.
 constexpr double kFilamentRoundoff_mm = 1e-9;
+
+bool has_axis_word(const Command& command) {
+  return std::any_of(command.words.begin(), command.words.end(), [](const Word& word) {
+    return std::string_view("XYZE").find(word.letter) != std::string_view::npos;
+  });
+}
+
+bool is_motion_command(const Command& command) {
+  return command.kind == CommandKind::traditional && command.letter == 'G' && command.number >= 0 &&
+         command.number <= 3 && has_axis_word(command);
+}
 
 }  // namespace
 
@@ -32,6 +45,14 @@ bool compensable(const Event& event) {
   return event.kind == EventKind::move && !event.segments.empty() &&
          std::all_of(event.segments.begin(), event.segments.end(),
                      [](const Segment& segment) { return compensable(segment); });
+}
+
+bool names_position(std::string_view content) {
+  // Most lines without effect are comments: look before parsing.
+  const std::size_t first = content.find_first_not_of(" \t");
+  return first != std::string_view::npos &&
+         std::string_view("GgNn").find(content[first]) != std::string_view::npos &&
+         is_motion_command(parse(content));
 }
 
 }  // namespace unflex::gcode

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
@@ -48,6 +47,17 @@ struct Ticket {
   std::size_t window;
   bool is_y;
 };
+
+double largest_axis_accel(const std::vector<planner::PlannedMove>& moves) {
+  double largest = 0.0;
+  for (const planner::PlannedMove& move : moves) {
+    if (move.accel_s + move.decel_s > 0.0) {
+      largest = std::max(largest, move.accel_mm_s2 * std::max(std::abs(move.direction[gcode::X]),
+                                                              std::abs(move.direction[gcode::Y])));
+    }
+  }
+  return largest;
+}
 
 class Compensator {
  public:
@@ -101,7 +111,12 @@ class Compensator {
       pending.nozzle = nozzle_;
       nozzle_ = at_rest(piece.moves.back().segment.end_mm);
       const std::size_t nodes = compensate::node_count(piece.moves, setup_);
-      if (nodes <= kMaxRunNodes) {
+      const double accel = largest_axis_accel(piece.moves);
+      if (accel > rules_.base_max_accel_mm_s2) {
+        pending.failure = fmt::format(
+            "the plan itself accelerates an axis by {:.0f} mm/s², more than base.max_accel_mm_s2",
+            accel);
+      } else if (nodes <= kMaxRunNodes) {
         pending.spans = compensate::cut(nodes, setup_);
       } else {
         pending.failure =
@@ -133,8 +148,9 @@ class Compensator {
         }
         const std::size_t count =
             std::min(kWindowsAtOnce, pending.spans.size() - pending.submitted);
-        const auto windows = compensate::windows(pending.piece.moves, pending.spans,
-                                                 pending.submitted, count, pending.nozzle, setup_);
+        const auto windows = compensate::windows(
+            pending.piece.moves, pending.spans, pending.submitted, count, pending.nozzle,
+            setup_for(setup_, pending.piece.moves, job_.settings));
         for (std::size_t i = 0; i < count; ++i) {
           submit({first_index_ + piece, pending.submitted + i, false}, windows[i].x);
           submit({first_index_ + piece, pending.submitted + i, true}, windows[i].y);
@@ -289,21 +305,6 @@ class Remaining final : public Progress {
   double done_;
 };
 
-double cpu_s(int who) {
-  rusage usage{};
-  getrusage(who, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-double peak_rss_mb(int who) {
-  rusage usage{};
-  getrusage(who, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
-}
-
 }  // namespace
 
 Result<report::Report> compensate(const Job& job, Progress& progress) {
@@ -342,10 +343,7 @@ Result<report::Report> compensate_with(const Job& job, const WorkerPool::EngineF
   if (Status status = add_verification(job, remaining, report); !status) {
     return tl::unexpected(status.error());
   }
-  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  report.cpu_s = cpu_s(RUSAGE_SELF) + cpu_s(RUSAGE_CHILDREN);
-  report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
-  report.peak_rss_mb = std::max(peak_rss_mb(RUSAGE_SELF), peak_rss_mb(RUSAGE_CHILDREN));
+  add_performance(begin, report);
   return report;
 }
 

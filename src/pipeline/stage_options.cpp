@@ -84,6 +84,24 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
   return setup;
 }
 
+compensate::Setup setup_for(const compensate::Setup& setup,
+                            const std::vector<planner::PlannedMove>& run,
+                            const machine::Settings& settings) {
+  compensate::Setup result = setup;
+  const auto keep_above_zero = [&](gcode::Axis axis, const std::optional<machine::Range>& travel,
+                                   compensate::BaseLimits& limits) {
+    const bool above = std::ranges::all_of(run, [&](const planner::PlannedMove& move) {
+      return move.segment.start_mm[axis] >= 0.0 && move.segment.end_mm[axis] >= 0.0;
+    });
+    if (!travel && above) {
+      limits.min_position_mm = 0.0;
+    }
+  };
+  keep_above_zero(gcode::X, settings.printer.travel_x_mm, result.x.limits);
+  keep_above_zero(gcode::Y, settings.printer.travel_y_mm, result.y.limits);
+  return result;
+}
+
 emit::EmitOptions emit_options(const machine::Settings& settings, std::string version) {
   emit::EmitOptions options;
   options.interpreter = interpreter_options(settings);
@@ -112,14 +130,16 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.nozzle_diameter_mm = settings.extruder.nozzle_diameter_mm;
   rules.nozzle = {axis(settings.dynamics_x), axis(settings.dynamics_y),
                   settings.verify.step_ms * 1e-3, settings.verify.hold_s};
-  const auto set_range = [](const std::optional<machine::Range>& travel, double& min, double& max) {
-    if (travel) {
-      min = travel->min;
-      max = travel->max;
-    }
+  const auto set_range = [](const std::optional<machine::Range>& travel, double& min, double& max,
+                            bool& min_assumed) {
+    min_assumed = !travel;
+    min = travel ? travel->min : 0.0;
+    max = travel ? travel->max : max;
   };
-  set_range(settings.printer.travel_x_mm, rules.travel.x_min_mm, rules.travel.x_max_mm);
-  set_range(settings.printer.travel_y_mm, rules.travel.y_min_mm, rules.travel.y_max_mm);
+  set_range(settings.printer.travel_x_mm, rules.travel.x_min_mm, rules.travel.x_max_mm,
+            rules.travel.x_min_assumed);
+  set_range(settings.printer.travel_y_mm, rules.travel.y_min_mm, rules.travel.y_max_mm,
+            rules.travel.y_min_assumed);
   rules.base_max_velocity_mm_s = settings.base_max_velocity_mm_s();
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
   rules.lead_in_s = settings.solve.lead_in_ms * 1e-3;

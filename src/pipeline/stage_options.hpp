@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "unflex/compensate/run.hpp"
 #include "unflex/emit/emitter.hpp"
@@ -16,6 +17,11 @@ namespace unflex::pipeline {
 [[nodiscard]] planner::Limits planner_limits(const machine::Settings& settings);
 [[nodiscard]] planner::FixedLimits fixed_limits(const machine::Settings& settings);
 [[nodiscard]] compensate::Setup compensate_setup(const machine::Settings& settings);
+// The same for one run: where the travel of an axis is not known, the base stays above 0 if the run
+// does, since many machines end there.
+[[nodiscard]] compensate::Setup setup_for(const compensate::Setup& setup,
+                                          const std::vector<planner::PlannedMove>& run,
+                                          const machine::Settings& settings);
 [[nodiscard]] emit::EmitOptions emit_options(const machine::Settings& settings,
                                              std::string version);
 [[nodiscard]] verify::Rules verify_rules(const machine::Settings& settings);

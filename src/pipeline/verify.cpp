@@ -1,3 +1,8 @@
+#include "unflex/verify/verify.hpp"
+
+#include <sys/resource.h>
+
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <utility>
@@ -5,22 +10,42 @@
 #include "report_rows.hpp"
 #include "stage_options.hpp"
 #include "unflex/pipeline/pipeline.hpp"
-#include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
 namespace {
 
 report::DeviationRow row(const verify::DeviationStats& stats) {
-  return {stats.contour_max_mm,  stats.contour_p99_mm, stats.contour_rms_mm,
-          stats.tracking_max_mm, stats.tracking_rms_mm, stats.duration_s,
-          stats.contour_max_line};
+  return {stats.contour_max_mm,  stats.contour_p99_mm, stats.contour_rms_mm,  stats.tracking_max_mm,
+          stats.tracking_rms_mm, stats.duration_s,     stats.contour_max_line};
 }
 
 report::DeviationRows rows(const verify::Deviation& deviation) {
   return {row(deviation.extruding), row(deviation.all)};
 }
 
+double cpu_s(int who) {
+  rusage usage{};
+  getrusage(who, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double peak_rss_mb(int who) {
+  rusage usage{};
+  getrusage(who, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
 }  // namespace
+
+void add_performance(std::chrono::steady_clock::time_point begin, report::Report& report) {
+  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.cpu_s = cpu_s(RUSAGE_SELF) + cpu_s(RUSAGE_CHILDREN);
+  report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
+  report.peak_rss_mb = std::max(peak_rss_mb(RUSAGE_SELF), peak_rss_mb(RUSAGE_CHILDREN));
+}
 
 report::Report new_report(std::string command, const Job& job) {
   report::Report report;
@@ -45,9 +70,8 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   if (!output) {
     return fail(ErrorKind::input, {job.output_name, 0}, "cannot read the file");
   }
-  const Result<verify::VerifyReport> result =
-      verify::verify(input, job.input_name, output, job.output_name, verify_rules(job.settings),
-                     progress);
+  const Result<verify::VerifyReport> result = verify::verify(
+      input, job.input_name, output, job.output_name, verify_rules(job.settings), progress);
   if (!result) {
     return tl::unexpected(result.error());
   }
@@ -65,6 +89,7 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   report.input_extrusion_mm = result->input_extrusion_mm;
   report.output_extrusion_mm = result->output_extrusion_mm;
   report.worst_move_extrusion_error_mm = result->worst_move_extrusion_error_mm;
+  report.runs_compensated = result->runs;
   report.violation_count = result->violation_count;
   for (const verify::Violation& violation : result->violations) {
     report.violations.push_back(
@@ -79,8 +104,7 @@ Result<report::Report> verify(const Job& job, Progress& progress) {
   if (Status status = add_verification(job, progress, report); !status) {
     return tl::unexpected(status.error());
   }
-  report.wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
   return report;
 }

@@ -46,6 +46,14 @@ void add_motion(const Report& r, Json& json) {
 }
 
 void add_work(const Report& r, Json& json) {
+  if (r.solver_engine.empty()) {
+    // Nothing was solved, a file was verified: what was tried for it is not known.
+    for (const char* const key : {"windows", "fallbacks", "kept_moves", "solver"}) {
+      json[key] = nullptr;
+    }
+    json["runs"] = {{"total", nullptr}, {"compensated", r.runs_compensated}, {"fallback", nullptr}};
+    return;
+  }
   json["windows"] = {
       {"total", r.windows_total}, {"solved", r.windows_solved}, {"fallback", r.windows_fallback}};
   json["runs"] = {

@@ -48,7 +48,7 @@ void write_runs(Sink out, const Report& r) {
   if (r.runs_total == 0 && r.windows_total == 0) {
     return;
   }
-  fmt::format_to(out, "runs          {} of {} compensated, {} kept their original moves\n",
+  fmt::format_to(out, "runs          {} of {} compensated, {} fell back to their original moves\n",
                  r.runs_compensated, r.runs_total, r.runs_fallback);
   const std::size_t listed = std::min(r.fallbacks.size(), kListedFallbacks);
   for (std::size_t i = 0; i < listed; ++i) {
@@ -59,6 +59,9 @@ void write_runs(Sink out, const Report& r) {
   if (r.runs_fallback > listed) {
     fmt::format_to(out, "              and {} more, listed by --report\n",
                    r.runs_fallback - listed);
+  }
+  for (const auto& [reason, count] : r.kept_moves) {
+    fmt::format_to(out, "              {} other moves stay as they are: {}\n", count, reason);
   }
   fmt::format_to(out, "solver        {}, {} windows, {} iterations\n", r.solver_engine,
                  r.windows_total, r.solver_iterations);

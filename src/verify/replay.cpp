@@ -18,28 +18,9 @@ constexpr std::string_view kRunComment = ";unflex run";
 // In emitted text a move of a few µm can rise by one rounding step of Z, which makes it steep.
 constexpr double kHeightRounding_mm = 3e-4;
 
-bool has_axis_word(const gcode::Command& command) {
-  return std::any_of(command.words.begin(), command.words.end(), [](const gcode::Word& word) {
-    return std::string_view("XYZE").find(word.letter) != std::string_view::npos;
-  });
-}
-
 bool only_word(const gcode::Command& command, char letter) {
   return command.words.size() == 1 && command.words.front().letter == letter &&
          command.words.front().value.has_value();
-}
-
-bool is_motion_command(const gcode::Command& command) {
-  return command.kind == gcode::CommandKind::traditional && command.letter == 'G' &&
-         command.number >= 0 && command.number <= 3 && has_axis_word(command);
-}
-
-// Whether a line without effect on the machine is nevertheless a move, one of no length.
-bool is_empty_move(std::string_view content) {
-  const std::size_t first = content.find_first_not_of(" \t");
-  return first != std::string_view::npos &&
-         std::string_view("GgNn").find(content[first]) != std::string_view::npos &&
-         is_motion_command(gcode::parse(content));
 }
 
 }  // namespace
@@ -144,7 +125,7 @@ void Replay::read_line() {
 void Replay::read_event(gcode::Event event, const Regime& before) {
   switch (event.kind) {
     case gcode::EventKind::passive: {
-      const bool motion = is_empty_move(event.line.content());
+      const bool motion = gcode::names_position(event.line.content());
       place(std::move(event.line), before, motion);
       break;
     }

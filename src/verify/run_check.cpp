@@ -17,19 +17,31 @@ constexpr double kLimitTolerance = 1e-3;
 }  // namespace
 
 void Excursion::add(const gcode::Segment& segment) {
-  const double x = segment.end_mm[gcode::X];
-  const double y = segment.end_mm[gcode::Y];
+  if (segment.start_known) {
+    add(segment.start_mm, segment.line);
+  }
+  add(segment.end_mm, segment.line);
+}
+
+void Excursion::add(const gcode::Position& at, std::size_t line) {
+  const double x = at[gcode::X];
+  const double y = at[gcode::Y];
   const std::array<double, 4> beyond = {travel_->x_min_mm - x, x - travel_->x_max_mm,
                                         travel_->y_min_mm - y, y - travel_->y_max_mm};
   for (std::size_t side = 0; side < sides_.size(); ++side) {
     if (beyond[side] > sides_[side].beyond_mm) {
-      sides_[side] = {beyond[side], segment.line, x, y};
+      sides_[side] = {beyond[side], line, x, y};
     }
   }
 }
 
 const Excursion::Side* Excursion::worse_than(const Excursion& input) const {
+  const std::array<bool, 4> assumed = {travel_->x_min_assumed, false, travel_->y_min_assumed,
+                                       false};
   for (std::size_t side = 0; side < sides_.size(); ++side) {
+    if (assumed[side] && input.sides_[side].beyond_mm > 0.0) {
+      continue;
+    }
     if (sides_[side].beyond_mm > input.sides_[side].beyond_mm + kRounding_mm) {
       return &sides_[side];
     }

@@ -34,6 +34,8 @@ class Excursion {
   [[nodiscard]] const Side* worse_than(const Excursion& input) const;
 
  private:
+  void add(const gcode::Position& at, std::size_t line);
+
   const TravelLimits* travel_;
   std::array<Side, 4> sides_{};
 };

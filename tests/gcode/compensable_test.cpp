@@ -40,5 +40,16 @@ TEST(Compensable, AreLinesAsAWhole) {
   EXPECT_FALSE(compensable(session.read("G1 X25")));
 }
 
+TEST(NamesPosition, IsTrueForMovesByTheirWords) {
+  for (const char* const line :
+       {"G1 X5", "g0 y2 f100", "N3 G1 E.5", "G3 X1 I5", "  G1 Z0.2 ; up"}) {
+    EXPECT_TRUE(names_position(line)) << line;
+  }
+  for (const char* const line :
+       {"", "; G1 X5", "G1 F1200", "G92 X5", "G28 X0", "M204 S500", "G4 P5", "SET_PIN PIN=x"}) {
+    EXPECT_FALSE(names_position(line)) << line;
+  }
+}
+
 }  // namespace
 }  // namespace unflex::gcode

@@ -186,12 +186,13 @@ class Texts : public ::testing::Test {
       return "";
     }
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-    EXPECT_EQ(report->runs_fallback, 0U) << testing::complaints(*report);
+    EXPECT_EQ(report->runs_fallback, fallbacks_) << testing::complaints(*report);
     EXPECT_GT(report->runs_compensated, 0U);
     report_ = *report;
     return folder.output();
   }
 
+  std::size_t fallbacks_ = 0;  // expected
   report::Report report_;
 };
 
@@ -240,6 +241,53 @@ TEST_F(Texts, EndProperlyWhereTheInputHasNoLastLineEnding) {
   // The last line as part of a run.
   const std::string moving = "G90\nM83\nG1 X0 Y0 Z0.2 F6000\nG1 X10 Y0 E1\nG1 X10 Y10 E1";
   EXPECT_THAT(compensated(moving), EndsWith("\n"));
+}
+
+// Inside a run the base is not where such a line says, and E may be in the other mode.
+TEST_F(Texts, LeaveOutMovesWithoutLengthInsideARun) {
+  const std::string output = compensated(
+      "G90\nM82\nG92 E0\nG1 X100 Y100 Z0.4 F6000\nG4 P500\nG1 X120 Y100 E1\nG1 X120 Y120 E2\n"
+      "G1 X120 Y120 E2\nG1 F4000\nG1 X100 Y120 E3\nG1 E2\n");
+  EXPECT_EQ(report_.runs_compensated, 1U);
+  EXPECT_EQ(report_.violation_count, 0U);
+  EXPECT_THAT(output, Not(HasSubstr("G1 X120 Y120 E2\n")));
+  EXPECT_THAT(output, HasSubstr("\nG1 F4000\n"));
+  EXPECT_NEAR(report_.output_extrusion_mm, report_.input_extrusion_mm, 1e-9);
+}
+
+TEST_F(Texts, EndARunExactlyWhereTheInputIs) {
+  const std::string output = compensated(
+      "G90\nM83\nG1 X130 Y120 Z0.4 F6000\nG4 P500\nG1 X134.590811296 Y119.150893041 E0.2\n"
+      "G1 X134.590811296 Y119.150893041 E0.1\n");
+  EXPECT_EQ(report_.runs_compensated, 1U);
+  EXPECT_EQ(report_.violation_count, 0U);
+  EXPECT_THAT(output, HasSubstr(" X134.590811296 Y119.150893041 "));
+}
+
+TEST_F(Texts, KeepRunsThatThePlanDrivesHarderThanTheBaseMayBe) {
+  fallbacks_ = 1;
+  const std::string output = compensated(
+      "G90\nM83\nG1 X100 Y100 Z0.4 F6000\nM204 S100000\nG4 P500\nG1 X120 Y100 E1\n"
+      "G1 X120 Y120 E1\nM104 S0\nM400\nM204 S2000\nG1 X100 Y120 E1\nG1 X100 Y100 E1\n");
+  EXPECT_EQ(report_.runs_total, 2U);
+  ASSERT_EQ(report_.fallbacks.size(), 1U);
+  EXPECT_THAT(report_.fallbacks.front().reason, HasSubstr("100000 mm/s²"));
+  EXPECT_THAT(output, HasSubstr("\nG1 X120 Y100 E1\nG1 X120 Y120 E1\n"));
+  EXPECT_EQ(report_.violation_count, 0U);
+}
+
+TEST_F(Texts, StopForObjectLabelsAndSavedStates) {
+  const std::string label = "EXCLUDE_OBJECT_START NAME=cube";
+  const std::string output =
+      compensated("G90\nM82\nG92 E0\nG1 X100 Y100 Z0.4 F6000\nG4 P500\nG1 X120 Y100 E1\n" + label +
+                  "\nG1 X120 Y120 E2\nG1 X100 Y120 E3\nSAVE_GCODE_STATE NAME=a\nG1 X100 Y100 E4\n"
+                  "G1 X110 Y100 E5\nRESTORE_GCODE_STATE NAME=a\nG1 X100 Y110 E6\n");
+  EXPECT_EQ(report_.violation_count, 0U);
+  // Limits are back before the label, and the first move after it goes as it was sliced.
+  EXPECT_THAT(output, HasSubstr(label + "\nG1 X120 Y120 E2\n"));
+  EXPECT_LT(output.rfind("ACCEL=5000", output.find(label)), output.find(label));
+  EXPECT_GT(output.rfind("ACCEL=5000", output.find(label)),
+            output.rfind("ACCEL=1000000", output.find(label)));
 }
 
 TEST_F(Texts, OfNothingToCompensateAreTheInput) {

@@ -20,7 +20,7 @@ TEST(Summary, IsExactlyThis) {
             "  all moves       1600 → 25.0         800 → 12.5          400 → 6.25\n"
             "print time    1h 00m 00s planned, 1h 00m 18s emitted (+0.50 %)\n"
             "base          at most 123 mm/s and 19999 mm/s²\n"
-            "runs          895 of 900 compensated, 5 kept their original moves\n"
+            "runs          895 of 900 compensated, 5 fell back to their original moves\n"
             "              lines 10-20: no solution\n"
             "              lines 30-44: worse than the original\n"
             "              and 3 more, listed by --report\n"

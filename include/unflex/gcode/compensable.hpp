@@ -19,6 +19,11 @@ inline constexpr double kMaxSlope = 0.02;
 // whole or not at all.
 [[nodiscard]] bool compensable(const Event& event);
 
+// Whether a line is a move by its words (G0 to G3 with an axis or E), though it may change nothing
+// where it stands. It would where the machine is elsewhere, as between two lines of a rewritten
+// motion.
+[[nodiscard]] bool names_position(std::string_view content);
+
 // Why a motion that is not compensable stays as it is: "start unknown", "extrude only",
 // "retracting move" or "Z move". Empty for a compensable one.
 [[nodiscard]] std::string_view kept_reason(const Segment& segment);

@@ -23,7 +23,7 @@ struct Range {
 
 struct PrinterSettings {
   Firmware firmware = Firmware::klipper;
-  // Where the base may be. Unset: not limited (the input's own extent is all that is known).
+  // Where the base may be. Unset: not limited, except that it stays above 0 where the path does.
   std::optional<Range> travel_x_mm;
   std::optional<Range> travel_y_mm;
   // [firmware_retraction] is configured; lengths as in the printer's configuration.

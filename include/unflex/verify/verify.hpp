@@ -20,6 +20,9 @@ struct TravelLimits {
   double x_max_mm = 1e9;
   double y_min_mm = -1e9;
   double y_max_mm = 1e9;
+  // The minimum of an axis is not known but taken to be 0 wherever the sliced path stays above it.
+  bool x_min_assumed = false;
+  bool y_min_assumed = false;
 };
 
 struct Rules {
