@@ -54,10 +54,12 @@ std::vector<double> vertices(const dynamics::BaseTrajectory& base, AxisAt axis,
   for (std::size_t i = 0; i < n; ++i) {
     on_curve[i] = (base.*axis)(times[i]).position_mm;
   }
+  const auto [lowest, highest] = extent(base, axis);
   ChordError before = chord_error(base, axis, times[0], times[1]);
   for (std::size_t i = 1; i + 1 < n; ++i) {
     const ChordError after = chord_error(base, axis, times[i], times[i + 1]);
     offset[i] = (before.towards_end + after.towards_start) / (0.5 * (times[i + 1] - times[i - 1]));
+    offset[i] = std::clamp(on_curve[i] + offset[i], lowest, highest) - on_curve[i];
     before = after;
   }
   const auto accel = [&](std::size_t i) {
@@ -76,9 +78,8 @@ std::vector<double> vertices(const dynamics::BaseTrajectory& base, AxisAt axis,
       }
     }
   }
-  const auto [lowest, highest] = extent(base, axis);
   for (std::size_t i = 0; i < n; ++i) {
-    on_curve[i] = std::clamp(on_curve[i] + offset[i], lowest, highest);
+    on_curve[i] += offset[i];
   }
   return on_curve;
 }
