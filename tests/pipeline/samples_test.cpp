@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <ostream>
 #include <string>
 #include <string_view>
 
@@ -21,6 +22,9 @@ struct Sample {
   std::size_t lines;            // no more than this; 0: all
   double improvement;
 };
+
+// For the name ctest shows.
+void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
 
 std::size_t line_end(const std::string& text, std::size_t begin) {
   return std::min(text.find('\n', begin), text.size() - 1) + 1;
