@@ -202,17 +202,6 @@ Status check_consistency(const Draft& draft) {
 
 std::vector<std::string> recommendations(const Settings& settings) {
   std::vector<std::string> remarks;
-  const bool dynamics_given = std::ranges::any_of(settings.origins, [](const auto& origin) {
-    return origin.first.starts_with("dynamics.") && origin.second != "default";
-  });
-  if (!dynamics_given) {
-    remarks.push_back(
-        fmt::format("no [dynamics] is given: compensating for {} Hz, ζ {} on X and {} Hz, ζ {} on "
-                    "Y, and setting "
-                    "the printer's input shaper back to these frequencies; give the printer's own",
-                    settings.dynamics_x.freq_hz, settings.dynamics_x.damping_ratio,
-                    settings.dynamics_y.freq_hz, settings.dynamics_y.damping_ratio));
-  }
   const double good_ms = 1e3 / (kGoodNodesPerPeriod * fastest_freq_hz(settings));
   if (settings.emit.period_ms > good_ms) {
     remarks.push_back(

@@ -206,14 +206,9 @@ TEST(Rows, HoldTheValueInForce) {
 }
 
 TEST(Recommendations, AskForAShorterPeriodAboveFiftyHertz) {
-  EXPECT_THAT(recommendations(read("", {"dynamics.y.freq_hz=50"})), IsEmpty());
+  EXPECT_THAT(recommendations(read("")), IsEmpty());
   EXPECT_THAT(recommendations(read("", {"dynamics.y.freq_hz=60"})),
               ElementsAre(HasSubstr("0.833 or less")));
-}
-
-TEST(Recommendations, AskForTheDynamicsWhereNoneAreGiven) {
-  EXPECT_THAT(recommendations(read("")), ElementsAre(HasSubstr("no [dynamics] is given")));
-  EXPECT_THAT(recommendations(read("[dynamics.x]\nfreq_hz = 45\n")), IsEmpty());
 }
 
 TEST(Load, ReadsAFile) {

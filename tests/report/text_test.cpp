@@ -24,6 +24,7 @@ TEST(Summary, IsExactlyThis) {
             "              lines 10-20: no solution\n"
             "              lines 30-44: worse than the original\n"
             "              and 3 more, listed by --report\n"
+            "              12 other moves stay as they are: Z move\n"
             "solver        ipopt 3.11.9, 1000 windows, 4242 iterations\n"
             "output        123456 lines, 4.5 MB, 890 lines/s at peak\n"
             "filament      1234.50 mm in, 1234.75 mm out\n"
