@@ -51,6 +51,13 @@ Status check_distinct(const RunConfig& config) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the input too; to replace it give --in-place");
   }
+  if (config.command == Command::compensate && config.printer_file) {
+    const std::string& target = config.in_place ? config.input : config.output;
+    if (clash(target, *config.printer_file)) {
+      return fail(ErrorKind::usage, {target, 0},
+                  "is the printer file too; give the output a name of its own");
+    }
+  }
   for (const std::string& other :
        {config.input, config.output, config.printer_file.value_or(std::string(kStandardStream))}) {
     if (!other.empty() && clash(report, other)) {
