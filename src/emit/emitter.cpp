@@ -119,6 +119,7 @@ bool KlipperEmitter::run(const Run& run, std::string& out) {
     set_run_modes(out);
     write_stroke(stroke, filament_origin, out);
   }
+  write(fmt::format("{} end", kComment), out);
   write_events(run.events->size());
   set_limits(input_limits_, out);
   restore_modes(out);

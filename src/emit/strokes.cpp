@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "unflex/core/number.hpp"
+#include "unflex/gcode/compensable.hpp"
 #include "vertices.hpp"
 
 namespace unflex::emit {
@@ -47,15 +49,15 @@ class Timetable {
     return after == starts_s_.begin() ? 0 : static_cast<std::size_t>(after - starts_s_.begin()) - 1;
   }
 
-  // Filament since the start of the run: each move's is spread along the base's path while the move
-  // lasts, which keeps filament per mm constant where the firmware looks for jumps in it.
-  [[nodiscard]] double filament_mm(double t) const {
-    const double origin = run_->moves->front().segment.start_mm[E];
+  // E or Z at time t: each move's share of it is spread along the base's path while the move lasts,
+  // which keeps filament per mm constant where the firmware looks for jumps in it, and the slope
+  // small where the base is slower than the plan.
+  [[nodiscard]] double along_path_mm(double t, gcode::Axis axis) const {
     if (t >= starts_s_.back()) {
-      return run_->moves->back().segment.end_mm[E] - origin;
+      return run_->moves->back().segment.end_mm[axis];
     }
     if (t <= starts_s_.front()) {
-      return 0.0;
+      return run_->moves->front().segment.start_mm[axis];
     }
     const std::size_t i = move_at(t);
     const PlannedMove& move = (*run_->moves)[i];
@@ -63,21 +65,18 @@ class Timetable {
     const double length = travelled_mm(starts_s_[i + 1]) - from;
     const double share =
         length > 0.0 ? (travelled_mm(t) - from) / length : (t - starts_s_[i]) / move.duration_s();
-    return move.segment.start_mm[E] - origin + share * move.segment.delta(E);
+    return move.segment.start_mm[axis] + share * move.segment.delta(axis);
+  }
+
+  // Filament since the start of the run.
+  [[nodiscard]] double filament_mm(double t) const {
+    return along_path_mm(t, E) - run_->moves->front().segment.start_mm[E];
   }
 
   // Of move i, along the base's path.
   [[nodiscard]] double filament_per_mm(std::size_t i) const {
     const double length = travelled_mm(starts_s_[i + 1]) - travelled_mm(starts_s_[i]);
     return length > 0.0 ? (*run_->moves)[i].segment.delta(E) / length : 0.0;
-  }
-
-  [[nodiscard]] double height_mm(double t) const {
-    if (t >= starts_s_.back()) {
-      return run_->moves->back().segment.end_mm[Z];
-    }
-    const std::size_t i = move_at(t);
-    return (*run_->moves)[i].position_mm(t - starts_s_[i])[Z];
   }
 
  private:
@@ -204,7 +203,10 @@ int speed_decimals(double feed_mm_min) {
   if (feed_mm_min >= 1000.0) {
     return 0;
   }
-  return feed_mm_min >= 100.0 ? 1 : 3;
+  if (feed_mm_min >= 100.0) {
+    return 1;
+  }
+  return feed_mm_min >= 1.0 ? 3 : 9;
 }
 
 // Distances and accelerations of the strokes, and their speeds: from the rounded distances and the
@@ -254,7 +256,8 @@ class SpeedSolver {
       const int decimals = speed_decimals(feed);
       (*strokes_)[i].feed_decimals = decimals;
       speed_mm_s_[i] = (*strokes_)[i].speed_mm_s =
-          static_cast<double>(to_scaled(feed, decimals)) / power_of_ten(decimals) * mm_s_per_feed_;
+          static_cast<double>(std::max<std::int64_t>(to_scaled(feed, decimals), 1)) /
+          power_of_ten(decimals) * mm_s_per_feed_;
       clock_s += (distance_mm_[i] + ramps_mm(i)) / speed_mm_s_[i];
     }
   }
@@ -303,8 +306,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     const bool is_end = i + 1 == times.size();
     stroke.x_mm = is_end ? end[gcode::X] : snap(x[i], grid.x_offset_mm, grid.decimals);
     stroke.y_mm = is_end ? end[gcode::Y] : snap(y[i], grid.y_offset_mm, grid.decimals);
-    stroke.z_mm =
-        is_end ? end[gcode::Z] : snap(table.height_mm(times[i]), grid.z_offset_mm, grid.decimals);
+    stroke.z_mm = is_end ? end[gcode::Z]
+                         : snap(table.along_path_mm(times[i], Z), grid.z_offset_mm, grid.decimals);
     stroke.e_mm = table.filament_mm(times[i]);
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_time_s.size() &&
@@ -312,9 +315,11 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
       ++event;
     }
     stroke.events = event;
-    const bool moves = std::hypot(stroke.x_mm - last.x_mm, stroke.y_mm - last.y_mm) >
-                       0.5 / power_of_ten(grid.decimals);
-    if (moves) {
+    const double length = std::hypot(stroke.x_mm - last.x_mm, stroke.y_mm - last.y_mm);
+    if (!is_end && std::abs(stroke.z_mm - last.z_mm) > 2.0 * gcode::kMaxSlope * length) {
+      stroke.z_mm = last.z_mm;  // a rounding step of Z waits for a line that is not steep by it
+    }
+    if (length > 0.5 / power_of_ten(grid.decimals)) {
       result.push_back(stroke);
       last = stroke;
     } else if (result.empty()) {

@@ -23,8 +23,15 @@ bool is_own_comment(std::string_view content) {
     return false;
   }
   content.remove_prefix(emit::kComment.size());
-  return content == " run" ||
+  return content == " run" || content == " end" ||
          (content.size() > 1 && content[0] == ' ' && content[1] >= '0' && content[1] <= '9');
+}
+
+// What other programs take for the end of a line.
+bool has_bare_return(std::string_view content) {
+  const std::size_t at = content.find('\r');
+  return at != std::string_view::npos &&
+         content.find_first_not_of("\r \t", at) != std::string_view::npos;
 }
 
 // A letter that printers know and a number: enough to tell G-code from prose.
@@ -105,6 +112,12 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
                 "this file was already compensated by unflex; give the file as it was sliced");
   }
   any_command_ = any_command_ || looks_like_command(line.content());
+  if (!any_bare_return_ && has_bare_return(line.content())) {
+    any_bare_return_ = true;
+    warnings_.push_back({{lines_.name(), line.number},
+                         "a carriage return without a line feed ends no line, neither here nor in "
+                         "the printer: convert the file's line ends to LF"});
+  }
   event = interpreter_.interpret(std::move(line));
   for (std::string& warning : event.warnings) {
     if (warnings_.size() < kMaxWarnings) {

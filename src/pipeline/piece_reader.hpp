@@ -52,6 +52,7 @@ class PieceReader {
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;
   bool any_command_ = false;
+  bool any_bare_return_ = false;
 };
 
 }  // namespace unflex::pipeline

@@ -73,7 +73,7 @@ WorkerPool::~WorkerPool() {
       close(worker.socket);
     }
     if (worker.pid > 0) {
-      if (worker.ticket) {
+      if (worker.task) {
         kill(worker.pid, SIGKILL);
       }
       waitpid(worker.pid, nullptr, 0);
@@ -123,45 +123,47 @@ void WorkerPool::submit(std::size_t ticket, const compensate::AxisWindow& window
 // Gives every idle worker a window.
 void WorkerPool::feed() {
   for (Worker& worker : workers_) {
-    if (queue_.empty()) {
-      return;
-    }
-    if (worker.ticket || worker.socket < 0) {
-      continue;
-    }
-    const Task task = std::move(queue_.front());
-    queue_.pop_front();
-    worker.ticket = task.ticket;
-    ++busy_;
-    if (!send_message(worker.socket, task.message)) {
-      failed_.push_back(*replace(worker, "a solver process died"));
+    // A worker may die of what it is given, and its successor of that again.
+    while (!queue_.empty() && !worker.task && worker.socket >= 0) {
+      worker.task = std::move(queue_.front());
+      queue_.pop_front();
+      ++busy_;
+      if (!send_message(worker.socket, worker.task->message)) {
+        replace(worker);
+      }
     }
   }
 }
 
-std::optional<WorkerPool::Done> WorkerPool::replace(Worker& worker, std::string reason) {
-  Done done{worker.ticket.value_or(0), fail(ErrorKind::internal, std::move(reason))};
+// Of a worker that died.
+void WorkerPool::replace(Worker& worker) {
   close(worker.socket);
   kill(worker.pid, SIGKILL);
   waitpid(worker.pid, nullptr, 0);
+  Task task = std::move(*worker.task);
   worker = {};
   --busy_;
+  if (task.tried) {
+    failed_.push_back(task.ticket);
+  } else {
+    task.tried = true;
+    queue_.push_front(std::move(task));
+  }
   // Without a successor the remaining workers carry on; with none left the queue fails in take().
   static_cast<void>(spawn(worker));
-  return done;
 }
 
 std::optional<WorkerPool::Done> WorkerPool::take(int timeout_ms) {
   feed();
   if (!failed_.empty()) {
-    Done done = std::move(failed_.front());
+    Done done{failed_.front(), fail(ErrorKind::internal, "two solver processes died of it")};
     failed_.pop_front();
     return done;
   }
   std::vector<pollfd> sockets;
   std::vector<Worker*> owners;
   for (Worker& worker : workers_) {
-    if (worker.ticket) {
+    if (worker.task) {
       sockets.push_back({worker.socket, POLLIN, 0});
       owners.push_back(&worker);
     }
@@ -184,10 +186,11 @@ std::optional<WorkerPool::Done> WorkerPool::take(int timeout_ms) {
     Worker& worker = *owners[i];
     std::string message;
     if (!receive_message(worker.socket, message)) {
-      return replace(worker, "a solver process died");
+      replace(worker);
+      return take(timeout_ms);
     }
-    Done done{*worker.ticket, unpack_solution(message)};
-    worker.ticket.reset();
+    Done done{worker.task->ticket, unpack_solution(message)};
+    worker.task.reset();
     --busy_;
     feed();
     return done;

@@ -1,5 +1,5 @@
-// Processes that solve axis windows. MUMPS below Ipopt is not thread-safe, so each solver lives in a
-// process of its own, forked before the program has any thread.
+// Processes that solve axis windows. MUMPS below Ipopt is not thread-safe, so each solver lives in
+// a process of its own, forked before the program has any thread.
 #pragma once
 
 #include <sys/types.h>
@@ -37,32 +37,34 @@ class WorkerPool {
   void submit(std::size_t ticket, const compensate::AxisWindow& window);
 
   // A solution that has arrived; waits up to timeout_ms for one. nullopt when none came or nothing
-  // is under way. A worker that died is replaced, and its window comes back as an error.
+  // is under way. A worker that died is replaced and its window solved once more; a window that two
+  // workers died of comes back as an error.
   [[nodiscard]] std::optional<Done> take(int timeout_ms);
 
   // Windows submitted and not yet taken.
   [[nodiscard]] std::size_t under_way() const { return queue_.size() + busy_; }
 
  private:
-  struct Worker {
-    pid_t pid = -1;
-    int socket = -1;
-    std::optional<std::size_t> ticket;  // of the window it is solving
-  };
   struct Task {
     std::size_t ticket;
     std::string message;
+    bool tried = false;  // a worker died of it
+  };
+  struct Worker {
+    pid_t pid = -1;
+    int socket = -1;
+    std::optional<Task> task;  // the window it is solving
   };
 
   explicit WorkerPool(EngineFactory factory) : factory_(std::move(factory)) {}
   Status spawn(Worker& worker);
   void feed();
-  std::optional<Done> replace(Worker& worker, std::string reason);
+  void replace(Worker& worker);
 
   EngineFactory factory_;
   std::vector<Worker> workers_;
   std::deque<Task> queue_;
-  std::deque<Done> failed_;  // could not even be handed to a worker
+  std::deque<std::size_t> failed_;  // tickets of windows that two workers died of
   std::size_t busy_ = 0;
 };
 

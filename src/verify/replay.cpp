@@ -14,9 +14,7 @@ namespace {
 
 constexpr std::string_view kOwnComment = ";unflex";
 constexpr std::string_view kRunComment = ";unflex run";
-
-// In emitted text a move of a few µm can rise by one rounding step of Z, which makes it steep.
-constexpr double kHeightRounding_mm = 3e-4;
+constexpr std::string_view kRunEndComment = ";unflex end";
 
 bool only_word(const gcode::Command& command, char letter) {
   return command.words.size() == 1 && command.words.front().letter == letter &&
@@ -148,17 +146,9 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
 }
 
 bool Replay::stays_in_run(const gcode::Event& event) const {
-  if (gcode::compensable(event)) {
-    return true;
-  }
-  return sections_.back().compensated &&
-         std::all_of(event.segments.begin(), event.segments.end(), [](const auto& segment) {
-           gcode::Segment level = segment;
-           const double rise = segment.delta(gcode::Z);
-           level.end_mm[gcode::Z] -=
-               std::copysign(std::min(std::abs(rise), kHeightRounding_mm), rise);
-           return gcode::compensable(level);
-         });
+  // What a line of emitted text may replace is known from the sliced file; by itself one of a few
+  // µm may well look steep.
+  return in_compensated_run_ || gcode::compensable(event);
 }
 
 void Replay::read_run_moves(gcode::Event event, const Regime& before) {
@@ -185,6 +175,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   const Section& ended = sections_.back();
   Section run;
   run.compensated = section.may_be_added && ended.compensated && !ended.regime.has_value();
+  in_compensated_run_ = run.compensated;
 
   push_section(std::move(section));
   for_each_plan([&](PlanQueue& plan) { plan.add(event.segments); });
@@ -194,6 +185,9 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
 void Replay::place(gcode::Line line, const Regime& before, bool motion) {
   if (in_output_ && line.content().starts_with(kRunComment)) {
     sections_.back().compensated = true;
+    in_compensated_run_ = true;
+  } else if (line.content().starts_with(kRunEndComment)) {
+    in_compensated_run_ = false;
   }
   PlacedLine placed;
   placed.line = std::move(line);

@@ -115,6 +115,7 @@ class Replay {
   PlanQueue plan_;
   PlanQueue resting_plan_;
   bool in_output_;
+  bool in_compensated_run_ = false;  // between the lines that announce its begin and its end
   bool at_end_ = false;
   std::optional<Error> error_;
   std::size_t lines_read_ = 0;

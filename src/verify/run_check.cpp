@@ -58,7 +58,7 @@ void BaseCheck::Excess::offer(double a_value, double limit, std::size_t a_line) 
 }
 
 void BaseCheck::begin_run() {
-  last_velocity_ = {};
+  end_velocity_ = {};
   last_duration_s_ = 0.0;
   velocity_excess_ = Excess{0.0, 1.0 + kLimitTolerance, 0};
   accel_excess_ = velocity_excess_;
@@ -77,8 +77,14 @@ void BaseCheck::add(const planner::PlannedMove& move) {
     velocity_excess_.offer(std::abs(v) - kRounding_mm / duration, rules_->base_max_velocity_mm_s,
                            segment.line);
   }
+  // The firmware may pass from motion left as it is into the run, and out of it, at some speed.
+  const std::array<double, 2> along = {move.direction[gcode::X], move.direction[gcode::Y]};
+  if (last_duration_s_ == 0.0) {
+    last_velocity_ = {move.start_v_mm_s * along[0], move.start_v_mm_s * along[1]};
+  }
   change_of_velocity(velocity, duration, segment.line);
   last_velocity_ = velocity;
+  end_velocity_ = {move.end_v_mm_s * along[0], move.end_v_mm_s * along[1]};
   last_duration_s_ = duration;
   last_line_ = segment.line;
   add_to_histogram(durations_, duration, 1.0);
@@ -100,7 +106,7 @@ void BaseCheck::change_of_velocity(const std::array<double, 2>& velocity, double
 }
 
 void BaseCheck::end_run() {
-  change_of_velocity({}, 0.0, last_line_);
+  change_of_velocity(end_velocity_, 0.0, last_line_);
   report(velocity_excess_, "velocity", "mm/s", rules_->base_max_velocity_mm_s);
   report(accel_excess_, "acceleration", "mm/s²", rules_->base_max_accel_mm_s2);
 }

@@ -68,8 +68,9 @@ class BaseCheck {
 
   const Rules* rules_;
   Violations* violations_;
-  std::array<double, 2> last_velocity_{};
-  double last_duration_s_ = 0.0;  // 0: at rest
+  std::array<double, 2> last_velocity_{};  // on the mean over the last move
+  std::array<double, 2> end_velocity_{};   // at its end
+  double last_duration_s_ = 0.0;           // 0: at rest
   std::size_t last_line_ = 0;
   Excess velocity_excess_;
   Excess accel_excess_;

@@ -20,7 +20,7 @@
 namespace unflex::verify {
 namespace {
 
-// One rounding step of filament, and half of one for a remainder carried in.
+// One rounding step of E, and half of one for a remainder carried in.
 constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 // A line inside a compensated run stands this near to its place: the base leads the nozzle, by up
 // to a/ω² when it accelerates.
@@ -87,6 +87,7 @@ class Verifier {
   void end_section();
   void let_original_follow(double until_s);
   void finish_reference();
+  [[nodiscard]] double filament_tolerance_mm() const;
   void check_run(bool compensated);
   bool sections_agree();
   void check_regime(const Section& input, const Section& output);
@@ -282,6 +283,15 @@ void Verifier::finish_reference() {
   let_original_follow(std::numeric_limits<double>::infinity());
 }
 
+// A step of E is as much filament as M221 makes of it.
+double Verifier::filament_tolerance_mm() const {
+  double factor = output_.following().regime->modal.flow_factor;
+  if (output_.section().regime.has_value()) {
+    factor = std::max(factor, output_.section().regime->modal.flow_factor);
+  }
+  return kFilamentTolerance_mm * std::max(1.0, factor);
+}
+
 void Verifier::check_run(bool compensated) {
   if (const Excursion::Side* const side = output_excursion_.worse_than(input_excursion_)) {
     violations_.in_output(
@@ -292,7 +302,7 @@ void Verifier::check_run(bool compensated) {
     violations_.in_output(refused_line_, "the firmware refuses so much filament on so short a way");
   }
   const double difference_mm = filament_.output_mm() - filament_.input_mm();
-  if (std::abs(difference_mm) > kFilamentTolerance_mm) {
+  if (std::abs(difference_mm) > filament_tolerance_mm()) {
     violations_.in_output(
         output_.following().line.number,
         fmt::format("the run before lays {:.5f} mm of filament instead of {:.5f} mm",

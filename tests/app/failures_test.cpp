@@ -28,6 +28,7 @@ class Failures : public ProgramTest, public ::testing::WithParamInterface<Failur
   Failures() {
     write_file(path("in.gcode"), small_print());
     write_file(path("out.gcode"), "precious\n");
+    write_file(path("good.toml"), "[limits]\nmax_accel_mm_s2 = 3000\n");
     write_file(path("bad.toml"), "[limits]\nmax_acel_mm_s2 = 1\n");
   }
 };
@@ -43,6 +44,7 @@ TEST_P(Failures, AreOneLineAndLeaveEverythingAsItWas) {
   EXPECT_EQ(names(), before);
   EXPECT_EQ(read_file(path("in.gcode")), small_print());
   EXPECT_EQ(read_file(path("out.gcode")), "precious\n");
+  EXPECT_EQ(read_file(path("good.toml")), "[limits]\nmax_accel_mm_s2 = 3000\n");
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -63,6 +65,10 @@ INSTANTIATE_TEST_SUITE_P(
                 {"compensate", "in.gcode", "-o", "out.gcode", "--a\nb"},
                 1,
                 "unflex: the following argument was not expected: --a b"},
+        Failure{"OutputIsThePrinter",
+                {"compensate", "in.gcode", "-o", "good.toml", "--printer", "good.toml"},
+                1,
+                "good.toml: is the printer file too; give the output a name of its own"},
         Failure{"BothOutputs",
                 {"compensate", "in.gcode", "-o", "out.gcode", "--in-place"},
                 1,

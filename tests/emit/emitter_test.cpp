@@ -27,6 +27,7 @@ const std::string kRaise =
 const std::string kRestore =
     "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
     "MINIMUM_CRUISE_RATIO=0.5\n";
+const std::string kEnd = ";unflex end\n";
 const std::string kShaperOff = "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\n";
 const std::string kShaperOn = "SET_INPUT_SHAPER SHAPER_FREQ_X=45 SHAPER_FREQ_Y=45\n";
 
@@ -57,7 +58,7 @@ TEST(Emitter, PutsLimitsSpeedAndShaperAroundARun) {
   ASSERT_THAT(text, StartsWith(kHead));
   EXPECT_THAT(outline(text.substr(kHead.size())),
               ElementsAre(";unflex test: compensated for Klipper, not to be compensated again\n",
-                          kShaperOff, ";unflex run\n", kRaise, "~", kRestore, "G1 F3000\n",
+                          kShaperOff, ";unflex run\n", kRaise, "~", kEnd, kRestore, "G1 F3000\n",
                           "M104 S0\n", kShaperOn));
 }
 
@@ -86,7 +87,7 @@ TEST(Emitter, CopiesAFileWithoutRunsByteForByte) {
 TEST(Emitter, KeepsAnAccelerationInsideARunAndRaisesItAgainAtOnce) {
   EXPECT_THAT(from_first_run(kHead + "G1 X10 E1\nM204 S700\nG1 Y10 E1\nG4 P1\n"),
               ElementsAre(";unflex run\n", kRaise, "~", "M204 S700\n",
-                          "SET_VELOCITY_LIMIT ACCEL=1000000\n", "~",
+                          "SET_VELOCITY_LIMIT ACCEL=1000000\n", "~", kEnd,
                           "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=700 SQUARE_CORNER_VELOCITY=5 "
                           "MINIMUM_CRUISE_RATIO=0.5\n",
                           "G1 F6000\n", "G4 P1\n", kShaperOn));
@@ -98,7 +99,7 @@ TEST(Emitter, KeepsVelocityLimitsInsideARunAndRaisesThemAgainAtOnce) {
                              "G1 Y10 E1\nG4 P1\n"),
       ElementsAre(";unflex run\n", kRaise, "~",
                   "set_velocity_limit velocity=80 square_corner_velocity=3\n",
-                  "SET_VELOCITY_LIMIT VELOCITY=1200 SQUARE_CORNER_VELOCITY=1000\n", "~",
+                  "SET_VELOCITY_LIMIT VELOCITY=1200 SQUARE_CORNER_VELOCITY=1000\n", "~", kEnd,
                   "SET_VELOCITY_LIMIT VELOCITY=80 ACCEL=5000 SQUARE_CORNER_VELOCITY=3 "
                   "MINIMUM_CRUISE_RATIO=0.5\n",
                   "G1 F6000\n", "G4 P1\n", kShaperOn));
@@ -113,18 +114,18 @@ TEST(Emitter, RestoresLimitsThatWereSetBeforeTheRun) {
 TEST(Emitter, GivesTheShaperBackBeforeTheMachineMovesByItself) {
   for (const std::string line : {"G28\n", "PARK_HEAD\n", "T1\n", "M600\n"}) {
     EXPECT_THAT(from_first_run(kHead + "G1 X10 E1\n" + line + kHead + "G1 X20 E1\n"),
-                ElementsAre(";unflex run\n", kRaise, "~", kRestore, "G1 F6000\n", kShaperOn, line,
-                            "G90\n", "M83\n", "~", kShaperOff, ";unflex run\n", kRaise, "~",
-                            kRestore, "G1 F6000\n", kShaperOn));
+                ElementsAre(";unflex run\n", kRaise, "~", kEnd, kRestore, "G1 F6000\n", kShaperOn,
+                            line, "G90\n", "M83\n", "~", kShaperOff, ";unflex run\n", kRaise, "~",
+                            kEnd, kRestore, "G1 F6000\n", kShaperOn));
   }
 }
 
 TEST(Emitter, LeavesTheShaperOffOverPausesAndRetractions) {
   EXPECT_THAT(
       from_first_run(kHead + "G1 X10 E1\nG4 P10\nM400\nG1 E-1 F2400\nG1 X20 F6000\nG1 E1\n"),
-      ElementsAre(";unflex run\n", kRaise, "~", kRestore, "G1 F6000\n", "G4 P10\n", "M400\n",
-                  "G1 E-1 F2400\n", ";unflex run\n", kRaise, "~", kRestore, "G1 F6000\n", "G1 E1\n",
-                  kShaperOn));
+      ElementsAre(";unflex run\n", kRaise, "~", kEnd, kRestore, "G1 F6000\n", "G4 P10\n", "M400\n",
+                  "G1 E-1 F2400\n", ";unflex run\n", kRaise, "~", kEnd, kRestore, "G1 F6000\n",
+                  "G1 E1\n", kShaperOn));
 }
 
 TEST(Emitter, LeavesOutTheAxisThatHasNoShaper) {
@@ -140,8 +141,9 @@ TEST(Emitter, LeavesOutTheAxisThatHasNoShaper) {
 
 TEST(Emitter, WritesRelativeFilamentAndReturnsToAbsolute) {
   const std::string input = "G90\nM82\nG92 E0\nG1 X0 Y0 Z0.2 F6000\nG1 X10 E1\nG1 Y10 E2\nG4 P1\n";
-  EXPECT_THAT(from_first_run(input), ElementsAre(";unflex run\n", kRaise, "M83\n", "~", kRestore,
-                                                 "M82\n", "G1 F6000\n", "G4 P1\n", kShaperOn));
+  EXPECT_THAT(from_first_run(input),
+              ElementsAre(";unflex run\n", kRaise, "M83\n", "~", kEnd, kRestore, "M82\n",
+                          "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
 TEST(Emitter, PutsTheZeroOfFilamentRightThatARunHasSplit) {
@@ -164,7 +166,7 @@ TEST(Emitter, PutsTheZeroOfFilamentRightThatARunHasSplit) {
 TEST(Emitter, WritesMillimetresAndAbsolutePlacesWhateverTheFileDoes) {
   EXPECT_THAT(
       from_first_run("G91\nG20\nM83\nG90\nG1 X0 Y0 Z0.01 F236\nG91\nG1 X0.4 E0.04\nG4 P1\n"),
-      ElementsAre(";unflex run\n", kRaise, "G21\n", "G90\n", "~", kRestore, "G91\n", "G20\n",
+      ElementsAre(";unflex run\n", kRaise, "G21\n", "G90\n", "~", kEnd, kRestore, "G91\n", "G20\n",
                   "G1 F236\n", "G4 P1\n", kShaperOn));
 }
 
@@ -173,9 +175,10 @@ TEST(Emitter, FollowsModesThatChangeInsideARun) {
                             "G1 X10 E1\nG91\nG1 Y10 E1\nG20\nG1 X0.1 E0.01\nG90\nM82\nG1 Y0 E0.2\n"
                             "G21\nM400\n";
   const std::vector<std::string> lines = from_first_run(input);
-  EXPECT_THAT(lines, ElementsAre(";unflex run\n", kRaise, "~", "G91\n", "G90\n", "~", "G20\n",
-                                 "G21\n", "~", "G90\n", "M82\n", "M83\n", "~", kRestore, "M82\n",
-                                 "G20\n", "G1 F236.220472441\n", "G21\n", "M400\n", kShaperOn));
+  EXPECT_THAT(
+      lines, ElementsAre(";unflex run\n", kRaise, "~", "G91\n", "G90\n", "~", "G20\n", "G21\n", "~",
+                         "G90\n", "M82\n", "M83\n", "~", kEnd, kRestore, "M82\n", "G20\n",
+                         "G1 F236.220472441\n", "G21\n", "M400\n", kShaperOn));
 }
 
 TEST(Emitter, KeepsTheLineEndingsOfTheFile) {

@@ -146,7 +146,7 @@ INSTANTIATE_TEST_SUITE_P(
                   }
                   return solve_properly(window);
                 },
-                "a solver process died"},
+                "two solver processes died of it"},
         Failing{"Throws",
                 [](const compensate::AxisWindow& window) -> Result<compensate::AxisSolution> {
                   if (is_bad(window)) {
@@ -262,6 +262,50 @@ TEST_F(Texts, EndARunExactlyWhereTheInputIs) {
   EXPECT_EQ(report_.runs_compensated, 1U);
   EXPECT_EQ(report_.violation_count, 0U);
   EXPECT_THAT(output, HasSubstr(" X134.590811296 Y119.150893041 "));
+}
+
+// Corners where the base all but stops while the plan goes on climbing.
+TEST_F(Texts, DrawASpiralOfSteepSmallTurns) {
+  std::string input = "G90\nM83\nG1 X100 Y100 Z0.2 F6000\nG4 P500\nG1 F3600\n";
+  for (int i = 1; i <= 24; ++i) {
+    input += fmt::format("G1 X{} Y{} Z{:.3f} E0.32\n", i % 4 == 1 || i % 4 == 2 ? 108 : 100,
+                         i % 4 == 2 || i % 4 == 3 ? 108 : 100, 0.2 + 0.075 * i);
+  }
+  static_cast<void>(compensated(input));
+  EXPECT_EQ(report_.runs_compensated, 1U);
+  EXPECT_LT(report_.compensated.extruding.contour_rms_mm, 5e-4);
+}
+
+TEST_F(Texts, EndARunBeforeASteepMoveThatHardlyClimbs) {
+  const std::string output = compensated(
+      "G90\nM83\nG1 X100 Y100 Z0.2 F6000\nG4 P500\nG1 X120 Y100 E1\nG1 X120 Y110 E.3\n"
+      "G1 Y110.028 Z.2008\nG1 X110 Y100 E-.3\nG1 E.3\n");
+  EXPECT_THAT(output, HasSubstr("\nG1 Y110.028 Z.2008\nG1 X110 Y100 E-.3\n"));
+  EXPECT_GT(output.find("ACCEL=5000"), output.find(";unflex end"));
+  EXPECT_LT(output.find("ACCEL=5000"), output.find("G1 Y110.028 Z.2008"));
+}
+
+// The firmware goes from the run into the wipe without a stop.
+TEST_F(Texts, PassIntoAKeptMoveAtSpeed) {
+  static_cast<void>(
+      compensated("G28\nG90\nM83\nG1 Z0.2 F600\nG1 X100 Y100 F3000\nG1 F600\nG10\n"
+                  "G1 X100.007668 Y99.995436 E0.00029\nM205 X8 Y8\nG92 E0\n"
+                  "G1 X100.015841 Y99.988248 E0.00036\nG1 X101.980734 Y101.211794 E-0.3\n"));
+}
+
+TEST_F(Texts, CountFilamentInStepsOfE) {
+  static_cast<void>(
+      compensated("G90\nM83\nM221 S300\nG1 X100 Y100 Z0.2 F6000\nG4 P500\nG1 X120 Y100 E.33333\n"
+                  "G1 X120 Y110 E.07777\nM221 S100\nG1 X100 Y110 E.123456\nG4 P1\n"));
+}
+
+TEST_F(Texts, WithBareCarriageReturnsAreWarnedOf) {
+  const JobFolder folder("G28\nG1 X10 Y10\rG1 X20 Y10\rG1 X20 Y20\nM84\n");
+  SilentProgress progress;
+  const Result<report::Report> report = compensate(folder.job(), progress);
+  ASSERT_TRUE(report.has_value());
+  ASSERT_FALSE(report->warnings.empty());
+  EXPECT_THAT(report->warnings.front(), StartsWith("in.gcode:2: warning: a carriage return"));
 }
 
 TEST_F(Texts, KeepRunsThatThePlanDrivesHarderThanTheBaseMayBe) {

@@ -183,8 +183,26 @@ TEST(WorkerPool, SurvivesTheDeathOfAnIdleWorker) {
   pool.submit(2, window(kSolve, 0.5));
   const auto taken = take_all(pool);
   ASSERT_EQ(taken.size(), 2U);
-  ASSERT_TRUE(taken.at(2).has_value());
-  EXPECT_EQ(taken.at(2)->objective, 0.5);
+  for (const std::size_t ticket : {1U, 2U}) {
+    ASSERT_TRUE(taken.at(ticket).has_value()) << taken.at(ticket).error().message;
+    EXPECT_EQ(taken.at(ticket)->objective, 0.25 * static_cast<double>(ticket));
+  }
+}
+
+// As when the system runs out of memory: the window itself is all right.
+TEST(WorkerPool, SolvesAWindowAgainWhoseWorkerWasKilled) {
+  WorkerPool pool = pool_of(1);
+  std::ifstream children(fmt::format("/proc/self/task/{}/children", getpid()));
+  pid_t worker = -1;
+  if (!(children >> worker)) {
+    GTEST_SKIP() << "the kernel does not list children";
+  }
+  pool.submit(1, window(kSolve, 2.0));
+  ASSERT_EQ(kill(worker, SIGKILL), 0);
+  const auto taken = take_all(pool);
+  ASSERT_EQ(taken.size(), 1U);
+  ASSERT_TRUE(taken.at(1).has_value()) << taken.at(1).error().message;
+  EXPECT_EQ(taken.at(1)->objective, 2.0);
 }
 
 TEST(WorkerPool, GoesOnAfterBeingMoved) {

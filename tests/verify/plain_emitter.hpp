@@ -101,7 +101,8 @@ class PlainEmitter {
 
   void end_run() {
     if (in_run_) {
-      text_ += set_limits(limits_.limits()) + fmt::format("G1 F{}\n", 60.0 * feed_mm_s_);
+      text_ += ";unflex end\n" + set_limits(limits_.limits()) +
+               fmt::format("G1 F{}\n", 60.0 * feed_mm_s_);
     }
     in_run_ = false;
   }

@@ -78,18 +78,22 @@ TEST_F(Sections, OnlyTheOutputAnnouncesCompensatedRuns) {
 }
 
 TEST_F(Sections, AnAnnouncementHoldsOverTheStopThatSetsUpTheRun) {
-  EXPECT_THAT(walk(std::string(kStart) +
-                       ";unflex run\nSET_INPUT_SHAPER SHAPER_FREQ_X=0\nG1 X20 E1\nG1 Z2\nG1 X10\n",
+  EXPECT_THAT(walk(std::string(kStart) + ";unflex run\nSET_INPUT_SHAPER SHAPER_FREQ_X=0\nG1 X20 "
+                                         "E1\n;unflex end\nG1 Z2\nG1 X10\n",
                    true),
               ElementsAre("run0", "move1", "run0", "move1", "compensated0", "barrier",
                           "compensated1", "move1", "run1", "end"));
 }
 
-TEST_F(Sections, ARoundingStepOfHeightDoesNotEndACompensatedRun) {
-  const std::string text = std::string(kStart) + ";unflex run\nG1 X20 E1\nG1 X20.003 Z0.2002\n";
-  EXPECT_THAT(walk(text, true),
+TEST_F(Sections, ACompensatedRunLastsUntilItsEndIsAnnounced) {
+  const std::string run = ";unflex run\nG1 X20 E1\nG1 X20.003 Z0.2002\n";
+  const std::string steep = "G1 X20.004 Z0.2003\n";
+  EXPECT_THAT(walk(kStart + run, true),
               ElementsAre("run0", "move1", "run0", "move1", "compensated2", "end"));
-  EXPECT_THAT(walk(text, false),
+  EXPECT_THAT(
+      walk(kStart + run + ";unflex end\n" + steep, true),
+      ElementsAre("run0", "move1", "run0", "move1", "compensated2", "move1", "run0", "end"));
+  EXPECT_THAT(walk(kStart + run, false),
               ElementsAre("run0", "move1", "run0", "move1", "run1", "move1", "run0", "end"));
 }
 
