@@ -60,7 +60,7 @@ void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
   fmt::format_to(out, "accelerations {:.0f} to {:.0f} mm/s² in force during moves\n",
                  i.lowest_accel_mm_s2, i.highest_accel_mm_s2);
   fmt::format_to(out, "printer       {}, {} mm/s, {} mm/s², corners {} mm/s\n",
-                 machine::to_string(s.printer.firmware), s.limits.max_velocity_mm_s,
+                 to_string(s.printer.firmware), s.limits.max_velocity_mm_s,
                  s.limits.max_accel_mm_s2, s.limits.square_corner_velocity_mm_s);
   fmt::format_to(out, "dynamics      X {:.4g} Hz, ζ {:.3g}; Y {:.4g} Hz, ζ {:.3g}\n",
                  s.dynamics_x.freq_hz, s.dynamics_x.damping_ratio, s.dynamics_y.freq_hz,
@@ -86,7 +86,7 @@ std::string inspection_json(const Inspection& i, const std::string& input,
   json["command"] = "inspect";
   json["version"] = version();
   json["input"] = input;
-  json["firmware"] = machine::to_string(settings.printer.firmware);
+  json["firmware"] = to_string(settings.printer.firmware);
   json["printer"] = report::settings_json(settings_in_force(settings));
   json["dialect"] = i.dialect;
   json["print_time_s"] = {

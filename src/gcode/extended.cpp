@@ -112,7 +112,10 @@ void Interpreter::velocity_limit(Event& event) {
   }
   if (velocity.given || accel.given || corner.given || cruise.given) {
     event.kind = EventKind::limits;
-    event.limits = {velocity.value, accel.value, corner.value, cruise.value};
+    event.limits.max_velocity_mm_s = velocity.value;
+    event.limits.max_accel_mm_s2 = accel.value;
+    event.limits.square_corner_velocity_mm_s = corner.value;
+    event.limits.minimum_cruise_ratio = cruise.value;
   }
 }
 

@@ -29,18 +29,6 @@ double settling_time_s(const AxisDynamics& axis) {
 
 }  // namespace
 
-std::string_view to_string(Firmware firmware) {
-  switch (firmware) {
-    case Firmware::klipper:
-      return "klipper";
-    case Firmware::marlin:
-      return "marlin";
-    case Firmware::rrf:
-      return "rrf";
-  }
-  return "";
-}
-
 double Settings::max_z_velocity_mm_s() const {
   return limits.max_z_velocity_mm_s.value_or(limits.max_velocity_mm_s);
 }

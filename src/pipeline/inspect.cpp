@@ -56,7 +56,8 @@ std::string command_name(const gcode::Command& command) {
 class Inspector {
  public:
   Inspector(Inspection& result, const machine::Settings& settings)
-      : result_(&result), planner_(planner_limits(settings), fixed_limits(settings)) {
+      : result_(&result),
+        planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))) {
     result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
     result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
     result_->lowest_accel_mm_s2 = std::numeric_limits<double>::infinity();
@@ -113,15 +114,15 @@ class Inspector {
 
   // By the firmware's own plan, which unlike that of the pieces goes through lifts without a stop.
   void plan(const gcode::Event& event) {
-    planner_.apply(event.limits);
+    planner_->apply(event.limits);
     for (const gcode::Segment& segment : event.segments) {
-      planner_.add(segment);
+      planner_->add(segment);
     }
     if (event.kind == gcode::EventKind::barrier) {
-      planner_.stop();
+      planner_->stop();
     }
     planned_.clear();
-    planner_.take(planned_);
+    planner_->take(planned_);
     for (const planner::PlannedMove& move : planned_) {
       add_move(move);
     }
@@ -151,7 +152,7 @@ class Inspector {
   }
 
   Inspection* result_;
-  planner::KlipperPlanner planner_;
+  std::unique_ptr<planner::Planner> planner_;
   std::vector<planner::PlannedMove> planned_;
   std::string slicers_;
   bool absolute_e_ = true;
@@ -168,7 +169,7 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
   const double bytes = static_cast<double>(std::filesystem::file_size(job.input));
   const compensate::Setup setup = compensate_setup(job.settings);
   PieceReader reader(input, job.input_name, interpreter_options(job.settings),
-                     planner_limits(job.settings), fixed_limits(job.settings));
+                     planner_limits(job.settings), firmware_config(job.settings));
   Inspection result;
   Inspector inspector(result, job.settings);
   for (;;) {

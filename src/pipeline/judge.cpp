@@ -74,20 +74,21 @@ dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
 Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_view text,
               gcode::Interpreter printer, const planner::Limits& printer_limits,
               const dynamics::NozzleXY& nozzle, const verify::Rules& rules) {
-  planner::KlipperPlanner planner(printer_limits, rules.fixed);
+  const std::unique_ptr<planner::Planner> planner =
+      planner::make_planner(printer_limits, rules.fixed);
   std::size_t line = 0;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
     const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), ++line});
     text.remove_prefix(end);
-    planner.apply(event.limits);
+    planner->apply(event.limits);
     for (const gcode::Segment& segment : event.segments) {
-      planner.add(segment);
+      planner->add(segment);
     }
   }
-  planner.stop();
+  planner->stop();
   std::vector<planner::PlannedMove> replayed;
-  planner.take(replayed);
+  planner->take(replayed);
 
   Verdict verdict;
   if (std::optional<std::string> broken = verify::broken_rule(original, replayed, rules)) {

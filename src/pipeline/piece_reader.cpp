@@ -55,8 +55,10 @@ void count_kept_moves(const gcode::Event& event, std::map<std::string, std::size
 
 PieceReader::PieceReader(std::istream& input, std::string name,
                          gcode::InterpreterOptions interpreter, planner::Limits limits,
-                         planner::FixedLimits fixed)
-    : lines_(input, std::move(name)), interpreter_(interpreter), planner_(limits, fixed) {}
+                         planner::FirmwareConfig fixed)
+    : lines_(input, std::move(name)),
+      interpreter_(interpreter),
+      planner_(planner::make_planner(limits, fixed)) {}
 
 Result<bool> PieceReader::next(Piece& piece) {
   gcode::Event event;
@@ -124,7 +126,7 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
       warnings_.push_back({{lines_.name(), event.line.number}, std::move(warning)});
     }
   }
-  planner_.apply(event.limits);
+  planner_->apply(event.limits);
   return true;
 }
 
@@ -133,10 +135,10 @@ void PieceReader::append(gcode::Event event) {
   append_between();
   std::size_t count = 0;
   for (const gcode::Segment& segment : event.segments) {
-    count += planner_.add(segment) ? 1 : 0;
+    count += planner_->add(segment) ? 1 : 0;
   }
   if (event.kind == gcode::EventKind::barrier) {
-    planner_.stop();
+    planner_->stop();
   }
   open_.events.push_back(std::move(event));
   open_.move_counts.push_back(count);
@@ -155,8 +157,8 @@ void PieceReader::close(Piece& piece) {
   if (open_.events.empty()) {
     append_between();
   }
-  planner_.stop();
-  planner_.take(open_.moves);
+  planner_->stop();
+  planner_->take(open_.moves);
   piece = std::exchange(open_, Piece{});
 }
 

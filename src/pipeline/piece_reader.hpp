@@ -29,7 +29,7 @@ void count_kept_moves(const gcode::Event& event, std::map<std::string, std::size
 class PieceReader {
  public:
   PieceReader(std::istream& input, std::string name, gcode::InterpreterOptions interpreter,
-              planner::Limits limits, planner::FixedLimits fixed);
+              planner::Limits limits, planner::FirmwareConfig fixed);
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
   // read, was written by unflex, or ends without a single G-code command in it.
@@ -37,7 +37,7 @@ class PieceReader {
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
-  [[nodiscard]] const planner::Limits& limits() const { return planner_.limits(); }
+  [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
 
  private:
   Result<bool> read_event(gcode::Event& event);
@@ -47,7 +47,7 @@ class PieceReader {
 
   gcode::LineReader lines_;
   gcode::Interpreter interpreter_;
-  planner::KlipperPlanner planner_;
+  std::unique_ptr<planner::Planner> planner_;
   Piece open_;                         // being filled
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;

@@ -60,14 +60,23 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
 }
 
 planner::Limits planner_limits(const machine::Settings& settings) {
-  return {settings.limits.max_velocity_mm_s, settings.limits.max_accel_mm_s2,
-          settings.limits.square_corner_velocity_mm_s, settings.limits.minimum_cruise_ratio};
+  planner::Limits limits;
+  limits.max_velocity_mm_s = settings.limits.max_velocity_mm_s;
+  limits.max_accel_mm_s2 = settings.limits.max_accel_mm_s2;
+  limits.square_corner_velocity_mm_s = settings.limits.square_corner_velocity_mm_s;
+  limits.minimum_cruise_ratio = settings.limits.minimum_cruise_ratio;
+  return limits;
 }
 
-planner::FixedLimits fixed_limits(const machine::Settings& settings) {
-  return {settings.max_z_velocity_mm_s(), settings.max_z_accel_mm_s2(),
-          settings.max_extrude_only_velocity_mm_s(), settings.max_extrude_only_accel_mm_s2(),
-          settings.extruder.instantaneous_corner_velocity_mm_s};
+planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
+  planner::FirmwareConfig config;
+  config.firmware = settings.printer.firmware;
+  config.max_z_velocity_mm_s = settings.max_z_velocity_mm_s();
+  config.max_z_accel_mm_s2 = settings.max_z_accel_mm_s2();
+  config.max_extrude_only_velocity_mm_s = settings.max_extrude_only_velocity_mm_s();
+  config.max_extrude_only_accel_mm_s2 = settings.max_extrude_only_accel_mm_s2();
+  config.instantaneous_corner_velocity_mm_s = settings.extruder.instantaneous_corner_velocity_mm_s;
+  return config;
 }
 
 compensate::Setup compensate_setup(const machine::Settings& settings) {
@@ -106,10 +115,13 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   emit::EmitOptions options;
   options.interpreter = interpreter_options(settings);
   options.printer_limits = planner_limits(settings);
-  options.fixed = fixed_limits(settings);
+  options.fixed = firmware_config(settings);
   // Room above the base's own limit, so that the firmware never slows a line down for it.
-  options.run_limits = {2.0 * settings.base_max_velocity_mm_s(), settings.emit.accel_mm_s2,
-                        settings.emit.square_corner_velocity_mm_s, 0.0};
+  options.run_limits = options.printer_limits;
+  options.run_limits.max_velocity_mm_s = 2.0 * settings.base_max_velocity_mm_s();
+  options.run_limits.max_accel_mm_s2 = settings.emit.accel_mm_s2;
+  options.run_limits.square_corner_velocity_mm_s = settings.emit.square_corner_velocity_mm_s;
+  options.run_limits.minimum_cruise_ratio = 0.0;
   options.tolerance_mm = settings.emit.tolerance_um * 1e-3;
   options.quick_line_s = 0.25 / std::max(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
   options.min_line_s =
@@ -123,7 +135,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   verify::Rules rules;
   rules.interpreter = interpreter_options(settings);
   rules.limits = planner_limits(settings);
-  rules.fixed = fixed_limits(settings);
+  rules.fixed = firmware_config(settings);
   const double radius = settings.extruder.filament_diameter_mm / 2.0;
   rules.max_extrude_ratio =
       settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius * radius);

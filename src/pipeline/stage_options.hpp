@@ -15,7 +15,7 @@ namespace unflex::pipeline {
 
 [[nodiscard]] gcode::InterpreterOptions interpreter_options(const machine::Settings& settings);
 [[nodiscard]] planner::Limits planner_limits(const machine::Settings& settings);
-[[nodiscard]] planner::FixedLimits fixed_limits(const machine::Settings& settings);
+[[nodiscard]] planner::FirmwareConfig firmware_config(const machine::Settings& settings);
 [[nodiscard]] compensate::Setup compensate_setup(const machine::Settings& settings);
 // The same for one run: where the travel of an axis is not known, the base stays above 0 if the run
 // does, since many machines end there.

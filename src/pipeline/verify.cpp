@@ -53,7 +53,7 @@ report::Report new_report(std::string command, const Job& job) {
   report.version = UNFLEX_VERSION;
   report.input = job.input_name;
   report.output = job.output_name;
-  report.firmware = machine::to_string(job.settings.printer.firmware);
+  report.firmware = to_string(job.settings.printer.firmware);
   for (machine::SettingRow& setting : machine::rows(job.settings)) {
     report.printer.push_back(
         {std::move(setting.key), std::move(setting.value), std::move(setting.origin)});

@@ -12,20 +12,20 @@ constexpr std::size_t kTakeEvery = 32;
 
 void PlanQueue::add(const std::vector<gcode::Segment>& segments) {
   for (const gcode::Segment& segment : segments) {
-    if (planner_.add(segment)) {
+    if (planner_->add(segment)) {
       items_.push_back(Item::move);
       ++untaken_;
     }
   }
   if (untaken_ >= kTakeEvery) {
-    planner_.take(planned_);
+    planner_->take(planned_);
     untaken_ = 0;
   }
 }
 
 void PlanQueue::stop() {
-  planner_.stop();
-  planner_.take(planned_);
+  planner_->stop();
+  planner_->take(planned_);
   untaken_ = 0;
 }
 

@@ -11,11 +11,11 @@ namespace unflex::verify {
 
 class PlanQueue {
  public:
-  PlanQueue(const planner::Limits& limits, const planner::FixedLimits& fixed)
-      : planner_(limits, fixed) {}
+  PlanQueue(const planner::Limits& limits, const planner::FirmwareConfig& fixed)
+      : planner_(planner::make_planner(limits, fixed)) {}
 
-  void apply(const gcode::LimitChange& change) { planner_.apply(change); }
-  [[nodiscard]] const planner::Limits& limits() const { return planner_.limits(); }
+  void apply(const gcode::LimitChange& change) { planner_->apply(change); }
+  [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
   void add(const std::vector<gcode::Segment>& segments);
   void stop();
   // What is added from now on belongs to the next section.
@@ -37,7 +37,7 @@ class PlanQueue {
  private:
   enum class Item { move, section_end };
 
-  planner::KlipperPlanner planner_;
+  std::unique_ptr<planner::Planner> planner_;
   std::deque<Item> items_;  // what comes next, in the order of the file
   std::vector<planner::PlannedMove> planned_;
   std::size_t used_ = 0;

@@ -45,7 +45,7 @@ bool is_known_addition(std::string_view content) {
 }
 
 Replay::Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
-               const planner::Limits& limits, const planner::FixedLimits& fixed, bool in_output)
+               const planner::Limits& limits, const planner::FirmwareConfig& fixed, bool in_output)
     : reader_(stream, std::move(name)),
       interpreter_(interpreter),
       plan_(limits, fixed),

@@ -64,7 +64,7 @@ class Replay {
   // in_output: this is the emitted file. Then runs may be announced as compensated, which is
   // ignored in the sliced file, and there is no resting plan.
   Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
-         const planner::Limits& limits, const planner::FixedLimits& fixed, bool in_output);
+         const planner::Limits& limits, const planner::FirmwareConfig& fixed, bool in_output);
 
   // The next move of the current section; false at its end.
   [[nodiscard]] bool next(planner::PlannedMove& move);

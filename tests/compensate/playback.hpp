@@ -12,7 +12,7 @@
 #include "unflex/compensate/run.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
-#include "unflex/planner/planner.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::compensate::testing {
 

@@ -10,6 +10,7 @@
 
 #include "plain_emission.hpp"
 #include "strokes.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::emit {
 namespace {

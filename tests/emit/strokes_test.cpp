@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plain_base.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::emit {
 namespace {

@@ -25,7 +25,7 @@
 
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
-#include "unflex/planner/planner.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -68,7 +68,7 @@ Plan plan_file(const fs::path& path) {
   options.firmware_retraction = false;
   gcode::Interpreter interpreter(options);
   gcode::LineReader reader(stream, path.string());
-  KlipperPlanner planner(Limits{}, FixedLimits{});
+  KlipperPlanner planner(Limits{}, FirmwareConfig{});
   gcode::Line line;
   double dwell_since_last_move_s = 0.0;
   bool pressure_advance = false;

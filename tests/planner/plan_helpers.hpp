@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "unflex/planner/planner.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::planner::testing {
 
@@ -29,7 +29,7 @@ inline std::vector<gcode::Segment> polyline(const std::vector<gcode::Position>& 
 
 // The plan of segments that begin and end at a standstill.
 inline std::vector<PlannedMove> plan(const std::vector<gcode::Segment>& segments, Limits limits,
-                                     FixedLimits fixed = {}) {
+                                     FirmwareConfig fixed = {}) {
   KlipperPlanner planner(limits, fixed);
   for (const gcode::Segment& each : segments) planner.add(each);
   planner.stop();

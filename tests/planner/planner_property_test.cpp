@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "planner/plan_helpers.hpp"
-#include "unflex/planner/planner.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -94,7 +94,7 @@ Limits scaled(Limits limits, double factor) {
   return limits;
 }
 
-FixedLimits scaled(FixedLimits fixed, double factor) {
+FirmwareConfig scaled(FirmwareConfig fixed, double factor) {
   fixed.max_z_velocity_mm_s *= factor;
   fixed.max_z_accel_mm_s2 *= factor * factor;
   fixed.max_extrude_only_velocity_mm_s *= factor;
@@ -114,7 +114,7 @@ enum class Taking { always, at_stops, at_the_end };
 
 // The plan with all speeds `factor` times as high and all accelerations factor² times.
 std::vector<PlannedMove> run(const std::vector<Step>& program, Taking taking, double factor = 1.0) {
-  FixedLimits slow_z;
+  FirmwareConfig slow_z;
   slow_z.max_z_velocity_mm_s = 15.0;
   slow_z.max_z_accel_mm_s2 = 150.0;
   KlipperPlanner planner(scaled(Limits{}, factor), scaled(slow_z, factor));

@@ -1,11 +1,10 @@
-#include "unflex/planner/planner.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
 #include "planner/plan_helpers.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -146,7 +145,7 @@ TEST(Planner, BrakesOverSeveralShortMovesBeforeAStop) {
 TEST(Planner, LimitsAJunctionByTheChangeOfExtrusionPerMillimetre) {
   const gcode::Position a{100.0, 0.0, 0.0, 5.0};
   const gcode::Position b{200.0, 0.0, 0.0, 8.0};  // 0.05, then 0.03 mm/mm
-  FixedLimits fixed;
+  FirmwareConfig fixed;
   const auto moves =
       plan({segment({}, a, 200.0), segment(a, b, 200.0)}, limits_with(1000.0), fixed);
   EXPECT_NEAR(moves[1].start_v_mm_s, 1.0 / 0.02, 1e-9);
@@ -169,19 +168,19 @@ TEST(Planner, StopsForAMoveOfTheExtruderAlone) {
   EXPECT_FALSE(moves[1].kinematic);
   EXPECT_DOUBLE_EQ(moves[1].length_mm, 10.0);
   EXPECT_EQ(moves[1].direction, (std::array<double, 4>{0.0, 0.0, 0.0, 1.0}));
-  EXPECT_DOUBLE_EQ(moves[1].accel_mm_s2, FixedLimits{}.max_extrude_only_accel_mm_s2);
-  EXPECT_DOUBLE_EQ(moves[1].cruise_v_mm_s, FixedLimits{}.max_extrude_only_velocity_mm_s);
+  EXPECT_DOUBLE_EQ(moves[1].accel_mm_s2, FirmwareConfig{}.max_extrude_only_accel_mm_s2);
+  EXPECT_DOUBLE_EQ(moves[1].cruise_v_mm_s, FirmwareConfig{}.max_extrude_only_velocity_mm_s);
 }
 
 TEST(Planner, LimitsARetractionDuringAMoveByTheExtruder) {
-  const FixedLimits fixed;
+  const FirmwareConfig fixed;
   const auto moves = plan({segment({}, {100.0, 0.0, 0.0, -50.0}, 300.0)}, Limits{}, fixed);
   EXPECT_DOUBLE_EQ(moves[0].accel_mm_s2, fixed.max_extrude_only_accel_mm_s2 / 0.5);
   EXPECT_DOUBLE_EQ(moves[0].cruise_v_mm_s, fixed.max_extrude_only_velocity_mm_s / 0.5);
 }
 
 TEST(Planner, LimitsExtrusionDuringAMoveOfZAloneButNotDuringOneInXy) {
-  const FixedLimits fixed;
+  const FirmwareConfig fixed;
   const auto up = plan({segment({}, {0.0, 0.0, 100.0, 50.0}, 300.0)}, Limits{}, fixed);
   EXPECT_DOUBLE_EQ(up[0].accel_mm_s2, fixed.max_extrude_only_accel_mm_s2 / 0.5);
   const auto along = plan({segment({}, {100.0, 0.0, 0.0, 50.0}, 300.0)}, Limits{}, fixed);
@@ -190,7 +189,7 @@ TEST(Planner, LimitsExtrusionDuringAMoveOfZAloneButNotDuringOneInXy) {
 }
 
 TEST(Planner, LimitsMovesWithZByTheSharesOfZ) {
-  FixedLimits fixed;
+  FirmwareConfig fixed;
   fixed.max_z_velocity_mm_s = 12.0;
   fixed.max_z_accel_mm_s2 = 120.0;
   const auto moves = plan({segment({}, {40.0, 0.0, 30.0, 0.0}, 300.0)}, Limits{}, fixed);

@@ -13,7 +13,7 @@
 
 #include "unflex/gcode/compensable.hpp"
 #include "unflex/gcode/line.hpp"
-#include "unflex/planner/planner.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::verify::testing {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "unflex/gcode/interpreter.hpp"
-#include "unflex/planner/planner.hpp"
+#include "unflex/planner/klipper_planner.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::verify::testing {
@@ -22,7 +22,7 @@ struct Point {
 // and the filament of a point are those of the move that leads there.
 inline std::vector<planner::PlannedMove> plan_path(const std::vector<Point>& points,
                                                    const planner::Limits& limits) {
-  planner::KlipperPlanner planner(limits, planner::FixedLimits{});
+  planner::KlipperPlanner planner(limits, planner::FirmwareConfig{});
   gcode::Segment segment;
   segment.end_mm = {points.front().x_mm, points.front().y_mm, 0.0, 0.0};
   for (std::size_t i = 1; i < points.size(); ++i) {

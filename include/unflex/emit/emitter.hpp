@@ -22,7 +22,7 @@ inline constexpr std::string_view kComment = ";unflex";
 struct EmitOptions {
   gcode::InterpreterOptions interpreter;
   planner::Limits printer_limits;  // in force when the file starts
-  planner::FixedLimits fixed;
+  planner::FirmwareConfig fixed;
   planner::Limits run_limits;  // inside a compensated run
   double tolerance_mm = 2e-3;  // of replacing the base's path by chords, at equal time
   // Lines up to this long may use the whole tolerance, longer ones less by the square of their

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "unflex/core/error.hpp"
+#include "unflex/core/firmware.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/line.hpp"
 
@@ -39,12 +39,27 @@ struct Segment {
   [[nodiscard]] bool extruding() const { return delta(E) > 0.0 && length_xy_mm() > 0.0; }
 };
 
-// New planner limits; those not set stay as they are.
+// Per axis X Y Z E, where a line gives one.
+using AxisValues = std::array<std::optional<double>, 4>;
+
+// New planner limits; those not set stay as they are. planner::Limits says which are whose.
 struct LimitChange {
   std::optional<double> max_velocity_mm_s;
   std::optional<double> max_accel_mm_s2;
   std::optional<double> square_corner_velocity_mm_s;
   std::optional<double> minimum_cruise_ratio;
+  AxisValues axis_max_velocity_mm_s;
+  AxisValues axis_max_accel_mm_s2;
+  AxisValues axis_jerk_mm_s;
+  std::optional<double> print_accel_mm_s2;
+  std::optional<double> travel_accel_mm_s2;
+  std::optional<double> retract_accel_mm_s2;
+  std::optional<double> junction_deviation_mm;
+  std::optional<double> min_velocity_mm_s;
+  std::optional<double> min_travel_velocity_mm_s;
+  std::optional<double> min_segment_time_s;
+  std::optional<double> min_movement_velocity_mm_s;
+  std::optional<int> jerk_policy;
 };
 
 enum class EventKind {
@@ -68,6 +83,7 @@ struct Event {
 
 // What the firmware's configuration decides about the meaning of a line.
 struct InterpreterOptions {
+  Firmware firmware = Firmware::klipper;
   // [firmware_retraction] is configured: G10 and G11 move the filament (and so stop the machine);
   // otherwise Klipper ignores them.
   bool firmware_retraction = true;

@@ -10,11 +10,9 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/core/firmware.hpp"
 
 namespace unflex::machine {
-
-enum class Firmware { klipper, marlin, rrf };
-[[nodiscard]] std::string_view to_string(Firmware firmware);
 
 struct Range {
   double min = 0.0;
@@ -72,11 +70,11 @@ struct BaseSettings {
 };
 
 struct SolveSettings {
-  double window_s = 2.0;        // core of a window in a run too long for one
-  double overlap_s = 0.06;      // pre-roll and post-roll of such a window
-  double lead_in_ms = 0.0;      // the base may start this much before the plan does
+  double window_s = 2.0;          // core of a window in a run too long for one
+  double overlap_s = 0.06;        // pre-roll and post-roll of such a window
+  double lead_in_ms = 0.0;        // the base may start this much before the plan does
   std::optional<double> tail_ms;  // the base may settle this much longer; unset: max(8ζ/ω, 2 ms)
-  double travel_weight = 0.1;   // of the tracking error where nothing is extruded
+  double travel_weight = 0.1;     // of the tracking error where nothing is extruded
   double jerk_weight = 1.5;       // regularisation (docs/theory.md)
 };
 

@@ -1,6 +1,5 @@
 // Velocity planning with lookahead, as the firmware does it.
 //
-// Notation (Klipper's klippy/toolhead.py, "Move" and "LookAheadQueue"):
 //   v_s, v_c, v_e   speed at the start, in the cruise and at the end of a move, mm/s
 //   a               acceleration of both ramps, mm/s²
 //   T_a, T_c, T_d   durations of acceleration, cruise and deceleration, s
@@ -8,32 +7,57 @@
 
 #include <array>
 #include <cstddef>
-#include <optional>
+#include <memory>
 #include <vector>
 
+#include "unflex/core/firmware.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::planner {
 
-// Limits a file may change in its middle.
+// Limits a file may change in its middle. Arrays are per axis X Y Z E.
 struct Limits {
+  // Klipper.
   double max_velocity_mm_s = 300.0;
   double max_accel_mm_s2 = 5000.0;
   double square_corner_velocity_mm_s = 5.0;
   double minimum_cruise_ratio = 0.5;
+  // Marlin and RepRapFirmware.
+  std::array<double, 4> axis_max_velocity_mm_s{300.0, 300.0, 5.0, 25.0};       // M203
+  std::array<double, 4> axis_max_accel_mm_s2{3000.0, 3000.0, 100.0, 10000.0};  // M201
+  std::array<double, 4> axis_jerk_mm_s{10.0, 10.0, 0.3, 5.0};                  // M205 X Y Z E, M566
+  double print_accel_mm_s2 = 3000.0;                                           // M204 P
+  double travel_accel_mm_s2 = 3000.0;                                          // M204 T
+  // Marlin.
+  double retract_accel_mm_s2 = 3000.0;    // M204 R: of filament alone
+  double junction_deviation_mm = 0.013;   // M205 J
+  double min_velocity_mm_s = 0.0;         // M205 S: of moves with filament
+  double min_travel_velocity_mm_s = 0.0;  // M205 T
+  double min_segment_time_s = 0.02;       // M205 B
+  // RepRapFirmware.
+  double min_movement_velocity_mm_s = 0.5;  // M203 I
+  int jerk_policy = 0;                      // M566 P
+
+  friend bool operator==(const Limits&, const Limits&) = default;
 };
 
 // Puts the limits that the change sets in place of those in force.
 void apply(const gcode::LimitChange& change, Limits& limits);
 
-// Limits only the firmware's configuration sets. Defaults are Klipper's for a 0.4 mm nozzle, 1.75
-// mm filament, max_velocity 300 and max_accel 5000.
-struct FixedLimits {
+// What only the firmware's configuration decides.
+struct FirmwareConfig {
+  Firmware firmware = Firmware::klipper;
+  // Klipper; for a 0.4 mm nozzle, 1.75 mm filament, max_velocity 300 and max_accel 5000.
   double max_z_velocity_mm_s = 300.0;
   double max_z_accel_mm_s2 = 5000.0;
   double max_extrude_only_velocity_mm_s = 79.8243241107433;
   double max_extrude_only_accel_mm_s2 = 1330.40540184572;
   double instantaneous_corner_velocity_mm_s = 1.0;
+  // Marlin and RepRapFirmware, per axis X Y Z E.
+  std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 93.0};
+  // Marlin.
+  bool classic_jerk = false;      // CLASSIC_JERK instead of junction deviation
+  int min_steps_per_segment = 6;  // MIN_STEPS_PER_SEGMENT
 };
 
 // A segment with its trapezoid.
@@ -60,61 +84,40 @@ struct PlannedMove {
   [[nodiscard]] double time_s(double distance_mm) const;
 };
 
-// Klipper's planner: junction speeds by square-corner velocity, approximated centripetal speed and
-// the extruder's instantaneous corner velocity; forward and backward pass; minimum cruise ratio.
-// Moves come out in order once nothing that follows can change them. The plan does not depend on
-// when, or how often, take() is called.
-class KlipperPlanner {
+// A firmware's planner. Moves come out in order once nothing that follows can change them. The plan
+// does not depend on when, or how often, take() is called.
+class Planner {
  public:
-  KlipperPlanner(Limits limits, FixedLimits fixed);
+  virtual ~Planner() = default;
+  Planner(const Planner&) = delete;
+  Planner& operator=(const Planner&) = delete;
 
   // Limits for the moves added from now on.
-  void apply(const gcode::LimitChange& change);
+  void apply(const gcode::LimitChange& change) { planner::apply(change, limits_); }
   [[nodiscard]] const Limits& limits() const { return limits_; }
 
   // Queues a segment, whose feed must be above zero. False, and nothing queued, if it has no length
   // at all.
-  bool add(const gcode::Segment& segment);
+  virtual bool add(const gcode::Segment& segment) = 0;
 
   // The machine comes to rest after the last queued move.
-  void stop();
+  virtual void stop() = 0;
 
   // Moves the moves that are final to the end of `out` and returns how many. After stop() these
   // are all moves queued before it.
-  std::size_t take(std::vector<PlannedMove>& out);
+  virtual std::size_t take(std::vector<PlannedMove>& out) = 0;
 
   // Moves queued and not yet taken.
-  [[nodiscard]] std::size_t pending() const;
+  [[nodiscard]] virtual std::size_t pending() const = 0;
 
- private:
-  // What the lookahead keeps of a queued move. Speeds are squared, mm²/s², because v² changes
-  // linearly along a ramp. "Smooth" is the same motion at the lower acceleration that
-  // minimum_cruise_ratio leaves, (1 − ratio)·a.
-  struct Junction {
-    double max_start_v2 = 0.0;         // at the start: the junction's limit, or what is reachable
-    double max_smooth_start_v2 = 0.0;  // the same with smooth acceleration
-    double max_cruise_v2 = 0.0;
-    double delta_v2 = 0.0;  // 2aL: the most by which v² can change within the move
-    double smooth_delta_v2 = 0.0;
-    double junction_deviation_mm = 0.0;
-    // Written by the backward pass. No cruise speed: that of the move before is carried over.
-    double start_v2 = 0.0;
-    double end_v2 = 0.0;
-    std::optional<double> cruise_v2;
-  };
-
-  void limit_speed(double velocity_mm_s, double accel_mm_s2);
-  void limit_by_axes();
-  void join_to_previous();
-  std::size_t backward_pass(bool lazy);
-  void forward_pass(std::size_t count);
-  void plan(bool lazy);
+ protected:
+  explicit Planner(const Limits& limits) : limits_(limits) {}
 
   Limits limits_;
-  FixedLimits fixed_;
-  std::vector<PlannedMove> moves_;   // final ones first, then those in lookahead_
-  std::vector<Junction> lookahead_;  // of the last lookahead_.size() entries of moves_
-  double until_plan_s_;  // shortest time of moves still to be queued before the next lazy planning
 };
+
+// The planner of config.firmware.
+[[nodiscard]] std::unique_ptr<Planner> make_planner(const Limits& limits,
+                                                    const FirmwareConfig& config);
 
 }  // namespace unflex::planner

@@ -28,7 +28,7 @@ struct TravelLimits {
 struct Rules {
   gcode::InterpreterOptions interpreter;
   planner::Limits limits;
-  planner::FixedLimits fixed;
+  planner::FirmwareConfig fixed;
   double max_extrude_ratio = 0.266080;  // mm of filament per mm of path a firmware accepts
   double nozzle_diameter_mm = 0.4;
   NozzleModel nozzle;
