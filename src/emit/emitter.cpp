@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
 #include <cmath>
 #include <utility>
 
@@ -35,6 +36,15 @@ void append_coordinate(std::string& text, char letter, double value) {
   const double on_grid =
       static_cast<double>(to_scaled(value, kPositionDecimals)) / power_of_ten(kPositionDecimals);
   append_word(text, letter, value, same(on_grid, value) ? kPositionDecimals : kExactDecimals);
+}
+
+// Without the zero before the point, as slicers write it: most lines carry less than a millimetre.
+void append_filament(std::string& text, double value) {
+  append_word(text, 'E', value, kFilamentDecimals);
+  const std::size_t point = text.find('.', text.rfind('E'));
+  if (point != std::string::npos && text[point - 1] == '0' && !std::isdigit(text[point - 2])) {
+    text.erase(point - 1, 1);
+  }
 }
 
 }  // namespace
@@ -169,7 +179,7 @@ void KlipperEmitter::write_stroke(const Stroke& stroke, double filament_origin, 
   const double filament =
       (filament_origin + stroke.e_mm - state.position_mm[E]) / state.flow_factor;
   if (to_scaled(filament, kFilamentDecimals) != 0) {
-    append_word(text, 'E', filament, kFilamentDecimals);
+    append_filament(text, filament);
   }
   append_word(text, 'F', stroke.speed_mm_s * 60.0 / state.speed_factor, stroke.feed_decimals);
   write(text, out);

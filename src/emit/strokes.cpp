@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "line_ends.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/compensable.hpp"
 #include "vertices.hpp"
@@ -141,58 +142,6 @@ std::vector<double> required_times(const Run& run, const Timetable& table,
   return times;
 }
 
-// Grows lines from `from` towards `to` as long as the base stays within the tolerance of the chord
-// at equal time, and appends their ends, `to` included.
-void divide(const dynamics::BaseTrajectory& base, double from, double to,
-            const EmitOptions& options, std::vector<double>& times) {
-  const double h = base.period_s;
-  const auto within_tolerance = [&](double a, double b) {
-    const double x0 = base.x_at(a).position_mm;
-    const double y0 = base.y_at(a).position_mm;
-    const double slope_x = (base.x_at(b).position_mm - x0) / (b - a);
-    const double slope_y = (base.y_at(b).position_mm - y0) / (b - a);
-    // What a line as long as a good part of the resonance's period leaves out, the nozzle follows.
-    const double slow = std::min(1.0, std::pow(options.quick_line_s / (b - a), 2));
-    const double tolerance2 = std::pow(options.tolerance_mm * slow, 2);
-    for (double t = (std::floor(a / h + 1e-9) + 1.0) * h; t < b - 1e-12; t += h) {
-      const double dx = base.x_at(t).position_mm - x0 - slope_x * (t - a);
-      const double dy = base.y_at(t).position_mm - y0 - slope_y * (t - a);
-      if (dx * dx + dy * dy > tolerance2) {
-        return false;
-      }
-    }
-    return true;
-  };
-  double start = from;
-  while (to - start >= 2.0 * options.min_line_s) {
-    // Line ends lie on the nodes where they can; what is left must be long enough for a line.
-    double end = 0.0;
-    for (double node = std::floor(start / h + 1e-9) + 1.0;; node += 1.0) {
-      const double t = node * h;
-      if (t - start < options.min_line_s - 1e-12) {
-        continue;
-      }
-      const bool too_far = t - start > options.max_line_s || to - t < options.min_line_s;
-      if (end > 0.0 && (too_far || !within_tolerance(start, t))) {
-        break;
-      }
-      if (too_far) {
-        break;
-      }
-      end = t;
-    }
-    if (end == 0.0) {
-      break;
-    }
-    if (to - start <= options.max_line_s && within_tolerance(start, to)) {
-      break;
-    }
-    times.push_back(end);
-    start = end;
-  }
-  times.push_back(to);
-}
-
 double snap(double value_mm, double offset_mm, int decimals) {
   return offset_mm +
          static_cast<double>(to_scaled(value_mm - offset_mm, decimals)) / power_of_ten(decimals);
@@ -284,16 +233,20 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const Timetable table(run);
   const dynamics::BaseTrajectory& base = *run.base;
   const std::vector<double> event_time_s = event_times(run, table);
-  const std::vector<double> required = required_times(run, table, event_time_s, options.min_line_s);
+  LineRules rules = options.lines;
+  rules.tolerance_mm *= run.tolerance_share;
+  const std::vector<double> required = required_times(run, table, event_time_s, rules.min_line_s);
   std::vector<double> times = {0.0};
   for (std::size_t i = 1; i < required.size(); ++i) {
-    divide(base, required[i - 1], required[i], options, times);
+    append_line_ends(base, required[i - 1], required[i], rules, times);
   }
+  const double step_mm = 1.0 / power_of_ten(grid.decimals);
   const std::vector<double> x =
-      vertices(base, &dynamics::BaseTrajectory::x_at, times, options.base_max_accel_mm_s2);
+      vertices(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x, times,
+               {grid.x_offset_mm, step_mm}, rules.reach_x, rules.max_accel_mm_s2);
   const std::vector<double> y =
-      vertices(base, &dynamics::BaseTrajectory::y_at, times, options.base_max_accel_mm_s2);
-
+      vertices(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y, times,
+               {grid.y_offset_mm, step_mm}, rules.reach_y, rules.max_accel_mm_s2);
   const gcode::Position start = run.moves->front().segment.start_mm;
   const gcode::Position end = run.moves->back().segment.end_mm;
   std::vector<Stroke> result;
@@ -311,7 +264,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     stroke.e_mm = table.filament_mm(times[i]);
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_time_s.size() &&
-           event_time_s[event] <= times[i] - 0.5 * options.min_line_s) {
+           event_time_s[event] <= times[i] - 0.5 * rules.min_line_s) {
       ++event;
     }
     stroke.events = event;

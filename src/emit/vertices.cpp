@@ -1,87 +1,266 @@
+// Notation, for one axis:
+//   t_k, T     end of line k, its duration          b     base, chords between the b(t_k)
+//   o_k        vertex k minus b(t_k)                p     nozzle that follows the base
+//   y          state (e, ė) of the nozzle that follows the polygon, minus (p, ṗ)
+//   z_k        (y, o_k);  u = o_{k+1}
+//   ε          weight of the polygon's own distance from the base
+//
+// A linear-quadratic regulator: min Σ ∫ e² + ε d² dt with z_{k+1} = M (z_k, u) + m_k, where d is
+// the polygon minus the base. The gains come from the end of the run to its beginning (Riccati; see
+// Anderson & Moore, Optimal Control: Linear Quadratic Methods, § 2.4 and 4.1), then the vertices
+// from the beginning on. Each is put on the grid before the next one is chosen, so that those to
+// come make up for its rounding.
 #include "vertices.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
 namespace unflex::emit {
 namespace {
 
-// First moments of the base's distance from the chord of one line, mm·s, against the two halves of
-// the hat functions: ∫ (b − chord)(1 − s) dt and ∫ (b − chord) s dt, s from 0 to 1 along the line.
-struct ChordError {
-  double towards_start = 0.0;
-  double towards_end = 0.0;
+using dynamics::BaseTrajectory;
+using dynamics::FlexibleAxis;
+using dynamics::NozzleState;
+
+// ε: content above about six times the resonance is left to follow the base rather than the nozzle.
+constexpr double kBaseWeight = 1e-3;
+// Steps per node period of the nozzle that follows the base.
+constexpr int kSubsteps = 4;
+
+// exact_step of one length, which is linear in everything, as a matrix.
+class Step {
+ public:
+  Step(const FlexibleAxis& axis, double dt) : dt_(dt) {
+    const auto column = [&](int i, NozzleState from, dynamics::BaseSegment base) {
+      const NozzleState to = dynamics::exact_step(axis, from, base, dt);
+      columns_.col(i) << to.position, to.velocity;
+    };
+    column(0, {1.0, 0.0}, {});
+    column(1, {0.0, 1.0}, {});
+    column(2, {}, {1.0, 0.0, 0.0});
+    column(3, {}, {0.0, 1.0, 0.0});
+    column(4, {}, {0.0, 0.0, 1.0});
+  }
+
+  [[nodiscard]] double dt() const { return dt_; }
+  [[nodiscard]] Eigen::Matrix2d free() const { return columns_.leftCols<2>(); }
+  [[nodiscard]] Eigen::Vector2d base(double position, double velocity, double accel = 0.0) const {
+    return columns_.col(2) * position + columns_.col(3) * velocity + columns_.col(4) * accel;
+  }
+
+ private:
+  double dt_;
+  Eigen::Matrix<double, 2, 5> columns_;
 };
 
-ChordError chord_error(const dynamics::BaseTrajectory& base, AxisAt axis, double from, double to) {
-  // Two samples per node period; b is smooth, so the trapezoidal rule does.
-  const double duration = to - from;
-  const int steps = std::max(4, static_cast<int>(std::ceil(2.0 * duration / base.period_s)));
-  const double b0 = (base.*axis)(from).position_mm;
-  const double b1 = (base.*axis)(to).position_mm;
-  ChordError sum;
-  for (int i = 1; i < steps; ++i) {
-    const double s = static_cast<double>(i) / steps;
-    const double error = (base.*axis)(from + s * duration).position_mm - b0 - s * (b1 - b0);
-    sum.towards_start += error * (1.0 - s);
-    sum.towards_end += error * s;
+// The nozzle that follows the base, from rest, at the nodes; in between by cubic interpolation.
+class Followed {
+ public:
+  Followed(const BaseTrajectory& base, AxisAt axis, const FlexibleAxis& nozzle)
+      : period_s_(base.period_s) {
+    const Step step(nozzle, base.period_s / kSubsteps);
+    states_.resize(base.nodes());
+    states_[0] = {(base.*axis)(0.0).position_mm, 0.0};
+    for (std::size_t k = 1; k < states_.size(); ++k) {
+      Eigen::Vector2d state = states_[k - 1];
+      for (int i = 0; i < kSubsteps; ++i) {
+        const double t = period_s_ * (static_cast<double>(k - 1) + (i + 0.0) / kSubsteps);
+        const dynamics::AxisMotion from = (base.*axis)(t);
+        const double middle = (base.*axis)(t + 0.5 * step.dt()).accel_mm_s2;
+        state = step.free() * (state - Eigen::Vector2d(from.position_mm, 0.0)) +
+                step.base(0.0, from.velocity_mm_s, middle) + Eigen::Vector2d(from.position_mm, 0.0);
+      }
+      states_[k] = state;
+    }
   }
-  const double weight = duration / steps;
-  return {sum.towards_start * weight, sum.towards_end * weight};
+
+  [[nodiscard]] Eigen::Vector2d at(double t) const {
+    const double scaled = t / period_s_;
+    const auto k = std::min(static_cast<std::size_t>(std::max(scaled, 0.0)), states_.size() - 2);
+    const double s = scaled - static_cast<double>(k);
+    const Eigen::Vector2d& a = states_[k];
+    const Eigen::Vector2d& b = states_[k + 1];
+    const double rise = b[0] - a[0];
+    const double va = a[1] * period_s_;
+    const double vb = b[1] * period_s_;
+    const double square = 3.0 * rise - 2.0 * va - vb;
+    const double cube = va + vb - 2.0 * rise;
+    return {a[0] + s * (va + s * (square + s * cube)),
+            (va + s * (2.0 * square + 3.0 * s * cube)) / period_s_};
+  }
+
+ private:
+  double period_s_;
+  std::vector<Eigen::Vector2d> states_;
+};
+
+// One line: where it takes y, and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
+struct Stage {
+  Eigen::Matrix<double, 2, 4> move = Eigen::Matrix<double, 2, 4>::Zero();
+  Eigen::Vector2d shift = Eigen::Vector2d::Zero();
+  Eigen::Matrix4d cost = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d slope = Eigen::Vector4d::Zero();
+  // The law u = feedback · z + feed_forward.
+  Eigen::RowVector3d feedback = Eigen::RowVector3d::Zero();
+  double feed_forward = 0.0;
+};
+
+Stage stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed, const Step& step,
+            double from, double to) {
+  Stage result;
+  const double duration = to - from;
+  const int steps = static_cast<int>(std::lround(duration / step.dt()));
+  const double b0 = (base.*axis)(from).position_mm;
+  const double slope = ((base.*axis)(to).position_mm - b0) / duration;
+  const auto add_square = [&](const Eigen::RowVector4d& row, double value, double weight) {
+    result.cost += weight * row.transpose() * row;
+    result.slope += weight * value * row.transpose();
+  };
+  // The nozzle's answer to (y, o, u), and to the chord alone.
+  Eigen::Matrix<double, 2, 4> answer = Eigen::Matrix<double, 2, 4>::Zero();
+  answer.leftCols<2>().setIdentity();
+  Eigen::Vector2d chord = followed.at(from) - Eigen::Vector2d(b0, 0.0);
+  for (int i = 0; i < steps; ++i) {
+    const double s = static_cast<double>(i) / steps;
+    answer = step.free() * answer;
+    answer.col(2) += step.base(1.0 - s, -1.0 / duration);
+    answer.col(3) += step.base(s, 1.0 / duration);
+    chord = step.free() * chord + step.base(slope * s * duration, slope);
+    const double end = s + 1.0 / steps;
+    const double t = from + end * duration;
+    const Eigen::Vector2d off = chord - (followed.at(t) - Eigen::Vector2d(b0, 0.0));
+    add_square(answer.row(0), off[0], step.dt());
+    const double chord_off = slope * end * duration - ((base.*axis)(t).position_mm - b0);
+    add_square({0.0, 0.0, 1.0 - end, end}, chord_off, kBaseWeight * step.dt());
+    if (i + 1 == steps) {
+      result.shift = off;
+    }
+  }
+  result.move = answer;
+  return result;
 }
 
-// The furthest the base goes on one axis, at its nodes.
-std::pair<double, double> extent(const dynamics::BaseTrajectory& base, AxisAt axis) {
-  double lowest = (base.*axis)(0.0).position_mm;
-  double highest = lowest;
-  for (std::size_t k = 1; k < base.nodes(); ++k) {
-    const double at = (base.*axis)(static_cast<double>(k) * base.period_s).position_mm;
-    lowest = std::min(lowest, at);
-    highest = std::max(highest, at);
+// ½ zᵀPz + pᵀz: what is still to come.
+struct CostToGo {
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+};
+
+// After the run the base rests and e rings down; ∫ e² from the closed form (Lyapunov's equation).
+CostToGo ring_down(const FlexibleAxis& axis) {
+  const double omega = axis.omega_rad_s;
+  const double zeta = std::max(axis.zeta, 0.01);
+  CostToGo result;
+  result.matrix(0, 0) = (1.0 + 4.0 * zeta * zeta) / (4.0 * zeta * omega);
+  result.matrix(0, 1) = result.matrix(1, 0) = 0.5 / (omega * omega);
+  result.matrix(1, 1) = 1.0 / (4.0 * zeta * std::pow(omega, 3));
+  return result;
+}
+
+// Sets the line's law and takes its cost to the cost to go. A pinned vertex is not free: u = 0.
+void regulate(Stage& line, CostToGo& to_go, bool pinned) {
+  Eigen::Matrix<double, 3, 4> next = Eigen::Matrix<double, 3, 4>::Zero();
+  next.topRows<2>() = line.move;
+  next(2, 3) = 1.0;
+  const Eigen::Vector3d constant(line.shift[0], line.shift[1], 0.0);
+  const Eigen::Matrix4d cost = line.cost + next.transpose() * to_go.matrix * next;
+  const Eigen::Vector4d slope =
+      line.slope + next.transpose() * (to_go.matrix * constant + to_go.slope);
+  to_go.matrix = cost.topLeftCorner<3, 3>();
+  to_go.slope = slope.head<3>();
+  if (pinned) {
+    line.feedback.setZero();
+    line.feed_forward = 0.0;
+  } else {
+    line.feedback = -cost.row(3).head<3>() / cost(3, 3);
+    line.feed_forward = -slope[3] / cost(3, 3);
+    to_go.matrix += cost.col(3).head<3>() * line.feedback;
+    to_go.slope += line.feedback.transpose() * slope[3];
   }
-  return {lowest, highest};
+}
+
+// `reach`, and as far as the base itself goes.
+Reach with_base(Reach reach, const BaseTrajectory& base, AxisAt axis) {
+  for (std::size_t k = 0; k < base.nodes(); ++k) {
+    const double at = (base.*axis)(static_cast<double>(k) * base.period_s).position_mm;
+    reach.min_mm = std::min(reach.min_mm, at);
+    reach.max_mm = std::max(reach.max_mm, at);
+  }
+  return reach;
+}
+
+// Pins the vertices around changes of speed that are too quick, those from and to rest at the ends
+// included; whether there were any to pin.
+bool pin_where_too_quick(const std::vector<double>& times, const std::vector<double>& at,
+                         double max_accel_mm_s2, std::vector<bool>& pinned) {
+  bool found = false;
+  const std::size_t last = times.size() - 1;
+  for (std::size_t i = 0; i <= last; ++i) {
+    const double before_s = i > 0 ? times[i] - times[i - 1] : 0.0;
+    const double after_s = i < last ? times[i + 1] - times[i] : 0.0;
+    const double before = i > 0 ? (at[i] - at[i - 1]) / before_s : 0.0;
+    const double after = i < last ? (at[i + 1] - at[i]) / after_s : 0.0;
+    if (std::abs(after - before) <= max_accel_mm_s2 * 0.5 * (before_s + after_s)) {
+      continue;
+    }
+    for (std::size_t k = i > 0 ? i - 1 : 0; k <= std::min(i + 1, last); ++k) {
+      found = found || !pinned[k];
+      pinned[k] = true;
+    }
+  }
+  return found;
 }
 
 }  // namespace
 
-std::vector<double> vertices(const dynamics::BaseTrajectory& base, AxisAt axis,
-                             const std::vector<double>& times, double max_accel_mm_s2) {
-  const std::size_t n = times.size();
-  std::vector<double> on_curve(n);
-  std::vector<double> offset(n, 0.0);
-  for (std::size_t i = 0; i < n; ++i) {
-    on_curve[i] = (base.*axis)(times[i]).position_mm;
-  }
-  const auto [lowest, highest] = extent(base, axis);
-  ChordError before = chord_error(base, axis, times[0], times[1]);
-  for (std::size_t i = 1; i + 1 < n; ++i) {
-    const ChordError after = chord_error(base, axis, times[i], times[i + 1]);
-    offset[i] = (before.towards_end + after.towards_start) / (0.5 * (times[i + 1] - times[i - 1]));
-    offset[i] = std::clamp(on_curve[i] + offset[i], lowest, highest) - on_curve[i];
-    before = after;
-  }
-  const auto accel = [&](std::size_t i) {
-    const double t1 = times[i] - times[i - 1];
-    const double t2 = times[i + 1] - times[i];
-    const auto at = [&](std::size_t j) { return on_curve[j] + offset[j]; };
-    return std::abs((at(i + 1) - at(i)) / t2 - (at(i) - at(i - 1)) / t1) / (0.5 * (t1 + t2));
-  };
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (std::size_t i = 1; i + 1 < n; ++i) {
-      if (accel(i) > max_accel_mm_s2 &&
-          (offset[i - 1] != 0.0 || offset[i] != 0.0 || offset[i + 1] != 0.0)) {
-        offset[i - 1] = offset[i] = offset[i + 1] = 0.0;
-        changed = true;
-      }
+double AxisGrid::nearest(double position_mm) const {
+  return offset_mm + std::round((position_mm - offset_mm) / step_mm) * step_mm;
+}
+
+std::vector<double> vertices(const BaseTrajectory& base, AxisAt axis, const FlexibleAxis& nozzle,
+                             const std::vector<double>& times, const AxisGrid& grid,
+                             const Reach& reach, double max_accel_mm_s2) {
+  const std::size_t lines = times.size() - 1;
+  const Followed followed(base, axis, nozzle);
+  Step step(nozzle, base.period_s);
+  std::vector<Stage> stages;
+  std::vector<double> on_curve = {(base.*axis)(0.0).position_mm};
+  for (std::size_t k = 0; k < lines; ++k) {
+    const double duration = times[k + 1] - times[k];
+    const double dt = duration / std::ceil(duration / base.period_s - 1e-9);
+    if (std::abs(dt - step.dt()) > 1e-12) {
+      step = Step(nozzle, dt);
     }
+    stages.push_back(stage(base, axis, followed, step, times[k], times[k + 1]));
+    on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
-  for (std::size_t i = 0; i < n; ++i) {
-    on_curve[i] += offset[i];
-  }
-  return on_curve;
+  const Reach within = with_base(reach, base, axis);
+  const CostToGo at_end = ring_down(nozzle);
+  std::vector<bool> pinned(lines + 1, false);
+  pinned.front() = pinned.back() = true;
+  std::vector<double> result;
+  do {
+    CostToGo to_go = at_end;
+    for (std::size_t k = lines; k-- > 0;) {
+      regulate(stages[k], to_go, pinned[k + 1]);
+    }
+    result = {on_curve.front()};
+    Eigen::Vector3d z = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < lines; ++k) {
+      double vertex = on_curve[k + 1];
+      if (k + 1 < lines) {
+        const double offset = stages[k].feedback * z + stages[k].feed_forward;
+        vertex = grid.nearest(std::clamp(vertex + offset, within.min_mm, within.max_mm));
+      }
+      Eigen::Vector4d w;
+      w << z, vertex - on_curve[k + 1];
+      z << stages[k].move * w + stages[k].shift, w[3];
+      result.push_back(vertex);
+    }
+  } while (pin_where_too_quick(times, result, max_accel_mm_s2, pinned));
+  return result;
 }
 
 }  // namespace unflex::emit

@@ -68,6 +68,11 @@ double Settings::tail_s() const {
   return std::max({kShortest, settling_time_s(dynamics_x), settling_time_s(dynamics_y)});
 }
 
+double Settings::tolerance_um() const {
+  constexpr double kPerHz = 0.3 / 45.0;
+  return emit.tolerance_um.value_or(kPerHz * std::min(dynamics_x.freq_hz, dynamics_y.freq_hz));
+}
+
 double Settings::shaper_freq_x_hz() const {
   return printer.input_shaper_freq_x_hz.value_or(dynamics_x.freq_hz);
 }

@@ -26,6 +26,8 @@ constexpr std::size_t kWindowsAhead = 24;
 constexpr std::size_t kWindowsAtOnce = 8;
 // A run's trajectory is held as a whole, 48 bytes per node; longer ones are left as they are.
 constexpr std::size_t kMaxRunNodes = 8'000'000;
+// Of the tolerance, for a run that the whole of it spoils.
+constexpr double kFineTolerance = 0.05;
 // Of the time of the whole job, for the progress bar.
 constexpr double kShareOfCompensation = 0.9;
 
@@ -242,22 +244,29 @@ class Compensator {
     const dynamics::BaseTrajectory base{setup_.period_s, compensate::join(pending.spans, pending.x),
                                         compensate::join(pending.spans, pending.y)};
     const Piece& piece = pending.piece;
-    emit::KlipperEmitter trial = emitter_;
-    if (!trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s},
-                   text)) {
-      return "the motion is too small to be written";
-    }
-    Verdict verdict = judge(piece.moves, text, emitter_.printer(), emitter_.printer_limits(),
-                            true_nozzle_, rules_);
-    if (verdict.objection) {
+    // Where long lines break a limit or cost too much, short ones may do.
+    std::string objection;
+    for (const double share : {1.0, kFineTolerance}) {
+      emit::KlipperEmitter trial = emitter_;
       text.clear();
-      return verdict.objection;
+      if (!trial.run(
+              {&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s, share},
+              text)) {
+        return "the motion is too small to be written";
+      }
+      Verdict verdict = judge(piece.moves, text, emitter_.printer(), emitter_.printer_limits(),
+                              true_nozzle_, rules_);
+      if (!verdict.objection) {
+        true_nozzle_ = verdict.nozzle;
+        emitter_ = std::move(trial);
+        ++report_->runs_compensated;
+        report_->windows_solved += pending.spans.size();
+        return std::nullopt;
+      }
+      objection = std::move(*verdict.objection);
     }
-    true_nozzle_ = verdict.nozzle;
-    emitter_ = std::move(trial);
-    ++report_->runs_compensated;
-    report_->windows_solved += pending.spans.size();
-    return std::nullopt;
+    text.clear();
+    return objection;
   }
 
   void note_fallback(const Pending& pending, std::string reason) {

@@ -15,6 +15,9 @@ namespace {
 // far below the limit so that the text keeps it.
 constexpr double kGridMm = 1e-4;
 constexpr double kAccelShare = 0.98;
+// The firmware's clock differs a little from line to line; no more than the budget of lines may
+// begin within any 100 ms all the same.
+constexpr double kClockRoom = 1.002;
 
 dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
   return dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio);
@@ -122,11 +125,18 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.run_limits.max_accel_mm_s2 = settings.emit.accel_mm_s2;
   options.run_limits.square_corner_velocity_mm_s = settings.emit.square_corner_velocity_mm_s;
   options.run_limits.minimum_cruise_ratio = 0.0;
-  options.tolerance_mm = settings.emit.tolerance_um * 1e-3;
-  options.quick_line_s = 0.25 / std::max(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
-  options.min_line_s =
-      std::max(settings.emit.period_ms * 1e-3, 1.0 / settings.emit.max_lines_per_s);
-  options.base_max_accel_mm_s2 = planned_base_accel(settings);
+  options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
+  options.lines.nozzle_x = axis(settings.dynamics_x);
+  options.lines.nozzle_y = axis(settings.dynamics_y);
+  const auto reach = [](const std::optional<machine::Range>& travel) {
+    return travel ? emit::Reach{travel->min, travel->max} : emit::Reach{.min_mm = 0.0};
+  };
+  options.lines.reach_x = reach(settings.printer.travel_x_mm);
+  options.lines.reach_y = reach(settings.printer.travel_y_mm);
+  options.lines.min_line_s =
+      std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.emit.max_lines_per_s);
+  options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
+  options.lines.max_accel_mm_s2 = planned_base_accel(settings);
   options.version = std::move(version);
   return options;
 }

@@ -6,11 +6,13 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
 
@@ -19,19 +21,34 @@ namespace unflex::emit {
 // The first bytes of every comment line that unflex adds.
 inline constexpr std::string_view kComment = ";unflex";
 
+// How far an axis may go.
+struct Reach {
+  double min_mm = -std::numeric_limits<double>::infinity();
+  double max_mm = std::numeric_limits<double>::infinity();
+};
+
+// How the base's motion is cut into lines.
+struct LineRules {
+  dynamics::FlexibleAxis nozzle_x;  // what hangs on the base
+  dynamics::FlexibleAxis nozzle_y;
+  Reach reach_x;
+  Reach reach_y;
+  double tolerance_mm = 3e-4;  // of what a line may move the nozzle by
+  double min_line_s = 1e-3;    // none is shorter than this …
+  double min_line_mm = 0.0;    // … or than this along both X and Y
+  double max_line_s = 0.05;
+  // On either axis from line to line, where lines can be short enough.
+  double max_speed_step_mm_s = 30.0;
+  double max_accel_mm_s2 = 20000.0;  // the same change by the time between the lines' middles
+};
+
 struct EmitOptions {
   gcode::InterpreterOptions interpreter;
   planner::Limits printer_limits;  // in force when the file starts
   planner::FirmwareConfig fixed;
   planner::Limits run_limits;  // inside a compensated run
-  double tolerance_mm = 2e-3;  // of replacing the base's path by chords, at equal time
-  // Lines up to this long may use the whole tolerance, longer ones less by the square of their
-  // length.
-  double quick_line_s = 5e-3;
-  double min_line_s = 1e-3;  // no line is shorter than this
-  double max_line_s = 0.05;
-  double base_max_accel_mm_s2 = 20000.0;  // of the change of speed from line to line
-  std::string version;                    // for the comment at the first run
+  LineRules lines;
+  std::string version;  // for the comment at the first run
 };
 
 struct Stroke;  // a line to be, see src/emit/strokes.hpp
@@ -44,7 +61,8 @@ struct Run {
   const std::vector<std::size_t>* move_counts = nullptr;
   const std::vector<planner::PlannedMove>* moves = nullptr;
   const dynamics::BaseTrajectory* base = nullptr;
-  double lead_in_s = 0.0;  // the first move starts this long after the base
+  double lead_in_s = 0.0;        // the first move starts this long after the base
+  double tolerance_share = 1.0;  // of LineRules::tolerance_mm that its lines may use
 };
 
 // Writes the output in the order of the input. Follows both texts with an interpreter of its own,

@@ -79,10 +79,13 @@ struct SolveSettings {
 };
 
 struct EmitSettings {
-  double period_ms = 1.0;           // node period
-  double tolerance_um = 2.0;        // of merging nodes into one line
-  double max_lines_per_s = 1100.0;  // hard limit
-  double accel_mm_s2 = 1e6;         // planner limits inside a compensated run
+  double period_ms = 1.0;  // node period
+  // Of what a line's shape may move the nozzle by. Unset: 0.3 µm at 45 Hz, in proportion to the
+  // lower frequency, so that lines per second hardly depend on it.
+  std::optional<double> tolerance_um;
+  double max_lines_per_s = 1100.0;    // hard limit
+  double max_speed_step_mm_s = 30.0;  // from line to line, per axis
+  double accel_mm_s2 = 1e6;           // planner limits inside a compensated run
   double square_corner_velocity_mm_s = 1000.0;
 };
 
@@ -114,6 +117,7 @@ struct Settings {
   [[nodiscard]] double base_max_velocity_mm_s() const;
   [[nodiscard]] double base_max_accel_mm_s2() const;
   [[nodiscard]] double tail_s() const;
+  [[nodiscard]] double tolerance_um() const;
   [[nodiscard]] double shaper_freq_x_hz() const;
   [[nodiscard]] double shaper_freq_y_hz() const;
 };

@@ -1,0 +1,155 @@
+// Notation:
+//   T       duration of a line, from a to b
+//   d(t)    the line that fits b best over [a, b], by least squares, minus b
+//   e(t)    what d moves the nozzle by: ë + 2ζωė + ω²e = 2ζωḋ + ω²d
+//
+// A fitted line leaves ∫d = ∫∫d = 0 at its end. A line is short against the resonance's period, so
+// e = ω²∬d + 2ζω∫d: the error begins and ends with the line, and each line can be judged alone.
+#include "line_ends.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "vertices.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using dynamics::BaseTrajectory;
+using dynamics::FlexibleAxis;
+
+constexpr int kMaxSamples = 128;
+
+// e at kMaxSamples points at most, `steps` + 1 of them equally spaced over the line.
+std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, AxisAt at,
+                                                 const BaseTrajectory& base, double from,
+                                                 double duration, int steps) {
+  std::array<double, kMaxSamples + 1> d{};
+  const auto weight = [&](int i) { return i == 0 || i == steps ? 0.5 : 1.0; };
+  const auto s = [&](int i) { return static_cast<double>(i) / steps - 0.5; };
+  const double origin = (base.*at)(from).position_mm;
+  double sum = 0.0;
+  double moment = 0.0;
+  double inertia = 0.0;
+  for (int i = 0; i <= steps; ++i) {
+    double& value = d[static_cast<std::size_t>(i)];
+    value = (base.*at)(from + (s(i) + 0.5) * duration).position_mm - origin;
+    sum += weight(i) * value;
+    moment += weight(i) * s(i) * value;
+    inertia += weight(i) * s(i) * s(i);
+  }
+  const double dt = duration / steps;
+  const double omega = axis.omega_rad_s;
+  double last = 0.0;
+  double once = 0.0;   // ∫d
+  double twice = 0.0;  // ∬d
+  for (int i = 0; i <= steps; ++i) {
+    double& value = d[static_cast<std::size_t>(i)];
+    const double off = sum / steps + moment / inertia * s(i) - value;
+    if (i > 0) {
+      const double before = once;
+      once += 0.5 * dt * (last + off);
+      twice += 0.5 * dt * (before + once);
+    }
+    last = off;
+    value = omega * (omega * twice + 2.0 * axis.zeta * once);
+  }
+  return d;
+}
+
+// The largest e of one line, over both axes.
+double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double to,
+                               const LineRules& rules) {
+  const double duration = to - from;
+  const int steps =
+      std::clamp(static_cast<int>(std::ceil(2.0 * duration / base.period_s)), 6, kMaxSamples);
+  const auto x = nozzle_error(rules.nozzle_x, &BaseTrajectory::x_at, base, from, duration, steps);
+  const auto y = nozzle_error(rules.nozzle_y, &BaseTrajectory::y_at, base, from, duration, steps);
+  double largest = 0.0;
+  for (std::size_t i = 0; i <= static_cast<std::size_t>(steps); ++i) {
+    largest = std::max(largest, std::hypot(x[i], y[i]));
+  }
+  return largest;
+}
+
+// How a line from `from` to `to` would do.
+class Candidate {
+ public:
+  Candidate(const BaseTrajectory& base, const LineRules& rules) : base_(&base), rules_(&rules) {}
+
+  // Long enough for the firmware.
+  [[nodiscard]] bool long_enough(double from, double to) const {
+    if (to - from < rules_->min_line_s - 1e-12) {
+      return false;
+    }
+    if (rules_->min_line_mm <= 0.0) {
+      return true;
+    }
+    const double dx = base_->x_at(to).position_mm - base_->x_at(from).position_mm;
+    const double dy = base_->y_at(to).position_mm - base_->y_at(from).position_mm;
+    return std::max(std::abs(dx), std::abs(dy)) >= rules_->min_line_mm;
+  }
+
+  // Moves the nozzle little, and speed changes little from the line before, which began at
+  // `before`.
+  [[nodiscard]] bool good(double before, double from, double to) const {
+    const auto change = [&](AxisAt axis) {
+      const double at = (base_->*axis)(from).position_mm;
+      const double last =
+          before < from ? (at - (base_->*axis)(before).position_mm) / (from - before) : 0.0;
+      return std::abs(((base_->*axis)(to).position_mm - at) / (to - from) - last);
+    };
+    return std::max(change(&BaseTrajectory::x_at), change(&BaseTrajectory::y_at)) <=
+               rules_->max_speed_step_mm_s &&
+           largest_nozzle_error_mm(*base_, from, to, *rules_) <= rules_->tolerance_mm;
+  }
+
+ private:
+  const BaseTrajectory* base_;
+  const LineRules* rules_;
+};
+
+}  // namespace
+
+void append_line_ends(const BaseTrajectory& base, double from, double to, const LineRules& rules,
+                      std::vector<double>& times) {
+  const double h = base.period_s;
+  const Candidate line(base, rules);
+  double start = from;
+  while (true) {
+    const double before = times.size() > 1 ? times[times.size() - 2] : start;
+    if (to - start <= rules.max_line_s && line.good(before, start, to)) {
+      break;
+    }
+    // What is left must be long enough for a line too. The shortest line goes in any case, longer
+    // ones as long as they are good.
+    double end = 0.0;
+    for (double t = start + rules.min_line_s; t < to; t += h) {
+      if (line.long_enough(start, t) && line.long_enough(t, to)) {
+        end = t;
+        break;
+      }
+    }
+    if (end == 0.0) {
+      break;
+    }
+    // Doubled steps as long as that goes, then halved ones.
+    bool growing = true;
+    for (double step = 1.0; step >= 1.0;) {
+      const double t = end + step * h;
+      if (t - start <= rules.max_line_s && line.long_enough(start, t) && line.long_enough(t, to) &&
+          line.good(before, start, t)) {
+        end = t;
+      } else {
+        growing = false;
+      }
+      step = growing ? 2.0 * step : std::floor(0.5 * step);
+    }
+    times.push_back(end);
+    start = end;
+  }
+  times.push_back(to);
+}
+
+}  // namespace unflex::emit

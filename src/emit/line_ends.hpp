@@ -1,0 +1,17 @@
+// Which moments the lines of a run end at.
+#pragma once
+
+#include <vector>
+
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/emit/emitter.hpp"
+
+namespace unflex::emit {
+
+// Appends to `times` the ends of the lines between `from` (its last entry) and `to`, `to` included.
+// Lines grow as long as what they leave out moves the nozzle by no more than the tolerance. None is
+// shorter than min_line_s, or than min_line_mm along X and Y both, if [from, to] allows.
+void append_line_ends(const dynamics::BaseTrajectory& base, double from, double to,
+                      const LineRules& rules, std::vector<double>& times);
+
+}  // namespace unflex::emit
