@@ -152,4 +152,27 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
   times.push_back(to);
 }
 
+bool split_lines(const BaseTrajectory& base, const std::vector<double>& x_error_mm,
+                 const std::vector<double>& y_error_mm, const LineRules& rules,
+                 std::vector<double>& times) {
+  const Candidate line(base, rules);
+  // Errors of lines add up, with any sign, for as long as the nozzle rings.
+  constexpr double kAddedUp = 4.0;
+  const double most = kAddedUp * rules.tolerance_mm;
+  const auto off = [&](std::size_t i) { return std::hypot(x_error_mm[i], y_error_mm[i]) > most; };
+  std::vector<double> result = {times.front()};
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    const double from = times[i - 1];
+    const double middle = 0.5 * (from + times[i]);
+    if ((off(i) || (i + 1 < times.size() && off(i + 1))) && line.long_enough(from, middle) &&
+        line.long_enough(middle, times[i])) {
+      result.push_back(middle);
+    }
+    result.push_back(times[i]);
+  }
+  const bool split = result.size() > times.size();
+  times.swap(result);
+  return split;
+}
+
 }  // namespace unflex::emit

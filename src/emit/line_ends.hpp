@@ -14,4 +14,11 @@ namespace unflex::emit {
 void append_line_ends(const dynamics::BaseTrajectory& base, double from, double to,
                       const LineRules& rules, std::vector<double>& times);
 
+// Halves the lines before whose ends the nozzle, by errors at `times`, is off by more than is to be
+// expected of lines within the tolerance, and the lines before those, as far as the halves are long
+// enough. Whether there were any.
+bool split_lines(const dynamics::BaseTrajectory& base, const std::vector<double>& x_error_mm,
+                 const std::vector<double>& y_error_mm, const LineRules& rules,
+                 std::vector<double>& times);
+
 }  // namespace unflex::emit

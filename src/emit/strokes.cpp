@@ -241,12 +241,14 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     append_line_ends(base, required[i - 1], required[i], rules, times);
   }
   const double step_mm = 1.0 / power_of_ten(grid.decimals);
-  const std::vector<double> x =
-      vertices(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x, times,
-               {grid.x_offset_mm, step_mm}, rules.reach_x, rules.max_accel_mm_s2);
-  const std::vector<double> y =
-      vertices(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y, times,
-               {grid.y_offset_mm, step_mm}, rules.reach_y, rules.max_accel_mm_s2);
+  const VertexChooser along_x(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x);
+  const VertexChooser along_y(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y);
+  AxisVertices x;
+  AxisVertices y;
+  do {
+    x = along_x.choose(times, {grid.x_offset_mm, step_mm}, rules.reach_x, rules.max_accel_mm_s2);
+    y = along_y.choose(times, {grid.y_offset_mm, step_mm}, rules.reach_y, rules.max_accel_mm_s2);
+  } while (split_lines(base, x.nozzle_error_mm, y.nozzle_error_mm, rules, times));
   const gcode::Position start = run.moves->front().segment.start_mm;
   const gcode::Position end = run.moves->back().segment.end_mm;
   std::vector<Stroke> result;
@@ -257,8 +259,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     Stroke stroke;
     stroke.end_s = times[i] - dropped_s;
     const bool is_end = i + 1 == times.size();
-    stroke.x_mm = is_end ? end[gcode::X] : snap(x[i], grid.x_offset_mm, grid.decimals);
-    stroke.y_mm = is_end ? end[gcode::Y] : snap(y[i], grid.y_offset_mm, grid.decimals);
+    stroke.x_mm = is_end ? end[gcode::X] : snap(x.position_mm[i], grid.x_offset_mm, grid.decimals);
+    stroke.y_mm = is_end ? end[gcode::Y] : snap(y.position_mm[i], grid.y_offset_mm, grid.decimals);
     stroke.z_mm = is_end ? end[gcode::Z]
                          : snap(table.along_path_mm(times[i], Z), grid.z_offset_mm, grid.decimals);
     stroke.e_mm = table.filament_mm(times[i]);

@@ -55,33 +55,37 @@ class Step {
   Eigen::Matrix<double, 2, 5> columns_;
 };
 
-// The nozzle that follows the base, from rest, at the nodes; in between by cubic interpolation.
+// The nozzle that follows the base, from rest, at the nodes.
+std::vector<std::array<double, 2>> follow(const BaseTrajectory& base, AxisAt axis,
+                                          const FlexibleAxis& nozzle) {
+  const Step step(nozzle, base.period_s / kSubsteps);
+  Eigen::Vector2d state((base.*axis)(0.0).position_mm, 0.0);
+  std::vector<std::array<double, 2>> states = {{state[0], state[1]}};
+  for (std::size_t k = 1; k < base.nodes(); ++k) {
+    for (int i = 0; i < kSubsteps; ++i) {
+      const double t = base.period_s * static_cast<double>(k - 1) + i * step.dt();
+      const dynamics::AxisMotion from = (base.*axis)(t);
+      const double middle = (base.*axis)(t + 0.5 * step.dt()).accel_mm_s2;
+      const Eigen::Vector2d origin(from.position_mm, 0.0);
+      state = step.free() * (state - origin) + step.base(0.0, from.velocity_mm_s, middle) + origin;
+    }
+    states.push_back({state[0], state[1]});
+  }
+  return states;
+}
+
+// The same between the nodes, by cubic interpolation.
 class Followed {
  public:
-  Followed(const BaseTrajectory& base, AxisAt axis, const FlexibleAxis& nozzle)
-      : period_s_(base.period_s) {
-    const Step step(nozzle, base.period_s / kSubsteps);
-    states_.resize(base.nodes());
-    states_[0] = {(base.*axis)(0.0).position_mm, 0.0};
-    for (std::size_t k = 1; k < states_.size(); ++k) {
-      Eigen::Vector2d state = states_[k - 1];
-      for (int i = 0; i < kSubsteps; ++i) {
-        const double t = period_s_ * (static_cast<double>(k - 1) + (i + 0.0) / kSubsteps);
-        const dynamics::AxisMotion from = (base.*axis)(t);
-        const double middle = (base.*axis)(t + 0.5 * step.dt()).accel_mm_s2;
-        state = step.free() * (state - Eigen::Vector2d(from.position_mm, 0.0)) +
-                step.base(0.0, from.velocity_mm_s, middle) + Eigen::Vector2d(from.position_mm, 0.0);
-      }
-      states_[k] = state;
-    }
-  }
+  Followed(const std::vector<std::array<double, 2>>& states, double period_s)
+      : states_(&states), period_s_(period_s) {}
 
   [[nodiscard]] Eigen::Vector2d at(double t) const {
     const double scaled = t / period_s_;
-    const auto k = std::min(static_cast<std::size_t>(std::max(scaled, 0.0)), states_.size() - 2);
+    const auto k = std::min(static_cast<std::size_t>(std::max(scaled, 0.0)), states_->size() - 2);
     const double s = scaled - static_cast<double>(k);
-    const Eigen::Vector2d& a = states_[k];
-    const Eigen::Vector2d& b = states_[k + 1];
+    const std::array<double, 2>& a = (*states_)[k];
+    const std::array<double, 2>& b = (*states_)[k + 1];
     const double rise = b[0] - a[0];
     const double va = a[1] * period_s_;
     const double vb = b[1] * period_s_;
@@ -92,8 +96,8 @@ class Followed {
   }
 
  private:
+  const std::vector<std::array<double, 2>>* states_;
   double period_s_;
-  std::vector<Eigen::Vector2d> states_;
 };
 
 // One line: where it takes y, and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
@@ -219,34 +223,38 @@ double AxisGrid::nearest(double position_mm) const {
   return offset_mm + std::round((position_mm - offset_mm) / step_mm) * step_mm;
 }
 
-std::vector<double> vertices(const BaseTrajectory& base, AxisAt axis, const FlexibleAxis& nozzle,
-                             const std::vector<double>& times, const AxisGrid& grid,
-                             const Reach& reach, double max_accel_mm_s2) {
+VertexChooser::VertexChooser(const BaseTrajectory& base, AxisAt axis, const FlexibleAxis& nozzle)
+    : base_(&base), axis_(axis), nozzle_(nozzle), followed_(follow(base, axis, nozzle)) {}
+
+AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisGrid& grid,
+                                   const Reach& reach, double max_accel_mm_s2) const {
+  const BaseTrajectory& base = *base_;
+  const AxisAt axis = axis_;
   const std::size_t lines = times.size() - 1;
-  const Followed followed(base, axis, nozzle);
-  Step step(nozzle, base.period_s);
+  const Followed followed(followed_, base.period_s);
+  Step step(nozzle_, base.period_s);
   std::vector<Stage> stages;
   std::vector<double> on_curve = {(base.*axis)(0.0).position_mm};
   for (std::size_t k = 0; k < lines; ++k) {
     const double duration = times[k + 1] - times[k];
     const double dt = duration / std::ceil(duration / base.period_s - 1e-9);
     if (std::abs(dt - step.dt()) > 1e-12) {
-      step = Step(nozzle, dt);
+      step = Step(nozzle_, dt);
     }
     stages.push_back(stage(base, axis, followed, step, times[k], times[k + 1]));
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
   const Reach within = with_base(reach, base, axis);
-  const CostToGo at_end = ring_down(nozzle);
+  const CostToGo at_end = ring_down(nozzle_);
   std::vector<bool> pinned(lines + 1, false);
   pinned.front() = pinned.back() = true;
-  std::vector<double> result;
+  AxisVertices result;
   do {
     CostToGo to_go = at_end;
     for (std::size_t k = lines; k-- > 0;) {
       regulate(stages[k], to_go, pinned[k + 1]);
     }
-    result = {on_curve.front()};
+    result = {{on_curve.front()}, {0.0}};
     Eigen::Vector3d z = Eigen::Vector3d::Zero();
     for (std::size_t k = 0; k < lines; ++k) {
       double vertex = on_curve[k + 1];
@@ -257,9 +265,10 @@ std::vector<double> vertices(const BaseTrajectory& base, AxisAt axis, const Flex
       Eigen::Vector4d w;
       w << z, vertex - on_curve[k + 1];
       z << stages[k].move * w + stages[k].shift, w[3];
-      result.push_back(vertex);
+      result.position_mm.push_back(vertex);
+      result.nozzle_error_mm.push_back(z[0]);
     }
-  } while (pin_where_too_quick(times, result, max_accel_mm_s2, pinned));
+  } while (pin_where_too_quick(times, result.position_mm, max_accel_mm_s2, pinned));
   return result;
 }
 

@@ -1,6 +1,7 @@
 // Where the lines of a run meet.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "unflex/dynamics/base_trajectory.hpp"
@@ -20,15 +21,33 @@ struct AxisGrid {
   [[nodiscard]] double nearest(double position_mm) const;
 };
 
-// Positions of one axis at the ends of the lines, on the grid but for the first and the last, which
-// are the base's own. Vertices on the base's curve would not do: a chord lies inside a curve, off
-// by b̈T²/12 on average, and the nozzle follows that. So they are where they make the nozzle follow
-// the polygon as it would follow the base, rounding to the grid included. None goes further out
-// than `reach` or the base itself, and no change of speed from line to line exceeds max_accel,
-// unless the base's own does.
-[[nodiscard]] std::vector<double> vertices(const dynamics::BaseTrajectory& base, AxisAt axis,
-                                           const dynamics::FlexibleAxis& nozzle,
-                                           const std::vector<double>& times, const AxisGrid& grid,
-                                           const Reach& reach, double max_accel_mm_s2);
+// One axis at the ends of the lines.
+struct AxisVertices {
+  std::vector<double> position_mm;
+  // Where a nozzle that follows the polygon is then, minus where one that follows the base is.
+  std::vector<double> nozzle_error_mm;
+};
+
+// Chooses the vertices of one axis of a run. On the base's curve they would not do: a chord lies
+// inside a curve, off by b̈T²/12 on average, and the nozzle follows that. So they are where they
+// make the nozzle follow the polygon as it would follow the base, rounding to the grid included.
+class VertexChooser {
+ public:
+  VertexChooser(const dynamics::BaseTrajectory& base, AxisAt axis,
+                const dynamics::FlexibleAxis& nozzle);
+
+  // For lines that end at times[1], times[2] …; the first vertex and the last are the base's own,
+  // the others on the grid. None goes further out than `reach` or the base itself, and no change of
+  // speed from line to line exceeds max_accel, unless the base's own does.
+  [[nodiscard]] AxisVertices choose(const std::vector<double>& times, const AxisGrid& grid,
+                                    const Reach& reach, double max_accel_mm_s2) const;
+
+ private:
+  const dynamics::BaseTrajectory* base_;
+  AxisAt axis_;
+  dynamics::FlexibleAxis nozzle_;
+  // (p, ṗ) of the nozzle that follows the base, at the nodes.
+  std::vector<std::array<double, 2>> followed_;
+};
 
 }  // namespace unflex::emit

@@ -207,8 +207,9 @@ TEST_F(Turn, MakesUpForACoarseGrid) {
   append_line_ends(base_, 0.0, kDuration_s, how.lines, times);
   const auto rms_mm = [&](double step_mm, double then_rounded_to_mm) {
     const auto place = [&](AxisAt axis) {
-      std::vector<double> at =
-          vertices(base_, axis, how.lines.nozzle_x, times, {0.0, step_mm}, {}, 1e6);
+      std::vector<double> at = VertexChooser(base_, axis, how.lines.nozzle_x)
+                                   .choose(times, {0.0, step_mm}, {}, 1e6)
+                                   .position_mm;
       for (std::size_t i = 1; i + 1 < at.size(); ++i) {
         EXPECT_NEAR(at[i] / step_mm, std::round(at[i] / step_mm), 1e-6);
         at[i] = std::round(at[i] / then_rounded_to_mm) * then_rounded_to_mm;
