@@ -1,6 +1,7 @@
 #include "unflex/planner/planner.hpp"
 
 #include "unflex/planner/klipper_planner.hpp"
+#include "unflex/planner/marlin_planner.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -40,6 +41,7 @@ void apply(const gcode::LimitChange& change, Limits& limits) {
 }
 
 std::unique_ptr<Planner> make_planner(const Limits& limits, const FirmwareConfig& config) {
+  if (config.firmware == Firmware::marlin) return std::make_unique<MarlinPlanner>(limits, config);
   return std::make_unique<KlipperPlanner>(limits, config);
 }
 

@@ -58,6 +58,7 @@ struct FirmwareConfig {
   // Marlin.
   bool classic_jerk = false;      // CLASSIC_JERK instead of junction deviation
   int min_steps_per_segment = 6;  // MIN_STEPS_PER_SEGMENT
+  int block_buffer_size = 16;     // BLOCK_BUFFER_SIZE; at least 4
 };
 
 // A segment with its trapezoid.

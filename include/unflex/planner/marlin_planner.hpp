@@ -1,0 +1,131 @@
+// Marlin's planner.
+//
+// Notation: Marlin 2.1.2, src/module/planner.cpp. The arithmetic is the firmware's own: 32-bit
+// floats and integers in the same order, because rates are rounded up to whole steps per second and
+// one more or less of them is 100 µs on a move of a second.
+//
+// Rounding. Targets are rounded to whole steps, and the rounding is carried: the start_mm and
+// end_mm of a planned move are where the motors are, not what the file says. A move of fewer than
+// min_steps_per_segment steps on every axis is not queued; its motion belongs to the next move that
+// is. E is rounded from its sum over the file; the firmware rounds it anew at each G92 E0, which
+// moves the filament by less than one step (and drops what was too short to be queued).
+//
+// Lookahead. The file is taken to be read faster than it is printed. The buffer of N blocks then
+// holds N − 1, the running one among them; when a block begins to run, the N − 3 after it are known
+// and the last of these ends at MINIMUM_PLANNER_SPEED. From then on its end speed is fixed. After a
+// stop the buffer is filled before the first block runs, which therefore knows N − 2; meanwhile the
+// third to (N/2)-th block are stretched to min_segment_time (SLOWDOWN), as they would be in the
+// firmware. A real printer's first block runs as soon as three are queued.
+//
+// Trapezoid. A block's ramps take whole steps: the one up is rounded up, the one down is rounded
+// down (calculate_trapezoid_for_block). Ramps have the block's exact acceleration, and the last one
+// ends where its steps end. So a move ends faster than the next one begins, squared by at most 4a
+// times one step, plus what the rates' rounding up and their minimum of 120 steps/s add.
+//
+// Left out: the stepper interrupt's timing (block_phase_isr). A block's first step takes a whole
+// period of its initial rate, and each further one that of the rate at its beginning. Within a
+// motion this is below a step; out of a standstill the first step takes 1/120 s = 8.3 ms.
+// So are S_CURVE_ACCELERATION, LIN_ADVANCE, TRAVEL_EXTRA_XYJERK, XY_FREQUENCY_LIMIT and backlash
+// (all off by default), and the hints of radius and safe exit speed that G2 and G3 give their
+// pieces.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::planner {
+namespace marlin {
+
+using Steps = std::array<std::int32_t, 4>;  // X Y Z E
+using Vector = std::array<float, 4>;        // X Y Z E
+
+// Limits and configuration in the firmware's own types (planner_settings_t).
+struct Settings {
+  Vector steps_per_mm{};
+  Vector mm_per_step{};
+  Vector max_velocity_mm_s{};
+  Vector jerk_mm_s{};
+  std::array<std::uint32_t, 4> max_accel_mm_s2{};
+  std::array<std::uint32_t, 4> max_accel_steps_s2{};
+  std::uint32_t accel_integer_limit_steps = 0;  // longer blocks: acceleration limits in floats
+  float print_accel_mm_s2 = 0.0F;
+  float travel_accel_mm_s2 = 0.0F;
+  float retract_accel_mm_s2 = 0.0F;
+  float junction_deviation_mm = 0.0F;
+  float min_velocity_mm_s = 0.0F;
+  float min_travel_velocity_mm_s = 0.0F;
+  std::int32_t min_segment_time_us = 0;
+  bool classic_jerk = false;
+  std::uint32_t min_steps_per_segment = 1;
+  std::size_t block_buffer_size = 16;
+};
+
+// One entry of the buffer (block_t). v2 are squared speeds.
+struct Block {
+  std::uint32_t step_events = 0;  // of the axis with most steps
+  std::uint32_t nominal_rate_steps_s = 0;
+  std::uint32_t accel_steps_s2 = 0;
+  float nominal_speed_mm_s = 0.0F;
+  float length_mm = 0.0F;
+  float accel_mm_s2 = 0.0F;
+  float max_entry_v2 = 0.0F;
+  float entry_v2 = 0.0F;
+  bool nominal_length = false;  // long enough to reach the nominal speed whatever comes
+  PlannedMove move;             // without its trapezoid
+};
+
+// What a junction needs of the block before it.
+struct Previous {
+  Vector unit{};
+  Vector speed_mm_s{};
+  float nominal_speed_mm_s = 0.0F;
+  float safe_speed_mm_s = 0.0F;
+};
+
+}  // namespace marlin
+
+// Marlin 2's planner: junction deviation or classic jerk, limits per axis, a lookahead of one
+// buffer, whole steps.
+class MarlinPlanner final : public Planner {
+ public:
+  // config.block_buffer_size must be at least 4.
+  MarlinPlanner(const Limits& limits, const FirmwareConfig& config);
+
+  // False as well for a move that is too short to be queued.
+  bool add(const gcode::Segment& segment) override;
+  void stop() override;
+  std::size_t take(std::vector<PlannedMove>& out) override;
+  [[nodiscard]] std::size_t pending() const override;
+
+ private:
+  [[nodiscard]] marlin::Block& block(std::size_t index) { return ring_[index % ring_.size()]; }
+  [[nodiscard]] marlin::Steps rounded(const gcode::Position& position_mm) const;
+  void follow_jumps(const gcode::Segment& segment);
+  void set_move(const gcode::Segment& segment, const marlin::Steps& target, PlannedMove& move);
+  void run_first();
+  void drop_first();
+  void reverse_pass();
+  void forward_pass();
+
+  FirmwareConfig config_;
+  Limits settings_limits_;  // those that settings_ were made from
+  marlin::Settings settings_;
+  marlin::Previous previous_;
+  marlin::Steps position_{};    // after the last queued block
+  gcode::Position asked_mm_{};  // end of the last segment given, queued or not
+  bool has_position_ = false;   // a segment has been given
+  bool start_known_ = true;     // of all segments since the last queued block
+  std::vector<marlin::Block> ring_;
+  // Blocks first_ … end_ − 1 are in the buffer, counted since the beginning.
+  std::size_t first_ = 0;
+  std::size_t end_ = 0;
+  std::size_t planned_ = 0;  // from here on entry speeds can still rise
+  bool running_ = false;     // the first block runs; it is among the final moves already
+  std::vector<PlannedMove> final_;
+};
+
+}  // namespace unflex::planner

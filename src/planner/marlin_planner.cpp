@@ -1,0 +1,193 @@
+// The buffer of blocks and the speeds at their junctions.
+//
+// Source: Marlin 2.1.2, src/module/planner.cpp: buffer_segment, _buffer_steps, get_current_block,
+// recalculate and its passes. Trapezoids are made once, when a block begins to run: the firmware
+// makes them anew whenever a speed changes, from the same two speeds.
+#include "unflex/planner/marlin_planner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "marlin_block.hpp"
+#include "marlin_trapezoid.hpp"
+
+namespace unflex::planner {
+namespace {
+
+using enum gcode::Axis;
+
+// The next segment begins elsewhere if it begins further away than this: homing, an offset, a jump.
+constexpr double kSamePlace_mm = 1e-6;
+
+// X, Y and Z fit the firmware's floats, and its products decide ties. E, counted from the beginning
+// of the file, does not.
+std::int32_t to_steps(std::size_t axis, double mm, double steps_per_mm) {
+  if (axis == E) return static_cast<std::int32_t>(std::lround(mm * steps_per_mm));
+  return static_cast<std::int32_t>(
+      std::lround(static_cast<float>(mm) * static_cast<float>(steps_per_mm)));
+}
+
+}  // namespace
+
+MarlinPlanner::MarlinPlanner(const Limits& limits, const FirmwareConfig& config)
+    : Planner(limits),
+      config_(config),
+      settings_limits_(limits),
+      settings_(marlin::make_settings(limits, config)),
+      ring_(settings_.block_buffer_size) {}
+
+bool MarlinPlanner::add(const gcode::Segment& segment) {
+  if (limits_ != settings_limits_) {
+    settings_ = marlin::make_settings(limits_, config_);
+    settings_limits_ = limits_;
+  }
+  follow_jumps(segment);
+  asked_mm_ = segment.end_mm;
+  start_known_ = start_known_ && segment.start_known;
+
+  // One entry always stays empty.
+  if (end_ - first_ == ring_.size() - 1) {
+    if (!running_) run_first();
+    drop_first();
+    run_first();
+  }
+  const marlin::Steps target = rounded(segment.end_mm);
+  marlin::Steps delta{};
+  for (std::size_t axis = 0; axis < delta.size(); ++axis) {
+    delta[axis] = target[axis] - position_[axis];
+  }
+  const std::size_t moves_queued = end_ - first_ - (running_ ? 1 : 0);
+  marlin::Block& added = block(end_);
+  if (!marlin::populate_block(settings_, delta, static_cast<float>(segment.feed_mm_s), moves_queued,
+                              previous_, added)) {
+    return false;
+  }
+  set_move(segment, target, added.move);
+  position_ = target;
+  start_known_ = true;
+  ++end_;
+  if (end_ - 1 != planned_) {
+    reverse_pass();
+    forward_pass();
+  }
+  return true;
+}
+
+void MarlinPlanner::stop() {
+  while (first_ != end_) {
+    if (!running_) run_first();
+    drop_first();
+  }
+}
+
+std::size_t MarlinPlanner::take(std::vector<PlannedMove>& out) {
+  const std::size_t count = final_.size();
+  out.insert(out.end(), std::make_move_iterator(final_.begin()),
+             std::make_move_iterator(final_.end()));
+  final_.clear();
+  return count;
+}
+
+std::size_t MarlinPlanner::pending() const {
+  return final_.size() + (end_ - first_) - (running_ ? 1 : 0);
+}
+
+marlin::Steps MarlinPlanner::rounded(const gcode::Position& position_mm) const {
+  marlin::Steps result{};
+  for (std::size_t axis = 0; axis < result.size(); ++axis) {
+    result[axis] = to_steps(axis, position_mm[axis], config_.steps_per_mm[axis]);
+  }
+  return result;
+}
+
+// An axis that does not begin where the segment before ended has been set elsewhere
+// (set_machine_position_mm).
+void MarlinPlanner::follow_jumps(const gcode::Segment& segment) {
+  const marlin::Steps start = rounded(segment.start_mm);
+  for (std::size_t axis = 0; axis < start.size(); ++axis) {
+    if (!has_position_ || std::abs(segment.start_mm[axis] - asked_mm_[axis]) > kSamePlace_mm) {
+      position_[axis] = start[axis];
+    }
+  }
+  has_position_ = true;
+}
+
+// From the position to the target, both in whole steps.
+void MarlinPlanner::set_move(const gcode::Segment& segment, const marlin::Steps& target,
+                             PlannedMove& move) {
+  move = PlannedMove{};
+  move.segment = segment;
+  move.segment.start_known = start_known_;
+  std::array<double, 4> delta{};
+  for (std::size_t axis = 0; axis < delta.size(); ++axis) {
+    const double steps_per_mm = config_.steps_per_mm[axis];
+    move.segment.start_mm[axis] = position_[axis] / steps_per_mm;
+    move.segment.end_mm[axis] = target[axis] / steps_per_mm;
+    delta[axis] = (target[axis] - position_[axis]) / steps_per_mm;
+  }
+  const double xyz_mm = std::sqrt(delta[X] * delta[X] + delta[Y] * delta[Y] + delta[Z] * delta[Z]);
+  move.kinematic = xyz_mm > 0.0;
+  move.length_mm = move.kinematic ? xyz_mm : std::abs(delta[E]);
+  for (std::size_t axis = 0; axis < delta.size(); ++axis) {
+    move.direction[axis] = delta[axis] / move.length_mm;
+  }
+}
+
+// The first block begins to run: its trapezoid is final, and so is the next one's entry speed
+// (get_current_block).
+void MarlinPlanner::run_first() {
+  marlin::Block& first = block(first_);
+  const float exit =
+      first_ + 1 == end_ ? marlin::kMinimumSpeed_mm_s : std::sqrt(block(first_ + 1).entry_v2);
+  marlin::set_profile(marlin::make_trapezoid(first, std::sqrt(first.entry_v2), exit), first);
+  final_.push_back(std::move(first.move));
+  running_ = true;
+  planned_ = std::max(planned_, first_ + 1);
+}
+
+void MarlinPlanner::drop_first() {
+  ++first_;
+  running_ = false;
+}
+
+// From the last block back to the one after planned_: highest speeds from which the machine can
+// still slow down. Stops short where nothing changes, as the firmware does.
+void MarlinPlanner::reverse_pass() {
+  float next_v2 = marlin::kMinimumSpeed_mm_s * marlin::kMinimumSpeed_mm_s;
+  bool next_changed = false;
+  bool is_new = true;
+  for (std::size_t i = end_ - 1; i != planned_; --i) {
+    marlin::Block& current = block(i);
+    bool changed = is_new;
+    if (current.entry_v2 != current.max_entry_v2 || next_changed) {
+      const float v2 = current.nominal_length
+                           ? current.max_entry_v2
+                           : std::min(current.max_entry_v2, marlin::reachable_v2(current, next_v2));
+      changed = changed || v2 != current.entry_v2;
+      current.entry_v2 = v2;
+    }
+    next_v2 = current.entry_v2;
+    next_changed = changed;
+    is_new = false;
+  }
+}
+
+// From planned_ on: lowers speeds that cannot be reached by accelerating. Nothing before a block
+// that begins at its limit, or at full acceleration, can change any more.
+void MarlinPlanner::forward_pass() {
+  for (std::size_t i = planned_ + 1; i < end_; ++i) {
+    const marlin::Block& before = block(i - 1);
+    marlin::Block& current = block(i);
+    if (!before.nominal_length && before.entry_v2 < current.entry_v2) {
+      const float v2 = marlin::reachable_v2(before, before.entry_v2);
+      if (v2 < current.entry_v2) {
+        current.entry_v2 = v2;
+        planned_ = i;
+      }
+    }
+    if (current.entry_v2 == current.max_entry_v2) planned_ = i;
+  }
+}
+
+}  // namespace unflex::planner
