@@ -1,0 +1,222 @@
+// The plan against the blocks that Marlin's own planner makes of the same moves.
+//
+// planner_marlin_cases.csv: one command per row.
+//   case,<name>,<classic jerk>,<BLOCK_BUFFER_SIZE>,<MIN_STEPS_PER_SEGMENT>   default limits again
+//   steps | max_accel | max_velocity | jerk,<X>,<Y>,<Z>,<E>      accel,<M204 P>,<R>,<T>
+//   deviation,<mm>      minimum,<M205 S>,<T>,<B in µs>      move,<X>,<Y>,<Z>,<E>,<feed>      stop
+// planner_marlin_blocks.csv: one block of Marlin 2.1.2.5's src/module/planner.cpp per row.
+//   <case>,<move>,<steps X>,<Y>,<Z>,<E>,<step_event_count>,<nominal_rate>,<initial_rate>,
+//   <final_rate>,<accelerate_until>,<decelerate_after>,<acceleration_steps_per_s2>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "unflex/core/number.hpp"
+#include "unflex/planner/marlin_planner.hpp"
+
+namespace unflex::planner {
+namespace {
+
+using Row = std::vector<std::string>;
+
+std::vector<Row> rows(const std::string& name) {
+  std::ifstream file(std::string(UNFLEX_TEST_DATA) + "/" + name);
+  std::vector<Row> result;
+  for (std::string line; std::getline(file, line);) {
+    Row& row = result.emplace_back();
+    for (std::size_t begin = 0; begin <= line.size();) {
+      const std::size_t end = std::min(line.find(',', begin), line.size());
+      row.push_back(line.substr(begin, end - begin));
+      begin = end + 1;
+    }
+  }
+  return result;
+}
+
+double number(const Row& row, std::size_t column) { return parse_number(row.at(column)).value(); }
+
+std::array<double, 4> axes(const Row& row) {
+  return {number(row, 1), number(row, 2), number(row, 3), number(row, 4)};
+}
+
+// The time that the numbers of a block describe.
+double block_duration_s(const Row& row) {
+  const double steps = number(row, 6);
+  const double nominal = number(row, 7);
+  const double initial = std::min(number(row, 8), nominal);
+  const double accel_until = number(row, 10);
+  const double decel_steps = steps - number(row, 11);
+  const double a = number(row, 12);
+  const double steps_to_nominal = (nominal * nominal - initial * initial) / (2.0 * a);
+  double t = 0.0;
+  double rate = nominal;
+  if (steps_to_nominal <= accel_until) {
+    t += (nominal - initial) / a + (accel_until - steps_to_nominal) / nominal;
+  } else {
+    rate = std::sqrt(initial * initial + 2.0 * a * accel_until);
+    t += 2.0 * accel_until / (initial + rate);
+  }
+  t += (steps - decel_steps - accel_until) / rate;
+  const double last = std::sqrt(std::max(rate * rate - 2.0 * a * decel_steps, 0.0));
+  return t + 2.0 * decel_steps / (rate + last);
+}
+
+struct Plan {
+  std::array<double, 4> steps_per_mm{};
+  std::vector<PlannedMove> moves;
+};
+
+// One case's planner, fed row by row.
+class Run {
+ public:
+  explicit Run(const Row& row) {
+    config_.firmware = Firmware::marlin;
+    config_.classic_jerk = row.at(2) == "1";
+    config_.block_buffer_size = static_cast<int>(number(row, 3));
+    config_.min_steps_per_segment = static_cast<int>(number(row, 4));
+  }
+
+  void feed(const Row& row) {
+    const std::string& kind = row.at(0);
+    gcode::LimitChange change;
+    if (kind == "steps") {
+      config_.steps_per_mm = axes(row);
+    } else if (kind == "move") {
+      move(row);
+    } else if (kind == "stop") {
+      planner().stop();
+    } else {
+      if (kind == "max_accel") std::ranges::copy(axes(row), change.axis_max_accel_mm_s2.begin());
+      if (kind == "max_velocity") {
+        std::ranges::copy(axes(row), change.axis_max_velocity_mm_s.begin());
+      }
+      if (kind == "jerk") std::ranges::copy(axes(row), change.axis_jerk_mm_s.begin());
+      if (kind == "deviation") change.junction_deviation_mm = number(row, 1);
+      if (kind == "accel") {
+        change.print_accel_mm_s2 = number(row, 1);
+        change.retract_accel_mm_s2 = number(row, 2);
+        change.travel_accel_mm_s2 = number(row, 3);
+      }
+      if (kind == "minimum") {
+        change.min_velocity_mm_s = number(row, 1);
+        change.min_travel_velocity_mm_s = number(row, 2);
+        change.min_segment_time_s = 1e-6 * number(row, 3);
+      }
+      planner().apply(change);
+    }
+  }
+
+  Plan plan() {
+    Plan result{config_.steps_per_mm, {}};
+    planner().take(result.moves);
+    return result;
+  }
+
+ private:
+  Planner& planner() {
+    if (!planner_) planner_ = make_planner(Limits{}, config_);
+    return *planner_;
+  }
+
+  void move(const Row& row) {
+    gcode::Segment segment;
+    segment.start_mm = at_mm_;
+    segment.end_mm = axes(row);
+    segment.feed_mm_s = number(row, 5);
+    segment.line = ++count_;
+    planner().add(segment);
+    at_mm_ = segment.end_mm;
+  }
+
+  FirmwareConfig config_;
+  std::unique_ptr<Planner> planner_;
+  gcode::Position at_mm_{};
+  std::size_t count_ = 0;
+};
+
+std::map<std::string, Plan> plans() {
+  std::map<std::string, Plan> result;
+  std::string name;
+  std::unique_ptr<Run> run;
+  for (const Row& row : rows("planner_marlin_cases.csv")) {
+    if (row.at(0) == "case") {
+      if (run) result[name] = run->plan();
+      name = row.at(1);
+      run = std::make_unique<Run>(row);
+    } else {
+      run->feed(row);
+    }
+  }
+  if (run) result[name] = run->plan();
+  return result;
+}
+
+std::map<std::string, std::vector<Row>> blocks() {
+  std::map<std::string, std::vector<Row>> result;
+  for (Row& row : rows("planner_marlin_blocks.csv")) result[row.at(0)].push_back(std::move(row));
+  return result;
+}
+
+TEST(MarlinOracle, SameMovesAreQueuedWithTheSameSteps) {
+  const auto planned = plans();
+  const auto expected = blocks();
+  ASSERT_GE(expected.size(), 80U);
+  ASSERT_EQ(planned.size(), expected.size());
+  for (const auto& [name, plan] : planned) {
+    const std::vector<Row>& of_marlin = expected.at(name);
+    ASSERT_EQ(plan.moves.size(), of_marlin.size()) << name;
+    for (std::size_t i = 0; i < of_marlin.size(); ++i) {
+      const gcode::Segment& segment = plan.moves[i].segment;
+      ASSERT_EQ(static_cast<double>(segment.line), number(of_marlin[i], 1)) << name;
+      for (std::size_t axis = 0; axis < 4; ++axis) {
+        const double steps =
+            (segment.end_mm[axis] - segment.start_mm[axis]) * plan.steps_per_mm[axis];
+        ASSERT_NEAR(std::abs(steps), number(of_marlin[i], 2 + axis), 1e-9)
+            << name << " move " << segment.line << " axis " << axis;
+      }
+    }
+  }
+}
+
+TEST(MarlinOracle, EveryBlockTakesTheSameTime) {
+  const auto planned = plans();
+  for (const auto& [name, of_marlin] : blocks()) {
+    const std::vector<PlannedMove>& moves = planned.at(name).moves;
+    ASSERT_EQ(moves.size(), of_marlin.size()) << name;
+    for (std::size_t i = 0; i < of_marlin.size(); ++i) {
+      ASSERT_NEAR(moves[i].duration_s(), block_duration_s(of_marlin[i]), 1e-9)
+          << name << " move " << moves[i].segment.line;
+    }
+  }
+}
+
+TEST(MarlinOracle, EveryBlockHasTheSameRates) {
+  const auto planned = plans();
+  for (const auto& [name, of_marlin] : blocks()) {
+    const std::vector<PlannedMove>& moves = planned.at(name).moves;
+    ASSERT_EQ(moves.size(), of_marlin.size()) << name;
+    for (std::size_t i = 0; i < of_marlin.size(); ++i) {
+      const Row& row = of_marlin[i];
+      const PlannedMove& move = moves[i];
+      const double steps_per_mm = number(row, 6) / move.length_mm;
+      const double initial = std::min(number(row, 8), number(row, 7));
+      ASSERT_NEAR(move.start_v_mm_s * steps_per_mm, initial, 1e-6) << name << " block " << i;
+      ASSERT_NEAR(move.accel_mm_s2 * steps_per_mm, number(row, 12), 1e-4) << name << " block " << i;
+      ASSERT_LE(move.cruise_v_mm_s * steps_per_mm, number(row, 7) + 1e-6) << name << " block " << i;
+      // Never slower than the final rate, which is rounded up.
+      const double last = move.end_v_mm_s * steps_per_mm;
+      ASSERT_GE(last, std::min(number(row, 9), number(row, 7)) - 1.01) << name << " block " << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace unflex::planner
