@@ -22,7 +22,10 @@ struct Limits {
   double max_accel_mm_s2 = 5000.0;
   double square_corner_velocity_mm_s = 5.0;
   double minimum_cruise_ratio = 0.5;
-  // Marlin and RepRapFirmware.
+  // Marlin and RepRapFirmware. The defaults, and those for Marlin alone, are of Marlin 2.1.2:
+  // Configuration.h (DEFAULT_MAX_FEEDRATE, DEFAULT_MAX_ACCELERATION, DEFAULT_ACCELERATION,
+  // DEFAULT_XJERK, JUNCTION_DEVIATION_MM) and Configuration_adv.h (DEFAULT_MINIMUMFEEDRATE,
+  // DEFAULT_MINSEGMENTTIME).
   std::array<double, 4> axis_max_velocity_mm_s{300.0, 300.0, 5.0, 25.0};       // M203
   std::array<double, 4> axis_max_accel_mm_s2{3000.0, 3000.0, 100.0, 10000.0};  // M201
   std::array<double, 4> axis_jerk_mm_s{10.0, 10.0, 0.3, 5.0};                  // M205 X Y Z E, M566
@@ -55,10 +58,15 @@ struct FirmwareConfig {
   double instantaneous_corner_velocity_mm_s = 1.0;
   // Marlin and RepRapFirmware, per axis X Y Z E.
   std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 93.0};
-  // Marlin.
+  // Marlin; defaults of its Configuration.h and Configuration_adv.h.
   bool classic_jerk = false;      // CLASSIC_JERK instead of junction deviation
   int min_steps_per_segment = 6;  // MIN_STEPS_PER_SEGMENT
   int block_buffer_size = 16;     // BLOCK_BUFFER_SIZE; at least 4
+  // RepRapFirmware 3.5.3 on a Duet 3 with a SAME70 (MB6HC, MB6XD). Others have 40 moves; a Duet 2
+  // 937500 clocks per second (src/Movement/Move.h: InitialDdaRingLength, M595 P;
+  // src/RepRapFirmware.h: StepClockRate).
+  int ring_length = 60;  // at least 4
+  double step_clock_hz = 750000.0;
 };
 
 // A segment with its trapezoid.
