@@ -2,6 +2,7 @@
 
 #include "unflex/planner/klipper_planner.hpp"
 #include "unflex/planner/marlin_planner.hpp"
+#include "unflex/planner/rrf_planner.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -42,6 +43,7 @@ void apply(const gcode::LimitChange& change, Limits& limits) {
 
 std::unique_ptr<Planner> make_planner(const Limits& limits, const FirmwareConfig& config) {
   if (config.firmware == Firmware::marlin) return std::make_unique<MarlinPlanner>(limits, config);
+  if (config.firmware == Firmware::rrf) return std::make_unique<RrfPlanner>(limits, config);
   return std::make_unique<KlipperPlanner>(limits, config);
 }
 

@@ -1,0 +1,120 @@
+// RepRapFirmware's planner.
+//
+// Notation: RepRapFirmware 3.5.3, src/Movement/DDA.cpp and DDARing.cpp. A queued move is a DDA; it
+// is provisional until it is prepared, and frozen from then on. Speeds are in mm per step clock and
+// in 32-bit floats, as in the firmware: its decisions ("does this move reach its requested speed",
+// "is it nothing but a deceleration") hang on the last bits. They agree with the firmware's up to
+// the fused multiply-adds that its compiler may have chosen.
+//
+// Rounding. A motor ends each move on a whole step, X, Y and Z each at the one nearest to what the
+// file says; start_mm and end_mm of a planned move are there. Lengths and speeds are those of the
+// file's path, so the direction of a planned move is a unit vector only up to a step over the
+// length. The extruder's remainders are carried: it follows the file's E to within a step and is
+// not rounded. An axis with 0 steps per mm is not rounded either.
+//
+// Duration. A move lasts a whole number of step clocks, rounded down (DDA::Prepare). What is cut
+// off (less than one clock) is taken from its longest phase.
+//
+// Lookahead. A move can change while it is provisional. The file is taken to be read faster than it
+// is printed, and the task that fills the ring (Move::MoveLoop) to run at every clock; a real one
+// runs every 2 ms. So before each instant the ring holds what CanAddMove allows: ring_length moves,
+// of which at most about two seconds are provisional. Moves are frozen 50 ms before they begin, or
+// 100 ms if they do not slow down, but never more than half the ring (PrepareMoves). Moves that
+// precede a stop, too few to fill the ring, begin when the stop is read.
+//
+// Limits. M201, M203 and M204 count for moves added later. M566 counts from where it stands for all
+// junctions that are reckoned from then on, which includes those of provisional moves.
+//
+// Left out: pressure advance (its default of 0 leaves acceleration alone; M572), input shaping, the
+// reduced accelerations of M201.1, kinematics other than Cartesian, tools with several X or Y
+// motors or extruders, M595 R (grace period), babystepping, movements of drives on CAN boards,
+// which may last one clock longer.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <vector>
+
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::planner {
+namespace rrf {
+
+using Vector = std::array<float, 4>;  // X Y Z E
+
+// Limits in the firmware's own units: mm and step clocks.
+struct Settings {
+  float clock_hz = 0.0F;
+  Vector max_speed{};     // M203
+  Vector max_accel{};     // M201
+  Vector allowed_jerk{};  // M566
+  float print_accel = 0.0F;
+  float travel_accel = 0.0F;
+  float min_speed = 0.0F;  // M203 I
+  bool join_all = false;   // jerk policy other than 0
+};
+
+// One move of the ring.
+struct Dda {
+  Vector direction{};
+  float length_mm = 0.0F;
+  float accel = 0.0F;
+  float decel = 0.0F;
+  float requested_speed = 0.0F;
+  float start_speed = 0.0F;
+  float top_speed = 0.0F;
+  float end_speed = 0.0F;
+  float accel_distance_mm = 0.0F;
+  float decel_distance_mm = 0.0F;
+  float target_end_speed = 0.0F;    // what the next move asks for
+  std::uint32_t clocks = 0;         // whole duration
+  bool moves_xy = false;            // xyMoving
+  bool prints = false;              // isPrintingMove
+  bool extruder_not_print = false;  // isNonPrintingExtruderMove
+  PlannedMove move;                 // without its trapezoid
+};
+
+}  // namespace rrf
+
+// The firmware's own limits before any M201, M203, M204 or M566 (src/Config/Configuration.h):
+//   M203 X100 Y100 Z20 E100 mm/s    M203 I0.5 mm/s     M201 X1000 Y1000 Z200 E500 mm/s²
+//   M566 X15 Y15 Z10 E5 mm/s, P0    M204 P50000 T50000 mm/s²
+[[nodiscard]] Limits rrf_default_limits();
+
+// RepRapFirmware 3's planner: limits per axis, jerk per motor with policy 0 or not, lookahead
+// within the ring.
+class RrfPlanner final : public Planner {
+ public:
+  // config.ring_length must be at least 4, config.step_clock_hz above 0.
+  RrfPlanner(const Limits& limits, const FirmwareConfig& config);
+
+  bool add(const gcode::Segment& segment) override;
+  void stop() override;
+  std::size_t take(std::vector<PlannedMove>& out) override;
+  [[nodiscard]] std::size_t pending() const override;
+
+ private:
+  void wait_for_space();
+  [[nodiscard]] bool can_add() const;
+  [[nodiscard]] bool can_freeze() const;
+  void freeze();
+  [[nodiscard]] std::int64_t next_event() const;
+  [[nodiscard]] std::int64_t last_finish() const;
+  [[nodiscard]] gcode::Position on_steps(const gcode::Position& position_mm) const;
+
+  FirmwareConfig config_;
+  Limits settings_limits_;  // those that settings_ were made from
+  rrf::Settings settings_;
+  std::size_t ring_length_;
+  std::int64_t clock_hz_;
+  std::deque<rrf::Dda> provisional_;
+  std::vector<PlannedMove> final_;
+  // Step clocks since the machine last stood still.
+  std::int64_t now_ = 0;
+  std::deque<std::int64_t> finish_;  // of frozen moves that have not ended yet; the first one runs
+  bool moving_ = false;
+};
+
+}  // namespace unflex::planner

@@ -1,0 +1,191 @@
+// Source: RepRapFirmware 3.5.3, src/Movement/DDA.cpp (InitStandardMove, VectorBoxIntersection,
+// NormaliseLinearMotion, RecalculateMove, PrepParams), src/Platform/Platform.h (the floors below
+// the limits), src/Config/Configuration.h. Sums and products stand in the firmware's order, because
+// floats round.
+//
+//   u, v, w   speed at the start, at the top and at the end       a, d   acceleration, deceleration
+//   s         length
+#include "rrf_dda.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace unflex::planner::rrf {
+namespace {
+
+using enum gcode::Axis;
+
+constexpr double kMinSpeed_mm_s = 0.01;  // AbsoluteMinFeedrate
+constexpr double kMinJerk_mm_s = 0.1;    // MinimumJerk
+constexpr double kMinAccel_mm_s2 = 0.1;  // MinimumAcceleration
+constexpr float kShortestRamp = 10.0F;   // MinimumAccelOrDecelClocks
+
+float squared(float value) { return value * value; }
+
+float per_clock(double mm_s, float clock_hz) { return static_cast<float>(mm_s) / clock_hz; }
+
+// The factor by which the unit vector grows until it touches the box (VectorBoxIntersection).
+float reach(const Vector& direction, const Vector& box) {
+  float factor = 0.0F;
+  for (const float side : box) factor += side;
+  for (std::size_t axis = 0; axis < box.size(); ++axis) {
+    const float part = std::abs(direction[axis]);
+    if (factor * part > box[axis]) factor = box[axis] / part;
+  }
+  return factor;
+}
+
+// Length in X, Y and Z; of filament where nothing else moves.
+float travel_mm(const Vector& delta) {
+  const float xyz = std::sqrt(squared(delta[X]) + squared(delta[Y]) + squared(delta[Z]));
+  return xyz > 0.0F ? xyz : std::abs(delta[E]);
+}
+
+// Removes a ramp too short to matter: the top speed becomes that of the move's faster end. Both
+// ramps are known to fit.
+void set_top_speed(Dda& dda) {
+  const float u = dda.start_speed;
+  const float w = dda.end_speed;
+  const float requested = dda.requested_speed;
+  const auto nearly_there = [requested](float speed, float accel) {
+    return speed + accel * kShortestRamp > requested && speed >= requested * 0.9F;
+  };
+  dda.top_speed = requested;
+  if (u >= w) {
+    if (nearly_there(u, dda.accel)) {
+      dda.top_speed = u;
+      dda.accel_distance_mm = 0.0F;
+    }
+  } else if (nearly_there(w, dda.decel)) {
+    dda.top_speed = w;
+    dda.decel_distance_mm = 0.0F;
+  }
+}
+
+// The whole move is one ramp. Rounding may have made it a little steeper than the limit, or its
+// neighbours' new limits much steeper: the ramp is then what it must be.
+void set_single_ramp(Dda& dda) {
+  const float u2 = squared(dda.start_speed);
+  const float w2 = squared(dda.end_speed);
+  const bool up = dda.start_speed < dda.end_speed;
+  dda.accel_distance_mm = up ? dda.length_mm : 0.0F;
+  dda.decel_distance_mm = up ? 0.0F : dda.length_mm;
+  dda.top_speed = std::max(dda.start_speed, dda.end_speed);
+  const float needed = std::abs(w2 - u2) / (2.0F * dda.length_mm);
+  // Nothing is needed where a·s vanishes beside u² in a float. The firmware then has 0/0 for the
+  // ramp's duration, and its conversion to 0 clocks.
+  if (needed > 0.0F) (up ? dda.accel : dda.decel) = needed;
+}
+
+float ramp_clocks(float high, float low, float accel) { return (high - low) / accel; }
+
+}  // namespace
+
+Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
+  Settings result;
+  const auto clock = static_cast<float>(config.step_clock_hz);
+  const float per_clock2 = 1.0F / static_cast<float>(config.step_clock_hz * config.step_clock_hz);
+  result.clock_hz = clock;
+  result.min_speed = per_clock(std::max(limits.min_movement_velocity_mm_s, kMinSpeed_mm_s), clock);
+  for (std::size_t axis = 0; axis < 4; ++axis) {
+    result.max_speed[axis] =
+        std::max(per_clock(limits.axis_max_velocity_mm_s[axis], clock), result.min_speed);
+    result.max_accel[axis] =
+        static_cast<float>(std::max(limits.axis_max_accel_mm_s2[axis], kMinAccel_mm_s2)) *
+        per_clock2;
+    result.allowed_jerk[axis] =
+        per_clock(std::max(limits.axis_jerk_mm_s[axis], kMinJerk_mm_s), clock);
+  }
+  result.print_accel = static_cast<float>(limits.print_accel_mm_s2) * per_clock2;
+  result.travel_accel = static_cast<float>(limits.travel_accel_mm_s2) * per_clock2;
+  result.join_all = limits.jerk_policy != 0;
+  return result;
+}
+
+bool start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda) {
+  // The firmware knows positions of X, Y and Z as floats, and filament as what a move takes.
+  Vector delta{};
+  for (const auto axis : {X, Y, Z}) {
+    delta[axis] =
+        static_cast<float>(segment.end_mm[axis]) - static_cast<float>(segment.start_mm[axis]);
+  }
+  delta[E] = static_cast<float>(segment.delta(E));
+  dda.length_mm = travel_mm(delta);
+  if (!(dda.length_mm > 0.0F)) return false;
+
+  const float scale = 1.0F / dda.length_mm;
+  for (std::size_t axis = 0; axis < delta.size(); ++axis) dda.direction[axis] = delta[axis] * scale;
+  dda.moves_xy = delta[X] != 0.0F || delta[Y] != 0.0F;
+  dda.prints = dda.moves_xy && delta[E] > 0.0F;
+  dda.extruder_not_print = delta[E] != 0.0F && !dda.prints;
+
+  dda.accel = reach(dda.direction, settings.max_accel);
+  if (dda.moves_xy) {
+    dda.accel = std::min(dda.accel, dda.prints ? settings.print_accel : settings.travel_accel);
+  }
+  dda.decel = dda.accel;
+  dda.requested_speed =
+      std::min(std::max(per_clock(segment.feed_mm_s, settings.clock_hz), settings.min_speed),
+               reach(dda.direction, settings.max_speed));
+  dda.start_speed = 0.0F;
+  dda.end_speed = 0.0F;
+  return true;
+}
+
+void set_trapezoid(Dda& dda) {
+  const float two_a = 2.0F * dda.accel;
+  const float two_d = 2.0F * dda.decel;
+  const float u2 = squared(dda.start_speed);
+  const float w2 = squared(dda.end_speed);
+  const float requested2 = squared(dda.requested_speed);
+  dda.accel_distance_mm = (requested2 - u2) / two_a;
+  dda.decel_distance_mm = (requested2 - w2) / two_d;
+  if (dda.accel_distance_mm + dda.decel_distance_mm < dda.length_mm) {
+    set_top_speed(dda);
+  } else {
+    // v² from (v² − u²)/2a + (v² − w²)/2d = s.
+    const float v2 =
+        ((two_a * two_d * dda.length_mm) + (two_a * w2) + two_d * u2) / (two_a + two_d);
+    if (v2 > u2 && v2 > w2) {
+      dda.accel_distance_mm = (v2 - u2) / two_a;
+      dda.decel_distance_mm = (v2 - w2) / two_d;
+      dda.top_speed = std::sqrt(v2);
+    } else {
+      set_single_ramp(dda);
+    }
+  }
+  const float total =
+      ramp_clocks(dda.top_speed, dda.start_speed, dda.accel) +
+      ramp_clocks(dda.top_speed, dda.end_speed, dda.decel) +
+      (dda.length_mm - dda.accel_distance_mm - dda.decel_distance_mm) / dda.top_speed;
+  dda.clocks = static_cast<std::uint32_t>(std::max(total, 0.0F));
+}
+
+void finish(const Settings& settings, Dda& dda) {
+  const float decel_start_mm = dda.length_mm - dda.decel_distance_mm;
+  const float steady_mm = decel_start_mm - std::min(dda.accel_distance_mm, decel_start_mm);
+  const float accel_clocks = ramp_clocks(dda.top_speed, dda.start_speed, dda.accel);
+  const float decel_clocks = ramp_clocks(dda.top_speed, dda.end_speed, dda.decel);
+  const float steady_clocks = steady_mm <= 0.0F ? 0.0F : steady_mm / dda.top_speed;
+  dda.clocks = static_cast<std::uint32_t>(accel_clocks + steady_clocks + decel_clocks);
+
+  const double clock_hz = settings.clock_hz;
+  PlannedMove& move = dda.move;
+  move.start_v_mm_s = dda.start_speed * clock_hz;
+  move.cruise_v_mm_s = dda.top_speed * clock_hz;
+  move.end_v_mm_s = dda.end_speed * clock_hz;
+  move.accel_mm_s2 = (accel_clocks > 0.0F ? dda.accel : dda.decel) * clock_hz * clock_hz;
+  move.accel_s = accel_clocks / clock_hz;
+  move.cruise_s = steady_clocks / clock_hz;
+  move.decel_s = decel_clocks / clock_hz;
+  double& longest =
+      std::max({std::ref(move.cruise_s), std::ref(move.decel_s), std::ref(move.accel_s)}).get();
+  longest += dda.clocks / clock_hz - move.duration_s();
+}
+
+float speed_after(float start_speed, float accel, float length_mm) {
+  return std::sqrt(squared(start_speed) + (2.0F * accel * length_mm));
+}
+
+}  // namespace unflex::planner::rrf

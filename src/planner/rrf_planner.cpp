@@ -1,0 +1,158 @@
+// The ring of moves, and when they are frozen.
+//
+// Source: RepRapFirmware 3.5.3, src/Movement/DDARing.cpp: CanAddMove, Spin, PrepareMoves;
+// src/Movement/DDA.h; src/Movement/Move.cpp: MoveLoop.
+#include "unflex/planner/rrf_planner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "rrf_dda.hpp"
+#include "rrf_lookahead.hpp"
+
+namespace unflex::planner {
+namespace {
+
+using enum gcode::Axis;
+
+// How long before its start a move is frozen, in step clocks (UsualMinimumPreparedTime,
+// AbsoluteMinimumPreparedTime).
+std::int64_t usual_lead(std::int64_t clock_hz) { return clock_hz / 10; }
+std::int64_t shortest_lead(std::int64_t clock_hz) { return clock_hz / 20; }
+
+// A move that does not slow down cannot become better (IsGoodToPrepare).
+std::int64_t lead(const rrf::Dda& dda, std::int64_t clock_hz) {
+  return dda.end_speed >= dda.top_speed ? usual_lead(clock_hz) : shortest_lead(clock_hz);
+}
+
+}  // namespace
+
+Limits rrf_default_limits() {
+  Limits limits;
+  limits.axis_max_velocity_mm_s = {100.0, 100.0, 20.0, 100.0};
+  limits.axis_max_accel_mm_s2 = {1000.0, 1000.0, 200.0, 500.0};
+  limits.axis_jerk_mm_s = {15.0, 15.0, 10.0, 5.0};
+  limits.print_accel_mm_s2 = 50000.0;
+  limits.travel_accel_mm_s2 = 50000.0;
+  limits.min_movement_velocity_mm_s = 0.5;
+  limits.jerk_policy = 0;
+  return limits;
+}
+
+RrfPlanner::RrfPlanner(const Limits& limits, const FirmwareConfig& config)
+    : Planner(limits),
+      config_(config),
+      settings_limits_(limits),
+      settings_(rrf::make_settings(limits, config)),
+      ring_length_(static_cast<std::size_t>(config.ring_length)),
+      clock_hz_(std::llround(config.step_clock_hz)) {}
+
+bool RrfPlanner::add(const gcode::Segment& segment) {
+  if (limits_ != settings_limits_) {
+    settings_ = rrf::make_settings(limits_, config_);
+    settings_limits_ = limits_;
+  }
+  rrf::Dda dda;
+  if (!rrf::start_dda(settings_, segment, dda)) return false;
+  wait_for_space();
+
+  PlannedMove& move = dda.move;
+  move.segment = segment;
+  move.segment.start_mm = on_steps(segment.start_mm);
+  move.segment.end_mm = on_steps(segment.end_mm);
+  move.length_mm = dda.length_mm;
+  move.kinematic = dda.direction[X] != 0.0F || dda.direction[Y] != 0.0F || dda.direction[Z] != 0.0F;
+  for (const auto axis : {X, Y, Z, E}) {
+    move.direction[axis] = move.segment.delta(axis) / move.length_mm;
+  }
+  provisional_.push_back(std::move(dda));
+  rrf::join_last(settings_, provisional_);
+  while (moving_ && can_freeze()) freeze();
+  return true;
+}
+
+void RrfPlanner::stop() {
+  while (!provisional_.empty()) freeze();
+  finish_.clear();
+  now_ = 0;
+  moving_ = false;
+}
+
+std::size_t RrfPlanner::take(std::vector<PlannedMove>& out) {
+  const std::size_t count = final_.size();
+  out.insert(out.end(), std::make_move_iterator(final_.begin()),
+             std::make_move_iterator(final_.end()));
+  final_.clear();
+  return count;
+}
+
+std::size_t RrfPlanner::pending() const { return final_.size() + provisional_.size(); }
+
+// Lets time pass until the ring has room.
+void RrfPlanner::wait_for_space() {
+  while (!can_add()) {
+    if (moving_) {
+      now_ = std::max(now_, next_event());
+      while (!finish_.empty() && finish_.front() <= now_) finish_.pop_front();
+      // A move is added before others are frozen.
+      if (can_add()) return;
+    }
+    while (can_freeze()) freeze();
+    if (!moving_) {
+      // The first move begins a little after it has been prepared.
+      for (std::int64_t& finish : finish_) finish += shortest_lead(clock_hz_);
+      moving_ = true;
+    }
+  }
+}
+
+bool RrfPlanner::can_add() const {
+  // One entry stays empty until the oldest move is frozen: that one's start is the end of the entry
+  // before it.
+  const std::size_t used = provisional_.size() + finish_.size();
+  if (used >= ring_length_ || (used + 1 == ring_length_ && finish_.empty())) return false;
+  std::int64_t total = 0;
+  for (const rrf::Dda& dda : provisional_) total += dda.clocks;
+  const std::int64_t after_first = provisional_.empty() ? 0 : total - provisional_.front().clocks;
+  return after_first < clock_hz_ / 2 || total < 2 * clock_hz_;
+}
+
+bool RrfPlanner::can_freeze() const {
+  return !provisional_.empty() && 2 * finish_.size() < ring_length_ &&
+         last_finish() - now_ < lead(provisional_.front(), clock_hz_);
+}
+
+void RrfPlanner::freeze() {
+  rrf::Dda& first = provisional_.front();
+  rrf::finish(settings_, first);
+  finish_.push_back(last_finish() + first.clocks);
+  final_.push_back(std::move(first.move));
+  provisional_.pop_front();
+}
+
+// When the running move ends, or the next one is due to be frozen.
+std::int64_t RrfPlanner::next_event() const {
+  std::int64_t event = finish_.empty() ? now_ : finish_.front();
+  if (!provisional_.empty() && 2 * finish_.size() < ring_length_) {
+    event = std::min(event, last_finish() - lead(provisional_.front(), clock_hz_) + 1);
+  }
+  return event;
+}
+
+std::int64_t RrfPlanner::last_finish() const { return finish_.empty() ? now_ : finish_.back(); }
+
+gcode::Position RrfPlanner::on_steps(const gcode::Position& position_mm) const {
+  gcode::Position result = position_mm;
+  for (const auto axis : {X, Y, Z}) {
+    const double steps_per_mm = config_.steps_per_mm[axis];
+    if (steps_per_mm > 0.0) {
+      const float steps = static_cast<float>(position_mm[axis]) * static_cast<float>(steps_per_mm);
+      result[axis] = std::rint(static_cast<double>(steps)) / steps_per_mm;
+    }
+  }
+  return result;
+}
+
+}  // namespace unflex::planner
