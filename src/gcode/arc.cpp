@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 
 namespace unflex::gcode {
@@ -30,7 +31,7 @@ double angle_travelled(const Arc& arc) {
 
 }  // namespace
 
-std::optional<std::vector<std::array<double, 3>>> plan_arc(const Arc& arc, double resolution_mm) {
+ArcPieces plan_arc(const Arc& arc, double resolution_mm) {
   const auto [i, j] = arc.centre_offset_mm;
   const double angle = angle_travelled(arc);
   const double rise = arc.end_mm[2] - arc.start_mm[2];
@@ -39,16 +40,16 @@ std::optional<std::vector<std::array<double, 3>>> plan_arc(const Arc& arc, doubl
   if (!(count <= kMostPieces)) {
     return std::nullopt;
   }
-  std::vector<std::array<double, 3>> ends(static_cast<std::size_t>(count));
-  for (std::size_t n = 1; n < ends.size(); ++n) {
+  std::vector<ArcPiece> pieces(static_cast<std::size_t>(count));
+  for (std::size_t n = 1; n < pieces.size(); ++n) {
     const double turned = static_cast<double>(n) * (angle / count);
     const double c = std::cos(turned);
     const double s = std::sin(turned);
-    ends[n - 1] = {arc.start_mm[0] + i - i * c + j * s, arc.start_mm[1] + j - i * s - j * c,
-                   arc.start_mm[2] + static_cast<double>(n) * (rise / count)};
+    pieces[n - 1] = {{arc.start_mm[0] + i - i * c + j * s, arc.start_mm[1] + j - i * s - j * c},
+                     static_cast<double>(n) / count};
   }
-  ends.back() = arc.end_mm;
-  return ends;
+  pieces.back() = {{arc.end_mm[0], arc.end_mm[1]}, 1.0};
+  return pieces;
 }
 
 std::optional<std::array<double, 2>> centre_from_radius(const std::array<double, 3>& start_mm,

@@ -1,10 +1,11 @@
-// Arcs as Klipper cuts them into straight pieces.
+// Arcs as the firmwares cut them into straight pieces.
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <optional>
 #include <vector>
+
+#include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
 
@@ -16,21 +17,44 @@ struct Arc {
   bool clockwise = false;
 };
 
-// The ends of the pieces, in order; the last is exactly arc.end_mm. nullopt if the arc would fall
-// into more than a million pieces.
-//
-// Source: klippy/extras/gcode_arcs.py, ArcSupport.planArc (after Marlin's plan_arc).
+// Where a piece ends.
+struct ArcPiece {
+  std::array<double, 2> end_mm{};  // alpha, beta
+  double share = 1.0;              // of the travel along the normal and of the filament
+};
+
+// The pieces in order; the last ends exactly at the arc's end. nullopt if the arc would fall into
+// more than a million pieces.
+using ArcPieces = std::optional<std::vector<ArcPiece>>;
+
+// Source: Klipper, klippy/extras/gcode_arcs.py, ArcSupport.planArc (after Marlin's plan_arc).
 //   φ  angle travelled, in (0, 2π] anticlockwise, [−2π, 0) clockwise; a full circle where start and
 //      end coincide
 //   n  = max(1, ⌊√((ρφ)² + Δz²) / resolution⌋) pieces, ρ the radius, Δz along the normal
-[[nodiscard]] std::optional<std::vector<std::array<double, 3>>> plan_arc(const Arc& arc,
-                                                                         double resolution_mm);
+[[nodiscard]] ArcPieces plan_arc(const Arc& arc, double resolution_mm);
+
+// Source: Marlin 2.1.2, src/gcode/motion/G2_G3.cpp, plan_arc.
+//   ℓ  = ρ|φ|, length without the normal;  s = MAX_ARC_SEGMENT_MM, or v / ARC_SEGMENTS_PER_SEC
+//        within MIN_ARC_SEGMENT_MM and it
+//   n₀ = max(⌊ℓ/s⌋, ⌈MIN_CIRCLE_SEGMENTS · |φ|/2π⌉)
+//   n  = ⌈ℓ/max⌉ if ℓ/n₀ > max, max(1, ⌊ℓ/min⌋) if ℓ/n₀ < min, else n₀
+// The radius vector is turned by sin θ ≈ θ − θ³/6, cos θ ≈ 1 − θ²/2, and computed afresh at every
+// N_ARC_CORRECTION-th piece. `circles` full turns come first, each an arc of its own.
+// Empty where Marlin leaves the arc out, as its angle is zero.
+[[nodiscard]] ArcPieces plan_marlin_arc(const Arc& arc, int circles, double feed_mm_s,
+                                        const MarlinArcs& rules);
+
+// Source: RepRapFirmware 3.5, src/GCodes/GCodes.cpp, DoArcMove and ReadMove; Configuration.h.
+//   s  = √(8ρ · 0.005 mm) or v / (200/s), the smaller, but 0.02 mm at least and 1 mm at most
+//   n  = max(1, ⌊ρ|φ|/s + 0.8⌋)
+[[nodiscard]] ArcPieces plan_rrf_arc(const Arc& arc, double feed_mm_s);
 
 // The centre of an arc of a given radius, as an offset from its start: the short way round for a
 // positive radius, the long way for a negative. A radius too small to reach the end becomes half
 // the chord. nullopt where start and end coincide, as they leave the centre open.
 //
-// Source: Marlin, src/gcode/motion/G2_G3.cpp, GcodeSuite::G2_G3.
+// Source: Marlin, src/gcode/motion/G2_G3.cpp, GcodeSuite::G2_G3; RepRapFirmware's DoArcMove gives
+// the same, and refuses a radius that is too small by more than 1 %.
 [[nodiscard]] std::optional<std::array<double, 2>> centre_from_radius(
     const std::array<double, 3>& start_mm, const std::array<double, 3>& end_mm, double radius_mm,
     bool clockwise);

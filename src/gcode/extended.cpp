@@ -119,13 +119,24 @@ void Interpreter::velocity_limit(Event& event) {
   }
 }
 
-// extras/input_shaper.py, cmd_SET_INPUT_SHAPER.
+// extras/input_shaper.py, cmd_SET_INPUT_SHAPER: SHAPER_TYPE is for both axes.
 void Interpreter::input_shaper(Event& event) {
   event.kind = EventKind::barrier;
-  state_.shaper_freq_x_hz =
-      number_of(command_, "SHAPER_FREQ_X").value.value_or(state_.shaper_freq_x_hz);
-  state_.shaper_freq_y_hz =
-      number_of(command_, "SHAPER_FREQ_Y").value.value_or(state_.shaper_freq_y_hz);
+  const auto type = [&](std::string_view key, std::string& target) {
+    const std::optional<std::string> both = command_.parameter("SHAPER_TYPE");
+    target = command_.parameter(key).value_or(both.value_or(target));
+  };
+  const auto number = [&](std::string_view key, auto& target) {
+    if (const auto value = number_of(command_, key).value) {
+      target = *value;
+    }
+  };
+  number("SHAPER_FREQ_X", state_.shaper_freq_x_hz);
+  number("SHAPER_FREQ_Y", state_.shaper_freq_y_hz);
+  number("DAMPING_RATIO_X", state_.shaper.damping_ratio_x);
+  number("DAMPING_RATIO_Y", state_.shaper.damping_ratio_y);
+  type("SHAPER_TYPE_X", state_.shaper.type_x);
+  type("SHAPER_TYPE_Y", state_.shaper.type_y);
 }
 
 // extras/exclude_object.py: Klipper does not stop for it. But when the user has cancelled the

@@ -1,7 +1,11 @@
-// Which commands stop the machine: Klipper's rule.
+// Which commands stop the machine: each firmware's rule. The lists are in klipper_commands.cpp,
+// marlin_commands.cpp and rrf_commands.cpp.
 #pragma once
 
+#include <algorithm>
 #include <string_view>
+
+#include "unflex/core/firmware.hpp"
 
 namespace unflex::gcode {
 
@@ -12,9 +16,23 @@ enum class Effect {
 };
 
 // What an M-code without a handler of its own does.
-[[nodiscard]] Effect m_code_effect(int number);
+[[nodiscard]] Effect m_code_effect(Firmware firmware, int number);
 
-// The same for an extended command; the name in upper case.
+// The same for an extended command of Klipper's; the name in upper case.
 [[nodiscard]] Effect extended_effect(std::string_view name);
+
+[[nodiscard]] Effect klipper_m_code_effect(int number);
+[[nodiscard]] Effect marlin_m_code_effect(int number);
+[[nodiscard]] Effect rrf_m_code_effect(int number);
+
+// Looks a key up in two sorted lists.
+template <class Passive, class Stopping, class Key>
+[[nodiscard]] Effect effect_by_lists(const Passive& passive, const Stopping& stopping,
+                                     const Key& key) {
+  if (std::binary_search(passive.begin(), passive.end(), key)) {
+    return Effect::passive;
+  }
+  return std::binary_search(stopping.begin(), stopping.end(), key) ? Effect::stop : Effect::unknown;
+}
 
 }  // namespace unflex::gcode

@@ -1,10 +1,12 @@
-// Modes, coordinates and everything that is no motion. Motion is in motion.cpp, Klipper's extended
-// commands are in extended.cpp.
+// What the firmwares share, and Klipper's modes and coordinates. Motion is in motion.cpp and
+// retraction.cpp, Klipper's extended commands are in extended.cpp, what is Marlin's and
+// RepRapFirmware's own in marlin.cpp and rrf.cpp.
 #include "unflex/gcode/interpreter.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
 #include <utility>
 
 #include "firmware_commands.hpp"
@@ -14,23 +16,74 @@ namespace {
 
 constexpr std::array<char, 4> kAxisLetters = {'X', 'Y', 'Z', 'E'};
 constexpr double kMmPerInch = 25.4;
+constexpr double kSecondsPerMinute = 60.0;
 
 }  // namespace
 
-Interpreter::Interpreter(InterpreterOptions options) : options_(options) {
-  state_.shaper_freq_x_hz = options.shaper_freq_x_hz;
-  state_.shaper_freq_y_hz = options.shaper_freq_y_hz;
+InterpreterOptions default_options(Firmware firmware) {
+  InterpreterOptions options;
+  options.firmware = firmware;
+  if (firmware == Firmware::marlin) {
+    // Configuration_adv.h: FWRETRACT is off; the rest are its values where it is on.
+    options.firmware_retraction = false;
+    options.retract_length_mm = 3.0;
+    options.retract_speed_mm_s = 45.0;
+    options.unretract_speed_mm_s = 8.0;
+  } else if (firmware == Firmware::rrf) {
+    // src/Config/Configuration.h: DefaultRetractLength, DefaultRetractSpeed in mm/min.
+    options.retract_length_mm = 2.0;
+    options.retract_speed_mm_s = 1000.0 / kSecondsPerMinute;
+    options.unretract_speed_mm_s = 1000.0 / kSecondsPerMinute;
+  }
+  return options;
+}
+
+double ModalState::filament_factor() const {
+  const double radius_mm = filament_diameter_mm / 2.0;
+  return volumetric ? flow_factor / (std::numbers::pi * radius_mm * radius_mm) : flow_factor;
+}
+
+Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(options)) {
+  state_.shaper_freq_x_hz = options_.shaper_freq_x_hz;
+  state_.shaper_freq_y_hz = options_.shaper_freq_y_hz;
+  state_.filament_diameter_mm = options_.filament_diameter_mm;
+  if (options_.firmware == Firmware::marlin) {
+    state_.g91_covers_e = false;
+    state_.feed_mm_s = 4000.0 / kSecondsPerMinute;  // DEFAULT_FEEDRATE_MM_M
+  } else if (options_.firmware == Firmware::rrf) {
+    state_.g91_covers_e = false;
+    state_.feed_mm_s = 3000.0 / kSecondsPerMinute;  // DefaultFeedRate
+    if (options_.shaper_freq_x_hz > 0.0) {
+      state_.shaper.kept_freq_hz = options_.shaper_freq_x_hz;
+    }
+  }
 }
 
 Event Interpreter::interpret(Line line) {
   Event event;
   event.line.number = line.number;
   parse(line.content(), command_);
+  switch (options_.firmware) {
+    case Firmware::klipper:
+      klipper(event);
+      break;
+    case Firmware::marlin:
+      marlin(event, line.content());
+      break;
+    case Firmware::rrf:
+      rrf(event, line.content());
+      break;
+  }
+  event.line = std::move(line);
+  return event;
+}
+
+void Interpreter::klipper(Event& event) {
   switch (command_.kind) {
     case CommandKind::none:
       break;
     case CommandKind::traditional:
-      traditional(event);
+      klipper_traditional(event);
       break;
     case CommandKind::extended:
       extended(event);
@@ -39,26 +92,24 @@ Event Interpreter::interpret(Line line) {
       not_understood(event, command_.problem);
       break;
   }
-  event.line = std::move(line);
-  return event;
 }
 
-void Interpreter::traditional(Event& event) {
+void Interpreter::klipper_traditional(Event& event) {
   constexpr int kPrinterCheck = 862;  // M862.1 to M862.6
   if (command_.subnumber >= 0) {
     if (command_.letter != 'M' || command_.number != kPrinterCheck) {
       lose_position(event);
     }
   } else if (command_.letter == 'G') {
-    g_code(event);
+    klipper_g_code(event);
   } else if (command_.letter == 'M') {
-    m_code(event);
+    klipper_m_code(event);
   } else {
     lose_position(event);  // T, or a letter that begins no command
   }
 }
 
-void Interpreter::g_code(Event& event) {
+void Interpreter::klipper_g_code(Event& event) {
   switch (command_.number) {
     case 0:
     case 1:
@@ -77,11 +128,8 @@ void Interpreter::g_code(Event& event) {
       state_.plane = command_.number;
       return;
     case 20:
-      state_.unit_mm = kMmPerInch;
-      return;
     case 21:
-      state_.unit_mm = 1.0;
-      return;
+      return set_units(command_.number == 20);
     case 28:
       return home(event);
     case 90:
@@ -97,7 +145,7 @@ void Interpreter::g_code(Event& event) {
   }
 }
 
-void Interpreter::m_code(Event& event) {
+void Interpreter::klipper_m_code(Event& event) {
   switch (command_.number) {
     case 82:
       state_.absolute_e = true;
@@ -116,7 +164,11 @@ void Interpreter::m_code(Event& event) {
     default:
       break;
   }
-  switch (m_code_effect(command_.number)) {
+  other_m_code(event);
+}
+
+void Interpreter::other_m_code(Event& event) {
+  switch (m_code_effect(options_.firmware, command_.number)) {
     case Effect::passive:
       return;
     case Effect::stop:
@@ -125,6 +177,17 @@ void Interpreter::m_code(Event& event) {
     case Effect::unknown:
       return lose_position(event);
   }
+}
+
+void Interpreter::set_units(bool inches) {
+  state_.unit_mm = inches ? kMmPerInch : 1.0;
+  update_e_unit();
+}
+
+// Marlin's parser.h, axis_unit_factor: a volume is in cubic inches.
+void Interpreter::update_e_unit() {
+  const bool is_cube = options_.firmware == Firmware::marlin && state_.volumetric;
+  state_.e_unit = is_cube ? state_.unit_mm * state_.unit_mm * state_.unit_mm : state_.unit_mm;
 }
 
 // Klipper reads P alone, in ms.
@@ -140,7 +203,9 @@ void Interpreter::dwell(Event& event) {
 }
 
 // Position values stay: what the axes read afterwards is the printer's configuration, not in the
-// text. Homing takes the effect of G92 off an axis (gcode_move.py, _handle_home_rails_end).
+// text. Homing takes the effect of G92 off an axis (Klipper's gcode_move.py,
+// _handle_home_rails_end; Marlin's motion.cpp, set_axis_is_at_home; RepRapFirmware's G92 sets the
+// very position that homing sets).
 void Interpreter::home(Event& event) {
   event.kind = EventKind::barrier;
   event.position_lost = true;
@@ -163,10 +228,12 @@ void Interpreter::set_position(Event& event) {
       return not_understood(event, fmt::format("G92 with {} but no number", letter));
     }
   }
-  const bool bare = std::none_of(named.begin(), named.end(), [](bool is) { return is; });
+  // Only Klipper takes a bare G92 for all axes.
+  const bool bare = options_.firmware == Firmware::klipper &&
+                    std::none_of(named.begin(), named.end(), [](bool is) { return is; });
   for (const Axis axis : {X, Y, Z, E}) {
     if (bare || named[axis]) {
-      const double scale = axis == E ? state_.unit_mm * state_.flow_factor : state_.unit_mm;
+      const double scale = axis == E ? state_.filament_per_e_mm() : state_.unit_mm;
       const double reading = bare ? 0.0 : *command_.value(kAxisLetters[axis]);
       state_.base_mm[axis] = state_.position_mm[axis] - reading * scale;
       state_.base_known[axis] = axis == E || state_.known[axis];
@@ -206,15 +273,81 @@ void Interpreter::speed_factor(Event& event) {
   }
 }
 
-// The zero of E moves so that its reading stays (gcode_move.py, cmd_M221).
 void Interpreter::flow_factor(Event& event) {
   const double percent = command_.has('S') ? command_.value('S').value_or(0.0) : 100.0;
   if (percent > 0.0) {
-    const double reading = (state_.position_mm[E] - state_.base_mm[E]) / state_.flow_factor;
-    state_.flow_factor = percent / 100.0;
-    state_.base_mm[E] = state_.position_mm[E] - reading * state_.flow_factor;
+    set_flow_factor(percent / 100.0);
   } else {
     event.warnings.emplace_back("M221 with an invalid S is ignored");
+  }
+}
+
+// The zero of E moves so that its reading stays (Klipper: gcode_move.py, cmd_M221).
+void Interpreter::set_flow_factor(double factor) {
+  const double reading = (state_.position_mm[E] - state_.base_mm[E]) / state_.filament_factor();
+  state_.flow_factor = factor;
+  state_.base_mm[E] = state_.position_mm[E] - reading * state_.filament_factor();
+}
+
+// The same for M200.
+void Interpreter::set_volumetric(bool on, double filament_diameter_mm) {
+  const double reading = (state_.position_mm[E] - state_.base_mm[E]) / state_.filament_factor();
+  state_.volumetric = on;
+  state_.filament_diameter_mm = filament_diameter_mm;
+  state_.base_mm[E] = state_.position_mm[E] - reading * state_.filament_factor();
+  update_e_unit();
+}
+
+void Interpreter::limit(Event& event, char letter, double scale, double least,
+                        std::optional<double>& value) {
+  if (!command_.has(letter)) {
+    return;
+  }
+  const std::optional<double> word = command_.value(letter);
+  if (word && *word >= least) {
+    value = *word * scale;
+    event.kind = EventKind::limits;
+  } else {
+    event.warnings.push_back(fmt::format("{}{} with an invalid {} is ignored", command_.letter,
+                                         command_.number, letter));
+  }
+}
+
+void Interpreter::axis_limits(Event& event, double scale, double least, AxisValues& values) {
+  for (const Axis axis : {X, Y, Z, E}) {
+    limit(event, kAxisLetters[axis], scale, least, values[axis]);
+  }
+}
+
+// M92. What the planner knows of steps stays its configuration's.
+void Interpreter::steps_per_mm(Event& event) {
+  bool changed = false;
+  for (const Axis axis : {X, Y, Z, E}) {
+    const std::optional<double> steps = command_.value(kAxisLetters[axis]);
+    if (steps && *steps > 0.0) {
+      changed = changed || state_.steps_per_mm[axis] != steps;
+      state_.steps_per_mm[axis] = steps;
+    }
+  }
+  if (changed) {
+    event.kind = EventKind::barrier;
+    event.warnings.emplace_back(
+        "M92 sets steps per mm: they must be those of the printer's configuration");
+  }
+}
+
+void Interpreter::limits_unknown(Event& event) {
+  lose_position(event);
+  event.warnings.push_back(fmt::format(
+      "{}{} may change the limits to ones not in this file; those known so far are kept",
+      command_.letter, command_.number));
+}
+
+void Interpreter::uncertain_modes(Event& event, std::string_view cause) {
+  lose_position(event);
+  if (!modes_uncertain_) {
+    modes_uncertain_ = true;
+    event.warnings.push_back(fmt::format("{}: what follows is passed through unchanged", cause));
   }
 }
 

@@ -1,11 +1,11 @@
-// G0 to G3, G10 and G11: from the words of a line to segments.
+// G0 to G3: from the words of a line to segments.
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "arc.hpp"
-#include "unflex/core/number.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -43,11 +43,12 @@ std::optional<Axis> axis_of(char letter) {
   }
 }
 
-// gcode_move.py, cmd_G1: G91 makes E relative too, whatever M82 says.
+// Klipper: gcode_move.py, cmd_G1. Marlin: gcode.cpp, get_destination_from_command. RepRapFirmware:
+// GCodes.cpp, DoStraightMove and LoadExtrusionAndFeedrateFromGCode.
 Target read_target(const Command& command, const ModalState& state) {
   Target target;
   target.position_mm = state.position_mm;
-  target.e_absolute = state.absolute_xyz && state.absolute_e;
+  target.e_absolute = state.e_is_absolute();
   for (const Word& word : command.words) {
     const std::optional<Axis> axis = axis_of(word.letter);
     if (!axis && word.letter != 'F') {
@@ -60,7 +61,7 @@ Target read_target(const Command& command, const ModalState& state) {
     } else {
       const bool is_e = *axis == E;
       const bool absolute = is_e ? target.e_absolute : state.absolute_xyz;
-      const double travel = *word.value * state.unit_mm * (is_e ? state.flow_factor : 1.0);
+      const double travel = *word.value * (is_e ? state.filament_per_e_mm() : state.unit_mm);
       const double origin = absolute ? state.base_mm[*axis] : state.position_mm[*axis];
       target.position_mm[*axis] = origin + travel;
       target.named[*axis] = true;
@@ -94,7 +95,7 @@ bool settle(const Target& target, ModalState& state) {
 
 double length(double dx, double dy, double dz) { return std::sqrt(dx * dx + dy * dy + dz * dz); }
 
-// The axes of an arc: two of the plane and its normal (gcode_arcs.py).
+// The axes of an arc: two of the plane and its normal.
 struct ArcPlane {
   Axis alpha;
   Axis beta;
@@ -103,10 +104,12 @@ struct ArcPlane {
   char beta_offset;
 };
 
-ArcPlane arc_plane(int plane) {
+// Klipper takes X before Z; the others Z before X, as the right-hand rule has it.
+ArcPlane arc_plane(int plane, Firmware firmware) {
   switch (plane) {
     case 18:
-      return {X, Z, Y, 'I', 'K'};
+      return firmware == Firmware::klipper ? ArcPlane{X, Z, Y, 'I', 'K'}
+                                           : ArcPlane{Z, X, Y, 'K', 'I'};
     case 19:
       return {Y, Z, X, 'J', 'K'};
     default:
@@ -140,6 +143,22 @@ std::optional<std::array<double, 2>> centre_offset(const Command& command, const
   return offset;
 }
 
+// RepRapFirmware abandons the print where a radius misses the end by more than 1 %.
+bool radius_reaches(const Command& command, double unit_mm, const Arc& arc) {
+  const double radius_mm = command.value('R').value_or(0.0) * unit_mm;
+  const double half_chord_mm =
+      0.5 * std::hypot(arc.end_mm[0] - arc.start_mm[0], arc.end_mm[1] - arc.start_mm[1]);
+  constexpr double kMissingShare = 0.02;
+  return radius_mm * radius_mm * (1.0 + kMissingShare) >= half_chord_mm * half_chord_mm;
+}
+
+int whole_circles(const Command& command, const MarlinArcs& rules) {
+  constexpr double kMostCircles = 100.0;
+  return rules.circles
+             ? static_cast<int>(std::clamp(command.value('P').value_or(0.0), 0.0, kMostCircles))
+             : 0;
+}
+
 }  // namespace
 
 double Segment::length_xy_mm() const { return length(delta(X), delta(Y), 0.0); }
@@ -155,7 +174,7 @@ void Interpreter::linear_move(Event& event) {
   if (!target.moves()) {
     return;
   }
-  const bool start_known = starts_known(target, state_);
+  const bool start_known = starts_known(target, state_) && modes_certain();
   const bool from_unknown = settle(target, state_);
   append_segment(event, target.position_mm, state_.feed_mm_s * state_.speed_factor, start_known);
   if (event.segments.empty() && from_unknown) {
@@ -164,14 +183,15 @@ void Interpreter::linear_move(Event& event) {
 }
 
 void Interpreter::arc_move(Event& event, bool clockwise) {
-  if (!state_.absolute_xyz) {
+  const bool is_klipper = options_.firmware == Firmware::klipper;
+  if (is_klipper && !state_.absolute_xyz) {
     return not_understood(event, "an arc in relative mode (G91), which Klipper refuses");
   }
   const Target target = read_target(command_, state_);
   if (target.problem != nullptr) {
     return not_understood(event, target.problem);
   }
-  const ArcPlane plane = arc_plane(state_.plane);
+  const ArcPlane plane = arc_plane(state_.plane, options_.firmware);
   Arc arc;
   arc.start_mm = in_plane(state_.position_mm, plane);
   arc.end_mm = in_plane(target.position_mm, plane);
@@ -180,59 +200,41 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   if (!offset) {
     return not_understood(event, "an arc without a centre");
   }
+  if (options_.firmware == Firmware::rrf && command_.has('R') &&
+      !radius_reaches(command_, state_.unit_mm, arc)) {
+    return not_understood(event, "an arc whose radius is too small to reach its end");
+  }
   arc.centre_offset_mm = *offset;
-  const auto ends = plan_arc(arc, options_.arc_resolution_mm);
-  if (!ends) {
-    return not_understood(event, "an arc of more than a million pieces");
-  }
   set_feed(event, target.feed);
-  const bool start_known = starts_known(target, state_);
+  const double feed_mm_s = state_.feed_mm_s * state_.speed_factor;
+  const ArcPieces pieces = is_klipper ? plan_arc(arc, options_.arc_resolution_mm)
+                           : options_.firmware == Firmware::marlin
+                               ? plan_marlin_arc(arc, whole_circles(command_, options_.marlin_arcs),
+                                                 feed_mm_s, options_.marlin_arcs)
+                               : plan_rrf_arc(arc, feed_mm_s);
+  if (!pieces) {
+    return not_understood(event, "an arc of too many pieces");
+  }
+  if (pieces->empty()) {
+    return not_understood(event, "an arc of no angle, which Marlin leaves out");
+  }
+  const bool start_known = starts_known(target, state_) && modes_certain();
   settle(target, state_);
-  const double start_e = state_.position_mm[E];
-  const double e_per_piece = (target.position_mm[E] - start_e) / static_cast<double>(ends->size());
-  event.segments.reserve(ends->size());
-  for (std::size_t i = 0; i < ends->size(); ++i) {
+  const Position start_mm = state_.position_mm;
+  const double radius_mm = std::hypot((*offset)[0], (*offset)[1]);
+  event.segments.reserve(pieces->size());
+  for (std::size_t i = 0; i < pieces->size(); ++i) {
+    const ArcPiece& piece = (*pieces)[i];
     Position next = target.position_mm;
-    next[plane.alpha] = (*ends)[i][0];
-    next[plane.beta] = (*ends)[i][1];
-    next[plane.normal] = (*ends)[i][2];
-    if (i + 1 < ends->size()) {
-      next[E] = start_e + static_cast<double>(i + 1) * e_per_piece;
+    const bool is_last = i + 1 == pieces->size();
+    if (!is_last) {
+      for (const Axis axis : {plane.normal, E}) {
+        next[axis] = start_mm[axis] + (target.position_mm[axis] - start_mm[axis]) * piece.share;
+      }
+      next[plane.alpha] = piece.end_mm[0];
+      next[plane.beta] = piece.end_mm[1];
     }
-    append_segment(event, next, state_.feed_mm_s * state_.speed_factor, start_known);
-  }
-}
-
-// firmware_retraction.py, cmd_G10 and cmd_G11: a relative E move between saving and restoring the
-// G-code state, so that E reads as before. The length is written with five decimals and the speed
-// in whole mm/min, and the flow and speed factors apply to both.
-void Interpreter::firmware_retraction(Event& event, bool retract) {
-  if (!options_.firmware_retraction) {
-    return;
-  }
-  if (!command_.words.empty()) {
-    event.kind = EventKind::barrier;  // "G10 S210 P0" sets a temperature in RepRapFirmware
-    return;
-  }
-  if (state_.retracted == retract) {
-    return;
-  }
-  state_.retracted = retract;
-  const double length_mm = retract
-                               ? -options_.retract_length_mm
-                               : options_.retract_length_mm + options_.unretract_extra_length_mm;
-  const double speed_mm_s = retract ? options_.retract_speed_mm_s : options_.unretract_speed_mm_s;
-  constexpr int kDecimals = 5;
-  const double travel_mm = static_cast<double>(to_scaled(length_mm, kDecimals)) /
-                           power_of_ten(kDecimals) * state_.flow_factor;
-  const double feed_mm_s = std::trunc(speed_mm_s * kSecondsPerMinute) / kSecondsPerMinute;
-  Position target = state_.position_mm;
-  target[E] += travel_mm;
-  state_.base_mm[E] += travel_mm;
-  append_segment(event, target, feed_mm_s * state_.speed_factor,
-                 state_.known[X] && state_.known[Y] && state_.known[Z]);
-  if (event.segments.empty()) {
-    event.kind = EventKind::barrier;  // the length is not known here, but the machine stops
+    append_segment(event, next, feed_mm_s, start_known, i == 0 || is_last ? 0.0 : radius_mm);
   }
 }
 
@@ -242,14 +244,16 @@ void Interpreter::set_feed(Event& event, std::optional<double> feed_word) {
   }
   if (*feed_word > 0.0) {
     state_.feed_mm_s = *feed_word * state_.unit_mm / kSecondsPerMinute;
-  } else {
+    feed_uncertain_ = false;
+  } else if (options_.firmware != Firmware::marlin) {  // which does not mind
     event.warnings.emplace_back("F must be above zero; it is ignored");
   }
 }
 
 void Interpreter::append_segment(Event& event, const Position& target, double feed_mm_s,
-                                 bool start_known) {
-  Segment segment{state_.position_mm, target, feed_mm_s, event.line.number, start_known};
+                                 bool start_known, double curve_radius_mm) {
+  Segment segment{state_.position_mm, target,      feed_mm_s,
+                  event.line.number,  start_known, curve_radius_mm};
   if (segment.length_mm() < kShortestMove_mm) {
     for (const Axis axis : {X, Y, Z}) {
       segment.end_mm[axis] = segment.start_mm[axis];

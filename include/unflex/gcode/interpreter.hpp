@@ -30,6 +30,10 @@ struct Segment {
   // file, after homing, a macro or a tool change), or when the filament it takes is not (absolute E
   // after a macro): such a motion must not be rewritten.
   bool start_known = true;
+  // Radius of the arc this piece continues; 0 for a straight move and an arc's first and last
+  // piece. Marlin hands it to its planner, which then limits the junction by centripetal
+  // acceleration (PlannerHints::curve_radius).
+  double curve_radius_mm = 0.0;
 
   [[nodiscard]] double delta(Axis axis) const { return end_mm[axis] - start_mm[axis]; }
   [[nodiscard]] double length_xy_mm() const;
@@ -81,11 +85,21 @@ struct Event {
   std::vector<std::string> warnings;  // remarks for the user about this line
 };
 
+// How Marlin cuts arcs (Configuration_adv.h, ARC_SUPPORT).
+struct MarlinArcs {
+  double min_segment_mm = 0.1;   // MIN_ARC_SEGMENT_MM
+  double max_segment_mm = 1.0;   // MAX_ARC_SEGMENT_MM
+  double segments_per_s = 0.0;   // ARC_SEGMENTS_PER_SEC; 0: not configured
+  int min_circle_segments = 72;  // MIN_CIRCLE_SEGMENTS
+  int correction_interval = 25;  // N_ARC_CORRECTION
+  bool circles = false;          // ARC_P_CIRCLES: P is a number of full circles
+};
+
 // What the firmware's configuration decides about the meaning of a line.
 struct InterpreterOptions {
   Firmware firmware = Firmware::klipper;
-  // [firmware_retraction] is configured: G10 and G11 move the filament (and so stop the machine);
-  // otherwise Klipper ignores them.
+  // Klipper's [firmware_retraction], Marlin's FWRETRACT: G10 and G11 move the filament (and so stop
+  // the machine); otherwise they do nothing. RepRapFirmware always has it.
   bool firmware_retraction = true;
   double retract_length_mm = 0.0;
   double retract_speed_mm_s = 20.0;
@@ -93,9 +107,30 @@ struct InterpreterOptions {
   double unretract_speed_mm_s = 10.0;
   // Klipper's [gcode_arcs] resolution: arcs become straight pieces about this long.
   double arc_resolution_mm = 1.0;
-  // [input_shaper] frequencies; 0: the printer has none.
+  // The firmware's input shaper; 0: the printer has none.
   double shaper_freq_x_hz = 0.0;
   double shaper_freq_y_hz = 0.0;
+  double retract_z_hop_mm = 0.0;  // Marlin and RepRapFirmware, M207 Z
+  MarlinArcs marlin_arcs{};
+  // Of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
+  double filament_diameter_mm = 1.75;
+};
+
+// The options with the values the firmware's own source has before anyone configures it.
+[[nodiscard]] InterpreterOptions default_options(Firmware firmware);
+
+// What a line that sets the input shaper again must say besides the frequencies. Empty: nothing in
+// the file has changed what the configuration says.
+struct ShaperSettings {
+  std::string type_x;  // Klipper SHAPER_TYPE, RepRapFirmware P (one type for both axes)
+  std::string type_y;
+  std::optional<double> damping_ratio_x;  // Klipper DAMPING_RATIO, Marlin D, RepRapFirmware S
+  std::optional<double> damping_ratio_y;
+  // RepRapFirmware keeps the frequency while P"none" switches the shaper off.
+  std::optional<double> kept_freq_hz;
+  std::string custom_words;  // RepRapFirmware: the words of M593 P"custom", H and T among them
+
+  friend bool operator==(const ShaperSettings&, const ShaperSettings&) = default;
 };
 
 // The state a line is read in.
@@ -103,23 +138,48 @@ struct ModalState {
   Position position_mm{};  // machine
   // Whether the axis' machine position is known from the text. E counts from the file's beginning.
   std::array<bool, 4> known{false, false, false, true};
-  Position base_mm{};  // machine position of the G-code zero (G92, offsets)
+  Position base_mm{};  // machine position of the G-code zero (G92, offsets, hop of G10)
   std::array<bool, 4> base_known{true, true, true, true};
-  Position offset_mm{};           // SET_GCODE_OFFSET: the zero that homing restores
-  bool absolute_xyz = true;       // G90 / G91
-  bool absolute_e = true;         // M82 / M83
-  double unit_mm = 1.0;           // 25.4 after G20
-  double feed_mm_s = 25.0;        // modal F, before M220
-  double speed_factor = 1.0;      // M220
-  double flow_factor = 1.0;       // M221
-  int plane = 17;                 // G17, G18, G19
-  bool retracted = false;         // firmware retraction
-  double shaper_freq_x_hz = 0.0;  // SET_INPUT_SHAPER; 0: off
+  Position offset_mm{};                // SET_GCODE_OFFSET: the zero that homing restores
+  bool absolute_xyz = true;            // G90 / G91; Marlin: also sets absolute_e
+  bool absolute_e = true;              // M82 / M83
+  bool g91_covers_e = true;            // Klipper: under G91, E is relative whatever M82 says
+  double unit_mm = 1.0;                // 25.4 after G20
+  double feed_mm_s = 25.0;             // modal F, before M220
+  double speed_factor = 1.0;           // M220
+  double kept_speed_factor = 1.0;      // Marlin, M220 B
+  double flow_factor = 1.0;            // M221
+  bool volumetric = false;             // M200: E is in mm³
+  double filament_diameter_mm = 1.75;  // M200 D
+  double e_unit = 1.0;                 // of an E word: unit_mm, or its cube where Marlin reads mm³
+  int plane = 17;                      // G17, G18, G19
+  bool retracted = false;              // firmware retraction
+  double hop_mm = 0.0;                 // how far G10 has lifted Z
+  bool auto_retract = false;           // Marlin, M209: moves of E alone are firmware retraction
+  double shaper_freq_x_hz = 0.0;       // SET_INPUT_SHAPER, M593; 0: off
   double shaper_freq_y_hz = 0.0;
+  ShaperSettings shaper;
+  std::optional<double> pressure_advance_s;  // M900 K, M572 S, where the file sets it
+  AxisValues steps_per_mm;                   // M92, where the file sets it
+  bool inverse_time = false;                 // RepRapFirmware, G93: F is one over minutes
+
+  // Whether an E word is a reading of the axis and not a difference.
+  [[nodiscard]] bool e_is_absolute() const { return absolute_e && (absolute_xyz || !g91_covers_e); }
+  // Filament per unit of E before unit and mode: M221 times, if E is a volume, one over the
+  // filament's cross-section. mm/mm or mm/mm³.
+  [[nodiscard]] double filament_factor() const;
+  // Filament, in mm, that one unit of an E word stands for.
+  [[nodiscard]] double filament_per_e_mm() const { return e_unit * filament_factor(); }
 };
 
-// Reads lines in the order of the file and says what each means to a Klipper printer
-// (klippy/extras/gcode_move.py, gcode_arcs.py, firmware_retraction.py, toolhead.py).
+// Reads lines in the order of the file and says what each means to the firmware:
+//   Klipper  klippy/extras/gcode_move.py, gcode_arcs.py, firmware_retraction.py, toolhead.py;
+//   Marlin 2.1.2  src/gcode: gcode.cpp, parser.cpp and the file of each command;
+//   RepRapFirmware 3.5  src/GCodes: GCodes.cpp to GCodes7.cpp, GCodeBuffer/StringParser.cpp.
+//
+// Not modelled: soft end stops (M211, M208, M564: a target outside is clipped), bed levelling, tool
+// offsets, cold extrusion, and 32 bit arithmetic except where it decides how many pieces an arc
+// has.
 class Interpreter {
  public:
   explicit Interpreter(InterpreterOptions options = {});
@@ -131,9 +191,10 @@ class Interpreter {
 
  private:
   // One handler per command or family of commands; each reads command_ and fills the event.
-  void traditional(Event& event);
-  void g_code(Event& event);
-  void m_code(Event& event);
+  void klipper(Event& event);
+  void klipper_traditional(Event& event);
+  void klipper_g_code(Event& event);
+  void klipper_m_code(Event& event);
   void extended(Event& event);
   void linear_move(Event& event);
   void arc_move(Event& event, bool clockwise);
@@ -152,9 +213,63 @@ class Interpreter {
   void object_label(Event& event);
   void restore_state(Event& event);
 
+  // What the firmwares share.
+  void other_m_code(Event& event);
+  void set_units(bool inches);
+  void update_e_unit();
+  void set_flow_factor(double factor);
+  void set_volumetric(bool on, double filament_diameter_mm);
+  void retraction_and_hop(Event& event, bool retract);
+  void steps_per_mm(Event& event);
+  void limits_unknown(Event& event);
+  void uncertain_modes(Event& event, std::string_view cause);
+  // Reads one limit; a value below `least` is left out with a warning.
+  void limit(Event& event, char letter, double scale, double least, std::optional<double>& value);
+  void axis_limits(Event& event, double scale, double least, AxisValues& values);
+
+  void marlin(Event& event, std::string_view content);
+  void marlin_g_code(Event& event);
+  void marlin_m_code(Event& event);
+  void marlin_linear_move(Event& event);
+  void marlin_acceleration(Event& event);
+  void marlin_advanced_settings(Event& event);
+  void marlin_speed_factor(Event& event);
+  void marlin_flow_factor(Event& event);
+  void marlin_volumetric(Event& event);
+  void marlin_retraction_settings(Event& event);
+  void marlin_shaper(Event& event);
+  void marlin_pressure_advance(Event& event);
+  void marlin_dwell(Event& event);
+
+  void rrf(Event& event, std::string_view content);
+  bool rrf_meta_line(Event& event, std::string_view content);
+  void rrf_conditional_line(Event& event);
+  void rrf_expression(Event& event);
+  void rrf_command(Event& event);
+  void rrf_g_code(Event& event);
+  void rrf_m_code(Event& event);
+  void rrf_tool(Event& event);
+  void rrf_linear_move(Event& event);
+  void rrf_g10(Event& event);
+  void rrf_plane(Event& event);
+  void rrf_dwell(Event& event);
+  void rrf_max_velocity(Event& event);
+  void rrf_acceleration(Event& event);
+  void rrf_jerk(Event& event, double scale);
+  void rrf_speed_factor(Event& event);
+  void rrf_flow_factor(Event& event);
+  void rrf_volumetric();
+  void rrf_retraction_settings(Event& event);
+  void rrf_shaper(Event& event);
+  void rrf_wait_for_heater(Event& event);
+  void rrf_pop();
+
+  // False behind a line that may or may not have set a mode or F.
+  [[nodiscard]] bool modes_certain() const { return !modes_uncertain_ && !feed_uncertain_; }
   void set_feed(Event& event, std::optional<double> feed_word);
   // Adds the straight piece to `target`, unless it has no length, and moves the state there.
-  void append_segment(Event& event, const Position& target, double feed_mm_s, bool start_known);
+  void append_segment(Event& event, const Position& target, double feed_mm_s, bool start_known,
+                      double curve_radius_mm = 0.0);
   void lose_position(Event& event);
   void not_understood(Event& event, std::string_view problem);
 
@@ -164,7 +279,13 @@ class Interpreter {
   // Whether the last SET_PRESSURE_ADVANCE switched it on, and on which extruder.
   std::optional<bool> pressure_advance_on_;
   std::string pressure_advance_extruder_;
-  Command command_;  // of the line being read; kept for its storage
+  std::vector<ModalState> pushed_states_;  // RepRapFirmware, M120
+  std::optional<int> tool_;                // the tool in use, where the file selects it
+  // RepRapFirmware: the indentation of the innermost `if`, `while` or `else` whose block is open.
+  std::optional<std::size_t> block_indent_;
+  bool modes_uncertain_ = false;  // a line that may not run has set a mode or a limit
+  bool feed_uncertain_ = false;   // the same for F alone
+  Command command_;               // of the line being read; kept for its storage
 };
 
 }  // namespace unflex::gcode

@@ -1,0 +1,348 @@
+// RepRapFirmware 3.5. Each function names its source below src/GCodes.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "firmware_commands.hpp"
+#include "rrf_meta.hpp"
+#include "unflex/gcode/interpreter.hpp"
+
+namespace unflex::gcode {
+namespace {
+
+bool has_any(const Command& command, std::string_view letters) {
+  return std::any_of(letters.begin(), letters.end(),
+                     [&](char letter) { return command.has(letter); });
+}
+
+// A second command in the same line, or a word that comes twice, of which RepRapFirmware takes the
+// first.
+bool is_ambiguous(const Command& command) {
+  for (auto word = command.words.begin(); word != command.words.end(); ++word) {
+    const bool is_command = word->value && (word->letter == 'G' || word->letter == 'M');
+    const bool again = std::any_of(command.words.begin(), word,
+                                   [&](const Word& w) { return w.letter == word->letter; });
+    if (is_command || again) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// What a line that may not run must leave alone, or what follows is uncertain. F and places are not
+// among it: they are known again with the next word that gives them.
+bool same_modes(const ModalState& a, const ModalState& b) {
+  return a.absolute_xyz == b.absolute_xyz && a.absolute_e == b.absolute_e &&
+         a.unit_mm == b.unit_mm && a.speed_factor == b.speed_factor &&
+         a.filament_factor() == b.filament_factor() && a.plane == b.plane &&
+         a.retracted == b.retracted && a.inverse_time == b.inverse_time &&
+         a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper == b.shaper;
+}
+
+}  // namespace
+
+void Interpreter::rrf(Event& event, std::string_view content) {
+  if (rrf_meta_line(event, content)) {
+    return;
+  }
+  if (command_.kind == CommandKind::none) {
+    const bool is_whole_line = !content.empty() && content.front() == ';';
+    return is_whole_line && labels_object(command_.comment) ? object_label(event) : void();
+  }
+  if (has_expression(content)) {
+    return rrf_expression(event);
+  }
+  rrf_command(event);
+}
+
+// True if the line needs no more reading: a meta command, or part of a block that may not run.
+bool Interpreter::rrf_meta_line(Event& event, std::string_view content) {
+  const MetaCommand meta = meta_command(content);
+  if (command_.kind == CommandKind::none && meta == MetaCommand::none) {
+    return false;
+  }
+  const std::size_t indent = indentation(content);
+  if (block_indent_ && indent <= *block_indent_) {
+    block_indent_.reset();
+  }
+  switch (meta) {
+    case MetaCommand::block:
+      block_indent_ = block_indent_.value_or(indent);
+      lose_position(event);
+      return true;
+    case MetaCommand::jump:
+      lose_position(event);
+      return true;
+    case MetaCommand::harmless:
+      return true;
+    case MetaCommand::none:
+      break;
+  }
+  if (block_indent_) {
+    rrf_conditional_line(event);
+    return true;
+  }
+  return false;
+}
+
+// What the line would do is tried on a copy.
+void Interpreter::rrf_conditional_line(Event& event) {
+  Interpreter trial = *this;
+  Event tried;
+  trial.rrf_command(tried);
+  if (!same_modes(state_, trial.state_) || tried.kind == EventKind::limits ||
+      trial.modes_uncertain_ != modes_uncertain_) {
+    return uncertain_modes(event, "a mode or a limit set under a condition");
+  }
+  feed_uncertain_ = feed_uncertain_ || trial.state_.feed_mm_s != state_.feed_mm_s;
+  lose_position(event);
+}
+
+// What is not evaluated here: harmless where the command is.
+void Interpreter::rrf_expression(Event& event) {
+  const bool is_m = command_.kind == CommandKind::traditional && command_.letter == 'M';
+  const bool is_g = command_.letter == 'G' && command_.number >= 0;
+  if (is_m && rrf_m_code_effect(command_.number) != Effect::unknown) {
+    return other_m_code(event);
+  }
+  switch (is_m ? command_.number : -1) {
+    case 200:
+    case 220:
+    case 221:
+    case 593:
+      return uncertain_modes(event, "a factor set by an expression");
+    case 201:
+    case 203:
+    case 204:
+    case 205:
+    case 207:
+    case 566:
+      return uncertain_modes(event, "a limit set by an expression");
+    default:
+      feed_uncertain_ = feed_uncertain_ || is_g;
+      return lose_position(event);
+  }
+}
+
+void Interpreter::rrf_command(Event& event) {
+  if (command_.kind == CommandKind::extended) {
+    return lose_position(event);  // refused, unless a plug-in takes it
+  }
+  if (command_.kind == CommandKind::malformed) {
+    return not_understood(event, command_.problem);
+  }
+  const bool is_m = command_.letter == 'M';
+  const bool is_g = command_.letter == 'G';
+  if ((is_g || is_m) && is_ambiguous(command_)) {
+    return is_m && rrf_m_code_effect(command_.number) != Effect::unknown
+               ? other_m_code(event)
+               : not_understood(event, "two commands in one line, or a word given twice");
+  }
+  if (command_.subnumber > 0 && command_.letter != 'T') {
+    constexpr int kReducedAccelerations = 201;  // M201.1, for probing
+    const bool passive = is_m && (command_.number == kReducedAccelerations ||
+                                  rrf_m_code_effect(command_.number) == Effect::passive);
+    return passive ? void() : lose_position(event);
+  }
+  if (is_g) {
+    rrf_g_code(event);
+  } else if (is_m) {
+    rrf_m_code(event);
+  } else if (command_.letter == 'T') {
+    rrf_tool(event);
+  } else {
+    lose_position(event);
+  }
+}
+
+void Interpreter::rrf_g_code(Event& event) {
+  switch (command_.number) {
+    case 0:
+    case 1:
+      return rrf_linear_move(event);
+    case 2:
+    case 3:
+      return state_.inverse_time || has_any(command_, "ABCDUVW")
+                 ? lose_position(event)
+                 : arc_move(event, command_.number == 2);
+    case 4:
+      return rrf_dwell(event);
+    case 10:
+      return rrf_g10(event);
+    case 11:
+      return retraction_and_hop(event, false);
+    case 17:
+    case 18:
+    case 19:
+      return rrf_plane(event);
+    case 20:
+    case 21:
+      return set_units(command_.number == 20);
+    case 28:
+      return home(event);
+    case 31:
+      return;  // the probe's settings or reading
+    case 60:
+      return;  // saves the position
+    case 90:
+    case 91:
+      state_.absolute_xyz = command_.number == 90;
+      return;
+    case 92:
+      return set_position(event);
+    case 93:
+    case 94:
+      state_.inverse_time = command_.number == 93;
+      return;
+    default:
+      return lose_position(event);
+  }
+}
+
+void Interpreter::rrf_m_code(Event& event) {
+  constexpr double kPerMinute = 1.0 / 60.0;
+  switch (command_.number) {
+    case 18:
+    case 84:
+      return has_any(command_, "S") && !has_any(command_, "XYZE")
+                 ? static_cast<void>(event.kind = EventKind::barrier)  // S: a time-out
+                 : lose_position(event);
+    case 82:
+    case 83:
+      state_.absolute_e = command_.number == 82;
+      return;
+    case 92:
+      return steps_per_mm(event);
+    case 101:
+    case 103:
+      return retraction_and_hop(event, command_.number == 103);
+    case 109:
+      return rrf_wait_for_heater(event);
+    case 120:
+      // GCodeMachineState.cpp: what is pushed is kept, and E is a length from here on.
+      pushed_states_.push_back(state_);
+      return set_volumetric(false, state_.filament_diameter_mm);
+    case 121:
+      return rrf_pop();
+    case 200:
+      return rrf_volumetric();
+    case 201:
+      return axis_limits(event, 1.0, 0.0, event.limits.axis_max_accel_mm_s2);
+    case 203:
+      return rrf_max_velocity(event);
+    case 204:
+      return rrf_acceleration(event);
+    case 205:
+      return rrf_jerk(event, 1.0);
+    case 207:
+      return rrf_retraction_settings(event);
+    case 220:
+      return rrf_speed_factor(event);
+    case 221:
+      return rrf_flow_factor(event);
+    case 291: {
+      // GCodes7.cpp, DoMessageBox: from S2 on it waits, and the user may move axes meanwhile.
+      constexpr double kFirstThatWaits = 2.0;
+      return command_.value('S').value_or(1.0) >= kFirstThatWaits ? lose_position(event) : void();
+    }
+    case 486:
+      return object_label(event);
+    case 501:
+    case 502:
+      return limits_unknown(event);
+    case 566:
+      return rrf_jerk(event, kPerMinute);
+    case 593:
+      return rrf_shaper(event);
+    default:
+      return other_m_code(event);
+  }
+}
+
+// GCodes2.cpp, HandleTcode: the tool in use is no change, but waits for the end of all motion.
+void Interpreter::rrf_tool(Event& event) {
+  event.kind = EventKind::barrier;
+  if (tool_ != command_.number) {
+    tool_ = command_.number;
+    state_.retracted = false;
+    state_.hop_mm = 0.0;
+    lose_position(event);
+  }
+}
+
+// GCodes.cpp, DoStraightMove: H is a homing move, R starts from a restore point. M220 and M221
+// apply only where an axis is named (LoadExtrusionAndFeedrateFromGCode).
+void Interpreter::rrf_linear_move(Event& event) {
+  if (state_.inverse_time) {
+    return not_understood(event, "a move in inverse time mode (G93)");
+  }
+  if (command_.value('H').value_or(0.0) != 0.0 || has_any(command_, "ABCDRUVW")) {
+    return lose_position(event);
+  }
+  if (has_any(command_, "XYZ") || !command_.has('E')) {
+    return linear_move(event);
+  }
+  const double speed_factor = state_.speed_factor;
+  const double flow_factor = state_.flow_factor;
+  state_.speed_factor = 1.0;
+  set_flow_factor(1.0);
+  linear_move(event);
+  state_.speed_factor = speed_factor;
+  set_flow_factor(flow_factor);
+}
+
+// GCodes2.cpp, HandleGcode: with L, P, R, S or an axis it sets a tool or a workplace.
+void Interpreter::rrf_g10(Event& event) {
+  if (has_any(command_, "LXYZUVWABCD")) {
+    return lose_position(event);
+  }
+  if (!has_any(command_, "PRS")) {
+    retraction_and_hop(event, true);
+  }
+}
+
+// GCodes2.cpp: waits for the end of all motion if the plane is another.
+void Interpreter::rrf_plane(Event& event) {
+  if (state_.plane != command_.number) {
+    state_.plane = command_.number;
+    event.kind = EventKind::barrier;
+  }
+}
+
+// GCodes.cpp, DoDwell: S in seconds comes before P in milliseconds.
+void Interpreter::rrf_dwell(Event& event) {
+  event.kind = EventKind::barrier;
+  constexpr double kSecondsPerMs = 1e-3;
+  const double pause_s = command_.has('S') ? command_.value('S').value_or(0.0)
+                                           : command_.value('P').value_or(0.0) * kSecondsPerMs;
+  event.dwell_s = std::max(0.0, pause_s);
+}
+
+// GCodes2.cpp, M109: without a target nothing but the wait; where no tool is in use it selects one,
+// and that runs macros.
+void Interpreter::rrf_wait_for_heater(Event& event) {
+  event.kind = EventKind::barrier;
+  if (has_any(command_, "RS") && !tool_) {
+    tool_ = static_cast<int>(command_.value('T').value_or(0.0));
+    lose_position(event);
+  }
+}
+
+// GCodes.cpp, Pop: modes and F come back, positions and factors stay.
+void Interpreter::rrf_pop() {
+  if (pushed_states_.empty()) {
+    return;
+  }
+  const ModalState& kept = pushed_states_.back();
+  state_.absolute_xyz = kept.absolute_xyz;
+  state_.absolute_e = kept.absolute_e;
+  state_.feed_mm_s = kept.feed_mm_s;
+  state_.plane = kept.plane;
+  state_.inverse_time = kept.inverse_time;
+  set_units(kept.unit_mm != 1.0);
+  set_volumetric(kept.volumetric, state_.filament_diameter_mm);
+  pushed_states_.pop_back();
+}
+
+}  // namespace unflex::gcode

@@ -1,0 +1,103 @@
+// RepRapFirmware's limits, factors and retraction settings. Each function names its source below
+// src/GCodes. None of these commands is in inches.
+#include <algorithm>
+#include <optional>
+
+#include "unflex/gcode/interpreter.hpp"
+
+namespace unflex::gcode {
+
+// GCodes2.cpp, M203: mm/min, or mm/s with S1; I first, as the others are at least that.
+void Interpreter::rrf_max_velocity(Event& event) {
+  constexpr double kLeast_mm_s = 0.01;  // AbsoluteMinFeedrate
+  const double scale = command_.value('S') == 1.0 ? 1.0 : 1.0 / 60.0;
+  limit(event, 'I', scale, 0.0, event.limits.min_movement_velocity_mm_s);
+  if (event.limits.min_movement_velocity_mm_s) {
+    event.limits.min_movement_velocity_mm_s =
+        std::max(kLeast_mm_s, *event.limits.min_movement_velocity_mm_s);
+  }
+  axis_limits(event, scale, kLeast_mm_s, event.limits.axis_max_velocity_mm_s);
+}
+
+// GCodes5.cpp, ConfigureAccelerations.
+void Interpreter::rrf_acceleration(Event& event) {
+  constexpr double kLeast_mm_s2 = 0.1;  // MinimumAcceleration
+  limit(event, 'S', 1.0, kLeast_mm_s2, event.limits.print_accel_mm_s2);
+  event.limits.travel_accel_mm_s2 = event.limits.print_accel_mm_s2;
+  limit(event, 'P', 1.0, kLeast_mm_s2, event.limits.print_accel_mm_s2);
+  limit(event, 'T', 1.0, kLeast_mm_s2, event.limits.travel_accel_mm_s2);
+}
+
+// GCodes2.cpp, M205 in mm/s, M566 in mm/min and with the policy P. At least MinimumJerk.
+void Interpreter::rrf_jerk(Event& event, double scale) {
+  constexpr double kLeast_mm_s = 0.1;
+  axis_limits(event, scale, 0.0, event.limits.axis_jerk_mm_s);
+  for (std::optional<double>& jerk : event.limits.axis_jerk_mm_s) {
+    jerk = jerk ? std::optional<double>(std::max(kLeast_mm_s, *jerk)) : std::nullopt;
+  }
+  const std::optional<double> policy = command_.value('P');
+  if (command_.number == 566 && policy && *policy >= 0.0) {
+    event.limits.jerk_policy = static_cast<int>(*policy);
+    event.kind = EventKind::limits;
+  }
+}
+
+// GCodes2.cpp, M220 and M221: one percent at least.
+void Interpreter::rrf_speed_factor(Event& event) {
+  if (command_.value('S').value_or(0.0) >= 1.0) {
+    state_.speed_factor = *command_.value('S') / 100.0;
+  } else if (command_.has('S')) {
+    event.warnings.emplace_back("M220 with an invalid S is ignored");
+  }
+}
+
+void Interpreter::rrf_flow_factor(Event& event) {
+  const std::optional<double> extruder = command_.value('D');
+  if (extruder && *extruder != static_cast<double>(tool_.value_or(0))) {
+    return;
+  }
+  if (command_.value('S').value_or(0.0) >= 1.0) {
+    set_flow_factor(*command_.value('S') / 100.0);
+  } else if (command_.has('S')) {
+    event.warnings.emplace_back("M221 with an invalid S is ignored");
+  }
+}
+
+// GCodes2.cpp, M200: without S, on; a diameter of zero takes E as a length.
+void Interpreter::rrf_volumetric() {
+  if (!command_.has('D') && !command_.has('S')) {
+    return;
+  }
+  const bool on = !command_.has('S') || command_.value('S').value_or(0.0) >= 1.0;
+  const double diameter_mm = command_.value('D').value_or(state_.filament_diameter_mm);
+  const bool is_volume = on && diameter_mm > 0.0;
+  set_volumetric(is_volume, diameter_mm > 0.0 ? diameter_mm : state_.filament_diameter_mm);
+}
+
+// Tools/Tool.cpp, SetFirmwareRetraction. T comes after F, R after S.
+void Interpreter::rrf_retraction_settings(Event& event) {
+  if (command_.value('P').value_or(tool_.value_or(0)) != tool_.value_or(0)) {
+    return;
+  }
+  constexpr double kLeastSpeed_mm_s = 1.0;  // MinRetractSpeed
+  constexpr double kPerMinute = 1.0 / 60.0;
+  InterpreterOptions& o = options_;
+  o.retract_length_mm = std::max(0.0, command_.value('S').value_or(o.retract_length_mm));
+  o.unretract_extra_length_mm =
+      std::max(-o.retract_length_mm, command_.value('R').value_or(o.unretract_extra_length_mm));
+  if (const auto speed = command_.value('F')) {
+    o.retract_speed_mm_s = o.unretract_speed_mm_s = std::max(kLeastSpeed_mm_s, *speed * kPerMinute);
+  }
+  if (const auto speed = command_.value('T')) {
+    o.unretract_speed_mm_s = std::max(kLeastSpeed_mm_s, *speed * kPerMinute);
+  }
+  if (const auto hop = command_.value('Z')) {
+    if (*hop >= 0.0) {
+      o.retract_z_hop_mm = *hop;
+    } else {
+      event.warnings.emplace_back("M207 with an invalid Z is ignored");
+    }
+  }
+}
+
+}  // namespace unflex::gcode
