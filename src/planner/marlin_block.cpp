@@ -140,23 +140,23 @@ Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
   return s;
 }
 
-bool populate_block(const Settings& settings, const Steps& delta, float feed_mm_s,
-                    std::size_t moves_queued, Previous& previous, Block& block) {
-  const Travel motion = travel(settings, delta);
+bool populate_block(const Settings& settings, const Request& request, std::size_t moves_queued,
+                    Previous& previous, Block& block) {
+  const Travel motion = travel(settings, request.delta);
   block.step_events = *std::ranges::max_element(motion.steps);
   if (block.step_events < settings.min_steps_per_segment) return false;
   block.length_mm = length_mm(settings, motion);
 
   const bool with_filament = motion.steps[E] != 0;
-  const float feed = std::max(
-      feed_mm_s, with_filament ? settings.min_velocity_mm_s : settings.min_travel_velocity_mm_s);
+  const float feed = std::max(request.feed_mm_s, with_filament ? settings.min_velocity_mm_s
+                                                               : settings.min_travel_velocity_mm_s);
   const float inverse_length = 1.0F / block.length_mm;
   const float per_second = stretched(settings, inverse_length * feed, moves_queued);
   const Vector speed_mm_s = limit_speeds(settings, motion, per_second, block);
   limit_accel(settings, motion, inverse_length, block);
 
-  const Approach approach{motion.distance_mm, speed_mm_s, inverse_length, with_filament,
-                          moves_queued > 0};
+  const Approach approach{motion.distance_mm, speed_mm_s,       inverse_length,
+                          with_filament,      moves_queued > 0, request.curve_radius_mm};
   block.max_entry_v2 = max_entry_v2(settings, block, approach, previous);
   block.entry_v2 = kMinimumSpeed_mm_s * kMinimumSpeed_mm_s;
   block.nominal_length = block.nominal_speed_mm_s * block.nominal_speed_mm_s <=

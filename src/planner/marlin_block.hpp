@@ -17,9 +17,16 @@ inline constexpr float kMinimumSpeed_mm_s = 0.05F;
   return v2 + 2.0F * block.accel_mm_s2 * block.length_mm;
 }
 
+// What is asked of a block.
+struct Request {
+  Steps delta{};
+  float feed_mm_s = 0.0F;
+  float curve_radius_mm = 0.0F;
+};
+
 // Fills everything in but the move. False, and `previous` untouched, if the block is too short to
 // be queued. `moves_queued`: blocks in the buffer that do not run yet.
-[[nodiscard]] bool populate_block(const Settings& settings, const Steps& delta, float feed_mm_s,
+[[nodiscard]] bool populate_block(const Settings& settings, const Request& request,
                                   std::size_t moves_queued, Previous& previous, Block& block);
 
 }  // namespace unflex::planner::marlin

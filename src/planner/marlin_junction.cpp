@@ -1,4 +1,4 @@
-// Junction deviation and classic jerk.
+// Junction deviation, within an arc centripetal acceleration, and classic jerk.
 //
 // Source: Marlin 2.1.2, src/module/planner.cpp, Planner::_populate_block; planner.h,
 // limit_value_by_axis_maximum.
@@ -85,13 +85,15 @@ float arc_v2(float length_mm, float accel, float cos_theta) {
   return length_mm * accel / chord_arccos(-cos_theta);
 }
 
-float deviation_v2(const Settings& settings, const Block& block, const Vector& u, const Vector& w) {
+float deviation_v2(const Settings& settings, const Block& block, float curve_radius_mm,
+                   const Vector& u, const Vector& w) {
   float cos_theta = -u[E] * w[E] + -u[X] * w[X] + -u[Y] * w[Y] + -u[Z] * w[Z];
   if (cos_theta > kStraight) return square(kMinimumSpeed_mm_s);
   Vector along{};
   for (std::size_t axis = 0; axis < along.size(); ++axis) along[axis] = w[axis] - u[axis];
   normalise(along);
   const float accel = junction_accel(settings, block.accel_mm_s2, along);
+  if (curve_radius_mm != 0.0F) return accel * curve_radius_mm;
   cos_theta = std::max(cos_theta, -kStraight);
   const float sin_half = std::sqrt(0.5F * (1.0F - cos_theta));
   const float v2 = accel * settings.junction_deviation_mm * sin_half / (1.0F - sin_half);
@@ -109,7 +111,7 @@ float junction_deviation_v2(const Settings& settings, const Block& block, const 
   }
   float v2 = 0.0F;
   if (joined) {
-    v2 = std::min({deviation_v2(settings, block, previous.unit, unit),
+    v2 = std::min({deviation_v2(settings, block, approach.curve_radius_mm, previous.unit, unit),
                    square(block.nominal_speed_mm_s), square(previous.nominal_speed_mm_s)});
   }
   previous.unit = unit;

@@ -11,7 +11,8 @@ struct Approach {
   Vector speed_mm_s{};  // nominal, per axis
   float inverse_length = 0.0F;
   bool with_filament = false;
-  bool moving = false;  // blocks that do not run yet are queued before this one
+  bool moving = false;           // blocks that do not run yet are queued before this one
+  float curve_radius_mm = 0.0F;  // of the arc that this block continues; 0 for none
 };
 
 // Highest squared speed at the start of the block, by junction deviation or classic jerk. Keeps in

@@ -53,14 +53,14 @@ bool MarlinPlanner::add(const gcode::Segment& segment) {
     run_first();
   }
   const marlin::Steps target = rounded(segment.end_mm);
-  marlin::Steps delta{};
-  for (std::size_t axis = 0; axis < delta.size(); ++axis) {
-    delta[axis] = target[axis] - position_[axis];
+  marlin::Request request{
+      {}, static_cast<float>(segment.feed_mm_s), static_cast<float>(segment.curve_radius_mm)};
+  for (std::size_t axis = 0; axis < target.size(); ++axis) {
+    request.delta[axis] = target[axis] - position_[axis];
   }
   const std::size_t moves_queued = end_ - first_ - (running_ ? 1 : 0);
   marlin::Block& added = block(end_);
-  if (!marlin::populate_block(settings_, delta, static_cast<float>(segment.feed_mm_s), moves_queued,
-                              previous_, added)) {
+  if (!marlin::populate_block(settings_, request, moves_queued, previous_, added)) {
     return false;
   }
   set_move(segment, target, added.move);
@@ -152,24 +152,17 @@ void MarlinPlanner::drop_first() {
 }
 
 // From the last block back to the one after planned_: highest speeds from which the machine can
-// still slow down. Stops short where nothing changes, as the firmware does.
+// still slow down. The firmware skips blocks that begin at their limit already, which is the same:
+// speeds only rise here.
 void MarlinPlanner::reverse_pass() {
   float next_v2 = marlin::kMinimumSpeed_mm_s * marlin::kMinimumSpeed_mm_s;
-  bool next_changed = false;
-  bool is_new = true;
   for (std::size_t i = end_ - 1; i != planned_; --i) {
     marlin::Block& current = block(i);
-    bool changed = is_new;
-    if (current.entry_v2 != current.max_entry_v2 || next_changed) {
-      const float v2 = current.nominal_length
-                           ? current.max_entry_v2
-                           : std::min(current.max_entry_v2, marlin::reachable_v2(current, next_v2));
-      changed = changed || v2 != current.entry_v2;
-      current.entry_v2 = v2;
+    current.entry_v2 = current.max_entry_v2;
+    if (!current.nominal_length) {
+      current.entry_v2 = std::min(current.entry_v2, marlin::reachable_v2(current, next_v2));
     }
     next_v2 = current.entry_v2;
-    next_changed = changed;
-    is_new = false;
   }
 }
 

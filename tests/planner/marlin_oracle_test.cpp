@@ -3,7 +3,8 @@
 // planner_marlin_cases.csv: one command per row.
 //   case,<name>,<classic jerk>,<BLOCK_BUFFER_SIZE>,<MIN_STEPS_PER_SEGMENT>   default limits again
 //   steps | max_accel | max_velocity | jerk,<X>,<Y>,<Z>,<E>      accel,<M204 P>,<R>,<T>
-//   deviation,<mm>      minimum,<M205 S>,<T>,<B in µs>      move,<X>,<Y>,<Z>,<E>,<feed>      stop
+//   deviation,<mm>      minimum,<M205 S>,<T>,<B in µs>      move,<X>,<Y>,<Z>,<E>,<feed>[,<radius>]
+//   stop
 // planner_marlin_blocks.csv: one block of Marlin 2.1.2.5's src/module/planner.cpp per row.
 //   <case>,<move>,<steps X>,<Y>,<Z>,<E>,<step_event_count>,<nominal_rate>,<initial_rate>,
 //   <final_rate>,<accelerate_until>,<decelerate_after>,<acceleration_steps_per_s2>
@@ -138,6 +139,7 @@ class Run {
     segment.end_mm = axes(row);
     segment.feed_mm_s = number(row, 5);
     segment.line = ++count_;
+    if (row.size() > 6) segment.curve_radius_mm = number(row, 6);
     planner().add(segment);
     at_mm_ = segment.end_mm;
   }
