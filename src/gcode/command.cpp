@@ -63,6 +63,11 @@ class Parser {
   // The next character that is no blank, '\0' at the end.
   [[nodiscard]] char peek_past_blanks(std::size_t from) const;
   [[nodiscard]] bool checksum_follows(std::size_t star) const;
+  // T-1, no tool.
+  [[nodiscard]] bool deselects_tool() const {
+    return to_upper(peek()) == 'T' && line_.substr(cursor_ + 1, 1) == "-" &&
+           is_digit(peek_past_blanks(cursor_ + 2));
+  }
   [[nodiscard]] std::size_t numbered_checksum() const;
 
   std::string_view line_;
@@ -89,7 +94,7 @@ void Parser::run() {
     read_comment();
   } else if (first == '*' && checksum_follows(cursor_)) {
     read_checksum();
-  } else if (is_letter(first) && is_digit(peek_past_blanks(cursor_ + 1))) {
+  } else if (is_letter(first) && (is_digit(peek_past_blanks(cursor_ + 1)) || deselects_tool())) {
     read_traditional();
   } else if (is_letter(first) || first == '_') {
     read_extended();
@@ -113,6 +118,8 @@ void Parser::read_traditional() {
   command_.letter = to_upper(line_[cursor_]);
   const std::size_t from = cursor_++;
   skip_blanks();
+  const int sign = peek() == '-' ? -1 : 1;
+  cursor_ += sign < 0 ? 1 : 0;
   const auto number = parse_integer<int>(take_digits());
   std::optional<int> subnumber = -1;
   if (peek() == '.') {
@@ -123,7 +130,7 @@ void Parser::read_traditional() {
     malformed(fmt::format("cannot read '{}'", line_.substr(from, cursor_ - from)));
     return;
   }
-  command_.number = *number;
+  command_.number = sign * *number;
   command_.subnumber = *subnumber;
   const bool takes_text =
       command_.letter == 'M' && subnumber == -1 && (number == 117 || number == 118 || number == 23);

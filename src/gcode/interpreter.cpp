@@ -53,9 +53,10 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
   } else if (options_.firmware == Firmware::rrf) {
     state_.g91_covers_e = false;
     state_.feed_mm_s = 3000.0 / kSecondsPerMinute;  // DefaultFeedRate
-    if (options_.shaper_freq_x_hz > 0.0) {
-      state_.shaper.kept_freq_hz = options_.shaper_freq_x_hz;
-    }
+    const bool shapes = options_.shaper_freq_x_hz > 0.0;
+    state_.shaper.kept_freq_hz =
+        shapes ? std::optional<double>(options_.shaper_freq_x_hz) : std::nullopt;
+    state_.shaper.type_x = state_.shaper.type_y = shapes ? options_.shaper_type : "none";
   }
 }
 
@@ -241,6 +242,8 @@ void Interpreter::set_position(Event& event) {
   }
   // E is only ever used as a difference, so naming it anew makes it known.
   state_.known[E] = state_.known[E] || bare || named[E];
+  // Of the firmwares only RepRapFirmware stops for it; but rewritten motion must not reach across a
+  // change of the zero.
   if (bare || named[X] || named[Y] || named[Z]) {
     event.kind = EventKind::barrier;
   }
@@ -287,6 +290,35 @@ void Interpreter::set_flow_factor(double factor) {
   const double reading = (state_.position_mm[E] - state_.base_mm[E]) / state_.filament_factor();
   state_.flow_factor = factor;
   state_.base_mm[E] = state_.position_mm[E] - reading * state_.filament_factor();
+}
+
+// The tool in use keeps its place; another is reached by macros or moves of the firmware's own, and
+// has its own M221 (Marlin: flow_percentage; RepRapFirmware: extrusionFactors).
+void Interpreter::select_tool(Event& event, int tool) {
+  event.kind = EventKind::barrier;
+  if (tool_ == tool) {
+    return;
+  }
+  if (tool_) {
+    flow_factors_[*tool_] = state_.flow_factor;
+    const auto kept = flow_factors_.find(tool);
+    set_flow_factor(kept == flow_factors_.end() ? 1.0 : kept->second);
+  }
+  tool_ = tool;
+  state_.retracted = false;
+  state_.hop_mm = 0.0;
+  lose_position(event);
+}
+
+// Without a tool, of the one in use.
+void Interpreter::set_flow_of(std::optional<double> tool, double factor) {
+  const int in_use = tool_.value_or(0);
+  const int number = tool ? static_cast<int>(*tool) : in_use;
+  if (number == in_use) {
+    set_flow_factor(factor);
+  } else {
+    flow_factors_[number] = factor;
+  }
 }
 
 // The same for M200.

@@ -66,9 +66,10 @@ void Interpreter::marlin(Event& event, std::string_view content) {
     marlin_g_code(event);
   } else if (is_m) {
     marlin_m_code(event);
+  } else if (command_.letter == 'T') {
+    select_tool(event, command_.number);
   } else {
-    lose_position(event);  // T, or a letter that begins no command
-    state_.retracted = false;
+    lose_position(event);  // a letter that begins no command
   }
 }
 
@@ -248,14 +249,10 @@ void Interpreter::marlin_speed_factor(Event& event) {
 
 // config/M221.cpp.
 void Interpreter::marlin_flow_factor(Event& event) {
-  const std::optional<double> tool = command_.value('T');
   const auto percent = whole(command_.value('S'));
-  if (!percent || (tool && *tool != static_cast<double>(tool_.value_or(0)))) {
-    return;
-  }
-  if (*percent > 0.0) {
-    set_flow_factor(*percent / 100.0);
-  } else {
+  if (percent && *percent > 0.0) {
+    set_flow_of(command_.value('T'), *percent / 100.0);
+  } else if (percent) {
     event.warnings.emplace_back("M221 with an invalid S is ignored");
   }
 }

@@ -11,8 +11,8 @@ namespace unflex::gcode {
 namespace {
 
 //   10 11 vacuum; 16 printer check; 20 27 31 SD card; 42 pin; 73 75 76 77 78 progress and job
-//   timer; 85 time-out; 100 102; 104 140 141 143 targets; 105 106 107 108; 110 to 123 but 112 and
-//   119's like: line number, debugging, reports, messages, end stops; 126 to 129 valves; 145 149
+//   timer; 85 time-out; 100 102; 104 140 141 143 targets; 105 106 107 108; 110 to 123 without
+//   112: line number, debugging, reports, messages, end stops; 126 to 129 valves; 145 149
 //   150 154 155; 163 to 166 mixing; 211 soft end stops; 217 218 tool settings, for the next change;
 //   250 255 256 display; 260 261; 280 281 282 servos; 290 babysteps, added to the steps on their
 //   way; 300 beep, from a queue; 301 302 304 305 309 heaters; 355 light; 380 381 solenoids; 403 404

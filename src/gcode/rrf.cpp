@@ -121,6 +121,9 @@ void Interpreter::rrf_expression(Event& event) {
       return uncertain_modes(event, "a limit set by an expression");
     default:
       feed_uncertain_ = feed_uncertain_ || is_g;
+      if (!is_g && !is_m) {
+        tool_.reset();  // T{…}
+      }
       return lose_position(event);
   }
 }
@@ -150,7 +153,7 @@ void Interpreter::rrf_command(Event& event) {
   } else if (is_m) {
     rrf_m_code(event);
   } else if (command_.letter == 'T') {
-    rrf_tool(event);
+    select_tool(event, command_.number);  // GCodes2.cpp, HandleTcode
   } else {
     lose_position(event);
   }
@@ -228,7 +231,7 @@ void Interpreter::rrf_m_code(Event& event) {
     case 200:
       return rrf_volumetric();
     case 201:
-      return axis_limits(event, 1.0, 0.0, event.limits.axis_max_accel_mm_s2);
+      return rrf_axis_acceleration(event);
     case 203:
       return rrf_max_velocity(event);
     case 204:
@@ -257,17 +260,6 @@ void Interpreter::rrf_m_code(Event& event) {
       return rrf_shaper(event);
     default:
       return other_m_code(event);
-  }
-}
-
-// GCodes2.cpp, HandleTcode: the tool in use is no change, but waits for the end of all motion.
-void Interpreter::rrf_tool(Event& event) {
-  event.kind = EventKind::barrier;
-  if (tool_ != command_.number) {
-    tool_ = command_.number;
-    state_.retracted = false;
-    state_.hop_mm = 0.0;
-    lose_position(event);
   }
 }
 
@@ -323,7 +315,7 @@ void Interpreter::rrf_dwell(Event& event) {
 // and that runs macros.
 void Interpreter::rrf_wait_for_heater(Event& event) {
   event.kind = EventKind::barrier;
-  if (has_any(command_, "RS") && !tool_) {
+  if (has_any(command_, "RS") && tool_.value_or(-1) < 0) {
     tool_ = static_cast<int>(command_.value('T').value_or(0.0));
     lose_position(event);
   }

@@ -6,35 +6,58 @@
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
+namespace {
+
+// What the firmware does to a value that is too small.
+void raise(std::optional<double>& value, double least) {
+  if (value) {
+    value = std::max(least, *value);
+  }
+}
+
+void raise(AxisValues& values, double least) {
+  for (std::optional<double>& value : values) {
+    raise(value, least);
+  }
+}
+
+constexpr double kMinAccel_mm_s2 = 0.1;     // MinimumAcceleration
+constexpr double kMinJerk_mm_s = 0.1;       // MinimumJerk
+constexpr double kMinVelocity_mm_s = 0.01;  // AbsoluteMinFeedrate
+
+}  // namespace
+
+// GCodes2.cpp, M201.
+void Interpreter::rrf_axis_acceleration(Event& event) {
+  axis_limits(event, 1.0, 0.0, event.limits.axis_max_accel_mm_s2);
+  raise(event.limits.axis_max_accel_mm_s2, kMinAccel_mm_s2);
+}
 
 // GCodes2.cpp, M203: mm/min, or mm/s with S1; I first, as the others are at least that.
 void Interpreter::rrf_max_velocity(Event& event) {
-  constexpr double kLeast_mm_s = 0.01;  // AbsoluteMinFeedrate
   const double scale = command_.value('S') == 1.0 ? 1.0 : 1.0 / 60.0;
-  limit(event, 'I', scale, 0.0, event.limits.min_movement_velocity_mm_s);
-  if (event.limits.min_movement_velocity_mm_s) {
-    event.limits.min_movement_velocity_mm_s =
-        std::max(kLeast_mm_s, *event.limits.min_movement_velocity_mm_s);
-  }
-  axis_limits(event, scale, kLeast_mm_s, event.limits.axis_max_velocity_mm_s);
+  std::optional<double>& least = event.limits.min_movement_velocity_mm_s;
+  limit(event, 'I', scale, 0.0, least);
+  raise(least, kMinVelocity_mm_s);
+  axis_limits(event, scale, 0.0, event.limits.axis_max_velocity_mm_s);
+  raise(event.limits.axis_max_velocity_mm_s, least.value_or(kMinVelocity_mm_s));
 }
 
 // GCodes5.cpp, ConfigureAccelerations.
 void Interpreter::rrf_acceleration(Event& event) {
-  constexpr double kLeast_mm_s2 = 0.1;  // MinimumAcceleration
-  limit(event, 'S', 1.0, kLeast_mm_s2, event.limits.print_accel_mm_s2);
-  event.limits.travel_accel_mm_s2 = event.limits.print_accel_mm_s2;
-  limit(event, 'P', 1.0, kLeast_mm_s2, event.limits.print_accel_mm_s2);
-  limit(event, 'T', 1.0, kLeast_mm_s2, event.limits.travel_accel_mm_s2);
+  LimitChange& limits = event.limits;
+  limit(event, 'S', 1.0, 0.0, limits.print_accel_mm_s2);
+  limits.travel_accel_mm_s2 = limits.print_accel_mm_s2;
+  limit(event, 'P', 1.0, 0.0, limits.print_accel_mm_s2);
+  limit(event, 'T', 1.0, 0.0, limits.travel_accel_mm_s2);
+  raise(limits.print_accel_mm_s2, kMinAccel_mm_s2);
+  raise(limits.travel_accel_mm_s2, kMinAccel_mm_s2);
 }
 
-// GCodes2.cpp, M205 in mm/s, M566 in mm/min and with the policy P. At least MinimumJerk.
+// GCodes2.cpp, M205 in mm/s, M566 in mm/min and with the policy P.
 void Interpreter::rrf_jerk(Event& event, double scale) {
-  constexpr double kLeast_mm_s = 0.1;
   axis_limits(event, scale, 0.0, event.limits.axis_jerk_mm_s);
-  for (std::optional<double>& jerk : event.limits.axis_jerk_mm_s) {
-    jerk = jerk ? std::optional<double>(std::max(kLeast_mm_s, *jerk)) : std::nullopt;
-  }
+  raise(event.limits.axis_jerk_mm_s, kMinJerk_mm_s);
   const std::optional<double> policy = command_.value('P');
   if (command_.number == 566 && policy && *policy >= 0.0) {
     event.limits.jerk_policy = static_cast<int>(*policy);
@@ -52,12 +75,8 @@ void Interpreter::rrf_speed_factor(Event& event) {
 }
 
 void Interpreter::rrf_flow_factor(Event& event) {
-  const std::optional<double> extruder = command_.value('D');
-  if (extruder && *extruder != static_cast<double>(tool_.value_or(0))) {
-    return;
-  }
   if (command_.value('S').value_or(0.0) >= 1.0) {
-    set_flow_factor(*command_.value('S') / 100.0);
+    set_flow_of(command_.value('D'), *command_.value('S') / 100.0);
   } else if (command_.has('S')) {
     event.warnings.emplace_back("M221 with an invalid S is ignored");
   }

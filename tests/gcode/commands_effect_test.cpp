@@ -33,21 +33,18 @@ TEST_P(Passive, LetsTheMotionGoOn) {
 
 INSTANTIATE_TEST_SUITE_P(
     Commands, Passive,
-    ::testing::Values("", "; comment", "(comment)", "N5", "M73 P10 R5", "M82", "M104 S210", "M105",
-                      "M106 S255", "M107", "M110 N0", "M115 U3.9.0", "M117 G28 now", "M118 A1 text",
-                      "M140 S60", "M141 S40", "M201 X1000 Y1000", "M203 X200", "M205 X8 Y8",
-                      "M204 P500", "M566 X300 P1", "M569 P0 S1", "M572 D0 S0.05", "M593 F0",
-                      "M862.3 P \"MK3S\"", "M862.1 P0.4", "M900 K0.05", "M906 X800", "M907 E430",
-                      "M75", "M76", "M77", "M155 S2", "M250 C50",
-                      "M302 S0", "M355 S1", "SET_FAN_SPEED FAN=a SPEED=.5", "SET_PIN PIN=a VALUE=1",
-                      "SET_LED LED=a RED=1", "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210",
-                      "RESPOND MSG=\"G28\"", "SET_PRINT_STATS_INFO CURRENT_LAYER=3",
-                      "EXCLUDE_OBJECT_DEFINE NAME=a",
-                      "EXCLUDE_OBJECT NAME=a",
-                      "SET_DISPLAY_TEXT MSG=hi", "set_filament_sensor SENSOR=a ENABLE=0",
-                      "SET_IDLE_TIMEOUT TIMEOUT=60",
-                      "SET_GCODE_VARIABLE MACRO=a VARIABLE=b VALUE=1", "TURN_OFF_HEATERS",
-                      "SET_SERVO SERVO=a ANGLE=1", "SET_RETRACTION"));
+    ::testing::Values(
+        "", "; comment", "(comment)", "N5", "M73 P10 R5", "M82", "M104 S210", "M105", "M106 S255",
+        "M107", "M110 N0", "M115 U3.9.0", "M117 G28 now", "M118 A1 text", "M140 S60", "M141 S40",
+        "M201 X1000 Y1000", "M203 X200", "M205 X8 Y8", "M204 P500", "M566 X300 P1", "M569 P0 S1",
+        "M572 D0 S0.05", "M593 F0", "M862.3 P \"MK3S\"", "M862.1 P0.4", "M900 K0.05", "M906 X800",
+        "M907 E430", "M75", "M76", "M77", "M155 S2", "M250 C50", "M302 S0", "M355 S1",
+        "SET_FAN_SPEED FAN=a SPEED=.5", "SET_PIN PIN=a VALUE=1", "SET_LED LED=a RED=1",
+        "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210", "RESPOND MSG=\"G28\"",
+        "SET_PRINT_STATS_INFO CURRENT_LAYER=3", "EXCLUDE_OBJECT_DEFINE NAME=a",
+        "EXCLUDE_OBJECT NAME=a", "SET_DISPLAY_TEXT MSG=hi", "set_filament_sensor SENSOR=a ENABLE=0",
+        "SET_IDLE_TIMEOUT TIMEOUT=60", "SET_GCODE_VARIABLE MACRO=a VARIABLE=b VALUE=1",
+        "TURN_OFF_HEATERS", "SET_SERVO SERVO=a ANGLE=1", "SET_RETRACTION"));
 
 TEST_P(Stopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());

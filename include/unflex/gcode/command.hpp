@@ -26,7 +26,7 @@ enum class CommandKind {
 struct Command {
   CommandKind kind = CommandKind::none;
   char letter = '\0';       // traditional: 'G', 'M', 'T' …, upper case
-  int number = -1;          // traditional: 1 for G1
+  int number = -1;          // traditional: 1 for G1; below zero only for a tool, T-1
   int subnumber = -1;       // traditional: 3 for M862.3, otherwise -1
   std::vector<Word> words;  // traditional, in the order of the line; without N and checksum
   std::string name;         // extended: the command's name in upper case

@@ -112,6 +112,9 @@ struct InterpreterOptions {
   double shaper_freq_y_hz = 0.0;
   double retract_z_hop_mm = 0.0;  // Marlin and RepRapFirmware, M207 Z
   MarlinArcs marlin_arcs{};
+  // RepRapFirmware's M593 P in config.g. Its off, P"none", replaces the type, so that switching the
+  // shaper on again takes it.
+  std::string shaper_type{};
   // Of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
   double filament_diameter_mm = 1.75;
 };
@@ -221,6 +224,8 @@ class Interpreter {
   void set_volumetric(bool on, double filament_diameter_mm);
   void retraction_and_hop(Event& event, bool retract);
   void steps_per_mm(Event& event);
+  void select_tool(Event& event, int tool);
+  void set_flow_of(std::optional<double> tool, double factor);
   void limits_unknown(Event& event);
   void uncertain_modes(Event& event, std::string_view cause);
   // Reads one limit; a value below `least` is left out with a warning.
@@ -248,11 +253,11 @@ class Interpreter {
   void rrf_command(Event& event);
   void rrf_g_code(Event& event);
   void rrf_m_code(Event& event);
-  void rrf_tool(Event& event);
   void rrf_linear_move(Event& event);
   void rrf_g10(Event& event);
   void rrf_plane(Event& event);
   void rrf_dwell(Event& event);
+  void rrf_axis_acceleration(Event& event);
   void rrf_max_velocity(Event& event);
   void rrf_acceleration(Event& event);
   void rrf_jerk(Event& event, double scale);
@@ -281,7 +286,8 @@ class Interpreter {
   std::string pressure_advance_extruder_;
   std::vector<ModalState> pushed_states_;  // RepRapFirmware, M120
   std::optional<int> tool_;                // the tool in use, where the file selects it
-  // RepRapFirmware: the indentation of the innermost `if`, `while` or `else` whose block is open.
+  std::map<int, double> flow_factors_;     // M221, of the tools not in use
+  // RepRapFirmware: the indentation of the outermost `if`, `while` or `else` whose block is open.
   std::optional<std::size_t> block_indent_;
   bool modes_uncertain_ = false;  // a line that may not run has set a mode or a limit
   bool feed_uncertain_ = false;   // the same for F alone

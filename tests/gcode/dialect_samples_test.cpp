@@ -1,0 +1,73 @@
+// Whole prints as Marlin and RepRapFirmware read them: nothing lost, nothing remarked upon.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "interpreting.hpp"
+#include "unflex/gcode/compensable.hpp"
+
+namespace unflex::gcode {
+namespace {
+
+struct Print {
+  const char* name;
+  Firmware firmware;
+  std::size_t moves;        // lines that move something
+  std::size_t compensable;  // of these, lines that may be rewritten
+  std::size_t limits;       // lines that change limits
+  double filament_mm;
+};
+
+void PrintTo(const Print& print, std::ostream* out) { *out << print.name; }
+
+class DialectPrint : public ::testing::TestWithParam<Print> {};
+
+TEST_P(DialectPrint, IsReadWithoutRemarks) {
+  const Print& print = GetParam();
+  const std::string path = std::string(UNFLEX_SHARED) + "/samples/" + print.name + ".gcode";
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "the sample prints are not there: " << path;
+  }
+  std::ifstream stream(path, std::ios::binary);
+  LineReader reader(stream, path);
+  Interpreter interpreter(default_options(print.firmware));
+  std::size_t moves = 0;
+  std::size_t rewritable = 0;
+  std::size_t limits = 0;
+  double filament_mm = 0.0;
+  Position last{};
+  Line line;
+  while (*reader.next(line)) {
+    const Event event = interpreter.interpret(line);
+    EXPECT_THAT(event.warnings, ::testing::IsEmpty()) << line.text;
+    moves += event.kind == EventKind::move ? 1 : 0;
+    limits += event.kind == EventKind::limits ? 1 : 0;
+    rewritable += compensable(event) ? 1 : 0;
+    for (const Segment& segment : event.segments) {
+      ASSERT_EQ(segment.start_mm, last) << line.number;
+      last = segment.end_mm;
+      filament_mm += segment.delta(E);
+    }
+  }
+  EXPECT_EQ(moves, print.moves);
+  EXPECT_EQ(rewritable, print.compensable);
+  EXPECT_EQ(limits, print.limits);
+  EXPECT_NEAR(filament_mm, print.filament_mm, 0.01);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Samples, DialectPrint,
+    ::testing::Values(Print{"bracket_mk3s_whole", Firmware::marlin, 100215, 87415, 1709, 5233.06},
+                      Print{"cube20_ender3_absE", Firmware::marlin, 17952, 15649, 9, 1519.48},
+                      Print{"dome_snap_dense", Firmware::marlin, 27648, 27226, 0, 422.968},
+                      Print{"pins_slic3r_zhop", Firmware::marlin, 18756, 17084, 2825, 240.988},
+                      Print{"textplate_cura", Firmware::marlin, 44062, 43025, 17614, 2149.54},
+                      Print{"wallring_mini_marlin2", Firmware::marlin, 31692, 22242, 2489, 4053.19},
+                      Print{"vase_rrf_spiral", Firmware::rrf, 33207, 33129, 438, 900.979}),
+    [](const auto& parameter) { return std::string(parameter.param.name); });
+
+}  // namespace
+}  // namespace unflex::gcode
