@@ -196,5 +196,20 @@ TEST(PressureAdvance, StopsOnlyWhenItIsSwitchedOnOrOff) {
   EXPECT_FALSE(session.read("SET_PRESSURE_ADVANCE ADVANCE=0.05").position_lost);
 }
 
+TEST(InputShaper, IsKeptForItsRestoration) {
+  InterpreterOptions options;
+  options.shaper_freq_x_hz = 45.0;
+  Session session(options);
+  EXPECT_EQ(session.state().shaper, ShaperSettings{}) << "the configuration's";
+  session.read("SET_INPUT_SHAPER SHAPER_FREQ_Y=38 SHAPER_TYPE=ei DAMPING_RATIO_X=0.08");
+  session.read("SET_INPUT_SHAPER SHAPER_TYPE_Y=mzv");
+  EXPECT_EQ(session.state().shaper_freq_x_hz, 45.0);
+  EXPECT_EQ(session.state().shaper_freq_y_hz, 38.0);
+  EXPECT_EQ(session.state().shaper.type_x, "ei");
+  EXPECT_EQ(session.state().shaper.type_y, "mzv");
+  EXPECT_EQ(session.state().shaper.damping_ratio_x, 0.08);
+  EXPECT_EQ(session.state().shaper.damping_ratio_y, std::nullopt);
+}
+
 }  // namespace
 }  // namespace unflex::gcode

@@ -1,9 +1,12 @@
 // G2 and G3 as Marlin's plan_arc cuts them, against numbers from its rules.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "arc_expectation.hpp"
 
@@ -129,6 +132,47 @@ TEST(MarlinArc, ThatMarlinMayReadOtherwiseIsNotRewritten) {
     EXPECT_EQ(event.kind, EventKind::barrier) << line;
     EXPECT_TRUE(event.position_lost) << line;
     EXPECT_THAT(event.warnings, SizeIs(1)) << line;
+  }
+}
+
+// With the default lengths ⌊ℓ⌋ pieces are always too long, so that n = ⌈ℓ / 1 mm⌉ unless the least
+// number per circle is more; and ⌊ℓ / 0.1 mm⌋ where those are too short.
+double pieces(double radius, double angle) {
+  const double flat = radius * angle;
+  const double least = std::ceil(72.0 * angle / (2.0 * pi));
+  if (flat / least < 0.1) {
+    return std::max(1.0, std::floor(flat / 0.1));
+  }
+  return flat > least ? std::ceil(flat) : least;
+}
+
+bool near_whole(double value) { return std::abs(value - std::round(value)) < 1e-3; }
+
+TEST(MarlinArc, KeepsItsRuleForRandomArcs) {
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (int i = 0; i < 500; ++i) {
+    const double radius = 0.2 + 60.0 * unit(random) * unit(random);
+    const double from = 2.0 * pi * unit(random);
+    const double angle = 0.05 + 6.1 * unit(random);
+    const bool clockwise = unit(random) < 0.5;
+    const double turn = clockwise ? -angle : angle;
+    const double flat = radius * angle;
+    if (near_whole(flat) || near_whole(flat / 0.1) || near_whole(72.0 * angle / (2.0 * pi))) {
+      continue;  // 32 bits may round it either way
+    }
+    Session session(marlin());
+    session.read(
+        fmt::format("G1 X{:.9f} Y{:.9f} Z0", radius * std::cos(from), radius * std::sin(from)));
+    const Event event = session.read(
+        fmt::format("{} X{:.9f} Y{:.9f} I{:.9f} J{:.9f} Z1 E2", clockwise ? "G2" : "G3",
+                    radius * std::cos(from + turn), radius * std::sin(from + turn),
+                    -radius * std::cos(from), -radius * std::sin(from)));
+    const double count = pieces(radius, angle);
+    const double theta = angle / count;
+    // Up to 24 steps of −θ⁴/24 each in the radius and of θ⁵/30 in the angle.
+    const double drift = 1e-6 + radius * (std::pow(theta, 4.0) + std::pow(theta, 5.0));
+    expect_arc(event, {0.0, 0.0, radius, turn, static_cast<std::size_t>(count), drift});
   }
 }
 

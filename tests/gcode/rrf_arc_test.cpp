@@ -1,9 +1,12 @@
 // G2 and G3 as RepRapFirmware's DoArcMove cuts them, against numbers from its rules.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "arc_expectation.hpp"
 
@@ -84,6 +87,33 @@ TEST(RrfArc, WithoutACentreOrInInverseTimeIsNotRewritten) {
     const Event event = session.read(std::string("G1 X10 Y0 Z0\n") + line);
     EXPECT_EQ(event.kind, EventKind::barrier) << line;
     EXPECT_TRUE(event.position_lost) << line;
+  }
+}
+
+TEST(RrfArc, KeepsItsRuleForRandomArcs) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (int i = 0; i < 500; ++i) {
+    const double radius = 0.2 + 60.0 * unit(random) * unit(random);
+    const double from = 2.0 * pi * unit(random);
+    const double angle = 0.05 + 6.1 * unit(random);
+    const bool clockwise = unit(random) < 0.5;
+    const double feed = 2.0 + 200.0 * unit(random);
+    const double turn = clockwise ? -angle : angle;
+    const double length = std::clamp(std::min(std::sqrt(0.04 * radius), feed / 200.0), 0.02, 1.0);
+    const double count = radius * angle / length + 0.8;
+    if (std::abs(count - std::round(count)) < 1e-3) {
+      continue;  // 32 bits may round it either way
+    }
+    Session session(rrf());
+    session.read(fmt::format("G1 X{:.9f} Y{:.9f} Z0 F{:.9f}", radius * std::cos(from),
+                             radius * std::sin(from), feed * 60.0));
+    const Event event = session.read(
+        fmt::format("{} X{:.9f} Y{:.9f} I{:.9f} J{:.9f} Z1 E2", clockwise ? "G2" : "G3",
+                    radius * std::cos(from + turn), radius * std::sin(from + turn),
+                    -radius * std::cos(from), -radius * std::sin(from)));
+    expect_arc(event, {0.0, 0.0, radius, turn,
+                       std::max<std::size_t>(1, static_cast<std::size_t>(count)), 1e-6});
   }
 }
 
