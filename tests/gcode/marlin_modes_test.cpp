@@ -134,6 +134,14 @@ TEST(MarlinVolumes, KeepTheReadingOfAbsoluteE) {
   EXPECT_NEAR(session.move("G1 X2 E13").delta(E), 1.5 / std::numbers::pi, 1e-12);
 }
 
+TEST(MarlinVolumes, AreCubicInchesInInches) {
+  Session session = marlin();
+  session.read("M83\nG1 X1 Y1 Z1\nM200 D2\nG20");
+  EXPECT_NEAR(session.move("G1 X1 E.001").delta(E), 0.001 * 25.4 * 25.4 * 25.4 / std::numbers::pi,
+              1e-12);
+  EXPECT_NEAR(session.move("M200 S0\nG1 X2 E.001").delta(E), 0.0254, 1e-12);
+}
+
 TEST(MarlinRetraction, IsUnknownToMostMarlins) {
   Session session = marlin();
   EXPECT_EQ(session.read("G10").kind, EventKind::passive);

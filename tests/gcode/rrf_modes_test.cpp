@@ -120,6 +120,12 @@ TEST(RrfVolumes, AreTurnedIntoFilament) {
   EXPECT_DOUBLE_EQ(session.move("G1 X5 E3").delta(E), 3.0);
 }
 
+TEST(RrfVolumes, AreNeverCubicInches) {
+  Session session = rrf();
+  session.read("M83\nG1 X1 Y1 Z1\nM200 D2\nG20");
+  EXPECT_NEAR(session.move("G1 X1 E1").delta(E), 25.4 / std::numbers::pi, 1e-12);
+}
+
 TEST(RrfRetraction, HasTheFirmwaresDefaults) {
   Session session = rrf();
   session.read("G1 X1 Y1 Z1 E10\nM220 S50\nM221 S50");
