@@ -44,20 +44,22 @@ void limit_jerk(const Settings& settings, const Dda& next, Dda& dda) {
 
 // One joint of the way back: decides at which speed the move can end. True if the move before it
 // must end faster as well for that; its target is then set.
-bool look_back(const Settings& settings, std::deque<Dda>& moves, std::size_t i) {
+bool look_back(const Settings& settings, std::deque<Dda>& moves, std::size_t i,
+               bool frozen_extrudes) {
   Dda& dda = moves[i];
   dda.target_end_speed = std::min(dda.target_end_speed, dda.requested_speed);
-  const bool at_speed = dda.top_speed >= dda.requested_speed;
-  if (!at_speed && i > 0 && only_decelerates(dda) && moves[i - 1].decel_distance_mm > 0.0F &&
-      may_change_previous(settings, moves[i - 1], dda)) {
-    limit_jerk(settings, moves[i + 1], dda);
-    moves[i - 1].target_end_speed =
-        std::min(speed_after(dda.target_end_speed, dda.decel, dda.length_mm), dda.requested_speed);
-    return true;
-  }
-  if (!at_speed) {
+  if (dda.top_speed < dda.requested_speed) {
+    const bool slows_before = i > 0 ? moves[i - 1].decel_distance_mm > 0.0F : frozen_extrudes;
+    const bool slows_on = only_decelerates(dda) && slows_before;
+    if (i > 0 && slows_on && may_change_previous(settings, moves[i - 1], dda)) {
+      limit_jerk(settings, moves[i + 1], dda);
+      moves[i - 1].target_end_speed = std::min(
+          speed_after(dda.target_end_speed, dda.decel, dda.length_mm), dda.requested_speed);
+      return true;
+    }
+    const float accel = slows_on ? dda.decel : dda.accel;
     dda.target_end_speed =
-        std::min(dda.target_end_speed, speed_after(dda.start_speed, dda.accel, dda.length_mm));
+        std::min(dda.target_end_speed, speed_after(dda.start_speed, accel, dda.length_mm));
   }
   limit_jerk(settings, moves[i + 1], dda);
   return false;
@@ -69,28 +71,35 @@ void settle(Dda& dda) {
   set_trapezoid(dda);
 }
 
+// Lets moves[last] end as fast as its target, or as fast as the moves before it allow.
+void raise_end_speed(const Settings& settings, std::deque<Dda>& moves, std::size_t last,
+                     bool frozen_extrudes) {
+  std::size_t i = last;
+  while (look_back(settings, moves, i, frozen_extrudes)) --i;
+  settle(moves[i]);
+  while (i < last) {
+    ++i;
+    Dda& dda = moves[i];
+    dda.start_speed = moves[i - 1].end_speed;
+    dda.target_end_speed =
+        std::min(dda.target_end_speed, speed_after(dda.start_speed, dda.accel, dda.length_mm));
+    settle(dda);
+  }
+}
+
 }  // namespace
 
-void join_last(const Settings& settings, std::deque<Dda>& provisional) {
+void join_last(const Settings& settings, std::deque<Dda>& provisional, bool frozen_extrudes) {
   Dda& added = provisional.back();
   if (provisional.size() > 1) {
     const std::size_t last = provisional.size() - 2;
-    if (may_join(settings, provisional[last], added)) {
+    Dda& previous = provisional[last];
+    if (may_join(settings, previous, added)) {
       // The new move ends at a standstill, so it can begin at most this fast.
-      provisional[last].target_end_speed =
+      previous.target_end_speed =
           std::min(std::sqrt(added.decel * added.length_mm * 2.0F), added.requested_speed);
-      std::size_t i = last;
-      while (look_back(settings, provisional, i)) --i;
-      settle(provisional[i]);
-      while (i < last) {
-        ++i;
-        Dda& dda = provisional[i];
-        dda.start_speed = provisional[i - 1].end_speed;
-        dda.target_end_speed =
-            std::min(dda.target_end_speed, speed_after(dda.start_speed, dda.accel, dda.length_mm));
-        settle(dda);
-      }
-      added.start_speed = provisional[last].end_speed;
+      raise_end_speed(settings, provisional, last, frozen_extrudes);
+      added.start_speed = previous.end_speed;
     }
   }
   set_trapezoid(added);

@@ -68,7 +68,7 @@ bool RrfPlanner::add(const gcode::Segment& segment) {
     move.direction[axis] = move.segment.delta(axis) / move.length_mm;
   }
   provisional_.push_back(std::move(dda));
-  rrf::join_last(settings_, provisional_);
+  rrf::join_last(settings_, provisional_, frozen_extrudes_);
   while (moving_ && can_freeze()) freeze();
   return true;
 }
@@ -127,6 +127,7 @@ bool RrfPlanner::can_freeze() const {
 void RrfPlanner::freeze() {
   rrf::Dda& first = provisional_.front();
   rrf::finish(settings_, first);
+  frozen_extrudes_ = first.direction[E] > 0.0F;
   finish_.push_back(last_finish() + first.clocks);
   final_.push_back(std::move(first.move));
   provisional_.pop_front();
