@@ -100,11 +100,9 @@ void RrfPlanner::wait_for_space() {
       if (can_add()) return;
     }
     while (can_freeze()) freeze();
-    if (!moving_) {
-      // The first move begins a little after it has been prepared.
-      for (std::int64_t& finish : finish_) finish += shortest_lead(clock_hz_);
-      moving_ = true;
-    }
+    // The firmware lets 50 ms pass before the first move begins. Until then nothing happens, so the
+    // plan is the same without.
+    moving_ = true;
   }
 }
 

@@ -111,7 +111,7 @@ class RrfOracle : public ::testing::Test {
  protected:
   void SetUp() override {
     for (Row& row : rows("planner_rrf_moves.csv")) of_rrf_[row.at(0)].push_back(std::move(row));
-    ASSERT_GE(of_rrf_.size(), 60U);
+    ASSERT_GE(of_rrf_.size(), 80U);
     ASSERT_EQ(planned_.size(), of_rrf_.size());
     for (const auto& [name, plan] : planned_) {
       ASSERT_TRUE(of_rrf_.contains(name)) << name;
