@@ -27,14 +27,89 @@ double settling_time_s(const AxisDynamics& axis) {
   return 8.0 * axis.damping_ratio / (2.0 * std::numbers::pi * axis.freq_hz);
 }
 
-}  // namespace
-
-double Settings::max_z_velocity_mm_s() const {
-  return limits.max_z_velocity_mm_s.value_or(limits.max_velocity_mm_s);
+std::array<double, 4> or_default(const AxisOptions& own, const std::array<double, 4>& otherwise) {
+  std::array<double, 4> values{};
+  for (std::size_t axis = 0; axis < values.size(); ++axis) {
+    values[axis] = own[axis].value_or(otherwise[axis]);
+  }
+  return values;
 }
 
-double Settings::max_z_accel_mm_s2() const {
-  return limits.max_z_accel_mm_s2.value_or(limits.max_accel_mm_s2);
+// M204 P and T.
+double default_command_accel(const Settings& settings) {
+  // RepRapFirmware's DefaultPrintingAcceleration, above whatever M201 allows.
+  constexpr double kRrfNoLimit_mm_s2 = 50000.0;
+  return settings.printer.firmware == Firmware::rrf ? kRrfNoLimit_mm_s2
+                                                    : settings.limits.max_accel_mm_s2;
+}
+
+}  // namespace
+
+// Defaults: Marlin 2.1.2 Configuration.h (DEFAULT_*) and Configuration_adv.h; RepRapFirmware 3.6
+// src/Config/Configuration.h (Default*).
+std::array<double, 4> Settings::axis_max_velocity_mm_s() const {
+  const double v = limits.max_velocity_mm_s;
+  return or_default(limits.axis_max_velocity_mm_s, [&]() -> std::array<double, 4> {
+    switch (printer.firmware) {
+      case Firmware::marlin:
+        return {v, v, 5.0, 25.0};
+      case Firmware::rrf:
+        return {v, v, 20.0, 100.0};
+      case Firmware::klipper:
+        break;
+    }
+    return {v, v, v, v};
+  }());
+}
+
+std::array<double, 4> Settings::axis_max_accel_mm_s2() const {
+  const double a = limits.max_accel_mm_s2;
+  return or_default(limits.axis_max_accel_mm_s2, [&]() -> std::array<double, 4> {
+    switch (printer.firmware) {
+      case Firmware::marlin:
+        return {a, a, 100.0, 10000.0};
+      case Firmware::rrf:
+        return {a, a, 200.0, 500.0};
+      case Firmware::klipper:
+        break;
+    }
+    return {a, a, a, a};
+  }());
+}
+
+std::array<double, 4> Settings::jerk_mm_s() const {
+  return or_default(limits.jerk_mm_s, printer.firmware == Firmware::rrf
+                                          ? std::array{15.0, 15.0, 10.0, 5.0}
+                                          : std::array{10.0, 10.0, 0.3, 5.0});
+}
+
+std::array<double, 4> Settings::steps_per_mm() const {
+  return or_default(printer.steps_per_mm, printer.firmware == Firmware::rrf
+                                              ? std::array{80.0, 80.0, 800.0, 420.0}
+                                              : std::array{80.0, 80.0, 400.0, 500.0});
+}
+
+double Settings::queue_length() const {
+  return printer.queue_length.value_or(printer.firmware == Firmware::rrf ? 60.0 : 16.0);
+}
+
+double Settings::print_accel_mm_s2() const {
+  return limits.print_accel_mm_s2.value_or(default_command_accel(*this));
+}
+
+double Settings::travel_accel_mm_s2() const {
+  return limits.travel_accel_mm_s2.value_or(default_command_accel(*this));
+}
+
+double Settings::retract_accel_mm_s2() const {
+  return limits.retract_accel_mm_s2.value_or(limits.max_accel_mm_s2);
+}
+
+double Settings::max_lines_per_s() const {
+  const double by_firmware = printer.firmware == Firmware::klipper  ? 1000.0
+                             : printer.firmware == Firmware::marlin ? 200.0
+                                                                    : 500.0;
+  return emit.max_lines_per_s.value_or(by_firmware);
 }
 
 double Settings::max_extrude_cross_section_mm2() const {

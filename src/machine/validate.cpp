@@ -99,26 +99,26 @@ Status resolve_axis(Draft& draft, const std::string& section, const MassSpringDa
   return {};
 }
 
-Status check_firmware(const Draft& draft) {
-  const Firmware firmware = draft.settings.printer.firmware;
-  if (firmware != Firmware::klipper) {
-    return conflict(draft, {"printer.firmware"},
-                    fmt::format("firmware \"{}\" is not supported by this version, only "
-                                "\"klipper\" is",
-                                to_string(firmware)));
-  }
-  return {};
-}
-
 Status check_printer(const Draft& draft) {
   const Settings& s = draft.settings;
-  if (s.max_z_velocity_mm_s() > s.limits.max_velocity_mm_s) {
+  constexpr std::size_t kZ = 2;
+  const bool klipper = s.printer.firmware == Firmware::klipper;
+  if (klipper && s.axis_max_velocity_mm_s()[kZ] > s.limits.max_velocity_mm_s) {
     return conflict(draft, {"limits.max_z_velocity_mm_s", "limits.max_velocity_mm_s"},
                     "limits.max_z_velocity_mm_s must not exceed limits.max_velocity_mm_s");
   }
-  if (s.max_z_accel_mm_s2() > s.limits.max_accel_mm_s2) {
+  if (klipper && s.axis_max_accel_mm_s2()[kZ] > s.limits.max_accel_mm_s2) {
     return conflict(draft, {"limits.max_z_accel_mm_s2", "limits.max_accel_mm_s2"},
                     "limits.max_z_accel_mm_s2 must not exceed limits.max_accel_mm_s2");
+  }
+  for (const auto& [key, value] :
+       {std::pair{"printer.min_steps_per_segment", s.printer.min_steps_per_segment},
+        std::pair{"printer.queue_length", s.queue_length()},
+        std::pair{"limits.jerk_policy", s.limits.jerk_policy}}) {
+    if (value != std::floor(value)) {
+      return conflict(draft, {key},
+                      fmt::format("{} is {}, but must be a whole number", key, value));
+    }
   }
   if (s.extruder.filament_diameter_mm < s.extruder.nozzle_diameter_mm) {
     return conflict(draft, {"extruder.filament_diameter_mm", "extruder.nozzle_diameter_mm"},
@@ -192,7 +192,7 @@ Status resolve_dynamics(Draft& draft) {
 }
 
 Status check_consistency(const Draft& draft) {
-  for (auto* check : {check_firmware, check_printer, check_base, check_emission, check_grid}) {
+  for (auto* check : {check_printer, check_base, check_emission, check_grid}) {
     if (Status checked = check(draft); !checked) {
       return checked;
     }

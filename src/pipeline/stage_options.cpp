@@ -68,17 +68,32 @@ planner::Limits planner_limits(const machine::Settings& settings) {
   limits.max_accel_mm_s2 = settings.limits.max_accel_mm_s2;
   limits.square_corner_velocity_mm_s = settings.limits.square_corner_velocity_mm_s;
   limits.minimum_cruise_ratio = settings.limits.minimum_cruise_ratio;
+  limits.axis_max_velocity_mm_s = settings.axis_max_velocity_mm_s();
+  limits.axis_max_accel_mm_s2 = settings.axis_max_accel_mm_s2();
+  limits.axis_jerk_mm_s = settings.jerk_mm_s();
+  limits.print_accel_mm_s2 = settings.print_accel_mm_s2();
+  limits.travel_accel_mm_s2 = settings.travel_accel_mm_s2();
+  limits.retract_accel_mm_s2 = settings.retract_accel_mm_s2();
+  limits.junction_deviation_mm = settings.limits.junction_deviation_mm;
+  limits.min_velocity_mm_s = settings.limits.min_velocity_mm_s;
+  limits.min_travel_velocity_mm_s = settings.limits.min_travel_velocity_mm_s;
+  limits.min_segment_time_s = settings.limits.min_segment_time_ms * 1e-3;
+  limits.min_movement_velocity_mm_s = settings.limits.min_movement_velocity_mm_s;
+  limits.jerk_policy = static_cast<int>(settings.limits.jerk_policy);
   return limits;
 }
 
 planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
   planner::FirmwareConfig config;
   config.firmware = settings.printer.firmware;
-  config.max_z_velocity_mm_s = settings.max_z_velocity_mm_s();
-  config.max_z_accel_mm_s2 = settings.max_z_accel_mm_s2();
+  config.max_z_velocity_mm_s = settings.axis_max_velocity_mm_s()[gcode::Z];
+  config.max_z_accel_mm_s2 = settings.axis_max_accel_mm_s2()[gcode::Z];
   config.max_extrude_only_velocity_mm_s = settings.max_extrude_only_velocity_mm_s();
   config.max_extrude_only_accel_mm_s2 = settings.max_extrude_only_accel_mm_s2();
   config.instantaneous_corner_velocity_mm_s = settings.extruder.instantaneous_corner_velocity_mm_s;
+  config.steps_per_mm = settings.steps_per_mm();
+  config.classic_jerk = settings.printer.classic_jerk;
+  config.min_steps_per_segment = static_cast<int>(settings.printer.min_steps_per_segment);
   return config;
 }
 
@@ -134,7 +149,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.reach_x = reach(settings.printer.travel_x_mm);
   options.lines.reach_y = reach(settings.printer.travel_y_mm);
   options.lines.min_line_s =
-      std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.emit.max_lines_per_s);
+      std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.max_lines_per_s());
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
   options.lines.max_accel_mm_s2 = planned_base_accel(settings);
   options.version = std::move(version);

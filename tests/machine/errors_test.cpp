@@ -104,11 +104,10 @@ INSTANTIATE_TEST_SUITE_P(
                 {},
                 "printer.toml:2: printer.firmware must be one of \"klipper\", \"marlin\", "
                 "\"rrf\", not the text \"kliper\""},
-        Mistake{"FirmwareOfALaterVersion",
-                "[printer]\nfirmware = \"marlin\"\n",
+        Mistake{"NotAWholeNumber",
+                "[printer]\nfirmware = \"marlin\"\nqueue_length = 16.5\n",
                 {},
-                "printer.toml:2: firmware \"marlin\" is not supported by this version, only "
-                "\"klipper\" is"},
+                "printer.toml:3: printer.queue_length is 16.5, but must be a whole number"},
         Mistake{"SchemaOfALaterVersion",
                 "schema_version = 2\n",
                 {},

@@ -124,12 +124,36 @@ TEST(Dynamics, FollowFromMassStiffnessAndDamping) {
 
 TEST(UnsetKeys, FollowKlippersFormulas) {
   const Settings s = read("");
-  EXPECT_DOUBLE_EQ(s.max_z_velocity_mm_s(), 300.0);
-  EXPECT_DOUBLE_EQ(s.max_z_accel_mm_s2(), 5000.0);
+  EXPECT_DOUBLE_EQ(s.axis_max_velocity_mm_s()[2], 300.0);
+  EXPECT_DOUBLE_EQ(s.axis_max_accel_mm_s2()[2], 5000.0);
   EXPECT_DOUBLE_EQ(s.max_extrude_cross_section_mm2(), 4.0 * 0.4 * 0.4);
   const double ratio = 0.64 / (std::numbers::pi * 0.875 * 0.875);
   EXPECT_NEAR(s.max_extrude_only_velocity_mm_s(), 300.0 * ratio, 1e-9);
   EXPECT_NEAR(s.max_extrude_only_accel_mm_s2(), 5000.0 * ratio, 1e-9);
+}
+
+TEST(UnsetKeys, FollowMarlinsDefaults) {
+  const Settings s = read(
+      "[printer]\nfirmware = \"marlin\"\n[limits]\nmax_accel_mm_s2 = 2000\n"
+      "max_y_accel_mm_s2 = 1500\nmax_x_velocity_mm_s = 180\n");
+  EXPECT_EQ(s.axis_max_velocity_mm_s(), (std::array{180.0, 300.0, 5.0, 25.0}));
+  EXPECT_EQ(s.axis_max_accel_mm_s2(), (std::array{2000.0, 1500.0, 100.0, 10000.0}));
+  EXPECT_EQ(s.jerk_mm_s(), (std::array{10.0, 10.0, 0.3, 5.0}));
+  EXPECT_EQ(s.steps_per_mm(), (std::array{80.0, 80.0, 400.0, 500.0}));
+  EXPECT_EQ(s.print_accel_mm_s2(), 2000.0);
+  EXPECT_EQ(s.queue_length(), 16.0);
+  EXPECT_EQ(s.max_lines_per_s(), 200.0);
+}
+
+TEST(UnsetKeys, FollowRepRapFirmwaresDefaults) {
+  const Settings s = read("[printer]\nfirmware = \"rrf\"\n");
+  EXPECT_EQ(s.axis_max_velocity_mm_s(), (std::array{300.0, 300.0, 20.0, 100.0}));
+  EXPECT_EQ(s.axis_max_accel_mm_s2(), (std::array{5000.0, 5000.0, 200.0, 500.0}));
+  EXPECT_EQ(s.jerk_mm_s(), (std::array{15.0, 15.0, 10.0, 5.0}));
+  EXPECT_EQ(s.steps_per_mm(), (std::array{80.0, 80.0, 800.0, 420.0}));
+  EXPECT_EQ(s.print_accel_mm_s2(), 50000.0);
+  EXPECT_EQ(s.queue_length(), 60.0);
+  EXPECT_EQ(s.max_lines_per_s(), 500.0);
 }
 
 TEST(UnsetKeys, IgnoreAConfiguredCrossSectionForTheExtrudeOnlyLimitsAsKlipperDoes) {

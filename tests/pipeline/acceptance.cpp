@@ -100,7 +100,7 @@ void expect_kept(const report::Report& report, const machine::Settings& settings
   EXPECT_LE(report.emitted_time_s, 1.01 * report.reference_time_s);
   EXPECT_LE(report.base_max_accel_mm_s2, settings.base_max_accel_mm_s2());
   EXPECT_LE(report.base_max_velocity_mm_s, settings.base_max_velocity_mm_s());
-  EXPECT_LE(report.max_lines_per_s, settings.emit.max_lines_per_s);
+  EXPECT_LE(report.max_lines_per_s, settings.max_lines_per_s());
   EXPECT_NEAR(report.output_extrusion_mm, report.input_extrusion_mm, kFilamentStepMm);
   EXPECT_LE(report.worst_move_extrusion_error_mm, kFilamentStepMm);
 }

@@ -2,6 +2,7 @@
 // they are read from.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -19,6 +20,9 @@ struct Range {
   double max = 0.0;
 };
 
+// Per axis X Y Z E, where set.
+using AxisOptions = std::array<std::optional<double>, 4>;
+
 struct PrinterSettings {
   Firmware firmware = Firmware::klipper;
   // Where the base may be. Unset: not limited, except that it stays above 0 where the path does.
@@ -31,19 +35,39 @@ struct PrinterSettings {
   double unretract_extra_length_mm = 0.0;
   double unretract_speed_mm_s = 10.0;
   double arc_resolution_mm = 1.0;  // [gcode_arcs] resolution
+  AxisOptions steps_per_mm;        // Marlin and RepRapFirmware; unset: the firmware's default
+  // Marlin.
+  bool classic_jerk = false;           // CLASSIC_JERK instead of junction deviation
+  double min_steps_per_segment = 6.0;  // MIN_STEPS_PER_SEGMENT, a whole number
+  std::optional<double>
+      queue_length;  // moves the firmware plans ahead; unset: the firmware's default
   // Frequencies the printer's own [input_shaper] is set back to after the print (its type stays).
   // 0: the printer has none. Unset: the frequency of the axis' dynamics.
   std::optional<double> input_shaper_freq_x_hz;
   std::optional<double> input_shaper_freq_y_hz;
 };
 
+// What the firmware knows as M201, M203 and so on is named by what it limits; docs/configuration.md
+// says which key is which command.
 struct LimitSettings {
   double max_velocity_mm_s = 300.0;
   double max_accel_mm_s2 = 5000.0;
   double square_corner_velocity_mm_s = 5.0;
   double minimum_cruise_ratio = 0.5;
-  std::optional<double> max_z_velocity_mm_s;  // unset: max_velocity_mm_s, as in Klipper
-  std::optional<double> max_z_accel_mm_s2;    // unset: max_accel_mm_s2, as in Klipper
+  // Klipper knows Z's alone, unset: max_velocity_mm_s and max_accel_mm_s2. For the others X and Y
+  // are those when unset, Z and E the firmware's default.
+  AxisOptions axis_max_velocity_mm_s;
+  AxisOptions axis_max_accel_mm_s2;
+  AxisOptions jerk_mm_s;  // Marlin with classic jerk, RepRapFirmware; unset: the firmware's default
+  std::optional<double> print_accel_mm_s2;    // unset: Marlin max_accel_mm_s2, RRF no limit
+  std::optional<double> travel_accel_mm_s2;   // likewise
+  std::optional<double> retract_accel_mm_s2;  // Marlin; unset: max_accel_mm_s2
+  double junction_deviation_mm = 0.013;       // Marlin
+  double min_velocity_mm_s = 0.0;             // Marlin
+  double min_travel_velocity_mm_s = 0.0;      // Marlin
+  double min_segment_time_ms = 20.0;          // Marlin
+  double min_movement_velocity_mm_s = 0.5;    // RepRapFirmware
+  double jerk_policy = 0.0;                   // RepRapFirmware, 0 or 1
 };
 
 struct ExtruderSettings {
@@ -83,9 +107,9 @@ struct EmitSettings {
   // Of what a line's shape may move the nozzle by. Unset: 0.3 µm at 45 Hz, in proportion to the
   // lower frequency, so that lines per second hardly depend on it.
   std::optional<double> tolerance_um;
-  double max_lines_per_s = 1100.0;    // hard limit
-  double max_speed_step_mm_s = 30.0;  // from line to line, per axis
-  double accel_mm_s2 = 1e6;           // planner limits inside a compensated run
+  std::optional<double> max_lines_per_s;  // hard limit; unset: by firmware
+  double max_speed_step_mm_s = 30.0;      // from line to line, per axis
+  double accel_mm_s2 = 1e6;               // planner limits inside a compensated run
   double square_corner_velocity_mm_s = 1000.0;
 };
 
@@ -108,9 +132,16 @@ struct Settings {
   // "default"), one entry for every known key, in the order of the documentation.
   std::vector<std::pair<std::string, std::string>> origins;
 
-  // The values behind unset options, by Klipper's formulas.
-  [[nodiscard]] double max_z_velocity_mm_s() const;
-  [[nodiscard]] double max_z_accel_mm_s2() const;
+  // The values behind unset options, by the firmware's own formulas and defaults.
+  [[nodiscard]] std::array<double, 4> axis_max_velocity_mm_s() const;
+  [[nodiscard]] std::array<double, 4> axis_max_accel_mm_s2() const;
+  [[nodiscard]] std::array<double, 4> jerk_mm_s() const;
+  [[nodiscard]] std::array<double, 4> steps_per_mm() const;
+  [[nodiscard]] double queue_length() const;
+  [[nodiscard]] double print_accel_mm_s2() const;
+  [[nodiscard]] double travel_accel_mm_s2() const;
+  [[nodiscard]] double retract_accel_mm_s2() const;
+  [[nodiscard]] double max_lines_per_s() const;
   [[nodiscard]] double max_extrude_cross_section_mm2() const;
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;

@@ -1,0 +1,140 @@
+// Sources: Klipper docs/G-Codes.md (SET_VELOCITY_LIMIT). Marlin 2.1.2
+// src/gcode/config/M200-M205.cpp (M203 in mm/s, M205 B in µs). RepRapFirmware 3.6
+// src/GCodes/GCodes2.cpp and GCodes.cpp (M203 and M566 in mm/min).
+#include "dialect.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace unflex::emit {
+namespace {
+
+using planner::Limits;
+
+constexpr double kMinute_s = 60.0;
+constexpr double kMicroseconds = 1e6;
+
+// One command with those of its words that have to be sent.
+class CommandLine {
+ public:
+  CommandLine(std::string_view command, bool all) : text_(command), all_(all) {}
+
+  // Word and value without anything between, as in X1000; or with it, as in ACCEL=1000.
+  void word(std::string_view name, double wanted, double current, double factor = 1.0) {
+    if (all_ || wanted != current) {
+      // Twelve digits: 0.1 · 60 is 6, not 6.000000000000001.
+      text_ += fmt::format(" {}{:.12g}", name, wanted * factor);
+      empty_ = false;
+    }
+  }
+
+  void axes(const std::array<double, 4>& wanted, const std::array<double, 4>& current,
+            double factor = 1.0) {
+    constexpr std::array<std::string_view, 4> kNames = {"X", "Y", "Z", "E"};
+    for (std::size_t axis = 0; axis < kNames.size(); ++axis) {
+      word(kNames[axis], wanted[axis], current[axis], factor);
+    }
+  }
+
+  void finish(std::vector<std::string>& lines) {
+    if (!empty_) {
+      lines.push_back(std::move(text_));
+    }
+  }
+
+ private:
+  std::string text_;
+  bool all_;
+  bool empty_ = true;
+};
+
+void klipper(const Limits& wanted, const Limits& current, bool all,
+             std::vector<std::string>& lines) {
+  CommandLine line("SET_VELOCITY_LIMIT", all);
+  line.word("VELOCITY=", wanted.max_velocity_mm_s, current.max_velocity_mm_s);
+  line.word("ACCEL=", wanted.max_accel_mm_s2, current.max_accel_mm_s2);
+  line.word("SQUARE_CORNER_VELOCITY=", wanted.square_corner_velocity_mm_s,
+            current.square_corner_velocity_mm_s);
+  line.word("MINIMUM_CRUISE_RATIO=", wanted.minimum_cruise_ratio, current.minimum_cruise_ratio);
+  line.finish(lines);
+}
+
+void marlin(const Limits& wanted, const Limits& current, bool all, bool classic_jerk,
+            std::vector<std::string>& lines) {
+  CommandLine accel("M201", all);
+  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2);
+  accel.finish(lines);
+  CommandLine velocity("M203", all);
+  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s);
+  velocity.finish(lines);
+  CommandLine used("M204", all);
+  used.word("P", wanted.print_accel_mm_s2, current.print_accel_mm_s2);
+  used.word("R", wanted.retract_accel_mm_s2, current.retract_accel_mm_s2);
+  used.word("T", wanted.travel_accel_mm_s2, current.travel_accel_mm_s2);
+  used.finish(lines);
+  CommandLine advanced("M205", all);
+  if (classic_jerk) {
+    advanced.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s);
+  } else {
+    advanced.word("J", wanted.junction_deviation_mm, current.junction_deviation_mm);
+  }
+  advanced.word("S", wanted.min_velocity_mm_s, current.min_velocity_mm_s);
+  advanced.word("T", wanted.min_travel_velocity_mm_s, current.min_travel_velocity_mm_s);
+  advanced.word("B", wanted.min_segment_time_s, current.min_segment_time_s, kMicroseconds);
+  advanced.finish(lines);
+}
+
+void rrf(const Limits& wanted, const Limits& current, bool all, std::vector<std::string>& lines) {
+  CommandLine accel("M201", all);
+  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2);
+  accel.finish(lines);
+  CommandLine velocity("M203", all);
+  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s, kMinute_s);
+  velocity.word("I", wanted.min_movement_velocity_mm_s, current.min_movement_velocity_mm_s,
+                kMinute_s);
+  velocity.finish(lines);
+  CommandLine used("M204", all);
+  used.word("P", wanted.print_accel_mm_s2, current.print_accel_mm_s2);
+  used.word("T", wanted.travel_accel_mm_s2, current.travel_accel_mm_s2);
+  used.finish(lines);
+  CommandLine jerk("M566", all);
+  jerk.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s, kMinute_s);
+  jerk.word("P", wanted.jerk_policy, current.jerk_policy);
+  jerk.finish(lines);
+}
+
+}  // namespace
+
+std::string_view brand(Firmware firmware) {
+  switch (firmware) {
+    case Firmware::marlin:
+      return "Marlin";
+    case Firmware::rrf:
+      return "RepRapFirmware";
+    case Firmware::klipper:
+      break;
+  }
+  return "Klipper";
+}
+
+std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, const Limits& wanted,
+                                     const Limits& current, bool known) {
+  std::vector<std::string> lines;
+  switch (config.firmware) {
+    case Firmware::klipper:
+      klipper(wanted, current, !known, lines);
+      break;
+    case Firmware::marlin:
+      marlin(wanted, current, !known, config.classic_jerk, lines);
+      break;
+    case Firmware::rrf:
+      rrf(wanted, current, !known, lines);
+      break;
+  }
+  return lines;
+}
+
+}  // namespace unflex::emit
