@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "dialect.hpp"
 #include "strokes.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/compensable.hpp"
@@ -47,16 +48,24 @@ void append_filament(std::string& text, double value) {
   }
 }
 
+// Places that can be written, or, where the firmware rounds to steps, that it goes to.
+AxisGrid axis_grid(const planner::FirmwareConfig& config, gcode::Axis axis, double zero_mm) {
+  if (config.firmware == Firmware::marlin) {
+    return {0.0, 1.0 / config.steps_per_mm[axis]};
+  }
+  return {zero_mm, 1.0 / power_of_ten(kPositionDecimals)};
+}
+
 }  // namespace
 
-KlipperEmitter::KlipperEmitter(EmitOptions options)
+Emitter::Emitter(EmitOptions options)
     : options_(std::move(options)),
       input_(options_.interpreter),
       printer_(options_.interpreter),
       input_limits_(options_.printer_limits),
       limits_(options_.printer_limits) {}
 
-void KlipperEmitter::write(std::string_view text, std::string& out) {
+void Emitter::write(std::string_view text, std::string& out) {
   if (open_line_) {
     // The input's last line has no line ending.
     out += newline_;
@@ -69,7 +78,7 @@ void KlipperEmitter::write(std::string_view text, std::string& out) {
   planner::apply(event.limits, limits_);
 }
 
-void KlipperEmitter::copy(const gcode::Event& event, std::string& out) {
+void Emitter::copy(const gcode::Event& event, std::string& out) {
   out += event.line.text;
   open_line_ = !event.line.text.ends_with('\n');
   newline_ = event.line.text.ends_with("\r\n") ? "\r\n" : "\n";
@@ -77,12 +86,12 @@ void KlipperEmitter::copy(const gcode::Event& event, std::string& out) {
   planner::apply(event.limits, limits_);
 }
 
-void KlipperEmitter::follow_input(const gcode::Event& event) {
+void Emitter::follow_input(const gcode::Event& event) {
   static_cast<void>(input_.interpret(event.line));
   planner::apply(event.limits, input_limits_);
 }
 
-void KlipperEmitter::line(const gcode::Event& event, std::string& out) {
+void Emitter::line(const gcode::Event& event, std::string& out) {
   if (event.kind == gcode::EventKind::barrier && event.position_lost) {
     // Homing, macros and tool changes move the machine by themselves, and may leave other limits.
     restore_shaper(out);
@@ -96,17 +105,18 @@ void KlipperEmitter::line(const gcode::Event& event, std::string& out) {
   }
 }
 
-void KlipperEmitter::keep(const std::vector<gcode::Event>& events, std::string& out) {
+void Emitter::keep(const std::vector<gcode::Event>& events, std::string& out) {
   restore_shaper(out);
   for (const gcode::Event& event : events) {
     line(event, out);
   }
 }
 
-bool KlipperEmitter::run(const Run& run, std::string& out) {
+bool Emitter::run(const Run& run, std::string& out) {
   const gcode::ModalState& state = printer_.state();
-  const Grid grid{state.base_mm[X], state.base_mm[Y], state.base_mm[Z], kPositionDecimals,
-                  state.speed_factor};
+  const Grid grid{axis_grid(options_.fixed, X, state.base_mm[X]),
+                  axis_grid(options_.fixed, Y, state.base_mm[Y]),
+                  axis_grid(options_.fixed, Z, state.base_mm[Z]), state.speed_factor};
   const std::vector<Stroke> run_strokes = strokes(run, grid, options_);
   if (run_strokes.empty()) {
     return false;
@@ -136,13 +146,13 @@ bool KlipperEmitter::run(const Run& run, std::string& out) {
   return true;
 }
 
-void KlipperEmitter::finish(std::string& out) { restore_shaper(out); }
+void Emitter::finish(std::string& out) { restore_shaper(out); }
 
-void KlipperEmitter::enter_run(std::string& out) {
+void Emitter::enter_run(std::string& out) {
   if (!started_) {
     started_ = true;
-    write(fmt::format("{} {}: compensated for Klipper, not to be compensated again", kComment,
-                      options_.version),
+    write(fmt::format("{} {}: compensated for {}, not to be compensated again", kComment,
+                      options_.version, brand(options_.fixed.firmware)),
           out);
   }
   set_shaper(0.0, 0.0, out);
@@ -150,7 +160,7 @@ void KlipperEmitter::enter_run(std::string& out) {
 }
 
 // Whatever the input's lines have set inside the run.
-void KlipperEmitter::set_run_modes(std::string& out) {
+void Emitter::set_run_modes(std::string& out) {
   set_limits(options_.run_limits, out);
   const gcode::ModalState& state = printer_.state();
   if (state.unit_mm != 1.0) {
@@ -164,7 +174,7 @@ void KlipperEmitter::set_run_modes(std::string& out) {
   }
 }
 
-void KlipperEmitter::write_stroke(const Stroke& stroke, double filament_origin, std::string& out) {
+void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::string& out) {
   const gcode::ModalState& state = printer_.state();
   std::string text = "G1";
   const auto axis = [&](gcode::Axis a, char letter, double position) {
@@ -185,7 +195,7 @@ void KlipperEmitter::write_stroke(const Stroke& stroke, double filament_origin, 
   write(text, out);
 }
 
-void KlipperEmitter::restore_modes(std::string& out) {
+void Emitter::restore_modes(std::string& out) {
   const gcode::ModalState& wanted = input_.state();
   const gcode::ModalState& state = printer_.state();
   if (!same(wanted.base_mm[E], state.base_mm[E])) {
@@ -196,11 +206,12 @@ void KlipperEmitter::restore_modes(std::string& out) {
                 9);
     write(text, out);
   }
-  if (wanted.absolute_e != state.absolute_e) {
-    write(wanted.absolute_e ? "M82" : "M83", out);
-  }
+  // Before M82 and M83: Marlin's G90 and G91 set the mode of E as well.
   if (wanted.absolute_xyz != state.absolute_xyz) {
     write(wanted.absolute_xyz ? "G90" : "G91", out);
+  }
+  if (wanted.absolute_e != state.absolute_e) {
+    write(wanted.absolute_e ? "M82" : "M83", out);
   }
   if (wanted.unit_mm != state.unit_mm) {
     write(wanted.unit_mm == 1.0 ? "G21" : "G20", out);
@@ -212,29 +223,18 @@ void KlipperEmitter::restore_modes(std::string& out) {
   }
 }
 
-void KlipperEmitter::set_limits(const planner::Limits& limits, std::string& out) {
-  std::string fields;
-  const auto field = [&](std::string_view name, double wanted, double current) {
-    if (!limits_known_ || wanted != current) {
-      fields += fmt::format(" {}={}", name, wanted);
-    }
-  };
-  field("VELOCITY", limits.max_velocity_mm_s, limits_.max_velocity_mm_s);
-  field("ACCEL", limits.max_accel_mm_s2, limits_.max_accel_mm_s2);
-  field("SQUARE_CORNER_VELOCITY", limits.square_corner_velocity_mm_s,
-        limits_.square_corner_velocity_mm_s);
-  field("MINIMUM_CRUISE_RATIO", limits.minimum_cruise_ratio, limits_.minimum_cruise_ratio);
-  limits_known_ = true;
-  if (!fields.empty()) {
-    write("SET_VELOCITY_LIMIT" + fields, out);
+void Emitter::set_limits(const planner::Limits& limits, std::string& out) {
+  for (const std::string& text : limit_lines(options_.fixed, limits, limits_, limits_known_)) {
+    write(text, out);
   }
+  limits_known_ = true;
 }
 
-void KlipperEmitter::restore_shaper(std::string& out) {
+void Emitter::restore_shaper(std::string& out) {
   set_shaper(input_.state().shaper_freq_x_hz, input_.state().shaper_freq_y_hz, out);
 }
 
-void KlipperEmitter::set_shaper(double x_hz, double y_hz, std::string& out) {
+void Emitter::set_shaper(double x_hz, double y_hz, std::string& out) {
   std::string fields;
   if (x_hz != printer_.state().shaper_freq_x_hz) {
     fields += fmt::format(" SHAPER_FREQ_X={}", x_hz);

@@ -73,23 +73,10 @@ double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double t
   return largest;
 }
 
-// How a line from `from` to `to` would do.
+// How a line would do.
 class Candidate {
  public:
   Candidate(const BaseTrajectory& base, const LineRules& rules) : base_(&base), rules_(&rules) {}
-
-  // Long enough for the firmware.
-  [[nodiscard]] bool long_enough(double from, double to) const {
-    if (to - from < rules_->min_line_s - 1e-12) {
-      return false;
-    }
-    if (rules_->min_line_mm <= 0.0) {
-      return true;
-    }
-    const double dx = base_->x_at(to).position_mm - base_->x_at(from).position_mm;
-    const double dy = base_->y_at(to).position_mm - base_->y_at(from).position_mm;
-    return std::max(std::abs(dx), std::abs(dy)) >= rules_->min_line_mm;
-  }
 
   // Moves the nozzle little, and speed changes little from the line before, which began at
   // `before`.
@@ -112,6 +99,18 @@ class Candidate {
 
 }  // namespace
 
+bool long_enough(const BaseTrajectory& base, double from, double to, const LineRules& rules) {
+  if (to - from < rules.min_line_s - 1e-12) {
+    return false;
+  }
+  if (rules.min_line_mm <= 0.0) {
+    return true;
+  }
+  const double dx = base.x_at(to).position_mm - base.x_at(from).position_mm;
+  const double dy = base.y_at(to).position_mm - base.y_at(from).position_mm;
+  return std::max(std::abs(dx), std::abs(dy)) >= rules.min_line_mm;
+}
+
 void append_line_ends(const BaseTrajectory& base, double from, double to, const LineRules& rules,
                       std::vector<double>& times) {
   const double h = base.period_s;
@@ -126,7 +125,7 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     // ones as long as they are good.
     double end = 0.0;
     for (double t = start + rules.min_line_s; t < to; t += h) {
-      if (line.long_enough(start, t) && line.long_enough(t, to)) {
+      if (long_enough(base, start, t, rules) && long_enough(base, t, to, rules)) {
         end = t;
         break;
       }
@@ -138,8 +137,8 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     bool growing = true;
     for (double step = 1.0; step >= 1.0;) {
       const double t = end + step * h;
-      if (t - start <= rules.max_line_s && line.long_enough(start, t) && line.long_enough(t, to) &&
-          line.good(before, start, t)) {
+      if (t - start <= rules.max_line_s && long_enough(base, start, t, rules) &&
+          long_enough(base, t, to, rules) && line.good(before, start, t)) {
         end = t;
       } else {
         growing = false;
@@ -155,7 +154,6 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
 bool split_lines(const BaseTrajectory& base, const std::vector<double>& x_error_mm,
                  const std::vector<double>& y_error_mm, const LineRules& rules,
                  std::vector<double>& times) {
-  const Candidate line(base, rules);
   // Errors of lines add up, with any sign, for as long as the nozzle rings.
   constexpr double kAddedUp = 4.0;
   const double most = kAddedUp * rules.tolerance_mm;
@@ -164,8 +162,8 @@ bool split_lines(const BaseTrajectory& base, const std::vector<double>& x_error_
   for (std::size_t i = 1; i < times.size(); ++i) {
     const double from = times[i - 1];
     const double middle = 0.5 * (from + times[i]);
-    if ((off(i) || (i + 1 < times.size() && off(i + 1))) && line.long_enough(from, middle) &&
-        line.long_enough(middle, times[i])) {
+    if ((off(i) || (i + 1 < times.size() && off(i + 1))) &&
+        long_enough(base, from, middle, rules) && long_enough(base, middle, times[i], rules)) {
       result.push_back(middle);
     }
     result.push_back(times[i]);

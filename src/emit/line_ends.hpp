@@ -8,9 +8,13 @@
 
 namespace unflex::emit {
 
+// Whether the firmware takes a line over this time: min_line_s, and min_line_mm along X or Y.
+[[nodiscard]] bool long_enough(const dynamics::BaseTrajectory& base, double from, double to,
+                               const LineRules& rules);
+
 // Appends to `times` the ends of the lines between `from` (its last entry) and `to`, `to` included.
 // Lines grow as long as what they leave out moves the nozzle by no more than the tolerance. None is
-// shorter than min_line_s, or than min_line_mm along X and Y both, if [from, to] allows.
+// too short, if [from, to] allows.
 void append_line_ends(const dynamics::BaseTrajectory& base, double from, double to,
                       const LineRules& rules, std::vector<double>& times);
 

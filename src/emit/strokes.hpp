@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "unflex/emit/emitter.hpp"
+#include "vertices.hpp"
 
 namespace unflex::emit {
 
@@ -20,13 +21,11 @@ struct Stroke {
   std::size_t events = 0;   // how many of the run's events stand before the stroke, in all
 };
 
-// What numbers are written in: machine position = offset + integer / 10^decimals, and speeds as F
-// before M220.
+// What a run is written in: places, and speeds as F before M220.
 struct Grid {
-  double x_offset_mm = 0.0;
-  double y_offset_mm = 0.0;
-  double z_offset_mm = 0.0;
-  int decimals = 4;
+  AxisGrid x;
+  AxisGrid y;
+  AxisGrid z;
   double speed_factor = 1.0;  // M220 when the run begins
 };
 

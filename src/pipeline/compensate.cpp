@@ -247,7 +247,7 @@ class Compensator {
     // Where long lines break a limit or cost too much, short ones may do.
     std::string objection;
     for (const double share : {1.0, kFineTolerance}) {
-      emit::KlipperEmitter trial = emitter_;
+      emit::Emitter trial = emitter_;
       text.clear();
       if (!trial.run(
               {&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s, share},
@@ -283,7 +283,7 @@ class Compensator {
   verify::Rules rules_;
   WorkerPool pool_;
   PieceReader reader_;
-  emit::KlipperEmitter emitter_;
+  emit::Emitter emitter_;
   std::ostream& output_;
   Progress& progress_;
   double input_bytes_;

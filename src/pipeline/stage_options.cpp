@@ -47,10 +47,48 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
   return setup;
 }
 
+// Inside a compensated run: room above the base's own limits, so that the firmware never slows a
+// line down for them. Z is left as it is.
+planner::Limits run_limits(planner::Limits limits, const machine::Settings& settings) {
+  const double velocity = 2.0 * settings.base_max_velocity_mm_s();
+  const double accel = settings.emit.accel_mm_s2;
+  const double corner = settings.emit.square_corner_velocity_mm_s;
+  switch (settings.printer.firmware) {
+    case Firmware::klipper:
+      limits.max_velocity_mm_s = velocity;
+      limits.max_accel_mm_s2 = accel;
+      limits.square_corner_velocity_mm_s = corner;
+      limits.minimum_cruise_ratio = 0.0;
+      return limits;
+    case Firmware::marlin:
+      // The most M205 J takes (Marlin 2.1.2, M200-M205.cpp).
+      limits.junction_deviation_mm = 0.3;
+      limits.min_velocity_mm_s = 0.0;
+      limits.min_travel_velocity_mm_s = 0.0;
+      limits.min_segment_time_s = 0.0;
+      break;
+    case Firmware::rrf:
+      limits.jerk_policy = 1;
+      limits.min_movement_velocity_mm_s = 0.01;  // AbsoluteMinFeedrate
+      break;
+  }
+  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::E}) {
+    limits.axis_max_accel_mm_s2[axis] = accel;
+    limits.axis_jerk_mm_s[axis] = corner;
+    if (axis != gcode::E) {
+      limits.axis_max_velocity_mm_s[axis] = velocity;
+    }
+  }
+  limits.print_accel_mm_s2 = accel;
+  limits.travel_accel_mm_s2 = accel;
+  return limits;
+}
+
 }  // namespace
 
 gcode::InterpreterOptions interpreter_options(const machine::Settings& settings) {
   gcode::InterpreterOptions options;
+  options.firmware = settings.printer.firmware;
   options.firmware_retraction = settings.printer.firmware_retraction;
   options.retract_length_mm = settings.printer.retract_length_mm;
   options.retract_speed_mm_s = settings.printer.retract_speed_mm_s;
@@ -134,12 +172,9 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.interpreter = interpreter_options(settings);
   options.printer_limits = planner_limits(settings);
   options.fixed = firmware_config(settings);
-  // Room above the base's own limit, so that the firmware never slows a line down for it.
-  options.run_limits = options.printer_limits;
-  options.run_limits.max_velocity_mm_s = 2.0 * settings.base_max_velocity_mm_s();
-  options.run_limits.max_accel_mm_s2 = settings.emit.accel_mm_s2;
-  options.run_limits.square_corner_velocity_mm_s = settings.emit.square_corner_velocity_mm_s;
-  options.run_limits.minimum_cruise_ratio = 0.0;
+  options.run_limits = run_limits(options.printer_limits, settings);
+  options.line_accel_mm_s2 = settings.emit.accel_mm_s2;
+  options.z_accel_mm_s2 = settings.axis_max_accel_mm_s2()[gcode::Z];
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
   options.lines.nozzle_x = axis(settings.dynamics_x);
   options.lines.nozzle_y = axis(settings.dynamics_y);
@@ -150,6 +185,12 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.reach_y = reach(settings.printer.travel_y_mm);
   options.lines.min_line_s =
       std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.max_lines_per_s());
+  if (settings.printer.firmware == Firmware::marlin) {
+    // Rounding may take a step off either end.
+    options.lines.min_line_mm =
+        (settings.printer.min_steps_per_segment + 1.0) /
+        std::min(settings.steps_per_mm()[gcode::X], settings.steps_per_mm()[gcode::Y]);
+  }
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
   options.lines.max_accel_mm_s2 = planned_base_accel(settings);
   options.version = std::move(version);

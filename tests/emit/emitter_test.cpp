@@ -213,12 +213,12 @@ TEST(Emitter, TriesARunOnACopyWithoutATrace) {
   const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
   std::istringstream stream(input);
   pipeline::PieceReader reader(stream, "in", {}, {}, {});
-  KlipperEmitter emitter(options());
+  Emitter emitter(options());
   std::string out;
   for (pipeline::Piece piece; reader.next(piece).value();) {
     if (piece.is_run) {
       const dynamics::BaseTrajectory base = testing::plan_as_base(piece.moves);
-      KlipperEmitter trial = emitter;
+      Emitter trial = emitter;
       std::string thrown_away;
       EXPECT_TRUE(
           trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, 0.0}, thrown_away));

@@ -14,7 +14,7 @@ namespace unflex::emit::testing {
 
 // Looks on before every line outside of runs: the printer's state and the input's.
 struct Boundary {
-  const KlipperEmitter* emitter = nullptr;
+  const Emitter* emitter = nullptr;
   const gcode::ModalState* input = nullptr;
   const planner::Limits* input_limits = nullptr;
   std::size_t line = 0;
@@ -30,7 +30,7 @@ inline Emission emit(const std::string& input, const EmitOptions& options,
   std::istringstream stream(input);
   pipeline::PieceReader reader(stream, "input", options.interpreter, options.printer_limits,
                                options.fixed);
-  KlipperEmitter emitter(options);
+  Emitter emitter(options);
   gcode::Interpreter interpreter(options.interpreter);
   planner::Limits limits = options.printer_limits;
   Emission emission;

@@ -74,7 +74,7 @@ struct Replay {
   Replay(const std::string& text, const EmitOptions& how) {
     std::istringstream stream(text);
     pipeline::PieceReader reader(stream, "in", how.interpreter, how.printer_limits, how.fixed);
-    KlipperEmitter emitter(how);
+    Emitter emitter(how);
     std::string out;
     for (pipeline::Piece piece; reader.next(piece).value();) {
       if (!piece.is_run) {

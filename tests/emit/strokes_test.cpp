@@ -113,7 +113,8 @@ TEST(Strokes, LieOnAGridThatBeginsAtTheZeroOfTheFile) {
   const Path path = random_path(3, 10);
   const dynamics::BaseTrajectory base = testing::plan_as_base(path.moves);
   const emit::Run run{&path.events, &path.move_counts, &path.moves, &base, 0.0};
-  const std::vector<Stroke> drawn = strokes(run, {0.00003, -1.00007, 0.0, 4}, options());
+  const std::vector<Stroke> drawn =
+      strokes(run, {{0.00003, 1e-4}, {-1.00007, 1e-4}, {}}, options());
   for (std::size_t i = 0; i + 1 < drawn.size(); ++i) {
     const double steps = (drawn[i].x_mm - 0.00003) * 1e4;
     EXPECT_NEAR(steps, std::round(steps), 1e-5);

@@ -1,4 +1,4 @@
-// The base's motion as G-code that a Klipper printer, which plans everything it reads anew,
+// The base's motion as G-code that a printer, whose firmware plans everything it reads anew,
 // executes as it was meant (docs/firmware.md says why each rule is there).
 //
 //   T  time a line shall take, s       d  its distance after rounding, mm
@@ -47,6 +47,9 @@ struct EmitOptions {
   planner::Limits printer_limits;  // in force when the file starts
   planner::FirmwareConfig fixed;
   planner::Limits run_limits;  // inside a compensated run
+  // What the firmware then accelerates a line by, and Z by.
+  double line_accel_mm_s2 = 1e6;
+  double z_accel_mm_s2 = 5000.0;
   LineRules lines;
   std::string version;  // for the comment at the first run
 };
@@ -68,9 +71,9 @@ struct Run {
 // Writes the output in the order of the input. Follows both texts with an interpreter of its own,
 // so that whatever stands outside the runs finds the modes, positions and limits the input left
 // there. Copyable: a copy tries a run, and is kept or thrown away.
-class KlipperEmitter {
+class Emitter {
  public:
-  explicit KlipperEmitter(EmitOptions options);
+  explicit Emitter(EmitOptions options);
 
   // An input line outside of compensated runs, byte for byte, with whatever has to be restored
   // before it.

@@ -1,0 +1,91 @@
+#include "timetable.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace unflex::emit {
+namespace {
+
+using gcode::E;
+using planner::PlannedMove;
+
+// A move boundary must be a vertex when a typical line (2 ms) laid across it would give either move
+// more than this too much or too little.
+constexpr double kFilamentStepMm = 1e-5;
+constexpr double kTypicalLineS = 2e-3;
+
+}  // namespace
+
+Timetable::Timetable(const Run& run) : run_(&run) {
+  double t = run.lead_in_s;
+  for (const PlannedMove& move : *run.moves) {
+    starts_s_.push_back(t);
+    t += move.duration_s();
+  }
+  starts_s_.push_back(t);
+  const dynamics::BaseTrajectory& base = *run.base;
+  travelled_mm_.push_back(0.0);
+  for (std::size_t k = 1; k < base.nodes(); ++k) {
+    travelled_mm_.push_back(travelled_mm_.back() +
+                            std::hypot(base.x.position_mm[k] - base.x.position_mm[k - 1],
+                                       base.y.position_mm[k] - base.y.position_mm[k - 1]));
+  }
+}
+
+std::size_t Timetable::move_at(double t) const {
+  const auto after = std::upper_bound(starts_s_.begin(), starts_s_.end() - 1, t);
+  return after == starts_s_.begin() ? 0 : static_cast<std::size_t>(after - starts_s_.begin()) - 1;
+}
+
+double Timetable::along_path_mm(double t, gcode::Axis axis) const {
+  if (t >= starts_s_.back()) {
+    return run_->moves->back().segment.end_mm[axis];
+  }
+  if (t <= starts_s_.front()) {
+    return run_->moves->front().segment.start_mm[axis];
+  }
+  const std::size_t i = move_at(t);
+  const PlannedMove& move = (*run_->moves)[i];
+  const double from = travelled_mm(starts_s_[i]);
+  const double length = travelled_mm(starts_s_[i + 1]) - from;
+  const double share =
+      length > 0.0 ? (travelled_mm(t) - from) / length : (t - starts_s_[i]) / move.duration_s();
+  return move.segment.start_mm[axis] + share * move.segment.delta(axis);
+}
+
+double Timetable::filament_mm(double t) const {
+  return along_path_mm(t, E) - run_->moves->front().segment.start_mm[E];
+}
+
+double Timetable::filament_per_mm(std::size_t i) const {
+  const double length = travelled_mm(starts_s_[i + 1]) - travelled_mm(starts_s_[i]);
+  return length > 0.0 ? (*run_->moves)[i].segment.delta(E) / length : 0.0;
+}
+
+bool Timetable::filament_changes(std::size_t i) const {
+  const double t = starts_s_[i];
+  const double speed =
+      std::hypot(run_->base->x_at(t).velocity_mm_s, run_->base->y_at(t).velocity_mm_s);
+  const double jump = std::abs(filament_per_mm(i) - filament_per_mm(i - 1));
+  return jump * std::max(speed, 1.0) * kTypicalLineS / 4.0 > kFilamentStepMm;
+}
+
+std::vector<double> Timetable::event_times_s() const {
+  std::vector<double> times;
+  std::size_t move = 0;
+  for (const std::size_t count : *run_->move_counts) {
+    times.push_back(starts_s_[move]);
+    move += count;
+  }
+  return times;
+}
+
+double Timetable::travelled_mm(double t) const {
+  const double at =
+      std::clamp(t / run_->base->period_s, 0.0, static_cast<double>(travelled_mm_.size() - 1));
+  const auto k = std::min(static_cast<std::size_t>(at), travelled_mm_.size() - 2);
+  return travelled_mm_[k] +
+         (at - static_cast<double>(k)) * (travelled_mm_[k + 1] - travelled_mm_[k]);
+}
+
+}  // namespace unflex::emit

@@ -1,0 +1,47 @@
+// The run's moves in time.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "unflex/emit/emitter.hpp"
+
+namespace unflex::emit {
+
+// The run's moves in time, and the filament and height that belong to a moment.
+class Timetable {
+ public:
+  explicit Timetable(const Run& run);
+
+  // Start of move i; i may be the number of moves.
+  [[nodiscard]] double start_s(std::size_t i) const { return starts_s_[i]; }
+  [[nodiscard]] std::size_t moves() const { return run_->moves->size(); }
+
+  // E or Z at time t: each move's share of it is spread along the base's path while the move lasts,
+  // which keeps filament per mm constant where the firmware looks for jumps in it, and the slope
+  // small where the base is slower than the plan.
+  [[nodiscard]] double along_path_mm(double t, gcode::Axis axis) const;
+
+  // Filament since the start of the run.
+  [[nodiscard]] double filament_mm(double t) const;
+
+  // Whether filament per mm changes so much at the boundary before move i that a line across it
+  // would give either move too much or too little.
+  [[nodiscard]] bool filament_changes(std::size_t i) const;
+
+  // For each event the time it stands at: the end of the moves before it.
+  [[nodiscard]] std::vector<double> event_times_s() const;
+
+ private:
+  // The move at time t.
+  [[nodiscard]] std::size_t move_at(double t) const;
+  // Of move i, along the base's path.
+  [[nodiscard]] double filament_per_mm(std::size_t i) const;
+  [[nodiscard]] double travelled_mm(double t) const;
+
+  const Run* run_;
+  std::vector<double> starts_s_;      // of each move, and the end of the last
+  std::vector<double> travelled_mm_;  // length of the base's path at the nodes
+};
+
+}  // namespace unflex::emit
