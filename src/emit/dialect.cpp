@@ -137,4 +137,47 @@ std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, cons
   return lines;
 }
 
+Shaper shaper_of(const gcode::ModalState& state) {
+  return {state.shaper_freq_x_hz, state.shaper_freq_y_hz, state.shaper_line};
+}
+
+Shaper no_shaper(Firmware firmware) {
+  Shaper off;
+  if (firmware == Firmware::rrf) {
+    off.line = "M593 P\"none\"";
+  }
+  return off;
+}
+
+std::vector<std::string> shaper_lines(Firmware firmware, const Shaper& wanted,
+                                      const Shaper& current) {
+  std::vector<std::string> lines;
+  const bool x = wanted.freq_x_hz != current.freq_x_hz;
+  const bool y = wanted.freq_y_hz != current.freq_y_hz;
+  switch (firmware) {
+    case Firmware::klipper:
+      if (x || y) {
+        lines.push_back("SET_INPUT_SHAPER" +
+                        (x ? fmt::format(" SHAPER_FREQ_X={}", wanted.freq_x_hz) : "") +
+                        (y ? fmt::format(" SHAPER_FREQ_Y={}", wanted.freq_y_hz) : ""));
+      }
+      break;
+    case Firmware::marlin:
+      if (x) {
+        lines.push_back(fmt::format("M593 X F{}", wanted.freq_x_hz));
+      }
+      if (y) {
+        lines.push_back(fmt::format("M593 Y F{}", wanted.freq_y_hz));
+      }
+      break;
+    case Firmware::rrf:
+      // A printer whose shaper the file does not name is left without.
+      if (wanted.line != current.line && !wanted.line.empty()) {
+        lines.push_back(wanted.line);
+      }
+      break;
+  }
+  return lines;
+}
+
 }  // namespace unflex::emit

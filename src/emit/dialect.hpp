@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "unflex/core/firmware.hpp"
+#include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::emit {
@@ -18,5 +19,19 @@ namespace unflex::emit {
 [[nodiscard]] std::vector<std::string> limit_lines(const planner::FirmwareConfig& config,
                                                    const planner::Limits& wanted,
                                                    const planner::Limits& current, bool known);
+
+// The firmware's own input shaping.
+struct Shaper {
+  double freq_x_hz = 0.0;  // Klipper, Marlin; 0: off
+  double freq_y_hz = 0.0;
+  std::string line;  // RepRapFirmware: the M593 in force, empty if the file gave none
+};
+
+[[nodiscard]] Shaper shaper_of(const gcode::ModalState& state);
+[[nodiscard]] Shaper no_shaper(Firmware firmware);
+
+// The lines that put `wanted` in place of `current`.
+[[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const Shaper& wanted,
+                                                    const Shaper& current);
 
 }  // namespace unflex::emit

@@ -155,7 +155,7 @@ void Emitter::enter_run(std::string& out) {
                       options_.version, brand(options_.fixed.firmware)),
           out);
   }
-  set_shaper(0.0, 0.0, out);
+  set_shaper(no_shaper(options_.fixed.firmware), out);
   write(fmt::format("{} run", kComment), out);
 }
 
@@ -230,20 +230,12 @@ void Emitter::set_limits(const planner::Limits& limits, std::string& out) {
   limits_known_ = true;
 }
 
-void Emitter::restore_shaper(std::string& out) {
-  set_shaper(input_.state().shaper_freq_x_hz, input_.state().shaper_freq_y_hz, out);
-}
+void Emitter::restore_shaper(std::string& out) { set_shaper(shaper_of(input_.state()), out); }
 
-void Emitter::set_shaper(double x_hz, double y_hz, std::string& out) {
-  std::string fields;
-  if (x_hz != printer_.state().shaper_freq_x_hz) {
-    fields += fmt::format(" SHAPER_FREQ_X={}", x_hz);
-  }
-  if (y_hz != printer_.state().shaper_freq_y_hz) {
-    fields += fmt::format(" SHAPER_FREQ_Y={}", y_hz);
-  }
-  if (!fields.empty()) {
-    write("SET_INPUT_SHAPER" + fields, out);
+void Emitter::set_shaper(const Shaper& wanted, std::string& out) {
+  for (const std::string& text :
+       shaper_lines(options_.fixed.firmware, wanted, shaper_of(printer_.state()))) {
+    write(text, out);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "line_ends.hpp"
 #include "speeds.hpp"
@@ -72,13 +73,20 @@ Polygon polygon(const Run& run, const std::vector<double>& required, const Grid&
   }
   const VertexChooser along_x(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x);
   const VertexChooser along_y(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y);
-  for (;;) {
-    AxisVertices x = along_x.choose(times, grid.x, rules.reach_x, rules.max_accel_mm_s2);
-    AxisVertices y = along_y.choose(times, grid.y, rules.reach_y, rules.max_accel_mm_s2);
-    if (!split_lines(base, x.nozzle_error_mm, y.nozzle_error_mm, rules, times)) {
-      return {std::move(times), std::move(x.position_mm), std::move(y.position_mm)};
-    }
+  const auto choose = [&](const AxisGrid& on_x, const AxisGrid& on_y) {
+    return std::pair{along_x.choose(times, on_x, rules.reach_x, rules.max_accel_mm_s2),
+                     along_y.choose(times, on_y, rules.reach_y, rules.max_accel_mm_s2)};
+  };
+  // More lines would not help against a coarse grid: they are judged without it.
+  const AxisGrid fine;
+  auto vertices = choose(fine, fine);
+  while (split_lines(base, vertices.first.nozzle_error_mm, vertices.second.nozzle_error_mm, rules,
+                     times)) {
+    vertices = choose(fine, fine);
   }
+  vertices = choose(grid.x, grid.y);
+  return {std::move(times), std::move(vertices.first.position_mm),
+          std::move(vertices.second.position_mm)};
 }
 
 }  // namespace

@@ -87,11 +87,11 @@ constexpr std::array kKeys = {
     Key{"printer.input_shaper_freq_x_hz", &setting<&S::printer, &P::input_shaper_freq_x_hz>,
         kNotNegative, "Hz",
         "What the printer's own [input_shaper] is set back to after the print; 0 if it has none",
-        "dynamics.x.freq_hz", &derived<&S::shaper_freq_x_hz>},
+        "Klipper dynamics.x.freq_hz, else 0", &derived<&S::shaper_freq_x_hz>},
     Key{"printer.input_shaper_freq_y_hz", &setting<&S::printer, &P::input_shaper_freq_y_hz>,
         kNotNegative, "Hz",
         "What the printer's own [input_shaper] is set back to after the print; 0 if it has none",
-        "dynamics.y.freq_hz", &derived<&S::shaper_freq_y_hz>},
+        "Klipper dynamics.y.freq_hz, else 0", &derived<&S::shaper_freq_y_hz>},
 
     Key{"limits.max_velocity_mm_s", &setting<&S::limits, &L::max_velocity_mm_s>, kPositive, "mm/s",
         "Klipper: [printer] max_velocity; the others: of X and Y"},

@@ -35,6 +35,11 @@ std::array<double, 4> or_default(const AxisOptions& own, const std::array<double
   return values;
 }
 
+// Input shaping is part of every Klipper, but an option of Marlin's that is off by default.
+double default_shaper_hz(const PrinterSettings& printer, const AxisDynamics& dynamics) {
+  return printer.firmware == Firmware::klipper ? dynamics.freq_hz : 0.0;
+}
+
 // M204 P and T.
 double default_command_accel(const Settings& settings) {
   // RepRapFirmware's DefaultPrintingAcceleration, above whatever M201 allows.
@@ -149,11 +154,11 @@ double Settings::tolerance_um() const {
 }
 
 double Settings::shaper_freq_x_hz() const {
-  return printer.input_shaper_freq_x_hz.value_or(dynamics_x.freq_hz);
+  return printer.input_shaper_freq_x_hz.value_or(default_shaper_hz(printer, dynamics_x));
 }
 
 double Settings::shaper_freq_y_hz() const {
-  return printer.input_shaper_freq_y_hz.value_or(dynamics_y.freq_hz);
+  return printer.input_shaper_freq_y_hz.value_or(default_shaper_hz(printer, dynamics_y));
 }
 
 }  // namespace unflex::machine

@@ -1,6 +1,7 @@
 #include "stage_options.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -10,14 +11,25 @@
 namespace unflex::pipeline {
 namespace {
 
-// Rounding a line's ends to the grid of 10⁻⁴ mm changes the acceleration from line to line by up to
-// 4 · ½ · 10⁻⁴ / h², rounding F and the firmware's ramps by a little more; the optimiser stays that
-// far below the limit so that the text keeps it.
+// Rounding a line's ends to the grid changes the acceleration from line to line by up to 4 · ½ ·
+// grid / T², rounding F and the firmware's ramps by a little more; the optimiser stays that far
+// below the limit so that the text keeps it.
 constexpr double kGridMm = 1e-4;
 constexpr double kAccelShare = 0.98;
 // The firmware's clock differs a little from line to line; no more than the budget of lines may
 // begin within any 100 ms all the same.
 constexpr double kClockRoom = 1.002;
+
+double min_line_s(const machine::Settings& settings) {
+  return std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.max_lines_per_s());
+}
+
+double grid_mm(const machine::Settings& settings) {
+  const std::array<double, 4> steps_per_mm = settings.steps_per_mm();
+  return settings.printer.firmware == Firmware::marlin
+             ? 1.0 / std::min(steps_per_mm[gcode::X], steps_per_mm[gcode::Y])
+             : kGridMm;
+}
 
 dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
   return dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio);
@@ -25,9 +37,10 @@ dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
 
 // What the base may be accelerated by so that the text stays within the limit.
 double planned_base_accel(const machine::Settings& settings) {
-  const double h = settings.emit.period_ms * 1e-3;
+  const double shortest_s = min_line_s(settings);
   const double limit = settings.base_max_accel_mm_s2();
-  return kAccelShare * limit - std::min(2.0 * kGridMm / (h * h), 0.2 * limit);
+  return kAccelShare * limit -
+         std::min(2.0 * grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);
 }
 
 compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
@@ -132,6 +145,7 @@ planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
   config.steps_per_mm = settings.steps_per_mm();
   config.classic_jerk = settings.printer.classic_jerk;
   config.min_steps_per_segment = static_cast<int>(settings.printer.min_steps_per_segment);
+  config.block_buffer_size = static_cast<int>(settings.queue_length());
   return config;
 }
 
@@ -183,13 +197,10 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   };
   options.lines.reach_x = reach(settings.printer.travel_x_mm);
   options.lines.reach_y = reach(settings.printer.travel_y_mm);
-  options.lines.min_line_s =
-      std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.max_lines_per_s());
+  options.lines.min_line_s = min_line_s(settings);
   if (settings.printer.firmware == Firmware::marlin) {
     // Rounding may take a step off either end.
-    options.lines.min_line_mm =
-        (settings.printer.min_steps_per_segment + 1.0) /
-        std::min(settings.steps_per_mm()[gcode::X], settings.steps_per_mm()[gcode::Y]);
+    options.lines.min_line_mm = (settings.printer.min_steps_per_segment + 1.0) * grid_mm(settings);
   }
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
   options.lines.max_accel_mm_s2 = planned_base_accel(settings);
@@ -203,8 +214,12 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.limits = planner_limits(settings);
   rules.fixed = firmware_config(settings);
   const double radius = settings.extruder.filament_diameter_mm / 2.0;
-  rules.max_extrude_ratio =
-      settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius * radius);
+  if (settings.printer.firmware != Firmware::klipper) {
+    rules.max_extrude_ratio = std::numeric_limits<double>::infinity();
+  } else {
+    rules.max_extrude_ratio =
+        settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius * radius);
+  }
   rules.nozzle_diameter_mm = settings.extruder.nozzle_diameter_mm;
   rules.nozzle = {axis(settings.dynamics_x), axis(settings.dynamics_y),
                   settings.verify.step_ms * 1e-3, settings.verify.hold_s};

@@ -65,6 +65,7 @@ bool MarlinPlanner::add(const gcode::Segment& segment) {
   }
   set_move(segment, target, added.move);
   position_ = target;
+  filament_mm_ = segment.end_mm[E];
   start_known_ = true;
   ++end_;
   if (end_ - 1 != planned_) {
@@ -108,6 +109,7 @@ void MarlinPlanner::follow_jumps(const gcode::Segment& segment) {
   for (std::size_t axis = 0; axis < start.size(); ++axis) {
     if (!has_position_ || std::abs(segment.start_mm[axis] - asked_mm_[axis]) > kSamePlace_mm) {
       position_[axis] = start[axis];
+      if (axis == E) filament_mm_ = segment.start_mm[E];
     }
   }
   has_position_ = true;
@@ -122,8 +124,12 @@ void MarlinPlanner::set_move(const gcode::Segment& segment, const marlin::Steps&
   std::array<double, 4> delta{};
   for (std::size_t axis = 0; axis < delta.size(); ++axis) {
     const double steps_per_mm = config_.steps_per_mm[axis];
-    move.segment.start_mm[axis] = position_[axis] / steps_per_mm;
-    move.segment.end_mm[axis] = target[axis] / steps_per_mm;
+    if (axis == E) {
+      move.segment.start_mm[E] = filament_mm_;
+    } else {
+      move.segment.start_mm[axis] = position_[axis] / steps_per_mm;
+      move.segment.end_mm[axis] = target[axis] / steps_per_mm;
+    }
     delta[axis] = (target[axis] - position_[axis]) / steps_per_mm;
   }
   const double xyz_mm = std::sqrt(delta[X] * delta[X] + delta[Y] * delta[Y] + delta[Z] * delta[Z]);

@@ -44,7 +44,7 @@ void LineCheck::compare(bool complete) {
       lost(*input);
       input_->lines().pop_front();
     } else if (complete && output != nullptr) {
-      if (!is_known_addition(output->line.content())) {
+      if (!is_known_addition(output->line.content(), input_->firmware())) {
         unknown(*output);
       }
       output_->lines().pop_front();
@@ -59,12 +59,12 @@ void LineCheck::compare(bool complete) {
 void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
   const bool same = same_line(input.line, output.line);
   const bool placed = same && at_same_place(input, output);
-  if (placed || (same && !is_known_addition(output.line.content()))) {
+  if (placed || (same && !is_known_addition(output.line.content(), input_->firmware()))) {
     match(input, output);
     input_->lines().pop_front();
     output_->lines().pop_front();
   } else {
-    if (!is_known_addition(output.line.content())) {
+    if (!is_known_addition(output.line.content(), input_->firmware())) {
       resynchronise(output);
     }
     output_->lines().pop_front();

@@ -82,6 +82,34 @@ std::string limits_difference(const planner::Limits& input, const planner::Limit
                                output.square_corner_velocity_mm_s);
   differences.compare_relative("minimum cruise ratio", input.minimum_cruise_ratio,
                                output.minimum_cruise_ratio);
+  constexpr std::array<std::string_view, 4> kAxes = {"X", "Y", "Z", "E"};
+  for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+    differences.compare_relative(fmt::format("maximum velocity of {}", kAxes[axis]),
+                                 input.axis_max_velocity_mm_s[axis],
+                                 output.axis_max_velocity_mm_s[axis]);
+    differences.compare_relative(fmt::format("maximum acceleration of {}", kAxes[axis]),
+                                 input.axis_max_accel_mm_s2[axis],
+                                 output.axis_max_accel_mm_s2[axis]);
+    differences.compare_relative(fmt::format("jerk of {}", kAxes[axis]), input.axis_jerk_mm_s[axis],
+                                 output.axis_jerk_mm_s[axis]);
+  }
+  differences.compare_relative("acceleration of prints", input.print_accel_mm_s2,
+                               output.print_accel_mm_s2);
+  differences.compare_relative("acceleration of travel", input.travel_accel_mm_s2,
+                               output.travel_accel_mm_s2);
+  differences.compare_relative("acceleration of retraction", input.retract_accel_mm_s2,
+                               output.retract_accel_mm_s2);
+  differences.compare_relative("junction deviation", input.junction_deviation_mm,
+                               output.junction_deviation_mm);
+  differences.compare_relative("minimum velocity", input.min_velocity_mm_s,
+                               output.min_velocity_mm_s);
+  differences.compare_relative("minimum velocity of travel", input.min_travel_velocity_mm_s,
+                               output.min_travel_velocity_mm_s);
+  differences.compare_relative("minimum segment time", input.min_segment_time_s,
+                               output.min_segment_time_s);
+  differences.compare_relative("minimum speed of movement", input.min_movement_velocity_mm_s,
+                               output.min_movement_velocity_mm_s);
+  differences.compare(input.jerk_policy == output.jerk_policy, "jerk policy");
   return differences.text();
 }
 

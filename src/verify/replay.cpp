@@ -23,12 +23,19 @@ bool only_word(const gcode::Command& command, char letter) {
 
 }  // namespace
 
-bool is_known_addition(std::string_view content) {
+bool is_known_addition(std::string_view content, Firmware firmware) {
   if (content.starts_with(kOwnComment)) {
     return true;
   }
   const gcode::Command command = gcode::parse(content);
-  if (command.kind == gcode::CommandKind::extended) {
+  if (firmware != Firmware::klipper) {
+    constexpr std::array<int, 5> kLimits = {201, 203, 204, 205, 593};  // and M566
+    if (command.is('M', 566)
+            ? firmware == Firmware::rrf
+            : std::ranges::any_of(kLimits, [&](int number) { return command.is('M', number); })) {
+      return true;
+    }
+  } else if (command.kind == gcode::CommandKind::extended) {
     return command.name == "SET_VELOCITY_LIMIT" || command.name == "SET_INPUT_SHAPER";
   }
   if (command.is('G', 92)) {
@@ -50,6 +57,7 @@ Replay::Replay(std::istream& stream, std::string name, const gcode::InterpreterO
       interpreter_(interpreter),
       plan_(limits, fixed),
       resting_plan_(limits, fixed),
+      firmware_(fixed.firmware),
       in_output_(in_output) {
   sections_.push_back(Section{});
 }
@@ -168,7 +176,8 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   section.regime = before;
   section.dwell_s = event.dwell_s;
   section.position_lost = event.position_lost;
-  section.may_be_added = kind == SectionKind::barrier && is_known_addition(event.line.content());
+  section.may_be_added =
+      kind == SectionKind::barrier && is_known_addition(event.line.content(), firmware_);
   section.line = std::move(event.line);
 
   // An announcement holds although unflex stops the machine before the first move.

@@ -57,7 +57,7 @@ struct PlacedLine {
 };
 
 // Whether unflex adds lines of this form to a file.
-[[nodiscard]] bool is_known_addition(std::string_view content);
+[[nodiscard]] bool is_known_addition(std::string_view content, Firmware firmware);
 
 class Replay {
  public:
@@ -69,6 +69,7 @@ class Replay {
   // The next move of the current section; false at its end.
   [[nodiscard]] bool next(planner::PlannedMove& move);
   // Whether next() would give one. Every line before it has then been read.
+  [[nodiscard]] Firmware firmware() const { return firmware_; }
   [[nodiscard]] bool has_move();
   // The moves of the sliced file by another plan, in which the machine rests at both ends of every
   // section. The two plans are independent of each other; what is not asked for of this one is
@@ -114,6 +115,7 @@ class Replay {
   gcode::Interpreter interpreter_;
   PlanQueue plan_;
   PlanQueue resting_plan_;
+  Firmware firmware_;
   bool in_output_;
   bool in_compensated_run_ = false;  // between the lines that announce its begin and its end
   bool at_end_ = false;

@@ -182,11 +182,11 @@ TEST(KnownAddition, ComprisesTheFormsOfTheEmitterOnly) {
   for (const char* line :
        {";unflex run", ";unflex 0.1", "SET_VELOCITY_LIMIT ACCEL=1000000", "M83", "M82 ;unflex",
         "G90", "G91", "G21", "G20", "G92 E1.25", "G1 F1200", "SET_INPUT_SHAPER SHAPER_FREQ_X=0"}) {
-    EXPECT_TRUE(is_known_addition(line)) << line;
+    EXPECT_TRUE(is_known_addition(line, Firmware::klipper)) << line;
   }
   for (const char* line : {"; unflex run", "G92 X0", "G92", "G92 E0 X1", "G1 F1200 X1", "G1 X1",
                            "M106 S0", "M83 S1", "G28", "SET_PIN PIN=x VALUE=1", "", "G0 F100"}) {
-    EXPECT_FALSE(is_known_addition(line)) << line;
+    EXPECT_FALSE(is_known_addition(line, Firmware::klipper)) << line;
   }
 }
 

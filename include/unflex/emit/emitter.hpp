@@ -54,6 +54,7 @@ struct EmitOptions {
   std::string version;  // for the comment at the first run
 };
 
+struct Shaper;  // the printer's own, see src/emit/dialect.hpp
 struct Stroke;  // a line to be, see src/emit/strokes.hpp
 
 // A compensated run.
@@ -104,7 +105,7 @@ class Emitter {
   void restore_modes(std::string& out);
   void restore_shaper(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out);
-  void set_shaper(double x_hz, double y_hz, std::string& out);
+  void set_shaper(const Shaper& wanted, std::string& out);
 
   EmitOptions options_;
   gcode::Interpreter input_;      // has read the input so far

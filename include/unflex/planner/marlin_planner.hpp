@@ -7,8 +7,9 @@
 // Rounding. Targets are rounded to whole steps, and the rounding is carried: the start_mm and
 // end_mm of a planned move are where the motors are, not what the file says. A move of fewer than
 // min_steps_per_segment steps on every axis is not queued; its motion belongs to the next move that
-// is. E is rounded from its sum over the file; the firmware rounds it anew at each G92 E0, which
-// moves the filament by less than one step (and drops what was too short to be queued).
+// is. The same goes for E in the planning; but the E of a planned move is the file's, so that
+// filament can be accounted for. The firmware rounds E anew at each G92 E0, which moves the filament
+// by less than one step (and drops what was too short to be queued).
 //
 // Lookahead. The file is taken to be read faster than it is printed. The buffer of N blocks then
 // holds N − 1, the running one among them; when a block begins to run, the N − 3 after it are known
@@ -117,6 +118,7 @@ class MarlinPlanner final : public Planner {
   marlin::Settings settings_;
   marlin::Previous previous_;
   marlin::Steps position_{};    // after the last queued block
+  double filament_mm_ = 0.0;    // E of the file after the last queued block
   gcode::Position asked_mm_{};  // end of the last segment given, queued or not
   bool has_position_ = false;   // a segment has been given
   bool start_known_ = true;     // of all segments since the last queued block
