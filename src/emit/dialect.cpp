@@ -120,6 +120,17 @@ std::string_view brand(Firmware firmware) {
   return "Klipper";
 }
 
+Limits limits_in_run(Firmware firmware, const Limits& file, Limits raised) {
+  if (firmware != Firmware::klipper) {
+    raised.axis_max_velocity_mm_s[gcode::Z] = file.axis_max_velocity_mm_s[gcode::Z];
+    raised.axis_max_velocity_mm_s[gcode::E] = file.axis_max_velocity_mm_s[gcode::E];
+    raised.axis_max_accel_mm_s2[gcode::Z] = file.axis_max_accel_mm_s2[gcode::Z];
+    raised.axis_jerk_mm_s[gcode::Z] = file.axis_jerk_mm_s[gcode::Z];
+    raised.retract_accel_mm_s2 = file.retract_accel_mm_s2;
+  }
+  return raised;
+}
+
 std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, const Limits& wanted,
                                      const Limits& current, bool known) {
   std::vector<std::string> lines;

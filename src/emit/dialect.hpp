@@ -14,6 +14,10 @@ namespace unflex::emit {
 // As its makers write it.
 [[nodiscard]] std::string_view brand(Firmware firmware);
 
+// `raised` limits for X, Y and filament; what concerns Z and retraction stays as the file has it.
+[[nodiscard]] planner::Limits limits_in_run(Firmware firmware, const planner::Limits& file,
+                                            planner::Limits raised);
+
 // The lines, without their endings, that put `wanted` in force: what differs from `current`, or
 // everything unless it is `known`.
 [[nodiscard]] std::vector<std::string> limit_lines(const planner::FirmwareConfig& config,

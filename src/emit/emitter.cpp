@@ -117,7 +117,9 @@ bool Emitter::run(const Run& run, std::string& out) {
   const Grid grid{axis_grid(options_.fixed, X, state.base_mm[X]),
                   axis_grid(options_.fixed, Y, state.base_mm[Y]),
                   axis_grid(options_.fixed, Z, state.base_mm[Z]), state.speed_factor};
-  const std::vector<Stroke> run_strokes = strokes(run, grid, options_);
+  EmitOptions options = options_;
+  options.run_limits = limits_in_run(options_.fixed.firmware, input_limits_, options_.run_limits);
+  const std::vector<Stroke> run_strokes = strokes(run, grid, options);
   if (run_strokes.empty()) {
     return false;
   }
@@ -161,7 +163,7 @@ void Emitter::enter_run(std::string& out) {
 
 // Whatever the input's lines have set inside the run.
 void Emitter::set_run_modes(std::string& out) {
-  set_limits(options_.run_limits, out);
+  set_limits(limits_in_run(options_.fixed.firmware, input_limits_, options_.run_limits), out);
   const gcode::ModalState& state = printer_.state();
   if (state.unit_mm != 1.0) {
     write("G21", out);

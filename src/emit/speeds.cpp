@@ -18,6 +18,7 @@
 namespace unflex::emit {
 namespace {
 
+using gcode::E;
 using gcode::X;
 using gcode::Y;
 using gcode::Z;
@@ -37,7 +38,7 @@ int feed_decimals(double feed_mm_min) {
   if (feed_mm_min >= 100.0) {
     return 1;
   }
-  return feed_mm_min >= 1.0 ? 3 : 9;
+  return feed_mm_min >= 1.0 ? 3 : 8;
 }
 
 class SpeedSolver {
@@ -50,22 +51,51 @@ class SpeedSolver {
         mm_s_per_feed_(mm_s_per_feed),
         distance_mm_(strokes.size()),
         accel_mm_s2_(strokes.size(), options.line_accel_mm_s2),
+        step_events_(strokes.size(), 0.0),
         correction_(strokes.size(), 1.0),
         speed_mm_s_(strokes.size()) {
+    const double z_accel_mm_s2 = options.fixed.firmware == Firmware::klipper
+                                     ? options.fixed.max_z_accel_mm_s2
+                                     : options.run_limits.axis_max_accel_mm_s2[Z];
     gcode::Position at = start_mm;
+    at[E] = 0.0;
     for (std::size_t i = 0; i < strokes.size(); ++i) {
       const Stroke& stroke = strokes[i];
       const double dz = stroke.z_mm - at[Z];
       distance_mm_[i] = std::hypot(stroke.x_mm - at[X], stroke.y_mm - at[Y], dz);
       if (dz != 0.0) {
-        accel_mm_s2_[i] =
-            std::min(accel_mm_s2_[i], options.z_accel_mm_s2 * distance_mm_[i] / std::abs(dz));
+        accel_mm_s2_[i] = std::min(accel_mm_s2_[i], z_accel_mm_s2 * distance_mm_[i] / std::abs(dz));
       }
-      at = {stroke.x_mm, stroke.y_mm, stroke.z_mm, 0.0};
+      const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm, stroke.e_mm};
+      for (std::size_t axis = 0; options.fixed.firmware == Firmware::marlin && axis < to.size();
+           ++axis) {
+        const double steps_per_mm = options.fixed.steps_per_mm[axis];
+        step_events_[i] = std::max(step_events_[i], std::abs(std::round(to[axis] * steps_per_mm) -
+                                                             std::round(at[axis] * steps_per_mm)));
+      }
+      at = to;
     }
   }
 
   void solve() {
+    struct D {
+      SpeedSolver* s;
+      ~D() {
+        if (getenv("DBG")) {
+          s->compare_with_firmware();
+          double c = 0;
+          for (size_t i = 0; i < s->strokes_->size(); ++i) {
+            double t =
+                s->correction_[i] * (s->distance_mm_[i] + s->ramps_mm(i)) / s->speed_mm_s_[i];
+            c += t;
+            double due = (*s->strokes_)[i].end_s - (i ? (*s->strokes_)[i - 1].end_s : 0);
+            fprintf(stderr, "%zu d %.4f v %.2f due %.3f got %.3f corr %.3f drift %.3f\n", i,
+                    s->distance_mm_[i], s->speed_mm_s_[i], due * 1e3, t * 1e3, s->correction_[i],
+                    (c - (*s->strokes_)[i].end_s) * 1e3);
+          }
+        }
+      }
+    } dd{this};
     settle_ramps();
     round_to_feeds();
     for (int i = 0; i < kReplays; ++i) {
@@ -98,12 +128,28 @@ class SpeedSolver {
       const double due_s = std::max(stroke.end_s - clock_s, given_s / kMostCorrection);
       const double way_mm = correction_[i] * (distance_mm_[i] + ramps_mm(i));
       const double feed = way_mm / due_s / mm_s_per_feed_;
-      stroke.feed_decimals = feed_decimals(feed);
-      speed_mm_s_[i] = stroke.speed_mm_s =
-          static_cast<double>(std::max<std::int64_t>(to_scaled(feed, stroke.feed_decimals), 1)) /
-          power_of_ten(stroke.feed_decimals) * mm_s_per_feed_;
+      set_speed(i, feed * mm_s_per_feed_);
       clock_s += way_mm / speed_mm_s_[i];
     }
+  }
+
+  // The speed nearest to v that the firmware can be told and will take.
+  void set_speed(std::size_t i, double v) {
+    Stroke& stroke = (*strokes_)[i];
+    double told = v;
+    if (step_events_[i] > 0.0) {
+      // Marlin rounds up to whole steps per second (planner.cpp, _populate_block: nominal_rate).
+      const double mm_per_step_event = distance_mm_[i] / step_events_[i];
+      const double rate = std::max(std::round(v / mm_per_step_event), 1.0);
+      v = rate * mm_per_step_event;
+      told = (rate - 0.5) * mm_per_step_event;
+    }
+    const double feed = told / mm_s_per_feed_;
+    stroke.feed_decimals = feed_decimals(feed) + (step_events_[i] > 0.0 ? 1 : 0);
+    stroke.speed_mm_s =
+        static_cast<double>(std::max<std::int64_t>(to_scaled(feed, stroke.feed_decimals), 1)) /
+        power_of_ten(stroke.feed_decimals) * mm_s_per_feed_;
+    speed_mm_s_[i] = step_events_[i] > 0.0 ? v : stroke.speed_mm_s;
   }
 
   void compare_with_firmware() {
@@ -142,7 +188,8 @@ class SpeedSolver {
   double mm_s_per_feed_;
   std::vector<double> distance_mm_;
   std::vector<double> accel_mm_s2_;
-  std::vector<double> correction_;  // c
+  std::vector<double> step_events_;  // Marlin: of the axis with most steps
+  std::vector<double> correction_;   // c
   std::vector<double> speed_mm_s_;
 };
 

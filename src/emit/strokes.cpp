@@ -57,6 +57,13 @@ gcode::Position end_of(const Run& run) {
   return run.moves->back().segment.end_mm;
 }
 
+// Whether the firmware moves for such a line, and not only with the next one.
+bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const LineRules& rules) {
+  const double steps = std::max(std::abs(to.x_mm - from.x_mm) / grid.x.step_mm,
+                                std::abs(to.y_mm - from.y_mm) / grid.y.step_mm);
+  return steps > rules.min_steps - 0.5;
+}
+
 // X and Y at the ends of the lines.
 struct Polygon {
   std::vector<double> times_s;
@@ -124,7 +131,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     if (!is_end && std::abs(stroke.z_mm - last.z_mm) > 2.0 * gcode::kMaxSlope * length) {
       stroke.z_mm = last.z_mm;  // a rounding step of Z waits for a line that is not steep by it
     }
-    if (length > 0.5 * std::min(grid.x.step_mm, grid.y.step_mm)) {
+    if (goes_through(last, stroke, grid, rules)) {
       result.push_back(stroke);
       last = stroke;
     } else if (result.empty()) {

@@ -188,7 +188,6 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.fixed = firmware_config(settings);
   options.run_limits = run_limits(options.printer_limits, settings);
   options.line_accel_mm_s2 = settings.emit.accel_mm_s2;
-  options.z_accel_mm_s2 = settings.axis_max_accel_mm_s2()[gcode::Z];
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
   options.lines.nozzle_x = axis(settings.dynamics_x);
   options.lines.nozzle_y = axis(settings.dynamics_y);
@@ -200,6 +199,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.min_line_s = min_line_s(settings);
   if (settings.printer.firmware == Firmware::marlin) {
     // Rounding may take a step off either end.
+    options.lines.min_steps = options.fixed.min_steps_per_segment;
     options.lines.min_line_mm = (settings.printer.min_steps_per_segment + 1.0) * grid_mm(settings);
   }
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;

@@ -36,6 +36,7 @@ struct LineRules {
   double tolerance_mm = 3e-4;  // of what a line may move the nozzle by
   double min_line_s = 1e-3;    // none is shorter than this …
   double min_line_mm = 0.0;    // … or than this along both X and Y
+  int min_steps = 1;           // of the grid; the firmware joins shorter lines to the next
   double max_line_s = 0.05;
   // On either axis from line to line, where lines can be short enough.
   double max_speed_step_mm_s = 30.0;
@@ -46,10 +47,8 @@ struct EmitOptions {
   gcode::InterpreterOptions interpreter;
   planner::Limits printer_limits;  // in force when the file starts
   planner::FirmwareConfig fixed;
-  planner::Limits run_limits;  // inside a compensated run
-  // What the firmware then accelerates a line by, and Z by.
-  double line_accel_mm_s2 = 1e6;
-  double z_accel_mm_s2 = 5000.0;
+  planner::Limits run_limits;     // inside a compensated run
+  double line_accel_mm_s2 = 1e6;  // what the firmware then accelerates a line by
   LineRules lines;
   std::string version;  // for the comment at the first run
 };
