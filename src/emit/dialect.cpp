@@ -106,6 +106,24 @@ void rrf(const Limits& wanted, const Limits& current, bool all, std::vector<std:
   jerk.finish(lines);
 }
 
+// One shaper for both axes.
+std::string rrf_shaper(const Shaper& wanted) {
+  if (wanted.freq_x_hz == 0.0) {
+    return "M593 P\"none\"";
+  }
+  const gcode::ShaperSettings& settings = wanted.settings;
+  if (!settings.custom_words.empty()) {
+    return "M593 " + settings.custom_words;
+  }
+  // "zvd" is what RepRapFirmware takes when it is told no type (AxisShaper::Configure).
+  std::string line = fmt::format(
+      "M593 P\"{}\" F{}", settings.type_x.empty() ? "zvd" : settings.type_x, wanted.freq_x_hz);
+  if (settings.damping_ratio_x) {
+    line += fmt::format(" S{}", *settings.damping_ratio_x);
+  }
+  return line;
+}
+
 }  // namespace
 
 std::string_view brand(Firmware firmware) {
@@ -149,15 +167,7 @@ std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, cons
 }
 
 Shaper shaper_of(const gcode::ModalState& state) {
-  return {state.shaper_freq_x_hz, state.shaper_freq_y_hz, state.shaper_line};
-}
-
-Shaper no_shaper(Firmware firmware) {
-  Shaper off;
-  if (firmware == Firmware::rrf) {
-    off.line = "M593 P\"none\"";
-  }
-  return off;
+  return {state.shaper_freq_x_hz, state.shaper_freq_y_hz, state.shaper};
 }
 
 std::vector<std::string> shaper_lines(Firmware firmware, const Shaper& wanted,
@@ -182,9 +192,8 @@ std::vector<std::string> shaper_lines(Firmware firmware, const Shaper& wanted,
       }
       break;
     case Firmware::rrf:
-      // A printer whose shaper the file does not name is left without.
-      if (wanted.line != current.line && !wanted.line.empty()) {
-        lines.push_back(wanted.line);
+      if (x || y) {
+        lines.push_back(rrf_shaper(wanted));
       }
       break;
   }

@@ -26,15 +26,14 @@ namespace unflex::emit {
 
 // The firmware's own input shaping.
 struct Shaper {
-  double freq_x_hz = 0.0;  // Klipper, Marlin; 0: off
+  double freq_x_hz = 0.0;  // 0: off
   double freq_y_hz = 0.0;
-  std::string line;  // RepRapFirmware: the M593 in force, empty if the file gave none
+  gcode::ShaperSettings settings;  // RepRapFirmware's, which forgets its type while it is off
 };
 
 [[nodiscard]] Shaper shaper_of(const gcode::ModalState& state);
-[[nodiscard]] Shaper no_shaper(Firmware firmware);
 
-// The lines that put `wanted` in place of `current`.
+// The lines that put `wanted` in place of `current`. A default Shaper is none.
 [[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const Shaper& wanted,
                                                     const Shaper& current);
 

@@ -157,7 +157,7 @@ void Emitter::enter_run(std::string& out) {
                       options_.version, brand(options_.fixed.firmware)),
           out);
   }
-  set_shaper(no_shaper(options_.fixed.firmware), out);
+  set_shaper({}, out);
   write(fmt::format("{} run", kComment), out);
 }
 
@@ -189,7 +189,7 @@ void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::st
   axis(Z, 'Z', stroke.z_mm);
   // What rounding left over so far is part of the difference.
   const double filament =
-      (filament_origin + stroke.e_mm - state.position_mm[E]) / state.flow_factor;
+      (filament_origin + stroke.e_mm - state.position_mm[E]) / state.filament_per_e_mm();
   if (to_scaled(filament, kFilamentDecimals) != 0) {
     append_filament(text, filament);
   }
@@ -203,8 +203,7 @@ void Emitter::restore_modes(std::string& out) {
   if (!same(wanted.base_mm[E], state.base_mm[E])) {
     // A G92 E of the input fell between two lines that split its moment: put the zero right.
     std::string text = "G92";
-    append_word(text, 'E',
-                (state.position_mm[E] - wanted.base_mm[E]) / (state.flow_factor * state.unit_mm),
+    append_word(text, 'E', (state.position_mm[E] - wanted.base_mm[E]) / state.filament_per_e_mm(),
                 9);
     write(text, out);
   }

@@ -78,24 +78,6 @@ class SpeedSolver {
   }
 
   void solve() {
-    struct D {
-      SpeedSolver* s;
-      ~D() {
-        if (getenv("DBG")) {
-          s->compare_with_firmware();
-          double c = 0;
-          for (size_t i = 0; i < s->strokes_->size(); ++i) {
-            double t =
-                s->correction_[i] * (s->distance_mm_[i] + s->ramps_mm(i)) / s->speed_mm_s_[i];
-            c += t;
-            double due = (*s->strokes_)[i].end_s - (i ? (*s->strokes_)[i - 1].end_s : 0);
-            fprintf(stderr, "%zu d %.4f v %.2f due %.3f got %.3f corr %.3f drift %.3f\n", i,
-                    s->distance_mm_[i], s->speed_mm_s_[i], due * 1e3, t * 1e3, s->correction_[i],
-                    (c - (*s->strokes_)[i].end_s) * 1e3);
-          }
-        }
-      }
-    } dd{this};
     settle_ramps();
     round_to_feeds();
     for (int i = 0; i < kReplays; ++i) {

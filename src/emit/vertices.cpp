@@ -16,6 +16,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <map>
 
 namespace unflex::emit {
 namespace {
@@ -198,7 +200,7 @@ Reach with_base(Reach reach, const BaseTrajectory& base, AxisAt axis) {
 // Pins the vertices around changes of speed that are too quick, those from and to rest at the ends
 // included; whether there were any to pin.
 bool pin_where_too_quick(const std::vector<double>& times, const std::vector<double>& at,
-                         double max_accel_mm_s2, std::vector<bool>& pinned) {
+                         double max_accel_mm_s2, std::size_t around, std::vector<bool>& pinned) {
   bool found = false;
   const std::size_t last = times.size() - 1;
   for (std::size_t i = 0; i <= last; ++i) {
@@ -209,7 +211,7 @@ bool pin_where_too_quick(const std::vector<double>& times, const std::vector<dou
     if (std::abs(after - before) <= max_accel_mm_s2 * 0.5 * (before_s + after_s)) {
       continue;
     }
-    for (std::size_t k = i > 0 ? i - 1 : 0; k <= std::min(i + 1, last); ++k) {
+    for (std::size_t k = i > around ? i - around : 0; k <= std::min(i + around, last); ++k) {
       found = found || !pinned[k];
       pinned[k] = true;
     }
@@ -232,15 +234,14 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
   const AxisAt axis = axis_;
   const std::size_t lines = times.size() - 1;
   const Followed followed(followed_, base.period_s);
-  Step step(nozzle_, base.period_s);
+  std::map<std::int64_t, Step> steps;  // by length; few lengths are different
   std::vector<Stage> stages;
   std::vector<double> on_curve = {(base.*axis)(0.0).position_mm};
   for (std::size_t k = 0; k < lines; ++k) {
     const double duration = times[k + 1] - times[k];
     const double dt = duration / std::ceil(duration / base.period_s - 1e-9);
-    if (std::abs(dt - step.dt()) > 1e-12) {
-      step = Step(nozzle_, dt);
-    }
+    constexpr double kSame_s = 1e-12;
+    const Step& step = steps.try_emplace(std::llround(dt / kSame_s), nozzle_, dt).first->second;
     stages.push_back(stage(base, axis, followed, step, times[k], times[k + 1]));
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
@@ -249,7 +250,8 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
   std::vector<bool> pinned(lines + 1, false);
   pinned.front() = pinned.back() = true;
   AxisVertices result;
-  do {
+  // Pinning moves the neighbours; the further around, the sooner that ends.
+  for (std::size_t around = 1;; around *= 2) {
     CostToGo to_go = at_end;
     for (std::size_t k = lines; k-- > 0;) {
       regulate(stages[k], to_go, pinned[k + 1]);
@@ -268,8 +270,10 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
       result.position_mm.push_back(vertex);
       result.nozzle_error_mm.push_back(z[0]);
     }
-  } while (pin_where_too_quick(times, result.position_mm, max_accel_mm_s2, pinned));
-  return result;
+    if (!pin_where_too_quick(times, result.position_mm, max_accel_mm_s2, around, pinned)) {
+      return result;
+    }
+  }
 }
 
 }  // namespace unflex::emit

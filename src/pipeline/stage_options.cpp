@@ -100,8 +100,7 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
 }  // namespace
 
 gcode::InterpreterOptions interpreter_options(const machine::Settings& settings) {
-  gcode::InterpreterOptions options;
-  options.firmware = settings.printer.firmware;
+  gcode::InterpreterOptions options = gcode::default_options(settings.printer.firmware);
   options.firmware_retraction = settings.printer.firmware_retraction;
   options.retract_length_mm = settings.printer.retract_length_mm;
   options.retract_speed_mm_s = settings.printer.retract_speed_mm_s;
@@ -145,7 +144,7 @@ planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
   config.steps_per_mm = settings.steps_per_mm();
   config.classic_jerk = settings.printer.classic_jerk;
   config.min_steps_per_segment = static_cast<int>(settings.printer.min_steps_per_segment);
-  config.block_buffer_size = static_cast<int>(settings.queue_length());
+  config.block_buffer_size = config.ring_length = static_cast<int>(settings.queue_length());
   return config;
 }
 

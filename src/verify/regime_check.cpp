@@ -39,10 +39,6 @@ class Differences {
   std::string text_;
 };
 
-bool absolute_filament(const gcode::ModalState& state) {
-  return state.absolute_xyz && state.absolute_e;
-}
-
 }  // namespace
 
 std::string modal_difference(const gcode::ModalState& input, const gcode::ModalState& output) {
@@ -56,19 +52,19 @@ std::string modal_difference(const gcode::ModalState& input, const gcode::ModalS
     differences.compare(input.known[axis] == output.known[axis],
                         fmt::format("whether {} is known", kNames[axis]));
   }
-  if (absolute_filament(input)) {
+  if (input.e_is_absolute()) {
     differences.compare("E", input.position_mm[gcode::E] - input.base_mm[gcode::E],
                         output.position_mm[gcode::E] - output.base_mm[gcode::E],
                         kFilamentTolerance_mm);
   }
   differences.compare(input.absolute_xyz == output.absolute_xyz, "G90/G91");
-  differences.compare(absolute_filament(input) == absolute_filament(output), "M82/M83");
+  differences.compare(input.e_is_absolute() == output.e_is_absolute(), "M82/M83");
   differences.compare(input.plane == output.plane, "plane (G17 to G19)");
   differences.compare(input.retracted == output.retracted, "firmware retraction");
   differences.compare_relative("unit", input.unit_mm, output.unit_mm);
   differences.compare_relative("feed rate", input.feed_mm_s, output.feed_mm_s);
   differences.compare_relative("speed factor", input.speed_factor, output.speed_factor);
-  differences.compare_relative("flow factor", input.flow_factor, output.flow_factor);
+  differences.compare_relative("flow factor", input.filament_factor(), output.filament_factor());
   return differences.text();
 }
 

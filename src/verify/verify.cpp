@@ -285,9 +285,9 @@ void Verifier::finish_reference() {
 
 // A step of E is as much filament as M221 makes of it.
 double Verifier::filament_tolerance_mm() const {
-  double factor = output_.following().regime->modal.flow_factor;
+  double factor = output_.following().regime->modal.filament_factor();
   if (output_.section().regime.has_value()) {
-    factor = std::max(factor, output_.section().regime->modal.flow_factor);
+    factor = std::max(factor, output_.section().regime->modal.filament_factor());
   }
   return kFilamentTolerance_mm * std::max(1.0, factor);
 }
