@@ -50,7 +50,7 @@ void append_filament(std::string& text, double value) {
 
 // Places that can be written, or, where the firmware rounds to steps, that it goes to.
 AxisGrid axis_grid(const planner::FirmwareConfig& config, gcode::Axis axis, double zero_mm) {
-  if (config.firmware == Firmware::marlin) {
+  if (config.firmware != Firmware::klipper) {
     return {0.0, 1.0 / config.steps_per_mm[axis]};
   }
   return {zero_mm, 1.0 / power_of_ten(kPositionDecimals)};

@@ -115,9 +115,24 @@ class SpeedSolver {
     }
   }
 
+  // RepRapFirmware leaves out ramps of less than ten step clocks if the speed is there within 10 %
+  // (DDA.cpp, RecalculateMove), and both moves then go at the lower speed.
+  [[nodiscard]] bool is_lost(double v, double before, double accel_mm_s2) const {
+    constexpr double kTenClocks_s = 10.0 / 750000.0;
+    constexpr double kRoom = 1.05;
+    return options_->fixed.firmware == Firmware::rrf &&
+           std::abs(v - before) <= kRoom * accel_mm_s2 * kTenClocks_s &&
+           std::min(v, before) >= 0.9 / kRoom * std::max(v, before);
+  }
+
   // The speed nearest to v that the firmware can be told and will take.
   void set_speed(std::size_t i, double v) {
     Stroke& stroke = (*strokes_)[i];
+    if (i > 0 && is_lost(v, speed_mm_s_[i - 1], accel_mm_s2_[i])) {
+      stroke.speed_mm_s = speed_mm_s_[i] = speed_mm_s_[i - 1];
+      stroke.feed_decimals = (*strokes_)[i - 1].feed_decimals;
+      return;
+    }
     double told = v;
     if (step_events_[i] > 0.0) {
       // Marlin rounds up to whole steps per second (planner.cpp, _populate_block: nominal_rate).

@@ -241,7 +241,8 @@ constexpr std::array kKeys = {
     Key{"emit.max_speed_step_mm_s", &setting<&S::emit, &T::max_speed_step_mm_s>, kPositive, "mm/s",
         "How much an axis' speed may change from line to line, where lines can be short enough"},
     Key{"emit.accel_mm_s2", &setting<&S::emit, &T::accel_mm_s2>, kPositive, "mm/s²",
-        "The printer's max_accel while it runs compensated motion"},
+        "The firmware's acceleration while it runs compensated motion",
+        "1000000, RRF 5 × base.max_accel_mm_s2", &derived<&S::emit_accel_mm_s2>},
     Key{"emit.square_corner_velocity_mm_s", &setting<&S::emit, &T::square_corner_velocity_mm_s>,
         kPositive, "mm/s", "The printer's square_corner_velocity while it runs compensated motion"},
 

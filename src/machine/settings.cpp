@@ -148,6 +148,13 @@ double Settings::tail_s() const {
   return std::max({kShortest, settling_time_s(dynamics_x), settling_time_s(dynamics_y)});
 }
 
+double Settings::emit_accel_mm_s2() const {
+  // RepRapFirmware leaves out short ramps: the lower its acceleration, the fewer.
+  constexpr double kTimesBase = 5.0;
+  return emit.accel_mm_s2.value_or(
+      printer.firmware == Firmware::rrf ? kTimesBase * base_max_accel_mm_s2() : 1e6);
+}
+
 double Settings::tolerance_um() const {
   constexpr double kPerHz = 0.3 / 45.0;
   return emit.tolerance_um.value_or(kPerHz * std::min(dynamics_x.freq_hz, dynamics_y.freq_hz));

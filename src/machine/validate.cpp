@@ -147,11 +147,11 @@ Status check_base(const Draft& draft) {
 Status check_emission(const Draft& draft) {
   const Settings& s = draft.settings;
   const double least_accel = kEmitAccelFactor * s.base_max_accel_mm_s2();
-  if (s.emit.accel_mm_s2 < least_accel) {
+  if (s.emit_accel_mm_s2() < least_accel) {
     return conflict(draft, {"emit.accel_mm_s2", "base.max_accel_mm_s2", "limits.max_accel_mm_s2"},
                     fmt::format("emit.accel_mm_s2 is {}, but must be at least {} ({} × "
                                 "base.max_accel_mm_s2); raise it or lower base.max_accel_mm_s2",
-                                s.emit.accel_mm_s2, least_accel, kEmitAccelFactor));
+                                s.emit_accel_mm_s2(), least_accel, kEmitAccelFactor));
   }
   if (s.emit.square_corner_velocity_mm_s < s.limits.square_corner_velocity_mm_s) {
     return conflict(

@@ -26,7 +26,7 @@ double min_line_s(const machine::Settings& settings) {
 
 double grid_mm(const machine::Settings& settings) {
   const std::array<double, 4> steps_per_mm = settings.steps_per_mm();
-  return settings.printer.firmware == Firmware::marlin
+  return settings.printer.firmware != Firmware::klipper
              ? 1.0 / std::min(steps_per_mm[gcode::X], steps_per_mm[gcode::Y])
              : kGridMm;
 }
@@ -64,7 +64,7 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
 // line down for them. Z is left as it is.
 planner::Limits run_limits(planner::Limits limits, const machine::Settings& settings) {
   const double velocity = 2.0 * settings.base_max_velocity_mm_s();
-  const double accel = settings.emit.accel_mm_s2;
+  const double accel = settings.emit_accel_mm_s2();
   const double corner = settings.emit.square_corner_velocity_mm_s;
   switch (settings.printer.firmware) {
     case Firmware::klipper:
@@ -186,7 +186,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.printer_limits = planner_limits(settings);
   options.fixed = firmware_config(settings);
   options.run_limits = run_limits(options.printer_limits, settings);
-  options.line_accel_mm_s2 = settings.emit.accel_mm_s2;
+  options.line_accel_mm_s2 = settings.emit_accel_mm_s2();
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
   options.lines.nozzle_x = axis(settings.dynamics_x);
   options.lines.nozzle_y = axis(settings.dynamics_y);

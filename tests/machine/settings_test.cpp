@@ -107,7 +107,7 @@ TEST(Overrides, TakeEveryTypeOfValue) {
   ASSERT_TRUE(s.printer.travel_x_mm);
   EXPECT_DOUBLE_EQ(s.printer.travel_x_mm->max, 250.0);
   EXPECT_FALSE(s.printer.firmware_retraction);
-  EXPECT_DOUBLE_EQ(s.emit.accel_mm_s2, 2e6);
+  EXPECT_DOUBLE_EQ(s.emit_accel_mm_s2(), 2e6);
   EXPECT_DOUBLE_EQ(s.limits.max_velocity_mm_s, 200.0);
   EXPECT_EQ(read("", {"printer.firmware=\"klipper\""}).printer.firmware, Firmware::klipper);
 }

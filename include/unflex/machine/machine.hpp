@@ -109,7 +109,9 @@ struct EmitSettings {
   std::optional<double> tolerance_um;
   std::optional<double> max_lines_per_s;  // hard limit; unset: by firmware
   double max_speed_step_mm_s = 30.0;      // from line to line, per axis
-  double accel_mm_s2 = 1e6;               // planner limits inside a compensated run
+  // The firmware's acceleration inside a compensated run; unset: 1e6, RepRapFirmware 5 times the
+  // base's.
+  std::optional<double> accel_mm_s2;
   double square_corner_velocity_mm_s = 1000.0;
 };
 
@@ -149,6 +151,7 @@ struct Settings {
   [[nodiscard]] double base_max_accel_mm_s2() const;
   [[nodiscard]] double tail_s() const;
   [[nodiscard]] double tolerance_um() const;
+  [[nodiscard]] double emit_accel_mm_s2() const;
   [[nodiscard]] double shaper_freq_x_hz() const;
   [[nodiscard]] double shaper_freq_y_hz() const;
 };
