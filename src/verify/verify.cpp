@@ -289,7 +289,13 @@ double Verifier::filament_tolerance_mm() const {
   if (output_.section().regime.has_value()) {
     factor = std::max(factor, output_.section().regime->modal.filament_factor());
   }
-  return kFilamentTolerance_mm * std::max(1.0, factor);
+  // Marlin lays the filament of a move that is too short for it with the next one, which may be
+  // after the run.
+  const planner::FirmwareConfig& firmware = rules_.fixed;
+  const double too_short_mm = firmware.firmware == Firmware::marlin
+                                  ? firmware.min_steps_per_segment / firmware.steps_per_mm[gcode::E]
+                                  : 0.0;
+  return too_short_mm + kFilamentTolerance_mm * std::max(1.0, factor);
 }
 
 void Verifier::check_run(bool compensated) {
