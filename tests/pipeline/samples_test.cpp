@@ -92,5 +92,44 @@ INSTANTIATE_TEST_SUITE_P(
                       Sample{"washer_arcs", "", 0, 0, 1.0}),
     name_of);
 
+struct OnFirmware {
+  std::string firmware;
+  std::string piece;
+  double rms_mm;           // at most this while extruding
+  double improvement;      // RMS at least this many times less than before
+  double max_lines_per_s;  // that firmware's default budget
+};
+
+void PrintTo(const OnFirmware& tested, std::ostream* out) {
+  *out << tested.firmware << ' ' << tested.piece;
+}
+
+class OtherFirmware : public ::testing::TestWithParam<OnFirmware> {};
+
+// What the firmware's whole steps leave of it; docs/firmware.md says how much that is.
+TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
+  const std::filesystem::path path =
+      std::filesystem::path(UNFLEX_TEST_DATA) / ("pipeline_" + GetParam().piece + ".gcode");
+  const JobFolder folder(read_file(path), {"printer.firmware=" + GetParam().firmware});
+  SilentProgress progress;
+  const Result<report::Report> report = compensate(folder.job(2), progress);
+  ASSERT_TRUE(report.has_value()) << to_string(report.error());
+  EXPECT_EQ(report->violation_count, 0U);
+  EXPECT_GT(report->runs_compensated, 0U);
+  EXPECT_LE(report->max_lines_per_s, GetParam().max_lines_per_s);
+  EXPECT_NEAR(report->emitted_time_s, report->reference_time_s, 0.01 * report->reference_time_s);
+  const double before = report->uncompensated.extruding.contour_rms_mm;
+  const double after = report->compensated.extruding.contour_rms_mm;
+  EXPECT_LE(after, GetParam().rms_mm);
+  EXPECT_LE(after, before / GetParam().improvement);
+}
+
+INSTANTIATE_TEST_SUITE_P(Small, OtherFirmware,
+                         ::testing::Values(OnFirmware{"marlin", "wallring", 5e-3, 6.0, 200.0},
+                                           OnFirmware{"marlin", "textplate", 5e-3, 1.3, 200.0},
+                                           OnFirmware{"rrf", "cube20", 5e-3, 3.0, 500.0},
+                                           OnFirmware{"rrf", "textplate", 5e-3, 1.8, 500.0},
+                                           OnFirmware{"rrf", "washer_arcs", 5e-3, 4.0, 500.0}));
+
 }  // namespace
 }  // namespace unflex::pipeline::testing

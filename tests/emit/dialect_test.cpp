@@ -1,0 +1,121 @@
+// What each firmware is told, word by word.
+#include "dialect.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "unflex/gcode/interpreter.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+planner::FirmwareConfig config_of(Firmware firmware, bool classic_jerk = false) {
+  planner::FirmwareConfig config;
+  config.firmware = firmware;
+  config.classic_jerk = classic_jerk;
+  return config;
+}
+
+planner::Limits some_limits() {
+  planner::Limits limits;
+  limits.axis_max_accel_mm_s2 = {1250.0, 1000.0, 400.0, 4000.0};
+  limits.axis_max_velocity_mm_s = {180.0, 175.5, 12.0, 80.0};
+  limits.axis_jerk_mm_s = {8.0, 7.0, 2.0, 10.0};
+  limits.print_accel_mm_s2 = 1500.0;
+  limits.travel_accel_mm_s2 = 1800.0;
+  limits.retract_accel_mm_s2 = 1250.0;
+  limits.junction_deviation_mm = 0.02;
+  limits.min_segment_time_s = 0.02;
+  limits.min_movement_velocity_mm_s = 0.1;
+  limits.jerk_policy = 1;
+  return limits;
+}
+
+TEST(LimitLines, AreAllOfThemWhereNothingIsKnown) {
+  const planner::Limits limits = some_limits();
+  EXPECT_THAT(limit_lines(config_of(Firmware::klipper), limits, limits, false),
+              ElementsAre("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
+                          "MINIMUM_CRUISE_RATIO=0.5"));
+  EXPECT_THAT(limit_lines(config_of(Firmware::marlin), limits, limits, false),
+              ElementsAre("M201 X1250 Y1000 Z400 E4000", "M203 X180 Y175.5 Z12 E80",
+                          "M204 P1500 R1250 T1800", "M205 J0.02 S0 T0 B20000"));
+  EXPECT_THAT(limit_lines(config_of(Firmware::rrf), limits, limits, false),
+              ElementsAre("M201 X1250 Y1000 Z400 E4000", "M203 X10800 Y10530 Z720 E4800 I6",
+                          "M204 P1500 T1800", "M566 X480 Y420 Z120 E600 P1"));
+}
+
+TEST(LimitLines, TellMarlinWithClassicJerkTheJerks) {
+  const planner::Limits limits = some_limits();
+  EXPECT_EQ(limit_lines(config_of(Firmware::marlin, true), limits, limits, false).back(),
+            "M205 X8 Y7 Z2 E10 S0 T0 B20000");
+}
+
+TEST(LimitLines, AreOnlyWhatDiffers) {
+  const planner::Limits current = some_limits();
+  planner::Limits wanted = current;
+  for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
+    EXPECT_THAT(limit_lines(config_of(firmware), wanted, current, true), IsEmpty());
+  }
+  wanted.axis_max_accel_mm_s2[gcode::Y] = 1100.0;
+  wanted.axis_jerk_mm_s[gcode::E] = 5.0;
+  EXPECT_THAT(limit_lines(config_of(Firmware::rrf), wanted, current, true),
+              ElementsAre("M201 Y1100", "M566 E300"));
+  EXPECT_THAT(limit_lines(config_of(Firmware::marlin), wanted, current, true),
+              ElementsAre("M201 Y1100"));
+}
+
+// Whatever is told is understood, by the same firmware's interpreter, as what was meant.
+TEST(LimitLines, AreReadBackAsTheyWereMeant) {
+  for (const Firmware firmware : {Firmware::marlin, Firmware::rrf}) {
+    const planner::Limits wanted = some_limits();
+    planner::Limits read;
+    gcode::Interpreter printer(gcode::default_options(firmware));
+    for (const std::string& text :
+         limit_lines(config_of(firmware), wanted, planner::Limits{}, false)) {
+      const gcode::Event event = printer.interpret({text + "\n", 1});
+      EXPECT_EQ(event.kind, gcode::EventKind::limits) << text;
+      planner::apply(event.limits, read);
+    }
+    for (std::size_t axis = 0; axis < 4; ++axis) {
+      EXPECT_DOUBLE_EQ(read.axis_max_accel_mm_s2[axis], wanted.axis_max_accel_mm_s2[axis]);
+      EXPECT_DOUBLE_EQ(read.axis_max_velocity_mm_s[axis], wanted.axis_max_velocity_mm_s[axis]);
+    }
+    EXPECT_DOUBLE_EQ(read.print_accel_mm_s2, wanted.print_accel_mm_s2);
+    EXPECT_DOUBLE_EQ(read.travel_accel_mm_s2, wanted.travel_accel_mm_s2);
+  }
+}
+
+TEST(LimitsInRun, LeaveZAndRetractionAsTheFileHasThem) {
+  planner::Limits raised;
+  raised.axis_max_accel_mm_s2 = {1e6, 1e6, 1e6, 1e6};
+  raised.retract_accel_mm_s2 = 1e6;
+  const planner::Limits file = some_limits();
+  const planner::Limits in_run = limits_in_run(Firmware::marlin, file, raised);
+  EXPECT_EQ(in_run.axis_max_accel_mm_s2, (std::array{1e6, 1e6, 400.0, 1e6}));
+  EXPECT_EQ(in_run.axis_max_velocity_mm_s[gcode::Z], 12.0);
+  EXPECT_EQ(in_run.retract_accel_mm_s2, 1250.0);
+}
+
+TEST(ShaperLines, SwitchOffAndBackOn) {
+  Shaper on;
+  on.freq_x_hz = 40.0;
+  on.freq_y_hz = 42.5;
+  EXPECT_THAT(shaper_lines(Firmware::klipper, {}, on),
+              ElementsAre("SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0"));
+  EXPECT_THAT(shaper_lines(Firmware::marlin, {}, on), ElementsAre("M593 X F0", "M593 Y F0"));
+  EXPECT_THAT(shaper_lines(Firmware::marlin, on, {}), ElementsAre("M593 X F40", "M593 Y F42.5"));
+  EXPECT_THAT(shaper_lines(Firmware::rrf, {}, on), ElementsAre("M593 P\"none\""));
+  on.settings.type_x = "mzv";
+  on.settings.damping_ratio_x = 0.1;
+  EXPECT_THAT(shaper_lines(Firmware::rrf, on, {}), ElementsAre("M593 P\"mzv\" F40 S0.1"));
+  EXPECT_THAT(shaper_lines(Firmware::rrf, on, on), IsEmpty());
+}
+
+}  // namespace
+}  // namespace unflex::emit
