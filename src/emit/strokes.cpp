@@ -6,6 +6,7 @@
 
 #include "line_ends.hpp"
 #include "speeds.hpp"
+#include "step_path.hpp"
 #include "timetable.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/compensable.hpp"
@@ -16,6 +17,9 @@ namespace {
 using gcode::X;
 using gcode::Y;
 using gcode::Z;
+
+// Rounding to a grid as coarse as this is what limits accuracy.
+constexpr double kCoarse_mm = 1e-3;
 
 // Moments at which a line must end: the ends of the run, lines that stand between moves, changes of
 // filament per mm. Those between which no line fits fall together.
@@ -64,16 +68,32 @@ bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const 
   return steps > rules.min_steps - 0.5;
 }
 
-// X and Y at the ends of the lines.
-struct Polygon {
-  std::vector<double> times_s;
-  std::vector<double> x_mm;
-  std::vector<double> y_mm;
-};
+// Across a path that is drawn errors count most, along it they only shift time; where nothing is
+// drawn they count as what they leave behind.
+ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
+  constexpr double kAlong = 0.02;
+  constexpr double kTravel = 0.02;
+  const gcode::Segment& segment = (*run.moves)[table.move_at(t)].segment;
+  if (!segment.extruding() || t > table.start_s(table.moves())) {
+    return {kTravel, 0.0, kTravel};
+  }
+  const double length = segment.length_xy_mm();
+  const double nx = -segment.delta(Y) / length;
+  const double ny = segment.delta(X) / length;
+  constexpr double kAcross = 1.0 - kAlong;
+  return {kAlong + kAcross * nx * nx, kAcross * nx * ny, kAlong + kAcross * ny * ny};
+}
 
-Polygon polygon(const Run& run, const std::vector<double>& required, const Grid& grid,
-                const LineRules& rules) {
+Polygon polygon(const Run& run, const Timetable& table, const std::vector<double>& required,
+                const Grid& grid, const LineRules& rules) {
   const dynamics::BaseTrajectory& base = *run.base;
+  if (grid.x.step_mm > kCoarse_mm || grid.y.step_mm > kCoarse_mm) {
+    const gcode::Position& start = run.moves->front().segment.start_mm;
+    const gcode::Position end = end_of(run);
+    return step_path(
+        base, required, [&](double t) { return error_weight(run, table, t); },
+        {start[X], start[Y], end[X], end[Y]}, grid.x, grid.y, rules);
+  }
   std::vector<double> times = {0.0};
   for (std::size_t i = 1; i < required.size(); ++i) {
     append_line_ends(base, required[i - 1], required[i], rules, times);
@@ -104,14 +124,17 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   LineRules rules = options.lines;
   rules.tolerance_mm *= run.tolerance_share;
   const Polygon vertices =
-      polygon(run, required_times(run, table, event_times_s, rules), grid, rules);
+      polygon(run, table, required_times(run, table, event_times_s, rules), grid, rules);
   const std::vector<double>& times = vertices.times_s;
+  if (times.empty()) {
+    return {};
+  }
 
   const gcode::Position start = run.moves->front().segment.start_mm;
   const gcode::Position end = end_of(run);
   std::vector<Stroke> result;
   Stroke last{0.0, start[X], start[Y], start[Z]};
-  double dropped_s = 0.0;
+  double dropped_s = times.front();
   std::size_t event = 0;
   for (std::size_t i = 1; i < times.size(); ++i) {
     Stroke stroke;

@@ -17,6 +17,9 @@ class Timetable {
   [[nodiscard]] double start_s(std::size_t i) const { return starts_s_[i]; }
   [[nodiscard]] std::size_t moves() const { return run_->moves->size(); }
 
+  // The move at time t.
+  [[nodiscard]] std::size_t move_at(double t) const;
+
   // E or Z at time t: each move's share of it is spread along the base's path while the move lasts,
   // which keeps filament per mm constant where the firmware looks for jumps in it, and the slope
   // small where the base is slower than the plan.
@@ -33,8 +36,6 @@ class Timetable {
   [[nodiscard]] std::vector<double> event_times_s() const;
 
  private:
-  // The move at time t.
-  [[nodiscard]] std::size_t move_at(double t) const;
   // Of move i, along the base's path.
   [[nodiscard]] double filament_per_mm(std::size_t i) const;
   [[nodiscard]] double travelled_mm(double t) const;

@@ -24,83 +24,9 @@ namespace {
 
 using dynamics::BaseTrajectory;
 using dynamics::FlexibleAxis;
-using dynamics::NozzleState;
 
 // ε: content above about six times the resonance is left to follow the base rather than the nozzle.
 constexpr double kBaseWeight = 1e-3;
-// Steps per node period of the nozzle that follows the base.
-constexpr int kSubsteps = 4;
-
-// exact_step of one length, which is linear in everything, as a matrix.
-class Step {
- public:
-  Step(const FlexibleAxis& axis, double dt) : dt_(dt) {
-    const auto column = [&](int i, NozzleState from, dynamics::BaseSegment base) {
-      const NozzleState to = dynamics::exact_step(axis, from, base, dt);
-      columns_.col(i) << to.position, to.velocity;
-    };
-    column(0, {1.0, 0.0}, {});
-    column(1, {0.0, 1.0}, {});
-    column(2, {}, {1.0, 0.0, 0.0});
-    column(3, {}, {0.0, 1.0, 0.0});
-    column(4, {}, {0.0, 0.0, 1.0});
-  }
-
-  [[nodiscard]] double dt() const { return dt_; }
-  [[nodiscard]] Eigen::Matrix2d free() const { return columns_.leftCols<2>(); }
-  [[nodiscard]] Eigen::Vector2d base(double position, double velocity, double accel = 0.0) const {
-    return columns_.col(2) * position + columns_.col(3) * velocity + columns_.col(4) * accel;
-  }
-
- private:
-  double dt_;
-  Eigen::Matrix<double, 2, 5> columns_;
-};
-
-// The nozzle that follows the base, from rest, at the nodes.
-std::vector<std::array<double, 2>> follow(const BaseTrajectory& base, AxisAt axis,
-                                          const FlexibleAxis& nozzle) {
-  const Step step(nozzle, base.period_s / kSubsteps);
-  Eigen::Vector2d state((base.*axis)(0.0).position_mm, 0.0);
-  std::vector<std::array<double, 2>> states = {{state[0], state[1]}};
-  for (std::size_t k = 1; k < base.nodes(); ++k) {
-    for (int i = 0; i < kSubsteps; ++i) {
-      const double t = base.period_s * static_cast<double>(k - 1) + i * step.dt();
-      const dynamics::AxisMotion from = (base.*axis)(t);
-      const double middle = (base.*axis)(t + 0.5 * step.dt()).accel_mm_s2;
-      const Eigen::Vector2d origin(from.position_mm, 0.0);
-      state = step.free() * (state - origin) + step.base(0.0, from.velocity_mm_s, middle) + origin;
-    }
-    states.push_back({state[0], state[1]});
-  }
-  return states;
-}
-
-// The same between the nodes, by cubic interpolation.
-class Followed {
- public:
-  Followed(const std::vector<std::array<double, 2>>& states, double period_s)
-      : states_(&states), period_s_(period_s) {}
-
-  [[nodiscard]] Eigen::Vector2d at(double t) const {
-    const double scaled = t / period_s_;
-    const auto k = std::min(static_cast<std::size_t>(std::max(scaled, 0.0)), states_->size() - 2);
-    const double s = scaled - static_cast<double>(k);
-    const std::array<double, 2>& a = (*states_)[k];
-    const std::array<double, 2>& b = (*states_)[k + 1];
-    const double rise = b[0] - a[0];
-    const double va = a[1] * period_s_;
-    const double vb = b[1] * period_s_;
-    const double square = 3.0 * rise - 2.0 * va - vb;
-    const double cube = va + vb - 2.0 * rise;
-    return {a[0] + s * (va + s * (square + s * cube)),
-            (va + s * (2.0 * square + 3.0 * s * cube)) / period_s_};
-  }
-
- private:
-  const std::vector<std::array<double, 2>>* states_;
-  double period_s_;
-};
 
 // One line: where it takes y, and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
 struct Stage {
@@ -226,14 +152,13 @@ double AxisGrid::nearest(double position_mm) const {
 }
 
 VertexChooser::VertexChooser(const BaseTrajectory& base, AxisAt axis, const FlexibleAxis& nozzle)
-    : base_(&base), axis_(axis), nozzle_(nozzle), followed_(follow(base, axis, nozzle)) {}
+    : base_(&base), axis_(axis), nozzle_(nozzle), followed_(base, axis, nozzle) {}
 
 AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisGrid& grid,
                                    const Reach& reach, double max_accel_mm_s2) const {
   const BaseTrajectory& base = *base_;
   const AxisAt axis = axis_;
   const std::size_t lines = times.size() - 1;
-  const Followed followed(followed_, base.period_s);
   std::map<std::int64_t, Step> steps;  // by length; few lengths are different
   std::vector<Stage> stages;
   std::vector<double> on_curve = {(base.*axis)(0.0).position_mm};
@@ -242,7 +167,7 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
     const double dt = duration / std::ceil(duration / base.period_s - 1e-9);
     constexpr double kSame_s = 1e-12;
     const Step& step = steps.try_emplace(std::llround(dt / kSame_s), nozzle_, dt).first->second;
-    stages.push_back(stage(base, axis, followed, step, times[k], times[k + 1]));
+    stages.push_back(stage(base, axis, followed_, step, times[k], times[k + 1]));
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
   const Reach within = with_base(reach, base, axis);

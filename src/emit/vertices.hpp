@@ -1,17 +1,14 @@
 // Where the lines of a run meet.
 #pragma once
 
-#include <array>
 #include <vector>
 
+#include "followed.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/emit/emitter.hpp"
 
 namespace unflex::emit {
-
-// BaseTrajectory::x_at or y_at.
-using AxisAt = dynamics::AxisMotion (dynamics::BaseTrajectory::*)(double) const;
 
 // Places that a vertex of one axis can have: offset + integer · step.
 struct AxisGrid {
@@ -46,8 +43,7 @@ class VertexChooser {
   const dynamics::BaseTrajectory* base_;
   AxisAt axis_;
   dynamics::FlexibleAxis nozzle_;
-  // (p, ṗ) of the nozzle that follows the base, at the nodes.
-  std::vector<std::array<double, 2>> followed_;
+  Followed followed_;
 };
 
 }  // namespace unflex::emit

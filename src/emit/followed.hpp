@@ -1,0 +1,44 @@
+// The nozzle that follows the base exactly, which the one that follows lines is compared with.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+
+namespace unflex::emit {
+
+// BaseTrajectory::x_at or y_at.
+using AxisAt = dynamics::AxisMotion (dynamics::BaseTrajectory::*)(double) const;
+
+// exact_step of one length, which is linear in everything, as a matrix. States are (p, ṗ).
+class Step {
+ public:
+  Step(const dynamics::FlexibleAxis& axis, double dt);
+
+  [[nodiscard]] double dt() const { return dt_; }
+  [[nodiscard]] Eigen::Matrix2d free() const { return columns_.leftCols<2>(); }
+  [[nodiscard]] Eigen::Vector2d base(double position, double velocity, double accel = 0.0) const {
+    return columns_.col(2) * position + columns_.col(3) * velocity + columns_.col(4) * accel;
+  }
+
+ private:
+  double dt_;
+  Eigen::Matrix<double, 2, 5> columns_;
+};
+
+// (p, ṗ) of the nozzle that follows one axis of the base, from rest.
+class Followed {
+ public:
+  Followed(const dynamics::BaseTrajectory& base, AxisAt axis, const dynamics::FlexibleAxis& nozzle);
+
+  [[nodiscard]] Eigen::Vector2d at(double t) const;
+
+ private:
+  std::vector<std::array<double, 2>> states_;  // at the base's nodes
+  double period_s_;
+};
+
+}  // namespace unflex::emit

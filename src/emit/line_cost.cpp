@@ -1,0 +1,191 @@
+#include "line_cost.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace unflex::emit {
+namespace {
+
+using dynamics::BaseTrajectory;
+using dynamics::FlexibleAxis;
+
+// ε: content above about six times the resonance is left to follow the base rather than the nozzle.
+constexpr double kBaseWeight = 1e-3;
+
+// Where (e, ė, o, u) of an axis stand in w.
+constexpr std::array<std::array<int, 4>, 2> kPlace = {{{0, 1, 2, 6}, {3, 4, 5, 7}}};
+
+}  // namespace
+
+LineChoice best_end(const LineCost& line, const Quadratic& to_go) {
+  const Matrix8d all = line.matrix + line.move.transpose() * to_go.matrix * line.move;
+  const Vector6d pull = to_go.matrix * line.shift + to_go.slope;
+  const Vector8d slope = line.slope + line.move.transpose() * pull;
+  LineChoice choice;
+  choice.stiffness = all.bottomRightCorner<2, 2>();
+  const Eigen::Matrix2d inverse = choice.stiffness.inverse();
+  choice.feedback = -inverse * all.bottomLeftCorner<2, 6>();
+  choice.feed_forward = -inverse * slope.tail<2>();
+  choice.value.matrix = all.topLeftCorner<6, 6>() + all.topRightCorner<6, 2>() * choice.feedback;
+  choice.value.slope = slope.head<6>() + all.topRightCorner<6, 2>() * choice.feed_forward;
+  choice.value.constant =
+      line.constant + to_go.at(line.shift) + 0.5 * slope.tail<2>().dot(choice.feed_forward);
+  return choice;
+}
+
+Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go) {
+  const Matrix8d all = line.matrix + line.move.transpose() * to_go.matrix * line.move;
+  const Vector6d pull = to_go.matrix * line.shift + to_go.slope;
+  const Vector8d slope = line.slope + line.move.transpose() * pull;
+  return {all.topLeftCorner<6, 6>(), slope.head<6>(), line.constant + to_go.at(line.shift)};
+}
+
+LineCosts::Answers LineCosts::answers(const FlexibleAxis& axis, double dt, std::size_t count) {
+  const Step step(axis, dt);
+  Answers result;
+  result.free.emplace_back(Eigen::Matrix2d::Identity());
+  result.step.emplace_back(Eigen::Vector2d::Zero());
+  result.ramp.emplace_back(Eigen::Vector2d::Zero());
+  for (std::size_t j = 0; j < count; ++j) {
+    result.free.emplace_back(step.free() * result.free.back());
+    result.step.emplace_back(step.free() * result.step.back() + step.base(1.0, 0.0));
+    result.ramp.emplace_back(step.free() * result.ramp.back() +
+                             step.base(static_cast<double>(j) * dt, 1.0));
+  }
+  return result;
+}
+
+LineCosts::LineCosts(const BaseTrajectory& base, const std::vector<double>& required,
+                     const std::function<ErrorWeight(double)>& weight, const LineRules& rules)
+    : nozzle_x_(rules.nozzle_x), nozzle_y_(rules.nozzle_y) {
+  const Followed follows_x(base, &BaseTrajectory::x_at, nozzle_x_);
+  const Followed follows_y(base, &BaseTrajectory::y_at, nozzle_y_);
+  const auto add = [&](double t) {
+    times_s_.push_back(t);
+    base_.emplace_back(base.x_at(t).position_mm, base.y_at(t).position_mm);
+    nozzle_x_at_.push_back(follows_x.at(t));
+    nozzle_y_at_.push_back(follows_y.at(t));
+    weights_.push_back(weight(t));
+  };
+  add(required.front());
+  for (std::size_t i = 1; i < required.size(); ++i) {
+    const double from = required[i - 1];
+    const double duration = required[i] - from;
+    const auto count = std::max<std::size_t>(
+        static_cast<std::size_t>(std::ceil(duration / base.period_s - 1e-9)), 1);
+    const double dt = duration / static_cast<double>(count);
+    const std::size_t last = times_s_.size() - 1 + count;
+    for (std::size_t j = 0; j < count; ++j) {
+      next_required_.push_back(last);
+      interval_.push_back(dt_s_.size());
+      add(j + 1 == count ? required[i] : from + static_cast<double>(j + 1) * dt);
+    }
+    const auto longest = static_cast<std::size_t>(std::ceil(rules.max_line_s / dt));
+    dt_s_.push_back(dt);
+    x_.push_back(answers(nozzle_x_, dt, std::min(longest + 1, count)));
+    y_.push_back(answers(nozzle_y_, dt, std::min(longest + 1, count)));
+  }
+  next_required_.push_back(times_s_.size() - 1);
+}
+
+LineCost LineCosts::line(std::size_t k, std::size_t m) const {
+  const std::size_t interval = interval_[k];
+  const double dt = dt_s_[interval];
+  const double duration = static_cast<double>(m) * dt;
+  LineCost result;
+  const std::array<const Answers*, 2> answers = {&x_[interval], &y_[interval]};
+  const std::array<const std::vector<Eigen::Vector2d>*, 2> nozzle = {&nozzle_x_at_, &nozzle_y_at_};
+  // What the chord from b_k to b_{k+m} alone would do.
+  std::array<Eigen::Vector2d, 2> begin;
+  std::array<double, 2> speed{};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    begin[axis] = (*nozzle[axis])[k] - Eigen::Vector2d(base_[k][a], 0.0);
+    speed[axis] = (base_[k + m][a] - base_[k][a]) / duration;
+  }
+  using Row = Eigen::RowVector4d;
+  Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();
+  Eigen::Matrix4d xy = Eigen::Matrix4d::Zero();
+  Eigen::Matrix4d yy = Eigen::Matrix4d::Zero();
+  std::array<Row, 2> slope = {Row::Zero(), Row::Zero()};
+  double off_base = 0.0;
+  for (std::size_t j = 1; j <= m; ++j) {
+    std::array<Row, 2> row;
+    std::array<double, 2> off{};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const auto a = static_cast<Eigen::Index>(axis);
+      const Answers& answer = *answers[axis];
+      const double ramp = answer.ramp[j][0] / duration;
+      row[axis] << answer.free[j](0, 0), answer.free[j](0, 1), answer.step[j][0] - ramp, ramp;
+      off[axis] = answer.free[j].row(0).dot(begin[axis]) + answer.ramp[j][0] * speed[axis] -
+                  ((*nozzle[axis])[k + j][0] - base_[k][a]);
+      const double s = static_cast<double>(j) / static_cast<double>(m);
+      const double d = speed[axis] * s * duration - (base_[k + j][a] - base_[k][a]);
+      const double weight = kBaseWeight * dt;
+      Eigen::Matrix4d& own = axis == 0 ? xx : yy;
+      own(2, 2) += weight * (1.0 - s) * (1.0 - s);
+      own(2, 3) += weight * (1.0 - s) * s;
+      own(3, 2) += weight * (1.0 - s) * s;
+      own(3, 3) += weight * s * s;
+      slope[axis][2] += weight * d * (1.0 - s);
+      slope[axis][3] += weight * d * s;
+      off_base += 0.5 * weight * d * d;
+    }
+    const ErrorWeight& w = weights_[k + j];
+    xx += dt * w.xx * row[0].transpose() * row[0];
+    xy += dt * w.xy * row[0].transpose() * row[1];
+    yy += dt * w.yy * row[1].transpose() * row[1];
+    const double to_x = dt * (w.xx * off[0] + w.xy * off[1]);
+    const double to_y = dt * (w.xy * off[0] + w.yy * off[1]);
+    slope[0] += to_x * row[0];
+    slope[1] += to_y * row[1];
+    result.constant += 0.5 * (to_x * off[0] + to_y * off[1]);
+  }
+  result.constant += off_base;
+  for (int i = 0; i < 4; ++i) {
+    const int xi = kPlace[0][static_cast<std::size_t>(i)];
+    const int yi = kPlace[1][static_cast<std::size_t>(i)];
+    for (int j = 0; j < 4; ++j) {
+      const int xj = kPlace[0][static_cast<std::size_t>(j)];
+      const int yj = kPlace[1][static_cast<std::size_t>(j)];
+      result.matrix(xi, xj) = xx(i, j);
+      result.matrix(xi, yj) = xy(i, j);
+      result.matrix(yj, xi) = xy(i, j);
+      result.matrix(yi, yj) = yy(i, j);
+    }
+    result.slope[xi] = slope[0][i];
+    result.slope[yi] = slope[1][i];
+  }
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    const Answers& answer = *answers[axis];
+    const Eigen::Index first = 3 * a;
+    result.move.block<2, 2>(first, first) = answer.free[m];
+    result.move.block<2, 1>(first, first + 2) = answer.step[m] - answer.ramp[m] / duration;
+    result.move.block<2, 1>(first, 6 + a) = answer.ramp[m] / duration;
+    result.move(first + 2, 6 + a) = 1.0;
+    result.shift.segment<2>(first) = answer.free[m] * begin[axis] + answer.ramp[m] * speed[axis] -
+                                     ((*nozzle[axis])[k + m] - Eigen::Vector2d(base_[k][a], 0.0));
+  }
+  return result;
+}
+
+Quadratic LineCosts::ring_down() const {
+  Quadratic result;
+  const auto fill = [&](Eigen::Index first, const FlexibleAxis& axis, double weight) {
+    // ∫ e² from the closed form (Lyapunov's equation).
+    const double omega = axis.omega_rad_s;
+    const double zeta = std::max(axis.zeta, 0.01);
+    result.matrix(first, first) = weight * (1.0 + 4.0 * zeta * zeta) / (4.0 * zeta * omega);
+    result.matrix(first, first + 1) = result.matrix(first + 1, first) =
+        weight * 0.5 / (omega * omega);
+    result.matrix(first + 1, first + 1) = weight / (4.0 * zeta * std::pow(omega, 3));
+  };
+  fill(0, nozzle_x_, weights_.back().xx);
+  fill(3, nozzle_y_, weights_.back().yy);
+  return result;
+}
+
+}  // namespace unflex::emit

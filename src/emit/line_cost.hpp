@@ -1,0 +1,105 @@
+// What a line of given duration does to the nozzle, as a quadratic of where it begins and ends.
+//
+// Notation:
+//   τ_k        candidate times of line ends; b_k, f_k  base and nozzle state (p, ṗ) there
+//   e          state of the nozzle that follows the lines, minus f
+//   o_k        a line's end at τ_k, minus b_k
+//   z          (e_x, ė_x, o_x, e_y, ė_y, o_y) at the line's begin
+//   u          (o_x, o_y) at its end
+//   w          (z, u)
+//   J          ½ ∫ eᵀWe + ε|d|² dt, d being the line minus the base
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "followed.hpp"
+#include "step_path.hpp"
+
+namespace unflex::emit {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Vector8d = Eigen::Matrix<double, 8, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Matrix8d = Eigen::Matrix<double, 8, 8>;
+
+// ½ zᵀPz + pᵀz + c.
+struct Quadratic {
+  Matrix6d matrix = Matrix6d::Zero();
+  Vector6d slope = Vector6d::Zero();
+  double constant = 0.0;
+
+  [[nodiscard]] double at(const Vector6d& z) const {
+    return z.dot(0.5 * (matrix * z) + slope) + constant;
+  }
+};
+
+// A line from τ_k to τ_{k+m}: J = ½ wᵀHw + hᵀw + c, z' = Mw + m.
+struct LineCost {
+  Matrix8d matrix = Matrix8d::Zero();
+  Vector8d slope = Vector8d::Zero();
+  double constant = 0.0;
+  Eigen::Matrix<double, 6, 8> move = Eigen::Matrix<double, 6, 8>::Zero();
+  Vector6d shift = Vector6d::Zero();
+};
+
+// A line and all that comes after it, as it depends on z and u:
+// value(z) + ½ (u − u*)ᵀ S (u − u*), u* = feedback z + feed_forward.
+struct LineChoice {
+  Quadratic value;
+  Eigen::Matrix2d stiffness = Eigen::Matrix2d::Zero();
+  Eigen::Matrix<double, 2, 6> feedback = Eigen::Matrix<double, 2, 6>::Zero();
+  Eigen::Vector2d feed_forward = Eigen::Vector2d::Zero();
+};
+
+[[nodiscard]] LineChoice best_end(const LineCost& line, const Quadratic& to_go);
+// The same for u = 0: the line ends on the base.
+[[nodiscard]] Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go);
+
+// The candidate times and what lines between them cost. Between two required times the candidates
+// are equally spaced, about a node of the base apart.
+class LineCosts {
+ public:
+  LineCosts(const dynamics::BaseTrajectory& base, const std::vector<double>& required,
+            const std::function<ErrorWeight(double)>& weight, const LineRules& rules);
+
+  // Number of candidate times.
+  [[nodiscard]] std::size_t size() const { return times_s_.size(); }
+  [[nodiscard]] double time_s(std::size_t k) const { return times_s_[k]; }
+  [[nodiscard]] const Eigen::Vector2d& base_mm(std::size_t k) const { return base_[k]; }
+  // The next required time after candidate k, as a candidate.
+  [[nodiscard]] std::size_t next_required(std::size_t k) const { return next_required_[k]; }
+
+  // k + m must not lie beyond next_required(k).
+  [[nodiscard]] LineCost line(std::size_t k, std::size_t m) const;
+
+  // After the last candidate the base rests and e rings down.
+  [[nodiscard]] Quadratic ring_down() const;
+
+ private:
+  // Answers of the nozzle on one axis after j candidates' time: to its own state, to a step and to
+  // a ramp of the base.
+  struct Answers {
+    std::vector<Eigen::Matrix2d> free;
+    std::vector<Eigen::Vector2d> step;
+    std::vector<Eigen::Vector2d> ramp;
+  };
+  [[nodiscard]] static Answers answers(const dynamics::FlexibleAxis& axis, double dt,
+                                       std::size_t count);
+
+  dynamics::FlexibleAxis nozzle_x_;
+  dynamics::FlexibleAxis nozzle_y_;
+  std::vector<double> times_s_;
+  std::vector<std::size_t> next_required_;
+  std::vector<Eigen::Vector2d> base_;
+  std::vector<Eigen::Vector2d> nozzle_x_at_;  // f
+  std::vector<Eigen::Vector2d> nozzle_y_at_;
+  std::vector<ErrorWeight> weights_;
+  std::vector<std::size_t> interval_;  // of each candidate, into dt_s_
+  std::vector<double> dt_s_;
+  std::vector<Answers> x_;  // of each interval
+  std::vector<Answers> y_;
+};
+
+}  // namespace unflex::emit

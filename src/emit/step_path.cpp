@@ -1,0 +1,461 @@
+// A firmware that counts motor steps takes a line's end to the nearest of them, and may refuse
+// lines of less than a few. Where a line ends, and when, are then whole numbers, and the best are
+// searched for: of all lines that begin where a kept state is, those that cost least are kept for
+// each candidate time, kKept of them (the M-algorithm; Anderson & Mohan, IEEE Trans. Comm. 32
+// (1984), 169). A state's cost is that of its lines so far and of the best lines to come if places
+// were no whole numbers and times fixed, which is a linear-quadratic regulator's (Anderson & Moore,
+// Optimal Control: Linear Quadratic Methods, § 2.4 and 4.1). line_cost.hpp has the notation.
+#include "step_path.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "line_cost.hpp"
+
+namespace unflex::emit {
+namespace {
+
+// States kept for each candidate time.
+constexpr std::size_t kKept = 16;
+// Ends tried for each state and duration.
+constexpr std::size_t kEnds = 3;
+// How many places off the best one, along the path, an end may lie.
+constexpr int kAlong = 5;
+// The first line may begin this many candidates late.
+constexpr std::size_t kLatest = 24;
+// Candidates that are searched at once, and how far beyond them.
+constexpr std::size_t kBlock = 2048;
+constexpr std::size_t kBeyond = 256;
+// A line is worth this much time of an error as large as the tolerance.
+constexpr double kLineWorth_s = 0.01;
+// What too quick a change of speed costs, mm²·s.
+constexpr double kTooQuick = 1e-6;
+
+using Place = std::array<std::int64_t, 2>;  // in steps
+
+struct State {
+  double total = 0.0;  // what it has cost and will cost
+  double spent = 0.0;
+  Vector6d z = Vector6d::Zero();
+  Place at{};
+  Eigen::Vector2d speed_mm_s = Eigen::Vector2d::Zero();  // of the line that ends here
+  double line_s = 0.0;                                   // its duration
+  std::size_t k = 0;
+  std::int32_t parent = -1;
+};
+
+class Search {
+ public:
+  Search(const LineCosts& costs, const RunEnds& ends, const AxisGrid& x, const AxisGrid& y,
+         const LineRules& rules)
+      : costs_(&costs), ends_(ends), grid_{&x, &y}, rules_(&rules), last_(costs.size() - 1) {
+    end_ = {steps(0, ends.end_x_mm), steps(1, ends.end_y_mm)};
+    line_worth_ = 0.5 * rules.tolerance_mm * rules.tolerance_mm * kLineWorth_s;
+  }
+
+  Polygon run() {
+    Polygon polygon;
+    std::vector<State> begin = late_starts();
+    std::size_t from = 0;
+    while (true) {
+      const std::size_t until = from + kBlock;
+      const bool is_last = until + kBeyond >= last_;
+      const std::optional<std::size_t> best =
+          block(begin, from, is_last ? last_ : until + kBeyond, is_last);
+      if (!best) {
+        return {};
+      }
+      // The best state's ancestors, the youngest last.
+      std::vector<const State*> way;
+      for (auto i = static_cast<std::int32_t>(*best); i >= 0;
+           i = arena_[static_cast<std::size_t>(i)].parent) {
+        way.push_back(&arena_[static_cast<std::size_t>(i)]);
+      }
+      std::ranges::reverse(way);
+      std::size_t taken = 0;
+      for (const State* state : way) {
+        if (!is_last && state->k > until) {
+          break;
+        }
+        if (taken++ > 0 || from == 0) {
+          polygon.times_s.push_back(costs_->time_s(state->k));
+          polygon.x_mm.push_back(mm(0, state->at[0]));
+          polygon.y_mm.push_back(mm(1, state->at[1]));
+        }
+      }
+      if (is_last) {
+        return polygon;
+      }
+      if (taken < 2) {
+        return {};  // a line longer than a block
+      }
+      State next = *way[taken - 1];
+      next.parent = -1;
+      from = next.k;
+      begin = {next};
+    }
+  }
+
+ private:
+  [[nodiscard]] std::int64_t steps(std::size_t axis, double mm) const {
+    return std::llround((mm - grid_[axis]->offset_mm) / grid_[axis]->step_mm);
+  }
+  [[nodiscard]] double mm(std::size_t axis, std::int64_t steps) const {
+    return grid_[axis]->offset_mm + static_cast<double>(steps) * grid_[axis]->step_mm;
+  }
+  [[nodiscard]] Eigen::Vector2d mm(const Place& at) const { return {mm(0, at[0]), mm(1, at[1])}; }
+
+  // The states that begin with the run, at rest in the meantime.
+  std::vector<State> late_starts() {
+    const Eigen::Vector2d start(ends_.start_x_mm, ends_.start_y_mm);
+    State state;
+    state.at = {steps(0, start[0]), steps(1, start[1])};
+    state.z[2] = start[0] - costs_->base_mm(0)[0];
+    state.z[5] = start[1] - costs_->base_mm(0)[1];
+    std::vector<State> result = {state};
+    const std::size_t latest = std::min(kLatest, costs_->next_required(0) - 1);
+    for (std::size_t k = 0; k < latest; ++k) {
+      const LineCost rest = costs_->line(k, 1);
+      Vector8d w;
+      w << state.z, start - costs_->base_mm(k + 1);
+      state.spent += w.dot(0.5 * (rest.matrix * w) + rest.slope) + rest.constant;
+      state.z = rest.move * w + rest.shift;
+      state.k = k + 1;
+      result.push_back(state);
+    }
+    return result;
+  }
+
+  // The number of candidates that the shortest line takes.
+  [[nodiscard]] std::size_t shortest(std::size_t k) const {
+    const double dt = costs_->time_s(k + 1) - costs_->time_s(k);
+    return static_cast<std::size_t>(std::ceil(rules_->min_line_s / dt - 1e-9));
+  }
+
+  // The durations tried for a line from candidate k on, in candidates.
+  void durations(std::size_t k, std::vector<std::size_t>& result) const {
+    result.clear();
+    const double dt = costs_->time_s(k + 1) - costs_->time_s(k);
+    const std::size_t left = costs_->next_required(k) - k;
+    const std::size_t least = shortest(k);
+    const auto most = static_cast<std::size_t>(rules_->max_line_s / dt);
+    for (std::size_t m = least; m <= std::min(most, left); m += std::max<std::size_t>(m / 6, 1)) {
+      if (m + least <= left) {
+        result.push_back(m);
+      }
+    }
+    if (left >= least && left <= std::max(most, 2 * least)) {
+      result.push_back(left);
+    }
+  }
+
+  // The duration of a line from k on that the cost to go reckons with: the shortest that covers
+  // enough steps.
+  [[nodiscard]] std::size_t usual(std::size_t k) const {
+    const std::size_t left = costs_->next_required(k) - k;
+    const std::size_t least = shortest(k);
+    if (left < 2 * least) {
+      return left;
+    }
+    const double dt = costs_->time_s(k + 1) - costs_->time_s(k);
+    const auto most = static_cast<std::size_t>(rules_->max_line_s / dt);
+    std::size_t m = least;
+    const auto covers = [&](std::size_t steps) {
+      const Eigen::Vector2d way = costs_->base_mm(k + steps) - costs_->base_mm(k);
+      return std::max(std::abs(way[0]) / grid_[0]->step_mm, std::abs(way[1]) / grid_[1]->step_mm) >=
+             rules_->min_steps;
+    };
+    while (m < std::min(most, left - least) && !covers(m)) {
+      ++m;
+    }
+    return m;
+  }
+
+  // After the last line: the machine rests at the run's end while the base still moves, from
+  // candidate k on. Of e alone, that is of z with o as it must be.
+  void set_rest_costs(std::size_t from) {
+    rest_.assign(last_ - from + 1, {});
+    rest_.back() = costs_->ring_down();
+    for (std::size_t k = last_; k-- > from;) {
+      const LineCost line = costs_->line(k, 1);
+      const Eigen::Vector2d o = mm(end_) - costs_->base_mm(k);
+      const Eigen::Vector2d u = mm(end_) - costs_->base_mm(k + 1);
+      const Quadratic& next = rest_[k + 1 - from];
+      const Matrix8d all = line.matrix + line.move.transpose() * next.matrix * line.move;
+      const Vector8d slope =
+          line.slope + line.move.transpose() * (next.matrix * line.shift + next.slope);
+      // w = e + fixed
+      Vector8d fixed = Vector8d::Zero();
+      fixed[2] = o[0];
+      fixed[5] = o[1];
+      fixed[6] = u[0];
+      fixed[7] = u[1];
+      Quadratic& here = rest_[k - from];
+      here.matrix = all.topLeftCorner<6, 6>();
+      here.slope = (slope + all * fixed).head<6>();
+      here.constant =
+          line.constant + next.at(line.shift) + slope.dot(fixed) + 0.5 * fixed.dot(all * fixed);
+      for (const Eigen::Index i : {2, 5}) {
+        here.matrix.row(i).setZero();
+        here.matrix.col(i).setZero();
+        here.slope[i] = 0.0;
+      }
+    }
+  }
+
+  void set_costs_to_go(std::size_t from, std::size_t until, bool is_last) {
+    to_go_.assign(until - from + 1, {});
+    rest_from_ = until + 1;
+    if (is_last) {
+      rest_from_ = std::max(from, until - std::min(until, kBeyond));
+      set_rest_costs(rest_from_);
+    }
+    const Quadratic at_end = costs_->ring_down();
+    for (std::size_t k = until + 1; k-- > from;) {
+      Quadratic& here = to_go_[k - from];
+      const std::size_t m = k < until ? usual(k) : 0;
+      if (k == until || k + m > until) {
+        here = is_last ? rest_[k - rest_from_] : at_end;
+      } else if (is_last && k + m == until) {
+        here = ending_on_base(costs_->line(k, m), to_go_[k + m - from]);
+      } else {
+        here = best_end(costs_->line(k, m), to_go_[k + m - from]).value;
+      }
+    }
+  }
+
+  // Searches candidates from `from` to `until`; the best state at the end, in arena_.
+  std::optional<std::size_t> block(const std::vector<State>& begin, std::size_t from,
+                                   std::size_t until, bool is_last) {
+    set_costs_to_go(from, until, is_last);
+    arena_.clear();
+    from_ = from;
+    kept_.assign(until - from + 1, {});
+    finished_.reset();
+    for (State state : begin) {
+      state.total = state.spent + to_go_[state.k - from].at(state.z);
+      keep(state);
+    }
+    std::vector<std::size_t> tried;
+    for (std::size_t k = from; k < until; ++k) {
+      std::vector<State>& states = kept_[k - from];
+      if (states.empty()) {
+        continue;
+      }
+      const std::size_t first = arena_.size();
+      arena_.insert(arena_.end(), states.begin(), states.end());
+      std::vector<State>().swap(states);
+      durations(k, tried);
+      for (const std::size_t m : tried) {
+        if (k + m > until) {
+          continue;
+        }
+        const LineCost line = costs_->line(k, m);
+        const Quadratic& after = to_go_[k + m - from];
+        const LineChoice choice = best_end(line, after);
+        const std::size_t count = arena_.size();
+        for (std::size_t i = first; i < count; ++i) {
+          if (is_last && k + m >= rest_from_) {
+            finish(i, m, line);
+          }
+          if (!is_last || k + m < until) {
+            extend(i, m, line, choice);
+          }
+        }
+      }
+    }
+    if (is_last) {
+      if (!finished_) {
+        return std::nullopt;
+      }
+      arena_.push_back(*finished_);
+      return arena_.size() - 1;
+    }
+    // Of the states at the end of the block.
+    std::optional<std::size_t> best;
+    for (std::size_t k = until; k > from && k + kBeyond / 2 > until; --k) {
+      for (const State& state : kept_[k - from]) {
+        arena_.push_back(state);
+      }
+    }
+    for (std::size_t i = 0; i < arena_.size(); ++i) {
+      if (arena_[i].k + kBeyond / 2 > until && (!best || arena_[i].total < arena_[*best].total)) {
+        best = i;
+      }
+    }
+    return best;
+  }
+
+  // State i with a line over m candidates to u.
+  [[nodiscard]] State after_line(std::size_t i, std::size_t m, const LineCost& line,
+                                 const Place& to, const Quadratic& to_go) const {
+    const State& state = arena_[i];
+    State next;
+    next.k = state.k + m;
+    next.at = to;
+    next.parent = static_cast<std::int32_t>(i);
+    next.line_s = costs_->time_s(next.k) - costs_->time_s(state.k);
+    next.speed_mm_s = (mm(to) - mm(state.at)) / next.line_s;
+    Vector8d w;
+    w << state.z, mm(to) - costs_->base_mm(next.k);
+    next.z = line.move * w + line.shift;
+    next.spent = state.spent + w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant +
+                 line_worth_ +
+                 too_quick(next.speed_mm_s - state.speed_mm_s, state.line_s + next.line_s);
+    next.total = next.spent + to_go.at(next.z);
+    return next;
+  }
+
+  [[nodiscard]] double too_quick(const Eigen::Vector2d& change_mm_s, double both_s) const {
+    const double allowed = rules_->max_accel_mm_s2 * 0.5 * both_s;
+    const double excess = change_mm_s.cwiseAbs().maxCoeff() / allowed - 1.0;
+    return excess > 0.0 ? kTooQuick * (1.0 + excess) : 0.0;
+  }
+
+  [[nodiscard]] bool enough(const Place& from, const Place& to) const {
+    return std::max(std::abs(to[0] - from[0]), std::abs(to[1] - from[1])) >= rules_->min_steps;
+  }
+
+  // The last line, after which the machine rests.
+  void finish(std::size_t i, std::size_t m, const LineCost& line) {
+    const State& state = arena_[i];
+    if (!enough(state.at, end_)) {
+      return;
+    }
+    State done = after_line(i, m, line, end_, rest_[state.k + m - rest_from_]);
+    done.total += too_quick(done.speed_mm_s, done.line_s);
+    if (!finished_ || done.total < finished_->total) {
+      finished_ = done;
+    }
+  }
+
+  void extend(std::size_t i, std::size_t m, const LineCost& line, const LineChoice& choice) {
+    struct End {
+      Place at{};
+      double extra = 0.0;
+    };
+    const State state = arena_[i];
+    const Eigen::Vector2d best =
+        costs_->base_mm(state.k + m) + choice.feedback * state.z + choice.feed_forward;
+    std::array<End, kEnds> ends;
+    std::size_t count = 0;
+    const auto consider = [&](const Place& to) {
+      if (!enough(state.at, to) || !within(0, to[0], state.k + m) ||
+          !within(1, to[1], state.k + m)) {
+        return;
+      }
+      const Eigen::Vector2d off = mm(to) - best;
+      End end{to, 0.5 * off.dot(choice.stiffness * off)};
+      for (std::size_t j = 0; j < count; ++j) {
+        if (ends[j].at == to) {
+          return;
+        }
+      }
+      if (count < kEnds) {
+        ends[count++] = end;
+      } else if (end.extra < ends[count - 1].extra) {
+        ends[count - 1] = end;
+      } else {
+        return;
+      }
+      for (std::size_t j = count - 1; j > 0 && ends[j].extra < ends[j - 1].extra; --j) {
+        std::swap(ends[j], ends[j - 1]);
+      }
+    };
+    // The best end among those with `steps` on one axis.
+    const auto consider_line = [&](std::size_t axis, std::int64_t steps_there) {
+      const std::size_t other = 1 - axis;
+      const auto a = static_cast<Eigen::Index>(axis);
+      const auto o = static_cast<Eigen::Index>(other);
+      const double off = mm(axis, steps_there) - best[a];
+      const double across = best[o] - choice.stiffness(0, 1) / choice.stiffness(o, o) * off;
+      Place to{};
+      to[axis] = steps_there;
+      to[other] = steps(other, across);
+      consider(to);
+    };
+    const std::size_t along = choice.stiffness(0, 0) < choice.stiffness(1, 1) ? 0 : 1;
+    const std::int64_t nearest = steps(along, best[static_cast<Eigen::Index>(along)]);
+    for (int d = -kAlong; d <= kAlong; ++d) {
+      consider_line(along, nearest + d);
+    }
+    const std::int64_t across = steps(1 - along, best[static_cast<Eigen::Index>(1 - along)]);
+    for (int d = -1; d <= 1; ++d) {
+      consider_line(1 - along, across + d);
+    }
+    if (count < kEnds && rules_->min_steps > 1) {
+      for (const std::size_t axis : {0U, 1U}) {
+        consider_line(axis, state.at[axis] - rules_->min_steps);
+        consider_line(axis, state.at[axis] + rules_->min_steps);
+      }
+    }
+    const double least = state.spent + choice.value.at(state.z) + line_worth_;
+    for (std::size_t j = 0; j < count; ++j) {
+      if (worth_keeping(state.k + m, least + ends[j].extra)) {
+        keep(after_line(i, m, line, ends[j].at, to_go_[state.k + m - from_]));
+      }
+    }
+  }
+
+  // Neither beyond the travel nor further out than the base.
+  [[nodiscard]] bool within(std::size_t axis, std::int64_t at, std::size_t k) const {
+    const Reach& reach = axis == 0 ? rules_->reach_x : rules_->reach_y;
+    const double base = costs_->base_mm(k)[static_cast<Eigen::Index>(axis)];
+    const double there = mm(axis, at);
+    const double slack = grid_[axis]->step_mm;
+    return there >= std::min(reach.min_mm, base - slack) &&
+           there <= std::max(reach.max_mm, base + slack);
+  }
+
+  [[nodiscard]] bool worth_keeping(std::size_t k, double total) const {
+    const std::vector<State>& states = kept_[k - from_];
+    return states.size() < kKept || total < states.back().total;
+  }
+
+  // Keeps the best kKept states of a candidate time, one of each place, in order.
+  void keep(const State& state) {
+    std::vector<State>& states = kept_[state.k - from_];
+    const auto same = std::ranges::find(states, state.at, &State::at);
+    if (same != states.end()) {
+      if (same->total <= state.total) {
+        return;
+      }
+      states.erase(same);
+    }
+    const auto place = std::ranges::upper_bound(states, state.total, {}, &State::total);
+    states.insert(place, state);
+    if (states.size() > kKept) {
+      states.pop_back();
+    }
+  }
+
+  const LineCosts* costs_;
+  RunEnds ends_;
+  std::array<const AxisGrid*, 2> grid_;
+  const LineRules* rules_;
+  std::size_t last_;  // candidate
+  Place end_{};
+  double line_worth_ = 0.0;
+  // Of the block that is being searched.
+  std::size_t from_ = 0;
+  std::vector<Quadratic> to_go_;
+  std::size_t rest_from_ = 0;
+  std::vector<Quadratic> rest_;
+  std::vector<State> arena_;
+  std::vector<std::vector<State>> kept_;
+  std::optional<State> finished_;
+};
+
+}  // namespace
+
+Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double>& required,
+                  const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
+                  const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
+  const LineCosts costs(base, required, weight, rules);
+  return Search(costs, ends, x, y, rules).run();
+}
+
+}  // namespace unflex::emit

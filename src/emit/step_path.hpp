@@ -1,0 +1,46 @@
+// Lines between whole motor steps, for firmwares that round every line to them.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/emit/emitter.hpp"
+#include "vertices.hpp"
+
+namespace unflex::emit {
+
+// Where the lines of a run end, and when; the first entry is where and when the first one begins.
+struct Polygon {
+  std::vector<double> times_s;
+  std::vector<double> x_mm;
+  std::vector<double> y_mm;
+};
+
+// What a nozzle that is off by e counts at one moment: eᵀWe.
+struct ErrorWeight {
+  double xx = 1.0;
+  double xy = 0.0;
+  double yy = 1.0;
+};
+
+// The ends of a run's lines.
+struct RunEnds {
+  double start_x_mm = 0.0;
+  double start_y_mm = 0.0;
+  double end_x_mm = 0.0;
+  double end_y_mm = 0.0;
+};
+
+// The lines of at least rules.min_steps of `x` or `y` that make the nozzle follow the base best: a
+// line may be longer or end a few steps further along the path if that brings its end closer to
+// whole steps across it. A line ends at each of the `required` times, of which the first and the
+// last are the run's own; the first line may begin late, the last one end early. Empty if there is
+// no such line.
+[[nodiscard]] Polygon step_path(const dynamics::BaseTrajectory& base,
+                                const std::vector<double>& required,
+                                const std::function<ErrorWeight(double)>& weight,
+                                const RunEnds& ends, const AxisGrid& x, const AxisGrid& y,
+                                const LineRules& rules);
+
+}  // namespace unflex::emit
