@@ -14,6 +14,11 @@ using dynamics::FlexibleAxis;
 // ε: content above about six times the resonance is left to follow the base rather than the nozzle.
 constexpr double kBaseWeight = 1e-3;
 
+// Candidate times per node of the base.
+constexpr double kPerNode = 2.0;
+// Moments at most at which the error during a line is looked at.
+constexpr std::size_t kLooks = 16;
+
 // Where (e, ė, o, u) of an axis stand in w.
 constexpr std::array<std::array<int, 4>, 2> kPlace = {{{0, 1, 2, 6}, {3, 4, 5, 7}}};
 
@@ -74,7 +79,7 @@ LineCosts::LineCosts(const BaseTrajectory& base, const std::vector<double>& requ
     const double from = required[i - 1];
     const double duration = required[i] - from;
     const auto count = std::max<std::size_t>(
-        static_cast<std::size_t>(std::ceil(duration / base.period_s - 1e-9)), 1);
+        static_cast<std::size_t>(std::ceil(kPerNode * duration / base.period_s - 1e-9)), 1);
     const double dt = duration / static_cast<double>(count);
     const std::size_t last = times_s_.size() - 1 + count;
     for (std::size_t j = 0; j < count; ++j) {
@@ -111,7 +116,10 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
   Eigen::Matrix4d yy = Eigen::Matrix4d::Zero();
   std::array<Row, 2> slope = {Row::Zero(), Row::Zero()};
   double off_base = 0.0;
-  for (std::size_t j = 1; j <= m; ++j) {
+  const std::size_t looks = std::min(m, kLooks);
+  const double between_s = duration / static_cast<double>(looks);
+  for (std::size_t look = 1; look <= looks; ++look) {
+    const std::size_t j = look * m / looks;
     std::array<Row, 2> row;
     std::array<double, 2> off{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -123,7 +131,7 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
                   ((*nozzle[axis])[k + j][0] - base_[k][a]);
       const double s = static_cast<double>(j) / static_cast<double>(m);
       const double d = speed[axis] * s * duration - (base_[k + j][a] - base_[k][a]);
-      const double weight = kBaseWeight * dt;
+      const double weight = kBaseWeight * between_s;
       Eigen::Matrix4d& own = axis == 0 ? xx : yy;
       own(2, 2) += weight * (1.0 - s) * (1.0 - s);
       own(2, 3) += weight * (1.0 - s) * s;
@@ -134,11 +142,11 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
       off_base += 0.5 * weight * d * d;
     }
     const ErrorWeight& w = weights_[k + j];
-    xx += dt * w.xx * row[0].transpose() * row[0];
-    xy += dt * w.xy * row[0].transpose() * row[1];
-    yy += dt * w.yy * row[1].transpose() * row[1];
-    const double to_x = dt * (w.xx * off[0] + w.xy * off[1]);
-    const double to_y = dt * (w.xy * off[0] + w.yy * off[1]);
+    xx += between_s * w.xx * row[0].transpose() * row[0];
+    xy += between_s * w.xy * row[0].transpose() * row[1];
+    yy += between_s * w.yy * row[1].transpose() * row[1];
+    const double to_x = between_s * (w.xx * off[0] + w.xy * off[1]);
+    const double to_y = between_s * (w.xy * off[0] + w.yy * off[1]);
     slope[0] += to_x * row[0];
     slope[1] += to_y * row[1];
     result.constant += 0.5 * (to_x * off[0] + to_y * off[1]);

@@ -100,7 +100,7 @@ class Candidate {
 }  // namespace
 
 bool long_enough(const BaseTrajectory& base, double from, double to, const LineRules& rules) {
-  if (to - from < rules.min_line_s - 1e-12) {
+  if (to - from < rules.even_line_s() - 1e-12) {
     return false;
   }
   if (rules.min_line_mm <= 0.0) {

@@ -11,7 +11,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <utility>
 
 #include "line_cost.hpp"
 
@@ -19,20 +21,20 @@ namespace unflex::emit {
 namespace {
 
 // States kept for each candidate time.
-constexpr std::size_t kKept = 16;
+constexpr std::size_t kKept = 4;
 // Ends tried for each state and duration.
 constexpr std::size_t kEnds = 3;
 // How many places off the best one, along the path, an end may lie.
-constexpr int kAlong = 5;
-// The first line may begin this many candidates late.
-constexpr std::size_t kLatest = 24;
+constexpr int kAlong = 3;
 // Candidates that are searched at once, and how far beyond them.
-constexpr std::size_t kBlock = 2048;
-constexpr std::size_t kBeyond = 256;
+constexpr std::size_t kBlock = 4096;
+constexpr std::size_t kBeyond = 512;
 // A line is worth this much time of an error as large as the tolerance.
 constexpr double kLineWorth_s = 0.01;
 // What too quick a change of speed costs, mm²·s.
 constexpr double kTooQuick = 1e-6;
+// What a line too many costs.
+constexpr double kTooMany = 1e-5;
 
 using Place = std::array<std::int64_t, 2>;  // in steps
 
@@ -47,6 +49,8 @@ struct State {
   std::int32_t parent = -1;
 };
 
+std::int64_t nearest(double steps) { return static_cast<std::int64_t>(std::floor(steps + 0.5)); }
+
 class Search {
  public:
   Search(const LineCosts& costs, const RunEnds& ends, const AxisGrid& x, const AxisGrid& y,
@@ -57,8 +61,7 @@ class Search {
   }
 
   Polygon run() {
-    Polygon polygon;
-    std::vector<State> begin = late_starts();
+    State begin = start();
     std::size_t from = 0;
     while (true) {
       const std::size_t until = from + kBlock;
@@ -81,13 +84,13 @@ class Search {
           break;
         }
         if (taken++ > 0 || from == 0) {
-          polygon.times_s.push_back(costs_->time_s(state->k));
-          polygon.x_mm.push_back(mm(0, state->at[0]));
-          polygon.y_mm.push_back(mm(1, state->at[1]));
+          polygon_.times_s.push_back(costs_->time_s(state->k));
+          polygon_.x_mm.push_back(mm(0, state->at[0]));
+          polygon_.y_mm.push_back(mm(1, state->at[1]));
         }
       }
       if (is_last) {
-        return polygon;
+        return std::move(polygon_);
       }
       if (taken < 2) {
         return {};  // a line longer than a block
@@ -95,38 +98,25 @@ class Search {
       State next = *way[taken - 1];
       next.parent = -1;
       from = next.k;
-      begin = {next};
+      begin = next;
     }
   }
 
  private:
   [[nodiscard]] std::int64_t steps(std::size_t axis, double mm) const {
-    return std::llround((mm - grid_[axis]->offset_mm) / grid_[axis]->step_mm);
+    return nearest((mm - grid_[axis]->offset_mm) / grid_[axis]->step_mm);
   }
   [[nodiscard]] double mm(std::size_t axis, std::int64_t steps) const {
     return grid_[axis]->offset_mm + static_cast<double>(steps) * grid_[axis]->step_mm;
   }
   [[nodiscard]] Eigen::Vector2d mm(const Place& at) const { return {mm(0, at[0]), mm(1, at[1])}; }
 
-  // The states that begin with the run, at rest in the meantime.
-  std::vector<State> late_starts() {
-    const Eigen::Vector2d start(ends_.start_x_mm, ends_.start_y_mm);
+  [[nodiscard]] State start() const {
     State state;
-    state.at = {steps(0, start[0]), steps(1, start[1])};
-    state.z[2] = start[0] - costs_->base_mm(0)[0];
-    state.z[5] = start[1] - costs_->base_mm(0)[1];
-    std::vector<State> result = {state};
-    const std::size_t latest = std::min(kLatest, costs_->next_required(0) - 1);
-    for (std::size_t k = 0; k < latest; ++k) {
-      const LineCost rest = costs_->line(k, 1);
-      Vector8d w;
-      w << state.z, start - costs_->base_mm(k + 1);
-      state.spent += w.dot(0.5 * (rest.matrix * w) + rest.slope) + rest.constant;
-      state.z = rest.move * w + rest.shift;
-      state.k = k + 1;
-      result.push_back(state);
-    }
-    return result;
+    state.at = {steps(0, ends_.start_x_mm), steps(1, ends_.start_y_mm)};
+    state.z[2] = ends_.start_x_mm - costs_->base_mm(0)[0];
+    state.z[5] = ends_.start_y_mm - costs_->base_mm(0)[1];
+    return state;
   }
 
   // The number of candidates that the shortest line takes.
@@ -142,7 +132,7 @@ class Search {
     const std::size_t left = costs_->next_required(k) - k;
     const std::size_t least = shortest(k);
     const auto most = static_cast<std::size_t>(rules_->max_line_s / dt);
-    for (std::size_t m = least; m <= std::min(most, left); m += std::max<std::size_t>(m / 6, 1)) {
+    for (std::size_t m = least; m <= std::min(most, left); m += std::max<std::size_t>(m / 12, 1)) {
       if (m + least <= left) {
         result.push_back(m);
       }
@@ -162,7 +152,8 @@ class Search {
     }
     const double dt = costs_->time_s(k + 1) - costs_->time_s(k);
     const auto most = static_cast<std::size_t>(rules_->max_line_s / dt);
-    std::size_t m = least;
+    std::size_t m =
+        std::max(least, static_cast<std::size_t>(std::ceil(rules_->even_line_s() / dt)));
     const auto covers = [&](std::size_t steps) {
       const Eigen::Vector2d way = costs_->base_mm(k + steps) - costs_->base_mm(k);
       return std::max(std::abs(way[0]) / grid_[0]->step_mm, std::abs(way[1]) / grid_[1]->step_mm) >=
@@ -228,17 +219,14 @@ class Search {
   }
 
   // Searches candidates from `from` to `until`; the best state at the end, in arena_.
-  std::optional<std::size_t> block(const std::vector<State>& begin, std::size_t from,
-                                   std::size_t until, bool is_last) {
+  std::optional<std::size_t> block(State begin, std::size_t from, std::size_t until, bool is_last) {
     set_costs_to_go(from, until, is_last);
     arena_.clear();
     from_ = from;
     kept_.assign(until - from + 1, {});
     finished_.reset();
-    for (State state : begin) {
-      state.total = state.spent + to_go_[state.k - from].at(state.z);
-      keep(state);
-    }
+    begin.total = begin.spent + to_go_[0].at(begin.z);
+    keep(begin);
     std::vector<std::size_t> tried;
     for (std::size_t k = from; k < until; ++k) {
       std::vector<State>& states = kept_[k - from];
@@ -248,6 +236,11 @@ class Search {
       const std::size_t first = arena_.size();
       arena_.insert(arena_.end(), states.begin(), states.end());
       std::vector<State>().swap(states);
+      earliest_s_.clear();
+      for (std::size_t i = first; i < arena_.size(); ++i) {
+        earliest_s_.push_back(earliest_end_s(i));
+      }
+      first_ = first;
       durations(k, tried);
       for (const std::size_t m : tried) {
         if (k + m > until) {
@@ -289,6 +282,28 @@ class Search {
     return best;
   }
 
+  // From when on a line that begins with state i may end, for no more than burst_lines to begin
+  // within any burst_s.
+  [[nodiscard]] double earliest_end_s(std::size_t i) const {
+    if (rules_->burst_lines <= 0) {
+      return 0.0;
+    }
+    auto ancestor = static_cast<std::int32_t>(i);
+    int lines = 1;
+    for (; lines < rules_->burst_lines && arena_[static_cast<std::size_t>(ancestor)].parent >= 0;
+         ++lines) {
+      ancestor = arena_[static_cast<std::size_t>(ancestor)].parent;
+    }
+    const auto before = static_cast<std::size_t>(rules_->burst_lines - lines);
+    const std::size_t written = polygon_.times_s.size();
+    if (before >= written) {
+      return 0.0;
+    }
+    return rules_->burst_s + (before == 0
+                                  ? costs_->time_s(arena_[static_cast<std::size_t>(ancestor)].k)
+                                  : polygon_.times_s[written - 1 - before]);
+  }
+
   // State i with a line over m candidates to u.
   [[nodiscard]] State after_line(std::size_t i, std::size_t m, const LineCost& line,
                                  const Place& to, const Quadratic& to_go) const {
@@ -304,7 +319,8 @@ class Search {
     next.z = line.move * w + line.shift;
     next.spent = state.spent + w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant +
                  line_worth_ +
-                 too_quick(next.speed_mm_s - state.speed_mm_s, state.line_s + next.line_s);
+                 too_quick(next.speed_mm_s - state.speed_mm_s, state.line_s + next.line_s) +
+                 (costs_->time_s(next.k) < earliest_s_[i - first_] ? kTooMany : 0.0);
     next.total = next.spent + to_go.at(next.z);
     return next;
   }
@@ -332,59 +348,69 @@ class Search {
     }
   }
 
+  // Tries lines over m candidates from state i to the places nearest to the best one, as the cost
+  // has it.
   void extend(std::size_t i, std::size_t m, const LineCost& line, const LineChoice& choice) {
+    const State state = arena_[i];
+    const std::size_t k = state.k + m;
+    const std::vector<State>& rivals = kept_[k - from_];
+    const double least = state.spent + choice.value.at(state.z) + line_worth_;
+    const double room = rivals.size() < kKept ? std::numeric_limits<double>::infinity()
+                                              : rivals.back().total - least;
+    if (room <= 0.0) {
+      return;
+    }
+    // From here on in steps.
+    const Eigen::Vector2d best_mm =
+        costs_->base_mm(k) + choice.feedback * state.z + choice.feed_forward;
+    const std::array<double, 2> step = {grid_[0]->step_mm, grid_[1]->step_mm};
+    const std::array<double, 2> best = {(best_mm[0] - grid_[0]->offset_mm) / step[0],
+                                        (best_mm[1] - grid_[1]->offset_mm) / step[1]};
+    const double xx = choice.stiffness(0, 0) * step[0] * step[0];
+    const double xy = choice.stiffness(0, 1) * step[0] * step[1];
+    const double yy = choice.stiffness(1, 1) * step[1] * step[1];
     struct End {
       Place at{};
       double extra = 0.0;
     };
-    const State state = arena_[i];
-    const Eigen::Vector2d best =
-        costs_->base_mm(state.k + m) + choice.feedback * state.z + choice.feed_forward;
     std::array<End, kEnds> ends;
     std::size_t count = 0;
     const auto consider = [&](const Place& to) {
-      if (!enough(state.at, to) || !within(0, to[0], state.k + m) ||
-          !within(1, to[1], state.k + m)) {
+      const double dx = static_cast<double>(to[0]) - best[0];
+      const double dy = static_cast<double>(to[1]) - best[1];
+      const End end{to, 0.5 * (xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy)};
+      if (end.extra >= (count < kEnds ? room : std::min(room, ends[count - 1].extra)) ||
+          !enough(state.at, to) || !within(0, to[0], k) || !within(1, to[1], k)) {
         return;
       }
-      const Eigen::Vector2d off = mm(to) - best;
-      End end{to, 0.5 * off.dot(choice.stiffness * off)};
       for (std::size_t j = 0; j < count; ++j) {
         if (ends[j].at == to) {
           return;
         }
       }
       if (count < kEnds) {
-        ends[count++] = end;
-      } else if (end.extra < ends[count - 1].extra) {
-        ends[count - 1] = end;
-      } else {
-        return;
+        ++count;
       }
+      ends[count - 1] = end;
       for (std::size_t j = count - 1; j > 0 && ends[j].extra < ends[j - 1].extra; --j) {
         std::swap(ends[j], ends[j - 1]);
       }
     };
-    // The best end among those with `steps` on one axis.
+    // The best place among those with this many steps on one axis.
     const auto consider_line = [&](std::size_t axis, std::int64_t steps_there) {
-      const std::size_t other = 1 - axis;
-      const auto a = static_cast<Eigen::Index>(axis);
-      const auto o = static_cast<Eigen::Index>(other);
-      const double off = mm(axis, steps_there) - best[a];
-      const double across = best[o] - choice.stiffness(0, 1) / choice.stiffness(o, o) * off;
+      const double off = static_cast<double>(steps_there) - best[axis];
+      const double ratio = xy / (axis == 0 ? yy : xx);
       Place to{};
       to[axis] = steps_there;
-      to[other] = steps(other, across);
+      to[1 - axis] = nearest(best[1 - axis] - ratio * off);
       consider(to);
     };
-    const std::size_t along = choice.stiffness(0, 0) < choice.stiffness(1, 1) ? 0 : 1;
-    const std::int64_t nearest = steps(along, best[static_cast<Eigen::Index>(along)]);
+    const std::size_t along = xx < yy ? 0 : 1;
     for (int d = -kAlong; d <= kAlong; ++d) {
-      consider_line(along, nearest + d);
+      consider_line(along, nearest(best[along]) + d);
     }
-    const std::int64_t across = steps(1 - along, best[static_cast<Eigen::Index>(1 - along)]);
     for (int d = -1; d <= 1; ++d) {
-      consider_line(1 - along, across + d);
+      consider_line(1 - along, nearest(best[1 - along]) + d);
     }
     if (count < kEnds && rules_->min_steps > 1) {
       for (const std::size_t axis : {0U, 1U}) {
@@ -392,10 +418,9 @@ class Search {
         consider_line(axis, state.at[axis] + rules_->min_steps);
       }
     }
-    const double least = state.spent + choice.value.at(state.z) + line_worth_;
     for (std::size_t j = 0; j < count; ++j) {
-      if (worth_keeping(state.k + m, least + ends[j].extra)) {
-        keep(after_line(i, m, line, ends[j].at, to_go_[state.k + m - from_]));
+      if (worth_keeping(k, least + ends[j].extra)) {
+        keep(after_line(i, m, line, ends[j].at, to_go_[k - from_]));
       }
     }
   }
@@ -439,12 +464,16 @@ class Search {
   std::size_t last_;  // candidate
   Place end_{};
   double line_worth_ = 0.0;
+  Polygon polygon_;  // of the blocks before
   // Of the block that is being searched.
   std::size_t from_ = 0;
   std::vector<Quadratic> to_go_;
   std::size_t rest_from_ = 0;
   std::vector<Quadratic> rest_;
   std::vector<State> arena_;
+  // Of the states of the candidate time that is being extended, which begin at first_.
+  std::size_t first_ = 0;
+  std::vector<double> earliest_s_;
   std::vector<std::vector<State>> kept_;
   std::optional<State> finished_;
 };

@@ -20,6 +20,10 @@ constexpr double kAccelShare = 0.98;
 // begin within any 100 ms all the same.
 constexpr double kClockRoom = 1.002;
 
+// The time over which lines are counted, and how short a single one may be against the even pace.
+constexpr double kBurst_s = 0.1;
+constexpr double kShortest = 0.4;
+
 double min_line_s(const machine::Settings& settings) {
   return std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.max_lines_per_s());
 }
@@ -196,6 +200,12 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.reach_x = reach(settings.printer.travel_x_mm);
   options.lines.reach_y = reach(settings.printer.travel_y_mm);
   options.lines.min_line_s = min_line_s(settings);
+  if (settings.printer.firmware != Firmware::klipper) {
+    options.lines.burst_lines = static_cast<int>(settings.max_lines_per_s() * kBurst_s);
+    options.lines.burst_s = kClockRoom * kBurst_s;
+    options.lines.min_line_s =
+        std::max(settings.emit.period_ms * 1e-3, kShortest / settings.max_lines_per_s());
+  }
   if (settings.printer.firmware == Firmware::marlin) {
     // Rounding may take a step off either end.
     options.lines.min_steps = options.fixed.min_steps_per_segment;

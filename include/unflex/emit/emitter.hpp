@@ -5,6 +5,7 @@
 //   v  its speed, mm/s                 A  the firmware's acceleration inside a run, mm/s²
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <string>
@@ -38,9 +39,18 @@ struct LineRules {
   double min_line_mm = 0.0;    // … or than this along both X and Y
   int min_steps = 1;           // of the grid; the firmware joins shorter lines to the next
   double max_line_s = 0.05;
+  // Between whole steps lines may be as short as min_line_s, but no more than burst_lines begin
+  // within any burst_s.
+  int burst_lines = 0;
+  double burst_s = 0.1;
   // On either axis from line to line, where lines can be short enough.
   double max_speed_step_mm_s = 30.0;
   double max_accel_mm_s2 = 20000.0;  // the same change by the time between the lines' middles
+
+  // The duration of lines as short as they can be without end.
+  [[nodiscard]] double even_line_s() const {
+    return burst_lines > 0 ? std::max(min_line_s, burst_s / burst_lines) : min_line_s;
+  }
 };
 
 struct EmitOptions {
