@@ -32,9 +32,9 @@ constexpr std::size_t kBeyond = 512;
 // A line is worth this much time of an error as large as the tolerance.
 constexpr double kLineWorth_s = 0.01;
 // What too quick a change of speed costs, mm²·s.
-constexpr double kTooQuick = 1e-6;
+constexpr double kTooQuick = 1e-4;
 // What a line too many costs.
-constexpr double kTooMany = 1e-5;
+constexpr double kTooMany = 1e-4;
 
 using Place = std::array<std::int64_t, 2>;  // in steps
 

@@ -61,6 +61,17 @@ gcode::Position end_of(const Run& run) {
   return run.moves->back().segment.end_mm;
 }
 
+// Where the file is when the run begins. Marlin may be behind by the filament of a move that was too
+// short for it.
+gcode::Position start_of(const Run& run) {
+  for (const gcode::Event& event : *run.events) {
+    if (!event.segments.empty()) {
+      return event.segments.front().start_mm;
+    }
+  }
+  return run.moves->front().segment.start_mm;
+}
+
 // Whether the firmware moves for such a line, and not only with the next one.
 bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const LineRules& rules) {
   const double steps = std::max(std::abs(to.x_mm - from.x_mm) / grid.x.step_mm,
@@ -123,6 +134,10 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const std::vector<double> event_times_s = table.event_times_s();
   LineRules rules = options.lines;
   rules.tolerance_mm *= run.tolerance_share;
+  if (run.even_pace) {
+    rules.min_line_s = rules.even_line_s();
+    rules.burst_lines = 0;
+  }
   const Polygon vertices =
       polygon(run, table, required_times(run, table, event_times_s, rules), grid, rules);
   const std::vector<double>& times = vertices.times_s;
@@ -133,6 +148,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const gcode::Position start = run.moves->front().segment.start_mm;
   const gcode::Position end = end_of(run);
   std::vector<Stroke> result;
+  const double file_start_e_mm = start_of(run)[gcode::E];
+  const double behind_mm = file_start_e_mm - start[gcode::E];
   Stroke last{0.0, start[X], start[Y], start[Z]};
   double dropped_s = times.front();
   std::size_t event = 0;
@@ -144,6 +161,9 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     stroke.y_mm = is_end ? end[Y] : vertices.y_mm[i];
     stroke.z_mm = is_end ? end[Z] : grid.z.nearest(table.along_path_mm(times[i], Z));
     stroke.e_mm = table.filament_mm(times[i]);
+    if (behind_mm > 0.0) {
+      stroke.e_mm = std::max(stroke.e_mm - behind_mm, 0.0);
+    }
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_times_s.size() &&
            event_times_s[event] <= times[i] - 0.5 * rules.min_line_s) {
@@ -163,7 +183,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   }
   if (!result.empty()) {
     Stroke& final = result.back();
-    final.e_mm = table.filament_mm(times.back());
+    final.e_mm = end[gcode::E] - file_start_e_mm;
     final.x_mm = end[X];
     final.y_mm = end[Y];
     final.z_mm = end[Z];

@@ -224,16 +224,25 @@ class Compensator {
       for (const gcode::Event& event : piece.events) {
         emitter_.line(event, text);
       }
-      true_nozzle_ = after_motion(piece, true_nozzle_, rules_.nozzle);
+      keep_motion(piece);
     } else if (std::optional<std::string> failure = write_run(pending, text)) {
       emitter_.keep(piece.events, text);
-      true_nozzle_ = after_motion(piece, true_nozzle_, rules_.nozzle);
+      keep_motion(piece);
       note_fallback(pending, std::move(*failure));
     }
     for (const gcode::Event& event : piece.events) {
       bytes_written_ += event.line.text.size();
     }
     output_ << text;
+  }
+
+  // The printer moves as the input has it.
+  void keep_motion(const Piece& piece) {
+    true_nozzle_ = after_motion(piece, true_nozzle_, rules_.nozzle);
+    line_rate_.change_text();
+    for (const planner::PlannedMove& move : piece.moves) {
+      line_rate_.add(move);
+    }
   }
 
   // The run as compensated text, or why its original lines must stand.
@@ -244,20 +253,27 @@ class Compensator {
     const dynamics::BaseTrajectory base{setup_.period_s, compensate::join(pending.spans, pending.x),
                                         compensate::join(pending.spans, pending.y)};
     const Piece& piece = pending.piece;
-    // Where long lines break a limit or cost too much, short ones may do.
+    // Where long lines break a limit or cost too much, short ones may do, and lines of an even pace
+    // where bursts of them meet those before the run.
+    struct Attempt {
+      double tolerance_share;
+      bool even_pace;
+    };
     std::string objection;
-    for (const double share : {1.0, kFineTolerance}) {
+    for (const Attempt& attempt :
+         {Attempt{1.0, false}, Attempt{kFineTolerance, false}, Attempt{1.0, true}}) {
       emit::Emitter trial = emitter_;
       text.clear();
-      if (!trial.run(
-              {&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s, share},
-              text)) {
+      if (!trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s,
+                      attempt.tolerance_share, attempt.even_pace},
+                     text)) {
         return "the motion is too small to be written";
       }
       Verdict verdict = judge(piece.moves, text, emitter_.printer(), emitter_.printer_limits(),
-                              true_nozzle_, rules_);
+                              true_nozzle_, rules_, line_rate_, job_.settings.max_lines_per_s());
       if (!verdict.objection) {
         true_nozzle_ = verdict.nozzle;
+        line_rate_ = std::move(verdict.rate);
         emitter_ = std::move(trial);
         ++report_->runs_compensated;
         report_->windows_solved += pending.spans.size();
@@ -292,6 +308,7 @@ class Compensator {
   // has set ringing, the next run starts with.
   dynamics::NozzleXY nozzle_;
   dynamics::NozzleXY true_nozzle_;  // where the writer is
+  verify::LineRate line_rate_;      // of what is written
   std::deque<Pending> queue_;
   std::size_t first_index_ = 0;   // of queue_'s front among all pieces
   std::deque<Ticket> tickets_;    // of the windows of queue_

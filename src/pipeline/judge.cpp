@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace unflex::pipeline {
 namespace {
@@ -82,7 +83,8 @@ dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
 
 Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_view text,
               gcode::Interpreter printer, const planner::Limits& printer_limits,
-              const dynamics::NozzleXY& nozzle, const verify::Rules& rules) {
+              const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
+              verify::LineRate rate, double max_lines_per_s) {
   const std::unique_ptr<planner::Planner> planner =
       planner::make_planner(printer_limits, rules.fixed);
   std::size_t line = 0;
@@ -104,6 +106,17 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_vie
     verdict.objection = std::move(broken);
     return verdict;
   }
+  rate.forget();
+  rate.change_text();
+  for (const planner::PlannedMove& move : replayed) {
+    rate.add(move);
+  }
+  if (rate.max_per_s() > max_lines_per_s) {
+    verdict.objection = fmt::format("{:.0f} lines per second are more than {:.0f}",
+                                    rate.max_per_s(), max_lines_per_s);
+    return verdict;
+  }
+  verdict.rate = std::move(rate);
   const verify::RunDeviation before = verify::measure(original, original, nozzle, rules.nozzle);
   const verify::RunDeviation after =
       verify::measure(original, replayed, nozzle, rules.nozzle, rules.lead_in_s);

@@ -11,6 +11,7 @@
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
+#include "unflex/verify/line_rate.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
@@ -23,15 +24,17 @@ namespace unflex::pipeline {
 
 struct Verdict {
   std::optional<std::string> objection;  // why the original moves must stand
-  dynamics::NozzleXY nozzle;             // without objection: after the run
+  dynamics::NozzleXY nozzle;             // without objection: after the run …
+  verify::LineRate rate;                 // … and its lines counted
 };
 
 // Replays the text of a compensated run as the printer would, in the state the printer is in before
-// it. Objects where it breaks a hard rule, or where its deviation is larger than that of the
-// original moves.
+// it. Objects where it breaks a hard rule, asks for more lines per second than allowed, or where
+// its deviation is larger than that of the original moves. rate: of the lines before it.
 [[nodiscard]] Verdict judge(const std::vector<planner::PlannedMove>& original,
                             std::string_view text, gcode::Interpreter printer,
                             const planner::Limits& printer_limits, const dynamics::NozzleXY& nozzle,
-                            const verify::Rules& rules);
+                            const verify::Rules& rules, verify::LineRate rate,
+                            double max_lines_per_s);
 
 }  // namespace unflex::pipeline

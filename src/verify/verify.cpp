@@ -10,11 +10,11 @@
 #include "filament_ledger.hpp"
 #include "line_check.hpp"
 #include "meter.hpp"
-#include "move_rate.hpp"
 #include "reference_path.hpp"
 #include "regime_check.hpp"
 #include "replay.hpp"
 #include "run_check.hpp"
+#include "unflex/verify/line_rate.hpp"
 #include "violations.hpp"
 
 namespace unflex::verify {
@@ -114,7 +114,7 @@ class Verifier {
   Excursion output_excursion_;
   bool input_refused_ = false;    // a move of the section is refused by the firmware
   std::size_t refused_line_ = 0;  // the same in the output; 0: none
-  MoveRate rate_;
+  LineRate rate_;
   std::size_t section_first_ = 0;  // first piece of the path in this section
   std::size_t original_next_ = 0;  // the one the original plays next
   std::size_t moves_ = 0;
@@ -239,7 +239,7 @@ void Verifier::play_run_moves(bool compensated) {
 }
 
 void Verifier::play(const planner::PlannedMove& move) {
-  rate_.add(totals_.emitted_time_s);
+  rate_.add(move);
   const double start_s = emitted_.time_s();
   emitted_.play(move);
   filament_.play(move, start_s);

@@ -42,8 +42,10 @@ struct Corner {
     }
   }
 
-  [[nodiscard]] std::optional<std::string> objection_to(const std::string& text) const {
-    return pipeline::judge(run.moves, text, printer, {}, at_rest({0.0, 0.0, 0.2, 0.0}), rules())
+  [[nodiscard]] std::optional<std::string> objection_to(const std::string& text,
+                                                        double max_lines_per_s = 1000.0) const {
+    return pipeline::judge(run.moves, text, printer, {}, at_rest({0.0, 0.0, 0.2, 0.0}), rules(), {},
+                           max_lines_per_s)
         .objection;
   }
 

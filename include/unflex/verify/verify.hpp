@@ -65,7 +65,7 @@ struct VerifyReport {
   double worst_move_extrusion_error_mm = 0.0;
   // Longest lag or lead of the nozzle behind the plan of its run, averaged over 0.1 s.
   double worst_run_drift_s = 0.0;
-  double max_lines_per_s = 0.0;    // most moves started in any 100 ms of the output, × 10
+  double max_lines_per_s = 0.0;    // most lines begun in any 100 ms of the output, × 10
   double segment_ms_median = 0.0;  // of the output's moves inside compensated runs
   std::size_t runs = 0;            // compensated ones
   std::size_t output_lines = 0;

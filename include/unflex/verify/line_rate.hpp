@@ -1,0 +1,42 @@
+// How many lines a file asks of the firmware per second.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <deque>
+
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::verify {
+
+// Counts lines that move the machine, one after the other. What a line becomes in the firmware, the
+// segments of an arc, counts as one.
+class LineRate {
+ public:
+  void add(const planner::PlannedMove& move) {
+    if (move.segment.line != line_) {
+      line_ = move.segment.line;
+      starts_s_.push_back(time_s_);
+      while (starts_s_.front() <= time_s_ - kSpan_s) {
+        starts_s_.pop_front();
+      }
+      most_ = std::max(most_, starts_s_.size());
+    }
+    time_s_ += move.duration_s();
+  }
+
+  // Lines of another text follow, numbered anew.
+  void change_text() { line_ = 0; }
+  // Most lines begun within any 100 ms, per second, since the beginning or forget().
+  [[nodiscard]] double max_per_s() const { return static_cast<double>(most_) / kSpan_s; }
+  void forget() { most_ = 0; }
+
+ private:
+  static constexpr double kSpan_s = 0.1;
+  std::deque<double> starts_s_;
+  double time_s_ = 0.0;
+  std::size_t line_ = 0;
+  std::size_t most_ = 0;
+};
+
+}  // namespace unflex::verify
