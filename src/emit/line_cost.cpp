@@ -15,7 +15,7 @@ using dynamics::FlexibleAxis;
 constexpr double kBaseWeight = 1e-3;
 
 // Candidate times per node of the base.
-constexpr double kPerNode = 2.0;
+constexpr std::size_t kPerNode = 2;
 // Moments at most at which the error during a line is looked at.
 constexpr std::size_t kLooks = 16;
 
@@ -25,9 +25,11 @@ constexpr std::array<std::array<int, 4>, 2> kPlace = {{{0, 1, 2, 6}, {3, 4, 5, 7
 }  // namespace
 
 LineChoice best_end(const LineCost& line, const Quadratic& to_go) {
-  const Matrix8d all = line.matrix + line.move.transpose() * to_go.matrix * line.move;
-  const Vector6d pull = to_go.matrix * line.shift + to_go.slope;
-  const Vector8d slope = line.slope + line.move.transpose() * pull;
+  // lazyProduct: Eigen's blocked product does not pay at this size.
+  const Eigen::Matrix<double, 6, 8> moved = to_go.matrix.lazyProduct(line.move);
+  const Matrix8d all = line.matrix + line.move.transpose().lazyProduct(moved);
+  const Vector6d pull = to_go.matrix.lazyProduct(line.shift) + to_go.slope;
+  const Vector8d slope = line.slope + line.move.transpose().lazyProduct(pull);
   LineChoice choice;
   choice.stiffness = all.bottomRightCorner<2, 2>();
   const Eigen::Matrix2d inverse = choice.stiffness.inverse();
@@ -41,9 +43,10 @@ LineChoice best_end(const LineCost& line, const Quadratic& to_go) {
 }
 
 Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go) {
-  const Matrix8d all = line.matrix + line.move.transpose() * to_go.matrix * line.move;
-  const Vector6d pull = to_go.matrix * line.shift + to_go.slope;
-  const Vector8d slope = line.slope + line.move.transpose() * pull;
+  const Eigen::Matrix<double, 6, 8> moved = to_go.matrix.lazyProduct(line.move);
+  const Matrix8d all = line.matrix + line.move.transpose().lazyProduct(moved);
+  const Vector6d pull = to_go.matrix.lazyProduct(line.shift) + to_go.slope;
+  const Vector8d slope = line.slope + line.move.transpose().lazyProduct(pull);
   return {all.topLeftCorner<6, 6>(), slope.head<6>(), line.constant + to_go.at(line.shift)};
 }
 
@@ -62,45 +65,61 @@ LineCosts::Answers LineCosts::answers(const FlexibleAxis& axis, double dt, std::
   return result;
 }
 
-LineCosts::LineCosts(const BaseTrajectory& base, const std::vector<double>& required,
-                     const std::function<ErrorWeight(double)>& weight, const LineRules& rules)
-    : nozzle_x_(rules.nozzle_x), nozzle_y_(rules.nozzle_y) {
+LineCosts::LineCosts(const BaseTrajectory& base, const std::function<ErrorWeight(double)>& weight,
+                     const LineRules& rules)
+    : nozzle_x_(rules.nozzle_x), nozzle_y_(rules.nozzle_y), dt_s_(base.period_s / kPerNode) {
   const Followed follows_x(base, &BaseTrajectory::x_at, nozzle_x_);
   const Followed follows_y(base, &BaseTrajectory::y_at, nozzle_y_);
-  const auto add = [&](double t) {
-    times_s_.push_back(t);
+  const std::size_t count = (base.nodes() - 1) * kPerNode + 1;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double t = time_s(k);
     base_.emplace_back(base.x_at(t).position_mm, base.y_at(t).position_mm);
     nozzle_x_at_.push_back(follows_x.at(t));
     nozzle_y_at_.push_back(follows_y.at(t));
     weights_.push_back(weight(t));
-  };
-  add(required.front());
-  for (std::size_t i = 1; i < required.size(); ++i) {
-    const double from = required[i - 1];
-    const double duration = required[i] - from;
-    const auto count = std::max<std::size_t>(
-        static_cast<std::size_t>(std::ceil(kPerNode * duration / base.period_s - 1e-9)), 1);
-    const double dt = duration / static_cast<double>(count);
-    const std::size_t last = times_s_.size() - 1 + count;
-    for (std::size_t j = 0; j < count; ++j) {
-      next_required_.push_back(last);
-      interval_.push_back(dt_s_.size());
-      add(j + 1 == count ? required[i] : from + static_cast<double>(j + 1) * dt);
-    }
-    const auto longest = static_cast<std::size_t>(std::ceil(rules.max_line_s / dt));
-    dt_s_.push_back(dt);
-    x_.push_back(answers(nozzle_x_, dt, std::min(longest + 1, count)));
-    y_.push_back(answers(nozzle_y_, dt, std::min(longest + 1, count)));
   }
-  next_required_.push_back(times_s_.size() - 1);
+  const auto longest = static_cast<std::size_t>(std::ceil(rules.max_line_s / dt_s_)) + 1;
+  x_ = answers(nozzle_x_, dt_s_, longest);
+  y_ = answers(nozzle_y_, dt_s_, longest);
+  shapes_.emplace_back();
+  for (std::size_t m = 1; m <= longest; ++m) {
+    shapes_.push_back(shape(m));
+  }
+  same_weight_until_.assign(count, count - 1);
+  for (std::size_t k = count - 1; k-- > 0;) {
+    same_weight_until_[k] = weights_[k] == weights_[k + 1] ? same_weight_until_[k + 1] : k;
+  }
+}
+
+LineCosts::Shape LineCosts::shape(std::size_t m) const {
+  const double duration = static_cast<double>(m) * dt_s_;
+  Shape result;
+  const std::size_t looks = std::min(m, kLooks);
+  const double between_s = duration / static_cast<double>(looks);
+  for (std::size_t look = 1; look <= looks; ++look) {
+    const std::size_t j = look * m / looks;
+    const auto row = [&](const Answers& answer) {
+      const double ramp = answer.ramp[j][0] / duration;
+      return Row(answer.free[j](0, 0), answer.free[j](0, 1), answer.step[j][0] - ramp, ramp);
+    };
+    const double s = static_cast<double>(j) / static_cast<double>(m);
+    result.looks.push_back({j, s, row(x_), row(y_)});
+    const Row& x = result.looks.back().x;
+    const Row& y = result.looks.back().y;
+    result.xx += between_s * x.transpose() * x;
+    result.xy += between_s * x.transpose() * y;
+    result.yy += between_s * y.transpose() * y;
+    const Row base(0.0, 0.0, 1.0 - s, s);
+    result.base += kBaseWeight * between_s * base.transpose() * base;
+  }
+  return result;
 }
 
 LineCost LineCosts::line(std::size_t k, std::size_t m) const {
-  const std::size_t interval = interval_[k];
-  const double dt = dt_s_[interval];
-  const double duration = static_cast<double>(m) * dt;
+  const double duration = static_cast<double>(m) * dt_s_;
+  const Shape& shape = shapes_[m];
   LineCost result;
-  const std::array<const Answers*, 2> answers = {&x_[interval], &y_[interval]};
+  const std::array<const Answers*, 2> answers = {&x_, &y_};
   const std::array<const std::vector<Eigen::Vector2d>*, 2> nozzle = {&nozzle_x_at_, &nozzle_y_at_};
   // What the chord from b_k to b_{k+m} alone would do.
   std::array<Eigen::Vector2d, 2> begin;
@@ -110,48 +129,47 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
     begin[axis] = (*nozzle[axis])[k] - Eigen::Vector2d(base_[k][a], 0.0);
     speed[axis] = (base_[k + m][a] - base_[k][a]) / duration;
   }
-  using Row = Eigen::RowVector4d;
-  Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();
+  const bool same_weight = same_weight_until_[k + 1] >= k + m;
+  const ErrorWeight& only = weights_[k + 1];
+  Eigen::Matrix4d xx = shape.base;
   Eigen::Matrix4d xy = Eigen::Matrix4d::Zero();
-  Eigen::Matrix4d yy = Eigen::Matrix4d::Zero();
-  std::array<Row, 2> slope = {Row::Zero(), Row::Zero()};
-  double off_base = 0.0;
-  const std::size_t looks = std::min(m, kLooks);
-  const double between_s = duration / static_cast<double>(looks);
-  for (std::size_t look = 1; look <= looks; ++look) {
-    const std::size_t j = look * m / looks;
-    std::array<Row, 2> row;
+  Eigen::Matrix4d yy = shape.base;
+  if (same_weight) {
+    xx += only.xx * shape.xx;
+    xy = only.xy * shape.xy;
+    yy += only.yy * shape.yy;
+  }
+  Row slope_x = Row::Zero();
+  Row slope_y = Row::Zero();
+  const double between_s = duration / static_cast<double>(shape.looks.size());
+  const double base_weight = kBaseWeight * between_s;
+  for (const Shape::Look& look : shape.looks) {
+    const std::size_t j = look.j;
     std::array<double, 2> off{};
+    std::array<double, 2> off_base{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const auto a = static_cast<Eigen::Index>(axis);
       const Answers& answer = *answers[axis];
-      const double ramp = answer.ramp[j][0] / duration;
-      row[axis] << answer.free[j](0, 0), answer.free[j](0, 1), answer.step[j][0] - ramp, ramp;
-      off[axis] = answer.free[j].row(0).dot(begin[axis]) + answer.ramp[j][0] * speed[axis] -
-                  ((*nozzle[axis])[k + j][0] - base_[k][a]);
-      const double s = static_cast<double>(j) / static_cast<double>(m);
-      const double d = speed[axis] * s * duration - (base_[k + j][a] - base_[k][a]);
-      const double weight = kBaseWeight * between_s;
-      Eigen::Matrix4d& own = axis == 0 ? xx : yy;
-      own(2, 2) += weight * (1.0 - s) * (1.0 - s);
-      own(2, 3) += weight * (1.0 - s) * s;
-      own(3, 2) += weight * (1.0 - s) * s;
-      own(3, 3) += weight * s * s;
-      slope[axis][2] += weight * d * (1.0 - s);
-      slope[axis][3] += weight * d * s;
-      off_base += 0.5 * weight * d * d;
+      off[axis] = answer.free[j](0, 0) * begin[axis][0] + answer.free[j](0, 1) * begin[axis][1] +
+                  answer.ramp[j][0] * speed[axis] - ((*nozzle[axis])[k + j][0] - base_[k][a]);
+      off_base[axis] = speed[axis] * look.s * duration - (base_[k + j][a] - base_[k][a]);
     }
     const ErrorWeight& w = weights_[k + j];
-    xx += between_s * w.xx * row[0].transpose() * row[0];
-    xy += between_s * w.xy * row[0].transpose() * row[1];
-    yy += between_s * w.yy * row[1].transpose() * row[1];
+    if (!same_weight) {
+      xx += between_s * w.xx * look.x.transpose() * look.x;
+      xy += between_s * w.xy * look.x.transpose() * look.y;
+      yy += between_s * w.yy * look.y.transpose() * look.y;
+    }
     const double to_x = between_s * (w.xx * off[0] + w.xy * off[1]);
     const double to_y = between_s * (w.xy * off[0] + w.yy * off[1]);
-    slope[0] += to_x * row[0];
-    slope[1] += to_y * row[1];
-    result.constant += 0.5 * (to_x * off[0] + to_y * off[1]);
+    slope_x += to_x * look.x;
+    slope_y += to_y * look.y;
+    const Row base(0.0, 0.0, 1.0 - look.s, look.s);
+    slope_x += base_weight * off_base[0] * base;
+    slope_y += base_weight * off_base[1] * base;
+    result.constant += 0.5 * (to_x * off[0] + to_y * off[1]) +
+                       0.5 * base_weight * (off_base[0] * off_base[0] + off_base[1] * off_base[1]);
   }
-  result.constant += off_base;
   for (int i = 0; i < 4; ++i) {
     const int xi = kPlace[0][static_cast<std::size_t>(i)];
     const int yi = kPlace[1][static_cast<std::size_t>(i)];
@@ -163,8 +181,8 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
       result.matrix(yj, xi) = xy(i, j);
       result.matrix(yi, yj) = yy(i, j);
     }
-    result.slope[xi] = slope[0][i];
-    result.slope[yi] = slope[1][i];
+    result.slope[xi] = slope_x[i];
+    result.slope[yi] = slope_y[i];
   }
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);

@@ -57,21 +57,20 @@ struct LineChoice {
 // The same for u = 0: the line ends on the base.
 [[nodiscard]] Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go);
 
-// The candidate times and what lines between them cost. Between two required times the candidates
-// are equally spaced, about a node of the base apart.
+// The candidate times, equally spaced, and what lines between them cost.
 class LineCosts {
  public:
-  LineCosts(const dynamics::BaseTrajectory& base, const std::vector<double>& required,
-            const std::function<ErrorWeight(double)>& weight, const LineRules& rules);
+  LineCosts(const dynamics::BaseTrajectory& base, const std::function<ErrorWeight(double)>& weight,
+            const LineRules& rules);
 
   // Number of candidate times.
-  [[nodiscard]] std::size_t size() const { return times_s_.size(); }
-  [[nodiscard]] double time_s(std::size_t k) const { return times_s_[k]; }
+  [[nodiscard]] std::size_t size() const { return base_.size(); }
+  [[nodiscard]] double time_s(std::size_t k) const { return static_cast<double>(k) * dt_s_; }
+  // Between two of them.
+  [[nodiscard]] double dt_s() const { return dt_s_; }
   [[nodiscard]] const Eigen::Vector2d& base_mm(std::size_t k) const { return base_[k]; }
-  // The next required time after candidate k, as a candidate.
-  [[nodiscard]] std::size_t next_required(std::size_t k) const { return next_required_[k]; }
 
-  // k + m must not lie beyond next_required(k).
+  // k + m < size(), and no longer than rules.max_line_s.
   [[nodiscard]] LineCost line(std::size_t k, std::size_t m) const;
 
   // After the last candidate the base rests and e rings down.
@@ -88,18 +87,35 @@ class LineCosts {
   [[nodiscard]] static Answers answers(const dynamics::FlexibleAxis& axis, double dt,
                                        std::size_t count);
 
+  using Row = Eigen::RowVector4d;
+  // What is the same for all lines over m candidates: e of an axis by (e, ė, o, u), at some
+  // moments, and the sums of its squares.
+  struct Shape {
+    struct Look {
+      std::size_t j = 0;  // candidates since the line's begin
+      double s = 0.0;     // the same as a share of the line
+      Row x;
+      Row y;
+    };
+    std::vector<Look> looks;
+    Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();
+    Eigen::Matrix4d xy = Eigen::Matrix4d::Zero();
+    Eigen::Matrix4d yy = Eigen::Matrix4d::Zero();
+    Eigen::Matrix4d base = Eigen::Matrix4d::Zero();
+  };
+  [[nodiscard]] Shape shape(std::size_t m) const;
+
   dynamics::FlexibleAxis nozzle_x_;
   dynamics::FlexibleAxis nozzle_y_;
-  std::vector<double> times_s_;
-  std::vector<std::size_t> next_required_;
+  double dt_s_;
   std::vector<Eigen::Vector2d> base_;
   std::vector<Eigen::Vector2d> nozzle_x_at_;  // f
   std::vector<Eigen::Vector2d> nozzle_y_at_;
   std::vector<ErrorWeight> weights_;
-  std::vector<std::size_t> interval_;  // of each candidate, into dt_s_
-  std::vector<double> dt_s_;
-  std::vector<Answers> x_;  // of each interval
-  std::vector<Answers> y_;
+  std::vector<std::size_t> same_weight_until_;
+  Answers x_;
+  Answers y_;
+  std::vector<Shape> shapes_;  // by m
 };
 
 }  // namespace unflex::emit

@@ -27,6 +27,10 @@ using gcode::Z;
 constexpr int kRampRounds = 6;
 // Plans by the firmware's own rules, each with the speeds the last one asked for.
 constexpr int kReplays = 2;
+// How much of its time a line may be shortened or lengthened by, to make up for those before it.
+constexpr double kMostCatchUp = 0.2;
+// … and what of the acceleration limit may go into it.
+constexpr double kCatchUpAccel = 0.05;
 // What one plan may change a speed by: the reason may have been a neighbour.
 constexpr double kMostCorrection = 2.0;
 
@@ -105,9 +109,11 @@ class SpeedSolver {
     double clock_s = 0.0;
     for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
       Stroke& stroke = (*strokes_)[i];
-      // A clock that is far ahead must not stop the machine.
       const double given_s = stroke.end_s - (i > 0 ? (*strokes_)[i - 1].end_s : 0.0);
-      const double due_s = std::max(stroke.end_s - clock_s, given_s / kMostCorrection);
+      const double share = std::min(kMostCatchUp, kCatchUpAccel * options_->lines.max_accel_mm_s2 *
+                                                      given_s * given_s / distance_mm_[i]);
+      const double due_s =
+          std::clamp(stroke.end_s - clock_s, (1.0 - share) * given_s, (1.0 + share) * given_s);
       const double way_mm = correction_[i] * (distance_mm_[i] + ramps_mm(i));
       const double feed = way_mm / due_s / mm_s_per_feed_;
       set_speed(i, feed * mm_s_per_feed_);
@@ -116,22 +122,30 @@ class SpeedSolver {
   }
 
   // RepRapFirmware leaves out ramps of less than ten step clocks if the speed is there within 10 %
-  // (DDA.cpp, RecalculateMove), and both moves then go at the lower speed.
-  [[nodiscard]] bool is_lost(double v, double before, double accel_mm_s2) const {
+  // (DDA.cpp, RecalculateMove), and both moves then go at the lower speed. The least change from
+  // `before` that it does not leave out.
+  [[nodiscard]] static double least_change(double before, double accel_mm_s2) {
     constexpr double kTenClocks_s = 10.0 / 750000.0;
     constexpr double kRoom = 1.05;
-    return options_->fixed.firmware == Firmware::rrf &&
-           std::abs(v - before) <= kRoom * accel_mm_s2 * kTenClocks_s &&
-           std::min(v, before) >= 0.9 / kRoom * std::max(v, before);
+    return kRoom * std::min(accel_mm_s2 * kTenClocks_s, 0.1 * before);
+  }
+  [[nodiscard]] bool is_lost(double v, double before, double accel_mm_s2) const {
+    return options_->fixed.firmware == Firmware::rrf && v != before &&
+           std::abs(v - before) < least_change(before, accel_mm_s2);
   }
 
   // The speed nearest to v that the firmware can be told and will take.
   void set_speed(std::size_t i, double v) {
     Stroke& stroke = (*strokes_)[i];
     if (i > 0 && is_lost(v, speed_mm_s_[i - 1], accel_mm_s2_[i])) {
-      stroke.speed_mm_s = speed_mm_s_[i] = speed_mm_s_[i - 1];
-      stroke.feed_decimals = (*strokes_)[i - 1].feed_decimals;
-      return;
+      const double before = speed_mm_s_[i - 1];
+      const double kept = std::copysign(least_change(before, accel_mm_s2_[i]), v - before);
+      if (std::abs(v - before) < 0.5 * std::abs(kept)) {
+        stroke.speed_mm_s = speed_mm_s_[i] = before;
+        stroke.feed_decimals = (*strokes_)[i - 1].feed_decimals;
+        return;
+      }
+      v = before + kept;
     }
     double told = v;
     if (step_events_[i] > 0.0) {

@@ -29,8 +29,12 @@ constexpr int kAlong = 3;
 // Candidates that are searched at once, and how far beyond them.
 constexpr std::size_t kBlock = 4096;
 constexpr std::size_t kBeyond = 512;
+// Lines up to this long may lie across a wanted time.
+constexpr double kAcross_mm = 0.25;
 // A line is worth this much time of an error as large as the tolerance.
 constexpr double kLineWorth_s = 0.01;
+// States that cost this many lines more than the best one are left.
+constexpr double kMargin = 100.0;
 // What too quick a change of speed costs, mm²·s.
 constexpr double kTooQuick = 1e-4;
 // What a line too many costs.
@@ -53,14 +57,21 @@ std::int64_t nearest(double steps) { return static_cast<std::int64_t>(std::floor
 
 class Search {
  public:
-  Search(const LineCosts& costs, const RunEnds& ends, const AxisGrid& x, const AxisGrid& y,
-         const LineRules& rules)
+  Search(const LineCosts& costs, const std::vector<double>& wanted, const RunEnds& ends,
+         const AxisGrid& x, const AxisGrid& y, const LineRules& rules)
       : costs_(&costs), ends_(ends), grid_{&x, &y}, rules_(&rules), last_(costs.size() - 1) {
     end_ = {steps(0, ends.end_x_mm), steps(1, ends.end_y_mm)};
+    least_ = candidates(rules.min_line_s);
+    most_ = static_cast<std::size_t>(rules.max_line_s / costs.dt_s() + 1e-9);
+    for (const double t : wanted) {
+      wanted_.push_back(static_cast<std::size_t>(nearest(t / costs.dt_s())));
+    }
     line_worth_ = 0.5 * rules.tolerance_mm * rules.tolerance_mm * kLineWorth_s;
   }
 
-  Polygon run() {
+  Polygon run(const std::vector<double>& lines_before_s) {
+    begins_s_ = lines_before_s;
+    begins_s_.push_back(0.0);
     State begin = start();
     std::size_t from = 0;
     while (true) {
@@ -84,6 +95,9 @@ class Search {
           break;
         }
         if (taken++ > 0 || from == 0) {
+          if (taken > 1) {
+            begins_s_.push_back(costs_->time_s(state->k));
+          }
           polygon_.times_s.push_back(costs_->time_s(state->k));
           polygon_.x_mm.push_back(mm(0, state->at[0]));
           polygon_.y_mm.push_back(mm(1, state->at[1]));
@@ -119,47 +133,47 @@ class Search {
     return state;
   }
 
-  // The number of candidates that the shortest line takes.
-  [[nodiscard]] std::size_t shortest(std::size_t k) const {
-    const double dt = costs_->time_s(k + 1) - costs_->time_s(k);
-    return static_cast<std::size_t>(std::ceil(rules_->min_line_s / dt - 1e-9));
+  // The number of candidates that take at least this long.
+  [[nodiscard]] std::size_t candidates(double duration_s) const {
+    return static_cast<std::size_t>(std::ceil(duration_s / costs_->dt_s() - 1e-9));
   }
 
   // The durations tried for a line from candidate k on, in candidates.
   void durations(std::size_t k, std::vector<std::size_t>& result) const {
     result.clear();
-    const double dt = costs_->time_s(k + 1) - costs_->time_s(k);
-    const std::size_t left = costs_->next_required(k) - k;
-    const std::size_t least = shortest(k);
-    const auto most = static_cast<std::size_t>(rules_->max_line_s / dt);
-    for (std::size_t m = least; m <= std::min(most, left); m += std::max<std::size_t>(m / 12, 1)) {
-      if (m + least <= left) {
-        result.push_back(m);
-      }
+    const std::size_t most = std::min(most_, last_ - k);
+    const auto wanted = std::ranges::upper_bound(wanted_, k);
+    const std::size_t until = wanted == wanted_.end() ? most : std::min(most, *wanted - k);
+    std::size_t m = least_;
+    for (; m <= until; m += std::max<std::size_t>(m / 12, 1)) {
+      result.push_back(m);
     }
-    if (left >= least && left <= std::max(most, 2 * least)) {
-      result.push_back(left);
+    if (until >= least_ && result.back() != until) {
+      result.push_back(until);
+    }
+    // Across the wanted time.
+    for (m = std::max(least_, until + 1); m <= most; ++m) {
+      if (m > 2 * least_ && (costs_->base_mm(k + m) - costs_->base_mm(k)).norm() > kAcross_mm) {
+        break;
+      }
+      result.push_back(m);
     }
   }
 
   // The duration of a line from k on that the cost to go reckons with: the shortest that covers
-  // enough steps.
+  // enough steps at an even pace.
   [[nodiscard]] std::size_t usual(std::size_t k) const {
-    const std::size_t left = costs_->next_required(k) - k;
-    const std::size_t least = shortest(k);
-    if (left < 2 * least) {
+    const std::size_t left = last_ - k;
+    std::size_t m = candidates(rules_->even_line_s());
+    if (left < 2 * m) {
       return left;
     }
-    const double dt = costs_->time_s(k + 1) - costs_->time_s(k);
-    const auto most = static_cast<std::size_t>(rules_->max_line_s / dt);
-    std::size_t m =
-        std::max(least, static_cast<std::size_t>(std::ceil(rules_->even_line_s() / dt)));
-    const auto covers = [&](std::size_t steps) {
-      const Eigen::Vector2d way = costs_->base_mm(k + steps) - costs_->base_mm(k);
+    const auto covers = [&](std::size_t candidates) {
+      const Eigen::Vector2d way = costs_->base_mm(k + candidates) - costs_->base_mm(k);
       return std::max(std::abs(way[0]) / grid_[0]->step_mm, std::abs(way[1]) / grid_[1]->step_mm) >=
              rules_->min_steps;
     };
-    while (m < std::min(most, left - least) && !covers(m)) {
+    while (m < std::min(most_, left - m) && !covers(m)) {
       ++m;
     }
     return m;
@@ -233,9 +247,17 @@ class Search {
       if (states.empty()) {
         continue;
       }
+      const double most = best_open(k, until) + kMargin * line_worth_;
       const std::size_t first = arena_.size();
-      arena_.insert(arena_.end(), states.begin(), states.end());
+      for (const State& state : states) {
+        if (state.total <= most) {
+          arena_.push_back(state);
+        }
+      }
       std::vector<State>().swap(states);
+      if (arena_.size() == first) {
+        continue;
+      }
       earliest_s_.clear();
       for (std::size_t i = first; i < arena_.size(); ++i) {
         earliest_s_.push_back(earliest_end_s(i));
@@ -294,14 +316,26 @@ class Search {
          ++lines) {
       ancestor = arena_[static_cast<std::size_t>(ancestor)].parent;
     }
+    // The youngest in begins_s_ is the oldest of the block.
     const auto before = static_cast<std::size_t>(rules_->burst_lines - lines);
-    const std::size_t written = polygon_.times_s.size();
-    if (before >= written) {
+    if (before >= begins_s_.size()) {
       return 0.0;
     }
     return rules_->burst_s + (before == 0
                                   ? costs_->time_s(arena_[static_cast<std::size_t>(ancestor)].k)
-                                  : polygon_.times_s[written - 1 - before]);
+                                  : begins_s_[begins_s_.size() - 1 - before]);
+  }
+
+  // The least that any state costs that is still to be extended, from candidate k on.
+  [[nodiscard]] double best_open(std::size_t k, std::size_t until) const {
+    double best = finished_ ? finished_->total : std::numeric_limits<double>::infinity();
+    const double until_s = costs_->time_s(k) + rules_->max_line_s;
+    for (; k <= until && costs_->time_s(k) <= until_s; ++k) {
+      if (const std::vector<State>& states = kept_[k - from_]; !states.empty()) {
+        best = std::min(best, states.front().total);
+      }
+    }
+    return best;
   }
 
   // State i with a line over m candidates to u.
@@ -461,10 +495,14 @@ class Search {
   RunEnds ends_;
   std::array<const AxisGrid*, 2> grid_;
   const LineRules* rules_;
-  std::size_t last_;  // candidate
+  std::size_t last_;       // candidate
+  std::size_t least_ = 1;  // candidates that a line takes
+  std::size_t most_ = 1;
+  std::vector<std::size_t> wanted_;
   Place end_{};
   double line_worth_ = 0.0;
-  Polygon polygon_;  // of the blocks before
+  Polygon polygon_;               // of the blocks before
+  std::vector<double> begins_s_;  // of their lines, and of those before the run
   // Of the block that is being searched.
   std::size_t from_ = 0;
   std::vector<Quadratic> to_go_;
@@ -480,11 +518,11 @@ class Search {
 
 }  // namespace
 
-Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double>& required,
+Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double>& wanted,
                   const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
                   const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
-  const LineCosts costs(base, required, weight, rules);
-  return Search(costs, ends, x, y, rules).run();
+  const LineCosts costs(base, weight, rules);
+  return Search(costs, wanted, ends, x, y, rules).run(ends.lines_before_s);
 }
 
 }  // namespace unflex::emit

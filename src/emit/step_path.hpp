@@ -22,23 +22,25 @@ struct ErrorWeight {
   double xx = 1.0;
   double xy = 0.0;
   double yy = 1.0;
+
+  bool operator==(const ErrorWeight&) const = default;
 };
 
-// The ends of a run's lines.
+// What a run begins and ends with.
 struct RunEnds {
   double start_x_mm = 0.0;
   double start_y_mm = 0.0;
   double end_x_mm = 0.0;
   double end_y_mm = 0.0;
+  std::vector<double> lines_before_s;  // when the lines before it began, in order, before 0
 };
 
 // The lines of at least rules.min_steps of `x` or `y` that make the nozzle follow the base best: a
 // line may be longer or end a few steps further along the path if that brings its end closer to
-// whole steps across it. A line ends at each of the `required` times, of which the first and the
-// last are the run's own; the first line may begin late, the last one end early. Empty if there is
-// no such line.
+// whole steps across it. Only short lines lie across one of the `wanted` times; the last line may
+// end before the base does. Empty if there is no such line.
 [[nodiscard]] Polygon step_path(const dynamics::BaseTrajectory& base,
-                                const std::vector<double>& required,
+                                const std::vector<double>& wanted,
                                 const std::function<ErrorWeight(double)>& weight,
                                 const RunEnds& ends, const AxisGrid& x, const AxisGrid& y,
                                 const LineRules& rules);

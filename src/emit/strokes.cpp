@@ -21,11 +21,10 @@ using gcode::Z;
 // Rounding to a grid as coarse as this is what limits accuracy.
 constexpr double kCoarse_mm = 1e-3;
 
-// Moments at which a line must end: the ends of the run, lines that stand between moves, changes of
-// filament per mm. Those between which no line fits fall together.
-std::vector<double> required_times(const Run& run, const Timetable& table,
-                                   const std::vector<double>& event_times_s,
-                                   const LineRules& rules) {
+// Moments at which a line should end: lines that stand between moves, changes of filament per mm,
+// the ends of motion. In order.
+std::vector<double> wanted_times(const Run& run, const Timetable& table,
+                                 const std::vector<double>& event_times_s) {
   std::vector<double> wanted;
   for (std::size_t i = 0; i < event_times_s.size(); ++i) {
     if ((*run.events)[i].kind != gcode::EventKind::move) {
@@ -40,6 +39,12 @@ std::vector<double> required_times(const Run& run, const Timetable& table,
   wanted.push_back(table.start_s(0));
   wanted.push_back(table.start_s(table.moves()));
   std::ranges::sort(wanted);
+  return wanted;
+}
+
+// Those of them that have lines between them, and the ends of the run.
+std::vector<double> required_times(const Run& run, const std::vector<double>& wanted,
+                                   const LineRules& rules) {
   const double end = run.base->duration_s();
   std::vector<double> times = {0.0};
   for (const double t : wanted) {
@@ -61,8 +66,8 @@ gcode::Position end_of(const Run& run) {
   return run.moves->back().segment.end_mm;
 }
 
-// Where the file is when the run begins. Marlin may be behind by the filament of a move that was too
-// short for it.
+// Where the file is when the run begins. Marlin may be behind by the filament of a move that was
+// too short for it.
 gcode::Position start_of(const Run& run) {
   for (const gcode::Event& event : *run.events) {
     if (!event.segments.empty()) {
@@ -95,16 +100,17 @@ ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
   return {kAlong + kAcross * nx * nx, kAcross * nx * ny, kAlong + kAcross * ny * ny};
 }
 
-Polygon polygon(const Run& run, const Timetable& table, const std::vector<double>& required,
+Polygon polygon(const Run& run, const Timetable& table, const std::vector<double>& wanted,
                 const Grid& grid, const LineRules& rules) {
   const dynamics::BaseTrajectory& base = *run.base;
   if (grid.x.step_mm > kCoarse_mm || grid.y.step_mm > kCoarse_mm) {
     const gcode::Position& start = run.moves->front().segment.start_mm;
     const gcode::Position end = end_of(run);
     return step_path(
-        base, required, [&](double t) { return error_weight(run, table, t); },
-        {start[X], start[Y], end[X], end[Y]}, grid.x, grid.y, rules);
+        base, wanted, [&](double t) { return error_weight(run, table, t); },
+        {start[X], start[Y], end[X], end[Y], run.lines_before_s}, grid.x, grid.y, rules);
   }
+  const std::vector<double> required = required_times(run, wanted, rules);
   std::vector<double> times = {0.0};
   for (std::size_t i = 1; i < required.size(); ++i) {
     append_line_ends(base, required[i - 1], required[i], rules, times);
@@ -134,12 +140,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const std::vector<double> event_times_s = table.event_times_s();
   LineRules rules = options.lines;
   rules.tolerance_mm *= run.tolerance_share;
-  if (run.even_pace) {
-    rules.min_line_s = rules.even_line_s();
-    rules.burst_lines = 0;
-  }
   const Polygon vertices =
-      polygon(run, table, required_times(run, table, event_times_s, rules), grid, rules);
+      polygon(run, table, wanted_times(run, table, event_times_s), grid, rules);
   const std::vector<double>& times = vertices.times_s;
   if (times.empty()) {
     return {};

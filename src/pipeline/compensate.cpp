@@ -253,19 +253,13 @@ class Compensator {
     const dynamics::BaseTrajectory base{setup_.period_s, compensate::join(pending.spans, pending.x),
                                         compensate::join(pending.spans, pending.y)};
     const Piece& piece = pending.piece;
-    // Where long lines break a limit or cost too much, short ones may do, and lines of an even pace
-    // where bursts of them meet those before the run.
-    struct Attempt {
-      double tolerance_share;
-      bool even_pace;
-    };
+    // Where long lines break a limit or cost too much, short ones may do.
     std::string objection;
-    for (const Attempt& attempt :
-         {Attempt{1.0, false}, Attempt{kFineTolerance, false}, Attempt{1.0, true}}) {
+    for (const double share : {1.0, kFineTolerance}) {
       emit::Emitter trial = emitter_;
       text.clear();
       if (!trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s,
-                      attempt.tolerance_share, attempt.even_pace},
+                      share, line_rate_.last_begins_s()},
                      text)) {
         return "the motion is too small to be written";
       }

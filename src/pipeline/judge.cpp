@@ -45,6 +45,14 @@ void follow(const planner::PlannedMove& move, const verify::NozzleModel& model,
   }
 }
 
+// How far the nozzle will swing around a base that rests at `at`.
+double swing_mm(const dynamics::NozzleXY& nozzle, const gcode::Position& at,
+                const verify::NozzleModel& model) {
+  return std::hypot(
+      nozzle.x.position - at[gcode::X], nozzle.x.velocity / model.x.omega_rad_s,
+      std::hypot(nozzle.y.position - at[gcode::Y], nozzle.y.velocity / model.y.omega_rad_s));
+}
+
 }  // namespace
 
 dynamics::NozzleXY at_rest(const gcode::Position& position) {
@@ -83,8 +91,8 @@ dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
 
 Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_view text,
               gcode::Interpreter printer, const planner::Limits& printer_limits,
-              const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
-              verify::LineRate rate, double max_lines_per_s) {
+              const dynamics::NozzleXY& nozzle, const verify::Rules& rules, verify::LineRate rate,
+              double max_lines_per_s) {
   const std::unique_ptr<planner::Planner> planner =
       planner::make_planner(printer_limits, rules.fixed);
   std::size_t line = 0;
@@ -116,7 +124,6 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_vie
                                     rate.max_per_s(), max_lines_per_s);
     return verdict;
   }
-  verdict.rate = std::move(rate);
   const verify::RunDeviation before = verify::measure(original, original, nozzle, rules.nozzle);
   const verify::RunDeviation after =
       verify::measure(original, replayed, nozzle, rules.nozzle, rules.lead_in_s);
@@ -127,6 +134,7 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_vie
     if (no_worse(a.contour_rms_mm, b.contour_rms_mm) &&
         no_worse(a.contour_max_mm, b.contour_max_mm + chance_mm(rules.fixed))) {
       verdict.nozzle = after.end;
+      verdict.rate = std::move(rate);
       return verdict;
     }
     verdict.objection = fmt::format(
@@ -136,11 +144,17 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_vie
     return verdict;
   }
   // Travel draws nothing, and a straight one has no contour error whatever it does: what counts is
-  // how well the nozzle keeps to where it should be, and so what it leaves to the next run.
+  // how well the nozzle keeps to where it should be, and so what it leaves to the next run. Where
+  // the firmware rounds the clock of each line, only the latter.
   const verify::DeviationStats b = before.all.stats();
   const verify::DeviationStats a = after.all.stats();
-  if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm)) {
+  const gcode::Position& end = original.back().segment.end_mm;
+  if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm) ||
+      (rules.fixed.firmware != Firmware::klipper &&
+       no_worse(swing_mm(after.end, end, rules.nozzle),
+                swing_mm(before.end, end, rules.nozzle) + chance_mm(rules.fixed)))) {
     verdict.nozzle = after.end;
+    verdict.rate = std::move(rate);
     return verdict;
   }
   verdict.objection =

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <deque>
+#include <vector>
 
 #include "unflex/planner/planner.hpp"
 
@@ -30,6 +31,14 @@ class LineRate {
   // Most lines begun within any 100 ms, per second, since the beginning or forget().
   [[nodiscard]] double max_per_s() const { return static_cast<double>(most_) / kSpan_s; }
   void forget() { most_ = 0; }
+  // When the lines of the last 100 ms began, against the end of the last one.
+  [[nodiscard]] std::vector<double> last_begins_s() const {
+    std::vector<double> result;
+    for (const double start : starts_s_) {
+      result.push_back(start - time_s_);
+    }
+    return result;
+  }
 
  private:
   static constexpr double kSpan_s = 0.1;
