@@ -33,8 +33,9 @@ constexpr std::size_t kBeyond = 512;
 constexpr double kAcross_mm = 0.25;
 // A line is worth this much time of an error as large as the tolerance.
 constexpr double kLineWorth_s = 0.01;
+constexpr double kHaste = 20.0;
 // States that cost this many lines more than the best one are left.
-constexpr double kMargin = 100.0;
+constexpr double kMargin = 400.0;
 // What too quick a change of speed costs, mm²·s.
 constexpr double kTooQuick = 1e-4;
 // What a line too many costs.
@@ -352,11 +353,18 @@ class Search {
     w << state.z, mm(to) - costs_->base_mm(next.k);
     next.z = line.move * w + line.shift;
     next.spent = state.spent + w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant +
-                 line_worth_ +
+                 price(m) +
                  too_quick(next.speed_mm_s - state.speed_mm_s, state.line_s + next.line_s) +
                  (costs_->time_s(next.k) < earliest_s_[i - first_] ? kTooMany : 0.0);
     next.total = next.spent + to_go.at(next.z);
     return next;
+  }
+
+  // What a line over m candidates costs for being one. The shorter, the more: it takes from the
+  // lines that may follow within the time they are counted over.
+  [[nodiscard]] double price(std::size_t m) const {
+    const double pace = rules_->even_line_s() / (static_cast<double>(m) * costs_->dt_s());
+    return line_worth_ * (1.0 + kHaste * std::max(pace * pace - 1.0, 0.0));
   }
 
   [[nodiscard]] double too_quick(const Eigen::Vector2d& change_mm_s, double both_s) const {
@@ -388,7 +396,7 @@ class Search {
     const State state = arena_[i];
     const std::size_t k = state.k + m;
     const std::vector<State>& rivals = kept_[k - from_];
-    const double least = state.spent + choice.value.at(state.z) + line_worth_;
+    const double least = state.spent + choice.value.at(state.z) + price(m);
     const double room = rivals.size() < kKept ? std::numeric_limits<double>::infinity()
                                               : rivals.back().total - least;
     if (room <= 0.0) {

@@ -32,7 +32,7 @@ struct RunEnds {
   double start_y_mm = 0.0;
   double end_x_mm = 0.0;
   double end_y_mm = 0.0;
-  std::vector<double> lines_before_s;  // when the lines before it began, in order, before 0
+  std::vector<double> lines_before_s = {};  // when the lines before it began, in order, before 0
 };
 
 // The lines of at least rules.min_steps of `x` or `y` that make the nozzle follow the base best: a

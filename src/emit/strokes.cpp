@@ -87,7 +87,7 @@ bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const 
 // Across a path that is drawn errors count most, along it they only shift time; where nothing is
 // drawn they count as what they leave behind.
 ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
-  constexpr double kAlong = 1e-3;
+  constexpr double kAlong = 0.001;
   constexpr double kTravel = 0.02;
   const gcode::Segment& segment = (*run.moves)[table.move_at(t)].segment;
   if (!segment.extruding() || t > table.start_s(table.moves())) {

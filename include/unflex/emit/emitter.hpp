@@ -76,7 +76,7 @@ struct Run {
   const dynamics::BaseTrajectory* base = nullptr;
   double lead_in_s = 0.0;        // the first move starts this long after the base
   double tolerance_share = 1.0;  // of LineRules::tolerance_mm that its lines may use
-  std::vector<double> lines_before_s;  // begins of the lines just before it, in order, before 0
+  std::vector<double> lines_before_s = {};  // begins of the lines just before it, in order, before 0
 };
 
 // Writes the output in the order of the input. Follows both texts with an interpreter of its own,

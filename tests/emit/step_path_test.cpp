@@ -1,0 +1,342 @@
+#include "step_path.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "line_cost.hpp"
+#include "plain_base.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using dynamics::BaseTrajectory;
+using dynamics::NozzleState;
+
+using PathFunction = std::function<std::array<double, 2>(double)>;
+
+// 0 to 1 over the duration, with the first two derivatives zero at both ends.
+double rise(double t, double duration_s) {
+  const double s = std::clamp(t / duration_s, 0.0, 1.0);
+  return s * s * s * (10.0 + s * (6.0 * s - 15.0));
+}
+
+ErrorWeight all_alike(double) { return {}; }
+
+// The nozzle that follows straight lines between the polygon's vertices, as exact_step has it, in
+// steps of at most 0.1 ms; `look` gets the time and both axes.
+void follow(const Polygon& polygon, const LineRules& rules, double until_s,
+            const std::function<void(double, NozzleState, NozzleState)>& look) {
+  NozzleState x{polygon.x_mm.front(), 0.0};
+  NozzleState y{polygon.y_mm.front(), 0.0};
+  const auto hold = [&](double from, double to, std::array<double, 2> at,
+                        std::array<double, 2> speed) {
+    const int steps = std::max(static_cast<int>(std::ceil((to - from) / 1e-4)), 1);
+    const double h = (to - from) / steps;
+    for (int i = 0; i < steps; ++i) {
+      const double t = h * i;
+      x = dynamics::exact_step(rules.nozzle_x, x, {at[0] + speed[0] * t, speed[0], 0.0}, h);
+      y = dynamics::exact_step(rules.nozzle_y, y, {at[1] + speed[1] * t, speed[1], 0.0}, h);
+      look(from + t + h, x, y);
+    }
+  };
+  for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
+    const double duration = polygon.times_s[i] - polygon.times_s[i - 1];
+    hold(polygon.times_s[i - 1], polygon.times_s[i], {polygon.x_mm[i - 1], polygon.y_mm[i - 1]},
+         {(polygon.x_mm[i] - polygon.x_mm[i - 1]) / duration,
+          (polygon.y_mm[i] - polygon.y_mm[i - 1]) / duration});
+  }
+  if (until_s > polygon.times_s.back() + 1e-9) {
+    hold(polygon.times_s.back(), until_s, {polygon.x_mm.back(), polygon.y_mm.back()}, {0.0, 0.0});
+  }
+}
+
+// RMS distance in µm between that nozzle and the one that follows the base, across `normal`.
+double error_um(const Polygon& polygon, const BaseTrajectory& base, const LineRules& rules,
+                std::array<double, 2> normal) {
+  const Followed fx(base, &BaseTrajectory::x_at, rules.nozzle_x);
+  const Followed fy(base, &BaseTrajectory::y_at, rules.nozzle_y);
+  double sum = 0.0;
+  int count = 0;
+  follow(polygon, rules, base.duration_s(), [&](double t, NozzleState x, NozzleState y) {
+    const double off =
+        normal[0] * (x.position - fx.at(t)[0]) + normal[1] * (y.position - fy.at(t)[0]);
+    sum += off * off;
+    ++count;
+  });
+  return 1e3 * std::sqrt(sum / count);
+}
+
+LineRules marlin_rules() {
+  LineRules rules;
+  rules.min_line_s = 2e-3;
+  rules.min_steps = 6;
+  rules.burst_lines = 18;
+  return rules;
+}
+
+const AxisGrid kSteps{0.0, 0.0125};
+
+TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{5.0 * rise(t, 0.1), 2.0 * std::sin(30.0 * t) * rise(t, 0.1)};
+      },
+      0.1);
+  LineRules rules;
+  rules.nozzle_y = dynamics::from_frequency(37.0, 0.1);
+  const ErrorWeight weight{0.9, 0.2, 0.3};
+  const LineCosts costs(
+      base, [&](double t) { return t < 0.06 ? weight : ErrorWeight{}; }, rules);
+  const Followed fx(base, &BaseTrajectory::x_at, rules.nozzle_x);
+  const Followed fy(base, &BaseTrajectory::y_at, rules.nozzle_y);
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0.0, 0.02);
+  for (const std::size_t k : {0U, 50U, 115U}) {  // the last line sees two weights
+    const std::size_t m = 10;
+    Vector8d w;
+    for (Eigen::Index i = 0; i < 8; ++i) {
+      w[i] = normal(random) * (i == 1 || i == 4 ? 100.0 : 1.0);
+    }
+    const double from = costs.time_s(k);
+    const double duration = costs.time_s(k + m) - from;
+    const Eigen::Vector2d start = costs.base_mm(k) + Eigen::Vector2d(w[2], w[5]);
+    const Eigen::Vector2d end = costs.base_mm(k + m) + Eigen::Vector2d(w[6], w[7]);
+    const Eigen::Vector2d speed = (end - start) / duration;
+    NozzleState x{fx.at(from)[0] + w[0], fx.at(from)[1] + w[1]};
+    NozzleState y{fy.at(from)[0] + w[3], fy.at(from)[1] + w[4]};
+    double cost = 0.0;
+    for (std::size_t j = 1; j <= m; ++j) {
+      const double h = costs.dt_s();
+      const Eigen::Vector2d at = start + speed * (static_cast<double>(j - 1) * h);
+      x = dynamics::exact_step(rules.nozzle_x, x, {at[0], speed[0], 0.0}, h);
+      y = dynamics::exact_step(rules.nozzle_y, y, {at[1], speed[1], 0.0}, h);
+      const double t = costs.time_s(k + j);
+      const double ex = x.position - fx.at(t)[0];
+      const double ey = y.position - fy.at(t)[0];
+      const ErrorWeight used = t < 0.06 ? weight : ErrorWeight{};
+      const Eigen::Vector2d off = at + speed * h - costs.base_mm(k + j);
+      cost += 0.5 * h * (used.xx * ex * ex + 2.0 * used.xy * ex * ey + used.yy * ey * ey) +
+              0.5 * h * 1e-3 * off.squaredNorm();
+    }
+    const LineCost line = costs.line(k, m);
+    const Vector6d z = line.move * w + line.shift;
+    EXPECT_NEAR(z[0], x.position - fx.at(from + duration)[0], 1e-10);
+    EXPECT_NEAR(z[1], x.velocity - fx.at(from + duration)[1], 1e-8);
+    EXPECT_DOUBLE_EQ(z[2], w[6]);
+    EXPECT_NEAR(z[3], y.position - fy.at(from + duration)[0], 1e-10);
+    EXPECT_NEAR(z[4], y.velocity - fy.at(from + duration)[1], 1e-8);
+    EXPECT_DOUBLE_EQ(z[5], w[7]);
+    const double claimed = w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant;
+    EXPECT_NEAR(claimed, cost, 1e-9 * cost);
+  }
+}
+
+TEST(LineCosts, RingDownIsTheIntegralOfTheSquare) {
+  const BaseTrajectory base = testing::sampled([](double) { return std::array{0.0, 0.0}; }, 0.01);
+  const LineRules rules;
+  const LineCosts costs(base, all_alike, rules);
+  Vector6d z = Vector6d::Zero();
+  z[0] = 0.01;
+  z[1] = -2.0;
+  NozzleState x{z[0], z[1]};
+  double sum = 0.0;
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < 200000; ++i) {
+    const NozzleState next = dynamics::exact_step(rules.nozzle_x, x, {}, kStep);
+    sum += 0.25 * kStep * (x.position * x.position + next.position * next.position);
+    x = next;
+  }
+  EXPECT_NEAR(costs.ring_down().at(z), sum, 1e-5 * sum);
+}
+
+TEST(LineCosts, BestEndIsTheMinimum) {
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{3.0 * rise(t, 0.05), 1.0 * rise(t, 0.05)};
+      },
+      0.05);
+  const LineCosts costs(base, all_alike, LineRules{});
+  const Quadratic to_go = costs.ring_down();
+  const LineCost line = costs.line(20, 8);
+  const LineChoice choice = best_end(line, to_go);
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0.0, 0.01);
+  for (int i = 0; i < 20; ++i) {
+    Vector6d z;
+    for (Eigen::Index j = 0; j < 6; ++j) {
+      z[j] = normal(random);
+    }
+    const Eigen::Vector2d best = choice.feedback * z + choice.feed_forward;
+    const Eigen::Vector2d off(normal(random), normal(random));
+    Vector8d w;
+    w << z, best + off;
+    const double real = w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant +
+                        to_go.at(line.move * w + line.shift);
+    EXPECT_NEAR(real, choice.value.at(z) + 0.5 * off.dot(choice.stiffness * off), 1e-12);
+  }
+  const Vector6d rest = Vector6d::Zero();
+  Vector8d on_base = Vector8d::Zero();
+  EXPECT_NEAR(ending_on_base(line, to_go).at(rest),
+              on_base.dot(line.slope) + line.constant + to_go.at(line.shift), 1e-15);
+}
+
+// Random ways from rest to rest, as a base might go.
+struct RandomWay {
+  explicit RandomWay(unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> anywhere(-1.0, 1.0);
+    duration_s = 0.3 + 0.2 * anywhere(random);
+    const double x = 10.0 * anywhere(random);
+    const double y = 10.0 * anywhere(random);
+    const double bulge = 2.0 * anywhere(random);
+    const double duration = duration_s;
+    path = [=](double t) {
+      const double s = rise(t, duration);
+      const double side = bulge * std::pow(std::sin(std::numbers::pi * s), 3);
+      return std::array{x * s - side * y / 10.0, y * s + side * x / 10.0};
+    };
+    const auto last = path(duration);
+    ends = {
+        0.0, 0.0, 0.0125 * std::round(last[0] / 0.0125), 0.0125 * std::round(last[1] / 0.0125), {}};
+  }
+
+  double duration_s = 0.0;
+  PathFunction path;
+  RunEnds ends;
+};
+
+TEST(StepPath, KeepsAllRulesOnRandomWays) {
+  const LineRules rules = marlin_rules();
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    const RandomWay way(seed);
+    const BaseTrajectory base = testing::sampled(way.path, std::ceil(way.duration_s * 1e3) * 1e-3);
+    const Polygon polygon = step_path(base, {}, all_alike, way.ends, kSteps, kSteps, rules);
+    ASSERT_GE(polygon.times_s.size(), 2U) << seed;
+    EXPECT_DOUBLE_EQ(polygon.times_s.front(), 0.0);
+    EXPECT_LE(polygon.times_s.back(), base.duration_s() + 1e-9);
+    EXPECT_NEAR(polygon.x_mm.front(), 0.0, 1e-12);
+    EXPECT_NEAR(polygon.x_mm.back(), way.ends.end_x_mm, 1e-12);
+    EXPECT_NEAR(polygon.y_mm.back(), way.ends.end_y_mm, 1e-12);
+    for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
+      const double dx = (polygon.x_mm[i] - polygon.x_mm[i - 1]) / 0.0125;
+      const double dy = (polygon.y_mm[i] - polygon.y_mm[i - 1]) / 0.0125;
+      EXPECT_NEAR(dx, std::round(dx), 1e-6);
+      EXPECT_NEAR(dy, std::round(dy), 1e-6);
+      EXPECT_GE(std::max(std::abs(dx), std::abs(dy)), 6.0 - 1e-6);
+      const double duration = polygon.times_s[i] - polygon.times_s[i - 1];
+      EXPECT_GE(duration, rules.min_line_s - 1e-9);
+      EXPECT_LE(duration, rules.max_line_s + 1e-9);
+      if (i >= 18) {
+        EXPECT_GE(polygon.times_s[i] - polygon.times_s[i - 18], rules.burst_s - 1e-9) << seed;
+      }
+    }
+  }
+}
+
+TEST(StepPath, IsNoFurtherOffThanStepsAre) {
+  LineRules rules = marlin_rules();
+  rules.min_steps = 1;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    const RandomWay way(seed);
+    const BaseTrajectory base = testing::sampled(way.path, std::ceil(way.duration_s * 1e3) * 1e-3);
+    const Polygon polygon = step_path(base, {}, all_alike, way.ends, kSteps, kSteps, rules);
+    // On each axis a place is off by 3.6 µm RMS if it is rounded to the nearest step, and the
+    // nozzle by more, by what that sets ringing.
+    EXPECT_LE(error_um(polygon, base, rules, {1.0, 0.0}), 4.5) << seed;
+    EXPECT_LE(error_um(polygon, base, rules, {0.0, 1.0}), 4.5) << seed;
+  }
+}
+
+TEST(StepPath, DrawsASlantedLineToAFractionOfAStep) {
+  // 17.3 and 5.1 mm: steps on both axes meet the line nowhere.
+  const double slant = std::hypot(17.3, 5.1);
+  const std::array<double, 2> normal = {-5.1 / slant, 17.3 / slant};
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{17.3 * rise(t, 0.4), 5.1 * rise(t, 0.4)};
+      },
+      0.42);
+  const auto across = [&](double) {
+    constexpr double kAlong = 1e-3;
+    return ErrorWeight{kAlong + normal[0] * normal[0], normal[0] * normal[1],
+                       kAlong + normal[1] * normal[1]};
+  };
+  const Polygon polygon =
+      step_path(base, {}, across, {0.0, 0.0, 17.3, 5.1}, kSteps, kSteps, marlin_rules());
+  ASSERT_FALSE(polygon.times_s.empty());
+  EXPECT_LE(error_um(polygon, base, marlin_rules(), normal), 0.6);
+}
+
+TEST(StepPath, CountsTheLinesBeforeTheRun) {
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{8.0 * rise(t, 0.2), 3.0 * rise(t, 0.2)};
+      },
+      0.21);
+  RunEnds ends{0.0, 0.0, 8.0, 3.0, {}};
+  for (int i = 18; i >= 1; --i) {
+    ends.lines_before_s.push_back(-1e-4 * i);
+  }
+  const LineRules rules = marlin_rules();
+  const Polygon polygon = step_path(base, {}, all_alike, ends, kSteps, kSteps, rules);
+  ASSERT_GE(polygon.times_s.size(), 2U);
+  // 18 lines in the last 2 ms: the next one has to wait as long as a line may take.
+  EXPECT_GE(polygon.times_s[1], 0.5 * rules.max_line_s);
+}
+
+TEST(StepPath, LinesAcrossAWantedTimeAreShort) {
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{40.0 * rise(t, 0.5), 0.0};
+      },
+      0.5);
+  const std::vector<double> wanted = {0.2, 0.25, 0.3};
+  const Polygon polygon =
+      step_path(base, wanted, all_alike, {0.0, 0.0, 40.0, 0.0}, kSteps, kSteps, marlin_rules());
+  for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
+    for (const double t : wanted) {
+      if (polygon.times_s[i - 1] < t - 3e-4 && polygon.times_s[i] > t + 3e-4) {
+        EXPECT_LE(polygon.times_s[i] - polygon.times_s[i - 1], 4e-3 + 1e-9);
+      }
+    }
+  }
+}
+
+TEST(StepPath, IsEmptyWhereNoLineIsLongEnough) {
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{0.03 * rise(t, 0.02), 0.0};
+      },
+      0.02);
+  EXPECT_TRUE(step_path(base, {}, all_alike, {0.0, 0.0, 0.025, 0.0}, kSteps, kSteps, marlin_rules())
+                  .times_s.empty());
+}
+
+TEST(StepPath, IsTheSameWayAcrossBlocks) {
+  // Some seconds, so that the search goes on from what it has decided.
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{20.0 * std::sin(0.8 * t) * rise(t, 1.0), 15.0 * rise(t, 6.0)};
+      },
+      6.0);
+  const double x = 0.0125 * std::round(20.0 * std::sin(4.8) / 0.0125);
+  const Polygon polygon =
+      step_path(base, {}, all_alike, {0.0, 0.0, x, 15.0}, kSteps, kSteps, marlin_rules());
+  ASSERT_FALSE(polygon.times_s.empty());
+  for (std::size_t i = 18; i < polygon.times_s.size(); ++i) {
+    EXPECT_GE(polygon.times_s[i] - polygon.times_s[i - 18], 0.1 - 1e-9);
+  }
+  EXPECT_LE(error_um(polygon, base, marlin_rules(), {0.0, 1.0}), 5.0);
+}
+
+}  // namespace
+}  // namespace unflex::emit
