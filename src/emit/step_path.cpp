@@ -33,7 +33,10 @@ constexpr std::size_t kBeyond = 512;
 constexpr double kAcross_mm = 0.25;
 // A line is worth this much time of an error as large as the tolerance.
 constexpr double kLineWorth_s = 0.01;
+// What lines faster than an even pace cost beyond their worth, per (pace² − 1).
 constexpr double kHaste = 20.0;
+// How much longer than an even pace a line is reckoned to take at most.
+constexpr double kPatience = 2.5;
 // States that cost this many lines more than the best one are left.
 constexpr double kMargin = 400.0;
 // What too quick a change of speed costs, mm²·s.
@@ -174,7 +177,9 @@ class Search {
       return std::max(std::abs(way[0]) / grid_[0]->step_mm, std::abs(way[1]) / grid_[1]->step_mm) >=
              rules_->min_steps;
     };
-    while (m < std::min(most_, left - m) && !covers(m)) {
+    // Where the base turns round, that may be never.
+    const std::size_t patience = candidates(kPatience * rules_->even_line_s());
+    while (m < std::min(patience, left - m) && !covers(m)) {
       ++m;
     }
     return m;

@@ -12,6 +12,7 @@
 #include "judge.hpp"
 #include "piece_reader.hpp"
 #include "report_rows.hpp"
+#include "retime.hpp"
 #include "stage_options.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 #include "unflex/verify/verify.hpp"
@@ -362,6 +363,13 @@ Result<report::Report> compensate_with(const Job& job, const WorkerPool::EngineF
   Remaining remaining(progress, kShareOfCompensation);
   if (Status status = add_verification(job, remaining, report); !status) {
     return tl::unexpected(status.error());
+  }
+  if (report.reference_time_s > 0.0) {
+    const double factor = report.emitted_time_s / report.reference_time_s;
+    if (Status status = retime(job.output, job.output_name, factor); !status) {
+      return tl::unexpected(status.error());
+    }
+    report.output_bytes = std::filesystem::file_size(job.output);
   }
   add_performance(begin, report);
   return report;

@@ -204,6 +204,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.min_line_s = min_line_s(settings);
   if (settings.printer.firmware != Firmware::klipper) {
     options.lines.burst_lines = static_cast<int>(settings.max_lines_per_s() * kBurst_s) - kLinesAfter;
+    options.lines.burst_reserve = kLinesAfter;
     options.lines.burst_s = kClockRoom * kBurst_s;
     options.lines.min_line_s =
         std::max(settings.emit.period_ms * 1e-3, kShortest / settings.max_lines_per_s());

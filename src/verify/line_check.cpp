@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "unflex/gcode/time_note.hpp"
+
 namespace unflex::verify {
 namespace {
 
@@ -19,7 +21,8 @@ std::string_view text_end(const gcode::Line& line) {
 }  // namespace
 
 bool same_line(const gcode::Line& input, const gcode::Line& output) {
-  return input.text == output.text || (text_end(input).empty() && input.text == output.content());
+  return gcode::same_but_for_times(input.content(), output.content()) &&
+         (text_end(input).empty() || text_end(input) == text_end(output));
 }
 
 // The next line of the current run that has to be compared.

@@ -40,8 +40,9 @@ struct LineRules {
   int min_steps = 1;           // of the grid; the firmware joins shorter lines to the next
   double max_line_s = 0.05;
   // Between whole steps lines may be as short as min_line_s, but no more than burst_lines begin
-  // within any burst_s.
+  // within any burst_s, with those before the run burst_reserve more.
   int burst_lines = 0;
+  int burst_reserve = 0;
   double burst_s = 0.1;
   // On either axis from line to line, where lines can be short enough.
   double max_speed_step_mm_s = 30.0;

@@ -1,0 +1,74 @@
+#include "retime.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+#include "unflex/gcode/time_note.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+constexpr std::size_t kChunk = 1U << 20U;
+
+// The whole lines at the front of `text`, up to `end`, with their times scaled.
+std::string scaled_lines(std::string_view text, double factor) {
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t newline = text.find('\n');
+    const std::size_t length = newline == std::string_view::npos ? text.size() : newline;
+    std::string_view line = text.substr(0, length);
+    const bool carriage_return = line.ends_with('\r');
+    line.remove_suffix(carriage_return ? 1 : 0);
+    out += gcode::with_times_scaled(line, factor);
+    out += text.substr(line.size(),
+                       length + (newline == std::string_view::npos ? 0 : 1) - line.size());
+    text.remove_prefix(std::min(length + 1, text.size()));
+  }
+  return out;
+}
+
+}  // namespace
+
+Status retime(const std::string& path, const std::string& name, double factor) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  std::string chunk(kChunk, '\0');
+  std::string unread;   // read, not yet a whole line
+  std::string pending;  // to be written, where it was not read yet
+  std::streamoff read_at = 0;
+  std::streamoff written_to = 0;
+  for (bool more = true; more && file;) {
+    file.seekg(read_at);
+    file.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+    const std::streamsize count = file.gcount();
+    if (!file.eof() && !file) {
+      break;
+    }
+    file.clear();
+    more = static_cast<std::size_t>(count) == chunk.size();
+    read_at += count;
+    unread.append(chunk, 0, static_cast<std::size_t>(count));
+    const std::size_t whole = more ? unread.rfind('\n') + 1 : unread.size();
+    pending += scaled_lines(std::string_view(unread).substr(0, whole), factor);
+    unread.erase(0, whole);
+    // Not over what is still to be read.
+    const auto room = static_cast<std::size_t>(read_at - written_to);
+    const std::size_t ready = more ? std::min(pending.size(), room) : pending.size();
+    file.seekp(written_to);
+    file.write(pending.data(), static_cast<std::streamsize>(ready));
+    written_to += static_cast<std::streamoff>(ready);
+    pending.erase(0, ready);
+  }
+  file.close();
+  std::error_code error;
+  if (file) {
+    std::filesystem::resize_file(path, static_cast<std::uintmax_t>(written_to), error);
+  }
+  if (!file || error) {
+    return fail(ErrorKind::internal, {name, 0}, "cannot write the output; is the disk full?");
+  }
+  return {};
+}
+
+}  // namespace unflex::pipeline
