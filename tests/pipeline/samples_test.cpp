@@ -117,7 +117,9 @@ TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
   EXPECT_EQ(report->violation_count, 0U);
   EXPECT_GT(report->runs_compensated, 0U);
   EXPECT_LE(report->max_lines_per_s, GetParam().max_lines_per_s);
-  EXPECT_NEAR(report->emitted_time_s, report->reference_time_s, 0.01 * report->reference_time_s);
+  EXPECT_LE(report->emitted_time_s, 1.01 * report->reference_time_s);
+  // A run's last line may end before the base would have come to rest.
+  EXPECT_GE(report->emitted_time_s, 0.97 * report->reference_time_s);
   const double before = report->uncompensated.extruding.contour_rms_mm;
   const double after = report->compensated.extruding.contour_rms_mm;
   EXPECT_LE(after, GetParam().rms_mm);
@@ -125,11 +127,11 @@ TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Small, OtherFirmware,
-                         ::testing::Values(OnFirmware{"marlin", "wallring", 5e-3, 6.0, 200.0},
-                                           OnFirmware{"marlin", "textplate", 5e-3, 1.3, 200.0},
-                                           OnFirmware{"rrf", "cube20", 5e-3, 3.0, 500.0},
-                                           OnFirmware{"rrf", "textplate", 5e-3, 1.8, 500.0},
-                                           OnFirmware{"rrf", "washer_arcs", 5e-3, 4.0, 500.0}));
+                         ::testing::Values(OnFirmware{"marlin", "wallring", 2e-3, 10.0, 200.0},
+                                           OnFirmware{"marlin", "textplate", 1e-3, 10.0, 200.0},
+                                           OnFirmware{"rrf", "cube20", 2.5e-3, 5.0, 500.0},
+                                           OnFirmware{"rrf", "textplate", 1e-3, 10.0, 500.0},
+                                           OnFirmware{"rrf", "washer_arcs", 2e-3, 10.0, 500.0}));
 
 }  // namespace
 }  // namespace unflex::pipeline::testing
