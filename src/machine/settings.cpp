@@ -48,6 +48,10 @@ double default_command_accel(const Settings& settings) {
                                                     : settings.limits.max_accel_mm_s2;
 }
 
+double by_firmware(Firmware firmware, double klipper, double marlin, double rrf) {
+  return firmware == Firmware::klipper ? klipper : firmware == Firmware::marlin ? marlin : rrf;
+}
+
 }  // namespace
 
 // Defaults: Marlin 2.1.2 Configuration.h (DEFAULT_*) and Configuration_adv.h; RepRapFirmware 3.6
@@ -98,6 +102,23 @@ double Settings::queue_length() const {
   return printer.queue_length.value_or(printer.firmware == Firmware::rrf ? 60.0 : 16.0);
 }
 
+// Klipper: extras/firmware_retraction.py. Marlin: Configuration_adv.h, RETRACT_LENGTH,
+// RETRACT_FEEDRATE, RETRACT_RECOVER_FEEDRATE. RepRapFirmware: Config/Configuration.h,
+// DefaultRetractLength, DefaultRetractSpeed.
+double Settings::retract_length_mm() const {
+  return printer.retract_length_mm.value_or(by_firmware(printer.firmware, 0.0, 3.0, 2.0));
+}
+
+double Settings::retract_speed_mm_s() const {
+  return printer.retract_speed_mm_s.value_or(
+      by_firmware(printer.firmware, 20.0, 45.0, 1000.0 / 60.0));
+}
+
+double Settings::unretract_speed_mm_s() const {
+  return printer.unretract_speed_mm_s.value_or(
+      by_firmware(printer.firmware, 10.0, 8.0, 1000.0 / 60.0));
+}
+
 double Settings::print_accel_mm_s2() const {
   return limits.print_accel_mm_s2.value_or(default_command_accel(*this));
 }
@@ -111,10 +132,7 @@ double Settings::retract_accel_mm_s2() const {
 }
 
 double Settings::max_lines_per_s() const {
-  const double by_firmware = printer.firmware == Firmware::klipper  ? 1000.0
-                             : printer.firmware == Firmware::marlin ? 200.0
-                                                                    : 500.0;
-  return emit.max_lines_per_s.value_or(by_firmware);
+  return emit.max_lines_per_s.value_or(by_firmware(printer.firmware, 1000.0, 200.0, 500.0));
 }
 
 double Settings::max_extrude_cross_section_mm2() const {

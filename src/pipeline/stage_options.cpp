@@ -108,10 +108,10 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
 gcode::InterpreterOptions interpreter_options(const machine::Settings& settings) {
   gcode::InterpreterOptions options = gcode::default_options(settings.printer.firmware);
   options.firmware_retraction = settings.printer.firmware_retraction;
-  options.retract_length_mm = settings.printer.retract_length_mm;
-  options.retract_speed_mm_s = settings.printer.retract_speed_mm_s;
+  options.retract_length_mm = settings.retract_length_mm();
+  options.retract_speed_mm_s = settings.retract_speed_mm_s();
   options.unretract_extra_length_mm = settings.printer.unretract_extra_length_mm;
-  options.unretract_speed_mm_s = settings.printer.unretract_speed_mm_s;
+  options.unretract_speed_mm_s = settings.unretract_speed_mm_s();
   options.arc_resolution_mm = settings.printer.arc_resolution_mm;
   options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
   options.shaper_freq_y_hz = settings.shaper_freq_y_hz();

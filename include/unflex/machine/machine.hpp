@@ -30,10 +30,11 @@ struct PrinterSettings {
   std::optional<Range> travel_y_mm;
   // [firmware_retraction] is configured; lengths as in the printer's configuration.
   bool firmware_retraction = true;
-  double retract_length_mm = 0.0;
-  double retract_speed_mm_s = 20.0;
+  // Unset: the firmware's defaults.
+  std::optional<double> retract_length_mm;
+  std::optional<double> retract_speed_mm_s;
   double unretract_extra_length_mm = 0.0;
-  double unretract_speed_mm_s = 10.0;
+  std::optional<double> unretract_speed_mm_s;
   double arc_resolution_mm = 1.0;  // [gcode_arcs] resolution
   AxisOptions steps_per_mm;        // Marlin and RepRapFirmware; unset: the firmware's default
   // Marlin.
@@ -140,6 +141,9 @@ struct Settings {
   [[nodiscard]] std::array<double, 4> jerk_mm_s() const;
   [[nodiscard]] std::array<double, 4> steps_per_mm() const;
   [[nodiscard]] double queue_length() const;
+  [[nodiscard]] double retract_length_mm() const;
+  [[nodiscard]] double retract_speed_mm_s() const;
+  [[nodiscard]] double unretract_speed_mm_s() const;
   [[nodiscard]] double print_accel_mm_s2() const;
   [[nodiscard]] double travel_accel_mm_s2() const;
   [[nodiscard]] double retract_accel_mm_s2() const;
