@@ -39,6 +39,8 @@ constexpr double kHaste = 20.0;
 constexpr double kPatience = 2.5;
 // States that cost this many lines more than the best one are left.
 constexpr double kMargin = 400.0;
+// However many lines follow a run, it gets this many within the time that lines are counted over.
+constexpr int kFewest = 4;
 // What too quick a change of speed costs, mm²·s.
 constexpr double kTooQuick = 1e-4;
 // What a line too many costs.
@@ -316,20 +318,20 @@ class Search {
     if (rules_->burst_lines <= 0) {
       return 0.0;
     }
+    const bool near_end = costs_->time_s(arena_[i].k) + rules_->burst_s > costs_->time_s(last_);
+    const int allowed = std::max(rules_->burst_lines - (near_end ? ends_.lines_after : 0), kFewest);
     auto ancestor = static_cast<std::int32_t>(i);
     int lines = 1;
-    for (; lines < rules_->burst_lines && arena_[static_cast<std::size_t>(ancestor)].parent >= 0;
-         ++lines) {
+    for (; lines < allowed && arena_[static_cast<std::size_t>(ancestor)].parent >= 0; ++lines) {
       ancestor = arena_[static_cast<std::size_t>(ancestor)].parent;
     }
-    // The youngest in begins_s_ is the oldest of the block.
-    const auto before = static_cast<std::size_t>(rules_->burst_lines - lines);
-    if (before >= begins_s_.size()) {
-      return 0.0;
+    if (lines == allowed) {
+      return rules_->burst_s + costs_->time_s(arena_[static_cast<std::size_t>(ancestor)].k);
     }
-    return rules_->burst_s + (before == 0
-                                  ? costs_->time_s(arena_[static_cast<std::size_t>(ancestor)].k)
-                                  : begins_s_[begins_s_.size() - 1 - before]);
+    // The youngest in begins_s_ is the oldest of the block.
+    const auto before = static_cast<std::size_t>(allowed - lines);
+    return before < begins_s_.size() ? rules_->burst_s + begins_s_[begins_s_.size() - 1 - before]
+                                     : 0.0;
   }
 
   // The least that any state costs that is still to be extended, from candidate k on.

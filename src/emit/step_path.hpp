@@ -33,6 +33,7 @@ struct RunEnds {
   double end_x_mm = 0.0;
   double end_y_mm = 0.0;
   std::vector<double> lines_before_s = {};  // when the lines before it began, in order, before 0
+  int lines_after = 0;                      // how many begin within rules.burst_s after it
 };
 
 // The lines of at least rules.min_steps of `x` or `y` that make the nozzle follow the base best: a

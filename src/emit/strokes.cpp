@@ -108,7 +108,8 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
     const gcode::Position end = end_of(run);
     return step_path(
         base, wanted, [&](double t) { return error_weight(run, table, t); },
-        {start[X], start[Y], end[X], end[Y], run.lines_before_s}, grid.x, grid.y, rules);
+        {start[X], start[Y], end[X], end[Y], run.lines_before_s, run.lines_after}, grid.x, grid.y,
+        rules);
   }
   const std::vector<double> required = required_times(run, wanted, rules);
   std::vector<double> times = {0.0};

@@ -93,6 +93,7 @@ class Compensator {
         return status;
       }
     }
+    all_read_ = true;
     if (Status status = drain(0); !status) {
       return status;
     }
@@ -206,7 +207,8 @@ class Compensator {
   }
 
   void write_complete() {
-    while (!queue_.empty() && queue_.front().missing == 0) {
+    // A run is written when it is known what follows.
+    while (!queue_.empty() && queue_.front().missing == 0 && (queue_.size() > 1 || all_read_)) {
       write(queue_.front());
       const std::size_t tickets = 2 * queue_.front().spans.size();
       tickets_.erase(tickets_.begin(), tickets_.begin() + static_cast<std::ptrdiff_t>(tickets));
@@ -255,12 +257,14 @@ class Compensator {
                                         compensate::join(pending.spans, pending.y)};
     const Piece& piece = pending.piece;
     // Where long lines break a limit or cost too much, short ones may do.
+    const int lines_after =
+        queue_.size() > 1 ? verify::LineRate::first_lines(queue_[1].piece.moves) : 0;
     std::string objection;
     for (const double share : {1.0, kFineTolerance}) {
       emit::Emitter trial = emitter_;
       text.clear();
       if (!trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s,
-                      share, line_rate_.last_begins_s()},
+                      share, line_rate_.last_begins_s(), lines_after},
                      text)) {
         return "the motion is too small to be written";
       }
@@ -310,6 +314,7 @@ class Compensator {
   std::size_t first_ticket_ = 0;  // number of tickets_' front
   std::size_t outstanding_ = 0;   // solutions missing in queue_, in all
   std::size_t bytes_written_ = 0;
+  bool all_read_ = false;
 };
 
 // The second part of a job's progress.

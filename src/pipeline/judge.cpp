@@ -116,10 +116,15 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_vie
   }
   rate.forget();
   rate.change_text();
+  verify::LineRate original_rate = rate;
+  for (const planner::PlannedMove& move : original) {
+    original_rate.add(move);
+  }
   for (const planner::PlannedMove& move : replayed) {
     rate.add(move);
   }
-  if (rate.max_per_s() > max_lines_per_s) {
+  // Where the sliced lines themselves are too many, fewer are better.
+  if (rate.max_per_s() > std::max(max_lines_per_s, original_rate.max_per_s())) {
     verdict.objection = fmt::format("{:.0f} lines per second are more than {:.0f}",
                                     rate.max_per_s(), max_lines_per_s);
     return verdict;

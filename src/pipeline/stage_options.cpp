@@ -23,8 +23,6 @@ constexpr double kClockRoom = 1.002;
 // The time over which lines are counted, and how short a single one may be against the even pace.
 constexpr double kBurst_s = 0.1;
 constexpr double kShortest = 0.4;
-// Room for the lines that follow a run within that time: a retraction, a lift.
-constexpr int kLinesAfter = 2;
 
 double min_line_s(const machine::Settings& settings) {
   return std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.max_lines_per_s());
@@ -203,8 +201,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.reach_y = reach(settings.printer.travel_y_mm);
   options.lines.min_line_s = min_line_s(settings);
   if (settings.printer.firmware != Firmware::klipper) {
-    options.lines.burst_lines = static_cast<int>(settings.max_lines_per_s() * kBurst_s) - kLinesAfter;
-    options.lines.burst_reserve = kLinesAfter;
+    options.lines.burst_lines = static_cast<int>(settings.max_lines_per_s() * kBurst_s);
     options.lines.burst_s = kClockRoom * kBurst_s;
     options.lines.min_line_s =
         std::max(settings.emit.period_ms * 1e-3, kShortest / settings.max_lines_per_s());

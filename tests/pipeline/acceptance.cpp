@@ -90,6 +90,27 @@ void expect_same_place(const Standing& in, const Standing& out) {
   EXPECT_NEAR(out.at_mm[gcode::E], in.at_mm[gcode::E], kPlaceFilamentMm) << in.text;
 }
 
+// The line without what it says of durations, which follow the emitted print time.
+std::string but_for_durations(const std::string& line) {
+  if (line.starts_with(";TIME")) {
+    return line.substr(0, line.find(':'));
+  }
+  if (line.starts_with("; estimated") && line.find("printing time") != std::string::npos) {
+    return line.substr(0, line.find('='));
+  }
+  std::string result;
+  const bool progress = line.starts_with("M73 ");
+  bool in_duration = false;
+  for (const char c : line) {
+    in_duration = progress && (c == 'R' || c == 'S' ||
+                               (in_duration && std::isdigit(static_cast<unsigned char>(c)) != 0));
+    if (!in_duration) {
+      result += c;
+    }
+  }
+  return result;
+}
+
 void expect_kept(const report::Report& report, const machine::Settings& settings) {
   EXPECT_EQ(report.violation_count, 0U) << complaints(report);
   EXPECT_GT(report.runs_total, 0U);
@@ -122,7 +143,8 @@ void expect_lines_kept(const std::string& input, const std::string& output) {
   const std::vector<Standing> out = standing_lines(output);
   std::size_t next = 0;
   for (const Standing& line : in) {
-    while (next < out.size() && out[next].text != line.text) {
+    const std::string wanted = but_for_durations(line.text);
+    while (next < out.size() && but_for_durations(out[next].text) != wanted) {
       EXPECT_TRUE(is_own(out[next].text)) << out[next].text;
       ++next;
     }

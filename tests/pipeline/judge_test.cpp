@@ -1,5 +1,6 @@
 #include "judge.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -71,6 +72,20 @@ TEST(Judge, RejectsTheSamePathAtTheWrongTimeWhereNothingIsPrinted) {
   ASSERT_TRUE(reason.has_value());
   EXPECT_TRUE(reason->starts_with("compensation would be worse: tracking RMS in travel "))
       << *reason;
+}
+
+TEST(Judge, RejectsMoreLinesPerSecondThanAllowed) {
+  std::string text = "G1 F6000\n";
+  for (int i = 1; i <= 40; ++i) {
+    text += fmt::format("G1 X{:.2f}\n", 0.25 * i);
+  }
+  text += "G1 Y10\n";
+  EXPECT_EQ(Corner(false).objection_to(text, 1000.0), std::nullopt);
+  const std::optional<std::string> reason = Corner(false).objection_to(text, 100.0);
+  ASSERT_TRUE(reason.has_value());
+  EXPECT_TRUE(reason->ends_with(" lines per second are more than 100")) << *reason;
+  // The two sliced lines are more than this as well, and no others could be fewer.
+  EXPECT_EQ(Corner(false).objection_to("G1 X10\nG1 Y10\n", 1.0), std::nullopt);
 }
 
 TEST(Judge, ReplaysByTheLimitsInTheText) {

@@ -40,9 +40,8 @@ struct LineRules {
   int min_steps = 1;           // of the grid; the firmware joins shorter lines to the next
   double max_line_s = 0.05;
   // Between whole steps lines may be as short as min_line_s, but no more than burst_lines begin
-  // within any burst_s, with those before the run burst_reserve more.
+  // within any burst_s, those before and after the run counted; 0: no limit.
   int burst_lines = 0;
-  int burst_reserve = 0;
   double burst_s = 0.1;
   // On either axis from line to line, where lines can be short enough.
   double max_speed_step_mm_s = 30.0;
@@ -78,6 +77,7 @@ struct Run {
   double lead_in_s = 0.0;        // the first move starts this long after the base
   double tolerance_share = 1.0;  // of LineRules::tolerance_mm that its lines may use
   std::vector<double> lines_before_s = {};  // begins of the lines just before it, in order, before 0
+  int lines_after = 0;  // how many lines begin within LineRules::burst_s after it
 };
 
 // Writes the output in the order of the input. Follows both texts with an interpreter of its own,

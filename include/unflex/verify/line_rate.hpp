@@ -28,6 +28,21 @@ class LineRate {
 
   // Lines of another text follow, numbered anew.
   void change_text() { line_ = 0; }
+  // Of these, coming next, how many lines begin within 100 ms.
+  [[nodiscard]] static int first_lines(const std::vector<planner::PlannedMove>& moves) {
+    int count = 0;
+    double time_s = 0.0;
+    std::size_t line = 0;
+    for (const planner::PlannedMove& move : moves) {
+      if (time_s >= kSpan_s) {
+        break;
+      }
+      count += move.segment.line != line ? 1 : 0;
+      line = move.segment.line;
+      time_s += move.duration_s();
+    }
+    return count;
+  }
   // Most lines begun within any 100 ms, per second, since the beginning or forget().
   [[nodiscard]] double max_per_s() const { return static_cast<double>(most_) / kSpan_s; }
   void forget() { most_ = 0; }
