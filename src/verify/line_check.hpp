@@ -7,7 +7,8 @@
 
 namespace unflex::verify {
 
-// Equal byte for byte but for durations in M73 and comments; an input that ends without a line ending may have got one.
+// Equal byte for byte but for durations in M73 and comments; an input that ends without a line
+// ending may have got one.
 [[nodiscard]] bool same_line(const gcode::Line& input, const gcode::Line& output);
 
 class LineCheck {

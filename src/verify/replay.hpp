@@ -69,8 +69,8 @@ class Replay {
   // The next move of the current section; false at its end.
   [[nodiscard]] bool next(planner::PlannedMove& move);
   // Whether next() would give one. Every line before it has then been read.
-  [[nodiscard]] Firmware firmware() const { return firmware_; }
   [[nodiscard]] bool has_move();
+  [[nodiscard]] Firmware firmware() const { return firmware_; }
   // The moves of the sliced file by another plan, in which the machine rests at both ends of every
   // section. The two plans are independent of each other; what is not asked for of this one is
   // dropped at the section's end, or by skip_resting().
