@@ -1,6 +1,7 @@
 #include "followed.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 namespace unflex::emit {
@@ -55,6 +56,16 @@ Eigen::Vector2d Followed::at(double t) const {
   const double cube = va + vb - 2.0 * rise;
   return {a[0] + s * (va + s * (square + s * cube)),
           (va + s * (2.0 * square + 3.0 * s * cube)) / period_s_};
+}
+
+Eigen::Matrix2d ring_down_square(const dynamics::FlexibleAxis& axis) {
+  const double omega = axis.omega_rad_s;
+  const double zeta = std::max(axis.zeta, 0.01);
+  const double mixed = 0.5 / (omega * omega);
+  Eigen::Matrix2d result;
+  result << (1.0 + 4.0 * zeta * zeta) / (4.0 * zeta * omega), mixed, mixed,
+      1.0 / (4.0 * zeta * std::pow(omega, 3));
+  return result;
 }
 
 }  // namespace unflex::emit

@@ -41,4 +41,12 @@ class Followed {
   double period_s_;
 };
 
+// What the polygon's own distance from the base counts, against the nozzle's: content above about
+// six times the resonance is left to follow the base rather than the nozzle.
+inline constexpr double kBaseWeight = 1e-3;
+
+// ∫ e² = (e, ė) P (e, ė)ᵀ of a nozzle that rings down around a base at rest, from the closed form
+// (Lyapunov's equation). Damping ratios below 0.01 are taken as 0.01, so that it is finite.
+[[nodiscard]] Eigen::Matrix2d ring_down_square(const dynamics::FlexibleAxis& axis);
+
 }  // namespace unflex::emit

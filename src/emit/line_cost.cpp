@@ -11,9 +11,6 @@ namespace {
 using dynamics::BaseTrajectory;
 using dynamics::FlexibleAxis;
 
-// ε: content above about six times the resonance is left to follow the base rather than the nozzle.
-constexpr double kBaseWeight = 1e-3;
-
 // Candidate times per node of the base.
 constexpr std::size_t kPerNode = 2;
 // Moments at most at which the error during a line is looked at.
@@ -24,12 +21,17 @@ constexpr std::array<std::array<int, 4>, 2> kPlace = {{{0, 1, 2, 6}, {3, 4, 5, 7
 
 }  // namespace
 
-LineChoice best_end(const LineCost& line, const Quadratic& to_go) {
+WholeCost whole_cost(const LineCost& line, const Quadratic& to_go) {
   // lazyProduct: Eigen's blocked product does not pay at this size.
   const Eigen::Matrix<double, 6, 8> moved = to_go.matrix.lazyProduct(line.move);
-  const Matrix8d all = line.matrix + line.move.transpose().lazyProduct(moved);
   const Vector6d pull = to_go.matrix.lazyProduct(line.shift) + to_go.slope;
-  const Vector8d slope = line.slope + line.move.transpose().lazyProduct(pull);
+  return {line.matrix + line.move.transpose().lazyProduct(moved),
+          line.slope + line.move.transpose().lazyProduct(pull),
+          line.constant + to_go.at(line.shift)};
+}
+
+LineChoice best_end(const LineCost& line, const Quadratic& to_go) {
+  const auto [all, slope, constant] = whole_cost(line, to_go);
   LineChoice choice;
   choice.stiffness = all.bottomRightCorner<2, 2>();
   const Eigen::Matrix2d inverse = choice.stiffness.inverse();
@@ -43,11 +45,8 @@ LineChoice best_end(const LineCost& line, const Quadratic& to_go) {
 }
 
 Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go) {
-  const Eigen::Matrix<double, 6, 8> moved = to_go.matrix.lazyProduct(line.move);
-  const Matrix8d all = line.matrix + line.move.transpose().lazyProduct(moved);
-  const Vector6d pull = to_go.matrix.lazyProduct(line.shift) + to_go.slope;
-  const Vector8d slope = line.slope + line.move.transpose().lazyProduct(pull);
-  return {all.topLeftCorner<6, 6>(), slope.head<6>(), line.constant + to_go.at(line.shift)};
+  const auto [all, slope, constant] = whole_cost(line, to_go);
+  return {all.topLeftCorner<6, 6>(), slope.head<6>(), constant};
 }
 
 LineCosts::Answers LineCosts::answers(const FlexibleAxis& axis, double dt, std::size_t count) {
@@ -200,17 +199,8 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
 
 Quadratic LineCosts::ring_down() const {
   Quadratic result;
-  const auto fill = [&](Eigen::Index first, const FlexibleAxis& axis, double weight) {
-    // ∫ e² from the closed form (Lyapunov's equation).
-    const double omega = axis.omega_rad_s;
-    const double zeta = std::max(axis.zeta, 0.01);
-    result.matrix(first, first) = weight * (1.0 + 4.0 * zeta * zeta) / (4.0 * zeta * omega);
-    result.matrix(first, first + 1) = result.matrix(first + 1, first) =
-        weight * 0.5 / (omega * omega);
-    result.matrix(first + 1, first + 1) = weight / (4.0 * zeta * std::pow(omega, 3));
-  };
-  fill(0, nozzle_x_, weights_.back().xx);
-  fill(3, nozzle_y_, weights_.back().yy);
+  result.matrix.block<2, 2>(0, 0) = weights_.back().xx * ring_down_square(nozzle_x_);
+  result.matrix.block<2, 2>(3, 3) = weights_.back().yy * ring_down_square(nozzle_y_);
   return result;
 }
 

@@ -53,6 +53,14 @@ struct LineChoice {
   Eigen::Vector2d feed_forward = Eigen::Vector2d::Zero();
 };
 
+// A line and all that comes after it: ½ wᵀHw + hᵀw + c.
+struct WholeCost {
+  Matrix8d matrix;
+  Vector8d slope;
+  double constant = 0.0;
+};
+
+[[nodiscard]] WholeCost whole_cost(const LineCost& line, const Quadratic& to_go);
 [[nodiscard]] LineChoice best_end(const LineCost& line, const Quadratic& to_go);
 // The same for u = 0: the line ends on the base.
 [[nodiscard]] Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go);

@@ -197,9 +197,7 @@ class Search {
       const Eigen::Vector2d o = mm(end_) - costs_->base_mm(k);
       const Eigen::Vector2d u = mm(end_) - costs_->base_mm(k + 1);
       const Quadratic& next = rest_[k + 1 - from];
-      const Matrix8d all = line.matrix + line.move.transpose() * next.matrix * line.move;
-      const Vector8d slope =
-          line.slope + line.move.transpose() * (next.matrix * line.shift + next.slope);
+      const auto [all, slope, constant] = whole_cost(line, next);
       // w = e + fixed
       Vector8d fixed = Vector8d::Zero();
       fixed[2] = o[0];
@@ -209,8 +207,7 @@ class Search {
       Quadratic& here = rest_[k - from];
       here.matrix = all.topLeftCorner<6, 6>();
       here.slope = (slope + all * fixed).head<6>();
-      here.constant =
-          line.constant + next.at(line.shift) + slope.dot(fixed) + 0.5 * fixed.dot(all * fixed);
+      here.constant = constant + slope.dot(fixed) + 0.5 * fixed.dot(all * fixed);
       for (const Eigen::Index i : {2, 5}) {
         here.matrix.row(i).setZero();
         here.matrix.col(i).setZero();

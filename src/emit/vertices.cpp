@@ -25,9 +25,6 @@ namespace {
 using dynamics::BaseTrajectory;
 using dynamics::FlexibleAxis;
 
-// ε: content above about six times the resonance is left to follow the base rather than the nozzle.
-constexpr double kBaseWeight = 1e-3;
-
 // One line: where it takes y, and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
 struct Stage {
   Eigen::Matrix<double, 2, 4> move = Eigen::Matrix<double, 2, 4>::Zero();
@@ -79,17 +76,6 @@ struct CostToGo {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
   Eigen::Vector3d slope = Eigen::Vector3d::Zero();
 };
-
-// After the run the base rests and e rings down; ∫ e² from the closed form (Lyapunov's equation).
-CostToGo ring_down(const FlexibleAxis& axis) {
-  const double omega = axis.omega_rad_s;
-  const double zeta = std::max(axis.zeta, 0.01);
-  CostToGo result;
-  result.matrix(0, 0) = (1.0 + 4.0 * zeta * zeta) / (4.0 * zeta * omega);
-  result.matrix(0, 1) = result.matrix(1, 0) = 0.5 / (omega * omega);
-  result.matrix(1, 1) = 1.0 / (4.0 * zeta * std::pow(omega, 3));
-  return result;
-}
 
 // Sets the line's law and takes its cost to the cost to go. A pinned vertex is not free: u = 0.
 void regulate(Stage& line, CostToGo& to_go, bool pinned) {
@@ -171,7 +157,9 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
   const Reach within = with_base(reach, base, axis);
-  const CostToGo at_end = ring_down(nozzle_);
+  // After the run the base rests and e rings down.
+  CostToGo at_end;
+  at_end.matrix.topLeftCorner<2, 2>() = ring_down_square(nozzle_);
   std::vector<bool> pinned(lines + 1, false);
   pinned.front() = pinned.back() = true;
   AxisVertices result;
