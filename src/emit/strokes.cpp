@@ -118,18 +118,15 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
   }
   const VertexChooser along_x(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x);
   const VertexChooser along_y(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y);
-  const auto choose = [&](const AxisGrid& on_x, const AxisGrid& on_y) {
-    return std::pair{along_x.choose(times, on_x, rules.reach_x, rules.max_accel_mm_s2),
-                     along_y.choose(times, on_y, rules.reach_y, rules.max_accel_mm_s2)};
+  const auto choose = [&] {
+    return std::pair{along_x.choose(times, grid.x, rules.reach_x, rules.max_accel_mm_s2),
+                     along_y.choose(times, grid.y, rules.reach_y, rules.max_accel_mm_s2)};
   };
-  // More lines would not help against a coarse grid: they are judged without it.
-  const AxisGrid fine;
-  auto vertices = choose(fine, fine);
+  auto vertices = choose();
   while (split_lines(base, vertices.first.nozzle_error_mm, vertices.second.nozzle_error_mm, rules,
                      times)) {
-    vertices = choose(fine, fine);
+    vertices = choose();
   }
-  vertices = choose(grid.x, grid.y);
   return {std::move(times), std::move(vertices.first.position_mm),
           std::move(vertices.second.position_mm)};
 }
