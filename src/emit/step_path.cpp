@@ -158,12 +158,22 @@ class Search {
       result.push_back(until);
     }
     // Across the wanted time.
+    const std::size_t any_length = too_many_wanted(k) ? candidates(rules_->even_line_s()) : 0;
     for (m = std::max(least_, until + 1); m <= most; ++m) {
-      if (m > 2 * least_ && (costs_->base_mm(k + m) - costs_->base_mm(k)).norm() > kAcross_mm) {
+      if (m > std::max(2 * least_, any_length) &&
+          (costs_->base_mm(k + m) - costs_->base_mm(k)).norm() > kAcross_mm) {
         break;
       }
       result.push_back(m);
     }
+  }
+
+  // Whether lines from k on that end at every wanted time would be more than the budget has.
+  [[nodiscard]] bool too_many_wanted(std::size_t k) const {
+    constexpr std::ptrdiff_t kSome = 4;
+    const auto next = std::ranges::upper_bound(wanted_, k);
+    return wanted_.end() - next >= kSome &&
+           *(next + kSome - 1) < k + kSome * candidates(rules_->even_line_s());
   }
 
   // The duration of a line from k on that the cost to go reckons with: the shortest that covers

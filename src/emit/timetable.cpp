@@ -63,6 +63,12 @@ double Timetable::filament_per_mm(std::size_t i) const {
 }
 
 bool Timetable::filament_changes(std::size_t i) const {
+  const auto pulls_back = [&](std::size_t move) {
+    return (*run_->moves)[move].segment.delta(E) < 0.0;
+  };
+  if (pulls_back(i - 1) && pulls_back(i)) {
+    return false;  // nothing is drawn: where along a wipe it happens does not matter
+  }
   const double t = starts_s_[i];
   const double speed =
       std::hypot(run_->base->x_at(t).velocity_mm_s, run_->base->y_at(t).velocity_mm_s);

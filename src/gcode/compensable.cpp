@@ -25,7 +25,7 @@ bool is_motion_command(const Command& command) {
 
 }  // namespace
 
-std::string_view kept_reason(const Segment& segment) {
+std::string_view kept_reason(const Segment& segment, Firmware firmware) {
   if (!segment.start_known) {
     return "start unknown";
   }
@@ -33,18 +33,20 @@ std::string_view kept_reason(const Segment& segment) {
   if (length_xy == 0.0) {
     return segment.delta(Z) == 0.0 ? "extrude only" : "Z move";
   }
-  if (segment.delta(E) < -kFilamentRoundoff_mm) {
+  if (firmware == Firmware::klipper && segment.delta(E) < -kFilamentRoundoff_mm) {
     return "retracting move";
   }
   return std::abs(segment.delta(Z)) <= kMaxSlope * length_xy ? "" : "Z move";
 }
 
-bool compensable(const Segment& segment) { return kept_reason(segment).empty(); }
+bool compensable(const Segment& segment, Firmware firmware) {
+  return kept_reason(segment, firmware).empty();
+}
 
-bool compensable(const Event& event) {
+bool compensable(const Event& event, Firmware firmware) {
   return event.kind == EventKind::move && !event.segments.empty() &&
          std::all_of(event.segments.begin(), event.segments.end(),
-                     [](const Segment& segment) { return compensable(segment); });
+                     [&](const Segment& segment) { return compensable(segment, firmware); });
 }
 
 bool names_position(std::string_view content) {

@@ -135,7 +135,7 @@ class Compensator {
     } else {
       nozzle_ = after_motion(piece, nozzle_, rules_.nozzle);
       for (const gcode::Event& event : piece.events) {
-        count_kept_moves(event, report_->kept_moves);
+        count_kept_moves(event, rules_.fixed.firmware, report_->kept_moves);
       }
     }
     queue_.push_back(std::move(pending));

@@ -57,6 +57,7 @@ class Inspector {
  public:
   Inspector(Inspection& result, const machine::Settings& settings)
       : result_(&result),
+        firmware_(settings.printer.firmware),
         planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))) {
     result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
     result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
@@ -108,7 +109,7 @@ class Inspector {
     if (slicers_.empty()) {
       slicers_ = slicer_named(event.line.content());
     }
-    count_kept_moves(event, result_->kept_moves);
+    count_kept_moves(event, firmware_, result_->kept_moves);
     plan(event);
   }
 
@@ -152,6 +153,7 @@ class Inspector {
   }
 
   Inspection* result_;
+  Firmware firmware_;
   std::unique_ptr<planner::Planner> planner_;
   std::vector<planner::PlannedMove> planned_;
   std::string slicers_;

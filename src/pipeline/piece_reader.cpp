@@ -43,12 +43,13 @@ bool looks_like_command(std::string_view content) {
 
 }  // namespace
 
-void count_kept_moves(const gcode::Event& event, std::map<std::string, std::size_t>& kept) {
-  if (gcode::compensable(event)) {
+void count_kept_moves(const gcode::Event& event, Firmware firmware,
+                      std::map<std::string, std::size_t>& kept) {
+  if (gcode::compensable(event, firmware)) {
     return;
   }
   for (const gcode::Segment& segment : event.segments) {
-    const std::string_view reason = gcode::kept_reason(segment);
+    const std::string_view reason = gcode::kept_reason(segment, firmware);
     ++kept[std::string(reason.empty() ? "part of an arc that is kept" : reason)];
   }
 }
@@ -58,7 +59,8 @@ PieceReader::PieceReader(std::istream& input, std::string name,
                          planner::FirmwareConfig fixed)
     : lines_(input, std::move(name)),
       interpreter_(interpreter),
-      planner_(planner::make_planner(limits, fixed)) {}
+      planner_(planner::make_planner(limits, fixed)),
+      firmware_(fixed.firmware) {}
 
 Result<bool> PieceReader::next(Piece& piece) {
   gcode::Event event;
@@ -77,7 +79,7 @@ Result<bool> PieceReader::next(Piece& piece) {
         append(std::move(event));
       }
     } else {
-      const bool for_run = gcode::compensable(event);
+      const bool for_run = gcode::compensable(event, firmware_);
       if (!open_.events.empty() && open_.is_run != for_run) {
         close(piece);
         open_.is_run = for_run;

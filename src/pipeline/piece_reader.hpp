@@ -24,7 +24,8 @@ struct Piece {
 };
 
 // Counts the event's moves that unflex leaves as they are, by reason.
-void count_kept_moves(const gcode::Event& event, std::map<std::string, std::size_t>& kept);
+void count_kept_moves(const gcode::Event& event, Firmware firmware,
+                      std::map<std::string, std::size_t>& kept);
 
 class PieceReader {
  public:
@@ -48,6 +49,7 @@ class PieceReader {
   gcode::LineReader lines_;
   gcode::Interpreter interpreter_;
   std::unique_ptr<planner::Planner> planner_;
+  Firmware firmware_;
   Piece open_;                         // being filled
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;

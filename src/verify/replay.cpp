@@ -156,7 +156,7 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
 bool Replay::stays_in_run(const gcode::Event& event) const {
   // What a line of emitted text may replace is known from the sliced file; by itself one of a few
   // µm may well look steep.
-  return in_compensated_run_ || gcode::compensable(event);
+  return in_compensated_run_ || gcode::compensable(event, firmware_);
 }
 
 void Replay::read_run_moves(gcode::Event event, const Regime& before) {

@@ -12,32 +12,38 @@ Segment by(double dx, double dy, double dz, double de) {
 }
 
 TEST(Compensable, AreMovesInThePlane) {
-  EXPECT_TRUE(compensable(by(1, 0, 0, 0))) << "travel";
-  EXPECT_TRUE(compensable(by(0, -1, 0, 0.1))) << "extrusion";
-  EXPECT_TRUE(compensable(by(3, 4, 0.099, 0.1))) << "a spiral vase";
-  EXPECT_TRUE(compensable(by(1, 0, 0, -1e-12))) << "round-off of the running filament sum";
-  EXPECT_EQ(kept_reason(by(1, 0, 0, 0)), "");
+  EXPECT_TRUE(compensable(by(1, 0, 0, 0), Firmware::klipper)) << "travel";
+  EXPECT_TRUE(compensable(by(0, -1, 0, 0.1), Firmware::klipper)) << "extrusion";
+  EXPECT_TRUE(compensable(by(3, 4, 0.099, 0.1), Firmware::klipper)) << "a spiral vase";
+  EXPECT_TRUE(compensable(by(1, 0, 0, -1e-12), Firmware::klipper)) << "round-off of the running filament sum";
+  EXPECT_EQ(kept_reason(by(1, 0, 0, 0), Firmware::klipper), "");
 }
 
 TEST(Compensable, AreNotTheOthersForAReason) {
-  EXPECT_EQ(kept_reason(by(0, 0, 0, 1)), "extrude only");
-  EXPECT_EQ(kept_reason(by(0, 0, 1, 0)), "Z move");
-  EXPECT_EQ(kept_reason(by(3, 4, 0.101, 0)), "Z move");
-  EXPECT_EQ(kept_reason(by(1, 0, 0, -0.5)), "retracting move");
+  EXPECT_EQ(kept_reason(by(0, 0, 0, 1), Firmware::klipper), "extrude only");
+  EXPECT_EQ(kept_reason(by(0, 0, 1, 0), Firmware::klipper), "Z move");
+  EXPECT_EQ(kept_reason(by(3, 4, 0.101, 0), Firmware::klipper), "Z move");
   Segment unknown = by(1, 0, 0, 0);
   unknown.start_known = false;
-  EXPECT_EQ(kept_reason(unknown), "start unknown");
-  EXPECT_FALSE(compensable(unknown));
+  EXPECT_EQ(kept_reason(unknown, Firmware::klipper), "start unknown");
+  EXPECT_FALSE(compensable(unknown, Firmware::klipper));
+}
+
+TEST(Compensable, AreWipesThatPullFilamentBackWhereTheirLimitsCanBeRaised) {
+  EXPECT_EQ(kept_reason(by(1, 0, 0, -0.5), Firmware::klipper), "retracting move");
+  EXPECT_EQ(kept_reason(by(1, 0, 0, -0.5), Firmware::marlin), "");
+  EXPECT_EQ(kept_reason(by(1, 0, 0, -0.5), Firmware::rrf), "");
+  EXPECT_EQ(kept_reason(by(0, 0, 0, -0.5), Firmware::rrf), "extrude only");
 }
 
 TEST(Compensable, AreLinesAsAWhole) {
   Session session;
   session.read("G1 X1 Y1 Z1");
-  EXPECT_TRUE(compensable(session.read("G1 X5")));
-  EXPECT_TRUE(compensable(session.read("G2 X15 I5 E1")));
-  EXPECT_FALSE(compensable(session.read("G2 X25 Z9 I5 E1")));
-  EXPECT_FALSE(compensable(session.read("M105")));
-  EXPECT_FALSE(compensable(session.read("G1 X25")));
+  EXPECT_TRUE(compensable(session.read("G1 X5"), Firmware::klipper));
+  EXPECT_TRUE(compensable(session.read("G2 X15 I5 E1"), Firmware::klipper));
+  EXPECT_FALSE(compensable(session.read("G2 X25 Z9 I5 E1"), Firmware::klipper));
+  EXPECT_FALSE(compensable(session.read("M105"), Firmware::klipper));
+  EXPECT_FALSE(compensable(session.read("G1 X25"), Firmware::klipper));
 }
 
 TEST(NamesPosition, IsTrueForMovesByTheirWords) {

@@ -20,6 +20,7 @@ using ::testing::EndsWith;
 using testing::factory;
 using ::testing::HasSubstr;
 using testing::JobFolder;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr int kFirstBad = 150;  // mm; engines of these tests fail at islands further right
@@ -358,6 +359,43 @@ TEST_F(Texts, StayWithinTheBudgetOfLines) {
   static_cast<void>(compensated(print_of({20, 60}), 1, {"emit.max_lines_per_s=200"}));
   EXPECT_LE(report_.max_lines_per_s, 200.0);
   EXPECT_GE(report_.segment_ms_median, 5.0 - 1e-3);
+}
+
+TEST_F(Texts, RewriteDenseWipesWhereTheirLimitsCanBeRaised) {
+  // 320 lines per second.
+  std::string wipe;
+  for (int i = 1; i <= 40; ++i) {
+    wipe += fmt::format("G1 X{:.2f} Y{:.2f} E-0.05\n", 120.0 - 0.25 * i, 120.0 - 0.02 * i);
+  }
+  const std::string input =
+      "G90\nM83\nG1 X100 Y100 Z0.4 F4800\nG4 P500\nG1 X120 Y100 E1\nG1 X120 Y120 E1\n" + wipe +
+      "G1 E-0.3 F2400\nG1 Z0.8\nG1 X50 F4800\n";
+  for (const char* const firmware : {"marlin", "rrf"}) {
+    const std::string output =
+        compensated(input, 1, {std::string("printer.firmware=") + firmware,
+                               "emit.max_lines_per_s=200", "limits.max_e_velocity_mm_s=50"});
+    EXPECT_LE(report_.max_lines_per_s, 200.0) << firmware;
+    EXPECT_THAT(output, Not(HasSubstr(wipe.substr(0, wipe.find('\n'))))) << firmware;
+    EXPECT_FALSE(report_.kept_moves.contains("retracting move")) << firmware;
+    EXPECT_NEAR(report_.output_extrusion_mm, 2.0 - 40 * 0.05 - 0.3, 1e-9) << firmware;
+  }
+  EXPECT_THAT(compensated(input), HasSubstr(wipe));
+  EXPECT_EQ(report_.kept_moves["retracting move"], 40U);
+}
+
+TEST_F(Texts, KeepToTheBudgetWhereTheSlicedLinesDoNot) {
+  // 320 lines per second, each with its own width.
+  std::string input = "G90\nM83\nG1 X100 Y100 Z0.4 F4800\nG4 P500\nG1 X120 Y100 E1\n";
+  for (int i = 1; i <= 60; ++i) {
+    input += fmt::format("G1 X{:.2f} Y{:.2f} E{}\n", 120.0 - 0.25 * i, 100.0 + 0.02 * i,
+                         i % 2 == 0 ? 0.01 : 0.013);
+  }
+  for (const char* const firmware : {"klipper", "marlin", "rrf"}) {
+    static_cast<void>(compensated(
+        input, 1, {std::string("printer.firmware=") + firmware, "emit.max_lines_per_s=200"}));
+    EXPECT_LE(report_.max_lines_per_s, 200.0) << firmware;
+    EXPECT_NEAR(report_.output_extrusion_mm, 1.0 + 30 * 0.023, 1e-9) << firmware;
+  }
 }
 
 TEST_F(Texts, AreVerifiedWithTheSameFiguresAgain) {

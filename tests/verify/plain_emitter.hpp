@@ -32,7 +32,7 @@ class PlainEmitter {
   std::string emit(const std::string& input) {
     read(input);
     for (const gcode::Event& event : events_) {
-      if (gcode::compensable(event)) {
+      if (gcode::compensable(event, Firmware::klipper)) {
         begin_run();
         for (std::size_t i = 0; i < event.segments.size(); ++i) {
           emit_move(planned_.front());
@@ -69,10 +69,10 @@ class PlainEmitter {
     while (reader.next(line).value()) {
       gcode::Event event = interpreter.interpret(line);
       if (event.kind == gcode::EventKind::barrier || !event.segments.empty()) {
-        if (gcode::compensable(event) != in_run) {
+        if (gcode::compensable(event, Firmware::klipper) != in_run) {
           planner.stop();
         }
-        in_run = gcode::compensable(event);
+        in_run = gcode::compensable(event, Firmware::klipper);
       }
       for (const gcode::Segment& segment : event.segments) {
         planner.add(segment);

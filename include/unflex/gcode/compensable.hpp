@@ -3,6 +3,7 @@
 
 #include <string_view>
 
+#include "unflex/core/firmware.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -11,13 +12,14 @@ namespace unflex::gcode {
 // vase climbs one layer per turn, far less; a Z hop far more.
 inline constexpr double kMaxSlope = 0.02;
 
-// Whether unflex may replace this motion: it starts at a known place, moves in X or Y, hardly in Z,
-// and does not pull filament back.
-[[nodiscard]] bool compensable(const Segment& segment);
+// Whether unflex may replace this motion: it starts at a known place, moves in X or Y and hardly in
+// Z. Klipper limits one that pulls filament back by its extruder's own acceleration, which no G-code
+// raises (kinematics/extruder.py, check_move): there it stays.
+[[nodiscard]] bool compensable(const Segment& segment, Firmware firmware);
 
 // The same for a whole line: a move all of whose segments are compensable. A line is rewritten as a
 // whole or not at all.
-[[nodiscard]] bool compensable(const Event& event);
+[[nodiscard]] bool compensable(const Event& event, Firmware firmware);
 
 // Whether a line is a move by its words (G0 to G3 with an axis or E), though it may change nothing
 // where it stands. It would where the machine is elsewhere, as between two lines of a rewritten
@@ -26,6 +28,6 @@ inline constexpr double kMaxSlope = 0.02;
 
 // Why a motion that is not compensable stays as it is: "start unknown", "extrude only",
 // "retracting move" or "Z move". Empty for a compensable one.
-[[nodiscard]] std::string_view kept_reason(const Segment& segment);
+[[nodiscard]] std::string_view kept_reason(const Segment& segment, Firmware firmware);
 
 }  // namespace unflex::gcode
