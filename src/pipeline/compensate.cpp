@@ -9,7 +9,9 @@
 #include <utility>
 
 #include "compensate_with.hpp"
+#include "emission_cost.hpp"
 #include "judge.hpp"
+#include "nozzle_motion.hpp"
 #include "piece_reader.hpp"
 #include "report_rows.hpp"
 #include "retime.hpp"
@@ -100,6 +102,9 @@ class Compensator {
     std::string text;
     emitter_.finish(text);
     output_ << text;
+    report.line_budget.max_lines_per_s = job_.settings.max_lines_per_s();
+    report.line_budget.cost_rms_mm = emission_cost_.rms_mm();
+    report.line_budget.cost_max_mm = emission_cost_.max_mm();
     for (const Diagnostic& warning : reader_.warnings()) {
       report.warnings.push_back(to_string(warning));
     }
@@ -243,8 +248,22 @@ class Compensator {
   void keep_motion(const Piece& piece) {
     true_nozzle_ = after_motion(piece, true_nozzle_, rules_.nozzle);
     line_rate_.change_text();
+    line_rate_.forget();
     for (const planner::PlannedMove& move : piece.moves) {
       line_rate_.add(move);
+    }
+    note_lines_above_budget(piece);
+  }
+
+  void note_lines_above_budget(const Piece& piece) {
+    if (line_rate_.max_per_s() <= job_.settings.max_lines_per_s()) {
+      return;
+    }
+    ++report_->line_budget.places_above;
+    if (report_->line_budget.above.size() < kMaxFallbacksListed) {
+      report_->line_budget.above.push_back({piece.events.front().line.number,
+                                            piece.events.back().line.number,
+                                            line_rate_.max_per_s()});
     }
   }
 
@@ -271,8 +290,11 @@ class Compensator {
       Verdict verdict = judge(piece.moves, text, emitter_.printer(), emitter_.printer_limits(),
                               true_nozzle_, rules_, line_rate_, job_.settings.max_lines_per_s());
       if (!verdict.objection) {
+        emission_cost_.add(piece.moves, setup_.lead_in_s, base, verdict.replayed, true_nozzle_,
+                           rules_.nozzle);
         true_nozzle_ = verdict.nozzle;
         line_rate_ = std::move(verdict.rate);
+        note_lines_above_budget(piece);
         emitter_ = std::move(trial);
         ++report_->runs_compensated;
         report_->windows_solved += pending.spans.size();
@@ -308,6 +330,7 @@ class Compensator {
   dynamics::NozzleXY nozzle_;
   dynamics::NozzleXY true_nozzle_;  // where the writer is
   verify::LineRate line_rate_;      // of what is written
+  EmissionCost emission_cost_;
   std::deque<Pending> queue_;
   std::size_t first_index_ = 0;   // of queue_'s front among all pieces
   std::deque<Ticket> tickets_;    // of the windows of queue_

@@ -21,30 +21,6 @@ double chance_mm(const planner::FirmwareConfig& config) {
                    std::min(config.steps_per_mm[gcode::X], config.steps_per_mm[gcode::Y]);
 }
 
-// What the nozzle does while the base makes the move, exactly, phase by phase.
-void follow(const planner::PlannedMove& move, const verify::NozzleModel& model,
-            dynamics::NozzleXY& nozzle) {
-  const double phases[] = {move.accel_s, move.cruise_s, move.decel_s};
-  const double accels[] = {move.accel_mm_s2, 0.0, -move.accel_mm_s2};
-  double t = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    if (phases[i] <= 0.0) {
-      continue;
-    }
-    const gcode::Position p = move.position_mm(t);
-    const double v = move.velocity_mm_s(t);
-    const auto step = [&](gcode::Axis axis, const dynamics::FlexibleAxis& flexible,
-                          dynamics::NozzleState state) {
-      const double ratio = move.kinematic ? move.direction[axis] : 0.0;
-      return dynamics::exact_step(flexible, state, {p[axis], v * ratio, accels[i] * ratio},
-                                  phases[i]);
-    };
-    nozzle.x = step(gcode::X, model.x, nozzle.x);
-    nozzle.y = step(gcode::Y, model.y, nozzle.y);
-    t += phases[i];
-  }
-}
-
 // How far the nozzle will swing around a base that rests at `at`.
 double swing_mm(const dynamics::NozzleXY& nozzle, const gcode::Position& at,
                 const verify::NozzleModel& model) {
@@ -54,40 +30,6 @@ double swing_mm(const dynamics::NozzleXY& nozzle, const gcode::Position& at,
 }
 
 }  // namespace
-
-dynamics::NozzleXY at_rest(const gcode::Position& position) {
-  return {{position[gcode::X], 0.0}, {position[gcode::Y], 0.0}};
-}
-
-dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
-                                const verify::NozzleModel& model) {
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < piece.events.size(); ++i) {
-    const gcode::Event& event = piece.events[i];
-    for (std::size_t k = 0; k < piece.move_counts[i]; ++k, ++next) {
-      const planner::PlannedMove& move = piece.moves[next];
-      if (!move.segment.start_known) {
-        // From wherever the machine was: nothing is known but that it starts at rest.
-        nozzle = at_rest(move.segment.start_mm);
-      }
-      follow(move, model, nozzle);
-    }
-    if (event.position_lost) {
-      // Homing and macros take their time: the nozzle has come to rest.
-      nozzle.x.velocity = nozzle.y.velocity = 0.0;
-    } else if (event.dwell_s > 0.0) {
-      const auto rest = [&](const dynamics::FlexibleAxis& axis, dynamics::NozzleState state,
-                            double base) {
-        return dynamics::exact_step(axis, state, {base, 0.0, 0.0}, event.dwell_s);
-      };
-      if (next > 0) {
-        const gcode::Position& at = piece.moves[next - 1].segment.end_mm;
-        nozzle = {rest(model.x, nozzle.x, at[gcode::X]), rest(model.y, nozzle.y, at[gcode::Y])};
-      }
-    }
-  }
-  return nozzle;
-}
 
 Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_view text,
               gcode::Interpreter printer, const planner::Limits& printer_limits,
@@ -140,6 +82,7 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_vie
         no_worse(a.contour_max_mm, b.contour_max_mm + chance_mm(rules.fixed))) {
       verdict.nozzle = after.end;
       verdict.rate = std::move(rate);
+      verdict.replayed = std::move(replayed);
       return verdict;
     }
     verdict.objection = fmt::format(
@@ -160,6 +103,7 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_vie
                 swing_mm(before.end, end, rules.nozzle) + chance_mm(rules.fixed)))) {
     verdict.nozzle = after.end;
     verdict.rate = std::move(rate);
+    verdict.replayed = std::move(replayed);
     return verdict;
   }
   verdict.objection =

@@ -1,5 +1,4 @@
-// What the nozzle does during motion that is left alone, and whether a compensated run is better
-// than its original.
+// Whether a compensated run is better than its original.
 #pragma once
 
 #include <optional>
@@ -7,7 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include "piece_reader.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
@@ -16,16 +14,11 @@
 
 namespace unflex::pipeline {
 
-[[nodiscard]] dynamics::NozzleXY at_rest(const gcode::Position& position);
-
-// The nozzle after the piece's own moves and pauses, starting from `nozzle`.
-[[nodiscard]] dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
-                                              const verify::NozzleModel& model);
-
 struct Verdict {
-  std::optional<std::string> objection;  // why the original moves must stand
-  dynamics::NozzleXY nozzle;             // without objection: after the run …
-  verify::LineRate rate;                 // … and its lines counted
+  std::optional<std::string> objection;        // why the original moves must stand
+  dynamics::NozzleXY nozzle;                   // without objection: after the run …
+  verify::LineRate rate;                       // … its lines counted …
+  std::vector<planner::PlannedMove> replayed;  // … and what the printer makes of them
 };
 
 // Replays the text of a compensated run as the printer would, in the state the printer is in before

@@ -37,6 +37,20 @@ Json fallbacks_json(const std::vector<Fallback>& fallbacks) {
   return array;
 }
 
+Json budget_json(const LineBudget& budget) {
+  Json above = Json::array();
+  for (const AboveBudget& place : budget.above) {
+    above.push_back({{"first_line", place.first_line},
+                     {"last_line", place.last_line},
+                     {"lines_per_s", place.lines_per_s}});
+  }
+  return {{"max_lines_per_s", budget.max_lines_per_s},
+          {"places_above", budget.places_above},
+          {"above", above},
+          {"cost_rms_mm", budget.cost_rms_mm},
+          {"cost_max_mm", budget.cost_max_mm}};
+}
+
 void add_motion(const Report& r, Json& json) {
   json["print_time_s"] = {{"reference", r.reference_time_s}, {"emitted", r.emitted_time_s}};
   json["deviation"] = {{"uncompensated", rows_json(r.uncompensated)},
@@ -48,7 +62,7 @@ void add_motion(const Report& r, Json& json) {
 void add_work(const Report& r, Json& json) {
   if (r.solver_engine.empty()) {
     // Nothing was solved, a file was verified: what was tried for it is not known.
-    for (const char* const key : {"windows", "fallbacks", "kept_moves", "solver"}) {
+    for (const char* const key : {"windows", "fallbacks", "kept_moves", "line_budget", "solver"}) {
       json[key] = nullptr;
     }
     json["runs"] = {{"total", nullptr}, {"compensated", r.runs_compensated}, {"fallback", nullptr}};
@@ -60,6 +74,7 @@ void add_work(const Report& r, Json& json) {
       {"total", r.runs_total}, {"compensated", r.runs_compensated}, {"fallback", r.runs_fallback}};
   json["fallbacks"] = fallbacks_json(r.fallbacks);
   json["kept_moves"] = Json(r.kept_moves);
+  json["line_budget"] = budget_json(r.line_budget);
   json["solver"] = {{"engine", r.solver_engine}, {"iterations", r.solver_iterations}};
 }
 

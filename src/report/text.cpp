@@ -70,6 +70,17 @@ void write_runs(Sink out, const Report& r) {
 void write_output(Sink out, const Report& r) {
   fmt::format_to(out, "output        {} lines, {:.1f} MB, {:.0f} lines/s at peak\n", r.output_lines,
                  static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s);
+  if (!r.solver_engine.empty()) {
+    const LineBudget& budget = r.line_budget;
+    fmt::format_to(out, "lines         cost {} µm RMS, {} µm at most; ",
+                   micrometres(budget.cost_rms_mm), micrometres(budget.cost_max_mm));
+    if (budget.places_above == 0) {
+      fmt::format_to(out, "never more than {:.0f} per second\n", budget.max_lines_per_s);
+    } else {
+      fmt::format_to(out, "more than {:.0f} per second in {} places, the first at line {}\n",
+                     budget.max_lines_per_s, budget.places_above, budget.above.front().first_line);
+    }
+  }
   fmt::format_to(out, "filament      {:.2f} mm in, {:.2f} mm out\n", r.input_extrusion_mm,
                  r.output_extrusion_mm);
   fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "nozzle_motion.hpp"
 #include "piece_reader.hpp"
 
 namespace unflex::pipeline {

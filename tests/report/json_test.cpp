@@ -74,11 +74,22 @@ TEST(JsonReport, ListsFallbacksWithTheirLines) {
                 {"first_line", 30}, {"last_line", 44}, {"reason", "worse than the original"}}));
 }
 
+TEST(JsonReport, ListsWhereTheBudgetOfLinesIsExceeded) {
+  const nlohmann::json budget = parsed(sample_report())["line_budget"];
+  EXPECT_EQ(budget["max_lines_per_s"], 850.0);
+  EXPECT_EQ(budget["places_above"], 2);
+  ASSERT_EQ(budget["above"].size(), 2U);
+  EXPECT_EQ(budget["above"][1],
+            (nlohmann::json{{"first_line", 90}, {"last_line", 91}, {"lines_per_s", 890.0}}));
+  EXPECT_EQ(budget["cost_rms_mm"], 0.0005);
+  EXPECT_EQ(budget["cost_max_mm"], 0.0075);
+}
+
 TEST(JsonReport, SaysNothingOfTheWorkBehindAFileThatWasOnlyVerified) {
   Report verified = sample_report();
   verified.solver_engine.clear();
   const nlohmann::json json = parsed(verified);
-  for (const char* const key : {"windows", "fallbacks", "kept_moves", "solver"}) {
+  for (const char* const key : {"windows", "fallbacks", "kept_moves", "line_budget", "solver"}) {
     EXPECT_TRUE(json[key].is_null()) << key;
   }
   EXPECT_TRUE(json["runs"]["total"].is_null());

@@ -13,23 +13,26 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 TEST(Summary, IsExactlyThis) {
-  EXPECT_EQ(to_text(sample_report()),
-            "cube.gcode → out.gcode\n"
-            "  contour, µm     max                 p99                 RMS\n"
-            "  extruding       800 → 12.5          400 → 6.25          200 → 3.12\n"
-            "  all moves       1600 → 25.0         800 → 12.5          400 → 6.25\n"
-            "print time    1h 00m 00s planned, 1h 00m 18s emitted (+0.50 %)\n"
-            "base          at most 123 mm/s and 19999 mm/s²\n"
-            "runs          895 of 900 compensated, 5 fell back to their original moves\n"
-            "              lines 10-20: no solution\n"
-            "              lines 30-44: worse than the original\n"
-            "              and 3 more, listed by --report\n"
-            "              12 other moves stay as they are: Z move\n"
-            "solver        ipopt 3.11.9, 1000 windows, 4242 iterations\n"
-            "output        123456 lines, 4.5 MB, 890 lines/s at peak\n"
-            "filament      1234.50 mm in, 1234.75 mm out\n"
-            "speed         40 s of print per second, 1m 30s in all, 64 MB\n"
-            "violations    3\n");
+  EXPECT_EQ(
+      to_text(sample_report()),
+      "cube.gcode → out.gcode\n"
+      "  contour, µm     max                 p99                 RMS\n"
+      "  extruding       800 → 12.5          400 → 6.25          200 → 3.12\n"
+      "  all moves       1600 → 25.0         800 → 12.5          400 → 6.25\n"
+      "print time    1h 00m 00s planned, 1h 00m 18s emitted (+0.50 %)\n"
+      "base          at most 123 mm/s and 19999 mm/s²\n"
+      "runs          895 of 900 compensated, 5 fell back to their original moves\n"
+      "              lines 10-20: no solution\n"
+      "              lines 30-44: worse than the original\n"
+      "              and 3 more, listed by --report\n"
+      "              12 other moves stay as they are: Z move\n"
+      "solver        ipopt 3.11.9, 1000 windows, 4242 iterations\n"
+      "output        123456 lines, 4.5 MB, 890 lines/s at peak\n"
+      "lines         cost 0.50 µm RMS, 7.50 µm at most; more than 850 per second in 2 places, "
+      "the first at line 70\n"
+      "filament      1234.50 mm in, 1234.75 mm out\n"
+      "speed         40 s of print per second, 1m 30s in all, 64 MB\n"
+      "violations    3\n");
 }
 
 TEST(Summary, DoesNotSpeakOfRunsWhereNothingWasSolved) {
@@ -37,7 +40,15 @@ TEST(Summary, DoesNotSpeakOfRunsWhereNothingWasSolved) {
   report.command = "verify";
   report.runs_total = 0;
   report.windows_total = 0;
+  report.solver_engine.clear();
   EXPECT_THAT(to_text(report), Not(HasSubstr("solver")));
+  EXPECT_THAT(to_text(report), Not(HasSubstr("per second in")));
+}
+
+TEST(Summary, SaysThatTheBudgetOfLinesHolds) {
+  Report report = sample_report();
+  report.line_budget.places_above = 0;
+  EXPECT_THAT(to_text(report), HasSubstr("7.50 µm at most; never more than 850 per second\n"));
 }
 
 TEST(Summary, OfAnEmptyPrintHasNoInfinities) {

@@ -32,6 +32,23 @@ struct Fallback {
   std::string reason;
 };
 
+// A stretch of the input whose lines, kept or rewritten, are more than the budget.
+struct AboveBudget {
+  std::size_t first_line = 0;
+  std::size_t last_line = 0;
+  double lines_per_s = 0.0;
+};
+
+struct LineBudget {
+  double max_lines_per_s = 0.0;
+  std::size_t places_above = 0;
+  std::vector<AboveBudget> above;  // at most 1000 are listed
+  // How far the nozzle is, across the path, from where it would be if the base moved exactly as
+  // optimised, while filament is laid: what few lines and the printer's grid cost.
+  double cost_rms_mm = 0.0;
+  double cost_max_mm = 0.0;
+};
+
 struct Setting {
   std::string key;
   std::string value;
@@ -63,6 +80,8 @@ struct Report {
   std::size_t windows_fallback = 0;  // windows of runs that kept their original moves
   std::vector<Fallback> fallbacks;   // at most 1000 are listed
   std::map<std::string, std::size_t> kept_moves;  // reason → moves outside runs ("wipe", "Z move" …)
+
+  LineBudget line_budget;
 
   std::string solver_engine;         // "ipopt 3.11.9"
   std::size_t solver_iterations = 0;

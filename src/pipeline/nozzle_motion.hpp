@@ -1,0 +1,21 @@
+// What the nozzle does while the base moves as planned, exactly.
+#pragma once
+
+#include "piece_reader.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/verify/deviation.hpp"
+
+namespace unflex::pipeline {
+
+[[nodiscard]] dynamics::NozzleXY at_rest(const gcode::Position& position);
+
+// Takes the nozzle from one moment of the move to a later one, seconds after its start.
+void advance(const planner::PlannedMove& move, double from_s, double to_s,
+             const verify::NozzleModel& model, dynamics::NozzleXY& nozzle);
+
+// The nozzle after the piece's own moves and pauses, starting from `nozzle`.
+[[nodiscard]] dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
+                                              const verify::NozzleModel& model);
+
+}  // namespace unflex::pipeline
