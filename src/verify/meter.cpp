@@ -18,6 +18,9 @@ constexpr double kSameTime_s = 1e-10;
 // clock runs off.
 constexpr double kClockReach_s = 0.02;
 
+// How long a cut of the path serves.
+constexpr double kCutKept_s = 1e-3;
+
 constexpr double kLagMemory_s = 0.1;
 constexpr double kLagLeastMemory_s = 0.05;
 constexpr double kLagLeastSpeed_mm_s = 5.0;
@@ -36,10 +39,13 @@ void advance(dynamics::BaseSegment& base, double h) {
 }  // namespace
 
 void LagEstimate::add(double error_dot_velocity, double velocity2, double h) {
-  const double keep = std::exp(-h / kLagMemory_s);
-  error_dot_velocity_ = keep * error_dot_velocity_ + h * error_dot_velocity;
-  velocity2_ = keep * velocity2_ + h * velocity2;
-  weight_s_ = keep * weight_s_ + h;
+  if (h != last_h_) {
+    last_h_ = h;
+    keep_ = std::exp(-h / kLagMemory_s);
+  }
+  error_dot_velocity_ = keep_ * error_dot_velocity_ + h * error_dot_velocity;
+  velocity2_ = keep_ * velocity2_ + h * velocity2;
+  weight_s_ = keep_ * weight_s_ + h;
   if (weight_s_ >= kLagLeastMemory_s &&
       velocity2_ >= kLagLeastSpeed_mm_s * kLagLeastSpeed_mm_s * weight_s_) {
     worst_s_ = std::max(worst_s_, std::abs(error_dot_velocity_) / velocity2_);
@@ -66,6 +72,7 @@ void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm
 void Meter::begin_section(ReferencePath& path) {
   if (path_ != &path) {
     path_ = &path;
+    first_cut_ = last_cut_ = Cut{};
     current_ = path.first();
     near_first_ = path.first();
     near_end_ = path.first();
@@ -149,42 +156,85 @@ double Meter::next_reference_change() {
 }
 
 void Meter::integrate(Phase& phase, double duration_s, bool measured) {
+  // For fewer steps it does not pay to set up maps.
+  constexpr double kManySteps = 8.0;
   const double steps = std::max(1.0, std::ceil(duration_s / model_.step_s - 1e-9));
   const double h = duration_s / steps;
+  if (steps < kManySteps) {
+    integrate(phase, steps, h, measured, [&] {
+      nozzle_.x = dynamics::rk4_step(model_.x, nozzle_.x, phase.x, h);
+      nozzle_.y = dynamics::rk4_step(model_.y, nozzle_.y, phase.y, h);
+    });
+    return;
+  }
+  const dynamics::Rk4Map map_x(model_.x, h);
+  const dynamics::Rk4Map map_y(model_.y, h);
+  integrate(phase, steps, h, measured, [&] {
+    nozzle_.x = map_x.step(nozzle_.x, phase.x);
+    nozzle_.y = map_y.step(nozzle_.y, phase.y);
+  });
+}
+
+template <typename Step>
+void Meter::integrate(Phase& phase, double steps, double h, bool measured, const Step& step) {
   const double start_s = time_s_;
-  for (double step = 1.0; step <= steps; step += 1.0) {
-    nozzle_.x = dynamics::rk4_step(model_.x, nozzle_.x, phase.x, h);
-    nozzle_.y = dynamics::rk4_step(model_.y, nozzle_.y, phase.y, h);
+  ReferencePhase reference;
+  if (measured) {
+    path_->extend_to(start_s + steps * h + reach_s_);
+    reference = reference_phase(steps * h);
+  }
+  for (double number = 1.0; number <= steps; number += 1.0) {
+    step();
     advance(phase.x, h);
     advance(phase.y, h);
     if (measured) {
-      time_s_ = start_s + step * h;
-      sample(h);
+      time_s_ = start_s + number * h;
+      advance(reference.x, h);
+      advance(reference.y, h);
+      sample(reference, h);
     }
   }
 }
 
-void Meter::sample(double h) {
-  path_->extend_to(time_s_ + reach_s_);
-  const PathPiece& reference = (*path_)[current_];
-  const double local_s = time_s_ - reference.start_s;
-  const double covered = reference.covered_xy_mm(time_s_);
-  const double error_x = reference.x_mm + reference.direction_x * covered - nozzle_.x.position;
-  const double error_y = reference.y_mm + reference.direction_y * covered - nozzle_.y.position;
-  const double tracking = std::sqrt(error_x * error_x + error_y * error_y);
+// From now on for a time in which it neither changes its acceleration nor its move.
+Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
+  const PathPiece& piece = (*path_)[current_];
+  const planner::PlannedMove& move = piece.move;
+  const double local_s = time_s_ - piece.start_s;
+  const double middle_s = local_s + 0.5 * duration_s;
+  double acceleration = 0.0;
+  if (middle_s < move.accel_s) {
+    acceleration = move.accel_mm_s2;
+  } else if (middle_s > move.accel_s + move.cruise_s) {
+    acceleration = -move.accel_mm_s2;
+  }
+  const double share_xy = move.length_mm > 0.0 ? piece.length_xy_mm / move.length_mm : 0.0;
+  const double covered = move.distance_mm(local_s) * share_xy;
+  const double speed = move.velocity_mm_s(local_s) * share_xy;
+  const auto along = [&](double start_mm, double direction) {
+    return dynamics::BaseSegment{start_mm + direction * covered, direction * speed,
+                                 direction * acceleration * share_xy};
+  };
+  return {along(piece.x_mm, piece.direction_x), along(piece.y_mm, piece.direction_y),
+          piece.extruding};
+}
+
+void Meter::sample(const ReferencePhase& reference, double h) {
+  const double error_x = reference.x.position - nozzle_.x.position;
+  const double error_y = reference.y.position - nozzle_.y.position;
 
   slide_window();
   std::size_t nearest = current_;
-  const double contour = std::sqrt(squared_contour_error(nearest));
+  const double contour2 = squared_contour_error(nearest);
+  const double tracking2 = error_x * error_x + error_y * error_y;
   const std::size_t line = (*path_)[nearest].move.segment.line;
-  all_.add(contour, tracking, h, line);
+  all_.add(contour2, tracking2, h, line);
   if (reference.extruding) {
-    extruding_.add(contour, tracking, h, line);
+    extruding_.add(contour2, tracking2, h, line);
   }
   if (follow_lag_) {
-    const double speed = reference.move.velocity_mm_s(local_s);
-    const double v_x = reference.move.direction[gcode::X] * speed;
-    const double v_y = reference.move.direction[gcode::Y] * speed;
+    const double v_x = reference.x.velocity;
+    const double v_y = reference.y.velocity;
     lag_.add(error_x * v_x + error_y * v_y, v_x * v_x + v_y * v_y, h);
   }
 }
@@ -200,9 +250,19 @@ void Meter::slide_window() {
   }
 }
 
+double Meter::Cut::at(const PathPiece& piece, std::size_t number, double t, double ahead_s) {
+  // The clock goes back after wait_for_reference().
+  if (number != piece_ || t > until_s_ || t < until_s_ - kCutKept_s) {
+    piece_ = number;
+    until_s_ = t + kCutKept_s;
+    covered_mm_ = piece.covered_xy_mm(t + ahead_s);
+  }
+  return covered_mm_;
+}
+
 // Distance to the part of the path between r(t − τ) and r(t + τ): whole pieces, the first and the
-// last one cut.
-double Meter::squared_contour_error(std::size_t& nearest) const {
+// last one cut. Where the nearest point is well inside, where exactly they are cut does not matter.
+double Meter::squared_contour_error(std::size_t& nearest) {
   const double p_x = nozzle_.x.position;
   const double p_y = nozzle_.y.position;
   const double from_s = time_s_ - reach_s_;
@@ -212,9 +272,14 @@ double Meter::squared_contour_error(std::size_t& nearest) const {
     const PathPiece& piece = (*path_)[number];
     const double x = p_x - piece.x_mm;
     const double y = p_y - piece.y_mm;
-    const double low = piece.start_s < from_s ? piece.covered_xy_mm(from_s) : 0.0;
-    const double high = piece.end_s > to_s ? piece.covered_xy_mm(to_s) : piece.length_xy_mm;
-    const double along = std::clamp(x * piece.direction_x + y * piece.direction_y, low, high);
+    double along =
+        std::clamp(x * piece.direction_x + y * piece.direction_y, 0.0, piece.length_xy_mm);
+    if (piece.start_s < from_s && along < first_cut_.at(piece, number, from_s, kCutKept_s)) {
+      along = std::max(along, piece.covered_xy_mm(from_s));
+    }
+    if (piece.end_s > to_s && along > last_cut_.at(piece, number, to_s, 0.0)) {
+      along = std::min(along, piece.covered_xy_mm(to_s));
+    }
     const double across_x = x - along * piece.direction_x;
     const double across_y = y - along * piece.direction_y;
     const double distance2 = across_x * across_x + across_y * across_y;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 
 #include "reference_path.hpp"
 #include "unflex/verify/deviation.hpp"
@@ -23,6 +24,8 @@ class LagEstimate {
   double velocity2_ = 0.0;
   double weight_s_ = 0.0;
   double worst_s_ = 0.0;
+  double last_h_ = 0.0;  // h of the last sample, for which …
+  double keep_ = 1.0;    // … so much of the memory stays
 };
 
 class Meter {
@@ -61,12 +64,34 @@ class Meter {
     double duration_s = 0.0;
   };
 
+  // Where a piece of the path is cut at some time, kept for a while.
+  class Cut {
+   public:
+    // How much of the piece is covered at t + ahead_s, or was shortly before.
+    double at(const PathPiece& piece, std::size_t number, double t, double ahead_s);
+
+   private:
+    std::size_t piece_ = std::numeric_limits<std::size_t>::max();
+    double until_s_ = 0.0;
+    double covered_mm_ = 0.0;
+  };
+
+  // The reference during one phase of one of its moves.
+  struct ReferencePhase {
+    dynamics::BaseSegment x;
+    dynamics::BaseSegment y;
+    bool extruding = false;
+  };
+
   void play(Phase phase);
   void integrate(Phase& phase, double duration_s, bool measured);
+  template <typename Step>
+  void integrate(Phase& phase, double steps, double h, bool measured, const Step& step);
   [[nodiscard]] double next_reference_change();
-  void sample(double h);
+  [[nodiscard]] ReferencePhase reference_phase(double duration_s) const;
+  void sample(const ReferencePhase& reference, double h);
   void slide_window();
-  [[nodiscard]] double squared_contour_error(std::size_t& nearest) const;
+  [[nodiscard]] double squared_contour_error(std::size_t& nearest);
 
   NozzleModel model_;
   ReferencePath* path_ = nullptr;
@@ -78,6 +103,8 @@ class Meter {
   std::size_t current_ = 0;     // piece of the reference at time_s_
   std::size_t near_first_ = 0;  // pieces that reach into [t − reach, t + reach]
   std::size_t near_end_ = 0;
+  Cut first_cut_;
+  Cut last_cut_;
   DeviationAccumulator extruding_;
   DeviationAccumulator all_;
   LagEstimate lag_;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "log_histogram.hpp"
 
 namespace unflex::verify {
 namespace {
@@ -87,7 +86,7 @@ void BaseCheck::add(const planner::PlannedMove& move) {
   end_velocity_ = {move.end_v_mm_s * along[0], move.end_v_mm_s * along[1]};
   last_duration_s_ = duration;
   last_line_ = segment.line;
-  add_to_histogram(durations_, duration, 1.0);
+  durations_s_.add_square(duration * duration, 1.0);
 }
 
 void BaseCheck::change_of_velocity(const std::array<double, 2>& velocity, double duration_s,
@@ -119,7 +118,7 @@ void BaseCheck::report(const Excess& excess, std::string_view what, std::string_
   }
 }
 
-double BaseCheck::median_duration_s() const { return histogram_quantile(durations_, 0.5); }
+double BaseCheck::median_duration_s() const { return durations_s_.quantile(0.5); }
 
 std::optional<std::string> broken_rule(const std::vector<planner::PlannedMove>& reference,
                                        const std::vector<planner::PlannedMove>& base,

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "unflex/verify/log_histogram.hpp"
 #include "unflex/verify/verify.hpp"
 #include "violations.hpp"
 
@@ -76,7 +77,7 @@ class BaseCheck {
   Excess accel_excess_;
   double max_velocity_ = 0.0;
   double max_accel_ = 0.0;
-  std::vector<double> durations_;  // histogram, by number
+  LogHistogram durations_s_;  // by number
 };
 
 // Whether the firmware refuses the move because it lays too much filament (Klipper:

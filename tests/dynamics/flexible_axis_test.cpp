@@ -174,6 +174,21 @@ TEST(Rk4Step, HasTheLocalErrorOfAFourthOrderTaylorSeries) {
   EXPECT_NEAR(got.velocity / 100.0, -x + x * x * x / 6.0, 1e-15);
 }
 
+TEST(Rk4Map, IsTheStep) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (int trial = 0; trial < 500; ++trial) {
+    const FlexibleAxis axis = from_frequency(60.0 + 40.0 * unit(random), 0.6 + 0.6 * unit(random));
+    const NozzleState start{200.0 * unit(random), 100.0 * unit(random)};
+    const BaseSegment base{start.position + unit(random), 100.0 * unit(random), 2e4 * unit(random)};
+    const double h = 1e-3 * (1.01 + unit(random));
+    const NozzleState step = rk4_step(axis, start, base, h);
+    const NozzleState got = Rk4Map(axis, h).step(start, base);
+    ASSERT_NEAR(got.position, step.position, 1e-12);
+    ASSERT_NEAR(got.velocity, step.velocity, 1e-9);
+  }
+}
+
 TEST(Rk4Step, AgreesWithTheExactStepForSmallSteps) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);

@@ -48,6 +48,31 @@ struct BaseSegment {
 [[nodiscard]] NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state,
                                    const BaseSegment& base, double h);
 
+// rk4_step of one length as the linear map it is, for many steps of that length.
+class Rk4Map {
+ public:
+  Rk4Map() = default;
+  Rk4Map(const FlexibleAxis& axis, double h);
+
+  // The base's position is carried along so that numbers stay small.
+  [[nodiscard]] NozzleState step(const NozzleState& state, const BaseSegment& base) const {
+    const double y = state.position - base.position;
+    return {base.position + of_position_.position * y + of_velocity_.position * state.velocity +
+                of_base_velocity_.position * base.velocity +
+                of_base_acceleration_.position * base.acceleration,
+            of_position_.velocity * y + of_velocity_.velocity * state.velocity +
+                of_base_velocity_.velocity * base.velocity +
+                of_base_acceleration_.velocity * base.acceleration};
+  }
+
+ private:
+  // What one unit of each makes after the step.
+  NozzleState of_position_;
+  NozzleState of_velocity_;
+  NozzleState of_base_velocity_;
+  NozzleState of_base_acceleration_;
+};
+
 // The exact state h seconds later for the same input, from the closed form of the damped
 // oscillator (any ζ ≥ 0).
 [[nodiscard]] NozzleState exact_step(const FlexibleAxis& axis, NozzleState state,

@@ -7,19 +7,20 @@
 //   tracking error  |p(t) − r(t)| in the XY plane, at the same time
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/planner.hpp"
+#include "unflex/verify/log_histogram.hpp"
 
 namespace unflex::verify {
 
 // Weighted by time: every sample counts for the time it stands for.
 struct DeviationStats {
   double contour_max_mm = 0.0;
-  double contour_p99_mm = 0.0;  // from a histogram with cells 1 % apart
+  double contour_p99_mm = 0.0;  // from a histogram with cells less than 1 % apart
   double contour_rms_mm = 0.0;
   double tracking_max_mm = 0.0;
   double tracking_rms_mm = 0.0;
@@ -33,20 +34,29 @@ struct Deviation {
   DeviationStats all;
 };
 
-// Gathers samples; two accumulators can be merged.
+// Gathers samples, given by the squares of their errors.
 class DeviationAccumulator {
  public:
-  void add(double contour_mm, double tracking_mm, double weight_s, std::size_t line);
-  void merge(const DeviationAccumulator& other);
+  void add(double contour2_mm2, double tracking2_mm2, double weight_s, std::size_t line) {
+    contour_s_.add_square(contour2_mm2, weight_s);
+    sum_contour2_ += weight_s * contour2_mm2;
+    sum_tracking2_ += weight_s * tracking2_mm2;
+    weight_s_ += weight_s;
+    tracking2_max_ = std::max(tracking2_max_, tracking2_mm2);
+    if (contour2_mm2 > contour2_max_) {
+      contour2_max_ = contour2_mm2;
+      line_ = line;
+    }
+  }
   [[nodiscard]] DeviationStats stats() const;
 
  private:
-  std::vector<double> histogram_s_;  // time per cell of the logarithm of the contour error
+  LogHistogram contour_s_;  // time per cell
   double sum_contour2_ = 0.0;
   double sum_tracking2_ = 0.0;
   double weight_s_ = 0.0;
-  double contour_max_ = 0.0;
-  double tracking_max_ = 0.0;
+  double contour2_max_ = 0.0;
+  double tracking2_max_ = 0.0;
   std::size_t line_ = 0;
 };
 
@@ -69,8 +79,8 @@ struct RunDeviation {
 };
 
 // Integrates the nozzle while the base makes `base`, and measures it against the path and plan of
-// `reference`; the base starts lead_in_s before the reference, and `start` is the nozzle then. Where the base takes
-// longer than the reference, the reference rests at its end.
+// `reference`; the base starts lead_in_s before the reference, and `start` is the nozzle then.
+// Where the base takes longer than the reference, the reference rests at its end.
 [[nodiscard]] RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                                    const std::vector<planner::PlannedMove>& base, NozzleXY start,
                                    const NozzleModel& model, double lead_in_s = 0.0);

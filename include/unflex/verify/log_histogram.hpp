@@ -1,0 +1,50 @@
+// Histogram over cells whose borders are less than 1 % apart, from 2⁻³⁰ to 2⁷; what lies outside
+// falls into the first or last cell. Values are given by their squares, which is what distances are
+// computed as.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace unflex::verify {
+
+class LogHistogram {
+ public:
+  // Adds `weight` to the cell of the value whose square is given.
+  void add_square(double square, double weight) {
+    if (weights_.empty()) {
+      weights_.resize(kCells);
+    }
+    const std::uint64_t cell = square > kSmallest ? number(square) - kFirst : 0;
+    weights_[std::min(cell, kCells - 1)] += weight;
+  }
+
+  // The middle of the cell in which the given fraction of the whole weight is reached, within
+  // 0.5 %; 0 for an empty histogram.
+  [[nodiscard]] double quantile(double fraction) const;
+
+ private:
+  // A double's bits are its exponent above its mantissa: those down to the mantissa's sixth divide
+  // every octave of squares into 64 equal cells, and numbers in order have cells in order.
+  static constexpr int kDropped = 52 - 6;
+  static constexpr double kSmallest = 0x1p-60;
+  static constexpr double kLargest = 0x1p14;
+
+  static constexpr std::uint64_t kFirst = std::bit_cast<std::uint64_t>(kSmallest) >> kDropped;
+  static constexpr std::uint64_t kCells =
+      (std::bit_cast<std::uint64_t>(kLargest) >> kDropped) - kFirst;
+
+  [[nodiscard]] static std::uint64_t number(double square) {
+    return std::bit_cast<std::uint64_t>(square) >> kDropped;
+  }
+
+  // Where the cell begins.
+  [[nodiscard]] static double border(std::size_t cell);
+
+  std::vector<double> weights_;
+};
+
+}  // namespace unflex::verify
