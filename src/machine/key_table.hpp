@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <variant>
 
@@ -23,9 +24,9 @@ struct Bounds {
 };
 
 // The member behind a key. The alternative held says what type of value the key takes.
-using Member =
-    std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&), bool& (*)(Draft&),
-                 Firmware& (*)(Draft&), std::optional<Range>& (*)(Draft&)>;
+using Member = std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&),
+                            bool& (*)(Draft&), Firmware& (*)(Draft&),
+                            std::optional<Range>& (*)(Draft&), std::string& (*)(Draft&)>;
 
 struct Key {
   std::string_view name;
@@ -36,6 +37,8 @@ struct Key {
   // For optional members: what holds while unset, in words, and as a number where there is one.
   std::string_view if_unset = {};
   double (*in_force)(const Settings&) = nullptr;
+  // Of a text: what it may be.
+  std::span<const std::string_view> words = {};
   // Another form of other keys: read, turned into those, and not kept.
   bool converted = false;
 };

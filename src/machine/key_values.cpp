@@ -1,6 +1,7 @@
 #include "key_values.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 
@@ -37,6 +38,8 @@ std::string to_toml_value(bool value) { return value ? "true" : "false"; }
 
 std::string to_toml_value(Firmware value) { return fmt::format("\"{}\"", to_string(value)); }
 
+std::string to_toml_value(const std::string& value) { return fmt::format("\"{}\"", value); }
+
 std::string to_toml_value(const Range& value) {
   return fmt::format("[{}, {}]", value.min, value.max);
 }
@@ -62,6 +65,9 @@ std::string range_text(const Key& key) {
   }
   if (std::holds_alternative<std::optional<Range>& (*)(Draft&)>(key.member)) {
     return "min < max";
+  }
+  if (std::holds_alternative<std::string& (*)(Draft&)>(key.member)) {
+    return fmt::format("\"{}\"", fmt::join(key.words, "\", \""));
   }
   return bounds_text(key.bounds);
 }

@@ -182,8 +182,11 @@ double Settings::shaper_freq_x_hz() const {
   return printer.input_shaper_freq_x_hz.value_or(default_shaper_hz(printer, dynamics_x));
 }
 
+// RepRapFirmware has one shaper for both axes.
 double Settings::shaper_freq_y_hz() const {
-  return printer.input_shaper_freq_y_hz.value_or(default_shaper_hz(printer, dynamics_y));
+  return printer.input_shaper_freq_y_hz.value_or(printer.firmware == Firmware::rrf
+                                                     ? shaper_freq_x_hz()
+                                                     : default_shaper_hz(printer, dynamics_y));
 }
 
 }  // namespace unflex::machine

@@ -93,6 +93,15 @@ std::string store(const toml::node& node, const Key& key, Firmware& target) {
   return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), kind_of(node));
 }
 
+std::string store(const toml::node& node, const Key& key, std::string& target) {
+  const auto* text = node.as_string();
+  if (text == nullptr || std::ranges::find(key.words, text->get()) == key.words.end()) {
+    return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), kind_of(node));
+  }
+  target = text->get();
+  return {};
+}
+
 std::string store(const toml::node& node, const Key& key, std::optional<Range>& target) {
   const auto* array = node.as_array();
   if (array == nullptr || array->size() != 2) {

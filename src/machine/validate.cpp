@@ -113,6 +113,8 @@ Status check_printer(const Draft& draft) {
   }
   for (const auto& [key, value] :
        {std::pair{"printer.min_steps_per_segment", s.printer.min_steps_per_segment},
+        std::pair{"printer.min_circle_segments", s.printer.min_circle_segments},
+        std::pair{"printer.arc_correction_interval", s.printer.arc_correction_interval},
         std::pair{"printer.queue_length", s.queue_length()},
         std::pair{"limits.jerk_policy", s.limits.jerk_policy}}) {
     if (value != std::floor(value)) {
@@ -120,9 +122,41 @@ Status check_printer(const Draft& draft) {
                       fmt::format("{} is {}, but must be a whole number", key, value));
     }
   }
+  if (s.printer.min_arc_segment_mm > s.printer.max_arc_segment_mm) {
+    return conflict(draft, {"printer.min_arc_segment_mm", "printer.max_arc_segment_mm"},
+                    fmt::format("printer.min_arc_segment_mm is {}, but must not exceed "
+                                "printer.max_arc_segment_mm, {}",
+                                s.printer.min_arc_segment_mm, s.printer.max_arc_segment_mm));
+  }
   if (s.extruder.filament_diameter_mm < s.extruder.nozzle_diameter_mm) {
     return conflict(draft, {"extruder.filament_diameter_mm", "extruder.nozzle_diameter_mm"},
                     "extruder.filament_diameter_mm must not be below nozzle_diameter_mm");
+  }
+  return {};
+}
+
+// What M593 of RepRapFirmware takes (AxisShaper::Configure).
+Status check_shaper(const Draft& draft) {
+  const Settings& s = draft.settings;
+  if (s.printer.firmware != Firmware::rrf) {
+    return {};
+  }
+  const double freq_hz = s.shaper_freq_x_hz();
+  if (freq_hz != s.shaper_freq_y_hz()) {
+    return conflict(draft, {"printer.input_shaper_freq_y_hz"},
+                    fmt::format("printer.input_shaper_freq_y_hz is {}, but RepRapFirmware has one "
+                                "input shaper for both axes; set "
+                                "printer.input_shaper_freq_x_hz, now {}, alone",
+                                s.shaper_freq_y_hz(), freq_hz));
+  }
+  // Half a period has to be a 16 bit number of step clocks.
+  const double least_hz = s.printer.step_clock_hz / (2.0 * 65535.0);
+  constexpr double kMost_hz = 1000.0;
+  if (freq_hz != 0.0 && (freq_hz < least_hz || freq_hz > kMost_hz)) {
+    return conflict(draft, {"printer.input_shaper_freq_x_hz"},
+                    fmt::format("printer.input_shaper_freq_x_hz is {}, but must be 0 for none or "
+                                "{:.3g} to {}, what RepRapFirmware takes",
+                                freq_hz, least_hz, kMost_hz));
   }
   return {};
 }
@@ -192,7 +226,7 @@ Status resolve_dynamics(Draft& draft) {
 }
 
 Status check_consistency(const Draft& draft) {
-  for (auto* check : {check_printer, check_base, check_emission, check_grid}) {
+  for (auto* check : {check_printer, check_shaper, check_base, check_emission, check_grid}) {
     if (Status checked = check(draft); !checked) {
       return checked;
     }

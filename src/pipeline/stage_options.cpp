@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/planner/rrf_planner.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -110,9 +111,19 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   options.retract_speed_mm_s = settings.retract_speed_mm_s();
   options.unretract_extra_length_mm = settings.printer.unretract_extra_length_mm;
   options.unretract_speed_mm_s = settings.unretract_speed_mm_s();
+  options.retract_z_hop_mm = settings.printer.retract_z_hop_mm;
   options.arc_resolution_mm = settings.printer.arc_resolution_mm;
+  options.marlin_arcs = {
+      .min_segment_mm = settings.printer.min_arc_segment_mm,
+      .max_segment_mm = settings.printer.max_arc_segment_mm,
+      .segments_per_s = settings.printer.arc_segments_per_s,
+      .min_circle_segments = static_cast<int>(settings.printer.min_circle_segments),
+      .correction_interval = static_cast<int>(settings.printer.arc_correction_interval),
+      .circles = settings.printer.arc_p_circles};
   options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
   options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
+  options.shaper_type = settings.printer.input_shaper_type;
+  options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
   return options;
 }
 
@@ -134,7 +145,7 @@ planner::Limits planner_limits(const machine::Settings& settings) {
   limits.min_segment_time_s = settings.limits.min_segment_time_ms * 1e-3;
   limits.min_movement_velocity_mm_s = settings.limits.min_movement_velocity_mm_s;
   limits.jerk_policy = static_cast<int>(settings.limits.jerk_policy);
-  return limits;
+  return settings.printer.firmware == Firmware::rrf ? planner::rrf_raised(limits) : limits;
 }
 
 planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
@@ -148,7 +159,10 @@ planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
   config.steps_per_mm = settings.steps_per_mm();
   config.classic_jerk = settings.printer.classic_jerk;
   config.min_steps_per_segment = static_cast<int>(settings.printer.min_steps_per_segment);
+  config.jd_handle_small_segments = settings.printer.jd_handle_small_segments;
+  config.minimum_planner_speed_mm_s = settings.printer.minimum_planner_speed_mm_s;
   config.block_buffer_size = config.ring_length = static_cast<int>(settings.queue_length());
+  config.step_clock_hz = settings.printer.step_clock_hz;
   return config;
 }
 
@@ -199,8 +213,9 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   };
   options.lines.reach_x = reach(settings.printer.travel_x_mm);
   options.lines.reach_y = reach(settings.printer.travel_y_mm);
-  options.lines.min_line_s = min_line_s(settings);
-  if (settings.printer.firmware != Firmware::klipper) {
+  if (settings.printer.firmware == Firmware::klipper) {
+    options.lines.min_line_s = min_line_s(settings);
+  } else {
     options.lines.burst_lines = static_cast<int>(settings.max_lines_per_s() * kBurst_s);
     options.lines.burst_s = kClockRoom * kBurst_s;
     options.lines.min_line_s =

@@ -134,7 +134,9 @@ Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
   s.min_velocity_mm_s = static_cast<float>(limits.min_velocity_mm_s);
   s.min_travel_velocity_mm_s = static_cast<float>(limits.min_travel_velocity_mm_s);
   s.min_segment_time_us = static_cast<std::int32_t>(std::lround(limits.min_segment_time_s * 1e6));
+  s.minimum_speed_mm_s = static_cast<float>(config.minimum_planner_speed_mm_s);
   s.classic_jerk = config.classic_jerk;
+  s.handle_small_segments = config.jd_handle_small_segments;
   s.min_steps_per_segment = static_cast<std::uint32_t>(std::max(config.min_steps_per_segment, 1));
   s.block_buffer_size = static_cast<std::size_t>(std::max(config.block_buffer_size, 4));
   return s;
@@ -158,9 +160,9 @@ bool populate_block(const Settings& settings, const Request& request, std::size_
   const Approach approach{motion.distance_mm, speed_mm_s,       inverse_length,
                           with_filament,      moves_queued > 0, request.curve_radius_mm};
   block.max_entry_v2 = max_entry_v2(settings, block, approach, previous);
-  block.entry_v2 = kMinimumSpeed_mm_s * kMinimumSpeed_mm_s;
-  block.nominal_length = block.nominal_speed_mm_s * block.nominal_speed_mm_s <=
-                         reachable_v2(block, kMinimumSpeed_mm_s * kMinimumSpeed_mm_s);
+  block.entry_v2 = settings.minimum_speed_mm_s * settings.minimum_speed_mm_s;
+  block.nominal_length =
+      block.nominal_speed_mm_s * block.nominal_speed_mm_s <= reachable_v2(block, block.entry_v2);
   previous.speed_mm_s = speed_mm_s;
   previous.nominal_speed_mm_s = block.nominal_speed_mm_s;
   return true;

@@ -7,9 +7,6 @@
 
 namespace unflex::planner::marlin {
 
-// MINIMUM_PLANNER_SPEED: speed at the end of the last block known.
-inline constexpr float kMinimumSpeed_mm_s = 0.05F;
-
 [[nodiscard]] Settings make_settings(const Limits& limits, const FirmwareConfig& config);
 
 // Squared speed reached from v2 over the length (max_allowable_speed_sqr).

@@ -88,7 +88,7 @@ float arc_v2(float length_mm, float accel, float cos_theta) {
 float deviation_v2(const Settings& settings, const Block& block, float curve_radius_mm,
                    const Vector& u, const Vector& w) {
   float cos_theta = -u[E] * w[E] + -u[X] * w[X] + -u[Y] * w[Y] + -u[Z] * w[Z];
-  if (cos_theta > kStraight) return square(kMinimumSpeed_mm_s);
+  if (cos_theta > kStraight) return square(settings.minimum_speed_mm_s);
   Vector along{};
   for (std::size_t axis = 0; axis < along.size(); ++axis) along[axis] = w[axis] - u[axis];
   normalise(along);
@@ -97,7 +97,9 @@ float deviation_v2(const Settings& settings, const Block& block, float curve_rad
   cos_theta = std::max(cos_theta, -kStraight);
   const float sin_half = std::sqrt(0.5F * (1.0F - cos_theta));
   const float v2 = accel * settings.junction_deviation_mm * sin_half / (1.0F - sin_half);
-  if (block.length_mm >= kShort_mm || cos_theta >= kCosOctagon) return v2;
+  if (!settings.handle_small_segments || block.length_mm >= kShort_mm || cos_theta >= kCosOctagon) {
+    return v2;
+  }
   return std::min(v2, arc_v2(block.length_mm, accel, cos_theta));
 }
 

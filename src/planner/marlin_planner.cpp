@@ -145,7 +145,7 @@ void MarlinPlanner::set_move(const gcode::Segment& segment, const marlin::Steps&
 void MarlinPlanner::run_first() {
   marlin::Block& first = block(first_);
   const float exit =
-      first_ + 1 == end_ ? marlin::kMinimumSpeed_mm_s : std::sqrt(block(first_ + 1).entry_v2);
+      first_ + 1 == end_ ? settings_.minimum_speed_mm_s : std::sqrt(block(first_ + 1).entry_v2);
   marlin::set_profile(marlin::make_trapezoid(first, std::sqrt(first.entry_v2), exit), first);
   final_.push_back(std::move(first.move));
   running_ = true;
@@ -161,7 +161,7 @@ void MarlinPlanner::drop_first() {
 // still slow down. The firmware skips blocks that begin at their limit already, which is the same:
 // speeds only rise here.
 void MarlinPlanner::reverse_pass() {
-  float next_v2 = marlin::kMinimumSpeed_mm_s * marlin::kMinimumSpeed_mm_s;
+  float next_v2 = settings_.minimum_speed_mm_s * settings_.minimum_speed_mm_s;
   for (std::size_t i = end_ - 1; i != planned_; --i) {
     marlin::Block& current = block(i);
     current.entry_v2 = current.max_entry_v2;

@@ -1,7 +1,6 @@
 // Source: RepRapFirmware 3.5.3, src/Movement/DDA.cpp (InitStandardMove, VectorBoxIntersection,
-// NormaliseLinearMotion, RecalculateMove, PrepParams), src/Platform/Platform.h (the floors below
-// the limits), src/Config/Configuration.h. Sums and products stand in the firmware's order, because
-// floats round.
+// NormaliseLinearMotion, RecalculateMove, PrepParams), src/Config/Configuration.h. Sums and
+// products stand in the firmware's order, because floats round.
 //
 //   u, v, w   speed at the start, at the top and at the end       a, d   acceleration, deceleration
 //   s         length
@@ -16,10 +15,7 @@ namespace {
 
 using enum gcode::Axis;
 
-constexpr double kMinSpeed_mm_s = 0.01;  // AbsoluteMinFeedrate
-constexpr double kMinJerk_mm_s = 0.1;    // MinimumJerk
-constexpr double kMinAccel_mm_s2 = 0.1;  // MinimumAcceleration
-constexpr float kShortestRamp = 10.0F;   // MinimumAccelOrDecelClocks
+constexpr float kShortestRamp = 10.0F;  // MinimumAccelOrDecelClocks
 
 float squared(float value) { return value * value; }
 
@@ -82,20 +78,17 @@ float ramp_clocks(float high, float low, float accel) { return (high - low) / ac
 
 }  // namespace
 
-Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
+Settings make_settings(const Limits& asked, const FirmwareConfig& config) {
+  const Limits limits = rrf_raised(asked);
   Settings result;
   const auto clock = static_cast<float>(config.step_clock_hz);
   const float per_clock2 = 1.0F / static_cast<float>(config.step_clock_hz * config.step_clock_hz);
   result.clock_hz = clock;
-  result.min_speed = per_clock(std::max(limits.min_movement_velocity_mm_s, kMinSpeed_mm_s), clock);
+  result.min_speed = per_clock(limits.min_movement_velocity_mm_s, clock);
   for (std::size_t axis = 0; axis < 4; ++axis) {
-    result.max_speed[axis] =
-        std::max(per_clock(limits.axis_max_velocity_mm_s[axis], clock), result.min_speed);
-    result.max_accel[axis] =
-        static_cast<float>(std::max(limits.axis_max_accel_mm_s2[axis], kMinAccel_mm_s2)) *
-        per_clock2;
-    result.allowed_jerk[axis] =
-        per_clock(std::max(limits.axis_jerk_mm_s[axis], kMinJerk_mm_s), clock);
+    result.max_speed[axis] = per_clock(limits.axis_max_velocity_mm_s[axis], clock);
+    result.max_accel[axis] = static_cast<float>(limits.axis_max_accel_mm_s2[axis]) * per_clock2;
+    result.allowed_jerk[axis] = per_clock(limits.axis_jerk_mm_s[axis], clock);
   }
   result.print_accel = static_cast<float>(limits.print_accel_mm_s2) * per_clock2;
   result.travel_accel = static_cast<float>(limits.travel_accel_mm_s2) * per_clock2;

@@ -41,6 +41,22 @@ Limits rrf_default_limits() {
   return limits;
 }
 
+Limits rrf_raised(Limits limits) {
+  constexpr double kMinSpeed_mm_s = 0.01;  // AbsoluteMinFeedrate
+  constexpr double kMinJerk_mm_s = 0.1;    // MinimumJerk
+  constexpr double kMinAccel_mm_s2 = 0.1;  // MinimumAcceleration
+  const auto raise = [](double& value, double least) { value = std::max(value, least); };
+  raise(limits.min_movement_velocity_mm_s, kMinSpeed_mm_s);
+  for (const auto axis : {X, Y, Z, E}) {
+    raise(limits.axis_max_velocity_mm_s[axis], limits.min_movement_velocity_mm_s);
+    raise(limits.axis_max_accel_mm_s2[axis], kMinAccel_mm_s2);
+    raise(limits.axis_jerk_mm_s[axis], kMinJerk_mm_s);
+  }
+  raise(limits.print_accel_mm_s2, kMinAccel_mm_s2);
+  raise(limits.travel_accel_mm_s2, kMinAccel_mm_s2);
+  return limits;
+}
+
 RrfPlanner::RrfPlanner(const Limits& limits, const FirmwareConfig& config)
     : Planner(limits),
       config_(config),

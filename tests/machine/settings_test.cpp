@@ -182,6 +182,19 @@ TEST(Tail, LastsTwoMillisecondsAtLeast) {
   EXPECT_DOUBLE_EQ(s.tail_s(), 0.002);
 }
 
+TEST(ShaperFrequency, IsOneForBothAxesOfRepRapFirmware) {
+  const std::vector<std::string> rrf = {"printer.firmware=rrf"};
+  EXPECT_DOUBLE_EQ(read("", rrf).shaper_freq_y_hz(), 0.0);
+  const Settings s = read("[printer]\ninput_shaper_freq_x_hz = 41\n", rrf);
+  EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 41.0);
+  EXPECT_EQ(s.printer.input_shaper_type, "zvd");
+}
+
+TEST(ShaperType, IsAWordInAFileAndInAnOverride) {
+  EXPECT_EQ(read("[printer]\ninput_shaper_type = \"mzv\"\n").printer.input_shaper_type, "mzv");
+  EXPECT_EQ(read("", {"printer.input_shaper_type=ei2"}).printer.input_shaper_type, "ei2");
+}
+
 TEST(ShaperFrequency, OfZeroStaysZero) {
   EXPECT_DOUBLE_EQ(read("", {"printer.input_shaper_freq_x_hz=0"}).shaper_freq_x_hz(), 0.0);
 }

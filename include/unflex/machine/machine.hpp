@@ -35,17 +35,29 @@ struct PrinterSettings {
   std::optional<double> retract_speed_mm_s;
   double unretract_extra_length_mm = 0.0;
   std::optional<double> unretract_speed_mm_s;
+  double retract_z_hop_mm = 0.0;   // Marlin and RepRapFirmware
   double arc_resolution_mm = 1.0;  // [gcode_arcs] resolution
   AxisOptions steps_per_mm;        // Marlin and RepRapFirmware; unset: the firmware's default
   // Marlin.
-  bool classic_jerk = false;           // CLASSIC_JERK instead of junction deviation
-  double min_steps_per_segment = 6.0;  // MIN_STEPS_PER_SEGMENT, a whole number
+  bool classic_jerk = false;                 // CLASSIC_JERK instead of junction deviation
+  double min_steps_per_segment = 6.0;        // MIN_STEPS_PER_SEGMENT, a whole number
+  bool jd_handle_small_segments = true;      // JD_HANDLE_SMALL_SEGMENTS
+  double minimum_planner_speed_mm_s = 0.05;  // MINIMUM_PLANNER_SPEED
+  double min_arc_segment_mm = 0.1;           // MIN_ARC_SEGMENT_MM
+  double max_arc_segment_mm = 1.0;           // MAX_ARC_SEGMENT_MM
+  double arc_segments_per_s = 0.0;           // ARC_SEGMENTS_PER_SEC; 0: not configured
+  double min_circle_segments = 72.0;         // MIN_CIRCLE_SEGMENTS, a whole number
+  double arc_correction_interval = 25.0;     // N_ARC_CORRECTION, a whole number
+  bool arc_p_circles = false;                // ARC_P_CIRCLES
   std::optional<double>
-      queue_length;  // moves the firmware plans ahead; unset: the firmware's default
+      queue_length;                 // moves the firmware plans ahead; unset: the firmware's default
+  double step_clock_hz = 750000.0;  // RepRapFirmware, StepClockRate
   // Frequencies the printer's own [input_shaper] is set back to after the print (its type stays).
   // 0: the printer has none. Unset: the frequency of the axis' dynamics.
   std::optional<double> input_shaper_freq_x_hz;
   std::optional<double> input_shaper_freq_y_hz;
+  // RepRapFirmware, which forgets the type when its shaper is switched off: M593 P.
+  std::string input_shaper_type = "zvd";
 };
 
 // What the firmware knows as M201, M203 and so on is named by what it limits; docs/configuration.md

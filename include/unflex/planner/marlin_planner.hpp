@@ -8,8 +8,8 @@
 // end_mm of a planned move are where the motors are, not what the file says. A move of fewer than
 // min_steps_per_segment steps on every axis is not queued; its motion belongs to the next move that
 // is. The same goes for E in the planning; but the E of a planned move is the file's, so that
-// filament can be accounted for. The firmware rounds E anew at each G92 E0, which moves the filament
-// by less than one step (and drops what was too short to be queued).
+// filament can be accounted for. The firmware rounds E anew at each G92 E0, which moves the
+// filament by less than one step (and drops what was too short to be queued).
 //
 // Lookahead. The file is taken to be read faster than it is printed. The buffer of N blocks then
 // holds N − 1, the running one among them; when a block begins to run, the N − 3 after it are known
@@ -61,7 +61,9 @@ struct Settings {
   float min_velocity_mm_s = 0.0F;
   float min_travel_velocity_mm_s = 0.0F;
   std::int32_t min_segment_time_us = 0;
+  float minimum_speed_mm_s = 0.05F;  // MINIMUM_PLANNER_SPEED
   bool classic_jerk = false;
+  bool handle_small_segments = true;
   std::uint32_t min_steps_per_segment = 1;
   std::size_t block_buffer_size = 16;
 };

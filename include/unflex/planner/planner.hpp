@@ -59,9 +59,11 @@ struct FirmwareConfig {
   // Marlin and RepRapFirmware, per axis X Y Z E.
   std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 93.0};
   // Marlin; defaults of its Configuration.h and Configuration_adv.h.
-  bool classic_jerk = false;      // CLASSIC_JERK instead of junction deviation
-  int min_steps_per_segment = 6;  // MIN_STEPS_PER_SEGMENT
-  int block_buffer_size = 16;     // BLOCK_BUFFER_SIZE; at least 4
+  bool classic_jerk = false;                 // CLASSIC_JERK instead of junction deviation
+  int min_steps_per_segment = 6;             // MIN_STEPS_PER_SEGMENT
+  int block_buffer_size = 16;                // BLOCK_BUFFER_SIZE; at least 4
+  bool jd_handle_small_segments = true;      // JD_HANDLE_SMALL_SEGMENTS
+  double minimum_planner_speed_mm_s = 0.05;  // MINIMUM_PLANNER_SPEED, above 0
   // RepRapFirmware 3.5.3 on a Duet 3 with a SAME70 (MB6HC, MB6XD). Others have 40 moves; a Duet 2
   // 937500 clocks per second (src/Movement/Move.h: InitialDdaRingLength, M595 P;
   // src/RepRapFirmware.h: StepClockRate).

@@ -87,6 +87,10 @@ struct Dda {
 //   M566 X15 Y15 Z10 E5 mm/s, P0    M204 P50000 T50000 mm/s²
 [[nodiscard]] Limits rrf_default_limits();
 
+// The limits that the firmware really has when it is told these: none is below a floor
+// (src/Platform/Platform.h: SetMaxFeedrate, SetInstantDv and so on).
+[[nodiscard]] Limits rrf_raised(Limits limits);
+
 // RepRapFirmware 3's planner: limits per axis, jerk per motor with policy 0 or not, lookahead
 // within the ring.
 class RrfPlanner final : public Planner {
