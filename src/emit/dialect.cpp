@@ -106,6 +106,14 @@ void rrf(const Limits& wanted, const Limits& current, bool all, std::vector<std:
   jerk.finish(lines);
 }
 
+// Switched off it has no type; switched on again it has that which it is told, or another one.
+bool same_rrf_shaper(const Shaper& one, const Shaper& other) {
+  return one.freq_x_hz == other.freq_x_hz &&
+         (one.freq_x_hz == 0.0 || (one.settings.type_x == other.settings.type_x &&
+                                   one.settings.damping_ratio_x == other.settings.damping_ratio_x &&
+                                   one.settings.custom_words == other.settings.custom_words));
+}
+
 // One shaper for both axes.
 std::string rrf_shaper(const Shaper& wanted) {
   if (wanted.freq_x_hz == 0.0) {
@@ -192,7 +200,7 @@ std::vector<std::string> shaper_lines(Firmware firmware, const Shaper& wanted,
       }
       break;
     case Firmware::rrf:
-      if (x || y) {
+      if (!same_rrf_shaper(wanted, current)) {
         lines.push_back(rrf_shaper(wanted));
       }
       break;

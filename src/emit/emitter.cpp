@@ -92,10 +92,11 @@ void Emitter::follow_input(const gcode::Event& event) {
 }
 
 void Emitter::line(const gcode::Event& event, std::string& out) {
-  if (event.kind == gcode::EventKind::barrier && event.position_lost) {
+  if (event.position_lost || event.may_jump) {
     // Homing, macros and tool changes move the machine by themselves, and may leave other limits.
+    // From a cancelled object it goes to the next in one line.
     restore_shaper(out);
-    limits_known_ = false;
+    limits_known_ = limits_known_ && !event.position_lost;
   }
   copy(event, out);
   follow_input(event);

@@ -144,6 +144,7 @@ void Interpreter::input_shaper(Event& event) {
 // machine then is.
 void Interpreter::object_label(Event& event) {
   event.kind = EventKind::barrier;
+  event.may_jump = true;
   state_.known[X] = state_.known[Y] = false;
 }
 

@@ -103,7 +103,8 @@ void Interpreter::marlin_g_code(Event& event) {
     case 28:
       return home(event);
     case 60:
-      return;  // saves the position
+      event.kind = EventKind::barrier;  // saves the position, which must be the file's
+      return;
     case 90:
     case 91:
       // gcode.h, set_relative_mode: E too, until M82 or M83 says otherwise.

@@ -28,9 +28,10 @@ constexpr std::array kPassiveCodes = {
     710, 851, 862, 871, 906, 907, 908, 909, 910, 911, 912, 913, 914, 919, 7219};
 
 //   3 4 5 spindle or laser; 7 8 9 coolant; 12 closed loop; 17 motors on; 80 power on, waits; 109
-//   190 191 192 193 wait for temperatures; 226 waits for a pin; 303 tunes; 400 waits.
-constexpr std::array kStoppingCodes = {3,   4,   5,   7,   8,   9,   12,  17, 80,
-                                       109, 190, 191, 192, 193, 226, 303, 400};
+//   190 191 192 193 wait for temperatures; 303 tunes; 400 waits. Not 226, which waits for a pin:
+//   meanwhile the user may do anything.
+constexpr std::array kStoppingCodes = {3,   4,   5,   7,   8,   9,   12,  17,
+                                       80,  109, 190, 191, 192, 193, 303, 400};
 
 static_assert(std::is_sorted(kPassiveCodes.begin(), kPassiveCodes.end()));
 static_assert(std::is_sorted(kStoppingCodes.begin(), kStoppingCodes.end()));

@@ -187,7 +187,8 @@ void Interpreter::rrf_g_code(Event& event) {
     case 31:
       return;  // the probe's settings or reading
     case 60:
-      return;  // saves the position
+      event.kind = EventKind::barrier;  // saves the position, which must be the file's
+      return;
     case 90:
     case 91:
       state_.absolute_xyz = command_.number == 90;
@@ -224,6 +225,8 @@ void Interpreter::rrf_m_code(Event& event) {
       return rrf_wait_for_heater(event);
     case 120:
       // GCodeMachineState.cpp: what is pushed is kept, and E is a length from here on.
+      // As with Klipper's SAVE_GCODE_STATE, these must be the file's modes, not those of a run.
+      event.kind = EventKind::barrier;
       pushed_states_.push_back(state_);
       return set_volumetric(false, state_.filament_diameter_mm);
     case 121:

@@ -54,16 +54,15 @@ void Interpreter::marlin_shaper(Event& event) {
 }
 
 // Movement/AxisShaper.cpp, AxisShaper::Configure. One shaper for both axes; all but L waits for the
-// end of all motion; a frequency or damping alone switches a shaper that is off to "zvd".
+// end of all motion; without a type, a shaper that is off becomes "zvd", L or not. So L must not
+// stand in a run, where the shaper is off.
 void Interpreter::rrf_shaper(Event& event) {
   const bool has_type = command_.has('P');
   const bool sets = has_type || command_.value('F') || command_.value('S') || command_.value('L');
   if (!sets) {
     return;
   }
-  if (has_type || command_.has('F') || command_.has('S')) {
-    event.kind = EventKind::barrier;
-  }
+  event.kind = EventKind::barrier;
   ShaperSettings& shaper = state_.shaper;
   const auto freq_hz = command_.value('F');
   const auto ratio = command_.value('S');

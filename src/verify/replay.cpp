@@ -175,7 +175,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   section.kind = kind;
   section.regime = before;
   section.dwell_s = event.dwell_s;
-  section.position_lost = event.position_lost;
+  section.may_be_left = event.position_lost || event.may_jump;
   section.may_be_added =
       kind == SectionKind::barrier && is_known_addition(event.line.content(), firmware_);
   section.line = std::move(event.line);

@@ -40,7 +40,7 @@ struct Section {
   gcode::Line line;
   std::optional<Regime> regime;  // runs: at the first move
   double dwell_s = 0.0;
-  bool position_lost = false;  // barrier: the machine moves by itself
+  bool may_be_left = false;  // barrier: the machine moves by itself, or may go elsewhere next
   // barrier: of a form unflex adds, so that it may be no section at all of the sliced file.
   bool may_be_added = false;
   // run: announced as compensated.

@@ -46,6 +46,19 @@ double stream_bytes(std::istream& stream) {
   return length;
 }
 
+// Type and damping of a shaper that is off are of no effect.
+bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
+  const bool same_x =
+      a.shaper_freq_x_hz == 0.0 ||
+      (a.shaper.type_x == b.shaper.type_x && a.shaper.damping_ratio_x == b.shaper.damping_ratio_x &&
+       a.shaper.custom_words == b.shaper.custom_words);
+  const bool same_y =
+      a.shaper_freq_y_hz == 0.0 ||
+      (a.shaper.type_y == b.shaper.type_y && a.shaper.damping_ratio_y == b.shaper.damping_ratio_y);
+  return a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper_freq_y_hz == b.shaper_freq_y_hz &&
+         same_x && same_y;
+}
+
 Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), meter.all().stats()}; }
 
 // Both files side by side, section by section. `original_` is the nozzle if the sliced file were
@@ -361,9 +374,8 @@ void Verifier::check_regime(const Section& input, const Section& output) {
   // Between compensated runs a single kept move may pass without the shaper, which costs Klipper a
   // stop to switch.
   const bool shaper_matters = input.kind == SectionKind::run || input.kind == SectionKind::end ||
-                              (input.kind == SectionKind::barrier && input.position_lost);
-  if (shaper_matters && (before.modal.shaper_freq_x_hz != after.modal.shaper_freq_x_hz ||
-                         before.modal.shaper_freq_y_hz != after.modal.shaper_freq_y_hz)) {
+                              (input.kind == SectionKind::barrier && input.may_be_left);
+  if (shaper_matters && !same_shaper(before.modal, after.modal)) {
     violations_.in_output(line, "the printer's input shaper is not restored");
   }
 }

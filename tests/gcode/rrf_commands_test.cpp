@@ -37,8 +37,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "M141 S40", "M201", "M203", "M204", "M205", "M566", "M207 S2", "M220", "M221",
                       "M220 S90", "M221 S95", "M280 P0 S90", "M290 S0.05", "M291 P\"hi\" S1",
                       "M300 S440 P50", "M42 P1 S1", "M568 P0 S210", "M591 D0", "M593 H1",
-                      "G10 P0 S210", "G10 R150 S200", "G11", "G31 P500", "G60 S1", "G92", "G92 E0",
-                      "G17", "G20", "G21", "G90", "G91", "G94", "M120", "M121", "M201.1 X100",
+                      "G10 P0 S210", "G10 R150 S200", "G11", "G31 P500", "G92", "G92 E0",
+                      "G17", "G20", "G21", "G90", "G91", "G94", "M121", "M201.1 X100",
                       "var x = 3", "global y = {1+2}", "set var.x = 4", "echo \"G28\"",
                       "M104 S{global.temperature}", "M117 {state.status}", "M200"));
 
@@ -53,7 +53,7 @@ TEST_P(RrfStopping, FinishesAllMotionAndKeepsThePosition) {
 INSTANTIATE_TEST_SUITE_P(Commands, RrfStopping,
                          ::testing::Values("G4", "G4 P100", "M400", "M109 S210", "M109", "M116",
                                            "M190 S60", "M191 S40", "M17", "M84 S5", "G92 X0", "G18",
-                                           "T0", "M572 D0 S0.05", "M593 P\"none\"", "M593 F40",
+                                           "T0", "M572 D0 S0.05", "M593 P\"none\"", "M593 F40", "M593 L0.2", "M120", "G60 S1",
                                            "M302 P1", "M569 P0 S1", "M574 X1", "M150 R255",
                                            "M906 X800", "M913 X50", "M577 P1",
                                            "M190 S{global.bed}"));
@@ -196,7 +196,8 @@ TEST(RrfShaper, IsKeptForItsRestoration) {
   session.read("M593 F50 S0.2");
   EXPECT_EQ(session.state().shaper_freq_y_hz, 50.0);
   EXPECT_EQ(session.state().shaper.damping_ratio_x, 0.2);
-  EXPECT_EQ(session.read("M593 L0.3").kind, EventKind::passive);
+  EXPECT_EQ(session.read("M593 L0.3").kind, EventKind::barrier)
+      << "it would switch on a shaper that is off within a run";
   session.read("M593 P\"custom\" H0.4:0.7 T0.01:0.01");
   EXPECT_EQ(session.state().shaper.custom_words, "P\"custom\" H0.4:0.7 T0.01:0.01");
 }

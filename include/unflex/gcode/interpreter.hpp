@@ -82,6 +82,8 @@ struct Event {
   double dwell_s = 0.0;           // barrier: G4's pause
   // barrier: the machine may be anywhere afterwards, in any mode (homing, macro, tool change).
   bool position_lost = false;
+  // barrier: the label of an object; if that was cancelled, the next motion starts elsewhere.
+  bool may_jump = false;
   std::vector<std::string> warnings;  // remarks for the user about this line
 };
 
