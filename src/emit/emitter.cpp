@@ -82,8 +82,7 @@ void Emitter::copy(const gcode::Event& event, std::string& out) {
   out += event.line.text;
   open_line_ = !event.line.text.ends_with('\n');
   newline_ = event.line.text.ends_with("\r\n") ? "\r\n" : "\n";
-  static_cast<void>(printer_.interpret(event.line));
-  planner::apply(event.limits, limits_);
+  planner::apply(printer_.interpret(event.line).limits, limits_);
 }
 
 void Emitter::follow_input(const gcode::Event& event) {
@@ -130,9 +129,14 @@ bool Emitter::run(const Run& run, std::string& out) {
   const auto write_events = [&](std::size_t end) {
     for (; written < end; ++written) {
       const gcode::Event& event = (*run.events)[written];
-      follow_input(event);
       // Moves are replaced, those without length too: the base is not where they say.
-      if (event.kind != gcode::EventKind::move && !gcode::names_position(event.line.content())) {
+      const bool stays =
+          event.kind != gcode::EventKind::move && !gcode::names_position(event.line.content());
+      if (stays && options_.fixed.firmware == Firmware::marlin) {
+        set_unit(input_.state().unit_mm, out);
+      }
+      follow_input(event);
+      if (stays) {
         copy(event, out);
       }
     }
@@ -144,6 +148,7 @@ bool Emitter::run(const Run& run, std::string& out) {
   }
   write(fmt::format("{} end", kComment), out);
   write_events(run.events->size());
+  set_unit(1.0, out);
   set_limits(input_limits_, out);
   restore_modes(out);
   return true;
@@ -164,16 +169,21 @@ void Emitter::enter_run(std::string& out) {
 
 // Whatever the input's lines have set inside the run.
 void Emitter::set_run_modes(std::string& out) {
+  set_unit(1.0, out);
   set_limits(limits_in_run(options_.fixed.firmware, input_limits_, options_.run_limits), out);
   const gcode::ModalState& state = printer_.state();
-  if (state.unit_mm != 1.0) {
-    write("G21", out);
-  }
   if (!state.absolute_xyz) {
     write("G90", out);
   }
   if (state.absolute_e) {
     write("M83", out);
+  }
+}
+
+// Of moves; Marlin reads limits, M200 and M207 in it as well.
+void Emitter::set_unit(double unit_mm, std::string& out) {
+  if (printer_.state().unit_mm != unit_mm) {
+    write(unit_mm == 1.0 ? "G21" : "G20", out);
   }
 }
 
@@ -215,9 +225,7 @@ void Emitter::restore_modes(std::string& out) {
   if (wanted.absolute_e != state.absolute_e) {
     write(wanted.absolute_e ? "M82" : "M83", out);
   }
-  if (wanted.unit_mm != state.unit_mm) {
-    write(wanted.unit_mm == 1.0 ? "G21" : "G20", out);
-  }
+  set_unit(wanted.unit_mm, out);
   if (std::abs(wanted.feed_mm_s - state.feed_mm_s) > kFeedToleranceMmS) {
     std::string text = "G1";
     append_word(text, 'F', wanted.feed_mm_s * 60.0 / state.unit_mm, kExactDecimals);

@@ -33,14 +33,15 @@ void Interpreter::rrf_axis_acceleration(Event& event) {
   raise(event.limits.axis_max_accel_mm_s2, kMinAccel_mm_s2);
 }
 
-// GCodes2.cpp, M203: mm/min, or mm/s with S1; I first, as the others are at least that.
+// GCodes2.cpp, M203: mm/min, or mm/s with S1. That no axis is slower than I, be it set here or
+// before, is the planner's to know.
 void Interpreter::rrf_max_velocity(Event& event) {
   const double scale = command_.value('S') == 1.0 ? 1.0 : 1.0 / 60.0;
   std::optional<double>& least = event.limits.min_movement_velocity_mm_s;
   limit(event, 'I', scale, 0.0, least);
   raise(least, kMinVelocity_mm_s);
   axis_limits(event, scale, 0.0, event.limits.axis_max_velocity_mm_s);
-  raise(event.limits.axis_max_velocity_mm_s, least.value_or(kMinVelocity_mm_s));
+  raise(event.limits.axis_max_velocity_mm_s, kMinVelocity_mm_s);
 }
 
 // GCodes5.cpp, ConfigureAccelerations.

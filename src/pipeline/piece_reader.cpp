@@ -161,6 +161,8 @@ void PieceReader::close(Piece& piece) {
   }
   planner_->stop();
   planner_->take(open_.moves);
+  // Marlin leaves moves of a few steps to the next one.
+  open_.is_run = open_.is_run && !open_.moves.empty();
   piece = std::exchange(open_, Piece{});
 }
 

@@ -16,7 +16,8 @@ namespace unflex::pipeline {
 
 struct Piece {
   // A run: compensable moves and the lines between them that do not stop the machine. Its plan goes
-  // from rest to rest, since the base has to stand still where it meets motion left as it is.
+  // from rest to rest, since the base has to stand still where it meets motion left as it is. Has
+  // at least one planned move.
   bool is_run = false;
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became

@@ -166,7 +166,7 @@ TEST(Emitter, PutsTheZeroOfFilamentRightThatARunHasSplit) {
 TEST(Emitter, WritesMillimetresAndAbsolutePlacesWhateverTheFileDoes) {
   EXPECT_THAT(
       from_first_run("G91\nG20\nM83\nG90\nG1 X0 Y0 Z0.01 F236\nG91\nG1 X0.4 E0.04\nG4 P1\n"),
-      ElementsAre(";unflex run\n", kRaise, "G21\n", "G90\n", "~", kEnd, kRestore, "G91\n", "G20\n",
+      ElementsAre(";unflex run\n", "G21\n", kRaise, "G90\n", "~", kEnd, kRestore, "G91\n", "G20\n",
                   "G1 F236\n", "G4 P1\n", kShaperOn));
 }
 
