@@ -13,9 +13,6 @@
 namespace unflex::dynamics {
 namespace {
 
-// g·mm/s² in a newton.
-constexpr double kNewton = 1e6;
-
 double nozzle_acceleration(const FlexibleAxis& axis, const NozzleState& nozzle,
                            const NozzleState& base) {
   const double omega = axis.omega_rad_s;
@@ -56,17 +53,6 @@ FreeResponse overdamped(double omega, double zeta, double h) {
 
 FlexibleAxis from_frequency(double freq_hz, double damping_ratio) {
   return {2.0 * std::numbers::pi * freq_hz, damping_ratio};
-}
-
-FlexibleAxis from_mass(double mass_g, double stiffness_n_mm, double damping_n_s_mm) {
-  const double stiffness = stiffness_n_mm * kNewton;  // g/s²
-  const double damping = damping_n_s_mm * kNewton;    // g/s
-  return {std::sqrt(stiffness / mass_g), damping / (2.0 * std::sqrt(mass_g * stiffness))};
-}
-
-double damped_frequency(const FlexibleAxis& axis) {
-  if (axis.zeta >= 1.0) return 0.0;
-  return axis.omega_rad_s * std::sqrt((1.0 - axis.zeta) * (1.0 + axis.zeta));
 }
 
 NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state, const BaseSegment& base,

@@ -99,7 +99,7 @@ TEST(Judge, ReplaysByTheLimitsInTheText) {
 // the oscillator's impulse response g: p(T) = ∫ g(T − t) (2ζω ḃ + ω² b) dt.
 double nozzle_by_convolution(const std::vector<planner::PlannedMove>& moves) {
   const dynamics::FlexibleAxis axis = rules().nozzle.x;
-  const double damped = dynamics::damped_frequency(axis);
+  const double damped = axis.omega_rad_s * std::sqrt(1.0 - axis.zeta * axis.zeta);
   const auto impulse = [&](double t) {
     return std::exp(-axis.zeta * axis.omega_rad_s * t) * std::sin(damped * t) / damped;
   };

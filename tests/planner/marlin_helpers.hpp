@@ -14,6 +14,7 @@ namespace unflex::planner::testing {
 inline FirmwareConfig marlin_config() {
   FirmwareConfig config;
   config.firmware = Firmware::marlin;
+  config.steps_per_mm = {80.0, 80.0, 400.0, 93.0};
   return config;
 }
 

@@ -13,40 +13,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "unflex/core/number.hpp"
+#include "planner/csv_rows.hpp"
 #include "unflex/planner/marlin_planner.hpp"
 
 namespace unflex::planner {
 namespace {
 
-using Row = std::vector<std::string>;
-
-std::vector<Row> rows(const std::string& name) {
-  std::ifstream file(std::string(UNFLEX_TEST_DATA) + "/" + name);
-  std::vector<Row> result;
-  for (std::string line; std::getline(file, line);) {
-    Row& row = result.emplace_back();
-    for (std::size_t begin = 0; begin <= line.size();) {
-      const std::size_t end = std::min(line.find(',', begin), line.size());
-      row.push_back(line.substr(begin, end - begin));
-      begin = end + 1;
-    }
-  }
-  return result;
-}
-
-double number(const Row& row, std::size_t column) { return parse_number(row.at(column)).value(); }
-
-std::array<double, 4> axes(const Row& row) {
-  return {number(row, 1), number(row, 2), number(row, 3), number(row, 4)};
-}
+using testing::axes;
+using testing::number;
+using testing::Row;
+using testing::rows;
 
 // What the numbers of a block describe: rates at the start, the peak and the end, and the time.
 struct Profile {
@@ -86,6 +68,7 @@ class Run {
  public:
   explicit Run(const Row& row) {
     config_.firmware = Firmware::marlin;
+    config_.steps_per_mm = {80.0, 80.0, 400.0, 93.0};
     config_.classic_jerk = row.at(2) == "1";
     config_.block_buffer_size = static_cast<int>(number(row, 3));
     config_.min_steps_per_segment = static_cast<int>(number(row, 4));

@@ -19,10 +19,6 @@ struct FlexibleAxis {
 
 // ω = 2πf.
 [[nodiscard]] FlexibleAxis from_frequency(double freq_hz, double damping_ratio);
-// ω = √(k/m), ζ = c/(2√(mk)); mass in g, stiffness in N/mm, damping in N·s/mm.
-[[nodiscard]] FlexibleAxis from_mass(double mass_g, double stiffness_n_mm, double damping_n_s_mm);
-// ω√(1−ζ²) in rad/s, at which the nozzle rings; 0 from critical damping on.
-[[nodiscard]] double damped_frequency(const FlexibleAxis& axis);
 
 // Position and velocity of the nozzle on one axis, mm and mm/s.
 struct NozzleState {

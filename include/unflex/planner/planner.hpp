@@ -56,8 +56,8 @@ struct FirmwareConfig {
   double max_extrude_only_velocity_mm_s = 79.8243241107433;
   double max_extrude_only_accel_mm_s2 = 1330.40540184572;
   double instantaneous_corner_velocity_mm_s = 1.0;
-  // Marlin and RepRapFirmware, per axis X Y Z E.
-  std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 93.0};
+  // Marlin and RepRapFirmware, per axis X Y Z E; Marlin's DEFAULT_AXIS_STEPS_PER_UNIT.
+  std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 500.0};
   // Marlin; defaults of its Configuration.h and Configuration_adv.h.
   bool classic_jerk = false;                 // CLASSIC_JERK instead of junction deviation
   int min_steps_per_segment = 6;             // MIN_STEPS_PER_SEGMENT
