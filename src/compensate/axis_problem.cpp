@@ -100,30 +100,20 @@ ControlVector AxisProblem::slope_limit() const {
 }
 
 void AxisProblem::node_bounds(int k, int n, PointVector& lower, PointVector& upper) const {
-  const BaseLimits& limits = window_->limits;
   lower.setConstant(-nlp::kNoBound);
   upper.setConstant(nlp::kNoBound);
-  if (active_.velocity) {
-    // ḃ is a parabola between nodes and may pass them by up to A h/4 (b̈ from A to −A).
-    const double margin = std::isfinite(limits.max_accel_mm_s2)
-                              ? limits.max_accel_mm_s2 * window_->period_s / 4.0
-                              : 0.0;
-    upper(kBaseRate) = to_scaled(kBaseRate, std::max(limits.max_velocity_mm_s - margin, 0.0));
-    lower(kBaseRate) = -upper(kBaseRate);
-  }
-  if (active_.accel) {
-    upper(kBaseAccel) = to_scaled(kBaseAccel, limits.max_accel_mm_s2);
-    lower(kBaseAccel) = -upper(kBaseAccel);
-  }
-  std::optional<double> resting_mm;
-  if (k == 0 && window_->start) {
-    resting_mm = window_->start->base_mm;
-  } else if (k == n - 1) {
-    resting_mm = window_->end_base_mm;
-  }
-  if (active_.position) {
-    bound_position(resting_mm, lower, upper);
-  }
+  const auto bound = [&](Component component, const Interval& interval) {
+    if (interval.lower > -nlp::kNoBound) {
+      lower(component) = to_scaled(component, interval.lower);
+    }
+    if (interval.upper < nlp::kNoBound) {
+      upper(component) = to_scaled(component, interval.upper);
+    }
+  };
+  const BaseBounds bounds = base_bounds(*window_, active_, static_cast<std::size_t>(k));
+  bound(kBase, bounds.position);
+  bound(kBaseRate, bounds.velocity);
+  bound(kBaseAccel, bounds.accel);
   const auto fix = [&](Component component, double physical) {
     lower(component) = upper(component) = to_scaled(component, physical);
   };
@@ -137,26 +127,6 @@ void AxisProblem::node_bounds(int k, int n, PointVector& lower, PointVector& upp
     fix(kBase, *window_->end_base_mm);
     fix(kBaseRate, 0.0);
   }
-}
-
-void AxisProblem::bound_position(std::optional<double> resting_mm, PointVector& lower,
-                                 PointVector& upper) const {
-  const BaseLimits& limits = window_->limits;
-  double margin = 0.0;
-  if (active_.position_between && std::isfinite(limits.max_accel_mm_s2)) {
-    // Between nodes b departs from the chord by at most A h²/8.
-    margin = std::min(limits.max_accel_mm_s2 * std::pow(window_->period_s, 2) / 8.0,
-                      0.5 * (limits.max_position_mm - limits.min_position_mm));
-    // Where it rests closer to the end of the travel than that, it can only set off inwards.
-    if (resting_mm && *resting_mm < limits.min_position_mm + margin) {
-      lower(kBaseAccel) = 0.0;
-    }
-    if (resting_mm && *resting_mm > limits.max_position_mm - margin) {
-      upper(kBaseAccel) = 0.0;
-    }
-  }
-  lower(kBase) = to_scaled(kBase, limits.min_position_mm + margin);
-  upper(kBase) = to_scaled(kBase, limits.max_position_mm - margin);
 }
 
 void AxisProblem::guess(int k, double /*t*/, PointVector& z) const {

@@ -2,26 +2,13 @@
 // node periods, lengths in hundredths of a millimetre from the window's first reference point.
 #pragma once
 
-#include <optional>
-
+#include "limits.hpp"
 #include "unflex/collocation/optimal_control_problem.hpp"
 #include "unflex/compensate/axis_window.hpp"
 
 namespace unflex::compensate {
 
 inline constexpr double kLengthUnitMm = 0.01;
-
-// Which limits the program carries. Bounds that the solution keeps anyway only cost iterations.
-struct ActiveLimits {
-  bool velocity = false;
-  bool accel = false;
-  bool jerk = false;
-  bool position = false;
-  // Also keeps b within its travel between nodes, by a margin at the nodes.
-  bool position_between = false;
-
-  bool operator==(const ActiveLimits&) const = default;
-};
 
 // States p, ṗ, b, ḃ; control b̈.
 class AxisProblem final : public collocation::OptimalControlProblem {
@@ -64,10 +51,6 @@ class AxisProblem final : public collocation::OptimalControlProblem {
   [[nodiscard]] double to_scaled(Component component, double physical) const;
 
  private:
-  // Bounds of b and b̈ that keep the base within its travel at a node where it may rest at
-  // resting_mm.
-  void bound_position(std::optional<double> resting_mm, collocation::PointVector& lower,
-                      collocation::PointVector& upper) const;
   // r and w at time t, which is a node or a middle.
   [[nodiscard]] std::size_t sample(double t) const;
 

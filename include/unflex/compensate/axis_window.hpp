@@ -77,4 +77,8 @@ class Engine {
 // Hargraves–Paris transcription solved by Ipopt. Not thread-safe (see nlp/ipopt_solver.hpp).
 [[nodiscard]] std::unique_ptr<Engine> make_ipopt_engine();
 
+// The same program without its equality constraints, solved by interior points of its own. Any
+// number of threads may solve at once, with one engine or several.
+[[nodiscard]] std::unique_ptr<Engine> make_banded_engine();
+
 }  // namespace unflex::compensate

@@ -1,0 +1,367 @@
+#include "flat_form.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "stencil_loops.hpp"
+
+namespace unflex::compensate {
+namespace {
+
+constexpr std::size_t kFewestNodes = 8;
+constexpr double kSmallestOmegaH = 0.05;
+constexpr std::size_t kMiddle = 2;  // c_{k+2} is where p_k is, roughly
+
+// Coefficients in powers of q from those in powers of s = q − 1.
+Stencil shifted(const Stencil& in_s) {
+  Stencil result{};
+  Stencil power{1.0};  // (q − 1)ⁱ
+  for (std::size_t i = 0; i <= kHalfBand; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      result[j] += in_s[i] * power[j];
+    }
+    for (std::size_t j = kHalfBand; j > 0; --j) {
+      power[j] = power[j - 1] - power[j];
+    }
+    power[0] = -power[0];
+  }
+  return result;
+}
+
+void apply(RowKind kind, const Stencil& stencil, const Padded& x, Padded& y) {
+  if (kind == RowKind::jerk) {
+    loops::apply<kHalfBand + 1>(stencil, x.data(), y.data(), y.size());
+  } else {
+    loops::apply<kHalfBand>(stencil, x.data(), y.data(), y.size());
+  }
+}
+
+}  // namespace
+
+// The polynomials are found in s = q − 1, the eigenvalues of Φ − I: those of Φ lie so close to 1
+// that in q the nozzle's coefficients, of size (ωh)², would be differences of numbers about 1.
+FlatStencils::FlatStencils(const AxisChain& chain) {
+  ChainMatrix adjugate = ChainMatrix::Identity();  // N_4, then N_3 …
+  jerk[5] = 1.0;
+  for (std::size_t i = 5; i-- > 0;) {
+    const ChainVector v = adjugate * chain.input;
+    for (std::size_t component = 0; component < state.size(); ++component) {
+      state[component][i] = v(static_cast<Eigen::Index>(component));
+    }
+    const ChainMatrix next = chain.growth * adjugate;
+    // b, ḃ and b̈ are three integrations of the jerk: s³ divides the polynomial.
+    jerk[i] = i < 3 ? 0.0 : -next.trace() / static_cast<double>(5 - i);
+    adjugate = next + jerk[i] * ChainMatrix::Identity();
+  }
+  const double scale = 1.0 / state[AxisChain::kNozzle][0];
+  for (Stencil* stencil : {&state[0], &state[1], &state[2], &state[3], &state[4], &jerk}) {
+    for (double& coefficient : *stencil) {
+      coefficient *= scale;
+    }
+    *stencil = shifted(*stencil);
+  }
+  const Stencil& p = state[AxisChain::kNozzle];
+  const Stencil& rate = state[AxisChain::kNozzleRate];
+  for (std::size_t i = 0; i <= kHalfBand; ++i) {
+    const double p_before = i > 0 ? p[i - 1] : 0.0;
+    const double rate_before = i > 0 ? rate[i - 1] : 0.0;
+    middle[i] = 0.5 * (p[i] + p_before) + 0.125 * (rate[i] - rate_before);
+  }
+}
+
+const Stencil& FlatStencils::of(RowKind kind) const {
+  switch (kind) {
+    case RowKind::position:
+      return state[AxisChain::kBase];
+    case RowKind::velocity:
+      return state[AxisChain::kBaseRate];
+    case RowKind::accel:
+      return state[AxisChain::kBaseAccel];
+    default:
+      return jerk;
+  }
+}
+
+bool FlatForm::suits(const ScaledWindow& scaled) {
+  const AxisWindow& window = *scaled.window;
+  return scaled.nodes >= kFewestNodes &&
+         window.axis.omega_rad_s * window.period_s >= kSmallestOmegaH;
+}
+
+void FlatForm::assign(const ScaledWindow& scaled) {
+  window_ = &scaled;
+  faint_pull_ = kFaintPull;
+  nodes_ = scaled.nodes;
+  const AxisWindow& window = *scaled.window;
+  const FlatStencils stencils(
+      AxisChain(window.axis.omega_rad_s * window.period_s, window.axis.zeta));
+  for (const RowKind kind : kRowKinds) {
+    stencils_[index_of(kind)] = stencils.of(kind);
+  }
+  nozzle_ = stencils.state[AxisChain::kNozzle];
+  middle_ = stencils.middle;
+  first_ = scaled.start ? 4 : 0;
+  last_ = scaled.end_base ? nodes_ + 1 : nodes_ + 3;
+
+  const std::size_t unknowns = nodes_ + 4;
+  for (Padded* values : {&c_, &step_, &gradient_, &scratch_}) {
+    values->resize(unknowns);
+  }
+  for (Padded* values : {&node_reference_, &node_weight_, &node_pull_}) {
+    values->resize(nodes_);
+  }
+  for (Padded* values : {&middle_reference_, &middle_weight_, &middle_pull_, &jerk_pull_}) {
+    values->resize(nodes_ - 1);
+  }
+  for (std::size_t d = 0; d <= kHalfBand; ++d) {
+    cost_hessian_[d].resize(unknowns);
+  }
+  for (std::size_t k = 0; k < nodes_; ++k) {
+    const bool at_end = k == 0 || k + 1 == nodes_;
+    node_weight_[k] = window.weight[2 * k] * (at_end ? 1.0 / 6.0 : 1.0 / 3.0);
+    node_reference_[k] = scaled.reference[2 * k];
+  }
+  for (std::size_t k = 0; k + 1 < nodes_; ++k) {
+    middle_weight_[k] = window.weight[2 * k + 1] * (2.0 / 3.0);
+    middle_reference_[k] = scaled.reference[2 * k + 1];
+  }
+  add_up_cost();
+
+  for (std::size_t i = 0; i < unknowns; ++i) {
+    const std::size_t k = std::clamp(i, kMiddle, nodes_ + 1) - kMiddle;
+    c_[i] = scaled.reference[2 * k];
+  }
+  find_ends();
+}
+
+// What keeps the fixed ends, and the first guess there.
+void FlatForm::find_ends() {
+  const Stencil& position = stencils_[index_of(RowKind::position)];
+  const Stencil& velocity = stencils_[index_of(RowKind::velocity)];
+  if (window_->start) {
+    const FlatStencils stencils(AxisChain(
+        window_->window->axis.omega_rad_s * window_->window->period_s, window_->window->axis.zeta));
+    ChainMatrix to_state;
+    for (Eigen::Index component = 0; component < 5; ++component) {
+      for (Eigen::Index i = 0; i < 5; ++i) {
+        to_state(component, i) =
+            stencils.state[static_cast<std::size_t>(component)][static_cast<std::size_t>(i)];
+      }
+    }
+    const Eigen::FullPivLU<ChainMatrix> solver(to_state);
+    ChainVector given;
+    given << *window_->start, 0.0;
+    start_direction_ = solver.solve(ChainVector(ChainVector::Unit(4)));
+    start_direction_ /= start_direction_.lpNorm<Eigen::Infinity>();
+    const ChainVector offset = solver.solve(given);
+    Eigen::Map<ChainVector>(c_.data()) = offset;
+  }
+  if (window_->end_base) {
+    Eigen::Matrix2d last;
+    last << position[3], position[4], velocity[3], velocity[4];
+    Eigen::Matrix<double, 2, 3> before;
+    before << position[0], position[1], position[2], velocity[0], velocity[1], velocity[2];
+    const Eigen::Matrix2d inverse = last.inverse();
+    end_from_ = -inverse * before;
+    Eigen::Map<Eigen::Vector2d>(c_.data() + nodes_ + 2) =
+        inverse.col(0) * *window_->end_base +
+        end_from_ * Eigen::Map<const Eigen::Vector3d>(c_.data() + nodes_ - 1);
+  }
+}
+
+void FlatForm::add_up_cost() {
+  // The jerk's weight is the same everywhere, so its part is one number per diagonal, but for the
+  // first and last rows, which not all of its stencils reach.
+  const Stencil& jerk = stencils_[index_of(RowKind::jerk)];
+  const std::size_t unknowns = nodes_ + 4;
+  for (std::size_t d = 0; d <= kHalfBand; ++d) {
+    Padded& diagonal = cost_hessian_[d];
+    double sum = 0.0;
+    for (std::size_t i = 0; i + d <= kHalfBand; ++i) {
+      sum += jerk[i] * jerk[i + d];
+    }
+    std::fill_n(diagonal.data(), unknowns, window_->jerk_weight * sum);
+    for (std::size_t r = 0; r < unknowns; ++r) {
+      if (r == kHalfBand && unknowns > 2 * kHalfBand) {
+        r = unknowns - kHalfBand;
+      }
+      double part = 0.0;
+      for (std::size_t i = 0; i + d <= kHalfBand && i <= r; ++i) {
+        part += r - i + 1 < nodes_ ? jerk[i] * jerk[i + d] : 0.0;
+      }
+      diagonal[r] = window_->jerk_weight * part;
+    }
+  }
+  loops::add_squares<kHalfBand>(nozzle_, node_weight_.data(), cost_hessian_, unknowns);
+  loops::add_squares<kHalfBand + 1>(middle_, middle_weight_.data(), cost_hessian_, unknowns);
+}
+
+void FlatForm::evaluate(const PerKind<bool>& kinds) {
+  const auto pull = [&](const Padded& reference, const Padded& weight, Padded& result) {
+    const auto error = as_array(result) - as_array(reference);
+    half_cost_ += 0.5 * (as_array(weight) * error.square()).sum();
+    as_array(result) = as_array(weight) * error;
+  };
+  half_cost_ = 0.0;
+  loops::apply<kHalfBand>(nozzle_, c_.data(), node_pull_.data(), nodes_);
+  pull(node_reference_, node_weight_, node_pull_);
+  loops::apply<kHalfBand + 1>(middle_, c_.data(), middle_pull_.data(), nodes_ - 1);
+  pull(middle_reference_, middle_weight_, middle_pull_);
+  const Stencil& jerk = stencils_[index_of(RowKind::jerk)];
+  apply(RowKind::jerk, jerk, c_, jerk_pull_);
+  half_cost_ += 0.5 * window_->jerk_weight * as_array(jerk_pull_).square().sum();
+  as_array(jerk_pull_) *= window_->jerk_weight;
+
+  as_array(gradient_).setZero();
+  const std::size_t unknowns = nodes_ + 4;
+  loops::add_transposed<kHalfBand>(nozzle_, node_pull_.data(), gradient_.data(), unknowns);
+  loops::add_transposed<kHalfBand + 1>(middle_, middle_pull_.data(), gradient_.data(), unknowns);
+  loops::add_transposed<kHalfBand + 1>(jerk, jerk_pull_.data(), gradient_.data(), unknowns);
+  for (const RowKind kind : kRowKinds) {
+    if (kinds[index_of(kind)]) {
+      Padded& rows = rows_[index_of(kind)];
+      rows.resize(row_count(kind));
+      apply(kind, stencils_[index_of(kind)], c_, rows);
+    }
+  }
+}
+
+double FlatForm::half_cost() const { return half_cost_; }
+
+bool FlatForm::factor(const PerKind<const double*>& weights) {
+  const std::size_t unknowns = nodes_ + 4;
+  for (std::size_t d = 0; d <= kHalfBand; ++d) {
+    hessian_[d] = cost_hessian_[d];
+  }
+  for (const RowKind kind : kRowKinds) {
+    const double* const weight = weights[index_of(kind)];
+    if (weight == nullptr) {
+      continue;
+    }
+    if (kind == RowKind::jerk) {
+      loops::add_squares<kHalfBand + 1>(stencils_[index_of(kind)], weight, hessian_, unknowns);
+    } else {
+      loops::add_squares<kHalfBand>(stencils_[index_of(kind)], weight, hessian_, unknowns);
+    }
+  }
+  tie_ends_of_hessian();
+  return ldlt_.factor(hessian_, first_, last_);
+}
+
+// From all of c to the unknowns.
+void FlatForm::tie_ends_of_hessian() {
+  const auto at = [&](std::size_t i, std::size_t j) {
+    const std::size_t d = i < j ? j - i : i - j;
+    return d <= kHalfBand ? hessian_[d][std::min(i, j)] : 0.0;
+  };
+  if (window_->start) {
+    Stencil row{};
+    for (std::size_t d = 0; d <= kHalfBand; ++d) {
+      for (std::size_t i = 0; i < 5; ++i) {
+        const double factor = start_direction_(static_cast<Eigen::Index>(i));
+        if (d > 0) {
+          row[d] += factor * at(i, 4 + d);
+        } else {
+          for (std::size_t j = 0; j < 5; ++j) {
+            row[0] += factor * start_direction_(static_cast<Eigen::Index>(j)) * at(i, j);
+          }
+        }
+      }
+    }
+    for (std::size_t d = 0; d <= kHalfBand; ++d) {
+      hessian_[d][4] = row[d];
+    }
+  }
+  if (window_->end_base) {
+    const std::size_t t = nodes_ - 1;
+    Eigen::Matrix<double, 5, 3> tie;
+    tie << Eigen::Matrix3d::Identity(), end_from_;
+    Eigen::Matrix<double, 2, 5> coupling;  // of c_{t−2}, c_{t−1} with c_t …
+    Eigen::Matrix<double, 5, 5> block;
+    for (Eigen::Index j = 0; j < 5; ++j) {
+      const std::size_t column = t + static_cast<std::size_t>(j);
+      coupling(0, j) = at(t - 2, column);
+      coupling(1, j) = at(t - 1, column);
+      for (Eigen::Index i = 0; i < 5; ++i) {
+        block(i, j) = at(t + static_cast<std::size_t>(i), column);
+      }
+    }
+    const Eigen::Matrix<double, 2, 3> tied_coupling = coupling * tie;
+    const Eigen::Matrix3d tied = tie.transpose() * block * tie;
+    for (std::size_t j = 0; j < 3; ++j) {
+      const auto column = static_cast<Eigen::Index>(j);
+      hessian_[j + 2][t - 2] = tied_coupling(0, column);
+      hessian_[j + 1][t - 1] = tied_coupling(1, column);
+      for (std::size_t i = 0; i <= j; ++i) {
+        hessian_[j - i][t + i] = tied(static_cast<Eigen::Index>(i), column);
+      }
+    }
+  }
+}
+
+void FlatForm::solve(const PerKind<const double*>& forces) {
+  const std::size_t unknowns = nodes_ + 4;
+  Padded& right = scratch_;
+  faint_pull_ = -faint_pull_;
+  as_array(right) = faint_pull_ - as_array(gradient_);
+  for (const RowKind kind : kRowKinds) {
+    const double* const force = forces[index_of(kind)];
+    if (force == nullptr) {
+      continue;
+    }
+    if (kind == RowKind::jerk) {
+      loops::add_transposed<kHalfBand + 1>(stencils_[index_of(kind)], force, right.data(),
+                                           unknowns);
+    } else {
+      loops::add_transposed<kHalfBand>(stencils_[index_of(kind)], force, right.data(), unknowns);
+    }
+  }
+  const std::size_t t = nodes_ - 1;
+  if (window_->start) {
+    right[4] = start_direction_.dot(Eigen::Map<const ChainVector>(right.data()));
+  }
+  if (window_->end_base) {
+    Eigen::Map<Eigen::Vector3d>(right.data() + t) +=
+        end_from_.transpose() * Eigen::Map<const Eigen::Vector2d>(right.data() + t + 3);
+  }
+  const auto size = static_cast<Eigen::Index>(last_ - first_ + 1);
+  const Eigen::Map<const Eigen::VectorXd> force(right.data() + first_, size);
+  Eigen::Map<Eigen::VectorXd> step(step_.data() + first_, size);
+  step = force;
+  ldlt_.solve(step_.data());
+  decrement_ = 0.5 * force.dot(step);
+  if (window_->start) {
+    Eigen::Map<ChainVector>(step_.data()) = start_direction_ * double(step_[4]);
+  }
+  if (window_->end_base) {
+    Eigen::Map<Eigen::Vector2d>(step_.data() + t + 3) =
+        end_from_ * Eigen::Map<const Eigen::Vector3d>(step_.data() + t);
+  }
+  for (const RowKind kind : kRowKinds) {
+    if (forces[index_of(kind)] != nullptr) {
+      Padded& steps = row_steps_[index_of(kind)];
+      steps.resize(row_count(kind));
+      apply(kind, stencils_[index_of(kind)], step_, steps);
+    }
+  }
+}
+
+void FlatForm::advance(double length) { as_array(c_) += length * as_array(step_); }
+
+void FlatForm::write(dynamics::AxisTrajectory& base) {
+  const auto put = [&](RowKind kind, double offset, std::vector<double>& to) {
+    Padded& rows = rows_[index_of(kind)];
+    rows.resize(nodes_);
+    apply(kind, stencils_[index_of(kind)], c_, rows);
+    to.resize(nodes_);
+    Eigen::Map<Eigen::ArrayXd>(to.data(), static_cast<Eigen::Index>(nodes_)) =
+        offset + window_->unit[index_of(kind)] * as_array(rows);
+  };
+  put(RowKind::position, window_->origin_mm, base.position_mm);
+  put(RowKind::velocity, 0.0, base.velocity_mm_s);
+  put(RowKind::accel, 0.0, base.accel_mm_s2);
+  window_->keep_ends(base);
+}
+
+}  // namespace unflex::compensate

@@ -1,0 +1,122 @@
+// The window with one unknown per node and no equality constraints.
+//
+// The chain of axis_chain.hpp has one input, so it has a flat output: a sequence c of nodes + 4
+// numbers with
+//
+//   z_k = Σ_{i=0..4} v_i c_{k+i}        j_k = Σ_{i=0..5} d_i c_{k+i}
+//
+// where Σ v_i qⁱ = adj(qI − Φ) B and d is the characteristic polynomial of Φ (Faddeev–LeVerrier;
+// Gantmacher, "The Theory of Matrices", IV.5). Everything that the cost and the limits speak of is
+// then a short stencil on c, and the Hessian has half-bandwidth 5. c is scaled so that a resting
+// axis has c = p = b.
+//
+// Fixed ends: p, ṗ, b, ḃ at the first node leave c_0 … c_4 = c* + m s with one unknown s, which
+// stands in c_4's place; b and ḃ at the last node give the last two c from the three before them.
+// Neither widens the band.
+//
+// All costs below are half of the window's, as are forces and multipliers.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+
+#include "axis_chain.hpp"
+#include "banded_ldlt.hpp"
+#include "padded.hpp"
+
+namespace unflex::compensate {
+
+// Coefficients of c_k … c_{k+5}.
+using Stencil = std::array<double, kHalfBand + 1>;
+
+struct FlatStencils {
+  std::array<Stencil, 5> state{};  // v: p, ṗ, b, ḃ, b̈; the last coefficient is 0
+  Stencil jerk{};                  // d
+  Stencil middle{};                // nozzle in the middle of the interval
+
+  explicit FlatStencils(const AxisChain& chain);
+
+  [[nodiscard]] const Stencil& of(RowKind kind) const;
+};
+
+class FlatForm {
+ public:
+  // Whether the window is long enough for its two ends not to meet, and ωh large enough for the
+  // numbers: from p to b̈ and back they grow by (ωh)⁻².
+  [[nodiscard]] static bool suits(const ScaledWindow& window);
+
+  // Takes the window, which must stay, and goes to a first guess that keeps its ends.
+  void assign(const ScaledWindow& window);
+
+  // Half the gradient of the cost where the form now is, and the values of the rows of these kinds.
+  void evaluate(const PerKind<bool>& kinds);
+  [[nodiscard]] double half_cost() const;
+  [[nodiscard]] const double* rows(RowKind kind) const { return rows_[index_of(kind)].data(); }
+
+  // Prepares for steps: Hessian plus Gᵀ W G, the rows weighted by W (null: not at all).
+  [[nodiscard]] bool factor(const PerKind<const double*>& weights);
+
+  // The step to the minimum of the quadratic model less its work against the forces on the rows
+  // (null: none), and what it changes the rows by.
+  void solve(const PerKind<const double*>& forces);
+  [[nodiscard]] const double* row_steps(RowKind kind) const {
+    return row_steps_[index_of(kind)].data();
+  }
+  // By how much the full step lowers the model.
+  [[nodiscard]] double decrement() const { return decrement_; }
+
+  // Makes the share `length` of the step.
+  void advance(double length);
+
+  void save() { saved_ = c_; }
+  void restore() { c_ = saved_; }
+
+  void write(dynamics::AxisTrajectory& base);
+
+ private:
+  [[nodiscard]] std::size_t row_count(RowKind kind) const {
+    return kind == RowKind::jerk ? nodes_ - 1 : nodes_;
+  }
+
+  void find_ends();
+  void keep_ends();
+  void add_up_cost();
+  void tie_ends_of_hessian();
+
+  const ScaledWindow* window_ = nullptr;
+  std::size_t nodes_ = 0;
+  std::size_t first_ = 0;  // unknowns: c_first … c_last
+  std::size_t last_ = 0;
+  PerKind<Stencil> stencils_{};
+  Stencil nozzle_{};
+  Stencil middle_{};
+  Eigen::Matrix<double, 5, 1> start_offset_;     // c*
+  Eigen::Matrix<double, 5, 1> start_direction_;  // m
+  Eigen::Matrix<double, 2, 3> end_from_;         // last two c from the three before …
+  Eigen::Vector2d end_offset_;                   // … plus this
+
+  Padded c_;
+  Padded saved_;
+  Padded step_;
+  Padded gradient_;
+  // Weights of the squares of p − r at nodes and middles, and these times p − r.
+  Padded node_reference_;
+  Padded middle_reference_;
+  Padded node_weight_;
+  Padded middle_weight_;
+  Padded node_pull_;
+  Padded middle_pull_;
+  Padded jerk_pull_;  // ρ j
+  double half_cost_ = 0.0;
+  double decrement_ = 0.0;
+  double faint_pull_ = 0.0;
+  PerKind<Padded> rows_;
+  PerKind<Padded> row_steps_;
+  Padded scratch_;
+  Band cost_hessian_;
+  Band hessian_;
+  BandedLdlt ldlt_;
+};
+
+}  // namespace unflex::compensate

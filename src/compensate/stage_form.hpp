@@ -1,0 +1,95 @@
+// The window stage by stage: states z_k and inputs j_k of axis_chain.hpp, stepped by a Riccati
+// recursion. Several times the work of the flat form (flat_form.hpp), but it takes any window: the
+// recursion never expresses the nozzle by differences of what the base does, so a small ωh costs no
+// digits, and any two nodes will do.
+//
+// C. V. Rao, S. J. Wright, J. B. Rawlings, "Application of interior-point methods to model
+// predictive control", J. Optim. Theory Appl. 99 (1998) 723–757. With the quadratic
+// ½ zᵀ P z + gᵀ z of what is still to come, a stage's inputs and P follow from the next one's:
+//
+//   R = ρ + Bᵀ P B + …    H = Φᵀ P B + …    K = −H/R    P ← Φᵀ P Φ + … + H K + Kᵀ Hᵀ + Kᵀ R K
+//
+// "…" is the stage's own cost: nozzle at the node and in the middle of the interval, weighted rows.
+// A base given at the end is kept by the last two inputs, whose K then is prescribed: with
+// b = given and ḃ = 0 one interval later,
+//
+//   j_{N−1} = −2 (ḃ + b̈)     and so     b + 2/3 ḃ + 1/6 b̈ = given     at node N−1
+//
+// The interface is FlatForm's; costs are half the window's.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "axis_chain.hpp"
+#include "padded.hpp"
+
+namespace unflex::compensate {
+
+class StageForm {
+ public:
+  void assign(const ScaledWindow& window);
+
+  void evaluate(const PerKind<bool>& kinds);
+  [[nodiscard]] double half_cost() const { return half_cost_; }
+  [[nodiscard]] const double* rows(RowKind kind) const { return rows_[index_of(kind)].data(); }
+
+  [[nodiscard]] bool factor(const PerKind<const double*>& weights);
+  void solve(const PerKind<const double*>& forces);
+  [[nodiscard]] const double* row_steps(RowKind kind) const {
+    return row_steps_[index_of(kind)].data();
+  }
+  [[nodiscard]] double decrement() const { return decrement_; }
+  void advance(double length);
+
+  void save();
+  void restore();
+
+  void write(dynamics::AxisTrajectory& base) const;
+
+ private:
+  struct Stage {
+    ChainVector feedback;      // Kᵀ
+    double inverse_curvature;  // 1/R; 0 where K is prescribed
+  };
+
+  // Whether the input of interval k keeps the end.
+  [[nodiscard]] bool prescribed(std::size_t k) const;
+  [[nodiscard]] ChainVector prescribed_feedback(std::size_t k) const;
+  [[nodiscard]] bool factor_start(const ChainMatrix& to_come);
+  void first_guess();
+  void roll_out(const ChainVector& first);
+  void split_rows(const std::vector<ChainVector>& states, const Padded& inputs,
+                  const PerKind<bool>& kinds, PerKind<Padded>& rows) const;
+
+  const ScaledWindow* window_ = nullptr;
+  std::size_t nodes_ = 0;
+  ChainMatrix transition_;     // Φ
+  ChainVector input_;          // B
+  ChainVector middle_;         // p_c by z_k …
+  double middle_input_ = 0.0;  // … and j_k
+  // δz_0 = start_basis_ y with y free, found by start_inverse_.
+  Eigen::Matrix<double, 5, Eigen::Dynamic, 0, 5, 5> start_basis_;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 5, 5> start_inverse_;
+
+  std::vector<ChainVector> states_;
+  std::vector<ChainVector> saved_states_;
+  std::vector<ChainVector> state_steps_;
+  Padded inputs_;
+  Padded saved_inputs_;
+  Padded input_steps_;
+  Padded feedforward_;
+  std::vector<Stage> stages_;
+  Padded node_weight_;
+  Padded middle_weight_;
+  Padded node_pull_;
+  Padded middle_pull_;
+  double half_cost_ = 0.0;
+  double decrement_ = 0.0;
+  double faint_pull_ = 0.0;
+  PerKind<Padded> rows_;
+  PerKind<Padded> row_steps_;
+};
+
+}  // namespace unflex::compensate
