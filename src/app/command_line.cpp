@@ -54,7 +54,17 @@ void add_compensate(CLI::App& program, RunConfig& config) {
   command->add_flag("--in-place", config.in_place, "Replace IN");
   add_common_options(*command, config);
   add_max_deviation(*command, config);
-  command->add_option("-j,--jobs", config.workers, "Solver processes, all processors by default")
+  command
+      ->add_option("--engine", config.engine,
+                   "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt")
+      ->type_name("auto|banded|ipopt")
+      ->transform(CLI::Transformer(
+          std::map<std::string, pipeline::EngineChoice>{{"auto", pipeline::EngineChoice::automatic},
+                                                        {"banded", pipeline::EngineChoice::banded},
+                                                        {"ipopt", pipeline::EngineChoice::ipopt}}));
+  command
+      ->add_option("-j,--jobs", config.workers,
+                   "How many to compute at once, all processors by default")
       ->type_name("N")
       ->check(CLI::Range(1U, kMaxWorkers));
   command->callback([&config] { config.command = Command::compensate; });

@@ -140,6 +140,7 @@ pipeline::Job job_of(const RunConfig& config, const Workspace& space) {
     job.output = space.compensated->path();
   }
   job.settings = space.settings;
+  job.engine = config.engine;
   job.workers = config.workers;
   return job;
 }

@@ -112,17 +112,24 @@ void Emitter::keep(const std::vector<gcode::Event>& events, std::string& out) {
   }
 }
 
-bool Emitter::run(const Run& run, std::string& out) {
-  const gcode::ModalState& state = printer_.state();
-  const Grid grid{axis_grid(options_.fixed, X, state.base_mm[X]),
-                  axis_grid(options_.fixed, Y, state.base_mm[Y]),
-                  axis_grid(options_.fixed, Z, state.base_mm[Z]), state.speed_factor};
-  EmitOptions options = options_;
-  options.run_limits = limits_in_run(options_.fixed.firmware, input_limits_, options_.run_limits);
-  const std::vector<Stroke> run_strokes = strokes(run, grid, options);
-  if (run_strokes.empty()) {
-    return false;
-  }
+RunStart run_start(const gcode::ModalState& state, const planner::Limits& limits) {
+  return {{state.base_mm[X], state.base_mm[Y], state.base_mm[Z]}, state.speed_factor, limits};
+}
+
+bool RunPlan::empty() const { return strokes == nullptr || strokes->empty(); }
+
+RunPlan plan_run(const Run& run, const RunStart& start, const EmitOptions& options) {
+  const Grid grid{axis_grid(options.fixed, X, start.zero_mm[X]),
+                  axis_grid(options.fixed, Y, start.zero_mm[Y]),
+                  axis_grid(options.fixed, Z, start.zero_mm[Z]), start.speed_factor};
+  EmitOptions in_run = options;
+  in_run.run_limits = limits_in_run(options.fixed.firmware, start.limits, options.run_limits);
+  return {start, std::make_shared<const std::vector<Stroke>>(strokes(run, grid, in_run))};
+}
+
+RunStart Emitter::run_start() const { return emit::run_start(printer_.state(), input_limits_); }
+
+void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   const double filament_origin = input_.state().position_mm[E];
   enter_run(out);
   std::size_t written = 0;
@@ -141,7 +148,7 @@ bool Emitter::run(const Run& run, std::string& out) {
       }
     }
   };
-  for (const Stroke& stroke : run_strokes) {
+  for (const Stroke& stroke : *plan.strokes) {
     write_events(stroke.events);
     set_run_modes(out);
     write_stroke(stroke, filament_origin, out);
@@ -151,7 +158,6 @@ bool Emitter::run(const Run& run, std::string& out) {
   set_unit(1.0, out);
   set_limits(input_limits_, out);
   restore_modes(out);
-  return true;
 }
 
 void Emitter::finish(std::string& out) { restore_shaper(out); }

@@ -3,55 +3,41 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <deque>
+#include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <optional>
 #include <utility>
 
 #include "compensate_with.hpp"
-#include "emission_cost.hpp"
-#include "judge.hpp"
+#include "gap_check.hpp"
 #include "nozzle_motion.hpp"
-#include "piece_reader.hpp"
 #include "report_rows.hpp"
 #include "retime.hpp"
+#include "run_writer.hpp"
 #include "stage_options.hpp"
+#include "task_pool.hpp"
 #include "unflex/pipeline/pipeline.hpp"
-#include "unflex/verify/verify.hpp"
+#include "verify_thread.hpp"
 #include "worker_pool.hpp"
 
 namespace unflex::pipeline {
 namespace {
 
-constexpr std::size_t kMaxFallbacksListed = 1000;
-// Windows the reader may be ahead of the solvers, per worker, and those built at once.
+// Nodes of runs that have been read and not yet been written, per worker, and windows that solver
+// processes are given ahead.
+constexpr std::size_t kNodesAhead = 200'000;
 constexpr std::size_t kWindowsAhead = 24;
+// Windows built at once.
 constexpr std::size_t kWindowsAtOnce = 8;
 // A run's trajectory is held as a whole, 48 bytes per node; longer ones are left as they are.
 constexpr std::size_t kMaxRunNodes = 8'000'000;
-// Of the tolerance, for a run that the whole of it spoils.
-constexpr double kFineTolerance = 0.05;
-// Of the time of the whole job, for the progress bar.
+// Of the time of the whole job, for the progress bar, where the output is verified afterwards.
 constexpr double kShareOfCompensation = 0.9;
-
-// A piece on its way: a run waits for its windows.
-struct Pending {
-  Piece piece;
-  std::vector<compensate::WindowSpan> spans;
-  std::vector<dynamics::AxisTrajectory> x;  // solutions, one per span
-  std::vector<dynamics::AxisTrajectory> y;
-  std::size_t submitted = 0;  // windows given to the solvers
-  std::size_t missing = 0;    // solutions not yet here, two per window
-  std::string failure;        // why there is no solution
-  dynamics::NozzleXY nozzle;  // when the run begins, if every run before is compensated
-};
-
-// Which solution a ticket of the pool stands for.
-struct Ticket {
-  std::size_t piece;
-  std::size_t window;
-  bool is_y;
-};
+constexpr std::chrono::milliseconds kPatience{100};
+constexpr std::chrono::milliseconds kShortPatience{2};
 
 double largest_axis_accel(const std::vector<planner::PlannedMove>& moves) {
   double largest = 0.0;
@@ -64,34 +50,60 @@ double largest_axis_accel(const std::vector<planner::PlannedMove>& moves) {
   return largest;
 }
 
+std::string text_of(const Piece& piece) {
+  std::string text;
+  for (const gcode::Event& event : piece.events) {
+    text += event.line.text;
+  }
+  return text;
+}
+
+tl::unexpected<Error> disk_full(const Job& job) {
+  return fail(ErrorKind::internal, {job.output_name, 0},
+              "cannot write the output; is the disk full?");
+}
+
+// Reads pieces, has runs worked on, and writes them in order. All of it in the calling thread but
+// for what is in the pools.
 class Compensator {
  public:
-  Compensator(const Job& job, WorkerPool pool, std::istream& input, std::ostream& output,
-              Progress& progress)
+  Compensator(const Job& job, Engines engines, WorkerPool& processes, std::istream& input,
+              std::ostream& output, Progress& progress, report::Report& report)
       : job_(job),
-        setup_(compensate_setup(job.settings)),
-        rules_(verify_rules(job.settings)),
-        pool_(std::move(pool)),
-        reader_(input, job.input_name, rules_.interpreter, rules_.limits, rules_.fixed),
-        emitter_(emit_options(job.settings, UNFLEX_VERSION)),
-        output_(output),
-        progress_(progress),
-        input_bytes_(static_cast<double>(std::filesystem::file_size(job.input))) {}
+        engines_(std::move(engines)),
+        rules_{compensate_setup(job.settings), emit_options(job.settings, UNFLEX_VERSION),
+               verify_rules(job.settings)},
+        reader_(input, job.input_name, rules_.verify.interpreter, rules_.verify.limits,
+                rules_.verify.fixed),
+        processes_(&processes),
+        output_(&output),
+        progress_(&progress),
+        report_(&report),
+        writer_(rules_, job.settings.max_lines_per_s(), report),
+        input_bytes_(static_cast<double>(std::filesystem::file_size(job.input))),
+        slots_(job.workers) {
+    if (engines_.threaded) {
+      engine_ = engines_.threaded();
+      verifier_.emplace(rules_.verify, job.input_name, job.output_name, progress, slots_);
+      pool_.emplace(std::max(job.workers, 1U), slots_);
+    } else {
+      pool_.emplace(0U, slots_);
+    }
+  }
 
-  Status work(report::Report& report) {
-    report_ = &report;
-    const std::size_t ahead = 2 * kWindowsAhead * std::max(job_.workers, 1U);
+  Status work() {
+    const CpuSlot slot(slots_);
     for (;;) {
-      Pending pending;
-      const Result<bool> more = reader_.next(pending.piece);
+      auto job = std::make_shared<RunJob>();
+      const Result<bool> more = reader_.next(job->piece);
       if (!more) {
         return tl::unexpected(more.error());
       }
       if (!*more) {
         break;
       }
-      admit(std::move(pending));
-      if (Status status = drain(ahead); !status) {
+      admit(std::move(job));
+      if (Status status = drain(kNodesAhead * std::max(job_.workers, 1U)); !status) {
         return status;
       }
     }
@@ -99,245 +111,256 @@ class Compensator {
     if (Status status = drain(0); !status) {
       return status;
     }
-    std::string text;
-    emitter_.finish(text);
-    output_ << text;
-    report.line_budget.max_lines_per_s = job_.settings.max_lines_per_s();
-    report.line_budget.cost_rms_mm = emission_cost_.rms_mm();
-    report.line_budget.cost_max_mm = emission_cost_.max_mm();
+    put({}, writer_.finish());
     for (const Diagnostic& warning : reader_.warnings()) {
-      report.warnings.push_back(to_string(warning));
+      report_->warnings.push_back(to_string(warning));
     }
-    return {};
+    if (Status status = check_engine(); !status) {
+      return status;
+    }
+    return finish_verification();
   }
 
  private:
   // Queues the piece.
-  void admit(Pending pending) {
-    const Piece& piece = pending.piece;
+  void admit(std::shared_ptr<RunJob> job) {
+    const Piece& piece = job->piece;
     if (piece.is_run) {
       ++report_->runs_total;
-      pending.nozzle = nozzle_;
+      job->nozzle = nozzle_;
       nozzle_ = at_rest(piece.moves.back().segment.end_mm);
-      const std::size_t nodes = compensate::node_count(piece.moves, setup_);
+      job->setup = setup_for(rules_.setup, piece.moves, job_.settings);
+      const std::size_t nodes = compensate::node_count(piece.moves, rules_.setup);
       const double accel = largest_axis_accel(piece.moves);
-      if (accel > rules_.base_max_accel_mm_s2) {
-        pending.failure = fmt::format(
+      if (accel > rules_.verify.base_max_accel_mm_s2) {
+        job->failure = fmt::format(
             "the plan itself accelerates an axis by {:.0f} mm/s², more than base.max_accel_mm_s2",
             accel);
       } else if (nodes <= kMaxRunNodes) {
-        pending.spans = compensate::cut(nodes, setup_);
+        job->spans = compensate::cut(nodes, rules_.setup);
       } else {
-        pending.failure =
-            fmt::format("{:.0f} s of motion without a stop are too long to be handled",
-                        static_cast<double>(nodes) * setup_.period_s);
+        job->failure = fmt::format("{:.0f} s of motion without a stop are too long to be handled",
+                                   static_cast<double>(nodes) * rules_.setup.period_s);
       }
-      pending.x.resize(pending.spans.size());
-      pending.y.resize(pending.spans.size());
-      pending.missing = 2 * pending.spans.size();
-      outstanding_ += pending.missing;
-      report_->windows_total += pending.spans.size();
+      job->results.resize(job->spans.size());
+      job->missing = 2 * job->spans.size();
+      job->prepared = job->spans.empty();
+      report_->windows_total += job->spans.size();
+      nodes_queued_ += nodes_of(*job);
+      if (engine_ && engines_.second) {
+        gaps_.choose(*job);
+      }
     } else {
-      nozzle_ = after_motion(piece, nozzle_, rules_.nozzle);
+      nozzle_ = after_motion(piece, nozzle_, rules_.verify.nozzle);
       for (const gcode::Event& event : piece.events) {
-        count_kept_moves(event, rules_.fixed.firmware, report_->kept_moves);
+        count_kept_moves(event, rules_.verify.fixed.firmware, report_->kept_moves);
       }
+      job->prepared = true;
     }
-    queue_.push_back(std::move(pending));
+    if (!queue_.empty()) {
+      // The lines of a run where they are counted have to fit those after it.
+      queue_.back()->lines_after = verify::LineRate::first_lines(piece.moves);
+    }
+    queue_.push_back(std::move(job));
+    feed();
   }
 
-  // Gives the solvers the next windows, in the order of the file, as long as they are not busy for
-  // some time already.
+  static std::size_t nodes_of(const RunJob& job) {
+    return job.spans.empty() ? 0 : job.spans.back().last + 1;
+  }
+
+  // Gives the solvers what they can take, in the order of the file.
   void feed() {
     for (std::size_t piece = 0; piece < queue_.size(); ++piece) {
-      Pending& pending = queue_[piece];
-      while (pending.submitted < pending.spans.size()) {
-        if (pool_.under_way() >= kWindowsAhead * std::max(job_.workers, 1U)) {
+      // A run is known in full when it is known what follows.
+      if (!all_read_ && piece + 1 == queue_.size() && rules_.emit.lines.burst_lines > 0) {
+        return;
+      }
+      RunJob& job = *queue_[piece];
+      while (job.submitted < job.spans.size()) {
+        const std::size_t count = std::min(kWindowsAtOnce, job.spans.size() - job.submitted);
+        if (engine_) {
+          solve_in_thread(queue_[piece], job.submitted, count);
+        } else if (processes_->under_way() < kWindowsAhead * std::max(job_.workers, 1U)) {
+          solve_in_process(queue_[piece], job.submitted, count);
+        } else {
           return;
         }
-        const std::size_t count =
-            std::min(kWindowsAtOnce, pending.spans.size() - pending.submitted);
-        const auto windows = compensate::windows(
-            pending.piece.moves, pending.spans, pending.submitted, count, pending.nozzle,
-            setup_for(setup_, pending.piece.moves, job_.settings));
-        for (std::size_t i = 0; i < count; ++i) {
-          submit({first_index_ + piece, pending.submitted + i, false}, windows[i].x);
-          submit({first_index_ + piece, pending.submitted + i, true}, windows[i].y);
-        }
-        pending.submitted += count;
+        job.submitted += count;
       }
     }
   }
 
-  void submit(Ticket ticket, const compensate::AxisWindow& window) {
-    tickets_.push_back(ticket);
-    pool_.submit(first_ticket_ + tickets_.size() - 1, window);
+  void solve_in_thread(const std::shared_ptr<RunJob>& job, std::size_t first, std::size_t count) {
+    pool_->submit([this, job, first, count] {
+      solve_windows(*job, first, count, *engine_);
+      if (job->missing.fetch_sub(2 * count) == 2 * count) {
+        prepare(*job, rules_);
+        const std::lock_guard lock(mutex_);
+        ready_.notify_one();
+      }
+    });
   }
 
-  // Takes solutions and writes pieces that are complete until at most `ahead` solutions are
-  // missing; for 0 until everything is written.
+  void solve_in_process(const std::shared_ptr<RunJob>& job, std::size_t first, std::size_t count) {
+    const std::vector<compensate::RunWindow> windows = windows_of(*job, first, count);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        tickets_.push_back({job, first + i, axis});
+        processes_->submit(first_ticket_ + tickets_.size() - 1,
+                           axis == 0 ? windows[i].x : windows[i].y);
+      }
+    }
+  }
+
+  // Writes pieces that are complete until runs of at most `ahead` nodes are queued; for 0 until
+  // everything is written.
   Status drain(std::size_t ahead) {
     for (;;) {
       feed();
-      write_complete();
-      if (progress_.cancelled()) {
+      while (can_write()) {
+        write(*queue_.front());
+        queue_.pop_front();
+      }
+      if (progress_->cancelled()) {
         return fail(ErrorKind::internal, "cancelled, nothing was written");
       }
-      if (!output_) {
-        return fail(ErrorKind::internal, {job_.output_name, 0},
-                    "cannot write the output; is the disk full?");
+      if (!*output_) {
+        return disk_full(job_);
       }
-      if (outstanding_ <= ahead && (ahead > 0 || queue_.empty())) {
+      const bool few = nodes_queued_ <= ahead && (ahead > 0 || queue_.empty());
+      if (few && !(verifier_ && verifier_->is_behind())) {
         return {};
       }
-      if (std::optional<WorkerPool::Done> done = pool_.take(100)) {
+      wait();
+    }
+  }
+
+  void wait() {
+    if (!engine_) {
+      if (std::optional<WorkerPool::Done> done =
+              processes_->take(static_cast<int>(kPatience.count()))) {
         place(std::move(*done));
       }
+      return;
     }
+    const CpuSlot::Without without(slots_);
+    std::unique_lock lock(mutex_);
+    ready_.wait_for(lock, verifier_->is_behind() ? kShortPatience : kPatience,
+                    [this] { return can_write(); });
+  }
+
+  // Where lines are counted, it must be known what follows a run.
+  [[nodiscard]] bool can_write() const {
+    return !queue_.empty() && queue_.front()->prepared &&
+           (queue_.size() > 1 || all_read_ || rules_.emit.lines.burst_lines == 0);
   }
 
   void place(WorkerPool::Done done) {
-    const Ticket ticket = tickets_[done.ticket - first_ticket_];
-    Pending& pending = queue_[ticket.piece - first_index_];
-    --pending.missing;
-    --outstanding_;
-    if (done.solution) {
-      report_->solver_iterations += static_cast<std::size_t>(done.solution->iterations);
-      (ticket.is_y ? pending.y : pending.x)[ticket.window] = std::move(done.solution->base);
-    } else if (pending.failure.empty()) {
-      pending.failure =
-          fmt::format("the solver failed on axis {}, window {}: {}", ticket.is_y ? 'y' : 'x',
-                      ticket.window + 1, done.solution.error().message);
+    const Ticket& ticket = tickets_[done.ticket - first_ticket_];
+    RunJob& job = *ticket.job;
+    job.results[ticket.window][ticket.axis] = axis_result(std::move(done.solution));
+    if (--job.missing == 0) {
+      prepare(job, rules_);
     }
   }
 
-  void write_complete() {
-    // A run is written when it is known what follows.
-    while (!queue_.empty() && queue_.front().missing == 0 && (queue_.size() > 1 || all_read_)) {
-      write(queue_.front());
-      const std::size_t tickets = 2 * queue_.front().spans.size();
+  void write(RunJob& job) {
+    const Piece& piece = job.piece;
+    put(text_of(piece), writer_.write(job));
+    report_->solver_iterations += job.iterations;
+    nodes_queued_ -= nodes_of(job);
+    gaps_.take(job);
+    if (!engine_) {
+      const std::size_t tickets = 2 * job.spans.size();
       tickets_.erase(tickets_.begin(), tickets_.begin() + static_cast<std::ptrdiff_t>(tickets));
       first_ticket_ += tickets;
-      queue_.pop_front();
-      ++first_index_;
-      progress_.update("compensating",
-                       kShareOfCompensation * static_cast<double>(bytes_written_) / input_bytes_);
+    }
+    progress_->update("compensating", (engine_ ? 1.0 : kShareOfCompensation) *
+                                          static_cast<double>(bytes_written_) / input_bytes_);
+  }
+
+  void put(std::string input, std::string output) {
+    bytes_written_ += input.size();
+    *output_ << output;
+    if (verifier_) {
+      verifier_->push(std::move(input), std::move(output));
     }
   }
 
-  void write(Pending& pending) {
-    const Piece& piece = pending.piece;
-    std::string text;
-    if (!piece.is_run) {
-      for (const gcode::Event& event : piece.events) {
-        emitter_.line(event, text);
+  // Has the probes solved by the second engine.
+  Status check_engine() {
+    for (std::size_t i = 0; i < gaps_.probes().size(); ++i) {
+      // Windows of runs that failed have none.
+      if (!gaps_.probes()[i].solution.base.position_mm.empty()) {
+        processes_->submit(i, gaps_.probes()[i].problem);
       }
-      keep_motion(piece);
-    } else if (std::optional<std::string> failure = write_run(pending, text)) {
-      emitter_.keep(piece.events, text);
-      keep_motion(piece);
-      note_fallback(pending, std::move(*failure));
     }
-    for (const gcode::Event& event : piece.events) {
-      bytes_written_ += event.line.text.size();
+    if (verifier_) {
+      verifier_->end();
     }
-    output_ << text;
-  }
-
-  // The printer moves as the input has it.
-  void keep_motion(const Piece& piece) {
-    true_nozzle_ = after_motion(piece, true_nozzle_, rules_.nozzle);
-    line_rate_.change_text();
-    line_rate_.forget();
-    for (const planner::PlannedMove& move : piece.moves) {
-      line_rate_.add(move);
-    }
-    note_lines_above_budget(piece);
-  }
-
-  void note_lines_above_budget(const Piece& piece) {
-    if (line_rate_.max_per_s() <= job_.settings.max_lines_per_s()) {
-      return;
-    }
-    ++report_->line_budget.places_above;
-    if (report_->line_budget.above.size() < kMaxFallbacksListed) {
-      report_->line_budget.above.push_back({piece.events.front().line.number,
-                                            piece.events.back().line.number,
-                                            line_rate_.max_per_s()});
-    }
-  }
-
-  // The run as compensated text, or why its original lines must stand.
-  std::optional<std::string> write_run(const Pending& pending, std::string& text) {
-    if (!pending.failure.empty()) {
-      return pending.failure;
-    }
-    const dynamics::BaseTrajectory base{setup_.period_s, compensate::join(pending.spans, pending.x),
-                                        compensate::join(pending.spans, pending.y)};
-    const Piece& piece = pending.piece;
-    // Where long lines break a limit or cost too much, short ones may do.
-    const int lines_after =
-        queue_.size() > 1 ? verify::LineRate::first_lines(queue_[1].piece.moves) : 0;
-    std::string objection;
-    for (const double share : {1.0, kFineTolerance}) {
-      emit::Emitter trial = emitter_;
-      text.clear();
-      if (!trial.run({&piece.events, &piece.move_counts, &piece.moves, &base, setup_.lead_in_s,
-                      share, line_rate_.last_begins_s(), lines_after},
-                     text)) {
-        return "the motion is too small to be written";
+    const CpuSlot::Without without(slots_);
+    while (processes_->under_way() > 0) {
+      if (std::optional<WorkerPool::Done> done =
+              processes_->take(static_cast<int>(kPatience.count()))) {
+        if (done->solution) {
+          GapCheck::compare(gaps_.probes()[done->ticket], *done->solution, report_->solver_check);
+        }
       }
-      Verdict verdict = judge(piece.moves, text, emitter_.printer(), emitter_.printer_limits(),
-                              true_nozzle_, rules_, line_rate_, job_.settings.max_lines_per_s());
-      if (!verdict.objection) {
-        emission_cost_.add(piece.moves, setup_.lead_in_s, base, verdict.replayed, true_nozzle_,
-                           rules_.nozzle);
-        true_nozzle_ = verdict.nozzle;
-        line_rate_ = std::move(verdict.rate);
-        note_lines_above_budget(piece);
-        emitter_ = std::move(trial);
-        ++report_->runs_compensated;
-        report_->windows_solved += pending.spans.size();
-        return std::nullopt;
+      if (progress_->cancelled()) {
+        return fail(ErrorKind::internal, "cancelled, nothing was written");
       }
-      objection = std::move(*verdict.objection);
     }
-    text.clear();
-    return objection;
+    return {};
   }
 
-  void note_fallback(const Pending& pending, std::string reason) {
-    ++report_->runs_fallback;
-    report_->windows_fallback += pending.spans.size();
-    if (report_->fallbacks.size() < kMaxFallbacksListed) {
-      report_->fallbacks.push_back({pending.piece.events.front().line.number,
-                                    pending.piece.events.back().line.number, std::move(reason)});
+  Status finish_verification() {
+    if (!verifier_) {
+      return {};
     }
+    const CpuSlot::Without without(slots_);
+    Result<verify::VerifyReport> verified = verifier_->result();
+    if (!verified) {
+      return tl::unexpected(verified.error());
+    }
+    add_verification(*verified, *report_);
+    return {};
   }
+
+  // Which solution a number given to the processes stands for.
+  struct Ticket {
+    std::shared_ptr<RunJob> job;
+    std::size_t window;
+    std::size_t axis;
+  };
 
   const Job& job_;
-  compensate::Setup setup_;
-  verify::Rules rules_;
-  WorkerPool pool_;
+  Engines engines_;
+  RunRules rules_;
   PieceReader reader_;
-  emit::Emitter emitter_;
-  std::ostream& output_;
-  Progress& progress_;
+  WorkerPool* processes_;
+  std::ostream* output_;
+  Progress* progress_;
+  report::Report* report_;
+  RunWriter writer_;
+  GapCheck gaps_;
   double input_bytes_;
-  report::Report* report_ = nullptr;
   // The nozzle where the reader is, if every run before was compensated: what motion left as it is
   // has set ringing, the next run starts with.
   dynamics::NozzleXY nozzle_;
-  dynamics::NozzleXY true_nozzle_;  // where the writer is
-  verify::LineRate line_rate_;      // of what is written
-  EmissionCost emission_cost_;
-  std::deque<Pending> queue_;
-  std::size_t first_index_ = 0;   // of queue_'s front among all pieces
+  std::deque<std::shared_ptr<RunJob>> queue_;
+  std::size_t nodes_queued_ = 0;
   std::deque<Ticket> tickets_;    // of the windows of queue_
   std::size_t first_ticket_ = 0;  // number of tickets_' front
-  std::size_t outstanding_ = 0;   // solutions missing in queue_, in all
   std::size_t bytes_written_ = 0;
   bool all_read_ = false;
+  std::mutex mutex_;
+  std::condition_variable ready_;  // a run has been prepared
+  CpuSlots slots_;
+  std::unique_ptr<compensate::Engine> engine_;
+  // Last, so that threads end before what they use.
+  std::optional<VerifyThread> verifier_;
+  std::optional<TaskPool> pool_;
 };
 
 // The second part of a job's progress.
@@ -354,19 +377,40 @@ class Remaining final : public Progress {
   double done_;
 };
 
+Engines engines_of(EngineChoice choice) {
+  switch (choice) {
+    case EngineChoice::ipopt:
+      return {nullptr, compensate::make_ipopt_engine};
+    case EngineChoice::banded:
+      return {compensate::make_banded_engine, nullptr};
+    case EngineChoice::automatic:
+      break;
+  }
+  return {compensate::make_banded_engine, compensate::make_ipopt_engine};
+}
+
+std::string name_of(const Engines& engines) {
+  if (!engines.threaded) {
+    return engines.second()->name();
+  }
+  const std::string name = engines.threaded()->name();
+  return engines.second ? fmt::format("{}, checked by {}", name, engines.second()->name()) : name;
+}
+
 }  // namespace
 
 Result<report::Report> compensate(const Job& job, Progress& progress) {
-  return compensate_with(job, compensate::make_ipopt_engine, progress);
+  return compensate_with(job, engines_of(job.engine), progress);
 }
 
-Result<report::Report> compensate_with(const Job& job, const WorkerPool::EngineFactory& engine,
-                                       Progress& progress) {
+Result<report::Report> compensate_with(const Job& job, const Engines& engines, Progress& progress) {
   const auto begin = std::chrono::steady_clock::now();
   report::Report report = new_report("compensate", job);
-  report.solver_engine = engine()->name();
+  report.solver_engine = name_of(engines);
   {
-    Result<WorkerPool> pool = WorkerPool::start(job.workers, engine);
+    // Before there is any thread.
+    Result<WorkerPool> pool = WorkerPool::start(
+        engines.threaded ? (engines.second ? 1 : 0) : job.workers, engines.second);
     if (!pool) {
       return tl::unexpected(pool.error());
     }
@@ -378,19 +422,20 @@ Result<report::Report> compensate_with(const Job& job, const WorkerPool::EngineF
     if (!output) {
       return fail(ErrorKind::internal, {job.output_name, 0}, "cannot write the output");
     }
-    Compensator compensator(job, std::move(*pool), input, output, progress);
-    if (Status status = compensator.work(report); !status) {
+    Compensator compensator(job, engines, *pool, input, output, progress, report);
+    if (Status status = compensator.work(); !status) {
       return tl::unexpected(status.error());
     }
     output.flush();
     if (!output) {
-      return fail(ErrorKind::internal, {job.output_name, 0},
-                  "cannot write the output; is the disk full?");
+      return disk_full(job);
     }
   }
-  Remaining remaining(progress, kShareOfCompensation);
-  if (Status status = add_verification(job, remaining, report); !status) {
-    return tl::unexpected(status.error());
+  if (!engines.threaded) {
+    Remaining remaining(progress, kShareOfCompensation);
+    if (Status status = add_verification(job, remaining, report); !status) {
+      return tl::unexpected(status.error());
+    }
   }
   if (report.reference_time_s > 0.0) {
     const double factor = report.emitted_time_s / report.reference_time_s;

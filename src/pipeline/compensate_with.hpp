@@ -1,4 +1,4 @@
-// compensate() with any solver.
+// compensate() with any solvers.
 #pragma once
 
 #include "unflex/core/error.hpp"
@@ -9,9 +9,15 @@
 
 namespace unflex::pipeline {
 
-// Every worker makes its own engine, and so does the caller's process, once, for its name.
-[[nodiscard]] Result<report::Report> compensate_with(const Job& job,
-                                                     const WorkerPool::EngineFactory& engine,
+// Solves in threads, where there is an engine that allows it; then the second one, if any, checks
+// a sample of the windows in a process of its own. Otherwise the second one solves everything, in
+// as many processes as there are workers, each with its own engine.
+struct Engines {
+  WorkerPool::EngineFactory threaded;
+  WorkerPool::EngineFactory second;
+};
+
+[[nodiscard]] Result<report::Report> compensate_with(const Job& job, const Engines& engines,
                                                      Progress& progress);
 
 }  // namespace unflex::pipeline

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace unflex::pipeline {
@@ -13,6 +14,10 @@ namespace {
 constexpr double kResolutionMm = 1e-4;
 // Where the firmware rounds to steps, a single place may be off by part of one by chance.
 constexpr double kShareOfStep = 0.1;
+// Of the faster axis' ringing.
+constexpr double kSamplesPerPeriod = 40.0;
+// What that may leave unseen of an error.
+constexpr double kSampling = 2e-4;
 
 double chance_mm(const planner::FirmwareConfig& config) {
   return config.firmware == Firmware::klipper
@@ -31,10 +36,21 @@ double swing_mm(const dynamics::NozzleXY& nozzle, const gcode::Position& at,
 
 }  // namespace
 
-Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_view text,
-              gcode::Interpreter printer, const planner::Limits& printer_limits,
-              const dynamics::NozzleXY& nozzle, const verify::Rules& rules, verify::LineRate rate,
-              double max_lines_per_s) {
+verify::RunDeviation deviation_of(const std::vector<planner::PlannedMove>& reference,
+                                  const std::vector<planner::PlannedMove>& base,
+                                  const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
+                                  double lead_in_s) {
+  verify::NozzleModel model = rules.nozzle;
+  const double fastest_rad_s = std::max(model.x.omega_rad_s, model.y.omega_rad_s);
+  model.step_s =
+      std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));
+  return verify::measure(reference, base, nozzle, model, lead_in_s);
+}
+
+Verdict judge(const std::vector<planner::PlannedMove>& original, const verify::RunDeviation& before,
+              std::string_view text, gcode::Interpreter printer,
+              const planner::Limits& printer_limits, const dynamics::NozzleXY& nozzle,
+              const verify::Rules& rules, verify::LineRate rate, double max_lines_per_s) {
   const std::unique_ptr<planner::Planner> planner =
       planner::make_planner(printer_limits, rules.fixed);
   std::size_t line = 0;
@@ -71,10 +87,11 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, std::string_vie
                                     rate.max_per_s(), max_lines_per_s);
     return verdict;
   }
-  const verify::RunDeviation before = verify::measure(original, original, nozzle, rules.nozzle);
   const verify::RunDeviation after =
-      verify::measure(original, replayed, nozzle, rules.nozzle, rules.lead_in_s);
-  const auto no_worse = [](double a, double b) { return a <= std::max(b, kResolutionMm); };
+      deviation_of(original, replayed, nozzle, rules, rules.lead_in_s);
+  const auto no_worse = [](double a, double b) {
+    return a <= std::max((1.0 + kSampling) * b, kResolutionMm);
+  };
   if (before.extruding.stats().duration_s > 0.0) {
     const verify::DeviationStats b = before.extruding.stats();
     const verify::DeviationStats a = after.extruding.stats();

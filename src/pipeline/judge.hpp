@@ -14,6 +14,13 @@
 
 namespace unflex::pipeline {
 
+// How the nozzle strays while the base makes the moves `base`; of the reference's own moves, how it
+// would without compensation. Sampled as finely as its ringing asks for, not as a verification is.
+[[nodiscard]] verify::RunDeviation deviation_of(const std::vector<planner::PlannedMove>& reference,
+                                                const std::vector<planner::PlannedMove>& base,
+                                                const dynamics::NozzleXY& nozzle,
+                                                const verify::Rules& rules, double lead_in_s);
+
 struct Verdict {
   std::optional<std::string> objection;        // why the original moves must stand
   dynamics::NozzleXY nozzle;                   // without objection: after the run …
@@ -23,11 +30,11 @@ struct Verdict {
 
 // Replays the text of a compensated run as the printer would, in the state the printer is in before
 // it. Objects where it breaks a hard rule, asks for more lines per second than allowed, or where
-// its deviation is larger than that of the original moves. rate: of the lines before it.
+// its deviation is larger than that of the original moves, `before`. rate: of the lines before it.
 [[nodiscard]] Verdict judge(const std::vector<planner::PlannedMove>& original,
-                            std::string_view text, gcode::Interpreter printer,
-                            const planner::Limits& printer_limits, const dynamics::NozzleXY& nozzle,
-                            const verify::Rules& rules, verify::LineRate rate,
-                            double max_lines_per_s);
+                            const verify::RunDeviation& before, std::string_view text,
+                            gcode::Interpreter printer, const planner::Limits& printer_limits,
+                            const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
+                            verify::LineRate rate, double max_lines_per_s);
 
 }  // namespace unflex::pipeline

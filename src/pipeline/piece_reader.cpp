@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "unflex/emit/emitter.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
 
@@ -135,6 +134,10 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
 // Puts the event into the open piece, after the lines that turned out to stand between.
 void PieceReader::append(gcode::Event event) {
   append_between();
+  if (open_.is_run && open_.events.empty()) {
+    // The move itself changes nothing of it.
+    open_.start = emit::run_start(interpreter_.state(), planner_->limits());
+  }
   std::size_t count = 0;
   for (const gcode::Segment& segment : event.segments) {
     count += planner_->add(segment) ? 1 : 0;

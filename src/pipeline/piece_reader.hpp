@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/emit/emitter.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/planner/planner.hpp"
@@ -22,6 +23,7 @@ struct Piece {
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
   std::vector<planner::PlannedMove> moves;
+  emit::RunStart start;  // of a run
 };
 
 // Counts the event's moves that unflex leaves as they are, by reason.

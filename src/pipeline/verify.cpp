@@ -61,6 +61,29 @@ report::Report new_report(std::string command, const Job& job) {
   return report;
 }
 
+void add_verification(const verify::VerifyReport& verified, report::Report& report) {
+  report.uncompensated = rows(verified.uncompensated);
+  report.compensated = rows(verified.compensated);
+  report.reference_time_s = verified.reference_time_s;
+  report.emitted_time_s = verified.emitted_time_s;
+  report.base_max_velocity_mm_s = verified.base_max_velocity_mm_s;
+  report.base_max_accel_mm_s2 = verified.base_max_accel_mm_s2;
+  report.output_lines = verified.output_lines;
+  report.output_bytes = verified.output_bytes;
+  report.max_lines_per_s = verified.max_lines_per_s;
+  report.segment_ms_median = verified.segment_ms_median;
+  report.worst_run_drift_ms = verified.worst_run_drift_s * 1e3;
+  report.input_extrusion_mm = verified.input_extrusion_mm;
+  report.output_extrusion_mm = verified.output_extrusion_mm;
+  report.worst_move_extrusion_error_mm = verified.worst_move_extrusion_error_mm;
+  report.runs_compensated = verified.runs;
+  report.violation_count = verified.violation_count;
+  for (const verify::Violation& violation : verified.violations) {
+    report.violations.push_back(
+        to_string(Error{ErrorKind::input, violation.place, violation.message}));
+  }
+}
+
 Status add_verification(const Job& job, Progress& progress, report::Report& report) {
   std::ifstream input(job.input, std::ios::binary);
   std::ifstream output(job.output, std::ios::binary);
@@ -75,26 +98,7 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   if (!result) {
     return tl::unexpected(result.error());
   }
-  report.uncompensated = rows(result->uncompensated);
-  report.compensated = rows(result->compensated);
-  report.reference_time_s = result->reference_time_s;
-  report.emitted_time_s = result->emitted_time_s;
-  report.base_max_velocity_mm_s = result->base_max_velocity_mm_s;
-  report.base_max_accel_mm_s2 = result->base_max_accel_mm_s2;
-  report.output_lines = result->output_lines;
-  report.output_bytes = result->output_bytes;
-  report.max_lines_per_s = result->max_lines_per_s;
-  report.segment_ms_median = result->segment_ms_median;
-  report.worst_run_drift_ms = result->worst_run_drift_s * 1e3;
-  report.input_extrusion_mm = result->input_extrusion_mm;
-  report.output_extrusion_mm = result->output_extrusion_mm;
-  report.worst_move_extrusion_error_mm = result->worst_move_extrusion_error_mm;
-  report.runs_compensated = result->runs;
-  report.violation_count = result->violation_count;
-  for (const verify::Violation& violation : result->violations) {
-    report.violations.push_back(
-        to_string(Error{ErrorKind::input, violation.place, violation.message}));
-  }
+  add_verification(*result, report);
   return {};
 }
 

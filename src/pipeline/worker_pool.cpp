@@ -51,7 +51,7 @@ Result<compensate::AxisSolution> solve(const compensate::Engine& engine,
 Result<WorkerPool> WorkerPool::start(unsigned workers, const EngineFactory& factory) {
   WorkerPool pool(factory);
   // All at once: a worker closes the sockets of those before it.
-  pool.workers_.resize(std::max(workers, 1U));
+  pool.workers_.resize(workers);
   for (Worker& worker : pool.workers_) {
     if (Status status = pool.spawn(worker); !status) {
       return tl::unexpected(status.error());

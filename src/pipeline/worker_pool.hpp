@@ -25,7 +25,7 @@ class WorkerPool {
     Result<compensate::AxisSolution> solution;
   };
 
-  // Forks `workers` processes (at least one), each with an engine of its own.
+  // Forks `workers` processes, each with an engine of its own.
   [[nodiscard]] static Result<WorkerPool> start(unsigned workers, const EngineFactory& factory);
 
   WorkerPool(WorkerPool&& other) noexcept;

@@ -75,7 +75,11 @@ void add_work(const Report& r, Json& json) {
   json["fallbacks"] = fallbacks_json(r.fallbacks);
   json["kept_moves"] = Json(r.kept_moves);
   json["line_budget"] = budget_json(r.line_budget);
-  json["solver"] = {{"engine", r.solver_engine}, {"iterations", r.solver_iterations}};
+  json["solver"] = {{"engine", r.solver_engine},
+                    {"iterations", r.solver_iterations},
+                    {"checked_windows", r.solver_check.windows},
+                    {"largest_gap", r.solver_check.largest_gap},
+                    {"largest_difference_mm", r.solver_check.largest_difference_mm}};
 }
 
 void add_output(const Report& r, Json& json) {

@@ -43,6 +43,7 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
     const planner::PlannedMove& first = base.empty() ? reference.front() : base.front();
     meter.set_state(start, first.segment.start_mm[gcode::X], first.segment.start_mm[gcode::Y]);
   }
+  meter.look();
   for (const planner::PlannedMove& move : base) {
     meter.play(move);
     path.discard_before(meter.time_s() - meter.reach_s());

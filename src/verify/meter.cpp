@@ -291,6 +291,14 @@ double Meter::squared_contour_error(std::size_t& nearest) {
   return best;
 }
 
+void Meter::look() {
+  static_cast<void>(next_reference_change());
+  if (current_ < path_->end() && (*path_)[current_].measured &&
+      (*path_)[current_].start_s <= time_s_ + kSameTime_s) {
+    sample(reference_phase(0.0), 0.0);
+  }
+}
+
 void Meter::wait_for_reference() {
   const NozzleXY nozzle = nozzle_;
   const double time_s = time_s_;

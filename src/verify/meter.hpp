@@ -39,6 +39,8 @@ class Meter {
   void begin_section(ReferencePath& path);
   // Moves the base. If it does not start where the base stands, base and nozzle are shifted there.
   void play(const planner::PlannedMove& move);
+  // Lets the present count among the largest errors.
+  void look();
   // The base stands still until the reference has ended, and the nozzle is measured meanwhile;
   // the nozzle's state afterwards is the one from before, since the machine does not wait.
   void wait_for_reference();

@@ -42,8 +42,12 @@ inline Emission emit(const std::string& input, const EmitOptions& options,
     bool written = false;
     if (piece.is_run && !piece.moves.empty()) {
       const dynamics::BaseTrajectory base = plan_as_base(piece.moves);
-      written =
-          emitter.run({&piece.events, &piece.move_counts, &piece.moves, &base, 0.0}, emission.text);
+      const Run run{&piece.events, &piece.move_counts, &piece.moves, &base, 0.0};
+      const RunPlan plan = plan_run(run, emitter.run_start(), options);
+      written = !plan.empty();
+      if (written) {
+        emitter.run(run, plan, emission.text);
+      }
       emission.runs += written ? 1 : 0;
     }
     for (const gcode::Event& event : piece.events) {

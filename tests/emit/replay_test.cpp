@@ -89,7 +89,7 @@ struct Replay {
       Grid grid;
       grid.speed_factor = emitter.printer().state().speed_factor;
       meant = strokes(to_emit, grid, how);
-      EXPECT_TRUE(emitter.run(to_emit, out));
+      emitter.run(to_emit, plan_run(to_emit, emitter.run_start(), how), out);
     }
     moves = planned(out, how);
     moves.erase(moves.begin(), moves.end() - static_cast<std::ptrdiff_t>(meant.size()));

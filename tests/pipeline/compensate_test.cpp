@@ -49,7 +49,7 @@ std::string print_of(const std::vector<int>& places) {
 
 Result<report::Report> run(const JobFolder& folder, const testing::Solve& solve) {
   SilentProgress progress;
-  return compensate_with(folder.job(2), factory(solve), progress);
+  return compensate_with(folder.job(2), {nullptr, factory(solve)}, progress);
 }
 
 bool is_bad(const compensate::AxisWindow& window) {

@@ -41,7 +41,7 @@ JobFolder::~JobFolder() {
 }
 
 Job JobFolder::job(unsigned workers) const {
-  return {folder_ / "in.gcode", "in.gcode", folder_ / "out.gcode", "out.gcode", settings_, workers};
+  return {folder_ / "in.gcode", "in.gcode", folder_ / "out.gcode", "out.gcode", settings_, EngineChoice::automatic, workers};
 }
 
 std::string complaints(const report::Report& report) {

@@ -26,7 +26,11 @@ TEST(JsonReport, HasEveryValueUnderItsKey) {
   EXPECT_EQ(json["windows"], (nlohmann::json{{"total", 1000}, {"solved", 994}, {"fallback", 6}}));
   EXPECT_EQ(json["runs"], (nlohmann::json{{"total", 900}, {"compensated", 895}, {"fallback", 5}}));
   EXPECT_EQ(json["kept_moves"], (nlohmann::json{{"Z move", 12}}));
-  EXPECT_EQ(json["solver"], (nlohmann::json{{"engine", "ipopt 3.11.9"}, {"iterations", 4242}}));
+  EXPECT_EQ(json["solver"], (nlohmann::json{{"engine", "ipopt 3.11.9"},
+                                           {"iterations", 4242},
+                                           {"checked_windows", 8},
+                                           {"largest_gap", 3e-9},
+                                           {"largest_difference_mm", 2e-6}}));
   EXPECT_EQ(json["output_stats"], (nlohmann::json{{"lines", 123456},
                                                   {"bytes", 4500000},
                                                   {"max_lines_per_s", 890.0},

@@ -44,6 +44,7 @@ inline Report sample_report() {
   r.line_budget = {850.0, 2, {{70, 75, 880.0}, {90, 91, 890.0}}, 0.0005, 0.0075};
   r.solver_engine = "ipopt 3.11.9";
   r.solver_iterations = 4242;
+  r.solver_check = {8, 3e-9, 2e-6};
   r.output_lines = 123456;
   r.output_bytes = 4500000;
   r.max_lines_per_s = 890.0;

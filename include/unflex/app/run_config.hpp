@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::app {
 
@@ -33,6 +34,7 @@ struct RunConfig {
   std::vector<std::string> overrides;  // "key=value"
   std::optional<std::string> report;   // a file ending in .json, or "-"
   std::optional<double> max_deviation_mm;
+  pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;
   bool quiet = false;
 };

@@ -6,8 +6,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -66,6 +68,17 @@ struct EmitOptions {
 struct Shaper;  // the printer's own, see src/emit/dialect.hpp
 struct Stroke;  // a line to be, see src/emit/strokes.hpp
 
+// What a run finds when it begins and has to fit into.
+struct RunStart {
+  std::array<double, 3> zero_mm{};  // machine position of X0 Y0 Z0 (G92)
+  double speed_factor = 1.0;        // M220
+  planner::Limits limits;           // as the input has them
+
+  friend bool operator==(const RunStart&, const RunStart&) = default;
+};
+
+[[nodiscard]] RunStart run_start(const gcode::ModalState& state, const planner::Limits& limits);
+
 // A compensated run.
 struct Run {
   // The input's lines in the run: moves, and passive and limit lines between them.
@@ -76,9 +89,21 @@ struct Run {
   const dynamics::BaseTrajectory* base = nullptr;
   double lead_in_s = 0.0;        // the first move starts this long after the base
   double tolerance_share = 1.0;  // of LineRules::tolerance_mm that its lines may use
-  std::vector<double> lines_before_s = {};  // begins of the lines just before it, in order, before 0
+  std::vector<double> lines_before_s =
+      {};               // begins of the lines just before it, in order, before 0
   int lines_after = 0;  // how many lines begin within LineRules::burst_s after it
 };
+
+// A run cut into lines, for a certain start. Without lines when its motion is too small for one.
+struct RunPlan {
+  RunStart start;
+  std::shared_ptr<const std::vector<Stroke>> strokes;
+
+  [[nodiscard]] bool empty() const;
+};
+
+// The costly part of writing a run; it does not depend on what is written before.
+[[nodiscard]] RunPlan plan_run(const Run& run, const RunStart& start, const EmitOptions& options);
 
 // Writes the output in the order of the input. Follows both texts with an interpreter of its own,
 // so that whatever stands outside the runs finds the modes, positions and limits the input left
@@ -95,9 +120,11 @@ class Emitter {
   // moved them, its own shaper included.
   void keep(const std::vector<gcode::Event>& events, std::string& out);
 
-  // A compensated run in place of its events. False, and nothing written, when its motion is too
-  // small for a single line.
-  [[nodiscard]] bool run(const Run& run, std::string& out);
+  // What a run that follows now would start from.
+  [[nodiscard]] RunStart run_start() const;
+
+  // A compensated run in place of its events. The plan is not empty and made for run_start().
+  void run(const Run& run, const RunPlan& plan, std::string& out);
 
   // After the last line.
   void finish(std::string& out);

@@ -14,13 +14,21 @@
 
 namespace unflex::pipeline {
 
+// What solves the windows.
+enum class EngineChoice {
+  automatic,  // banded, checked by Ipopt on a few windows
+  banded,     // structure-exploiting interior point, in threads
+  ipopt,      // in processes
+};
+
 struct Job {
   std::filesystem::path input;   // a seekable file
   std::string input_name;        // as the user calls it, for messages ("-" for stdin)
   std::filesystem::path output;  // compensate: written here, not atomically
   std::string output_name;
   machine::Settings settings;
-  unsigned workers = 1;          // solver processes
+  EngineChoice engine = EngineChoice::automatic;
+  unsigned workers = 1;          // threads or solver processes that compute at once
 };
 
 // Reads the input, compensates it, writes the output and verifies what was written.

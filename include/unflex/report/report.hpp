@@ -49,6 +49,13 @@ struct LineBudget {
   double cost_max_mm = 0.0;
 };
 
+// Windows that a second engine has solved as well.
+struct SolverCheck {
+  std::size_t windows = 0;
+  double largest_gap = 0.0;            // of the objectives, relative
+  double largest_difference_mm = 0.0;  // of the base's positions
+};
+
 struct Setting {
   std::string key;
   std::string value;
@@ -72,19 +79,21 @@ struct Report {
   double base_max_velocity_mm_s = 0.0;
   double base_max_accel_mm_s2 = 0.0;
 
-  std::size_t runs_total = 0;        // stretches between stops that could be compensated
+  std::size_t runs_total = 0;  // stretches between stops that could be compensated
   std::size_t runs_compensated = 0;
   std::size_t runs_fallback = 0;
   std::size_t windows_total = 0;
   std::size_t windows_solved = 0;
   std::size_t windows_fallback = 0;  // windows of runs that kept their original moves
   std::vector<Fallback> fallbacks;   // at most 1000 are listed
-  std::map<std::string, std::size_t> kept_moves;  // reason → moves outside runs ("wipe", "Z move" …)
+  std::map<std::string, std::size_t>
+      kept_moves;  // reason → moves outside runs ("wipe", "Z move" …)
 
   LineBudget line_budget;
 
-  std::string solver_engine;         // "ipopt 3.11.9"
+  std::string solver_engine;  // "ipopt 3.11.9"
   std::size_t solver_iterations = 0;
+  SolverCheck solver_check;
 
   std::size_t output_lines = 0;
   std::size_t output_bytes = 0;

@@ -1,0 +1,53 @@
+#include "gap_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace unflex::pipeline {
+namespace {
+
+// A window in which nothing moves has an objective of rounding errors: an error of a nanometre
+// throughout does not count.
+constexpr double kNothing_mm = 1e-6;
+
+}  // namespace
+
+void GapCheck::choose(RunJob& job) {
+  for (std::size_t window = 0; window < job.spans.size(); ++window) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const std::uint64_t number = seen_++;
+      // Not std::uniform_int_distribution, whose numbers are each library's own.
+      const std::uint64_t slot = number < kProbes ? number : random_() % (number + 1);
+      if (slot < kProbes) {
+        job.probes.push_back({static_cast<std::size_t>(slot), window, axis, {}, {}});
+      }
+    }
+  }
+}
+
+void GapCheck::take(RunJob& job) {
+  for (Probe& probe : job.probes) {
+    if (probes_.size() <= probe.slot) {
+      probes_.resize(probe.slot + 1);
+    }
+    probes_[probe.slot] = std::move(probe);
+  }
+}
+
+void GapCheck::compare(const Probe& probe, const compensate::AxisSolution& second,
+                       report::SolverCheck& check) {
+  const double nothing = kNothing_mm * kNothing_mm * static_cast<double>(probe.problem.nodes()) *
+                         probe.problem.period_s;
+  ++check.windows;
+  check.largest_gap =
+      std::max(check.largest_gap, std::abs(probe.solution.objective - second.objective) /
+                                      std::max(second.objective, nothing));
+  for (std::size_t k = 0; k < second.base.position_mm.size(); ++k) {
+    check.largest_difference_mm =
+        std::max(check.largest_difference_mm,
+                 std::abs(probe.solution.base.position_mm[k] - second.base.position_mm[k]));
+  }
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,36 @@
+// A fixed sample of the windows is solved by a second engine as well, which shares no code with the
+// first.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "run_job.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::pipeline {
+
+class GapCheck {
+ public:
+  static constexpr std::size_t kProbes = 8;
+
+  // Chooses among the job's windows, which come in the order of the file (Vitter's algorithm R,
+  // ACM Trans. Math. Softw. 11 (1985) 37). Always the same for the same file.
+  void choose(RunJob& job);
+  // Takes what the job's windows have become.
+  void take(RunJob& job);
+
+  // The problems, and what the second engine makes of each.
+  [[nodiscard]] const std::vector<Probe>& probes() const { return probes_; }
+  static void compare(const Probe& probe, const compensate::AxisSolution& second,
+                      report::SolverCheck& check);
+
+ private:
+  std::mt19937_64 random_{0x756e666c6578};  // "unflex"
+  std::uint64_t seen_ = 0;
+  std::vector<Probe> probes_;
+};
+
+}  // namespace unflex::pipeline

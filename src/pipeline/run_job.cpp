@@ -1,0 +1,101 @@
+#include "run_job.hpp"
+
+#include <fmt/format.h>
+
+#include <exception>
+#include <utility>
+
+#include "judge.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// The first window that failed, if any did.
+std::string failure_of(const RunJob& job) {
+  for (std::size_t window = 0; window < job.results.size(); ++window) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      if (const std::string& failure = job.results[window][axis].failure; !failure.empty()) {
+        return fmt::format("the solver failed on axis {}, window {}: {}", axis == 0 ? 'x' : 'y',
+                           window + 1, failure);
+      }
+    }
+  }
+  return {};
+}
+
+dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
+  std::vector<dynamics::AxisTrajectory> solutions;
+  for (std::array<AxisResult, 2>& result : job.results) {
+    solutions.push_back(std::move(result[axis].base));
+    job.iterations += static_cast<std::size_t>(result[axis].iterations);
+  }
+  return compensate::join(job.spans, solutions);
+}
+
+// Where the firmware counts steps, how lines are cut depends on those before the run. What these
+// will be is not known yet: as many as there may be, at an even pace.
+std::vector<double> even_lines_before_s(const emit::LineRules& rules) {
+  std::vector<double> begins_s;
+  for (int i = rules.burst_lines; i > 0; --i) {
+    begins_s.push_back(-i * rules.even_line_s());
+  }
+  return begins_s;
+}
+
+}  // namespace
+
+emit::Run RunJob::run(double tolerance_share, std::vector<double> lines_before_s) const {
+  return {&piece.events,   &piece.move_counts,        &piece.moves, &base, setup.lead_in_s,
+          tolerance_share, std::move(lines_before_s), lines_after};
+}
+
+AxisResult axis_result(Result<compensate::AxisSolution> solution) {
+  if (!solution) {
+    return {{}, 0, solution.error().message};
+  }
+  return {std::move(solution->base), solution->iterations, {}};
+}
+
+std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
+                                              std::size_t count) {
+  return compensate::windows(job.piece.moves, job.spans, first, count, job.nozzle, job.setup);
+}
+
+void solve_windows(RunJob& job, std::size_t first, std::size_t count,
+                   const compensate::Engine& engine) noexcept try {
+  std::vector<compensate::RunWindow> windows = windows_of(job, first, count);
+  for (std::size_t i = 0; i < count; ++i) {
+    compensate::AxisWindow* const problems[] = {&windows[i].x, &windows[i].y};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      Result<compensate::AxisSolution> solution = engine.solve(*problems[axis]);
+      for (Probe& probe : job.probes) {
+        if (solution && probe.window == first + i && probe.axis == axis) {
+          probe.problem = std::move(*problems[axis]);
+          probe.solution = *solution;
+        }
+      }
+      job.results[first + i][axis] = axis_result(std::move(solution));
+    }
+  }
+} catch (const std::exception& exception) {
+  // Out of memory, mostly.
+  job.results[first][0].failure = exception.what();
+}
+
+void prepare(RunJob& job, const RunRules& rules) noexcept {
+  try {
+    job.failure = failure_of(job);
+    if (job.failure.empty()) {
+      job.base = {job.setup.period_s, joined(job, 0), joined(job, 1)};
+      job.plan = emit::plan_run(job.run(1.0, even_lines_before_s(rules.emit.lines)),
+                                job.piece.start, rules.emit);
+      job.before = deviation_of(job.piece.moves, job.piece.moves, job.nozzle, rules.verify, 0.0);
+    }
+  } catch (const std::exception& exception) {
+    job.failure = exception.what();
+  }
+  job.results.clear();
+  job.prepared = true;
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,83 @@
+// A piece of the input on its way from the reader to the writer. What a run becomes depends on the
+// run alone and on how the nozzle would swing if every run before it were compensated, so runs can
+// be worked on side by side.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "piece_reader.hpp"
+#include "unflex/compensate/axis_window.hpp"
+#include "unflex/compensate/run.hpp"
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/emit/emitter.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::pipeline {
+
+// What became of one axis of a window.
+struct AxisResult {
+  dynamics::AxisTrajectory base;
+  int iterations = 0;
+  std::string failure;  // why there is no solution
+};
+
+// A window that another engine is to solve as well.
+struct Probe {
+  std::size_t slot = 0;  // which of the file's probes it becomes
+  std::size_t window = 0;
+  std::size_t axis = 0;
+  compensate::AxisWindow problem;
+  compensate::AxisSolution solution;
+};
+
+struct RunJob {
+  Piece piece;
+  // From here on of runs only.
+  dynamics::NozzleXY nozzle;  // when the run begins, if every run before is compensated
+  compensate::Setup setup;
+  std::vector<compensate::WindowSpan> spans;
+  std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
+  std::vector<Probe> probes;
+  std::size_t submitted = 0;             // windows given to the solvers
+  int lines_after = 0;                   // of Run, by the sliced lines that follow
+  std::atomic<std::size_t> missing = 0;  // axes of windows not yet solved
+
+  // From prepare(): the base and its lines, or the reason why the run's own moves must stand.
+  dynamics::BaseTrajectory base;
+  emit::RunPlan plan;
+  verify::RunDeviation before;  // of its own moves
+  std::size_t iterations = 0;
+  std::string failure;
+  std::atomic<bool> prepared = false;
+
+  // What the emitter is to write; the arguments are Run's.
+  [[nodiscard]] emit::Run run(double tolerance_share = 1.0,
+                              std::vector<double> lines_before_s = {}) const;
+};
+
+// How runs are worked on.
+struct RunRules {
+  compensate::Setup setup;
+  emit::EmitOptions emit;
+  verify::Rules verify;
+};
+
+[[nodiscard]] AxisResult axis_result(Result<compensate::AxisSolution> solution);
+
+// The problems of `count` windows of the run from number `first` on.
+[[nodiscard]] std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
+                                                            std::size_t count);
+
+// Solves these windows. Calls for others may run at the same time.
+void solve_windows(RunJob& job, std::size_t first, std::size_t count,
+                   const compensate::Engine& engine) noexcept;
+
+// Once all windows are solved. Throws nothing.
+void prepare(RunJob& job, const RunRules& rules) noexcept;
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,51 @@
+#include "task_pool.hpp"
+
+#include <utility>
+
+namespace unflex::pipeline {
+
+TaskPool::TaskPool(unsigned threads, CpuSlots& slots) : slots_(&slots) {
+  for (unsigned i = 0; i < threads; ++i) {
+    threads_.emplace_back([this] { work(); });
+  }
+}
+
+TaskPool::~TaskPool() {
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  wake_.notify_all();
+  threads_.clear();
+}
+
+void TaskPool::submit(Task task) {
+  if (threads_.empty()) {
+    task();
+    return;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back(std::move(task));
+  }
+  wake_.notify_one();
+}
+
+void TaskPool::work() {
+  for (;;) {
+    Task task;
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait(lock, [this] { return ends_ || !tasks_.empty(); });
+      if (ends_) {
+        return;
+      }
+      task = std::move(tasks_.front());
+      tasks_.pop_front();
+    }
+    const CpuSlot slot(*slots_);
+    task();
+  }
+}
+
+}  // namespace unflex::pipeline

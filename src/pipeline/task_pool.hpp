@@ -1,0 +1,39 @@
+// Threads that carry out tasks in the order they come.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "cpu_slots.hpp"
+
+namespace unflex::pipeline {
+
+class TaskPool {
+ public:
+  using Task = std::function<void()>;  // throws nothing
+
+  // Without threads, tasks are carried out where they are submitted.
+  TaskPool(unsigned threads, CpuSlots& slots);
+  // Finishes the tasks that are under way and drops the others.
+  ~TaskPool();
+  TaskPool(const TaskPool&) = delete;
+  TaskPool& operator=(const TaskPool&) = delete;
+
+  void submit(Task task);
+
+ private:
+  void work();
+
+  CpuSlots* slots_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Task> tasks_;
+  bool ends_ = false;
+  std::vector<std::jthread> threads_;
+};
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,102 @@
+#include "verify_thread.hpp"
+
+#include <exception>
+#include <utility>
+
+namespace unflex::pipeline {
+namespace {
+
+constexpr std::size_t kLong_bytes = 4U << 20U;
+
+}  // namespace
+
+void TextQueue::push(std::string text) {
+  {
+    const std::lock_guard lock(mutex_);
+    bytes_ += text.size();
+    texts_.push_back(std::move(text));
+  }
+  changed_.notify_one();
+}
+
+void TextQueue::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_one();
+}
+
+bool TextQueue::is_long() {
+  const std::lock_guard lock(mutex_);
+  return bytes_ > kLong_bytes;
+}
+
+TextQueue::int_type TextQueue::underflow() {
+  const auto ready = [this] { return ended_ || !texts_.empty(); };
+  for (;;) {
+    std::unique_lock lock(mutex_);
+    if (!ready()) {
+      lock.unlock();
+      const CpuSlot::Without without(*slots_);
+      lock.lock();
+      changed_.wait(lock, ready);
+      lock.unlock();
+      continue;
+    }
+    if (texts_.empty()) {
+      return traits_type::eof();
+    }
+    current_ = std::move(texts_.front());
+    texts_.pop_front();
+    bytes_ -= current_.size();
+    if (!current_.empty()) {
+      break;
+    }
+  }
+  setg(current_.data(), current_.data(), current_.data() + current_.size());
+  return traits_type::to_int_type(*gptr());
+}
+
+VerifyThread::VerifyThread(const verify::Rules& rules, std::string input_name,
+                           std::string output_name, const Progress& cancelled, CpuSlots& slots)
+    : input_(slots),
+      output_(slots),
+      progress_(cancelled, stopped_),
+      result_(fail(ErrorKind::internal, "not verified")),
+      thread_([this, rules, input_name = std::move(input_name),
+               output_name = std::move(output_name), &slots] {
+        const CpuSlot slot(slots);
+        try {
+          std::istream input(&input_);
+          std::istream output(&output_);
+          result_ = verify::verify(input, input_name, output, output_name, rules, progress_);
+        } catch (const std::exception& exception) {
+          result_ = fail(ErrorKind::internal, exception.what());
+        }
+        done_ = true;
+      }) {}
+
+VerifyThread::~VerifyThread() {
+  stopped_ = true;
+  end();
+}
+
+void VerifyThread::push(std::string input, std::string output) {
+  input_.push(std::move(input));
+  output_.push(std::move(output));
+}
+
+bool VerifyThread::is_behind() { return !done_ && (input_.is_long() || output_.is_long()); }
+
+void VerifyThread::end() {
+  input_.end();
+  output_.end();
+}
+
+Result<verify::VerifyReport> VerifyThread::result() {
+  thread_.join();
+  return std::move(result_);
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,84 @@
+// Verifies the output while it is being written.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <istream>
+#include <mutex>
+#include <optional>
+#include <streambuf>
+#include <string>
+#include <thread>
+
+#include "cpu_slots.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::pipeline {
+
+// A text that one thread writes and another reads. The reader gives its slot back while it waits.
+class TextQueue final : public std::streambuf {
+ public:
+  explicit TextQueue(CpuSlots& slots) : slots_(&slots) {}
+
+  void push(std::string text);
+  void end();
+  // Whether more than a few MB are still to be read.
+  [[nodiscard]] bool is_long();
+
+ protected:
+  int_type underflow() override;
+
+ private:
+  CpuSlots* slots_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::string> texts_;
+  std::size_t bytes_ = 0;
+  bool ended_ = false;
+  std::string current_;  // the reader's
+};
+
+class VerifyThread {
+ public:
+  // cancelled: asked from this thread.
+  VerifyThread(const verify::Rules& rules, std::string input_name, std::string output_name,
+               const Progress& cancelled, CpuSlots& slots);
+  // Stops it, where finish() was not called.
+  ~VerifyThread();
+  VerifyThread(const VerifyThread&) = delete;
+  VerifyThread& operator=(const VerifyThread&) = delete;
+
+  // The next piece of both texts. Does not wait.
+  void push(std::string input, std::string output);
+  // Whether it is so far behind that it should be waited for.
+  [[nodiscard]] bool is_behind();
+  // Both texts have ended.
+  void end();
+  [[nodiscard]] bool done() const { return done_; }
+  // After end(): waits for the result.
+  [[nodiscard]] Result<verify::VerifyReport> result();
+
+ private:
+  class Cancelled final : public Progress {
+   public:
+    Cancelled(const Progress& outer, const std::atomic<bool>& stopped)
+        : outer_(&outer), stopped_(&stopped) {}
+    void update(std::string_view /*stage*/, double /*fraction*/) override {}
+    [[nodiscard]] bool cancelled() const override { return *stopped_ || outer_->cancelled(); }
+
+   private:
+    const Progress* outer_;
+    const std::atomic<bool>* stopped_;
+  };
+
+  TextQueue input_;
+  TextQueue output_;
+  std::atomic<bool> stopped_ = false;
+  std::atomic<bool> done_ = false;
+  Cancelled progress_;
+  Result<verify::VerifyReport> result_;
+  std::jthread thread_;
+};
+
+}  // namespace unflex::pipeline
