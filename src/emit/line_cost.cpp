@@ -19,6 +19,21 @@ constexpr std::size_t kLooks = 16;
 // Where (e, ė, o, u) of an axis stand in w.
 constexpr std::array<std::array<int, 4>, 2> kPlace = {{{0, 1, 2, 6}, {3, 4, 5, 7}}};
 
+NozzleAnswers nozzle_answers(const FlexibleAxis& axis, double dt, std::size_t count) {
+  const Step step(axis, dt);
+  NozzleAnswers result;
+  result.free.emplace_back(Eigen::Matrix2d::Identity());
+  result.step.emplace_back(Eigen::Vector2d::Zero());
+  result.ramp.emplace_back(Eigen::Vector2d::Zero());
+  for (std::size_t j = 0; j < count; ++j) {
+    result.free.emplace_back(step.free() * result.free.back());
+    result.step.emplace_back(step.free() * result.step.back() + step.base(1.0, 0.0));
+    result.ramp.emplace_back(step.free() * result.ramp.back() +
+                             step.base(static_cast<double>(j) * dt, 1.0));
+  }
+  return result;
+}
+
 }  // namespace
 
 WholeCost whole_cost(const LineCost& line, const Quadratic& to_go) {
@@ -49,21 +64,6 @@ Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go) {
   return {all.topLeftCorner<6, 6>(), slope.head<6>(), constant};
 }
 
-LineCosts::Answers LineCosts::answers(const FlexibleAxis& axis, double dt, std::size_t count) {
-  const Step step(axis, dt);
-  Answers result;
-  result.free.emplace_back(Eigen::Matrix2d::Identity());
-  result.step.emplace_back(Eigen::Vector2d::Zero());
-  result.ramp.emplace_back(Eigen::Vector2d::Zero());
-  for (std::size_t j = 0; j < count; ++j) {
-    result.free.emplace_back(step.free() * result.free.back());
-    result.step.emplace_back(step.free() * result.step.back() + step.base(1.0, 0.0));
-    result.ramp.emplace_back(step.free() * result.ramp.back() +
-                             step.base(static_cast<double>(j) * dt, 1.0));
-  }
-  return result;
-}
-
 LineCosts::LineCosts(const BaseTrajectory& base, const std::function<ErrorWeight(double)>& weight,
                      const LineRules& rules)
     : nozzle_x_(rules.nozzle_x), nozzle_y_(rules.nozzle_y), dt_s_(base.period_s / kPerNode) {
@@ -78,8 +78,8 @@ LineCosts::LineCosts(const BaseTrajectory& base, const std::function<ErrorWeight
     weights_.push_back(weight(t));
   }
   const auto longest = static_cast<std::size_t>(std::ceil(rules.max_line_s / dt_s_)) + 1;
-  x_ = answers(nozzle_x_, dt_s_, longest);
-  y_ = answers(nozzle_y_, dt_s_, longest);
+  x_ = nozzle_answers(nozzle_x_, dt_s_, longest);
+  y_ = nozzle_answers(nozzle_y_, dt_s_, longest);
   shapes_.emplace_back();
   for (std::size_t m = 1; m <= longest; ++m) {
     shapes_.push_back(shape(m));
@@ -90,6 +90,10 @@ LineCosts::LineCosts(const BaseTrajectory& base, const std::function<ErrorWeight
   }
 }
 
+std::size_t LineCosts::candidates(double duration_s) const {
+  return static_cast<std::size_t>(std::ceil(duration_s / dt_s_ - 1e-9));
+}
+
 LineCosts::Shape LineCosts::shape(std::size_t m) const {
   const double duration = static_cast<double>(m) * dt_s_;
   Shape result;
@@ -97,7 +101,7 @@ LineCosts::Shape LineCosts::shape(std::size_t m) const {
   const double between_s = duration / static_cast<double>(looks);
   for (std::size_t look = 1; look <= looks; ++look) {
     const std::size_t j = look * m / looks;
-    const auto row = [&](const Answers& answer) {
+    const auto row = [&](const NozzleAnswers& answer) {
       const double ramp = answer.ramp[j][0] / duration;
       return Row(answer.free[j](0, 0), answer.free[j](0, 1), answer.step[j][0] - ramp, ramp);
     };
@@ -118,7 +122,7 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
   const double duration = static_cast<double>(m) * dt_s_;
   const Shape& shape = shapes_[m];
   LineCost result;
-  const std::array<const Answers*, 2> answers = {&x_, &y_};
+  const std::array<const NozzleAnswers*, 2> answers = {&x_, &y_};
   const std::array<const std::vector<Eigen::Vector2d>*, 2> nozzle = {&nozzle_x_at_, &nozzle_y_at_};
   // What the chord from b_k to b_{k+m} alone would do.
   std::array<Eigen::Vector2d, 2> begin;
@@ -148,7 +152,7 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
     std::array<double, 2> off_base{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const auto a = static_cast<Eigen::Index>(axis);
-      const Answers& answer = *answers[axis];
+      const NozzleAnswers& answer = *answers[axis];
       off[axis] = answer.free[j](0, 0) * begin[axis][0] + answer.free[j](0, 1) * begin[axis][1] +
                   answer.ramp[j][0] * speed[axis] - ((*nozzle[axis])[k + j][0] - base_[k][a]);
       off_base[axis] = speed[axis] * look.s * duration - (base_[k + j][a] - base_[k][a]);
@@ -185,7 +189,7 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
   }
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    const Answers& answer = *answers[axis];
+    const NozzleAnswers& answer = *answers[axis];
     const Eigen::Index first = 3 * a;
     result.move.block<2, 2>(first, first) = answer.free[m];
     result.move.block<2, 1>(first, first + 2) = answer.step[m] - answer.ramp[m] / duration;

@@ -65,6 +65,14 @@ struct WholeCost {
 // The same for u = 0: the line ends on the base.
 [[nodiscard]] Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go);
 
+// Answers of the nozzle on one axis after j candidates' time: to its own state, to a step and to a
+// ramp of the base.
+struct NozzleAnswers {
+  std::vector<Eigen::Matrix2d> free;
+  std::vector<Eigen::Vector2d> step;
+  std::vector<Eigen::Vector2d> ramp;
+};
+
 // The candidate times, equally spaced, and what lines between them cost.
 class LineCosts {
  public:
@@ -76,7 +84,15 @@ class LineCosts {
   [[nodiscard]] double time_s(std::size_t k) const { return static_cast<double>(k) * dt_s_; }
   // Between two of them.
   [[nodiscard]] double dt_s() const { return dt_s_; }
+  // The number of them that take at least this long.
+  [[nodiscard]] std::size_t candidates(double duration_s) const;
   [[nodiscard]] const Eigen::Vector2d& base_mm(std::size_t k) const { return base_[k]; }
+  // f of one axis.
+  [[nodiscard]] const Eigen::Vector2d& nozzle(std::size_t axis, std::size_t k) const {
+    return axis == 0 ? nozzle_x_at_[k] : nozzle_y_at_[k];
+  }
+  [[nodiscard]] const ErrorWeight& weight(std::size_t k) const { return weights_[k]; }
+  [[nodiscard]] const NozzleAnswers& answers(std::size_t axis) const { return axis == 0 ? x_ : y_; }
 
   // k + m < size(), and no longer than rules.max_line_s.
   [[nodiscard]] LineCost line(std::size_t k, std::size_t m) const;
@@ -85,16 +101,6 @@ class LineCosts {
   [[nodiscard]] Quadratic ring_down() const;
 
  private:
-  // Answers of the nozzle on one axis after j candidates' time: to its own state, to a step and to
-  // a ramp of the base.
-  struct Answers {
-    std::vector<Eigen::Matrix2d> free;
-    std::vector<Eigen::Vector2d> step;
-    std::vector<Eigen::Vector2d> ramp;
-  };
-  [[nodiscard]] static Answers answers(const dynamics::FlexibleAxis& axis, double dt,
-                                       std::size_t count);
-
   using Row = Eigen::RowVector4d;
   // What is the same for all lines over m candidates: e of an axis by (e, ė, o, u), at some
   // moments, and the sums of its squares.
@@ -121,8 +127,8 @@ class LineCosts {
   std::vector<Eigen::Vector2d> nozzle_y_at_;
   std::vector<ErrorWeight> weights_;
   std::vector<std::size_t> same_weight_until_;
-  Answers x_;
-  Answers y_;
+  NozzleAnswers x_;
+  NozzleAnswers y_;
   std::vector<Shape> shapes_;  // by m
 };
 

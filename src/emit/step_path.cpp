@@ -2,9 +2,8 @@
 // lines of less than a few. Where a line ends, and when, are then whole numbers, and the best are
 // searched for: of all lines that begin where a kept state is, those that cost least are kept for
 // each candidate time, kKept of them (the M-algorithm; Anderson & Mohan, IEEE Trans. Comm. 32
-// (1984), 169). A state's cost is that of its lines so far and of the best lines to come if places
-// were no whole numbers and times fixed, which is a linear-quadratic regulator's (Anderson & Moore,
-// Optimal Control: Linear Quadratic Methods, § 2.4 and 4.1). line_cost.hpp has the notation.
+// (1984), 169). A state's cost is that of its lines so far and of those to come (cost_to_go.hpp).
+// line_cost.hpp has the notation.
 #include "step_path.hpp"
 
 #include <algorithm>
@@ -15,17 +14,16 @@
 #include <optional>
 #include <utility>
 
+#include "cost_to_go.hpp"
 #include "line_cost.hpp"
+#include "line_fan.hpp"
+#include "step_ends.hpp"
 
 namespace unflex::emit {
 namespace {
 
 // States kept for each candidate time.
-constexpr std::size_t kKept = 4;
-// Ends tried for each state and duration.
-constexpr std::size_t kEnds = 3;
-// How many places off the best one, along the path, an end may lie.
-constexpr int kAlong = 3;
+constexpr std::size_t kKept = LineFan::kLanes;
 // Candidates that are searched at once, and how far beyond them.
 constexpr std::size_t kBlock = 4096;
 constexpr std::size_t kBeyond = 512;
@@ -35,18 +33,12 @@ constexpr double kAcross_mm = 0.25;
 constexpr double kLineWorth_s = 0.01;
 // What lines faster than an even pace cost beyond their worth, per (pace² − 1).
 constexpr double kHaste = 20.0;
-// How much longer than an even pace a line is reckoned to take at most.
-constexpr double kPatience = 2.5;
-// States that cost this many lines more than the best one are left.
-constexpr double kMargin = 400.0;
 // However many lines follow a run, it gets this many within the time that lines are counted over.
 constexpr int kFewest = 4;
 // What too quick a change of speed costs, mm²·s.
 constexpr double kTooQuick = 1e-4;
 // What a line too many costs.
 constexpr double kTooMany = 1e-4;
-
-using Place = std::array<std::int64_t, 2>;  // in steps
 
 struct State {
   double total = 0.0;  // what it has cost and will cost
@@ -59,18 +51,50 @@ struct State {
   std::int32_t parent = -1;
 };
 
-std::int64_t nearest(double steps) { return static_cast<std::int64_t>(std::floor(steps + 0.5)); }
+// All lines from the states of one candidate time.
+struct Lines {
+  explicit Lines(const LineCosts& costs) : fan(costs) {}
+
+  LineFan fan;
+  LineFan::Choice choice;  // of lines to the candidate that is being searched
+  std::size_t k = 0;
+  std::size_t first = 0;  // of the states, in the arena
+  std::size_t count = 0;
+  std::array<double, kKept> earliest_s{};  // that a line may end
+};
+
+// Lines of one duration from one state.
+struct Option {
+  double least = 0.0;  // total
+  const Lines* lines = nullptr;
+  std::size_t lane = 0;
+};
+
+// One of them.
+struct Line {
+  double total = 0.0;
+  Place to{};
+  const Lines* lines = nullptr;
+  std::size_t lane = 0;
+};
 
 class Search {
  public:
   Search(const LineCosts& costs, const std::vector<double>& wanted, const RunEnds& ends,
          const AxisGrid& x, const AxisGrid& y, const LineRules& rules)
-      : costs_(&costs), ends_(ends), grid_{&x, &y}, rules_(&rules), last_(costs.size() - 1) {
-    end_ = {steps(0, ends.end_x_mm), steps(1, ends.end_y_mm)};
-    least_ = candidates(rules.min_line_s);
-    most_ = static_cast<std::size_t>(rules.max_line_s / costs.dt_s() + 1e-9);
+      : costs_(&costs),
+        ends_(ends),
+        grid_(x, y),
+        rules_(&rules),
+        last_(costs.size() - 1),
+        shortest_(costs.candidates(rules.min_line_s)),
+        longest_(static_cast<std::size_t>(rules.max_line_s / costs.dt_s() + 1e-9)),
+        end_(grid_.nearest({ends.end_x_mm, ends.end_y_mm})),
+        to_go_(costs, rules, grid_.step_mm(), grid_.mm(end_)),
+        lines_(longest_ + 1, Lines(costs)),
+        ending_(longest_ + 1) {
     for (const double t : wanted) {
-      wanted_.push_back(static_cast<std::size_t>(nearest(t / costs.dt_s())));
+      wanted_.push_back(static_cast<std::size_t>(nearest_whole(t / costs.dt_s())));
     }
     line_worth_ = 0.5 * rules.tolerance_mm * rules.tolerance_mm * kLineWorth_s;
   }
@@ -105,8 +129,9 @@ class Search {
             begins_s_.push_back(costs_->time_s(state->k));
           }
           polygon_.times_s.push_back(costs_->time_s(state->k));
-          polygon_.x_mm.push_back(mm(0, state->at[0]));
-          polygon_.y_mm.push_back(mm(1, state->at[1]));
+          const Eigen::Vector2d at = grid_.mm(state->at);
+          polygon_.x_mm.push_back(at[0]);
+          polygon_.y_mm.push_back(at[1]);
         }
       }
       if (is_last) {
@@ -123,44 +148,31 @@ class Search {
   }
 
  private:
-  [[nodiscard]] std::int64_t steps(std::size_t axis, double mm) const {
-    return nearest((mm - grid_[axis]->offset_mm) / grid_[axis]->step_mm);
-  }
-  [[nodiscard]] double mm(std::size_t axis, std::int64_t steps) const {
-    return grid_[axis]->offset_mm + static_cast<double>(steps) * grid_[axis]->step_mm;
-  }
-  [[nodiscard]] Eigen::Vector2d mm(const Place& at) const { return {mm(0, at[0]), mm(1, at[1])}; }
-
   [[nodiscard]] State start() const {
     State state;
-    state.at = {steps(0, ends_.start_x_mm), steps(1, ends_.start_y_mm)};
+    state.at = grid_.nearest({ends_.start_x_mm, ends_.start_y_mm});
     state.z[2] = ends_.start_x_mm - costs_->base_mm(0)[0];
     state.z[5] = ends_.start_y_mm - costs_->base_mm(0)[1];
     return state;
   }
 
-  // The number of candidates that take at least this long.
-  [[nodiscard]] std::size_t candidates(double duration_s) const {
-    return static_cast<std::size_t>(std::ceil(duration_s / costs_->dt_s() - 1e-9));
-  }
-
   // The durations tried for a line from candidate k on, in candidates.
   void durations(std::size_t k, std::vector<std::size_t>& result) const {
     result.clear();
-    const std::size_t most = std::min(most_, last_ - k);
+    const std::size_t most = std::min(longest_, last_ - k);
     const auto wanted = std::ranges::upper_bound(wanted_, k);
     const std::size_t until = wanted == wanted_.end() ? most : std::min(most, *wanted - k);
-    std::size_t m = least_;
+    std::size_t m = shortest_;
     for (; m <= until; m += std::max<std::size_t>(m / 12, 1)) {
       result.push_back(m);
     }
-    if (until >= least_ && result.back() != until) {
+    if (until >= shortest_ && result.back() != until) {
       result.push_back(until);
     }
     // Across the wanted time.
     const std::size_t any_length = too_many_wanted(k) ? candidates(rules_->even_line_s()) : 0;
-    for (m = std::max(least_, until + 1); m <= most; ++m) {
-      if (m > std::max(2 * least_, any_length) &&
+    for (m = std::max(shortest_, until + 1); m <= most; ++m) {
+      if (m > std::max(2 * shortest_, any_length) &&
           (costs_->base_mm(k + m) - costs_->base_mm(k)).norm() > kAcross_mm) {
         break;
       }
@@ -175,126 +187,30 @@ class Search {
     return wanted_.end() - next >= kSome &&
            *(next + kSome - 1) < k + kSome * candidates(rules_->even_line_s());
   }
-
-  // The duration of a line from k on that the cost to go reckons with: the shortest that covers
-  // enough steps at an even pace.
-  [[nodiscard]] std::size_t usual(std::size_t k) const {
-    const std::size_t left = last_ - k;
-    std::size_t m = candidates(rules_->even_line_s());
-    if (left < 2 * m) {
-      return left;
-    }
-    const auto covers = [&](std::size_t candidates) {
-      const Eigen::Vector2d way = costs_->base_mm(k + candidates) - costs_->base_mm(k);
-      return std::max(std::abs(way[0]) / grid_[0]->step_mm, std::abs(way[1]) / grid_[1]->step_mm) >=
-             rules_->min_steps;
-    };
-    // Where the base turns round, that may be never.
-    const std::size_t patience = candidates(kPatience * rules_->even_line_s());
-    while (m < std::min(patience, left - m) && !covers(m)) {
-      ++m;
-    }
-    return m;
-  }
-
-  // After the last line: the machine rests at the run's end while the base still moves, from
-  // candidate k on. Of e alone, that is of z with o as it must be.
-  void set_rest_costs(std::size_t from) {
-    rest_.assign(last_ - from + 1, {});
-    rest_.back() = costs_->ring_down();
-    for (std::size_t k = last_; k-- > from;) {
-      const LineCost line = costs_->line(k, 1);
-      const Eigen::Vector2d o = mm(end_) - costs_->base_mm(k);
-      const Eigen::Vector2d u = mm(end_) - costs_->base_mm(k + 1);
-      const Quadratic& next = rest_[k + 1 - from];
-      const auto [all, slope, constant] = whole_cost(line, next);
-      // w = e + fixed
-      Vector8d fixed = Vector8d::Zero();
-      fixed[2] = o[0];
-      fixed[5] = o[1];
-      fixed[6] = u[0];
-      fixed[7] = u[1];
-      Quadratic& here = rest_[k - from];
-      here.matrix = all.topLeftCorner<6, 6>();
-      here.slope = (slope + all * fixed).head<6>();
-      here.constant = constant + slope.dot(fixed) + 0.5 * fixed.dot(all * fixed);
-      for (const Eigen::Index i : {2, 5}) {
-        here.matrix.row(i).setZero();
-        here.matrix.col(i).setZero();
-        here.slope[i] = 0.0;
-      }
-    }
-  }
-
-  void set_costs_to_go(std::size_t from, std::size_t until, bool is_last) {
-    to_go_.assign(until - from + 1, {});
-    rest_from_ = until + 1;
-    if (is_last) {
-      rest_from_ = std::max(from, until - std::min(until, kBeyond));
-      set_rest_costs(rest_from_);
-    }
-    const Quadratic at_end = costs_->ring_down();
-    for (std::size_t k = until + 1; k-- > from;) {
-      Quadratic& here = to_go_[k - from];
-      const std::size_t m = k < until ? usual(k) : 0;
-      if (k == until || k + m > until) {
-        here = is_last ? rest_[k - rest_from_] : at_end;
-      } else if (is_last && k + m == until) {
-        here = ending_on_base(costs_->line(k, m), to_go_[k + m - from]);
-      } else {
-        here = best_end(costs_->line(k, m), to_go_[k + m - from]).value;
-      }
-    }
-  }
-
   // Searches candidates from `from` to `until`; the best state at the end, in arena_.
   std::optional<std::size_t> block(State begin, std::size_t from, std::size_t until, bool is_last) {
-    set_costs_to_go(from, until, is_last);
+    to_go_.compute(from, until, is_last);
     arena_.clear();
-    from_ = from;
-    kept_.assign(until - from + 1, {});
     finished_.reset();
-    begin.total = begin.spent + to_go_[0].at(begin.z);
-    keep(begin);
-    std::vector<std::size_t> tried;
-    for (std::size_t k = from; k < until; ++k) {
-      std::vector<State>& states = kept_[k - from];
-      if (states.empty()) {
-        continue;
-      }
-      const double most = best_open(k, until) + kMargin * line_worth_;
+    ending_.assign(ending_.size(), {});
+    begin.total = begin.spent + to_go_.at(from).at(begin.z);
+    arena_.push_back(begin);
+    spread(0, until);
+    for (std::size_t k = from + 1; k <= until; ++k) {
+      std::vector<Lines*>& lines = ending_[k % ending_.size()];
       const std::size_t first = arena_.size();
-      for (const State& state : states) {
-        if (state.total <= most) {
-          arena_.push_back(state);
-        }
+      for (Lines* each : lines) {
+        each->fan.reach(k - each->k);
       }
-      std::vector<State>().swap(states);
-      if (arena_.size() == first) {
-        continue;
+      if (is_last && to_go_.may_rest(k)) {
+        finish(lines, k);
       }
-      earliest_s_.clear();
-      for (std::size_t i = first; i < arena_.size(); ++i) {
-        earliest_s_.push_back(earliest_end_s(i));
+      if (!is_last || k < until) {
+        extend(lines, k);
       }
-      first_ = first;
-      durations(k, tried);
-      for (const std::size_t m : tried) {
-        if (k + m > until) {
-          continue;
-        }
-        const LineCost line = costs_->line(k, m);
-        const Quadratic& after = to_go_[k + m - from];
-        const LineChoice choice = best_end(line, after);
-        const std::size_t count = arena_.size();
-        for (std::size_t i = first; i < count; ++i) {
-          if (is_last && k + m >= rest_from_) {
-            finish(i, m, line);
-          }
-          if (!is_last || k + m < until) {
-            extend(i, m, line, choice);
-          }
-        }
+      lines.clear();
+      if (k < until && arena_.size() > first) {
+        spread(first, until);
       }
     }
     if (is_last) {
@@ -306,17 +222,33 @@ class Search {
     }
     // Of the states at the end of the block.
     std::optional<std::size_t> best;
-    for (std::size_t k = until; k > from && k + kBeyond / 2 > until; --k) {
-      for (const State& state : kept_[k - from]) {
-        arena_.push_back(state);
-      }
-    }
     for (std::size_t i = 0; i < arena_.size(); ++i) {
       if (arena_[i].k + kBeyond / 2 > until && (!best || arena_[i].total < arena_[*best].total)) {
         best = i;
       }
     }
     return best;
+  }
+
+  // Lines from all states of the arena from `first` on, which are of one candidate time.
+  void spread(std::size_t first, std::size_t until) {
+    const std::size_t k = arena_[first].k;
+    Lines& lines = lines_[k % lines_.size()];
+    lines.k = k;
+    lines.first = first;
+    lines.count = arena_.size() - first;
+    std::array<Vector6d, kKept> z;
+    for (std::size_t lane = 0; lane < lines.count; ++lane) {
+      z[lane] = arena_[first + lane].z;
+      lines.earliest_s[lane] = earliest_end_s(first + lane);
+    }
+    lines.fan.begin(k, {z.data(), lines.count});
+    durations(k, tried_);
+    for (const std::size_t m : tried_) {
+      if (k + m <= until) {
+        ending_[(k + m) % ending_.size()].push_back(&lines);
+      }
+    }
   }
 
   // From when on a line that begins with state i may end, for no more than burst_lines to begin
@@ -341,39 +273,6 @@ class Search {
                                      : 0.0;
   }
 
-  // The least that any state costs that is still to be extended, from candidate k on.
-  [[nodiscard]] double best_open(std::size_t k, std::size_t until) const {
-    double best = finished_ ? finished_->total : std::numeric_limits<double>::infinity();
-    const double until_s = costs_->time_s(k) + rules_->max_line_s;
-    for (; k <= until && costs_->time_s(k) <= until_s; ++k) {
-      if (const std::vector<State>& states = kept_[k - from_]; !states.empty()) {
-        best = std::min(best, states.front().total);
-      }
-    }
-    return best;
-  }
-
-  // State i with a line over m candidates to u.
-  [[nodiscard]] State after_line(std::size_t i, std::size_t m, const LineCost& line,
-                                 const Place& to, const Quadratic& to_go) const {
-    const State& state = arena_[i];
-    State next;
-    next.k = state.k + m;
-    next.at = to;
-    next.parent = static_cast<std::int32_t>(i);
-    next.line_s = costs_->time_s(next.k) - costs_->time_s(state.k);
-    next.speed_mm_s = (mm(to) - mm(state.at)) / next.line_s;
-    Vector8d w;
-    w << state.z, mm(to) - costs_->base_mm(next.k);
-    next.z = line.move * w + line.shift;
-    next.spent = state.spent + w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant +
-                 price(m) +
-                 too_quick(next.speed_mm_s - state.speed_mm_s, state.line_s + next.line_s) +
-                 (costs_->time_s(next.k) < earliest_s_[i - first_] ? kTooMany : 0.0);
-    next.total = next.spent + to_go.at(next.z);
-    return next;
-  }
-
   // What a line over m candidates costs for being one. The shorter, the more: it takes from the
   // lines that may follow within the time they are counted over.
   [[nodiscard]] double price(std::size_t m) const {
@@ -387,155 +286,154 @@ class Search {
     return excess > 0.0 ? kTooQuick * (1.0 + excess) : 0.0;
   }
 
-  [[nodiscard]] bool enough(const Place& from, const Place& to) const {
-    return std::max(std::abs(to[0] - from[0]), std::abs(to[1] - from[1])) >= rules_->min_steps;
+  // What a line that ends at candidate k costs beyond J, wherever that is.
+  [[nodiscard]] double fixed_cost(const Lines& lines, std::size_t lane, std::size_t k) const {
+    return price(k - lines.k) + (costs_->time_s(k) < lines.earliest_s[lane] ? kTooMany : 0.0);
+  }
+
+  // A state with a line to another place.
+  [[nodiscard]] State after_line(const Lines& lines, std::size_t lane, std::size_t k,
+                                 const Place& to, double total) const {
+    const State& state = arena_[lines.first + lane];
+    State next;
+    next.total = total;
+    next.k = k;
+    next.at = to;
+    next.parent = static_cast<std::int32_t>(lines.first + lane);
+    next.line_s = lines.fan.duration_s();
+    next.speed_mm_s = speed_to(state, to, next.line_s);
+    next.z = lines.fan.after(lane, next.speed_mm_s);
+    next.spent = state.spent + lines.fan.cost(lane, next.speed_mm_s) + fixed_cost(lines, lane, k) +
+                 too_quick(next.speed_mm_s - state.speed_mm_s, state.line_s + next.line_s);
+    return next;
+  }
+
+  // Where it is; the run's begin may lie between whole steps.
+  [[nodiscard]] Eigen::Vector2d start_mm(const State& state) const {
+    return costs_->base_mm(state.k) + Eigen::Vector2d(state.z[2], state.z[5]);
+  }
+  [[nodiscard]] Eigen::Vector2d speed_to(const State& state, const Place& to,
+                                         double duration_s) const {
+    return (grid_.mm(to) - start_mm(state)) / duration_s;
   }
 
   // The last line, after which the machine rests.
-  void finish(std::size_t i, std::size_t m, const LineCost& line) {
-    const State& state = arena_[i];
-    if (!enough(state.at, end_)) {
-      return;
-    }
-    State done = after_line(i, m, line, end_, rest_[state.k + m - rest_from_]);
-    done.total += too_quick(done.speed_mm_s, done.line_s);
-    if (!finished_ || done.total < finished_->total) {
-      finished_ = done;
-    }
-  }
-
-  // Tries lines over m candidates from state i to the places nearest to the best one, as the cost
-  // has it.
-  void extend(std::size_t i, std::size_t m, const LineCost& line, const LineChoice& choice) {
-    const State state = arena_[i];
-    const std::size_t k = state.k + m;
-    const std::vector<State>& rivals = kept_[k - from_];
-    const double least = state.spent + choice.value.at(state.z) + price(m);
-    const double room = rivals.size() < kKept ? std::numeric_limits<double>::infinity()
-                                              : rivals.back().total - least;
-    if (room <= 0.0) {
-      return;
-    }
-    // From here on in steps.
-    const Eigen::Vector2d best_mm =
-        costs_->base_mm(k) + choice.feedback * state.z + choice.feed_forward;
-    const std::array<double, 2> step = {grid_[0]->step_mm, grid_[1]->step_mm};
-    const std::array<double, 2> best = {(best_mm[0] - grid_[0]->offset_mm) / step[0],
-                                        (best_mm[1] - grid_[1]->offset_mm) / step[1]};
-    const double xx = choice.stiffness(0, 0) * step[0] * step[0];
-    const double xy = choice.stiffness(0, 1) * step[0] * step[1];
-    const double yy = choice.stiffness(1, 1) * step[1] * step[1];
-    struct End {
-      Place at{};
-      double extra = 0.0;
-    };
-    std::array<End, kEnds> ends;
-    std::size_t count = 0;
-    const auto consider = [&](const Place& to) {
-      const double dx = static_cast<double>(to[0]) - best[0];
-      const double dy = static_cast<double>(to[1]) - best[1];
-      const End end{to, 0.5 * (xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy)};
-      if (end.extra >= (count < kEnds ? room : std::min(room, ends[count - 1].extra)) ||
-          !enough(state.at, to) || !within(0, to[0], k) || !within(1, to[1], k)) {
-        return;
-      }
-      for (std::size_t j = 0; j < count; ++j) {
-        if (ends[j].at == to) {
-          return;
+  void finish(const std::vector<Lines*>& all, std::size_t k) {
+    for (const Lines* lines : all) {
+      const LineFan::Choice choice = lines->fan.choice(to_go_.resting(k));
+      const double duration_s = lines->fan.duration_s();
+      for (std::size_t lane = 0; lane < lines->count; ++lane) {
+        const State& state = arena_[lines->first + lane];
+        const Eigen::Vector2d speed = speed_to(state, end_, duration_s);
+        const double total = state.spent + choice.at(lane, speed) + fixed_cost(*lines, lane, k) +
+                             too_quick(speed - state.speed_mm_s, state.line_s + duration_s) +
+                             too_quick(speed, duration_s);
+        if ((!finished_ || total < finished_->total) &&
+            Places{state.at, rules_->min_steps}.far_enough(end_)) {
+          finished_ = after_line(*lines, lane, k, end_, total);
         }
       }
-      if (count < kEnds) {
-        ++count;
-      }
-      ends[count - 1] = end;
-      for (std::size_t j = count - 1; j > 0 && ends[j].extra < ends[j - 1].extra; --j) {
-        std::swap(ends[j], ends[j - 1]);
-      }
-    };
-    // The best place among those with this many steps on one axis.
-    const auto consider_line = [&](std::size_t axis, std::int64_t steps_there) {
-      const double off = static_cast<double>(steps_there) - best[axis];
-      const double ratio = xy / (axis == 0 ? yy : xx);
-      Place to{};
-      to[axis] = steps_there;
-      to[1 - axis] = nearest(best[1 - axis] - ratio * off);
-      consider(to);
-    };
-    const std::size_t along = xx < yy ? 0 : 1;
-    for (int d = -kAlong; d <= kAlong; ++d) {
-      consider_line(along, nearest(best[along]) + d);
-    }
-    for (int d = -1; d <= 1; ++d) {
-      consider_line(1 - along, nearest(best[1 - along]) + d);
-    }
-    if (count < kEnds && rules_->min_steps > 1) {
-      for (const std::size_t axis : {0U, 1U}) {
-        consider_line(axis, state.at[axis] - rules_->min_steps);
-        consider_line(axis, state.at[axis] + rules_->min_steps);
-      }
-    }
-    for (std::size_t j = 0; j < count; ++j) {
-      if (worth_keeping(k, least + ends[j].extra)) {
-        keep(after_line(i, m, line, ends[j].at, to_go_[k - from_]));
-      }
     }
   }
 
-  // Neither beyond the travel nor further out than the base.
-  [[nodiscard]] bool within(std::size_t axis, std::int64_t at, std::size_t k) const {
-    const Reach& reach = axis == 0 ? rules_->reach_x : rules_->reach_y;
-    const double base = costs_->base_mm(k)[static_cast<Eigen::Index>(axis)];
-    const double there = mm(axis, at);
-    const double slack = grid_[axis]->step_mm;
-    return there >= std::min(reach.min_mm, base - slack) &&
-           there <= std::max(reach.max_mm, base + slack);
+  // Lines that end at candidate k, those that promise most first, to the places nearest to the best
+  // ones, as the cost has it.
+  void extend(const std::vector<Lines*>& all, std::size_t k) {
+    options_.clear();
+    for (Lines* lines : all) {
+      lines->choice = lines->fan.choice(to_go_.at(k));
+      for (std::size_t lane = 0; lane < lines->count; ++lane) {
+        const double least = arena_[lines->first + lane].spent +
+                             lines->choice.least[static_cast<Eigen::Index>(lane)] +
+                             fixed_cost(*lines, lane, k);
+        options_.push_back({least, lines, lane});
+      }
+    }
+    // Neither beyond the travel nor further out than the base.
+    const Eigen::Vector2d& base = costs_->base_mm(k);
+    const Eigen::Vector2d& slack = grid_.step_mm();
+    const Eigen::Vector2d least_mm(rules_->reach_x.min_mm, rules_->reach_y.min_mm);
+    const Eigen::Vector2d most_mm(rules_->reach_x.max_mm, rules_->reach_y.max_mm);
+    Places places{.min_steps = rules_->min_steps,
+                  .least = grid_.steps(least_mm.cwiseMin(base - slack)),
+                  .most = grid_.steps(most_mm.cwiseMax(base + slack))};
+    const auto later = [](const Option& a, const Option& b) { return a.least > b.least; };
+    std::ranges::make_heap(options_, later);
+    kept_.clear();
+    while (!options_.empty() && options_.front().least < most_to_keep()) {
+      const Option& option = options_.front();
+      places.from = arena_[option.lines->first + option.lane].at;
+      extend(option, places);
+      std::ranges::pop_heap(options_, later);
+      options_.pop_back();
+    }
+    for (const Line& line : kept_) {
+      arena_.push_back(after_line(*line.lines, line.lane, k, line.to, line.total));
+    }
   }
 
-  [[nodiscard]] bool worth_keeping(std::size_t k, double total) const {
-    const std::vector<State>& states = kept_[k - from_];
-    return states.size() < kKept || total < states.back().total;
+  void extend(const Option& option, const Places& places) {
+    const auto& [least, lines, lane] = option;
+    const State& state = arena_[lines->first + lane];
+    const LineFan::Choice& choice = lines->choice;
+    const double duration_s = lines->fan.duration_s();
+    const Eigen::Vector2d per_step = grid_.step_mm() / duration_s;
+    const Bowl bowl{grid_.steps(start_mm(state) + duration_s * choice.best_mm_s(lane)),
+                    choice.xx * per_step[0] * per_step[0], choice.xy * per_step[0] * per_step[1],
+                    choice.yy * per_step[1] * per_step[1]};
+    for (const StepEnd& end : cheapest_ends(bowl, places, most_to_keep() - least)) {
+      const Eigen::Vector2d change = speed_to(state, end.at, duration_s) - state.speed_mm_s;
+      keep({least + end.extra + too_quick(change, state.line_s + duration_s), end.at, lines, lane});
+    }
   }
 
-  // Keeps the best kKept states of a candidate time, one of each place, in order.
-  void keep(const State& state) {
-    std::vector<State>& states = kept_[state.k - from_];
-    const auto same = std::ranges::find(states, state.at, &State::at);
-    if (same != states.end()) {
-      if (same->total <= state.total) {
+  // What a line to the candidate that is being searched may cost to be kept.
+  [[nodiscard]] double most_to_keep() const {
+    return kept_.size() < kKept ? std::numeric_limits<double>::infinity() : kept_.back().total;
+  }
+
+  // Keeps the best kKept lines, one to each place, in order.
+  void keep(const Line& line) {
+    if (line.total >= most_to_keep()) {
+      return;
+    }
+    const auto same = std::ranges::find(kept_, line.to, &Line::to);
+    if (same != kept_.end()) {
+      if (same->total <= line.total) {
         return;
       }
-      states.erase(same);
+      kept_.erase(same);
     }
-    const auto place = std::ranges::upper_bound(states, state.total, {}, &State::total);
-    states.insert(place, state);
-    if (states.size() > kKept) {
-      states.pop_back();
+    const auto place = std::ranges::upper_bound(kept_, line.total, {}, &Line::total);
+    kept_.insert(place, line);
+    if (kept_.size() > kKept) {
+      kept_.pop_back();
     }
   }
 
   const LineCosts* costs_;
   RunEnds ends_;
-  std::array<const AxisGrid*, 2> grid_;
+  StepGrid grid_;
   const LineRules* rules_;
-  std::size_t last_;       // candidate
-  std::size_t least_ = 1;  // candidates that a line takes
-  std::size_t most_ = 1;
+  std::size_t last_;      // candidate
+  std::size_t shortest_;  // candidates that a line takes
+  std::size_t longest_;
   std::vector<std::size_t> wanted_;
-  Place end_{};
+  Place end_;
   double line_worth_ = 0.0;
   Polygon polygon_;               // of the blocks before
   std::vector<double> begins_s_;  // of their lines, and of those before the run
   // Of the block that is being searched.
-  std::size_t from_ = 0;
-  std::vector<Quadratic> to_go_;
-  std::size_t rest_from_ = 0;
-  std::vector<Quadratic> rest_;
+  CostToGo to_go_;
   std::vector<State> arena_;
-  // Of the states of the candidate time that is being extended, which begin at first_.
-  std::size_t first_ = 0;
-  std::vector<double> earliest_s_;
-  std::vector<std::vector<State>> kept_;
   std::optional<State> finished_;
+  // By candidate, the last of them: the lines that begin there, and those that end there.
+  std::vector<Lines> lines_;
+  std::vector<std::vector<Lines*>> ending_;
+  // Of the candidate that is being searched.
+  std::vector<std::size_t> tried_;
+  std::vector<Option> options_;
+  std::vector<Line> kept_;
 };
 
 }  // namespace

@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "line_cost.hpp"
+#include "line_fan.hpp"
 #include "plain_base.hpp"
+#include "step_ends.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 
 namespace unflex::emit {
@@ -137,6 +139,95 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
     EXPECT_DOUBLE_EQ(z[5], w[7]);
     const double claimed = w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant;
     EXPECT_NEAR(claimed, cost, 1e-9 * cost);
+  }
+}
+
+TEST(LineFan, AgreesWithLineCostsAndBestEnd) {
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{5.0 * rise(t, 0.1), 2.0 * std::sin(30.0 * t) * rise(t, 0.1)};
+      },
+      0.1);
+  LineRules rules;
+  rules.nozzle_y = dynamics::from_frequency(37.0, 0.1);
+  const LineCosts costs(
+      base,
+      [](double t) {
+        return t < 0.06 ? ErrorWeight{0.9, 0.2, 0.3} : ErrorWeight{};
+      },
+      rules);
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal(0.0, 0.02);
+  Quadratic to_go = costs.ring_down();
+  const Matrix6d any = Matrix6d::NullaryExpr([&] { return 1e-2 * normal(random); });
+  to_go.matrix += any * any.transpose();
+  to_go.slope = Vector6d::NullaryExpr([&] { return 1e-3 * normal(random); });
+  to_go.constant = 1e-5;
+  LineFan fan(costs);
+  for (const std::size_t k : {0U, 50U, 115U}) {  // some of the last lines see two weights
+    std::array<Vector6d, LineFan::kLanes - 1> states;
+    for (Vector6d& z : states) {
+      z = Vector6d::NullaryExpr([&] { return normal(random); });
+      z[1] *= 100.0;
+      z[4] *= 100.0;
+    }
+    fan.begin(k, states);
+    for (const std::size_t m : {1U, 7U, 12U, 16U}) {
+      fan.reach(m);
+      const LineCost line = costs.line(k, m);
+      const LineChoice expected = best_end(line, to_go);
+      const LineFan::Choice choice = fan.choice(to_go);
+      for (std::size_t lane = 0; lane < states.size(); ++lane) {
+        const Vector6d& z = states[lane];
+        const Eigen::Vector2d start = costs.base_mm(k) + Eigen::Vector2d(z[2], z[5]);
+        const Eigen::Vector2d best_mm =
+            costs.base_mm(k + m) + expected.feedback * z + expected.feed_forward;
+        EXPECT_LE((start + fan.duration_s() * choice.best_mm_s(lane) - best_mm).norm(), 1e-9);
+        const double least = expected.value.at(z);
+        EXPECT_NEAR(choice.least[static_cast<Eigen::Index>(lane)], least, 1e-9 * std::abs(least));
+
+        const Eigen::Vector2d v(normal(random) * 1e3, normal(random) * 1e3);
+        Vector8d w;
+        w << z, start + fan.duration_s() * v - costs.base_mm(k + m);
+        const Vector6d after = line.move * w + line.shift;
+        EXPECT_LE((fan.after(lane, v) - after).cwiseAbs().maxCoeff(), 1e-8);
+        const double cost = w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant;
+        EXPECT_NEAR(fan.cost(lane, v), cost, 1e-9 * cost);
+        const double whole = cost + to_go.at(after);
+        EXPECT_NEAR(choice.at(lane, v), whole, 1e-9 * std::abs(whole));
+      }
+    }
+  }
+}
+
+TEST(CheapestEnds, AreTheCheapestOfAll) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (int i = 0; i < 200; ++i) {
+    Bowl bowl;
+    bowl.best = {50.0 * uniform(random), 50.0 * uniform(random)};
+    bowl.xx = 1.5 + uniform(random);
+    bowl.yy = 1.5 + uniform(random);
+    bowl.xy = 0.4 * uniform(random);
+    const Places places{{static_cast<std::int64_t>(bowl.best[0]), 0}, 3, {-45, -45}, {45, 45}};
+    const StepEnds found = cheapest_ends(bowl, places, 100.0);
+    double cheapest = 100.0;
+    for (std::int64_t x = -45; x <= 45; ++x) {
+      for (std::int64_t y = -45; y <= 45; ++y) {
+        const double dx = static_cast<double>(x) - bowl.best[0];
+        const double dy = static_cast<double>(y) - bowl.best[1];
+        if (places.far_enough({x, y})) {
+          cheapest = std::min(
+              cheapest, 0.5 * (bowl.xx * dx * dx + 2.0 * bowl.xy * dx * dy + bowl.yy * dy * dy));
+        }
+      }
+    }
+    if (std::abs(bowl.best[0]) > 44.0 || std::abs(bowl.best[1]) > 44.0) {
+      continue;  // at the edge only some are tried
+    }
+    ASSERT_GT(found.count, 0U);
+    EXPECT_NEAR(found.ends[0].extra, cheapest, 1e-9);
+    EXPECT_TRUE(places.far_enough(found.ends[0].at));
   }
 }
 
@@ -314,9 +405,9 @@ TEST(StepPath, LinesAcrossAWantedTimeAreShort) {
 TEST(StepPath, IsEmptyWhereNoLineIsLongEnough) {
   const BaseTrajectory base = testing::sampled(
       [](double t) {
-        return std::array{0.03 * rise(t, 0.02), 0.0};
+        return std::array{0.03 * rise(t, 0.003), 0.0};
       },
-      0.02);
+      0.003);
   EXPECT_TRUE(step_path(base, {}, all_alike, {0.0, 0.0, 0.025, 0.0}, kSteps, kSteps, marlin_rules())
                   .times_s.empty());
 }

@@ -1,0 +1,86 @@
+#include "cost_to_go.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace unflex::emit {
+namespace {
+
+// How long before the base's end the last line may end, in candidates.
+constexpr std::size_t kEarliest = 512;
+// How much longer than an even pace a line is reckoned to take at most.
+constexpr double kPatience = 2.5;
+
+}  // namespace
+
+// The duration of a line from k on that the cost to go reckons with: the shortest that covers
+// enough steps at an even pace.
+std::size_t CostToGo::usual(std::size_t k) const {
+  const std::size_t left = costs_->size() - 1 - k;
+  std::size_t m = costs_->candidates(rules_->even_line_s());
+  if (left < 2 * m) {
+    return left;
+  }
+  const auto covers = [&](std::size_t candidates) {
+    const Eigen::Vector2d way = costs_->base_mm(k + candidates) - costs_->base_mm(k);
+    return way.cwiseQuotient(step_mm_).cwiseAbs().maxCoeff() >= rules_->min_steps;
+  };
+  // Where the base turns round, that may be never.
+  const std::size_t patience = costs_->candidates(kPatience * rules_->even_line_s());
+  while (m < std::min(patience, left - m) && !covers(m)) {
+    ++m;
+  }
+  return m;
+}
+
+// After the last line: the machine rests at the run's end while the base still moves. Of e alone,
+// that is of z with o as it must be.
+void CostToGo::compute_resting(std::size_t until) {
+  rest_.assign(until - rest_from_ + 1, {});
+  rest_.back() = costs_->ring_down();
+  for (std::size_t k = until; k-- > rest_from_;) {
+    const LineCost line = costs_->line(k, 1);
+    const Eigen::Vector2d o = end_mm_ - costs_->base_mm(k);
+    const Eigen::Vector2d u = end_mm_ - costs_->base_mm(k + 1);
+    const auto [all, slope, constant] = whole_cost(line, resting(k + 1));
+    // w = e + fixed
+    Vector8d fixed = Vector8d::Zero();
+    fixed[2] = o[0];
+    fixed[5] = o[1];
+    fixed[6] = u[0];
+    fixed[7] = u[1];
+    Quadratic& here = rest_[k - rest_from_];
+    here.matrix = all.topLeftCorner<6, 6>();
+    here.slope = (slope + all * fixed).head<6>();
+    here.constant = constant + slope.dot(fixed) + 0.5 * fixed.dot(all * fixed);
+    for (const Eigen::Index i : {2, 5}) {
+      here.matrix.row(i).setZero();
+      here.matrix.col(i).setZero();
+      here.slope[i] = 0.0;
+    }
+  }
+}
+
+void CostToGo::compute(std::size_t from, std::size_t until, bool is_last) {
+  from_ = from;
+  to_go_.assign(until - from + 1, {});
+  rest_from_ = until + 1;
+  if (is_last) {
+    rest_from_ = std::max(from, until - std::min(until, kEarliest));
+    compute_resting(until);
+  }
+  const Quadratic at_end = costs_->ring_down();
+  for (std::size_t k = until + 1; k-- > from;) {
+    Quadratic& here = to_go_[k - from];
+    const std::size_t m = k < until ? usual(k) : 0;
+    if (k == until || k + m > until) {
+      here = is_last ? resting(k) : at_end;
+    } else if (is_last && k + m == until) {
+      here = ending_on_base(costs_->line(k, m), at(k + m));
+    } else {
+      here = best_end(costs_->line(k, m), at(k + m)).value;
+    }
+  }
+}
+
+}  // namespace unflex::emit

@@ -1,0 +1,44 @@
+// What all lines that are still to come will cost: the value function that the search goes by.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "line_cost.hpp"
+
+namespace unflex::emit {
+
+// The cost of the best lines to come if places were no whole numbers and times fixed, which is a
+// linear-quadratic regulator's (Anderson & Moore, Optimal Control: Linear Quadratic Methods, § 2.4
+// and 4.1).
+class CostToGo {
+ public:
+  // The machine comes to rest at `end_mm`, on a grid of `step_mm`.
+  CostToGo(const LineCosts& costs, const LineRules& rules, const Eigen::Vector2d& step_mm,
+           const Eigen::Vector2d& end_mm)
+      : costs_(&costs), rules_(&rules), step_mm_(step_mm), end_mm_(end_mm) {}
+
+  // For the candidates from `from` to `until`; is_last: the last line ends there.
+  void compute(std::size_t from, std::size_t until, bool is_last);
+
+  [[nodiscard]] const Quadratic& at(std::size_t k) const { return to_go_[k - from_]; }
+  // Of the machine that rests from candidate k on, if there is need to know.
+  [[nodiscard]] bool may_rest(std::size_t k) const { return k >= rest_from_; }
+  [[nodiscard]] const Quadratic& resting(std::size_t k) const { return rest_[k - rest_from_]; }
+
+ private:
+  [[nodiscard]] std::size_t usual(std::size_t k) const;
+  void compute_resting(std::size_t until);
+
+  const LineCosts* costs_;
+  const LineRules* rules_;
+  Eigen::Vector2d step_mm_;
+  Eigen::Vector2d end_mm_;
+  std::size_t from_ = 0;
+  std::size_t rest_from_ = 0;
+  std::vector<Quadratic> to_go_;
+  std::vector<Quadratic> rest_;
+};
+
+}  // namespace unflex::emit

@@ -1,0 +1,94 @@
+// All lines that begin with one of a few states, by their duration.
+//
+// A line at speed v: e at j candidates after its begin is what it would be if the machine stayed
+// where it is, plus v times the answer to a ramp. So J is a quadratic of v, and its coefficients
+// are sums over j that go on from one duration to the next.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+
+#include "line_cost.hpp"
+
+namespace unflex::emit {
+
+class LineFan {
+ public:
+  // States at once.
+  static constexpr std::size_t kLanes = 4;
+  using Lanes = Eigen::Array<double, kLanes, 1>;
+
+  // A line and all that comes after it, for each state:
+  // least + ½ (v − best)ᵀ S (v − best).
+  struct Choice {
+    Lanes least = Lanes::Zero();
+    Lanes best_x_mm_s = Lanes::Zero();
+    Lanes best_y_mm_s = Lanes::Zero();
+    double xx = 0.0;  // S
+    double xy = 0.0;
+    double yy = 0.0;
+
+    [[nodiscard]] Eigen::Vector2d best_mm_s(std::size_t lane) const {
+      const auto i = static_cast<Eigen::Index>(lane);
+      return {best_x_mm_s[i], best_y_mm_s[i]};
+    }
+    [[nodiscard]] double at(std::size_t lane, const Eigen::Vector2d& v) const {
+      const Eigen::Vector2d off = v - best_mm_s(lane);
+      return least[static_cast<Eigen::Index>(lane)] + 0.5 * xx * off[0] * off[0] +
+             xy * off[0] * off[1] + 0.5 * yy * off[1] * off[1];
+    }
+  };
+
+  explicit LineFan(const LineCosts& costs) : costs_(&costs) {}
+
+  // Lines from τ_k on, and from these z, no more than kLanes.
+  void begin(std::size_t k, std::span<const Vector6d> states);
+  // Lines over m candidates, no fewer than before.
+  void reach(std::size_t m);
+
+  // Of the lines reached: with what follows, J alone, and z at the end.
+  [[nodiscard]] double duration_s() const { return duration_s_; }
+  [[nodiscard]] Choice choice(const Quadratic& to_go) const;
+  [[nodiscard]] double cost(std::size_t lane, const Eigen::Vector2d& v) const;
+  [[nodiscard]] Vector6d after(std::size_t lane, const Eigen::Vector2d& v) const;
+
+ private:
+  // One axis: its state at the begin, and sums over the candidates so far.
+  struct Axis {
+    const NozzleAnswers* answers = nullptr;
+    Lanes place = Lanes::Zero();   // o
+    Lanes behind = Lanes::Zero();  // p of the nozzle minus where the line begins
+    Lanes speed = Lanes::Zero();   // ṗ
+    Lanes pull = Lanes::Zero();    // Σ ramp (W e)
+    double ramps = 0.0;            // Σ W ramp²
+    double base = 0.0;             // Σ of the base's way, b_{k+j} − b_k
+    double time_base = 0.0;        // Σ j dt of the same
+    // Of the lines reached.
+    Lanes slope = Lanes::Zero();  // ∂J/∂v at v = 0
+    Lanes error = Lanes::Zero();  // e, ė, o at the end for v = 0
+    Lanes error_speed = Lanes::Zero();
+    Lanes end = Lanes::Zero();
+    double stiffness = 0.0;  // ∂²J/∂v²
+    double ramp = 0.0;       // what e and ė at the end gain with v
+    double ramp_speed = 0.0;
+  };
+  void finish(Axis& axis, Eigen::Index index) const;
+
+  const LineCosts* costs_;
+  std::size_t k_ = 0;
+  std::size_t m_ = 0;
+  Axis x_;
+  Axis y_;
+  Lanes square_ = Lanes::Zero();  // Σ eᵀWe for v = 0
+  double ramps_xy_ = 0.0;
+  double base_square_ = 0.0;  // Σ |b_{k+j} − b_k|²
+  double times_s_ = 0.0;      // Σ j dt, and of its square
+  double times_squared_ = 0.0;
+  // Of the lines reached.
+  double duration_s_ = 0.0;
+  Lanes held_ = Lanes::Zero();  // J for v = 0
+  double stiffness_xy_ = 0.0;
+};
+
+}  // namespace unflex::emit

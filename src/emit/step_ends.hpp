@@ -1,0 +1,84 @@
+// Whole steps near a place.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+
+#include "vertices.hpp"
+
+namespace unflex::emit {
+
+using Place = std::array<std::int64_t, 2>;  // in steps
+
+// The nearest whole number, of less than 2^51: where a double has no places after the point, adding
+// rounds.
+[[nodiscard]] inline double nearest_whole(double x) {
+  constexpr double kNoFraction = 0x1.8p52;
+  return (x + kNoFraction) - kNoFraction;
+}
+
+class StepGrid {
+ public:
+  StepGrid(const AxisGrid& x, const AxisGrid& y)
+      : step_mm_(x.step_mm, y.step_mm), offset_mm_(x.offset_mm, y.offset_mm) {}
+
+  [[nodiscard]] const Eigen::Vector2d& step_mm() const { return step_mm_; }
+  [[nodiscard]] Eigen::Vector2d steps(const Eigen::Vector2d& mm) const {
+    return (mm - offset_mm_).cwiseQuotient(step_mm_);
+  }
+  [[nodiscard]] Place nearest(const Eigen::Vector2d& mm) const {
+    const Eigen::Vector2d at = steps(mm);
+    return {static_cast<std::int64_t>(nearest_whole(at[0])),
+            static_cast<std::int64_t>(nearest_whole(at[1]))};
+  }
+  [[nodiscard]] Eigen::Vector2d mm(const Place& at) const {
+    return offset_mm_ + Eigen::Vector2d(static_cast<double>(at[0]), static_cast<double>(at[1]))
+                            .cwiseProduct(step_mm_);
+  }
+
+ private:
+  Eigen::Vector2d step_mm_;
+  Eigen::Vector2d offset_mm_;
+};
+
+// Whatever a place costs more than the best one: ½ (x, y) S (x, y)ᵀ of its distance, in steps.
+struct Bowl {
+  Eigen::Vector2d best = Eigen::Vector2d::Zero();  // in steps
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+};
+
+// Which places there are: at least min_steps from `from` on one axis, and from least to most.
+struct Places {
+  Place from{};
+  int min_steps = 1;
+  Eigen::Vector2d least = Eigen::Vector2d::Zero();  // in steps
+  Eigen::Vector2d most = Eigen::Vector2d::Zero();
+
+  [[nodiscard]] bool far_enough(const Place& to) const {
+    return std::max(std::abs(to[0] - from[0]), std::abs(to[1] - from[1])) >= min_steps;
+  }
+};
+
+struct StepEnd {
+  Place at{};
+  double extra = 0.0;
+};
+
+// The cheapest ones, in order, all of them below `room`.
+struct StepEnds {
+  static constexpr std::size_t kMost = 3;
+  std::array<StepEnd, kMost> ends;
+  std::size_t count = 0;
+
+  [[nodiscard]] const StepEnd* begin() const { return ends.data(); }
+  [[nodiscard]] const StepEnd* end() const { return ends.data() + count; }
+};
+[[nodiscard]] StepEnds cheapest_ends(const Bowl& bowl, const Places& places, double room);
+
+}  // namespace unflex::emit
