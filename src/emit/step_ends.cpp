@@ -13,32 +13,32 @@ constexpr int kAlong = 3;
 // Whole numbers are held as doubles here: conversions would take most of the time.
 class Chooser {
  public:
-  Chooser(const Bowl& bowl, const Places& places, double room)
-      : best_{bowl.best[0], bowl.best[1]},
+  Chooser(const Bowl& bowl, const Eigen::Vector2d& best, const Places& places, double room)
+      : bowl_(&bowl),
+        best_{best[0], best[1]},
         from_{static_cast<double>(places.from[0]), static_cast<double>(places.from[1])},
         places_(&places),
-        room_(room) {
-    const std::array<double, 2> steep = {bowl.xx, bowl.yy};
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const double other = steep[1 - axis];
-      per_step_[axis] = -bowl.xy / other;
-      along_[axis] = 0.5 * (steep[axis] + bowl.xy * per_step_[axis]);
-      across_[axis] = 0.5 * other;
-    }
-  }
+        room_(room) {}
 
   // The best place among those with this many steps on one axis.
   void consider(std::size_t axis, double steps_there) {
     const double off = steps_there - best_[axis];
-    const double other = best_[1 - axis] + per_step_[axis] * off;
+    const double other = best_[1 - axis] + bowl_->slant[axis] * off;
     const double whole = nearest_whole(other);
     const double extra =
-        along_[axis] * off * off + across_[axis] * (whole - other) * (whole - other);
+        bowl_->along[axis] * off * off + bowl_->beside[axis] * (whole - other) * (whole - other);
     if (extra < room_) {
       Steps to{};
       to[axis] = steps_there;
       to[1 - axis] = whole;
       add(to, extra);
+    }
+  }
+  // And those with so many around the best one.
+  void consider_around(std::size_t axis, int reach) {
+    const double middle = nearest_whole(best_[axis]);
+    for (int d = -reach; d <= reach; ++d) {
+      consider(axis, middle + d);
     }
   }
 
@@ -75,34 +75,27 @@ class Chooser {
            to[1] <= places_->most[1];
   }
 
+  const Bowl* bowl_;
   Steps best_;
   Steps from_;
   const Places* places_;
   double room_;
-  // By the axis that is given: where the cheapest place is when it goes a step further, and what
-  // the square of a step costs along that way, and beside it.
-  std::array<double, 2> per_step_{};
-  std::array<double, 2> along_{};
-  std::array<double, 2> across_{};
   StepEnds found_;
 };
 
 }  // namespace
 
-StepEnds cheapest_ends(const Bowl& bowl, const Places& places, double room) {
-  Chooser chooser(bowl, places, room);
-  const std::size_t along = bowl.xx < bowl.yy ? 0 : 1;
-  const auto best = [&](std::size_t axis) {
-    return nearest_whole(bowl.best[static_cast<Eigen::Index>(axis)]);
-  };
-  const double best_along = best(along);
-  for (int d = -kAlong; d <= kAlong; ++d) {
-    chooser.consider(along, best_along + d);
-  }
-  const double best_across = best(1 - along);
-  for (int d = -1; d <= 1; ++d) {
-    chooser.consider(1 - along, best_across + d);
-  }
+Bowl::Bowl(double xx, double xy, double yy)
+    : flat(xx < yy ? 0 : 1),
+      slant{-xy / yy, -xy / xx},
+      along{0.5 * (xx + xy * slant[0]), 0.5 * (yy + xy * slant[1])},
+      beside{0.5 * yy, 0.5 * xx} {}
+
+StepEnds cheapest_ends(const Bowl& bowl, const Eigen::Vector2d& best, const Places& places,
+                       double room) {
+  Chooser chooser(bowl, best, places, room);
+  chooser.consider_around(bowl.flat, kAlong);
+  chooser.consider_around(1 - bowl.flat, 1);
   if (chooser.found().count < StepEnds::kMost && places.min_steps > 1) {
     for (const std::size_t axis : {0U, 1U}) {
       const auto from = static_cast<double>(places.from[axis]);

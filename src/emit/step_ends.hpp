@@ -47,10 +47,15 @@ class StepGrid {
 
 // Whatever a place costs more than the best one: ½ (x, y) S (x, y)ᵀ of its distance, in steps.
 struct Bowl {
-  Eigen::Vector2d best = Eigen::Vector2d::Zero();  // in steps
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
+  Bowl() = default;
+  Bowl(double xx, double xy, double yy);
+
+  std::size_t flat = 0;  // the axis along which S is less
+  // By the axis that is given: how far the cheapest place on the other one moves with it, and what
+  // the square of a step costs along that way, and beside it.
+  std::array<double, 2> slant{};
+  std::array<double, 2> along{};
+  std::array<double, 2> beside{};
 };
 
 // Which places there are: at least min_steps from `from` on one axis, and from least to most.
@@ -70,7 +75,7 @@ struct StepEnd {
   double extra = 0.0;
 };
 
-// The cheapest ones, in order, all of them below `room`.
+// The cheapest ones around the best place, in steps; in order, all of them below `room`.
 struct StepEnds {
   static constexpr std::size_t kMost = 3;
   std::array<StepEnd, kMost> ends;
@@ -79,6 +84,7 @@ struct StepEnds {
   [[nodiscard]] const StepEnd* begin() const { return ends.data(); }
   [[nodiscard]] const StepEnd* end() const { return ends.data() + count; }
 };
-[[nodiscard]] StepEnds cheapest_ends(const Bowl& bowl, const Places& places, double room);
+[[nodiscard]] StepEnds cheapest_ends(const Bowl& bowl, const Eigen::Vector2d& best,
+                                     const Places& places, double room);
 
 }  // namespace unflex::emit

@@ -24,6 +24,8 @@ namespace {
 
 // States kept for each candidate time.
 constexpr std::size_t kKept = LineFan::kLanes;
+// Lines to one candidate, by what they promise, that set the bar for the others.
+constexpr std::ptrdiff_t kFirst = 8;
 // Candidates that are searched at once, and how far beyond them.
 constexpr std::size_t kBlock = 4096;
 constexpr std::size_t kBeyond = 512;
@@ -56,7 +58,11 @@ struct Lines {
   explicit Lines(const LineCosts& costs) : fan(costs) {}
 
   LineFan fan;
-  LineFan::Choice choice;  // of lines to the candidate that is being searched
+  // Of lines to the candidate that is being searched.
+  double duration_s = 0.0;
+  double price = 0.0;  // see Search::price()
+  LineFan::Choice choice;
+  Bowl bowl;
   std::size_t k = 0;
   std::size_t first = 0;  // of the states, in the arena
   std::size_t count = 0;
@@ -201,6 +207,8 @@ class Search {
       const std::size_t first = arena_.size();
       for (Lines* each : lines) {
         each->fan.reach(k - each->k);
+        each->duration_s = each->fan.duration_s();
+        each->price = price(k - each->k);
       }
       if (is_last && to_go_.may_rest(k)) {
         finish(lines, k);
@@ -288,7 +296,7 @@ class Search {
 
   // What a line that ends at candidate k costs beyond J, wherever that is.
   [[nodiscard]] double fixed_cost(const Lines& lines, std::size_t lane, std::size_t k) const {
-    return price(k - lines.k) + (costs_->time_s(k) < lines.earliest_s[lane] ? kTooMany : 0.0);
+    return lines.price + (costs_->time_s(k) < lines.earliest_s[lane] ? kTooMany : 0.0);
   }
 
   // A state with a line to another place.
@@ -300,7 +308,7 @@ class Search {
     next.k = k;
     next.at = to;
     next.parent = static_cast<std::int32_t>(lines.first + lane);
-    next.line_s = lines.fan.duration_s();
+    next.line_s = lines.duration_s;
     next.speed_mm_s = speed_to(state, to, next.line_s);
     next.z = lines.fan.after(lane, next.speed_mm_s);
     next.spent = state.spent + lines.fan.cost(lane, next.speed_mm_s) + fixed_cost(lines, lane, k) +
@@ -321,7 +329,7 @@ class Search {
   void finish(const std::vector<Lines*>& all, std::size_t k) {
     for (const Lines* lines : all) {
       const LineFan::Choice choice = lines->fan.choice(to_go_.resting(k));
-      const double duration_s = lines->fan.duration_s();
+      const double duration_s = lines->duration_s;
       for (std::size_t lane = 0; lane < lines->count; ++lane) {
         const State& state = arena_[lines->first + lane];
         const Eigen::Vector2d speed = speed_to(state, end_, duration_s);
@@ -342,6 +350,10 @@ class Search {
     options_.clear();
     for (Lines* lines : all) {
       lines->choice = lines->fan.choice(to_go_.at(k));
+      const Eigen::Vector2d per_step = grid_.step_mm() / lines->duration_s;
+      lines->bowl = Bowl(lines->choice.xx * per_step[0] * per_step[0],
+                         lines->choice.xy * per_step[0] * per_step[1],
+                         lines->choice.yy * per_step[1] * per_step[1]);
       for (std::size_t lane = 0; lane < lines->count; ++lane) {
         const double least = arena_[lines->first + lane].spent +
                              lines->choice.least[static_cast<Eigen::Index>(lane)] +
@@ -357,15 +369,16 @@ class Search {
     Places places{.min_steps = rules_->min_steps,
                   .least = grid_.steps(least_mm.cwiseMin(base - slack)),
                   .most = grid_.steps(most_mm.cwiseMax(base + slack))};
-    const auto later = [](const Option& a, const Option& b) { return a.least > b.least; };
-    std::ranges::make_heap(options_, later);
+    // With the best few the bar is set; the order of the others does not matter.
+    if (std::ssize(options_) > kFirst) {
+      std::ranges::nth_element(options_, options_.begin() + kFirst, {}, &Option::least);
+    }
     kept_.clear();
-    while (!options_.empty() && options_.front().least < most_to_keep()) {
-      const Option& option = options_.front();
-      places.from = arena_[option.lines->first + option.lane].at;
-      extend(option, places);
-      std::ranges::pop_heap(options_, later);
-      options_.pop_back();
+    for (const Option& option : options_) {
+      if (option.least < most_to_keep()) {
+        places.from = arena_[option.lines->first + option.lane].at;
+        extend(option, places);
+      }
     }
     for (const Line& line : kept_) {
       arena_.push_back(after_line(*line.lines, line.lane, k, line.to, line.total));
@@ -375,13 +388,10 @@ class Search {
   void extend(const Option& option, const Places& places) {
     const auto& [least, lines, lane] = option;
     const State& state = arena_[lines->first + lane];
-    const LineFan::Choice& choice = lines->choice;
-    const double duration_s = lines->fan.duration_s();
-    const Eigen::Vector2d per_step = grid_.step_mm() / duration_s;
-    const Bowl bowl{grid_.steps(start_mm(state) + duration_s * choice.best_mm_s(lane)),
-                    choice.xx * per_step[0] * per_step[0], choice.xy * per_step[0] * per_step[1],
-                    choice.yy * per_step[1] * per_step[1]};
-    for (const StepEnd& end : cheapest_ends(bowl, places, most_to_keep() - least)) {
+    const double duration_s = lines->duration_s;
+    const Eigen::Vector2d best =
+        grid_.steps(start_mm(state) + duration_s * lines->choice.best_mm_s(lane));
+    for (const StepEnd& end : cheapest_ends(lines->bowl, best, places, most_to_keep() - least)) {
       const Eigen::Vector2d change = speed_to(state, end.at, duration_s) - state.speed_mm_s;
       keep({least + end.extra + too_quick(change, state.line_s + duration_s), end.at, lines, lane});
     }

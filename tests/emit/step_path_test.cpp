@@ -204,25 +204,23 @@ TEST(CheapestEnds, AreTheCheapestOfAll) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   for (int i = 0; i < 200; ++i) {
-    Bowl bowl;
-    bowl.best = {50.0 * uniform(random), 50.0 * uniform(random)};
-    bowl.xx = 1.5 + uniform(random);
-    bowl.yy = 1.5 + uniform(random);
-    bowl.xy = 0.4 * uniform(random);
-    const Places places{{static_cast<std::int64_t>(bowl.best[0]), 0}, 3, {-45, -45}, {45, 45}};
-    const StepEnds found = cheapest_ends(bowl, places, 100.0);
+    const Eigen::Vector2d best(50.0 * uniform(random), 50.0 * uniform(random));
+    const double xx = 1.5 + uniform(random);
+    const double yy = 1.5 + uniform(random);
+    const double xy = 0.4 * uniform(random);
+    const Places places{{static_cast<std::int64_t>(best[0]), 0}, 3, {-45, -45}, {45, 45}};
+    const StepEnds found = cheapest_ends(Bowl(xx, xy, yy), best, places, 100.0);
     double cheapest = 100.0;
     for (std::int64_t x = -45; x <= 45; ++x) {
       for (std::int64_t y = -45; y <= 45; ++y) {
-        const double dx = static_cast<double>(x) - bowl.best[0];
-        const double dy = static_cast<double>(y) - bowl.best[1];
+        const double dx = static_cast<double>(x) - best[0];
+        const double dy = static_cast<double>(y) - best[1];
         if (places.far_enough({x, y})) {
-          cheapest = std::min(
-              cheapest, 0.5 * (bowl.xx * dx * dx + 2.0 * bowl.xy * dx * dy + bowl.yy * dy * dy));
+          cheapest = std::min(cheapest, 0.5 * (xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy));
         }
       }
     }
-    if (std::abs(bowl.best[0]) > 44.0 || std::abs(bowl.best[1]) > 44.0) {
+    if (std::abs(best[0]) > 44.0 || std::abs(best[1]) > 44.0) {
       continue;  // at the edge only some are tried
     }
     ASSERT_GT(found.count, 0U);
