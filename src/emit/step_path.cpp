@@ -176,7 +176,8 @@ class Search {
       result.push_back(until);
     }
     // Across the wanted time.
-    const std::size_t any_length = too_many_wanted(k) ? candidates(rules_->even_line_s()) : 0;
+    const std::size_t any_length =
+        too_many_wanted(k) ? costs_->candidates(rules_->even_line_s()) : 0;
     for (m = std::max(shortest_, until + 1); m <= most; ++m) {
       if (m > std::max(2 * shortest_, any_length) &&
           (costs_->base_mm(k + m) - costs_->base_mm(k)).norm() > kAcross_mm) {
@@ -191,8 +192,9 @@ class Search {
     constexpr std::ptrdiff_t kSome = 4;
     const auto next = std::ranges::upper_bound(wanted_, k);
     return wanted_.end() - next >= kSome &&
-           *(next + kSome - 1) < k + kSome * candidates(rules_->even_line_s());
+           *(next + kSome - 1) < k + kSome * costs_->candidates(rules_->even_line_s());
   }
+
   // Searches candidates from `from` to `until`; the best state at the end, in arena_.
   std::optional<std::size_t> block(State begin, std::size_t from, std::size_t until, bool is_last) {
     to_go_.compute(from, until, is_last);
