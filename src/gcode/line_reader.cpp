@@ -25,14 +25,22 @@ std::string_view Line::content() const {
 LineReader::LineReader(std::istream& stream, std::string name)
     : stream_(&stream), name_(std::move(name)), block_(kBlockBytes) {}
 
+// With what the stream has: one that is still being written may long have no more.
+void LineReader::fill_block() {
+  cursor_ = 0;
+  filled_ = 0;
+  if (stream_->peek() != std::istream::traits_type::eof()) {
+    filled_ = static_cast<std::size_t>(
+        stream_->readsome(block_.data(), static_cast<std::streamsize>(block_.size())));
+  }
+}
+
 Result<bool> LineReader::next(Line& line) {
   line.text.clear();
   line.number = line_number_ + 1;
   while (!line.text.ends_with('\n')) {
     if (cursor_ == filled_) {
-      stream_->read(block_.data(), static_cast<std::streamsize>(block_.size()));
-      filled_ = static_cast<std::size_t>(stream_->gcount());
-      cursor_ = 0;
+      fill_block();
       if (stream_->bad()) {
         return fail(ErrorKind::internal, {name_, line.number},
                     "cannot read on: input/output error");

@@ -117,6 +117,42 @@ class BrokenDisk : public std::streambuf {
   int_type underflow() override { throw std::ios_base::failure("broken"); }
 };
 
+// Gives its texts one by one, and remembers how many it was asked for.
+class Portions final : public std::streambuf {
+ public:
+  explicit Portions(std::vector<std::string> texts) : texts_(std::move(texts)) {}
+  [[nodiscard]] std::size_t given() const { return given_; }
+
+ protected:
+  int_type underflow() override {
+    if (given_ == texts_.size()) {
+      return traits_type::eof();
+    }
+    std::string& text = texts_[given_++];
+    setg(text.data(), text.data(), text.data() + text.size());
+    return traits_type::to_int_type(*gptr());
+  }
+
+ private:
+  std::vector<std::string> texts_;
+  std::size_t given_ = 0;
+};
+
+TEST(LineReader, GivesALineAsSoonAsItIsThere) {
+  Portions portions({"a\nb\nc", "c\nd", "\n", "e"});
+  std::istream stream(&portions);
+  LineReader reader(stream, "test.gcode");
+  Line line;
+  const std::vector<std::pair<std::string, std::size_t>> expected = {
+      {"a\n", 1}, {"b\n", 1}, {"cc\n", 2}, {"d\n", 3}, {"e", 4}};
+  for (const auto& [text, given] : expected) {
+    ASSERT_TRUE(reader.next(line).value());
+    EXPECT_EQ(line.text, text);
+    EXPECT_EQ(portions.given(), given);
+  }
+  EXPECT_FALSE(reader.next(line).value());
+}
+
 TEST(LineReader, ReportsAStreamThatFails) {
   BrokenDisk disk;
   std::istream stream(&disk);

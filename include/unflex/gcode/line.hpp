@@ -26,7 +26,7 @@ class LineReader {
   // The stream must outlive the reader and be opened in binary mode. name: for messages.
   LineReader(std::istream& stream, std::string name);
 
-  // The next line; false at the end. An error when the stream fails, when a NUL byte shows that
+  // The next line, as soon as the stream has it; false at the end. An error when the stream fails, when a NUL byte shows that
   // this is no text, or when a line is longer than 1 MiB.
   [[nodiscard]] Result<bool> next(Line& line);
 
@@ -35,6 +35,8 @@ class LineReader {
   [[nodiscard]] std::size_t bytes_read() const { return bytes_read_; }
 
  private:
+  void fill_block();
+
   std::istream* stream_;
   std::string name_;
   std::vector<char> block_;

@@ -1,0 +1,195 @@
+// What runs beside the main thread.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <thread>
+
+#include "cpu_slots.hpp"
+#include "gap_check.hpp"
+#include "jobs.hpp"
+#include "stage_options.hpp"
+#include "task_pool.hpp"
+#include "verify_thread.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(TaskPool, CarriesOutEveryTaskAndNoMoreAtATimeThanThereAreSlots) {
+  CpuSlots slots(2);
+  std::atomic<int> done = 0;
+  std::atomic<int> at_once = 0;
+  std::atomic<int> most = 0;
+  {
+    TaskPool pool(4, slots);
+    for (int i = 0; i < 40; ++i) {
+      pool.submit([&] {
+        const int now = ++at_once;
+        for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
+        }
+        std::this_thread::sleep_for(1ms);
+        --at_once;
+        ++done;
+      });
+    }
+    while (done < 40) {
+      std::this_thread::sleep_for(1ms);
+    }
+  }
+  EXPECT_EQ(done, 40);
+  EXPECT_EQ(most, 2);
+}
+
+TEST(TaskPool, DropsWhatIsLeftWhenItEnds) {
+  CpuSlots slots(1);
+  std::atomic<int> begun = 0;
+  {
+    TaskPool pool(1, slots);
+    for (int i = 0; i < 1000; ++i) {
+      pool.submit([&] {
+        ++begun;
+        std::this_thread::sleep_for(1ms);
+      });
+    }
+  }
+  EXPECT_LT(begun, 1000);
+}
+
+TEST(TaskPool, WithoutThreadsWorksAtOnce) {
+  CpuSlots slots(1);
+  TaskPool pool(0, slots);
+  bool done = false;
+  pool.submit([&] { done = true; });
+  EXPECT_TRUE(done);
+}
+
+TEST(CpuSlot, IsFreeForOthersWhileItsHolderWaits) {
+  CpuSlots slots(1);
+  const CpuSlot slot(slots);
+  bool done = false;
+  std::jthread other;
+  {
+    const CpuSlot::Without without(slots);
+    other = std::jthread([&] {
+      const CpuSlot mine(slots);
+      done = true;
+    });
+    other.join();
+  }
+  EXPECT_TRUE(done);
+}
+
+constexpr const char* kPrint =
+    "G90\nM83\nG1 X50 Y50 Z0.4 F6000\nG1 X60 Y50 E0.5\nG1 X60 Y60 E0.5\nM84\n";
+
+TEST(VerifyThread, FindsWhatVerifyingAfterwardsFinds) {
+  CpuSlots slots(1);
+  const SilentProgress progress;
+  VerifyThread thread(verify_rules(testing::settings()), "in", "out", progress, slots);
+  // Texts come in pieces that are no whole lines, and one long before the other.
+  const std::string text = kPrint;
+  thread.push("", text.substr(0, 20));
+  thread.push(text.substr(0, 33), text.substr(20));
+  thread.push(text.substr(33), "");
+  thread.end();
+  const Result<verify::VerifyReport> result = thread.result();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->violation_count, 0U);
+  EXPECT_EQ(result->output_lines, 6U);
+  EXPECT_GT(result->uncompensated.extruding.contour_max_mm, 0.01);
+}
+
+TEST(VerifyThread, IsBehindUntilItHasReadWhatItWasGiven) {
+  CpuSlots slots(1);
+  const SilentProgress progress;
+  VerifyThread thread(verify_rules(testing::settings()), "in", "out", progress, slots);
+  std::string long_text;
+  while (long_text.size() < (5U << 20U)) {
+    long_text += "; nothing that would take the machine anywhere\n";
+  }
+  {
+    const CpuSlot slot(slots);  // it cannot work
+    thread.push(long_text, long_text);
+    EXPECT_TRUE(thread.is_behind());
+  }
+  thread.end();
+  ASSERT_TRUE(thread.result().has_value());
+  EXPECT_FALSE(thread.is_behind());
+}
+
+TEST(VerifyThread, EndsUnaskedWhenItIsNoLongerWanted) {
+  CpuSlots slots(1);
+  const SilentProgress progress;
+  VerifyThread thread(verify_rules(testing::settings()), "in", "out", progress, slots);
+  thread.push(kPrint, kPrint);
+}
+
+// Jobs with these numbers of windows, as the reader would have them.
+std::vector<std::unique_ptr<RunJob>> jobs(const std::vector<std::size_t>& windows) {
+  std::vector<std::unique_ptr<RunJob>> result;
+  for (const std::size_t count : windows) {
+    result.push_back(std::make_unique<RunJob>());
+    result.back()->spans.resize(count);
+  }
+  return result;
+}
+
+// Which axes of windows a file of that many windows has for probes, in the order of the slots.
+std::vector<std::size_t> chosen(const std::vector<std::size_t>& windows) {
+  GapCheck check;
+  std::size_t before = 0;
+  for (const std::unique_ptr<RunJob>& job : jobs(windows)) {
+    check.choose(*job);
+    for (Probe& probe : job->probes) {
+      probe.solution.iterations = static_cast<int>(2 * (before + probe.window) + probe.axis);
+    }
+    before += job->spans.size();
+    check.take(*job);
+  }
+  std::vector<std::size_t> result;
+  for (const Probe& probe : check.probes()) {
+    result.push_back(static_cast<std::size_t>(probe.solution.iterations));
+  }
+  return result;
+}
+
+TEST(GapCheck, TakesEverythingOfASmallFile) {
+  EXPECT_EQ(chosen({1, 2}), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
+}
+
+TEST(GapCheck, TakesAFixedSampleOfALargeOneHoweverItIsCut) {
+  const std::vector<std::size_t> sample = chosen(std::vector<std::size_t>(500, 1));
+  EXPECT_EQ(sample.size(), GapCheck::kProbes);
+  EXPECT_EQ(chosen({300, 200}), sample);
+  EXPECT_GT(*std::ranges::max_element(sample), 500U);
+  EXPECT_LT(*std::ranges::min_element(sample), 500U);
+}
+
+TEST(GapCheck, GivesTheLargestDifferences) {
+  Probe probe;
+  probe.problem.reference_mm.resize(5);
+  probe.problem.weight.resize(5);
+  probe.solution.objective = 1.02e-6;
+  probe.solution.base.position_mm = {1.0, 2.0, 3.5};
+  compensate::AxisSolution second = probe.solution;
+  second.objective = 1e-6;
+  second.base.position_mm = {1.0, 2.25, 3.5};
+  report::SolverCheck check;
+  GapCheck::compare(probe, second, check);
+  EXPECT_NEAR(check.largest_gap, 0.02, 1e-9);
+  EXPECT_EQ(check.largest_difference_mm, 0.25);
+  EXPECT_EQ(check.windows, 1U);
+  // Nothing moves: what is left is rounding.
+  probe.solution.objective = 3e-22;
+  probe.solution.base = second.base;
+  second.objective = 1e-22;
+  report::SolverCheck still;
+  GapCheck::compare(probe, second, still);
+  EXPECT_LT(still.largest_gap, 1e-6);
+}
+
+}  // namespace
+}  // namespace unflex::pipeline
