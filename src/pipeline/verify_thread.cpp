@@ -14,6 +14,7 @@ void TextQueue::push(std::string text) {
   {
     const std::lock_guard lock(mutex_);
     bytes_ += text.size();
+    reader_waits_ = reader_waits_ && text.empty();
     texts_.push_back(std::move(text));
   }
   changed_.notify_one();
@@ -32,11 +33,17 @@ bool TextQueue::is_long() {
   return bytes_ > kLong_bytes;
 }
 
+bool TextQueue::is_starved() {
+  const std::lock_guard lock(mutex_);
+  return reader_waits_;
+}
+
 TextQueue::int_type TextQueue::underflow() {
   const auto ready = [this] { return ended_ || !texts_.empty(); };
   for (;;) {
     std::unique_lock lock(mutex_);
     if (!ready()) {
+      reader_waits_ = true;
       lock.unlock();
       const CpuSlot::Without without(*slots_);
       lock.lock();
@@ -87,7 +94,10 @@ void VerifyThread::push(std::string input, std::string output) {
   output_.push(std::move(output));
 }
 
-bool VerifyThread::is_behind() { return !done_ && (input_.is_long() || output_.is_long()); }
+bool VerifyThread::is_behind() {
+  return !done_ && (input_.is_long() || output_.is_long()) && !input_.is_starved() &&
+         !output_.is_starved();
+}
 
 void VerifyThread::end() {
   input_.end();

@@ -25,6 +25,8 @@ class TextQueue final : public std::streambuf {
   void end();
   // Whether more than a few MB are still to be read.
   [[nodiscard]] bool is_long();
+  // Whether the reader waits for more.
+  [[nodiscard]] bool is_starved();
 
  protected:
   int_type underflow() override;
@@ -35,6 +37,7 @@ class TextQueue final : public std::streambuf {
   std::condition_variable changed_;
   std::deque<std::string> texts_;
   std::size_t bytes_ = 0;
+  bool reader_waits_ = false;
   bool ended_ = false;
   std::string current_;  // the reader's
 };
@@ -51,7 +54,8 @@ class VerifyThread {
 
   // The next piece of both texts. Does not wait.
   void push(std::string input, std::string output);
-  // Whether it is so far behind that it should be waited for.
+  // Whether it is so far behind that it should be waited for. Never while it waits itself: a run
+  // of many MB is read to its end only when what follows is there.
   [[nodiscard]] bool is_behind();
   // Both texts have ended.
   void end();

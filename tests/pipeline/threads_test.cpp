@@ -120,6 +120,16 @@ TEST(VerifyThread, IsBehindUntilItHasReadWhatItWasGiven) {
   EXPECT_FALSE(thread.is_behind());
 }
 
+TEST(VerifyThread, IsNotWaitedForWhileItWaitsForOneOfTheTexts) {
+  CpuSlots slots(1);
+  const SilentProgress progress;
+  VerifyThread thread(verify_rules(testing::settings()), "in", "out", progress, slots);
+  thread.push("", std::string(5U << 20U, '\n'));
+  while (thread.is_behind()) {
+    std::this_thread::sleep_for(1ms);
+  }
+}
+
 TEST(VerifyThread, EndsUnaskedWhenItIsNoLongerWanted) {
   CpuSlots slots(1);
   const SilentProgress progress;
