@@ -138,6 +138,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const std::vector<double> event_times_s = table.event_times_s();
   LineRules rules = options.lines;
   rules.tolerance_mm *= run.tolerance_share;
+  rules.burst_lines = static_cast<int>(run.lines_share * rules.burst_lines);
   const Polygon vertices =
       polygon(run, table, wanted_times(run, table, event_times_s), grid, rules);
   const std::vector<double>& times = vertices.times_s;

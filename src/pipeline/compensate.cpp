@@ -228,7 +228,8 @@ class Compensator {
       if (!*output_) {
         return disk_full(job_);
       }
-      const bool few = nodes_queued_ <= ahead && (ahead > 0 || queue_.empty());
+      // However long the only run is, what follows it must be known.
+      const bool few = ahead > 0 ? nodes_queued_ <= ahead || queue_.size() <= 1 : queue_.empty();
       if (few && !(verifier_ && verifier_->is_behind())) {
         return {};
       }

@@ -44,9 +44,17 @@ std::vector<double> even_lines_before_s(const emit::LineRules& rules) {
 
 }  // namespace
 
-emit::Run RunJob::run(double tolerance_share, std::vector<double> lines_before_s) const {
-  return {&piece.events,   &piece.move_counts,        &piece.moves, &base, setup.lead_in_s,
-          tolerance_share, std::move(lines_before_s), lines_after};
+emit::Run RunJob::run(double tolerance_share, double lines_share,
+                      std::vector<double> lines_before_s) const {
+  return {.events = &piece.events,
+          .move_counts = &piece.move_counts,
+          .moves = &piece.moves,
+          .base = &base,
+          .lead_in_s = setup.lead_in_s,
+          .tolerance_share = tolerance_share,
+          .lines_share = lines_share,
+          .lines_before_s = std::move(lines_before_s),
+          .lines_after = lines_after};
 }
 
 AxisResult axis_result(Result<compensate::AxisSolution> solution) {
@@ -87,7 +95,7 @@ void prepare(RunJob& job, const RunRules& rules) noexcept {
     job.failure = failure_of(job);
     if (job.failure.empty()) {
       job.base = {job.setup.period_s, joined(job, 0), joined(job, 1)};
-      job.plan = emit::plan_run(job.run(1.0, even_lines_before_s(rules.emit.lines)),
+      job.plan = emit::plan_run(job.run(1.0, 1.0, even_lines_before_s(rules.emit.lines)),
                                 job.piece.start, rules.emit);
       job.before = deviation_of(job.piece.moves, job.piece.moves, job.nozzle, rules.verify, 0.0);
     }

@@ -93,6 +93,39 @@ TEST(Strokes, EndExactlyWhereAndWithWhatTheMovesEnd) {
   }
 }
 
+// Most strokes that begin within any 100 ms.
+std::size_t most_at_once(const std::vector<Stroke>& drawn) {
+  std::size_t most = 0;
+  for (std::size_t first = 0; first < drawn.size(); ++first) {
+    const auto begin_s = [&](std::size_t i) { return i > 0 ? drawn[i - 1].end_s : 0.0; };
+    std::size_t after = first;
+    while (after < drawn.size() && begin_s(after) < begin_s(first) + 0.1) {
+      ++after;
+    }
+    most = std::max(most, after - first);
+  }
+  return most;
+}
+
+TEST(Strokes, AreNoMoreThanTheirShareOfTheBudget) {
+  EmitOptions how = options();
+  how.fixed.firmware = Firmware::marlin;
+  how.lines.burst_lines = 20;
+  how.lines.min_line_s = 2e-3;
+  how.lines.min_steps = 6;
+  Grid grid;
+  grid.x = grid.y = {0.0, 0.0125};
+  const Path path = random_path(7, 40);
+  const dynamics::BaseTrajectory base = testing::plan_as_base(path.moves);
+  emit::Run run{&path.events, &path.move_counts, &path.moves, &base};
+  for (const double share : {1.0, 0.85, 0.5}) {
+    run.lines_share = share;
+    const std::size_t most = most_at_once(strokes(run, grid, how));
+    EXPECT_LE(static_cast<double>(most), 20.0 * share);
+    EXPECT_GT(static_cast<double>(most), 10.0 * share);
+  }
+}
+
 TEST(Strokes, LieOnTheGridAndTakeNoLessThanTheShortestTime) {
   for (const double shortest : {1e-3, 2e-3, 5e-3}) {
     EmitOptions how = options();
