@@ -18,6 +18,9 @@ class Input {
   // Copies what cannot be read twice (stdin, pipes) to a temporary file without a name.
   [[nodiscard]] Status make_seekable();
 
+  // Of what cannot be read twice, to read it once; otherwise −1.
+  [[nodiscard]] int stream_fd() const { return is_stream_ ? fd_.get() : -1; }
+
   // Where to read it, and what the user calls it.
   [[nodiscard]] std::filesystem::path path() const;
   [[nodiscard]] const std::string& name() const { return name_; }

@@ -125,15 +125,29 @@ Status Output::replace_target() {
   return {};
 }
 
+Status Output::open_stream() {
+  stream_ = FileDescriptor(name_ == kStandardStream ? ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3)
+                                                    : ::open(name_.c_str(), O_WRONLY | O_CLOEXEC));
+  return stream_.valid() ? Status{} : Status(cannot_write(errno));
+}
+
+Result<int> Output::stream_fd() {
+  if (!target_.empty()) {
+    return -1;
+  }
+  return open_stream().map([&] { return stream_.get(); });
+}
+
 Status Output::copy_to_stream() {
   const FileDescriptor source(::open(temporary_.path().c_str(), O_RDONLY | O_CLOEXEC));
-  const FileDescriptor stream(name_ == kStandardStream
-                                  ? ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3)
-                                  : ::open(name_.c_str(), O_WRONLY | O_CLOEXEC));
-  if (!source.valid() || !stream.valid()) {
+  if (!source.valid()) {
     return cannot_write(errno);
   }
-  const int error = copy_all(source.get(), stream.get());
+  if (Status opened = open_stream(); !opened) {
+    return opened;
+  }
+  const int error = copy_all(source.get(), stream_.get());
+  stream_ = FileDescriptor();  // whoever reads it learns that this was all
   return error == 0 ? Status{} : Status(cannot_write(error));
 }
 

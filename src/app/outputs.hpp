@@ -23,6 +23,9 @@ class Output {
   [[nodiscard]] const std::filesystem::path& path() const { return temporary_.path(); }
   [[nodiscard]] Status write(std::string_view text);
 
+  // Of a stream, to write to it at once and not commit(); otherwise −1. Errors as of commit().
+  [[nodiscard]] Result<int> stream_fd();
+
   // Errors are of kind internal; the old file is then as it was.
   [[nodiscard]] Status commit();
 
@@ -31,12 +34,14 @@ class Output {
       : name_(std::move(name)), target_(std::move(target)), temporary_(std::move(temporary)) {}
 
   [[nodiscard]] Status replace_target();
+  [[nodiscard]] Status open_stream();
   [[nodiscard]] Status copy_to_stream();
   [[nodiscard]] tl::unexpected<Error> cannot_write(int error) const;
 
   std::string name_;
   std::filesystem::path target_;  // empty for a stream
   TemporaryFile temporary_;
+  FileDescriptor stream_;
 };
 
 }  // namespace unflex::app

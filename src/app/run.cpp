@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <exception>
+#include <filesystem>
 #include <optional>
 
 #include "console.hpp"
@@ -37,7 +38,7 @@ ExitCode exit_code(ErrorKind kind) {
 }
 
 tl::unexpected<Error> interrupted() {
-  return fail(ErrorKind::internal, "interrupted, nothing was written");
+  return fail(ErrorKind::internal, "interrupted, no file was written");
 }
 
 // Two names for one file would have the result destroy what it was made from.
@@ -95,7 +96,11 @@ Status open_outputs(const RunConfig& config, Workspace& space) {
   return {};
 }
 
-Status spool(Workspace& space) {
+// What is read more than once.
+Status spool(const RunConfig& config, Workspace& space) {
+  if (config.command == Command::compensate) {
+    return {};
+  }
   if (Status copied = space.input.make_seekable(); !copied) {
     return copied;
   }
@@ -121,7 +126,7 @@ Result<Workspace> prepare(const RunConfig& config) {
   }
   const Status ready =
       check_distinct(config).and_then([&] { return open_outputs(config, space); }).and_then([&] {
-        return spool(space);
+        return spool(config, space);
       });
   if (!ready) {
     return tl::unexpected(ready.error());
@@ -129,13 +134,19 @@ Result<Workspace> prepare(const RunConfig& config) {
   return space;
 }
 
-pipeline::Job job_of(const RunConfig& config, const Workspace& space) {
+Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   pipeline::Job job;
   job.input = space.input.path();
   job.input_name = space.input.name();
   job.output_name = config.output;
   if (space.output) {
     job.output = space.output->path();
+    const Result<int> stream = space.output->stream_fd();
+    if (!stream) {
+      return tl::unexpected(stream.error());
+    }
+    job.output_fd = *stream;
+    job.input_fd = space.input.stream_fd();
   } else if (space.compensated) {
     job.output = space.compensated->path();
   }
@@ -200,11 +211,16 @@ Status write_report(Workspace& space, std::string_view text) {
   return space.report->commit();
 }
 
-// What the results say about success: broken rules before deviation.
-ExitCode judge(const RunConfig& config, const report::Report& report) {
+// What the results say about success: broken rules before deviation. passed_on: the output has gone
+// to a stream as it came.
+ExitCode judge(const RunConfig& config, bool passed_on, const report::Report& report) {
+  const std::string_view consequence =
+      passed_on ? "what was passed on must not be printed" : "nothing was written";
+
   print_lines(report.violations, report.violation_count, "violations");
   if (report.violation_count > 0 && config.command == Command::compensate) {
-    print_line("unflex: the result breaks rules, which is a fault of unflex; nothing was written");
+    print_line(fmt::format("unflex: the result breaks rules, which is a fault of unflex; {}",
+                           consequence));
     return ExitCode::internal;
   }
   if (report.violation_count > 0) {
@@ -215,16 +231,16 @@ ExitCode judge(const RunConfig& config, const report::Report& report) {
     print_line(
         fmt::format("{}: extruding moves stray up to {:.4g} mm, more than --max-deviation {}{}",
                     config.output, deviation_mm, *config.max_deviation_mm,
-                    config.command == Command::compensate ? "; nothing was written" : ""));
+                    config.command == Command::compensate ? fmt::format("; {}", consequence) : ""));
     return ExitCode::deviation;
   }
   return ExitCode::done;
 }
 
 // An output that failed is not handed on, but what is known about it is.
-Status deliver(const RunConfig& config, Workspace& space, ExitCode verdict,
+Status deliver(const RunConfig& config, Workspace& space, ExitCode verdict, bool passed_on,
                const report::Report& report) {
-  if (space.output && verdict == ExitCode::done) {
+  if (space.output && verdict == ExitCode::done && !passed_on) {
     if (Status committed = space.output->commit(); !committed) {
       return committed;
     }
@@ -239,18 +255,23 @@ Result<ExitCode> run_on_prints(const RunConfig& config) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  const pipeline::Job job = job_of(config, *space);
+  const Result<pipeline::Job> job = job_of(config, *space);
+  if (!job) {
+    return tl::unexpected(job.error());
+  }
   Result<report::Report> report = with_progress(config, [&](Progress& progress) {
-    return config.command == Command::compensate ? pipeline::compensate(job, progress)
-                                                 : pipeline::verify(job, progress);
+    return config.command == Command::compensate ? pipeline::compensate(*job, progress)
+                                                 : pipeline::verify(*job, progress);
   });
   if (!report) {
     return tl::unexpected(report.error());
   }
   add_setting_warnings(space->settings, report->warnings);
   print_warnings(report->warnings);
-  const ExitCode verdict = judge(config, *report);
-  return deliver(config, *space, verdict, *report).map([&] { return verdict; });
+  const ExitCode verdict = judge(config, job->output_fd >= 0, *report);
+  return deliver(config, *space, verdict, job->output_fd >= 0, *report).map([&] {
+    return verdict;
+  });
 }
 
 Result<ExitCode> run_inspect(const RunConfig& config) {
@@ -258,9 +279,12 @@ Result<ExitCode> run_inspect(const RunConfig& config) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  const pipeline::Job job = job_of(config, *space);
+  const Result<pipeline::Job> job = job_of(config, *space);
+  if (!job) {
+    return tl::unexpected(job.error());
+  }
   Result<pipeline::Inspection> inspection =
-      with_progress(config, [&](Progress& progress) { return pipeline::inspect(job, progress); });
+      with_progress(config, [&](Progress& progress) { return pipeline::inspect(*job, progress); });
   if (!inspection) {
     return tl::unexpected(inspection.error());
   }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <cstring>
 #include <deque>
 #include <filesystem>
 #include <fstream>
@@ -12,8 +13,10 @@
 #include <utility>
 
 #include "compensate_with.hpp"
+#include "fd_stream.hpp"
 #include "gap_check.hpp"
 #include "nozzle_motion.hpp"
+#include "piece_thread.hpp"
 #include "report_rows.hpp"
 #include "retime.hpp"
 #include "run_writer.hpp"
@@ -34,8 +37,6 @@ constexpr std::size_t kWindowsAhead = 24;
 constexpr std::size_t kWindowsAtOnce = 8;
 // A run's trajectory is held as a whole, 48 bytes per node; longer ones are left as they are.
 constexpr std::size_t kMaxRunNodes = 8'000'000;
-// Of the time of the whole job, for the progress bar, where the output is verified afterwards.
-constexpr double kShareOfCompensation = 0.9;
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kShortPatience{2};
 
@@ -67,61 +68,81 @@ tl::unexpected<Error> disk_full(const Job& job) {
 // for what is in the pools.
 class Compensator {
  public:
-  Compensator(const Job& job, Engines engines, WorkerPool& processes, std::istream& input,
-              std::ostream& output, Progress& progress, report::Report& report)
+  Compensator(const Job& job, const Engines& engines, WorkerPool& processes, std::istream& input,
+              std::ostream& output, Progress& progress, CpuSlots& slots, report::Report& report)
       : job_(job),
-        engines_(std::move(engines)),
+        checks_(engines.threaded && engines.second),
         rules_{compensate_setup(job.settings), emit_options(job.settings, UNFLEX_VERSION),
                verify_rules(job.settings)},
-        reader_(input, job.input_name, rules_.verify.interpreter, rules_.verify.limits,
-                rules_.verify.fixed),
         processes_(&processes),
         output_(&output),
         progress_(&progress),
+        slots_(&slots),
         report_(&report),
         writer_(rules_, job.settings.max_lines_per_s(), report),
-        input_bytes_(static_cast<double>(std::filesystem::file_size(job.input))),
-        slots_(job.workers) {
-    if (engines_.threaded) {
-      engine_ = engines_.threaded();
-      verifier_.emplace(rules_.verify, job.input_name, job.output_name, progress, slots_);
-      pool_.emplace(std::max(job.workers, 1U), slots_);
-    } else {
-      pool_.emplace(0U, slots_);
-    }
-  }
+        input_bytes_(job.input_fd < 0 ? static_cast<double>(std::filesystem::file_size(job.input))
+                                      : 0.0),
+        engine_(engines.threaded ? engines.threaded() : nullptr),
+        pieces_(input, job.input_name, rules_.verify, slots, [this] { wake(); }),
+        verifier_(rules_.verify, job.input_name, job.output_name, slots),
+        pool_(std::max(job.workers, 1U), slots) {}
 
   Status work() {
-    const CpuSlot slot(slots_);
-    for (;;) {
-      auto job = std::make_shared<RunJob>();
-      const Result<bool> more = reader_.next(job->piece);
-      if (!more) {
-        return tl::unexpected(more.error());
+    const CpuSlot slot(*slots_);
+    while (!(all_read_ && queue_.empty())) {
+      feed();
+      while (can_write()) {
+        write(*queue_.front());
+        queue_.pop_front();
       }
-      if (!*more) {
-        break;
+      if (progress_->cancelled()) {
+        return fail(ErrorKind::internal, "cancelled");
       }
-      admit(std::move(job));
-      if (Status status = drain(kNodesAhead * std::max(job_.workers, 1U)); !status) {
-        return status;
+      if (!*output_) {
+        return disk_full(job_);
+      }
+      if (!(has_room() && take_piece())) {
+        wait();
       }
     }
-    all_read_ = true;
-    if (Status status = drain(0); !status) {
-      return status;
+    if (pieces_.error()) {
+      return tl::unexpected(*pieces_.error());
     }
     put({}, writer_.finish());
-    for (const Diagnostic& warning : reader_.warnings()) {
+    for (const Diagnostic& warning : pieces_.warnings()) {
       report_->warnings.push_back(to_string(warning));
     }
-    if (Status status = check_engine(); !status) {
-      return status;
-    }
-    return finish_verification();
+    verifier_.end();
+    return check_engine().and_then([&] { return finish_verification(); });
   }
 
  private:
+  void wake() {
+    const std::lock_guard lock(mutex_);
+    news_.notify_one();
+  }
+
+  // Whether more should be read. However long the only run is, what follows it must be known.
+  [[nodiscard]] bool has_room() {
+    return (nodes_queued_ <= kNodesAhead * std::max(job_.workers, 1U) || queue_.size() <= 1) &&
+           !verifier_.is_behind();
+  }
+
+  // Takes what has been read; false when nothing has.
+  bool take_piece() {
+    if (std::unique_ptr<Piece> piece = pieces_.take()) {
+      auto job = std::make_shared<RunJob>();
+      job->piece = std::move(*piece);
+      admit(std::move(job));
+      return true;
+    }
+    if (!all_read_ && pieces_.at_end()) {
+      all_read_ = true;
+      return true;
+    }
+    return false;
+  }
+
   // Queues the piece.
   void admit(std::shared_ptr<RunJob> job) {
     const Piece& piece = job->piece;
@@ -147,7 +168,7 @@ class Compensator {
       job->prepared = job->spans.empty();
       report_->windows_total += job->spans.size();
       nodes_queued_ += nodes_of(*job);
-      if (engine_ && engines_.second) {
+      if (checks_) {
         gaps_.choose(*job);
       }
     } else {
@@ -162,7 +183,6 @@ class Compensator {
       queue_.back()->lines_after = verify::LineRate::first_lines(piece.moves);
     }
     queue_.push_back(std::move(job));
-    feed();
   }
 
   static std::size_t nodes_of(const RunJob& job) {
@@ -192,12 +212,11 @@ class Compensator {
   }
 
   void solve_in_thread(const std::shared_ptr<RunJob>& job, std::size_t first, std::size_t count) {
-    pool_->submit([this, job, first, count] {
+    pool_.submit([this, job, first, count] {
       solve_windows(*job, first, count, *engine_);
       if (job->missing.fetch_sub(2 * count) == 2 * count) {
         prepare(*job, rules_);
-        const std::lock_guard lock(mutex_);
-        ready_.notify_one();
+        wake();
       }
     });
   }
@@ -213,42 +232,21 @@ class Compensator {
     }
   }
 
-  // Writes pieces that are complete until runs of at most `ahead` nodes are queued; for 0 until
-  // everything is written.
-  Status drain(std::size_t ahead) {
-    for (;;) {
-      feed();
-      while (can_write()) {
-        write(*queue_.front());
-        queue_.pop_front();
-      }
-      if (progress_->cancelled()) {
-        return fail(ErrorKind::internal, "cancelled, nothing was written");
-      }
-      if (!*output_) {
-        return disk_full(job_);
-      }
-      // However long the only run is, what follows it must be known.
-      const bool few = ahead > 0 ? nodes_queued_ <= ahead || queue_.size() <= 1 : queue_.empty();
-      if (few && !(verifier_ && verifier_->is_behind())) {
-        return {};
-      }
-      wait();
-    }
-  }
-
+  // For something to do.
   void wait() {
-    if (!engine_) {
-      if (std::optional<WorkerPool::Done> done =
-              processes_->take(static_cast<int>(kPatience.count()))) {
+    if (processes_->under_way() > 0) {
+      const CpuSlot::Without without(*slots_);
+      if (std::optional<WorkerPool::Done> done = processes_->take(kShortPatience.count())) {
         place(std::move(*done));
       }
       return;
     }
-    const CpuSlot::Without without(slots_);
+    const CpuSlot::Without without(*slots_);
     std::unique_lock lock(mutex_);
-    ready_.wait_for(lock, verifier_->is_behind() ? kShortPatience : kPatience,
-                    [this] { return can_write(); });
+    // The verifier does not say when it has caught up.
+    news_.wait_for(lock, verifier_.is_behind() ? kShortPatience : kPatience, [this] {
+      return can_write() || (has_room() && !all_read_ && pieces_.has_news());
+    });
   }
 
   // Where lines are counted, it must be known what follows a run.
@@ -262,7 +260,10 @@ class Compensator {
     RunJob& job = *ticket.job;
     job.results[ticket.window][ticket.axis] = axis_result(std::move(done.solution));
     if (--job.missing == 0) {
-      prepare(job, rules_);
+      pool_.submit([this, job = ticket.job] {
+        prepare(*job, rules_);
+        wake();
+      });
     }
   }
 
@@ -277,16 +278,19 @@ class Compensator {
       tickets_.erase(tickets_.begin(), tickets_.begin() + static_cast<std::ptrdiff_t>(tickets));
       first_ticket_ += tickets;
     }
-    progress_->update("compensating", (engine_ ? 1.0 : kShareOfCompensation) *
-                                          static_cast<double>(bytes_written_) / input_bytes_);
+    progress_->update("compensating", input_bytes_ > 0.0
+                                          ? static_cast<double>(bytes_written_) / input_bytes_
+                                          : -1.0);
   }
 
   void put(std::string input, std::string output) {
     bytes_written_ += input.size();
-    *output_ << output;
-    if (verifier_) {
-      verifier_->push(std::move(input), std::move(output));
+    if (job_.output_fd >= 0) {
+      // How long the print takes is not known yet.
+      output = scaled_lines(output, writer_.time_factor());
     }
+    *output_ << output;
+    verifier_.push(std::move(input), std::move(output));
   }
 
   // Has the probes solved by the second engine.
@@ -297,10 +301,7 @@ class Compensator {
         processes_->submit(i, gaps_.probes()[i].problem);
       }
     }
-    if (verifier_) {
-      verifier_->end();
-    }
-    const CpuSlot::Without without(slots_);
+    const CpuSlot::Without without(*slots_);
     while (processes_->under_way() > 0) {
       if (std::optional<WorkerPool::Done> done =
               processes_->take(static_cast<int>(kPatience.count()))) {
@@ -309,18 +310,15 @@ class Compensator {
         }
       }
       if (progress_->cancelled()) {
-        return fail(ErrorKind::internal, "cancelled, nothing was written");
+        return fail(ErrorKind::internal, "cancelled");
       }
     }
     return {};
   }
 
   Status finish_verification() {
-    if (!verifier_) {
-      return {};
-    }
-    const CpuSlot::Without without(slots_);
-    Result<verify::VerifyReport> verified = verifier_->result();
+    const CpuSlot::Without without(*slots_);
+    Result<verify::VerifyReport> verified = verifier_.result();
     if (!verified) {
       return tl::unexpected(verified.error());
     }
@@ -336,16 +334,15 @@ class Compensator {
   };
 
   const Job& job_;
-  Engines engines_;
+  bool checks_;
   RunRules rules_;
-  PieceReader reader_;
   WorkerPool* processes_;
   std::ostream* output_;
   Progress* progress_;
+  CpuSlots* slots_;
   report::Report* report_;
   RunWriter writer_;
   GapCheck gaps_;
-  double input_bytes_;
   // The nozzle where the reader is, if every run before was compensated: what motion left as it is
   // has set ringing, the next run starts with.
   dynamics::NozzleXY nozzle_;
@@ -353,29 +350,16 @@ class Compensator {
   std::size_t nodes_queued_ = 0;
   std::deque<Ticket> tickets_;    // of the windows of queue_
   std::size_t first_ticket_ = 0;  // number of tickets_' front
+  double input_bytes_;            // 0: not known
   std::size_t bytes_written_ = 0;
   bool all_read_ = false;
   std::mutex mutex_;
-  std::condition_variable ready_;  // a run has been prepared
-  CpuSlots slots_;
-  std::unique_ptr<compensate::Engine> engine_;
+  std::condition_variable news_;                // a piece has been read or a run been prepared
+  std::unique_ptr<compensate::Engine> engine_;  // in threads; otherwise the processes solve
   // Last, so that threads end before what they use.
-  std::optional<VerifyThread> verifier_;
-  std::optional<TaskPool> pool_;
-};
-
-// The second part of a job's progress.
-class Remaining final : public Progress {
- public:
-  Remaining(Progress& whole, double done) : whole_(&whole), done_(done) {}
-  void update(std::string_view stage, double fraction) override {
-    whole_->update(stage, fraction < 0.0 ? fraction : done_ + (1.0 - done_) * fraction);
-  }
-  [[nodiscard]] bool cancelled() const override { return whole_->cancelled(); }
-
- private:
-  Progress* whole_;
-  double done_;
+  PieceThread pieces_;
+  VerifyThread verifier_;
+  TaskPool pool_;
 };
 
 Engines engines_of(EngineChoice choice) {
@@ -415,16 +399,34 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
     if (!pool) {
       return tl::unexpected(pool.error());
     }
-    std::ifstream input(job.input, std::ios::binary);
-    std::ofstream output(job.output, std::ios::binary | std::ios::trunc);
-    if (!input) {
+    CpuSlots slots(job.workers);
+    FdSource source(job.input_fd, progress, slots);
+    FdSink sink(job.output_fd, progress, slots);
+    std::istream in_stream(&source);
+    std::ostream out_stream(&sink);
+    std::ifstream in_file;
+    std::ofstream out_file;
+    if (job.input_fd < 0) {
+      in_file.open(job.input, std::ios::binary);
+    }
+    if (job.output_fd < 0) {
+      out_file.open(job.output, std::ios::binary | std::ios::trunc);
+    }
+    if (!in_file) {
       return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
     }
-    if (!output) {
+    if (!out_file) {
       return fail(ErrorKind::internal, {job.output_name, 0}, "cannot write the output");
     }
-    Compensator compensator(job, engines, *pool, input, output, progress, report);
-    if (Status status = compensator.work(); !status) {
+    std::ostream& output = job.output_fd < 0 ? out_file : out_stream;
+    Compensator compensator(job, engines, *pool, job.input_fd < 0 ? in_file : in_stream, output,
+                            progress, slots, report);
+    const Status status = compensator.work();
+    if (sink.error() != 0) {
+      return fail(ErrorKind::internal, {job.output_name == "-" ? "stdout" : job.output_name, 0},
+                  fmt::format("cannot write: {}", std::strerror(sink.error())));
+    }
+    if (!status) {
       return tl::unexpected(status.error());
     }
     output.flush();
@@ -432,13 +434,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       return disk_full(job);
     }
   }
-  if (!engines.threaded) {
-    Remaining remaining(progress, kShareOfCompensation);
-    if (Status status = add_verification(job, remaining, report); !status) {
-      return tl::unexpected(status.error());
-    }
-  }
-  if (report.reference_time_s > 0.0) {
+  if (report.reference_time_s > 0.0 && job.output_fd < 0) {
     const double factor = report.emitted_time_s / report.reference_time_s;
     if (Status status = retime(job.output, job.output_name, factor); !status) {
       return tl::unexpected(status.error());

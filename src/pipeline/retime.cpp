@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::size_t kChunk = 1U << 20U;
 
-// The whole lines at the front of `text`, up to `end`, with their times scaled.
+}  // namespace
+
 std::string scaled_lines(std::string_view text, double factor) {
   std::string out;
   while (!text.empty()) {
@@ -28,8 +29,6 @@ std::string scaled_lines(std::string_view text, double factor) {
   }
   return out;
 }
-
-}  // namespace
 
 Status retime(const std::string& path, const std::string& name, double factor) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);

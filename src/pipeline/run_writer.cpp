@@ -65,6 +65,8 @@ void RunWriter::keep_motion(const Piece& piece) {
   line_rate_.forget();
   for (const planner::PlannedMove& move : piece.moves) {
     line_rate_.add(move);
+    sliced_s_ += move.duration_s();
+    written_s_ += move.duration_s();
   }
   note_lines_above_budget(piece);
 }
@@ -125,6 +127,12 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
             rules_->verify, line_rate_, max_lines_per_s_);
   if (verdict.objection) {
     return std::move(verdict.objection);
+  }
+  for (const planner::PlannedMove& move : job.piece.moves) {
+    sliced_s_ += move.duration_s();
+  }
+  for (const planner::PlannedMove& move : verdict.replayed) {
+    written_s_ += move.duration_s();
   }
   cost_.add(job.piece.moves, job.setup.lead_in_s, job.base, verdict.replayed, nozzle_,
             rules_->verify.nozzle);

@@ -23,6 +23,11 @@ class RunWriter {
   // What follows the last piece.
   [[nodiscard]] std::string finish();
 
+  // How much longer what has been written takes than it would have.
+  [[nodiscard]] double time_factor() const {
+    return sliced_s_ > 0.0 ? written_s_ / sliced_s_ : 1.0;
+  }
+
  private:
   void keep_motion(const Piece& piece);
   void note_lines_above_budget(const Piece& piece);
@@ -39,6 +44,8 @@ class RunWriter {
   verify::RunDeviation before_;  // of the run at hand, if it were left as it is
   verify::LineRate line_rate_;   // of what has been written
   EmissionCost cost_;
+  double sliced_s_ = 0.0;   // time that what has been written took …
+  double written_s_ = 0.0;  // … and takes
 };
 
 }  // namespace unflex::pipeline

@@ -66,10 +66,9 @@ TextQueue::int_type TextQueue::underflow() {
 }
 
 VerifyThread::VerifyThread(const verify::Rules& rules, std::string input_name,
-                           std::string output_name, const Progress& cancelled, CpuSlots& slots)
+                           std::string output_name, CpuSlots& slots)
     : input_(slots),
       output_(slots),
-      progress_(cancelled, stopped_),
       result_(fail(ErrorKind::internal, "not verified")),
       thread_([this, rules, input_name = std::move(input_name),
                output_name = std::move(output_name), &slots] {
@@ -77,7 +76,7 @@ VerifyThread::VerifyThread(const verify::Rules& rules, std::string input_name,
         try {
           std::istream input(&input_);
           std::istream output(&output_);
-          result_ = verify::verify(input, input_name, output, output_name, rules, progress_);
+          result_ = verify::verify(input, input_name, output, output_name, rules, stopped_);
         } catch (const std::exception& exception) {
           result_ = fail(ErrorKind::internal, exception.what());
         }
@@ -85,7 +84,7 @@ VerifyThread::VerifyThread(const verify::Rules& rules, std::string input_name,
       }) {}
 
 VerifyThread::~VerifyThread() {
-  stopped_ = true;
+  stopped_.now = true;
   end();
 }
 

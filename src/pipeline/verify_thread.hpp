@@ -1,6 +1,7 @@
 // Verifies the output while it is being written.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <istream>
@@ -44,9 +45,8 @@ class TextQueue final : public std::streambuf {
 
 class VerifyThread {
  public:
-  // cancelled: asked from this thread.
   VerifyThread(const verify::Rules& rules, std::string input_name, std::string output_name,
-               const Progress& cancelled, CpuSlots& slots);
+               CpuSlots& slots);
   // Stops it, where finish() was not called.
   ~VerifyThread();
   VerifyThread(const VerifyThread&) = delete;
@@ -64,23 +64,18 @@ class VerifyThread {
   [[nodiscard]] Result<verify::VerifyReport> result();
 
  private:
-  class Cancelled final : public Progress {
+  class Stopped final : public Progress {
    public:
-    Cancelled(const Progress& outer, const std::atomic<bool>& stopped)
-        : outer_(&outer), stopped_(&stopped) {}
     void update(std::string_view /*stage*/, double /*fraction*/) override {}
-    [[nodiscard]] bool cancelled() const override { return *stopped_ || outer_->cancelled(); }
+    [[nodiscard]] bool cancelled() const override { return now; }
 
-   private:
-    const Progress* outer_;
-    const std::atomic<bool>* stopped_;
+    std::atomic<bool> now = false;
   };
 
   TextQueue input_;
   TextQueue output_;
-  std::atomic<bool> stopped_ = false;
+  Stopped stopped_;
   std::atomic<bool> done_ = false;
-  Cancelled progress_;
   Result<verify::VerifyReport> result_;
   std::jthread thread_;
 };

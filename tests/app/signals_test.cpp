@@ -49,7 +49,7 @@ TEST_P(EndingSignal, RemovesTheTemporaryFileAndKeepsTheTarget) {
   program.signal(GetParam());
   const Outcome outcome = program.wait();
   EXPECT_EQ(outcome.exit_code, 128 + GetParam());
-  EXPECT_EQ(outcome.err, "unflex: interrupted, nothing was written\n");
+  EXPECT_EQ(outcome.err, "unflex: interrupted, no file was written\n");
   EXPECT_EQ(outcome.out, "");
   EXPECT_EQ(read_file(path("out.gcode")), "precious\n");
   EXPECT_THAT(names(), ElementsAre("in.gcode", "out.gcode"));

@@ -41,7 +41,12 @@ JobFolder::~JobFolder() {
 }
 
 Job JobFolder::job(unsigned workers) const {
-  return {folder_ / "in.gcode", "in.gcode", folder_ / "out.gcode", "out.gcode", settings_, EngineChoice::automatic, workers};
+  return {.input = folder_ / "in.gcode",
+          .input_name = "in.gcode",
+          .output = folder_ / "out.gcode",
+          .output_name = "out.gcode",
+          .settings = settings_,
+          .workers = workers};
 }
 
 std::string complaints(const report::Report& report) {

@@ -25,6 +25,9 @@ struct Job {
   std::filesystem::path input;   // a seekable file
   std::string input_name;        // as the user calls it, for messages ("-" for stdin)
   std::filesystem::path output;  // compensate: written here, not atomically
+  // compensate: read and written as the text comes, instead of the files, where not negative.
+  int input_fd = -1;
+  int output_fd = -1;
   std::string output_name;
   machine::Settings settings;
   EngineChoice engine = EngineChoice::automatic;

@@ -1,0 +1,82 @@
+#include "piece_thread.hpp"
+
+#include <exception>
+#include <utility>
+
+namespace unflex::pipeline {
+namespace {
+
+// Pieces that are read ahead. Each may be a long run.
+constexpr std::size_t kMostAhead = 8;
+
+}  // namespace
+
+PieceThread::PieceThread(std::istream& input, std::string name, const verify::Rules& rules,
+                         CpuSlots& slots, std::function<void()> wake)
+    : slots_(&slots),
+      reader_(input, std::move(name), rules.interpreter, rules.limits, rules.fixed),
+      thread_([this, wake = std::move(wake)] { read(wake); }) {}
+
+PieceThread::~PieceThread() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  room_.notify_one();
+}
+
+void PieceThread::read(std::function<void()> wake) {
+  const CpuSlot slot(*slots_);
+  bool ended = false;
+  while (!ended) {
+    auto piece = std::make_unique<Piece>();
+    std::optional<Error> error;
+    try {
+      const Result<bool> more = reader_.next(*piece);
+      ended = !more || !*more;
+      if (!more) {
+        error = more.error();
+      }
+    } catch (const std::exception& exception) {
+      ended = true;
+      error = fail(ErrorKind::internal, exception.what()).value();
+    }
+    const CpuSlot::Without without(*slots_);
+    {
+      std::unique_lock lock(mutex_);
+      room_.wait(lock, [this] { return stopped_ || pieces_.size() < kMostAhead; });
+      if (stopped_) {
+        return;
+      }
+      if (!ended) {
+        pieces_.push_back(std::move(piece));
+      }
+      error_ = std::move(error);
+      ended_ = ended;
+    }
+    wake();
+  }
+}
+
+std::unique_ptr<Piece> PieceThread::take() {
+  const std::lock_guard lock(mutex_);
+  if (pieces_.empty()) {
+    return nullptr;
+  }
+  std::unique_ptr<Piece> piece = std::move(pieces_.front());
+  pieces_.pop_front();
+  room_.notify_one();
+  return piece;
+}
+
+bool PieceThread::has_news() {
+  const std::lock_guard lock(mutex_);
+  return !pieces_.empty() || ended_;
+}
+
+bool PieceThread::at_end() {
+  const std::lock_guard lock(mutex_);
+  return pieces_.empty() && ended_;
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,55 @@
+// Reads pieces ahead.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <istream>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "cpu_slots.hpp"
+#include "piece_reader.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::pipeline {
+
+class PieceThread {
+ public:
+  // The stream is read in the thread; wake: called there whenever something has come.
+  PieceThread(std::istream& input, std::string name, const verify::Rules& rules, CpuSlots& slots,
+              std::function<void()> wake);
+  // Stops reading; waits for a read that is under way.
+  ~PieceThread();
+  PieceThread(const PieceThread&) = delete;
+  PieceThread& operator=(const PieceThread&) = delete;
+
+  // The next piece, if it has been read.
+  [[nodiscard]] std::unique_ptr<Piece> take();
+  // Whether take() would give one or at_end() has come.
+  [[nodiscard]] bool has_news();
+  // Whether the last piece has been taken: the input has ended, or could not be read on.
+  [[nodiscard]] bool at_end();
+  // At the end.
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+  [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return reader_.warnings(); }
+
+ private:
+  void read(std::function<void()> wake);
+
+  CpuSlots* slots_;
+  PieceReader reader_;
+  std::mutex mutex_;
+  std::condition_variable room_;
+  std::deque<std::unique_ptr<Piece>> pieces_;
+  std::optional<Error> error_;
+  bool ended_ = false;
+  bool stopped_ = false;
+  std::jthread thread_;
+};
+
+}  // namespace unflex::pipeline
