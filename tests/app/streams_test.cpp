@@ -1,0 +1,129 @@
+// Text goes through the program as it comes.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <string>
+#include <string_view>
+
+#include "app/program.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// The program with pipes at both ends that stay open.
+class Filter {
+ public:
+  explicit Filter(const std::filesystem::path& errors) {
+    std::array<int, 2> in{};
+    std::array<int, 2> out{};
+    EXPECT_EQ(::pipe(in.data()), 0);
+    EXPECT_EQ(::pipe(out.data()), 0);
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      ::dup2(in[0], STDIN_FILENO);
+      ::dup2(out[1], STDOUT_FILENO);
+      for (const int fd : {in[0], in[1], out[0], out[1]}) {
+        ::close(fd);
+      }
+      static_cast<void>(std::freopen(errors.c_str(), "w", stderr));
+      ::execl(UNFLEX_PROGRAM, "unflex", "compensate", "-", "-o", "-", nullptr);
+      ::_exit(127);
+    }
+    ::close(in[0]);
+    ::close(out[1]);
+    in_ = in[1];
+    out_ = out[0];
+  }
+  ~Filter() {
+    close_input();
+    ::close(out_);
+  }
+  Filter(const Filter&) = delete;
+  Filter& operator=(const Filter&) = delete;
+
+  void write(std::string_view text) const {
+    ASSERT_EQ(::write(in_, text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  }
+  void close_input() {
+    if (in_ >= 0) {
+      ::close(in_);
+      in_ = -1;
+    }
+  }
+
+  // Reads until `what` has come; all that has come. Not longer than half a minute.
+  const std::string& read_until(std::string_view what) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (text_.find(what) == std::string::npos && std::chrono::steady_clock::now() < deadline &&
+           read_some()) {
+    }
+    return text_;
+  }
+  // Reads to the end; the exit code.
+  int finish() {
+    while (read_some()) {
+    }
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  bool read_some() {
+    pollfd ready{out_, POLLIN, 0};
+    if (::poll(&ready, 1, 1000) == 0) {
+      return true;
+    }
+    std::array<char, 4096> block{};
+    const ssize_t count = ::read(out_, block.data(), block.size());
+    if (count > 0) {
+      text_.append(block.data(), static_cast<std::size_t>(count));
+    }
+    return count > 0;
+  }
+
+  pid_t pid_ = -1;
+  int in_ = -1;
+  int out_ = -1;
+  std::string text_;
+};
+
+constexpr std::string_view kFirstRun =
+    "; sliced\nG28\nG90\nM83\nM73 P0 R10\nG1 Z0.4 F6000\nG1 X20 Y20 F6000\nG1 X40 Y20 E0.8 F3000\n"
+    "G1 X40 Y40 E0.8\nG1 E-1\n";
+constexpr std::string_view kSecondRun = "G1 X20 Y40 F6000\nG1 E1\nG1 X20 Y20 E0.8 F3000\nM84\n";
+
+TEST_F(ProgramTest, PassesARunOnAsSoonAsItHasEnded) {
+  Filter filter(path("err"));
+  filter.write(kFirstRun);
+  EXPECT_THAT(filter.read_until(";unflex end"), HasSubstr(";unflex end"));
+  EXPECT_THAT(filter.text(), Not(HasSubstr("M84")));
+  filter.write(kSecondRun);
+  filter.close_input();
+  EXPECT_EQ(filter.finish(), 0);
+  EXPECT_THAT(filter.text(), HasSubstr("\nM84\n"));
+  // The same bytes as in a file; what M73 says is too small to change.
+  write_file(path("in.gcode"), std::string(kFirstRun) + std::string(kSecondRun));
+  EXPECT_EQ(run({"compensate", "in.gcode", "-o", "out.gcode"}).exit_code, 0);
+  EXPECT_EQ(filter.text(), read_file(path("out.gcode")));
+}
+
+TEST_F(ProgramTest, EndsWhenItsInputEndsBeforeAnything) {
+  Filter filter(path("err"));
+  filter.close_input();
+  EXPECT_EQ(filter.finish(), 2);
+  EXPECT_EQ(filter.text(), "");
+}
+
+}  // namespace
+}  // namespace unflex::app
