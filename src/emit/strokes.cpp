@@ -138,7 +138,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const std::vector<double> event_times_s = table.event_times_s();
   LineRules rules = options.lines;
   rules.tolerance_mm *= run.tolerance_share;
-  rules.burst_lines = static_cast<int>(run.lines_share * rules.burst_lines);
+  rules.burst_lines = static_cast<int>(run.limits_share * rules.burst_lines);
+  rules.max_accel_mm_s2 *= run.limits_share;
   const Polygon vertices =
       polygon(run, table, wanted_times(run, table, event_times_s), grid, rules);
   const std::vector<double>& times = vertices.times_s;

@@ -44,7 +44,7 @@ std::vector<double> even_lines_before_s(const emit::LineRules& rules) {
 
 }  // namespace
 
-emit::Run RunJob::run(double tolerance_share, double lines_share,
+emit::Run RunJob::run(double tolerance_share, double limits_share,
                       std::vector<double> lines_before_s) const {
   return {.events = &piece.events,
           .move_counts = &piece.move_counts,
@@ -52,7 +52,7 @@ emit::Run RunJob::run(double tolerance_share, double lines_share,
           .base = &base,
           .lead_in_s = setup.lead_in_s,
           .tolerance_share = tolerance_share,
-          .lines_share = lines_share,
+          .limits_share = limits_share,
           .lines_before_s = std::move(lines_before_s),
           .lines_after = lines_after};
 }

@@ -56,7 +56,7 @@ struct RunJob {
   std::atomic<bool> prepared = false;
 
   // What the emitter is to write; the arguments are Run's.
-  [[nodiscard]] emit::Run run(double tolerance_share = 1.0, double lines_share = 1.0,
+  [[nodiscard]] emit::Run run(double tolerance_share = 1.0, double limits_share = 1.0,
                               std::vector<double> lines_before_s = {}) const;
 };
 

@@ -12,8 +12,8 @@ namespace {
 constexpr std::size_t kMostListed = 1000;
 // Of the tolerance, for a run that the whole of it spoils.
 constexpr double kFineTolerance = 0.05;
-// Of the budget, for a run that exceeds it.
-constexpr double kFewerLines = 0.85;
+// Of the limits, for a run that exceeds them.
+constexpr double kLower = 0.85;
 constexpr double kApart_mm = 1e-3;
 
 // How differently two nozzles swing.
@@ -93,8 +93,8 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   before_ = apart_mm(nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
                 ? deviation_of(job.piece.moves, job.piece.moves, nozzle_, rules_->verify, 0.0)
                 : job.before;
-  const auto plan = [&](double tolerance_share, double lines_share) {
-    return emit::plan_run(job.run(tolerance_share, lines_share, line_rate_.last_begins_s()),
+  const auto plan = [&](double tolerance_share, double limits_share) {
+    return emit::plan_run(job.run(tolerance_share, limits_share, line_rate_.last_begins_s()),
                           emitter_.run_start(), rules_->emit);
   };
   const bool counts_steps = rules_->emit.lines.burst_lines > 0;
@@ -106,9 +106,9 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   if (objection && (counts_steps || job.plan.start != emitter_.run_start())) {
     objection = try_run(job, plan(1.0, 1.0), text);
   }
-  // Where the lines are a few too many, aiming lower helps.
+  // Where whole steps make a line too quick or the lines a few too many, aiming lower helps.
   if (objection && counts_steps) {
-    objection = try_run(job, plan(1.0, kFewerLines), text);
+    objection = try_run(job, plan(1.0, kLower), text);
   }
   // Where long lines break a limit or cost too much, short ones may do.
   return objection ? try_run(job, plan(kFineTolerance, 1.0), text) : objection;

@@ -119,7 +119,7 @@ TEST(Strokes, AreNoMoreThanTheirShareOfTheBudget) {
   const dynamics::BaseTrajectory base = testing::plan_as_base(path.moves);
   emit::Run run{&path.events, &path.move_counts, &path.moves, &base};
   for (const double share : {1.0, 0.85, 0.5}) {
-    run.lines_share = share;
+    run.limits_share = share;
     const std::size_t most = most_at_once(strokes(run, grid, how));
     EXPECT_LE(static_cast<double>(most), 20.0 * share);
     EXPECT_GT(static_cast<double>(most), 10.0 * share);

@@ -89,7 +89,7 @@ struct Run {
   const dynamics::BaseTrajectory* base = nullptr;
   double lead_in_s = 0.0;        // the first move starts this long after the base
   double tolerance_share = 1.0;  // of LineRules::tolerance_mm that its lines may use
-  double lines_share = 1.0;      // of LineRules::burst_lines
+  double limits_share = 1.0;     // of LineRules' burst_lines and max_accel_mm_s2 that they may use
   std::vector<double> lines_before_s =
       {};               // begins of the lines just before it, in order, before 0
   int lines_after = 0;  // how many lines begin within LineRules::burst_s after it
