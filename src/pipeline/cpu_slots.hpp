@@ -2,20 +2,34 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
-#include <semaphore>
+#include <condition_variable>
+#include <mutex>
 
 namespace unflex::pipeline {
 
+// Not a std::counting_semaphore: that of libstdc++ 12.2 may sleep for ever though a slot is free
+// (GCC bug 104928).
 class CpuSlots {
  public:
-  explicit CpuSlots(unsigned count) : free_(static_cast<std::ptrdiff_t>(std::max(count, 1U))) {}
+  explicit CpuSlots(unsigned count) : free_(std::max(count, 1U)) {}
 
-  void take() { free_.acquire(); }
-  void give() { free_.release(); }
+  void take() {
+    std::unique_lock lock(mutex_);
+    given_.wait(lock, [this] { return free_ > 0; });
+    --free_;
+  }
+  void give() {
+    {
+      const std::lock_guard lock(mutex_);
+      ++free_;
+    }
+    given_.notify_one();
+  }
 
  private:
-  std::counting_semaphore<> free_;
+  std::mutex mutex_;
+  std::condition_variable given_;
+  unsigned free_;
 };
 
 // Holds a slot, or, as `Without`, gives the holder's back for a while.
