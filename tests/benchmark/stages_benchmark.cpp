@@ -1,0 +1,146 @@
+// What each stage costs, on a piece of a real print, in ns per move, per node of the base, or per ms
+// of print. docs/performance.md has the figures.
+#include <benchmark/benchmark.h>
+
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "judge.hpp"
+#include "run_job.hpp"
+#include "stage_options.hpp"
+#include "unflex/machine/machine.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+const std::string& print() {
+  static const std::string text = [] {
+    std::ifstream file(UNFLEX_PRINT, std::ios::binary);
+    std::ostringstream content;
+    content << file.rdbuf();
+    return content.str();
+  }();
+  return text;
+}
+
+machine::Settings settings(const std::string& firmware) {
+  return machine::load(std::nullopt, {"printer.firmware=" + firmware}).value();
+}
+
+RunRules rules_of(const machine::Settings& s) {
+  return {compensate_setup(s), emit_options(s, "benchmark"), verify_rules(s)};
+}
+
+std::vector<Piece> pieces(const RunRules& rules) {
+  std::istringstream stream(print());
+  PieceReader reader(stream, "print", rules.verify.interpreter, rules.verify.limits,
+                     rules.verify.fixed);
+  std::vector<Piece> result(1);
+  while (reader.next(result.back()).value()) {
+    result.emplace_back();
+  }
+  result.pop_back();
+  return result;
+}
+
+// The longest run, ready to be solved.
+std::unique_ptr<RunJob> job_of(const machine::Settings& s, const RunRules& rules) {
+  auto job = std::make_unique<RunJob>();
+  for (Piece& piece : pieces(rules)) {
+    if (piece.is_run && piece.moves.size() > job->piece.moves.size()) {
+      job->piece = std::move(piece);
+    }
+  }
+  job->nozzle = {{job->piece.moves.front().segment.start_mm[gcode::X], 0.0},
+                 {job->piece.moves.front().segment.start_mm[gcode::Y], 0.0}};
+  job->setup = setup_for(rules.setup, job->piece.moves, s);
+  job->spans = compensate::cut(compensate::node_count(job->piece.moves, rules.setup), rules.setup);
+  job->results.resize(job->spans.size());
+  return job;
+}
+
+void per(benchmark::State& state, const char* what, double count) {
+  state.counters[what] =
+      benchmark::Counter(count, benchmark::Counter::kIsIterationInvariantRate |
+                                    benchmark::Counter::kInvert);
+}
+
+void ReadAndPlan(benchmark::State& state) {
+  const RunRules rules = rules_of(settings("klipper"));
+  std::size_t moves = 0;
+  for (const Piece& piece : pieces(rules)) {
+    moves += piece.moves.size();
+  }
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(pieces(rules));
+  }
+  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(print().size()));
+  per(state, "per_move", static_cast<double>(moves));
+}
+BENCHMARK(ReadAndPlan)->Unit(benchmark::kMillisecond);
+
+// accel: the base's limit in mm/s², 0 for the default, which hardly any window touches.
+void Solve(benchmark::State& state, compensate::Engine& engine, double accel) {
+  const machine::Settings s = settings("klipper");
+  RunRules rules = rules_of(s);
+  if (accel > 0.0) {
+    rules.setup.x.limits.max_accel_mm_s2 = rules.setup.y.limits.max_accel_mm_s2 = accel;
+  }
+  const auto job = job_of(s, rules);
+  std::vector<compensate::RunWindow> windows = windows_of(*job, 0, job->spans.size());
+  double nodes = 0.0;
+  for (const compensate::RunWindow& window : windows) {
+    nodes += 2.0 * static_cast<double>(window.x.nodes());
+  }
+  for (auto _ : state) {
+    for (const compensate::RunWindow& window : windows) {
+      benchmark::DoNotOptimize(engine.solve(window.x));
+      benchmark::DoNotOptimize(engine.solve(window.y));
+    }
+  }
+  per(state, "per_node_and_axis", nodes);
+}
+void SolveBanded(benchmark::State& state) {
+  Solve(state, *compensate::make_banded_engine(), static_cast<double>(state.range(0)));
+}
+BENCHMARK(SolveBanded)->Arg(0)->Arg(8000)->Unit(benchmark::kMillisecond);
+void SolveIpopt(benchmark::State& state) {
+  Solve(state, *compensate::make_ipopt_engine(), static_cast<double>(state.range(0)));
+}
+BENCHMARK(SolveIpopt)->Arg(0)->Arg(8000)->Unit(benchmark::kMillisecond);
+
+void CutIntoLines(benchmark::State& state, const std::string& firmware) {
+  const machine::Settings s = settings(firmware);
+  const RunRules rules = rules_of(s);
+  const auto job = job_of(s, rules);
+  solve_windows(*job, 0, job->spans.size(), *compensate::make_banded_engine());
+  prepare(*job, rules);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(emit::plan_run(job->run(), job->piece.start, rules.emit));
+  }
+  per(state, "per_node", static_cast<double>(job->base.nodes()));
+}
+BENCHMARK_CAPTURE(CutIntoLines, klipper, "klipper")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(CutIntoLines, marlin, "marlin")->Unit(benchmark::kMillisecond);
+
+void Measure(benchmark::State& state) {
+  const machine::Settings s = settings("klipper");
+  const RunRules rules = rules_of(s);
+  const auto job = job_of(s, rules);
+  double time_s = 0.0;
+  for (const planner::PlannedMove& move : job->piece.moves) {
+    time_s += move.duration_s();
+  }
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        verify::measure(job->piece.moves, job->piece.moves, job->nozzle, rules.verify.nozzle));
+  }
+  per(state, "per_ms_of_print", 1e3 * time_s);
+}
+BENCHMARK(Measure)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace unflex::pipeline
