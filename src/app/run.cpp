@@ -6,7 +6,6 @@
 
 #include <cerrno>
 #include <exception>
-#include <filesystem>
 #include <optional>
 
 #include "console.hpp"

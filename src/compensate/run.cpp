@@ -41,14 +41,6 @@ class Reference {
   double start_s_;
 };
 
-double duration_s(const std::vector<planner::PlannedMove>& moves) {
-  double sum = 0.0;
-  for (const planner::PlannedMove& move : moves) {
-    sum += move.duration_s();
-  }
-  return sum;
-}
-
 std::size_t to_nodes(double time_s, double period_s) {
   return static_cast<std::size_t>(std::ceil(time_s / period_s - 1e-9));
 }

@@ -70,9 +70,7 @@ class Inspector {
     }
     if (piece.is_run) {
       ++result_->runs;
-      for (const planner::PlannedMove& move : piece.moves) {
-        result_->run_time_s += move.duration_s();
-      }
+      result_->run_time_s += planner::duration_s(piece.moves);
       result_->windows += compensate::cut(compensate::node_count(piece.moves, setup), setup).size();
     }
   }

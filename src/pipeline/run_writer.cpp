@@ -65,9 +65,10 @@ void RunWriter::keep_motion(const Piece& piece) {
   line_rate_.forget();
   for (const planner::PlannedMove& move : piece.moves) {
     line_rate_.add(move);
-    sliced_s_ += move.duration_s();
-    written_s_ += move.duration_s();
   }
+  const double kept_s = planner::duration_s(piece.moves);
+  sliced_s_ += kept_s;
+  written_s_ += kept_s;
   note_lines_above_budget(piece);
 }
 
@@ -128,12 +129,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   if (verdict.objection) {
     return std::move(verdict.objection);
   }
-  for (const planner::PlannedMove& move : job.piece.moves) {
-    sliced_s_ += move.duration_s();
-  }
-  for (const planner::PlannedMove& move : verdict.replayed) {
-    written_s_ += move.duration_s();
-  }
+  sliced_s_ += planner::duration_s(job.piece.moves);
+  written_s_ += planner::duration_s(verdict.replayed);
   cost_.add(job.piece.moves, job.setup.lead_in_s, job.base, verdict.replayed, nozzle_,
             rules_->verify.nozzle);
   nozzle_ = verdict.nozzle;

@@ -59,7 +59,6 @@ class VerifyThread {
   [[nodiscard]] bool is_behind();
   // Both texts have ended.
   void end();
-  [[nodiscard]] bool done() const { return done_; }
   // After end(): waits for the result.
   [[nodiscard]] Result<verify::VerifyReport> result();
 

@@ -56,6 +56,14 @@ gcode::Position PlannedMove::position_mm(double t) const {
   return position;
 }
 
+double duration_s(const std::vector<PlannedMove>& moves) {
+  double sum = 0.0;
+  for (const PlannedMove& move : moves) {
+    sum += move.duration_s();
+  }
+  return sum;
+}
+
 double PlannedMove::time_s(double distance_mm) const {
   const double duration = duration_s();
   if (distance_mm <= 0.0) return 0.0;

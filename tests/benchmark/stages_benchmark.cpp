@@ -130,15 +130,11 @@ void Measure(benchmark::State& state) {
   const machine::Settings s = settings("klipper");
   const RunRules rules = rules_of(s);
   const auto job = job_of(s, rules);
-  double time_s = 0.0;
-  for (const planner::PlannedMove& move : job->piece.moves) {
-    time_s += move.duration_s();
-  }
   for (auto _ : state) {
     benchmark::DoNotOptimize(
         verify::measure(job->piece.moves, job->piece.moves, job->nozzle, rules.verify.nozzle));
   }
-  per(state, "per_ms_of_print", 1e3 * time_s);
+  per(state, "per_ms_of_print", 1e3 * planner::duration_s(job->piece.moves));
 }
 BENCHMARK(Measure)->Unit(benchmark::kMillisecond);
 

@@ -47,14 +47,6 @@ inline planner::Limits planner_limits(double velocity, double accel, double corn
   return {velocity, accel, corner_velocity, 0.0};
 }
 
-inline double duration_s(const std::vector<planner::PlannedMove>& moves) {
-  double sum = 0.0;
-  for (const planner::PlannedMove& move : moves) {
-    sum += move.duration_s();
-  }
-  return sum;
-}
-
 // Where the plan is t seconds after its beginning; it rests before and after.
 inline gcode::Position plan_at(const std::vector<planner::PlannedMove>& moves, double t) {
   for (const planner::PlannedMove& move : moves) {

@@ -13,7 +13,6 @@
 namespace unflex::compensate {
 namespace {
 
-using testing::duration_s;
 using testing::plan_at;
 using testing::planner_limits;
 using testing::setup_for;

@@ -46,7 +46,7 @@ double distance_mm(const planner::PlannedMove& move, double x, double y) {
 Contour contour(const std::vector<planner::PlannedMove>& moves,
                 const std::vector<dynamics::NozzleState>& x,
                 const std::vector<dynamics::NozzleState>& y, double step_s) {
-  const double end = testing::duration_s(moves);
+  const double end = planner::duration_s(moves);
   double worst = 0.0;
   double sum = 0.0;
   std::size_t count = 0;
@@ -65,7 +65,7 @@ std::vector<dynamics::NozzleState> play_plan(const dynamics::FlexibleAxis& axis,
                                              gcode::Axis which, double step_s) {
   std::vector<dynamics::NozzleState> result = {{}};
   double base = 0.0;
-  for (double t = step_s; t <= testing::duration_s(moves); t += step_s) {
+  for (double t = step_s; t <= planner::duration_s(moves); t += step_s) {
     const double next = testing::plan_at(moves, t)[which];
     result.push_back(
         dynamics::exact_step(axis, result.back(), {base, (next - base) / step_s, 0.0}, step_s));

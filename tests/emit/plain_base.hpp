@@ -39,14 +39,6 @@ inline dynamics::BaseTrajectory sampled(const std::function<std::array<double, 2
   return base;
 }
 
-inline double duration_s(const std::vector<planner::PlannedMove>& moves) {
-  double sum = 0.0;
-  for (const planner::PlannedMove& move : moves) {
-    sum += move.duration_s();
-  }
-  return sum;
-}
-
 // X and Y of the plan at a time after its start, before and after it at rest.
 inline std::array<double, 2> plan_at(const std::vector<planner::PlannedMove>& moves, double t) {
   std::size_t i = 0;

@@ -170,7 +170,7 @@ TEST(Replay, LosesNoTimeToTheExtruder) {
   const Replay replay(drawing(6, 20.0), how);
   how.fixed.instantaneous_corner_velocity_mm_s = 1e9;
   const Replay unlimited(drawing(6, 20.0), how);
-  EXPECT_NEAR(testing::duration_s(replay.moves), testing::duration_s(unlimited.moves), 20e-6);
+  EXPECT_NEAR(planner::duration_s(replay.moves), planner::duration_s(unlimited.moves), 20e-6);
 }
 
 }  // namespace

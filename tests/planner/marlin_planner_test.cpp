@@ -17,7 +17,6 @@ using testing::marlin_limits;
 using testing::marlin_plan;
 using testing::polyline;
 using testing::segment;
-using testing::total_duration_s;
 
 // One step of X or Y, and what a rate rounded up to whole steps per second is off by at most.
 constexpr double kStep_mm = 1.0 / 80.0;
@@ -301,7 +300,7 @@ TEST(MarlinPlanner, ShortMovesAfterAStopAreStretched) {
     EXPECT_NEAR(moves[i].cruise_v_mm_s, 20.0, kRounding_mm_s) << i;
   }
   const auto untouched = marlin_plan(dense_line(60, 0.2, 20.0));
-  EXPECT_LT(total_duration_s(untouched), total_duration_s(moves) - 0.02);
+  EXPECT_LT(duration_s(untouched), duration_s(moves) - 0.02);
 }
 
 TEST(MarlinPlanner, RatesBelowTheSlowestHaveNoRamps) {

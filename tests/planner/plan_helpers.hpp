@@ -38,10 +38,4 @@ inline std::vector<PlannedMove> plan(const std::vector<gcode::Segment>& segments
   return result;
 }
 
-inline double total_duration_s(const std::vector<PlannedMove>& moves) {
-  double sum = 0.0;
-  for (const PlannedMove& move : moves) sum += move.duration_s();
-  return sum;
-}
-
 }  // namespace unflex::planner::testing

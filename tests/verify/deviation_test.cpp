@@ -12,7 +12,6 @@ namespace unflex::verify {
 namespace {
 
 using testing::at_rest;
-using testing::duration_s;
 using testing::plan_path;
 
 planner::Limits limits_with(double accel_mm_s2, double corner_mm_s) {

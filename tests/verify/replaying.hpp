@@ -45,14 +45,6 @@ inline NozzleXY at_rest(const std::vector<planner::PlannedMove>& moves) {
   return {{start[gcode::X], 0.0}, {start[gcode::Y], 0.0}};
 }
 
-inline double duration_s(const std::vector<planner::PlannedMove>& moves) {
-  double sum = 0.0;
-  for (const planner::PlannedMove& move : moves) {
-    sum += move.duration_s();
-  }
-  return sum;
-}
-
 inline VerifyReport verify_text(const std::string& input, const std::string& output,
                                 const Rules& rules = {}) {
   std::istringstream input_stream(input);

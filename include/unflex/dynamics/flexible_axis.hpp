@@ -47,7 +47,6 @@ struct BaseSegment {
 // rk4_step of one length as the linear map it is, for many steps of that length.
 class Rk4Map {
  public:
-  Rk4Map() = default;
   Rk4Map(const FlexibleAxis& axis, double h);
 
   // The base's position is carried along so that numbers stay small.

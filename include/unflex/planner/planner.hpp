@@ -95,6 +95,9 @@ struct PlannedMove {
   [[nodiscard]] double time_s(double distance_mm) const;
 };
 
+// Of all of them, one after the other.
+[[nodiscard]] double duration_s(const std::vector<PlannedMove>& moves);
+
 // A firmware's planner. Moves come out in order once nothing that follows can change them. The plan
 // does not depend on when, or how often, take() is called.
 class Planner {
