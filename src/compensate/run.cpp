@@ -1,6 +1,7 @@
 #include "unflex/compensate/run.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace unflex::compensate {
@@ -12,8 +13,17 @@ constexpr std::size_t kBlendNodes = 10;
 // Walks along the plan; times must not decrease from call to call.
 class Reference {
  public:
-  Reference(const std::vector<planner::PlannedMove>& moves, const Setup& setup)
-      : moves_(&moves), setup_(&setup), start_s_(setup.lead_in_s) {}
+  // origin_s: when the course's own moves begin.
+  Reference(const Course& course, double origin_s, const Setup& setup)
+      : parts_{course.before, course.moves, course.after},
+        last_part_(course.after.empty() ? 1 : 2),
+        travel_weight_(setup.travel_weight),
+        start_s_(origin_s) {
+    for (const planner::PlannedMove& move : course.before) {
+      start_s_ -= move.duration_s();
+    }
+    settle();
+  }
 
   struct Sample {
     double x_mm;
@@ -21,22 +31,34 @@ class Reference {
     double weight;
   };
 
-  // t since the beginning of the lead-in.
   Sample at(double t) {
-    while (index_ + 1 < moves_->size() && t >= start_s_ + (*moves_)[index_].duration_s()) {
-      start_s_ += (*moves_)[index_].duration_s();
+    while (!is_last() && t >= start_s_ + move().duration_s()) {
+      start_s_ += move().duration_s();
       ++index_;
+      settle();
     }
-    const planner::PlannedMove& move = (*moves_)[index_];
-    const gcode::Position p = move.position_mm(t - start_s_);
-    const bool moving = t >= start_s_ && t <= start_s_ + move.duration_s();
-    return {p[gcode::X], p[gcode::Y],
-            moving && move.segment.extruding() ? 1.0 : setup_->travel_weight};
+    const gcode::Position p = move().position_mm(t - start_s_);
+    const bool moving = t >= start_s_ && t <= start_s_ + move().duration_s();
+    return {p[gcode::X], p[gcode::Y], moving && move().segment.extruding() ? 1.0 : travel_weight_};
   }
 
  private:
-  const std::vector<planner::PlannedMove>* moves_;
-  const Setup* setup_;
+  [[nodiscard]] const planner::PlannedMove& move() const { return parts_[part_][index_]; }
+  [[nodiscard]] bool is_last() const {
+    return part_ == last_part_ && index_ + 1 == parts_[part_].size();
+  }
+  // To the next part's first move after the last of one.
+  void settle() {
+    if (part_ < last_part_ && index_ == parts_[part_].size()) {
+      ++part_;
+      index_ = 0;
+    }
+  }
+
+  std::array<Course::Moves, 3> parts_;
+  std::size_t last_part_;
+  double travel_weight_;
+  std::size_t part_ = 0;
   std::size_t index_ = 0;
   double start_s_;
 };
@@ -45,15 +67,21 @@ std::size_t to_nodes(double time_s, double period_s) {
   return static_cast<std::size_t>(std::ceil(time_s / period_s - 1e-9));
 }
 
+// Nodes that are solved beyond the end of a part.
+std::size_t around(const Course::Moves& moves, double period_s, const Setup& setup) {
+  return static_cast<std::size_t>(std::min(planner::duration_s(moves), 2.0 * setup.overlap_s) /
+                                  period_s);
+}
+
 // The axis' part of a window without its ends.
-AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, std::vector<double> reference,
-                     std::vector<double> weight) {
+AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
+                     std::vector<double> reference, std::vector<double> weight) {
   AxisWindow window;
   window.axis = axis.axis;
-  window.period_s = setup.period_s;
+  window.period_s = period_s;
   // What the base's jerk does to the nozzle's motion goes with (ωh)²: so weighted, one value serves
   // all resonances.
-  window.jerk_weight = setup.jerk_weight * std::pow(axis.axis.omega_rad_s * setup.period_s, 4);
+  window.jerk_weight = setup.jerk_weight * std::pow(axis.axis.omega_rad_s * period_s, 4);
   window.limits = axis.limits;
   // Where the sliced path itself leaves the travel, the base may go as far but no further.
   const auto [low, high] = std::ranges::minmax(reference);
@@ -66,10 +94,25 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, std::vector<doub
 
 }  // namespace
 
-std::size_t node_count(const std::vector<planner::PlannedMove>& moves, const Setup& setup) {
-  // Four nodes are the fewest that leave the base's acceleration any freedom between its ends.
-  return std::max<std::size_t>(
-      to_nodes(setup.lead_in_s + duration_s(moves) + setup.tail_s, setup.period_s) + 1, 4);
+NodeGrid node_grid(const Course& course, const Setup& setup) {
+  const double duration_s =
+      (course.before.empty() ? setup.lead_in_s : 0.0) + planner::duration_s(course.moves);
+  NodeGrid grid;
+  std::size_t after = 0;
+  if (course.after.empty()) {
+    grid.period_s = setup.period_s;
+    // Four nodes are the fewest that leave the base's acceleration any freedom between its ends.
+    grid.last = std::max<std::size_t>(to_nodes(duration_s + setup.tail_s, setup.period_s), 3);
+  } else {
+    grid.last = std::max<std::size_t>(
+        static_cast<std::size_t>(std::lround(duration_s / setup.period_s)), 3);
+    grid.period_s = duration_s / static_cast<double>(grid.last);
+    after = around(course.after, grid.period_s, setup);
+  }
+  grid.first = around(course.before, grid.period_s, setup);
+  grid.last += grid.first;
+  grid.count = grid.last + after + 1;
+  return grid;
 }
 
 std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
@@ -91,25 +134,26 @@ std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
   return spans;
 }
 
-std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
-                               const std::vector<WindowSpan>& spans,
+std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpan>& spans,
                                const dynamics::NozzleXY& nozzle, const Setup& setup) {
-  return windows(moves, spans, 0, spans.size(), nozzle, setup);
+  return windows(course, spans, 0, spans.size(), nozzle, setup);
 }
 
-std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
-                               const std::vector<WindowSpan>& spans, std::size_t first,
-                               std::size_t count, const dynamics::NozzleXY& nozzle,
-                               const Setup& setup) {
+std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpan>& spans,
+                               std::size_t first, std::size_t count,
+                               const dynamics::NozzleXY& nozzle, const Setup& setup) {
+  const NodeGrid grid = node_grid(course, setup);
   // Twice as many samples as nodes, from the first node of the first window.
   const std::size_t first_sample = 2 * spans[first].first;
   const std::size_t last_sample = 2 * spans[first + count - 1].last;
   std::vector<double> x;
   std::vector<double> y;
   std::vector<double> weight;
-  Reference reference(moves, setup);
+  const bool from_rest = course.before.empty();
+  Reference reference(
+      course, from_rest ? setup.lead_in_s : static_cast<double>(grid.first) * grid.period_s, setup);
   for (std::size_t i = first_sample; i <= last_sample; ++i) {
-    const Reference::Sample sample = reference.at(0.5 * static_cast<double>(i) * setup.period_s);
+    const Reference::Sample sample = reference.at(0.5 * static_cast<double>(i) * grid.period_s);
     x.push_back(sample.x_mm);
     y.push_back(sample.y_mm);
     weight.push_back(sample.weight);
@@ -122,13 +166,13 @@ std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
           all.begin() + static_cast<std::ptrdiff_t>(2 * span.first - first_sample),
           all.begin() + static_cast<std::ptrdiff_t>(2 * span.last + 1 - first_sample));
     };
-    RunWindow window{make_axis(setup.x, setup, slice(x), slice(weight)),
-                     make_axis(setup.y, setup, slice(y), slice(weight))};
-    if (span.first == 0) {
+    RunWindow window{make_axis(setup.x, setup, grid.period_s, slice(x), slice(weight)),
+                     make_axis(setup.y, setup, grid.period_s, slice(y), slice(weight))};
+    if (from_rest && span.first == 0) {
       window.x.start = AxisWindow::Start{nozzle.x, window.x.reference_mm.front()};
       window.y.start = AxisWindow::Start{nozzle.y, window.y.reference_mm.front()};
     }
-    if (span.last == spans.back().last) {
+    if (course.after.empty() && span.last == spans.back().last) {
       window.x.end_base_mm = window.x.reference_mm.back();
       window.y.end_base_mm = window.y.reference_mm.back();
     }

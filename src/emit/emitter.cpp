@@ -56,6 +56,16 @@ AxisGrid axis_grid(const planner::FirmwareConfig& config, gcode::Axis axis, doub
   return {zero_mm, 1.0 / power_of_ten(kPositionDecimals)};
 }
 
+Grid grid_of(const RunStart& start, const planner::FirmwareConfig& config) {
+  return {axis_grid(config, X, start.zero_mm[X]), axis_grid(config, Y, start.zero_mm[Y]),
+          axis_grid(config, Z, start.zero_mm[Z]), start.speed_factor};
+}
+
+EmitOptions in_run(const RunStart& start, EmitOptions options) {
+  options.run_limits = limits_in_run(options.fixed.firmware, start.limits, options.run_limits);
+  return options;
+}
+
 }  // namespace
 
 Emitter::Emitter(EmitOptions options)
@@ -119,19 +129,25 @@ RunStart run_start(const gcode::ModalState& state, const planner::Limits& limits
 bool RunPlan::empty() const { return strokes == nullptr || strokes->empty(); }
 
 RunPlan plan_run(const Run& run, const RunStart& start, const EmitOptions& options) {
-  const Grid grid{axis_grid(options.fixed, X, start.zero_mm[X]),
-                  axis_grid(options.fixed, Y, start.zero_mm[Y]),
-                  axis_grid(options.fixed, Z, start.zero_mm[Z]), start.speed_factor};
-  EmitOptions in_run = options;
-  in_run.run_limits = limits_in_run(options.fixed.firmware, start.limits, options.run_limits);
-  return {start, std::make_shared<const std::vector<Stroke>>(strokes(run, grid, in_run))};
+  const Grid grid = grid_of(start, options.fixed);
+  return {start, start_of_lines(run, grid),
+          std::make_shared<const std::vector<Stroke>>(strokes(run, grid, in_run(start, options)))};
+}
+
+RunPlan retimed(const RunPlan& plan, const Run& run, const EmitOptions& options) {
+  std::vector<Stroke> strokes = *plan.strokes;
+  time_strokes(run, grid_of(plan.start, options.fixed), in_run(plan.start, options), strokes);
+  return {plan.start, plan.from_mm,
+          std::make_shared<const std::vector<Stroke>>(std::move(strokes))};
 }
 
 RunStart Emitter::run_start() const { return emit::run_start(printer_.state(), input_limits_); }
 
 void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   const double filament_origin = input_.state().position_mm[E];
-  enter_run(out);
+  if (!run.goes_on) {
+    enter_run(out);
+  }
   std::size_t written = 0;
   const auto write_events = [&](std::size_t end) {
     for (; written < end; ++written) {
@@ -152,6 +168,10 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
     write_events(stroke.events);
     set_run_modes(out);
     write_stroke(stroke, filament_origin, out);
+  }
+  if (run.until_s) {
+    write_events(run.events->size());
+    return;
   }
   write(fmt::format("{} end", kComment), out);
   write_events(run.events->size());

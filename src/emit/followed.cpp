@@ -28,7 +28,8 @@ Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
                    const dynamics::FlexibleAxis& nozzle)
     : period_s_(base.period_s) {
   const Step step(nozzle, base.period_s / kSubsteps);
-  Eigen::Vector2d state((base.*axis)(0.0).position_mm, 0.0);
+  const dynamics::AxisMotion start = (base.*axis)(0.0);
+  Eigen::Vector2d state(start.position_mm, start.velocity_mm_s);
   states_.push_back({state[0], state[1]});
   for (std::size_t k = 1; k < base.nodes(); ++k) {
     for (int i = 0; i < kSubsteps; ++i) {

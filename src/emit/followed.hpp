@@ -29,7 +29,7 @@ class Step {
   Eigen::Matrix<double, 2, 5> columns_;
 };
 
-// (p, ṗ) of the nozzle that follows one axis of the base, from rest.
+// (p, ṗ) of the nozzle that follows one axis of the base, from where that is and as fast.
 class Followed {
  public:
   Followed(const dynamics::BaseTrajectory& base, AxisAt axis, const dynamics::FlexibleAxis& nozzle);

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
 
 #include "unflex/core/number.hpp"
@@ -25,14 +26,42 @@ using gcode::Z;
 
 // The ramps are short against the lines, so a few rounds over the neighbours settle them.
 constexpr int kRampRounds = 6;
-// Plans by the firmware's own rules, each with the speeds the last one asked for.
-constexpr int kReplays = 2;
+// Plans by the firmware's own rules, each with what the one before has taught.
+constexpr int kRounds = 3;
 // How much of its time a line may be shortened or lengthened by, to make up for those before it.
 constexpr double kMostCatchUp = 0.2;
 // … and what of the acceleration limit may go into it.
 constexpr double kCatchUpAccel = 0.05;
 // What one plan may change a speed by: the reason may have been a neighbour.
 constexpr double kMostCorrection = 2.0;
+
+// How long the straight line lasts that the firmware is on before and after the lines of a part.
+constexpr double kApproach_s = 0.05;
+constexpr std::size_t kNoStroke = std::numeric_limits<std::size_t>::max();
+
+double magnitude(const std::optional<std::array<double, 2>>& velocity_mm_s) {
+  return velocity_mm_s ? std::hypot((*velocity_mm_s)[0], (*velocity_mm_s)[1]) : 0.0;
+}
+
+// The line to (side = −1) or from (side = 1) `next`, at that velocity, and laying as much filament
+// per mm.
+gcode::Segment approach(const gcode::Segment& next, const std::array<double, 2>& velocity_mm_s,
+                        double side) {
+  gcode::Segment line;
+  gcode::Position& near = side < 0.0 ? line.end_mm : line.start_mm;
+  gcode::Position& far = side < 0.0 ? line.start_mm : line.end_mm;
+  near = side < 0.0 ? next.start_mm : next.end_mm;
+  far = near;
+  far[X] += side * kApproach_s * velocity_mm_s[0];
+  far[Y] += side * kApproach_s * velocity_mm_s[1];
+  line.feed_mm_s = std::hypot(velocity_mm_s[0], velocity_mm_s[1]);
+  if (next.length_xy_mm() > 0.0) {
+    far[E] += side * kApproach_s * line.feed_mm_s * next.delta(E) / next.length_xy_mm();
+  }
+  line.line = kNoStroke;
+  line.start_known = true;
+  return line;
+}
 
 // Digits of F in mm/min that keep a line's duration within 0.05 %.
 int feed_decimals(double feed_mm_min) {
@@ -45,11 +74,56 @@ int feed_decimals(double feed_mm_min) {
   return feed_mm_min >= 1.0 ? 3 : 8;
 }
 
+// When the firmware, by its own plan, is through with the lines it has been given.
+class FirmwareClock {
+ public:
+  FirmwareClock(std::unique_ptr<planner::Planner> firmware, double start_s)
+      : firmware_(std::move(firmware)), final_s_(start_s) {}
+
+  // Lines are numbered from 0. expected_s: what the line takes until the plan has it.
+  void add(const gcode::Segment& line, double expected_s) {
+    firmware_->add(line);
+    durations_s_.push_back(expected_s);
+    expected_s_ += expected_s;
+    take();
+  }
+  // A line that is none of the run's.
+  void pass(const gcode::Segment& line) { firmware_->add(line); }
+  void finish() {
+    firmware_->stop();
+    take();
+  }
+
+  [[nodiscard]] double now_s() const { return final_s_ + expected_s_; }
+  [[nodiscard]] double duration_s(std::size_t line) const { return durations_s_[line]; }
+
+ private:
+  void take() {
+    moves_.clear();
+    firmware_->take(moves_);
+    for (const planner::PlannedMove& move : moves_) {
+      if (move.segment.line != kNoStroke) {
+        double& duration_s = durations_s_[move.segment.line];
+        expected_s_ -= duration_s;
+        duration_s = move.duration_s();
+        final_s_ += duration_s;
+      }
+    }
+  }
+
+  std::unique_ptr<planner::Planner> firmware_;
+  std::vector<planner::PlannedMove> moves_;
+  std::vector<double> durations_s_;  // planned ones, and expected ones after them
+  double final_s_;
+  double expected_s_ = 0.0;
+};
+
 class SpeedSolver {
  public:
-  SpeedSolver(const gcode::Position& start_mm, const EmitOptions& options, double mm_s_per_feed,
-              std::vector<Stroke>& strokes)
+  SpeedSolver(const gcode::Position& start_mm, const Passing& passing, const EmitOptions& options,
+              double mm_s_per_feed, std::vector<Stroke>& strokes)
       : start_mm_(start_mm),
+        passing_(passing),
         options_(&options),
         strokes_(&strokes),
         mm_s_per_feed_(mm_s_per_feed),
@@ -81,12 +155,11 @@ class SpeedSolver {
     }
   }
 
-  void solve() {
+  // late_s: how late the first line begins.
+  void solve(double late_s) {
     settle_ramps();
-    round_to_feeds();
-    for (int i = 0; i < kReplays; ++i) {
-      compare_with_firmware();
-      round_to_feeds();
+    for (int i = 0; i < kRounds; ++i) {
+      round_to_feeds(late_s);
     }
   }
 
@@ -94,58 +167,86 @@ class SpeedSolver {
   void settle_ramps() {
     std::vector<double> next(strokes_->size());
     for (int round = 0; round <= kRampRounds; ++round) {
-      double start_s = 0.0;
       for (std::size_t i = 0; i < next.size(); ++i) {
-        const double end_s = (*strokes_)[i].end_s;
-        next[i] = (distance_mm_[i] + (round > 0 ? ramps_mm(i) : 0.0)) / (end_s - start_s);
-        start_s = end_s;
+        next[i] = (distance_mm_[i] + (round > 0 ? ramps_mm(i) : 0.0)) / given_s(i);
       }
       speed_mm_s_.swap(next);
     }
   }
 
-  // What rounding does to the clock the next line makes up for.
-  void round_to_feeds() {
-    double clock_s = 0.0;
+  // What rounding and the firmware do to the clock the next lines make up for.
+  void round_to_feeds(double late_s) {
+    FirmwareClock clock(planner::make_planner(options_->run_limits, options_->fixed), late_s);
+    gcode::Segment line;
+    line.end_mm = start_mm_;
     for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
       Stroke& stroke = (*strokes_)[i];
-      const double given_s = stroke.end_s - (i > 0 ? (*strokes_)[i - 1].end_s : 0.0);
       const double share = std::min(kMostCatchUp, kCatchUpAccel * options_->lines.max_accel_mm_s2 *
-                                                      given_s * given_s / distance_mm_[i]);
-      const double due_s =
-          std::clamp(stroke.end_s - clock_s, (1.0 - share) * given_s, (1.0 + share) * given_s);
+                                                      given_s(i) * given_s(i) / distance_mm_[i]);
+      const double due_s = std::clamp(stroke.end_s - clock.now_s(), (1.0 - share) * given_s(i),
+                                      (1.0 + share) * given_s(i));
       const double way_mm = correction_[i] * (distance_mm_[i] + ramps_mm(i));
       const double feed = way_mm / due_s / mm_s_per_feed_;
       set_speed(i, feed * mm_s_per_feed_);
-      clock_s += way_mm / speed_mm_s_[i];
+      const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm,
+                                  start_mm_[gcode::E] + stroke.e_mm};
+      line = {line.end_mm, to, stroke.speed_mm_s, i, true};
+      if (i == 0 && passing_.in_mm_s) {
+        clock.pass(approach(line, *passing_.in_mm_s, -1.0));
+      }
+      clock.add(line, way_mm / speed_mm_s_[i]);
+    }
+    if (passing_.out_mm_s) {
+      clock.pass(approach(line, *passing_.out_mm_s, 1.0));
+    }
+    clock.finish();
+    for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
+      const double formula_s = (distance_mm_[i] + ramps_mm(i)) / speed_mm_s_[i];
+      correction_[i] =
+          std::clamp(clock.duration_s(i) / formula_s, 1.0 / kMostCorrection, kMostCorrection);
     }
   }
 
-  // RepRapFirmware leaves out ramps of less than ten step clocks if the speed is there within 10 %
-  // (DDA.cpp, RecalculateMove), and both moves then go at the lower speed. The least change from
-  // `before` that it does not leave out.
-  [[nodiscard]] static double least_change(double before, double accel_mm_s2) {
+  // RepRapFirmware leaves out a line's ramp up from the faster of its two ends, and so goes no
+  // faster than that, if it would take less than ten step clocks and gain less than 10 %
+  // (DDA.cpp, RecalculateMove). The least gain over `end` that it does not leave out.
+  [[nodiscard]] static double least_gain(double end_mm_s, double accel_mm_s2) {
     constexpr double kTenClocks_s = 10.0 / 750000.0;
     constexpr double kRoom = 1.05;
-    return kRoom * std::min(accel_mm_s2 * kTenClocks_s, 0.1 * before);
+    return kRoom * std::min(accel_mm_s2 * kTenClocks_s, end_mm_s / 9.0);
   }
-  [[nodiscard]] bool is_lost(double v, double before, double accel_mm_s2) const {
-    return options_->fixed.firmware == Firmware::rrf && v != before &&
-           std::abs(v - before) < least_change(before, accel_mm_s2);
+
+  // The speed nearest to v of which the firmware leaves out no ramp.
+  [[nodiscard]] double with_its_ramps(std::size_t i, double v) const {
+    const double before = speed_mm_s_[i - 1];
+    if (v < before) {
+      // The line before ends slower than it goes. If it also began slower, it has to be worth it.
+      const double gain = least_gain(v, accel_mm_s2_[i - 1]);
+      const bool rose = i < 2 || speed_mm_s_[i - 2] < before;
+      if (!rose || before - v >= gain) {
+        return v;
+      }
+      return before - v < 0.5 * gain ? before : before - gain;
+    }
+    const double after = i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : 0.0;
+    const double faster_end = std::max(before, std::min(after, v));
+    const double gain = least_gain(faster_end, accel_mm_s2_[i]);
+    if (v == faster_end || v - faster_end >= gain) {
+      return v;
+    }
+    return v - faster_end < 0.5 * gain ? faster_end : faster_end + gain;
   }
 
   // The speed nearest to v that the firmware can be told and will take.
   void set_speed(std::size_t i, double v) {
     Stroke& stroke = (*strokes_)[i];
-    if (i > 0 && is_lost(v, speed_mm_s_[i - 1], accel_mm_s2_[i])) {
-      const double before = speed_mm_s_[i - 1];
-      const double kept = std::copysign(least_change(before, accel_mm_s2_[i]), v - before);
-      if (std::abs(v - before) < 0.5 * std::abs(kept)) {
-        stroke.speed_mm_s = speed_mm_s_[i] = before;
+    if (i > 0 && options_->fixed.firmware == Firmware::rrf) {
+      v = with_its_ramps(i, v);
+      if (v == speed_mm_s_[i - 1]) {
+        stroke.speed_mm_s = speed_mm_s_[i] = v;
         stroke.feed_decimals = (*strokes_)[i - 1].feed_decimals;
         return;
       }
-      v = before + kept;
     }
     double told = v;
     if (step_events_[i] > 0.0) {
@@ -163,37 +264,27 @@ class SpeedSolver {
     speed_mm_s_[i] = step_events_[i] > 0.0 ? v : stroke.speed_mm_s;
   }
 
-  void compare_with_firmware() {
-    const std::unique_ptr<planner::Planner> firmware =
-        planner::make_planner(options_->run_limits, options_->fixed);
-    gcode::Position at = start_mm_;
-    for (std::size_t i = 0; i < strokes_->size(); ++i) {
-      const Stroke& stroke = (*strokes_)[i];
-      const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm,
-                                  start_mm_[gcode::E] + stroke.e_mm};
-      firmware->add({at, to, stroke.speed_mm_s, i, true});
-      at = to;
-    }
-    firmware->stop();
-    std::vector<planner::PlannedMove> moves;
-    firmware->take(moves);
-    for (const planner::PlannedMove& move : moves) {
-      const std::size_t i = move.segment.line;
-      const double expected_s = (distance_mm_[i] + ramps_mm(i)) / speed_mm_s_[i];
-      correction_[i] =
-          std::clamp(move.duration_s() / expected_s, 1.0 / kMostCorrection, kMostCorrection);
-    }
+  // The time that stroke i is to take.
+  [[nodiscard]] double given_s(std::size_t i) const {
+    return (*strokes_)[i].end_s - (i > 0 ? (*strokes_)[i - 1].end_s : 0.0);
   }
 
   // What the ramps of stroke i cost, as distance at its speed.
   [[nodiscard]] double ramps_mm(std::size_t i) const {
     const double v = speed_mm_s_[i];
-    const double up = std::max(v - (i > 0 ? speed_mm_s_[i - 1] : 0.0), 0.0);
-    const double down = std::max(v - (i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : 0.0), 0.0);
+    const double before = i > 0 ? speed_mm_s_[i - 1] : magnitude(passing_.in_mm_s);
+    const double after =
+        i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : magnitude(passing_.out_mm_s);
+    // No ramp lasts longer than the line. Where one would have to, the line takes longer, and those
+    // after it make up for that.
+    const double most = accel_mm_s2_[i] * given_s(i);
+    const double up = std::clamp(v - before, 0.0, most);
+    const double down = std::clamp(v - after, 0.0, most);
     return (up * up + down * down) / (2.0 * accel_mm_s2_[i]);
   }
 
   gcode::Position start_mm_;
+  Passing passing_;
   const EmitOptions* options_;
   std::vector<Stroke>* strokes_;
   double mm_s_per_feed_;
@@ -206,9 +297,9 @@ class SpeedSolver {
 
 }  // namespace
 
-void set_speeds(const gcode::Position& start_mm, const EmitOptions& options, double mm_s_per_feed,
-                std::vector<Stroke>& strokes) {
-  SpeedSolver(start_mm, options, mm_s_per_feed, strokes).solve();
+void set_speeds(const gcode::Position& start_mm, const Passing& passing, const EmitOptions& options,
+                double mm_s_per_feed, double late_s, std::vector<Stroke>& strokes) {
+  SpeedSolver(start_mm, passing, options, mm_s_per_feed, strokes).solve(late_s);
 }
 
 }  // namespace unflex::emit

@@ -1,15 +1,24 @@
 // How fast each line of a run is to be.
 #pragma once
 
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "strokes.hpp"
 
 namespace unflex::emit {
 
+// The base's velocity where the lines begin and end; unset: it rests.
+struct Passing {
+  std::optional<std::array<double, 2>> in_mm_s;
+  std::optional<std::array<double, 2>> out_mm_s;
+};
+
 // Sets the speeds of the strokes, and the digits of F they need, so that the firmware takes the
-// time each of them was given. mm_s_per_feed: what F1 means.
-void set_speeds(const gcode::Position& start_mm, const EmitOptions& options, double mm_s_per_feed,
-                std::vector<Stroke>& strokes);
+// time each of them was given. mm_s_per_feed: what F1 means. late_s: by how much the first begins
+// late, which they make up for.
+void set_speeds(const gcode::Position& start_mm, const Passing& passing, const EmitOptions& options,
+                double mm_s_per_feed, double late_s, std::vector<Stroke>& strokes);
 
 }  // namespace unflex::emit

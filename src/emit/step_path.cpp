@@ -92,7 +92,10 @@ class Search {
         ends_(ends),
         grid_(x, y),
         rules_(&rules),
-        last_(costs.size() - 1),
+        last_(ends.until_s
+                  ? std::min(static_cast<std::size_t>(nearest_whole(*ends.until_s / costs.dt_s())),
+                             costs.size() - 1)
+                  : costs.size() - 1),
         shortest_(costs.candidates(rules.min_line_s)),
         longest_(static_cast<std::size_t>(rules.max_line_s / costs.dt_s() + 1e-9)),
         end_(grid_.nearest({ends.end_x_mm, ends.end_y_mm})),
@@ -159,7 +162,15 @@ class Search {
     state.at = grid_.nearest({ends_.start_x_mm, ends_.start_y_mm});
     state.z[2] = ends_.start_x_mm - costs_->base_mm(0)[0];
     state.z[5] = ends_.start_y_mm - costs_->base_mm(0)[1];
+    if (ends_.goes_on) {
+      state.speed_mm_s = base_speed_mm_s(0);
+      state.line_s = rules_->even_line_s();
+    }
     return state;
+  }
+
+  [[nodiscard]] Eigen::Vector2d base_speed_mm_s(std::size_t k) const {
+    return (costs_->base_mm(k + 1) - costs_->base_mm(k)) / costs_->dt_s();
   }
 
   // The durations tried for a line from candidate k on, in candidates.
@@ -197,7 +208,11 @@ class Search {
 
   // Searches candidates from `from` to `until`; the best state at the end, in arena_.
   std::optional<std::size_t> block(State begin, std::size_t from, std::size_t until, bool is_last) {
-    to_go_.compute(from, until, is_last);
+    if (is_last && ends_.until_s) {
+      to_go_.compute(from, std::min(until + kBeyond, costs_->size() - 1), false);
+    } else {
+      to_go_.compute(from, until, is_last);
+    }
     arena_.clear();
     finished_.reset();
     ending_.assign(ending_.size(), {});
@@ -212,7 +227,7 @@ class Search {
         each->duration_s = each->fan.duration_s();
         each->price = price(k - each->k);
       }
-      if (is_last && to_go_.may_rest(k)) {
+      if (is_last && (ends_.until_s ? k == until : to_go_.may_rest(k))) {
         finish(lines, k);
       }
       if (!is_last || k < until) {
@@ -327,17 +342,18 @@ class Search {
     return (grid_.mm(to) - start_mm(state)) / duration_s;
   }
 
-  // The last line, after which the machine rests.
+  // The last line, after which the machine rests or goes on.
   void finish(const std::vector<Lines*>& all, std::size_t k) {
     for (const Lines* lines : all) {
-      const LineFan::Choice choice = lines->fan.choice(to_go_.resting(k));
+      const LineFan::Choice choice =
+          lines->fan.choice(ends_.until_s ? to_go_.at(k) : to_go_.resting(k));
       const double duration_s = lines->duration_s;
       for (std::size_t lane = 0; lane < lines->count; ++lane) {
         const State& state = arena_[lines->first + lane];
         const Eigen::Vector2d speed = speed_to(state, end_, duration_s);
         const double total = state.spent + choice.at(lane, speed) + fixed_cost(*lines, lane, k) +
                              too_quick(speed - state.speed_mm_s, state.line_s + duration_s) +
-                             too_quick(speed, duration_s);
+                             (ends_.until_s ? 0.0 : too_quick(speed, duration_s));
         if ((!finished_ || total < finished_->total) &&
             Places{state.at, rules_->min_steps}.far_enough(end_)) {
           finished_ = after_line(*lines, lane, k, end_, total);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "unflex/dynamics/base_trajectory.hpp"
@@ -34,6 +35,9 @@ struct RunEnds {
   double end_y_mm = 0.0;
   std::vector<double> lines_before_s = {};  // when the lines before it began, in order, before 0
   int lines_after = 0;                      // how many begin within rules.burst_s after it
+  bool goes_on = false;                     // it begins in motion
+  // When it ends in motion; the base is given further.
+  std::optional<double> until_s = {};
 };
 
 // The lines of at least rules.min_steps of `x` or `y` that make the nozzle follow the base best: a

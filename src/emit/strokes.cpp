@@ -45,7 +45,7 @@ std::vector<double> wanted_times(const Run& run, const Timetable& table,
 // Those of them that have lines between them, and the ends of the run.
 std::vector<double> required_times(const Run& run, const std::vector<double>& wanted,
                                    const LineRules& rules) {
-  const double end = run.base->duration_s();
+  const double end = run.end_s();
   std::vector<double> times = {0.0};
   for (const double t : wanted) {
     if (long_enough(*run.base, times.back(), t, rules) && long_enough(*run.base, t, end, rules)) {
@@ -57,13 +57,24 @@ std::vector<double> required_times(const Run& run, const std::vector<double>& wa
 }
 
 // Where the file's own moves take the machine, which the firmware may round.
-gcode::Position end_of(const Run& run) {
+gcode::Position end_of_moves(const Run& run) {
   for (auto event = run.events->rbegin(); event != run.events->rend(); ++event) {
     if (!event->segments.empty()) {
       return event->segments.back().end_mm;
     }
   }
   return run.moves->back().segment.end_mm;
+}
+
+// Where the run's lines end.
+gcode::Position end_of_lines(const Run& run, const Timetable& table, const Grid& grid) {
+  gcode::Position end = end_of_moves(run);
+  if (run.until_s) {
+    end[X] = grid.x.nearest(run.base->x_at(*run.until_s).position_mm);
+    end[Y] = grid.y.nearest(run.base->y_at(*run.until_s).position_mm);
+    end[Z] = grid.z.nearest(table.along_path_mm(*run.until_s, Z));
+  }
+  return end;
 }
 
 // Where the file is when the run begins. Marlin may be behind by the filament of a move that was
@@ -75,6 +86,13 @@ gcode::Position start_of(const Run& run) {
     }
   }
   return run.moves->front().segment.start_mm;
+}
+
+gcode::Position start_position(const Run& run, const Grid& grid) {
+  gcode::Position start = run.moves->front().segment.start_mm;
+  start[X] = start_of_lines(run, grid)[0];
+  start[Y] = start_of_lines(run, grid)[1];
+  return start;
 }
 
 // Whether the firmware moves for such a line, and not only with the next one.
@@ -104,12 +122,13 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
                 const Grid& grid, const LineRules& rules) {
   const dynamics::BaseTrajectory& base = *run.base;
   if (grid.x.step_mm > kCoarse_mm || grid.y.step_mm > kCoarse_mm) {
-    const gcode::Position& start = run.moves->front().segment.start_mm;
-    const gcode::Position end = end_of(run);
+    const std::array<double, 2> start = start_of_lines(run, grid);
+    const gcode::Position end = end_of_lines(run, table, grid);
     return step_path(
         base, wanted, [&](double t) { return error_weight(run, table, t); },
-        {start[X], start[Y], end[X], end[Y], run.lines_before_s, run.lines_after}, grid.x, grid.y,
-        rules);
+        {start[0], start[1], end[X], end[Y], run.lines_before_s, run.lines_after, run.goes_on,
+         run.until_s},
+        grid.x, grid.y, rules);
   }
   const std::vector<double> required = required_times(run, wanted, rules);
   std::vector<double> times = {0.0};
@@ -119,8 +138,9 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
   const VertexChooser along_x(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x);
   const VertexChooser along_y(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y);
   const auto choose = [&] {
-    return std::pair{along_x.choose(times, grid.x, rules.reach_x, rules.max_accel_mm_s2),
-                     along_y.choose(times, grid.y, rules.reach_y, rules.max_accel_mm_s2)};
+    const Ends ends{!run.goes_on, !run.until_s};
+    return std::pair{along_x.choose(times, grid.x, rules.reach_x, rules.max_accel_mm_s2, ends),
+                     along_y.choose(times, grid.y, rules.reach_y, rules.max_accel_mm_s2, ends)};
   };
   auto vertices = choose();
   while (split_lines(base, vertices.first.nozzle_error_mm, vertices.second.nozzle_error_mm, rules,
@@ -131,7 +151,58 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
           std::move(vertices.second.position_mm)};
 }
 
+// How much of its change of Z a line bears: it must not be steep by it, nor slow, as Z has limits
+// of its own that a run leaves as they are. The rest waits for other lines, as long as nobody sees
+// that.
+double change_of_z_mm(const Stroke& from, const Stroke& to, double next_mm_s, const Grid& grid,
+                      const EmitOptions& options) {
+  constexpr double kUnseen_mm = 0.01;
+  // Of the line's time, for ramps.
+  constexpr double kRamps = 0.25;
+  constexpr double kOfJerk = 0.5;
+  const double length = std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
+  const double dz = to.z_mm - from.z_mm;
+  double most = 2.0 * gcode::kMaxSlope * length;
+  if (options.fixed.firmware != Firmware::klipper && std::abs(dz) < kUnseen_mm) {
+    const double duration_s = to.end_s - from.end_s;
+    const double change_mm_s = std::abs(length / duration_s - next_mm_s);
+    const planner::Limits& limits = options.run_limits;
+    most = std::min({most, kOfJerk * limits.axis_jerk_mm_s[Z] * duration_s,
+                     kRamps * limits.axis_max_accel_mm_s2[Z] * length * duration_s / change_mm_s});
+  }
+  if (std::abs(dz) <= most) {
+    return dz;
+  }
+  return std::copysign(std::floor(most / grid.z.step_mm) * grid.z.step_mm, dz);
+}
+
+// How fast, and in which direction, a part of a run begins and ends.
+Passing passing(const Run& run) {
+  const auto velocity = [&](double t) -> std::optional<std::array<double, 2>> {
+    constexpr double kMoves_mm_s = 0.1;
+    const std::array v{run.base->x_at(t).velocity_mm_s, run.base->y_at(t).velocity_mm_s};
+    return std::hypot(v[0], v[1]) > kMoves_mm_s ? std::optional(v) : std::nullopt;
+  };
+  Passing result;
+  if (run.goes_on) {
+    result.in_mm_s = velocity(0.0);
+  }
+  if (run.until_s) {
+    result.out_mm_s = velocity(*run.until_s);
+  }
+  return result;
+}
+
 }  // namespace
+
+std::array<double, 2> start_of_lines(const Run& run, const Grid& grid) {
+  if (!run.goes_on) {
+    const gcode::Position& start = run.moves->front().segment.start_mm;
+    return {start[X], start[Y]};
+  }
+  return run.from_mm.value_or(std::array{grid.x.nearest(run.base->x_at(0.0).position_mm),
+                                         grid.y.nearest(run.base->y_at(0.0).position_mm)});
+}
 
 std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions& options) {
   const Timetable table(run);
@@ -147,8 +218,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     return {};
   }
 
-  const gcode::Position start = run.moves->front().segment.start_mm;
-  const gcode::Position end = end_of(run);
+  const gcode::Position start = start_position(run, grid);
+  const gcode::Position end = end_of_lines(run, table, grid);
   std::vector<Stroke> result;
   const double file_start_e_mm = start_of(run)[gcode::E];
   const double behind_mm = file_start_e_mm - start[gcode::E];
@@ -172,9 +243,12 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
       ++event;
     }
     stroke.events = event;
-    const double length = std::hypot(stroke.x_mm - last.x_mm, stroke.y_mm - last.y_mm);
-    if (!is_end && std::abs(stroke.z_mm - last.z_mm) > 2.0 * gcode::kMaxSlope * length) {
-      stroke.z_mm = last.z_mm;  // a rounding step of Z waits for a line that is not steep by it
+    const double next_mm_s = is_end ? 0.0
+                                    : std::hypot(vertices.x_mm[i + 1] - stroke.x_mm,
+                                                 vertices.y_mm[i + 1] - stroke.y_mm) /
+                                          (times[i + 1] - times[i]);
+    if (!is_end) {
+      stroke.z_mm = last.z_mm + change_of_z_mm(last, stroke, next_mm_s, grid, options);
     }
     if (goes_through(last, stroke, grid, rules)) {
       result.push_back(stroke);
@@ -189,9 +263,15 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     final.x_mm = end[X];
     final.y_mm = end[Y];
     final.z_mm = end[Z];
-    set_speeds(start, options, grid.speed_factor / 60.0, result);
+    time_strokes(run, grid, options, result);
   }
   return result;
+}
+
+void time_strokes(const Run& run, const Grid& grid, const EmitOptions& options,
+                  std::vector<Stroke>& strokes) {
+  set_speeds(start_position(run, grid), passing(run), options, grid.speed_factor / 60.0, run.late_s,
+             strokes);
 }
 
 }  // namespace unflex::emit

@@ -1,6 +1,7 @@
 // From the base's continuous motion to the straight strokes that a run is written as.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -29,10 +30,17 @@ struct Grid {
   double speed_factor = 1.0;  // M220 when the run begins
 };
 
-// The strokes of a run. Positions lie on the grid, but the last one is exactly where the last move
-// ends. Strokes that would have no length after rounding are merged into their successor, at the
-// ends of the run dropped. Empty when nothing is left.
+// Where in X and Y the first line of the run begins.
+[[nodiscard]] std::array<double, 2> start_of_lines(const Run& run, const Grid& grid);
+
+// The strokes of a run. Positions lie on the grid, but a run's last one is exactly where the last
+// move ends. Strokes that would have no length after rounding are merged into their successor, at
+// the ends of the run dropped. Empty when nothing is left.
 [[nodiscard]] std::vector<Stroke> strokes(const Run& run, const Grid& grid,
                                           const EmitOptions& options);
+
+// Gives them new speeds, for another Run::late_s.
+void time_strokes(const Run& run, const Grid& grid, const EmitOptions& options,
+                  std::vector<Stroke>& strokes);
 
 }  // namespace unflex::emit

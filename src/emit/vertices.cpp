@@ -112,10 +112,11 @@ Reach with_base(Reach reach, const BaseTrajectory& base, AxisAt axis) {
 // Pins the vertices around changes of speed that are too quick, those from and to rest at the ends
 // included; whether there were any to pin.
 bool pin_where_too_quick(const std::vector<double>& times, const std::vector<double>& at,
-                         double max_accel_mm_s2, std::size_t around, std::vector<bool>& pinned) {
+                         double max_accel_mm_s2, Ends ends, std::size_t around,
+                         std::vector<bool>& pinned) {
   bool found = false;
   const std::size_t last = times.size() - 1;
-  for (std::size_t i = 0; i <= last; ++i) {
+  for (std::size_t i = ends.from_rest ? 0 : 1; i + (ends.to_rest ? 0 : 1) <= last; ++i) {
     const double before_s = i > 0 ? times[i] - times[i - 1] : 0.0;
     const double after_s = i < last ? times[i + 1] - times[i] : 0.0;
     const double before = i > 0 ? (at[i] - at[i - 1]) / before_s : 0.0;
@@ -141,7 +142,7 @@ VertexChooser::VertexChooser(const BaseTrajectory& base, AxisAt axis, const Flex
     : base_(&base), axis_(axis), nozzle_(nozzle), followed_(base, axis, nozzle) {}
 
 AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisGrid& grid,
-                                   const Reach& reach, double max_accel_mm_s2) const {
+                                   const Reach& reach, double max_accel_mm_s2, Ends ends) const {
   const BaseTrajectory& base = *base_;
   const AxisAt axis = axis_;
   const std::size_t lines = times.size() - 1;
@@ -157,7 +158,7 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
   const Reach within = with_base(reach, base, axis);
-  // After the run the base rests and e rings down.
+  // After the run e rings down.
   CostToGo at_end;
   at_end.matrix.topLeftCorner<2, 2>() = ring_down_square(nozzle_);
   std::vector<bool> pinned(lines + 1, false);
@@ -183,7 +184,7 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
       result.position_mm.push_back(vertex);
       result.nozzle_error_mm.push_back(z[0]);
     }
-    if (!pin_where_too_quick(times, result.position_mm, max_accel_mm_s2, around, pinned)) {
+    if (!pin_where_too_quick(times, result.position_mm, max_accel_mm_s2, ends, around, pinned)) {
       return result;
     }
   }

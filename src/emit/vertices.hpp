@@ -18,6 +18,12 @@ struct AxisGrid {
   [[nodiscard]] double nearest(double position_mm) const;
 };
 
+// Whether the base rests where the lines begin and end.
+struct Ends {
+  bool from_rest = true;
+  bool to_rest = true;
+};
+
 // One axis at the ends of the lines.
 struct AxisVertices {
   std::vector<double> position_mm;
@@ -37,7 +43,8 @@ class VertexChooser {
   // the others on the grid. None goes further out than `reach` or the base itself, and no change of
   // speed from line to line exceeds max_accel, unless the base's own does.
   [[nodiscard]] AxisVertices choose(const std::vector<double>& times, const AxisGrid& grid,
-                                    const Reach& reach, double max_accel_mm_s2) const;
+                                    const Reach& reach, double max_accel_mm_s2,
+                                    Ends ends = {}) const;
 
  private:
   const dynamics::BaseTrajectory* base_;

@@ -35,7 +35,8 @@ constexpr std::size_t kNodesAhead = 200'000;
 constexpr std::size_t kWindowsAhead = 24;
 // Windows built at once.
 constexpr std::size_t kWindowsAtOnce = 8;
-// A run's trajectory is held as a whole, 48 bytes per node; longer ones are left as they are.
+// The trajectory of a run or part is held as a whole, 48 bytes per node; longer ones are left as
+// they are. Only a single move makes a part so long.
 constexpr std::size_t kMaxRunNodes = 8'000'000;
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kShortPatience{2};
@@ -79,7 +80,7 @@ class Compensator {
         progress_(&progress),
         slots_(&slots),
         report_(&report),
-        writer_(rules_, job.settings.max_lines_per_s(), report),
+        writer_(rules_, job.input_name, job.settings.max_lines_per_s(), report),
         input_bytes_(job.input_fd < 0 ? static_cast<double>(std::filesystem::file_size(job.input))
                                       : 0.0),
         engine_(engines.threaded ? engines.threaded() : nullptr),
@@ -92,7 +93,9 @@ class Compensator {
     while (!(all_read_ && queue_.empty())) {
       feed();
       while (can_write()) {
-        write(*queue_.front());
+        if (Status status = write(*queue_.front()); !status) {
+          return status;
+        }
         queue_.pop_front();
       }
       if (progress_->cancelled()) {
@@ -147,11 +150,13 @@ class Compensator {
   void admit(std::shared_ptr<RunJob> job) {
     const Piece& piece = job->piece;
     if (piece.is_run) {
-      ++report_->runs_total;
+      report_->runs_total += piece.begins_run() ? 1 : 0;
       job->nozzle = nozzle_;
-      nozzle_ = at_rest(piece.moves.back().segment.end_mm);
+      nozzle_ = piece.ends_run() ? at_rest(piece.moves.back().segment.end_mm)
+                                 : at_end_of(piece.moves.back());
       job->setup = setup_for(rules_.setup, piece.moves, job_.settings);
-      const std::size_t nodes = compensate::node_count(piece.moves, rules_.setup);
+      job->grid = compensate::node_grid(job->course(), rules_.setup);
+      const std::size_t nodes = job->grid.count;
       const double accel = largest_axis_accel(piece.moves);
       if (accel > rules_.verify.base_max_accel_mm_s2) {
         job->failure = fmt::format(
@@ -267,9 +272,12 @@ class Compensator {
     }
   }
 
-  void write(RunJob& job) {
-    const Piece& piece = job.piece;
-    put(text_of(piece), writer_.write(job));
+  Status write(RunJob& job) {
+    Result<std::string> text = writer_.write(job);
+    if (!text) {
+      return tl::unexpected(text.error());
+    }
+    put(text_of(job.piece), std::move(*text));
     report_->solver_iterations += job.iterations;
     nodes_queued_ -= nodes_of(job);
     gaps_.take(job);
@@ -281,6 +289,7 @@ class Compensator {
     progress_->update("compensating", input_bytes_ > 0.0
                                           ? static_cast<double>(bytes_written_) / input_bytes_
                                           : -1.0);
+    return {};
   }
 
   void put(std::string input, std::string output) {

@@ -69,9 +69,12 @@ class Inspector {
       add_event(event);
     }
     if (piece.is_run) {
-      ++result_->runs;
+      result_->runs += piece.begins_run() ? 1 : 0;
       result_->run_time_s += planner::duration_s(piece.moves);
-      result_->windows += compensate::cut(compensate::node_count(piece.moves, setup), setup).size();
+      result_->windows +=
+          compensate::cut(
+              compensate::node_grid({piece.before, piece.moves, piece.after}, setup).count, setup)
+              .size();
     }
   }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -36,59 +37,78 @@ double swing_mm(const dynamics::NozzleXY& nozzle, const gcode::Position& at,
 
 }  // namespace
 
-verify::RunDeviation deviation_of(const std::vector<planner::PlannedMove>& reference,
-                                  const std::vector<planner::PlannedMove>& base,
+verify::RunDeviation deviation_of(const Piece& run, const std::vector<planner::PlannedMove>& base,
                                   const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
                                   double lead_in_s) {
   verify::NozzleModel model = rules.nozzle;
   const double fastest_rad_s = std::max(model.x.omega_rad_s, model.y.omega_rad_s);
   model.step_s =
       std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));
-  return verify::measure(reference, base, nozzle, model, lead_in_s);
+  if (run.begins_run() && run.ends_run()) {
+    return verify::measure(run.moves, base, nozzle, model, lead_in_s);
+  }
+  // Where the base is a little ahead of the plan, or behind, the path must be there already.
+  std::vector<planner::PlannedMove> reference = run.before;
+  reference.insert(reference.end(), run.moves.begin(), run.moves.end());
+  reference.insert(reference.end(), run.after.begin(), run.after.end());
+  return verify::measure(reference, base, nozzle, model,
+                         lead_in_s - planner::duration_s(run.before), !run.ends_run());
 }
 
-Verdict judge(const std::vector<planner::PlannedMove>& original, const verify::RunDeviation& before,
-              std::string_view text, gcode::Interpreter printer,
-              const planner::Limits& printer_limits, const dynamics::NozzleXY& nozzle,
-              const verify::Rules& rules, verify::LineRate rate, double max_lines_per_s) {
-  const std::unique_ptr<planner::Planner> planner =
-      planner::make_planner(printer_limits, rules.fixed);
-  std::size_t line = 0;
+namespace {
+
+constexpr std::size_t kNoLine = std::numeric_limits<std::size_t>::max();
+
+// As if the printer went on for a while as on its last line.
+gcode::Segment continued(const gcode::Segment& last) {
+  constexpr double kAWhile_s = 0.05;
+  gcode::Segment line = last;
+  line.start_mm = last.end_mm;
+  const double lengths = kAWhile_s * last.feed_mm_s / last.length_mm();
+  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z, gcode::E}) {
+    line.end_mm[axis] += lengths * last.delta(axis);
+  }
+  line.line = kNoLine;
+  return line;
+}
+
+// What the printer makes of the text.
+std::vector<planner::PlannedMove> replay(std::string_view text, gcode::Interpreter printer,
+                                         const planner::Limits& limits,
+                                         const planner::FirmwareConfig& config,
+                                         const InMotion& in_motion) {
+  const std::unique_ptr<planner::Planner> planner = planner::make_planner(limits, config);
+  for (gcode::Segment line : in_motion.lines_before) {
+    line.line = kNoLine;
+    planner->add(line);
+  }
+  std::size_t number = 0;
+  std::optional<gcode::Segment> last;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
-    const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), ++line});
+    const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), ++number});
     text.remove_prefix(end);
     planner->apply(event.limits);
     for (const gcode::Segment& segment : event.segments) {
       planner->add(segment);
+      last = segment;
     }
+  }
+  if (in_motion.goes_on && last && last->length_mm() > 0.0) {
+    planner->add(continued(*last));
   }
   planner->stop();
   std::vector<planner::PlannedMove> replayed;
   planner->take(replayed);
+  std::erase_if(replayed,
+                [](const planner::PlannedMove& move) { return move.segment.line == kNoLine; });
+  return replayed;
+}
 
-  Verdict verdict;
-  if (std::optional<std::string> broken = verify::broken_rule(original, replayed, rules)) {
-    verdict.objection = std::move(broken);
-    return verdict;
-  }
-  rate.forget();
-  rate.change_text();
-  verify::LineRate original_rate = rate;
-  for (const planner::PlannedMove& move : original) {
-    original_rate.add(move);
-  }
-  for (const planner::PlannedMove& move : replayed) {
-    rate.add(move);
-  }
-  // Where the sliced lines themselves are too many, fewer are better.
-  if (rate.max_per_s() > std::max(max_lines_per_s, original_rate.max_per_s())) {
-    verdict.objection = fmt::format("{:.0f} lines per second are more than {:.0f}",
-                                    rate.max_per_s(), max_lines_per_s);
-    return verdict;
-  }
-  const verify::RunDeviation after =
-      deviation_of(original, replayed, nozzle, rules, rules.lead_in_s);
+// Why the deviation `after` is worse than the one before.
+std::optional<std::string> worse(const verify::RunDeviation& before,
+                                 const verify::RunDeviation& after, const gcode::Position& end,
+                                 const verify::Rules& rules) {
   const auto no_worse = [](double a, double b) {
     return a <= std::max((1.0 + kSampling) * b, kResolutionMm);
   };
@@ -97,35 +117,75 @@ Verdict judge(const std::vector<planner::PlannedMove>& original, const verify::R
     const verify::DeviationStats a = after.extruding.stats();
     if (no_worse(a.contour_rms_mm, b.contour_rms_mm) &&
         no_worse(a.contour_max_mm, b.contour_max_mm + chance_mm(rules.fixed))) {
-      verdict.nozzle = after.end;
-      verdict.rate = std::move(rate);
-      verdict.replayed = std::move(replayed);
-      return verdict;
+      return std::nullopt;
     }
-    verdict.objection = fmt::format(
+    return fmt::format(
         "compensation would be worse: contour RMS {:.3f} to {:.3f} µm, largest {:.3f} to {:.3f} µm",
         b.contour_rms_mm * 1e3, a.contour_rms_mm * 1e3, b.contour_max_mm * 1e3,
         a.contour_max_mm * 1e3);
-    return verdict;
   }
   // Travel draws nothing, and a straight one has no contour error whatever it does: what counts is
   // how well the nozzle keeps to where it should be, and so what it leaves to the next run. Where
   // the firmware rounds the clock of each line, only the latter.
   const verify::DeviationStats b = before.all.stats();
   const verify::DeviationStats a = after.all.stats();
-  const gcode::Position& end = original.back().segment.end_mm;
   if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm) ||
       (rules.fixed.firmware != Firmware::klipper &&
        no_worse(swing_mm(after.end, end, rules.nozzle),
                 swing_mm(before.end, end, rules.nozzle) + chance_mm(rules.fixed)))) {
-    verdict.nozzle = after.end;
-    verdict.rate = std::move(rate);
-    verdict.replayed = std::move(replayed);
+    return std::nullopt;
+  }
+  return fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",
+                     b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
+}
+
+// Whether a print could bear it although it is worse.
+bool is_bearable(const verify::RunDeviation& before, const verify::RunDeviation& after) {
+  constexpr double kBearableRms_mm = 5e-3;
+  constexpr double kBearable_mm = 25e-3;
+  constexpr double kTimes = 2.0;
+  const verify::DeviationStats b = before.all.stats();
+  const verify::DeviationStats a = after.all.stats();
+  return a.contour_rms_mm <= std::max(kTimes * b.contour_rms_mm, kBearableRms_mm) &&
+         a.contour_max_mm <= std::max(kTimes * b.contour_max_mm, kBearable_mm);
+}
+
+}  // namespace
+
+Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_view text,
+              gcode::Interpreter printer, const planner::Limits& printer_limits,
+              const dynamics::NozzleXY& nozzle, const verify::Rules& rules, double lead_in_s,
+              verify::LineRate rate, double max_lines_per_s, const InMotion& in_motion) {
+  Verdict verdict;
+  verdict.replayed = replay(text, std::move(printer), printer_limits, rules.fixed, in_motion);
+  verdict.objection = verify::broken_rule(run.moves, verdict.replayed, rules);
+  if (verdict.objection) {
     return verdict;
   }
-  verdict.objection =
-      fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",
-                  b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
+  rate.forget();
+  rate.change_text();
+  verify::LineRate original_rate = rate;
+  for (const planner::PlannedMove& move : run.moves) {
+    original_rate.add(move);
+  }
+  for (const planner::PlannedMove& move : verdict.replayed) {
+    rate.add(move);
+  }
+  // Where the sliced lines themselves are too many, fewer are better.
+  if (rate.max_per_s() > std::max(max_lines_per_s, original_rate.max_per_s())) {
+    verdict.objection = fmt::format("{:.0f} lines per second are more than {:.0f}",
+                                    rate.max_per_s(), max_lines_per_s);
+    return verdict;
+  }
+  const verify::RunDeviation after = deviation_of(run, verdict.replayed, nozzle, rules, lead_in_s);
+  verdict.nozzle = after.end;
+  verdict.rate = std::move(rate);
+  std::optional<std::string> objection =
+      worse(before, after, run.moves.back().segment.end_mm, rules);
+  verdict.worse = objection.has_value();
+  if (!(in_motion.may_be_worse && is_bearable(before, after))) {
+    verdict.objection = std::move(objection);
+  }
   return verdict;
 }
 

@@ -10,6 +10,13 @@ dynamics::NozzleXY at_rest(const gcode::Position& position) {
   return {{position[gcode::X], 0.0}, {position[gcode::Y], 0.0}};
 }
 
+dynamics::NozzleXY at_end_of(const planner::PlannedMove& move) {
+  const gcode::Position& end = move.segment.end_mm;
+  const double v = move.end_v_mm_s;
+  return {{end[gcode::X], v * move.direction[gcode::X]},
+          {end[gcode::Y], v * move.direction[gcode::Y]}};
+}
+
 // Phase by phase: the acceleration changes where one ends.
 void advance(const planner::PlannedMove& move, double from_s, double to_s,
              const verify::NozzleModel& model, dynamics::NozzleXY& nozzle) {

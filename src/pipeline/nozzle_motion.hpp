@@ -10,6 +10,9 @@ namespace unflex::pipeline {
 
 [[nodiscard]] dynamics::NozzleXY at_rest(const gcode::Position& position);
 
+// On the plan, where the move ends and as fast as it then is.
+[[nodiscard]] dynamics::NozzleXY at_end_of(const planner::PlannedMove& move);
+
 // Takes the nozzle from one moment of the move to a later one, seconds after its start.
 void advance(const planner::PlannedMove& move, double from_s, double to_s,
              const verify::NozzleModel& model, dynamics::NozzleXY& nozzle);

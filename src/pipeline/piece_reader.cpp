@@ -1,5 +1,6 @@
 #include "piece_reader.hpp"
 
+#include <iterator>
 #include <utility>
 
 #include "unflex/gcode/command.hpp"
@@ -11,6 +12,47 @@ namespace {
 // Lines between runs are handed on in portions, so that a long file without motion stays small.
 constexpr std::size_t kMaxEventsOutsideRuns = 4096;
 constexpr std::size_t kMaxWarnings = 1000;
+// Runs up to this long are handled as a whole, so that they can be left as they are …
+constexpr double kWhole_s = 60.0;
+// … of longer ones parts, which end near borders this far apart, …
+constexpr double kPart_s = 20.0;
+constexpr double kBorder_s = 0.5;
+constexpr double kChoice_s = 5.0;
+// … and are given so much of what is around them.
+constexpr double kAround_s = 0.3;
+// After how many events it is looked whether a run is that long.
+constexpr std::size_t kEventsPerLook = 256;
+
+// The last moves that take kAround_s, or all there are.
+std::vector<planner::PlannedMove> last_of(const std::vector<planner::PlannedMove>& moves) {
+  double duration_s = 0.0;
+  auto first = moves.end();
+  while (first != moves.begin() && duration_s < kAround_s) {
+    --first;
+    duration_s += first->duration_s();
+  }
+  return {first, moves.end()};
+}
+
+// The first moves that take kAround_s.
+std::vector<planner::PlannedMove> first_of(const std::vector<planner::PlannedMove>& moves) {
+  double duration_s = 0.0;
+  auto last = moves.begin();
+  while (last != moves.end() && duration_s < kAround_s) {
+    duration_s += last->duration_s();
+    ++last;
+  }
+  return {moves.begin(), last};
+}
+
+// What is from `first` on.
+template <class Value>
+std::vector<Value> split_off(std::vector<Value>& values, std::size_t first) {
+  const auto begin = values.begin() + static_cast<std::ptrdiff_t>(first);
+  std::vector<Value> rest(std::make_move_iterator(begin), std::make_move_iterator(values.end()));
+  values.erase(begin, values.end());
+  return rest;
+}
 
 bool stands_anywhere(const gcode::Event& event) {
   return event.kind == gcode::EventKind::passive || event.kind == gcode::EventKind::limits;
@@ -87,6 +129,9 @@ Result<bool> PieceReader::next(Piece& piece) {
       }
       open_.is_run = for_run;
       append(std::move(event));
+      if (for_run && split(piece)) {
+        return true;
+      }
     }
     if (!open_.is_run && open_.events.size() >= kMaxEventsOutsideRuns) {
       close(piece);
@@ -138,10 +183,14 @@ void PieceReader::append(gcode::Event event) {
     // The move itself changes nothing of it.
     open_.start = emit::run_start(interpreter_.state(), planner_->limits());
   }
+  if (open_.is_run) {
+    mark_border(event);
+  }
   std::size_t count = 0;
   for (const gcode::Segment& segment : event.segments) {
     count += planner_->add(segment) ? 1 : 0;
   }
+  moves_added_ += count;
   if (event.kind == gcode::EventKind::barrier) {
     planner_->stop();
   }
@@ -157,6 +206,75 @@ void PieceReader::append_between() {
   between_.clear();
 }
 
+// Of the move that is about to be added.
+void PieceReader::mark_border(const gcode::Event& event) {
+  if (since_border_s_ >= kBorder_s) {
+    since_border_s_ = 0.0;
+    borders_.push_back({open_.events.size(), moves_added_,
+                        emit::run_start(interpreter_.state(), planner_->limits())});
+  }
+  for (const gcode::Segment& segment : event.segments) {
+    since_border_s_ += segment.length_xy_mm() / segment.feed_mm_s;
+  }
+}
+
+// The border at which a part is to end, once it is long enough and the plan final until some time
+// after it: of those within a while the one the machine passes fastest, as it does no corner.
+std::optional<std::size_t> PieceReader::border_to_split_at() const {
+  const std::vector<planner::PlannedMove>& moves = open_.moves;
+  const double total_s = planner::duration_s(moves);
+  if (total_s < (open_.before.empty() ? kWhole_s : kPart_s + kChoice_s + kAround_s)) {
+    return std::nullopt;
+  }
+  std::optional<std::size_t> best;
+  double end_s = 0.0;
+  std::size_t move = 0;
+  for (std::size_t i = 0; i < borders_.size() && borders_[i].move < moves.size(); ++i) {
+    for (; move < borders_[i].move; ++move) {
+      end_s += moves[move].duration_s();
+    }
+    if (total_s - end_s < kAround_s || (best && end_s > kPart_s + kChoice_s)) {
+      break;
+    }
+    if (end_s >= kPart_s &&
+        (!best || moves[move].start_v_mm_s > moves[borders_[*best].move].start_v_mm_s)) {
+      best = i;
+    }
+  }
+  return best;
+}
+
+// Hands out a part of the open run, if that is long by now.
+bool PieceReader::split(Piece& piece) {
+  if (++events_since_look_ < kEventsPerLook) {
+    return false;
+  }
+  events_since_look_ = 0;
+  planner_->take(open_.moves);
+  const std::optional<std::size_t> chosen = border_to_split_at();
+  if (!chosen) {
+    return false;
+  }
+  Border border = std::move(borders_[*chosen]);
+  borders_.erase(borders_.begin(), borders_.begin() + static_cast<std::ptrdiff_t>(*chosen) + 1);
+  for (Border& later : borders_) {
+    later.event -= border.event;
+    later.move -= border.move;
+  }
+  moves_added_ -= border.move;
+
+  Piece rest;
+  rest.is_run = true;
+  rest.start = std::move(border.start);
+  rest.events = split_off(open_.events, border.event);
+  rest.move_counts = split_off(open_.move_counts, border.event);
+  rest.moves = split_off(open_.moves, border.move);
+  rest.before = last_of(open_.moves);
+  open_.after = first_of(rest.moves);
+  piece = std::exchange(open_, std::move(rest));
+  return true;
+}
+
 // Hands out the open piece; the lines after a run's last move go to the next one.
 void PieceReader::close(Piece& piece) {
   if (open_.events.empty()) {
@@ -167,6 +285,9 @@ void PieceReader::close(Piece& piece) {
   // Marlin leaves moves of a few steps to the next one.
   open_.is_run = open_.is_run && !open_.moves.empty();
   piece = std::exchange(open_, Piece{});
+  borders_.clear();
+  moves_added_ = 0;
+  since_border_s_ = 0.0;
 }
 
 }  // namespace unflex::pipeline

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <istream>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,12 +20,18 @@ namespace unflex::pipeline {
 struct Piece {
   // A run: compensable moves and the lines between them that do not stop the machine. Its plan goes
   // from rest to rest, since the base has to stand still where it meets motion left as it is. Has
-  // at least one planned move.
+  // at least one planned move. A long one comes in parts.
   bool is_run = false;
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
   std::vector<planner::PlannedMove> moves;
   emit::RunStart start;  // of a run
+  // Of a part of a run, some of its moves around: none before the first part and after the last.
+  std::vector<planner::PlannedMove> before;
+  std::vector<planner::PlannedMove> after;
+
+  [[nodiscard]] bool begins_run() const { return is_run && before.empty(); }
+  [[nodiscard]] bool ends_run() const { return is_run && after.empty(); }
 };
 
 // Counts the event's moves that unflex leaves as they are, by reason.
@@ -47,13 +55,27 @@ class PieceReader {
   Result<bool> read_event(gcode::Event& event);
   void append(gcode::Event event);
   void append_between();
+  void mark_border(const gcode::Event& event);
+  [[nodiscard]] std::optional<std::size_t> border_to_split_at() const;
+  bool split(Piece& piece);
   void close(Piece& piece);
 
   gcode::LineReader lines_;
   gcode::Interpreter interpreter_;
   std::unique_ptr<planner::Planner> planner_;
   Firmware firmware_;
-  Piece open_;                         // being filled
+  // Where a run that turns out to be long may be parted: before a move of it.
+  struct Border {
+    std::size_t event = 0;
+    std::size_t move = 0;
+    emit::RunStart start;
+  };
+
+  Piece open_;                   // being filled
+  std::deque<Border> borders_;   // of it
+  std::size_t moves_added_ = 0;  // to it
+  double since_border_s_ = 0.0;  // roughly
+  std::size_t events_since_look_ = 0;
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;
   bool any_command_ = false;

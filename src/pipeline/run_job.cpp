@@ -23,13 +23,19 @@ std::string failure_of(const RunJob& job) {
   return {};
 }
 
+// From the course's first node on; of a part also what comes after its last.
 dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
   std::vector<dynamics::AxisTrajectory> solutions;
   for (std::array<AxisResult, 2>& result : job.results) {
     solutions.push_back(std::move(result[axis].base));
     job.iterations += static_cast<std::size_t>(result[axis].iterations);
   }
-  return compensate::join(job.spans, solutions);
+  dynamics::AxisTrajectory base = compensate::join(job.spans, solutions);
+  const auto before = static_cast<std::ptrdiff_t>(job.grid.first);
+  for (std::vector<double>* values : {&base.position_mm, &base.velocity_mm_s, &base.accel_mm_s2}) {
+    values->erase(values->begin(), values->begin() + before);
+  }
+  return base;
 }
 
 // Where the firmware counts steps, how lines are cut depends on those before the run. What these
@@ -46,15 +52,20 @@ std::vector<double> even_lines_before_s(const emit::LineRules& rules) {
 
 emit::Run RunJob::run(double tolerance_share, double limits_share,
                       std::vector<double> lines_before_s) const {
-  return {.events = &piece.events,
-          .move_counts = &piece.move_counts,
-          .moves = &piece.moves,
-          .base = &base,
-          .lead_in_s = setup.lead_in_s,
-          .tolerance_share = tolerance_share,
-          .limits_share = limits_share,
-          .lines_before_s = std::move(lines_before_s),
-          .lines_after = lines_after};
+  emit::Run run{.events = &piece.events,
+                .move_counts = &piece.move_counts,
+                .moves = &piece.moves,
+                .base = &base,
+                .lead_in_s = lead_in_s(),
+                .tolerance_share = tolerance_share,
+                .limits_share = limits_share,
+                .lines_before_s = std::move(lines_before_s),
+                .lines_after = lines_after,
+                .goes_on = !piece.begins_run()};
+  if (!piece.ends_run()) {
+    run.until_s = static_cast<double>(grid.last - grid.first) * grid.period_s;
+  }
+  return run;
 }
 
 AxisResult axis_result(Result<compensate::AxisSolution> solution) {
@@ -66,7 +77,7 @@ AxisResult axis_result(Result<compensate::AxisSolution> solution) {
 
 std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
                                               std::size_t count) {
-  return compensate::windows(job.piece.moves, job.spans, first, count, job.nozzle, job.setup);
+  return compensate::windows(job.course(), job.spans, first, count, job.nozzle, job.setup);
 }
 
 void solve_windows(RunJob& job, std::size_t first, std::size_t count,
@@ -94,10 +105,10 @@ void prepare(RunJob& job, const RunRules& rules) noexcept {
   try {
     job.failure = failure_of(job);
     if (job.failure.empty()) {
-      job.base = {job.setup.period_s, joined(job, 0), joined(job, 1)};
+      job.base = {job.grid.period_s, joined(job, 0), joined(job, 1)};
       job.plan = emit::plan_run(job.run(1.0, 1.0, even_lines_before_s(rules.emit.lines)),
                                 job.piece.start, rules.emit);
-      job.before = deviation_of(job.piece.moves, job.piece.moves, job.nozzle, rules.verify, 0.0);
+      job.before = deviation_of(job.piece, job.piece.moves, job.nozzle, rules.verify, 0.0);
     }
   } catch (const std::exception& exception) {
     job.failure = exception.what();

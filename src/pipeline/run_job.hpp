@@ -37,9 +37,10 @@ struct Probe {
 
 struct RunJob {
   Piece piece;
-  // From here on of runs only.
-  dynamics::NozzleXY nozzle;  // when the run begins, if every run before is compensated
+  // From here on of runs, or parts of runs, only.
+  dynamics::NozzleXY nozzle;  // when it begins, if every run before is compensated
   compensate::Setup setup;
+  compensate::NodeGrid grid;
   std::vector<compensate::WindowSpan> spans;
   std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
   std::vector<Probe> probes;
@@ -55,6 +56,12 @@ struct RunJob {
   std::string failure;
   std::atomic<bool> prepared = false;
 
+  // What the nozzle is to follow.
+  [[nodiscard]] compensate::Course course() const {
+    return {piece.before, piece.moves, piece.after};
+  }
+  // How long before its plan the base begins.
+  [[nodiscard]] double lead_in_s() const { return piece.begins_run() ? setup.lead_in_s : 0.0; }
   // What the emitter is to write; the arguments are Run's.
   [[nodiscard]] emit::Run run(double tolerance_share = 1.0, double limits_share = 1.0,
                               std::vector<double> lines_before_s = {}) const;

@@ -1,5 +1,8 @@
 #include "run_writer.hpp"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -12,9 +15,16 @@ namespace {
 constexpr std::size_t kMostListed = 1000;
 // Of the tolerance, for a run that the whole of it spoils.
 constexpr double kFineTolerance = 0.05;
-// Of the limits, for a run that exceeds them.
+// Of the limits, for a run that exceeds them …
 constexpr double kLower = 0.85;
+// … and for one that must be written.
+constexpr double kLowest[] = {0.7, 0.5};
+// What of a part's last lines tells the printer how it arrives at the next part.
+constexpr double kLastLines_s = 0.05;
 constexpr double kApart_mm = 1e-3;
+// Parts that begin less late are written as they were planned.
+constexpr double kLate_s = 2e-5;
+constexpr double kSamePlace_mm = 1e-7;
 
 // How differently two nozzles swing.
 double apart_mm(const dynamics::NozzleXY& a, const dynamics::NozzleXY& b,
@@ -27,12 +37,31 @@ double apart_mm(const dynamics::NozzleXY& a, const dynamics::NozzleXY& b,
   return std::hypot(on_axis(a.x, b.x, model.x), on_axis(a.y, b.y, model.y));
 }
 
+std::vector<gcode::Segment> last_lines(const std::vector<planner::PlannedMove>& moves) {
+  double duration_s = 0.0;
+  auto first = moves.end();
+  while (first != moves.begin() && duration_s < kLastLines_s) {
+    --first;
+    duration_s += first->duration_s();
+  }
+  std::vector<gcode::Segment> lines;
+  for (; first != moves.end(); ++first) {
+    lines.push_back(first->segment);
+  }
+  return lines;
+}
+
 }  // namespace
 
-RunWriter::RunWriter(const RunRules& rules, double max_lines_per_s, report::Report& report)
-    : rules_(&rules), max_lines_per_s_(max_lines_per_s), report_(&report), emitter_(rules.emit) {}
+RunWriter::RunWriter(const RunRules& rules, std::string input_name, double max_lines_per_s,
+                     report::Report& report)
+    : rules_(&rules),
+      input_name_(std::move(input_name)),
+      max_lines_per_s_(max_lines_per_s),
+      report_(&report),
+      emitter_(rules.emit) {}
 
-std::string RunWriter::write(const RunJob& job) {
+Result<std::string> RunWriter::write(const RunJob& job) {
   const Piece& piece = job.piece;
   std::string text;
   if (!piece.is_run) {
@@ -40,11 +69,32 @@ std::string RunWriter::write(const RunJob& job) {
       emitter_.line(event, text);
     }
     keep_motion(piece);
-  } else if (std::optional<std::string> failure = write_run(job, text)) {
+    return text;
+  }
+  if (piece.begins_run()) {
+    last_lines_.clear();
+    late_s_ = 0.0;
+    run_stands_ = false;
+  }
+  std::optional<std::string> failure =
+      run_stands_ ? "the run's beginning stands as it is" : write_run(job, text);
+  if (failure && !last_lines_.empty()) {
+    // There is no way back to the sliced lines in the middle of the motion.
+    failure = insist(job, text);
+    if (failure) {
+      const std::size_t line = piece.events.front().line.number;
+      return fail(ErrorKind::input, {input_name_, line},
+                  fmt::format("up to line {} the print cannot be compensated, and it does not stop "
+                              "before: {}; print it as it was sliced",
+                              piece.events.back().line.number, *failure));
+    }
+  }
+  if (failure) {
     text.clear();
     emitter_.keep(piece.events, text);
     keep_motion(piece);
     note_fallback(job, std::move(*failure));
+    run_stands_ = true;
   }
   return text;
 }
@@ -84,6 +134,34 @@ void RunWriter::note_lines_above_budget(const Piece& piece) {
   }
 }
 
+emit::RunPlan RunWriter::plan(const RunJob& job, double tolerance_share,
+                              double limits_share) const {
+  emit::Run run = job.run(tolerance_share, limits_share, line_rate_.last_begins_s());
+  const gcode::Position& at = emitter_.printer().state().position_mm;
+  run.from_mm = std::array{at[gcode::X], at[gcode::Y]};
+  run.late_s = late_s_;
+  return emit::plan_run(run, emitter_.run_start(), rules_->emit);
+}
+
+// The lines that were prepared, in time.
+emit::RunPlan RunWriter::in_time(const RunJob& job) const {
+  if (std::abs(late_s_) < kLate_s || job.plan.empty()) {
+    return job.plan;
+  }
+  emit::Run run = job.run();
+  run.late_s = late_s_;
+  return emit::retimed(job.plan, run, rules_->emit);
+}
+
+// Whether the run was planned for where the printer is.
+bool RunWriter::fits(const RunJob& job) const {
+  const gcode::Position& at = emitter_.printer().state().position_mm;
+  const bool same_place =
+      job.piece.begins_run() || std::hypot(job.plan.from_mm[0] - at[gcode::X],
+                                           job.plan.from_mm[1] - at[gcode::Y]) < kSamePlace_mm;
+  return same_place && job.plan.start == emitter_.run_start();
+}
+
 // The run as compensated text, or why its original lines must stand.
 std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& text) {
   if (!job.failure.empty()) {
@@ -92,58 +170,79 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   // Its own moves would find the nozzle as it is, which after motion that was kept is not as
   // reckoned with.
   before_ = apart_mm(nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
-                ? deviation_of(job.piece.moves, job.piece.moves, nozzle_, rules_->verify, 0.0)
+                ? deviation_of(job.piece, job.piece.moves, nozzle_, rules_->verify, 0.0)
                 : job.before;
-  const auto plan = [&](double tolerance_share, double limits_share) {
-    return emit::plan_run(job.run(tolerance_share, limits_share, line_rate_.last_begins_s()),
-                          emitter_.run_start(), rules_->emit);
-  };
   const bool counts_steps = rules_->emit.lines.burst_lines > 0;
   std::optional<std::string> objection = "planned for another start";
-  if (job.plan.start == emitter_.run_start()) {
-    objection = try_run(job, job.plan, text);
+  if (fits(job)) {
+    objection = try_run(job, in_time(job), false, text);
   }
   // What was not known beforehand: how it starts, and the lines before.
-  if (objection && (counts_steps || job.plan.start != emitter_.run_start())) {
-    objection = try_run(job, plan(1.0, 1.0), text);
+  if (objection && (counts_steps || !fits(job))) {
+    objection = try_run(job, plan(job, 1.0, 1.0), false, text);
   }
   // Where whole steps make a line too quick or the lines a few too many, aiming lower helps.
   if (objection && counts_steps) {
-    objection = try_run(job, plan(1.0, kLower), text);
+    objection = try_run(job, plan(job, 1.0, kLower), false, text);
   }
   // Where long lines break a limit or cost too much, short ones may do.
-  return objection ? try_run(job, plan(kFineTolerance, 1.0), text) : objection;
+  return objection ? try_run(job, plan(job, kFineTolerance, 1.0), false, text) : objection;
+}
+
+// The same for a part that must be written: what keeps the limits will do.
+std::optional<std::string> RunWriter::insist(const RunJob& job, std::string& text) {
+  if (!job.failure.empty()) {
+    return job.failure;
+  }
+  std::optional<std::string> objection = try_run(job, plan(job, 1.0, 1.0), true, text);
+  for (const double share : kLowest) {
+    if (objection) {
+      objection = try_run(job, plan(job, 1.0, share), true, text);
+    }
+  }
+  return objection;
 }
 
 std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::RunPlan& plan,
-                                              std::string& text) {
+                                              bool may_be_worse, std::string& text) {
   if (plan.empty()) {
     return "the motion is too small to be written";
   }
+  const Piece& piece = job.piece;
   emit::Emitter trial = emitter_;
   text.clear();
   trial.run(job.run(), plan, text);
-  Verdict verdict =
-      judge(job.piece.moves, before_, text, emitter_.printer(), emitter_.printer_limits(), nozzle_,
-            rules_->verify, line_rate_, max_lines_per_s_);
+  Verdict verdict = judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(),
+                          nozzle_, rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
+                          {last_lines_, !piece.ends_run(), may_be_worse});
   if (verdict.objection) {
     return std::move(verdict.objection);
   }
-  sliced_s_ += planner::duration_s(job.piece.moves);
+  if (verdict.worse) {
+    report_->warnings.push_back(to_string(
+        Diagnostic{{input_name_, piece.events.front().line.number},
+                   fmt::format("up to line {}, in the middle of a long run, the nozzle strays more "
+                               "than it would without compensation",
+                               piece.events.back().line.number)}));
+  }
+  sliced_s_ += planner::duration_s(piece.moves);
   written_s_ += planner::duration_s(verdict.replayed);
-  cost_.add(job.piece.moves, job.setup.lead_in_s, job.base, verdict.replayed, nozzle_,
+  cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, nozzle_,
             rules_->verify.nozzle);
+  late_s_ +=
+      planner::duration_s(verdict.replayed) - planner::duration_s(piece.moves) - job.lead_in_s();
+  last_lines_ = piece.ends_run() ? std::vector<gcode::Segment>() : last_lines(verdict.replayed);
   nozzle_ = verdict.nozzle;
   line_rate_ = std::move(verdict.rate);
-  note_lines_above_budget(job.piece);
+  note_lines_above_budget(piece);
   emitter_ = std::move(trial);
-  ++report_->runs_compensated;
+  report_->runs_compensated += piece.begins_run() ? 1 : 0;
   report_->windows_solved += job.spans.size();
   return std::nullopt;
 }
 
 void RunWriter::note_fallback(const RunJob& job, std::string reason) {
-  ++report_->runs_fallback;
+  report_->runs_fallback += job.piece.begins_run() ? 1 : 0;
   report_->windows_fallback += job.spans.size();
   if (report_->fallbacks.size() < kMostListed) {
     report_->fallbacks.push_back({job.piece.events.front().line.number,

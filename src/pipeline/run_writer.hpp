@@ -4,9 +4,11 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "emission_cost.hpp"
 #include "run_job.hpp"
+#include "unflex/core/error.hpp"
 #include "unflex/emit/emitter.hpp"
 #include "unflex/report/report.hpp"
 #include "unflex/verify/line_rate.hpp"
@@ -15,11 +17,13 @@ namespace unflex::pipeline {
 
 class RunWriter {
  public:
-  // Both must outlive the writer. max_lines_per_s: the budget.
-  RunWriter(const RunRules& rules, double max_lines_per_s, report::Report& report);
+  // Rules and report must outlive the writer. input_name: in errors. max_lines_per_s: the budget.
+  RunWriter(const RunRules& rules, std::string input_name, double max_lines_per_s,
+            report::Report& report);
 
-  // The piece as text. Of a run, prepare() has been called.
-  [[nodiscard]] std::string write(const RunJob& job);
+  // The piece as text. Of a run, prepare() has been called. An error where a run of which parts
+  // have been written cannot go on.
+  [[nodiscard]] Result<std::string> write(const RunJob& job);
   // What follows the last piece.
   [[nodiscard]] std::string finish();
 
@@ -31,18 +35,27 @@ class RunWriter {
  private:
   void keep_motion(const Piece& piece);
   void note_lines_above_budget(const Piece& piece);
+  [[nodiscard]] emit::RunPlan plan(const RunJob& job, double tolerance_share,
+                                   double limits_share) const;
+  [[nodiscard]] emit::RunPlan in_time(const RunJob& job) const;
+  [[nodiscard]] bool fits(const RunJob& job) const;
   std::optional<std::string> write_run(const RunJob& job, std::string& text);
+  std::optional<std::string> insist(const RunJob& job, std::string& text);
   std::optional<std::string> try_run(const RunJob& job, const emit::RunPlan& plan,
-                                     std::string& text);
+                                     bool may_be_worse, std::string& text);
   void note_fallback(const RunJob& job, std::string reason);
 
   const RunRules* rules_;
+  std::string input_name_;
   double max_lines_per_s_;
   report::Report* report_;
   emit::Emitter emitter_;
-  dynamics::NozzleXY nozzle_;    // as it really swings after what has been written
-  verify::RunDeviation before_;  // of the run at hand, if it were left as it is
-  verify::LineRate line_rate_;   // of what has been written
+  dynamics::NozzleXY nozzle_;               // as it really swings after what has been written
+  verify::RunDeviation before_;             // of the run at hand, if it were left as it is
+  verify::LineRate line_rate_;              // of what has been written
+  std::vector<gcode::Segment> last_lines_;  // of the part before, of a run in parts
+  double late_s_ = 0.0;                     // by how much it ended late
+  bool run_stands_ = false;                 // the first part of the run at hand stands as it is
   EmissionCost cost_;
   double sliced_s_ = 0.0;   // time that what has been written took …
   double written_s_ = 0.0;  // … and takes

@@ -56,7 +56,7 @@ gcode::Position PlannedMove::position_mm(double t) const {
   return position;
 }
 
-double duration_s(const std::vector<PlannedMove>& moves) {
+double duration_s(std::span<const PlannedMove> moves) {
   double sum = 0.0;
   for (const PlannedMove& move : moves) {
     sum += move.duration_s();

@@ -25,7 +25,7 @@ DeviationStats DeviationAccumulator::stats() const {
 
 RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                      const std::vector<planner::PlannedMove>& base, NozzleXY start,
-                     const NozzleModel& model, double lead_in_s) {
+                     const NozzleModel& model, double lead_in_s, bool goes_on) {
   std::size_t taken = 0;
   ReferencePath path([&](planner::PlannedMove& move) {
     if (taken == reference.size()) {
@@ -48,7 +48,9 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
     meter.play(move);
     path.discard_before(meter.time_s() - meter.reach_s());
   }
-  meter.wait_for_reference();
+  if (!goes_on) {
+    meter.wait_for_reference();
+  }
 
   RunDeviation result;
   result.extruding = meter.extruding();

@@ -1,5 +1,5 @@
-// What each stage costs, on a piece of a real print, in ns per move, per node of the base, or per ms
-// of print. docs/performance.md has the figures.
+// What each stage costs, on a piece of a real print, in ns per move, per node of the base, or per
+// ms of print. docs/performance.md has the figures.
 #include <benchmark/benchmark.h>
 
 #include <fstream>
@@ -57,15 +57,15 @@ std::unique_ptr<RunJob> job_of(const machine::Settings& s, const RunRules& rules
   job->nozzle = {{job->piece.moves.front().segment.start_mm[gcode::X], 0.0},
                  {job->piece.moves.front().segment.start_mm[gcode::Y], 0.0}};
   job->setup = setup_for(rules.setup, job->piece.moves, s);
-  job->spans = compensate::cut(compensate::node_count(job->piece.moves, rules.setup), rules.setup);
+  job->grid = compensate::node_grid(job->course(), rules.setup);
+  job->spans = compensate::cut(job->grid.count, rules.setup);
   job->results.resize(job->spans.size());
   return job;
 }
 
 void per(benchmark::State& state, const char* what, double count) {
-  state.counters[what] =
-      benchmark::Counter(count, benchmark::Counter::kIsIterationInvariantRate |
-                                    benchmark::Counter::kInvert);
+  state.counters[what] = benchmark::Counter(
+      count, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
 void ReadAndPlan(benchmark::State& state) {

@@ -73,7 +73,7 @@ inline dynamics::NozzleXY at_rest(const std::vector<planner::PlannedMove>& moves
 
 // The x axis of the run as one window, starting and ending at rest.
 inline AxisWindow x_window(const std::vector<planner::PlannedMove>& moves, const Setup& setup) {
-  const std::size_t nodes = node_count(moves, setup);
+  const std::size_t nodes = node_grid(moves, setup).count;
   return windows(moves, {{0, nodes - 1, 0, nodes - 1}}, at_rest(moves), setup).front().x;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "playback.hpp"
@@ -44,7 +45,7 @@ TEST(NodeCount, CoversLeadInMovesAndTail) {
   setup.tail_s = 5e-3;
   for (const double period : {1e-3, 0.7e-3, 2e-3}) {
     setup.period_s = period;
-    const double last = static_cast<double>(node_count(moves, setup) - 1) * period;
+    const double last = static_cast<double>(node_grid(moves, setup).count - 1) * period;
     const double needed = 12e-3 + duration_s(moves);
     EXPECT_GE(last, needed - 1e-9);
     EXPECT_LT(last, needed + period);
@@ -55,7 +56,7 @@ TEST(NodeCount, IsNeverTooSmallToBeSolved) {
   const auto moves = testing::plan({{0.0, 0.0}, {1e-4, 0.0}}, planner_limits(100.0, 5000.0, 5.0));
   compensate::Setup setup = setup_for({}, 2e4);
   setup.tail_s = 0.0;
-  const std::size_t nodes = node_count(moves, setup);
+  const std::size_t nodes = node_grid(moves, setup).count;
   EXPECT_EQ(nodes, 4U);
   const auto run = windows(moves, cut(nodes, setup), testing::at_rest(moves), setup);
   EXPECT_TRUE(make_ipopt_engine()->solve(run.front().x).has_value());
@@ -119,7 +120,7 @@ TEST(Windows, TakeReferenceAndWeightFromThePlan) {
   compensate::Setup setup = setup_for({}, 2e4);
   setup.lead_in_s = 3.3e-3;
   setup.travel_weight = 0.25;
-  const std::size_t nodes = node_count(moves, setup);
+  const std::size_t nodes = node_grid(moves, setup).count;
   const auto run = windows(moves, cut(nodes, setup), testing::at_rest(moves), setup);
   ASSERT_EQ(run.size(), 1U);
   ASSERT_EQ(run[0].x.reference_mm.size(), 2 * nodes - 1);
@@ -137,10 +138,49 @@ TEST(Windows, TakeReferenceAndWeightFromThePlan) {
   }
 }
 
+// Solves all windows of a course and takes what lies between its ends.
+std::vector<double> base_x_mm(const Course& course, const compensate::Setup& setup) {
+  const NodeGrid grid = node_grid(course, setup);
+  const auto spans = cut(grid.count, setup);
+  const auto engine = make_banded_engine();
+  std::vector<dynamics::AxisTrajectory> solutions;
+  const auto nozzle = dynamics::NozzleXY{{course.moves.front().segment.start_mm[0], 0.0},
+                                         {course.moves.front().segment.start_mm[1], 0.0}};
+  for (const RunWindow& window : windows(course, spans, nozzle, setup)) {
+    solutions.push_back(engine->solve(window.x)->base);
+  }
+  const std::vector<double> all = join(spans, solutions).position_mm;
+  return {all.begin() + static_cast<std::ptrdiff_t>(grid.first),
+          all.begin() + static_cast<std::ptrdiff_t>(grid.last) + 1};
+}
+
+TEST(Windows, OfPartsOfARunGiveTheSameBaseAsThoseOfTheWhole) {
+  const auto moves = long_run(60);
+  // It matters a little where the nodes lie, at corners most.
+  const compensate::Setup setup = setup_for({}, 2e4);
+  const std::vector<double> whole = base_x_mm(moves, setup);
+  const std::span<const planner::PlannedMove> all(moves);
+  for (const std::size_t border : {20U, 31U, 40U}) {
+    const Course first({}, all.first(border), all.subspan(border));
+    const Course second(all.first(border), all.subspan(border), {});
+    const NodeGrid grid = node_grid(first, setup);
+    EXPECT_NEAR(static_cast<double>(grid.last) * grid.period_s,
+                setup.lead_in_s + duration_s(all.first(border)), 1e-12);
+    EXPECT_NEAR(grid.period_s, setup.period_s, 1e-3 * setup.period_s);
+    const std::vector<double> before = base_x_mm(first, setup);
+    const std::vector<double> after = base_x_mm(second, setup);
+    ASSERT_EQ(before.size(), grid.last + 1);
+    // They meet, and end where the whole does.
+    EXPECT_NEAR(before.back(), after.front(), 1e-3) << border;
+    EXPECT_NEAR(before.front(), whole.front(), 1e-9);
+    EXPECT_NEAR(after.back(), whole.back(), 1e-9);
+  }
+}
+
 TEST(Windows, OfACutRunAreSlicesOfTheWhole) {
   const auto moves = long_run(30);
   compensate::Setup setup = setup_for({}, 2e4);
-  const std::size_t nodes = node_count(moves, setup);
+  const std::size_t nodes = node_grid(moves, setup).count;
   setup.window_s = 0.5;
   setup.overlap_s = 0.03;
   const auto spans = cut(nodes, setup);
@@ -176,7 +216,8 @@ TEST(Windows, WidenTheTravelToThePathAndNoFurther) {
   setup.y.limits.min_position_mm = 21.0;
   setup.y.limits.max_position_mm = 40.0;
   const auto run =
-      windows(moves, cut(node_count(moves, setup), setup), testing::at_rest(moves), setup).front();
+      windows(moves, cut(node_grid(moves, setup).count, setup), testing::at_rest(moves), setup)
+          .front();
   EXPECT_EQ(run.x.limits.min_position_mm, 0.0);
   EXPECT_NEAR(run.x.limits.max_position_mm, 14.0, 1e-12);
   EXPECT_NEAR(run.y.limits.min_position_mm, 20.0, 1e-12);
@@ -196,7 +237,7 @@ struct Solved {
 };
 
 Solved solve_both(const std::vector<planner::PlannedMove>& moves, const Setup& setup) {
-  const std::size_t nodes = node_count(moves, setup);
+  const std::size_t nodes = node_grid(moves, setup).count;
   const auto engine = make_ipopt_engine();
   Solved result;
   result.period_s = setup.period_s;

@@ -82,7 +82,7 @@ TEST_P(ThesisCorner, IsDrawnSharp) {
                                    testing::planner_limits(c.velocity, c.accel, 0.0));
   const dynamics::FlexibleAxis axis{c.omega, c.zeta};
   compensate::Setup setup = testing::setup_for(axis, 4.0 * c.accel);
-  const std::size_t nodes = node_count(moves, setup);
+  const std::size_t nodes = node_grid(moves, setup).count;
   const RunWindow run = windows(moves, cut(nodes, setup), testing::at_rest(moves), setup).front();
   const auto engine = make_ipopt_engine();
   const auto x = engine->solve(run.x);

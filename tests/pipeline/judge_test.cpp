@@ -47,8 +47,8 @@ struct Corner {
   [[nodiscard]] std::optional<std::string> objection_to(const std::string& text,
                                                         double max_lines_per_s = 1000.0) const {
     const dynamics::NozzleXY nozzle = at_rest({0.0, 0.0, 0.2, 0.0});
-    return pipeline::judge(run.moves, deviation_of(run.moves, run.moves, nozzle, rules(), 0.0),
-                           text, printer, {}, nozzle, rules(), {}, max_lines_per_s)
+    return pipeline::judge(run, deviation_of(run, run.moves, nozzle, rules(), 0.0), text, printer,
+                           {}, nozzle, rules(), rules().lead_in_s, {}, max_lines_per_s, {})
         .objection;
   }
 

@@ -1,10 +1,12 @@
-// A run: a stretch of motion between two moments of rest that is compensated as a whole.
+// A run: a stretch of motion between two moments of rest that is compensated as a whole, or, where
+// it is long, part by part.
 //
 //   r(t)  reference: the planned moves, after the lead-in and before the tail
 //   b(t)  base, at rest at both ends of the run
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "unflex/compensate/axis_window.hpp"
@@ -23,17 +25,37 @@ struct Setup {
   AxisSetup x;
   AxisSetup y;
   double period_s = 1e-3;
-  double lead_in_s = 0.0;     // rest of the reference before the first move
-  double tail_s = 2e-3;       // rest of the reference after the last move, at least
-  double window_s = 2.0;      // core of a window where a run needs several
-  double overlap_s = 0.06;    // pre-roll and post-roll of such windows
-  double travel_weight = 0.1; // w where nothing is extruded; 1 where something is
-  double jerk_weight = 1.5;      // ρ / (h⁶ (ωh)⁴)
+  double lead_in_s = 0.0;      // rest of the reference before the first move
+  double tail_s = 2e-3;        // rest of the reference after the last move, at least
+  double window_s = 2.0;       // core of a window where a run needs several
+  double overlap_s = 0.06;     // pre-roll and post-roll of such windows
+  double travel_weight = 0.1;  // w where nothing is extruded; 1 where something is
+  double jerk_weight = 1.5;    // ρ / (h⁶ (ωh)⁴)
 };
 
-// Nodes of a run, from rest to rest.
-[[nodiscard]] std::size_t node_count(const std::vector<planner::PlannedMove>& moves,
-                                     const Setup& setup);
+// What the nozzle shall follow: the plan of a run, or of a part of one.
+struct Course {
+  using Moves = std::span<const planner::PlannedMove>;
+
+  Course(const std::vector<planner::PlannedMove>& run) : moves(run) {}
+  Course(Moves ahead, Moves part, Moves behind) : before(ahead), moves(part), after(behind) {}
+
+  // The moves around a part, at least 2 Setup::overlap_s of them or all there are; none: rest.
+  Moves before;
+  Moves moves;  // not empty
+  Moves after;
+};
+
+// The nodes of a course.
+struct NodeGrid {
+  double period_s = 0.0;  // so that a part ends at a node
+  std::size_t count = 0;
+  // The course itself is between these; the others are there for its ends' sake.
+  std::size_t first = 0;
+  std::size_t last = 0;
+};
+
+[[nodiscard]] NodeGrid node_grid(const Course& course, const Setup& setup);
 
 // One window of a run: nodes first … last are solved, core_first … core_last are used.
 struct WindowSpan {
@@ -53,22 +75,21 @@ struct RunWindow {
   AxisWindow y;
 };
 
-// The problems of all windows. moves: the run's plan, from rest to rest, not empty. nozzle: where
-// the nozzle is, and how fast, when the run begins (rest but for what earlier motion left behind).
-[[nodiscard]] std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
+// The problems of all windows, on the nodes of node_grid(). nozzle: where the nozzle is, and how
+// fast, when the run begins (rest but for what earlier motion left behind).
+[[nodiscard]] std::vector<RunWindow> windows(const Course& course,
                                              const std::vector<WindowSpan>& spans,
                                              const dynamics::NozzleXY& nozzle, const Setup& setup);
 
 // The same for `count` windows from number `first` on.
-[[nodiscard]] std::vector<RunWindow> windows(const std::vector<planner::PlannedMove>& moves,
+[[nodiscard]] std::vector<RunWindow> windows(const Course& course,
                                              const std::vector<WindowSpan>& spans,
                                              std::size_t first, std::size_t count,
                                              const dynamics::NozzleXY& nozzle, const Setup& setup);
 
 // Joins the solutions of the windows, in the order of `spans`, blending over the middle of each
 // overlap.
-[[nodiscard]] dynamics::AxisTrajectory join(
-    const std::vector<WindowSpan>& spans,
-    const std::vector<dynamics::AxisTrajectory>& solutions);
+[[nodiscard]] dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,
+                                            const std::vector<dynamics::AxisTrajectory>& solutions);
 
 }  // namespace unflex::compensate

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -79,7 +80,7 @@ struct RunStart {
 
 [[nodiscard]] RunStart run_start(const gcode::ModalState& state, const planner::Limits& limits);
 
-// A compensated run.
+// A compensated run, or a part of one.
 struct Run {
   // The input's lines in the run: moves, and passive and limit lines between them.
   const std::vector<gcode::Event>* events = nullptr;
@@ -93,11 +94,21 @@ struct Run {
   std::vector<double> lines_before_s =
       {};               // begins of the lines just before it, in order, before 0
   int lines_after = 0;  // how many lines begin within LineRules::burst_s after it
+  // It goes on from another part: there the last line's end is in X and Y, the nearest to the base
+  // that can be written unless known better.
+  bool goes_on = false;
+  std::optional<std::array<double, 2>> from_mm = {};
+  double late_s = 0.0;  // by how much its first line begins late
+  // When the next part goes on from it. The base, which moves then, is given some time further.
+  std::optional<double> until_s = {};
+
+  [[nodiscard]] double end_s() const { return until_s.value_or(base->duration_s()); }
 };
 
 // A run cut into lines, for a certain start. Without lines when its motion is too small for one.
 struct RunPlan {
   RunStart start;
+  std::array<double, 2> from_mm{};  // where the first line begins
   std::shared_ptr<const std::vector<Stroke>> strokes;
 
   [[nodiscard]] bool empty() const;
@@ -105,6 +116,9 @@ struct RunPlan {
 
 // The costly part of writing a run; it does not depend on what is written before.
 [[nodiscard]] RunPlan plan_run(const Run& run, const RunStart& start, const EmitOptions& options);
+
+// The same lines for a run that begins later or less late.
+[[nodiscard]] RunPlan retimed(const RunPlan& plan, const Run& run, const EmitOptions& options);
 
 // Writes the output in the order of the input. Follows both texts with an interpreter of its own,
 // so that whatever stands outside the runs finds the modes, positions and limits the input left
@@ -124,7 +138,8 @@ class Emitter {
   // What a run that follows now would start from.
   [[nodiscard]] RunStart run_start() const;
 
-  // A compensated run in place of its events. The plan is not empty and made for run_start().
+  // A compensated run in place of its events. The plan is not empty and made for run_start(). Of a
+  // run in parts, all have to follow each other.
   void run(const Run& run, const RunPlan& plan, std::string& out);
 
   // After the last line.

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "unflex/core/firmware.hpp"
@@ -96,7 +97,7 @@ struct PlannedMove {
 };
 
 // Of all of them, one after the other.
-[[nodiscard]] double duration_s(const std::vector<PlannedMove>& moves);
+[[nodiscard]] double duration_s(std::span<const PlannedMove> moves);
 
 // A firmware's planner. Moves come out in order once nothing that follows can change them. The plan
 // does not depend on when, or how often, take() is called.

@@ -80,9 +80,12 @@ struct RunDeviation {
 
 // Integrates the nozzle while the base makes `base`, and measures it against the path and plan of
 // `reference`; the base starts lead_in_s before the reference, and `start` is the nozzle then.
-// Where the base takes longer than the reference, the reference rests at its end.
+// Where the base takes longer than the reference, the reference rests at its end; where it ends
+// sooner, it rests until the reference ends, too. A negative lead_in_s: the reference starts before
+// the base. goes_on: nothing is measured after the base's last move.
 [[nodiscard]] RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                                    const std::vector<planner::PlannedMove>& base, NozzleXY start,
-                                   const NozzleModel& model, double lead_in_s = 0.0);
+                                   const NozzleModel& model, double lead_in_s = 0.0,
+                                   bool goes_on = false);
 
 }  // namespace unflex::verify
