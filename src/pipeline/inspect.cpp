@@ -4,9 +4,12 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <memory>
 #include <string_view>
 
+#include "cpu_slots.hpp"
 #include "piece_reader.hpp"
+#include "piece_thread.hpp"
 #include "stage_options.hpp"
 #include "unflex/compensate/run.hpp"
 #include "unflex/gcode/command.hpp"
@@ -86,6 +89,9 @@ class Inspector {
       result_->x_min_mm = result_->x_max_mm = result_->y_min_mm = result_->y_max_mm = 0.0;
       result_->lowest_accel_mm_s2 = 0.0;
     }
+    if (linear_moves_ > 0) {
+      result_->commands["G1"] += linear_moves_;
+    }
     result_->absolute_e = extruded_absolute_ >= 0;
     result_->dialect = slicers_.empty() ? "unknown slicer" : slicers_;
   }
@@ -98,12 +104,11 @@ class Inspector {
     result_->limit_lines += event.kind == gcode::EventKind::limits ? 1 : 0;
     result_->barrier_lines += event.kind == gcode::EventKind::barrier ? 1 : 0;
     result_->reference_time_s += event.dwell_s;
-    const gcode::Command command = gcode::parse(event.line.content());
-    if (command.kind != gcode::CommandKind::none) {
-      ++result_->commands[command_name(command)];
+    if (event.line.content().starts_with("G1 ")) {
+      ++linear_moves_;  // most lines; what they say is in the event
+    } else {
+      add_command(gcode::parse(event.line.content()));
     }
-    result_->arcs += command.is('G', 2) || command.is('G', 3) ? 1 : 0;
-    absolute_e_ = command.is('M', 82) || (absolute_e_ && !command.is('M', 83));
     for (const gcode::Segment& segment : event.segments) {
       extruded_absolute_ += segment.extruding() ? (absolute_e_ ? 1 : -1) : 0;
     }
@@ -112,6 +117,14 @@ class Inspector {
     }
     count_kept_moves(event, firmware_, result_->kept_moves);
     plan(event);
+  }
+
+  void add_command(const gcode::Command& command) {
+    if (command.kind != gcode::CommandKind::none) {
+      ++result_->commands[command_name(command)];
+    }
+    result_->arcs += command.is('G', 2) || command.is('G', 3) ? 1 : 0;
+    absolute_e_ = command.is('M', 82) || (absolute_e_ && !command.is('M', 83));
   }
 
   // By the firmware's own plan, which unlike that of the pieces goes through lifts without a stop.
@@ -158,6 +171,7 @@ class Inspector {
   std::unique_ptr<planner::Planner> planner_;
   std::vector<planner::PlannedMove> planned_;
   std::string slicers_;
+  std::size_t linear_moves_ = 0;
   bool absolute_e_ = true;
   long extruded_absolute_ = 0;  // extruding moves in M82 less those in M83
 };
@@ -171,27 +185,22 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
   }
   const double bytes = static_cast<double>(std::filesystem::file_size(job.input));
   const compensate::Setup setup = compensate_setup(job.settings);
-  PieceReader reader(input, job.input_name, interpreter_options(job.settings),
-                     planner_limits(job.settings), firmware_config(job.settings));
   Inspection result;
   Inspector inspector(result, job.settings);
-  for (;;) {
-    Piece piece;
-    const Result<bool> more = reader.next(piece);
-    if (!more) {
-      return tl::unexpected(more.error());
-    }
-    if (!*more) {
-      break;
-    }
-    inspector.add(piece, setup);
-    progress.update("reading", static_cast<double>(reader.bytes_read()) / bytes);
+  CpuSlots slots(2);
+  PieceThread pieces(input, job.input_name, verify_rules(job.settings), slots, [] {});
+  while (const std::unique_ptr<Piece> piece = pieces.wait_and_take()) {
+    inspector.add(*piece, setup);
+    progress.update("reading", static_cast<double>(result.bytes) / bytes);
     if (progress.cancelled()) {
       return fail(ErrorKind::internal, "cancelled");
     }
   }
+  if (pieces.error()) {
+    return tl::unexpected(*pieces.error());
+  }
   inspector.finish();
-  for (const Diagnostic& warning : reader.warnings()) {
+  for (const Diagnostic& warning : pieces.warnings()) {
     result.warnings.push_back(to_string(warning));
   }
   return result;

@@ -6,8 +6,8 @@
 namespace unflex::pipeline {
 namespace {
 
-// Pieces that are read ahead. Each may be a long run.
-constexpr std::size_t kMostAhead = 8;
+// Lines that are read ahead.
+constexpr std::size_t kMostAhead = 10'000;
 
 }  // namespace
 
@@ -44,18 +44,28 @@ void PieceThread::read(std::function<void()> wake) {
     const CpuSlot::Without without(*slots_);
     {
       std::unique_lock lock(mutex_);
-      room_.wait(lock, [this] { return stopped_ || pieces_.size() < kMostAhead; });
+      room_.wait(lock, [this] { return stopped_ || lines_ahead_ < kMostAhead; });
       if (stopped_) {
         return;
       }
       if (!ended) {
+        lines_ahead_ += piece->events.size();
         pieces_.push_back(std::move(piece));
       }
       error_ = std::move(error);
       ended_ = ended;
     }
+    news_.notify_one();
     wake();
   }
+}
+
+std::unique_ptr<Piece> PieceThread::wait_and_take() {
+  {
+    std::unique_lock lock(mutex_);
+    news_.wait(lock, [this] { return !pieces_.empty() || ended_; });
+  }
+  return take();
 }
 
 std::unique_ptr<Piece> PieceThread::take() {
@@ -65,7 +75,10 @@ std::unique_ptr<Piece> PieceThread::take() {
   }
   std::unique_ptr<Piece> piece = std::move(pieces_.front());
   pieces_.pop_front();
-  room_.notify_one();
+  lines_ahead_ -= piece->events.size();
+  if (lines_ahead_ < kMostAhead) {
+    room_.notify_one();
+  }
   return piece;
 }
 

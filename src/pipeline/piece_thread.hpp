@@ -30,6 +30,8 @@ class PieceThread {
 
   // The next piece, if it has been read.
   [[nodiscard]] std::unique_ptr<Piece> take();
+  // Waits for it; nullptr at the end.
+  [[nodiscard]] std::unique_ptr<Piece> wait_and_take();
   // Whether take() would give one or at_end() has come.
   [[nodiscard]] bool has_news();
   // Whether the last piece has been taken: the input has ended, or could not be read on.
@@ -45,7 +47,9 @@ class PieceThread {
   PieceReader reader_;
   std::mutex mutex_;
   std::condition_variable room_;
+  std::condition_variable news_;
   std::deque<std::unique_ptr<Piece>> pieces_;
+  std::size_t lines_ahead_ = 0;  // in them
   std::optional<Error> error_;
   bool ended_ = false;
   bool stopped_ = false;

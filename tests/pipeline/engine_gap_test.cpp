@@ -1,0 +1,100 @@
+// The banded engine against Ipopt, which solves the same windows by another way altogether, on all
+// windows of a stretch of a real print.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+#include <string>
+
+#include "jobs.hpp"
+#include "nozzle_motion.hpp"
+#include "piece_reader.hpp"
+#include "stage_options.hpp"
+#include "unflex/compensate/run.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+struct Gap {
+  std::size_t windows = 0;
+  double objective = 0.0;  // relative
+  double base_mm = 0.0;
+};
+
+void compare(const compensate::AxisWindow& window, const compensate::Engine& banded,
+             const compensate::Engine& ipopt, Gap& gap) {
+  const auto one = banded.solve(window);
+  const auto other = ipopt.solve(window);
+  ASSERT_TRUE(one.has_value()) << to_string(one.error());
+  ASSERT_TRUE(other.has_value()) << to_string(other.error());
+  // Where nothing moves the objective is rounding errors: a nanometre throughout is nothing.
+  constexpr double kNothing_mm = 1e-6;
+  const double nothing =
+      kNothing_mm * kNothing_mm * static_cast<double>(window.nodes()) * window.period_s;
+  gap.objective = std::max(gap.objective, std::abs(one->objective - other->objective) /
+                                              std::max(other->objective, nothing));
+  for (std::size_t k = 0; k < window.nodes(); ++k) {
+    gap.base_mm =
+        std::max(gap.base_mm, std::abs(one->base.position_mm[k] - other->base.position_mm[k]));
+  }
+  ++gap.windows;
+}
+
+Gap gap_over(const std::string& text) {
+  machine::Settings settings;
+  const compensate::Setup common = compensate_setup(settings);
+  std::istringstream stream(text);
+  PieceReader reader(stream, "print", interpreter_options(settings), planner_limits(settings),
+                     firmware_config(settings));
+  const auto banded = compensate::make_banded_engine();
+  const auto ipopt = compensate::make_ipopt_engine();
+  Gap gap;
+  for (Piece piece; reader.next(piece).value(); piece = {}) {
+    if (!piece.is_run) {
+      continue;
+    }
+    const compensate::Setup setup = setup_for(common, piece.moves, settings);
+    const compensate::Course course(piece.before, piece.moves, piece.after);
+    const auto spans = compensate::cut(compensate::node_grid(course, setup).count, setup);
+    const auto start = at_rest(piece.moves.front().segment.start_mm);
+    for (const compensate::RunWindow& window : compensate::windows(course, spans, start, setup)) {
+      compare(window.x, *banded, *ipopt, gap);
+      compare(window.y, *banded, *ipopt, gap);
+    }
+  }
+  return gap;
+}
+
+void expect_small(const Gap& gap, std::size_t least_windows) {
+  EXPECT_GE(gap.windows, least_windows);
+  EXPECT_LE(gap.objective, 1e-6);
+  EXPECT_LE(gap.base_mm, 0.05e-3);
+  ::testing::Test::RecordProperty("windows", static_cast<int>(gap.windows));
+  ::testing::Test::RecordProperty("objective_gap", std::to_string(gap.objective));
+}
+
+TEST(SamplesEngineGap, IsNothingOnAPieceOfAPrint) {
+  const std::filesystem::path path =
+      std::filesystem::path(UNFLEX_TEST_DATA) / "pipeline_cube20.gcode";
+  expect_small(gap_over(testing::read_file(path)), 20);
+}
+
+TEST(SamplesEngineGap, IsNothingOnTheFirstTwentyLayersOfACube) {
+  const std::filesystem::path path =
+      std::filesystem::path(UNFLEX_SHARED) / "samples" / "cube20_ender3_absE.gcode";
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "no shared samples beside the repository";
+  }
+  const std::string text = testing::read_file(path);
+  constexpr int kLayers = 20;
+  std::size_t end = 0;
+  for (int layer = 0; layer <= kLayers; ++layer) {
+    end = text.find(";LAYER_CHANGE", end + 1);
+  }
+  expect_small(gap_over(text.substr(0, end)), 600);
+}
+
+}  // namespace
+}  // namespace unflex::pipeline
