@@ -73,10 +73,13 @@ gcode::Segment continued(const gcode::Segment& last) {
 }
 
 // What the printer makes of the text.
-std::vector<planner::PlannedMove> replay(std::string_view text, gcode::Interpreter printer,
-                                         const planner::Limits& limits,
-                                         const planner::FirmwareConfig& config,
-                                         const InMotion& in_motion) {
+struct Replayed {
+  std::optional<planner::PlannedMove> before;  // of a part, the last move before it
+  std::vector<planner::PlannedMove> moves;
+};
+
+Replayed replay(std::string_view text, gcode::Interpreter printer, const planner::Limits& limits,
+                const planner::FirmwareConfig& config, const InMotion& in_motion) {
   const std::unique_ptr<planner::Planner> planner = planner::make_planner(limits, config);
   for (gcode::Segment line : in_motion.lines_before) {
     line.line = kNoLine;
@@ -98,10 +101,16 @@ std::vector<planner::PlannedMove> replay(std::string_view text, gcode::Interpret
     planner->add(continued(*last));
   }
   planner->stop();
-  std::vector<planner::PlannedMove> replayed;
-  planner->take(replayed);
-  std::erase_if(replayed,
-                [](const planner::PlannedMove& move) { return move.segment.line == kNoLine; });
+  Replayed replayed;
+  planner->take(replayed.moves);
+  const auto is_around = [](const planner::PlannedMove& move) {
+    return move.segment.line == kNoLine;
+  };
+  const auto first = std::ranges::find_if_not(replayed.moves, is_around);
+  if (first != replayed.moves.begin()) {
+    replayed.before = *(first - 1);
+  }
+  std::erase_if(replayed.moves, is_around);
   return replayed;
 }
 
@@ -157,8 +166,10 @@ Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_
               const dynamics::NozzleXY& nozzle, const verify::Rules& rules, double lead_in_s,
               verify::LineRate rate, double max_lines_per_s, const InMotion& in_motion) {
   Verdict verdict;
-  verdict.replayed = replay(text, std::move(printer), printer_limits, rules.fixed, in_motion);
-  verdict.objection = verify::broken_rule(run.moves, verdict.replayed, rules);
+  Replayed replayed = replay(text, std::move(printer), printer_limits, rules.fixed, in_motion);
+  verdict.replayed = std::move(replayed.moves);
+  verdict.objection = verify::broken_rule(run.moves, verdict.replayed, rules,
+                                          replayed.before ? &*replayed.before : nullptr);
   if (verdict.objection) {
     return verdict;
   }

@@ -20,8 +20,8 @@ constexpr double kBorder_s = 0.5;
 constexpr double kChoice_s = 5.0;
 // … and are given so much of what is around them.
 constexpr double kAround_s = 0.3;
-// After how many events it is looked whether a run is that long.
-constexpr std::size_t kEventsPerLook = 256;
+// After how many borders it is looked whether a run is that long.
+constexpr std::size_t kBordersPerLook = 8;
 
 // The last moves that take kAround_s, or all there are.
 std::vector<planner::PlannedMove> last_of(const std::vector<planner::PlannedMove>& moves) {
@@ -210,6 +210,7 @@ void PieceReader::append_between() {
 void PieceReader::mark_border(const gcode::Event& event) {
   if (since_border_s_ >= kBorder_s) {
     since_border_s_ = 0.0;
+    ++borders_since_look_;
     borders_.push_back({open_.events.size(), moves_added_,
                         emit::run_start(interpreter_.state(), planner_->limits())});
   }
@@ -246,10 +247,10 @@ std::optional<std::size_t> PieceReader::border_to_split_at() const {
 
 // Hands out a part of the open run, if that is long by now.
 bool PieceReader::split(Piece& piece) {
-  if (++events_since_look_ < kEventsPerLook) {
+  if (borders_since_look_ < kBordersPerLook) {
     return false;
   }
-  events_since_look_ = 0;
+  borders_since_look_ = 0;
   planner_->take(open_.moves);
   const std::optional<std::size_t> chosen = border_to_split_at();
   if (!chosen) {

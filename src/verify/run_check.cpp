@@ -5,13 +5,17 @@
 #include <algorithm>
 #include <cmath>
 
-
 namespace unflex::verify {
 namespace {
 
 // Emitted coordinates have four decimals.
 constexpr double kRounding_mm = 1e-4;
 constexpr double kLimitTolerance = 1e-3;
+
+std::array<double, 2> mean_velocity(const planner::PlannedMove& move) {
+  return {move.segment.delta(gcode::X) / move.duration_s(),
+          move.segment.delta(gcode::Y) / move.duration_s()};
+}
 
 }  // namespace
 
@@ -63,14 +67,20 @@ void BaseCheck::begin_run() {
   accel_excess_ = velocity_excess_;
 }
 
+void BaseCheck::go_on(const planner::PlannedMove& before) {
+  begin_run();
+  if (before.duration_s() > 0.0) {
+    keep(before);
+  }
+}
+
 void BaseCheck::add(const planner::PlannedMove& move) {
   const double duration = move.duration_s();
   if (duration <= 0.0) {
     return;
   }
   const gcode::Segment& segment = move.segment;
-  const std::array<double, 2> velocity = {segment.delta(gcode::X) / duration,
-                                          segment.delta(gcode::Y) / duration};
+  const std::array<double, 2> velocity = mean_velocity(move);
   for (const double v : velocity) {
     max_velocity_ = std::max(max_velocity_, std::abs(v));
     velocity_excess_.offer(std::abs(v) - kRounding_mm / duration, rules_->base_max_velocity_mm_s,
@@ -82,11 +92,16 @@ void BaseCheck::add(const planner::PlannedMove& move) {
     last_velocity_ = {move.start_v_mm_s * along[0], move.start_v_mm_s * along[1]};
   }
   change_of_velocity(velocity, duration, segment.line);
-  last_velocity_ = velocity;
-  end_velocity_ = {move.end_v_mm_s * along[0], move.end_v_mm_s * along[1]};
-  last_duration_s_ = duration;
-  last_line_ = segment.line;
+  keep(move);
   durations_s_.add_square(duration * duration, 1.0);
+}
+
+void BaseCheck::keep(const planner::PlannedMove& move) {
+  last_velocity_ = mean_velocity(move);
+  end_velocity_ = {move.end_v_mm_s * move.direction[gcode::X],
+                   move.end_v_mm_s * move.direction[gcode::Y]};
+  last_duration_s_ = move.duration_s();
+  last_line_ = move.segment.line;
 }
 
 void BaseCheck::change_of_velocity(const std::array<double, 2>& velocity, double duration_s,
@@ -122,7 +137,7 @@ double BaseCheck::median_duration_s() const { return durations_s_.quantile(0.5);
 
 std::optional<std::string> broken_rule(const std::vector<planner::PlannedMove>& reference,
                                        const std::vector<planner::PlannedMove>& base,
-                                       const Rules& rules) {
+                                       const Rules& rules, const planner::PlannedMove* before) {
   Violations violations("", "");
   Excursion allowed(rules.travel);
   bool refused_before = false;
@@ -132,7 +147,7 @@ std::optional<std::string> broken_rule(const std::vector<planner::PlannedMove>& 
   }
   Excursion excursion(rules.travel);
   BaseCheck check(rules, violations);
-  check.begin_run();
+  before != nullptr ? check.go_on(*before) : check.begin_run();
   for (const planner::PlannedMove& move : base) {
     check.add(move);
     excursion.add(move.segment);

@@ -48,6 +48,8 @@ class BaseCheck {
       : rules_(&rules), violations_(&violations) {}
 
   void begin_run();
+  // In the middle of a run, after this move.
+  void go_on(const planner::PlannedMove& before);
   void add(const planner::PlannedMove& move);
   void end_run();
 
@@ -63,6 +65,7 @@ class BaseCheck {
     std::size_t line = 0;
     void offer(double a_value, double limit, std::size_t a_line);
   };
+  void keep(const planner::PlannedMove& move);
   void change_of_velocity(const std::array<double, 2>& velocity, double duration_s,
                           std::size_t line);
   void report(const Excess& excess, std::string_view what, std::string_view unit, double limit);

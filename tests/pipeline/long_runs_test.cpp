@@ -98,7 +98,7 @@ TEST(LongRun, ComesInPartsThatMakeUpTheWhole) {
 
 TEST(LongRun, OfLessThanAMinuteStaysWhole) {
   std::size_t runs = 0;
-  for (const Piece& piece : pieces_of(spiral(55.0))) {
+  for (const Piece& piece : pieces_of(spiral(35.0))) {
     runs += piece.is_run ? 1 : 0;
     EXPECT_TRUE(!piece.is_run || (piece.begins_run() && piece.ends_run()));
   }

@@ -76,10 +76,12 @@ struct VerifyReport {
 
 // The first hard rule that `base`, the replayed moves of one compensated run, breaks: the base's
 // velocity and acceleration, the travel (where `reference`, the run's own plan, does not go as far
-// itself), filament that the firmware refuses. nullopt when it keeps them all.
+// itself), filament that the firmware refuses. nullopt when it keeps them all. before: of a part of
+// a run, the last replayed move before it.
 [[nodiscard]] std::optional<std::string> broken_rule(
     const std::vector<planner::PlannedMove>& reference,
-    const std::vector<planner::PlannedMove>& base, const Rules& rules);
+    const std::vector<planner::PlannedMove>& base, const Rules& rules,
+    const planner::PlannedMove* before = nullptr);
 
 // Replays both texts and compares them. Errors: unreadable input. A file that breaks a rule is no
 // error but a report with violations: a line lost, changed or moved; filament not conserved; a
