@@ -145,7 +145,7 @@ TEST(Shaper, WithMoreHumpsStandsMoreFrequencyError) {
   };
   EXPECT_NEAR(left(ShaperKind::zv, 0.1), std::sin(0.05 * std::numbers::pi), 1e-12);
   EXPECT_LT(left(ShaperKind::zvd, 0.1), 0.2 * left(ShaperKind::zv, 0.1));
-  EXPECT_GT(left(ShaperKind::ei, 0.2), left(ShaperKind::two_hump_ei, 0.2));
+  EXPECT_GT(left(ShaperKind::ei, 0.3), left(ShaperKind::two_hump_ei, 0.3));
   EXPECT_GT(left(ShaperKind::two_hump_ei, 0.4), left(ShaperKind::three_hump_ei, 0.4));
 }
 
