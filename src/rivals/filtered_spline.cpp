@@ -129,7 +129,9 @@ AxisPath filtered_spline(const AxisPath& reference, const dynamics::FlexibleAxis
                          const SplineOptions& options) {
   const double knot_s = options.knot_s;
   const double length_s = options.lead_in_s + end_s(reference) + options.tail_s;
-  const auto free = static_cast<std::size_t>(std::ceil(length_s / knot_s));
+  // The last of them ends with the tail.
+  const auto knots = static_cast<std::size_t>(std::ceil(length_s / knot_s));
+  const std::size_t free = knots > kDegree ? knots - kDegree : 1;
   const double first = reference.front().motion.position;
   const double last = reference.back().motion.position;
   // The coefficients after the free ones stand at the end; as many as reach into the samples.
