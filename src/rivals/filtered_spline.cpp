@@ -46,8 +46,8 @@ AxisPath basis_path(double knot_s) {
 // φ at the samples, as far as it matters and no further than `longest` of them.
 std::vector<double> filtered_basis(const dynamics::FlexibleAxis& axis, double knot_s,
                                    std::size_t longest) {
-  const double rate = axis.zeta < 1.0 ? axis.zeta * axis.omega_rad_s
-                                      : 0.5 * axis.omega_rad_s / axis.zeta;
+  const double rate =
+      axis.zeta < 1.0 ? axis.zeta * axis.omega_rad_s : 0.5 * axis.omega_rad_s / axis.zeta;
   const double memory_s = kSupport * knot_s - std::log(kForgotten) / std::max(rate, 1e-9);
   const double samples = std::ceil(kSamples * memory_s / knot_s);
   TimeGrid grid{0.0, knot_s / kSamples, longest};
@@ -90,8 +90,8 @@ class Preview {
       }
       factors_.compute(matrix_);
     }
-    return factors_.solve(Eigen::Map<const Eigen::VectorXd>(left_.data() + from,
-                                                            static_cast<Eigen::Index>(rows)));
+    return factors_.solve(
+        Eigen::Map<const Eigen::VectorXd>(left_.data() + from, static_cast<Eigen::Index>(rows)));
   }
 
  private:

@@ -32,8 +32,7 @@ class Builder {
     for (int i = 0; i < kParts && duration_s > 0.0; ++i) {
       const double u = static_cast<double>(i) / kParts;
       const double next = static_cast<double>(i + 1) / kParts;
-      append(path, u * duration_s,
-             distance + duration_s * (from * u + (to - from) * covered(u)),
+      append(path, u * duration_s, distance + duration_s * (from * u + (to - from) * covered(u)),
              from + (to - from) * share(u),
              (to - from) * (share(next) - share(u)) * kParts / duration_s);
     }

@@ -61,9 +61,8 @@ Defects defects(const Nodes& nodes, const dynamics::FlexibleAxis& axis, std::siz
   const double sum_rate = p1.velocity + p2.velocity;
   const double middle = 0.5 * (p1.position + p2.position) + h / 8.0 * (p1.velocity - p2.velocity);
   const Form middle_rate = 0.5 * sum_rate * one + h / 8.0 * (f1 - f2);
-  const Form f_middle =
-      stiffness * (0.5 * (base1 + base2) - middle * one) +
-      damping * (0.5 * (unit(kNow) + unit(kNext)) - middle_rate);
+  const Form f_middle = stiffness * (0.5 * (base1 + base2) - middle * one) +
+                        damping * (0.5 * (unit(kNow) + unit(kNext)) - middle_rate);
   return {(slope - 0.25 * sum_rate) * one - middle_rate,
           slope_rate * one - 0.25 * (f1 + f2) - f_middle};
 }
@@ -89,8 +88,8 @@ std::vector<double> substitute(const Nodes& nodes, const std::vector<Form>& form
   for (std::size_t k = 0; k < forms.size(); ++k) {
     const Form& form = forms[k];
     const double before = k > 0 ? velocity[k - 1] : 0.0;
-    const double rest = form(kBase) * base + form(kBefore) * before + form(kNow) * velocity[k] +
-                        form(kConstant);
+    const double rest =
+        form(kBase) * base + form(kBefore) * before + form(kNow) * velocity[k] + form(kConstant);
     velocity.push_back(-rest / form(kNext));
     base += 0.5 * nodes.h * (velocity[k] + velocity[k + 1]);
   }
@@ -112,8 +111,8 @@ AxisPath thesis_least_squares(const AxisPath& reference, const dynamics::Flexibl
     rows.row(0) = of_interval.position;
     rows.row(1) = of_interval.velocity;
     if (k > 0) {
-      rows.row(2) = kJerkWeight / (nodes.h * nodes.h) *
-                    (unit(kBefore) - 2.0 * unit(kNow) + unit(kNext));
+      rows.row(2) =
+          kJerkWeight / (nodes.h * nodes.h) * (unit(kBefore) - 2.0 * unit(kNow) + unit(kNext));
     }
     for (int i = 0; i < 3; ++i) {
       const Form form = later.row(i);

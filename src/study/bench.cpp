@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "contour.hpp"
+#include "gauge.hpp"
 
 namespace unflex::study {
 namespace {
@@ -22,13 +23,72 @@ dynamics::FlexibleAxis off_by(dynamics::FlexibleAxis axis, double error) {
   return axis;
 }
 
-Straying measure(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
-                 const BenchSetup& setup, double frequency_error) {
+double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan) {
+  const gcode::Position& target = plan.back().segment.end_mm;
+  return std::max(std::abs(base.x.back().motion.position - target[gcode::X]),
+                  std::abs(base.y.back().motion.position - target[gcode::Y]));
+}
+
+Trace trace_of(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
+               const BenchSetup& setup) {
+  const double before = std::ceil(setup.unflex.lead_in_s / setup.trace_step_s);
+  const double after =
+      std::ceil((planner::duration_s(plan) + setup.trace_tail_s) / setup.trace_step_s);
+  // What begins earlier than the trace is played from its own beginning.
+  const double first_s = std::min(base.x.front().start_s, base.y.front().start_s);
+  const double skipped = std::max(0.0, std::ceil(-first_s / setup.trace_step_s) - before);
+  const rivals::TimeGrid all{-(before + skipped) * setup.trace_step_s, setup.trace_step_s,
+                             static_cast<std::size_t>(before + skipped + after) + 1};
+  const auto x = rivals::nozzle_on(setup.unflex.x.axis, base.x, all);
+  const auto y = rivals::nozzle_on(setup.unflex.y.axis, base.y, all);
+  rivals::PathCursor base_x(base.x);
+  rivals::PathCursor base_y(base.y);
+  Trace trace{{-before * setup.trace_step_s, setup.trace_step_s, 0}, {}, {}};
+  for (auto k = static_cast<std::size_t>(skipped); k < all.count; ++k) {
+    trace.base.push_back({base_x.at(all.at(k)), base_y.at(all.at(k))});
+    trace.nozzle.push_back({x[k], y[k]});
+  }
+  trace.grid.count = trace.nozzle.size();
+  return trace;
+}
+
+MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
+                     const compensate::Engine& engine) {
+  MethodResult result;
+  result.method = method;
+  const Result<BaseMotion> base = base_by(method, run, setup, engine);
+  if (!base) {
+    result.remark = base.error().message;
+    return result;
+  }
+  result.used = true;
+  result.remark = base->remark;
+  result.iterations = base->iterations;
+  const auto& plan = method == Method::slow_s_curve ? run.slow_plan : run.plan;
+  for (std::size_t i = 0; i < kFrequencyErrors.size(); ++i) {
+    result.straying[i] = straying(*base, plan, setup, kFrequencyErrors[i]);
+  }
+  if (setup.trace_step_s > 0.0) {
+    result.trace = trace_of(*base, plan, setup);
+  }
+  const rivals::PeakMotion x = rivals::peak(base->x);
+  const rivals::PeakMotion y = rivals::peak(base->y);
+  result.base_peak = {std::max(x.velocity_mm_s, y.velocity_mm_s),
+                      std::max(x.accel_mm_s2, y.accel_mm_s2)};
+  result.end_gap_mm = gap_mm(*base, plan);
+  result.longer_s =
+      std::max(rivals::end_s(base->x), rivals::end_s(base->y)) - planner::duration_s(run.plan);
+  return result;
+}
+
+}  // namespace
+
+Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
+                  const BenchSetup& setup, double frequency_error) {
   const double plan_end_s = planner::duration_s(plan);
-  const double start_s =
-      std::min({0.0, base.x.front().start_s, base.y.front().start_s});
-  const double end_s = std::max({plan_end_s, rivals::end_s(base.x), rivals::end_s(base.y)}) +
-                       setup.hold_s;
+  const double start_s = std::min({0.0, base.x.front().start_s, base.y.front().start_s});
+  const double end_s =
+      std::max({plan_end_s, rivals::end_s(base.x), rivals::end_s(base.y)}) + setup.hold_s;
   // Samples stand at whole steps from the plan's beginning.
   const double before = std::ceil(-start_s / setup.step_s);
   const rivals::TimeGrid grid{
@@ -51,40 +111,6 @@ Straying measure(const BaseMotion& base, const std::vector<planner::PlannedMove>
   }
   return result;
 }
-
-double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan) {
-  const gcode::Position& target = plan.back().segment.end_mm;
-  return std::max(std::abs(base.x.back().motion.position - target[gcode::X]),
-                  std::abs(base.y.back().motion.position - target[gcode::Y]));
-}
-
-MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
-                     const compensate::Engine& engine) {
-  MethodResult result;
-  result.method = method;
-  const Result<BaseMotion> base = base_by(method, run, setup, engine);
-  if (!base) {
-    result.remark = base.error().message;
-    return result;
-  }
-  result.used = true;
-  result.remark = base->remark;
-  result.iterations = base->iterations;
-  const auto& plan = method == Method::slow_s_curve ? run.slow_plan : run.plan;
-  for (std::size_t i = 0; i < kFrequencyErrors.size(); ++i) {
-    result.straying[i] = measure(*base, plan, setup, kFrequencyErrors[i]);
-  }
-  const rivals::PeakMotion x = rivals::peak(base->x);
-  const rivals::PeakMotion y = rivals::peak(base->y);
-  result.base_peak = {std::max(x.velocity_mm_s, y.velocity_mm_s),
-                      std::max(x.accel_mm_s2, y.accel_mm_s2)};
-  result.end_gap_mm = gap_mm(*base, plan);
-  result.longer_s =
-      std::max(rivals::end_s(base->x), rivals::end_s(base->y)) - planner::duration_s(run.plan);
-  return result;
-}
-
-}  // namespace
 
 double Straying::rms_mm() const { return time_s > 0.0 ? std::sqrt(square_sum_mm2s / time_s) : 0.0; }
 

@@ -19,7 +19,8 @@ using Moves = std::vector<planner::PlannedMove>;
 
 // Parabolas that an interval of unflex' base is divided into to hang the nozzle on it.
 constexpr int kParts = 8;
-// Knots of a filtered spline per period of the nozzle, and how many it is given to begin and end in.
+// Knots of a filtered spline per period of the nozzle, and how many it is given to begin and end
+// in.
 constexpr double kKnotsPerPeriod = 10.0;
 constexpr double kSplineEndKnots = 5.0;
 
@@ -59,7 +60,9 @@ Result<BaseMotion> shaped_base(rivals::ShaperKind kind, const Moves& plan,
 template <class Make>
 BaseMotion both_axes(const Moves& plan, const compensate::Setup& setup, const Make& make) {
   return {make(rivals::reference_path(plan, gcode::X), setup.x.axis),
-          make(rivals::reference_path(plan, gcode::Y), setup.y.axis), 0, {}};
+          make(rivals::reference_path(plan, gcode::Y), setup.y.axis),
+          0,
+          {}};
 }
 
 rivals::AxisPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
@@ -146,14 +149,16 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
   };
   switch (method) {
     case Method::s_curve:
-      return BaseMotion{rivals::s_curve(run.plan, gcode::X), rivals::s_curve(run.plan, gcode::Y),
-                        0, {}};
+      return BaseMotion{
+          rivals::s_curve(run.plan, gcode::X), rivals::s_curve(run.plan, gcode::Y), 0, {}};
     case Method::slow_s_curve:
       if (run.slow_plan.empty()) {
         return fail(ErrorKind::input, "needs a plan of its own");
       }
       return BaseMotion{rivals::s_curve(run.slow_plan, gcode::X),
-                        rivals::s_curve(run.slow_plan, gcode::Y), 0, {}};
+                        rivals::s_curve(run.slow_plan, gcode::Y),
+                        0,
+                        {}};
     case Method::filtered_spline:
       return both_axes(run.plan, setup.unflex, &spline);
     case Method::thesis_least_squares:
@@ -167,9 +172,8 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
     case Method::unflex_10x:
       return unflex_base(10.0, run.plan, setup, engine);
     default:
-      return both_axes(run.plan, setup.unflex, [](const auto& reference, const auto& /*axis*/) {
-        return reference;
-      });
+      return both_axes(run.plan, setup.unflex,
+                       [](const auto& reference, const auto& /*axis*/) { return reference; });
   }
 }
 

@@ -1,5 +1,5 @@
-// One bench for everything that can be done with a planned motion: each method moves the base in its
-// own way, the same nozzle hangs on it, and the same gauge measures how far it strays.
+// One bench for everything that can be done with a planned motion: each method moves the base in
+// its own way, the same nozzle hangs on it, and the same gauge measures how far it strays.
 #pragma once
 
 #include <array>
@@ -40,11 +40,13 @@ inline constexpr std::size_t kMethodCount = 15;
 inline constexpr std::array<double, 5> kFrequencyErrors = {0.0, -0.10, -0.05, 0.05, 0.10};
 
 struct BenchSetup {
-  compensate::Setup unflex;   // its acceleration limits are set per method
+  compensate::Setup unflex;          // its acceleration limits are set per method
   double plan_accel_mm_s2 = 5000.0;  // that unflex' multiples are of
   double thesis_period_s = 5e-3;
-  double step_s = 5e-5;   // of the samples the nozzle is measured at
-  double hold_s = 0.0;    // how long it is looked at after the base has come to rest
+  double step_s = 5e-5;        // of the samples the nozzle is measured at
+  double hold_s = 0.0;         // how long it is looked at after the base has come to rest
+  double trace_step_s = 0.0;   // of the traces; 0: none
+  double trace_tail_s = 0.06;  // how long after the plan's end they go on
 };
 
 // A stretch of motion from rest to rest.
@@ -64,13 +66,20 @@ struct BaseMotion {
 
 // Distances of the nozzle from the path.
 struct Straying {
-  double max_mm = 0.0;         // while filament is laid
+  double max_mm = 0.0;           // while filament is laid
   double square_sum_mm2s = 0.0;  // ∫ distance² dt over the same time
   double time_s = 0.0;
-  double after_max_mm = 0.0;   // from the plan's end on
+  double after_max_mm = 0.0;  // from the plan's end on
 
   [[nodiscard]] double rms_mm() const;
   void merge(const Straying& other);
+};
+
+// What base and nozzle do, for figures.
+struct Trace {
+  rivals::TimeGrid grid;
+  std::vector<dynamics::NozzleXY> base;
+  std::vector<dynamics::NozzleXY> nozzle;
 };
 
 struct MethodResult {
@@ -78,10 +87,11 @@ struct MethodResult {
   bool used = false;   // in every run; otherwise …
   std::string remark;  // … why not; or else what is to be said about how it was used
   std::array<Straying, kFrequencyErrors.size()> straying;
-  rivals::PeakMotion base_peak;      // larger axis
-  double end_gap_mm = 0.0;           // how far from its target the base comes to rest, larger axis
-  double longer_s = 0.0;             // plan and base come to rest that much later than the plan
+  rivals::PeakMotion base_peak;  // larger axis
+  double end_gap_mm = 0.0;       // how far from its target the base comes to rest, larger axis
+  double longer_s = 0.0;         // plan and base come to rest that much later than the plan
   int iterations = 0;
+  Trace trace;  // at the exact frequency; empty unless asked for
 };
 
 using BenchResult = std::vector<MethodResult>;  // one per method, in their order

@@ -1,0 +1,108 @@
+#include <fmt/format.h>
+
+#include <iterator>
+#include <string>
+
+#include "unflex/report/format.hpp"
+#include "unflex/study/study.hpp"
+
+namespace unflex::study {
+namespace {
+
+using Sink = std::back_insert_iterator<std::string>;
+
+constexpr std::string_view kNone = "—";
+
+std::string micrometres(double mm) {
+  const double um = mm * 1e3;
+  if (um >= 100.0) {
+    return fmt::format("{:.0f}", um);
+  }
+  return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
+}
+
+void write_heading(Sink out, const Outcome& outcome) {
+  fmt::format_to(out, "{}, unflex by {}\n",
+                 outcome.input.empty() ? "(0,0) → (10,0) → (10,10) mm, full stop in the corner"
+                                       : outcome.input,
+                 outcome.engine);
+  for (const CaseResult& result : outcome.cases) {
+    fmt::format_to(out, "  {:<4} {}\n", result.name, result.description);
+  }
+}
+
+void write_maxima(Sink out, const Outcome& outcome) {
+  fmt::format_to(out, "\n{:<28}", "contour error max, µm");
+  for (const CaseResult& result : outcome.cases) {
+    fmt::format_to(out, "{:>8}", result.name);
+  }
+  for (std::size_t i = 0; i < kMethodCount; ++i) {
+    fmt::format_to(out, "\n  {:<26}", name(static_cast<Method>(i)));
+    for (const CaseResult& result : outcome.cases) {
+      const MethodResult& method = result.methods[i];
+      fmt::format_to(out, "{:>8}",
+                     method.used ? micrometres(method.straying[0].max_mm) : std::string(kNone));
+    }
+  }
+  fmt::format_to(out, "\n");
+}
+
+// One case in depth: what a wrong frequency costs, and what the motion asks of the machine.
+void write_case(Sink out, const CaseResult& result) {
+  fmt::format_to(out, "\n{:<28}{:>8}{:>8}{:>8}{:>8}{:>8}{:>9}{:>9}{:>9}{:>9}{:>9}\n",
+                 fmt::format("{}, µm", result.name), "RMS", "−10 %", "−5 %", "+5 %", "+10 %",
+                 "after", "gap", "mm/s", "mm/s²", "longer");
+  for (const MethodResult& method : result.methods) {
+    if (!method.used) {
+      fmt::format_to(out, "  {:<26}{:>8}  {}\n", name(method.method), kNone, method.remark);
+      continue;
+    }
+    fmt::format_to(out, "  {:<26}{:>8}", name(method.method),
+                   micrometres(method.straying[0].rms_mm()));
+    for (std::size_t i = 1; i < kFrequencyErrors.size(); ++i) {
+      fmt::format_to(out, "{:>8}", micrometres(method.straying[i].max_mm));
+    }
+    fmt::format_to(out, "{:>9}{:>9}{:>9.0f}{:>9.0f}{:>6.0f} ms{}{}\n",
+                   micrometres(method.straying[0].after_max_mm), micrometres(method.end_gap_mm),
+                   method.base_peak.velocity_mm_s, method.base_peak.accel_mm_s2,
+                   method.longer_s * 1e3 + 0.0, method.remark.empty() ? "" : "  ", method.remark);
+  }
+}
+
+void write_chains(Sink out, const Outcome& outcome) {
+  if (outcome.chains.empty()) {
+    return;
+  }
+  fmt::format_to(out,
+                 "\nunflex 4× from coarse to fine: iterations (ms) from scratch → from the "
+                 "coarser solution\n");
+  for (const ChainResult& chain : outcome.chains) {
+    fmt::format_to(out, "  {:<4} {:<13}", chain.case_name, chain.engine);
+    for (const ChainStep& step : chain.steps) {
+      fmt::format_to(out, "  {:g} ms: {} ({:.2f}) → {} ({:.2f})", step.period_s * 1e3,
+                     step.cold_iterations, step.cold_s * 1e3, step.warm_iterations,
+                     step.warm_s * 1e3);
+    }
+    fmt::format_to(out, "\n");
+  }
+}
+
+}  // namespace
+
+std::string to_text(const Outcome& outcome) {
+  std::string text;
+  const Sink out = std::back_inserter(text);
+  write_heading(out, outcome);
+  write_maxima(out, outcome);
+  if (!outcome.cases.empty()) {
+    write_case(out, outcome.cases.front());
+    fmt::format_to(out,
+                   "  after: contour error after the plan's end; gap: how far from its target the "
+                   "base rests\n");
+  }
+  write_chains(out, outcome);
+  fmt::format_to(out, "\n{} in all\n", report::duration_text(outcome.wall_s));
+  return text;
+}
+
+}  // namespace unflex::study
