@@ -114,26 +114,34 @@ PeakMotion peak(const AxisPath& path) {
   return most;
 }
 
+NozzleWalk::NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path, double start_s)
+    : axis_(axis),
+      path_(&path),
+      now_s_(start_s),
+      nozzle_{path.front().motion.position, 0.0} {}
+
+const dynamics::NozzleState& NozzleWalk::at(double t) {
+  const AxisPath& path = *path_;
+  while (t - now_s_ > kSameTime_s) {
+    const dynamics::BaseSegment base = motion_at(path, index_, now_s_);
+    // Before the first parabola the next change is its beginning, later that of the next one.
+    const bool waiting = now_s_ + kSameTime_s < path[index_].start_s;
+    const std::size_t next = waiting ? index_ : index_ + 1;
+    const double change_s = next < path.size() ? path[next].start_s : t;
+    const double to_s = std::min(change_s, t);
+    nozzle_ = dynamics::exact_step(axis_, nozzle_, base, to_s - now_s_);
+    now_s_ = to_s;
+  }
+  return nozzle_;
+}
+
 std::vector<dynamics::NozzleState> nozzle_on(const dynamics::FlexibleAxis& axis,
                                              const AxisPath& path, const TimeGrid& grid) {
   std::vector<dynamics::NozzleState> result;
   result.reserve(grid.count);
-  dynamics::NozzleState nozzle{path.front().motion.position, 0.0};
-  std::size_t index = 0;
-  double now_s = grid.start_s;
+  NozzleWalk walk(axis, path, grid.start_s);
   for (std::size_t k = 0; k < grid.count; ++k) {
-    const double until_s = grid.at(k);
-    while (until_s - now_s > kSameTime_s) {
-      const dynamics::BaseSegment base = motion_at(path, index, now_s);
-      // Before the first parabola the next change is its beginning, later that of the next one.
-      const bool waiting = now_s + kSameTime_s < path[index].start_s;
-      const std::size_t next = waiting ? index : index + 1;
-      const double change_s = next < path.size() ? path[next].start_s : until_s;
-      const double to_s = std::min(change_s, until_s);
-      nozzle = dynamics::exact_step(axis, nozzle, base, to_s - now_s);
-      now_s = to_s;
-    }
-    result.push_back(nozzle);
+    result.push_back(walk.at(grid.at(k)));
   }
   return result;
 }

@@ -43,10 +43,12 @@ Trace trace_of(const BaseMotion& base, const std::vector<planner::PlannedMove>& 
   const auto y = rivals::nozzle_on(setup.unflex.y.axis, base.y, all);
   rivals::PathCursor base_x(base.x);
   rivals::PathCursor base_y(base.y);
-  Trace trace{{-before * setup.trace_step_s, setup.trace_step_s, 0}, {}, {}};
+  Trace trace{{-before * setup.trace_step_s, setup.trace_step_s, 0}, {}, {}, {}};
+  ContourGauge gauge(plan, reach_s(setup.unflex));
   for (auto k = static_cast<std::size_t>(skipped); k < all.count; ++k) {
     trace.base.push_back({base_x.at(all.at(k)), base_y.at(all.at(k))});
     trace.nozzle.push_back({x[k], y[k]});
+    trace.error_mm.push_back(gauge.measure(all.at(k), x[k].position, y[k].position).distance_mm);
   }
   trace.grid.count = trace.nozzle.size();
   return trace;
@@ -56,7 +58,12 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
                      const compensate::Engine& engine) {
   MethodResult result;
   result.method = method;
-  const Result<BaseMotion> base = base_by(method, run, setup, engine);
+  Result<BaseMotion> base = base_by(method, run, setup, engine);
+  if (!base && base.error().kind == ErrorKind::internal) {
+    // No solution, as for a run that `compensate` would keep as it is.
+    result.failed_runs = 1;
+    base = base_by(Method::uncompensated, run, setup, engine);
+  }
   if (!base) {
     result.remark = base.error().message;
     return result;
@@ -94,13 +101,13 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
   const rivals::TimeGrid grid{
       -before * setup.step_s, setup.step_s,
       static_cast<std::size_t>(before + std::ceil(end_s / setup.step_s - 1e-6)) + 1};
-  const auto x = rivals::nozzle_on(off_by(setup.unflex.x.axis, frequency_error), base.x, grid);
-  const auto y = rivals::nozzle_on(off_by(setup.unflex.y.axis, frequency_error), base.y, grid);
+  rivals::NozzleWalk x(off_by(setup.unflex.x.axis, frequency_error), base.x, grid.start_s);
+  rivals::NozzleWalk y(off_by(setup.unflex.y.axis, frequency_error), base.y, grid.start_s);
   ContourGauge gauge(plan, reach_s(setup.unflex));
   Straying result;
   for (std::size_t k = 0; k < grid.count; ++k) {
     const double t = grid.at(k);
-    const auto reading = gauge.measure(t, x[k].position, y[k].position);
+    const auto reading = gauge.measure(t, x.at(t).position, y.at(t).position);
     if (t > plan_end_s) {
       result.after_max_mm = std::max(result.after_max_mm, reading.distance_mm);
     } else if (t >= 0.0 && reading.extruding) {
@@ -144,6 +151,7 @@ void merge(BenchResult& into, const BenchResult& run) {
     sum.end_gap_mm = std::max(sum.end_gap_mm, more.end_gap_mm);
     sum.longer_s += more.longer_s;
     sum.iterations += more.iterations;
+    sum.failed_runs += more.failed_runs;
   }
 }
 

@@ -33,6 +33,7 @@ Json method_json(const MethodResult& method) {
                   {"end_gap_mm", method.end_gap_mm}};
   json["longer_s"] = method.longer_s;
   json["iterations"] = method.iterations;
+  json["failed_runs"] = method.failed_runs;
   return json;
 }
 

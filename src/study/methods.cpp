@@ -17,8 +17,6 @@ namespace {
 
 using Moves = std::vector<planner::PlannedMove>;
 
-// Parabolas that an interval of unflex' base is divided into to hang the nozzle on it.
-constexpr int kParts = 8;
 // Knots of a filtered spline per period of the nozzle, and how many it is given to begin and end
 // in.
 constexpr double kKnotsPerPeriod = 10.0;
@@ -94,7 +92,7 @@ Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSe
   }
   const auto path = [&](const std::vector<dynamics::AxisTrajectory>& solutions) {
     return rivals::through_nodes(compensate::join(spans, solutions), -setup.lead_in_s,
-                                 setup.period_s, kParts);
+                                 setup.period_s, bench.parts);
   };
   result.x = path(x);
   result.y = path(y);

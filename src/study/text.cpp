@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 #include <string>
 
@@ -65,7 +66,7 @@ void write_case(Sink out, const CaseResult& result) {
     fmt::format_to(out, "{:>9}{:>9}{:>9.0f}{:>9.0f}{:>6.0f} ms{}{}\n",
                    micrometres(method.straying[0].after_max_mm), micrometres(method.end_gap_mm),
                    method.base_peak.velocity_mm_s, method.base_peak.accel_mm_s2,
-                   method.longer_s * 1e3 + 0.0, method.remark.empty() ? "" : "  ", method.remark);
+                   std::max(0.0, method.longer_s * 1e3), method.remark.empty() ? "" : "  ", method.remark);
   }
 }
 

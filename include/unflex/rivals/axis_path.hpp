@@ -57,6 +57,21 @@ struct PeakMotion {
 };
 [[nodiscard]] PeakMotion peak(const AxisPath& path);
 
+// The nozzle on a path, in closed form from one parabola's beginning to the next; times must not
+// decrease. It rests at the path's beginning until start_s, which must not be later than that.
+class NozzleWalk {
+ public:
+  NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path, double start_s);
+  [[nodiscard]] const dynamics::NozzleState& at(double t);
+
+ private:
+  dynamics::FlexibleAxis axis_;
+  const AxisPath* path_;
+  std::size_t index_ = 0;
+  double now_s_;
+  dynamics::NozzleState nozzle_;
+};
+
 // Sampling times: start_s + k · step_s for k = 0 … count − 1.
 struct TimeGrid {
   double start_s = 0.0;
@@ -66,8 +81,7 @@ struct TimeGrid {
   [[nodiscard]] double at(std::size_t k) const { return start_s + static_cast<double>(k) * step_s; }
 };
 
-// The nozzle at the grid's times while the base makes `path`, in closed form between the beginnings
-// of parabolas. It rests at the path's beginning until the grid starts, which must not be later.
+// A walk over the grid's times, beginning with the first.
 [[nodiscard]] std::vector<dynamics::NozzleState> nozzle_on(const dynamics::FlexibleAxis& axis,
                                                            const AxisPath& path,
                                                            const TimeGrid& grid);

@@ -43,6 +43,7 @@ struct BenchSetup {
   compensate::Setup unflex;          // its acceleration limits are set per method
   double plan_accel_mm_s2 = 5000.0;  // that unflex' multiples are of
   double thesis_period_s = 5e-3;
+  int parts = 8;          // parabolas that stand for an interval of unflex' base
   double step_s = 5e-5;        // of the samples the nozzle is measured at
   double hold_s = 0.0;         // how long it is looked at after the base has come to rest
   double trace_step_s = 0.0;   // of the traces; 0: none
@@ -80,6 +81,7 @@ struct Trace {
   rivals::TimeGrid grid;
   std::vector<dynamics::NozzleXY> base;
   std::vector<dynamics::NozzleXY> nozzle;
+  std::vector<double> error_mm;  // distance of the nozzle from the path
 };
 
 struct MethodResult {
@@ -91,6 +93,7 @@ struct MethodResult {
   double end_gap_mm = 0.0;       // how far from its target the base comes to rest, larger axis
   double longer_s = 0.0;         // plan and base come to rest that much later than the plan
   int iterations = 0;
+  std::size_t failed_runs = 0;  // without a solution: measured as the plan has them
   Trace trace;  // at the exact frequency; empty unless asked for
 };
 

@@ -41,10 +41,10 @@ struct Outcome {
 };
 
 struct Options {
-  bool ipopt = false;              // unflex' bases by Ipopt instead of the banded engine
-  unsigned workers = 1;            // threads; the result does not depend on them
-  std::vector<std::string> cases;  // names of those to run; none: all
-  bool traces = false;             // for the figures
+  bool ipopt = false;                   // unflex' bases by Ipopt instead of the banded engine
+  unsigned workers = 1;                 // threads; the result does not depend on them
+  std::vector<std::string> cases = {};  // names of those to run; none: all
+  bool traces = false;                  // for the figures
 };
 
 // The bench of a thesis case: nodes at 1 ms, 10 ms of lead-in, a tail of 8ζ/ω but at least 20 ms,
@@ -53,6 +53,9 @@ struct Options {
 
 // The thesis' cases. An error of kind usage for the name of a case that there is not.
 [[nodiscard]] Result<Outcome> study_corner(const Options& options, Progress& progress);
+
+// Of the engine that makes unflex' bases.
+[[nodiscard]] std::string engine_name(const Options& options);
 
 // The runs of a print by all methods, added to `result` in their order.
 void study_runs(const std::vector<Run>& runs, const BenchSetup& setup, const Options& options,
@@ -63,5 +66,8 @@ void study_runs(const std::vector<Run>& runs, const BenchSetup& setup, const Opt
 
 // The report as JSON with the keys of docs/study.md, two spaces of indentation, final newline.
 [[nodiscard]] std::string to_json(const Outcome& outcome);
+
+// One self-contained page with tables and, where the outcome has traces, figures.
+[[nodiscard]] std::string to_html(const Outcome& outcome);
 
 }  // namespace unflex::study
