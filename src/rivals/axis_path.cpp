@@ -115,10 +115,7 @@ PeakMotion peak(const AxisPath& path) {
 }
 
 NozzleWalk::NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path, double start_s)
-    : axis_(axis),
-      path_(&path),
-      now_s_(start_s),
-      nozzle_{path.front().motion.position, 0.0} {}
+    : axis_(axis), path_(&path), now_s_(start_s), nozzle_{path.front().motion.position, 0.0} {}
 
 const dynamics::NozzleState& NozzleWalk::at(double t) {
   const AxisPath& path = *path_;

@@ -13,13 +13,13 @@ namespace {
 constexpr int kDegree = 5;
 constexpr int kSupport = kDegree + 1;  // knots spanned by one basis function
 constexpr int kSamples = 5;            // per knot
-constexpr int kParts = 40;             // parabolas per knot that stand for the quintic
+constexpr int kParts = 16;             // parabolas per knot that stand for the quintic
 constexpr std::size_t kWindow = 60;
 constexpr std::size_t kKept = 30;
 // What is left of a basis function's response, as a share, when it is given up.
 constexpr double kForgotten = 1e-8;
 
-// Σ_i (−1)^i C(n+1, i) (u − i)₊^m / m!, the cardinal spline for m = n and its n − m-th derivative.
+// Σ_i (−1)^i C(n+1, i) (u − i)₊^m / m!: the cardinal spline for m = n, its derivatives for less.
 double cardinal(double u, int m) {
   constexpr std::array<double, kSupport + 1> kBinomial = {1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0};
   if (u <= 0.0 || u >= kSupport) {
@@ -27,25 +27,44 @@ double cardinal(double u, int m) {
   }
   double sum = 0.0;
   for (int i = 0; i <= static_cast<int>(u); ++i) {
-    sum += kBinomial[static_cast<std::size_t>(i)] * std::pow(u - i, m);
+    double term = kBinomial[static_cast<std::size_t>(i)];
+    for (int power = 1; power <= m; ++power) {
+      term *= (u - i) / power;
+    }
+    sum += term;
   }
-  return sum / std::tgamma(m + 1.0);
+  return sum;
 }
 
-AxisPath basis_path(double knot_s) {
-  dynamics::AxisTrajectory nodes;
+// N, N′ and N″ at every part of a knot: at the i-th of them i / kParts after the first knot.
+using BasisTable = std::vector<std::array<double, 3>>;
+
+BasisTable basis_table() {
+  BasisTable table;
   for (int i = 0; i <= kSupport * kParts; ++i) {
     const double u = static_cast<double>(i) / kParts;
-    nodes.position_mm.push_back(cardinal(u, kDegree));
-    nodes.velocity_mm_s.push_back(cardinal(u, kDegree - 1) / knot_s);
-    nodes.accel_mm_s2.push_back(cardinal(u, kDegree - 2) / (knot_s * knot_s));
+    table.push_back({cardinal(u, kDegree), cardinal(u, kDegree - 1), cardinal(u, kDegree - 2)});
+  }
+  return table;
+}
+
+void append(dynamics::AxisTrajectory& nodes, const std::array<double, 3>& motion, double knot_s) {
+  nodes.position_mm.push_back(motion[0]);
+  nodes.velocity_mm_s.push_back(motion[1] / knot_s);
+  nodes.accel_mm_s2.push_back(motion[2] / (knot_s * knot_s));
+}
+
+AxisPath basis_path(const BasisTable& table, double knot_s) {
+  dynamics::AxisTrajectory nodes;
+  for (const std::array<double, 3>& motion : table) {
+    append(nodes, motion, knot_s);
   }
   return through_nodes(nodes, 0.0, knot_s / kParts, 1);
 }
 
 // φ at the samples, as far as it matters and no further than `longest` of them.
-std::vector<double> filtered_basis(const dynamics::FlexibleAxis& axis, double knot_s,
-                                   std::size_t longest) {
+std::vector<double> filtered_basis(const BasisTable& table, const dynamics::FlexibleAxis& axis,
+                                   double knot_s, std::size_t longest) {
   const double rate =
       axis.zeta < 1.0 ? axis.zeta * axis.omega_rad_s : 0.5 * axis.omega_rad_s / axis.zeta;
   const double memory_s = kSupport * knot_s - std::log(kForgotten) / std::max(rate, 1e-9);
@@ -55,7 +74,7 @@ std::vector<double> filtered_basis(const dynamics::FlexibleAxis& axis, double kn
     grid.count = static_cast<std::size_t>(samples);
   }
   std::vector<double> result;
-  for (const dynamics::NozzleState& state : nozzle_on(axis, basis_path(knot_s), grid)) {
+  for (const dynamics::NozzleState& state : nozzle_on(axis, basis_path(table, knot_s), grid)) {
     result.push_back(state.position);
   }
   return result;
@@ -102,23 +121,20 @@ class Preview {
 };
 
 // b at the knots' parts.
-AxisPath spline_path(const std::vector<double>& coefficients, double first, double start_s,
-                     double knot_s) {
+AxisPath spline_path(const BasisTable& table, const std::vector<double>& coefficients, double first,
+                     double start_s, double knot_s) {
   dynamics::AxisTrajectory nodes;
   const std::size_t knots = coefficients.size();
   for (std::size_t i = 0; i <= knots * kParts; ++i) {
-    const double u = static_cast<double>(i) / kParts;
     std::array<double, 3> motion = {first, 0.0, 0.0};
     const std::size_t last = std::min(i / kParts, knots - 1);
     for (std::size_t j = last >= kDegree ? last - kDegree : 0; j <= last; ++j) {
-      for (int d = 0; d < 3; ++d) {
-        motion[static_cast<std::size_t>(d)] +=
-            (coefficients[j] - first) * cardinal(u - static_cast<double>(j), kDegree - d);
+      const std::array<double, 3>& basis = table[i - j * kParts];
+      for (std::size_t d = 0; d < motion.size(); ++d) {
+        motion[d] += (coefficients[j] - first) * basis[d];
       }
     }
-    nodes.position_mm.push_back(motion[0]);
-    nodes.velocity_mm_s.push_back(motion[1] / knot_s);
-    nodes.accel_mm_s2.push_back(motion[2] / (knot_s * knot_s));
+    append(nodes, motion, knot_s);
   }
   return through_nodes(nodes, start_s, knot_s / kParts, 1);
 }
@@ -142,7 +158,8 @@ AxisPath filtered_spline(const AxisPath& reference, const dynamics::FlexibleAxis
     wanted[i] =
         cursor.at(static_cast<double>(i) * knot_s / kSamples - options.lead_in_s).position - first;
   }
-  const std::vector<double> basis = filtered_basis(axis, knot_s, wanted.size());
+  const BasisTable table = basis_table();
+  const std::vector<double> basis = filtered_basis(table, axis, knot_s, wanted.size());
   Preview preview(basis, std::move(wanted));
   for (std::size_t j = free; j < total; ++j) {
     preview.settle(j, last - first);
@@ -161,7 +178,7 @@ AxisPath filtered_spline(const AxisPath& reference, const dynamics::FlexibleAxis
     }
   }
   coefficients.resize(total, last);
-  return spline_path(coefficients, first, -options.lead_in_s, knot_s);
+  return spline_path(table, coefficients, first, -options.lead_in_s, knot_s);
 }
 
 }  // namespace unflex::rivals

@@ -53,8 +53,11 @@ void write_lead(Sink out, const Outcome& outcome) {
       max(Method::unflex_4x));
   fmt::format_to(out, "<p class=\"note\">{}. Bars are logarithmic.</p><div class=\"bars\">\n",
                  escape_html(first.description));
-  const double longest =
-      std::log(by(first, Method::uncompensated).straying[0].max_mm / kBarFrom_mm);
+  double most_mm = 0.0;
+  for (const MethodResult& method : first.methods) {
+    most_mm = std::max(most_mm, method.straying[0].max_mm);
+  }
+  const double longest = std::log(most_mm / kBarFrom_mm);
   for (const MethodResult& method : first.methods) {
     if (!method.used) {
       continue;
@@ -105,6 +108,27 @@ void write_maxima(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "</tbody></table></div></section>\n");
 }
 
+void write_gaps(Sink out, const Outcome& outcome) {
+  fmt::format_to(out,
+                 "<section class=\"card\"><h2>Where the base comes to rest</h2><p>The thesis' "
+                 "equations let the base stop when the plan does, although it has not caught up "
+                 "yet: so far from its target, in µm.</p><div class=\"scroll\"><table "
+                 "class=\"data\"><thead><tr><th>method</th>");
+  for (const CaseResult& result : outcome.cases) {
+    fmt::format_to(out, "<th scope=\"col\">{}</th>", report::term(result.name, result.description));
+  }
+  fmt::format_to(out, "</tr></thead><tbody>\n");
+  for (const Method method :
+       {Method::thesis_least_squares, Method::thesis_velocity_defects, Method::unflex_4x}) {
+    write_row_start(out, method);
+    for (const CaseResult& result : outcome.cases) {
+      fmt::format_to(out, "<td>{}</td>", micrometres(by(result, method).end_gap_mm));
+    }
+    fmt::format_to(out, "</tr>\n");
+  }
+  fmt::format_to(out, "</tbody></table></div></section>\n");
+}
+
 // Contour error against the error of the frequency.
 report::Plot sensitivity_plot(const CaseResult& result) {
   report::Plot plot{.title = "Contour error against the error of the natural frequency",
@@ -141,7 +165,8 @@ void write_depth(Sink out, const CaseResult& result) {
   const report::Plot plot = sensitivity_plot(result);
   fmt::format_to(out,
                  "<section class=\"card\"><h2>{} in depth</h2><p>What an error of the natural "
-                 "frequency costs, how the motion ends, and what it asks of the machine.</p>{}{}",
+                 "frequency costs, how the motion ends, and what it asks of the machine.</p>{}"
+                 "<div class=\"wide\">{}</div>",
                  escape_html(result.name), report::svg_legend(plot), report::svg_plot(plot));
   fmt::format_to(
       out,
@@ -259,6 +284,7 @@ std::string to_html(const Outcome& outcome) {
   const Sink out = std::back_inserter(body);
   write_lead(out, outcome);
   write_maxima(out, outcome);
+  write_gaps(out, outcome);
   write_depth(out, outcome.cases.front());
   write_figures(out, outcome);
   write_chains(out, outcome);

@@ -12,6 +12,7 @@ inline constexpr std::string_view kStyle = R"css(
 .bars .bar i { display: block; height: .9rem; border-radius: 3px; background: var(--series-6); width: calc(var(--share) * (100% - 6rem)); min-width: 2px; }
 .bars .bar.before i { background: var(--before); }
 .bars .bar.after i { background: var(--after); }
+.wide { max-width: 42rem; }
 table.data tr.unflex > * { font-weight: 600; }
 table.data td.none { color: var(--muted); }
 .choose { display: flex; flex-wrap: wrap; gap: .6rem 1.2rem; margin: 0 0 .75rem; }

@@ -48,6 +48,23 @@ void write_maxima(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "\n");
 }
 
+// The thesis' failure at the end of motion.
+void write_gaps(Sink out, const Outcome& outcome) {
+  fmt::format_to(out, "\n{:<28}", "base rests short by, µm");
+  for (const CaseResult& result : outcome.cases) {
+    fmt::format_to(out, "{:>8}", result.name);
+  }
+  for (const Method method :
+       {Method::thesis_least_squares, Method::thesis_velocity_defects, Method::unflex_4x}) {
+    fmt::format_to(out, "\n  {:<26}", name(method));
+    for (const CaseResult& result : outcome.cases) {
+      fmt::format_to(out, "{:>8}",
+                     micrometres(result.methods[static_cast<std::size_t>(method)].end_gap_mm));
+    }
+  }
+  fmt::format_to(out, "\n");
+}
+
 // One case in depth: what a wrong frequency costs, and what the motion asks of the machine.
 void write_case(Sink out, const CaseResult& result) {
   fmt::format_to(out, "\n{:<28}{:>8}{:>8}{:>8}{:>8}{:>8}{:>9}{:>9}{:>9}{:>9}{:>9}\n",
@@ -66,7 +83,8 @@ void write_case(Sink out, const CaseResult& result) {
     fmt::format_to(out, "{:>9}{:>9}{:>9.0f}{:>9.0f}{:>6.0f} ms{}{}\n",
                    micrometres(method.straying[0].after_max_mm), micrometres(method.end_gap_mm),
                    method.base_peak.velocity_mm_s, method.base_peak.accel_mm_s2,
-                   std::max(0.0, method.longer_s * 1e3), method.remark.empty() ? "" : "  ", method.remark);
+                   std::max(0.0, method.longer_s * 1e3), method.remark.empty() ? "" : "  ",
+                   method.remark);
   }
 }
 
@@ -95,6 +113,7 @@ std::string to_text(const Outcome& outcome) {
   const Sink out = std::back_inserter(text);
   write_heading(out, outcome);
   write_maxima(out, outcome);
+  write_gaps(out, outcome);
   if (!outcome.cases.empty()) {
     write_case(out, outcome.cases.front());
     fmt::format_to(out,
