@@ -133,12 +133,14 @@ std::vector<PlotPoint> simplified(const std::vector<PlotPoint>& points) {
 double tick_step(const PlotRange& range, double wanted) {
   const double rough = (range.to - range.from) / wanted;
   const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  for (const double multiple : {1.0, 2.0, 5.0}) {
-    if (multiple * power >= rough) {
-      return multiple * power;
+  double nearest = power;
+  for (const double multiple : {2.0, 5.0, 10.0}) {
+    // By ratio: the border between two steps is their geometric mean.
+    if (rough * rough > nearest * multiple * power) {
+      nearest = multiple * power;
     }
   }
-  return 10.0 * power;
+  return nearest;
 }
 
 std::vector<double> ticks(const PlotRange& range, double wanted) {
@@ -162,8 +164,8 @@ std::string tick_text(double value, const PlotRange& range, double wanted) {
   return text;
 }
 
-constexpr double kTicksX = 5.0;
-constexpr double kTicksY = 4.0;
+constexpr double kTicksX = 5.5;
+constexpr double kTicksY = 5.0;
 
 void write_axes(Sink out, const Plot& plot, const Frame& frame) {
   const double bottom = kTop + frame.height();
