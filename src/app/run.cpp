@@ -301,11 +301,12 @@ Result<ExitCode> run_inspect(const RunConfig& config) {
 
 // What the command studies: the corner, or a print.
 Result<study::Outcome> study_outcome(const RunConfig& config, std::optional<Workspace>& print) {
+  const bool traces = config.report && config.report->ends_with(".html");
   if (!print) {
     const study::Options options{.ipopt = config.engine == pipeline::EngineChoice::ipopt,
                                  .workers = config.workers,
                                  .cases = config.cases,
-                                 .traces = config.report && config.report->ends_with(".html")};
+                                 .traces = traces};
     return with_progress(
         config, [&](Progress& progress) { return study::study_corner(options, progress); });
   }
@@ -314,7 +315,7 @@ Result<study::Outcome> study_outcome(const RunConfig& config, std::optional<Work
     return tl::unexpected(job.error());
   }
   Result<study::Outcome> outcome = with_progress(
-      config, [&](Progress& progress) { return pipeline::study_print(*job, progress); });
+      config, [&](Progress& progress) { return pipeline::study_print(*job, traces, progress); });
   if (outcome) {
     outcome->printer = settings_in_force(print->settings);
     add_setting_warnings(print->settings, outcome->warnings);

@@ -35,7 +35,7 @@ std::string describe(const machine::Settings& settings) {
 
 }  // namespace
 
-Result<study::Outcome> study_print(const Job& job, Progress& progress) {
+Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progress) {
   std::ifstream input(job.input, std::ios::binary);
   if (!input) {
     return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
@@ -51,6 +51,8 @@ Result<study::Outcome> study_print(const Job& job, Progress& progress) {
   study::CaseResult result{"print", describe(job.settings), 0.0, 0, {}};
   std::vector<study::Run> batch;
   double batch_s = 0.0;
+  study::Run worst;
+  double worst_mm = -1.0;
   for (bool more = true; more;) {
     Piece piece;
     const Result<bool> read = reader.next(piece);
@@ -62,8 +64,14 @@ Result<study::Outcome> study_print(const Job& job, Progress& progress) {
       batch_s += planner::duration_s(piece.moves);
       batch.push_back({std::move(piece.moves), {}});
     }
-    if (!more || batch_s >= kBatch_s) {
-      study::study_runs(batch, setup, options, result);
+    if (!batch.empty() && (!more || batch_s >= kBatch_s)) {
+      const std::size_t number = study::study_runs(batch, setup, options, result);
+      // Of all runs so far, the largest error is now known.
+      const double max_mm = result.methods.front().straying[0].max_mm;
+      if (max_mm > worst_mm) {
+        worst_mm = max_mm;
+        worst = std::move(batch[number]);
+      }
       batch.clear();
       batch_s = 0.0;
     }
@@ -75,6 +83,9 @@ Result<study::Outcome> study_print(const Job& job, Progress& progress) {
   if (result.runs == 0) {
     return fail(ErrorKind::input, {job.input_name, 0},
                 "has no stretch that could be compensated; unflex inspect tells why");
+  }
+  if (traces) {
+    study::trace_worst_place(worst, setup, options, result);
   }
   outcome.cases.push_back(std::move(result));
   for (const Diagnostic& warning : reader.warnings()) {

@@ -31,26 +31,24 @@ double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& p
 
 Trace trace_of(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
                const BenchSetup& setup) {
-  const double before = std::ceil(setup.unflex.lead_in_s / setup.trace_step_s);
-  const double after =
-      std::ceil((planner::duration_s(plan) + setup.trace_tail_s) / setup.trace_step_s);
-  // What begins earlier than the trace is played from its own beginning.
-  const double first_s = std::min(base.x.front().start_s, base.y.front().start_s);
-  const double skipped = std::max(0.0, std::ceil(-first_s / setup.trace_step_s) - before);
-  const rivals::TimeGrid all{-(before + skipped) * setup.trace_step_s, setup.trace_step_s,
-                             static_cast<std::size_t>(before + skipped + after) + 1};
-  const auto x = rivals::nozzle_on(setup.unflex.x.axis, base.x, all);
-  const auto y = rivals::nozzle_on(setup.unflex.y.axis, base.y, all);
+  Trace trace{{setup.trace_from_s, setup.trace_step_s, 0}, {}, {}, {}};
+  const auto count = (setup.trace_to_s - setup.trace_from_s) / setup.trace_step_s;
+  trace.grid.count = static_cast<std::size_t>(std::ceil(count - 1e-6)) + 1;
+  const auto walk = [&](const dynamics::FlexibleAxis& axis, const rivals::AxisPath& path) {
+    return rivals::NozzleWalk(axis, path, std::min(path.front().start_s, setup.trace_from_s));
+  };
+  rivals::NozzleWalk x = walk(setup.unflex.x.axis, base.x);
+  rivals::NozzleWalk y = walk(setup.unflex.y.axis, base.y);
   rivals::PathCursor base_x(base.x);
   rivals::PathCursor base_y(base.y);
-  Trace trace{{-before * setup.trace_step_s, setup.trace_step_s, 0}, {}, {}, {}};
   ContourGauge gauge(plan, reach_s(setup.unflex));
-  for (auto k = static_cast<std::size_t>(skipped); k < all.count; ++k) {
-    trace.base.push_back({base_x.at(all.at(k)), base_y.at(all.at(k))});
-    trace.nozzle.push_back({x[k], y[k]});
-    trace.error_mm.push_back(gauge.measure(all.at(k), x[k].position, y[k].position).distance_mm);
+  for (std::size_t k = 0; k < trace.grid.count; ++k) {
+    const double t = trace.grid.at(k);
+    trace.base.push_back({base_x.at(t), base_y.at(t)});
+    trace.nozzle.push_back({x.at(t), y.at(t)});
+    const dynamics::NozzleXY& nozzle = trace.nozzle.back();
+    trace.error_mm.push_back(gauge.measure(t, nozzle.x.position, nozzle.y.position).distance_mm);
   }
-  trace.grid.count = trace.nozzle.size();
   return trace;
 }
 
@@ -111,7 +109,10 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
     if (t > plan_end_s) {
       result.after_max_mm = std::max(result.after_max_mm, reading.distance_mm);
     } else if (t >= 0.0 && reading.extruding) {
-      result.max_mm = std::max(result.max_mm, reading.distance_mm);
+      if (reading.distance_mm > result.max_mm) {
+        result.max_mm = reading.distance_mm;
+        result.max_at_s = t;
+      }
       result.square_sum_mm2s += reading.distance_mm * reading.distance_mm * setup.step_s;
       result.time_s += setup.step_s;
     }
@@ -122,7 +123,10 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
 double Straying::rms_mm() const { return time_s > 0.0 ? std::sqrt(square_sum_mm2s / time_s) : 0.0; }
 
 void Straying::merge(const Straying& other) {
-  max_mm = std::max(max_mm, other.max_mm);
+  if (other.max_mm > max_mm) {
+    max_mm = other.max_mm;
+    max_at_s = other.max_at_s;
+  }
   square_sum_mm2s += other.square_sum_mm2s;
   time_s += other.time_s;
   after_max_mm = std::max(after_max_mm, other.after_max_mm);

@@ -15,8 +15,6 @@ using report::PlotCurve;
 using report::PlotPoint;
 using report::Stroke;
 
-constexpr double kCornerX_mm = 10.0;
-constexpr double kCornerY_mm = 0.0;
 // Half the width of the zoom, in the error without compensation.
 constexpr double kZoom = 1.3;
 
@@ -61,15 +59,16 @@ Plot in_the_plane(const std::vector<Track>& list, std::string title) {
   return plot;
 }
 
-// Both axes of every track over time.
+// Both axes of every track over time, from the values given on.
 Plot over_time(const std::vector<Track>& list, double dynamics::NozzleState::*quantity,
-               std::string title, std::string label) {
+               const dynamics::NozzleXY& from, std::string title, std::string label) {
   Plot plot{.title = std::move(title), .x_label = "t, ms", .y_label = std::move(label)};
   for (const Track& track : list) {
     for (const auto axis : {&dynamics::NozzleXY::x, &dynamics::NozzleXY::y}) {
       PlotCurve curve = curve_of(track);
       for (std::size_t k = 0; k < track.states->size(); ++k) {
-        curve.points.push_back({1e3 * track.grid->at(k), (*track.states)[k].*axis.*quantity});
+        curve.points.push_back(
+            {1e3 * track.grid->at(k), (*track.states)[k].*axis.*quantity - from.*axis.*quantity});
       }
       plot.curves.push_back(std::move(curve));
     }
@@ -100,18 +99,21 @@ std::string figures(const CaseResult& result, const MethodResult& method) {
   const double half =
       kZoom * result.methods[static_cast<std::size_t>(Method::uncompensated)].straying[0].max_mm;
 
+  // Displacements are from where the plan is first.
+  const dynamics::NozzleXY& start = list.front().states->front();
+
   const Plot plane = in_the_plane(list, fmt::format("Path in the plane, {}", of));
-  Plot corner = in_the_plane(list, fmt::format("Path at the corner, {}", of));
-  corner.x = report::PlotRange{kCornerX_mm - half, kCornerX_mm + half};
-  corner.y = report::PlotRange{kCornerY_mm - half, kCornerY_mm + half};
+  Plot corner = in_the_plane(list, fmt::format("Zoomed in, {}", of));
+  corner.x = report::PlotRange{result.focus_x_mm - half, result.focus_x_mm + half};
+  corner.y = report::PlotRange{result.focus_y_mm - half, result.focus_y_mm + half};
   std::string html = report::svg_legend(plane) + "<div class=\"plots\">\n";
   html += figure("Path in the plane", plane);
-  html += figure("The corner", corner);
+  html += figure("Zoomed in where it matters", corner);
   html += figure("Displacement, x then y",
-                 over_time(list, &dynamics::NozzleState::position,
+                 over_time(list, &dynamics::NozzleState::position, start,
                            fmt::format("Displacement over time, {}", of), "mm"));
   html +=
-      figure("Velocity, x then y", over_time(list, &dynamics::NozzleState::velocity,
+      figure("Velocity, x then y", over_time(list, &dynamics::NozzleState::velocity, {},
                                              fmt::format("Velocity over time, {}", of), "mm/s"));
   html += figure("Distance of the nozzle from the path",
                  error_over_time(method, fmt::format("Contour error over time, {}", of)));

@@ -16,8 +16,12 @@ namespace {
 constexpr double kLeadIn_s = 0.01;
 constexpr double kLeastTail_s = 0.02;
 constexpr double kJerkWeight = 0.1;
-constexpr double kHold_s = 0.5;
+// More than two periods of the softest case: whatever rings has shown its largest swing.
+constexpr double kHold_s = 0.25;
 constexpr double kTraceStep_s = 5e-4;
+constexpr double kTraceTail_s = 0.06;
+// Around the worst place of a print.
+constexpr double kTraceAround_s = 0.06;
 // Fine steps from coarse ones are measured with what unflex is allowed by default …
 constexpr double kChainMultiple = 4.0;
 // … on the reference, the softest and the least damped case, if all are run.
@@ -151,11 +155,18 @@ Result<Outcome> study_corner(const Options& options, Progress& progress) {
     } else {
       const Case& of = (*cases)[task - 2];
       BenchSetup setup = corner_setup(of);
-      setup.trace_step_s = options.traces ? kTraceStep_s : 0.0;
       const Run run = run_of(of);
+      setup.trace_step_s = options.traces ? kTraceStep_s : 0.0;
+      setup.trace_from_s = -setup.unflex.lead_in_s;
+      setup.trace_to_s = planner::duration_s(run.plan) + kTraceTail_s;
       CaseResult& result = outcome.cases[task - 2];
-      result = {std::string(of.name), describe(of), planner::duration_s(run.plan), 1,
-                try_all(run, setup, *engine)};
+      result = {std::string(of.name),
+                describe(of),
+                planner::duration_s(run.plan),
+                1,
+                try_all(run, setup, *engine),
+                run.plan.front().segment.end_mm[gcode::X],
+                run.plan.front().segment.end_mm[gcode::Y]};
       drop_repeated_traces(of, result.methods);
     }
     const std::lock_guard lock(mutex);
@@ -176,12 +187,15 @@ Result<Outcome> study_corner(const Options& options, Progress& progress) {
 
 std::string engine_name(const Options& options) { return make_engine(options)->name(); }
 
-void study_runs(const std::vector<Run>& runs, const BenchSetup& setup, const Options& options,
-                CaseResult& result) {
+std::size_t study_runs(const std::vector<Run>& runs, const BenchSetup& setup,
+                       const Options& options, CaseResult& result) {
   const auto engine = make_engine(options);
   std::vector<BenchResult> results(runs.size());
   in_parallel(runs.size(), threads(options),
               [&](std::size_t i) { results[i] = try_all(runs[i], setup, *engine); });
+  const auto worst = std::ranges::max_element(
+      results, {}, [](const BenchResult& of_run) { return of_run.front().straying[0].max_mm; });
+  const auto worst_number = static_cast<std::size_t>(worst - results.begin());
   for (std::size_t i = 0; i < runs.size(); ++i) {
     result.plan_s += planner::duration_s(runs[i].plan);
     ++result.runs;
@@ -191,6 +205,26 @@ void study_runs(const std::vector<Run>& runs, const BenchSetup& setup, const Opt
       merge(result.methods, results[i]);
     }
   }
+  return worst_number;
+}
+
+void trace_worst_place(const Run& run, BenchSetup setup, const Options& options,
+                       CaseResult& result) {
+  const double end_s = planner::duration_s(run.plan);
+  const double at_s = result.methods.front().straying[0].max_at_s;
+  setup.trace_step_s = kTraceStep_s;
+  setup.trace_from_s = std::max(at_s - kTraceAround_s, -setup.unflex.lead_in_s);
+  setup.trace_to_s = std::min(at_s + kTraceAround_s, end_s + kTraceTail_s);
+  BenchResult traced = try_all(run, setup, *make_engine(options));
+  for (std::size_t i = 0; i < traced.size(); ++i) {
+    result.methods[i].trace = std::move(traced[i].trace);
+  }
+  const auto place = [&](gcode::Axis axis) {
+    const rivals::AxisPath path = rivals::reference_path(run.plan, axis);
+    return rivals::PathCursor(path).at(at_s).position;
+  };
+  result.focus_x_mm = place(gcode::X);
+  result.focus_y_mm = place(gcode::Y);
 }
 
 }  // namespace unflex::study

@@ -43,11 +43,12 @@ struct BenchSetup {
   compensate::Setup unflex;          // its acceleration limits are set per method
   double plan_accel_mm_s2 = 5000.0;  // that unflex' multiples are of
   double thesis_period_s = 5e-3;
-  int parts = 8;          // parabolas that stand for an interval of unflex' base
-  double step_s = 5e-5;        // of the samples the nozzle is measured at
-  double hold_s = 0.0;         // how long it is looked at after the base has come to rest
-  double trace_step_s = 0.0;   // of the traces; 0: none
-  double trace_tail_s = 0.06;  // how long after the plan's end they go on
+  int parts = 8;              // parabolas that stand for an interval of unflex' base
+  double step_s = 5e-5;       // of the samples the nozzle is measured at
+  double hold_s = 0.0;        // how long it is looked at after the base has come to rest
+  double trace_step_s = 0.0;  // of the traces; 0: none
+  double trace_from_s = 0.0;  // where in the plan they begin
+  double trace_to_s = 0.0;    // … and end
 };
 
 // A stretch of motion from rest to rest.
@@ -70,6 +71,7 @@ struct Straying {
   double max_mm = 0.0;           // while filament is laid
   double square_sum_mm2s = 0.0;  // ∫ distance² dt over the same time
   double time_s = 0.0;
+  double max_at_s = 0.0;      // when that is, in the plan of the run
   double after_max_mm = 0.0;  // from the plan's end on
 
   [[nodiscard]] double rms_mm() const;
@@ -94,7 +96,7 @@ struct MethodResult {
   double longer_s = 0.0;         // plan and base come to rest that much later than the plan
   int iterations = 0;
   std::size_t failed_runs = 0;  // without a solution: measured as the plan has them
-  Trace trace;  // at the exact frequency; empty unless asked for
+  Trace trace;                  // at the exact frequency; empty unless asked for
 };
 
 using BenchResult = std::vector<MethodResult>;  // one per method, in their order

@@ -21,6 +21,10 @@ struct CaseResult {
   double plan_s = 0.0;      // duration of the plan
   std::size_t runs = 1;
   BenchResult methods;
+  // What the figures zoom in on; of a print, they show the surroundings of its worst place as it
+  // is.
+  double focus_x_mm = 0.0;
+  double focus_y_mm = 0.0;
 };
 
 struct ChainResult {
@@ -57,9 +61,14 @@ struct Options {
 // Of the engine that makes unflex' bases.
 [[nodiscard]] std::string engine_name(const Options& options);
 
-// The runs of a print by all methods, added to `result` in their order.
-void study_runs(const std::vector<Run>& runs, const BenchSetup& setup, const Options& options,
-                CaseResult& result);
+// The runs of a print by all methods, added to `result` in their order. Returns which of them is
+// the one whose nozzle strays most uncompensated.
+std::size_t study_runs(const std::vector<Run>& runs, const BenchSetup& setup,
+                       const Options& options, CaseResult& result);
+
+// Traces for `result` of the run's surroundings of its worst place as it is.
+void trace_worst_place(const Run& run, BenchSetup setup, const Options& options,
+                       CaseResult& result);
 
 // Tables for people.
 [[nodiscard]] std::string to_text(const Outcome& outcome);
