@@ -14,7 +14,7 @@ namespace {
 // Runs are taken together until they last so long: enough for all threads, little to hold.
 constexpr double kBatch_s = 20.0;
 constexpr double kSampleStep_s = 2e-4;
-constexpr int kParts = 2;
+constexpr int kParts = 5;
 
 study::BenchSetup bench_setup(const machine::Settings& settings) {
   study::BenchSetup setup;

@@ -115,7 +115,11 @@ PeakMotion peak(const AxisPath& path) {
 }
 
 NozzleWalk::NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path, double start_s)
-    : axis_(axis), path_(&path), now_s_(start_s), nozzle_{path.front().motion.position, 0.0} {}
+    : axis_(axis),
+      path_(&path),
+      now_s_(start_s),
+      nozzle_{path.front().motion.position, 0.0},
+      step_(axis, 0.0) {}
 
 const dynamics::NozzleState& NozzleWalk::at(double t) {
   const AxisPath& path = *path_;
@@ -126,7 +130,11 @@ const dynamics::NozzleState& NozzleWalk::at(double t) {
     const std::size_t next = waiting ? index_ : index_ + 1;
     const double change_s = next < path.size() ? path[next].start_s : t;
     const double to_s = std::min(change_s, t);
-    nozzle_ = dynamics::exact_step(axis_, nozzle_, base, to_s - now_s_);
+    if (std::abs(to_s - now_s_ - step_s_) > kSameTime_s) {
+      step_s_ = to_s - now_s_;
+      step_ = dynamics::ExactMap(axis_, step_s_);
+    }
+    nozzle_ = step_.step(nozzle_, base);
     now_s_ = to_s;
   }
   return nozzle_;

@@ -70,6 +70,9 @@ class NozzleWalk {
   std::size_t index_ = 0;
   double now_s_;
   dynamics::NozzleState nozzle_;
+  // Most steps are as long as the last one.
+  double step_s_ = 0.0;
+  dynamics::ExactMap step_;
 };
 
 // Sampling times: start_s + k · step_s for k = 0 … count − 1.

@@ -43,7 +43,7 @@ struct BenchSetup {
   compensate::Setup unflex;          // its acceleration limits are set per method
   double plan_accel_mm_s2 = 5000.0;  // that unflex' multiples are of
   double thesis_period_s = 5e-3;
-  int parts = 8;              // parabolas that stand for an interval of unflex' base
+  int parts = 10;             // parabolas that stand for an interval of unflex' base
   double step_s = 5e-5;       // of the samples the nozzle is measured at
   double hold_s = 0.0;        // how long it is looked at after the base has come to rest
   double trace_step_s = 0.0;  // of the traces; 0: none
