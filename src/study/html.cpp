@@ -16,18 +16,11 @@ namespace unflex::study {
 namespace {
 
 using report::escape_html;
+using report::micrometres_text;
 using Sink = std::back_insert_iterator<std::string>;
 
 // Bars are as long as the logarithm of the error above this.
 constexpr double kBarFrom_mm = 1e-5;
-
-std::string micrometres(double mm) {
-  const double um = mm * 1e3;
-  if (um >= 100.0) {
-    return fmt::format("{:.0f}", um);
-  }
-  return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
-}
 
 const MethodResult& by(const CaseResult& result, Method method) {
   return result.methods[static_cast<std::size_t>(method)];
@@ -39,7 +32,7 @@ void write_lead(Sink out, const Outcome& outcome) {
   const CaseResult& first = outcome.cases.front();
   const auto max = [&](Method method) {
     const MethodResult& result = by(first, method);
-    return result.used ? micrometres(result.straying[0].max_mm) + " µm" : std::string("—");
+    return result.used ? micrometres_text(result.straying[0].max_mm) + " µm" : std::string("—");
   };
   fmt::format_to(
       out,
@@ -72,7 +65,7 @@ void write_lead(Sink out, const Outcome& outcome) {
                    method.method == Method::uncompensated ? " before"
                    : is_unflex(method.method)             ? " after"
                                                           : "",
-                   share, micrometres(max_mm));
+                   share, micrometres_text(max_mm));
   }
   fmt::format_to(out, "</div></section>\n");
 }
@@ -98,7 +91,7 @@ void write_maxima(Sink out, const Outcome& outcome) {
     for (const CaseResult& result : outcome.cases) {
       const MethodResult& method = result.methods[i];
       if (method.used) {
-        fmt::format_to(out, "<td>{}</td>", micrometres(method.straying[0].max_mm));
+        fmt::format_to(out, "<td>{}</td>", micrometres_text(method.straying[0].max_mm));
       } else {
         fmt::format_to(out, "<td class=\"none\">{}</td>", report::term("—", method.remark));
       }
@@ -122,7 +115,7 @@ void write_gaps(Sink out, const Outcome& outcome) {
        {Method::thesis_least_squares, Method::thesis_velocity_defects, Method::unflex_4x}) {
     write_row_start(out, method);
     for (const CaseResult& result : outcome.cases) {
-      fmt::format_to(out, "<td>{}</td>", micrometres(by(result, method).end_gap_mm));
+      fmt::format_to(out, "<td>{}</td>", micrometres_text(by(result, method).end_gap_mm));
     }
     fmt::format_to(out, "</tr>\n");
   }
@@ -183,15 +176,15 @@ void write_depth(Sink out, const CaseResult& result) {
                      escape_html(method.remark));
       continue;
     }
-    fmt::format_to(out, "<td>{}</td>", micrometres(method.straying[0].rms_mm()));
+    fmt::format_to(out, "<td>{}</td>", micrometres_text(method.straying[0].rms_mm()));
     for (const std::size_t i : {1U, 2U, 0U, 3U, 4U}) {
-      fmt::format_to(out, "<td>{}</td>", micrometres(method.straying[i].max_mm));
+      fmt::format_to(out, "<td>{}</td>", micrometres_text(method.straying[i].max_mm));
     }
     fmt::format_to(out,
                    "<td>{}</td><td>{}</td><td>{:.0f}</td><td>{:.0f}</td><td>{:.0f}</td></tr>\n",
-                   micrometres(method.straying[0].after_max_mm), micrometres(method.end_gap_mm),
-                   method.base_peak.velocity_mm_s, method.base_peak.accel_mm_s2,
-                   std::max(0.0, method.longer_s * 1e3));
+                   micrometres_text(method.straying[0].after_max_mm),
+                   micrometres_text(method.end_gap_mm), method.base_peak.velocity_mm_s,
+                   method.base_peak.accel_mm_s2, std::max(0.0, method.longer_s * 1e3));
   }
   fmt::format_to(out, "</tbody></table></div>\n");
   for (const MethodResult& method : result.methods) {
@@ -257,7 +250,7 @@ void write_chains(Sink out, const Outcome& outcome) {
                      "<tr><th scope=\"row\">{}</th><td>{}</td><td>{:g} ms</td><td>{}</td>"
                      "<td>{} in {:.2f} ms</td><td>{} in {:.2f} ms</td></tr>\n",
                      chain.case_name, chain.engine, step.period_s * 1e3,
-                     micrometres(step.contour_max_mm), step.cold_iterations, step.cold_s * 1e3,
+                     micrometres_text(step.contour_max_mm), step.cold_iterations, step.cold_s * 1e3,
                      step.warm_iterations, step.warm_s * 1e3);
     }
   }

@@ -10,17 +10,10 @@
 namespace unflex::study {
 namespace {
 
+using report::micrometres_text;
 using Sink = std::back_insert_iterator<std::string>;
 
 constexpr std::string_view kNone = "—";
-
-std::string micrometres(double mm) {
-  const double um = mm * 1e3;
-  if (um >= 100.0) {
-    return fmt::format("{:.0f}", um);
-  }
-  return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
-}
 
 void write_heading(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "{}, unflex by {}\n",
@@ -41,8 +34,9 @@ void write_maxima(Sink out, const Outcome& outcome) {
     fmt::format_to(out, "\n  {:<26}", name(static_cast<Method>(i)));
     for (const CaseResult& result : outcome.cases) {
       const MethodResult& method = result.methods[i];
-      fmt::format_to(out, "{:>8}",
-                     method.used ? micrometres(method.straying[0].max_mm) : std::string(kNone));
+      fmt::format_to(
+          out, "{:>8}",
+          method.used ? micrometres_text(method.straying[0].max_mm) : std::string(kNone));
     }
   }
   fmt::format_to(out, "\n");
@@ -59,7 +53,7 @@ void write_gaps(Sink out, const Outcome& outcome) {
     fmt::format_to(out, "\n  {:<26}", name(method));
     for (const CaseResult& result : outcome.cases) {
       fmt::format_to(out, "{:>8}",
-                     micrometres(result.methods[static_cast<std::size_t>(method)].end_gap_mm));
+                     micrometres_text(result.methods[static_cast<std::size_t>(method)].end_gap_mm));
     }
   }
   fmt::format_to(out, "\n");
@@ -76,15 +70,15 @@ void write_case(Sink out, const CaseResult& result) {
       continue;
     }
     fmt::format_to(out, "  {:<26}{:>8}", name(method.method),
-                   micrometres(method.straying[0].rms_mm()));
+                   micrometres_text(method.straying[0].rms_mm()));
     for (std::size_t i = 1; i < kFrequencyErrors.size(); ++i) {
-      fmt::format_to(out, "{:>8}", micrometres(method.straying[i].max_mm));
+      fmt::format_to(out, "{:>8}", micrometres_text(method.straying[i].max_mm));
     }
     fmt::format_to(out, "{:>9}{:>9}{:>9.0f}{:>9.0f}{:>6.0f} ms{}{}\n",
-                   micrometres(method.straying[0].after_max_mm), micrometres(method.end_gap_mm),
-                   method.base_peak.velocity_mm_s, method.base_peak.accel_mm_s2,
-                   std::max(0.0, method.longer_s * 1e3), method.remark.empty() ? "" : "  ",
-                   method.remark);
+                   micrometres_text(method.straying[0].after_max_mm),
+                   micrometres_text(method.end_gap_mm), method.base_peak.velocity_mm_s,
+                   method.base_peak.accel_mm_s2, std::max(0.0, method.longer_s * 1e3),
+                   method.remark.empty() ? "" : "  ", method.remark);
   }
 }
 

@@ -109,8 +109,7 @@ TEST_F(ThesisCases, StrayLessWithAFilteredSplineThanWithAnyShaper) {
   }
 }
 
-// With the frequency 10 % off all that inverts the model is much alike; only being told wrongly
-// costs more than not moving exactly.
+// A wrong model costs all who invert it the same, however well they do.
 TEST_F(ThesisCases, StrayAlikeWithAllInversesWhereTheFrequencyIsWrong) {
   constexpr std::size_t kTenPercentMore = 4;
   ASSERT_EQ(kFrequencyErrors[kTenPercentMore], 0.10);
