@@ -34,12 +34,12 @@ struct RunConfig {
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"
-  std::vector<std::string> cases;      // study: names, none for all
   std::optional<std::string> report;   // a file ending in .json (study: or .html), or "-"
   std::optional<double> max_deviation_mm;
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;
   bool quiet = false;
+  std::vector<std::string> cases;  // study: names, none for all
 };
 
 // The command line understood: either work to do, or a text to print instead (--help, --version).
