@@ -119,7 +119,20 @@ NozzleWalk::NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path,
       path_(&path),
       now_s_(start_s),
       nozzle_{path.front().motion.position, 0.0},
-      step_(axis, 0.0) {}
+      map_(axis, 0.0) {}
+
+void NozzleWalk::step(const dynamics::BaseSegment& base, double h) {
+  if (std::abs(h - map_step_s_) <= kSameTime_s) {
+    nozzle_ = map_.step(nozzle_, base);
+    return;
+  }
+  nozzle_ = dynamics::exact_step(axis_, nozzle_, base, h);
+  if (std::abs(h - last_step_s_) <= kSameTime_s) {
+    map_step_s_ = h;
+    map_ = dynamics::ExactMap(axis_, h);
+  }
+  last_step_s_ = h;
+}
 
 const dynamics::NozzleState& NozzleWalk::at(double t) {
   const AxisPath& path = *path_;
@@ -130,11 +143,7 @@ const dynamics::NozzleState& NozzleWalk::at(double t) {
     const std::size_t next = waiting ? index_ : index_ + 1;
     const double change_s = next < path.size() ? path[next].start_s : t;
     const double to_s = std::min(change_s, t);
-    if (std::abs(to_s - now_s_ - step_s_) > kSameTime_s) {
-      step_s_ = to_s - now_s_;
-      step_ = dynamics::ExactMap(axis_, step_s_);
-    }
-    nozzle_ = step_.step(nozzle_, base);
+    step(base, to_s - now_s_);
     now_s_ = to_s;
   }
   return nozzle_;

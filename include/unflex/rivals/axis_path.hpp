@@ -65,14 +65,17 @@ class NozzleWalk {
   [[nodiscard]] const dynamics::NozzleState& at(double t);
 
  private:
+  void step(const dynamics::BaseSegment& base, double h);
+
   dynamics::FlexibleAxis axis_;
   const AxisPath* path_;
   std::size_t index_ = 0;
   double now_s_;
   dynamics::NozzleState nozzle_;
-  // Most steps are as long as the last one.
-  double step_s_ = 0.0;
-  dynamics::ExactMap step_;
+  double last_step_s_ = 0.0;
+  // For steps of the length that last came twice running.
+  double map_step_s_ = 0.0;
+  dynamics::ExactMap map_;
 };
 
 // Sampling times: start_s + k · step_s for k = 0 … count − 1.
