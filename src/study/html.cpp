@@ -46,7 +46,7 @@ void write_lead(Sink out, const Outcome& outcome) {
       max(Method::unflex_4x));
   fmt::format_to(out, "<p class=\"note\">{}. Bars are logarithmic.</p><div class=\"bars\">\n",
                  escape_html(first.description));
-  double most_mm = 0.0;
+  double most_mm = 2.0 * kBarFrom_mm;
   for (const MethodResult& method : first.methods) {
     most_mm = std::max(most_mm, method.straying[0].max_mm);
   }

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
 #include <string_view>
 
 #include "unflex/report/svg_plot.hpp"
@@ -17,6 +17,7 @@ using report::Stroke;
 
 // Half the width of the zoom, in the error without compensation.
 constexpr double kZoom = 1.3;
+constexpr double kLeastZoom_mm = 1e-3;
 
 // One line of the figures: what moves, and how it is drawn.
 struct Track {
@@ -96,8 +97,9 @@ std::string figure(std::string_view caption, const Plot& plot) {
 std::string figures(const CaseResult& result, const MethodResult& method) {
   const std::vector<Track> list = tracks(result, method);
   const std::string of = fmt::format("{}, case {}", name(method.method), result.name);
-  const double half =
-      kZoom * result.methods[static_cast<std::size_t>(Method::uncompensated)].straying[0].max_mm;
+  const double half = std::max(
+      kZoom * result.methods[static_cast<std::size_t>(Method::uncompensated)].straying[0].max_mm,
+      kLeastZoom_mm);
 
   // Displacements are from where the plan is first.
   const dynamics::NozzleXY& start = list.front().states->front();

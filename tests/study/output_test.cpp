@@ -86,6 +86,16 @@ TEST(StudyHtml, EscapesWhatComesFromOutside) {
   EXPECT_THAT(html, HasSubstr("a&amp;b.toml:3"));
 }
 
+// Nothing but travel, or a plan that the nozzle follows exactly.
+TEST(StudyHtml, OfNoErrorAtAllIsStillAPage) {
+  Outcome still = outcome();
+  for (MethodResult& method : still.cases.front().methods) {
+    method.straying = {};
+  }
+  EXPECT_THAT(to_html(still), Not(HasSubstr("nan")));
+  EXPECT_THAT(to_html(still), Not(HasSubstr("inf")));
+}
+
 TEST(StudyHtml, OfAllCasesIsSmall) {
   SilentProgress progress;
   const Result<Outcome> all =
