@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "piece_reader.hpp"
 #include "stage_options.hpp"
@@ -62,9 +64,14 @@ Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progre
     more = *read;
     if (piece.is_run) {
       batch_s += planner::duration_s(piece.moves);
-      batch.push_back({std::move(piece.moves), {}});
+      if (piece.begins_run()) {
+        batch.emplace_back();
+      }
+      std::ranges::move(piece.moves, std::back_inserter(batch.back().plan));
     }
-    if (!batch.empty() && (!more || batch_s >= kBatch_s)) {
+    // A long run comes in parts, but is tried as a whole.
+    const bool inside = piece.is_run && !piece.ends_run();
+    if (!batch.empty() && !inside && (!more || batch_s >= kBatch_s)) {
       const std::size_t number = study::study_runs(batch, setup, options, result);
       // Of all runs so far, the largest error is now known.
       const double max_mm = result.methods.front().straying[0].max_mm;

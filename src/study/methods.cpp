@@ -74,7 +74,8 @@ Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSe
   compensate::Setup setup = bench.unflex;
   setup.x.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
-  const auto spans = compensate::cut(compensate::node_count(plan, setup), setup);
+  const compensate::NodeGrid grid = compensate::node_grid(plan, setup);
+  const auto spans = compensate::cut(grid.count, setup);
   const gcode::Position& start = plan.front().segment.start_mm;
   const dynamics::NozzleXY nozzle{{start[gcode::X], 0.0}, {start[gcode::Y], 0.0}};
   std::vector<dynamics::AxisTrajectory> x;
@@ -92,7 +93,7 @@ Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSe
   }
   const auto path = [&](const std::vector<dynamics::AxisTrajectory>& solutions) {
     return rivals::through_nodes(compensate::join(spans, solutions), -setup.lead_in_s,
-                                 setup.period_s, bench.parts);
+                                 grid.period_s, bench.parts);
   };
   result.x = path(x);
   result.y = path(y);
