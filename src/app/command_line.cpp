@@ -45,6 +45,23 @@ void add_max_deviation(CLI::App& command, RunConfig& config) {
       ->check(positive_mm());
 }
 
+void add_engine(CLI::App& command, RunConfig& config, const char* help) {
+  command.add_option("--engine", config.engine, help)
+      ->type_name("auto|banded|ipopt")
+      ->transform(CLI::Transformer(
+          std::map<std::string, pipeline::EngineChoice>{{"auto", pipeline::EngineChoice::automatic},
+                                                        {"banded", pipeline::EngineChoice::banded},
+                                                        {"ipopt", pipeline::EngineChoice::ipopt}}));
+}
+
+void add_jobs(CLI::App& command, RunConfig& config) {
+  command
+      .add_option("-j,--jobs", config.workers,
+                  "How many to compute at once, all processors by default")
+      ->type_name("N")
+      ->check(CLI::Range(1U, kMaxWorkers));
+}
+
 void add_compensate(CLI::App& program, RunConfig& config) {
   CLI::App* const command = program.add_subcommand(
       "compensate", "Write G-code whose motion makes the nozzle draw the sliced path");
@@ -54,19 +71,9 @@ void add_compensate(CLI::App& program, RunConfig& config) {
   command->add_flag("--in-place", config.in_place, "Replace IN");
   add_common_options(*command, config);
   add_max_deviation(*command, config);
-  command
-      ->add_option("--engine", config.engine,
-                   "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt")
-      ->type_name("auto|banded|ipopt")
-      ->transform(CLI::Transformer(
-          std::map<std::string, pipeline::EngineChoice>{{"auto", pipeline::EngineChoice::automatic},
-                                                        {"banded", pipeline::EngineChoice::banded},
-                                                        {"ipopt", pipeline::EngineChoice::ipopt}}));
-  command
-      ->add_option("-j,--jobs", config.workers,
-                   "How many to compute at once, all processors by default")
-      ->type_name("N")
-      ->check(CLI::Range(1U, kMaxWorkers));
+  add_engine(*command, config,
+             "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
+  add_jobs(*command, config);
   command->callback([&config] { config.command = Command::compensate; });
 }
 
@@ -92,6 +99,20 @@ void add_inspect(CLI::App& program, RunConfig& config) {
   command->callback([&config] { config.command = Command::inspect; });
 }
 
+void add_study(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "study", "Measure all ways to move the base against each other, on a corner or on a print");
+  command->add_option("IN", config.input, "G-code, - for stdin; without it the thesis' corner")
+      ->type_name("");
+  command->add_option("--case", config.cases, "Only this case of the corner; repeatable")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  add_common_options(*command, config);
+  add_engine(*command, config, "What solves for unflex: banded (auto), or ipopt");
+  add_jobs(*command, config);
+  command->callback([&config] { config.command = Command::study; });
+}
+
 tl::unexpected<Error> usage(std::string message) {
   return fail(ErrorKind::usage, std::move(message));
 }
@@ -115,6 +136,9 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
+  if (config.command == Command::study && name.ends_with(".html")) {
+    return {};
+  }
   if (name.ends_with(".html")) {
     return usage(fmt::format("--report {}: HTML comes with a later version, use .json", name));
   }
@@ -136,6 +160,13 @@ Status complete(RunConfig& config) {
   if (config.command == Command::verify && config.input == kStandardStream &&
       config.output == kStandardStream) {
     return usage("only one of OUT and --against can be stdin");
+  }
+  if (config.command == Command::study && !config.input.empty() && !config.cases.empty()) {
+    return usage("--case is of the corner; a print has none");
+  }
+  if (config.command == Command::study && config.input.empty() &&
+      (config.printer_file || !config.overrides.empty())) {
+    return usage("--printer and --set are of a print; the corner's cases have their own settings");
   }
   return config.report ? check_report(config) : Status{};
 }
@@ -185,6 +216,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   add_compensate(program, config);
   add_verify(program, config);
   add_inspect(program, config);
+  add_study(program, config);
   program.footer(
       "Exit codes: 0 done, 1 usage or configuration, 2 bad input, 3 deviation above\n"
       "--max-deviation or a rule broken, 4 internal. More: docs/cli.md");

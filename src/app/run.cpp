@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <exception>
 #include <optional>
 
@@ -17,7 +18,9 @@
 #include "unflex/machine/machine.hpp"
 #include "unflex/machine/recommend.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "unflex/pipeline/study_print.hpp"
 #include "unflex/report/report.hpp"
+#include "unflex/study/study.hpp"
 
 namespace unflex::app {
 namespace {
@@ -200,14 +203,14 @@ Status print_summary(const RunConfig& config, std::string_view text) {
                                   fmt::format("cannot write: {}", errno_text(error))));
 }
 
-Status write_report(Workspace& space, std::string_view text) {
-  if (!space.report) {
+Status write_report(std::optional<Output>& report, std::string_view text) {
+  if (!report) {
     return {};
   }
-  if (Status written = space.report->write(text); !written) {
+  if (Status written = report->write(text); !written) {
     return written;
   }
-  return space.report->commit();
+  return report->commit();
 }
 
 // What the results say about success: broken rules before deviation. passed_on: the output has gone
@@ -244,7 +247,7 @@ Status deliver(const RunConfig& config, Workspace& space, ExitCode verdict, bool
       return committed;
     }
   }
-  return write_report(space, report::to_json(report)).and_then([&] {
+  return write_report(space.report, report::to_json(report)).and_then([&] {
     return print_summary(config, report::to_text(report));
   });
 }
@@ -291,9 +294,64 @@ Result<ExitCode> run_inspect(const RunConfig& config) {
   print_warnings(inspection->warnings);
   const std::string json = inspection_json(*inspection, config.input, space->settings);
   const std::string text = inspection_text(*inspection, config.input, space->settings);
-  return write_report(*space, json).and_then([&] { return print_summary(config, text); }).map([] {
-    return ExitCode::done;
-  });
+  return write_report(space->report, json)
+      .and_then([&] { return print_summary(config, text); })
+      .map([] { return ExitCode::done; });
+}
+
+// What the command studies: the corner, or a print.
+Result<study::Outcome> study_outcome(const RunConfig& config, std::optional<Workspace>& print) {
+  const bool traces = config.report && config.report->ends_with(".html");
+  if (!print) {
+    const study::Options options{.ipopt = config.engine == pipeline::EngineChoice::ipopt,
+                                 .workers = config.workers,
+                                 .cases = config.cases,
+                                 .traces = traces};
+    return with_progress(
+        config, [&](Progress& progress) { return study::study_corner(options, progress); });
+  }
+  const Result<pipeline::Job> job = job_of(config, *print);
+  if (!job) {
+    return tl::unexpected(job.error());
+  }
+  Result<study::Outcome> outcome = with_progress(
+      config, [&](Progress& progress) { return pipeline::study_print(*job, traces, progress); });
+  if (outcome) {
+    outcome->printer = settings_in_force(print->settings);
+    add_setting_warnings(print->settings, outcome->warnings);
+  }
+  return outcome;
+}
+
+Result<ExitCode> run_study(const RunConfig& config) {
+  const auto start = std::chrono::steady_clock::now();
+  std::optional<Workspace> print;
+  std::optional<Output> report;
+  if (!config.input.empty()) {
+    Result<Workspace> space = prepare(config);
+    if (!space) {
+      return tl::unexpected(space.error());
+    }
+    print.emplace(std::move(*space));
+  } else if (config.report) {
+    Result<Output> opened = Output::open(*config.report);
+    if (!opened) {
+      return tl::unexpected(opened.error());
+    }
+    report.emplace(std::move(*opened));
+  }
+  Result<study::Outcome> outcome = study_outcome(config, print);
+  if (!outcome) {
+    return tl::unexpected(outcome.error());
+  }
+  outcome->version = version();
+  outcome->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  print_warnings(outcome->warnings);
+  const bool html = config.report && config.report->ends_with(".html");
+  return write_report(print ? print->report : report,
+                      html ? study::to_html(*outcome) : study::to_json(*outcome))
+      .and_then([&] { return print_summary(config, study::to_text(*outcome)); })
+      .map([] { return ExitCode::done; });
 }
 
 // A descriptor 0, 1 or 2 that was closed would be given to the next file opened, and messages
@@ -306,12 +364,22 @@ void reserve_standard_descriptors() {
   }
 }
 
+Result<ExitCode> run_command(const RunConfig& config) {
+  switch (config.command) {
+    case Command::inspect:
+      return run_inspect(config);
+    case Command::study:
+      return run_study(config);
+    default:
+      return run_on_prints(config);
+  }
+}
+
 }  // namespace
 
 int run(const RunConfig& config) {
   catch_signals();
-  const Result<ExitCode> result =
-      config.command == Command::inspect ? run_inspect(config) : run_on_prints(config);
+  const Result<ExitCode> result = run_command(config);
   if (!result) {
     const bool ended = ending_signal() != 0;
     print_error(ended ? interrupted().value() : result.error());

@@ -130,6 +130,17 @@ void AxisProblem::node_bounds(int k, int n, PointVector& lower, PointVector& upp
 }
 
 void AxisProblem::guess(int k, double /*t*/, PointVector& z) const {
+  if (window_->guess) {
+    const auto i = static_cast<std::size_t>(k);
+    const dynamics::NozzleState& nozzle = window_->guess->nozzle[i];
+    const dynamics::AxisTrajectory& base = window_->guess->base;
+    z(kNozzle) = to_scaled(kNozzle, nozzle.position);
+    z(kNozzleRate) = to_scaled(kNozzleRate, nozzle.velocity);
+    z(kBase) = to_scaled(kBase, base.position_mm[i]);
+    z(kBaseRate) = to_scaled(kBaseRate, base.velocity_mm_s[i]);
+    z(kBaseAccel) = to_scaled(kBaseAccel, base.accel_mm_s2[i]);
+    return;
+  }
   const auto n = static_cast<int>(window_->nodes());
   const auto r = [&](int node) {
     return window_->reference_mm[static_cast<std::size_t>(2 * std::clamp(node, 0, n - 1))];

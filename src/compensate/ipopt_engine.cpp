@@ -27,7 +27,7 @@ class IpoptEngine final : public Engine {
       times[k] = static_cast<double>(k);
     }
     const auto program = collocation::transcribe(problem, std::move(times));
-    Result<nlp::Solution> solution = nlp::solve(*program, nlp::SolverOptions{});
+    Result<nlp::Solution> solution = nlp::solve(*program, {.warm = window.guess.has_value()});
     if (!solution) {
       return tl::unexpected(solution.error());
     }

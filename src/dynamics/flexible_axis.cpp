@@ -74,11 +74,14 @@ NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state, const BaseSegm
       state.velocity + h / 6.0 * (k1.velocity + 2.0 * (k2.velocity + k3.velocity) + k4.velocity)};
 }
 
-Rk4Map::Rk4Map(const FlexibleAxis& axis, double h)
-    : of_position_(rk4_step(axis, {1.0, 0.0}, {}, h)),
-      of_velocity_(rk4_step(axis, {0.0, 1.0}, {}, h)),
-      of_base_velocity_(rk4_step(axis, {}, {0.0, 1.0, 0.0}, h)),
-      of_base_acceleration_(rk4_step(axis, {}, {0.0, 0.0, 1.0}, h)) {}
+StepMap::StepMap(Step one_step, const FlexibleAxis& axis, double h)
+    : of_position_(one_step(axis, {1.0, 0.0}, {}, h)),
+      of_velocity_(one_step(axis, {0.0, 1.0}, {}, h)),
+      of_base_velocity_(one_step(axis, {}, {0.0, 1.0, 0.0}, h)),
+      of_base_acceleration_(one_step(axis, {}, {0.0, 0.0, 1.0}, h)) {}
+
+Rk4Map::Rk4Map(const FlexibleAxis& axis, double h) : StepMap(&rk4_step, axis, h) {}
+ExactMap::ExactMap(const FlexibleAxis& axis, double h) : StepMap(&exact_step, axis, h) {}
 
 NozzleState exact_step(const FlexibleAxis& axis, NozzleState state, const BaseSegment& base,
                        double h) {

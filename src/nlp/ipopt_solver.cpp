@@ -135,6 +135,10 @@ class Adapter final : public Ipopt::TNLP {
   Solution solution_;
 };
 
+// Fewest iterations over the corner's windows, of powers of ten.
+constexpr double kWarmPush = 1e-4;
+constexpr double kWarmBarrier = 1e-3;
+
 // Sets one option; the first refusal is kept in `refused`.
 class OptionSetter {
  public:
@@ -179,6 +183,16 @@ Result<Solution> solve(const Problem& problem, const SolverOptions& options) {
   setter.set("mu_oracle", "loqo");
   setter.set("tol", options.tolerance);
   setter.set("max_iter", options.max_iterations);
+  if (options.warm) {
+    // By default Ipopt moves the start 1 % away from all bounds and lets the barrier begin high.
+    setter.set("bound_push", kWarmPush);
+    setter.set("bound_frac", kWarmPush);
+    setter.set("slack_bound_push", kWarmPush);
+    setter.set("slack_bound_frac", kWarmPush);
+    setter.set("mu_strategy", "monotone");
+    setter.set("mu_init", kWarmBarrier);
+    setter.set("bound_mult_init_method", "mu-based");
+  }
   if (problem.linear_constraints()) {
     setter.set("jac_c_constant", "yes");
     setter.set("jac_d_constant", "yes");

@@ -14,19 +14,10 @@ constexpr std::size_t kListedFallbacks = 3;
 
 using Sink = std::back_insert_iterator<std::string>;
 
-// Three figures, so that 1234 µm and 0.05 µm fit the same column.
-std::string micrometres(double mm) {
-  const double um = mm * kMicrometresPerMm;
-  if (um >= 100.0) {
-    return fmt::format("{:.0f}", um);
-  }
-  return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
-}
-
 void write_deviation(Sink out, std::string_view moves, const DeviationRow& before,
                      const DeviationRow& after) {
   const auto cell = [](double from_mm, double to_mm) {
-    return fmt::format("{} → {}", micrometres(from_mm), micrometres(to_mm));
+    return fmt::format("{} → {}", micrometres_text(from_mm), micrometres_text(to_mm));
   };
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", moves,
                  cell(before.contour_max_mm, after.contour_max_mm),
@@ -73,7 +64,7 @@ void write_output(Sink out, const Report& r) {
   if (!r.solver_engine.empty()) {
     const LineBudget& budget = r.line_budget;
     fmt::format_to(out, "lines         cost {} µm RMS, {} µm at most; ",
-                   micrometres(budget.cost_rms_mm), micrometres(budget.cost_max_mm));
+                   micrometres_text(budget.cost_rms_mm), micrometres_text(budget.cost_max_mm));
     if (budget.places_above == 0) {
       fmt::format_to(out, "never more than {:.0f} per second\n", budget.max_lines_per_s);
     } else {
@@ -88,6 +79,14 @@ void write_output(Sink out, const Report& r) {
 }
 
 }  // namespace
+
+std::string micrometres_text(double mm) {
+  const double um = mm * kMicrometresPerMm;
+  if (um >= 100.0) {
+    return fmt::format("{:.0f}", um);
+  }
+  return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
+}
 
 std::string duration_text(double seconds) {
   // Just below a minute tenths would round to 60.0.

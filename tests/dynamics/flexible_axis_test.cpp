@@ -160,7 +160,7 @@ TEST(Rk4Step, HasTheLocalErrorOfAFourthOrderTaylorSeries) {
   EXPECT_NEAR(got.velocity / 100.0, -x + x * x * x / 6.0, 1e-15);
 }
 
-TEST(Rk4Map, IsTheStep) {
+TEST(StepMaps, AreTheirSteps) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   for (int trial = 0; trial < 500; ++trial) {
@@ -168,10 +168,14 @@ TEST(Rk4Map, IsTheStep) {
     const NozzleState start{200.0 * unit(random), 100.0 * unit(random)};
     const BaseSegment base{start.position + unit(random), 100.0 * unit(random), 2e4 * unit(random)};
     const double h = 1e-3 * (1.01 + unit(random));
-    const NozzleState step = rk4_step(axis, start, base, h);
-    const NozzleState got = Rk4Map(axis, h).step(start, base);
-    ASSERT_NEAR(got.position, step.position, 1e-12);
-    ASSERT_NEAR(got.velocity, step.velocity, 1e-9);
+    const NozzleState rk4 = rk4_step(axis, start, base, h);
+    const NozzleState by_rk4_map = Rk4Map(axis, h).step(start, base);
+    ASSERT_NEAR(by_rk4_map.position, rk4.position, 1e-12);
+    ASSERT_NEAR(by_rk4_map.velocity, rk4.velocity, 1e-9);
+    const NozzleState exact = exact_step(axis, start, base, h);
+    const NozzleState by_exact_map = ExactMap(axis, h).step(start, base);
+    ASSERT_NEAR(by_exact_map.position, exact.position, 1e-12);
+    ASSERT_NEAR(by_exact_map.velocity, exact.velocity, 1e-9);
   }
 }
 

@@ -11,7 +11,7 @@
 
 namespace unflex::app {
 
-enum class Command { compensate, verify, inspect };
+enum class Command { compensate, verify, inspect, study };
 
 // The codes the program exits with, see docs/cli.md.
 enum class ExitCode : int {
@@ -27,16 +27,19 @@ inline constexpr std::string_view kStandardStream = "-";
 
 struct RunConfig {
   Command command = Command::compensate;
-  std::string input;   // compensate, inspect: IN; verify: the file given to --against
+  // compensate, inspect: IN; verify: the file given to --against; study: IN, empty for the thesis'
+  // cases
+  std::string input;
   std::string output;  // compensate: -o, or the input with --in-place; verify: OUT
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"
-  std::optional<std::string> report;   // a file ending in .json, or "-"
+  std::optional<std::string> report;   // a file ending in .json (study: or .html), or "-"
   std::optional<double> max_deviation_mm;
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;
   bool quiet = false;
+  std::vector<std::string> cases;  // study: names, none for all
 };
 
 // The command line understood: either work to do, or a text to print instead (--help, --version).

@@ -51,6 +51,13 @@ struct AxisWindow {
   std::optional<Start> start;
   // At the last node: the base at rest there. Unset: free.
   std::optional<double> end_base_mm;
+  // A motion not far from the solution, at the nodes: where an engine that iterates from a point may
+  // begin. It has no influence on the solution, and is not passed on to worker processes.
+  struct Guess {
+    std::vector<dynamics::NozzleState> nozzle;
+    dynamics::AxisTrajectory base;
+  };
+  std::optional<Guess> guess;
 
   [[nodiscard]] std::size_t nodes() const { return (reference_mm.size() + 1) / 2; }
 };

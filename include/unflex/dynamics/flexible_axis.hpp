@@ -44,11 +44,14 @@ struct BaseSegment {
 [[nodiscard]] NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state,
                                    const BaseSegment& base, double h);
 
-// rk4_step of one length as the linear map it is, for many steps of that length.
-class Rk4Map {
- public:
-  Rk4Map(const FlexibleAxis& axis, double h);
+// The exact state h seconds later for the same input, from the closed form of the damped
+// oscillator (any ζ ≥ 0).
+[[nodiscard]] NozzleState exact_step(const FlexibleAxis& axis, NozzleState state,
+                                     const BaseSegment& base, double h);
 
+// A step of one length as the linear map it is, for many steps of that length.
+class StepMap {
+ public:
   // The base's position is carried along so that numbers stay small.
   [[nodiscard]] NozzleState step(const NozzleState& state, const BaseSegment& base) const {
     const double y = state.position - base.position;
@@ -60,6 +63,10 @@ class Rk4Map {
                 of_base_acceleration_.velocity * base.acceleration};
   }
 
+ protected:
+  using Step = NozzleState (*)(const FlexibleAxis&, NozzleState, const BaseSegment&, double);
+  StepMap(Step one_step, const FlexibleAxis& axis, double h);
+
  private:
   // What one unit of each makes after the step.
   NozzleState of_position_;
@@ -68,9 +75,16 @@ class Rk4Map {
   NozzleState of_base_acceleration_;
 };
 
-// The exact state h seconds later for the same input, from the closed form of the damped
-// oscillator (any ζ ≥ 0).
-[[nodiscard]] NozzleState exact_step(const FlexibleAxis& axis, NozzleState state,
-                                     const BaseSegment& base, double h);
+// rk4_step().
+class Rk4Map : public StepMap {
+ public:
+  Rk4Map(const FlexibleAxis& axis, double h);
+};
+
+// exact_step().
+class ExactMap : public StepMap {
+ public:
+  ExactMap(const FlexibleAxis& axis, double h);
+};
 
 }  // namespace unflex::dynamics

@@ -16,6 +16,9 @@ namespace unflex::nlp {
 struct SolverOptions {
   double tolerance = 1e-7;  // of the scaled optimality error
   int max_iterations = 200;
+  // The start is near the solution of a program whose unknowns are about 1: stay close to it, also
+  // where it is close to bounds.
+  bool warm = false;
 };
 
 enum class Outcome {

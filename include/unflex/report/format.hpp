@@ -19,6 +19,9 @@ inline constexpr int kSchemaVersion = 1;
 // Two spaces of indentation, final newline. What is not UTF-8 (file names are bytes) is replaced.
 [[nodiscard]] std::string dump(const Json& json);
 
+// Three figures, so that 1234 µm and 0.05 µm fit the same column; without the unit.
+[[nodiscard]] std::string micrometres_text(double mm);
+
 // 3725.4 → "1h 02m 05s"; below a minute with tenths, "5.3s".
 [[nodiscard]] std::string duration_text(double seconds);
 

@@ -1,0 +1,17 @@
+// The study's bench on a print instead of the thesis' corner.
+#pragma once
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/study/study.hpp"
+
+namespace unflex::pipeline {
+
+// Tries all methods on every run of `job.input`, planned as `compensate` plans it, with the job's
+// settings; unflex' multiples are of limits.max_accel_mm_s2. Every run begins with the nozzle at
+// rest, and nothing is written as G-code: bases move exactly as their method has them. traces: also
+// of the worst place, for the figures.
+[[nodiscard]] Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progress);
+
+}  // namespace unflex::pipeline

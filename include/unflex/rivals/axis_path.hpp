@@ -1,0 +1,95 @@
+// The motion of one axis as parabolas one after the other: what a base is told by any method, and
+// what the nozzle does that hangs on it.
+//
+//   b, p   base and nozzle       r   reference, the plan's own motion
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/rivals/shapers.hpp"
+
+namespace unflex::rivals {
+
+// Holds until the next parabola begins.
+struct Parabola {
+  double start_s = 0.0;
+  dynamics::BaseSegment motion;
+};
+
+// In order of time and not empty. Before the first one the axis rests where that begins; the last
+// one lasts for ever.
+using AxisPath = std::vector<Parabola>;
+
+// r(t) of a plan that starts at rest at time 0 and ends at rest.
+[[nodiscard]] AxisPath reference_path(const std::vector<planner::PlannedMove>& moves,
+                                      gcode::Axis axis);
+
+// Σ weight · b(t − time_s), exactly.
+[[nodiscard]] AxisPath shaped(const AxisPath& path, const ShaperPulses& pulses);
+
+// Motion given at nodes, the first at start_s, with b̈ linear between them: each interval becomes
+// `parts` parabolas whose ends are exact and whose acceleration is the mean.
+[[nodiscard]] AxisPath through_nodes(const dynamics::AxisTrajectory& nodes, double start_s,
+                                     double period_s, int parts);
+
+// b and ḃ at time t; walks along for times that do not decrease.
+class PathCursor {
+ public:
+  explicit PathCursor(const AxisPath& path) : path_(&path) {}
+  [[nodiscard]] dynamics::NozzleState at(double t);
+
+ private:
+  const AxisPath* path_;
+  std::size_t index_ = 0;
+};
+
+// When the last parabola begins, that is when the path comes to rest if it does.
+[[nodiscard]] double end_s(const AxisPath& path);
+
+struct PeakMotion {
+  double velocity_mm_s = 0.0;
+  double accel_mm_s2 = 0.0;
+};
+[[nodiscard]] PeakMotion peak(const AxisPath& path);
+
+// The nozzle on a path, in closed form from one parabola's beginning to the next; times must not
+// decrease. It rests at the path's beginning until start_s, which must not be later than that.
+class NozzleWalk {
+ public:
+  NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path, double start_s);
+  [[nodiscard]] const dynamics::NozzleState& at(double t);
+
+ private:
+  void step(const dynamics::BaseSegment& base, double h);
+
+  dynamics::FlexibleAxis axis_;
+  const AxisPath* path_;
+  std::size_t index_ = 0;
+  double now_s_;
+  dynamics::NozzleState nozzle_;
+  double last_step_s_ = 0.0;
+  // For steps of the length that last came twice running.
+  double map_step_s_ = 0.0;
+  dynamics::ExactMap map_;
+};
+
+// Sampling times: start_s + k · step_s for k = 0 … count − 1.
+struct TimeGrid {
+  double start_s = 0.0;
+  double step_s = 1e-4;
+  std::size_t count = 0;
+
+  [[nodiscard]] double at(std::size_t k) const { return start_s + static_cast<double>(k) * step_s; }
+};
+
+// A walk over the grid's times, beginning with the first.
+[[nodiscard]] std::vector<dynamics::NozzleState> nozzle_on(const dynamics::FlexibleAxis& axis,
+                                                           const AxisPath& path,
+                                                           const TimeGrid& grid);
+
+}  // namespace unflex::rivals

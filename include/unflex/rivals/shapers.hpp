@@ -1,0 +1,52 @@
+// Input shapers, the rivals in every firmware: the reference is convolved with a train of pulses
+// that leaves no vibration, or little of it, behind.
+//
+//   f     natural frequency, undamped, Hz      ζ     damping ratio
+//   K     e^{−πζ/√(1−ζ²)}: what a half period of damping leaves      T_d   1/(f √(1−ζ²))
+//
+// Pulses as in Klipper, klippy/extras/shaper_defs.py; its sources, where a name is not its own:
+//   ZV, ZVD     Singer & Seering, "Preshaping command inputs to reduce system vibration",
+//               J. Dyn. Syst. Meas. Control 112 (1990) 76–82
+//   EI          Singhose, Seering & Singer, "Residual vibration reduction using vector diagrams to
+//               generate shaped inputs", J. Mech. Des. 116 (1994) 654–659, here at 5 % vibration
+//   2HUMP_EI, 3HUMP_EI    Singhose, Porter, Tuttle & Singer, "Vibration reduction using multi-hump
+//               input shapers", J. Dyn. Syst. Meas. Control 119 (1997) 320–326
+//   MZV         Klipper's own
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace unflex::rivals {
+
+enum class ShaperKind { zv, mzv, zvd, ei, two_hump_ei, three_hump_ei };
+
+inline constexpr std::array<ShaperKind, 6> kShaperKinds = {
+    ShaperKind::zv, ShaperKind::mzv,         ShaperKind::zvd,
+    ShaperKind::ei, ShaperKind::two_hump_ei, ShaperKind::three_hump_ei};
+
+// As Klipper spells it in capitals: "ZV", "2HUMP_EI".
+[[nodiscard]] std::string_view name(ShaperKind kind);
+
+// Above this the pulses are not defined: 0.99 for those in closed form, 0.4, 0.3 and 0.2 for EI,
+// 2HUMP_EI and 3HUMP_EI, which are fits. Klipper refuses them there.
+[[nodiscard]] double max_damping_ratio(ShaperKind kind);
+
+// The reference delayed by time_s counts with this weight.
+struct Pulse {
+  double time_s = 0.0;
+  double weight = 0.0;
+};
+
+// In order of time; the weights sum up to 1 and the mean delay Σ weight · time_s is 0, so that
+// motion at constant speed stays what it is (as in Klipper, klippy/chelper/kin_shaper.c). The first
+// pulses therefore lie before 0.
+using ShaperPulses = std::vector<Pulse>;
+
+// Built for the given axis. nullopt above max_damping_ratio(); freq_hz must be above zero.
+[[nodiscard]] std::optional<ShaperPulses> shaper_pulses(ShaperKind kind, double freq_hz,
+                                                        double damping_ratio);
+
+}  // namespace unflex::rivals

@@ -1,0 +1,115 @@
+// One bench for everything that can be done with a planned motion: each method moves the base in
+// its own way, the same nozzle hangs on it, and the same gauge measures how far it strays.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "unflex/compensate/run.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/rivals/axis_path.hpp"
+
+namespace unflex::study {
+
+enum class Method {
+  uncompensated,
+  zv,
+  mzv,
+  zvd,
+  ei,
+  two_hump_ei,
+  three_hump_ei,
+  s_curve,
+  slow_s_curve,
+  filtered_spline,
+  thesis_least_squares,
+  thesis_velocity_defects,
+  unflex_2x,
+  unflex_4x,
+  unflex_10x,
+};
+inline constexpr std::size_t kMethodCount = 15;
+
+// "uncompensated", "ZV", "unflex 4×" …
+[[nodiscard]] std::string_view name(Method method);
+
+// By how much the true natural frequency differs from the one that the base was made for.
+inline constexpr std::array<double, 5> kFrequencyErrors = {0.0, -0.10, -0.05, 0.05, 0.10};
+
+struct BenchSetup {
+  compensate::Setup unflex;          // its acceleration limits are set per method
+  double plan_accel_mm_s2 = 5000.0;  // that unflex' multiples are of
+  double thesis_period_s = 5e-3;
+  int parts = 10;             // parabolas that stand for an interval of unflex' base
+  double step_s = 5e-5;       // of the samples the nozzle is measured at
+  double hold_s = 0.0;        // how long it is looked at after the base has come to rest
+  double trace_step_s = 0.0;  // of the traces; 0: none
+  double trace_from_s = 0.0;  // where in the plan they begin
+  double trace_to_s = 0.0;    // … and end
+};
+
+// A stretch of motion from rest to rest.
+struct Run {
+  std::vector<planner::PlannedMove> plan;
+  // The same path planned with half the acceleration, for the slow S-curve; empty: not tried.
+  std::vector<planner::PlannedMove> slow_plan;
+};
+
+// The base as a method moves it over a run.
+struct BaseMotion {
+  rivals::AxisPath x;
+  rivals::AxisPath y;
+  int iterations = 0;  // of unflex' engine
+  std::string remark;
+};
+
+// Distances of the nozzle from the path.
+struct Straying {
+  double max_mm = 0.0;           // while filament is laid
+  double square_sum_mm2s = 0.0;  // ∫ distance² dt over the same time
+  double time_s = 0.0;
+  double max_at_s = 0.0;      // when that is, in the plan of the run
+  double after_max_mm = 0.0;  // from the plan's end on
+
+  [[nodiscard]] double rms_mm() const;
+  void merge(const Straying& other);
+};
+
+// What base and nozzle do, for figures.
+struct Trace {
+  rivals::TimeGrid grid;
+  std::vector<dynamics::NozzleXY> base;
+  std::vector<dynamics::NozzleXY> nozzle;
+  std::vector<double> error_mm;  // distance of the nozzle from the path
+};
+
+struct MethodResult {
+  Method method = Method::uncompensated;
+  bool used = false;   // in every run; otherwise …
+  std::string remark;  // … why not; or else what is to be said about how it was used
+  std::array<Straying, kFrequencyErrors.size()> straying;
+  rivals::PeakMotion base_peak;  // larger axis
+  double end_gap_mm = 0.0;       // how far from its target the base comes to rest, larger axis
+  double longer_s = 0.0;         // plan and base come to rest that much later than the plan
+  int iterations = 0;
+  std::size_t failed_runs = 0;  // without a solution: measured as the plan has them
+  Trace trace;                  // at the exact frequency; empty unless asked for
+};
+
+using BenchResult = std::vector<MethodResult>;  // one per method, in their order
+
+// One run by all methods. The engine is used for unflex alone.
+[[nodiscard]] BenchResult try_all(const Run& run, const BenchSetup& setup,
+                                  const compensate::Engine& engine);
+
+// The base by one method. An error, with the reason, where it cannot be used.
+[[nodiscard]] Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setup,
+                                         const compensate::Engine& engine);
+
+// Adds the result of another run.
+void merge(BenchResult& into, const BenchResult& run);
+
+}  // namespace unflex::study

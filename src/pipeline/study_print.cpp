@@ -1,0 +1,104 @@
+#include "unflex/pipeline/study_print.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "piece_reader.hpp"
+#include "stage_options.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// Runs are taken together until they last so long: enough for all threads, little to hold.
+constexpr double kBatch_s = 20.0;
+constexpr double kSampleStep_s = 2e-4;
+constexpr int kParts = 5;
+
+study::BenchSetup bench_setup(const machine::Settings& settings) {
+  study::BenchSetup setup;
+  setup.unflex = compensate_setup(settings);
+  setup.plan_accel_mm_s2 = settings.limits.max_accel_mm_s2;
+  setup.thesis_period_s = setup.unflex.period_s;
+  setup.step_s = kSampleStep_s;
+  setup.parts = kParts;
+  return setup;
+}
+
+std::string describe(const machine::Settings& settings) {
+  return fmt::format("X {:.4g} Hz, ζ {:.3g}; Y {:.4g} Hz, ζ {:.3g}; {} mm/s²",
+                     settings.dynamics_x.freq_hz, settings.dynamics_x.damping_ratio,
+                     settings.dynamics_y.freq_hz, settings.dynamics_y.damping_ratio,
+                     settings.limits.max_accel_mm_s2);
+}
+
+}  // namespace
+
+Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progress) {
+  std::ifstream input(job.input, std::ios::binary);
+  if (!input) {
+    return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
+  }
+  const double bytes = static_cast<double>(std::filesystem::file_size(job.input));
+  PieceReader reader(input, job.input_name, interpreter_options(job.settings),
+                     planner_limits(job.settings), firmware_config(job.settings));
+  const study::BenchSetup setup = bench_setup(job.settings);
+  const study::Options options{.ipopt = job.engine == EngineChoice::ipopt, .workers = job.workers};
+  study::Outcome outcome;
+  outcome.input = job.input_name;
+  outcome.engine = study::engine_name(options);
+  study::CaseResult result{"print", describe(job.settings), 0.0, 0, {}};
+  std::vector<study::Run> batch;
+  double batch_s = 0.0;
+  study::Run worst;
+  double worst_mm = -1.0;
+  for (bool more = true; more;) {
+    Piece piece;
+    const Result<bool> read = reader.next(piece);
+    if (!read) {
+      return tl::unexpected(read.error());
+    }
+    more = *read;
+    if (piece.is_run) {
+      batch_s += planner::duration_s(piece.moves);
+      if (piece.begins_run()) {
+        batch.emplace_back();
+      }
+      std::ranges::move(piece.moves, std::back_inserter(batch.back().plan));
+    }
+    // A long run comes in parts, but is tried as a whole.
+    const bool inside = piece.is_run && !piece.ends_run();
+    if (!batch.empty() && !inside && (!more || batch_s >= kBatch_s)) {
+      const std::size_t number = study::study_runs(batch, setup, options, result);
+      // Of all runs so far, the largest error is now known.
+      const double max_mm = result.methods.front().straying[0].max_mm;
+      if (max_mm > worst_mm) {
+        worst_mm = max_mm;
+        worst = std::move(batch[number]);
+      }
+      batch.clear();
+      batch_s = 0.0;
+    }
+    progress.update("studying", static_cast<double>(reader.bytes_read()) / bytes);
+    if (progress.cancelled()) {
+      return fail(ErrorKind::internal, "cancelled");
+    }
+  }
+  if (result.runs == 0) {
+    return fail(ErrorKind::input, {job.input_name, 0},
+                "has no stretch that could be compensated; unflex inspect tells why");
+  }
+  if (traces) {
+    study::trace_worst_place(worst, setup, options, result);
+  }
+  outcome.cases.push_back(std::move(result));
+  for (const Diagnostic& warning : reader.warnings()) {
+    outcome.warnings.push_back(to_string(warning));
+  }
+  return outcome;
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,82 @@
+#include "unflex/rivals/shaped_nozzle.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace unflex::rivals {
+namespace {
+
+// Cubic through position and velocity at both ends of an interval of length h, at fraction u.
+dynamics::NozzleState hermite(const dynamics::NozzleState& a, const dynamics::NozzleState& b,
+                              double h, double u) {
+  const double rise = b.position - a.position;
+  const double from = a.velocity * h;
+  const double to = b.velocity * h;
+  const double second = 3.0 * rise - 2.0 * from - to;
+  const double third = from + to - 2.0 * rise;
+  return {a.position + u * (from + u * (second + u * third)),
+          (from + u * (2.0 * second + 3.0 * u * third)) / h};
+}
+
+}  // namespace
+
+ShapedNozzle::ShapedNozzle(const ShaperPulses& x, const ShaperPulses& y) {
+  const auto set = [&](std::vector<Tap>& taps, const ShaperPulses& pulses) {
+    for (const Pulse& pulse : pulses.empty() ? ShaperPulses{{0.0, 1.0}} : pulses) {
+      taps.push_back({pulse});
+      lookahead_s_ = std::max(lookahead_s_, -pulse.time_s);
+      memory_s_ = std::max(memory_s_, pulse.time_s);
+    }
+  };
+  set(x_, x);
+  set(y_, y);
+}
+
+void ShapedNozzle::add(double time_s, const dynamics::NozzleXY& unshaped) {
+  samples_.push_back({time_s, unshaped});
+}
+
+double ShapedNozzle::known_until_s() const {
+  return samples_.empty() ? -std::numeric_limits<double>::infinity()
+                          : samples_.back().time_s - lookahead_s_;
+}
+
+dynamics::NozzleState ShapedNozzle::sum(std::vector<Tap>& taps,
+                                        dynamics::NozzleState dynamics::NozzleXY::*axis,
+                                        double time_s) {
+  dynamics::NozzleState result;
+  for (Tap& tap : taps) {
+    const double t = time_s - tap.pulse.time_s;
+    std::size_t i = std::max(tap.index, forgotten_) - forgotten_;
+    while (i + 1 < samples_.size() && samples_[i + 1].time_s <= t) {
+      ++i;
+    }
+    tap.index = i + forgotten_;
+    const Sample& from = samples_[i];
+    dynamics::NozzleState delayed{(from.nozzle.*axis).position, 0.0};
+    if (t >= from.time_s && i + 1 < samples_.size()) {
+      const Sample& to = samples_[i + 1];
+      const double h = to.time_s - from.time_s;
+      delayed = hermite(from.nozzle.*axis, to.nozzle.*axis, h, (t - from.time_s) / h);
+    }
+    result.position += tap.pulse.weight * delayed.position;
+    result.velocity += tap.pulse.weight * delayed.velocity;
+  }
+  return result;
+}
+
+void ShapedNozzle::forget_before(double time_s) {
+  while (samples_.size() > 2 && samples_[1].time_s <= time_s) {
+    samples_.pop_front();
+    ++forgotten_;
+  }
+}
+
+dynamics::NozzleXY ShapedNozzle::at(double time_s) {
+  const dynamics::NozzleXY result{sum(x_, &dynamics::NozzleXY::x, time_s),
+                                  sum(y_, &dynamics::NozzleXY::y, time_s)};
+  forget_before(time_s - memory_s_);
+  return result;
+}
+
+}  // namespace unflex::rivals

@@ -1,0 +1,158 @@
+#include "unflex/rivals/shapers.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+namespace unflex::rivals {
+namespace {
+
+// The vibration that EI admits at the frequency it is built for.
+constexpr double kVibrationTolerance = 1.0 / 20.0;
+
+double damped_period(double freq_hz, double zeta) {
+  return 1.0 / (freq_hz * std::sqrt(1.0 - zeta * zeta));
+}
+
+// What damping leaves of a vibration after a share of the damped period.
+double decay(double zeta, double periods) {
+  return std::exp(-2.0 * std::numbers::pi * zeta * periods / std::sqrt(1.0 - zeta * zeta));
+}
+
+ShaperPulses zv(double freq_hz, double zeta) {
+  return {{0.0, 1.0}, {0.5 * damped_period(freq_hz, zeta), decay(zeta, 0.5)}};
+}
+
+ShaperPulses zvd(double freq_hz, double zeta) {
+  const double period = damped_period(freq_hz, zeta);
+  const double k = decay(zeta, 0.5);
+  return {{0.0, 1.0}, {0.5 * period, 2.0 * k}, {period, k * k}};
+}
+
+// Three pulses over three quarters of the period. Without damping they stand at 0°, 135° and 270°
+// of the vibration and add up to nothing with the weights 1, √2, 1.
+ShaperPulses mzv(double freq_hz, double zeta) {
+  const double period = damped_period(freq_hz, zeta);
+  const double k = decay(zeta, 0.375);
+  return {{0.0, 1.0}, {0.375 * period, std::numbers::sqrt2 * k}, {0.75 * period, k * k}};
+}
+
+ShaperPulses ei(double freq_hz, double zeta) {
+  constexpr double v = kVibrationTolerance;
+  const double period = damped_period(freq_hz, zeta);
+  const double first =
+      (0.24968 + 0.24961 * v) + ((0.80008 + 1.23328 * v) + (0.49599 + 3.17316 * v) * zeta) * zeta;
+  const double last =
+      (0.25149 + 0.21474 * v) + ((-0.83249 + 1.41498 * v) + (0.85181 - 4.90094 * v) * zeta) * zeta;
+  const double middle_time =
+      0.4999 + (((0.46159 + 8.57843 * v) * v) +
+                (((4.26169 - 108.644 * v) * v) + ((1.75601 + 336.989 * v) * v) * zeta) * zeta) *
+                   zeta;
+  return {{0.0, first}, {middle_time * period, 1.0 - first - last}, {period, last}};
+}
+
+// Time, in undamped periods, and weight of a pulse as cubics of ζ, lowest order first.
+struct FittedPulse {
+  std::array<double, 4> time;
+  std::array<double, 4> weight;
+};
+
+constexpr std::array<FittedPulse, 4> kTwoHumps = {{
+    {{0.0, 0.0, 0.0, 0.0}, {0.16054, 0.76699, 2.26560, -1.22750}},
+    {{0.49890, 0.16270, -0.54262, 6.16180}, {0.33911, 0.45081, -2.58080, 1.73650}},
+    {{0.99748, 0.18382, -1.58270, 8.17120}, {0.34089, -0.61533, -0.68765, 0.42261}},
+    {{1.49920, -0.09297, -0.28338, 1.85710}, {0.15997, -0.60246, 1.00280, -0.93145}},
+}};
+
+constexpr std::array<FittedPulse, 5> kThreeHumps = {{
+    {{0.0, 0.0, 0.0, 0.0}, {0.11275, 0.76632, 3.29160, -1.44380}},
+    {{0.49974, 0.23834, 0.44559, 12.4720}, {0.23698, 0.61164, -2.57850, 4.85220}},
+    {{0.99849, 0.29808, -2.36460, 23.3990}, {0.30008, -0.19062, -2.14560, 0.13744}},
+    {{1.49870, 0.10306, -2.01390, 17.0320}, {0.23775, -0.73297, 0.46885, -2.08650}},
+    {{1.99960, -0.28231, 0.61536, 5.40450}, {0.11244, -0.45439, 0.96382, -1.46000}},
+}};
+
+double cubic(const std::array<double, 4>& c, double x) {
+  return c[0] + x * (c[1] + x * (c[2] + x * c[3]));
+}
+
+template <std::size_t N>
+ShaperPulses fitted(const std::array<FittedPulse, N>& fits, double freq_hz, double zeta) {
+  ShaperPulses pulses;
+  for (const FittedPulse& fit : fits) {
+    pulses.push_back({cubic(fit.time, zeta) / freq_hz, cubic(fit.weight, zeta)});
+  }
+  return pulses;
+}
+
+// Weights need not sum up to 1 yet, times begin at 0.
+ShaperPulses raw_pulses(ShaperKind kind, double freq_hz, double zeta) {
+  switch (kind) {
+    case ShaperKind::zv:
+      return zv(freq_hz, zeta);
+    case ShaperKind::mzv:
+      return mzv(freq_hz, zeta);
+    case ShaperKind::zvd:
+      return zvd(freq_hz, zeta);
+    case ShaperKind::ei:
+      return ei(freq_hz, zeta);
+    case ShaperKind::two_hump_ei:
+      return fitted(kTwoHumps, freq_hz, zeta);
+    case ShaperKind::three_hump_ei:
+      return fitted(kThreeHumps, freq_hz, zeta);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string_view name(ShaperKind kind) {
+  switch (kind) {
+    case ShaperKind::zv:
+      return "ZV";
+    case ShaperKind::mzv:
+      return "MZV";
+    case ShaperKind::zvd:
+      return "ZVD";
+    case ShaperKind::ei:
+      return "EI";
+    case ShaperKind::two_hump_ei:
+      return "2HUMP_EI";
+    case ShaperKind::three_hump_ei:
+      return "3HUMP_EI";
+  }
+  return {};
+}
+
+double max_damping_ratio(ShaperKind kind) {
+  switch (kind) {
+    case ShaperKind::ei:
+      return 0.4;
+    case ShaperKind::two_hump_ei:
+      return 0.3;
+    case ShaperKind::three_hump_ei:
+      return 0.2;
+    default:
+      return 0.99;
+  }
+}
+
+std::optional<ShaperPulses> shaper_pulses(ShaperKind kind, double freq_hz, double damping_ratio) {
+  if (damping_ratio > max_damping_ratio(kind)) {
+    return std::nullopt;
+  }
+  ShaperPulses pulses = raw_pulses(kind, freq_hz, damping_ratio);
+  double sum = 0.0;
+  double moment_s = 0.0;
+  for (const Pulse& pulse : pulses) {
+    sum += pulse.weight;
+    moment_s += pulse.weight * pulse.time_s;
+  }
+  for (Pulse& pulse : pulses) {
+    pulse.weight /= sum;
+    pulse.time_s -= moment_s / sum;
+  }
+  return pulses;
+}
+
+}  // namespace unflex::rivals

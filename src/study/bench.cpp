@@ -1,0 +1,162 @@
+#include "unflex/study/bench.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "contour.hpp"
+#include "gauge.hpp"
+
+namespace unflex::study {
+namespace {
+
+// As the verifier's reach: half a period of the slower axis, and some room.
+constexpr double kReachRoom_s = 0.02;
+
+double reach_s(const compensate::Setup& setup) {
+  return kReachRoom_s +
+         std::numbers::pi / std::min(setup.x.axis.omega_rad_s, setup.y.axis.omega_rad_s);
+}
+
+dynamics::FlexibleAxis off_by(dynamics::FlexibleAxis axis, double error) {
+  axis.omega_rad_s *= 1.0 + error;
+  return axis;
+}
+
+double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan) {
+  const gcode::Position& target = plan.back().segment.end_mm;
+  return std::max(std::abs(base.x.back().motion.position - target[gcode::X]),
+                  std::abs(base.y.back().motion.position - target[gcode::Y]));
+}
+
+Trace trace_of(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
+               const BenchSetup& setup) {
+  Trace trace{{setup.trace_from_s, setup.trace_step_s, 0}, {}, {}, {}};
+  const auto count = (setup.trace_to_s - setup.trace_from_s) / setup.trace_step_s;
+  trace.grid.count = static_cast<std::size_t>(std::ceil(count - 1e-6)) + 1;
+  const auto walk = [&](const dynamics::FlexibleAxis& axis, const rivals::AxisPath& path) {
+    return rivals::NozzleWalk(axis, path, std::min(path.front().start_s, setup.trace_from_s));
+  };
+  rivals::NozzleWalk x = walk(setup.unflex.x.axis, base.x);
+  rivals::NozzleWalk y = walk(setup.unflex.y.axis, base.y);
+  rivals::PathCursor base_x(base.x);
+  rivals::PathCursor base_y(base.y);
+  ContourGauge gauge(plan, reach_s(setup.unflex));
+  for (std::size_t k = 0; k < trace.grid.count; ++k) {
+    const double t = trace.grid.at(k);
+    trace.base.push_back({base_x.at(t), base_y.at(t)});
+    trace.nozzle.push_back({x.at(t), y.at(t)});
+    const dynamics::NozzleXY& nozzle = trace.nozzle.back();
+    trace.error_mm.push_back(gauge.measure(t, nozzle.x.position, nozzle.y.position).distance_mm);
+  }
+  return trace;
+}
+
+MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
+                     const compensate::Engine& engine) {
+  MethodResult result;
+  result.method = method;
+  Result<BaseMotion> base = base_by(method, run, setup, engine);
+  if (!base && base.error().kind == ErrorKind::internal) {
+    // No solution, as for a run that `compensate` would keep as it is.
+    result.failed_runs = 1;
+    base = base_by(Method::uncompensated, run, setup, engine);
+  }
+  if (!base) {
+    result.remark = base.error().message;
+    return result;
+  }
+  result.used = true;
+  result.remark = base->remark;
+  result.iterations = base->iterations;
+  const auto& plan = method == Method::slow_s_curve ? run.slow_plan : run.plan;
+  for (std::size_t i = 0; i < kFrequencyErrors.size(); ++i) {
+    result.straying[i] = straying(*base, plan, setup, kFrequencyErrors[i]);
+  }
+  if (setup.trace_step_s > 0.0) {
+    result.trace = trace_of(*base, plan, setup);
+  }
+  const rivals::PeakMotion x = rivals::peak(base->x);
+  const rivals::PeakMotion y = rivals::peak(base->y);
+  result.base_peak = {std::max(x.velocity_mm_s, y.velocity_mm_s),
+                      std::max(x.accel_mm_s2, y.accel_mm_s2)};
+  result.end_gap_mm = gap_mm(*base, plan);
+  result.longer_s =
+      std::max(rivals::end_s(base->x), rivals::end_s(base->y)) - planner::duration_s(run.plan);
+  return result;
+}
+
+}  // namespace
+
+Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
+                  const BenchSetup& setup, double frequency_error) {
+  const double plan_end_s = planner::duration_s(plan);
+  const double start_s = std::min({0.0, base.x.front().start_s, base.y.front().start_s});
+  const double end_s =
+      std::max({plan_end_s, rivals::end_s(base.x), rivals::end_s(base.y)}) + setup.hold_s;
+  // Samples stand at whole steps from the plan's beginning.
+  const double before = std::ceil(-start_s / setup.step_s);
+  const rivals::TimeGrid grid{
+      -before * setup.step_s, setup.step_s,
+      static_cast<std::size_t>(before + std::ceil(end_s / setup.step_s - 1e-6)) + 1};
+  rivals::NozzleWalk x(off_by(setup.unflex.x.axis, frequency_error), base.x, grid.start_s);
+  rivals::NozzleWalk y(off_by(setup.unflex.y.axis, frequency_error), base.y, grid.start_s);
+  ContourGauge gauge(plan, reach_s(setup.unflex));
+  Straying result;
+  for (std::size_t k = 0; k < grid.count; ++k) {
+    const double t = grid.at(k);
+    const auto reading = gauge.measure(t, x.at(t).position, y.at(t).position);
+    if (t > plan_end_s) {
+      result.after_max_mm = std::max(result.after_max_mm, reading.distance_mm);
+    } else if (t >= 0.0 && reading.extruding) {
+      if (reading.distance_mm > result.max_mm) {
+        result.max_mm = reading.distance_mm;
+        result.max_at_s = t;
+      }
+      result.square_sum_mm2s += reading.distance_mm * reading.distance_mm * setup.step_s;
+      result.time_s += setup.step_s;
+    }
+  }
+  return result;
+}
+
+double Straying::rms_mm() const { return time_s > 0.0 ? std::sqrt(square_sum_mm2s / time_s) : 0.0; }
+
+void Straying::merge(const Straying& other) {
+  if (other.max_mm > max_mm) {
+    max_mm = other.max_mm;
+    max_at_s = other.max_at_s;
+  }
+  square_sum_mm2s += other.square_sum_mm2s;
+  time_s += other.time_s;
+  after_max_mm = std::max(after_max_mm, other.after_max_mm);
+}
+
+BenchResult try_all(const Run& run, const BenchSetup& setup, const compensate::Engine& engine) {
+  BenchResult result;
+  for (std::size_t i = 0; i < kMethodCount; ++i) {
+    result.push_back(try_one(static_cast<Method>(i), run, setup, engine));
+  }
+  return result;
+}
+
+void merge(BenchResult& into, const BenchResult& run) {
+  for (std::size_t i = 0; i < into.size(); ++i) {
+    MethodResult& sum = into[i];
+    const MethodResult& more = run[i];
+    sum.used = sum.used && more.used;
+    sum.remark = sum.remark.empty() ? more.remark : sum.remark;
+    for (std::size_t e = 0; e < kFrequencyErrors.size(); ++e) {
+      sum.straying[e].merge(more.straying[e]);
+    }
+    sum.base_peak.velocity_mm_s =
+        std::max(sum.base_peak.velocity_mm_s, more.base_peak.velocity_mm_s);
+    sum.base_peak.accel_mm_s2 = std::max(sum.base_peak.accel_mm_s2, more.base_peak.accel_mm_s2);
+    sum.end_gap_mm = std::max(sum.end_gap_mm, more.end_gap_mm);
+    sum.longer_s += more.longer_s;
+    sum.iterations += more.iterations;
+    sum.failed_runs += more.failed_runs;
+  }
+}
+
+}  // namespace unflex::study

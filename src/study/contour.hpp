@@ -1,0 +1,42 @@
+// How far a nozzle is from the path of a run.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::study {
+
+// Measures against the part of the path that the plan passes within ±reach of the time given (a
+// part passes close to itself elsewhere), to whole moves.
+class ContourGauge {
+ public:
+  ContourGauge(const std::vector<planner::PlannedMove>& moves, double reach_s);
+
+  struct Reading {
+    double distance_mm = 0.0;
+    bool extruding = false;  // the plan lays filament at this time
+  };
+  // Times must not decrease from call to call.
+  [[nodiscard]] Reading measure(double time_s, double x_mm, double y_mm);
+
+ private:
+  struct Edge {
+    double start_s = 0.0;
+    double end_s = 0.0;
+    double x_mm = 0.0;
+    double y_mm = 0.0;
+    double direction_x = 0.0;
+    double direction_y = 0.0;
+    double length_mm = 0.0;
+    bool extruding = false;
+  };
+  std::vector<Edge> edges_;
+  double reach_s_;
+  std::size_t first_ = 0;
+  std::size_t end_ = 0;
+  std::size_t current_ = 0;
+};
+
+}  // namespace unflex::study

@@ -1,0 +1,103 @@
+// The keys are documented in docs/study.md; a test holds the two together.
+#include <fmt/format.h>
+
+#include "unflex/report/format.hpp"
+#include "unflex/study/study.hpp"
+
+namespace unflex::study {
+namespace {
+
+using report::Json;
+
+Json straying_json(const Straying& straying, double frequency_error) {
+  return {{"frequency_error", frequency_error},
+          {"contour_max_mm", straying.max_mm},
+          {"contour_rms_mm", straying.rms_mm()},
+          {"after_max_mm", straying.after_max_mm}};
+}
+
+Json method_json(const MethodResult& method) {
+  Json json;
+  json["method"] = name(method.method);
+  json["used"] = method.used;
+  json["remark"] = method.remark;
+  if (!method.used) {
+    return json;
+  }
+  json["deviation"] = Json::array();
+  for (std::size_t i = 0; i < kFrequencyErrors.size(); ++i) {
+    json["deviation"].push_back(straying_json(method.straying[i], kFrequencyErrors[i]));
+  }
+  json["base"] = {{"max_velocity_mm_s", method.base_peak.velocity_mm_s},
+                  {"max_accel_mm_s2", method.base_peak.accel_mm_s2},
+                  {"end_gap_mm", method.end_gap_mm}};
+  json["longer_s"] = method.longer_s;
+  json["iterations"] = method.iterations;
+  json["failed_runs"] = method.failed_runs;
+  return json;
+}
+
+Json case_json(const CaseResult& result) {
+  Json methods = Json::array();
+  for (const MethodResult& method : result.methods) {
+    methods.push_back(method_json(method));
+  }
+  return {{"case", result.name},
+          {"description", result.description},
+          {"plan_s", result.plan_s},
+          {"runs", result.runs},
+          {"methods", methods}};
+}
+
+Json chain_json(const ChainResult& chain) {
+  Json steps = Json::array();
+  for (const ChainStep& step : chain.steps) {
+    steps.push_back({{"period_ms", step.period_s * 1e3},
+                     {"nodes", step.nodes},
+                     {"contour_max_mm", step.contour_max_mm},
+                     {"cold_iterations", step.cold_iterations},
+                     {"warm_iterations", step.warm_iterations},
+                     {"difference_mm", step.difference_mm}});
+  }
+  return {{"case", chain.case_name}, {"engine", chain.engine}, {"steps", steps}};
+}
+
+// Whatever differs from one time to the next.
+Json performance_json(const Outcome& outcome) {
+  Json chains = Json::array();
+  for (const ChainResult& chain : outcome.chains) {
+    Json cold = Json::array();
+    Json warm = Json::array();
+    for (const ChainStep& step : chain.steps) {
+      cold.push_back(step.cold_s * 1e3);
+      warm.push_back(step.warm_s * 1e3);
+    }
+    chains.push_back({{"cold_ms", cold}, {"warm_ms", warm}});
+  }
+  return {{"wall_s", outcome.wall_s}, {"coarse_to_fine", chains}};
+}
+
+}  // namespace
+
+std::string to_json(const Outcome& outcome) {
+  Json json;
+  json["schema_version"] = report::kSchemaVersion;
+  json["command"] = "study";
+  json["version"] = outcome.version;
+  json["input"] = outcome.input.empty() ? Json(nullptr) : Json(outcome.input);
+  json["printer"] = report::settings_json(outcome.printer);
+  json["solver"] = {{"engine", outcome.engine}};
+  json["cases"] = Json::array();
+  for (const CaseResult& result : outcome.cases) {
+    json["cases"].push_back(case_json(result));
+  }
+  json["coarse_to_fine"] = Json::array();
+  for (const ChainResult& chain : outcome.chains) {
+    json["coarse_to_fine"].push_back(chain_json(chain));
+  }
+  json["warnings"] = outcome.warnings;
+  json["performance"] = performance_json(outcome);
+  return report::dump(json);
+}
+
+}  // namespace unflex::study

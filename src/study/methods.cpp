@@ -1,0 +1,179 @@
+// What each method makes of a run.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "unflex/rivals/filtered_spline.hpp"
+#include "unflex/rivals/s_curve.hpp"
+#include "unflex/rivals/shapers.hpp"
+#include "unflex/rivals/thesis_method.hpp"
+#include "unflex/study/bench.hpp"
+
+namespace unflex::study {
+namespace {
+
+using Moves = std::vector<planner::PlannedMove>;
+
+// Knots of a filtered spline per period of the nozzle, and how many it is given to begin and end
+// in.
+constexpr double kKnotsPerPeriod = 10.0;
+constexpr double kSplineEndKnots = 5.0;
+
+// The shaper of an axis, built for its damping or the most that the shaper is defined for.
+struct BuiltShaper {
+  rivals::ShaperPulses pulses;
+  std::string remark;
+};
+
+Result<BuiltShaper> build(rivals::ShaperKind kind, const dynamics::FlexibleAxis& axis) {
+  if (axis.zeta >= 1.0) {
+    return fail(ErrorKind::input, "undefined at ζ = 1: without vibration there is no period");
+  }
+  const double most = rivals::max_damping_ratio(kind);
+  const double zeta = std::min(axis.zeta, most);
+  const double freq_hz = axis.omega_rad_s / (2.0 * std::numbers::pi);
+  BuiltShaper built{*rivals::shaper_pulses(kind, freq_hz, zeta), {}};
+  if (zeta < axis.zeta) {
+    built.remark = fmt::format("built for ζ = {}, the most it is defined for", most);
+  }
+  return built;
+}
+
+Result<BaseMotion> shaped_base(rivals::ShaperKind kind, const Moves& plan,
+                               const compensate::Setup& setup) {
+  const Result<BuiltShaper> x = build(kind, setup.x.axis);
+  const Result<BuiltShaper> y = build(kind, setup.y.axis);
+  if (!x || !y) {
+    return tl::unexpected(x ? y.error() : x.error());
+  }
+  return BaseMotion{rivals::shaped(rivals::reference_path(plan, gcode::X), x->pulses),
+                    rivals::shaped(rivals::reference_path(plan, gcode::Y), y->pulses), 0,
+                    x->remark.empty() ? y->remark : x->remark};
+}
+
+// Both axes by a function of the axis' reference and dynamics.
+template <class Make>
+BaseMotion both_axes(const Moves& plan, const compensate::Setup& setup, const Make& make) {
+  return {make(rivals::reference_path(plan, gcode::X), setup.x.axis),
+          make(rivals::reference_path(plan, gcode::Y), setup.y.axis),
+          0,
+          {}};
+}
+
+rivals::AxisPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
+  const double knot_s = 2.0 * std::numbers::pi / axis.omega_rad_s / kKnotsPerPeriod;
+  return rivals::filtered_spline(reference, axis,
+                                 {knot_s, kSplineEndKnots * knot_s, kSplineEndKnots * knot_s});
+}
+
+Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSetup& bench,
+                               const compensate::Engine& engine) {
+  compensate::Setup setup = bench.unflex;
+  setup.x.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
+  setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
+  const compensate::NodeGrid grid = compensate::node_grid(plan, setup);
+  const auto spans = compensate::cut(grid.count, setup);
+  const gcode::Position& start = plan.front().segment.start_mm;
+  const dynamics::NozzleXY nozzle{{start[gcode::X], 0.0}, {start[gcode::Y], 0.0}};
+  std::vector<dynamics::AxisTrajectory> x;
+  std::vector<dynamics::AxisTrajectory> y;
+  BaseMotion result;
+  for (const compensate::RunWindow& window : compensate::windows(plan, spans, nozzle, setup)) {
+    Result<compensate::AxisSolution> of_x = engine.solve(window.x);
+    Result<compensate::AxisSolution> of_y = engine.solve(window.y);
+    if (!of_x || !of_y) {
+      return tl::unexpected(of_x ? of_y.error() : of_x.error());
+    }
+    result.iterations += of_x->iterations + of_y->iterations;
+    x.push_back(std::move(of_x->base));
+    y.push_back(std::move(of_y->base));
+  }
+  const auto path = [&](const std::vector<dynamics::AxisTrajectory>& solutions) {
+    return rivals::through_nodes(compensate::join(spans, solutions), -setup.lead_in_s,
+                                 grid.period_s, bench.parts);
+  };
+  result.x = path(x);
+  result.y = path(y);
+  return result;
+}
+
+std::optional<rivals::ShaperKind> shaper_of(Method method) {
+  const int number = static_cast<int>(method) - static_cast<int>(Method::zv);
+  if (number < 0 || number >= static_cast<int>(rivals::kShaperKinds.size())) {
+    return std::nullopt;
+  }
+  return rivals::kShaperKinds[static_cast<std::size_t>(number)];
+}
+
+}  // namespace
+
+std::string_view name(Method method) {
+  if (const auto kind = shaper_of(method)) {
+    return rivals::name(*kind);
+  }
+  switch (method) {
+    case Method::s_curve:
+      return "S-curve, equal time";
+    case Method::slow_s_curve:
+      return "S-curve, equal acceleration";
+    case Method::filtered_spline:
+      return "filtered B-spline";
+    case Method::thesis_least_squares:
+      return "thesis, all equations";
+    case Method::thesis_velocity_defects:
+      return "thesis, velocity defects";
+    case Method::unflex_2x:
+      return "unflex 2×";
+    case Method::unflex_4x:
+      return "unflex 4×";
+    case Method::unflex_10x:
+      return "unflex 10×";
+    default:
+      return "uncompensated";
+  }
+}
+
+Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setup,
+                           const compensate::Engine& engine) {
+  if (const auto kind = shaper_of(method)) {
+    return shaped_base(*kind, run.plan, setup.unflex);
+  }
+  const auto thesis = [&](auto solve) {
+    return both_axes(run.plan, setup.unflex, [&](const auto& reference, const auto& axis) {
+      return solve(reference, axis, setup.thesis_period_s);
+    });
+  };
+  switch (method) {
+    case Method::s_curve:
+      return BaseMotion{
+          rivals::s_curve(run.plan, gcode::X), rivals::s_curve(run.plan, gcode::Y), 0, {}};
+    case Method::slow_s_curve:
+      if (run.slow_plan.empty()) {
+        return fail(ErrorKind::input, "needs a plan of its own");
+      }
+      return BaseMotion{rivals::s_curve(run.slow_plan, gcode::X),
+                        rivals::s_curve(run.slow_plan, gcode::Y),
+                        0,
+                        {}};
+    case Method::filtered_spline:
+      return both_axes(run.plan, setup.unflex, &spline);
+    case Method::thesis_least_squares:
+      return thesis(&rivals::thesis_least_squares);
+    case Method::thesis_velocity_defects:
+      return thesis(&rivals::thesis_velocity_defects);
+    case Method::unflex_2x:
+      return unflex_base(2.0, run.plan, setup, engine);
+    case Method::unflex_4x:
+      return unflex_base(4.0, run.plan, setup, engine);
+    case Method::unflex_10x:
+      return unflex_base(10.0, run.plan, setup, engine);
+    default:
+      return both_axes(run.plan, setup.unflex,
+                       [](const auto& reference, const auto& /*axis*/) { return reference; });
+  }
+}
+
+}  // namespace unflex::study

@@ -1,0 +1,230 @@
+#include "unflex/study/study.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+namespace unflex::study {
+namespace {
+
+constexpr double kLeadIn_s = 0.01;
+constexpr double kLeastTail_s = 0.02;
+constexpr double kJerkWeight = 0.1;
+// More than two periods of the softest case: whatever rings has shown its largest swing.
+constexpr double kHold_s = 0.25;
+constexpr double kTraceStep_s = 5e-4;
+constexpr double kTraceTail_s = 0.06;
+// Around the worst place of a print.
+constexpr double kTraceAround_s = 0.06;
+// Fine steps from coarse ones are measured with what unflex is allowed by default …
+constexpr double kChainMultiple = 4.0;
+// … on the reference, the softest and the least damped case, if all are run.
+constexpr std::array<std::string_view, 3> kChainCases = {"ref", "1A", "2A"};
+
+// Calls work(i) for i = 0 … count − 1 in several threads, in any order.
+void in_parallel(std::size_t count, unsigned workers,
+                 const std::function<void(std::size_t)>& work) {
+  std::atomic<std::size_t> next = 0;
+  const auto loop = [&] {
+    for (std::size_t i = next++; i < count; i = next++) {
+      work(i);
+    }
+  };
+  std::vector<std::jthread> threads;
+  for (unsigned i = 1; i < std::min<std::size_t>(workers, count); ++i) {
+    threads.emplace_back(loop);
+  }
+  loop();
+}
+
+std::unique_ptr<compensate::Engine> make_engine(const Options& options) {
+  return options.ipopt ? compensate::make_ipopt_engine() : compensate::make_banded_engine();
+}
+
+// Ipopt's linear solver must not run in two threads.
+unsigned threads(const Options& options) { return options.ipopt ? 1 : options.workers; }
+
+Run run_of(const Case& of) {
+  return {corner(of, of.accel_mm_s2), corner(of, 0.5 * of.accel_mm_s2)};
+}
+
+std::string describe(const Case& of) {
+  return fmt::format("ω {} rad/s, ζ {}, {} mm/s², {} mm/s, step {} ms", of.axis.omega_rad_s,
+                     of.axis.zeta, of.accel_mm_s2, of.velocity_mm_s, of.period_s * 1e3);
+}
+
+// With other nodes, the thesis' own methods alone move differently from the reference.
+void drop_repeated_traces(const Case& of, BenchResult& methods) {
+  if (of.name != "5A" && of.name != "5B") {
+    return;
+  }
+  for (MethodResult& result : methods) {
+    if (result.method != Method::uncompensated && result.method != Method::thesis_least_squares &&
+        result.method != Method::thesis_velocity_defects) {
+      result.trace = {};
+    }
+  }
+}
+
+Result<std::vector<Case>> chosen(const std::vector<std::string>& names) {
+  const auto all = thesis_cases();
+  if (names.empty()) {
+    return std::vector<Case>(all.begin(), all.end());
+  }
+  std::vector<Case> result;
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(all, name, &Case::name);
+    if (found == all.end()) {
+      std::string known;
+      for (const Case& of : all) {
+        known += fmt::format("{}{}", known.empty() ? "" : ", ", of.name);
+      }
+      return fail(ErrorKind::usage, fmt::format("--case {}: there are {}", name, known));
+    }
+    result.push_back(*found);
+  }
+  return result;
+}
+
+std::vector<Case> chain_cases(const std::vector<Case>& cases, const Options& options) {
+  std::vector<Case> result;
+  for (const Case& of : cases) {
+    if (!options.cases.empty() || std::ranges::find(kChainCases, of.name) != kChainCases.end()) {
+      result.push_back(of);
+    }
+  }
+  return result;
+}
+
+Result<std::vector<ChainResult>> chains(const std::vector<Case>& cases,
+                                        const compensate::Engine& engine) {
+  std::vector<ChainResult> result;
+  for (const Case& of : cases) {
+    Result<std::vector<ChainStep>> steps =
+        coarse_to_fine(run_of(of), corner_setup(of), kChainMultiple, engine);
+    if (!steps) {
+      return tl::unexpected(steps.error());
+    }
+    result.push_back({std::string(of.name), engine.name(), std::move(*steps)});
+  }
+  return result;
+}
+
+}  // namespace
+
+BenchSetup corner_setup(const Case& of) {
+  BenchSetup setup;
+  setup.unflex.x.axis = setup.unflex.y.axis = of.axis;
+  setup.unflex.lead_in_s = kLeadIn_s;
+  setup.unflex.tail_s = std::max(8.0 * of.axis.zeta / of.axis.omega_rad_s, kLeastTail_s);
+  setup.unflex.jerk_weight = kJerkWeight;
+  setup.plan_accel_mm_s2 = of.accel_mm_s2;
+  setup.thesis_period_s = of.period_s;
+  setup.hold_s = kHold_s;
+  return setup;
+}
+
+Result<Outcome> study_corner(const Options& options, Progress& progress) {
+  const Result<std::vector<Case>> cases = chosen(options.cases);
+  if (!cases) {
+    return tl::unexpected(cases.error());
+  }
+  const auto engine = make_engine(options);
+  const auto banded = compensate::make_banded_engine();
+  const auto ipopt = compensate::make_ipopt_engine();
+  Outcome outcome;
+  outcome.engine = engine->name();
+  outcome.cases.resize(cases->size());
+  std::array<Result<std::vector<ChainResult>>, 2> measured;
+  const std::vector<Case> chained = chain_cases(*cases, options);
+  std::mutex mutex;
+  std::size_t done = 0;
+  // Both engines' chains first, since Ipopt's takes longest; they count as one task each.
+  in_parallel(cases->size() + 2, threads(options), [&](std::size_t task) {
+    if (progress.cancelled()) {
+      return;
+    }
+    if (task < 2) {
+      measured[task] = chains(chained, task == 0 ? *ipopt : *banded);
+    } else {
+      const Case& of = (*cases)[task - 2];
+      BenchSetup setup = corner_setup(of);
+      const Run run = run_of(of);
+      setup.trace_step_s = options.traces ? kTraceStep_s : 0.0;
+      setup.trace_from_s = -setup.unflex.lead_in_s;
+      setup.trace_to_s = planner::duration_s(run.plan) + kTraceTail_s;
+      CaseResult& result = outcome.cases[task - 2];
+      result = {std::string(of.name),
+                describe(of),
+                planner::duration_s(run.plan),
+                1,
+                try_all(run, setup, *engine),
+                run.plan.front().segment.end_mm[gcode::X],
+                run.plan.front().segment.end_mm[gcode::Y]};
+      drop_repeated_traces(of, result.methods);
+    }
+    const std::lock_guard lock(mutex);
+    progress.update("studying",
+                    static_cast<double>(++done) / static_cast<double>(cases->size() + 2));
+  });
+  if (progress.cancelled()) {
+    return fail(ErrorKind::internal, "cancelled");
+  }
+  for (Result<std::vector<ChainResult>>& of_engine : measured) {
+    if (!of_engine) {
+      return tl::unexpected(of_engine.error());
+    }
+    std::ranges::move(*of_engine, std::back_inserter(outcome.chains));
+  }
+  return outcome;
+}
+
+std::string engine_name(const Options& options) { return make_engine(options)->name(); }
+
+std::size_t study_runs(const std::vector<Run>& runs, const BenchSetup& setup,
+                       const Options& options, CaseResult& result) {
+  const auto engine = make_engine(options);
+  std::vector<BenchResult> results(runs.size());
+  in_parallel(runs.size(), threads(options),
+              [&](std::size_t i) { results[i] = try_all(runs[i], setup, *engine); });
+  const auto worst = std::ranges::max_element(
+      results, {}, [](const BenchResult& of_run) { return of_run.front().straying[0].max_mm; });
+  const auto worst_number = static_cast<std::size_t>(worst - results.begin());
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    result.plan_s += planner::duration_s(runs[i].plan);
+    ++result.runs;
+    if (result.methods.empty()) {
+      result.methods = std::move(results[i]);
+    } else {
+      merge(result.methods, results[i]);
+    }
+  }
+  return worst_number;
+}
+
+void trace_worst_place(const Run& run, BenchSetup setup, const Options& options,
+                       CaseResult& result) {
+  const double end_s = planner::duration_s(run.plan);
+  const double at_s = result.methods.front().straying[0].max_at_s;
+  setup.trace_step_s = kTraceStep_s;
+  setup.trace_from_s = std::max(at_s - kTraceAround_s, -setup.unflex.lead_in_s);
+  setup.trace_to_s = std::min(at_s + kTraceAround_s, end_s + kTraceTail_s);
+  BenchResult traced = try_all(run, setup, *make_engine(options));
+  for (std::size_t i = 0; i < traced.size(); ++i) {
+    result.methods[i].trace = std::move(traced[i].trace);
+  }
+  const auto place = [&](gcode::Axis axis) {
+    const rivals::AxisPath path = rivals::reference_path(run.plan, axis);
+    return rivals::PathCursor(path).at(at_s).position;
+  };
+  result.focus_x_mm = place(gcode::X);
+  result.focus_y_mm = place(gcode::Y);
+}
+
+}  // namespace unflex::study

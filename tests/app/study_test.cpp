@@ -1,0 +1,75 @@
+// unflex study through the whole program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "app/program.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class Study : public ProgramTest {};
+
+TEST_F(Study, OfOneCaseIsATableOnStdout) {
+  const Outcome outcome = run({"study", "--case", "3A"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(outcome.out, StartsWith("(0,0) → (10,0) → (10,10) mm"));
+  EXPECT_THAT(outcome.out, HasSubstr("  uncompensated                  100\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("  3A   ipopt"));
+  EXPECT_THAT(outcome.out, HasSubstr("  3A   banded"));
+}
+
+TEST_F(Study, OfThePrintUsesThePrintersSettings) {
+  write_file(path("in.gcode"), small_print());
+  const Outcome outcome = run({"study", "in.gcode", "--set", "dynamics.x.freq_hz=50", "--set",
+                               "emit.period_ms=0.9", "--report", "r.json", "-q"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  const auto json = nlohmann::json::parse(read_file(path("r.json")));
+  EXPECT_EQ(json["command"], "study");
+  EXPECT_EQ(json["input"], "in.gcode");
+  EXPECT_EQ(json["printer"]["dynamics.x.freq_hz"]["value"], 50);
+  const auto& methods = json["cases"][0]["methods"];
+  const auto rms = [&](std::size_t number) {
+    return methods[number]["deviation"][0]["contour_rms_mm"].get<double>();
+  };
+  ASSERT_EQ(methods[13]["method"], "unflex 4×");
+  EXPECT_LT(rms(13), rms(1) / 3.0);
+  EXPECT_LT(rms(1), rms(0) / 3.0);
+}
+
+TEST_F(Study, OfThePrintFromStdinIsThatOfTheFile) {
+  write_file(path("in.gcode"), small_print());
+  const Outcome file = run({"study", "in.gcode", "-j", "1", "--report", "-"});
+  const Outcome piped = run({"study", "-", "-j", "3", "--report", "-"}, small_print());
+  auto first = nlohmann::json::parse(file.out);
+  auto second = nlohmann::json::parse(piped.out);
+  first.erase("performance");
+  second.erase("performance");
+  second["input"] = "in.gcode";
+  EXPECT_EQ(first, second);
+}
+
+TEST_F(Study, IsAPageIfTheReportsNameEndsSo) {
+  const Outcome outcome = run({"study", "--case", "ref", "--report", "r.html", "-q"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(names(), ElementsAre("r.html"));
+  EXPECT_THAT(read_file(path("r.html")), StartsWith("<!DOCTYPE html>"));
+}
+
+TEST_F(Study, OfAFileWithoutMotionSaysSo) {
+  write_file(path("in.gcode"), "M104 S200\nG28\n");
+  const Outcome outcome = run({"study", "in.gcode"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err,
+            "in.gcode: has no stretch that could be compensated; unflex inspect tells why\n");
+}
+
+}  // namespace
+}  // namespace unflex::app

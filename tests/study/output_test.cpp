@@ -1,0 +1,123 @@
+// What the study writes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "report/documented_keys.hpp"
+#include "unflex/study/study.hpp"
+
+namespace unflex::study {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const Outcome& outcome() {
+  static const Outcome made = [] {
+    SilentProgress progress;
+    Outcome result =
+        study_corner({.ipopt = false, .workers = 2, .cases = {"ref", "2B"}, .traces = true},
+                     progress)
+            .value();
+    result.version = "1.2.3";
+    return result;
+  }();
+  return made;
+}
+
+std::size_t count(const std::string& text, std::string_view what) {
+  std::size_t found = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) {
+    ++found;
+  }
+  return found;
+}
+
+TEST(StudyText, HasARowForEveryMethodAndAColumnForEveryCase) {
+  const std::string text = to_text(outcome());
+  for (std::size_t i = 0; i < kMethodCount; ++i) {
+    EXPECT_THAT(text, HasSubstr("  " + std::string(name(static_cast<Method>(i))) + "  "));
+  }
+  EXPECT_THAT(text, HasSubstr("contour error max, µm            ref      2B\n"
+                              "  uncompensated                  464     316\n"
+                              "  ZV                             112       —\n"));
+  EXPECT_THAT(text, HasSubstr("1 ms: 16 ("));
+}
+
+TEST(StudyJson, IsDocumentedKeyByKey) {
+  Outcome full = outcome();
+  full.printer.push_back({"limits.max_accel_mm_s2", "5000", "default"});
+  std::set<std::string> keys;
+  report::collect_keys(nlohmann::json::parse(to_json(full)), "", keys);
+  EXPECT_EQ(report::documented_keys(UNFLEX_DOCS "/report.md", "study"), keys);
+}
+
+TEST(StudyJson, SaysWhyAMethodIsNotUsed) {
+  const auto json = nlohmann::json::parse(to_json(outcome()));
+  const auto& zv = json["cases"][1]["methods"][1];
+  EXPECT_EQ(zv["method"], "ZV");
+  EXPECT_EQ(zv["used"], false);
+  EXPECT_THAT(zv["remark"].get<std::string>(), HasSubstr("undefined at ζ = 1"));
+  EXPECT_FALSE(zv.contains("deviation"));
+  EXPECT_EQ(json["input"], nullptr);
+}
+
+TEST(StudyHtml, HasFiveFiguresForEveryMethodThatIsUsed) {
+  const std::string html = to_html(outcome());
+  // 2B has no shapers; one more plot shows the sensitivity.
+  EXPECT_EQ(count(html, "<div data-figures="), 15U + 9U);
+  EXPECT_EQ(count(html, "<svg class=\"plot\""), 5U * (15U + 9U) + 1U);
+  EXPECT_EQ(count(html, "<div data-figures=\"ref 13\">"), 1U);  // shown at first
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
+  EXPECT_THAT(html, Not(HasSubstr("http://")));
+  EXPECT_THAT(html, Not(HasSubstr("https://")));
+}
+
+TEST(StudyHtml, EscapesWhatComesFromOutside) {
+  Outcome print = outcome();
+  print.input = "<script>alert(1)</script>.gcode";
+  print.printer.push_back({"printer.name", "\"</dd><script>\"", "a&b.toml:3"});
+  const std::string html = to_html(print);
+  EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
+  EXPECT_THAT(html, HasSubstr("&lt;script&gt;alert(1)"));
+  EXPECT_THAT(html, Not(HasSubstr("</dd><script>")));
+  EXPECT_THAT(html, HasSubstr("a&amp;b.toml:3"));
+}
+
+// Nothing but travel, or a plan that the nozzle follows exactly.
+TEST(StudyHtml, OfNoErrorAtAllIsStillAPage) {
+  Outcome still = outcome();
+  for (MethodResult& method : still.cases.front().methods) {
+    method.straying = {};
+  }
+  EXPECT_THAT(to_html(still), Not(HasSubstr("nan")));
+  EXPECT_THAT(to_html(still), Not(HasSubstr("inf")));
+}
+
+TEST(StudyHtml, OfAllCasesIsSmall) {
+  SilentProgress progress;
+  const Result<Outcome> all =
+      study_corner({.ipopt = false, .workers = 2, .cases = {}, .traces = true}, progress);
+  ASSERT_TRUE(all.has_value());
+  EXPECT_LT(to_html(*all).size(), 3'000'000U);
+}
+
+// The errors of the thesis that the design lists, by where they stand.
+TEST(Theory, NamesEveryErrorOfTheThesis) {
+  std::ifstream page(UNFLEX_DOCS "/theory.md");
+  const std::string text{std::istreambuf_iterator<char>(page), {}};
+  const std::string table = text.substr(text.find("## Where the thesis' text differs"));
+  for (const char* place :
+       {"| eq. 2.2 |", "| eq. 2.4, slope in the middle |", "| eq. 3.3 |", "| eq. 3.6 |",
+        "| eq. 3.9 |", "| eq. 3.11 |", "| eq. 3.14 |", "| eq. 3.18 |",
+        "| appendix, damped frequency |", "| appendix, Runge–Kutta |",
+        "| appendix, junction speed |", "| appendix, lookahead |", "| formulation |",
+        "| jagged base |", "| end of the job |"}) {
+    EXPECT_THAT(table, HasSubstr(place));
+  }
+}
+
+}  // namespace
+}  // namespace unflex::study
