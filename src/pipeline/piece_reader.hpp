@@ -47,6 +47,7 @@ class PieceReader {
   // read, was written by unflex, or ends without a single G-code command in it.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
+  [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
 
