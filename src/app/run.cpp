@@ -170,6 +170,9 @@ auto with_progress(const RunConfig& config, Work work)
 // Remarks about the settings come before those about the print.
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings) {
   std::vector<std::string> remarks;
+  for (const Diagnostic& note : settings.notes) {
+    remarks.push_back(to_string(note));
+  }
   for (const std::string& remark : machine::recommendations(settings)) {
     remarks.push_back(fmt::format("unflex: warning: {}", remark));
   }

@@ -1,13 +1,11 @@
 #include <fmt/format.h>
 
-#include <array>
-#include <cerrno>
-#include <fstream>
-#include <system_error>
-
 #include "draft.hpp"
+#include "file_text.hpp"
 #include "key_table.hpp"
 #include "key_values.hpp"
+#include "klipper_reader.hpp"
+#include "source_kind.hpp"
 #include "toml_reader.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
@@ -15,14 +13,14 @@
 namespace unflex::machine {
 namespace {
 
-// Printer files have a few hundred bytes; whoever passes a print by mistake hears so at once.
-constexpr std::size_t kMaxFileBytes = 1U << 20U;
-
 std::string origin_text(const std::optional<SourcePlace>& place) {
   if (!place) {
     return "default";
   }
-  return place->line == 0 ? "--set" : fmt::format("{}:{}", place->file, place->line);
+  if (place->file.starts_with(kOverrideMark)) {
+    return "--set";
+  }
+  return place->line == 0 ? place->file : fmt::format("{}:{}", place->file, place->line);
 }
 
 void record_origins(Draft& draft) {
@@ -56,52 +54,42 @@ Draft defaults() {
   return draft;
 }
 
-Result<std::string> read_file(const std::filesystem::path& file) {
-  const SourcePlace place{file.string(), 0};
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    return fail(ErrorKind::usage, place, "is a directory, not a printer file");
+// Stores what a printer file says, whatever kind it is of.
+Status read_printer(std::string_view text, const std::string& name, Draft& draft) {
+  switch (source_kind(text)) {
+    case SourceKind::klipper:
+      return read_klipper(text, name).and_then([&](const Reading& reading) {
+        return apply(reading, draft);
+      });
+    case SourceKind::print:
+      return fail(ErrorKind::usage, {name, 0},
+                  "is a print, not a printer file; what its slicer says of the printer is read "
+                  "from the print that is compensated");
+    default:
+      return read_toml(text, name, draft);
   }
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) {
-    return fail(
-        ErrorKind::usage, place,
-        fmt::format("cannot read the printer file: {}", std::generic_category().message(errno)));
-  }
-  std::string text;
-  std::array<char, 4096> block{};
-  while (stream.read(block.data(), block.size()) || stream.gcount() > 0) {
-    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > kMaxFileBytes) {
-      return fail(ErrorKind::usage, place, "is too large for a printer file");
-    }
-  }
-  if (stream.bad()) {
-    return fail(ErrorKind::usage, place, "cannot read the printer file");
-  }
-  return text;
 }
 
 std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
 
 }  // namespace
 
-Result<Settings> load(const std::optional<std::filesystem::path>& toml_file,
+Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
                       const std::vector<std::string>& overrides) {
-  if (!toml_file) {
+  if (!printer_file) {
     return finish(defaults(), overrides);
   }
-  const Result<std::string> text = read_file(*toml_file);
+  const Result<std::string> text = read_printer_file(*printer_file);
   if (!text) {
     return tl::unexpected(text.error());
   }
-  return parse(*text, toml_file->string(), overrides);
+  return parse(*text, printer_file->string(), overrides);
 }
 
-Result<Settings> parse(std::string_view toml_text, const std::string& name,
+Result<Settings> parse(std::string_view text, const std::string& name,
                        const std::vector<std::string>& overrides) {
   Draft draft = defaults();
-  if (Status read = read_toml(toml_text, name, draft); !read) {
+  if (Status read = read_printer(text, name, draft); !read) {
     return tl::unexpected(read.error());
   }
   return finish(std::move(draft), overrides);

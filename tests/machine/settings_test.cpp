@@ -82,7 +82,7 @@ step_ms = 0.05
   EXPECT_DOUBLE_EQ(s.dynamics_y.damping_ratio, 0.06);
   EXPECT_DOUBLE_EQ(s.base.max_jerk_mm_s3, 1e8);
   EXPECT_DOUBLE_EQ(s.tail_s(), 0.005);
-  EXPECT_DOUBLE_EQ(s.emit.period_ms, 0.5);
+  EXPECT_DOUBLE_EQ(s.period_ms(), 0.5);
   EXPECT_DOUBLE_EQ(s.verify.step_ms, 0.05);
 }
 
@@ -97,7 +97,7 @@ TEST(Settings, RememberWhereTheyCameFrom) {
 TEST(Overrides, WinOverTheFileAndOverEarlierOnes) {
   const Settings s =
       read("[emit]\nperiod_ms = 1\n", {"emit.period_ms=0.25", "emit.period_ms = .5"});
-  EXPECT_DOUBLE_EQ(s.emit.period_ms, 0.5);
+  EXPECT_DOUBLE_EQ(s.period_ms(), 0.5);
 }
 
 TEST(Overrides, TakeEveryTypeOfValue) {
