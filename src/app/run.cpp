@@ -106,16 +106,22 @@ Status spool(const RunConfig& config, Workspace& space) {
   return space.compensated ? space.compensated->make_seekable() : Status{};
 }
 
-Result<Workspace> prepare(const RunConfig& config) {
-  Result<machine::Settings> settings = machine::load(config.printer_file, config.overrides);
-  if (!settings) {
-    return tl::unexpected(settings.error());
+// Of the print that is read, not of what was made from it.
+Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
+  const Result<machine::PrintText> print = input.look();
+  if (!print) {
+    return tl::unexpected(print.error());
   }
+  return machine::load(
+      {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
+}
+
+Result<Workspace> prepare(const RunConfig& config) {
   Result<Input> input = Input::open(config.input);
   if (!input) {
     return tl::unexpected(input.error());
   }
-  Workspace space{std::move(*settings), std::move(*input), {}, {}, {}};
+  Workspace space{{}, std::move(*input), {}, {}, {}};
   if (config.command == Command::verify) {
     Result<Input> compensated = Input::open(config.output);
     if (!compensated) {
@@ -124,9 +130,11 @@ Result<Workspace> prepare(const RunConfig& config) {
     space.compensated.emplace(std::move(*compensated));
   }
   const Status ready =
-      check_distinct(config).and_then([&] { return open_outputs(config, space); }).and_then([&] {
-        return spool(config, space);
-      });
+      check_distinct(config)
+          .and_then([&] { return open_outputs(config, space); })
+          .and_then([&] { return spool(config, space); })
+          .and_then([&] { return load_settings(config, space.input); })
+          .map([&](machine::Settings settings) { space.settings = std::move(settings); });
   if (!ready) {
     return tl::unexpected(ready.error());
   }
@@ -146,6 +154,7 @@ Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
     }
     job.output_fd = *stream;
     job.input_fd = space.input.stream_fd();
+    job.input_head = space.input.head();
   } else if (space.compensated) {
     job.output = space.compensated->path();
   }

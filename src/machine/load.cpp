@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
+#include "command_reader.hpp"
 #include "draft.hpp"
 #include "file_text.hpp"
 #include "key_table.hpp"
 #include "key_values.hpp"
 #include "klipper_reader.hpp"
+#include "slicer_reader.hpp"
 #include "source_kind.hpp"
 #include "toml_reader.hpp"
 #include "unflex/machine/machine.hpp"
@@ -13,9 +15,11 @@
 namespace unflex::machine {
 namespace {
 
+constexpr std::string_view kDefaultOrigin = "default";
+
 std::string origin_text(const std::optional<SourcePlace>& place) {
   if (!place) {
-    return "default";
+    return std::string(kDefaultOrigin);
   }
   if (place->file.starts_with(kOverrideMark)) {
     return "--set";
@@ -30,6 +34,64 @@ void record_origins(Draft& draft) {
       draft.settings.origins.emplace_back(key.name, origin_text(draft.places[i]));
     }
   }
+}
+
+Draft defaults() {
+  Draft draft;
+  draft.places.resize(key_table().size());
+  return draft;
+}
+
+// Stores what a printer file says, whatever kind it is of.
+Status read_printer(std::string_view text, const std::string& name, Draft& draft) {
+  const auto store = [&](const Reading& reading) { return apply(reading, draft); };
+  switch (source_kind(text)) {
+    case SourceKind::klipper:
+      return read_klipper(text, name).and_then(store);
+    case SourceKind::marlin_dump:
+      return read_marlin_dump(text, name).and_then(store);
+    case SourceKind::rrf_config:
+      return read_rrf_config(text, name).and_then(store);
+    case SourceKind::print:
+      return fail(ErrorKind::usage, {name, 0},
+                  "is a print, not a printer file; what its slicer says of the printer is read "
+                  "from the print that is compensated");
+    case SourceKind::toml:
+      break;
+  }
+  return read_toml(text, name, draft);
+}
+
+void note_late_settings(const PrintText& print, std::vector<Diagnostic>& notes) {
+  const std::string_view late = slicer_with_late_settings(print);
+  if (!late.empty()) {
+    Diagnostic note;
+    note.place.file = print.name;
+    note.message = fmt::format(
+        "{} writes its settings at the end, where a pipe's come too late; give a file or --printer",
+        late);
+    notes.push_back(std::move(note));
+  }
+}
+
+Status read_sources(const Sources& sources, Draft& draft) {
+  if (sources.print != nullptr) {
+    if (Status applied = apply(read_slicer(*sources.print), draft); !applied) {
+      return applied;
+    }
+    if (!sources.printer_file) {
+      note_late_settings(*sources.print, draft.settings.notes);
+    }
+  }
+  if (sources.printer_file) {
+    const Result<std::string> text = read_printer_file(*sources.printer_file);
+    const Status read = text ? read_printer(*text, sources.printer_file->string(), draft)
+                             : Status(tl::unexpected(text.error()));
+    if (!read) {
+      return read;
+    }
+  }
+  return {};
 }
 
 Result<Settings> finish(Draft draft, const std::vector<std::string>& overrides) {
@@ -48,42 +110,19 @@ Result<Settings> finish(Draft draft, const std::vector<std::string>& overrides) 
   return draft.settings;
 }
 
-Draft defaults() {
-  Draft draft;
-  draft.places.resize(key_table().size());
-  return draft;
-}
-
-// Stores what a printer file says, whatever kind it is of.
-Status read_printer(std::string_view text, const std::string& name, Draft& draft) {
-  switch (source_kind(text)) {
-    case SourceKind::klipper:
-      return read_klipper(text, name).and_then([&](const Reading& reading) {
-        return apply(reading, draft);
-      });
-    case SourceKind::print:
-      return fail(ErrorKind::usage, {name, 0},
-                  "is a print, not a printer file; what its slicer says of the printer is read "
-                  "from the print that is compensated");
-    default:
-      return read_toml(text, name, draft);
-  }
-}
-
-std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
-
 }  // namespace
+
+Result<Settings> load(const Sources& sources) {
+  Draft draft = defaults();
+  if (Status read = read_sources(sources, draft); !read) {
+    return tl::unexpected(read.error());
+  }
+  return finish(std::move(draft), sources.overrides);
+}
 
 Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
                       const std::vector<std::string>& overrides) {
-  if (!printer_file) {
-    return finish(defaults(), overrides);
-  }
-  const Result<std::string> text = read_printer_file(*printer_file);
-  if (!text) {
-    return tl::unexpected(text.error());
-  }
-  return parse(*text, printer_file->string(), overrides);
+  return load(Sources{.print = nullptr, .printer_file = printer_file, .overrides = overrides});
 }
 
 Result<Settings> parse(std::string_view text, const std::string& name,
@@ -95,10 +134,33 @@ Result<Settings> parse(std::string_view text, const std::string& name,
   return finish(std::move(draft), overrides);
 }
 
+namespace {
+
+std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
+
+// Keys left at their default are comments: they stay so when the text is read again, and what
+// holds is still seen.
+std::string toml_line(const Key& key, std::string_view name, const std::string& origin,
+                      Draft& draft) {
+  const std::optional<std::string> own = own_value(key, draft);
+  const std::optional<std::string> value = value_in_force(key, draft);
+  if (own && origin == kDefaultOrigin) {
+    return fmt::format("# {} = {}\n", name, *own);
+  }
+  if (own) {
+    return fmt::format("{} = {}{}\n", name, *own, origin.empty() ? "" : "  # " + origin);
+  }
+  return value ? fmt::format("# {} = {}  (unset: {})\n", name, *value, key.if_unset)
+               : fmt::format("# {} is unset: {}\n", name, key.if_unset);
+}
+
+}  // namespace
+
 std::string to_toml(const Settings& settings) {
   Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}};
   std::string text = "schema_version = 1\n";
   std::string_view section;
+  std::size_t next_origin = 0;
   for (const Key& key : key_table()) {
     if (key.converted) {
       continue;
@@ -107,17 +169,12 @@ std::string to_toml(const Settings& settings) {
       section = section_of(key.name);
       text += fmt::format("\n[{}]\n", section);
     }
-    const std::string_view name = key.name.substr(section.size() + 1);
-    const std::optional<std::string> own = own_value(key, draft);
-    const std::optional<std::string> value = value_in_force(key, draft);
-    // Unset keys stay unset when the text is read again, and what holds instead is still seen.
-    if (own) {
-      text += fmt::format("{} = {}\n", name, *own);
-    } else if (value) {
-      text += fmt::format("# {} = {}  (unset: {})\n", name, *value, key.if_unset);
-    } else {
-      text += fmt::format("# {} is unset: {}\n", name, key.if_unset);
-    }
+    // Settings that were not read but built in memory have no origins.
+    const std::string origin = next_origin < settings.origins.size()
+                                   ? settings.origins[next_origin].second
+                                   : std::string{};
+    ++next_origin;
+    text += toml_line(key, key.name.substr(section.size() + 1), origin, draft);
   }
   return text;
 }
@@ -130,10 +187,9 @@ std::vector<SettingRow> rows(const Settings& settings) {
     if (key.converted) {
       continue;
     }
-    // Settings that were not read but built in memory have no origins.
     const std::string origin = next_origin < settings.origins.size()
                                    ? settings.origins[next_origin].second
-                                   : std::string("default");
+                                   : std::string(kDefaultOrigin);
     ++next_origin;
     rows.push_back({.key = std::string(key.name),
                     .value = value_in_force(key, draft).value_or(""),

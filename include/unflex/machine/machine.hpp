@@ -12,6 +12,7 @@
 
 #include "unflex/core/error.hpp"
 #include "unflex/core/firmware.hpp"
+#include "unflex/machine/print_text.hpp"
 
 namespace unflex::machine {
 
@@ -176,11 +177,21 @@ struct Settings {
   [[nodiscard]] double shaper_freq_y_hz() const;
 };
 
-// Reads the settings: defaults, then the printer file (if any), then the overrides "key=value" in
-// their order, then validation. The printer file is told by its content: unflex's own TOML or
-// Klipper's printer.cfg with what it includes. Unknown keys, wrong types and values out of range
-// are errors of kind usage with their place ("printer.toml:7: …", or the text of the override) and
-// a remedy.
+// Where settings come from.
+struct Sources {
+  const PrintText* print = nullptr;                   // the print they are for, if it is at hand
+  std::optional<std::filesystem::path> printer_file;  // --printer
+  std::vector<std::string> overrides;                 // --set, "key=value"
+};
+
+// Reads the settings: defaults, then what the print's slicer says of the printer, then the printer
+// file, then the overrides in their order, then validation. The printer file is told by its
+// content: unflex's own TOML, Klipper's printer.cfg with what it includes, what Marlin answers to
+// M503, or RepRapFirmware's config.g. Unknown keys, wrong types and values out of range are errors
+// of kind usage with their place ("printer.toml:7: …", or the text of the override) and a remedy.
+[[nodiscard]] Result<Settings> load(const Sources& sources);
+
+// The same without a print.
 [[nodiscard]] Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
                                     const std::vector<std::string>& overrides);
 
@@ -188,7 +199,8 @@ struct Settings {
 [[nodiscard]] Result<Settings> parse(std::string_view text, const std::string& name,
                                      const std::vector<std::string>& overrides);
 
-// Every key with its value in force as TOML text, for inspect and the report.
+// Every key with its value in force as TOML text, and where it came from as a comment. Read again it
+// gives the same values.
 [[nodiscard]] std::string to_toml(const Settings& settings);
 
 // (key, value in force as TOML writes it, origin) for every key, in the order of the documentation.
