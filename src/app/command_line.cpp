@@ -24,14 +24,19 @@ CLI::Validator positive_mm() {
           ""};
 }
 
-void add_common_options(CLI::App& command, RunConfig& config) {
-  command
-      .add_option("--printer", config.printer_file, "Printer file (TOML), docs/configuration.md")
-      ->type_name("FILE");
+void add_overrides(CLI::App& command, RunConfig& config) {
   // One value for each --set: more would swallow the input's name.
   command.add_option("--set", config.overrides, "Override a key of the printer file; repeatable")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
+}
+
+void add_common_options(CLI::App& command, RunConfig& config) {
+  command
+      .add_option("--printer", config.printer_file,
+                  "The printer: TOML, Klipper's printer.cfg, Marlin's M503, RRF's config.g")
+      ->type_name("FILE");
+  add_overrides(command, config);
   command.add_option("--report", config.report, "Write a report, FILE.json, or - for stdout")
       ->type_name("FILE");
   command.add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
@@ -90,6 +95,23 @@ void add_inspect(CLI::App& program, RunConfig& config) {
   command->add_option("IN", config.input, "G-code, - for stdin")->type_name("")->required();
   add_common_options(*command, config);
   command->callback([&config] { config.command = Command::inspect; });
+}
+
+void add_printer(CLI::App& program, RunConfig& config) {
+  CLI::App* const printer = program.add_subcommand("printer", "Printer files");
+  printer->require_subcommand(1);
+  CLI::App* const init = printer->add_subcommand(
+      "init", "Write a printer file (TOML) from what already describes the printer");
+  init->add_option("--from", config.input,
+                   "Klipper's printer.cfg, Marlin's M503, RRF's config.g, or a sliced print")
+      ->type_name("FILE")
+      ->required();
+  init->add_option("-o,--output", config.output, "Where to write, - for stdout")
+      ->type_name("OUT")
+      ->required();
+  add_overrides(*init, config);
+  init->add_flag("-q,--quiet", config.quiet, "No summary");
+  init->callback([&config] { config.command = Command::printer_init; });
 }
 
 tl::unexpected<Error> usage(std::string message) {
@@ -185,6 +207,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   add_compensate(program, config);
   add_verify(program, config);
   add_inspect(program, config);
+  add_printer(program, config);
   program.footer(
       "Exit codes: 0 done, 1 usage or configuration, 2 bad input, 3 deviation above\n"
       "--max-deviation or a rule broken, 4 internal. More: docs/cli.md");

@@ -97,7 +97,6 @@ class Reader {
     travel("y");
     input_shaper("x");
     input_shaper("y");
-    note_unknown_resonances();
     if (failure_) {
       return tl::unexpected(*failure_);
     }
@@ -216,20 +215,6 @@ class Reader {
       reading_.add("dynamics." + axis + ".freq_hz", freq_hz, at);
       reading_.add("dynamics." + axis + ".damping_ratio", ratio.value_or(kDefaultDampingRatio),
                    ratio ? place("input_shaper", damping) : at);
-    }
-  }
-
-  void note_unknown_resonances() {
-    for (const std::string axis : {"x", "y"}) {
-      const bool is_known = std::ranges::any_of(reading_.assignments, [&](const Assignment& given) {
-        return given.key == "dynamics." + axis + ".freq_hz";
-      });
-      if (!is_known) {
-        note({file_, 0},
-             fmt::format("[input_shaper] with shaper_freq_{0} is missing: the resonance "
-                         "along {0} is not known, see dynamics.{0}.freq_hz",
-                         axis));
-      }
     }
   }
 

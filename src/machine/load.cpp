@@ -1,4 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 
 #include "command_reader.hpp"
 #include "draft.hpp"
@@ -44,7 +47,10 @@ Draft defaults() {
 
 // Stores what a printer file says, whatever kind it is of.
 Status read_printer(std::string_view text, const std::string& name, Draft& draft) {
-  const auto store = [&](const Reading& reading) { return apply(reading, draft); };
+  const auto store = [&](const Reading& reading) {
+    draft.foreign_file = name;
+    return apply(reading, draft);
+  };
   switch (source_kind(text)) {
     case SourceKind::klipper:
       return read_klipper(text, name).and_then(store);
@@ -60,6 +66,26 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
       break;
   }
   return read_toml(text, name, draft);
+}
+
+// A firmware's own configuration says all but the resonances where no input shaper is set up.
+void note_unknown_resonances(Draft& draft) {
+  std::vector<std::string_view> axes;
+  for (const std::string_view axis : {"x", "y"}) {
+    if (!draft.places[*find_key(fmt::format("dynamics.{}.freq_hz", axis))]) {
+      axes.push_back(axis);
+    }
+  }
+  if (draft.foreign_file.empty() || axes.empty()) {
+    return;
+  }
+  Diagnostic note;
+  note.place.file = draft.foreign_file;
+  note.message = fmt::format(
+      "no input shaper tells the resonance along {}; measure it and give --set "
+      "dynamics.{}.freq_hz=..., until then {} Hz is a guess",
+      fmt::join(axes, " and "), axes.front(), AxisDynamics{}.freq_hz);
+  draft.settings.notes.push_back(std::move(note));
 }
 
 void note_late_settings(const PrintText& print, std::vector<Diagnostic>& notes) {
@@ -106,11 +132,16 @@ Result<Settings> finish(Draft draft, const std::vector<std::string>& overrides) 
   if (Status checked = check_consistency(draft); !checked) {
     return tl::unexpected(checked.error());
   }
+  note_unknown_resonances(draft);
   record_origins(draft);
   return draft.settings;
 }
 
 }  // namespace
+
+bool describes_printer(const PrintText& text) {
+  return text.tail_line == 1 && source_kind(text.tail) != SourceKind::print;
+}
 
 Result<Settings> load(const Sources& sources) {
   Draft draft = defaults();
@@ -138,6 +169,13 @@ namespace {
 
 std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
 
+// A file's name must not end the comment it stands in.
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
 // Keys left at their default are comments: they stay so when the text is read again, and what
 // holds is still seen.
 std::string toml_line(const Key& key, std::string_view name, const std::string& origin,
@@ -148,7 +186,7 @@ std::string toml_line(const Key& key, std::string_view name, const std::string& 
     return fmt::format("# {} = {}\n", name, *own);
   }
   if (own) {
-    return fmt::format("{} = {}{}\n", name, *own, origin.empty() ? "" : "  # " + origin);
+    return fmt::format("{} = {}{}\n", name, *own, origin.empty() ? "" : "  # " + printable(origin));
   }
   return value ? fmt::format("# {} = {}  (unset: {})\n", name, *value, key.if_unset)
                : fmt::format("# {} is unset: {}\n", name, key.if_unset);
@@ -157,8 +195,12 @@ std::string toml_line(const Key& key, std::string_view name, const std::string& 
 }  // namespace
 
 std::string to_toml(const Settings& settings) {
-  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}};
-  std::string text = "schema_version = 1\n";
+  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}, .foreign_file = {}};
+  std::string text =
+      "# A printer as unflex sees it; docs/configuration.md explains each key. Behind a value "
+      "stands\n"
+      "# where it is from, and keys that are comments are at their default.\n\nschema_version = "
+      "1\n";
   std::string_view section;
   std::size_t next_origin = 0;
   for (const Key& key : key_table()) {
@@ -180,7 +222,7 @@ std::string to_toml(const Settings& settings) {
 }
 
 std::vector<SettingRow> rows(const Settings& settings) {
-  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}};
+  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}, .foreign_file = {}};
   std::vector<SettingRow> rows;
   std::size_t next_origin = 0;
   for (const Key& key : key_table()) {

@@ -21,7 +21,7 @@ inline void collect_keys(const nlohmann::json& node, const std::string& path,
     return;
   }
   const std::set<std::string> open = {"deviation", "deviation.*", "printer", "kept_moves",
-                                      "commands"};
+                                      "commands", "limits_in_print"};
   for (const auto& [name, value] : node.items()) {
     const std::string part = open.contains(path) ? "*" : name;
     collect_keys(value, path.empty() ? part : path + "." + part, keys);

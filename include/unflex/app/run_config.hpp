@@ -11,7 +11,7 @@
 
 namespace unflex::app {
 
-enum class Command { compensate, verify, inspect };
+enum class Command { compensate, verify, inspect, printer_init };
 
 // The codes the program exits with, see docs/cli.md.
 enum class ExitCode : int {
@@ -27,8 +27,10 @@ inline constexpr std::string_view kStandardStream = "-";
 
 struct RunConfig {
   Command command = Command::compensate;
-  std::string input;   // compensate, inspect: IN; verify: the file given to --against
-  std::string output;  // compensate: -o, or the input with --in-place; verify: OUT
+  // compensate, inspect: IN; verify: the file given to --against; printer init: --from
+  std::string input;
+  // compensate, printer init: -o, or the input with --in-place; verify: OUT
+  std::string output;
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"

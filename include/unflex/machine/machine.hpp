@@ -191,6 +191,9 @@ struct Sources {
 // of kind usage with their place ("printer.toml:7: …", or the text of the override) and a remedy.
 [[nodiscard]] Result<Settings> load(const Sources& sources);
 
+// Whether a file that was looked at describes a printer itself, and is no print.
+[[nodiscard]] bool describes_printer(const PrintText& text);
+
 // The same without a print.
 [[nodiscard]] Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
                                     const std::vector<std::string>& overrides);
