@@ -51,6 +51,21 @@ Result<machine::PrintText> Input::look() {
                             .is_stream = true};
 }
 
+Result<std::string> Input::read_all() {
+  std::string text;
+  for (;;) {
+    const tl::expected<std::string, int> block = read_some(fd_.get());
+    if (!block) {
+      return fail(ErrorKind::input, {name_, 0},
+                  fmt::format("cannot read: {}", errno_text(block.error())));
+    }
+    if (block->empty()) {
+      return text;
+    }
+    text += *block;
+  }
+}
+
 Status Input::make_seekable() {
   if (!is_stream_) {
     return {};

@@ -24,6 +24,9 @@ class Input {
   [[nodiscard]] Result<machine::PrintText> look();
   [[nodiscard]] const std::string& head() const { return head_; }
 
+  // All of it, of what is small enough to be held.
+  [[nodiscard]] Result<std::string> read_all();
+
   // Of what cannot be read twice, to read it once; otherwise −1.
   [[nodiscard]] int stream_fd() const {
     return is_stream_ && !is_copied_ ? fd_.get() : -1;

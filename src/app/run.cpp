@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "console.hpp"
+#include "identify.hpp"
 #include "inputs.hpp"
 #include "inspection.hpp"
 #include "outputs.hpp"
@@ -360,6 +361,8 @@ Result<ExitCode> run_command(const RunConfig& config) {
       return run_inspect(config);
     case Command::printer_init:
       return run_printer_init(config);
+    case Command::identify:
+      return run_identify(config);
     case Command::compensate:
     case Command::verify:
       break;

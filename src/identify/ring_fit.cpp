@@ -174,7 +174,7 @@ Result<Mode> fit_ringing(const std::vector<double>& samples, double rate_hz) {
     mode.warnings.emplace_back(
         "one mode does not explain this: the decay is noise or several resonances");
   }
-  mode.curve.x_name = "s";
+  mode.curve.is_spectrum = false;
   for (Eigen::Index i = 0; i < shown; ++i) {
     mode.curve.x.push_back(ring->time_s[i]);
     mode.curve.measured.push_back(ring->data[i]);

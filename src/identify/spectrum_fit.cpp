@@ -130,7 +130,6 @@ Result<Mode> fit_spectrum(const Spectrum& spectrum, Axis axis, const Sweep& swee
   mode.damping_ratio = estimate_of(p.damping_ratio, 2.0 * std::max(even(1, 1), together(1, 1)));
   const Eigen::ArrayXd fitted = data - best.residual;
   add_warnings(misfit_of(freq_hz, data, fitted, fitted.minCoeff(), 3), sweep, mode);
-  mode.curve.x_name = "Hz";
   mode.curve.x.assign(freq_hz.begin(), freq_hz.end());
   mode.curve.measured.assign(data.begin(), data.end());
   mode.curve.fitted.assign(fitted.begin(), fitted.end());

@@ -122,9 +122,9 @@ bool holds_sweep(const std::vector<double>& samples, double rate_hz, const Sweep
 }
 
 Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const Sweep& sweep) {
-  const EnergySpectrum spectrum = energy_spectrum(samples, rate_hz);
-  Band band = band_of(spectrum, sweep);
-  if (band.energy.size() < 100 || !(band.energy.mean() > 0.0)) {
+  const auto [least, most] = std::ranges::minmax(samples);
+  Band band = band_of(energy_spectrum(samples, rate_hz), sweep);
+  if (band.energy.size() < 100 || !(least < most)) {
     return fail(ErrorKind::input, "there is no motion in the band of the sweep");
   }
   band.energy /= band.energy.mean();
@@ -142,6 +142,11 @@ Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const
     }
   }
   const SpectrumParameters p = SpectrumParameters::from(best.fit.parameters);
+  const Eigen::ArrayXd fitted = model_of(band, excitation, p);
+  constexpr double kAboveNoise = 2.0;
+  if (fitted.maxCoeff() < (1.0 + kAboveNoise) * p.noise) {
+    return fail(ErrorKind::input, "no resonance stands out of the noise in it");
+  }
   // What is no noise goes together over some tenths of a Hz.
   const auto block = static_cast<Eigen::Index>(0.5 / band.step_hz);
   const Eigen::MatrixXd alone = sandwich(best.fit, best.weights, 1);
@@ -150,10 +155,8 @@ Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const
   mode.method = Method::sweep;
   mode.freq_hz = estimate_of(p.mode_hz, std::max(alone(0, 0), together(0, 0)));
   mode.damping_ratio = estimate_of(p.damping_ratio, std::max(alone(1, 1), together(1, 1)));
-  const Eigen::ArrayXd fitted = model_of(band, excitation, p);
   const auto one_hz = static_cast<Eigen::Index>(1.0 / band.step_hz);
   add_warnings(misfit_of(band.freq_hz, band.energy, fitted, p.noise, one_hz), sweep, mode);
-  mode.curve.x_name = "Hz";
   for (Eigen::Index i = 0; i + one_hz <= band.energy.size(); i += one_hz) {
     mode.curve.x.push_back(band.freq_hz.segment(i, one_hz).mean());
     mode.curve.measured.push_back(band.energy.segment(i, one_hz).mean());

@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/identify/mode.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::app {
 
-enum class Command { compensate, verify, inspect, printer_init };
+enum class Command { compensate, verify, inspect, printer_init, identify };
 
 // The codes the program exits with, see docs/cli.md.
 enum class ExitCode : int {
@@ -24,6 +25,14 @@ enum class ExitCode : int {
 
 // The name that stands for stdin or stdout.
 inline constexpr std::string_view kStandardStream = "-";
+
+// What `identify` works on.
+struct IdentifyConfig {
+  std::vector<std::string> records;
+  std::optional<identify::Axis> axis;  // of all of them; unset: as each tells
+  identify::Sweep sweep;
+  std::optional<identify::Tower> tower;
+};
 
 struct RunConfig {
   Command command = Command::compensate;
@@ -39,6 +48,7 @@ struct RunConfig {
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;
   bool quiet = false;
+  IdentifyConfig identify;
 };
 
 // The command line understood: either work to do, or a text to print instead (--help, --version).

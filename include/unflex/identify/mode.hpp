@@ -18,11 +18,12 @@ struct Estimate {
   double high = 0.0;
 };
 
-// What was measured and what the mode makes of it, to be drawn.
+// What was measured and what the mode makes of it, to be drawn: energy over frequency in Hz, or
+// acceleration over time in s.
 struct Curve {
-  std::string x_name;  // "Hz", "s"
+  bool is_spectrum = true;
   std::vector<double> x;
-  std::vector<double> measured;
+  std::vector<double> measured;  // relative
   std::vector<double> fitted;
 };
 
