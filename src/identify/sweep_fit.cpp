@@ -143,8 +143,9 @@ Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const
   }
   const SpectrumParameters p = SpectrumParameters::from(best.fit.parameters);
   const Eigen::ArrayXd fitted = model_of(band, excitation, p);
-  constexpr double kAboveNoise = 2.0;
-  if (fitted.maxCoeff() < (1.0 + kAboveNoise) * p.noise) {
+  // White noise looks like a mode far below that is nearly all damper.
+  constexpr double kFlat = 3.0;
+  if (fitted.maxCoeff() < kFlat * fitted.minCoeff()) {
     return fail(ErrorKind::input, "no resonance stands out of the noise in it");
   }
   // What is no noise goes together over some tenths of a Hz.
