@@ -28,9 +28,7 @@ class Input {
   [[nodiscard]] Result<std::string> read_all();
 
   // Of what cannot be read twice, to read it once; otherwise −1.
-  [[nodiscard]] int stream_fd() const {
-    return is_stream_ && !is_copied_ ? fd_.get() : -1;
-  }
+  [[nodiscard]] int stream_fd() const { return is_stream_ && !is_copied_ ? fd_.get() : -1; }
 
   // Where to read it, and what the user calls it.
   [[nodiscard]] std::filesystem::path path() const;

@@ -13,6 +13,7 @@
 #include "inputs.hpp"
 #include "inspection.hpp"
 #include "outputs.hpp"
+#include "printer_init.hpp"
 #include "progress.hpp"
 #include "signals.hpp"
 #include "unflex/machine/machine.hpp"
@@ -51,10 +52,6 @@ Status check_distinct(const RunConfig& config) {
       clash(config.output, config.input)) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the input too; to replace it give --in-place");
-  }
-  if (config.command == Command::printer_init && clash(config.output, config.input)) {
-    return fail(ErrorKind::usage, {config.output, 0},
-                "is what it is made from too; give it a name of its own");
   }
   if (config.command == Command::compensate && config.printer_file) {
     const std::string& target = config.in_place ? config.input : config.output;
@@ -204,8 +201,7 @@ Status print_summary(const RunConfig& config, std::string_view text) {
   }
   const bool stdout_taken =
       config.report == kStandardStream ||
-      ((config.command == Command::compensate || config.command == Command::printer_init) &&
-       config.output == kStandardStream);
+      (config.command == Command::compensate && config.output == kStandardStream);
   if (stdout_taken) {
     if (::isatty(STDERR_FILENO) == 1) {
       static_cast<void>(write_all(STDERR_FILENO, text));
@@ -312,47 +308,6 @@ Result<ExitCode> run_inspect(const RunConfig& config) {
   return write_report(*space, json).and_then([&] { return print_summary(config, text); }).map([] {
     return ExitCode::done;
   });
-}
-
-// The printer as the file describes it, or as the print's slicer does.
-Result<machine::Settings> settings_from(const RunConfig& config, Input& input) {
-  if (Status copied = input.make_seekable(); !copied) {
-    return tl::unexpected(copied.error());
-  }
-  const Result<machine::PrintText> text = input.look();
-  if (!text) {
-    return tl::unexpected(text.error());
-  }
-  return machine::describes_printer(*text)
-             ? machine::parse(text->tail, config.input, config.overrides)
-             : machine::load({.print = &*text, .printer_file = {}, .overrides = config.overrides});
-}
-
-Result<ExitCode> run_printer_init(const RunConfig& config) {
-  Result<Input> input = Input::open(config.input);
-  if (!input) {
-    return tl::unexpected(input.error());
-  }
-  if (Status distinct = check_distinct(config); !distinct) {
-    return tl::unexpected(distinct.error());
-  }
-  const Result<machine::Settings> settings = settings_from(config, *input);
-  if (!settings) {
-    return tl::unexpected(settings.error());
-  }
-  std::vector<std::string> warnings;
-  add_setting_warnings(*settings, warnings);
-  print_warnings(warnings);
-  Result<Output> output = Output::open(config.output);
-  if (!output) {
-    return tl::unexpected(output.error());
-  }
-  return output->write(machine::to_toml(*settings))
-      .and_then([&] { return output->commit(); })
-      .and_then([&] {
-        return print_summary(config, fmt::format("{} → {}\n", config.input, config.output));
-      })
-      .map([] { return ExitCode::done; });
 }
 
 Result<ExitCode> run_command(const RunConfig& config) {

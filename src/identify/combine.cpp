@@ -82,6 +82,10 @@ Result<Mode> fit(const DataSet& set, Axis axis, const Sweep& sweep) {
   if (!mode) {
     return fail(mode.error().kind, {set.name, 0}, mode.error().message);
   }
+  // Not what a resonance looks like, whatever the numbers.
+  if (!std::isfinite(mode->freq_hz.value) || !(mode->damping_ratio.value < 1.0)) {
+    return fail(ErrorKind::input, {set.name, 0}, "no resonance can be made out in it");
+  }
   return mode;
 }
 

@@ -67,71 +67,109 @@ class WelchModel {
   Eigen::ArrayXd divisor_;
 };
 
-}  // namespace
+// The bins in the band of the sweep, relative to their mean.
+struct Bins {
+  Eigen::Index first = 0;
+  Eigen::ArrayXd freq_hz;
+  Eigen::ArrayXd density;
+};
 
-Result<Mode> fit_spectrum(const Spectrum& spectrum, Axis axis, const Sweep& sweep) {
+Result<Bins> bins_of(const Spectrum& spectrum, Axis axis, const Sweep& sweep) {
+  constexpr Eigen::Index kFewest = 20;
   const std::vector<double>& density = spectrum.density[axis == Axis::x ? 0 : 1];
   const auto first = static_cast<Eigen::Index>(
       std::ceil(std::max(kLowest_hz, 1.2 * sweep.start_hz) / spectrum.step_hz));
   const auto last = std::min(static_cast<Eigen::Index>(sweep.end_hz / spectrum.step_hz) - 1,
                              static_cast<Eigen::Index>(density.size()));
-  constexpr Eigen::Index kFewest = 20;
   if (last - first < kFewest) {
     return fail(ErrorKind::input, "it has too few frequencies in the band of the sweep");
   }
-  Eigen::ArrayXd data = Eigen::Map<const Eigen::ArrayXd>(density.data() + first, last - first);
-  if (!(data.maxCoeff() > 0.0)) {
+  Bins bins{.first = first,
+            .freq_hz = Eigen::ArrayXd::LinSpaced(last - first,
+                                                 static_cast<double>(first) * spectrum.step_hz,
+                                                 static_cast<double>(last - 1) * spectrum.step_hz),
+            .density = Eigen::Map<const Eigen::ArrayXd>(density.data() + first, last - first)};
+  if (!(bins.density.maxCoeff() > 0.0)) {
     return fail(ErrorKind::input, "there is no motion in the band of the sweep");
   }
-  data /= data.mean();
-  const Eigen::ArrayXd freq_hz =
-      Eigen::ArrayXd::LinSpaced(data.size(), static_cast<double>(first) * spectrum.step_hz,
-                                static_cast<double>(last - 1) * spectrum.step_hz);
-  const WelchModel welch(spectrum, first, data.size(), sweep.start_hz);
-  const Model model = [&](const Eigen::VectorXd& p) { return welch(SpectrumParameters::from(p)); };
+  bins.density /= bins.density.mean();
+  return bins;
+}
 
+struct Candidate {
+  LeastSquares fit;
+  Eigen::ArrayXd weights;
+  double cost = 0.0;
+};
+
+// How far a bin is off goes with its height; nothing is better known than to a hundredth of the
+// root mean square.
+Candidate refine(const Bins& bins, const WelchModel& welch, SpectrumParameters start) {
+  constexpr int kRounds = 6;
+  constexpr double kLeastVariance = 1e-4;
+  const Model model = [&](const Eigen::VectorXd& p) { return welch(SpectrumParameters::from(p)); };
+  Candidate candidate;
+  Eigen::VectorXd at = start.logarithms();
+  for (int round = 0; round < kRounds; ++round) {
+    candidate.weights =
+        (model(at).square() + kLeastVariance * bins.density.square().mean()).inverse();
+    candidate.fit = minimise(model, bins.density, candidate.weights, at);
+    at = candidate.fit.parameters;
+  }
+  candidate.cost = candidate.fit.weighted_sum - candidate.weights.log().sum();
+  return candidate;
+}
+
+Candidate best_of(const Bins& bins, const WelchModel& welch) {
   Eigen::Index peak = 0;
-  (data / freq_hz).maxCoeff(&peak);
-  LeastSquares best;
-  Eigen::ArrayXd best_weights;
-  double best_cost = 0.0;
+  (bins.density / bins.freq_hz).maxCoeff(&peak);
+  Candidate best;
   for (const double damping_ratio : {0.03, 0.1, 0.25}) {
-    SpectrumParameters p{freq_hz[peak], damping_ratio, 1.0, 1e-6};
-    p.scale = data.mean() / welch(p).mean();
-    p.noise = 1e-3 * data.mean();
-    Eigen::VectorXd at = p.logarithms();
-    LeastSquares fit;
-    Eigen::ArrayXd weights;
-    // How far a bin is off goes with its height; nothing is better known than to a hundredth of
-    // the mean.
-    for (int round = 0; round < 6; ++round) {
-      weights = (model(at).square() + 1e-4 * data.square().mean()).inverse();
-      fit = minimise(model, data, weights, at);
-      at = fit.parameters;
-    }
-    const double cost = fit.weighted_sum - weights.log().sum();
-    if (best_weights.size() == 0 || cost < best_cost) {
-      best = std::move(fit);
-      best_weights = weights;
-      best_cost = cost;
+    SpectrumParameters start{bins.freq_hz[peak], damping_ratio, 1.0, 1e-6};
+    start.scale = 1.0 / welch(start).mean();
+    start.noise = 1e-3;
+    Candidate candidate = refine(bins, welch, start);
+    if (best.weights.size() == 0 || candidate.cost < best.cost) {
+      best = std::move(candidate);
     }
   }
-  const SpectrumParameters p = SpectrumParameters::from(best.parameters);
-  const double spread = best.weighted_sum / static_cast<double>(data.size() - 4);
+  return best;
+}
+
+// Of the parameters: the greater of what the residual's size tells and what its pattern does,
+// since the window makes neighbours alike. Twice, as a few bins are all there is of a resonance.
+Eigen::VectorXd variances(const Candidate& candidate) {
+  constexpr double kCaution = 2.0;
+  const LeastSquares& fit = candidate.fit;
+  const Eigen::Index unknowns = fit.parameters.size();
+  const double spread = fit.weighted_sum / static_cast<double>(fit.residual.size() - unknowns);
   const Eigen::MatrixXd even =
-      spread * (best.jacobian.transpose() * best_weights.matrix().asDiagonal() * best.jacobian)
+      spread * (fit.jacobian.transpose() * candidate.weights.matrix().asDiagonal() * fit.jacobian)
                    .ldlt()
-                   .solve(Eigen::MatrixXd::Identity(4, 4));
-  // The window makes neighbours alike.
-  const Eigen::MatrixXd together = sandwich(best, best_weights, kReach);
+                   .solve(Eigen::MatrixXd::Identity(unknowns, unknowns));
+  const Eigen::MatrixXd together = sandwich(fit, candidate.weights, kReach);
+  return kCaution * even.diagonal().cwiseMax(together.diagonal());
+}
+
+}  // namespace
+
+Result<Mode> fit_spectrum(const Spectrum& spectrum, Axis axis, const Sweep& sweep) {
+  const Result<Bins> bins = bins_of(spectrum, axis, sweep);
+  if (!bins) {
+    return tl::unexpected(bins.error());
+  }
+  const WelchModel welch(spectrum, bins->first, bins->density.size(), sweep.start_hz);
+  const Candidate best = best_of(*bins, welch);
+  const SpectrumParameters p = SpectrumParameters::from(best.fit.parameters);
+  const Eigen::VectorXd variance = variances(best);
   Mode mode;
   mode.method = Method::spectrum;
-  mode.freq_hz = estimate_of(p.mode_hz, 2.0 * std::max(even(0, 0), together(0, 0)));
-  mode.damping_ratio = estimate_of(p.damping_ratio, 2.0 * std::max(even(1, 1), together(1, 1)));
-  const Eigen::ArrayXd fitted = data - best.residual;
-  add_warnings(misfit_of(freq_hz, data, fitted, fitted.minCoeff(), 3), sweep, mode);
-  mode.curve.x.assign(freq_hz.begin(), freq_hz.end());
-  mode.curve.measured.assign(data.begin(), data.end());
+  mode.freq_hz = estimate_of(p.mode_hz, variance[0]);
+  mode.damping_ratio = estimate_of(p.damping_ratio, variance[1]);
+  const Eigen::ArrayXd fitted = bins->density - best.fit.residual;
+  add_warnings(misfit_of(bins->freq_hz, bins->density, fitted, fitted.minCoeff(), 3), sweep, mode);
+  mode.curve.x.assign(bins->freq_hz.begin(), bins->freq_hz.end());
+  mode.curve.measured.assign(bins->density.begin(), bins->density.end());
   mode.curve.fitted.assign(fitted.begin(), fitted.end());
   return mode;
 }

@@ -113,6 +113,32 @@ Candidate refine(const Band& band, const Eigen::ArrayXd& excitation, SpectrumPar
   return candidate;
 }
 
+Candidate best_of(const Band& band, const Eigen::ArrayXd& excitation) {
+  const double guess_hz = first_guess_hz(band);
+  Candidate best;
+  for (const double damping_ratio : {0.03, 0.1, 0.25}) {
+    SpectrumParameters start{guess_hz, damping_ratio, 1.0, 0.05};
+    start.scale = 1.0 / (excitation * gain_squared(band.freq_hz, guess_hz, damping_ratio)).mean();
+    Candidate candidate = refine(band, excitation, start);
+    if (best.weights.size() == 0 || candidate.cost < best.cost) {
+      best = std::move(candidate);
+    }
+  }
+  return best;
+}
+
+// The curve in steps of 1 Hz.
+Curve curve_of(const Band& band, const Eigen::ArrayXd& fitted) {
+  const auto one_hz = static_cast<Eigen::Index>(1.0 / band.step_hz);
+  Curve curve;
+  for (Eigen::Index i = 0; i + one_hz <= band.energy.size(); i += one_hz) {
+    curve.x.push_back(band.freq_hz.segment(i, one_hz).mean());
+    curve.measured.push_back(band.energy.segment(i, one_hz).mean());
+    curve.fitted.push_back(fitted.segment(i, one_hz).mean());
+  }
+  return curve;
+}
+
 }  // namespace
 
 bool holds_sweep(const std::vector<double>& samples, double rate_hz, const Sweep& sweep) {
@@ -129,18 +155,7 @@ Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const
   }
   band.energy /= band.energy.mean();
   const Eigen::ArrayXd excitation = sweep_energy(band.freq_hz, sweep.start_hz);
-  const double guess_hz = first_guess_hz(band);
-  Candidate best;
-  bool is_first = true;
-  for (const double damping_ratio : {0.03, 0.1, 0.25}) {
-    SpectrumParameters start{guess_hz, damping_ratio, 1.0, 0.05};
-    start.scale = 1.0 / (excitation * gain_squared(band.freq_hz, guess_hz, damping_ratio)).mean();
-    Candidate candidate = refine(band, excitation, start);
-    if (is_first || candidate.cost < best.cost) {
-      best = std::move(candidate);
-      is_first = false;
-    }
-  }
+  const Candidate best = best_of(band, excitation);
   const SpectrumParameters p = SpectrumParameters::from(best.fit.parameters);
   const Eigen::ArrayXd fitted = model_of(band, excitation, p);
   // White noise looks like a mode far below that is nearly all damper.
@@ -158,11 +173,7 @@ Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const
   mode.damping_ratio = estimate_of(p.damping_ratio, std::max(alone(1, 1), together(1, 1)));
   const auto one_hz = static_cast<Eigen::Index>(1.0 / band.step_hz);
   add_warnings(misfit_of(band.freq_hz, band.energy, fitted, p.noise, one_hz), sweep, mode);
-  for (Eigen::Index i = 0; i + one_hz <= band.energy.size(); i += one_hz) {
-    mode.curve.x.push_back(band.freq_hz.segment(i, one_hz).mean());
-    mode.curve.measured.push_back(band.energy.segment(i, one_hz).mean());
-    mode.curve.fitted.push_back(fitted.segment(i, one_hz).mean());
-  }
+  mode.curve = curve_of(band, fitted);
   return mode;
 }
 

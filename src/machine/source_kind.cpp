@@ -59,9 +59,9 @@ void look_at(std::string_view line, Traces& traces) {
   if (delimiter != std::string_view::npos && delimiter > 0 && content.front() != '#' &&
       content.front() != ';') {
     const std::string_view name = trimmed(content.substr(0, delimiter));
-    // Options as Klipper spells them, or any with its own delimiter.
-    traces.klipper += name == "kinematics" || name == "max_accel" || name == "max_velocity" ||
-                      (traces.headers > 0 && content[delimiter] == ':' && content.front() != '"');
+    // No key of ours is called so, and TOML knows no colon.
+    traces.klipper += name == "kinematics" ? 2 : 0;
+    traces.klipper += traces.headers > 0 && content[delimiter] == ':' && content.front() != '"';
   }
   look_at_command(content, traces);
 }

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 
 #include "sweep_simulation.hpp"
 #include "unflex/identify/mode.hpp"
@@ -16,10 +18,12 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-#ifndef UNFLEX_IDENTIFY_DRAWS
-#define UNFLEX_IDENTIFY_DRAWS 40
-#endif
-constexpr int kDraws = UNFLEX_IDENTIFY_DRAWS;
+// UNFLEX_IDENTIFY_DRAWS=200 is what docs/identify.md tells of.
+int number_of_draws() {
+  constexpr int kDefault = 40;
+  const char* const wanted = std::getenv("UNFLEX_IDENTIFY_DRAWS");
+  return wanted == nullptr ? kDefault : std::max(kDefault, std::atoi(wanted));
+}
 
 Recording recording_of(const SimulatedTest& test) {
   const std::vector<double> samples = simulate(test);
@@ -31,12 +35,13 @@ bool holds(const Estimate& estimate, double truth) {
 }
 
 TEST(RecordedSweep, TellsFrequencyAndDampingWithHonestIntervals) {
+  const int draws = number_of_draws();
   std::mt19937 random(20);
   int close_freq = 0;
   int close_damping = 0;
   int held_freq = 0;
   int held_damping = 0;
-  for (int draw = 0; draw < kDraws; ++draw) {
+  for (int draw = 0; draw < draws; ++draw) {
     SimulatedTest test;
     test.mode_hz = std::uniform_real_distribution(20.0, 120.0)(random);
     test.damping_ratio = std::uniform_real_distribution(0.02, 0.3)(random);
@@ -52,11 +57,15 @@ TEST(RecordedSweep, TellsFrequencyAndDampingWithHonestIntervals) {
     held_damping += holds(mode->damping_ratio, test.damping_ratio);
   }
   std::printf("of %d draws: f within 1 %% %d, zeta within 15 %% %d, intervals hold f %d, zeta %d\n",
-              kDraws, close_freq, close_damping, held_freq, held_damping);
-  EXPECT_GE(close_freq, 0.95 * kDraws);
-  EXPECT_GE(close_damping, 0.95 * kDraws);
-  EXPECT_GE(held_freq, 0.88 * kDraws);
-  EXPECT_GE(held_damping, 0.88 * kDraws);
+              draws, close_freq, close_damping, held_freq, held_damping);
+  EXPECT_GE(close_freq, 0.95 * draws);
+  EXPECT_GE(close_damping, 0.95 * draws);
+  EXPECT_GE(held_freq, 0.9 * draws);
+  EXPECT_GE(held_damping, 0.9 * draws);
+  if (draws >= 200) {  // of fewer, all may well hold
+    EXPECT_LE(held_freq, 0.99 * draws);
+    EXPECT_LE(held_damping, 0.99 * draws);
+  }
 }
 
 TEST(RecordedSweep, OfOlderAndFasterTestsIsReadToo) {

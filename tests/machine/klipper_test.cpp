@@ -143,6 +143,8 @@ TEST_F(KlipperFiles, OfDeltasBringANote) {
 TEST_F(KlipperFiles, AreToldByTheirContentAndNotByTheirName) {
   EXPECT_EQ(good(write("a.toml", kWhole)).limits.max_accel_mm_s2, 1000.0);
   EXPECT_EQ(good(write("b.cfg", "[limits]\nmax_accel_mm_s2 = 77\n")).limits.max_accel_mm_s2, 77.0);
+  EXPECT_THAT(failure(write("c.toml", "[limits]\nmax_accel = 7\nmax_velocity = 7\n")),
+              HasSubstr("did you mean 'limits.max_accel_mm_s2'?"));
 }
 
 }  // namespace
