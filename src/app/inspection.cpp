@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <iterator>
+#include <optional>
 #include <string_view>
 
 #include "unflex/app/run_config.hpp"
+#include "unflex/core/number.hpp"
 #include "unflex/report/format.hpp"
 
 namespace unflex::app {
@@ -35,7 +37,7 @@ Json moves_json(const Inspection& i) {
 }
 
 // Of the table of settings.
-constexpr int kKeyColumns = 42;
+constexpr int kKeyColumns = 44;
 constexpr int kValueColumns = 14;
 
 void write_counts(Sink out, const Inspection& i) {
@@ -71,12 +73,18 @@ void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
                  s.dynamics_y.damping_ratio);
 }
 
+// The report has all digits of what follows from other keys.
+std::string short_value(const std::string& value) {
+  const std::optional<double> number = parse_number(value);
+  return value.empty() ? "-" : number ? fmt::format("{:.6g}", *number) : value;
+}
+
 // Every key, its value in force when the print starts, and where that is from.
 void write_settings(Sink out, const machine::Settings& settings) {
   fmt::format_to(out, "settings\n");
   for (const machine::SettingRow& row : machine::rows(settings)) {
-    fmt::format_to(out, "  {:<{}} {:<{}} {}\n", row.key, kKeyColumns,
-                   row.value.empty() ? "-" : row.value, kValueColumns, row.origin);
+    fmt::format_to(out, "  {:<{}} {:<{}} {}\n", row.key, kKeyColumns, short_value(row.value),
+                   kValueColumns, row.origin);
   }
 }
 
