@@ -27,7 +27,7 @@ struct Job {
   std::filesystem::path output;  // compensate: written here, not atomically
   // compensate: read and written as the text comes, instead of the files, where not negative.
   int input_fd = -1;
-  std::string input_head;  // of input_fd, read already
+  std::string input_head = {};  // of input_fd, read already
   int output_fd = -1;
   std::string output_name;
   machine::Settings settings;
