@@ -14,7 +14,7 @@ namespace {
 
 constexpr unsigned kMaxWorkers = 256;
 
-CLI::Validator positive_mm() {
+CLI::Validator positive() {
   return {[](std::string& text) {
             double value = 0.0;
             const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
@@ -24,14 +24,19 @@ CLI::Validator positive_mm() {
           ""};
 }
 
-void add_common_options(CLI::App& command, RunConfig& config) {
-  command
-      .add_option("--printer", config.printer_file, "Printer file (TOML), docs/configuration.md")
-      ->type_name("FILE");
+void add_overrides(CLI::App& command, RunConfig& config) {
   // One value for each --set: more would swallow the input's name.
   command.add_option("--set", config.overrides, "Override a key of the printer file; repeatable")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
+}
+
+void add_common_options(CLI::App& command, RunConfig& config) {
+  command
+      .add_option("--printer", config.printer_file,
+                  "The printer: TOML, Klipper's printer.cfg, Marlin's M503, RRF's config.g")
+      ->type_name("FILE");
+  add_overrides(command, config);
   command.add_option("--report", config.report, "Write a report, FILE.json, or - for stdout")
       ->type_name("FILE");
   command.add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
@@ -42,7 +47,7 @@ void add_max_deviation(CLI::App& command, RunConfig& config) {
       .add_option("--max-deviation", config.max_deviation_mm,
                   "Fail with exit code 3 if extruding moves stray further from the path")
       ->type_name("MM")
-      ->check(positive_mm());
+      ->check(positive());
 }
 
 void add_engine(CLI::App& command, RunConfig& config, const char* help) {
@@ -113,6 +118,88 @@ void add_study(CLI::App& program, RunConfig& config) {
   command->callback([&config] { config.command = Command::study; });
 }
 
+void add_printer(CLI::App& program, RunConfig& config) {
+  CLI::App* const printer = program.add_subcommand("printer", "Printer files");
+  printer->require_subcommand(1);
+  CLI::App* const init = printer->add_subcommand(
+      "init", "Write a printer file (TOML) from what already describes the printer");
+  init->add_option("--from", config.input,
+                   "Klipper's printer.cfg, Marlin's M503, RRF's config.g, or a sliced print")
+      ->type_name("FILE")
+      ->required();
+  init->add_option("-o,--output", config.output, "Where to write, - for stdout")
+      ->type_name("OUT")
+      ->required();
+  add_overrides(*init, config);
+  init->add_flag("-q,--quiet", config.quiet, "No summary");
+  init->callback([&config] { config.command = Command::printer_init; });
+}
+
+// A resonance in a print: spacing, speed and decay of its waves.
+void add_tower(CLI::App& command, RunConfig& config) {
+  // Half the width of what a ruler tells.
+  constexpr double kShareOfSpacing = 0.05;
+  constexpr double kShareOfDecay = 0.2;
+  const auto tower = [&config]() -> identify::Tower& {
+    return config.identify.tower ? *config.identify.tower : config.identify.tower.emplace();
+  };
+  command
+      .add_option_function<double>(
+          "--wave-spacing-mm",
+          [tower](double value) {
+            tower().spacing_mm = value;
+            tower().spacing_spread_mm = kShareOfSpacing * value;
+          },
+          "Of a ringing tower: distance from wave to wave")
+      ->type_name("MM")
+      ->check(positive());
+  command
+      .add_option_function<double>(
+          "--speed-mm-s", [tower](double value) { tower().speed_mm_s = value; },
+          "Of a ringing tower: speed its walls were printed at")
+      ->type_name("V")
+      ->check(positive());
+  command
+      .add_option_function<double>(
+          "--decay",
+          [tower](double value) {
+            tower().decay = value;
+            tower().decay_spread = kShareOfDecay * (value - 1.0);
+          },
+          "Of a ringing tower: height of a wave over that of the next")
+      ->type_name("RATIO")
+      ->check(positive());
+}
+
+void add_identify(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "identify", "Find the resonances in an accelerometer's records or a ringing tower");
+  IdentifyConfig& identify = config.identify;
+  command
+      ->add_option("CSV", identify.records,
+                   "Records of Klipper, Shake&Tune or RepRapFirmware, any number of them")
+      ->type_name("");
+  command->add_option("--axis", identify.axis, "The axis they are of, if their names do not tell")
+      ->type_name("x|y")
+      ->transform(CLI::Transformer(
+          std::map<std::string, identify::Axis>{{"x", identify::Axis::x}, {"y", identify::Axis::y}},
+          CLI::ignore_case));
+  command
+      ->add_option("--freq-start", identify.sweep.start_hz, "Where the sweep began, 5 by default")
+      ->type_name("HZ")
+      ->check(positive());
+  command->add_option("--freq-end", identify.sweep.end_hz, "Where the sweep ended, 133 by default")
+      ->type_name("HZ")
+      ->check(positive());
+  add_tower(*command, config);
+  command
+      ->add_option("--report", config.report,
+                   "Write a report, FILE.json or FILE.html, or - for stdout")
+      ->type_name("FILE");
+  command->add_flag("-q,--quiet", config.quiet, "Print the lines for the printer file alone");
+  command->callback([&config] { config.command = Command::identify; });
+}
+
 tl::unexpected<Error> usage(std::string message) {
   return fail(ErrorKind::usage, std::move(message));
 }
@@ -136,7 +223,8 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  if (config.command == Command::study && name.ends_with(".html")) {
+  if ((config.command == Command::study || config.command == Command::identify) &&
+      name.ends_with(".html")) {
     return {};
   }
   if (name.ends_with(".html")) {
@@ -144,6 +232,22 @@ Status check_report(const RunConfig& config) {
   }
   if (!name.ends_with(".json")) {
     return usage(fmt::format("--report {}: the name must end in .json", name));
+  }
+  return {};
+}
+
+Status check_records(const IdentifyConfig& config) {
+  if (config.records.empty() && !config.tower) {
+    return usage("what to identify from? give records, or --wave-spacing-mm and --speed-mm-s");
+  }
+  if (config.tower && (config.tower->spacing_mm == 0.0 || config.tower->speed_mm_s == 0.0)) {
+    return usage("a ringing tower needs both --wave-spacing-mm and --speed-mm-s");
+  }
+  if (config.tower && !config.axis) {
+    return usage("say with --axis which of x and y the ringing tower's wall shows");
+  }
+  if (config.sweep.start_hz >= config.sweep.end_hz) {
+    return usage("--freq-start must be below --freq-end");
   }
   return {};
 }
@@ -167,6 +271,11 @@ Status complete(RunConfig& config) {
   if (config.command == Command::study && config.input.empty() &&
       (config.printer_file || !config.overrides.empty())) {
     return usage("--printer and --set are of a print; the corner's cases have their own settings");
+  }
+  if (config.command == Command::identify) {
+    if (Status checked = check_records(config.identify); !checked) {
+      return checked;
+    }
   }
   return config.report ? check_report(config) : Status{};
 }
@@ -216,6 +325,8 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   add_compensate(program, config);
   add_verify(program, config);
   add_inspect(program, config);
+  add_printer(program, config);
+  add_identify(program, config);
   add_study(program, config);
   program.footer(
       "Exit codes: 0 done, 1 usage or configuration, 2 bad input, 3 deviation above\n"

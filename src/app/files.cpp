@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <system_error>
@@ -78,21 +77,30 @@ int write_all(int fd, std::string_view data) {
   return 0;
 }
 
-int copy_all(int from, int to) {
-  std::array<char, kBlockBytes> block;
+tl::expected<std::string, int> read_some(int fd) {
+  std::string block(kBlockBytes, '\0');
   for (;;) {
-    const ssize_t got = ::read(from, block.data(), block.size());
-    if (got == 0) {
+    const ssize_t got = ::read(fd, block.data(), block.size());
+    if (got >= 0) {
+      block.resize(static_cast<std::size_t>(got));
+      return block;
+    }
+    if (!try_again()) {
+      return tl::unexpected(errno);
+    }
+  }
+}
+
+int copy_all(int from, int to) {
+  for (;;) {
+    const tl::expected<std::string, int> block = read_some(from);
+    if (!block) {
+      return block.error();
+    }
+    if (block->empty()) {
       return 0;
     }
-    if (got < 0) {
-      if (!try_again()) {
-        return errno;
-      }
-      continue;
-    }
-    const std::string_view data(block.data(), static_cast<std::size_t>(got));
-    if (const int error = write_all(to, data); error != 0) {
+    if (const int error = write_all(to, *block); error != 0) {
       return error;
     }
     if (ending_signal() != 0) {

@@ -54,6 +54,9 @@ class TemporaryFile {
   pid_t owner_ = 0;
 };
 
+// What can be read next, empty at the end, or the errno; EINTR as below.
+[[nodiscard]] tl::expected<std::string, int> read_some(int fd);
+
 // Both return 0 or the errno of what went wrong; EINTR only if a signal asked the program to end.
 [[nodiscard]] int write_all(int fd, std::string_view data);
 [[nodiscard]] int copy_all(int from, int to);

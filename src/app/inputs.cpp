@@ -29,6 +29,43 @@ Result<Input> Input::open(const std::string& name) {
   return input;
 }
 
+Result<machine::PrintText> Input::look() {
+  if (stream_fd() < 0) {
+    return machine::read_print_text(path(), name_);
+  }
+  while (machine::head_end(head_) == std::string::npos && head_.size() < machine::kMaxHeadBytes) {
+    const tl::expected<std::string, int> block = read_some(fd_.get());
+    if (!block) {
+      return fail(ErrorKind::input, {name_, 0},
+                  fmt::format("cannot read: {}", errno_text(block.error())));
+    }
+    if (block->empty()) {
+      break;
+    }
+    head_ += *block;
+  }
+  return machine::PrintText{.name = name_,
+                            .head = head_.substr(0, machine::head_end(head_)),
+                            .tail = {},
+                            .tail_line = 0,
+                            .is_stream = true};
+}
+
+Result<std::string> Input::read_all() {
+  std::string text;
+  for (;;) {
+    const tl::expected<std::string, int> block = read_some(fd_.get());
+    if (!block) {
+      return fail(ErrorKind::input, {name_, 0},
+                  fmt::format("cannot read: {}", errno_text(block.error())));
+    }
+    if (block->empty()) {
+      return text;
+    }
+    text += *block;
+  }
+}
+
 Status Input::make_seekable() {
   if (!is_stream_) {
     return {};
@@ -50,6 +87,7 @@ Status Input::make_seekable() {
     return fail(ErrorKind::internal, {name_, 0}, errno_text(errno));
   }
   fd_ = std::move(kept);
+  is_copied_ = true;
   return {};
 }
 

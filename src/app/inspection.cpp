@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <iterator>
+#include <optional>
 #include <string_view>
 
 #include "unflex/app/run_config.hpp"
+#include "unflex/core/number.hpp"
 #include "unflex/report/format.hpp"
 
 namespace unflex::app {
@@ -33,6 +35,10 @@ Json moves_json(const Inspection& i) {
           {"highest_accel_mm_s2", i.highest_accel_mm_s2},
           {"absolute_extrusion", i.absolute_e}};
 }
+
+// Of the table of settings.
+constexpr int kKeyColumns = 44;
+constexpr int kValueColumns = 14;
 
 void write_counts(Sink out, const Inspection& i) {
   fmt::format_to(out, "dialect       {}\n", i.dialect.empty() ? "unknown" : i.dialect);
@@ -67,6 +73,42 @@ void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
                  s.dynamics_y.damping_ratio);
 }
 
+// The report has all digits of what follows from other keys.
+std::string short_value(const std::string& value) {
+  const std::optional<double> number = parse_number(value);
+  return value.empty() ? "-" : number ? fmt::format("{:.6g}", *number) : value;
+}
+
+// Every key, its value in force when the print starts, and where that is from.
+void write_settings(Sink out, const machine::Settings& settings) {
+  fmt::format_to(out, "settings\n");
+  for (const machine::SettingRow& row : machine::rows(settings)) {
+    fmt::format_to(out, "  {:<{}} {:<{}} {}\n", row.key, kKeyColumns, short_value(row.value),
+                   kValueColumns, row.origin);
+  }
+}
+
+void write_limits_in_print(Sink out, const Inspection& i, const std::string& input) {
+  if (!i.limits.empty()) {
+    fmt::format_to(out, "set by the print itself\n");
+  }
+  for (const auto& [key, limit] : i.limits) {
+    fmt::format_to(out, "  {:<{}} {:<{}.6g} {}:{}{}\n", key, kKeyColumns, limit.first_value,
+                   kValueColumns, input, limit.first_line,
+                   limit.times > 1 ? fmt::format(", the first of {} times", limit.times) : "");
+  }
+}
+
+Json limits_json(const Inspection& i) {
+  Json json = Json::object();
+  for (const auto& [key, limit] : i.limits) {
+    json[key] = {{"first_value", limit.first_value},
+                 {"first_line", limit.first_line},
+                 {"times", limit.times}};
+  }
+  return json;
+}
+
 }  // namespace
 
 std::string inspection_text(const Inspection& inspection, const std::string& input,
@@ -76,6 +118,8 @@ std::string inspection_text(const Inspection& inspection, const std::string& inp
   write_counts(out, inspection);
   write_time(out, inspection);
   write_limits(out, inspection, settings);
+  write_settings(out, settings);
+  write_limits_in_print(out, inspection, input);
   return text;
 }
 
@@ -88,6 +132,7 @@ std::string inspection_json(const Inspection& i, const std::string& input,
   json["input"] = input;
   json["firmware"] = to_string(settings.printer.firmware);
   json["printer"] = report::settings_json(settings_in_force(settings));
+  json["limits_in_print"] = limits_json(i);
   json["dialect"] = i.dialect;
   json["print_time_s"] = {
       {"reference", i.reference_time_s}, {"moving", i.moving_time_s}, {"runs", i.run_time_s}};

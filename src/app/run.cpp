@@ -10,9 +10,11 @@
 #include <optional>
 
 #include "console.hpp"
+#include "identify.hpp"
 #include "inputs.hpp"
 #include "inspection.hpp"
 #include "outputs.hpp"
+#include "printer_init.hpp"
 #include "progress.hpp"
 #include "signals.hpp"
 #include "unflex/machine/machine.hpp"
@@ -109,16 +111,22 @@ Status spool(const RunConfig& config, Workspace& space) {
   return space.compensated ? space.compensated->make_seekable() : Status{};
 }
 
-Result<Workspace> prepare(const RunConfig& config) {
-  Result<machine::Settings> settings = machine::load(config.printer_file, config.overrides);
-  if (!settings) {
-    return tl::unexpected(settings.error());
+// Of the print that is read, not of what was made from it.
+Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
+  const Result<machine::PrintText> print = input.look();
+  if (!print) {
+    return tl::unexpected(print.error());
   }
+  return machine::load(
+      {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
+}
+
+Result<Workspace> prepare(const RunConfig& config) {
   Result<Input> input = Input::open(config.input);
   if (!input) {
     return tl::unexpected(input.error());
   }
-  Workspace space{std::move(*settings), std::move(*input), {}, {}, {}};
+  Workspace space{{}, std::move(*input), {}, {}, {}};
   if (config.command == Command::verify) {
     Result<Input> compensated = Input::open(config.output);
     if (!compensated) {
@@ -127,9 +135,11 @@ Result<Workspace> prepare(const RunConfig& config) {
     space.compensated.emplace(std::move(*compensated));
   }
   const Status ready =
-      check_distinct(config).and_then([&] { return open_outputs(config, space); }).and_then([&] {
-        return spool(config, space);
-      });
+      check_distinct(config)
+          .and_then([&] { return open_outputs(config, space); })
+          .and_then([&] { return spool(config, space); })
+          .and_then([&] { return load_settings(config, space.input); })
+          .map([&](machine::Settings settings) { space.settings = std::move(settings); });
   if (!ready) {
     return tl::unexpected(ready.error());
   }
@@ -149,6 +159,7 @@ Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
     }
     job.output_fd = *stream;
     job.input_fd = space.input.stream_fd();
+    job.input_head = space.input.head();
   } else if (space.compensated) {
     job.output = space.compensated->path();
   }
@@ -173,6 +184,9 @@ auto with_progress(const RunConfig& config, Work work)
 // Remarks about the settings come before those about the print.
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings) {
   std::vector<std::string> remarks;
+  for (const Diagnostic& note : settings.notes) {
+    remarks.push_back(to_string(note));
+  }
   for (const std::string& remark : machine::recommendations(settings)) {
     remarks.push_back(fmt::format("unflex: warning: {}", remark));
   }
@@ -352,6 +366,21 @@ Result<ExitCode> run_study(const RunConfig& config) {
                       html ? study::to_html(*outcome) : study::to_json(*outcome))
       .and_then([&] { return print_summary(config, study::to_text(*outcome)); })
       .map([] { return ExitCode::done; });
+}
+
+Result<ExitCode> run_command(const RunConfig& config) {
+  switch (config.command) {
+    case Command::inspect:
+      return run_inspect(config);
+    case Command::printer_init:
+      return run_printer_init(config);
+    case Command::identify:
+      return run_identify(config);
+    case Command::compensate:
+    case Command::verify:
+      break;
+  }
+  return run_on_prints(config);
 }
 
 // A descriptor 0, 1 or 2 that was closed would be given to the next file opened, and messages

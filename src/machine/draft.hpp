@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "unflex/core/error.hpp"
@@ -23,6 +24,8 @@ struct Draft {
   MassSpringDamper mass_y;
   // Parallel to key_table(): where the key was given last; empty while it has its default.
   std::vector<std::optional<SourcePlace>> places;
+  // The printer file, if it is the firmware's own configuration and not ours.
+  std::string foreign_file;
 };
 
 }  // namespace unflex::machine

@@ -309,7 +309,8 @@ constexpr std::array kKeys = {
         "Weight of the base's jerk against the tracking error"},
 
     Key{"emit.period_ms", &setting<&S::emit, &T::period_ms>, Bounds{.min = 0.05, .max = 50.0}, "ms",
-        "Node period: time between two points of the base's motion"},
+        "Node period: time between two points of the base's motion",
+        "1, or a twentieth of the shorter resonance's period", &derived<&S::period_ms>},
     Key{"emit.tolerance_um", &setting<&S::emit, &T::tolerance_um>,
         Bounds{.min = 0.0, .max = 1000.0}, "µm",
         "How far what a line leaves out of the base's motion may move the nozzle",

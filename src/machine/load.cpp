@@ -1,13 +1,16 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include <array>
-#include <cerrno>
-#include <fstream>
-#include <system_error>
+#include <algorithm>
 
+#include "command_reader.hpp"
 #include "draft.hpp"
+#include "file_text.hpp"
 #include "key_table.hpp"
 #include "key_values.hpp"
+#include "klipper_reader.hpp"
+#include "slicer_reader.hpp"
+#include "source_kind.hpp"
 #include "toml_reader.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
@@ -15,14 +18,16 @@
 namespace unflex::machine {
 namespace {
 
-// Printer files have a few hundred bytes; whoever passes a print by mistake hears so at once.
-constexpr std::size_t kMaxFileBytes = 1U << 20U;
+constexpr std::string_view kDefaultOrigin = "default";
 
 std::string origin_text(const std::optional<SourcePlace>& place) {
   if (!place) {
-    return "default";
+    return std::string(kDefaultOrigin);
   }
-  return place->line == 0 ? "--set" : fmt::format("{}:{}", place->file, place->line);
+  if (place->file.starts_with(kOverrideMark)) {
+    return "--set";
+  }
+  return place->line == 0 ? place->file : fmt::format("{}:{}", place->file, place->line);
 }
 
 void record_origins(Draft& draft) {
@@ -32,6 +37,87 @@ void record_origins(Draft& draft) {
       draft.settings.origins.emplace_back(key.name, origin_text(draft.places[i]));
     }
   }
+}
+
+Draft defaults() {
+  Draft draft;
+  draft.places.resize(key_table().size());
+  return draft;
+}
+
+// Stores what a printer file says, whatever kind it is of.
+Status read_printer(std::string_view text, const std::string& name, Draft& draft) {
+  const auto store = [&](const Reading& reading) {
+    draft.foreign_file = name;
+    return apply(reading, draft);
+  };
+  switch (source_kind(text)) {
+    case SourceKind::klipper:
+      return read_klipper(text, name).and_then(store);
+    case SourceKind::marlin_dump:
+      return read_marlin_dump(text, name).and_then(store);
+    case SourceKind::rrf_config:
+      return read_rrf_config(text, name).and_then(store);
+    case SourceKind::print:
+      return fail(ErrorKind::usage, {name, 0},
+                  "is a print, not a printer file; what its slicer says of the printer is read "
+                  "from the print that is compensated");
+    case SourceKind::toml:
+      break;
+  }
+  return read_toml(text, name, draft);
+}
+
+// A firmware's own configuration says all but the resonances where no input shaper is set up.
+void note_unknown_resonances(Draft& draft) {
+  std::vector<std::string_view> axes;
+  for (const std::string_view axis : {"x", "y"}) {
+    if (!draft.places[*find_key(fmt::format("dynamics.{}.freq_hz", axis))]) {
+      axes.push_back(axis);
+    }
+  }
+  if (draft.foreign_file.empty() || axes.empty()) {
+    return;
+  }
+  Diagnostic note;
+  note.place.file = draft.foreign_file;
+  note.message = fmt::format(
+      "no input shaper tells the resonance along {}; measure it and give --set "
+      "dynamics.{}.freq_hz=..., until then {} Hz is a guess",
+      fmt::join(axes, " and "), axes.front(), AxisDynamics{}.freq_hz);
+  draft.settings.notes.push_back(std::move(note));
+}
+
+void note_late_settings(const PrintText& print, std::vector<Diagnostic>& notes) {
+  const std::string_view late = slicer_with_late_settings(print);
+  if (!late.empty()) {
+    Diagnostic note;
+    note.place.file = print.name;
+    note.message = fmt::format(
+        "{} writes its settings at the end, where a pipe's come too late; give a file or --printer",
+        late);
+    notes.push_back(std::move(note));
+  }
+}
+
+Status read_sources(const Sources& sources, Draft& draft) {
+  if (sources.print != nullptr) {
+    if (Status applied = apply(read_slicer(*sources.print), draft); !applied) {
+      return applied;
+    }
+    if (!sources.printer_file) {
+      note_late_settings(*sources.print, draft.settings.notes);
+    }
+  }
+  if (sources.printer_file) {
+    const Result<std::string> text = read_printer_file(*sources.printer_file);
+    const Status read = text ? read_printer(*text, sources.printer_file->string(), draft)
+                             : Status(tl::unexpected(text.error()));
+    if (!read) {
+      return read;
+    }
+  }
+  return {};
 }
 
 Result<Settings> finish(Draft draft, const std::vector<std::string>& overrides) {
@@ -46,71 +132,77 @@ Result<Settings> finish(Draft draft, const std::vector<std::string>& overrides) 
   if (Status checked = check_consistency(draft); !checked) {
     return tl::unexpected(checked.error());
   }
+  note_unknown_resonances(draft);
   record_origins(draft);
   return draft.settings;
 }
 
-Draft defaults() {
-  Draft draft;
-  draft.places.resize(key_table().size());
-  return draft;
-}
-
-Result<std::string> read_file(const std::filesystem::path& file) {
-  const SourcePlace place{file.string(), 0};
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    return fail(ErrorKind::usage, place, "is a directory, not a printer file");
-  }
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) {
-    return fail(
-        ErrorKind::usage, place,
-        fmt::format("cannot read the printer file: {}", std::generic_category().message(errno)));
-  }
-  std::string text;
-  std::array<char, 4096> block{};
-  while (stream.read(block.data(), block.size()) || stream.gcount() > 0) {
-    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > kMaxFileBytes) {
-      return fail(ErrorKind::usage, place, "is too large for a printer file");
-    }
-  }
-  if (stream.bad()) {
-    return fail(ErrorKind::usage, place, "cannot read the printer file");
-  }
-  return text;
-}
-
-std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
-
 }  // namespace
 
-Result<Settings> load(const std::optional<std::filesystem::path>& toml_file,
-                      const std::vector<std::string>& overrides) {
-  if (!toml_file) {
-    return finish(defaults(), overrides);
-  }
-  const Result<std::string> text = read_file(*toml_file);
-  if (!text) {
-    return tl::unexpected(text.error());
-  }
-  return parse(*text, toml_file->string(), overrides);
+bool describes_printer(const PrintText& text) {
+  return text.tail_line == 1 && source_kind(text.tail) != SourceKind::print;
 }
 
-Result<Settings> parse(std::string_view toml_text, const std::string& name,
+Result<Settings> load(const Sources& sources) {
+  Draft draft = defaults();
+  if (Status read = read_sources(sources, draft); !read) {
+    return tl::unexpected(read.error());
+  }
+  return finish(std::move(draft), sources.overrides);
+}
+
+Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
+                      const std::vector<std::string>& overrides) {
+  return load(Sources{.print = nullptr, .printer_file = printer_file, .overrides = overrides});
+}
+
+Result<Settings> parse(std::string_view text, const std::string& name,
                        const std::vector<std::string>& overrides) {
   Draft draft = defaults();
-  if (Status read = read_toml(toml_text, name, draft); !read) {
+  if (Status read = read_printer(text, name, draft); !read) {
     return tl::unexpected(read.error());
   }
   return finish(std::move(draft), overrides);
 }
 
+namespace {
+
+std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
+
+// A file's name must not end the comment it stands in.
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+// Keys left at their default are comments: they stay so when the text is read again, and what
+// holds is still seen.
+std::string toml_line(const Key& key, std::string_view name, const std::string& origin,
+                      Draft& draft) {
+  const std::optional<std::string> own = own_value(key, draft);
+  const std::optional<std::string> value = value_in_force(key, draft);
+  if (own && origin == kDefaultOrigin) {
+    return fmt::format("# {} = {}\n", name, *own);
+  }
+  if (own) {
+    return fmt::format("{} = {}{}\n", name, *own, origin.empty() ? "" : "  # " + printable(origin));
+  }
+  return value ? fmt::format("# {} = {}  (unset: {})\n", name, *value, key.if_unset)
+               : fmt::format("# {} is unset: {}\n", name, key.if_unset);
+}
+
+}  // namespace
+
 std::string to_toml(const Settings& settings) {
-  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}};
-  std::string text = "schema_version = 1\n";
+  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}, .foreign_file = {}};
+  std::string text =
+      "# A printer as unflex sees it; docs/configuration.md explains each key. Behind a value "
+      "stands\n"
+      "# where it is from, and keys that are comments are at their default.\n\nschema_version = "
+      "1\n";
   std::string_view section;
+  std::size_t next_origin = 0;
   for (const Key& key : key_table()) {
     if (key.converted) {
       continue;
@@ -119,33 +211,27 @@ std::string to_toml(const Settings& settings) {
       section = section_of(key.name);
       text += fmt::format("\n[{}]\n", section);
     }
-    const std::string_view name = key.name.substr(section.size() + 1);
-    const std::optional<std::string> own = own_value(key, draft);
-    const std::optional<std::string> value = value_in_force(key, draft);
-    // Unset keys stay unset when the text is read again, and what holds instead is still seen.
-    if (own) {
-      text += fmt::format("{} = {}\n", name, *own);
-    } else if (value) {
-      text += fmt::format("# {} = {}  (unset: {})\n", name, *value, key.if_unset);
-    } else {
-      text += fmt::format("# {} is unset: {}\n", name, key.if_unset);
-    }
+    // Settings that were not read but built in memory have no origins.
+    const std::string origin = next_origin < settings.origins.size()
+                                   ? settings.origins[next_origin].second
+                                   : std::string{};
+    ++next_origin;
+    text += toml_line(key, key.name.substr(section.size() + 1), origin, draft);
   }
   return text;
 }
 
 std::vector<SettingRow> rows(const Settings& settings) {
-  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}};
+  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}, .foreign_file = {}};
   std::vector<SettingRow> rows;
   std::size_t next_origin = 0;
   for (const Key& key : key_table()) {
     if (key.converted) {
       continue;
     }
-    // Settings that were not read but built in memory have no origins.
     const std::string origin = next_origin < settings.origins.size()
                                    ? settings.origins[next_origin].second
-                                   : std::string("default");
+                                   : std::string(kDefaultOrigin);
     ++next_origin;
     rows.push_back({.key = std::string(key.name),
                     .value = value_in_force(key, draft).value_or(""),

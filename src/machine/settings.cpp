@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "unflex/machine/machine.hpp"
+#include "validate.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -171,6 +172,12 @@ double Settings::emit_accel_mm_s2() const {
   constexpr double kTimesBase = 5.0;
   return emit.accel_mm_s2.value_or(
       printer.firmware == Firmware::rrf ? kTimesBase * base_max_accel_mm_s2() : 1e6);
+}
+
+double Settings::period_ms() const {
+  constexpr double kLongest_ms = 1.0;
+  const double fastest_hz = std::max(dynamics_x.freq_hz, dynamics_y.freq_hz);
+  return emit.period_ms.value_or(std::min(kLongest_ms, 1e3 / (kGoodNodesPerPeriod * fastest_hz)));
 }
 
 double Settings::tolerance_um() const {

@@ -4,12 +4,10 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <cmath>
-#include <type_traits>
 #include <vector>
 
+#include "assign.hpp"
 #include "key_table.hpp"
-#include "key_values.hpp"
 #include "suggestion.hpp"
 #include "unflex/core/number.hpp"
 
@@ -19,107 +17,27 @@ namespace {
 constexpr int kSchemaVersion = 1;
 constexpr std::string_view kSchemaKey = "schema_version";
 
-std::string kind_of(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a table";
-    case toml::node_type::array:
-      return "an array";
-    case toml::node_type::string:
-      return fmt::format("the text \"{}\"", node.as_string()->get());
-    case toml::node_type::integer:
-    case toml::node_type::floating_point:
-      return "a number";
-    case toml::node_type::boolean:
-      return "true or false";
-    default:
-      return "a date or time";
-  }
-}
-
-std::optional<double> number_of(const toml::node& node) {
+Value value_of(const toml::node& node) {
   if (const auto* integer = node.as_integer()) {
     return static_cast<double>(integer->get());
   }
   if (const auto* floating = node.as_floating_point()) {
     return floating->get();
   }
-  return std::nullopt;
-}
-
-// One overload per type a member can have. Each returns what is wrong, or nothing.
-std::string store(const toml::node& node, const Key& key, double& target) {
-  const std::optional<double> value = number_of(node);
-  if (!value) {
-    return fmt::format("{} must be a number, not {}", key.name, kind_of(node));
+  if (const auto* flag = node.as_boolean()) {
+    return flag->get();
   }
-  if (!std::isfinite(*value)) {
-    return fmt::format("{} must be a finite number", key.name);
-  }
-  if (!key.bounds.contains(*value)) {
-    return fmt::format("{} is {}, but must be {}", key.name, *value, range_text(key));
-  }
-  target = *value;
-  return {};
-}
-
-std::string store(const toml::node& node, const Key& key, std::optional<double>& target) {
-  double value = 0.0;
-  std::string wrong = store(node, key, value);
-  if (wrong.empty()) {
-    target = value;
-  }
-  return wrong;
-}
-
-std::string store(const toml::node& node, const Key& key, bool& target) {
-  const auto* value = node.as_boolean();
-  if (value == nullptr) {
-    return fmt::format("{} must be true or false, not {}", key.name, kind_of(node));
-  }
-  target = value->get();
-  return {};
-}
-
-std::string store(const toml::node& node, const Key& key, Firmware& target) {
   if (const auto* text = node.as_string()) {
-    for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
-      if (text->get() == to_string(firmware)) {
-        target = firmware;
-        return {};
-      }
+    return text->get();
+  }
+  if (const auto* array = node.as_array()) {
+    std::vector<Value> list;
+    for (const toml::node& element : *array) {
+      list.push_back(value_of(element));
     }
+    return list;
   }
-  return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), kind_of(node));
-}
-
-std::string store(const toml::node& node, const Key& key, std::string& target) {
-  const auto* text = node.as_string();
-  if (text == nullptr || std::ranges::find(key.words, text->get()) == key.words.end()) {
-    return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), kind_of(node));
-  }
-  target = text->get();
-  return {};
-}
-
-std::string store(const toml::node& node, const Key& key, std::optional<Range>& target) {
-  const auto* array = node.as_array();
-  if (array == nullptr || array->size() != 2) {
-    return fmt::format("{} must be two numbers, as in [0, 250]", key.name);
-  }
-  Range range;
-  for (std::string wrong :
-       {store(*array->get(0), key, range.min), store(*array->get(1), key, range.max)}) {
-    if (!wrong.empty()) {
-      return wrong;
-    }
-  }
-  if (!(range.min < range.max)) {
-    return fmt::format("{} is [{}, {}], but the first number must be the smaller", key.name,
-                       range.min, range.max);
-  }
-  target = range;
-  return {};
+  return Value::other(node.is_table() ? "a table" : "a date or time");
 }
 
 std::string check_schema(const toml::node& node) {
@@ -137,14 +55,7 @@ std::string store(const toml::node& node, const std::string& name, const SourceP
   if (name == kSchemaKey) {
     return check_schema(node);
   }
-  const std::optional<std::size_t> index = find_key(name);
-  if (!index) {
-    return is_section(name) ? fmt::format("'{}' is a section, not a key", name)
-                            : fmt::format("unknown key '{}'{}", name, suggest_key(name));
-  }
-  const Key& key = key_table()[*index];
-  draft.places[*index] = place;
-  return std::visit([&](auto member) { return store(node, key, member(draft)); }, key.member);
+  return assign(name, value_of(node), place, draft);
 }
 
 // A value or an empty table of the file with its dotted name.
@@ -227,7 +138,7 @@ Status read_toml(std::string_view text, const std::string& name, Draft& draft) {
 }
 
 Status apply_override(const std::string& text, Draft& draft) {
-  const SourcePlace place{fmt::format("--set {}", text), 0};
+  const SourcePlace place{fmt::format("{}{}", kOverrideMark, text), 0};
   const std::size_t equals = text.find('=');
   const std::string key(trim(std::string_view(text).substr(0, equals)));
   if (equals == std::string::npos || key.empty()) {

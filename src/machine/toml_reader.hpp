@@ -8,6 +8,9 @@
 
 namespace unflex::machine {
 
+// What the place of an override begins with.
+inline constexpr std::string_view kOverrideMark = "--set ";
+
 // Reads a printer file into the draft; `name` is its name in messages.
 [[nodiscard]] Status read_toml(std::string_view text, const std::string& name, Draft& draft);
 

@@ -19,7 +19,6 @@ namespace {
 constexpr double kEmitAccelFactor = 5.0;
 // Fewer nodes per period of resonance than this and the optimum is worse than a ZV shaper's.
 constexpr double kLeastNodesPerPeriod = 10.0;
-constexpr double kGoodNodesPerPeriod = 20.0;
 
 std::optional<SourcePlace> place_of(const Draft& draft, std::string_view key) {
   const std::optional<std::size_t> index = find_key(key);
@@ -202,11 +201,11 @@ double fastest_freq_hz(const Settings& settings) {
 Status check_grid(const Draft& draft) {
   const Settings& s = draft.settings;
   const double longest_ms = 1e3 / (kLeastNodesPerPeriod * fastest_freq_hz(s));
-  if (s.emit.period_ms > longest_ms) {
+  if (s.period_ms() > longest_ms) {
     return conflict(draft, {"emit.period_ms", "dynamics.x.freq_hz", "dynamics.y.freq_hz"},
                     fmt::format("emit.period_ms is {}, too long for a resonance at {:.4g} Hz; "
                                 "at most {:.3g}, better {:.3g}",
-                                s.emit.period_ms, fastest_freq_hz(s), longest_ms,
+                                s.period_ms(), fastest_freq_hz(s), longest_ms,
                                 longest_ms * kLeastNodesPerPeriod / kGoodNodesPerPeriod));
   }
   if (s.solve.overlap_s > s.solve.window_s) {
@@ -237,10 +236,10 @@ Status check_consistency(const Draft& draft) {
 std::vector<std::string> recommendations(const Settings& settings) {
   std::vector<std::string> remarks;
   const double good_ms = 1e3 / (kGoodNodesPerPeriod * fastest_freq_hz(settings));
-  if (settings.emit.period_ms > good_ms) {
+  if (settings.period_ms() > good_ms) {
     remarks.push_back(
         fmt::format("emit.period_ms is {}; at {:.4g} Hz {:.3g} or less follows the path better",
-                    settings.emit.period_ms, fastest_freq_hz(settings), good_ms));
+                    settings.period_ms(), fastest_freq_hz(settings), good_ms));
   }
   return remarks;
 }

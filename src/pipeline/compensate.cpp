@@ -409,7 +409,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       return tl::unexpected(pool.error());
     }
     CpuSlots slots(job.workers);
-    FdSource source(job.input_fd, progress, slots);
+    FdSource source(job.input_head, job.input_fd, progress, slots);
     FdSink sink(job.output_fd, progress, slots);
     std::istream in_stream(&source);
     std::ostream out_stream(&sink);

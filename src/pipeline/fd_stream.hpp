@@ -14,8 +14,11 @@ namespace unflex::pipeline {
 // The reader gives its slot back while it waits. Ends early when cancelled.
 class FdSource final : public std::streambuf {
  public:
-  FdSource(int fd, const Progress& progress, CpuSlots& slots)
-      : fd_(fd), progress_(&progress), slots_(&slots) {}
+  // head: what of the text has been read already.
+  FdSource(std::string head, int fd, const Progress& progress, CpuSlots& slots)
+      : fd_(fd), progress_(&progress), slots_(&slots), block_(std::move(head)) {
+    setg(block_.data(), block_.data(), block_.data() + block_.size());
+  }
 
  protected:
   int_type underflow() override;

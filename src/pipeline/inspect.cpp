@@ -14,6 +14,7 @@
 #include "unflex/compensate/run.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
+#include "unflex/machine/limit_keys.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::pipeline {
@@ -116,6 +117,13 @@ class Inspector {
       slicers_ = slicer_named(event.line.content());
     }
     count_kept_moves(event, firmware_, result_->kept_moves);
+    for (const machine::LimitValue& limit : machine::limit_values(event.limits)) {
+      LimitInPrint& known = result_->limits[limit.key];
+      if (known.times++ == 0) {
+        known.first_value = limit.value;
+        known.first_line = event.line.number;
+      }
+    }
     plan(event);
   }
 

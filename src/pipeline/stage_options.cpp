@@ -26,7 +26,7 @@ constexpr double kBurst_s = 0.1;
 constexpr double kShortest = 0.4;
 
 double min_line_s(const machine::Settings& settings) {
-  return std::max(settings.emit.period_ms * 1e-3, kClockRoom / settings.max_lines_per_s());
+  return std::max(settings.period_ms() * 1e-3, kClockRoom / settings.max_lines_per_s());
 }
 
 double grid_mm(const machine::Settings& settings) {
@@ -170,7 +170,7 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
   compensate::Setup setup;
   setup.x = axis_setup(settings.dynamics_x, settings.printer.travel_x_mm, settings);
   setup.y = axis_setup(settings.dynamics_y, settings.printer.travel_y_mm, settings);
-  setup.period_s = settings.emit.period_ms * 1e-3;
+  setup.period_s = settings.period_ms() * 1e-3;
   setup.lead_in_s = settings.solve.lead_in_ms * 1e-3;
   setup.tail_s = settings.tail_s();
   setup.window_s = settings.solve.window_s;
@@ -219,7 +219,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
     options.lines.burst_lines = static_cast<int>(settings.max_lines_per_s() * kBurst_s);
     options.lines.burst_s = kClockRoom * kBurst_s;
     options.lines.min_line_s =
-        std::max(settings.emit.period_ms * 1e-3, kShortest / settings.max_lines_per_s());
+        std::max(settings.period_ms() * 1e-3, kShortest / settings.max_lines_per_s());
   }
   if (settings.printer.firmware == Firmware::marlin) {
     // Rounding may take a step off either end.

@@ -158,7 +158,7 @@ INSTANTIATE_TEST_SUITE_P(
         Failure{"PrinterFileIsGcode",
                 {"inspect", "in.gcode", "--printer", "in.gcode"},
                 1,
-                "in.gcode:1: not valid TOML: "}),
+                "in.gcode: is a print, not a printer file"}),
     [](const auto& failure) { return failure.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(

@@ -37,6 +37,7 @@ pipeline::Inspection sample() {
   i.absolute_e = true;
   i.lowest_accel_mm_s2 = 500.0;
   i.highest_accel_mm_s2 = 1500.0;
+  i.limits = {{"limits.print_accel_mm_s2", {1250.0, 7, 3}}};
   i.warnings = {"in.gcode:3: warning: something"};
   return i;
 }
@@ -50,6 +51,21 @@ TEST(InspectionText, ShowsWhatWasUnderstood) {
   EXPECT_THAT(text, HasSubstr("200 moves stay as they are: Z move"));
   EXPECT_THAT(text, HasSubstr("500 to 1500 mm/s²"));
   EXPECT_THAT(text, HasSubstr("X 45 Hz, ζ 0.06"));
+}
+
+TEST(InspectionText, ShowsEveryValueAndWhereItIsFrom) {
+  const auto settings =
+      machine::parse("[limits]\nmax_accel_mm_s2 = 3000\n", "p.toml", {"base.max_accel_mm_s2=9000"});
+  ASSERT_TRUE(settings);
+  const std::string text = inspection_text(sample(), "in.gcode", *settings);
+  EXPECT_THAT(text, ::testing::ContainsRegex("\n  limits.max_accel_mm_s2 +3000 +p.toml:2\n"));
+  EXPECT_THAT(text, ::testing::ContainsRegex("\n  base.max_accel_mm_s2 +9000 +--set\n"));
+  EXPECT_THAT(text, ::testing::ContainsRegex("\n  base.max_velocity_mm_s +600 +default\n"));
+  EXPECT_THAT(text, ::testing::ContainsRegex(
+                        "\n  limits.print_accel_mm_s2 +1250 +in.gcode:7, the first of 3 times\n"));
+  for (const machine::SettingRow& row : machine::rows(*settings)) {
+    EXPECT_THAT(text, HasSubstr("\n  " + row.key + " "));
+  }
 }
 
 TEST(InspectionJson, HoldsThePrintTimeAndTheSettings) {

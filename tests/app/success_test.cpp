@@ -158,7 +158,8 @@ TEST_F(SmallPrint, IsInspectedWithTheReportOnStdoutAlone) {
 }
 
 TEST_F(SmallPrint, BringsAWarningAboutALongPeriodOnly) {
-  const Outcome outcome = run({"inspect", "in.gcode", "--set", "dynamics.x.freq_hz=60"});
+  const Outcome outcome =
+      run({"inspect", "in.gcode", "--set", "dynamics.x.freq_hz=60", "--set", "emit.period_ms=1"});
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_EQ(outcome.err,
             "unflex: warning: emit.period_ms is 1; at 60 Hz 0.833 or less follows the path "

@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/identify/mode.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::app {
 
-enum class Command { compensate, verify, inspect, study };
+enum class Command { compensate, verify, inspect, printer_init, identify, study };
 
 // The codes the program exits with, see docs/cli.md.
 enum class ExitCode : int {
@@ -25,12 +26,21 @@ enum class ExitCode : int {
 // The name that stands for stdin or stdout.
 inline constexpr std::string_view kStandardStream = "-";
 
+// What `identify` works on.
+struct IdentifyConfig {
+  std::vector<std::string> records;
+  std::optional<identify::Axis> axis;  // of all of them; unset: as each tells
+  identify::Sweep sweep;
+  std::optional<identify::Tower> tower;
+};
+
 struct RunConfig {
   Command command = Command::compensate;
-  // compensate, inspect: IN; verify: the file given to --against; study: IN, empty for the thesis'
-  // cases
+  // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
+  // empty for the thesis' cases
   std::string input;
-  std::string output;  // compensate: -o, or the input with --in-place; verify: OUT
+  // compensate, printer init: -o, or the input with --in-place; verify: OUT
+  std::string output;
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"
@@ -39,6 +49,7 @@ struct RunConfig {
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;
   bool quiet = false;
+  IdentifyConfig identify;
   std::vector<std::string> cases;  // study: names, none for all
 };
 

@@ -193,6 +193,8 @@ class Interpreter {
   [[nodiscard]] Event interpret(Line line);
 
   [[nodiscard]] const ModalState& state() const { return state_; }
+  // With what M207 and the like have changed.
+  [[nodiscard]] const InterpreterOptions& options() const { return options_; }
 
  private:
   // One handler per command or family of commands; each reads command_ and fills the event.

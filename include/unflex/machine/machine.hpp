@@ -12,6 +12,7 @@
 
 #include "unflex/core/error.hpp"
 #include "unflex/core/firmware.hpp"
+#include "unflex/machine/print_text.hpp"
 
 namespace unflex::machine {
 
@@ -116,7 +117,8 @@ struct SolveSettings {
 };
 
 struct EmitSettings {
-  double period_ms = 1.0;  // node period
+  // Node period; unset: 1 ms, or a twentieth of the faster resonance's period if that is shorter.
+  std::optional<double> period_ms;
   // Of what a line's shape may move the nozzle by. Unset: 0.3 µm at 45 Hz, in proportion to the
   // lower frequency, so that lines per second hardly depend on it.
   std::optional<double> tolerance_um;
@@ -146,6 +148,8 @@ struct Settings {
   // Where each key in force came from ("limits.max_accel_mm_s2" → "printer.toml:7", "--set",
   // "default"), one entry for every known key, in the order of the documentation.
   std::vector<std::pair<std::string, std::string>> origins;
+  // What the user should know about what was read.
+  std::vector<Diagnostic> notes;
 
   // The values behind unset options, by the firmware's own formulas and defaults.
   [[nodiscard]] std::array<double, 4> axis_max_velocity_mm_s() const;
@@ -166,23 +170,40 @@ struct Settings {
   [[nodiscard]] double base_max_velocity_mm_s() const;
   [[nodiscard]] double base_max_accel_mm_s2() const;
   [[nodiscard]] double tail_s() const;
+  [[nodiscard]] double period_ms() const;
   [[nodiscard]] double tolerance_um() const;
   [[nodiscard]] double emit_accel_mm_s2() const;
   [[nodiscard]] double shaper_freq_x_hz() const;
   [[nodiscard]] double shaper_freq_y_hz() const;
 };
 
-// Reads the settings: defaults, then the TOML text (if any), then the overrides "key=value" in
-// their order, then validation. Unknown keys, wrong types and values out of range are errors of
-// kind usage with their place ("printer.toml:7: …", or the text of the override) and a remedy.
-[[nodiscard]] Result<Settings> load(const std::optional<std::filesystem::path>& toml_file,
+// Where settings come from.
+struct Sources {
+  const PrintText* print = nullptr;                   // the print they are for, if it is at hand
+  std::optional<std::filesystem::path> printer_file;  // --printer
+  std::vector<std::string> overrides;                 // --set, "key=value"
+};
+
+// Reads the settings: defaults, then what the print's slicer says of the printer, then the printer
+// file, then the overrides in their order, then validation. The printer file is told by its
+// content: unflex's own TOML, Klipper's printer.cfg with what it includes, what Marlin answers to
+// M503, or RepRapFirmware's config.g. Unknown keys, wrong types and values out of range are errors
+// of kind usage with their place ("printer.toml:7: …", or the text of the override) and a remedy.
+[[nodiscard]] Result<Settings> load(const Sources& sources);
+
+// Whether a file that was looked at describes a printer itself, and is no print.
+[[nodiscard]] bool describes_printer(const PrintText& text);
+
+// The same without a print.
+[[nodiscard]] Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
                                     const std::vector<std::string>& overrides);
 
-// The same for a text; name stands for the file in messages.
-[[nodiscard]] Result<Settings> parse(std::string_view toml_text, const std::string& name,
+// The same for the text of a printer file; name stands for the file in messages.
+[[nodiscard]] Result<Settings> parse(std::string_view text, const std::string& name,
                                      const std::vector<std::string>& overrides);
 
-// Every key with its value in force as TOML text, for inspect and the report.
+// Every key with its value in force as TOML text, and where it came from as a comment. Read again it
+// gives the same values.
 [[nodiscard]] std::string to_toml(const Settings& settings);
 
 // (key, value in force as TOML writes it, origin) for every key, in the order of the documentation.

@@ -27,6 +27,7 @@ struct Job {
   std::filesystem::path output;  // compensate: written here, not atomically
   // compensate: read and written as the text comes, instead of the files, where not negative.
   int input_fd = -1;
+  std::string input_head = {};  // of input_fd, read already
   int output_fd = -1;
   std::string output_name;
   machine::Settings settings;
@@ -40,6 +41,13 @@ struct Job {
 
 // Verifies `job.output` against `job.input`.
 [[nodiscard]] Result<report::Report> verify(const Job& job, Progress& progress);
+
+// A limit that the print's own commands set.
+struct LimitInPrint {
+  double first_value = 0.0;
+  std::size_t first_line = 0;
+  std::size_t times = 0;  // how often it is set
+};
 
 // What was understood of a file.
 struct Inspection {
@@ -65,6 +73,7 @@ struct Inspection {
   double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0, z_max_mm = 0.0;
   bool absolute_e = false;        // M82 in force for most extrusions
   double lowest_accel_mm_s2 = 0.0, highest_accel_mm_s2 = 0.0;  // in force during moves
+  std::map<std::string, LimitInPrint> limits;  // by key: "limits.max_accel_mm_s2"
   std::vector<std::string> warnings;
 };
 

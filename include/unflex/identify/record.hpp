@@ -1,0 +1,55 @@
+// What people record of a printer's resonances, as they have it in files.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+
+namespace unflex::identify {
+
+enum class Axis { x, y };
+
+[[nodiscard]] char letter(Axis axis);
+
+// Samples of an accelerometer at even times.
+struct Recording {
+  double rate_hz = 0.0;
+  std::array<std::vector<double>, 3> accel;  // X, Y, Z, of equal length, in any unit
+};
+
+// Power spectral densities as Klipper computes them from a recording (shaper_calibrate.py): Welch's
+// method over Kaiser windows of 1 / step_hz.
+struct Spectrum {
+  double step_hz = 0.0;                        // density k is at k · step_hz
+  std::array<std::vector<double>, 3> density;  // X, Y, Z, in any unit
+  // SHAPER_CALIBRATE divides by the frequency before it writes.
+  bool is_normalized = false;
+};
+
+struct DataSet {
+  std::string name;  // the file's, and for one of several in a file its own
+  std::variant<Recording, Spectrum> data;
+  std::optional<Axis> axis;  // that the name tells
+  bool is_diagonal = false;  // a test of a belt, neither along X nor along Y
+  std::vector<std::string> notes;
+};
+
+// Reads the text of a file:
+//   Klipper's raw recording, also Shake&Tune's   #time,accel_x,accel_y,accel_z
+//   Klipper's spectrum                           freq,psd_x,psd_y,psd_z,psd_xyz[,shapers:,…], or
+//   with
+//                                                one column for each of several points
+//   RepRapFirmware's M956                        Sample,X,Y,Z … Rate 1344, overflows 0
+// Errors are of kind input: another header, a line that is no row of numbers, too few rows.
+[[nodiscard]] Result<std::vector<DataSet>> parse_csv(std::string_view text,
+                                                     const std::string& file);
+
+// The axis a file's name tells: "raw_data_x_1.csv", "resonances_axis=0.000,1.000,0.000.csv".
+[[nodiscard]] std::optional<Axis> axis_in_name(std::string_view file);
+
+}  // namespace unflex::identify

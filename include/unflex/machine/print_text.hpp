@@ -1,0 +1,30 @@
+// What of a print can be seen before it is read: where slicers write what they know of the printer.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "unflex/core/error.hpp"
+
+namespace unflex::machine {
+
+struct PrintText {
+  std::string name;           // for messages
+  std::string head;           // whole lines from the first to the first move
+  std::string tail;           // whole lines to the last; empty where it is not to be had
+  std::size_t tail_line = 0;  // number of the tail's first line
+  bool is_stream = false;     // the tail comes too late
+};
+
+// The head and the tail of a file. Errors are of kind input.
+[[nodiscard]] Result<PrintText> read_print_text(const std::filesystem::path& file,
+                                                const std::string& name);
+
+// Where the head of a print ends that begins like `text`: behind the line of the first move
+// (G0 to G3), or npos while that has not come. No head is longer than kMaxHeadBytes.
+inline constexpr std::size_t kMaxHeadBytes = std::size_t{1} << 20U;
+[[nodiscard]] std::size_t head_end(std::string_view text);
+
+}  // namespace unflex::machine

@@ -1,0 +1,155 @@
+#include "identify.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "console.hpp"
+#include "files.hpp"
+#include "identification.hpp"
+#include "inputs.hpp"
+#include "outputs.hpp"
+
+namespace unflex::app {
+namespace {
+
+void warn(Identification& all, const std::string& name, const std::string& message) {
+  Diagnostic warning;
+  warning.place.file = name;
+  warning.message = message;
+  all.warnings.push_back(to_string(warning));
+}
+
+Result<std::string> read_record(const std::string& name) {
+  Result<Input> input = Input::open(name);
+  return input ? input->read_all() : Result<std::string>(tl::unexpected(input.error()));
+}
+
+// Which axis a record is of: as told, as its name says, or along which it moved the more.
+Result<identify::Axis> axis_of(const IdentifyConfig& config, const identify::DataSet& set,
+                               Identification& all) {
+  if (config.axis) {
+    return *config.axis;
+  }
+  if (set.is_diagonal) {
+    return fail(ErrorKind::input, {set.name, 0},
+                "is a test along a diagonal, of a belt; unflex needs one along X or Y, or --axis");
+  }
+  if (set.axis) {
+    return *set.axis;
+  }
+  const identify::Axis axis = dominant_axis(set);
+  warn(all, set.name,
+       fmt::format("its name does not tell the axis; taken for {}, along which it moved the most; "
+                   "--axis says otherwise",
+                   letter(axis)));
+  return axis;
+}
+
+Status add_set(const IdentifyConfig& config, const identify::DataSet& set, Identification& all) {
+  for (const std::string& note : set.notes) {
+    warn(all, set.name, note);
+  }
+  const Result<identify::Axis> axis = axis_of(config, set, all);
+  if (!axis) {
+    return tl::unexpected(axis.error());
+  }
+  Result<identify::Mode> mode = fit(set, *axis, config.sweep);
+  if (!mode) {
+    return tl::unexpected(mode.error());
+  }
+  for (const std::string& warning : mode->warnings) {
+    warn(all, set.name, warning);
+  }
+  all.records.push_back({set.name, *axis, std::move(*mode)});
+  return {};
+}
+
+Status add_file(const IdentifyConfig& config, const std::string& name, Identification& all) {
+  const Result<std::string> text = read_record(name);
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  const Result<std::vector<identify::DataSet>> sets = identify::parse_csv(*text, name);
+  if (!sets) {
+    return tl::unexpected(sets.error());
+  }
+  for (const identify::DataSet& set : *sets) {
+    if (Status added = add_set(config, set, all); !added) {
+      return added;
+    }
+  }
+  return {};
+}
+
+Status add_tower(const IdentifyConfig& config, Identification& all) {
+  constexpr std::string_view kName = "ringing tower";
+  Result<identify::Mode> mode = fit_tower(*config.tower);
+  if (!mode) {
+    return tl::unexpected(mode.error());
+  }
+  for (const std::string& warning : mode->warnings) {
+    warn(all, std::string(kName), warning);
+  }
+  all.records.push_back(
+      {std::string(kName), config.axis.value_or(identify::Axis::x), std::move(*mode)});
+  return {};
+}
+
+Result<Identification> identify_all(const IdentifyConfig& config) {
+  Identification all;
+  for (const std::string& name : config.records) {
+    if (Status added = add_file(config, name, all); !added) {
+      return tl::unexpected(added.error());
+    }
+  }
+  if (config.tower) {
+    if (Status added = add_tower(config, all); !added) {
+      return tl::unexpected(added.error());
+    }
+  }
+  std::map<identify::Axis, std::vector<identify::Mode>> by_axis;
+  for (const IdentifiedRecord& record : all.records) {
+    by_axis[record.axis].push_back(record.mode);
+  }
+  for (const auto& [axis, modes] : by_axis) {
+    all.axes[axis] = combine(modes);
+  }
+  return all;
+}
+
+Status write_report(const std::string& name, const Identification& all) {
+  Result<Output> output = Output::open(name);
+  if (!output) {
+    return tl::unexpected(output.error());
+  }
+  return output
+      ->write(name.ends_with(".html") ? identification_html(all) : identification_json(all))
+      .and_then([&] { return output->commit(); });
+}
+
+}  // namespace
+
+Result<ExitCode> run_identify(const RunConfig& config) {
+  const Result<Identification> all = identify_all(config.identify);
+  if (!all) {
+    return tl::unexpected(all.error());
+  }
+  print_lines(all->warnings, all->warnings.size(), "warnings");
+  if (config.report) {
+    if (Status written = write_report(*config.report, *all); !written) {
+      return tl::unexpected(written.error());
+    }
+  }
+  // Without figures and drawings what is left is the lines to paste.
+  if (config.report != kStandardStream) {
+    const int error =
+        write_all(STDOUT_FILENO, config.quiet ? snippet(*all) : identification_text(*all));
+    if (error != 0) {
+      return fail(ErrorKind::internal, {"stdout", 0},
+                  fmt::format("cannot write: {}", errno_text(error)));
+    }
+  }
+  return ExitCode::done;
+}
+
+}  // namespace unflex::app

@@ -1,0 +1,70 @@
+#include "printer_init.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "console.hpp"
+#include "files.hpp"
+#include "inputs.hpp"
+#include "outputs.hpp"
+#include "unflex/machine/machine.hpp"
+
+namespace unflex::app {
+namespace {
+
+// The printer as the file describes it, or as the print's slicer does.
+Result<machine::Settings> settings_from(const RunConfig& config, Input& input) {
+  if (Status copied = input.make_seekable(); !copied) {
+    return tl::unexpected(copied.error());
+  }
+  const Result<machine::PrintText> text = input.look();
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  return machine::describes_printer(*text)
+             ? machine::parse(text->tail, config.input, config.overrides)
+             : machine::load({.print = &*text, .printer_file = {}, .overrides = config.overrides});
+}
+
+Status write_settings(const RunConfig& config, const machine::Settings& settings) {
+  Result<Output> output = Output::open(config.output);
+  if (!output) {
+    return tl::unexpected(output.error());
+  }
+  return output->write(machine::to_toml(settings)).and_then([&] { return output->commit(); });
+}
+
+Status print_summary(const RunConfig& config) {
+  if (config.quiet || config.output == kStandardStream) {
+    return {};
+  }
+  const int error = write_all(STDOUT_FILENO, fmt::format("{} → {}\n", config.input, config.output));
+  return error == 0 ? Status{}
+                    : Status(fail(ErrorKind::internal, {"stdout", 0},
+                                  fmt::format("cannot write: {}", errno_text(error))));
+}
+
+}  // namespace
+
+Result<ExitCode> run_printer_init(const RunConfig& config) {
+  Result<Input> input = Input::open(config.input);
+  if (!input) {
+    return tl::unexpected(input.error());
+  }
+  if (config.output != kStandardStream && same_file(config.output, config.input)) {
+    return fail(ErrorKind::usage, {config.output, 0},
+                "is what it is made from too; give it a name of its own");
+  }
+  const Result<machine::Settings> settings = settings_from(config, *input);
+  if (!settings) {
+    return tl::unexpected(settings.error());
+  }
+  for (const Diagnostic& note : settings->notes) {
+    print_line(to_string(note));
+  }
+  return write_settings(config, *settings).and_then([&] { return print_summary(config); }).map([] {
+    return ExitCode::done;
+  });
+}
+
+}  // namespace unflex::app

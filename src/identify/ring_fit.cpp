@@ -1,0 +1,186 @@
+// Once the base is at rest the nozzle's acceleration is
+//   y(t) = e^(−ζωt) (a cos ω_d t + b sin ω_d t) + c,   ω_d = ω√(1−ζ²),
+// c being gravity. When that begins is not recorded: it is the earliest moment after the peak from
+// which on this fits about as well as from any later one.
+#include "ring_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "fourier.hpp"
+#include "least_squares.hpp"
+#include "response.hpp"
+
+namespace unflex::identify {
+namespace {
+
+constexpr Eigen::Index kFewestSamples = 48;
+constexpr double kLowest_hz = 5.0;
+constexpr double kHighest_hz = 250.0;
+// What decays faster is over before it has swung to and fro.
+constexpr double kMostDamping = 0.4;
+
+// ln f, ln ζ, a, b, c.
+Eigen::ArrayXd ringing(const Eigen::ArrayXd& time_s, const Eigen::VectorXd& p) {
+  const double damping_ratio = std::min(std::exp(p[1]), 0.95);
+  const double omega = 2.0 * std::numbers::pi * std::exp(p[0]);
+  const double omega_d = omega * std::sqrt(1.0 - damping_ratio * damping_ratio);
+  const Eigen::ArrayXd envelope = (-damping_ratio * omega * time_s).exp();
+  return envelope * (p[2] * (omega_d * time_s).cos() + p[3] * (omega_d * time_s).sin()) + p[4];
+}
+
+// The best a, b, c for a frequency and a damping ratio.
+Eigen::VectorXd with_amplitudes(const Eigen::ArrayXd& time_s, const Eigen::ArrayXd& data,
+                                double freq_hz, double damping_ratio) {
+  Eigen::VectorXd p(5);
+  p << std::log(freq_hz), std::log(damping_ratio), 0.0, 0.0, 0.0;
+  Eigen::MatrixXd columns(data.size(), 3);
+  for (int column = 0; column < 3; ++column) {
+    Eigen::VectorXd unit = p;
+    unit[2 + column] = 1.0;
+    columns.col(column) = ringing(time_s, unit).matrix();
+  }
+  p.tail(3) = columns.colPivHouseholderQr().solve(data.matrix());
+  return p;
+}
+
+std::optional<double> strongest_hz(const Eigen::ArrayXd& data, double rate_hz) {
+  // A few oscillations are a broad peak: zeros behind them show where its top is.
+  const auto length = static_cast<std::size_t>(std::max<Eigen::Index>(4096, data.size()));
+  std::vector<double> padded(length, 0.0);
+  const double mean = data.tail(data.size() / 4).mean();
+  for (Eigen::Index i = 0; i < data.size(); ++i) {
+    padded[static_cast<std::size_t>(i)] = data[i] - mean;
+  }
+  const EnergySpectrum spectrum = energy_spectrum(padded, rate_hz);
+  const auto first = static_cast<Eigen::Index>(std::ceil(kLowest_hz / spectrum.step_hz));
+  const auto last = std::min(static_cast<Eigen::Index>(kHighest_hz / spectrum.step_hz),
+                             spectrum.energy.size() - 1);
+  if (last <= first) {
+    return std::nullopt;
+  }
+  Eigen::Index at = 0;
+  spectrum.energy.segment(first, last - first).maxCoeff(&at);
+  return static_cast<double>(first + at) * spectrum.step_hz;
+}
+
+struct Ringing {
+  LeastSquares fit;
+  double spread = 0.0;  // standard deviation of the residual
+  Eigen::ArrayXd time_s;
+  Eigen::ArrayXd data;
+
+  [[nodiscard]] double amplitude() const {
+    return std::hypot(fit.parameters[2], fit.parameters[3]);
+  }
+};
+
+std::optional<Ringing> fit_from(const Eigen::ArrayXd& all, Eigen::Index start, double rate_hz) {
+  Ringing result;
+  result.data = all.tail(all.size() - start);
+  result.time_s = Eigen::ArrayXd::LinSpaced(result.data.size(), 0.0,
+                                            static_cast<double>(result.data.size() - 1) / rate_hz);
+  const std::optional<double> guess_hz = strongest_hz(result.data, rate_hz);
+  if (!guess_hz) {
+    return std::nullopt;
+  }
+  const Eigen::ArrayXd weights = Eigen::ArrayXd::Ones(result.data.size());
+  const Model model = [&](const Eigen::VectorXd& p) { return ringing(result.time_s, p); };
+  bool is_first = true;
+  for (const double damping_ratio : {0.03, 0.12}) {
+    LeastSquares fit =
+        minimise(model, result.data, weights,
+                 with_amplitudes(result.time_s, result.data, *guess_hz, damping_ratio));
+    if (is_first || fit.weighted_sum < result.fit.weighted_sum) {
+      result.fit = std::move(fit);
+      is_first = false;
+    }
+  }
+  const double freq_hz = std::exp(result.fit.parameters[0]);
+  result.spread = std::sqrt(result.fit.weighted_sum / static_cast<double>(result.data.size() - 5));
+  const bool usable = freq_hz > kLowest_hz && freq_hz < kHighest_hz &&
+                      std::exp(result.fit.parameters[1]) < kMostDamping;
+  return usable ? std::optional(std::move(result)) : std::nullopt;
+}
+
+// Fits from places between the peak and two thirds of what follows; the first that is as good as
+// the best.
+std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, double rate_hz) {
+  constexpr Eigen::Index kStarts = 24;
+  constexpr double kAboveNoise = 3.0;
+  const double rest = all.tail(all.size() / 5).mean();
+  Eigen::Index peak = 0;
+  (all - rest).abs().maxCoeff(&peak);
+  std::vector<Ringing> found;
+  const Eigen::Index room = (all.size() - peak) * 2 / 3;
+  for (Eigen::Index i = 0; i < kStarts; ++i) {
+    const Eigen::Index start = peak + room * i / kStarts;
+    if (all.size() - start < kFewestSamples) {
+      break;
+    }
+    std::optional<Ringing> candidate = fit_from(all, start, rate_hz);
+    if (candidate && candidate->amplitude() > kAboveNoise * candidate->spread) {
+      found.push_back(std::move(*candidate));
+    }
+  }
+  const auto best = std::ranges::min_element(found, {}, &Ringing::spread);
+  // Within what chance makes of the best one's spread.
+  const auto first = std::ranges::find_if(found, [&](const Ringing& r) {
+    const double chance = 2.5 / std::sqrt(2.0 * static_cast<double>(r.data.size()));
+    return r.spread <= (1.0 + chance) * best->spread;
+  });
+  return first == found.end() ? std::nullopt : std::optional(std::move(*first));
+}
+
+}  // namespace
+
+Result<Mode> fit_ringing(const std::vector<double>& samples, double rate_hz) {
+  const Eigen::Map<const Eigen::ArrayXd> given(samples.data(),
+                                               static_cast<Eigen::Index>(samples.size()));
+  const double height = (given - given.mean()).abs().maxCoeff();
+  if (given.size() < 2 * kFewestSamples || !(height > 0.0)) {
+    return fail(ErrorKind::input, "there is no motion in it, or it is too short");
+  }
+  const std::optional<Ringing> ring = earliest_good((given - given.mean()) / height, rate_hz);
+  if (!ring) {
+    return fail(
+        ErrorKind::input,
+        "no ringing stands out of the noise; record a sweep, or the stop after a fast move");
+  }
+  const Eigen::ArrayXd weights = Eigen::ArrayXd::Ones(ring->data.size());
+  const auto period = std::max<Eigen::Index>(
+      1, static_cast<Eigen::Index>(rate_hz / std::exp(ring->fit.parameters[0])));
+  const Eigen::MatrixXd alone = sandwich(ring->fit, weights, 1);
+  const Eigen::MatrixXd together = sandwich(ring->fit, weights, period);
+  Mode mode;
+  mode.method = Method::ringing;
+  mode.freq_hz =
+      estimate_of(std::exp(ring->fit.parameters[0]), std::max(alone(0, 0), together(0, 0)));
+  mode.damping_ratio =
+      estimate_of(std::exp(ring->fit.parameters[1]), std::max(alone(1, 1), together(1, 1)));
+  // Of the stretch in which it rings, not of the noise behind it.
+  const double time_constant_s =
+      1.0 / (2.0 * std::numbers::pi * mode.freq_hz.value * mode.damping_ratio.value);
+  const auto shown =
+      std::clamp<Eigen::Index>(static_cast<Eigen::Index>(4.0 * time_constant_s * rate_hz),
+                               kFewestSamples, ring->data.size());
+  const Eigen::ArrayXd signal = ring->data.head(shown) - ring->fit.parameters[4];
+  mode.unexplained = std::min(
+      1.0, std::sqrt(ring->fit.residual.head(shown).square().sum() / signal.square().sum()));
+  constexpr double kTooMuch = 0.5;
+  if (mode.unexplained > kTooMuch) {
+    mode.warnings.emplace_back(
+        "one mode does not explain this: the decay is noise or several resonances");
+  }
+  mode.curve.is_spectrum = false;
+  for (Eigen::Index i = 0; i < shown; ++i) {
+    mode.curve.x.push_back(ring->time_s[i]);
+    mode.curve.measured.push_back(ring->data[i]);
+    mode.curve.fitted.push_back(ring->data[i] - ring->fit.residual[i]);
+  }
+  return mode;
+}
+
+}  // namespace unflex::identify

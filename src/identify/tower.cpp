@@ -1,0 +1,47 @@
+#include <cmath>
+#include <numbers>
+
+#include "response.hpp"
+#include "unflex/identify/mode.hpp"
+
+namespace unflex::identify {
+namespace {
+
+constexpr double kQuantile = 1.959964;
+
+// ζ from the ratio of two successive waves: δ = ln ratio = 2πζ / √(1 − ζ²).
+double damping_of(double ratio) {
+  const double decrement = std::log(ratio);
+  return decrement / std::hypot(2.0 * std::numbers::pi, decrement);
+}
+
+}  // namespace
+
+Result<Mode> fit_tower(const Tower& tower) {
+  constexpr double kLeast = 1e-3;
+  if (!(tower.spacing_mm > 0.0) || !(tower.speed_mm_s > 0.0)) {
+    return fail(ErrorKind::usage, "the waves' spacing and the speed must be above 0");
+  }
+  if (tower.decay != 0.0 && !(tower.decay > 1.0)) {
+    return fail(ErrorKind::usage,
+                "the decay is how many times lower a wave is than the one before, above 1");
+  }
+  Mode mode;
+  mode.method = Method::tower;
+  const double freq_hz = tower.speed_mm_s / tower.spacing_mm;
+  const double spread = std::max(tower.spacing_spread_mm / tower.spacing_mm, kLeast);
+  mode.freq_hz = estimate_of(freq_hz, std::pow(spread / kQuantile, 2));
+  if (tower.decay == 0.0) {
+    mode.damping_ratio = {.value = 0.1, .low = 0.03, .high = 0.2};
+    mode.warnings.emplace_back(
+        "the damping is a guess: measure how much lower each wave is than the one before");
+    return mode;
+  }
+  const double least = std::max(tower.decay - tower.decay_spread, 1.0 + kLeast);
+  mode.damping_ratio = {.value = damping_of(tower.decay),
+                        .low = damping_of(least),
+                        .high = damping_of(tower.decay + tower.decay_spread)};
+  return mode;
+}
+
+}  // namespace unflex::identify

@@ -1,0 +1,116 @@
+#include "assign.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "key_table.hpp"
+#include "key_values.hpp"
+#include "suggestion.hpp"
+
+namespace unflex::machine {
+namespace {
+
+// One overload per type a member can have. Each returns what is wrong, or nothing.
+std::string store(const Value& value, const Key& key, double& target) {
+  const double* const number = std::get_if<double>(&value.content);
+  if (number == nullptr) {
+    return fmt::format("{} must be a number, not {}", key.name, value.kind);
+  }
+  if (!std::isfinite(*number)) {
+    return fmt::format("{} must be a finite number", key.name);
+  }
+  if (!key.bounds.contains(*number)) {
+    return fmt::format("{} is {}, but must be {}", key.name, *number, range_text(key));
+  }
+  target = *number;
+  return {};
+}
+
+std::string store(const Value& value, const Key& key, std::optional<double>& target) {
+  double number = 0.0;
+  std::string wrong = store(value, key, number);
+  if (wrong.empty()) {
+    target = number;
+  }
+  return wrong;
+}
+
+std::string store(const Value& value, const Key& key, bool& target) {
+  const bool* const flag = std::get_if<bool>(&value.content);
+  if (flag == nullptr) {
+    return fmt::format("{} must be true or false, not {}", key.name, value.kind);
+  }
+  target = *flag;
+  return {};
+}
+
+std::string store(const Value& value, const Key& key, Firmware& target) {
+  if (const auto* text = std::get_if<std::string>(&value.content)) {
+    for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
+      if (*text == to_string(firmware)) {
+        target = firmware;
+        return {};
+      }
+    }
+  }
+  return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), value.kind);
+}
+
+std::string store(const Value& value, const Key& key, std::string& target) {
+  const auto* text = std::get_if<std::string>(&value.content);
+  if (text == nullptr || std::ranges::find(key.words, *text) == key.words.end()) {
+    return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), value.kind);
+  }
+  target = *text;
+  return {};
+}
+
+std::string store(const Value& value, const Key& key, std::optional<Range>& target) {
+  const auto* list = std::get_if<std::vector<Value>>(&value.content);
+  if (list == nullptr || list->size() != 2) {
+    return fmt::format("{} must be two numbers, as in [0, 250]", key.name);
+  }
+  Range range;
+  for (std::string wrong :
+       {store(list->front(), key, range.min), store(list->back(), key, range.max)}) {
+    if (!wrong.empty()) {
+      return wrong;
+    }
+  }
+  if (!(range.min < range.max)) {
+    return fmt::format("{} is [{}, {}], but the first number must be the smaller", key.name,
+                       range.min, range.max);
+  }
+  target = range;
+  return {};
+}
+
+}  // namespace
+
+std::string assign(const std::string& name, const Value& value, const SourcePlace& place,
+                   Draft& draft) {
+  const std::optional<std::size_t> index = find_key(name);
+  if (!index) {
+    return is_section(name) ? fmt::format("'{}' is a section, not a key", name)
+                            : fmt::format("unknown key '{}'{}", name, suggest_key(name));
+  }
+  const Key& key = key_table()[*index];
+  draft.places[*index] = place;
+  return std::visit([&](auto member) { return store(value, key, member(draft)); }, key.member);
+}
+
+Status apply(const Reading& reading, Draft& draft) {
+  for (const Assignment& assignment : reading.assignments) {
+    std::string wrong = assign(assignment.key, assignment.value, assignment.place, draft);
+    if (!wrong.empty()) {
+      return fail(ErrorKind::usage, assignment.place, std::move(wrong));
+    }
+  }
+  draft.settings.notes.insert(draft.settings.notes.end(), reading.notes.begin(),
+                              reading.notes.end());
+  return {};
+}
+
+}  // namespace unflex::machine

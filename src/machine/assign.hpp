@@ -1,0 +1,58 @@
+// Values on their way from a source to the member behind a key.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "draft.hpp"
+
+namespace unflex::machine {
+
+// What a source may hold for a key. monostate is what no key takes.
+struct Value {
+  Value(double number) : content(number), kind("a number") {}
+  Value(bool flag) : content(flag), kind("true or false") {}
+  Value(std::string text) : content(text), kind("the text \"" + text + "\"") {}
+  Value(const char* text) : Value(std::string(text)) {}
+  Value(const Range& range)
+      : content(std::vector<Value>{Value(range.min), Value(range.max)}), kind("an array") {}
+  Value(std::vector<Value> list) : content(std::move(list)), kind("an array") {}
+  [[nodiscard]] static Value other(std::string kind) {
+    Value value(0.0);
+    value.content = std::monostate{};
+    value.kind = std::move(kind);
+    return value;
+  }
+
+  std::variant<std::monostate, double, bool, std::string, std::vector<Value>> content;
+  std::string kind;  // in words, for messages
+};
+
+// A key's value and where it was read.
+struct Assignment {
+  std::string key;
+  Value value;
+  SourcePlace place;
+};
+
+// What a reader understood of a printer's or a slicer's own settings.
+struct Reading {
+  std::vector<Assignment> assignments;  // a later one of a key wins
+  std::vector<Diagnostic> notes;        // what the user should know
+
+  void add(std::string key, Value value, SourcePlace place) {
+    assignments.push_back({std::move(key), std::move(value), std::move(place)});
+  }
+};
+
+// Stores the value of a key and its place. Returns what is wrong: unknown key, type, bounds; or
+// nothing.
+[[nodiscard]] std::string assign(const std::string& name, const Value& value,
+                                 const SourcePlace& place, Draft& draft);
+
+// Stores them all. What is wrong is an error of kind usage at its place.
+[[nodiscard]] Status apply(const Reading& reading, Draft& draft);
+
+}  // namespace unflex::machine

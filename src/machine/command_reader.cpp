@@ -1,0 +1,344 @@
+// Each command means what it means in a print, so the interpreter reads it.
+//   Marlin 2.1.2 src/gcode, *_report; src/module/settings.cpp.
+//   RepRapFirmware 3.6 src/GCodes, Movement/Kinematics/Kinematics.h (KinematicsType).
+#include "command_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "text_lines.hpp"
+#include "unflex/core/number.hpp"
+#include "unflex/gcode/command.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/machine/limit_keys.hpp"
+
+namespace unflex::machine {
+namespace {
+
+constexpr std::array kAxes = {"x", "y", "z", "e"};
+
+bool is_one_of(int number, std::initializer_list<int> numbers) {
+  return std::ranges::find(numbers, number) != numbers.end();
+}
+
+// "E400:400" names several drives of which the first one counts here.
+std::string firsts_of_lists(std::string_view line) {
+  std::string text;
+  bool skips = false;
+  for (const char c : line) {
+    skips = c == ':' || (skips && c != ' ' && c != '\t' && c != ';');
+    if (!skips) {
+      text.push_back(c);
+    }
+  }
+  return text;
+}
+
+gcode::InterpreterOptions options_of(Firmware firmware) {
+  gcode::InterpreterOptions options = gcode::default_options(firmware);
+  options.firmware_retraction = true;
+  return options;
+}
+
+// What both dialects share.
+class CommandReader {
+ public:
+  CommandReader(Firmware firmware, std::string file)
+      : file_(std::move(file)), interpreter_(options_of(firmware)) {
+    reading.add("printer.firmware", std::string(to_string(firmware)), {file_, 0});
+  }
+
+  // Has the interpreter read a line, and takes what it sets.
+  void take(std::string text, std::size_t number) {
+    const gcode::Command command = gcode::parse(text);
+    const SourcePlace place{file_, number};
+    const gcode::Event event = interpreter_.interpret({std::move(text), number});
+    if (command.number != 92) {  // in a print steps are a reason to warn
+      for (const std::string& warning : event.warnings) {
+        note(place, warning);
+      }
+    }
+    for (const LimitValue& limit : limit_values(event.limits)) {
+      reading.add(limit.key, limit.value, place);
+      remember(limit, place);
+    }
+    switch (command.number) {
+      case 92:
+        steps(place);
+        break;
+      case 200:
+        if (command.value('D').value_or(0.0) > 0.0) {
+          reading.add("extruder.filament_diameter_mm", *command.value('D'), place);
+        }
+        break;
+      case 207:
+      case 208:
+        retraction(place);
+        break;
+      default:
+        break;
+    }
+  }
+
+  // Of what both axes can do; the motors' limits follow from it: enough for the faster axis, not
+  // too much for the weaker.
+  void finish() {
+    if (velocity_) {
+      reading.add("limits.max_velocity_mm_s", velocity_->first, velocity_->second);
+    }
+    if (accel_) {
+      reading.add("limits.max_accel_mm_s2", accel_->first, accel_->second);
+    }
+  }
+
+  void note(SourcePlace place, std::string message) {
+    reading.notes.push_back({std::move(place), std::move(message)});
+  }
+
+  // A shaper's frequency is the resonance as it was measured.
+  void shaper(const std::string& axis, double freq_hz, std::optional<double> damping_ratio,
+              const SourcePlace& place) {
+    reading.add("printer.input_shaper_freq_" + axis + "_hz", freq_hz, place);
+    if (freq_hz > 0.0) {
+      reading.add("dynamics." + axis + ".freq_hz", freq_hz, place);
+      if (damping_ratio) {
+        reading.add("dynamics." + axis + ".damping_ratio", *damping_ratio, place);
+      }
+    }
+  }
+
+  [[nodiscard]] const gcode::ModalState& state() const { return interpreter_.state(); }
+  [[nodiscard]] const std::string& file() const { return file_; }
+
+  Reading reading;
+
+ private:
+  using Found = std::optional<std::pair<double, SourcePlace>>;
+
+  void remember(const LimitValue& limit, const SourcePlace& place) {
+    if (limit.key == "limits.max_x_velocity_mm_s" ||
+        (limit.key == "limits.max_y_velocity_mm_s" &&
+         (!velocity_ || limit.value > velocity_->first))) {
+      velocity_ = {limit.value, place};
+    }
+    if (limit.key == "limits.max_x_accel_mm_s2" ||
+        (limit.key == "limits.max_y_accel_mm_s2" && (!accel_ || limit.value < accel_->first))) {
+      accel_ = {limit.value, place};
+    }
+  }
+
+  void steps(const SourcePlace& place) {
+    for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+      if (const auto value = state().steps_per_mm[axis]) {
+        reading.add(fmt::format("printer.{}_steps_per_mm", kAxes[axis]), *value, place);
+      }
+    }
+  }
+
+  void retraction(const SourcePlace& place) {
+    const gcode::InterpreterOptions& o = interpreter_.options();
+    reading.add("printer.firmware_retraction", true, place);
+    reading.add("printer.retract_length_mm", o.retract_length_mm, place);
+    reading.add("printer.retract_speed_mm_s", o.retract_speed_mm_s, place);
+    reading.add("printer.unretract_extra_length_mm", o.unretract_extra_length_mm, place);
+    reading.add("printer.unretract_speed_mm_s", o.unretract_speed_mm_s, place);
+    reading.add("printer.retract_z_hop_mm", o.retract_z_hop_mm, place);
+  }
+
+  std::string file_;
+  gcode::Interpreter interpreter_;
+  Found velocity_;
+  Found accel_;
+};
+
+void marlin_junctions(CommandReader& reader, const gcode::Command& command,
+                      const SourcePlace& place) {
+  // Which of the two Marlin was built with shows in which it lists.
+  if (command.has('J')) {
+    reader.reading.add("printer.classic_jerk", false, place);
+    // M503 shows two decimals of it.
+    if (command.value('J') == 0.01) {
+      reader.note(place,
+                  "M503 rounds J, and Marlin's default of 0.013 shows as 0.01; if it was never "
+                  "changed give --set limits.junction_deviation_mm=0.013");
+    }
+  } else if (command.has('X')) {
+    reader.reading.add("printer.classic_jerk", true, place);
+  }
+}
+
+void marlin_shaper(CommandReader& reader, const gcode::Command& command, const SourcePlace& place) {
+  if (command.has('X') || !command.has('Y')) {
+    reader.shaper("x", reader.state().shaper_freq_x_hz, reader.state().shaper.damping_ratio_x,
+                  place);
+  }
+  if (command.has('Y') || !command.has('X')) {
+    reader.shaper("y", reader.state().shaper_freq_y_hz, reader.state().shaper.damping_ratio_y,
+                  place);
+  }
+}
+
+void read_marlin_line(CommandReader& reader, std::string_view line, std::size_t number) {
+  constexpr std::string_view kEcho = "echo:";
+  const std::size_t echo = line.rfind(kEcho);
+  const std::string text(
+      trimmed(echo == std::string_view::npos ? line : line.substr(echo + kEcho.size())));
+  const gcode::Command command = gcode::parse(text);
+  const SourcePlace place{reader.file(), number};
+  const bool is_g_unit = command.is('G', 20) || command.is('G', 21);
+  if (!is_g_unit && (command.kind != gcode::CommandKind::traditional || command.letter != 'M')) {
+    return;
+  }
+  if (is_g_unit || is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 208, 593})) {
+    reader.take(text, number);
+  }
+  if (command.number == 205) {
+    marlin_junctions(reader, command, place);
+  } else if (command.number == 593) {
+    marlin_shaper(reader, command, place);
+  } else if (command.number == 665) {
+    reader.note(place,
+                "the resonances of a delta or a SCARA change with the place; unflex takes them for "
+                "the same everywhere");
+  }
+}
+
+// M208: X0:220, or X0 with S1 for the least and X220 for the most.
+struct Travel {
+  std::optional<double> min;
+  std::optional<double> max;
+  SourcePlace place;
+};
+
+std::array<Travel, 2> read_travel(const gcode::Command& command, std::string_view arguments,
+                                  std::array<Travel, 2> travel, const SourcePlace& place) {
+  for (const auto& [letter, index] : {std::pair{'X', 0U}, std::pair{'Y', 1U}}) {
+    const std::size_t at = arguments.find(letter);
+    if (at == std::string_view::npos) {
+      continue;
+    }
+    std::string_view value = arguments.substr(at + 1);
+    value = value.substr(0, value.find_first_of(" \tYZUVWABCS"));
+    const std::size_t colon = value.find(':');
+    const std::optional<double> first = parse_number(value.substr(0, colon));
+    Travel& axis = travel[index];
+    axis.place = place;
+    if (colon != std::string_view::npos) {
+      axis.min = first;
+      axis.max = parse_number(value.substr(colon + 1));
+    } else {
+      (command.value('S') == 1.0 ? axis.min : axis.max) = first;
+    }
+  }
+  return travel;
+}
+
+Status check_rrf_kinematics(CommandReader& reader, const gcode::Command& command,
+                            const SourcePlace& place) {
+  const int type = static_cast<int>(command.value('K').value_or(0.0));
+  // linearDelta and rotaryDelta; scara, hangprinter, polar and fiveBarScara.
+  if (command.number == 665 || is_one_of(type, {3, 10})) {
+    reader.note(place,
+                "the resonances of a delta change with the place; unflex takes them for the same "
+                "everywhere");
+  } else if (is_one_of(type, {4, 6, 7, 9})) {
+    return fail(ErrorKind::usage, place,
+                fmt::format("kinematics K{} has no carriages along X and Y; unflex models one "
+                            "resonance along each and cannot compensate such a machine",
+                            type));
+  }
+  return {};
+}
+
+void rrf_shaper(CommandReader& reader, const SourcePlace& place) {
+  const gcode::ModalState& state = reader.state();
+  constexpr double kDefaultDampingRatio = 0.1;  // AxisShaper.h
+  if (state.shaper.type_x == "custom") {
+    return reader.note(place,
+                       "a custom shaper cannot be set back after the print; unflex leaves it to "
+                       "the file's own M593");
+  }
+  for (const std::string axis : {"x", "y"}) {
+    reader.shaper(axis, state.shaper_freq_x_hz,
+                  state.shaper.damping_ratio_x.value_or(kDefaultDampingRatio), place);
+  }
+  if (state.shaper_freq_x_hz > 0.0) {
+    reader.reading.add("printer.input_shaper_type", state.shaper.type_x, place);
+  }
+}
+
+Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t number,
+                     std::array<Travel, 2>& travel) {
+  const gcode::Command original = gcode::parse(line);
+  const SourcePlace place{reader.file(), number};
+  if (original.kind == gcode::CommandKind::none) {
+    return {};
+  }
+  const std::string text = firsts_of_lists(line);
+  const gcode::Command command = gcode::parse(text);
+  if (command.kind != gcode::CommandKind::traditional || command.letter != 'M') {
+    return {};
+  }
+  if (is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 566, 593})) {
+    reader.take(text, number);
+  }
+  switch (command.number) {
+    case 98:
+      reader.note(place, "M98 runs another file, which unflex does not read");
+      break;
+    case 208:
+      travel = read_travel(command, line.substr(line.find("208") + 3), travel, place);
+      break;
+    case 593:
+      rrf_shaper(reader, place);
+      break;
+    case 665:
+    case 669:
+      return check_rrf_kinematics(reader, command, place);
+    default:
+      break;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Reading> read_marlin_dump(std::string_view text, const std::string& file) {
+  CommandReader reader(Firmware::marlin, file);
+  // What the dump does not list was not built in.
+  reader.reading.add("printer.firmware_retraction", false, {file, 0});
+  for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
+    read_marlin_line(reader, line, number);
+  });
+  reader.finish();
+  return std::move(reader.reading);
+}
+
+Result<Reading> read_rrf_config(std::string_view text, const std::string& file) {
+  CommandReader reader(Firmware::rrf, file);
+  std::array<Travel, 2> travel;
+  Status status;
+  for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
+    if (status) {
+      status = read_rrf_line(reader, line, number, travel);
+    }
+  });
+  if (!status) {
+    return tl::unexpected(status.error());
+  }
+  for (std::size_t axis = 0; axis < travel.size(); ++axis) {
+    if (travel[axis].max) {
+      reader.reading.add(fmt::format("printer.travel_{}_mm", kAxes[axis]),
+                         Range{travel[axis].min.value_or(0.0), *travel[axis].max},
+                         travel[axis].place);
+    }
+  }
+  reader.finish();
+  return std::move(reader.reading);
+}
+
+}  // namespace unflex::machine

@@ -1,0 +1,44 @@
+#include "file_text.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cerrno>
+#include <fstream>
+#include <system_error>
+
+namespace unflex::machine {
+namespace {
+
+// Printer files have some kilobytes; whoever passes a print by mistake hears so at once.
+constexpr std::size_t kMaxFileBytes = 1U << 20U;
+
+}  // namespace
+
+Result<std::string> read_printer_file(const std::filesystem::path& file) {
+  const SourcePlace place{file.string(), 0};
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    return fail(ErrorKind::usage, place, "is a directory, not a printer file");
+  }
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) {
+    return fail(
+        ErrorKind::usage, place,
+        fmt::format("cannot read the printer file: {}", std::generic_category().message(errno)));
+  }
+  std::string text;
+  std::array<char, 4096> block{};
+  while (stream.read(block.data(), block.size()) || stream.gcount() > 0) {
+    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
+    if (text.size() > kMaxFileBytes) {
+      return fail(ErrorKind::usage, place, "is too large for a printer file");
+    }
+  }
+  if (stream.bad()) {
+    return fail(ErrorKind::usage, place, "cannot read the printer file");
+  }
+  return text;
+}
+
+}  // namespace unflex::machine

@@ -1,0 +1,218 @@
+#include "klipper_config.hpp"
+
+#include <fmt/format.h>
+#include <glob.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "file_text.hpp"
+#include "text_lines.hpp"
+
+namespace unflex::machine {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kSavedMark = "#*#";
+constexpr std::string_view kSavedHeader =
+    "#*# <---------------------- SAVE_CONFIG ---------------------->";
+constexpr std::string_view kInclude = "include ";
+
+// An indented line goes on with the value of the option before it.
+struct Parser {
+  std::string file;
+  KlipperConfig* config = nullptr;
+  KlipperSection* section = nullptr;
+  KlipperOption* option = nullptr;
+  std::size_t indent = 0;  // of the line the option began in
+};
+
+std::string_view without_comment(std::string_view line) {
+  line = line.substr(0, line.find('#'));
+  for (std::size_t at = line.find(';'); at != std::string_view::npos; at = line.find(';', at + 1)) {
+    if (at == 0 || line[at - 1] == ' ' || line[at - 1] == '\t') {
+      return line.substr(0, at);
+    }
+  }
+  return line;
+}
+
+// "[stepper_x]" → "stepper_x", and "" where the line is no header.
+std::string_view header_of(std::string_view content) {
+  const std::size_t end = content.rfind(']');
+  return content.starts_with('[') && end != std::string_view::npos && end > 1
+             ? content.substr(1, end - 1)
+             : std::string_view{};
+}
+
+void open_section(Parser& parser, std::string_view header, std::size_t number) {
+  const auto [entry, is_new] = parser.config->sections.try_emplace(std::string(header));
+  if (is_new) {
+    entry->second.place = {parser.file, number};
+  }
+  parser.section = &entry->second;
+  parser.option = nullptr;
+}
+
+// One line of a file that is no include.
+Status parse_line(Parser& parser, std::string_view line, std::size_t number) {
+  const std::string_view text = without_comment(line);
+  const std::string_view content = trimmed(text);
+  if (content.empty()) {
+    return {};
+  }
+  const std::size_t indent = text.find(content);
+  if (parser.option != nullptr && indent > parser.indent) {
+    parser.option->text += fmt::format("{}{}", parser.option->text.empty() ? "" : "\n", content);
+    return {};
+  }
+  parser.indent = indent;
+  if (const std::string_view header = header_of(content); !header.empty()) {
+    open_section(parser, header, number);
+    return {};
+  }
+  const std::size_t delimiter = content.find_first_of(":=");
+  if (parser.section == nullptr || delimiter == std::string_view::npos || delimiter == 0) {
+    return fail(ErrorKind::usage, {parser.file, number},
+                parser.section == nullptr
+                    ? "stands before the first [section]; is this a printer.cfg of Klipper's?"
+                    : "is neither [section] nor 'option: value'; Klipper would refuse it too");
+  }
+  KlipperOption& option = parser.section->options[lower(trimmed(content.substr(0, delimiter)))];
+  option = {std::string(trimmed(content.substr(delimiter + 1))), {parser.file, number}};
+  parser.option = &option;
+  return {};
+}
+
+// The files a pattern names, sorted; an error where it names one that does not exist.
+Result<std::vector<std::string>> included_files(std::string_view pattern,
+                                                const SourcePlace& place) {
+  const std::string path = (fs::path(place.file).parent_path() / pattern).string();
+  glob_t found{};
+  const int error = ::glob(path.c_str(), GLOB_NOSORT, nullptr, &found);
+  std::vector<std::string> files(found.gl_pathv, found.gl_pathv + found.gl_pathc);
+  ::globfree(&found);
+  std::sort(files.begin(), files.end());
+  // A pattern may match nothing, a name may not.
+  if (files.empty() && (error != GLOB_NOMATCH || path.find_first_of("*?[") == std::string::npos)) {
+    return fail(ErrorKind::usage, place,
+                fmt::format("the included file {} does not exist or cannot be read", path));
+  }
+  return files;
+}
+
+Status parse_file(std::string_view text, const std::string& file, KlipperConfig& config,
+                  std::vector<fs::path>& open_files);
+
+Status include(std::string_view pattern, const SourcePlace& place, KlipperConfig& config,
+               std::vector<fs::path>& open_files) {
+  const Result<std::vector<std::string>> files = included_files(pattern, place);
+  if (!files) {
+    return tl::unexpected(files.error());
+  }
+  for (const std::string& file : *files) {
+    std::error_code ignored;
+    if (std::ranges::find(open_files, fs::weakly_canonical(file, ignored)) != open_files.end()) {
+      return fail(ErrorKind::usage, place, fmt::format("{} includes itself", file));
+    }
+    const Result<std::string> text = read_printer_file(file);
+    if (!text) {
+      return tl::unexpected(text.error());
+    }
+    if (Status parsed = parse_file(*text, file, config, open_files); !parsed) {
+      return parsed;
+    }
+  }
+  return {};
+}
+
+Status parse_file(std::string_view text, const std::string& file, KlipperConfig& config,
+                  std::vector<fs::path>& open_files) {
+  std::error_code ignored;
+  open_files.push_back(fs::weakly_canonical(file, ignored));
+  Parser parser{.file = file, .config = &config};
+  Status status;
+  for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
+    if (!status) {
+      return;
+    }
+    const std::string_view header = header_of(line.substr(0, line.find('#')));
+    if (header.starts_with(kInclude)) {
+      status = include(trimmed(header.substr(kInclude.size())), {file, number}, config, open_files);
+      // What follows has to open its section again.
+      parser = {.file = file, .config = &config};
+    } else {
+      status = parse_line(parser, line, number);
+    }
+  });
+  open_files.pop_back();
+  return status;
+}
+
+// SAVE_CONFIG writes what it saves as comments. What stands elsewhere as well is not taken from
+// here, and nothing is once someone has written below.
+Status add_saved(std::string_view text, std::size_t first_line, const std::string& file,
+                 KlipperConfig& config) {
+  KlipperConfig saved;
+  Parser parser{.file = file, .config = &saved};
+  Status status;
+  std::size_t foreign = 0;
+  for_each_line(text, first_line, [&](std::string_view line, std::size_t number) {
+    const bool ours = line.starts_with(kSavedMark) && (line.size() == 3 || line[3] == ' ');
+    if (!ours && !trimmed(line).empty() && foreign == 0) {
+      foreign = number;
+    }
+    if (ours && status) {
+      status = parse_line(parser, line.substr(std::min<std::size_t>(line.size(), 4)), number);
+    }
+  });
+  if (foreign != 0) {
+    config.notes.push_back({{file, foreign},
+                            "stands below what SAVE_CONFIG has saved, all of which is ignored, as "
+                            "Klipper does"});
+    return {};
+  }
+  for (auto& [name, section] : saved.sections) {
+    config.sections.try_emplace(name, KlipperSection{section.place, {}})
+        .first->second.options.merge(section.options);
+  }
+  return status;
+}
+
+}  // namespace
+
+const KlipperOption* KlipperSection::find(const std::string& option) const {
+  const auto found = options.find(option);
+  return found == options.end() ? nullptr : &found->second;
+}
+
+const KlipperSection* KlipperConfig::find(const std::string& section) const {
+  const auto found = sections.find(section);
+  return found == sections.end() ? nullptr : &found->second;
+}
+
+Result<KlipperConfig> parse_klipper_config(std::string_view text, const std::string& file) {
+  KlipperConfig config;
+  std::vector<fs::path> open_files;
+  const std::size_t saved = text.find(kSavedHeader);
+  const std::string_view written = text.substr(0, saved);
+  if (Status parsed = parse_file(written, file, config, open_files); !parsed) {
+    return tl::unexpected(parsed.error());
+  }
+  if (saved == std::string_view::npos) {
+    return config;
+  }
+  // The header's two lines say who writes there.
+  std::string_view rest = text.substr(saved);
+  std::size_t line = 1 + static_cast<std::size_t>(std::ranges::count(written, '\n'));
+  for (int skipped = 0; skipped < 2; ++skipped, ++line) {
+    rest.remove_prefix(std::min(rest.find('\n'), rest.size() - 1) + 1);
+  }
+  if (Status added = add_saved(rest, line, file, config); !added) {
+    return tl::unexpected(added.error());
+  }
+  return config;
+}
+
+}  // namespace unflex::machine

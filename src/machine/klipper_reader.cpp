@@ -1,0 +1,241 @@
+#include "klipper_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "klipper_config.hpp"
+
+namespace unflex::machine {
+namespace {
+
+struct Row {
+  std::string_view section;
+  std::string_view option;
+  std::string_view key;
+};
+
+// Options that are keys under another name. toolhead.py, kinematics/extruder.py,
+// extras/firmware_retraction.py, extras/gcode_arcs.py.
+constexpr std::array kRows = {
+    Row{"printer", "max_velocity", "limits.max_velocity_mm_s"},
+    Row{"printer", "max_accel", "limits.max_accel_mm_s2"},
+    Row{"printer", "square_corner_velocity", "limits.square_corner_velocity_mm_s"},
+    Row{"printer", "max_z_velocity", "limits.max_z_velocity_mm_s"},
+    Row{"printer", "max_z_accel", "limits.max_z_accel_mm_s2"},
+    Row{"extruder", "nozzle_diameter", "extruder.nozzle_diameter_mm"},
+    Row{"extruder", "filament_diameter", "extruder.filament_diameter_mm"},
+    Row{"extruder", "max_extrude_cross_section", "extruder.max_extrude_cross_section_mm2"},
+    Row{"extruder", "max_extrude_only_velocity", "extruder.max_extrude_only_velocity_mm_s"},
+    Row{"extruder", "max_extrude_only_accel", "extruder.max_extrude_only_accel_mm_s2"},
+    Row{"extruder", "instantaneous_corner_velocity", "extruder.instantaneous_corner_velocity_mm_s"},
+    Row{"firmware_retraction", "retract_length", "printer.retract_length_mm"},
+    Row{"firmware_retraction", "retract_speed", "printer.retract_speed_mm_s"},
+    Row{"firmware_retraction", "unretract_extra_length", "printer.unretract_extra_length_mm"},
+    Row{"firmware_retraction", "unretract_speed", "printer.unretract_speed_mm_s"},
+    Row{"gcode_arcs", "resolution", "printer.arc_resolution_mm"},
+};
+
+// What a kinematics means for a model with one resonance along X and one along Y.
+enum class Fit {
+  good,         // carriages move along X and Y
+  approximate,  // the resonances change with the place
+  none,         // there is no X and Y of the machine's own
+};
+
+struct Kinematics {
+  std::string_view name;
+  Fit fit;
+};
+
+constexpr std::array kKinematics = {Kinematics{"cartesian", Fit::good},
+                                    Kinematics{"corexy", Fit::good},
+                                    Kinematics{"corexz", Fit::good},
+                                    Kinematics{"hybrid_corexy", Fit::good},
+                                    Kinematics{"hybrid_corexz", Fit::good},
+                                    Kinematics{"generic_cartesian", Fit::good},
+                                    Kinematics{"delta", Fit::approximate},
+                                    Kinematics{"rotary_delta", Fit::approximate},
+                                    Kinematics{"deltesian", Fit::approximate},
+                                    Kinematics{"polar", Fit::none},
+                                    Kinematics{"winch", Fit::none},
+                                    Kinematics{"none", Fit::none}};
+
+// Python's float(), as far as printers use it.
+std::optional<double> number_of(std::string_view text) {
+  if (text.starts_with('+')) {
+    text.remove_prefix(1);
+  }
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool whole = error == std::errc{} && end == text.data() + text.size();
+  return whole ? std::optional(value) : std::nullopt;
+}
+
+class Reader {
+ public:
+  Reader(const KlipperConfig& config, std::string file)
+      : config_(&config), file_(std::move(file)) {}
+
+  Result<Reading> read() {
+    if (const Status usable = kinematics(); !usable) {
+      return tl::unexpected(usable.error());
+    }
+    reading_.add("printer.firmware", "klipper", config_->find("printer")->place);
+    for (const Row& row : kRows) {
+      if (const auto value = number(row.section, row.option)) {
+        reading_.add(std::string(row.key), *value, place(row.section, row.option));
+      }
+    }
+    minimum_cruise_ratio();
+    firmware_retraction();
+    travel("x");
+    travel("y");
+    input_shaper("x");
+    input_shaper("y");
+    if (failure_) {
+      return tl::unexpected(*failure_);
+    }
+    return std::move(reading_);
+  }
+
+ private:
+  [[nodiscard]] const KlipperOption* option(std::string_view section, std::string_view name) const {
+    const KlipperSection* const found = config_->find(std::string(section));
+    return found == nullptr ? nullptr : found->find(std::string(name));
+  }
+
+  [[nodiscard]] SourcePlace place(std::string_view section, std::string_view name) const {
+    const KlipperOption* const found = option(section, name);
+    return found == nullptr ? SourcePlace{file_, 0} : found->place;
+  }
+
+  // The number of an option that is there; what is no number becomes the failure.
+  std::optional<double> number(std::string_view section, std::string_view name) {
+    const KlipperOption* const found = option(section, name);
+    if (found == nullptr) {
+      return std::nullopt;
+    }
+    const std::optional<double> value = number_of(found->text);
+    if ((!value || !std::isfinite(*value)) && !failure_) {
+      failure_ =
+          Error{ErrorKind::usage, found->place,
+                fmt::format("{} in [{}] must be a number, not '{}'", name, section, found->text)};
+    }
+    return value;
+  }
+
+  void note(SourcePlace at, std::string message) {
+    reading_.notes.push_back({std::move(at), std::move(message)});
+  }
+
+  Status kinematics() {
+    for (const std::string_view required : {"kinematics", "max_velocity", "max_accel"}) {
+      if (option("printer", required) == nullptr) {
+        return fail(ErrorKind::usage, {file_, 0},
+                    fmt::format("{} in [printer] is missing; give the printer's whole "
+                                "configuration, with what it includes",
+                                required));
+      }
+    }
+    const KlipperOption& given = *option("printer", "kinematics");
+    const auto* known = std::ranges::find(kKinematics, given.text, &Kinematics::name);
+    if (known == kKinematics.end()) {
+      note(given.place, fmt::format("unflex does not know kinematics '{}' and takes X and Y for "
+                                    "the axes that swing",
+                                    given.text));
+    } else if (known->fit == Fit::none) {
+      return fail(ErrorKind::usage, given.place,
+                  fmt::format("kinematics '{}' has no carriages along X and Y; unflex models one "
+                              "resonance along each and cannot compensate such a machine",
+                              given.text));
+    } else if (known->fit == Fit::approximate) {
+      note(given.place, fmt::format("the resonances of kinematics '{}' change with the place; "
+                                    "unflex takes them for the same everywhere",
+                                    given.text));
+    }
+    return {};
+  }
+
+  // Before minimum_cruise_ratio Klipper had max_accel_to_decel.
+  void minimum_cruise_ratio() {
+    constexpr std::string_view kKey = "limits.minimum_cruise_ratio";
+    if (const auto ratio = number("printer", "minimum_cruise_ratio")) {
+      reading_.add(std::string(kKey), *ratio, place("printer", "minimum_cruise_ratio"));
+      return;
+    }
+    const auto to_decel = number("printer", "max_accel_to_decel");
+    const auto accel = number("printer", "max_accel");
+    if (to_decel && accel && *accel > 0.0) {
+      reading_.add(std::string(kKey), 1.0 - std::min(1.0, *to_decel / *accel),
+                   place("printer", "max_accel_to_decel"));
+    }
+  }
+
+  void firmware_retraction() {
+    const KlipperSection* const section = config_->find("firmware_retraction");
+    reading_.add("printer.firmware_retraction", section != nullptr,
+                 section == nullptr ? SourcePlace{file_, 0} : section->place);
+  }
+
+  // generic_cartesian names carriages instead of steppers.
+  [[nodiscard]] std::string rail_of(const std::string& axis) const {
+    for (const auto& [name, section] : config_->sections) {
+      const KlipperOption* const moves = section.find("axis");
+      if (name.starts_with("carriage ") && moves != nullptr && moves->text == axis) {
+        return name;
+      }
+    }
+    return "stepper_" + axis;
+  }
+
+  void travel(const std::string& axis) {
+    const std::string rail = rail_of(axis);
+    const auto max = number(rail, "position_max");
+    if (max) {
+      const double min = number(rail, "position_min").value_or(0.0);
+      reading_.add("printer.travel_" + axis + "_mm", Range{min, *max}, place(rail, "position_max"));
+    }
+  }
+
+  // A shaper's frequency is the resonance as it was measured. input_shaper.py, shaper_defs.py.
+  void input_shaper(const std::string& axis) {
+    constexpr double kDefaultDampingRatio = 0.1;
+    const std::string frequency = "shaper_freq_" + axis;
+    const std::string damping = "damping_ratio_" + axis;
+    const double freq_hz = number("input_shaper", frequency).value_or(0.0);
+    const SourcePlace at = place("input_shaper", frequency);
+    reading_.add("printer.input_shaper_freq_" + axis + "_hz", freq_hz, at);
+    if (freq_hz > 0.0) {
+      const auto ratio = number("input_shaper", damping);
+      reading_.add("dynamics." + axis + ".freq_hz", freq_hz, at);
+      reading_.add("dynamics." + axis + ".damping_ratio", ratio.value_or(kDefaultDampingRatio),
+                   ratio ? place("input_shaper", damping) : at);
+    }
+  }
+
+  const KlipperConfig* config_;
+  std::string file_;
+  Reading reading_;
+  std::optional<Error> failure_;
+};
+
+}  // namespace
+
+Result<Reading> read_klipper(std::string_view text, const std::string& file) {
+  const Result<KlipperConfig> config = parse_klipper_config(text, file);
+  if (!config) {
+    return tl::unexpected(config.error());
+  }
+  Result<Reading> reading = Reader(*config, file).read();
+  if (reading) {
+    reading->notes.insert(reading->notes.begin(), config->notes.begin(), config->notes.end());
+  }
+  return reading;
+}
+
+}  // namespace unflex::machine

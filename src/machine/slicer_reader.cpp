@@ -1,0 +1,244 @@
+#include "slicer_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <map>
+#include <optional>
+
+#include "text_lines.hpp"
+#include "unflex/core/number.hpp"
+#include "unflex/gcode/command.hpp"
+
+namespace unflex::machine {
+namespace {
+
+struct SlicerOption {
+  std::string text;
+  SourcePlace place;
+};
+
+using Options = std::map<std::string, SlicerOption>;
+
+struct Flavor {
+  std::string_view name;  // gcode_flavor, and Cura's FLAVOR, in lower case
+  Firmware firmware;
+};
+
+constexpr std::array kFlavors = {Flavor{"klipper", Firmware::klipper},
+                                 Flavor{"marlin", Firmware::marlin},
+                                 Flavor{"marlin2", Firmware::marlin},
+                                 Flavor{"marlinfirmware", Firmware::marlin},
+                                 Flavor{"marlin(volumetric)", Firmware::marlin},
+                                 Flavor{"reprapfirmware", Firmware::rrf},
+                                 Flavor{"reprap (reprap)", Firmware::rrf},
+                                 Flavor{"rrf", Firmware::rrf}};
+
+// "; key = value", as all of Slic3r's family write.
+void look_for_option(std::string_view line, const SourcePlace& place, Options& options) {
+  if (!line.starts_with("; ")) {
+    return;
+  }
+  const std::size_t equals = line.find(" = ");
+  const std::string_view key = line.substr(2, equals - std::min<std::size_t>(equals, 2));
+  const bool is_key =
+      equals != std::string_view::npos && !key.empty() &&
+      key.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == std::string_view::npos;
+  if (is_key) {
+    options[std::string(key)] = {std::string(trimmed(line.substr(equals + 3))), place};
+  }
+}
+
+// The first line with a command of Klipper's own or a macro, 0 if there is none: other firmwares
+// have no commands of that form.
+std::size_t klipper_line(std::string_view head) {
+  std::size_t first = 0;
+  for_each_line(head, 1, [&](std::string_view line, std::size_t number) {
+    if (first == 0 && gcode::parse(line).kind == gcode::CommandKind::extended) {
+      first = number;
+    }
+  });
+  return first;
+}
+
+class Reader {
+ public:
+  explicit Reader(const PrintText& print) : print_(&print) {
+    const auto look = [&](std::string_view line, std::size_t number) {
+      constexpr std::string_view kCuraFlavor = ";FLAVOR:";
+      const SourcePlace place{print.name, number};
+      look_for_option(line, place, options_);
+      if (line.starts_with(kCuraFlavor)) {
+        options_["gcode_flavor"] = {std::string(trimmed(line.substr(kCuraFlavor.size()))), place};
+      }
+    };
+    for_each_line(print.head, 1, look);
+    for_each_line(print.tail, print.tail_line, look);
+  }
+
+  Reading read() {
+    diameter("nozzle_diameter", "extruder.nozzle_diameter_mm");
+    diameter("filament_diameter", "extruder.filament_diameter_mm");
+    const std::optional<Firmware> firmware = flavor();
+    const SlicerOption* const usage = option("machine_limits_usage");
+    if (firmware && (usage == nullptr || usage->text != "ignore")) {
+      *firmware == Firmware::klipper ? klipper_limits() : axis_limits(*firmware);
+    }
+    return std::move(reading_);
+  }
+
+ private:
+  [[nodiscard]] const SlicerOption* option(const std::string& name) const {
+    const auto found = options_.find(name);
+    return found == options_.end() ? nullptr : &found->second;
+  }
+
+  // The first of an option's values (the first extruder's, the normal mode's) if it is above 0.
+  [[nodiscard]] std::optional<double> number(const std::string& name) const {
+    const SlicerOption* const found = option(name);
+    if (found == nullptr) {
+      return std::nullopt;
+    }
+    const std::optional<double> value =
+        parse_number(trimmed(std::string_view(found->text).substr(0, found->text.find(','))));
+    return value && *value > 0.0 ? value : std::nullopt;
+  }
+
+  void add(const std::string& key, std::optional<double> value, const std::string& from) {
+    if (value) {
+      reading_.add(key, *value, option(from)->place);
+    }
+  }
+
+  void diameter(const std::string& name, const std::string& key) { add(key, number(name), name); }
+
+  // Printers with Klipper are often sliced for as "marlin".
+  std::optional<Firmware> flavor() {
+    const SlicerOption* const given = option("gcode_flavor");
+    if (given == nullptr) {
+      return std::nullopt;
+    }
+    const auto* const known = std::ranges::find(kFlavors, lower(given->text), &Flavor::name);
+    if (known == kFlavors.end()) {
+      reading_.notes.push_back(
+          {given->place, fmt::format("unflex does not know G-code of the flavor '{}'; say what "
+                                     "runs it with --set printer.firmware=...",
+                                     given->text)});
+      return std::nullopt;
+    }
+    const std::size_t macro = known->firmware == Firmware::marlin ? klipper_line(print_->head) : 0;
+    const Firmware firmware = macro != 0 ? Firmware::klipper : known->firmware;
+    reading_.add("printer.firmware", std::string(to_string(firmware)),
+                 macro != 0 ? SourcePlace{print_->name, macro} : given->place);
+    return firmware;
+  }
+
+  // OrcaSlicer and Bambu Studio speak of speeds, the others of feed rates.
+  [[nodiscard]] std::string velocity_option(std::string_view axis) const {
+    std::string speed = fmt::format("machine_max_speed_{}", axis);
+    return option(speed) != nullptr ? speed : fmt::format("machine_max_feedrate_{}", axis);
+  }
+
+  // The least of some options, or the greatest, from where it is.
+  template <class Better>
+  void add_extreme(const std::string& key, const std::vector<std::string>& names, Better better) {
+    std::string best;
+    for (const std::string& name : names) {
+      if (number(name) && (best.empty() || better(*number(name), *number(best)))) {
+        best = name;
+      }
+    }
+    if (!best.empty()) {
+      add(key, number(best), best);
+    }
+  }
+
+  void add_least(const std::string& key, const std::vector<std::string>& names) {
+    add_extreme(key, names, std::less<>());
+  }
+
+  // Klipper's limits are for the tool's path; M204 and its like start from them.
+  void klipper_limits() {
+    const std::vector<std::string> velocities = {velocity_option("x"), velocity_option("y")};
+    const std::vector<std::string> accels = {"machine_max_acceleration_x",
+                                             "machine_max_acceleration_y",
+                                             "machine_max_acceleration_extruding"};
+    const auto and_z = [](std::vector<std::string> names, std::string z) {
+      names.push_back(std::move(z));
+      return names;
+    };
+    add_least("limits.max_velocity_mm_s", velocities);
+    add_least("limits.max_accel_mm_s2", accels);
+    if (number(velocity_option("z"))) {
+      add_least("limits.max_z_velocity_mm_s", and_z(velocities, velocity_option("z")));
+    }
+    if (number("machine_max_acceleration_z")) {
+      add_least("limits.max_z_accel_mm_s2", and_z(accels, "machine_max_acceleration_z"));
+    }
+  }
+
+  void axis_limits(Firmware firmware) {
+    for (const std::string axis : {"x", "y", "z", "e"}) {
+      const std::string accel = "machine_max_acceleration_" + axis;
+      const std::string jerk = "machine_max_jerk_" + axis;
+      add("limits.max_" + axis + "_velocity_mm_s", number(velocity_option(axis)),
+          velocity_option(axis));
+      add("limits.max_" + axis + "_accel_mm_s2", number(accel), accel);
+      add("limits.jerk_" + axis + "_mm_s", number(jerk), jerk);
+    }
+    // What the motors can do follows from these: enough for the faster axis, not too much for the
+    // weaker.
+    add_extreme("limits.max_velocity_mm_s", {velocity_option("x"), velocity_option("y")},
+                std::greater<>());
+    add_least("limits.max_accel_mm_s2",
+              {"machine_max_acceleration_x", "machine_max_acceleration_y"});
+    const std::string print = "machine_max_acceleration_extruding";
+    const std::string travel = "machine_max_acceleration_travel";
+    add("limits.print_accel_mm_s2", number(print), print);
+    add("limits.travel_accel_mm_s2", number(travel), travel);
+    if (firmware == Firmware::marlin) {
+      const std::string retract = "machine_max_acceleration_retracting";
+      add("limits.retract_accel_mm_s2", number(retract), retract);
+      junctions();
+    }
+  }
+
+  // The flavor "marlin" means Marlin 1, which knew jerk alone for long.
+  void junctions() {
+    const std::string deviation = "machine_max_junction_deviation";
+    if (number(deviation)) {
+      add("limits.junction_deviation_mm", number(deviation), deviation);
+      reading_.add("printer.classic_jerk", false, option(deviation)->place);
+    } else if (option("gcode_flavor")->text == "marlin" && number("machine_max_jerk_x")) {
+      reading_.add("printer.classic_jerk", true, option("gcode_flavor")->place);
+    }
+  }
+
+  const PrintText* print_;
+  Options options_;
+  Reading reading_;
+};
+
+}  // namespace
+
+Reading read_slicer(const PrintText& print) { return Reader(print).read(); }
+
+std::string_view slicer_with_late_settings(const PrintText& print) {
+  constexpr std::array<std::string_view, 4> kNames = {"PrusaSlicer", "SuperSlicer", "Slic3r",
+                                                      "OrcaSlicer"};
+  std::string_view late;
+  bool has_settings = false;
+  for_each_line(print.head, 1, [&](std::string_view line, std::size_t) {
+    has_settings = has_settings || line.starts_with("; gcode_flavor = ");
+    for (const std::string_view name : kNames) {
+      if (late.empty() && line.starts_with(';') && line.find(name) != std::string_view::npos) {
+        late = name;
+      }
+    }
+  });
+  return print.is_stream && !has_settings ? late : std::string_view{};
+}
+
+}  // namespace unflex::machine

@@ -1,0 +1,89 @@
+#include "source_kind.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "key_table.hpp"
+#include "text_lines.hpp"
+#include "unflex/gcode/command.hpp"
+
+namespace unflex::machine {
+namespace {
+
+// Commands of RepRapFirmware's that make a machine and that no print and no dump of Marlin's has:
+// drives, axes and their drivers, end stops, heaters, kinematics, board's name.
+constexpr std::array kRrfCodes = {550, 558, 563, 569, 574, 584, 665, 667, 669, 906, 950};
+
+struct Traces {
+  int echoes = 0;
+  int rrf_settings = 0;
+  int settings = 0;  // M92, M201 and the like
+  int moves = 0;
+  int klipper = 0;  // sections and options no TOML of ours has
+  int headers = 0;
+};
+
+bool is_setting(const gcode::Command& command) {
+  constexpr std::array kCodes = {92, 201, 203, 204, 205, 207, 208, 566, 593};
+  return command.kind == gcode::CommandKind::traditional && command.letter == 'M' &&
+         std::ranges::find(kCodes, command.number) != kCodes.end();
+}
+
+void look_at_command(std::string_view line, Traces& traces) {
+  const gcode::Command command = gcode::parse(line);
+  if (command.kind != gcode::CommandKind::traditional) {
+    return;
+  }
+  traces.moves += command.letter == 'G' && command.number >= 0 && command.number <= 3 ? 1 : 0;
+  traces.settings += is_setting(command) ? 1 : 0;
+  traces.rrf_settings +=
+      command.letter == 'M' && std::ranges::find(kRrfCodes, command.number) != kRrfCodes.end();
+}
+
+void look_at(std::string_view line, Traces& traces) {
+  const std::string_view content = trimmed(line);
+  const std::size_t echo = content.find("echo:");
+  if (echo != std::string_view::npos) {
+    ++traces.echoes;
+    return look_at_command(content.substr(echo + 5), traces);
+  }
+  if (content.starts_with('[') && content.find(']') != std::string_view::npos) {
+    const std::string_view name = content.substr(1, content.find(']') - 1);
+    ++traces.headers;
+    const bool is_klippers = name.starts_with("stepper_") || name.starts_with("include ") ||
+                             name.starts_with("mcu") || name == "input_shaper";
+    traces.klipper += is_klippers ? 2 : 0;
+    return;
+  }
+  const std::size_t delimiter = content.find_first_of(":=");
+  if (delimiter != std::string_view::npos && delimiter > 0 && content.front() != '#' &&
+      content.front() != ';') {
+    const std::string_view name = trimmed(content.substr(0, delimiter));
+    // No key of ours is called so, and TOML knows no colon.
+    traces.klipper += name == "kinematics" ? 2 : 0;
+    traces.klipper += traces.headers > 0 && content[delimiter] == ':' && content.front() != '"';
+  }
+  look_at_command(content, traces);
+}
+
+}  // namespace
+
+SourceKind source_kind(std::string_view text) {
+  Traces traces;
+  for_each_line(text, 1, [&](std::string_view line, std::size_t) { look_at(line, traces); });
+  if (traces.headers > 0 && traces.klipper > 1) {
+    return SourceKind::klipper;
+  }
+  if (traces.moves > 10 || (traces.moves > 0 && traces.rrf_settings < 2 && traces.echoes == 0)) {
+    return SourceKind::print;
+  }
+  if (traces.echoes > 1 && traces.settings > 0) {
+    return SourceKind::marlin_dump;
+  }
+  if (traces.rrf_settings > 0) {
+    return SourceKind::rrf_config;
+  }
+  return traces.settings > 1 && traces.headers == 0 ? SourceKind::marlin_dump : SourceKind::toml;
+}
+
+}  // namespace unflex::machine

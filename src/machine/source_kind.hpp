@@ -1,0 +1,18 @@
+// What kind of file describes a printer, told by its content.
+#pragma once
+
+#include <string_view>
+
+namespace unflex::machine {
+
+enum class SourceKind {
+  toml,         // unflex's own
+  klipper,      // printer.cfg
+  marlin_dump,  // what M503 answers
+  rrf_config,   // config.g
+  print,        // sliced G-code
+};
+
+[[nodiscard]] SourceKind source_kind(std::string_view text);
+
+}  // namespace unflex::machine

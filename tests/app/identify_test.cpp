@@ -1,0 +1,117 @@
+// Records become lines for the printer file.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "app/program.hpp"
+#include "report/documented_keys.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// RepRapFirmware's record of ringing along X and Y.
+std::string ringing(double x_hz, double y_hz) {
+  constexpr double kRate_hz = 1344.0;
+  constexpr double kDampingRatio = 0.06;
+  std::string text = "Sample,X,Y,Z\n";
+  for (int i = 0; i < 500; ++i) {
+    const double time_s = i / kRate_hz;
+    const auto swing = [&](double freq_hz) {
+      const double omega = 2.0 * std::numbers::pi * freq_hz;
+      return std::exp(-kDampingRatio * omega * time_s) *
+             std::cos(omega * std::sqrt(1.0 - kDampingRatio * kDampingRatio) * time_s);
+    };
+    text += std::to_string(i) + "," + std::to_string(swing(x_hz)) + "," +
+            std::to_string(0.2 * swing(y_hz)) + ",1.0\n";
+  }
+  return text + "Rate 1344, overflows 0\n";
+}
+
+class Identify : public ProgramTest {
+ protected:
+  Identify() {
+    write_file(path("a_x.csv"), ringing(50.0, 40.0));
+    write_file(path("a_y.csv"), ringing(50.0, 40.0));
+    write_file(path("b.csv"), ringing(50.0, 40.0));
+  }
+};
+
+TEST_F(Identify, GivesLinesThatAPrinterFileTakes) {
+  const Outcome outcome = run({"identify", "a_x.csv", "a_y.csv", "-q"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(outcome.out, StartsWith("[dynamics.x]\nfreq_hz = 50"));
+  write_file(path("p.toml"), outcome.out);
+  write_file(path("in.gcode"), small_print());
+  const Outcome inspected =
+      run({"inspect", "in.gcode", "--printer", "p.toml", "-q", "--report", "-"});
+  EXPECT_EQ(inspected.exit_code, 0) << inspected.err;
+  const auto printer = nlohmann::json::parse(inspected.out)["printer"];
+  EXPECT_NEAR(printer["dynamics.x.freq_hz"]["value"].get<double>(), 50.0, 0.05);
+  EXPECT_NEAR(printer["dynamics.y.freq_hz"]["value"].get<double>(), 40.0, 0.05);
+  EXPECT_NEAR(printer["dynamics.y.damping_ratio"]["value"].get<double>(), 0.06, 0.001);
+}
+
+TEST_F(Identify, DrawsWhatItFitted) {
+  const Outcome outcome = run({"identify", "a_x.csv"});
+  EXPECT_THAT(outcome.out, StartsWith("a_x.csv: along x, ringing\n"));
+  EXPECT_THAT(outcome.out, ::testing::ContainsRegex("\n  measured  .*█"));
+  EXPECT_THAT(outcome.out, ::testing::ContainsRegex("\n  fitted    .*█"));
+}
+
+TEST_F(Identify, TakesTheAxisThatMovedMostAndSaysSo) {
+  const Outcome outcome = run({"identify", "b.csv", "-q"});
+  EXPECT_THAT(outcome.out, StartsWith("[dynamics.x]"));
+  EXPECT_THAT(outcome.err, StartsWith("b.csv: warning: its name does not tell the axis"));
+  const Outcome told = run({"identify", "b.csv", "-q", "--axis", "Y"});
+  EXPECT_EQ(told.err, "");
+  EXPECT_THAT(told.out, StartsWith("[dynamics.y]\nfreq_hz = 40"));
+}
+
+TEST_F(Identify, WritesAReportWhoseKeysAreDocumented) {
+  ASSERT_EQ(run({"identify", "a_x.csv", "a_y.csv", "--report", "r.json"}).exit_code, 0);
+  const auto json = nlohmann::json::parse(read_file(path("r.json")));
+  EXPECT_NEAR(json["dynamics"]["x"]["freq_hz"]["value"].get<double>(), 50.0, 0.05);
+  EXPECT_LE(json["dynamics"]["x"]["freq_hz"]["low"], json["dynamics"]["x"]["freq_hz"]["high"]);
+  std::set<std::string> keys;
+  report::collect_keys(json, "", keys);
+  keys.insert("records[].curve.freq_hz");  // in place of time_s, of spectra
+  EXPECT_EQ(report::documented_keys(UNFLEX_DOCS "/identify.md", "Report"), keys);
+}
+
+TEST_F(Identify, WritesAPageOfItsOwn) {
+  write_file(path("<b>&_x.csv"), ringing(50.0, 40.0));
+  ASSERT_EQ(run({"identify", "<b>&_x.csv", "--report", "r.html"}).exit_code, 0);
+  const std::string page = read_file(path("r.html"));
+  EXPECT_THAT(page, HasSubstr("&lt;b&gt;&amp;_x.csv"));
+  EXPECT_THAT(page, HasSubstr("<svg"));
+  EXPECT_EQ(page.find("<b>&_x"), std::string::npos);
+  EXPECT_EQ(page.find("http://"), std::string::npos);
+}
+
+TEST_F(Identify, TakesARingingTower) {
+  const Outcome outcome = run({"identify", "--wave-spacing-mm", "2", "--speed-mm-s", "100",
+                               "--decay", "1.5", "--axis", "y", "-q"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, StartsWith("[dynamics.y]\nfreq_hz = 50"));
+}
+
+TEST_F(Identify, SaysWhatIsMissing) {
+  EXPECT_EQ(run({"identify"}).exit_code, 1);
+  EXPECT_EQ(run({"identify", "no.csv"}).exit_code, 2);
+  EXPECT_THAT(run({"identify", "--wave-spacing-mm", "2", "--axis", "x"}).err,
+              HasSubstr("needs both"));
+  write_file(path("in.gcode"), small_print());
+  const Outcome outcome = run({"identify", "in.gcode"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("is no record that unflex knows"));
+}
+
+}  // namespace
+}  // namespace unflex::app

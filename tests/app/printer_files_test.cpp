@@ -1,0 +1,75 @@
+// However the printer is described, the print comes out the same.
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "app/program.hpp"
+
+namespace unflex::app {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+const std::string kConfig = std::string(UNFLEX_TEST_DATA) + "/printer/printer.cfg";
+
+class PrinterFile : public ProgramTest {
+ protected:
+  PrinterFile() { write_file(path("in.gcode"), small_print()); }
+
+  std::string compensated(std::vector<std::string> options) {
+    std::vector<std::string> arguments = {"compensate", "in.gcode", "-o", "-", "-q"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.out;
+  }
+};
+
+TEST_F(PrinterFile, GivesTheSameBytesAsPrinterCfgAsTomlAndByOverrides) {
+  const std::string from_cfg = compensated({"--printer", kConfig});
+  ASSERT_NE(from_cfg, "");
+  EXPECT_NE(from_cfg, compensated({})) << "the settings would not matter";
+  ASSERT_EQ(run({"printer", "init", "--from", kConfig, "-o", "printer.toml"}).exit_code, 0);
+  EXPECT_EQ(compensated({"--printer", "printer.toml"}), from_cfg);
+
+  ASSERT_EQ(
+      run({"inspect", "in.gcode", "--printer", kConfig, "-q", "--report", "r.json"}).exit_code, 0);
+  std::vector<std::string> overrides;
+  const auto report = nlohmann::json::parse(read_file(path("r.json")));
+  for (const auto& [key, setting] : report["printer"].items()) {
+    if (setting["origin"] != "default") {
+      overrides.insert(overrides.end(), {"--set", key + "=" + setting["value"].dump()});
+    }
+  }
+  ASSERT_GT(overrides.size(), 20U);
+  EXPECT_EQ(compensated(overrides), from_cfg);
+}
+
+TEST_F(PrinterFile, IsMadeFromAPrintToo) {
+  write_file(path("sliced.gcode"),
+             small_print() + "; gcode_flavor = marlin\n; machine_max_acceleration_x = 1500\n");
+  const Outcome outcome = run({"printer", "init", "--from", "sliced.gcode", "-o", "-"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("firmware = \"marlin\"  # sliced.gcode:"));
+  EXPECT_THAT(outcome.out, HasSubstr("max_accel_mm_s2 = 1500  # sliced.gcode:"));
+}
+
+TEST_F(PrinterFile, IsNotWrittenOverWhatItIsMadeFrom) {
+  write_file(path("p.toml"), "[limits]\nmax_accel_mm_s2 = 1\n");
+  const Outcome outcome = run({"printer", "init", "--from", "p.toml", "-o", "p.toml"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, StartsWith("p.toml: is what it is made from too"));
+}
+
+TEST_F(PrinterFile, IsNotNeededWhereTheSlicerTells) {
+  write_file(path("in.gcode"), "; gcode_flavor = reprapfirmware\n" + small_print());
+  const Outcome file = run({"compensate", "in.gcode", "-o", "-", "-q"});
+  EXPECT_THAT(file.out, HasSubstr("M566"));
+  const Outcome piped = run({"compensate", "-", "-o", "-", "-q"}, read_file(path("in.gcode")));
+  EXPECT_EQ(piped.out, file.out);
+}
+
+}  // namespace
+}  // namespace unflex::app

@@ -1,0 +1,151 @@
+// A printer.cfg says all that is needed, as Klipper reads it.
+
+#include <gmock/gmock.h>
+
+#include "reading.hpp"
+
+namespace unflex::machine {
+namespace {
+
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr const char* kWhole =
+    "[printer]\nkinematics: cartesian\nmax_velocity: 200\nmax_accel: 1000\n"
+    "[input_shaper]\nshaper_freq_x: 40\nshaper_freq_y: 50\n";
+
+class KlipperFiles : public PrinterFiles {
+ protected:
+  static std::string failure(const std::string& file) {
+    const Result<Settings> settings = load(file, {});
+    EXPECT_FALSE(settings) << "was read";
+    EXPECT_TRUE(settings || settings.error().kind == ErrorKind::usage);
+    return settings ? "" : to_string(settings.error());
+  }
+  static Settings good(const std::string& file) {
+    Result<Settings> settings = load(file, {});
+    EXPECT_TRUE(settings) << to_string(settings.error());
+    return settings.value_or(Settings{});
+  }
+};
+
+TEST_F(KlipperFiles, AreReadWithTheirIncludesAndWhatWasSaved) {
+  const Settings s = good(fixture("printer.cfg"));
+  EXPECT_EQ(told(s, "printer.firmware"), "\"klipper\" printer.cfg:8");
+  EXPECT_EQ(told(s, "limits.max_velocity_mm_s"), "280 printer.cfg:10");
+  EXPECT_EQ(told(s, "limits.max_accel_mm_s2"), "4200 printer.cfg:11");
+  EXPECT_EQ(told(s, "limits.minimum_cruise_ratio"), "0.5 printer.cfg:12");
+  EXPECT_EQ(told(s, "limits.square_corner_velocity_mm_s"), "6.5 printer.cfg:13");
+  EXPECT_EQ(told(s, "limits.max_z_velocity_mm_s"), "14 printer.cfg:14");
+  EXPECT_EQ(told(s, "limits.max_z_accel_mm_s2"), "120 printer.cfg:15");
+  EXPECT_EQ(told(s, "printer.travel_x_mm"), "[-4.5, 235] printer.cfg:21");
+  EXPECT_EQ(told(s, "printer.travel_y_mm"), "[0, 228] printer.cfg:27");
+  EXPECT_EQ(told(s, "extruder.nozzle_diameter_mm"), "0.6 extruder.cfg:2");
+  EXPECT_EQ(told(s, "extruder.filament_diameter_mm"), "1.75 extruder.cfg:3");
+  EXPECT_EQ(told(s, "extruder.max_extrude_cross_section_mm2"), "5 extruder.cfg:4");
+  EXPECT_EQ(told(s, "extruder.instantaneous_corner_velocity_mm_s"), "2 extruder.cfg:5");
+  EXPECT_EQ(told(s, "printer.firmware_retraction"), "true shaper.cfg:4");
+  EXPECT_EQ(told(s, "printer.retract_length_mm"), "0.8 shaper.cfg:5");
+  EXPECT_EQ(told(s, "printer.unretract_speed_mm_s"), "10 default");
+  EXPECT_EQ(told(s, "printer.arc_resolution_mm"), "0.25 macros.cfg:9");
+  EXPECT_THAT(s.notes, IsEmpty());
+}
+
+TEST_F(KlipperFiles, GiveTheShapersFrequencyAsTheResonance) {
+  const Settings s = good(fixture("printer.cfg"));
+  EXPECT_EQ(told(s, "dynamics.x.freq_hz"), "51.2 shaper.cfg:2");
+  EXPECT_EQ(told(s, "dynamics.x.damping_ratio"), "0.1 shaper.cfg:2");
+  EXPECT_EQ(told(s, "dynamics.y.freq_hz"), "38.4 printer.cfg:41");
+  EXPECT_EQ(told(s, "dynamics.y.damping_ratio"), "0.07 printer.cfg:42");
+  EXPECT_EQ(told(s, "printer.input_shaper_freq_x_hz"), "51.2 shaper.cfg:2");
+}
+
+TEST_F(KlipperFiles, WithoutAShaperHaveNoneToSetBackAndAnUnknownResonance) {
+  const Settings s =
+      good(write("printer.cfg",
+                 "[printer]\nkinematics: cartesian\nmax_velocity: 200\nmax_accel: 1000\n[mcu]\n"));
+  EXPECT_EQ(told(s, "printer.input_shaper_freq_x_hz"), "0 printer.cfg");
+  EXPECT_EQ(told(s, "printer.firmware_retraction"), "false printer.cfg");
+  EXPECT_EQ(told(s, "dynamics.x.freq_hz"), "45 default");
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_THAT(s.notes[0].message, HasSubstr("resonance along x and y"));
+}
+
+TEST_F(KlipperFiles, TakeTheLastOfAnOptionInTheOrderOfTheIncludes) {
+  write("later.cfg", "[printer]\nmax_accel: 2\n");
+  EXPECT_EQ(told(good(write("a.cfg", std::string(kWhole) + "[include later.cfg]\n")),
+                 "limits.max_accel_mm_s2"),
+            "2 later.cfg:2");
+  EXPECT_EQ(told(good(write("b.cfg", std::string("[include later.cfg]\n") + kWhole)),
+                 "limits.max_accel_mm_s2"),
+            "1000 b.cfg:5");
+}
+
+TEST_F(KlipperFiles, FindIncludesBesideTheFileThatNamesThem) {
+  write("sub/inner.cfg", "[printer]\nsquare_corner_velocity: 9\n");
+  write("sub/outer.cfg", "[include inner.cfg]\n[include nothing*.cfg]\n");
+  EXPECT_EQ(told(good(write("p.cfg", std::string("[include sub/outer.cfg]\n") + kWhole)),
+                 "limits.square_corner_velocity_mm_s"),
+            "9 inner.cfg:2");
+}
+
+TEST_F(KlipperFiles, ThatIncludeThemselvesAreRefused) {
+  const std::string file = write("a.cfg", std::string(kWhole) + "[include b.cfg]\n");
+  write("b.cfg", "[include a.cfg]\n");
+  EXPECT_THAT(failure(file), EndsWith("a.cfg includes itself"));
+  EXPECT_THAT(failure(file), HasSubstr("b.cfg:1: "));
+}
+
+TEST_F(KlipperFiles, ThatIncludeWhatIsNotThereAreRefused) {
+  EXPECT_THAT(failure(write("a.cfg", std::string(kWhole) + "[include no.cfg]\n")),
+              ::testing::ContainsRegex("a.cfg:8: the included file .*no.cfg does not exist"));
+}
+
+TEST_F(KlipperFiles, IgnoreWhatWasSavedOnceSomeoneHasWrittenBelow) {
+  const Settings s = good(write(
+      "a.cfg", std::string(kWhole) +
+                   "#*# <---------------------- SAVE_CONFIG ---------------------->\n"
+                   "#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.\n#*#\n"
+                   "#*# [input_shaper]\n#*# damping_ratio_x = 0.3\n[extruder]\n"));
+  EXPECT_EQ(told(s, "dynamics.x.damping_ratio"), "0.1 a.cfg:6");
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_EQ(s.notes[0].place.line, 13);
+}
+
+TEST_F(KlipperFiles, NameTheLineOfWhatIsWrong) {
+  EXPECT_THAT(failure(write("a.cfg", std::string(kWhole) + "[extruder]\nnozzle_diameter: wide\n")),
+              EndsWith("a.cfg:9: nozzle_diameter in [extruder] must be a number, not 'wide'"));
+  EXPECT_THAT(failure(write("b.cfg", std::string(kWhole) + "[extruder]\nnozzle_diameter: 0\n")),
+              EndsWith("b.cfg:9: extruder.nozzle_diameter_mm is 0, but must be > 0"));
+  EXPECT_THAT(failure(write("c.cfg", std::string(kWhole) + "[mcu]\nnonsense\n")),
+              EndsWith("c.cfg:9: is neither [section] nor 'option: value'; Klipper would refuse it "
+                       "too"));
+  EXPECT_THAT(failure(write("d.cfg", "[mcu]\nserial: x\n[printer]\nkinematics: corexy\n")),
+              HasSubstr("d.cfg: max_velocity in [printer] is missing"));
+}
+
+TEST_F(KlipperFiles, OfMachinesWithoutCarriagesAlongXAndYAreRefused) {
+  std::string text = kWhole;
+  text.replace(text.find("cartesian"), 9, "polar");
+  EXPECT_THAT(failure(write("a.cfg", text)), HasSubstr("a.cfg:2: kinematics 'polar' has no"));
+}
+
+TEST_F(KlipperFiles, OfDeltasBringANote) {
+  std::string text = kWhole;
+  text.replace(text.find("cartesian"), 9, "delta");
+  const Settings s = good(write("a.cfg", text));
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_THAT(s.notes[0].message, HasSubstr("change with the place"));
+}
+
+TEST_F(KlipperFiles, AreToldByTheirContentAndNotByTheirName) {
+  EXPECT_EQ(good(write("a.toml", kWhole)).limits.max_accel_mm_s2, 1000.0);
+  EXPECT_EQ(good(write("b.cfg", "[limits]\nmax_accel_mm_s2 = 77\n")).limits.max_accel_mm_s2, 77.0);
+  EXPECT_THAT(failure(write("c.toml", "[limits]\nmax_accel = 7\nmax_velocity = 7\n")),
+              HasSubstr("did you mean 'limits.max_accel_mm_s2'?"));
+}
+
+}  // namespace
+}  // namespace unflex::machine

@@ -1,0 +1,226 @@
+// Marlin's M503, RepRapFirmware's config.g and slicers say what they know, in their order.
+
+#include <gmock/gmock.h>
+
+#include "reading.hpp"
+
+namespace unflex::machine {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+class Sources : public PrinterFiles {};
+
+Settings read(const std::string& text, const std::string& name = "print.gcode") {
+  Result<Settings> settings = parse(text, name, {});
+  EXPECT_TRUE(settings) << to_string(settings.error());
+  return settings.value_or(Settings{});
+}
+
+PrintText print_of(const std::string& head, const std::string& tail) {
+  return {.name = "print.gcode", .head = head, .tail = tail, .tail_line = 101};
+}
+
+Settings sliced(const PrintText& print, const std::vector<std::string>& overrides = {}) {
+  Result<Settings> settings = load({.print = &print, .printer_file = {}, .overrides = overrides});
+  EXPECT_TRUE(settings) << to_string(settings.error());
+  return settings.value_or(Settings{});
+}
+
+constexpr const char* kMarlinBlock =
+    "; gcode_flavor = marlin2\n; machine_max_feedrate_x = 180,90\n; machine_max_feedrate_y = 200\n"
+    "; machine_max_feedrate_z = 12\n; machine_max_acceleration_x = 3000\n"
+    "; machine_max_acceleration_y = 2500\n; machine_max_acceleration_extruding = 1250\n"
+    "; machine_max_acceleration_travel = 0\n; machine_max_jerk_x = 8\n; nozzle_diameter = 0.6,0.4\n"
+    "; filament_diameter = 2.85\n; bed_shape = 0x0,200x0,200x200,0x200\n";
+
+TEST(MarlinDump, IsRead) {
+  const Result<Settings> loaded = load(fixture("m503.txt"), {});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const Settings& s = *loaded;
+  EXPECT_EQ(told(s, "printer.firmware"), "\"marlin\" m503.txt");
+  EXPECT_EQ(told(s, "printer.y_steps_per_mm"), "80.5 m503.txt:7");
+  EXPECT_EQ(told(s, "limits.max_y_velocity_mm_s"), "400 m503.txt:9");
+  EXPECT_EQ(told(s, "limits.max_velocity_mm_s"), "500 m503.txt:9");
+  EXPECT_EQ(told(s, "limits.max_x_accel_mm_s2"), "900 m503.txt:11");
+  EXPECT_EQ(told(s, "limits.max_accel_mm_s2"), "700 m503.txt:11");
+  EXPECT_EQ(told(s, "limits.print_accel_mm_s2"), "600 m503.txt:13");
+  EXPECT_EQ(told(s, "limits.travel_accel_mm_s2"), "650 m503.txt:13");
+  EXPECT_EQ(told(s, "limits.retract_accel_mm_s2"), "500 m503.txt:13");
+  EXPECT_EQ(told(s, "limits.min_segment_time_ms"), "15 m503.txt:15");
+  EXPECT_EQ(told(s, "limits.junction_deviation_mm"), "0.02 m503.txt:15");
+  EXPECT_EQ(told(s, "printer.classic_jerk"), "false m503.txt:15");
+  EXPECT_EQ(told(s, "printer.retract_length_mm"), "3.2 m503.txt:19");
+  EXPECT_EQ(told(s, "printer.unretract_extra_length_mm"), "0.1 m503.txt:19");
+  EXPECT_EQ(told(s, "printer.unretract_speed_mm_s"), "8 m503.txt:19");
+  EXPECT_EQ(told(s, "dynamics.x.freq_hz"), "40 m503.txt:21");
+  EXPECT_EQ(told(s, "dynamics.y.damping_ratio"), "0.12 m503.txt:22");
+  EXPECT_EQ(told(s, "printer.input_shaper_freq_y_hz"), "35 m503.txt:22");
+  EXPECT_EQ(told(s, "extruder.filament_diameter_mm"), "2.85 m503.txt:5");
+  EXPECT_THAT(s.notes, IsEmpty());
+}
+
+TEST(MarlinDump, OfClassicJerkIsRead) {
+  const Settings s = read("echo:  M92 X80 Y80\necho:  M205 B20000 S0 T0 X8.00 Y9.00 Z0.40 E5.00\n");
+  EXPECT_TRUE(s.printer.classic_jerk);
+  EXPECT_EQ(s.jerk_mm_s(), (std::array{8.0, 9.0, 0.4, 5.0}));
+  EXPECT_FALSE(s.printer.firmware_retraction);
+}
+
+TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsANote) {
+  const Settings s =
+      read("echo:  M92 X80 Y80\necho:  M205 J0.01\necho:  M593 F40 D0.1\n", "dump.txt");
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_EQ(s.notes[0].place.line, 2);
+  EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 40.0);
+}
+
+TEST(MarlinDump, InInchesIsConverted) {
+  EXPECT_NEAR(*read("echo:  G20\necho:  M201 X10 Y10\n").limits.axis_max_accel_mm_s2[0], 254.0,
+              1e-9);
+}
+
+TEST(RrfConfig, IsRead) {
+  const Result<Settings> loaded = load(fixture("config.g"), {});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const Settings& s = *loaded;
+  EXPECT_EQ(told(s, "printer.firmware"), "\"rrf\" config.g");
+  EXPECT_EQ(told(s, "printer.travel_x_mm"), "[-5, 230] config.g:5");
+  EXPECT_EQ(told(s, "printer.e_steps_per_mm"), "420 config.g:7");
+  EXPECT_EQ(told(s, "limits.jerk_x_mm_s"), "15 config.g:8");
+  EXPECT_EQ(told(s, "limits.jerk_policy"), "1 config.g:8");
+  EXPECT_EQ(told(s, "limits.max_x_velocity_mm_s"), "300 config.g:9");
+  EXPECT_EQ(told(s, "limits.min_movement_velocity_mm_s"), "0.5 config.g:9");
+  EXPECT_EQ(told(s, "limits.max_accel_mm_s2"), "3000 config.g:10");
+  EXPECT_EQ(told(s, "limits.print_accel_mm_s2"), "2500 config.g:11");
+  EXPECT_EQ(told(s, "dynamics.y.freq_hz"), "42.5 config.g:12");
+  EXPECT_EQ(told(s, "dynamics.x.damping_ratio"), "0.08 config.g:12");
+  EXPECT_EQ(told(s, "printer.input_shaper_type"), "\"mzv\" config.g:12");
+  EXPECT_EQ(told(s, "printer.retract_speed_mm_s"), "30 config.g:13");
+  EXPECT_EQ(told(s, "printer.unretract_speed_mm_s"), "20 config.g:13");
+  EXPECT_EQ(told(s, "printer.retract_z_hop_mm"), "0.2 config.g:13");
+  EXPECT_THAT(s.notes, IsEmpty());
+}
+
+TEST(RrfConfig, GivesTravelAsPairsToo) {
+  const Settings s = read("M550 P\"x\"\nM208 X-2:210 Y0:200.5 Z0:200\nM593 P\"none\"\n");
+  EXPECT_EQ(by_key(s)["printer.travel_x_mm"].value, "[-2, 210]");
+  EXPECT_EQ(by_key(s)["printer.travel_y_mm"].value, "[0, 200.5]");
+  EXPECT_DOUBLE_EQ(s.shaper_freq_x_hz(), 0.0);
+}
+
+TEST(RrfConfig, OfAScaraIsRefused) {
+  const Result<Settings> settings = parse("M550 P\"x\"\nM669 K4\n", "config.g", {});
+  ASSERT_FALSE(settings);
+  EXPECT_THAT(to_string(settings.error()), ::testing::StartsWith("config.g:2: kinematics K4"));
+}
+
+TEST(Slicers, TellAMarlinsLimits) {
+  const Settings s = sliced(print_of("; generated by PrusaSlicer 2.5.0\n", kMarlinBlock));
+  EXPECT_EQ(told(s, "printer.firmware"), "\"marlin\" print.gcode:101");
+  EXPECT_EQ(told(s, "limits.max_x_velocity_mm_s"), "180 print.gcode:102");
+  EXPECT_EQ(told(s, "limits.max_velocity_mm_s"), "200 print.gcode:103");
+  EXPECT_EQ(told(s, "limits.max_accel_mm_s2"), "2500 print.gcode:106");
+  EXPECT_EQ(told(s, "limits.print_accel_mm_s2"), "1250 print.gcode:107");
+  EXPECT_EQ(by_key(s)["limits.travel_accel_mm_s2"].origin, "default");
+  EXPECT_EQ(told(s, "extruder.nozzle_diameter_mm"), "0.6 print.gcode:110");
+  EXPECT_EQ(by_key(s)["printer.travel_x_mm"].origin, "default") << "a bed is not the travel";
+  EXPECT_FALSE(s.printer.classic_jerk);
+}
+
+TEST(Slicers, TellAKlippersLimitsAtTheHead) {
+  const Settings s = sliced(print_of(
+      "; CONFIG_BLOCK_START\n; gcode_flavor = klipper\n; machine_max_speed_x = 500,200\n"
+      "; machine_max_speed_y = 400,200\n; machine_max_acceleration_x = 20000\n"
+      "; machine_max_acceleration_extruding = 12000\n; machine_max_acceleration_z = 20000\n"
+      "; CONFIG_BLOCK_END\n",
+      ""));
+  EXPECT_EQ(told(s, "printer.firmware"), "\"klipper\" print.gcode:2");
+  EXPECT_DOUBLE_EQ(s.limits.max_velocity_mm_s, 400.0);
+  EXPECT_DOUBLE_EQ(s.limits.max_accel_mm_s2, 12000.0);
+  EXPECT_DOUBLE_EQ(s.axis_max_accel_mm_s2()[2], 12000.0);
+}
+
+TEST(Slicers, ThatSayMarlinMeanKlipperWhereThePrintHasItsMacros) {
+  const Settings s = sliced(print_of("M104 S200\nSTART_PRINT BED=60\n", kMarlinBlock));
+  EXPECT_EQ(told(s, "printer.firmware"), "\"klipper\" print.gcode:2");
+  EXPECT_DOUBLE_EQ(s.limits.max_accel_mm_s2, 1250.0);
+}
+
+TEST(Slicers, AreNotBelievedWhatTheyWereToldToIgnore) {
+  const Settings s =
+      sliced(print_of("", std::string(kMarlinBlock) + "; machine_limits_usage = ignore\n"));
+  EXPECT_DOUBLE_EQ(s.limits.max_accel_mm_s2, 5000.0);
+  EXPECT_EQ(s.printer.firmware, Firmware::marlin);
+}
+
+TEST(Slicers, NameTheFlavorAloneInCura) {
+  EXPECT_EQ(sliced(print_of(";FLAVOR:Marlin\n;TIME:12\n", "")).printer.firmware, Firmware::marlin);
+  EXPECT_EQ(sliced(print_of(";FLAVOR:RepRap (RepRap)\n", "")).printer.firmware, Firmware::rrf);
+  const Settings odd = sliced(print_of(";FLAVOR:Makerbot\n", ""));
+  EXPECT_EQ(odd.printer.firmware, Firmware::klipper);
+  ASSERT_THAT(odd.notes, SizeIs(1));
+  EXPECT_THAT(to_string(odd.notes[0]), HasSubstr("print.gcode:1: warning: "));
+}
+
+TEST(Slicers, ThatWriteAtTheEndAreMissedInAPipe) {
+  PrintText print = print_of("; generated by PrusaSlicer 2.7\n", "");
+  print.is_stream = true;
+  EXPECT_THAT(sliced(print).notes, SizeIs(1));
+  print.head += "; gcode_flavor = klipper\n";
+  EXPECT_THAT(sliced(print).notes, IsEmpty());
+}
+
+TEST_F(Sources, WinInTheirOrder) {
+  const std::string file =
+      write("p.toml", "[limits]\nmax_accel_mm_s2 = 2000\nmax_velocity_mm_s = 150\n");
+  const PrintText print = print_of("", kMarlinBlock);
+  const Result<Settings> s =
+      load({.print = &print, .printer_file = file, .overrides = {"limits.max_velocity_mm_s=120"}});
+  ASSERT_TRUE(s) << to_string(s.error());
+  EXPECT_EQ(told(*s, "limits.max_velocity_mm_s"), "120 --set");
+  EXPECT_EQ(told(*s, "limits.max_accel_mm_s2"), "2000 p.toml:2");
+  EXPECT_EQ(told(*s, "limits.print_accel_mm_s2"), "1250 print.gcode:107");
+  EXPECT_EQ(told(*s, "emit.period_ms"), "1 default");
+}
+
+TEST_F(Sources, OfAPrintAreItsHeadAndItsTailWithTheirLines) {
+  std::string text = "; head\nM104 S200\nG1 X1 F600\n";
+  for (int i = 0; i < 80000; ++i) {
+    text += "G1 X1.234 Y5.678 E9.0\n";
+  }
+  text += kMarlinBlock;
+  const Result<PrintText> print = read_print_text(write("p.gcode", text), "p.gcode");
+  ASSERT_TRUE(print);
+  EXPECT_EQ(print->head, "; head\nM104 S200\nG1 X1 F600\n");
+  EXPECT_TRUE(print->tail.ends_with(kMarlinBlock));
+  EXPECT_TRUE(print->tail.starts_with("G1 X1.234 Y5.678 E9.0\n"));
+  EXPECT_EQ(told(sliced(*print), "printer.firmware"), "\"marlin\" p.gcode:80004");
+  EXPECT_FALSE(describes_printer(*print));
+}
+
+TEST_F(Sources, OfAShortFileAreAllOfIt) {
+  const Result<PrintText> print = read_print_text(write("p.cfg", "[printer]\na: 1\n"), "p.cfg");
+  ASSERT_TRUE(print);
+  EXPECT_EQ(print->tail, "[printer]\na: 1\n");
+  EXPECT_EQ(print->tail_line, 1);
+  EXPECT_TRUE(describes_printer(*print));
+}
+
+TEST(ToToml, OfEverySourceReadsBackAsTheSameSettings) {
+  for (const std::string name : {"printer.cfg", "m503.txt", "config.g"}) {
+    const Result<Settings> first = load(fixture(name), {});
+    ASSERT_TRUE(first) << name;
+    const Settings second = read(to_toml(*first), "printer.toml");
+    const std::map<std::string, SettingRow> before = by_key(*first);
+    for (const auto& [key, row] : by_key(second)) {
+      EXPECT_EQ(row.value, before.at(key).value) << name << " " << key;
+    }
+    EXPECT_THAT(to_toml(*first), HasSubstr("  # " + fixture(name) + ":")) << name;
+  }
+}
+
+}  // namespace
+}  // namespace unflex::machine
