@@ -23,7 +23,10 @@ Result<machine::Settings> settings_from(const RunConfig& config, Input& input) {
   }
   return machine::describes_printer(*text)
              ? machine::parse(text->tail, config.input, config.overrides)
-             : machine::load({.print = &*text, .printer_file = {}, .overrides = config.overrides});
+             : machine::load({.print = &*text,
+                              .printer_file = {},
+                              .overrides = config.overrides,
+                              .firmware_as_sliced = true});
 }
 
 Status write_settings(const RunConfig& config, const machine::Settings& settings) {

@@ -368,21 +368,6 @@ Result<ExitCode> run_study(const RunConfig& config) {
       .map([] { return ExitCode::done; });
 }
 
-Result<ExitCode> run_command(const RunConfig& config) {
-  switch (config.command) {
-    case Command::inspect:
-      return run_inspect(config);
-    case Command::printer_init:
-      return run_printer_init(config);
-    case Command::identify:
-      return run_identify(config);
-    case Command::compensate:
-    case Command::verify:
-      break;
-  }
-  return run_on_prints(config);
-}
-
 // A descriptor 0, 1 or 2 that was closed would be given to the next file opened, and messages
 // would land in it. /dev/null is opened the wrong way round, so that using it is still an error.
 void reserve_standard_descriptors() {
@@ -397,11 +382,17 @@ Result<ExitCode> run_command(const RunConfig& config) {
   switch (config.command) {
     case Command::inspect:
       return run_inspect(config);
+    case Command::printer_init:
+      return run_printer_init(config);
+    case Command::identify:
+      return run_identify(config);
     case Command::study:
       return run_study(config);
-    default:
-      return run_on_prints(config);
+    case Command::compensate:
+    case Command::verify:
+      break;
   }
+  return run_on_prints(config);
 }
 
 }  // namespace

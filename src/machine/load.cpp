@@ -100,9 +100,28 @@ void note_late_settings(const PrintText& print, std::vector<Diagnostic>& notes) 
   }
 }
 
+// What the slicer says, as far as it is meant for the firmware that others than it have named.
+Reading read_slicer_for(const Sources& sources) {
+  if (sources.firmware_as_sliced) {
+    return read_slicer(*sources.print, std::nullopt);
+  }
+  Draft others = defaults();
+  if (sources.printer_file) {
+    if (const Result<std::string> text = read_printer_file(*sources.printer_file)) {
+      // Errors are reported when it is read for good.
+      static_cast<void>(read_printer(*text, sources.printer_file->string(), others));
+    }
+  }
+  for (const std::string& text : sources.overrides) {
+    static_cast<void>(apply_override(text, others));
+  }
+  return read_slicer(*sources.print, others.settings.printer.firmware,
+                     !others.places[*find_key("printer.firmware")]);
+}
+
 Status read_sources(const Sources& sources, Draft& draft) {
   if (sources.print != nullptr) {
-    if (Status applied = apply(read_slicer(*sources.print), draft); !applied) {
+    if (Status applied = apply(read_slicer_for(sources), draft); !applied) {
       return applied;
     }
     if (!sources.printer_file) {

@@ -78,13 +78,30 @@ class Reader {
     for_each_line(print.tail, print.tail_line, look);
   }
 
-  Reading read() {
+  Reading read(std::optional<Firmware> runs, bool by_default) {
     diameter("nozzle_diameter", "extruder.nozzle_diameter_mm");
     diameter("filament_diameter", "extruder.filament_diameter_mm");
-    const std::optional<Firmware> firmware = flavor();
+    const std::optional<Firmware> named = flavor();
+    if (!named) {
+      return std::move(reading_);
+    }
+    const std::size_t macro = *named == Firmware::marlin ? klipper_line(print_->head) : 0;
+    const Firmware meant = macro != 0 ? Firmware::klipper : *named;
+    const SourcePlace place = option("gcode_flavor")->place;
+    if (!runs) {
+      reading_.add("printer.firmware", std::string(to_string(meant)),
+                   macro != 0 ? SourcePlace{print_->name, macro} : place);
+    } else if (by_default && meant != *runs) {
+      reading_.notes.push_back(
+          {place,
+           fmt::format("sliced for {0}, but taken to be run by {1}, the default; say which it "
+                       "is with --set printer.firmware={0} or {1}, or give --printer",
+                       to_string(meant), to_string(*runs))});
+    }
+    const Firmware firmware = runs.value_or(meant);
     const SlicerOption* const usage = option("machine_limits_usage");
-    if (firmware && (usage == nullptr || usage->text != "ignore")) {
-      *firmware == Firmware::klipper ? klipper_limits() : axis_limits(*firmware);
+    if ((!runs || *named == firmware) && (usage == nullptr || usage->text != "ignore")) {
+      firmware == Firmware::klipper ? klipper_limits() : axis_limits(firmware);
     }
     return std::move(reading_);
   }
@@ -114,7 +131,6 @@ class Reader {
 
   void diameter(const std::string& name, const std::string& key) { add(key, number(name), name); }
 
-  // Printers with Klipper are often sliced for as "marlin".
   std::optional<Firmware> flavor() {
     const SlicerOption* const given = option("gcode_flavor");
     if (given == nullptr) {
@@ -128,11 +144,7 @@ class Reader {
                                      given->text)});
       return std::nullopt;
     }
-    const std::size_t macro = known->firmware == Firmware::marlin ? klipper_line(print_->head) : 0;
-    const Firmware firmware = macro != 0 ? Firmware::klipper : known->firmware;
-    reading_.add("printer.firmware", std::string(to_string(firmware)),
-                 macro != 0 ? SourcePlace{print_->name, macro} : given->place);
-    return firmware;
+    return known->firmware;
   }
 
   // OrcaSlicer and Bambu Studio speak of speeds, the others of feed rates.
@@ -223,7 +235,9 @@ class Reader {
 
 }  // namespace
 
-Reading read_slicer(const PrintText& print) { return Reader(print).read(); }
+Reading read_slicer(const PrintText& print, std::optional<Firmware> runs, bool by_default) {
+  return Reader(print).read(runs, by_default);
+}
 
 std::string_view slicer_with_late_settings(const PrintText& print) {
   constexpr std::array<std::string_view, 4> kNames = {"PrusaSlicer", "SuperSlicer", "Slic3r",

@@ -63,12 +63,18 @@ TEST_F(PrinterFile, IsNotWrittenOverWhatItIsMadeFrom) {
   EXPECT_THAT(outcome.err, StartsWith("p.toml: is what it is made from too"));
 }
 
-TEST_F(PrinterFile, IsNotNeededWhereTheSlicerTells) {
+TEST_F(PrinterFile, IsAskedForWhereTheSlicerHadAnotherFirmwareInMind) {
   write_file(path("in.gcode"), "; gcode_flavor = reprapfirmware\n" + small_print());
   const Outcome file = run({"compensate", "in.gcode", "-o", "-", "-q"});
-  EXPECT_THAT(file.out, HasSubstr("M566"));
+  EXPECT_THAT(file.out, HasSubstr("SET_VELOCITY_LIMIT"));
+  EXPECT_THAT(file.err, HasSubstr("in.gcode:1: warning: sliced for rrf, but taken to be run by "
+                                  "klipper, the default"));
   const Outcome piped = run({"compensate", "-", "-o", "-", "-q"}, read_file(path("in.gcode")));
   EXPECT_EQ(piped.out, file.out);
+  const Outcome told =
+      run({"compensate", "in.gcode", "-o", "-", "-q", "--set", "printer.firmware=rrf"});
+  EXPECT_THAT(told.out, HasSubstr("M566"));
+  EXPECT_EQ(told.err, "");
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Marlin's M503, RepRapFirmware's config.g and slicers say what they know, in their order.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "reading.hpp"
@@ -24,7 +25,8 @@ PrintText print_of(const std::string& head, const std::string& tail) {
 }
 
 Settings sliced(const PrintText& print, const std::vector<std::string>& overrides = {}) {
-  Result<Settings> settings = load({.print = &print, .printer_file = {}, .overrides = overrides});
+  Result<Settings> settings = load(
+      {.print = &print, .printer_file = {}, .overrides = overrides, .firmware_as_sliced = true});
   EXPECT_TRUE(settings) << to_string(settings.error());
   return settings.value_or(Settings{});
 }
@@ -149,6 +151,28 @@ TEST(Slicers, ThatSayMarlinMeanKlipperWhereThePrintHasItsMacros) {
   EXPECT_DOUBLE_EQ(s.limits.max_accel_mm_s2, 1250.0);
 }
 
+TEST(Slicers, DoNotChooseTheFirmwareOfACompensation) {
+  const PrintText print = print_of("", kMarlinBlock);
+  const Result<Settings> settings = load({.print = &print, .printer_file = {}, .overrides = {}});
+  ASSERT_TRUE(settings);
+  EXPECT_EQ(told(*settings, "printer.firmware"), "\"klipper\" default");
+  EXPECT_EQ(by_key(*settings)["limits.max_accel_mm_s2"].origin, "default") << "a Marlin's";
+  EXPECT_EQ(told(*settings, "extruder.nozzle_diameter_mm"), "0.6 print.gcode:110");
+  ASSERT_THAT(settings->notes, SizeIs(1));
+  EXPECT_THAT(to_string(settings->notes[0]),
+              HasSubstr("print.gcode:101: warning: sliced for marlin, but taken to be run by "
+                        "klipper, the default"));
+  for (const char* firmware : {"klipper", "marlin"}) {
+    const Result<Settings> chosen =
+        load({.print = &print,
+              .printer_file = {},
+              .overrides = {fmt::format("printer.firmware={}", firmware)}});
+    ASSERT_TRUE(chosen);
+    EXPECT_THAT(chosen->notes, IsEmpty());
+    EXPECT_EQ(chosen->limits.max_accel_mm_s2 == 2500.0, std::string(firmware) == "marlin");
+  }
+}
+
 TEST(Slicers, AreNotBelievedWhatTheyWereToldToIgnore) {
   const Settings s =
       sliced(print_of("", std::string(kMarlinBlock) + "; machine_limits_usage = ignore\n"));
@@ -178,7 +202,9 @@ TEST_F(Sources, WinInTheirOrder) {
       write("p.toml", "[limits]\nmax_accel_mm_s2 = 2000\nmax_velocity_mm_s = 150\n");
   const PrintText print = print_of("", kMarlinBlock);
   const Result<Settings> s =
-      load({.print = &print, .printer_file = file, .overrides = {"limits.max_velocity_mm_s=120"}});
+      load({.print = &print,
+            .printer_file = file,
+            .overrides = {"limits.max_velocity_mm_s=120", "printer.firmware=marlin"}});
   ASSERT_TRUE(s) << to_string(s.error());
   EXPECT_EQ(told(*s, "limits.max_velocity_mm_s"), "120 --set");
   EXPECT_EQ(told(*s, "limits.max_accel_mm_s2"), "2000 p.toml:2");

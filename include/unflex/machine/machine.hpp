@@ -182,6 +182,9 @@ struct Sources {
   const PrintText* print = nullptr;                   // the print they are for, if it is at hand
   std::optional<std::filesystem::path> printer_file;  // --printer
   std::vector<std::string> overrides;                 // --set, "key=value"
+  // The firmware is the one the print was sliced for, if no other source names one. Otherwise the
+  // default: many printers are sliced for as if they had another.
+  bool firmware_as_sliced = false;
 };
 
 // Reads the settings: defaults, then what the print's slicer says of the printer, then the printer
