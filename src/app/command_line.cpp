@@ -32,7 +32,7 @@ void add_common_options(CLI::App& command, RunConfig& config) {
   command.add_option("--set", config.overrides, "Override a key of the printer file; repeatable")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
-  command.add_option("--report", config.report, "Write a report, FILE.json, or - for stdout")
+  command.add_option("--report", config.report, "Write a report, FILE.json or FILE.html, or JSON to stdout with -")
       ->type_name("FILE");
   command.add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
 }
@@ -136,14 +136,13 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  if (config.command == Command::study && name.ends_with(".html")) {
-    return {};
-  }
-  if (name.ends_with(".html")) {
-    return usage(fmt::format("--report {}: HTML comes with a later version, use .json", name));
+  if (is_html(name)) {
+    return config.command == Command::inspect
+               ? Status(usage(fmt::format("--report {}: inspect writes .json only", name)))
+               : Status{};
   }
   if (!name.ends_with(".json")) {
-    return usage(fmt::format("--report {}: the name must end in .json", name));
+    return usage(fmt::format("--report {}: the name must end in .json or .html", name));
   }
   return {};
 }
@@ -203,6 +202,8 @@ Status check_command(const CLI::App& program, const std::vector<std::string>& ar
 }
 
 }  // namespace
+
+bool is_html(std::string_view report) { return report.ends_with(".html"); }
 
 std::string_view version() { return UNFLEX_VERSION; }
 
