@@ -21,6 +21,8 @@ constexpr double kLeastPerTolerance = 30.0;
 constexpr int kAlike = 3;
 constexpr int kAlikePerLevel = 2;
 constexpr unsigned char kSmall = 40;
+// What of the whole length may be outside of where the print is, on each side.
+constexpr double kOutside = 0.003;
 // By how much too much is drawn together.
 constexpr double kFill = 0.75;
 
@@ -171,6 +173,35 @@ void LayerStore::coarsen() {
   may_merge_ = false;
 }
 
+std::array<double, 2> LayerStore::extent(std::int32_t Point::*coordinate) const {
+  // Lengths at a coordinate; half a stretch at each of its ends.
+  std::vector<std::pair<std::int32_t, double>> lengths;
+  double whole = 0.0;
+  for (std::size_t path = 0; path < paths_.size(); ++path) {
+    for (std::size_t i = paths_[path].begin + 1; i < end_of(path); ++i) {
+      const Point& from = points_[i - 1];
+      const Point& to = points_[i];
+      const double length = std::hypot(to.x - from.x, to.y - from.y);
+      lengths.emplace_back(from.*coordinate, 0.5 * length);
+      lengths.emplace_back(to.*coordinate, 0.5 * length);
+      whole += length;
+    }
+  }
+  if (lengths.empty()) {
+    return {};
+  }
+  std::sort(lengths.begin(), lengths.end());
+  const auto reached = [&](auto begin, auto end) {
+    double passed = 0.0;
+    const auto at = std::find_if(begin, end, [&](const auto& each) {
+      passed += each.second;
+      return passed > kOutside * whole;
+    });
+    return static_cast<double>(at != end ? at->first : begin->first);
+  };
+  return {reached(lengths.begin(), lengths.end()), reached(lengths.rbegin(), lengths.rend())};
+}
+
 void LayerStore::encode_into(std::size_t layers, std::vector<std::size_t>& ends,
                              std::string& bytes) const {
   ends.assign(layers, 0);
@@ -216,6 +247,12 @@ report::LayerPaths LayerStore::encode(std::size_t layers, std::vector<std::size_
     encode_into(layers, ends, result.bytes);
   }
   result.layer_step = layer_step_;
+  const std::array<double, 2> x = extent(&Point::x);
+  const std::array<double, 2> y = extent(&Point::y);
+  result.x_min_mm = x[0] / kUnitsPerMm;
+  result.x_max_mm = x[1] / kUnitsPerMm;
+  result.y_min_mm = y[0] / kUnitsPerMm;
+  result.y_max_mm = y[1] / kUnitsPerMm;
   result.tolerance_mm = tolerance_ / kUnitsPerMm;
   return result;
 }

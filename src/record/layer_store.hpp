@@ -60,6 +60,8 @@ class LayerStore {
   [[nodiscard]] std::size_t end_of(std::size_t path) const;
   [[nodiscard]] bool too_small(std::span<const Point> path) const;
   void coarsen();
+  // Where all but a few thousandths of the paths' length lies, 0.01 mm.
+  [[nodiscard]] std::array<double, 2> extent(std::int32_t Point::*coordinate) const;
   void encode_into(std::size_t layers, std::vector<std::size_t>& ends, std::string& bytes) const;
 
   std::size_t budget_bytes_;

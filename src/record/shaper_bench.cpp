@@ -13,7 +13,7 @@ namespace {
 constexpr double kPerPeriod = 16.0;
 constexpr double kBlock_s = 1.0;
 // Measured before every second block is left out, and again before every second of the others.
-constexpr double kStrideLasts_s = 240.0;
+constexpr double kStrideLasts_s = 120.0;
 // Nozzles that nobody asks for must be let to forget now and then.
 constexpr std::size_t kSkipped = 32;
 // A nozzle that is not heard of for so many intervals has stood still.

@@ -18,8 +18,7 @@ namespace {
 // Of lists that may be of any length.
 constexpr std::size_t kMostListed = 100;
 
-// µm with a hundredth.
-double um(double mm) { return std::round(mm * 1e5) / 100.0; }
+double um(double mm) { return std::round(mm * 1e6) / 1000.0; }
 double rounded(double value, double unit) { return std::round(value / unit) * unit; }
 
 Json spread_json(const Spread& spread) { return {um(spread.max_mm), um(spread.rms_mm)}; }
@@ -168,6 +167,9 @@ Json data_json(const Report& r) {
           {"layers", layers_json(recording.layers)},
           {"layer_step", recording.paths.layer_step},
           {"tolerance_mm", recording.paths.tolerance_mm},
+          {"frame",
+           {recording.paths.x_min_mm, recording.paths.y_min_mm, recording.paths.x_max_mm,
+            recording.paths.y_max_mm}},
           {"features", features_json(recording.features)},
           {"worst", {places_json(recording.worst_before), places_json(recording.worst_after)}},
           {"histogram", histogram_json(recording.histogram)},
@@ -179,6 +181,11 @@ Json data_json(const Report& r) {
           {"facts", facts_json(r)},
           {"settings", settings}};
 }
+
+constexpr std::string_view kTypical =
+    "Root mean square, over the time in which filament is laid, of the distance between nozzle and "
+    "sliced path. It is computed: the file is replayed as the firmware would, with the nozzle "
+    "hanging on springs and dampers of the frequencies given in the settings.";
 
 // Three figures.
 std::string um_text(double mm) {
@@ -193,7 +200,7 @@ std::string time_sentence(const Report& r) {
   if (std::abs(longer_s) < 0.5) {
     return fmt::format("and the print takes as long as before, {}", time);
   }
-  return fmt::format("and the print takes {} {}: {}", duration_text(std::abs(longer_s)),
+  return fmt::format("and the print takes {} {} ({})", duration_text(std::abs(longer_s)),
                      longer_s > 0.0 ? "longer" : "less", time);
 }
 
@@ -224,10 +231,12 @@ std::string hero(const Report& r) {
   };
   const double change =
       r.reference_time_s > 0.0 ? 100.0 * (r.emitted_time_s / r.reference_time_s - 1.0) : 0.0;
+  const std::string typical = term("on average", kTypical);
   std::string html = fmt::format(
-      R"(<section class="card hero" aria-label="Result"><p class="gain">Printed as sliced, the nozzle strays up to <b class="before">{}</b> from its path; with the compensated file it stays within <b class="after">{}</b>, {}.</p>
+      R"(<section class="card hero" aria-label="Result"><p class="gain">As sliced, the nozzle strays <b class="before">{}</b> from its path {}, and <b class="before">{}</b> at worst; compensated, it is <b class="after">{}</b> and <b class="after">{}</b>, {}.</p>
 )",
-      um_text(before.contour_max_mm), um_text(after.contour_max_mm), escape_html(time_sentence(r)));
+      um_text(before.contour_rms_mm), typical, um_text(before.contour_max_mm),
+      um_text(after.contour_rms_mm), um_text(after.contour_max_mm), escape_html(time_sentence(r)));
   if (r.violation_count > 0) {
     html += fmt::format(
         R"(<p class="alert">The compensated file breaks {} {}; do not print it. They are listed <a href="#remarks">below</a>.</p>
@@ -235,12 +244,7 @@ std::string hero(const Report& r) {
         r.violation_count, r.violation_count == 1 ? "rule" : "rules");
   }
   html += R"(<dl class="key-figures">)";
-  html += figure("Typical deviation",
-                 "Root mean square, over the time in which filament is laid, of the distance "
-                 "between nozzle and sliced path. It is computed: the file is replayed as the "
-                 "firmware would, with the nozzle hanging on springs and dampers of the "
-                 "frequencies given in the settings.",
-                 before.contour_rms_mm, after.contour_rms_mm);
+  html += figure("Typical deviation", kTypical, before.contour_rms_mm, after.contour_rms_mm);
   html += figure("99 % of the time below",
                  "Only during one hundredth of the extruding time is the nozzle further from its "
                  "path than this.",

@@ -165,7 +165,7 @@ class Chromium:
                        "return [b.x + b.width / 2, b.y + b.height / 2]; })()")
         self.click(*box)
 
-    def screenshot(self, path, whole=False):
-        answer = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+    def screenshot(self, path):
+        answer = self.call("Page.captureScreenshot", format="png")
         with open(path, "wb") as file:
             file.write(base64.b64decode(answer["data"]))

@@ -41,7 +41,9 @@ struct LayerRow {
 struct LayerPaths {
   std::string bytes;
   std::size_t layer_step = 1;  // each n-th layer is there
-  double tolerance_mm = 0.0;   // points that are left out lie this near to what is drawn
+  // Where the print is: a rectangle that hardly any of the paths' length is outside of.
+  double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0;
+  double tolerance_mm = 0.0;  // points that are left out lie this near to what is drawn
 };
 
 // Logarithmic, 15 steps to the double: code c stands for 0.05 µm · 2^(c/15); 0 for all below.

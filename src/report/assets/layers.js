@@ -21,23 +21,25 @@ const layerReader = (bytes, rows) => {
       return value;
     };
     const signed = () => { const value = number(); return value % 2 ? -(value + 1) / 2 : value / 2; };
-    const places = [], codes = [], path = [], heads = [];
-    let x = 0, y = 0, line = 0;
+    const most = (to - from) >> 2, heads = [];
+    const places = new Float64Array(4 * most), codes = new Uint8Array(2 * most), path = new Int32Array(most);
+    let x = 0, y = 0, line = 0, segments = 0;
     while (at < to) {
       const feature = number(), count = number();
       line += signed();
       heads.push({feature, first: line, last: line + number()});
       x += signed(); y += signed();
-      for (let i = 0; i < count; ++i) {
-        const px = x, py = y;
+      for (let i = 0; i < count; ++i, ++segments) {
+        const place = 4 * segments;
+        places[place] = x / 100; places[place + 1] = y / 100;
         x += signed(); y += signed();
-        places.push(px, py, x, y);
-        codes.push(bytes[at], bytes[at + 1]);
-        at += 2;
-        path.push(heads.length - 1);
+        places[place + 2] = x / 100; places[place + 3] = y / 100;
+        codes[2 * segments] = bytes[at++];
+        codes[2 * segments + 1] = bytes[at++];
+        path[segments] = heads.length - 1;
       }
     }
-    return {count: path.length, places: Float64Array.from(places, v => v / 100), codes: Uint8Array.from(codes), path, heads};
+    return {count: segments, places, codes, path, heads};
   };
   return index => read[index] || (read[index] = decode(index ? rows[index - 1][2] : 0, rows[index][2]));
 };
@@ -71,20 +73,7 @@ const layerView = (data, onLayer) => {
     });
   };
 
-  // The first layer has skirts and the like beside the print.
-  const bounds = (() => {
-    let box = null;
-    const first = data.layers.length > 2 * step ? step : 0;
-    for (let i = first; i < data.layers.length; i += step) {
-      const places = reader(i).places;
-      for (let j = 0; j < places.length; j += 2) {
-        if (!box) box = [places[j], places[j + 1], places[j], places[j + 1]];
-        if (places[j] < box[0]) box[0] = places[j]; else if (places[j] > box[2]) box[2] = places[j];
-        if (places[j + 1] < box[1]) box[1] = places[j + 1]; else if (places[j + 1] > box[3]) box[3] = places[j + 1];
-      }
-    }
-    return box || [0, 0, 100, 100];
-  })();
+  const bounds = data.frame;
 
   const size = canvas => ({width: canvas.clientWidth, height: canvas.clientHeight});
   const toScreen = (canvas, x, y) => {

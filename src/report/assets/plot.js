@@ -69,7 +69,7 @@ const plot = (() => {
     const draw = () => {
       const width = box.clientWidth, height = box.clientHeight;
       if (width < 40 || height < 40) return;
-      const right = spec.labels ? 96 : margin.right;
+      const right = spec.labels ? 112 : margin.right;
       const inner = {left: margin.left, right: width - right, top: margin.top,
                      bottom: height - (spec.bare ? 4 : margin.bottom)};
       let [x0, x1] = spec.x || extent(spec.series, "x");

@@ -51,19 +51,22 @@ const unflexReport = (() => {
   // The worst places.
   const showMoment = momentView();
   const buttons = [];
-  const choose = (place, button, scroll) => {
+  const look = (place, button) => {
     buttons.forEach(each => each.setAttribute("aria-current", String(each === button)));
-    view.show(place);
     byId("moment-note").textContent = `Line ${place.line}, ${featureName(place.feature)}, layer ${place.layer + 1}, X ${place.at[0]} Y ${place.at[1]} Z ${place.at[2]}: ${micrometres(place.um[0])} before, ${micrometres(place.um[1])} after. Time counts from when the plan is there.`;
     showMoment(place);
-    if (scroll) byId("print").scrollIntoView({behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth", block: "start"});
+  };
+  const choose = (place, button) => {
+    look(place, button);
+    view.show(place);
+    byId("print").scrollIntoView({behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth", block: "start"});
   };
   [["worst-before", data.worst[0]], ["worst-after", data.worst[1]]].forEach(([id, places]) => {
     byId(id).replaceChildren(...places.map(place => {
       const button = make("button", {type: "button"},
         make("span", {class: "change"}, make("span", {class: "before"}, figures(place.um[0])), " → ", make("span", {class: "after"}, micrometres(place.um[1]))),
         make("span", {class: "what"}, `line ${place.line} · layer ${place.layer + 1} · ${featureName(place.feature)}`));
-      button.addEventListener("click", () => choose(place, button, true));
+      button.addEventListener("click", () => choose(place, button));
       buttons.push(button);
       return make("li", {}, button);
     }));
@@ -74,13 +77,15 @@ const unflexReport = (() => {
 
   // How far, for how long.
   const histogram = () => {
-    const cells = data.histogram, from = cells.map(cell => cell[0] || cells[1][0] / 1.19);
-    const total = Math.max(data.extruding_s, 1e-9);
-    const used = cells.map((cell, i) => [i, cell[1] + cell[2]]).filter(([, s]) => s > 1e-4 * total).map(([i]) => i);
-    const low = Math.max((used[0] || 0) - 1, 0), high = Math.min((used[used.length - 1] || 1) + 2, cells.length - 1);
-    const curve = k => ({x: from.slice(low, high + 1), y: cells.slice(low, high + 1).map(cell => 100 * cell[k] / total), step: true, fill: true});
+    const cells = data.histogram, total = Math.max(data.extruding_s, 1e-9), least = 0.05;
+    const low = cells.findIndex(cell => cell[0] > 0.99 * least);
+    const high = cells.reduce((last, cell, i) => cell[1] + cell[2] > 0 ? i : last, low) + 2;
+    const shown = cells.slice(low, Math.min(high, cells.length - 1));
+    const below = k => (100 * cells.slice(0, low).reduce((sum, cell) => sum + cell[k], 0) / total).toFixed(0) + " %";
+    const curve = k => ({x: shown.map(cell => cell[0]), y: shown.map(cell => 100 * cell[k] / total), step: true, fill: true});
     plot(byId("histogram"), {series: [{...curve(1), name: "before", colour: "--before"}, {...curve(2), name: "after", colour: "--after"}],
       xLog: true, yLabel: "% of the time", xLabel: "µm", fromZero: true, value: v => v.toFixed(1) + " %", title: "Share of the time over the deviation, before and after"});
+    byId("distribution-note").textContent = `Share of the extruding time that the nozzle is this far from its path. Nearer than ${least} µm, as on straight lines at constant speed, it is during ${below(1)} before and ${below(2)} after.`;
   };
 
   const head = (...names) => make("thead", {}, make("tr", {}, ...names.map(name => make("th", {scope: "col"}, name))));
@@ -133,18 +138,15 @@ const unflexReport = (() => {
     byId("settings").replaceChildren(head("Key", "Value", "From"), make("tbody", {}, ...data.settings.map(row => make("tr", {}, ...row.map(text => make("td", {}, text))))));
   };
 
-  // The picture first; the rest when it is on screen.
-  const worstLayer = rows.reduce((best, row, i) => row[3] > rows[best][3] ? i : best, 0);
-  view.setLayer(worstLayer);
+  // The picture first, of the layer that gives most to see; the rest when it is on screen.
+  const weight = (row, i) => (row[2] - (i ? rows[i - 1][2] : 0)) * row[4] ** 2;
+  const telling = rows.reduce((best, row, i) => weight(row, i) > weight(rows[best], best) ? i : best, 0);
+  view.setLayer(telling);
   view.draw();
   performance.mark("unflex-first-view");
   requestAnimationFrame(() => setTimeout(() => {
     histogram(); features(); rivals(); details();
-    const first = data.worst[1][0] || data.worst[0][0];
-    if (first) {
-      showMoment(first);
-      byId("moment-note").textContent = `Line ${first.line}, ${featureName(first.feature)}, layer ${first.layer + 1}: ${micrometres(first.um[0])} before, ${micrometres(first.um[1])} after. Time counts from when the plan is there.`;
-    } else byId("moment").hidden = true;
+    if (places.length) look(places[0], buttons[0]); else byId("moment").hidden = true;
     performance.mark("unflex-complete");
   }));
   return {data, view};
