@@ -18,6 +18,10 @@ constexpr double kStrideLasts_s = 120.0;
 constexpr std::size_t kSkipped = 32;
 // A nozzle that is not heard of for so many intervals has stood still.
 constexpr double kGap = 4.0;
+// A corner's largest deviation is a kink, so what comes near the largest so far (as a square) is
+// looked at so many times in an interval.
+constexpr double kNearPeak = 0.16;
+constexpr int kFine = 8;
 // Intervals between the last a machine is heard of and the last moment that is measured.
 constexpr double kMargin = 2.0;
 
@@ -107,27 +111,43 @@ void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
     near_.slide(path, next_s_);
   }
   const double weight = static_cast<double>(stride_) * interval_s_;
+  peaking_.clear();
   for (Shaper& shaper : shapers_) {
     for (Nozzle& nozzle : shaper.nozzles) {
-      const dynamics::NozzleXY state = nozzle.shaped.at(next_s_);
-      if (counts) {
-        std::size_t nearest = 0;
-        const double contour2 =
-            near_.squared_contour_error(path, state.x.position, state.y.position, nearest);
-        nozzle.sum_contour2 += weight * contour2;
-        nozzle.contour2_max_mm2 = std::max(nozzle.contour2_max_mm2, contour2);
+      const double contour2 = squared_contour_error(nozzle, path, next_s_, counts);
+      nozzle.sum_contour2 += weight * contour2;
+      if (counts && contour2 > kNearPeak * nozzle.contour2_max_mm2) {
+        peaking_.push_back(&nozzle);
       }
     }
   }
-  if (counts) {
-    weight_s_ += weight;
-    measured_s_ += interval_s_;
-    at_stride_s_ += interval_s_;
-    if (at_stride_s_ >= kStrideLasts_s) {
-      stride_ *= 2;
-      at_stride_s_ = 0.0;
+  if (!counts) {
+    return;
+  }
+  for (int fine = 0; fine < kFine && !peaking_.empty(); ++fine) {
+    const double time_s = next_s_ + interval_s_ * fine / kFine;
+    near_.slide(path, time_s);
+    for (Nozzle* const nozzle : peaking_) {
+      nozzle->contour2_max_mm2 =
+          std::max(nozzle->contour2_max_mm2, squared_contour_error(*nozzle, path, time_s, true));
     }
   }
+  weight_s_ += weight;
+  measured_s_ += interval_s_;
+  at_stride_s_ += interval_s_;
+  if (at_stride_s_ >= kStrideLasts_s) {
+    stride_ *= 2;
+    at_stride_s_ = 0.0;
+  }
+}
+
+// Without `counts` the nozzle is only let to forget what is past.
+double ShaperBench::squared_contour_error(Nozzle& nozzle, const verify::ReferencePath& path,
+                                          double time_s, bool counts) {
+  const dynamics::NozzleXY state = nozzle.shaped.at(time_s);
+  std::size_t nearest = 0;
+  return counts ? near_.squared_contour_error(path, state.x.position, state.y.position, nearest)
+                : 0.0;
 }
 
 std::vector<report::Contender> ShaperBench::contenders() const {

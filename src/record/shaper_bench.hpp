@@ -42,6 +42,8 @@ class ShaperBench {
   };
 
   void measure(const verify::ReferencePath& path, bool counts);
+  [[nodiscard]] double squared_contour_error(Nozzle& nozzle, const verify::ReferencePath& path,
+                                             double time_s, bool counts);
   [[nodiscard]] bool is_sampled(double time_s) const;
 
   double interval_s_;
@@ -53,6 +55,7 @@ class ShaperBench {
   bool begun_ = false;
   std::size_t piece_ = 0;  // of the path, at next_s_
   double next_s_ = 0.0;
+  std::vector<Nozzle*> peaking_;
   std::size_t skipped_ = 0;
   std::size_t stride_ = 1;
   double at_stride_s_ = 0.0;
