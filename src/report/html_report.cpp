@@ -17,6 +17,7 @@ namespace {
 
 // Of lists that may be of any length.
 constexpr std::size_t kMostListed = 100;
+constexpr std::size_t kLongestText = 500;
 
 double um(double mm) { return std::round(mm * 1e6) / 1000.0; }
 double rounded(double value, double unit) { return std::round(value / unit) * unit; }
@@ -110,9 +111,13 @@ Json contenders_json(const std::vector<Contender>& contenders) {
 }
 
 Json listed(const std::vector<std::string>& texts) {
-  return std::vector<std::string>(
-      texts.begin(),
-      texts.begin() + static_cast<std::ptrdiff_t>(std::min(texts.size(), kMostListed)));
+  Json array = Json::array();
+  for (const std::string& text : texts) {
+    if (array.size() < kMostListed) {
+      array.push_back(text.substr(0, kLongestText));
+    }
+  }
+  return array;
 }
 
 Json remarks_json(const Report& r) {
