@@ -57,7 +57,7 @@ const layerView = (data, onLayer) => {
   // Colours on a logarithmic scale; in the light from pale to dark, in the dark the other way round,
   // so that their order shows in any kind of sight. Lines grow a little with the deviation too.
   const stops = {
-    light: [[190, 203, 216], [122, 170, 206], [214, 158, 40], [201, 84, 18], [92, 14, 60]],
+    light: [[196, 208, 220], [140, 184, 216], [206, 148, 36], [201, 84, 18], [92, 14, 60]],
     dark: [[58, 72, 88], [58, 118, 176], [214, 142, 44], [247, 196, 84], [255, 250, 214]],
   };
   const shades = 32;
