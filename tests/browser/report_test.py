@@ -165,7 +165,7 @@ class Report(unittest.TestCase):
                            "(unflexReport.data.worst[0][0])")
         self.browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         self.assertRegex(self.run_js("document.getElementById('readout').textContent"),
-                         r".+, lines? \d+.*: [\d.]+ µm before, [\d.]+ µm after")
+                         r".+, lines? \d+.*: [\d.]+\sµm before, [\d.]+\sµm after")
 
     def test_everything_can_be_reached_by_keyboard(self):
         reached = set()

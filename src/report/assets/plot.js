@@ -17,7 +17,7 @@ const make = (() => {
 
 // Three figures; micrometres.
 const figures = value => value >= 99.95 ? value.toFixed(0) : value >= 9.995 ? value.toFixed(1) : value.toFixed(2);
-const micrometres = value => figures(value) + " µm";
+const micrometres = value => figures(value) + "\u00a0µm";
 
 const plot = (() => {
   const margin = {left: 52, right: 12, top: 10, bottom: 34};
