@@ -24,7 +24,7 @@ constexpr double kFinestCell_mm = 1e-5;
 constexpr int kHistogramCells = 72;
 constexpr double kCellsPerOctave = 4.0;
 // Around the centre of a scene that counts as being at the place.
-constexpr double kAtPlace = 0.25;
+constexpr double kAtPlace = 0.05;
 
 double half_width_s(const verify::NozzleModel& model) {
   const double slower = std::min(model.x.omega_rad_s, model.y.omega_rad_s);
@@ -60,6 +60,8 @@ void Recorder::Gatherer::section(const verify::ReferencePath& sliced,
   }
   complete_moves(cells_.end());
   section_first_ = sliced.end();
+  // Moves of filament alone have not been entered.
+  cells_.continue_at(section_first_);
   versions_[0].path = &sliced;
   versions_[1].path = &emitted;
   for (Version& version : versions_) {

@@ -43,6 +43,8 @@ class PathCells {
     return cells_[move.first_cell - first_cell_ + i];
   }
   void drop_front();
+  // There are none; the next to be appended gets this number.
+  void continue_at(std::size_t number) { first_ = number; }
 
  private:
   std::deque<PathMove> moves_;

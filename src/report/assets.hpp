@@ -12,6 +12,7 @@ extern const std::string_view page_js;
 extern const std::string_view report_css;
 extern const std::string_view report_html;
 extern const std::string_view plot_js;
+extern const std::string_view paths_js;
 extern const std::string_view layers_js;
 extern const std::string_view moment_js;
 extern const std::string_view report_js;

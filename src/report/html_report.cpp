@@ -281,8 +281,8 @@ std::string to_html(const Report& report) {
   page.body += embedded_json("data", data_json(report));
   page.body += fmt::format("<script type=\"application/octet-stream\" id=\"paths\">{}</script>\n",
                            base64(report.recording->paths.bytes));
-  for (const std::string_view script :
-       {assets::plot_js, assets::layers_js, assets::moment_js, assets::report_js}) {
+  for (const std::string_view script : {assets::plot_js, assets::paths_js, assets::layers_js,
+                                        assets::moment_js, assets::report_js}) {
     page.script += script;
   }
   return html_page(page);

@@ -124,41 +124,59 @@ TEST(Recorder, AgreesWithTheVerification) {
             recording.worst_before[0].layer);
 }
 
-TEST(Recorder, DrawsEveryMoveThatLaysFilamentWithItsDeviation) {
-  const std::string input = print(3);
-  const Recorded recorded(input, input);
-  const Recording& recording = recorded.recording;
-  ASSERT_THAT(recording.layers, SizeIs(3));
-  EXPECT_DOUBLE_EQ(recording.layers[2].z_mm, 0.7);
+// The two paths that print() lays on every layer, and no others.
+void expect_all_paths(const Recording& recording, std::size_t layers) {
+  ASSERT_THAT(recording.layers, SizeIs(layers));
   std::size_t from = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
+  for (const report::LayerRow& layer : recording.layers) {
     const std::vector<testing::DecodedPath> paths =
-        testing::decoded(recording.paths.bytes, from, recording.layers[i].paths_end);
-    from = recording.layers[i].paths_end;
-    ASSERT_THAT(paths, SizeIs(2)) << i;
+        testing::decoded(recording.paths.bytes, from, layer.paths_end);
+    from = layer.paths_end;
+    ASSERT_THAT(paths, SizeIs(2)) << layer.z_mm;
     EXPECT_EQ(recording.features[paths[0].feature].name, "Perimeter");
     EXPECT_EQ(recording.features[paths[1].feature].name, "Infill");
-    EXPECT_EQ(paths[0].first_line, recording.layers[i].first_line);
-    EXPECT_EQ(paths[0].last_line, paths[0].first_line + 3);
+    EXPECT_EQ(paths[0].first_line, layer.first_line);
+    EXPECT_EQ(paths[0].last_line, layer.first_line + 3);
     EXPECT_EQ(paths[0].points.front(), (testing::DecodedPoint{20.0, 20.0}));
     EXPECT_EQ(paths[0].points.back().x_mm, 20.0);
     EXPECT_EQ(paths[0].points.back().y_mm, 20.0);
     EXPECT_EQ(paths[1].points.back().x_mm, 48.0);
-    unsigned most = 0;
+    unsigned before = 0;
+    unsigned after = 0;
     for (const testing::DecodedPath& path : paths) {
       for (std::size_t k = 1; k < path.points.size(); ++k) {
-        // The file is its own output.
-        EXPECT_EQ(path.points[k].before, path.points[k].after);
-        most = std::max(most, path.points[k].before);
+        before = std::max(before, path.points[k].before);
+        after = std::max(after, path.points[k].after);
       }
     }
-    EXPECT_EQ(most, report::deviation_code(std::pow(recording.layers[i].spread.before.max_mm, 2)));
+    EXPECT_EQ(before, report::deviation_code(std::pow(layer.spread.before.max_mm, 2)));
+    EXPECT_EQ(after, report::deviation_code(std::pow(layer.spread.after.max_mm, 2)));
+  }
+}
+
+TEST(Recorder, DrawsEveryMoveThatLaysFilamentWithItsDeviation) {
+  for (const bool comments : {true, false}) {
+    const std::string input = print(3, comments);
+    expect_all_paths(Recorded(input, input).recording, 3);
+    expect_all_paths(Recorded(input, verify::testing::PlainEmitter().emit(input)).recording, 3);
+  }
+}
+
+TEST(Recorder, SeesNoDifferenceWhereThereIsNone) {
+  const std::string input = print(3);
+  const Recording recording = Recorded(input, input).recording;
+  EXPECT_EQ(recording.layers[1].spread.before.rms_mm, recording.layers[1].spread.after.rms_mm);
+  ASSERT_EQ(recording.worst_before.size(), recording.worst_after.size());
+  for (std::size_t i = 0; i < recording.worst_before.size(); ++i) {
+    EXPECT_EQ(recording.worst_before[i].line, recording.worst_after[i].line);
+    EXPECT_NEAR(recording.worst_before[i].before_mm, recording.worst_before[i].after_mm,
+                0.1 * recording.worst_before[i].before_mm);
   }
 }
 
 TEST(Recorder, FindsLayersByHeightWhereNoCommentNamesThem) {
   const std::string input = print(5, false);
-  const Recorded recorded(input, input);
+  const Recorded recorded(input, verify::testing::PlainEmitter().emit(input));
   ASSERT_THAT(recorded.recording.layers, SizeIs(5));
   EXPECT_DOUBLE_EQ(recorded.recording.layers[4].z_mm, 1.1);
 }
