@@ -43,6 +43,13 @@ const unflexReport = (() => {
     view.fit();
   });
 
+  if (data.tolerance_mm > 0.006) {
+    const layers = data.layer_step > 1 ? `, and one layer of ${data.layer_step}` : "";
+    byId("coarse").textContent =
+      `This print is long: its paths are drawn to ${data.tolerance_mm} mm${layers}.`;
+    byId("coarse").hidden = false;
+  }
+
   // The largest deviation of every layer, above the slider.
   function drawStrip() {
     const strip = byId("strip");
