@@ -13,9 +13,9 @@ namespace {
 constexpr double kPerPeriod = 16.0;
 constexpr double kBlock_s = 1.0;
 // Measured before every second block is left out, and again before every second of the others.
-constexpr double kStrideLasts_s = 120.0;
+constexpr double kStrideLasts_s = 60.0;
 // Nozzles that nobody asks for must be let to forget now and then.
-constexpr std::size_t kSkipped = 32;
+constexpr std::size_t kSkipped = 128;
 // A nozzle that is not heard of for so many intervals has stood still.
 constexpr double kGap = 4.0;
 // A corner's largest deviation is a kink, so what comes near the largest so far (as a square) is

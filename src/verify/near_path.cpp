@@ -22,14 +22,4 @@ void NearPath::begin(const ReferencePath& path) {
   end_ = path.first();
 }
 
-double NearPath::Cut::at(const PathPiece& piece, std::size_t number, double t, double ahead_s) {
-  // The clock may go back.
-  if (number != piece_ || t > until_s_ || t < until_s_ - kCutKept_s) {
-    piece_ = number;
-    until_s_ = t + kCutKept_s;
-    covered_mm_ = piece.covered_xy_mm(t + ahead_s);
-  }
-  return covered_mm_;
-}
-
 }  // namespace unflex::verify

@@ -132,8 +132,8 @@ TEST(ShaperBench, MeasuresALongPrintOnlyNowAndThen) {
     bench.add(0, t, {{t, 1.0}, {1e-3, 0.0}});
     bench.advance(path, t);
   }
-  // All of 120 s, half of 240 s, a quarter of what is left.
-  EXPECT_NEAR(bench.measured_s(), 250.0, 5.0);
+  // All of 60 s, half of 120 s, a quarter of what is left.
+  EXPECT_NEAR(bench.measured_s(), 175.0, 5.0);
   for (const report::Contender& contender : bench.contenders()) {
     EXPECT_NEAR(contender.spreads[0].rms_mm, 1e-3, 1e-9);
   }

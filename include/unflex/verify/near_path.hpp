@@ -55,12 +55,23 @@ class NearPath {
   Cut last_cut_;
 };
 
-// Here for speed: these two are most of what a verification takes.
+// Here for speed: these are most of what a verification takes.
+
+inline double NearPath::Cut::at(const PathPiece& piece, std::size_t number, double t,
+                                double ahead_s) {
+  // The clock may go back.
+  if (number != piece_ || t > until_s_ || t < until_s_ - kCutKept_s) {
+    piece_ = number;
+    until_s_ = t + kCutKept_s;
+    covered_mm_ = piece.covered_xy_mm(t + ahead_s);
+  }
+  return covered_mm_;
+}
 
 inline void NearPath::slide(const ReferencePath& path, double t) {
   time_s_ = t;
   first_ = std::max(first_, path.first());
-  while (first_ + 1 < path.end() && path[first_].end_s < t - reach_s_) {
+  while (path[first_].end_s < t - reach_s_ && first_ + 1 < path.end()) {
     ++first_;
   }
   end_ = std::max(end_, first_ + 1);
