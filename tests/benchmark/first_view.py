@@ -18,7 +18,8 @@ def main():
         browser.window(1366, 820)
         for _ in range(int(sys.argv[2]) if len(sys.argv) > 2 else 7):
             browser.open(page)
-            browser.wait_for("performance.getEntriesByName('unflex-complete').length > 0")
+            for mark in ("unflex-complete", "first-contentful-paint"):
+                browser.wait_for(f"performance.getEntriesByName('{mark}').length > 0")
             paint, first, complete = browser.run(
                 "[performance.getEntriesByName('first-contentful-paint')[0].startTime,"
                 "performance.getEntriesByName('unflex-first-view')[0].startTime,"
