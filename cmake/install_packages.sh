@@ -11,7 +11,11 @@ packages=(
   coinor-libipopt-dev libblas-dev liblapack-dev
   libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev nlohmann-json3-dev
 )
-test_packages=(libgmock-dev libgtest-dev)
+test_packages=(
+  libgmock-dev libgtest-dev
+  # HTML reports are looked at in a real browser.
+  chromium python3
+)
 
 if [[ ${1:-} == --tests ]]; then
   packages+=("${test_packages[@]}")

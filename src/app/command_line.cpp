@@ -37,7 +37,9 @@ void add_common_options(CLI::App& command, RunConfig& config) {
                   "The printer: TOML, Klipper's printer.cfg, Marlin's M503, RRF's config.g")
       ->type_name("FILE");
   add_overrides(command, config);
-  command.add_option("--report", config.report, "Write a report, FILE.json, or - for stdout")
+  command
+      .add_option("--report", config.report,
+                  "Write a report, FILE.json or FILE.html, or JSON to stdout with -")
       ->type_name("FILE");
   command.add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
 }
@@ -223,15 +225,13 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  if ((config.command == Command::study || config.command == Command::identify) &&
-      name.ends_with(".html")) {
-    return {};
-  }
-  if (name.ends_with(".html")) {
-    return usage(fmt::format("--report {}: HTML comes with a later version, use .json", name));
+  if (is_html(name)) {
+    return config.command == Command::inspect
+               ? Status(usage(fmt::format("--report {}: inspect writes .json only", name)))
+               : Status{};
   }
   if (!name.ends_with(".json")) {
-    return usage(fmt::format("--report {}: the name must end in .json", name));
+    return usage(fmt::format("--report {}: the name must end in .json or .html", name));
   }
   return {};
 }
@@ -312,6 +312,8 @@ Status check_command(const CLI::App& program, const std::vector<std::string>& ar
 }
 
 }  // namespace
+
+bool is_html(std::string_view report) { return report.ends_with(".html"); }
 
 std::string_view version() { return UNFLEX_VERSION; }
 

@@ -166,6 +166,7 @@ Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   job.settings = space.settings;
   job.engine = config.engine;
   job.workers = config.workers;
+  job.record = config.report && is_html(*config.report);
   return job;
 }
 
@@ -261,7 +262,8 @@ Status deliver(const RunConfig& config, Workspace& space, ExitCode verdict, bool
       return committed;
     }
   }
-  return write_report(space.report, report::to_json(report)).and_then([&] {
+  const std::string text = report.recording ? report::to_html(report) : report::to_json(report);
+  return write_report(space.report, text).and_then([&] {
     return print_summary(config, report::to_text(report));
   });
 }

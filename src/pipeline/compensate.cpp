@@ -85,7 +85,8 @@ class Compensator {
                                       : 0.0),
         engine_(engines.threaded ? engines.threaded() : nullptr),
         pieces_(input, job.input_name, rules_.verify, slots, [this] { wake(); }),
-        verifier_(rules_.verify, job.input_name, job.output_name, slots),
+        recorder_(recorder_for(job, rules_.verify)),
+        verifier_(rules_.verify, observation_of(recorder_.get()), job.input_name, job.output_name, slots),
         pool_(std::max(job.workers, 1U), slots) {}
 
   Status work() {
@@ -331,7 +332,7 @@ class Compensator {
     if (!verified) {
       return tl::unexpected(verified.error());
     }
-    add_verification(*verified, *report_);
+    add_verification(*verified, recorder_.get(), *report_);
     return {};
   }
 
@@ -367,6 +368,7 @@ class Compensator {
   std::unique_ptr<compensate::Engine> engine_;  // in threads; otherwise the processes solve
   // Last, so that threads end before what they use.
   PieceThread pieces_;
+  std::unique_ptr<record::Recorder> recorder_;  // none where nobody asks
   VerifyThread verifier_;
   TaskPool pool_;
 };

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "unflex/record/recorder.hpp"
 #include "unflex/report/report.hpp"
 #include "unflex/verify/verify.hpp"
 
@@ -18,8 +20,15 @@ namespace unflex::pipeline {
 // What the work since `begin` has cost this process and its children.
 void add_performance(std::chrono::steady_clock::time_point begin, report::Report& report);
 
-// Puts the figures of a verification into the report.
-void add_verification(const verify::VerifyReport& verified, report::Report& report);
+// What gathers for an HTML report, if the job asks for one.
+[[nodiscard]] std::unique_ptr<record::Recorder> recorder_for(const Job& job,
+                                                             const verify::Rules& rules);
+// What it asks of the verification; nothing without one.
+[[nodiscard]] verify::Observation observation_of(record::Recorder* recorder);
+
+// Puts the figures of a verification, and what was recorded meanwhile, into the report.
+void add_verification(const verify::VerifyReport& verified, record::Recorder* recorder,
+                      report::Report& report);
 
 // Verifies the job's output against its input and puts the figures into the report.
 [[nodiscard]] Status add_verification(const Job& job, Progress& progress, report::Report& report);

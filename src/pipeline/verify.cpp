@@ -61,7 +61,24 @@ report::Report new_report(std::string command, const Job& job) {
   return report;
 }
 
-void add_verification(const verify::VerifyReport& verified, report::Report& report) {
+std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rules& rules) {
+  if (!job.record) {
+    return nullptr;
+  }
+  record::Options options;
+  options.nozzle = rules.nozzle;
+  return std::make_unique<record::Recorder>(options);
+}
+
+verify::Observation observation_of(record::Recorder* recorder) {
+  return recorder != nullptr ? recorder->observation() : verify::Observation{};
+}
+
+void add_verification(const verify::VerifyReport& verified, record::Recorder* recorder,
+                      report::Report& report) {
+  if (recorder != nullptr) {
+    report.recording = recorder->finish(verified);
+  }
   report.uncompensated = rows(verified.uncompensated);
   report.compensated = rows(verified.compensated);
   report.reference_time_s = verified.reference_time_s;
@@ -93,12 +110,15 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   if (!output) {
     return fail(ErrorKind::input, {job.output_name, 0}, "cannot read the file");
   }
-  const Result<verify::VerifyReport> result = verify::verify(
-      input, job.input_name, output, job.output_name, verify_rules(job.settings), progress);
+  const verify::Rules rules = verify_rules(job.settings);
+  const std::unique_ptr<record::Recorder> recorder = recorder_for(job, rules);
+  const Result<verify::VerifyReport> result =
+      verify::verify(input, job.input_name, output, job.output_name, rules, progress,
+                     observation_of(recorder.get()));
   if (!result) {
     return tl::unexpected(result.error());
   }
-  add_verification(*result, report);
+  add_verification(*result, recorder.get(), report);
   return {};
 }
 

@@ -65,18 +65,18 @@ TextQueue::int_type TextQueue::underflow() {
   return traits_type::to_int_type(*gptr());
 }
 
-VerifyThread::VerifyThread(const verify::Rules& rules, std::string input_name,
-                           std::string output_name, CpuSlots& slots)
+VerifyThread::VerifyThread(const verify::Rules& rules, const verify::Observation& observation,
+                           std::string input_name, std::string output_name, CpuSlots& slots)
     : input_(slots),
       output_(slots),
       result_(fail(ErrorKind::internal, "not verified")),
-      thread_([this, rules, input_name = std::move(input_name),
+      thread_([this, rules, observation, input_name = std::move(input_name),
                output_name = std::move(output_name), &slots] {
         const CpuSlot slot(slots);
         try {
           std::istream input(&input_);
           std::istream output(&output_);
-          result_ = verify::verify(input, input_name, output, output_name, rules, stopped_);
+          result_ = verify::verify(input, input_name, output, output_name, rules, stopped_, observation);
         } catch (const std::exception& exception) {
           result_ = fail(ErrorKind::internal, exception.what());
         }

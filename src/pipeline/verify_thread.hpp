@@ -45,8 +45,9 @@ class TextQueue final : public std::streambuf {
 
 class VerifyThread {
  public:
-  VerifyThread(const verify::Rules& rules, std::string input_name, std::string output_name,
-               CpuSlots& slots);
+  // What the observation refers to must outlive this.
+  VerifyThread(const verify::Rules& rules, const verify::Observation& observation,
+               std::string input_name, std::string output_name, CpuSlots& slots);
   // Stops it, where finish() was not called.
   ~VerifyThread();
   VerifyThread(const VerifyThread&) = delete;

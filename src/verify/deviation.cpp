@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "meter.hpp"
-#include "reference_path.hpp"
+#include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
 

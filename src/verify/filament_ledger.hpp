@@ -14,7 +14,7 @@
 #include <cstddef>
 #include <deque>
 
-#include "reference_path.hpp"
+#include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
 

@@ -21,4 +21,12 @@ double LogHistogram::quantile(double fraction) const {
   return 0.0;
 }
 
+double LogHistogram::weight_below(double value) const {
+  double weight = 0.0;
+  for (std::size_t cell = 0; cell < weights_.size() && border(cell) < value; ++cell) {
+    weight += weights_[cell];
+  }
+  return weight;
+}
+
 }  // namespace unflex::verify

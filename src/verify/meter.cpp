@@ -1,26 +1,17 @@
 // Notation:
 //   r, p, b   reference, nozzle and base      h   step of the integration
-//   τ         reach_s_: the contour error is the distance from p(t) to r([t − τ, t + τ])
 #include "meter.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace unflex::verify {
 namespace {
 
 // Times closer together than this are the same; the time axis of a print of days resolves 1e-11 s.
 constexpr double kSameTime_s = 1e-10;
-// The nozzle lags by less than half a period of its slower axis; the constant covers a base whose
-// clock runs off.
-constexpr double kClockReach_s = 0.02;
-
-// How long a cut of the path serves.
-constexpr double kCutKept_s = 1e-3;
-
 constexpr double kLagMemory_s = 0.1;
 constexpr double kLagLeastMemory_s = 0.05;
 constexpr double kLagLeastSpeed_mm_s = 5.0;
@@ -58,10 +49,12 @@ void LagEstimate::restart() {
   weight_s_ = 0.0;
 }
 
-Meter::Meter(const NozzleModel& model)
-    : model_(model),
-      reach_s_(kClockReach_s +
-               std::numbers::pi / std::min(model.x.omega_rad_s, model.y.omega_rad_s)) {}
+Meter::Meter(const NozzleModel& model, double near_s) : model_(model), near_(near_s) {}
+
+void Meter::watch(Observer* observer, NozzleId id) {
+  observer_ = observer;
+  id_ = id;
+}
 
 void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm) {
   nozzle_ = nozzle;
@@ -72,10 +65,8 @@ void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm
 void Meter::begin_section(ReferencePath& path) {
   if (path_ != &path) {
     path_ = &path;
-    first_cut_ = last_cut_ = Cut{};
+    near_.begin(path);
     current_ = path.first();
-    near_first_ = path.first();
-    near_end_ = path.first();
   }
   time_s_ = path.section_start_s();
 }
@@ -136,7 +127,7 @@ void Meter::play(Phase phase) {
 // The first time after now at which the reference begins another phase or move; infinity once its
 // section has ended.
 double Meter::next_reference_change() {
-  path_->extend_to(time_s_ + reach_s_);
+  path_->extend_to(time_s_ + reach_s());
   current_ = std::max(current_, path_->first());
   while (current_ < path_->end() && (*path_)[current_].end_s <= time_s_ + kSameTime_s) {
     ++current_;
@@ -180,18 +171,23 @@ void Meter::integrate(Phase& phase, double steps, double h, bool measured, const
   const double start_s = time_s_;
   ReferencePhase reference;
   if (measured) {
-    path_->extend_to(start_s + steps * h + reach_s_);
+    path_->extend_to(start_s + steps * h + reach_s());
     reference = reference_phase(steps * h);
   }
   for (double number = 1.0; number <= steps; number += 1.0) {
     step();
     advance(phase.x, h);
     advance(phase.y, h);
+    Sample measurement;
     if (measured) {
       time_s_ = start_s + number * h;
       advance(reference.x, h);
       advance(reference.y, h);
-      sample(reference, h);
+      measurement = sample(reference, h);
+    }
+    if (observer_ != nullptr) {
+      time_s_ = start_s + number * h;
+      tell(phase, h, measured, reference, measurement);
     }
   }
 }
@@ -219,13 +215,14 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
           piece.extruding};
 }
 
-void Meter::sample(const ReferencePhase& reference, double h) {
+Meter::Sample Meter::sample(const ReferencePhase& reference, double h) {
   const double error_x = reference.x.position - nozzle_.x.position;
   const double error_y = reference.y.position - nozzle_.y.position;
 
-  slide_window();
+  near_.slide(*path_, time_s_);
   std::size_t nearest = current_;
-  const double contour2 = squared_contour_error(nearest);
+  const double contour2 =
+      near_.squared_contour_error(*path_, nozzle_.x.position, nozzle_.y.position, nearest);
   const double tracking2 = error_x * error_x + error_y * error_y;
   const std::size_t line = (*path_)[nearest].move.segment.line;
   all_.add(contour2, tracking2, h, line);
@@ -237,65 +234,35 @@ void Meter::sample(const ReferencePhase& reference, double h) {
     const double v_y = reference.y.velocity;
     lag_.add(error_x * v_x + error_y * v_y, v_x * v_x + v_y * v_y, h);
   }
+  return {contour2, line};
 }
 
-void Meter::slide_window() {
-  near_first_ = std::max(near_first_, path_->first());
-  while (near_first_ < current_ && (*path_)[near_first_].end_s < time_s_ - reach_s_) {
-    ++near_first_;
+void Meter::tell(const Phase& phase, double h, bool measured, const ReferencePhase& reference,
+                 const Sample& sample) {
+  Step step;
+  step.time_s = time_s_;
+  step.h_s = h;
+  step.nozzle = nozzle_;
+  step.base_x = phase.x;
+  step.base_y = phase.y;
+  step.measured = measured;
+  step.waiting = waiting_;
+  if (measured) {
+    step.extruding = reference.extruding;
+    step.reference_x_mm = reference.x.position;
+    step.reference_y_mm = reference.y.position;
+    step.piece = current_;
+    step.contour2_mm2 = sample.contour2_mm2;
+    step.line = sample.line;
   }
-  near_end_ = std::max(near_end_, current_ + 1);
-  while (near_end_ < path_->end() && (*path_)[near_end_].start_s <= time_s_ + reach_s_) {
-    ++near_end_;
-  }
-}
-
-double Meter::Cut::at(const PathPiece& piece, std::size_t number, double t, double ahead_s) {
-  // The clock goes back after wait_for_reference().
-  if (number != piece_ || t > until_s_ || t < until_s_ - kCutKept_s) {
-    piece_ = number;
-    until_s_ = t + kCutKept_s;
-    covered_mm_ = piece.covered_xy_mm(t + ahead_s);
-  }
-  return covered_mm_;
-}
-
-// Distance to the part of the path between r(t − τ) and r(t + τ): whole pieces, the first and the
-// last one cut. Where the nearest point is well inside, where exactly they are cut does not matter.
-double Meter::squared_contour_error(std::size_t& nearest) {
-  const double p_x = nozzle_.x.position;
-  const double p_y = nozzle_.y.position;
-  const double from_s = time_s_ - reach_s_;
-  const double to_s = time_s_ + reach_s_;
-  double best = std::numeric_limits<double>::infinity();
-  for (std::size_t number = near_first_; number < near_end_; ++number) {
-    const PathPiece& piece = (*path_)[number];
-    const double x = p_x - piece.x_mm;
-    const double y = p_y - piece.y_mm;
-    double along =
-        std::clamp(x * piece.direction_x + y * piece.direction_y, 0.0, piece.length_xy_mm);
-    if (piece.start_s < from_s && along < first_cut_.at(piece, number, from_s, kCutKept_s)) {
-      along = std::max(along, piece.covered_xy_mm(from_s));
-    }
-    if (piece.end_s > to_s && along > last_cut_.at(piece, number, to_s, 0.0)) {
-      along = std::min(along, piece.covered_xy_mm(to_s));
-    }
-    const double across_x = x - along * piece.direction_x;
-    const double across_y = y - along * piece.direction_y;
-    const double distance2 = across_x * across_x + across_y * across_y;
-    if (distance2 < best) {
-      best = distance2;
-      nearest = number;
-    }
-  }
-  return best;
+  observer_->step(id_, step);
 }
 
 void Meter::look() {
   static_cast<void>(next_reference_change());
   if (current_ < path_->end() && (*path_)[current_].measured &&
       (*path_)[current_].start_s <= time_s_ + kSameTime_s) {
-    sample(reference_phase(0.0), 0.0);
+    static_cast<void>(sample(reference_phase(0.0), 0.0));
   }
 }
 
@@ -303,11 +270,13 @@ void Meter::wait_for_reference() {
   const NozzleXY nozzle = nozzle_;
   const double time_s = time_s_;
   // Bounded stretches, so that a reference far ahead need not be known to its end at once.
+  waiting_ = true;
   path_->extend_to(time_s_ + kSameTime_s);
   while (path_->end_s() - time_s_ > kSameTime_s) {
     play(Phase{{base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, path_->end_s() - time_s_});
     path_->extend_to(time_s_ + kSameTime_s);
   }
+  waiting_ = false;
   nozzle_ = nozzle;
   time_s_ = time_s;
 }

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <limits>
 
-#include "reference_path.hpp"
 #include "unflex/verify/deviation.hpp"
+#include "unflex/verify/near_path.hpp"
+#include "unflex/verify/observer.hpp"
+#include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
 
@@ -30,7 +31,12 @@ class LagEstimate {
 
 class Meter {
  public:
-  explicit Meter(const NozzleModel& model);
+  // near_s: how far from its time the reference's path counts as near.
+  Meter(const NozzleModel& model, double near_s);
+  explicit Meter(const NozzleModel& model) : Meter(model, verify::reach_s(model)) {}
+
+  // Tells of every step.
+  void watch(Observer* observer, NozzleId id);
 
   // The nozzle and base at the very start.
   void set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm);
@@ -56,26 +62,13 @@ class Meter {
   [[nodiscard]] double base_y_mm() const { return base_y_mm_; }
   [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
   [[nodiscard]] const DeviationAccumulator& all() const { return all_; }
-  // How far from its time the reference's path counts as near, s.
-  [[nodiscard]] double reach_s() const { return reach_s_; }
+  [[nodiscard]] double reach_s() const { return near_.reach_s(); }
 
  private:
   struct Phase {
     dynamics::BaseSegment x;
     dynamics::BaseSegment y;
     double duration_s = 0.0;
-  };
-
-  // Where a piece of the path is cut at some time, kept for a while.
-  class Cut {
-   public:
-    // How much of the piece is covered at t + ahead_s, or was shortly before.
-    double at(const PathPiece& piece, std::size_t number, double t, double ahead_s);
-
-   private:
-    std::size_t piece_ = std::numeric_limits<std::size_t>::max();
-    double until_s_ = 0.0;
-    double covered_mm_ = 0.0;
   };
 
   // The reference during one phase of one of its moves.
@@ -91,26 +84,30 @@ class Meter {
   void integrate(Phase& phase, double steps, double h, bool measured, const Step& step);
   [[nodiscard]] double next_reference_change();
   [[nodiscard]] ReferencePhase reference_phase(double duration_s) const;
-  void sample(const ReferencePhase& reference, double h);
-  void slide_window();
-  [[nodiscard]] double squared_contour_error(std::size_t& nearest);
+  // What was measured of the nozzle.
+  struct Sample {
+    double contour2_mm2 = 0.0;
+    std::size_t line = 0;
+  };
+  Sample sample(const ReferencePhase& reference, double h);
+  void tell(const Phase& phase, double h, bool measured, const ReferencePhase& reference,
+            const Sample& sample);
 
   NozzleModel model_;
   ReferencePath* path_ = nullptr;
-  double reach_s_;
   double time_s_ = 0.0;
   NozzleXY nozzle_;
   double base_x_mm_ = 0.0;
   double base_y_mm_ = 0.0;
-  std::size_t current_ = 0;     // piece of the reference at time_s_
-  std::size_t near_first_ = 0;  // pieces that reach into [t − reach, t + reach]
-  std::size_t near_end_ = 0;
-  Cut first_cut_;
-  Cut last_cut_;
+  std::size_t current_ = 0;  // piece of the reference at time_s_
+  NearPath near_;
   DeviationAccumulator extruding_;
   DeviationAccumulator all_;
   LagEstimate lag_;
   bool follow_lag_ = false;
+  bool waiting_ = false;
+  Observer* observer_ = nullptr;
+  NozzleId id_;
 };
 
 }  // namespace unflex::verify

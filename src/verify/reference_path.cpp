@@ -1,4 +1,4 @@
-#include "reference_path.hpp"
+#include "unflex/verify/reference_path.hpp"
 
 #include <cmath>
 #include <utility>

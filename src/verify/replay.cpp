@@ -116,6 +116,9 @@ void Replay::read_line() {
   const Regime before{interpreter_.state(), plan_.limits()};
   if (more && *more) {
     ++lines_read_;
+    if (listener_) {
+      listener_(line);
+    }
     read_event(interpreter_.interpret(std::move(line)), before);
   } else {
     for_each_plan([](PlanQueue& plan) { plan.stop(); });

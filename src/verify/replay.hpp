@@ -10,8 +10,10 @@
 
 #include <cstddef>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "plan_queue.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -66,6 +68,11 @@ class Replay {
   Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
          const planner::Limits& limits, const planner::FirmwareConfig& fixed, bool in_output);
 
+  // Calls `listener` with every line, before what it means is known.
+  void on_line(std::function<void(const gcode::Line&)> listener) {
+    listener_ = std::move(listener);
+  }
+
   // The next move of the current section; false at its end.
   [[nodiscard]] bool next(planner::PlannedMove& move);
   // Whether next() would give one. Every line before it has then been read.
@@ -116,6 +123,7 @@ class Replay {
   PlanQueue plan_;
   PlanQueue resting_plan_;
   Firmware firmware_;
+  std::function<void(const gcode::Line&)> listener_;
   bool in_output_;
   bool in_compensated_run_ = false;  // between the lines that announce its begin and its end
   bool at_end_ = false;

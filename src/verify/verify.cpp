@@ -9,12 +9,12 @@
 
 #include "filament_ledger.hpp"
 #include "line_check.hpp"
-#include "meter.hpp"
-#include "reference_path.hpp"
+#include "nozzles.hpp"
 #include "regime_check.hpp"
 #include "replay.hpp"
 #include "run_check.hpp"
 #include "unflex/verify/line_rate.hpp"
+#include "unflex/verify/reference_path.hpp"
 #include "violations.hpp"
 
 namespace unflex::verify {
@@ -69,9 +69,11 @@ Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), met
 class Verifier {
  public:
   Verifier(std::istream& input, const std::string& input_name, std::istream& output,
-           const std::string& output_name, const Rules& rules, Progress& progress)
+           const std::string& output_name, const Rules& rules, Progress& progress,
+           const Observation& observation)
       : rules_(rules),
         progress_(&progress),
+        observer_(observation.observer),
         output_bytes_(stream_bytes(output)),
         violations_(input_name, output_name),
         input_(input, input_name, rules.interpreter, rules.limits, rules.fixed, false),
@@ -79,11 +81,15 @@ class Verifier {
         lines_(input_, output_, place_tolerance_mm(rules), violations_),
         path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
         run_path_([this](planner::PlannedMove& move) { return input_.next_resting(move); }),
-        original_(rules.nozzle),
-        emitted_(rules.nozzle),
+        original_(rules.nozzle, observation, false),
+        emitted_(rules.nozzle, observation, true),
         base_(rules, violations_),
         input_excursion_(rules_.travel),
-        output_excursion_(rules_.travel) {}
+        output_excursion_(rules_.travel) {
+    if (observer_ != nullptr) {
+      input_.on_line([observer = observer_](const gcode::Line& line) { observer->line(line); });
+    }
+  }
 
   Verifier(const Verifier&) = delete;
   Verifier& operator=(const Verifier&) = delete;
@@ -111,6 +117,7 @@ class Verifier {
 
   Rules rules_;
   Progress* progress_;
+  Observer* observer_;
   double output_bytes_;
   Violations violations_;
   Replay input_;
@@ -119,8 +126,8 @@ class Verifier {
   ReferencePath path_;
   ReferencePath run_path_;
   ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
-  Meter original_;
-  Meter emitted_;
+  Nozzles original_;
+  Nozzles emitted_;
   FilamentLedger filament_;
   BaseCheck base_;
   Excursion input_excursion_;
@@ -177,6 +184,9 @@ void Verifier::begin_section(bool compensated) {
   }
   emitted_path_ = compensated ? &run_path_ : &path_;
   emitted_.begin_section(*emitted_path_);
+  if (observer_ != nullptr) {
+    observer_->section(path_, *emitted_path_);
+  }
   filament_.begin_run(*emitted_path_);
   section_first_ = path_.end();
   original_next_ = path_.end();
@@ -253,7 +263,7 @@ void Verifier::play_run_moves(bool compensated) {
 
 void Verifier::play(const planner::PlannedMove& move) {
   rate_.add(move);
-  const double start_s = emitted_.time_s();
+  const double start_s = emitted_.main().time_s();
   emitted_.play(move);
   filament_.play(move, start_s);
   totals_.emitted_time_s += move.duration_s();
@@ -263,7 +273,7 @@ void Verifier::play(const planner::PlannedMove& move) {
     refused_line_ = move.segment.line;
   }
   // The original is as far in its section as the emitted one is in its own.
-  const double elapsed_s = emitted_.time_s() - emitted_path_->section_start_s();
+  const double elapsed_s = emitted_.main().time_s() - emitted_path_->section_start_s();
   path_.extend_to(path_.section_start_s() + elapsed_s);
   let_original_follow(path_.section_start_s() + elapsed_s);
 }
@@ -274,12 +284,17 @@ void Verifier::let_original_follow(double until_s) {
     const planner::PlannedMove move = path_[original_next_++].move;
     original_.play(move);
   }
+  double needed_s = original_.main().time_s();
+  if (observer_ != nullptr) {
+    observer_->advanced(path_, needed_s);
+    needed_s -= observer_->memory_s();
+  }
   if (emitted_path_ == &path_) {
-    path_.discard_before(std::min(original_.time_s(), emitted_.time_s()) - original_.reach_s());
+    path_.discard_before(std::min(needed_s, emitted_.main().time_s()) - original_.main().reach_s());
     input_.skip_resting();
   } else {
-    path_.discard_before(original_.time_s() - original_.reach_s());
-    run_path_.discard_before(emitted_.time_s() - emitted_.reach_s());
+    path_.discard_before(needed_s - original_.main().reach_s());
+    run_path_.discard_before(emitted_.main().time_s() - emitted_.main().reach_s());
   }
 }
 
@@ -392,6 +407,9 @@ void Verifier::play_kept_line() {
     path_.rest(dwell_s);
     original_.hold(dwell_s);
     emitted_.hold(dwell_s);
+    if (observer_ != nullptr) {
+      observer_->hold(dwell_s);
+    }
     totals_.reference_time_s += dwell_s;
     totals_.emitted_time_s += dwell_s;
   }
@@ -401,9 +419,9 @@ void Verifier::play_kept_line() {
 void Verifier::hold() {
   begin_section(false);
   const double hold_s = rules_.nozzle.hold_s;
-  path_.hold(original_.base_x_mm(), original_.base_y_mm(), hold_s);
-  original_.play(resting(original_.base_x_mm(), original_.base_y_mm(), hold_s));
-  emitted_.play(resting(emitted_.base_x_mm(), emitted_.base_y_mm(), hold_s));
+  path_.hold(original_.main().base_x_mm(), original_.main().base_y_mm(), hold_s);
+  original_.play(resting(original_.main().base_x_mm(), original_.main().base_y_mm(), hold_s));
+  emitted_.play(resting(emitted_.main().base_x_mm(), emitted_.main().base_y_mm(), hold_s));
 }
 
 void Verifier::report_progress() {
@@ -413,11 +431,14 @@ void Verifier::report_progress() {
 
 VerifyReport Verifier::report() {
   VerifyReport report = totals_;
-  report.uncompensated = deviation(original_);
-  report.compensated = deviation(emitted_);
+  report.uncompensated = deviation(original_.main());
+  report.compensated = deviation(emitted_.main());
+  for (std::size_t i = 0; i < original_.detuned().size(); ++i) {
+    report.detuned.push_back({deviation(original_.detuned()[i]), deviation(emitted_.detuned()[i])});
+  }
   report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
   report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
-  report.worst_run_drift_s = emitted_.worst_lag_s();
+  report.worst_run_drift_s = emitted_.main().worst_lag_s();
   report.max_lines_per_s = rate_.max_per_s();
   report.segment_ms_median = 1e3 * base_.median_duration_s();
   report.output_lines = output_.lines_read();
@@ -431,8 +452,9 @@ VerifyReport Verifier::report() {
 
 Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
                             std::istream& output, const std::string& output_name,
-                            const Rules& rules, Progress& progress) {
-  return Verifier(input, input_name, output, output_name, rules, progress).verify();
+                            const Rules& rules, Progress& progress,
+                            const Observation& observation) {
+  return Verifier(input, input_name, output, output_name, rules, progress, observation).verify();
 }
 
 }  // namespace unflex::verify

@@ -60,6 +60,29 @@ TEST_F(SmallPrint, GivesTheSameBytesFromFileAndPipeAndForAnyNumberOfWorkers) {
   EXPECT_EQ(read_file(path("in.gcode")), first);
 }
 
+TEST_F(SmallPrint, IsShownOnAPageThatIsTheSameForAnyNumberOfWorkers) {
+  const auto page = [&](const std::string& jobs) {
+    const Outcome outcome =
+        run({"compensate", "in.gcode", "-o", "out.gcode", "-q", "-j", jobs, "--report", "r.html"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return read_file(path("r.html"));
+  };
+  const std::string first = page("1");
+  EXPECT_THAT(first, StartsWith("<!DOCTYPE html>"));
+  EXPECT_THAT(first, HasSubstr("<title>in.gcode</title>"));
+  EXPECT_EQ(page("4"), first);
+  // The report changes nothing of the output.
+  EXPECT_EQ(read_file(path("out.gcode")), compensated());
+}
+
+TEST_F(SmallPrint, IsShownOnAPageWhenItIsVerified) {
+  write_file(path("out.gcode"), compensated());
+  const Outcome outcome =
+      run({"verify", "out.gcode", "--against", "in.gcode", "--report", "r.html", "-q"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(read_file(path("r.html")), HasSubstr("As sliced, the nozzle strays"));
+}
+
 TEST_F(SmallPrint, KeepsThePermissionsOfWhatItReplaces) {
   std::filesystem::permissions(path("in.gcode"), std::filesystem::perms(0640));
   ASSERT_EQ(run({"compensate", "in.gcode", "--in-place"}).exit_code, 0);

@@ -87,7 +87,7 @@ constexpr const char* kPrint =
 
 TEST(VerifyThread, FindsWhatVerifyingAfterwardsFinds) {
   CpuSlots slots(1);
-  VerifyThread thread(verify_rules(testing::settings()), "in", "out", slots);
+  VerifyThread thread(verify_rules(testing::settings()), {}, "in", "out", slots);
   // Texts come in pieces that are no whole lines, and one long before the other.
   const std::string text = kPrint;
   thread.push("", text.substr(0, 20));
@@ -103,7 +103,7 @@ TEST(VerifyThread, FindsWhatVerifyingAfterwardsFinds) {
 
 TEST(VerifyThread, IsBehindUntilItHasReadWhatItWasGiven) {
   CpuSlots slots(1);
-  VerifyThread thread(verify_rules(testing::settings()), "in", "out", slots);
+  VerifyThread thread(verify_rules(testing::settings()), {}, "in", "out", slots);
   std::string long_text;
   while (long_text.size() < (5U << 20U)) {
     long_text += "; nothing that would take the machine anywhere\n";
@@ -120,7 +120,7 @@ TEST(VerifyThread, IsBehindUntilItHasReadWhatItWasGiven) {
 
 TEST(VerifyThread, IsNotWaitedForWhileItWaitsForOneOfTheTexts) {
   CpuSlots slots(1);
-  VerifyThread thread(verify_rules(testing::settings()), "in", "out", slots);
+  VerifyThread thread(verify_rules(testing::settings()), {}, "in", "out", slots);
   thread.push("", std::string(5U << 20U, '\n'));
   while (thread.is_behind()) {
     std::this_thread::sleep_for(1ms);
@@ -129,7 +129,7 @@ TEST(VerifyThread, IsNotWaitedForWhileItWaitsForOneOfTheTexts) {
 
 TEST(VerifyThread, EndsUnaskedWhenItIsNoLongerWanted) {
   CpuSlots slots(1);
-  VerifyThread thread(verify_rules(testing::settings()), "in", "out", slots);
+  VerifyThread thread(verify_rules(testing::settings()), {}, "in", "out", slots);
   thread.push(kPrint, kPrint);
 }
 

@@ -46,5 +46,16 @@ TEST(LogHistogram, TakesWhatLiesOutside) {
   EXPECT_NEAR(histogram.quantile(1.0), 128.0, 1.0);
 }
 
+TEST(LogHistogram, KnowsTheWeightBelowAValue) {
+  LogHistogram histogram;
+  EXPECT_EQ(histogram.weight_below(1.0), 0.0);
+  histogram.add_square(0.0, 1.0);
+  histogram.add_square(0.25, 2.0);
+  histogram.add_square(100.0, 4.0);
+  EXPECT_EQ(histogram.weight_below(0.49), 1.0);
+  EXPECT_EQ(histogram.weight_below(0.51), 3.0);
+  EXPECT_EQ(histogram.weight_below(std::numeric_limits<double>::infinity()), 7.0);
+}
+
 }  // namespace
 }  // namespace unflex::verify

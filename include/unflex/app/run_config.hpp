@@ -44,7 +44,7 @@ struct RunConfig {
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"
-  std::optional<std::string> report;   // a file ending in .json (study: or .html), or "-"
+  std::optional<std::string> report;   // a file ending in .json or .html, or "-"
   std::optional<double> max_deviation_mm;
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;
@@ -61,6 +61,9 @@ struct CommandLine {
 
 // Reads the command line, without the program's name. Errors are of kind usage, one line.
 [[nodiscard]] Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments);
+
+// Whether a report of that name is a page.
+[[nodiscard]] bool is_html(std::string_view report);
 
 [[nodiscard]] std::string_view version();
 

@@ -32,6 +32,7 @@ struct Job {
   std::string output_name;
   machine::Settings settings;
   EngineChoice engine = EngineChoice::automatic;
+  bool record = false;  // gather what an HTML report shows
   unsigned workers = 1;          // threads or solver processes that compute at once
 };
 

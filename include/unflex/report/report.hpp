@@ -3,10 +3,12 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/report/recording.hpp"
 
 namespace unflex::report {
 
@@ -113,10 +115,15 @@ struct Report {
   std::vector<std::string> violations;  // "file:line: message"
   std::size_t violation_count = 0;
   std::vector<std::string> warnings;
+
+  std::optional<Recording> recording;  // where it was asked for; only in HTML
 };
 
 // The report as JSON with the keys of docs/report.md, two spaces of indentation, final newline.
 [[nodiscard]] std::string to_json(const Report& report);
+
+// The report as a page for people, complete in itself. It needs the recording.
+[[nodiscard]] std::string to_html(const Report& report);
 
 // A summary for people, a dozen lines.
 [[nodiscard]] std::string to_text(const Report& report);

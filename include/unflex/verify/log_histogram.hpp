@@ -25,6 +25,8 @@ class LogHistogram {
   // The middle of the cell in which the given fraction of the whole weight is reached, within
   // 0.5 %; 0 for an empty histogram.
   [[nodiscard]] double quantile(double fraction) const;
+  // Of the cells that begin below the value.
+  [[nodiscard]] double weight_below(double value) const;
 
  private:
   // A double's bits are its exponent above its mantissa: those down to the mantissa's sixth divide

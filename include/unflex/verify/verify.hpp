@@ -12,6 +12,7 @@
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/deviation.hpp"
+#include "unflex/verify/observer.hpp"
 
 namespace unflex::verify {
 
@@ -44,6 +45,12 @@ struct Violation {
   std::string message;
 };
 
+// What another nozzle on the same two bases does.
+struct Detuned {
+  Deviation uncompensated;
+  Deviation compensated;
+};
+
 struct VerifyReport {
   // Measured against the firmware's plan of the input.
   Deviation uncompensated;
@@ -51,6 +58,7 @@ struct VerifyReport {
   // itself; where the input passes from one stretch into the next at speed, that takes some ms
   // longer.
   Deviation compensated;
+  std::vector<Detuned> detuned;   // one for each of Observation::detuned
   double reference_time_s = 0.0;  // duration of the input by the firmware's plan, dwells included
   double emitted_time_s = 0.0;    // of the output
   // Of the replayed base, larger axis, compensated runs only: mean velocity of one move.
@@ -89,8 +97,10 @@ struct VerifyReport {
 // acceleration above its limit (by more than 0.1 % and than the rounding of coordinates explains);
 // a move the firmware refuses (extrusion ratio); limits or modes not restored. Where the sequence
 // of stops differs, nothing can be compared any further; the figures are then of what came before.
+// Nothing but VerifyReport::detuned depends on the observation.
 [[nodiscard]] Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
                                           std::istream& output, const std::string& output_name,
-                                          const Rules& rules, Progress& progress);
+                                          const Rules& rules, Progress& progress,
+                                          const Observation& observation = {});
 
 }  // namespace unflex::verify

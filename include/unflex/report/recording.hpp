@@ -1,0 +1,100 @@
+// What a page shows of a print besides its figures: the paths with their deviation, the worst
+// places, and how others would have done. Its size is bounded whatever the print.
+//
+//   before, after   the sliced file as the firmware plays it, and the compensated one
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace unflex::report {
+
+// Contour error over time, of moves that lay filament.
+struct Spread {
+  double max_mm = 0.0;
+  double rms_mm = 0.0;
+};
+
+struct BeforeAfter {
+  Spread before;
+  Spread after;
+};
+
+// In the order of the print.
+struct LayerRow {
+  double z_mm = 0.0;
+  std::size_t first_line = 0;
+  BeforeAfter spread;
+  std::size_t paths_end = 0;  // its paths are the bytes of LayerPaths::bytes up to here
+};
+
+// The paths of all layers, one layer after the other, each a sequence of paths without a gap:
+//
+//   path      feature, count, first line (from the path before), last line (from the first),
+//             x, y (from the last point of the path before), and `count` points
+//   point     x, y (from the point before), before, after
+//
+// Numbers are LEB128, coordinates zigzag in hundredths of a mm; before and after are one byte each,
+// the largest deviation on the way to the point (deviation_code()). At the beginning of every layer
+// "before" is zero.
+struct LayerPaths {
+  std::string bytes;
+  std::size_t layer_step = 1;  // each n-th layer is there
+  // Where the print is: a rectangle that hardly any of the paths' length is outside of.
+  double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0;
+  double tolerance_mm = 0.0;  // points that are left out lie this near to what is drawn
+};
+
+// Logarithmic, 15 steps to the double: code c stands for 0.05 µm · 2^(c/15); 0 for all below.
+[[nodiscard]] unsigned char deviation_code(double squared_mm2);
+
+struct FeatureRow {
+  std::string name;  // as the slicer calls it; empty where it does not
+  double duration_s = 0.0;
+  BeforeAfter spread;
+};
+
+// Around a place, in the XY plane, relative to it.
+struct Moment {
+  double time_s = 0.0;  // from when the reference is there
+  double contour_mm = 0.0;
+  double reference_x_mm = 0.0, reference_y_mm = 0.0;
+  double base_x_mm = 0.0, base_y_mm = 0.0;
+  double nozzle_x_mm = 0.0, nozzle_y_mm = 0.0;
+};
+
+struct Place {
+  std::size_t line = 0;
+  std::size_t layer = 0;
+  std::size_t feature = 0;
+  double x_mm = 0.0, y_mm = 0.0, z_mm = 0.0;
+  double before_mm = 0.0, after_mm = 0.0;  // largest contour error there
+  std::vector<Moment> before, after;
+};
+
+// Time during which the contour error is between this cell's border and that of the next one.
+struct HistogramCell {
+  double from_mm = 0.0;
+  double before_s = 0.0;
+  double after_s = 0.0;
+};
+
+// What the nozzle would have done if the true frequencies were others than those of the settings.
+struct Contender {
+  std::string name;
+  std::vector<Spread> spreads;  // one for each of Recording::frequency_errors, or none
+};
+
+struct Recording {
+  std::vector<LayerRow> layers;
+  LayerPaths paths;
+  std::vector<FeatureRow> features;
+  std::vector<Place> worst_before, worst_after;  // the worst first
+  std::vector<HistogramCell> histogram;
+  std::vector<double> frequency_errors;  // 0.05: the true ones are 5 % above
+  std::vector<Contender> contenders;     // first the sliced file, then the compensated one
+  double shapers_measured_s = 0.0;       // print time for which the others were measured
+};
+
+}  // namespace unflex::report

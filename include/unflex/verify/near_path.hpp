@@ -1,0 +1,113 @@
+// The part of the reference's path that the nozzle can be near at a time.
+//
+// Notation:
+//   r, p   reference and nozzle      τ   reach: how far from its time the path counts as near, s
+//   contour error   the distance from p(t) to r([t − τ, t + τ])
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+
+#include "unflex/verify/deviation.hpp"
+#include "unflex/verify/reference_path.hpp"
+
+namespace unflex::verify {
+
+// The reach τ for a nozzle.
+[[nodiscard]] double reach_s(const NozzleModel& model);
+
+// Asked for one time after the other. Times may go back a little, as far as the path still reaches.
+class NearPath {
+ public:
+  explicit NearPath(double reach_s) : reach_s_(reach_s) {}
+
+  // From now on looks at this path.
+  void begin(const ReferencePath& path);
+  // To time t, of which the path must hold the piece.
+  void slide(const ReferencePath& path, double t);
+  // Of a nozzle at p at that time; `nearest` becomes the number of the nearest piece.
+  [[nodiscard]] double squared_contour_error(const ReferencePath& path, double p_x_mm,
+                                             double p_y_mm, std::size_t& nearest);
+  [[nodiscard]] double reach_s() const { return reach_s_; }
+
+ private:
+  // Where a piece of the path is cut at some time, kept for a while.
+  class Cut {
+   public:
+    // How much of the piece is covered at t + ahead_s, or was shortly before.
+    double at(const PathPiece& piece, std::size_t number, double t, double ahead_s);
+
+   private:
+    std::size_t piece_ = std::numeric_limits<std::size_t>::max();
+    double until_s_ = 0.0;
+    double covered_mm_ = 0.0;
+  };
+
+  // How long a cut of the path serves.
+  static constexpr double kCutKept_s = 1e-3;
+
+  double reach_s_;
+  double time_s_ = 0.0;
+  std::size_t first_ = 0;  // pieces that reach into [t − τ, t + τ]
+  std::size_t end_ = 0;
+  Cut first_cut_;
+  Cut last_cut_;
+};
+
+// Here for speed: these are most of what a verification takes.
+
+inline double NearPath::Cut::at(const PathPiece& piece, std::size_t number, double t,
+                                double ahead_s) {
+  // The clock may go back.
+  if (number != piece_ || t > until_s_ || t < until_s_ - kCutKept_s) {
+    piece_ = number;
+    until_s_ = t + kCutKept_s;
+    covered_mm_ = piece.covered_xy_mm(t + ahead_s);
+  }
+  return covered_mm_;
+}
+
+inline void NearPath::slide(const ReferencePath& path, double t) {
+  time_s_ = t;
+  first_ = std::max(first_, path.first());
+  while (path[first_].end_s < t - reach_s_ && first_ + 1 < path.end()) {
+    ++first_;
+  }
+  end_ = std::max(end_, first_ + 1);
+  while (end_ < path.end() && path[end_].start_s <= t + reach_s_) {
+    ++end_;
+  }
+}
+
+// Whole pieces, the first and the last one cut. Where the nearest point is well inside, where
+// exactly they are cut does not matter.
+inline double NearPath::squared_contour_error(const ReferencePath& path, double p_x_mm,
+                                              double p_y_mm, std::size_t& nearest) {
+  const double from_s = time_s_ - reach_s_;
+  const double to_s = time_s_ + reach_s_;
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t number = first_; number < end_; ++number) {
+    const PathPiece& piece = path[number];
+    const double x = p_x_mm - piece.x_mm;
+    const double y = p_y_mm - piece.y_mm;
+    double along =
+        std::clamp(x * piece.direction_x + y * piece.direction_y, 0.0, piece.length_xy_mm);
+    if (piece.start_s < from_s && along < first_cut_.at(piece, number, from_s, kCutKept_s)) {
+      along = std::max(along, piece.covered_xy_mm(from_s));
+    }
+    if (piece.end_s > to_s && along > last_cut_.at(piece, number, to_s, 0.0)) {
+      along = std::min(along, piece.covered_xy_mm(to_s));
+    }
+    const double across_x = x - along * piece.direction_x;
+    const double across_y = y - along * piece.direction_y;
+    const double distance2 = across_x * across_x + across_y * across_y;
+    if (distance2 < best) {
+      best = distance2;
+      nearest = number;
+    }
+  }
+  return best;
+}
+
+}  // namespace unflex::verify

@@ -1,0 +1,44 @@
+// What slicers say in comments about the lines that follow: kind of feature, new layer.
+//
+//   ;TYPE:External perimeter    PrusaSlicer, SuperSlicer, OrcaSlicer, Cura, ideaMaker
+//   ; FEATURE: Outer wall       Bambu Studio        ; feature outer perimeter   Simplify3D
+//   ;LAYER_CHANGE  ; CHANGE_LAYER  ;LAYER:12  ; layer 12, Z = 2.4
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace unflex::record {
+
+class FeatureLog {
+ public:
+  // The next line of the file.
+  void read(std::string_view content, std::size_t number);
+
+  struct At {
+    std::size_t feature = 0;
+    std::size_t layers_begun = 0;  // comments that begin a layer so far
+  };
+  // In which a line is that has been read. Lines must not decrease from call to call.
+  [[nodiscard]] At at(std::size_t number);
+
+  // Names by number; 0 is what no comment names. At most 48 are told apart, the rest is the last.
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  [[nodiscard]] std::size_t number_of(std::string_view name);
+
+  struct Change {
+    std::size_t line;
+    At at;
+  };
+  std::vector<std::string> names_{""};
+  At last_;
+  At current_;
+  std::deque<Change> changes_;
+};
+
+}  // namespace unflex::record

@@ -1,0 +1,351 @@
+#include "gatherer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace unflex::record {
+namespace {
+
+// Deviations are kept for bits of the path of about this long.
+constexpr double kChunk_s = 3e-3;
+// Within this time there is one candidate for the worst places.
+constexpr double kBlock_s = 0.1;
+// Around a place so many periods of the slower axis are shown, on either side.
+constexpr double kPeriods = 3.0;
+constexpr double kShortest_s = 0.06;
+constexpr double kLongest_s = 0.2;
+constexpr std::size_t kMostLayers = 8192;
+// Without comments a layer begins where filament is laid at another height, or while Z rises
+// steadily, after so much.
+constexpr double kSameZ_mm = 0.005;
+constexpr double kSpiralLayer_mm = 0.2;
+constexpr double kFinestCell_mm = 1e-5;
+constexpr int kHistogramCells = 72;
+constexpr double kCellsPerOctave = 4.0;
+// Around the centre of a scene that counts as being at the place.
+constexpr double kAtPlace = 0.05;
+
+double half_width_s(const verify::NozzleModel& model) {
+  const double slower = std::min(model.x.omega_rad_s, model.y.omega_rad_s);
+  return std::clamp(kPeriods * 2.0 * std::numbers::pi / slower, kShortest_s, kLongest_s);
+}
+
+}  // namespace
+
+void Recorder::Gatherer::Sums::add(const Chunk& chunk) {
+  contour2_max_mm2 = std::max(contour2_max_mm2, chunk.contour2_max_mm2);
+  sum_contour2 += chunk.sum_contour2;
+  weight_s += chunk.weight_s;
+}
+
+report::Spread Recorder::Gatherer::Sums::spread() const {
+  return {std::sqrt(contour2_max_mm2), weight_s > 0.0 ? std::sqrt(sum_contour2 / weight_s) : 0.0};
+}
+
+Recorder::Gatherer::Gatherer(const Options& options, std::size_t machines)
+    : store_(options.paths_bytes),
+      versions_{Version(half_width_s(options.nozzle), options.places),
+                Version(half_width_s(options.nozzle), options.places)},
+      bench_(options.nozzle, machines) {}
+
+void Recorder::Gatherer::line(const gcode::Line& line) {
+  features_.read(line.content(), line.number);
+}
+
+void Recorder::Gatherer::section(const verify::ReferencePath& sliced,
+                                 const verify::ReferencePath& emitted) {
+  for (int number : {0, 1}) {
+    close_chunk(number, std::numeric_limits<double>::infinity());
+  }
+  complete_moves(cells_.end());
+  section_first_ = sliced.end();
+  // Moves of filament alone have not been entered.
+  cells_.continue_at(section_first_);
+  versions_[0].path = &sliced;
+  versions_[1].path = &emitted;
+  for (Version& version : versions_) {
+    version.first_piece = version.path->end();
+    version.piece = std::numeric_limits<std::size_t>::max();
+  }
+}
+
+void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::Step& step) {
+  if (!nozzle.emitted) {
+    bench_.add(nozzle.model, step.time_s, step.nozzle);
+  }
+  if (nozzle.model != 0) {
+    return;
+  }
+  const int number = nozzle.emitted ? 1 : 0;
+  Version& version = versions_[number];
+  if (step.measured) {
+    measured_step(number, step);
+  }
+  if (!step.waiting && version.ring.advance(step.h_s)) {
+    if (step.measured) {
+      move_along(version, step);
+    }
+    version.ring.add(step, version.where);
+    if (version.ring.has_requests()) {
+      collect_moments(number, false);
+    }
+  }
+}
+
+void Recorder::Gatherer::move_along(Version& version, const verify::Step& step) const {
+  const double along_mm =
+      cells_[version.where.move].along_mm(step.reference_x_mm, step.reference_y_mm);
+  version.where.along_mm = std::max(version.where.along_mm, along_mm);
+}
+
+void Recorder::Gatherer::measured_step(int number, const verify::Step& step) {
+  Version& version = versions_[number];
+  if (step.piece != version.piece) {
+    close_chunk(number, std::numeric_limits<double>::infinity());
+    enter(number, step.piece);
+  }
+  if (!step.extruding) {
+    return;
+  }
+  version.histogram.add_square(step.contour2_mm2, step.h_s);
+  Chunk& chunk = version.chunk;
+  chunk.weight_s += step.h_s;
+  chunk.sum_contour2 += step.h_s * step.contour2_mm2;
+  if (step.contour2_mm2 > chunk.contour2_max_mm2) {
+    chunk.contour2_max_mm2 = step.contour2_mm2;
+    chunk.max_x_mm = step.reference_x_mm;
+    chunk.max_y_mm = step.reference_y_mm;
+    chunk.max_line = step.line;
+  }
+  if (chunk.weight_s >= kChunk_s) {
+    move_along(version, step);
+    close_chunk(number, version.where.along_mm);
+    version.chunk.from_mm = version.where.along_mm;
+  }
+}
+
+// The nozzle's reference comes to another piece of its path.
+void Recorder::Gatherer::enter(int number, std::size_t piece) {
+  Version& version = versions_[number];
+  version.piece = piece;
+  const std::size_t move = section_first_ + (piece - version.first_piece);
+  append_moves(version, move);
+  version.where = {move, 0.0};
+  version.chunk.from_mm = 0.0;
+  complete_moves(std::min(versions_[0].where.move, versions_[1].where.move));
+}
+
+void Recorder::Gatherer::append_moves(const Version& version, std::size_t until) {
+  while (cells_.end() <= until) {
+    const std::size_t piece = version.first_piece + (cells_.end() - section_first_);
+    const verify::PathPiece& added = (*version.path)[std::max(piece, version.path->first())];
+    const FeatureLog::At at = features_.at(added.move.segment.line);
+    const std::size_t layer = added.extruding ? layer_of(added, at.layers_begun) : layers_.size();
+    cells_.append(added, layer, at.feature);
+  }
+}
+
+std::size_t Recorder::Gatherer::layer_of(const verify::PathPiece& piece, std::size_t layers_begun) {
+  const gcode::Segment& segment = piece.move.segment;
+  const double z_mm = segment.end_mm[gcode::Z];
+  bool begins = layers_.empty();
+  if (!begins) {
+    const double rise_mm = std::abs(z_mm - layers_.back().z_mm);
+    const bool level = segment.delta(gcode::Z) == 0.0;
+    begins = layers_begun > 0 ? layers_begun != layers_begun_
+                              : rise_mm > (level ? kSameZ_mm : kSpiralLayer_mm);
+  }
+  if (begins && layers_.size() < kMostLayers) {
+    layers_.push_back({z_mm, segment.line, {}});
+  }
+  layers_begun_ = layers_begun;
+  return layers_.size() - 1;
+}
+
+void Recorder::Gatherer::close_chunk(int number, double to_mm) {
+  Version& version = versions_[number];
+  const Chunk chunk = std::exchange(version.chunk, Chunk{});
+  if (chunk.contour2_max_mm2 < 0.0) {
+    return;
+  }
+  const PathMove& move = cells_[version.where.move];
+  cells_.deviate(version.where.move, number, chunk.from_mm, std::min(to_mm, move.length_mm),
+                 report::deviation_code(chunk.contour2_max_mm2));
+  layers_[move.layer].sums[number].add(chunk);
+  if (feature_sums_.size() <= move.feature) {
+    feature_sums_.resize(move.feature + 1);
+  }
+  feature_sums_[move.feature][number].add(chunk);
+
+  if (chunk.contour2_max_mm2 > version.block.contour2_mm2) {
+    const double along_mm = move.along_mm(chunk.max_x_mm, chunk.max_y_mm);
+    version.block = {chunk.contour2_max_mm2, {version.where.move, along_mm},
+                     chunk.max_line,         move.layer,
+                     move.feature,           chunk.max_x_mm,
+                     chunk.max_y_mm,         move.z_mm};
+  }
+  version.block_s += chunk.weight_s;
+  if (version.block_s >= kBlock_s) {
+    propose(number);
+  }
+}
+
+// Puts the worst of the last tenth of a second forward for the worst places.
+void Recorder::Gatherer::propose(int number) {
+  Version& version = versions_[number];
+  const PlaceCandidate candidate = std::exchange(version.block, {});
+  version.block_s = 0.0;
+  if (candidate.contour2_mm2 <= 0.0) {
+    return;
+  }
+  const std::size_t id = next_id_++;
+  const WorstPlaces::Change change = version.worst.add(candidate, id);
+  for (const std::size_t removed : change.removed) {
+    std::erase_if(scenes_, [&](const Scene& scene) { return scene.id == removed; });
+    for (Version& each : versions_) {
+      each.ring.cancel(removed);
+    }
+  }
+  if (change.added) {
+    scenes_.push_back({id, {}});
+    for (Version& each : versions_) {
+      each.ring.request(id, candidate.where);
+    }
+  }
+}
+
+void Recorder::Gatherer::collect_moments(int number, bool over) {
+  for (MomentRing::Taken& taken : versions_[number].ring.take(over)) {
+    const auto scene = std::find_if(scenes_.begin(), scenes_.end(),
+                                    [&](const Scene& each) { return each.id == taken.id; });
+    if (scene != scenes_.end()) {
+      scene->moments[number] = std::move(taken.moments);
+    }
+  }
+}
+
+// Moves before this one have been left by both nozzles.
+void Recorder::Gatherer::complete_moves(std::size_t until) {
+  while (cells_.first() < until) {
+    const PathMove& move = cells_[cells_.first()];
+    for (std::size_t i = 0; i < move.cells; ++i) {
+      const auto place = [&](std::size_t border) {
+        return move.length_mm * static_cast<double>(border) / static_cast<double>(move.cells);
+      };
+      const double from_mm = place(i);
+      const double to_mm = place(i + 1);
+      const std::array<unsigned char, 2> codes = cells_.cell(move, i);
+      store_.add({move.layer, move.feature, move.line, move.x_mm + from_mm * move.direction_x,
+                  move.y_mm + from_mm * move.direction_y, move.x_mm + to_mm * move.direction_x,
+                  move.y_mm + to_mm * move.direction_y, codes[0], codes[1]});
+    }
+    cells_.drop_front();
+  }
+}
+
+void Recorder::Gatherer::hold(double duration_s) {
+  for (Version& version : versions_) {
+    version.ring.pass(duration_s);
+  }
+}
+
+void Recorder::Gatherer::advanced(const verify::ReferencePath& sliced, double time_s) {
+  bench_.advance(sliced, time_s);
+}
+
+std::vector<report::Place> Recorder::Gatherer::places(int number) const {
+  std::vector<report::Place> result;
+  for (const WorstPlaces::Kept& kept : versions_[number].worst.places()) {
+    const PlaceCandidate& candidate = kept.candidate;
+    report::Place place;
+    place.line = candidate.line;
+    place.layer = candidate.layer;
+    place.feature = candidate.feature;
+    place.x_mm = candidate.x_mm;
+    place.y_mm = candidate.y_mm;
+    place.z_mm = candidate.z_mm;
+    for (const Scene& scene : scenes_) {
+      if (scene.id == kept.id) {
+        place.before = scene.moments[0];
+        place.after = scene.moments[1];
+      }
+    }
+    const auto largest = [](const std::vector<report::Moment>& moments) {
+      double most = 0.0;
+      for (const report::Moment& moment : moments) {
+        const double reach_s = kAtPlace * moments.back().time_s;
+        most = std::abs(moment.time_s) <= reach_s ? std::max(most, moment.contour_mm) : most;
+      }
+      return most;
+    };
+    place.before_mm = largest(place.before);
+    place.after_mm = largest(place.after);
+    (number == 0 ? place.before_mm : place.after_mm) = std::sqrt(candidate.contour2_mm2);
+    for (std::vector<report::Moment>* moments : {&place.before, &place.after}) {
+      for (report::Moment& moment : *moments) {
+        moment.reference_x_mm -= place.x_mm;
+        moment.reference_y_mm -= place.y_mm;
+        moment.base_x_mm -= place.x_mm;
+        moment.base_y_mm -= place.y_mm;
+        moment.nozzle_x_mm -= place.x_mm;
+        moment.nozzle_y_mm -= place.y_mm;
+      }
+    }
+    result.push_back(std::move(place));
+  }
+  return result;
+}
+
+std::vector<report::HistogramCell> Recorder::Gatherer::histogram() const {
+  std::vector<report::HistogramCell> result;
+  double before_s = 0.0;
+  double after_s = 0.0;
+  for (int cell = 0; cell < kHistogramCells; ++cell) {
+    const double to_mm = cell + 1 < kHistogramCells
+                             ? kFinestCell_mm * std::exp2((cell + 1) / kCellsPerOctave)
+                             : std::numeric_limits<double>::infinity();
+    const double before_to_s = versions_[0].histogram.weight_below(to_mm);
+    const double after_to_s = versions_[1].histogram.weight_below(to_mm);
+    result.push_back({cell == 0 ? 0.0 : kFinestCell_mm * std::exp2(cell / kCellsPerOctave),
+                      before_to_s - before_s, after_to_s - after_s});
+    before_s = before_to_s;
+    after_s = after_to_s;
+  }
+  return result;
+}
+
+report::Recording Recorder::Gatherer::finish() {
+  for (int number : {0, 1}) {
+    close_chunk(number, std::numeric_limits<double>::infinity());
+    propose(number);
+  }
+  for (int number : {0, 1}) {
+    collect_moments(number, true);
+  }
+  complete_moves(cells_.end());
+
+  report::Recording recording;
+  std::vector<std::size_t> ends;
+  recording.paths = store_.encode(layers_.size(), ends);
+  for (std::size_t i = 0; i < layers_.size(); ++i) {
+    recording.layers.push_back({layers_[i].z_mm,
+                                layers_[i].first_line,
+                                {layers_[i].sums[0].spread(), layers_[i].sums[1].spread()},
+                                ends[i]});
+  }
+  feature_sums_.resize(features_.names().size());
+  for (std::size_t i = 0; i < feature_sums_.size(); ++i) {
+    recording.features.push_back({features_.names()[i],
+                                  feature_sums_[i][0].weight_s,
+                                  {feature_sums_[i][0].spread(), feature_sums_[i][1].spread()}});
+  }
+  recording.worst_before = places(0);
+  recording.worst_after = places(1);
+  recording.histogram = histogram();
+  recording.contenders = bench_.contenders();
+  recording.shapers_measured_s = bench_.measured_s();
+  return recording;
+}
+
+}  // namespace unflex::record

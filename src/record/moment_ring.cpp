@@ -1,0 +1,83 @@
+#include "moment_ring.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace unflex::record {
+namespace {
+
+constexpr std::size_t kEntries = 8192;
+// Moments before, and after, a place.
+constexpr std::size_t kHalf = 75;
+
+}  // namespace
+
+MomentRing::MomentRing(double half_width_s)
+    : interval_s_(half_width_s / static_cast<double>(kHalf)), entries_(kEntries) {}
+
+void MomentRing::add(const verify::Step& step, const PathPoint& where) {
+  last_s_ = clock_s_;
+  Entry& entry = entries_[count_++ % entries_.size()];
+  entry.where = where;
+  report::Moment& moment = entry.moment;
+  moment.time_s = clock_s_;
+  moment.contour_mm = std::sqrt(step.contour2_mm2);
+  moment.reference_x_mm = step.measured ? step.reference_x_mm : step.base_x.position;
+  moment.reference_y_mm = step.measured ? step.reference_y_mm : step.base_y.position;
+  moment.base_x_mm = step.base_x.position;
+  moment.base_y_mm = step.base_y.position;
+  moment.nozzle_x_mm = step.nozzle.x.position;
+  moment.nozzle_y_mm = step.nozzle.y.position;
+}
+
+void MomentRing::cancel(std::size_t id) {
+  std::erase_if(requests_, [&](const Request& request) { return request.id == id; });
+}
+
+// The first entry at or behind the place; count_ if there is none yet.
+std::size_t MomentRing::find(const PathPoint& where) const {
+  std::size_t from = begin();
+  std::size_t to = count_;
+  while (from < to) {
+    const std::size_t middle = from + (to - from) / 2;
+    if (at(middle).where < where) {
+      from = middle + 1;
+    } else {
+      to = middle;
+    }
+  }
+  return from;
+}
+
+std::vector<report::Moment> MomentRing::around(std::size_t centre) const {
+  const report::Moment origin = at(centre).moment;
+  const std::size_t from = std::max(begin(), centre - std::min(centre, kHalf));
+  const std::size_t to = std::min(count_, centre + kHalf + 1);
+  std::vector<report::Moment> result;
+  result.reserve(to - from);
+  for (std::size_t i = from; i < to; ++i) {
+    report::Moment moment = at(i).moment;
+    moment.time_s -= origin.time_s;
+    result.push_back(moment);
+  }
+  return result;
+}
+
+std::vector<MomentRing::Taken> MomentRing::take(bool over) {
+  std::vector<Taken> taken;
+  std::erase_if(requests_, [&](const Request& request) {
+    const std::size_t centre = find(request.where);
+    const bool gone = begin() > 0 && centre == begin();
+    if (!over && !gone && count_ <= centre + kHalf) {
+      return false;
+    }
+    taken.push_back({request.id, {}});
+    if (!gone && centre < count_) {
+      taken.back().moments = around(centre);
+    }
+    return true;
+  });
+  return taken;
+}
+
+}  // namespace unflex::record

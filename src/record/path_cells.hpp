@@ -1,0 +1,56 @@
+// The sliced file's moves between the time one of the two nozzles is there and the time both have
+// been: each cut into cells, of which the largest deviation before and after is kept.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <deque>
+
+#include "unflex/verify/reference_path.hpp"
+
+namespace unflex::record {
+
+struct PathMove {
+  bool extruding = false;
+  std::size_t line = 0;
+  std::size_t layer = 0;
+  std::size_t feature = 0;
+  double x_mm = 0.0, y_mm = 0.0, z_mm = 0.0;  // start, z: end
+  double direction_x = 0.0, direction_y = 0.0;
+  double length_mm = 0.0;
+  std::size_t first_cell = 0;
+  std::size_t cells = 0;
+
+  // How far along the move a point is.
+  [[nodiscard]] double along_mm(double x, double y) const {
+    return (x - x_mm) * direction_x + (y - y_mm) * direction_y;
+  }
+};
+
+// Moves have numbers that go up by one and stay the same.
+class PathCells {
+ public:
+  [[nodiscard]] std::size_t first() const { return first_; }
+  [[nodiscard]] std::size_t end() const { return first_ + moves_.size(); }
+  [[nodiscard]] const PathMove& operator[](std::size_t number) const {
+    return moves_[number - first_];
+  }
+
+  void append(const verify::PathPiece& piece, std::size_t layer, std::size_t feature);
+  // Version 0 is before, 1 after. Between the two distances along the move.
+  void deviate(std::size_t number, int version, double from_mm, double to_mm, unsigned char code);
+  [[nodiscard]] std::array<unsigned char, 2> cell(const PathMove& move, std::size_t i) const {
+    return cells_[move.first_cell - first_cell_ + i];
+  }
+  void drop_front();
+  // There are none; the next to be appended gets this number.
+  void continue_at(std::size_t number) { first_ = number; }
+
+ private:
+  std::deque<PathMove> moves_;
+  std::deque<std::array<unsigned char, 2>> cells_;
+  std::size_t first_ = 0;
+  std::size_t first_cell_ = 0;
+};
+
+}  // namespace unflex::record

@@ -1,0 +1,167 @@
+#include "shaper_bench.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "unflex/rivals/shapers.hpp"
+
+namespace unflex::record {
+namespace {
+
+// Moments per period of the faster axis.
+constexpr double kPerPeriod = 16.0;
+constexpr double kBlock_s = 1.0;
+// Measured before every second block is left out, and again before every second of the others.
+constexpr double kStrideLasts_s = 60.0;
+// Nozzles that nobody asks for must be let to forget now and then.
+constexpr std::size_t kSkipped = 128;
+// A nozzle that is not heard of for so many intervals has stood still.
+constexpr double kGap = 4.0;
+// A corner's largest deviation is a kink, so what comes near the largest so far (as a square) is
+// looked at so many times in an interval.
+constexpr double kNearPeak = 0.16;
+constexpr int kFine = 8;
+// Intervals between the last a machine is heard of and the last moment that is measured.
+constexpr double kMargin = 2.0;
+
+double frequency_hz(const dynamics::FlexibleAxis& axis) {
+  return axis.omega_rad_s / (2.0 * std::numbers::pi);
+}
+
+}  // namespace
+
+ShaperBench::ShaperBench(const verify::NozzleModel& model, std::size_t machines)
+    : interval_s_(std::clamp(
+          1.0 / (kPerPeriod * std::max(frequency_hz(model.x), frequency_hz(model.y))), 5e-4, 2e-3)),
+      last_add_s_(machines, -1.0),
+      last_(machines),
+      near_(verify::reach_s(model)) {
+  for (const rivals::ShaperKind kind : rivals::kShaperKinds) {
+    Shaper shaper{std::string(rivals::name(kind)), {}};
+    const auto x = rivals::shaper_pulses(kind, frequency_hz(model.x), model.x.zeta);
+    const auto y = rivals::shaper_pulses(kind, frequency_hz(model.y), model.y.zeta);
+    if (x && y) {
+      shaper.nozzles.assign(machines, Nozzle{rivals::ShapedNozzle(*x, *y)});
+      lookahead_s_ = std::max(lookahead_s_, shaper.nozzles.front().shaped.lookahead_s());
+    }
+    shapers_.push_back(std::move(shaper));
+  }
+}
+
+void ShaperBench::add(std::size_t machine, double time_s, const dynamics::NozzleXY& unshaped) {
+  const double last_s = last_add_s_[machine];
+  if (time_s - last_s < interval_s_) {
+    return;
+  }
+  const auto add = [&](double at_s, const dynamics::NozzleXY& nozzle) {
+    for (Shaper& shaper : shapers_) {
+      if (!shaper.nozzles.empty()) {
+        shaper.nozzles[machine].shaped.add(at_s, nozzle);
+      }
+    }
+  };
+  if (last_s >= 0.0 && time_s - last_s > kGap * interval_s_) {
+    // No cubic from before to after the rest.
+    const dynamics::NozzleXY& last = last_[machine];
+    add(last_s + interval_s_, {{last.x.position, 0.0}, {last.y.position, 0.0}});
+    add(time_s - interval_s_, {{unshaped.x.position, 0.0}, {unshaped.y.position, 0.0}});
+  }
+  add(time_s, unshaped);
+  last_add_s_[machine] = time_s;
+  last_[machine] = unshaped;
+}
+
+double ShaperBench::memory_s() const { return lookahead_s_ + 2.0 * kMargin * interval_s_; }
+
+bool ShaperBench::is_sampled(double time_s) const {
+  return static_cast<std::size_t>(time_s / kBlock_s) % stride_ == 0;
+}
+
+void ShaperBench::advance(const verify::ReferencePath& path, double time_s) {
+  if (!begun_) {
+    begun_ = true;
+    near_.begin(path);
+  }
+  piece_ = std::max(piece_, path.first());
+  for (const double until_s = time_s - lookahead_s_ - kMargin * interval_s_; next_s_ <= until_s;
+       next_s_ += interval_s_) {
+    while (piece_ < path.end() && path[piece_].end_s <= next_s_) {
+      ++piece_;
+    }
+    if (piece_ == path.end()) {
+      return;
+    }
+    const verify::PathPiece& piece = path[piece_];
+    // Whole intervals, so that the moments are the same however the path comes.
+    if (piece.start_s > next_s_ + interval_s_) {
+      const double rest_s = std::min(piece.start_s, until_s) - next_s_;
+      next_s_ += interval_s_ * std::max(0.0, std::ceil(rest_s / interval_s_) - 1.0);
+      continue;
+    }
+    const bool counts = piece.extruding && piece.start_s <= next_s_ && is_sampled(next_s_);
+    if (counts || ++skipped_ % kSkipped == 0) {
+      measure(path, counts);
+    }
+  }
+}
+
+void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
+  if (counts) {
+    near_.slide(path, next_s_);
+  }
+  const double weight = static_cast<double>(stride_) * interval_s_;
+  peaking_.clear();
+  for (Shaper& shaper : shapers_) {
+    for (Nozzle& nozzle : shaper.nozzles) {
+      const double contour2 = squared_contour_error(nozzle, path, next_s_, counts);
+      nozzle.sum_contour2 += weight * contour2;
+      if (counts && contour2 > kNearPeak * nozzle.contour2_max_mm2) {
+        peaking_.push_back(&nozzle);
+      }
+    }
+  }
+  if (!counts) {
+    return;
+  }
+  for (int fine = 0; fine < kFine && !peaking_.empty(); ++fine) {
+    const double time_s = next_s_ + interval_s_ * fine / kFine;
+    near_.slide(path, time_s);
+    for (Nozzle* const nozzle : peaking_) {
+      nozzle->contour2_max_mm2 =
+          std::max(nozzle->contour2_max_mm2, squared_contour_error(*nozzle, path, time_s, true));
+    }
+  }
+  weight_s_ += weight;
+  measured_s_ += interval_s_;
+  at_stride_s_ += interval_s_;
+  if (at_stride_s_ >= kStrideLasts_s) {
+    stride_ *= 2;
+    at_stride_s_ = 0.0;
+  }
+}
+
+// Without `counts` the nozzle is only let to forget what is past.
+double ShaperBench::squared_contour_error(Nozzle& nozzle, const verify::ReferencePath& path,
+                                          double time_s, bool counts) {
+  const dynamics::NozzleXY state = nozzle.shaped.at(time_s);
+  std::size_t nearest = 0;
+  return counts ? near_.squared_contour_error(path, state.x.position, state.y.position, nearest)
+                : 0.0;
+}
+
+std::vector<report::Contender> ShaperBench::contenders() const {
+  std::vector<report::Contender> result;
+  for (const Shaper& shaper : shapers_) {
+    report::Contender contender{shaper.name, {}};
+    for (const Nozzle& nozzle : shaper.nozzles) {
+      contender.spreads.push_back(
+          {std::sqrt(nozzle.contour2_max_mm2),
+           weight_s_ > 0.0 ? std::sqrt(nozzle.sum_contour2 / weight_s_) : 0.0});
+    }
+    result.push_back(std::move(contender));
+  }
+  return result;
+}
+
+}  // namespace unflex::record

@@ -1,0 +1,66 @@
+// How the firmware's input shapers would have done on the same print: each built for the printer's
+// frequencies as the settings have them, on a machine whose true ones are as set or somewhat off.
+//
+// A whole print has more moments than can be looked at, so from some length on only every second,
+// fourth, … of its seconds is measured, and counts as often.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "unflex/report/recording.hpp"
+#include "unflex/rivals/shaped_nozzle.hpp"
+#include "unflex/verify/near_path.hpp"
+
+namespace unflex::record {
+
+class ShaperBench {
+ public:
+  // `model` is the printer of the settings; there are `machines` true ones.
+  ShaperBench(const verify::NozzleModel& model, std::size_t machines);
+
+  // A machine's nozzle without a shaper. Times must increase.
+  void add(std::size_t machine, double time_s, const dynamics::NozzleXY& unshaped);
+  // All machines have come to this time of the path.
+  void advance(const verify::ReferencePath& path, double time_s);
+  // For how long after its time the path is needed.
+  [[nodiscard]] double memory_s() const;
+
+  [[nodiscard]] std::vector<report::Contender> contenders() const;
+  [[nodiscard]] double measured_s() const { return measured_s_; }
+
+ private:
+  struct Nozzle {
+    rivals::ShapedNozzle shaped;
+    double contour2_max_mm2 = 0.0;
+    double sum_contour2 = 0.0;
+  };
+  struct Shaper {
+    std::string name;
+    std::vector<Nozzle> nozzles;  // one per machine; none if it is not defined for the printer
+  };
+
+  void measure(const verify::ReferencePath& path, bool counts);
+  [[nodiscard]] double squared_contour_error(Nozzle& nozzle, const verify::ReferencePath& path,
+                                             double time_s, bool counts);
+  [[nodiscard]] bool is_sampled(double time_s) const;
+
+  double interval_s_;
+  double lookahead_s_ = 0.0;
+  std::vector<Shaper> shapers_;
+  std::vector<double> last_add_s_;  // per machine
+  std::vector<dynamics::NozzleXY> last_;
+  verify::NearPath near_;
+  bool begun_ = false;
+  std::size_t piece_ = 0;  // of the path, at next_s_
+  double next_s_ = 0.0;
+  std::vector<Nozzle*> peaking_;
+  std::size_t skipped_ = 0;
+  std::size_t stride_ = 1;
+  double at_stride_s_ = 0.0;
+  double weight_s_ = 0.0;
+  double measured_s_ = 0.0;
+};
+
+}  // namespace unflex::record

@@ -1,0 +1,291 @@
+// The page is complete without its script but for the pictures; what the script shows it reads from
+// one JSON object and the bytes of the paths.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "assets.hpp"
+#include "base64.hpp"
+#include "unflex/report/html_page.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::report {
+namespace {
+
+// Of lists that may be of any length.
+constexpr std::size_t kMostListed = 100;
+constexpr std::size_t kLongestText = 500;
+
+double um(double mm) { return std::round(mm * 1e6) / 1000.0; }
+double rounded(double value, double unit) { return std::round(value / unit) * unit; }
+
+Json spread_json(const Spread& spread) { return {um(spread.max_mm), um(spread.rms_mm)}; }
+
+Json change_json(const BeforeAfter& change) {
+  return {spread_json(change.before), spread_json(change.after)};
+}
+
+Json row_json(const DeviationRow& row) {
+  return {{"max", um(row.contour_max_mm)},
+          {"p99", um(row.contour_p99_mm)},
+          {"rms", um(row.contour_rms_mm)},
+          {"line", row.contour_max_line}};
+}
+
+Json layers_json(const std::vector<LayerRow>& layers) {
+  Json array = Json::array();
+  for (const LayerRow& layer : layers) {
+    array.push_back({rounded(layer.z_mm, 0.001), layer.first_line, layer.paths_end,
+                     um(layer.spread.before.max_mm), um(layer.spread.before.rms_mm),
+                     um(layer.spread.after.max_mm), um(layer.spread.after.rms_mm)});
+  }
+  return array;
+}
+
+Json features_json(const std::vector<FeatureRow>& features) {
+  Json array = Json::array();
+  for (const FeatureRow& feature : features) {
+    array.push_back({{"name", feature.name},
+                     {"time", rounded(feature.duration_s, 0.1)},
+                     {"change", change_json(feature.spread)}});
+  }
+  return array;
+}
+
+void append_float(double value, std::string& bytes) {
+  const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  for (unsigned shift = 0; shift < 32; shift += 8) {
+    bytes += static_cast<char>(bits >> shift & 0xFFU);
+  }
+}
+
+// Little-endian floats, eight to a moment, in the order of its fields.
+std::string packed(const std::vector<Moment>& moments) {
+  std::string bytes;
+  for (const Moment& m : moments) {
+    for (const double value : {m.time_s, m.contour_mm, m.reference_x_mm, m.reference_y_mm,
+                               m.base_x_mm, m.base_y_mm, m.nozzle_x_mm, m.nozzle_y_mm}) {
+      append_float(value, bytes);
+    }
+  }
+  return base64(bytes);
+}
+
+Json places_json(const std::vector<Place>& places) {
+  Json array = Json::array();
+  for (const Place& place : places) {
+    array.push_back(
+        {{"line", place.line},
+         {"layer", place.layer},
+         {"feature", place.feature},
+         {"at",
+          {rounded(place.x_mm, 0.001), rounded(place.y_mm, 0.001), rounded(place.z_mm, 0.001)}},
+         {"um", {um(place.before_mm), um(place.after_mm)}},
+         {"moments", {packed(place.before), packed(place.after)}}});
+  }
+  return array;
+}
+
+Json histogram_json(const std::vector<HistogramCell>& cells) {
+  Json array = Json::array();
+  for (const HistogramCell& cell : cells) {
+    array.push_back({rounded(cell.from_mm * 1e3, 1e-5), rounded(cell.before_s, 1e-3),
+                     rounded(cell.after_s, 1e-3)});
+  }
+  return array;
+}
+
+Json contenders_json(const std::vector<Contender>& contenders) {
+  Json array = Json::array();
+  for (const Contender& contender : contenders) {
+    Json spreads = Json::array();
+    for (const Spread& spread : contender.spreads) {
+      spreads.push_back(spread_json(spread));
+    }
+    array.push_back({{"name", contender.name}, {"spreads", spreads}});
+  }
+  return array;
+}
+
+Json listed(const std::vector<std::string>& texts) {
+  Json array = Json::array();
+  for (const std::string& text : texts) {
+    if (array.size() < kMostListed) {
+      array.push_back(text.substr(0, kLongestText));
+    }
+  }
+  return array;
+}
+
+Json remarks_json(const Report& r) {
+  Json fallbacks = Json::array();
+  for (const Fallback& kept : r.fallbacks) {
+    if (fallbacks.size() < kMostListed) {
+      fallbacks.push_back({kept.first_line, kept.last_line, kept.reason});
+    }
+  }
+  return {{"violations", listed(r.violations)},
+          {"violation_count", r.violation_count},
+          {"warnings", listed(r.warnings)},
+          {"warning_count", r.warnings.size()},
+          {"fallbacks", fallbacks},
+          {"fallback_count", r.runs_fallback},
+          {"kept_moves", Json(r.kept_moves)}};
+}
+
+Json facts_json(const Report& r) {
+  Json facts = Json::array();
+  const auto add = [&](std::string name, std::string value) {
+    facts.push_back({std::move(name), std::move(value)});
+  };
+  add("Sliced file", r.input);
+  add("Compensated file", r.output);
+  add("Firmware", r.firmware);
+  add("Print time", fmt::format("{} as sliced, {} compensated", duration_text(r.reference_time_s),
+                                duration_text(r.emitted_time_s)));
+  if (!r.solver_engine.empty()) {
+    add("Runs", fmt::format("{} of {} compensated, {} keep their original moves",
+                            r.runs_compensated, r.runs_total, r.runs_fallback));
+    add("Solver", fmt::format("{}, {} windows, {} iterations", r.solver_engine, r.windows_total,
+                              r.solver_iterations));
+  }
+  add("Base", fmt::format("at most {:.0f} mm/s and {:.0f} mm/s²", r.base_max_velocity_mm_s,
+                          r.base_max_accel_mm_s2));
+  add("Output", fmt::format("{} lines, {:.1f} MB, at most {:.0f} lines/s", r.output_lines,
+                            static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s));
+  add("Filament",
+      fmt::format("{:.2f} mm in, {:.2f} mm out", r.input_extrusion_mm, r.output_extrusion_mm));
+  add("Written by", fmt::format("unflex {}", r.version));
+  return facts;
+}
+
+Json data_json(const Report& r) {
+  const Recording& recording = *r.recording;
+  Json settings = Json::array();
+  for (const Setting& setting : r.printer) {
+    settings.push_back({setting.key, setting.value, setting.origin});
+  }
+  return {{"deviation", {row_json(r.uncompensated.extruding), row_json(r.compensated.extruding)}},
+          {"layers", layers_json(recording.layers)},
+          {"layer_step", recording.paths.layer_step},
+          {"tolerance_mm", recording.paths.tolerance_mm},
+          {"frame",
+           {recording.paths.x_min_mm, recording.paths.y_min_mm, recording.paths.x_max_mm,
+            recording.paths.y_max_mm}},
+          {"features", features_json(recording.features)},
+          {"worst", {places_json(recording.worst_before), places_json(recording.worst_after)}},
+          {"histogram", histogram_json(recording.histogram)},
+          {"frequency_errors", recording.frequency_errors},
+          {"contenders", contenders_json(recording.contenders)},
+          {"extruding_s", rounded(r.uncompensated.extruding.duration_s, 0.1)},
+          {"shapers_s", rounded(recording.shapers_measured_s, 0.1)},
+          {"remarks", remarks_json(r)},
+          {"facts", facts_json(r)},
+          {"settings", settings}};
+}
+
+constexpr std::string_view kTypical =
+    "Root mean square, over the time in which filament is laid, of the distance between nozzle and "
+    "sliced path. It is computed: the file is replayed as the firmware would, with the nozzle "
+    "hanging on springs and dampers of the frequencies given in the settings.";
+
+// Three figures.
+std::string um_text(double mm) {
+  const double value = mm * 1e3;
+  const int digits = value >= 99.95 ? 0 : value >= 9.995 ? 1 : 2;
+  return fmt::format("{:.{}f} µm", value, digits);
+}
+
+std::string time_sentence(const Report& r) {
+  const double longer_s = r.emitted_time_s - r.reference_time_s;
+  const std::string time = duration_text(r.emitted_time_s);
+  if (std::abs(longer_s) < 0.5) {
+    return fmt::format("and the print takes as long as before, {}", time);
+  }
+  return fmt::format("and the print takes {} {} ({})", duration_text(std::abs(longer_s)),
+                     longer_s > 0.0 ? "longer" : "less", time);
+}
+
+std::string key_figure(std::string_view name, std::string_view explanation,
+                       const std::string& before, const std::string& after,
+                       const std::string& note) {
+  return fmt::format(
+      R"(<div><dt>{}</dt><dd><span class="before">{}</span> → <span class="after">{}</span> <small>{}</small></dd></div>
+)",
+      term(name, explanation), escape_html(before), escape_html(after), escape_html(note));
+}
+
+std::string times_less(double before, double after) {
+  if (!(after > 0.0) || before < 1.05 * after) {
+    return "";
+  }
+  const double factor = before / after;
+  return fmt::format("{:.{}f}× less", factor, factor >= 9.95 ? 0 : 1);
+}
+
+std::string hero(const Report& r) {
+  const DeviationRow& before = r.uncompensated.extruding;
+  const DeviationRow& after = r.compensated.extruding;
+  const auto figure = [](std::string_view name, std::string_view explanation, double from_mm,
+                         double to_mm) {
+    return key_figure(name, explanation, um_text(from_mm), um_text(to_mm),
+                      times_less(from_mm, to_mm));
+  };
+  const double change =
+      r.reference_time_s > 0.0 ? 100.0 * (r.emitted_time_s / r.reference_time_s - 1.0) : 0.0;
+  const std::string typical = term("on average", kTypical);
+  std::string html = fmt::format(
+      R"(<section class="card hero" aria-label="Result"><p class="gain">As sliced, the nozzle strays <b class="before">{}</b> from its path {}, and <b class="before">{}</b> at worst; compensated, it is <b class="after">{}</b> and <b class="after">{}</b>, {}.</p>
+)",
+      um_text(before.contour_rms_mm), typical, um_text(before.contour_max_mm),
+      um_text(after.contour_rms_mm), um_text(after.contour_max_mm), escape_html(time_sentence(r)));
+  if (r.violation_count > 0) {
+    html += fmt::format(
+        R"(<p class="alert">The compensated file breaks {} {}; do not print it. They are listed <a href="#remarks">below</a>.</p>
+)",
+        r.violation_count, r.violation_count == 1 ? "rule" : "rules");
+  }
+  html += R"(<dl class="key-figures">)";
+  html += figure("Typical deviation", kTypical, before.contour_rms_mm, after.contour_rms_mm);
+  html += figure("99 % of the time below",
+                 "Only during one hundredth of the extruding time is the nozzle further from its "
+                 "path than this.",
+                 before.contour_p99_mm, after.contour_p99_mm);
+  html += figure("Largest",
+                 "The greatest distance of the nozzle from the sliced path anywhere in the print "
+                 "while filament is laid.",
+                 before.contour_max_mm, after.contour_max_mm);
+  html +=
+      key_figure("Print time", "As the firmware's planner makes it, heating and macros excluded.",
+                 duration_text(r.reference_time_s), duration_text(r.emitted_time_s),
+                 fmt::format("{:+.2f} %", change));
+  html += "</dl></section>\n";
+  return html;
+}
+
+std::string file_name(const std::string& path) {
+  return path == "-" ? "standard input" : path.substr(path.find_last_of('/') + 1);
+}
+
+}  // namespace
+
+std::string to_html(const Report& report) {
+  Page page;
+  page.title = file_name(report.input);
+  page.style = assets::report_css;
+  page.body = hero(report);
+  page.body += assets::report_html;
+  page.body += embedded_json("data", data_json(report));
+  page.body += fmt::format("<script type=\"application/octet-stream\" id=\"paths\">{}</script>\n",
+                           base64(report.recording->paths.bytes));
+  for (const std::string_view script : {assets::plot_js, assets::paths_js, assets::layers_js,
+                                        assets::moment_js, assets::report_js}) {
+    page.script += script;
+  }
+  return html_page(page);
+}
+
+}  // namespace unflex::report

@@ -1,0 +1,84 @@
+#include "moment_ring.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace unflex::record {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+// One move of 1 mm per 10 ms; the reference goes 1 mm per 10 ms too, and so does everything else.
+void play(MomentRing& ring, double& t, double until_s) {
+  constexpr double kStep_s = 1e-4;
+  for (; t < until_s; t += kStep_s) {
+    if (!ring.advance(kStep_s)) {
+      continue;
+    }
+    verify::Step step;
+    step.measured = true;
+    step.reference_x_mm = step.base_x.position = 100.0 * t;
+    step.nozzle.x.position = 100.0 * t + 1.0;
+    step.contour2_mm2 = 0.25;
+    const auto move = static_cast<std::size_t>(100.0 * t);
+    ring.add(step, {move, 100.0 * t - static_cast<double>(move)});
+  }
+}
+
+TEST(MomentRing, GivesWhatWasAroundAPlaceBothBehindAndAhead) {
+  for (const double asked_s : {0.5, 0.9}) {
+    MomentRing ring(0.075);
+    double t = 0.0;
+    play(ring, t, asked_s);
+    ring.request(17, {70, 0.25});  // t = 0.7025
+    play(ring, t, 0.74);
+    if (asked_s < 0.7) {
+      EXPECT_THAT(ring.take(false), IsEmpty());
+    }
+    play(ring, t, 1.0);
+    const std::vector<MomentRing::Taken> taken = ring.take(false);
+    ASSERT_THAT(taken, SizeIs(1));
+    EXPECT_EQ(taken[0].id, 17U);
+    const std::vector<report::Moment>& moments = taken[0].moments;
+    ASSERT_THAT(moments, SizeIs(151));
+    EXPECT_EQ(moments[75].time_s, 0.0);
+    EXPECT_NEAR(moments[75].reference_x_mm, 70.25, 0.15);
+    EXPECT_NEAR(moments.front().time_s, -0.075, 0.01);
+    EXPECT_NEAR(moments.back().time_s, 0.075, 0.01);
+    EXPECT_EQ(moments[3].contour_mm, 0.5);
+    for (const report::Moment& moment : moments) {
+      EXPECT_NEAR(moment.reference_x_mm, moments[75].reference_x_mm + 100.0 * moment.time_s, 0.02);
+    }
+    EXPECT_FALSE(ring.has_requests());
+  }
+}
+
+TEST(MomentRing, GivesWhatThereIsAtTheEnd) {
+  MomentRing ring(0.075);
+  double t = 0.0;
+  play(ring, t, 0.05);
+  ring.request(1, {4, 0.0});
+  ring.request(2, {99, 0.0});
+  EXPECT_THAT(ring.take(false), IsEmpty());
+  const std::vector<MomentRing::Taken> taken = ring.take(true);
+  ASSERT_THAT(taken, SizeIs(2));
+  EXPECT_GT(taken[0].moments.size(), 40U);
+  EXPECT_THAT(taken[1].moments, IsEmpty());
+}
+
+TEST(MomentRing, ForgetsWhatIsLongPastAndWhatIsNoLongerWanted) {
+  MomentRing ring(0.075);
+  double t = 0.0;
+  play(ring, t, 20.0);
+  ring.request(1, {4, 0.0});
+  ring.request(2, {2500, 0.0});
+  ring.cancel(2);
+  const std::vector<MomentRing::Taken> taken = ring.take(false);
+  ASSERT_THAT(taken, SizeIs(1));
+  EXPECT_THAT(taken[0].moments, IsEmpty());
+  EXPECT_FALSE(ring.has_requests());
+}
+
+}  // namespace
+}  // namespace unflex::record

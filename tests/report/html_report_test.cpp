@@ -1,0 +1,172 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "base64.hpp"
+#include "report/sample_report.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::report {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr const char* kHostile =
+    "</script><script>alert('x')</script><img src=x onerror=\"alert(1)\">";
+
+Recording sample_recording() {
+  Recording recording;
+  recording.layers = {{0.2, 10, {{0.08, 0.02}, {0.004, 0.001}}, 4}};
+  recording.paths.bytes = std::string("\x00\xff\x10<", 4);
+  recording.features = {{"", 1.0, {}}, {"External perimeter", 9.0, {{0.08, 0.02}, {0.004, 0.001}}}};
+  Place place;
+  place.line = 42;
+  place.feature = 1;
+  place.before_mm = 0.08;
+  place.after_mm = 0.004;
+  place.before = {{-0.5, 0.25, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0}};
+  recording.worst_before = {place};
+  recording.histogram = {{0.0, 1.0, 2.0}, {1e-3, 3.0, 4.0}};
+  recording.frequency_errors = {-0.1, 0.0, 0.1};
+  recording.contenders = {{"uncompensated", {{0.1, 0.03}, {0.08, 0.02}, {0.07, 0.01}}}, {"EI", {}}};
+  return recording;
+}
+
+Report recorded_report() {
+  Report report = sample_report();
+  report.recording = sample_recording();
+  return report;
+}
+
+// What is between the element's tags.
+std::string element(const std::string& page, const std::string& id) {
+  const std::size_t at = page.find("id=\"" + id + "\">");
+  EXPECT_NE(at, std::string::npos) << id;
+  const std::size_t begin = page.find('>', at) + 1;
+  return page.substr(begin, page.find("</script>", begin) - begin);
+}
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t found = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) {
+    ++found;
+  }
+  return found;
+}
+
+TEST(HtmlReport, SaysInOneSentenceWhatWasGained) {
+  const std::string page = to_html(recorded_report());
+  EXPECT_THAT(page, HasSubstr("<title>cube.gcode</title>"));
+  EXPECT_THAT(page, HasSubstr("strays <b class=\"before\">200 µm</b> from its path"));
+  EXPECT_THAT(page, HasSubstr("<b class=\"before\">800 µm</b> at worst; compensated, it is "
+                              "<b class=\"after\">3.12 µm</b> and <b class=\"after\">12.5 µm</b>, "
+                              "and the print takes 18.0s longer (1h 00m 18s)."));
+  EXPECT_THAT(page, HasSubstr("64× less"));
+  EXPECT_THAT(page, HasSubstr("+0.50 %"));
+}
+
+TEST(HtmlReport, SaysWhenRulesAreBroken) {
+  Report report = recorded_report();
+  EXPECT_THAT(to_html(report), HasSubstr("breaks 3 rules; do not print it"));
+  report.violation_count = 0;
+  EXPECT_THAT(to_html(report), Not(HasSubstr("do not print it")));
+}
+
+TEST(HtmlReport, DoesNotSpeakOfGainWhereThereIsNone) {
+  Report report = recorded_report();
+  report.compensated = report.uncompensated;
+  report.emitted_time_s = report.reference_time_s;
+  const std::string page = to_html(report);
+  EXPECT_THAT(page, Not(HasSubstr("× less")));
+  EXPECT_THAT(page, HasSubstr("takes as long as before, 1h 00m 00s"));
+}
+
+TEST(HtmlReport, HoldsTheDataThatItsScriptReads) {
+  const std::string page = to_html(recorded_report());
+  EXPECT_EQ(element(page, "paths"), base64(sample_recording().paths.bytes));
+  const nlohmann::json data = nlohmann::json::parse(element(page, "data"));
+  EXPECT_EQ(data["layers"], nlohmann::json::parse("[[0.2, 10, 4, 80.0, 20.0, 4.0, 1.0]]"));
+  EXPECT_EQ(data["features"][1]["name"], "External perimeter");
+  EXPECT_EQ(data["worst"][0][0]["line"], 42);
+  EXPECT_EQ(data["worst"][0][0]["um"], nlohmann::json::parse("[80.0, 4.0]"));
+  // −0.5, 0.25, 1 … 6 as floats.
+  EXPECT_EQ(data["worst"][0][0]["moments"][0], "AAAAvwAAgD4AAIA/AAAAQAAAQEAAAIBAAACgQAAAwEA=");
+  EXPECT_EQ(data["worst"][0][0]["moments"][1], "");
+  EXPECT_EQ(data["worst"][1], nlohmann::json::array());
+  EXPECT_EQ(data["histogram"], nlohmann::json::parse("[[0.0, 1.0, 2.0], [1.0, 3.0, 4.0]]"));
+  EXPECT_EQ(data["contenders"][0]["spreads"][2], nlohmann::json::parse("[70.0, 10.0]"));
+  EXPECT_EQ(data["contenders"][1]["spreads"], nlohmann::json::array());
+  EXPECT_EQ(data["settings"].size(), sample_report().printer.size());
+  EXPECT_EQ(data["remarks"]["violations"][0], "out.gcode:7: outside the travel");
+}
+
+TEST(HtmlReport, LetsNoTextFromOutsideBecomeMarkup) {
+  Report report = recorded_report();
+  report.input = report.output = kHostile;
+  report.warnings = {kHostile};
+  report.violations = {kHostile};
+  report.fallbacks = {{1, 2, kHostile}};
+  report.kept_moves = {{kHostile, 1}};
+  report.printer = {{kHostile, kHostile, kHostile}};
+  report.recording->features[1].name = kHostile;
+  const std::string page = to_html(report);
+  EXPECT_EQ(count(page, "<script>alert"), 0U);
+  EXPECT_EQ(count(page, "<img"), 0U);
+  EXPECT_EQ(count(page, "<script"), count(to_html(recorded_report()), "<script"));
+  EXPECT_EQ(count(page, "</script>"), count(page, "<script"));
+  const nlohmann::json data = nlohmann::json::parse(element(page, "data"));
+  EXPECT_EQ(data["features"][1]["name"], kHostile);
+  EXPECT_EQ(data["facts"][0][1], kHostile);
+}
+
+TEST(HtmlReport, BoundsItsLists) {
+  Report report = recorded_report();
+  report.warnings.assign(100'000, std::string(100, 'w'));
+  report.violations.assign(1000, "v");
+  report.fallbacks.assign(1000, {1, 2, "f"});
+  const std::string page = to_html(report);
+  EXPECT_LT(page.size(), 200'000U);
+  const nlohmann::json remarks = nlohmann::json::parse(element(page, "data"))["remarks"];
+  EXPECT_EQ(remarks["warnings"].size(), 100U);
+  EXPECT_EQ(remarks["warning_count"], 100'000);
+}
+
+TEST(HtmlReport, IsBelowThreeMegabytesForTheLargestRecording) {
+  Report report = recorded_report();
+  Recording& recording = *report.recording;
+  recording.paths.bytes.assign(1'500'000, 'x');
+  recording.layers.assign(
+      8192, {123.456, 1'234'567, {{0.123456, 0.0123456}, {0.0123456, 0.00123456}}, 1'234'567});
+  recording.features.assign(48, {std::string(60, '<'), 12345.6, {{0.1, 0.1}, {0.1, 0.1}}});
+  Place place = recording.worst_before[0];
+  place.before.assign(151, {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8});
+  place.after = place.before;
+  recording.worst_before.assign(12, place);
+  recording.worst_after = recording.worst_before;
+  EXPECT_LT(to_html(report).size(), 3'000'000U);
+}
+
+TEST(HtmlReport, OfAnEmptyPrintHasNoInfinities) {
+  Report empty;
+  empty.recording.emplace();
+  const std::string page = to_html(empty);
+  EXPECT_THAT(page, HasSubstr("0.00 µm"));
+  EXPECT_THAT(page, Not(HasSubstr("nan")));
+  EXPECT_THAT(page, Not(HasSubstr("inf ")));
+}
+
+TEST(Base64, IsThatOfTheStandard) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foo"), "Zm9v");
+  EXPECT_EQ(base64("foob"), "Zm9vYg==");
+  EXPECT_EQ(base64("fooba"), "Zm9vYmE=");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(base64("\xff\xfe\xfd\x80"), "//79gA==");
+}
+
+}  // namespace
+}  // namespace unflex::report
