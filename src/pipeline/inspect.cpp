@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -117,6 +118,13 @@ class Inspector {
       slicers_ = slicer_named(event.line.content());
     }
     count_kept_moves(event, firmware_, result_->kept_moves);
+    if (event.kind == gcode::EventKind::limits || event.kind == gcode::EventKind::barrier) {
+      add_limits(event);
+    }
+    plan(event);
+  }
+
+  void add_limits(const gcode::Event& event) {
     for (const machine::LimitValue& limit : machine::limit_values(event.limits)) {
       LimitInPrint& known = result_->limits[limit.key];
       if (known.times++ == 0) {
@@ -124,7 +132,6 @@ class Inspector {
         known.first_line = event.line.number;
       }
     }
-    plan(event);
   }
 
   void add_command(const gcode::Command& command) {
@@ -137,7 +144,9 @@ class Inspector {
 
   // By the firmware's own plan, which unlike that of the pieces goes through lifts without a stop.
   void plan(const gcode::Event& event) {
-    planner_->apply(event.limits);
+    if (event.kind != gcode::EventKind::move) {
+      planner_->apply(event.limits);
+    }
     for (const gcode::Segment& segment : event.segments) {
       planner_->add(segment);
     }
@@ -197,8 +206,11 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
   Inspector inspector(result, job.settings);
   CpuSlots slots(2);
   PieceThread pieces(input, job.input_name, verify_rules(job.settings), slots, [] {});
-  while (const std::unique_ptr<Piece> piece = pieces.wait_and_take()) {
-    inspector.add(*piece, setup);
+  std::deque<std::unique_ptr<Piece>> read;
+  for (pieces.exchange(read); !read.empty(); pieces.exchange(read)) {
+    for (const std::unique_ptr<Piece>& piece : read) {
+      inspector.add(*piece, setup);
+    }
     progress.update("reading", static_cast<double>(result.bytes) / bytes);
     if (progress.cancelled()) {
       return fail(ErrorKind::internal, "cancelled");

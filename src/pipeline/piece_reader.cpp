@@ -172,7 +172,9 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
       warnings_.push_back({{lines_.name(), event.line.number}, std::move(warning)});
     }
   }
-  planner_->apply(event.limits);
+  if (event.kind != gcode::EventKind::move) {
+    planner_->apply(event.limits);
+  }
   return true;
 }
 

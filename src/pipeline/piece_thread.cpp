@@ -31,6 +31,8 @@ void PieceThread::read(std::function<void()> wake) {
   while (!ended) {
     auto piece = std::make_unique<Piece>();
     std::optional<Error> error;
+    std::deque<std::unique_ptr<Piece>> returned;
+    std::size_t lines_ahead = 0;
     try {
       const Result<bool> more = reader_.next(*piece);
       ended = !more || !*more;
@@ -54,18 +56,24 @@ void PieceThread::read(std::function<void()> wake) {
       }
       error_ = std::move(error);
       ended_ = ended;
+      returned.swap(returned_);
+      lines_ahead = lines_ahead_;
     }
-    news_.notify_one();
+    if (ended || lines_ahead >= kMostAhead / 2) {
+      news_.notify_one();
+    }
     wake();
   }
 }
 
-std::unique_ptr<Piece> PieceThread::wait_and_take() {
-  {
-    std::unique_lock lock(mutex_);
-    news_.wait(lock, [this] { return !pieces_.empty() || ended_; });
-  }
-  return take();
+void PieceThread::exchange(std::deque<std::unique_ptr<Piece>>& pieces) {
+  std::unique_lock lock(mutex_);
+  returned_ = std::exchange(pieces, {});
+  // Threads that wake each other for every piece do little else.
+  news_.wait(lock, [this] { return lines_ahead_ >= kMostAhead / 2 || ended_; });
+  pieces.swap(pieces_);
+  lines_ahead_ = 0;
+  room_.notify_one();
 }
 
 std::unique_ptr<Piece> PieceThread::take() {

@@ -30,8 +30,9 @@ class PieceThread {
 
   // The next piece, if it has been read.
   [[nodiscard]] std::unique_ptr<Piece> take();
-  // Waits for it; nullptr at the end.
-  [[nodiscard]] std::unique_ptr<Piece> wait_and_take();
+  // Gives back pieces that have been dealt with, since they are best freed in the thread that made
+  // them, and waits for all that have been read meanwhile; none at the end.
+  void exchange(std::deque<std::unique_ptr<Piece>>& pieces);
   // Whether take() would give one or at_end() has come.
   [[nodiscard]] bool has_news();
   // Whether the last piece has been taken: the input has ended, or could not be read on.
@@ -49,7 +50,8 @@ class PieceThread {
   std::condition_variable room_;
   std::condition_variable news_;
   std::deque<std::unique_ptr<Piece>> pieces_;
-  std::size_t lines_ahead_ = 0;  // in them
+  std::deque<std::unique_ptr<Piece>> returned_;
+  std::size_t lines_ahead_ = 0;  // in pieces_
   std::optional<Error> error_;
   bool ended_ = false;
   bool stopped_ = false;
