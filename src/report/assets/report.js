@@ -17,7 +17,7 @@ const unflexReport = (() => {
     }
     const shown = view ? view.shownLayer() : index;
     layerName.textContent =
-      `Layer ${index + 1} of ${rows.length}, Z ${row[0]} mm, from line ${row[1]}` +
+      `Layer ${index + 1} of ${rows.length}, Z ${+Number(row[0]).toFixed(3)} mm, from line ${row[1]}` +
       (shown === index ? "" : ` (drawn: layer ${shown + 1})`);
     slider.setAttribute("aria-valuetext", layerName.textContent);
     [
