@@ -1,6 +1,8 @@
 #include "piece_reader.hpp"
 
+#include <cmath>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include "unflex/gcode/command.hpp"
@@ -17,7 +19,11 @@ constexpr double kWhole_s = 60.0;
 // … of longer ones parts, which end near borders this far apart, …
 constexpr double kPart_s = 20.0;
 constexpr double kBorder_s = 0.5;
-constexpr double kChoice_s = 5.0;
+// … if there is one where velocity changes by no more than this. Otherwise they become longer, up
+// to about this long or of so many moves, …
+constexpr double kSmooth_mm_s = 3.0;
+constexpr double kMost_s = 1800.0;
+constexpr std::size_t kMostMoves = 100'000;
 // … and are given so much of what is around them.
 constexpr double kAround_s = 0.3;
 // After how many borders it is looked whether a run is that long.
@@ -32,6 +38,14 @@ std::vector<planner::PlannedMove> last_of(const std::vector<planner::PlannedMove
     duration_s += first->duration_s();
   }
   return {first, moves.end()};
+}
+
+// How much velocity changes from the move before to this one.
+double turn_before(const std::vector<planner::PlannedMove>& moves, std::size_t move) {
+  const planner::PlannedMove& from = moves[move - 1];
+  const planner::PlannedMove& to = moves[move];
+  return to.start_v_mm_s * std::hypot(to.direction[gcode::X] - from.direction[gcode::X],
+                                      to.direction[gcode::Y] - from.direction[gcode::Y]);
 }
 
 // The first moves that take kAround_s.
@@ -222,29 +236,37 @@ void PieceReader::mark_border(const gcode::Event& event) {
 }
 
 // The border at which a part is to end, once it is long enough and the plan final until some time
-// after it: of those within a while the one the machine passes fastest, as it does no corner.
+// after it: the first that is no corner. Where all are, the least sharp, but only of very many.
 std::optional<std::size_t> PieceReader::border_to_split_at() const {
   const std::vector<planner::PlannedMove>& moves = open_.moves;
   const double total_s = planner::duration_s(moves);
-  if (total_s < (open_.before.empty() ? kWhole_s : kPart_s + kChoice_s + kAround_s)) {
+  if (total_s < (open_.before.empty() ? kWhole_s : kPart_s + kAround_s)) {
     return std::nullopt;
   }
   std::optional<std::size_t> best;
+  double least_turn_mm_s = std::numeric_limits<double>::infinity();
   double end_s = 0.0;
   std::size_t move = 0;
   for (std::size_t i = 0; i < borders_.size() && borders_[i].move < moves.size(); ++i) {
     for (; move < borders_[i].move; ++move) {
       end_s += moves[move].duration_s();
     }
-    if (total_s - end_s < kAround_s || (best && end_s > kPart_s + kChoice_s)) {
+    if (total_s - end_s < kAround_s) {
       break;
     }
-    if (end_s >= kPart_s &&
-        (!best || moves[move].start_v_mm_s > moves[borders_[*best].move].start_v_mm_s)) {
+    if (end_s < kPart_s) {
+      continue;
+    }
+    const double turn_mm_s = turn_before(moves, move);
+    if (turn_mm_s <= kSmooth_mm_s) {
+      return i;
+    }
+    if (turn_mm_s < least_turn_mm_s) {
+      least_turn_mm_s = turn_mm_s;
       best = i;
     }
   }
-  return best;
+  return total_s > kMost_s || moves.size() > kMostMoves ? best : std::nullopt;
 }
 
 // Hands out a part of the open run, if that is long by now.
