@@ -2,6 +2,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "command_reader.hpp"
 #include "draft.hpp"
@@ -100,34 +102,42 @@ void note_late_settings(const PrintText& print, std::vector<Diagnostic>& notes) 
   }
 }
 
-// What the slicer says, as far as it is meant for the firmware that others than it have named.
-Reading read_slicer_for(const Sources& sources) {
-  if (sources.firmware_as_sliced) {
-    return read_slicer(*sources.print, std::nullopt);
-  }
-  Draft others = defaults();
-  if (sources.printer_file) {
-    if (const Result<std::string> text = read_printer_file(*sources.printer_file)) {
-      // Errors are reported when it is read for good.
-      static_cast<void>(read_printer(*text, sources.printer_file->string(), others));
+Status apply_overrides(const std::vector<std::string>& overrides, Draft& draft) {
+  for (const std::string& text : overrides) {
+    if (Status applied = apply_override(text, draft); !applied) {
+      return applied;
     }
   }
-  for (const std::string& text : sources.overrides) {
-    static_cast<void>(apply_override(text, others));
+  return {};
+}
+
+// What a print's slicer says of the printer holds where nobody else says anything.
+Status read_print(const Sources& sources, Draft& draft) {
+  const bool by_default = !draft.places[*find_key("printer.firmware")];
+  Reading reading = sources.firmware_as_sliced
+                        ? read_slicer(*sources.print, std::nullopt)
+                        : read_slicer(*sources.print, draft.settings.printer.firmware, by_default);
+  // What does not hold must be right as well.
+  Draft alone = defaults();
+  if (Status applied = apply(reading, alone); !applied) {
+    return applied;
   }
-  return read_slicer(*sources.print, others.settings.printer.firmware,
-                     !others.places[*find_key("printer.firmware")]);
+  std::erase_if(reading.assignments, [&](const Assignment& assignment) {
+    return draft.places[*find_key(assignment.key)].has_value();
+  });
+  std::vector<Diagnostic> notes_of_others = std::exchange(draft.settings.notes, {});
+  if (Status applied = apply(reading, draft); !applied) {
+    return applied;
+  }
+  std::vector<Diagnostic>& notes = draft.settings.notes;
+  if (!sources.printer_file) {
+    note_late_settings(*sources.print, notes);
+  }
+  std::ranges::move(notes_of_others, std::back_inserter(notes));
+  return {};
 }
 
 Status read_sources(const Sources& sources, Draft& draft) {
-  if (sources.print != nullptr) {
-    if (Status applied = apply(read_slicer_for(sources), draft); !applied) {
-      return applied;
-    }
-    if (!sources.printer_file) {
-      note_late_settings(*sources.print, draft.settings.notes);
-    }
-  }
   if (sources.printer_file) {
     const Result<std::string> text = read_printer_file(*sources.printer_file);
     const Status read = text ? read_printer(*text, sources.printer_file->string(), draft)
@@ -136,15 +146,13 @@ Status read_sources(const Sources& sources, Draft& draft) {
       return read;
     }
   }
-  return {};
+  if (Status applied = apply_overrides(sources.overrides, draft); !applied) {
+    return applied;
+  }
+  return sources.print != nullptr ? read_print(sources, draft) : Status{};
 }
 
-Result<Settings> finish(Draft draft, const std::vector<std::string>& overrides) {
-  for (const std::string& text : overrides) {
-    if (Status applied = apply_override(text, draft); !applied) {
-      return tl::unexpected(applied.error());
-    }
-  }
+Result<Settings> finish(Draft draft) {
   if (Status resolved = resolve_dynamics(draft); !resolved) {
     return tl::unexpected(resolved.error());
   }
@@ -167,7 +175,7 @@ Result<Settings> load(const Sources& sources) {
   if (Status read = read_sources(sources, draft); !read) {
     return tl::unexpected(read.error());
   }
-  return finish(std::move(draft), sources.overrides);
+  return finish(std::move(draft));
 }
 
 Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
@@ -178,10 +186,9 @@ Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
 Result<Settings> parse(std::string_view text, const std::string& name,
                        const std::vector<std::string>& overrides) {
   Draft draft = defaults();
-  if (Status read = read_printer(text, name, draft); !read) {
-    return tl::unexpected(read.error());
-  }
-  return finish(std::move(draft), overrides);
+  const Status read =
+      read_printer(text, name, draft).and_then([&] { return apply_overrides(overrides, draft); });
+  return read ? finish(std::move(draft)) : Result<Settings>(tl::unexpected(read.error()));
 }
 
 namespace {

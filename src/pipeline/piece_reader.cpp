@@ -29,17 +29,6 @@ constexpr double kAround_s = 0.3;
 // After how many borders it is looked whether a run is that long.
 constexpr std::size_t kBordersPerLook = 8;
 
-// The last moves that take kAround_s, or all there are.
-std::vector<planner::PlannedMove> last_of(const std::vector<planner::PlannedMove>& moves) {
-  double duration_s = 0.0;
-  auto first = moves.end();
-  while (first != moves.begin() && duration_s < kAround_s) {
-    --first;
-    duration_s += first->duration_s();
-  }
-  return {first, moves.end()};
-}
-
 // How much velocity changes from the move before to this one.
 double turn_before(const std::vector<planner::PlannedMove>& moves, std::size_t move) {
   const planner::PlannedMove& from = moves[move - 1];
@@ -206,7 +195,6 @@ void PieceReader::append(gcode::Event event) {
   for (const gcode::Segment& segment : event.segments) {
     count += planner_->add(segment) ? 1 : 0;
   }
-  moves_added_ += count;
   if (event.kind == gcode::EventKind::barrier) {
     planner_->stop();
   }
@@ -227,7 +215,7 @@ void PieceReader::mark_border(const gcode::Event& event) {
   if (since_border_s_ >= kBorder_s) {
     since_border_s_ = 0.0;
     ++borders_since_look_;
-    borders_.push_back({open_.events.size(), moves_added_,
+    borders_.push_back({open_.events.size(), open_.moves.size() + planner_->pending(),
                         emit::run_start(interpreter_.state(), planner_->limits())});
   }
   for (const gcode::Segment& segment : event.segments) {
@@ -286,7 +274,6 @@ bool PieceReader::split(Piece& piece) {
     later.event -= border.event;
     later.move -= border.move;
   }
-  moves_added_ -= border.move;
 
   Piece rest;
   rest.is_run = true;
@@ -294,7 +281,8 @@ bool PieceReader::split(Piece& piece) {
   rest.events = split_off(open_.events, border.event);
   rest.move_counts = split_off(open_.move_counts, border.event);
   rest.moves = split_off(open_.moves, border.move);
-  rest.before = last_of(open_.moves);
+  const auto before = planner::last_moves(open_.moves, kAround_s);
+  rest.before.assign(before.begin(), before.end());
   open_.after = first_of(rest.moves);
   piece = std::exchange(open_, std::move(rest));
   return true;
@@ -311,7 +299,6 @@ void PieceReader::close(Piece& piece) {
   open_.is_run = open_.is_run && !open_.moves.empty();
   piece = std::exchange(open_, Piece{});
   borders_.clear();
-  moves_added_ = 0;
   since_border_s_ = 0.0;
 }
 

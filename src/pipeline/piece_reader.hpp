@@ -73,7 +73,6 @@ class PieceReader {
 
   Piece open_;                   // being filled
   std::deque<Border> borders_;   // of it
-  std::size_t moves_added_ = 0;  // to it
   double since_border_s_ = 0.0;  // roughly
   std::size_t borders_since_look_ = 0;
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows

@@ -38,15 +38,9 @@ double apart_mm(const dynamics::NozzleXY& a, const dynamics::NozzleXY& b,
 }
 
 std::vector<gcode::Segment> last_lines(const std::vector<planner::PlannedMove>& moves) {
-  double duration_s = 0.0;
-  auto first = moves.end();
-  while (first != moves.begin() && duration_s < kLastLines_s) {
-    --first;
-    duration_s += first->duration_s();
-  }
   std::vector<gcode::Segment> lines;
-  for (; first != moves.end(); ++first) {
-    lines.push_back(first->segment);
+  for (const planner::PlannedMove& move : planner::last_moves(moves, kLastLines_s)) {
+    lines.push_back(move.segment);
   }
   return lines;
 }

@@ -64,6 +64,14 @@ double duration_s(std::span<const PlannedMove> moves) {
   return sum;
 }
 
+std::span<const PlannedMove> last_moves(std::span<const PlannedMove> moves, double duration_s) {
+  std::size_t first = moves.size();
+  for (double taken_s = 0.0; first > 0 && taken_s < duration_s;) {
+    taken_s += moves[--first].duration_s();
+  }
+  return moves.subspan(first);
+}
+
 double PlannedMove::time_s(double distance_mm) const {
   const double duration = duration_s();
   if (distance_mm <= 0.0) return 0.0;

@@ -1,8 +1,10 @@
 // However the printer is described, the print comes out the same.
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "app/program.hpp"
 
@@ -45,6 +47,14 @@ TEST_F(PrinterFile, GivesTheSameBytesAsPrinterCfgAsTomlAndByOverrides) {
   }
   ASSERT_GT(overrides.size(), 20U);
   EXPECT_EQ(compensated(overrides), from_cfg);
+}
+
+TEST_F(PrinterFile, MayComeFromAPipe) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  std::thread writer([&] { write_file(path("pipe"), read_file(kConfig)); });
+  const std::string piped = compensated({"--printer", "pipe"});
+  writer.join();
+  EXPECT_EQ(piped, compensated({"--printer", kConfig}));
 }
 
 TEST_F(PrinterFile, IsMadeFromAPrintToo) {

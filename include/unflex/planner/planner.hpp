@@ -99,6 +99,10 @@ struct PlannedMove {
 // Of all of them, one after the other.
 [[nodiscard]] double duration_s(std::span<const PlannedMove> moves);
 
+// The last of them that take so long together, or all there are.
+[[nodiscard]] std::span<const PlannedMove> last_moves(std::span<const PlannedMove> moves,
+                                                      double duration_s);
+
 // A firmware's planner. Moves come out in order once nothing that follows can change them. The plan
 // does not depend on when, or how often, take() is called.
 class Planner {
