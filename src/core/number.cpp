@@ -11,6 +11,38 @@ namespace {
 constexpr std::array<std::int64_t, 10> kPowersOfTen = {
     1, 10, 100, 1'000, 10'000, 100'000, 1'000'000, 10'000'000, 100'000'000, 1'000'000'000};
 
+// Plain decimals: a double holds their digits as an integer and the power of ten that divides it,
+// so one division rounds correctly (Clinger, How to Read Floating Point Numbers Accurately, 1990).
+// Others are left to from_chars.
+constexpr int kExactDigits = 15;
+constexpr std::array<double, kExactDigits + 1> kExactPowersOfTen = {
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+
+std::optional<double> parse_short(std::string_view text) {
+  const bool negative = !text.empty() && text.front() == '-';
+  text.remove_prefix(negative ? 1 : 0);
+  if (text.size() > kExactDigits) {
+    return std::nullopt;
+  }
+  std::int64_t digits = 0;
+  std::size_t point = text.size();
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] >= '0' && text[i] <= '9') {
+      digits = 10 * digits + (text[i] - '0');
+    } else if (text[i] == '.' && point == text.size()) {
+      point = i;
+    } else {
+      return std::nullopt;
+    }
+  }
+  const std::size_t decimals = point == text.size() ? 0 : text.size() - point - 1;
+  if (text.size() == (point == text.size() ? 0U : 1U)) {
+    return std::nullopt;  // no digit
+  }
+  const double magnitude = static_cast<double>(digits) / kExactPowersOfTen[decimals];
+  return negative ? -magnitude : magnitude;
+}
+
 }  // namespace
 
 std::optional<double> parse_number(std::string_view text) {
@@ -21,6 +53,9 @@ std::optional<double> parse_number(std::string_view text) {
     if (!text.empty() && text.front() == '-') {
       return std::nullopt;
     }
+  }
+  if (const std::optional<double> number = parse_short(text)) {
+    return number;
   }
   bool any_digit = false;
   for (const char c : text) {
@@ -34,8 +69,7 @@ std::optional<double> parse_number(std::string_view text) {
   }
   double value = 0.0;
   const char* const end = text.data() + text.size();
-  const auto [stop, failure] =
-      std::from_chars(text.data(), end, value, std::chars_format::fixed);
+  const auto [stop, failure] = std::from_chars(text.data(), end, value, std::chars_format::fixed);
   if (failure != std::errc{} || stop != end || !std::isfinite(value)) {
     return std::nullopt;
   }
@@ -46,8 +80,8 @@ void append_scaled(std::string& out, std::int64_t scaled, int decimals) {
   std::array<char, 24> digits{};
   const bool negative = scaled < 0;
   // Negating in unsigned arithmetic keeps the smallest int64 defined.
-  auto magnitude = negative ? 0U - static_cast<std::uint64_t>(scaled)
-                            : static_cast<std::uint64_t>(scaled);
+  auto magnitude =
+      negative ? 0U - static_cast<std::uint64_t>(scaled) : static_cast<std::uint64_t>(scaled);
   while (decimals > 0 && magnitude % 10 == 0) {
     magnitude /= 10;
     --decimals;

@@ -85,19 +85,19 @@ void Emitter::write(std::string_view text, std::string& out) {
   out += text;
   out += newline_;
   const gcode::Event event = printer_.interpret({out.substr(begin), 0});
-  planner::apply(event.limits, limits_);
+  planner::apply(*event.limits, limits_);
 }
 
 void Emitter::copy(const gcode::Event& event, std::string& out) {
   out += event.line.text;
   open_line_ = !event.line.text.ends_with('\n');
   newline_ = event.line.text.ends_with("\r\n") ? "\r\n" : "\n";
-  planner::apply(printer_.interpret(event.line).limits, limits_);
+  planner::apply(*printer_.interpret(event.line).limits, limits_);
 }
 
 void Emitter::follow_input(const gcode::Event& event) {
   static_cast<void>(input_.interpret(event.line));
-  planner::apply(event.limits, input_limits_);
+  planner::apply(*event.limits, input_limits_);
 }
 
 void Emitter::line(const gcode::Event& event, std::string& out) {

@@ -112,10 +112,10 @@ void Interpreter::velocity_limit(Event& event) {
   }
   if (velocity.given || accel.given || corner.given || cruise.given) {
     event.kind = EventKind::limits;
-    event.limits.max_velocity_mm_s = velocity.value;
-    event.limits.max_accel_mm_s2 = accel.value;
-    event.limits.square_corner_velocity_mm_s = corner.value;
-    event.limits.minimum_cruise_ratio = cruise.value;
+    event.limits.edit().max_velocity_mm_s = velocity.value;
+    event.limits.edit().max_accel_mm_s2 = accel.value;
+    event.limits.edit().square_corner_velocity_mm_s = corner.value;
+    event.limits.edit().minimum_cruise_ratio = cruise.value;
   }
 }
 

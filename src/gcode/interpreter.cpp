@@ -17,6 +17,8 @@ namespace {
 constexpr std::array<char, 4> kAxisLetters = {'X', 'Y', 'Z', 'E'};
 constexpr double kMmPerInch = 25.4;
 constexpr double kSecondsPerMinute = 60.0;
+// Room for so many is kept from line to line.
+constexpr std::size_t kKeptSegments = 4;
 
 }  // namespace
 
@@ -60,23 +62,38 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
   }
 }
 
+void Event::reset() {
+  kind = EventKind::passive;
+  if (segments.capacity() > kKeptSegments) {
+    segments = {};  // of an arc
+  }
+  segments.clear();
+  limits.reset();
+  dwell_s = 0.0;
+  position_lost = false;
+  may_jump = false;
+  warnings.clear();
+}
+
 Event Interpreter::interpret(Line line) {
   Event event;
-  event.line.number = line.number;
-  parse(line.content(), command_);
+  event.line = std::move(line);
+  interpret(event);
+  return event;
+}
+
+void Interpreter::interpret(Event& event) {
+  event.reset();
+  const std::string_view content = event.line.content();
+  parse(content, command_);
   switch (options_.firmware) {
     case Firmware::klipper:
-      klipper(event);
-      break;
+      return klipper(event);
     case Firmware::marlin:
-      marlin(event, line.content());
-      break;
+      return marlin(event, content);
     case Firmware::rrf:
-      rrf(event, line.content());
-      break;
+      return rrf(event, content);
   }
-  event.line = std::move(line);
-  return event;
 }
 
 void Interpreter::klipper(Event& event) {
@@ -263,7 +280,7 @@ void Interpreter::acceleration(Event& event) {
   }
   if (accel) {
     event.kind = EventKind::limits;
-    event.limits.max_accel_mm_s2 = accel;
+    event.limits.edit().max_accel_mm_s2 = accel;
   }
 }
 

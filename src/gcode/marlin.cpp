@@ -131,9 +131,11 @@ void Interpreter::marlin_m_code(Event& event) {
     case 200:
       return marlin_volumetric(event);
     case 201:
-      return axis_limits(event, state_.unit_mm, kAboveZero, event.limits.axis_max_accel_mm_s2);
+      return axis_limits(event, state_.unit_mm, kAboveZero,
+                         event.limits.edit().axis_max_accel_mm_s2);
     case 203:
-      return axis_limits(event, state_.unit_mm, kAboveZero, event.limits.axis_max_velocity_mm_s);
+      return axis_limits(event, state_.unit_mm, kAboveZero,
+                         event.limits.edit().axis_max_velocity_mm_s);
     case 204:
       return marlin_acceleration(event);
     case 205:
@@ -202,11 +204,12 @@ void Interpreter::marlin_dwell(Event& event) {
 // config/M200-M205.cpp, M204: S is P and T in one.
 void Interpreter::marlin_acceleration(Event& event) {
   const double unit = state_.unit_mm;
-  limit(event, 'S', unit, kAboveZero, event.limits.print_accel_mm_s2);
-  event.limits.travel_accel_mm_s2 = event.limits.print_accel_mm_s2;
-  limit(event, 'P', unit, kAboveZero, event.limits.print_accel_mm_s2);
-  limit(event, 'R', unit, kAboveZero, event.limits.retract_accel_mm_s2);
-  limit(event, 'T', unit, kAboveZero, event.limits.travel_accel_mm_s2);
+  LimitChange& limits = event.limits.edit();
+  limit(event, 'S', unit, kAboveZero, limits.print_accel_mm_s2);
+  limits.travel_accel_mm_s2 = limits.print_accel_mm_s2;
+  limit(event, 'P', unit, kAboveZero, limits.print_accel_mm_s2);
+  limit(event, 'R', unit, kAboveZero, limits.retract_accel_mm_s2);
+  limit(event, 'T', unit, kAboveZero, limits.travel_accel_mm_s2);
 }
 
 // config/M200-M205.cpp, M205. Whether J or the jerks count is a matter of how Marlin was built.
@@ -215,7 +218,7 @@ void Interpreter::marlin_advanced_settings(Event& event) {
   constexpr double kLeastDeviation_mm = 0.01;
   constexpr double kMostDeviation_mm = 0.3;
   const double unit = state_.unit_mm;
-  LimitChange& limits = event.limits;
+  LimitChange& limits = event.limits.edit();
   limit(event, 'B', kSecondsPerMicrosecond, 0.0, limits.min_segment_time_s);
   limit(event, 'S', unit, 0.0, limits.min_velocity_mm_s);
   limit(event, 'T', unit, 0.0, limits.min_travel_velocity_mm_s);

@@ -29,24 +29,24 @@ constexpr double kMinVelocity_mm_s = 0.01;  // AbsoluteMinFeedrate
 
 // GCodes2.cpp, M201.
 void Interpreter::rrf_axis_acceleration(Event& event) {
-  axis_limits(event, 1.0, 0.0, event.limits.axis_max_accel_mm_s2);
-  raise(event.limits.axis_max_accel_mm_s2, kMinAccel_mm_s2);
+  axis_limits(event, 1.0, 0.0, event.limits.edit().axis_max_accel_mm_s2);
+  raise(event.limits.edit().axis_max_accel_mm_s2, kMinAccel_mm_s2);
 }
 
 // GCodes2.cpp, M203: mm/min, or mm/s with S1. That no axis is slower than I, be it set here or
 // before, is the planner's to know.
 void Interpreter::rrf_max_velocity(Event& event) {
   const double scale = command_.value('S') == 1.0 ? 1.0 : 1.0 / 60.0;
-  std::optional<double>& least = event.limits.min_movement_velocity_mm_s;
+  std::optional<double>& least = event.limits.edit().min_movement_velocity_mm_s;
   limit(event, 'I', scale, 0.0, least);
   raise(least, kMinVelocity_mm_s);
-  axis_limits(event, scale, 0.0, event.limits.axis_max_velocity_mm_s);
-  raise(event.limits.axis_max_velocity_mm_s, kMinVelocity_mm_s);
+  axis_limits(event, scale, 0.0, event.limits.edit().axis_max_velocity_mm_s);
+  raise(event.limits.edit().axis_max_velocity_mm_s, kMinVelocity_mm_s);
 }
 
 // GCodes5.cpp, ConfigureAccelerations.
 void Interpreter::rrf_acceleration(Event& event) {
-  LimitChange& limits = event.limits;
+  LimitChange& limits = event.limits.edit();
   limit(event, 'S', 1.0, 0.0, limits.print_accel_mm_s2);
   limits.travel_accel_mm_s2 = limits.print_accel_mm_s2;
   limit(event, 'P', 1.0, 0.0, limits.print_accel_mm_s2);
@@ -57,11 +57,11 @@ void Interpreter::rrf_acceleration(Event& event) {
 
 // GCodes2.cpp, M205 in mm/s, M566 in mm/min and with the policy P.
 void Interpreter::rrf_jerk(Event& event, double scale) {
-  axis_limits(event, scale, 0.0, event.limits.axis_jerk_mm_s);
-  raise(event.limits.axis_jerk_mm_s, kMinJerk_mm_s);
+  axis_limits(event, scale, 0.0, event.limits.edit().axis_jerk_mm_s);
+  raise(event.limits.edit().axis_jerk_mm_s, kMinJerk_mm_s);
   const std::optional<double> policy = command_.value('P');
   if (command_.number == 566 && policy && *policy >= 0.0) {
-    event.limits.jerk_policy = static_cast<int>(*policy);
+    event.limits.edit().jerk_policy = static_cast<int>(*policy);
     event.kind = EventKind::limits;
   }
 }

@@ -62,7 +62,7 @@ class CommandReader {
         note(place, warning);
       }
     }
-    for (const LimitValue& limit : limit_values(event.limits)) {
+    for (const LimitValue& limit : limit_values(*event.limits)) {
       reading.add(limit.key, limit.value, place);
       remember(limit, place);
     }

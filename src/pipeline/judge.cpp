@@ -91,7 +91,7 @@ Replayed replay(std::string_view text, gcode::Interpreter printer, const planner
     const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
     const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), ++number});
     text.remove_prefix(end);
-    planner->apply(event.limits);
+    planner->apply(*event.limits);
     for (const gcode::Segment& segment : event.segments) {
       planner->add(segment);
       last = segment;

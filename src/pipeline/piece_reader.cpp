@@ -1,5 +1,6 @@
 #include "piece_reader.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -14,6 +15,7 @@ namespace {
 // Lines between runs are handed on in portions, so that a long file without motion stays small.
 constexpr std::size_t kMaxEventsOutsideRuns = 4096;
 constexpr std::size_t kMaxWarnings = 1000;
+constexpr std::size_t kMostSpareEvents = 10'000;
 // Runs up to this long are handled as a whole, so that they can be left as they are …
 constexpr double kWhole_s = 60.0;
 // … of longer ones parts, which end near borders this far apart, …
@@ -107,8 +109,13 @@ PieceReader::PieceReader(std::istream& input, std::string name,
       firmware_(fixed.firmware) {}
 
 Result<bool> PieceReader::next(Piece& piece) {
-  gcode::Event event;
+  recycle(piece);
   for (;;) {
+    gcode::Event event;
+    if (!spare_.empty()) {
+      event = std::move(spare_.back());
+      spare_.pop_back();
+    }
     const Result<bool> more = read_event(event);
     if (!more) {
       return more;
@@ -152,8 +159,18 @@ Result<bool> PieceReader::next(Piece& piece) {
   return true;
 }
 
+// Empties the piece. Lines are what there is most of; pieces that kept their storage would all grow
+// to the size of the largest.
+void PieceReader::recycle(Piece& piece) {
+  const std::size_t room = kMostSpareEvents - std::min(kMostSpareEvents, spare_.size());
+  const std::size_t kept = std::min(room, piece.events.size());
+  spare_.insert(spare_.end(), std::make_move_iterator(piece.events.begin()),
+                std::make_move_iterator(piece.events.begin() + static_cast<std::ptrdiff_t>(kept)));
+  piece = {};
+}
+
 Result<bool> PieceReader::read_event(gcode::Event& event) {
-  gcode::Line line;
+  gcode::Line& line = event.line;
   const Result<bool> more = lines_.next(line);
   if (!more || !*more) {
     return more;
@@ -169,14 +186,14 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
                          "a carriage return without a line feed ends no line, neither here nor in "
                          "the printer: convert the file's line ends to LF"});
   }
-  event = interpreter_.interpret(std::move(line));
+  interpreter_.interpret(event);
   for (std::string& warning : event.warnings) {
     if (warnings_.size() < kMaxWarnings) {
       warnings_.push_back({{lines_.name(), event.line.number}, std::move(warning)});
     }
   }
   if (event.kind != gcode::EventKind::move) {
-    planner_->apply(event.limits);
+    planner_->apply(*event.limits);
   }
   return true;
 }

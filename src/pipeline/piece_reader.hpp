@@ -44,7 +44,8 @@ class PieceReader {
               planner::Limits limits, planner::FirmwareConfig fixed);
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
-  // read, was written by unflex, or ends without a single G-code command in it.
+  // read, was written by unflex, or ends without a single G-code command in it. What the piece held
+  // before is gone; the storage of its lines is used again.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
@@ -52,6 +53,7 @@ class PieceReader {
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
 
  private:
+  void recycle(Piece& piece);
   Result<bool> read_event(gcode::Event& event);
   void append(gcode::Event event);
   void append_between();
@@ -75,6 +77,7 @@ class PieceReader {
   std::deque<Border> borders_;   // of it
   double since_border_s_ = 0.0;  // roughly
   std::size_t borders_since_look_ = 0;
+  std::vector<gcode::Event> spare_;    // storage for the next ones
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;
   bool any_command_ = false;

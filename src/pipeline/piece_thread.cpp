@@ -1,6 +1,8 @@
 #include "piece_thread.hpp"
 
+#include <algorithm>
 #include <exception>
+#include <iterator>
 #include <utility>
 
 namespace unflex::pipeline {
@@ -28,10 +30,16 @@ PieceThread::~PieceThread() {
 void PieceThread::read(std::function<void()> wake) {
   const CpuSlot slot(*slots_);
   bool ended = false;
+  std::deque<std::unique_ptr<Piece>> returned;
   while (!ended) {
-    auto piece = std::make_unique<Piece>();
+    std::unique_ptr<Piece> piece;
+    if (returned.empty()) {
+      piece = std::make_unique<Piece>();
+    } else {
+      piece = std::move(returned.front());
+      returned.pop_front();
+    }
     std::optional<Error> error;
-    std::deque<std::unique_ptr<Piece>> returned;
     std::size_t lines_ahead = 0;
     try {
       const Result<bool> more = reader_.next(*piece);
@@ -56,7 +64,8 @@ void PieceThread::read(std::function<void()> wake) {
       }
       error_ = std::move(error);
       ended_ = ended;
-      returned.swap(returned_);
+      std::ranges::move(returned_, std::back_inserter(returned));
+      returned_.clear();
       lines_ahead = lines_ahead_;
     }
     if (ended || lines_ahead >= kMostAhead / 2) {

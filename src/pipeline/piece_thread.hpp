@@ -30,8 +30,8 @@ class PieceThread {
 
   // The next piece, if it has been read.
   [[nodiscard]] std::unique_ptr<Piece> take();
-  // Gives back pieces that have been dealt with, since they are best freed in the thread that made
-  // them, and waits for all that have been read meanwhile; none at the end.
+  // Gives back pieces that have been dealt with, whose storage the next ones use, and waits for all
+  // that have been read meanwhile; none at the end.
   void exchange(std::deque<std::unique_ptr<Piece>>& pieces);
   // Whether take() would give one or at_end() has come.
   [[nodiscard]] bool has_news();

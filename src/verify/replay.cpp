@@ -139,7 +139,7 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
       break;
     }
     case gcode::EventKind::limits:
-      for_each_plan([&](PlanQueue& plan) { plan.apply(event.limits); });
+      for_each_plan([&](PlanQueue& plan) { plan.apply(*event.limits); });
       place(std::move(event.line), before, false);
       break;
     case gcode::EventKind::move:

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <charconv>
 #include <clocale>
 #include <cmath>
 #include <cstdint>
@@ -28,6 +29,22 @@ TEST(ParseNumber, ReadsWhatPrintersAndSlicersWrite) {
   EXPECT_EQ(parse_number("-0"), 0.0);
   EXPECT_EQ(parse_number("007.50"), 7.5);
   EXPECT_EQ(parse_number("7800.000"), 7800.0);
+}
+
+TEST(ParseNumber, GivesTheNearestDoubleForAnyNumberOfDigits) {
+  std::mt19937 random(7);  // NOLINT: the same numbers every time
+  for (int i = 0; i < 20'000; ++i) {
+    std::string text = random() % 2 == 0 ? "-" : "";
+    const std::size_t digits = 1 + random() % 20;
+    const std::size_t point = random() % (digits + 1);
+    for (std::size_t d = 0; d < digits; ++d) {
+      text += d == point ? "." : "";
+      text += static_cast<char>('0' + random() % 10);
+    }
+    double expected = 0.0;
+    std::from_chars(text.data(), text.data() + text.size(), expected);
+    EXPECT_EQ(parse_number(text), expected) << text;
+  }
 }
 
 TEST(ParseNumber, RefusesEverythingElse) {

@@ -80,7 +80,7 @@ TEST(LimitLines, AreReadBackAsTheyWereMeant) {
          limit_lines(config_of(firmware), wanted, planner::Limits{}, false)) {
       const gcode::Event event = printer.interpret({text + "\n", 1});
       EXPECT_EQ(event.kind, gcode::EventKind::limits) << text;
-      planner::apply(event.limits, read);
+      planner::apply(*event.limits, read);
     }
     for (std::size_t axis = 0; axis < 4; ++axis) {
       EXPECT_DOUBLE_EQ(read.axis_max_accel_mm_s2[axis], wanted.axis_max_accel_mm_s2[axis]);

@@ -55,7 +55,7 @@ inline Emission emit(const std::string& input, const EmitOptions& options,
         emitter.line(event, emission.text);
       }
       static_cast<void>(interpreter.interpret(event.line));
-      planner::apply(event.limits, limits);
+      planner::apply(*event.limits, limits);
     }
   }
   if (look) {

@@ -181,12 +181,12 @@ TEST(RandomProgram, EndsAsItWouldWithoutRunsWhenTheTextIsRead) {
     planner::Limits input_limits;
     planner::Limits limits;
     for (const std::string& line : testing::lines_of(program)) {
-      planner::apply(input.interpret({line, 0}).limits, input_limits);
+      planner::apply(*input.interpret({line, 0}).limits, input_limits);
     }
     for (const std::string& line : testing::lines_of(text)) {
       const gcode::Event event = printer.interpret({line, 0});
       EXPECT_TRUE(event.warnings.empty()) << line;
-      planner::apply(event.limits, limits);
+      planner::apply(*event.limits, limits);
     }
     SCOPED_TRACE(fmt::format("seed {}", seed));
     expect_same_state(printer.state(), input.state());

@@ -16,11 +16,11 @@ TEST(Limits, ComeFromM204) {
   Session session;
   Event event = session.read("M204 S800");
   EXPECT_EQ(event.kind, EventKind::limits);
-  EXPECT_EQ(event.limits.max_accel_mm_s2, 800.0);
-  EXPECT_EQ(event.limits.max_velocity_mm_s, std::nullopt);
-  EXPECT_EQ(session.read("M204 P900 T1200").limits.max_accel_mm_s2, 900.0);
-  EXPECT_EQ(session.read("M204 P1500 T1200 R300").limits.max_accel_mm_s2, 1200.0);
-  EXPECT_EQ(session.read("M204 P1500 T1200 S2000").limits.max_accel_mm_s2, 2000.0);
+  EXPECT_EQ(event.limits->max_accel_mm_s2, 800.0);
+  EXPECT_EQ(event.limits->max_velocity_mm_s, std::nullopt);
+  EXPECT_EQ(session.read("M204 P900 T1200").limits->max_accel_mm_s2, 900.0);
+  EXPECT_EQ(session.read("M204 P1500 T1200 R300").limits->max_accel_mm_s2, 1200.0);
+  EXPECT_EQ(session.read("M204 P1500 T1200 S2000").limits->max_accel_mm_s2, 2000.0);
 }
 
 TEST(Limits, OfM204WithOneOfPAndTAreRefused) {
@@ -43,15 +43,15 @@ TEST(Limits, ComeFromSetVelocityLimit) {
       "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=1e5 SQUARE_CORNER_VELOCITY=0 "
       "minimum_cruise_ratio=.25");
   EXPECT_EQ(event.kind, EventKind::limits);
-  EXPECT_EQ(event.limits.max_velocity_mm_s, 300.0);
-  EXPECT_EQ(event.limits.max_accel_mm_s2, 1e5);
-  EXPECT_EQ(event.limits.square_corner_velocity_mm_s, 0.0);
-  EXPECT_EQ(event.limits.minimum_cruise_ratio, 0.25);
+  EXPECT_EQ(event.limits->max_velocity_mm_s, 300.0);
+  EXPECT_EQ(event.limits->max_accel_mm_s2, 1e5);
+  EXPECT_EQ(event.limits->square_corner_velocity_mm_s, 0.0);
+  EXPECT_EQ(event.limits->minimum_cruise_ratio, 0.25);
   const Event one = session.read("SET_VELOCITY_LIMIT ACCEL=\"3000\" ACCEL_TO_DECEL=1500");
   EXPECT_EQ(one.kind, EventKind::limits);
-  EXPECT_EQ(one.limits.max_accel_mm_s2, 3000.0);
-  EXPECT_EQ(one.limits.max_velocity_mm_s, std::nullopt);
-  EXPECT_EQ(one.limits.minimum_cruise_ratio, std::nullopt);
+  EXPECT_EQ(one.limits->max_accel_mm_s2, 3000.0);
+  EXPECT_EQ(one.limits->max_velocity_mm_s, std::nullopt);
+  EXPECT_EQ(one.limits->minimum_cruise_ratio, std::nullopt);
 }
 
 TEST(Limits, ThatAreInvalidChangeNothing) {
@@ -63,7 +63,7 @@ TEST(Limits, ThatAreInvalidChangeNothing) {
     const Event event = session.read(std::string("SET_VELOCITY_LIMIT ") + line);
     EXPECT_EQ(event.kind, EventKind::passive) << line;
     EXPECT_THAT(event.warnings, SizeIs(1)) << line;
-    EXPECT_EQ(event.limits.max_accel_mm_s2, std::nullopt) << line;
+    EXPECT_EQ(event.limits->max_accel_mm_s2, std::nullopt) << line;
   }
   EXPECT_EQ(session.read("SET_VELOCITY_LIMIT").kind, EventKind::passive);
   EXPECT_EQ(session.read("SET_VELOCITY_LIMIT ACCEL_TO_DECEL=500").kind, EventKind::passive);

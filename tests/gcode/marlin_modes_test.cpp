@@ -25,45 +25,45 @@ TEST(MarlinLimits, OfAxesAreInUnitsPerSecond) {
   Session session = marlin();
   Event event = session.read("M201 X1250 Y1000 Z200 E5000");
   EXPECT_EQ(event.kind, EventKind::limits);
-  EXPECT_EQ(event.limits.axis_max_accel_mm_s2, (AxisValues{1250.0, 1000.0, 200.0, 5000.0}));
+  EXPECT_EQ(event.limits->axis_max_accel_mm_s2, (AxisValues{1250.0, 1000.0, 200.0, 5000.0}));
   event = session.read("M203 X200 E120");
-  EXPECT_EQ(event.limits.axis_max_velocity_mm_s,
+  EXPECT_EQ(event.limits->axis_max_velocity_mm_s,
             (AxisValues{200.0, std::nullopt, std::nullopt, 120.0}));
-  EXPECT_EQ(event.limits.max_velocity_mm_s, std::nullopt);
+  EXPECT_EQ(event.limits->max_velocity_mm_s, std::nullopt);
   session.read("G20");
-  EXPECT_DOUBLE_EQ(*session.read("M203 X2").limits.axis_max_velocity_mm_s[X], 50.8);
+  EXPECT_DOUBLE_EQ(*session.read("M203 X2").limits->axis_max_velocity_mm_s[X], 50.8);
 }
 
 TEST(MarlinLimits, OfM204TellApartPrintTravelAndRetraction) {
   Session session = marlin();
   Event event = session.read("M204 P800 R1250 T1500");
   EXPECT_EQ(event.kind, EventKind::limits);
-  EXPECT_EQ(event.limits.print_accel_mm_s2, 800.0);
-  EXPECT_EQ(event.limits.retract_accel_mm_s2, 1250.0);
-  EXPECT_EQ(event.limits.travel_accel_mm_s2, 1500.0);
-  EXPECT_EQ(event.limits.max_accel_mm_s2, std::nullopt);
+  EXPECT_EQ(event.limits->print_accel_mm_s2, 800.0);
+  EXPECT_EQ(event.limits->retract_accel_mm_s2, 1250.0);
+  EXPECT_EQ(event.limits->travel_accel_mm_s2, 1500.0);
+  EXPECT_EQ(event.limits->max_accel_mm_s2, std::nullopt);
   event = session.read("M204 S900");
-  EXPECT_EQ(event.limits.print_accel_mm_s2, 900.0);
-  EXPECT_EQ(event.limits.travel_accel_mm_s2, 900.0);
-  EXPECT_EQ(event.limits.retract_accel_mm_s2, std::nullopt);
+  EXPECT_EQ(event.limits->print_accel_mm_s2, 900.0);
+  EXPECT_EQ(event.limits->travel_accel_mm_s2, 900.0);
+  EXPECT_EQ(event.limits->retract_accel_mm_s2, std::nullopt);
   event = session.read("M204 P700");
-  EXPECT_EQ(event.limits.print_accel_mm_s2, 700.0);
-  EXPECT_EQ(event.limits.travel_accel_mm_s2, std::nullopt);
+  EXPECT_EQ(event.limits->print_accel_mm_s2, 700.0);
+  EXPECT_EQ(event.limits->travel_accel_mm_s2, std::nullopt);
   event = session.read("M204 S900 T1200");
-  EXPECT_EQ(event.limits.print_accel_mm_s2, 900.0);
-  EXPECT_EQ(event.limits.travel_accel_mm_s2, 1200.0);
+  EXPECT_EQ(event.limits->print_accel_mm_s2, 900.0);
+  EXPECT_EQ(event.limits->travel_accel_mm_s2, 1200.0);
 }
 
 TEST(MarlinLimits, OfM205AreTheAdvancedSettings) {
   Session session = marlin();
   const Event event = session.read("M205 B20000 S1 T2 X8 Y9 Z0.4 E4.5 J0.02");
   EXPECT_EQ(event.kind, EventKind::limits);
-  EXPECT_DOUBLE_EQ(*event.limits.min_segment_time_s, 0.02);
-  EXPECT_EQ(event.limits.min_velocity_mm_s, 1.0);
-  EXPECT_EQ(event.limits.min_travel_velocity_mm_s, 2.0);
-  EXPECT_EQ(event.limits.axis_jerk_mm_s, (AxisValues{8.0, 9.0, 0.4, 4.5}));
-  EXPECT_EQ(event.limits.junction_deviation_mm, 0.02);
-  EXPECT_EQ(session.read("M205 B0").limits.min_segment_time_s, 0.0);
+  EXPECT_DOUBLE_EQ(*event.limits->min_segment_time_s, 0.02);
+  EXPECT_EQ(event.limits->min_velocity_mm_s, 1.0);
+  EXPECT_EQ(event.limits->min_travel_velocity_mm_s, 2.0);
+  EXPECT_EQ(event.limits->axis_jerk_mm_s, (AxisValues{8.0, 9.0, 0.4, 4.5}));
+  EXPECT_EQ(event.limits->junction_deviation_mm, 0.02);
+  EXPECT_EQ(session.read("M205 B0").limits->min_segment_time_s, 0.0);
   EXPECT_EQ(session.read("M205 S0 T0").warnings.size(), 0U);
 }
 

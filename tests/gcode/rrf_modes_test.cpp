@@ -18,41 +18,41 @@ TEST(RrfLimits, OfSpeedAreInMillimetresPerMinute) {
   Session session = rrf();
   Event event = session.read("M203 X18000 Y12000 Z600 E3600 I30");
   EXPECT_EQ(event.kind, EventKind::limits);
-  EXPECT_EQ(event.limits.axis_max_velocity_mm_s, (AxisValues{300.0, 200.0, 10.0, 60.0}));
-  EXPECT_EQ(event.limits.min_movement_velocity_mm_s, 0.5);
+  EXPECT_EQ(event.limits->axis_max_velocity_mm_s, (AxisValues{300.0, 200.0, 10.0, 60.0}));
+  EXPECT_EQ(event.limits->min_movement_velocity_mm_s, 0.5);
   event = session.read("M203 S1 X300 I0");
-  EXPECT_EQ(event.limits.axis_max_velocity_mm_s[X], 300.0);
-  EXPECT_EQ(event.limits.min_movement_velocity_mm_s, 0.01) << "AbsoluteMinFeedrate";
-  EXPECT_DOUBLE_EQ(*session.read("M203 E3600:1800").limits.axis_max_velocity_mm_s[E], 60.0);
+  EXPECT_EQ(event.limits->axis_max_velocity_mm_s[X], 300.0);
+  EXPECT_EQ(event.limits->min_movement_velocity_mm_s, 0.01) << "AbsoluteMinFeedrate";
+  EXPECT_DOUBLE_EQ(*session.read("M203 E3600:1800").limits->axis_max_velocity_mm_s[E], 60.0);
 }
 
 TEST(RrfLimits, OfAccelerationTellApartPrintAndTravel) {
   Session session = rrf();
   Event event = session.read("M201 X1250 Y1000 E5000:3000");
-  EXPECT_EQ(event.limits.axis_max_accel_mm_s2, (AxisValues{1250.0, 1000.0, std::nullopt, 5000.0}));
+  EXPECT_EQ(event.limits->axis_max_accel_mm_s2, (AxisValues{1250.0, 1000.0, std::nullopt, 5000.0}));
   event = session.read("M204 P800 T1500");
-  EXPECT_EQ(event.limits.print_accel_mm_s2, 800.0);
-  EXPECT_EQ(event.limits.travel_accel_mm_s2, 1500.0);
-  EXPECT_EQ(event.limits.max_accel_mm_s2, std::nullopt);
+  EXPECT_EQ(event.limits->print_accel_mm_s2, 800.0);
+  EXPECT_EQ(event.limits->travel_accel_mm_s2, 1500.0);
+  EXPECT_EQ(event.limits->max_accel_mm_s2, std::nullopt);
   event = session.read("M204 S900");
-  EXPECT_EQ(event.limits.print_accel_mm_s2, 900.0);
-  EXPECT_EQ(event.limits.travel_accel_mm_s2, 900.0);
-  EXPECT_EQ(session.read("M204 P0").limits.print_accel_mm_s2, 0.1) << "MinimumAcceleration";
+  EXPECT_EQ(event.limits->print_accel_mm_s2, 900.0);
+  EXPECT_EQ(event.limits->travel_accel_mm_s2, 900.0);
+  EXPECT_EQ(session.read("M204 P0").limits->print_accel_mm_s2, 0.1) << "MinimumAcceleration";
   session.read("G20");
-  EXPECT_EQ(session.read("M204 P800").limits.print_accel_mm_s2, 800.0) << "never in inches";
+  EXPECT_EQ(session.read("M204 P800").limits->print_accel_mm_s2, 800.0) << "never in inches";
 }
 
 TEST(RrfLimits, OfJerkAreInMillimetresPerMinuteOrSecond) {
   Session session = rrf();
   Event event = session.read("M566 X600 Y480 Z30 E300:300 P1");
   EXPECT_EQ(event.kind, EventKind::limits);
-  EXPECT_EQ(event.limits.axis_jerk_mm_s, (AxisValues{10.0, 8.0, 0.5, 5.0}));
-  EXPECT_EQ(event.limits.jerk_policy, 1);
+  EXPECT_EQ(event.limits->axis_jerk_mm_s, (AxisValues{10.0, 8.0, 0.5, 5.0}));
+  EXPECT_EQ(event.limits->jerk_policy, 1);
   event = session.read("M205 X10 Y8 P1");
-  EXPECT_EQ(event.limits.axis_jerk_mm_s, (AxisValues{10.0, 8.0, std::nullopt, std::nullopt}));
-  EXPECT_EQ(event.limits.jerk_policy, std::nullopt) << "only M566 has a policy";
-  EXPECT_EQ(session.read("M566 X1").limits.axis_jerk_mm_s[X], 0.1) << "MinimumJerk";
-  EXPECT_EQ(session.read("M566 P0").limits.jerk_policy, 0);
+  EXPECT_EQ(event.limits->axis_jerk_mm_s, (AxisValues{10.0, 8.0, std::nullopt, std::nullopt}));
+  EXPECT_EQ(event.limits->jerk_policy, std::nullopt) << "only M566 has a policy";
+  EXPECT_EQ(session.read("M566 X1").limits->axis_jerk_mm_s[X], 0.1) << "MinimumJerk";
+  EXPECT_EQ(session.read("M566 P0").limits->jerk_policy, 0);
 }
 
 TEST(RrfLimits, ThatAreInvalidChangeNothing) {

@@ -42,7 +42,7 @@ class PlainEmitter {
         text_ += event.line.text;
       } else if (event.kind == gcode::EventKind::limits) {
         text_ += event.line.text;
-        limits_.apply(event.limits);
+        limits_.apply(*event.limits);
         text_ += in_run_ ? set_limits(kRaised) : "";
       } else {
         end_run();
@@ -77,7 +77,7 @@ class PlainEmitter {
       for (const gcode::Segment& segment : event.segments) {
         planner.add(segment);
       }
-      planner.apply(event.limits);
+      planner.apply(*event.limits);
       if (event.kind == gcode::EventKind::barrier) {
         planner.stop();
       }

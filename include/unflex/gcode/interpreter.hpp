@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unflex/core/firmware.hpp"
+#include "unflex/core/lazy.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/line.hpp"
 
@@ -36,11 +37,12 @@ struct Segment {
   double curve_radius_mm = 0.0;
 
   [[nodiscard]] double delta(Axis axis) const { return end_mm[axis] - start_mm[axis]; }
+  [[nodiscard]] bool moves_xy() const { return delta(X) != 0.0 || delta(Y) != 0.0; }
   [[nodiscard]] double length_xy_mm() const;
   // Length in X, Y and Z.
   [[nodiscard]] double length_mm() const;
   // Lays filament while it moves in X or Y.
-  [[nodiscard]] bool extruding() const { return delta(E) > 0.0 && length_xy_mm() > 0.0; }
+  [[nodiscard]] bool extruding() const { return delta(E) > 0.0 && moves_xy(); }
 };
 
 // Per axis X Y Z E, where a line gives one.
@@ -78,13 +80,16 @@ struct Event {
   EventKind kind = EventKind::passive;
   Line line;
   std::vector<Segment> segments;  // move
-  LimitChange limits;             // limits
+  Lazy<LimitChange> limits;       // limits
   double dwell_s = 0.0;           // barrier: G4's pause
   // barrier: the machine may be anywhere afterwards, in any mode (homing, macro, tool change).
   bool position_lost = false;
   // barrier: the label of an object; if that was cancelled, the next motion starts elsewhere.
   bool may_jump = false;
   std::vector<std::string> warnings;  // remarks for the user about this line
+
+  // As before it was interpreted; keeps the line and the storage.
+  void reset();
 };
 
 // How Marlin cuts arcs (Configuration_adv.h, ARC_SUPPORT).
@@ -191,6 +196,8 @@ class Interpreter {
 
   // Never fails: a line that cannot be understood passes as a barrier with a warning.
   [[nodiscard]] Event interpret(Line line);
+  // The same of event.line, into an event whose storage is used again.
+  void interpret(Event& event);
 
   [[nodiscard]] const ModalState& state() const { return state_; }
   // With what M207 and the like have changed.
