@@ -16,30 +16,48 @@ using collocation::StateByPointPattern;
 using collocation::StateVector;
 
 AxisProblem::AxisProblem(const AxisWindow& window, ActiveLimits active)
-    : window_(&window),
-      active_(active),
-      origin_mm_(window.reference_mm.front()),
-      damping_(2.0 * window.axis.zeta * window.axis.omega_rad_s * window.period_s),
-      stiffness_(std::pow(window.axis.omega_rad_s * window.period_s, 2)) {}
+    : window_(&window), active_(active), origin_mm_(window.reference_mm.front()) {
+  for (std::size_t i = 0; i < window.models(); ++i) {
+    const AxisVariant model = window.model(i);
+    const double omega_h = model.axis.omega_rad_s * window.period_s;
+    models_.push_back({2.0 * model.axis.zeta * omega_h, std::pow(omega_h, 2), model.share});
+  }
+}
+
+int AxisProblem::place(Component component, std::size_t model) const {
+  if (component == kBaseAccel) {
+    return states();
+  }
+  const bool other_nozzle = model > 0 && (component == kNozzle || component == kNozzleRate);
+  return component + (other_nozzle ? 2 + 2 * static_cast<int>(model) : 0);
+}
 
 void AxisProblem::dynamics(double /*t*/, const PointVector& z, StateVector& f) const {
-  f(kNozzle) = z(kNozzleRate);
-  f(kNozzleRate) =
-      damping_ * (z(kBaseRate) - z(kNozzleRate)) + stiffness_ * (z(kBase) - z(kNozzle));
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const int p = place(kNozzle, i);
+    const int rate = place(kNozzleRate, i);
+    f(p) = z(rate);
+    f(rate) =
+        models_[i].damping * (z(kBaseRate) - z(rate)) + models_[i].stiffness * (z(kBase) - z(p));
+  }
   f(kBase) = z(kBaseRate);
-  f(kBaseRate) = z(kBaseAccel);
+  f(kBaseRate) = z(place(kBaseAccel));
 }
 
 void AxisProblem::dynamics_jacobian(double /*t*/, const PointVector& /*z*/,
                                     StateByPoint& fz) const {
   fz.setZero();
-  fz(kNozzle, kNozzleRate) = 1.0;
-  fz(kNozzleRate, kNozzle) = -stiffness_;
-  fz(kNozzleRate, kNozzleRate) = -damping_;
-  fz(kNozzleRate, kBase) = stiffness_;
-  fz(kNozzleRate, kBaseRate) = damping_;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const int p = place(kNozzle, i);
+    const int rate = place(kNozzleRate, i);
+    fz(p, rate) = 1.0;
+    fz(rate, p) = -models_[i].stiffness;
+    fz(rate, rate) = -models_[i].damping;
+    fz(rate, kBase) = models_[i].stiffness;
+    fz(rate, kBaseRate) = models_[i].damping;
+  }
   fz(kBase, kBaseRate) = 1.0;
-  fz(kBaseRate, kBaseAccel) = 1.0;
+  fz(kBaseRate, place(kBaseAccel)) = 1.0;
 }
 
 void AxisProblem::dynamics_hessian(double /*t*/, const PointVector& /*z*/,
@@ -48,15 +66,18 @@ void AxisProblem::dynamics_hessian(double /*t*/, const PointVector& /*z*/,
 }
 
 StateByPointPattern AxisProblem::dynamics_pattern() const {
-  StateByPointPattern pattern(4, 5);
+  StateByPointPattern pattern(states(), states() + 1);
   pattern.setConstant(false);
-  pattern(kNozzle, kNozzleRate) = true;
-  pattern(kNozzleRate, kNozzle) = true;
-  pattern(kNozzleRate, kNozzleRate) = true;
-  pattern(kNozzleRate, kBase) = true;
-  pattern(kNozzleRate, kBaseRate) = true;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const int p = place(kNozzle, i);
+    const int rate = place(kNozzleRate, i);
+    pattern(p, rate) = true;
+    for (const int of : {p, rate, place(kBase), place(kBaseRate)}) {
+      pattern(rate, of) = true;
+    }
+  }
   pattern(kBase, kBaseRate) = true;
-  pattern(kBaseRate, kBaseAccel) = true;
+  pattern(kBaseRate, place(kBaseAccel)) = true;
   return pattern;
 }
 
@@ -65,27 +86,39 @@ std::size_t AxisProblem::sample(double t) const {
 }
 
 double AxisProblem::cost(double t, const PointVector& z) const {
-  const std::size_t i = sample(t);
-  const double error = z(kNozzle) - (window_->reference_mm[i] - origin_mm_) / kLengthUnitMm;
-  return window_->weight[i] * error * error;
+  const std::size_t sampled = sample(t);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const double error = z(place(kNozzle, i)) - to_scaled(kNozzle, window_->reference_mm[sampled]);
+    sum += models_[i].share * error * error;
+  }
+  return window_->weight[sampled] * sum;
 }
 
 void AxisProblem::cost_gradient(double t, const PointVector& z, PointVector& gradient) const {
-  const std::size_t i = sample(t);
+  const std::size_t sampled = sample(t);
   gradient.setZero();
-  gradient(kNozzle) = 2.0 * window_->weight[i] *
-                      (z(kNozzle) - (window_->reference_mm[i] - origin_mm_) / kLengthUnitMm);
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const int p = place(kNozzle, i);
+    gradient(p) = 2.0 * window_->weight[sampled] * models_[i].share *
+                  (z(p) - to_scaled(kNozzle, window_->reference_mm[sampled]));
+  }
 }
 
 void AxisProblem::cost_hessian(double t, const PointVector& /*z*/, PointByPoint& h) const {
   h.setZero();
-  h(kNozzle, kNozzle) = 2.0 * window_->weight[sample(t)];
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const int p = place(kNozzle, i);
+    h(p, p) = 2.0 * window_->weight[sample(t)] * models_[i].share;
+  }
 }
 
 PointByPointPattern AxisProblem::cost_pattern() const {
-  PointByPointPattern pattern(5, 5);
+  PointByPointPattern pattern(states() + 1, states() + 1);
   pattern.setConstant(false);
-  pattern(kNozzle, kNozzle) = true;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    pattern(place(kNozzle, i), place(kNozzle, i)) = true;
+  }
   return pattern;
 }
 
@@ -104,22 +137,25 @@ void AxisProblem::node_bounds(int k, int n, PointVector& lower, PointVector& upp
   upper.setConstant(nlp::kNoBound);
   const auto bound = [&](Component component, const Interval& interval) {
     if (interval.lower > -nlp::kNoBound) {
-      lower(component) = to_scaled(component, interval.lower);
+      lower(place(component)) = to_scaled(component, interval.lower);
     }
     if (interval.upper < nlp::kNoBound) {
-      upper(component) = to_scaled(component, interval.upper);
+      upper(place(component)) = to_scaled(component, interval.upper);
     }
   };
   const BaseBounds bounds = base_bounds(*window_, active_, static_cast<std::size_t>(k));
   bound(kBase, bounds.position);
   bound(kBaseRate, bounds.velocity);
   bound(kBaseAccel, bounds.accel);
-  const auto fix = [&](Component component, double physical) {
-    lower(component) = upper(component) = to_scaled(component, physical);
+  const auto fix = [&](Component component, double physical, std::size_t model = 0) {
+    const int at = place(component, model);
+    lower(at) = upper(at) = to_scaled(component, physical);
   };
   if (k == 0 && window_->start) {
-    fix(kNozzle, window_->start->nozzle.position);
-    fix(kNozzleRate, window_->start->nozzle.velocity);
+    for (std::size_t i = 0; i < models_.size(); ++i) {
+      fix(kNozzle, window_->start->nozzle.position, i);
+      fix(kNozzleRate, window_->start->nozzle.velocity, i);
+    }
     fix(kBase, window_->start->base_mm);
     fix(kBaseRate, 0.0);
   }
@@ -130,40 +166,45 @@ void AxisProblem::node_bounds(int k, int n, PointVector& lower, PointVector& upp
 }
 
 void AxisProblem::guess(int k, double /*t*/, PointVector& z) const {
+  dynamics::NozzleState nozzle;
+  dynamics::AxisMotion base;
   if (window_->guess) {
     const auto i = static_cast<std::size_t>(k);
-    const dynamics::NozzleState& nozzle = window_->guess->nozzle[i];
-    const dynamics::AxisTrajectory& base = window_->guess->base;
-    z(kNozzle) = to_scaled(kNozzle, nozzle.position);
-    z(kNozzleRate) = to_scaled(kNozzleRate, nozzle.velocity);
-    z(kBase) = to_scaled(kBase, base.position_mm[i]);
-    z(kBaseRate) = to_scaled(kBaseRate, base.velocity_mm_s[i]);
-    z(kBaseAccel) = to_scaled(kBaseAccel, base.accel_mm_s2[i]);
-    return;
+    const dynamics::AxisTrajectory& guessed = window_->guess->base;
+    nozzle = window_->guess->nozzle[i];
+    base = {guessed.position_mm[i], guessed.velocity_mm_s[i], guessed.accel_mm_s2[i]};
+  } else {
+    const auto n = static_cast<int>(window_->nodes());
+    const double h = window_->period_s;
+    const auto r = [&](int node) {
+      return window_->reference_mm[static_cast<std::size_t>(2 * std::clamp(node, 0, n - 1))];
+    };
+    const double rate = 0.5 * (r(k + 1) - r(k - 1)) / h;
+    nozzle = {r(k), rate};
+    base = {r(k), rate, (r(k + 1) - 2.0 * r(k) + r(k - 1)) / (h * h)};
   }
-  const auto n = static_cast<int>(window_->nodes());
-  const auto r = [&](int node) {
-    return window_->reference_mm[static_cast<std::size_t>(2 * std::clamp(node, 0, n - 1))];
-  };
-  const double rate = 0.5 * (r(k + 1) - r(k - 1)) / kLengthUnitMm;
-  z(kNozzle) = z(kBase) = (r(k) - origin_mm_) / kLengthUnitMm;
-  z(kNozzleRate) = z(kBaseRate) = rate;
-  z(kBaseAccel) = (r(k + 1) - 2.0 * r(k) + r(k - 1)) / kLengthUnitMm;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    z(place(kNozzle, i)) = to_scaled(kNozzle, nozzle.position);
+    z(place(kNozzleRate, i)) = to_scaled(kNozzleRate, nozzle.velocity);
+  }
+  z(kBase) = to_scaled(kBase, base.position_mm);
+  z(kBaseRate) = to_scaled(kBaseRate, base.velocity_mm_s);
+  z(place(kBaseAccel)) = to_scaled(kBaseAccel, base.accel_mm_s2);
 }
 
 std::string AxisProblem::name(int component) const {
   switch (component) {
-    case kNozzle:
-      return "nozzle position";
-    case kNozzleRate:
-      return "nozzle velocity";
     case kBase:
       return "base position";
     case kBaseRate:
       return "base velocity";
     default:
-      return "base acceleration";
+      break;
   }
+  if (component == place(kBaseAccel)) {
+    return "base acceleration";
+  }
+  return component % 2 == 0 ? "nozzle position" : "nozzle velocity";
 }
 
 double AxisProblem::to_physical(Component component, double scaled) const {

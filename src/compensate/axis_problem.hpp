@@ -2,6 +2,9 @@
 // node periods, lengths in hundredths of a millimetre from the window's first reference point.
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include "limits.hpp"
 #include "unflex/collocation/optimal_control_problem.hpp"
 #include "unflex/compensate/axis_window.hpp"
@@ -10,15 +13,19 @@ namespace unflex::compensate {
 
 inline constexpr double kLengthUnitMm = 0.01;
 
-// States p, ṗ, b, ḃ; control b̈.
+// States p, ṗ, b, ḃ and the p_i, ṗ_i of what the axis may be beside; control b̈.
 class AxisProblem final : public collocation::OptimalControlProblem {
  public:
+  // The numbers are places in z where the axis is one thing only.
   enum Component : int { kNozzle = 0, kNozzleRate, kBase, kBaseRate, kBaseAccel };
 
   // The window must outlive the problem.
   AxisProblem(const AxisWindow& window, ActiveLimits active);
 
-  int states() const override { return 4; }
+  // The place of a component in z, a nozzle's for what the axis may be.
+  [[nodiscard]] int place(Component component, std::size_t model = 0) const;
+
+  int states() const override { return 2 + 2 * static_cast<int>(window_->models()); }
   int controls() const override { return 1; }
 
   void dynamics(double t, const collocation::PointVector& z,
@@ -57,8 +64,12 @@ class AxisProblem final : public collocation::OptimalControlProblem {
   const AxisWindow* window_;
   ActiveLimits active_;
   double origin_mm_;
-  double damping_;    // 2ζωh
-  double stiffness_;  // (ωh)²
+  struct Model {
+    double damping;    // 2ζωh
+    double stiffness;  // (ωh)²
+    double share;      // α
+  };
+  std::vector<Model> models_;
 };
 
 }  // namespace unflex::compensate

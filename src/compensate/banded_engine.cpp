@@ -89,8 +89,16 @@ class BandedEngine final : public Engine {
     thread_local ScaledWindow scaled;
     thread_local InteriorPoint interior_point;
     thread_local FlatForm flat;
-    thread_local StageForm stages;
+    thread_local StageForm<1> stages;
+    thread_local StageForm<3> stages_of_three;
+    thread_local StageForm<5> stages_of_five;
     scaled.assign(window);
+    if (window.models() > 3) {
+      return solve_by(stages_of_five, interior_point, scaled, false);
+    }
+    if (window.models() > 1) {
+      return solve_by(stages_of_three, interior_point, scaled, false);
+    }
     if (form_ == BandedForm::flat || (form_ == BandedForm::fitting && FlatForm::suits(scaled))) {
       // Where it runs out of digits, stages have some left.
       Result<AxisSolution> solution =

@@ -42,7 +42,9 @@ class IpoptEngine final : public Engine {
     result.base.accel_mm_s2.resize(n);
     for (std::size_t k = 0; k < n; ++k) {
       const auto z = collocation::node(problem, solution->x, static_cast<int>(k));
-      const auto at = [&](AxisProblem::Component c) { return problem.to_physical(c, z(c)); };
+      const auto at = [&](AxisProblem::Component c) {
+        return problem.to_physical(c, z(problem.place(c)));
+      };
       result.base.position_mm[k] = at(AxisProblem::kBase);
       result.base.velocity_mm_s[k] = at(AxisProblem::kBaseRate);
       result.base.accel_mm_s2[k] = at(AxisProblem::kBaseAccel);

@@ -9,6 +9,10 @@ namespace {
 
 // Half the number of nodes over which two windows are blended.
 constexpr std::size_t kBlendNodes = 10;
+// Shorter cruises are left to the solver.
+constexpr std::size_t kShortestCruise = 100;
+// A cruise as fast as the base may be leaves it no room to settle.
+constexpr double kRoomToSettle = 0.99;
 
 // Walks along the plan; times must not decrease from call to call.
 class Reference {
@@ -78,6 +82,7 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
                      std::vector<double> reference, std::vector<double> weight) {
   AxisWindow window;
   window.axis = axis.axis;
+  window.variants = axis.variants;
   window.period_s = period_s;
   // What the base's jerk does to the nozzle's motion goes with (ωh)²: so weighted, one value serves
   // all resonances.
@@ -93,6 +98,17 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
 }
 
 }  // namespace
+
+AxisVariant AxisWindow::model(std::size_t i) const {
+  if (i > 0) {
+    return variants[i - 1];
+  }
+  double share = 1.0;
+  for (const AxisVariant& variant : variants) {
+    share -= variant.share;
+  }
+  return {axis, share};
+}
 
 NodeGrid node_grid(const Course& course, const Setup& setup) {
   const double duration_s =
@@ -132,6 +148,85 @@ std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
     span.last = std::min(span.core_last + overlap, nodes - 1);
   }
   return spans;
+}
+
+namespace {
+
+// Until the base, and the nozzle with it, goes along with an even motion after an uneven one.
+double settling_s(const Setup& setup, double period_s) {
+  double longest_s = 0.0;
+  for (const BaseLimits& limits : {setup.x.limits, setup.y.limits}) {
+    // Zero where the one is not limited; what neither is takes no time.
+    const double ramp_s = limits.max_accel_mm_s2 / limits.max_jerk_mm_s3;
+    longest_s = std::max(longest_s, std::isfinite(ramp_s) ? 2.0 * ramp_s : 0.0);
+  }
+  return std::max(setup.overlap_s + longest_s, static_cast<double>(kBlendNodes + 1) * period_s);
+}
+
+bool leaves_room(const planner::PlannedMove& move, const Setup& setup) {
+  const auto axis_fits = [&](gcode::Axis axis, const BaseLimits& limits) {
+    return std::abs(move.direction[axis]) * move.cruise_v_mm_s <=
+           kRoomToSettle * limits.max_velocity_mm_s;
+  };
+  return axis_fits(gcode::X, setup.x.limits) && axis_fits(gcode::Y, setup.y.limits);
+}
+
+// Where nothing needs solving, in the order of the course.
+std::vector<WindowSpan> cruises(const Course& course, const NodeGrid& grid, const Setup& setup) {
+  const double settling = settling_s(setup, grid.period_s);
+  const double end_s = static_cast<double>(grid.count - 1) * grid.period_s;
+  double begin_s = course.before.empty() ? setup.lead_in_s
+                                         : static_cast<double>(grid.first) * grid.period_s -
+                                               planner::duration_s(course.before);
+  std::vector<WindowSpan> found;
+  for (const Course::Moves& moves : {course.before, course.moves, course.after}) {
+    for (const planner::PlannedMove& move : moves) {
+      const double from_s = std::max(begin_s + move.accel_s, 0.0) + settling;
+      begin_s += move.duration_s();
+      const double to_s = std::min(begin_s - move.decel_s, end_s) - settling;
+      if (to_s - from_s < static_cast<double>(kShortestCruise) * grid.period_s ||
+          !leaves_room(move, setup)) {
+        continue;
+      }
+      const std::size_t first = to_nodes(from_s, grid.period_s);
+      const std::size_t end = to_nodes(to_s, grid.period_s);
+      if (first + kShortestCruise <= end) {
+        found.push_back({first - kBlendNodes, end - 1 + kBlendNodes, first, end - 1, true});
+      }
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+std::vector<WindowSpan> mesh(const Course& course, const NodeGrid& grid, const Setup& setup) {
+  std::vector<WindowSpan> spans;
+  const auto solve_to = [&](std::size_t last) {
+    const std::size_t first = spans.empty() ? 0 : spans.back().core_last - kBlendNodes;
+    for (WindowSpan span : cut(last - first + 1, setup)) {
+      span = {span.first + first, span.last + first, span.core_first + first,
+              span.core_last + first};
+      spans.push_back(span);
+    }
+  };
+  for (const WindowSpan& cruise : cruises(course, grid, setup)) {
+    solve_to(cruise.core_first + kBlendNodes);
+    spans.push_back(cruise);
+  }
+  solve_to(grid.count - 1);
+  // Where windows and cruises meet, either is used up to the same node.
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    if (spans[i].cruise) {
+      spans[i - 1].core_last = spans[i].core_first;
+      spans[i + 1].core_first = spans[i].core_last;
+    }
+  }
+  return spans;
+}
+
+std::size_t windows_to_solve(const std::vector<WindowSpan>& spans) {
+  return static_cast<std::size_t>(std::ranges::count(spans, false, &WindowSpan::cruise));
 }
 
 std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpan>& spans,
@@ -179,6 +274,23 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
     result.push_back(std::move(window));
   }
   return result;
+}
+
+AxisSolution along(const AxisWindow& window) {
+  const std::size_t nodes = window.nodes();
+  const double duration_s = static_cast<double>(nodes - 1) * window.period_s;
+  AxisSolution solution;
+  for (std::size_t k = 0; k < nodes; ++k) {
+    solution.base.position_mm.push_back(window.reference_mm[2 * k]);
+  }
+  solution.base.velocity_mm_s.assign(
+      nodes, (window.reference_mm.back() - window.reference_mm.front()) / duration_s);
+  solution.base.accel_mm_s2.assign(nodes, 0.0);
+  return solution;
+}
+
+Result<AxisSolution> solve(const Engine& engine, const WindowSpan& span, const AxisWindow& window) {
+  return span.cruise ? along(window) : engine.solve(window);
 }
 
 dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,

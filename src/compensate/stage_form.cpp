@@ -9,45 +9,57 @@ namespace {
 constexpr std::array<RowKind, 3> kNodeKinds = {RowKind::position, RowKind::velocity,
                                                RowKind::accel};
 
-Eigen::Index component_of(RowKind kind) {
-  return AxisChain::kBase + static_cast<Eigen::Index>(kind);
-}
+}  // namespace
 
 // Of b, ḃ and b̈ one interval before the base rests at b.
-ChainVector resting_soon() {
-  ChainVector row = ChainVector::Zero();
-  row(AxisChain::kBase) = 1.0;
-  row(AxisChain::kBaseRate) = 2.0 / 3.0;
-  row(AxisChain::kBaseAccel) = 1.0 / 6.0;
+template <int kModels>
+typename StageForm<kModels>::State StageForm<kModels>::resting_soon() {
+  State row = State::Zero();
+  row(kBase) = 1.0;
+  row(kBaseRate) = 2.0 / 3.0;
+  row(kBaseAccel) = 1.0 / 6.0;
   return row;
 }
 
-}  // namespace
-
-void StageForm::assign(const ScaledWindow& scaled) {
+template <int kModels>
+void StageForm<kModels>::assign(const ScaledWindow& scaled) {
   window_ = &scaled;
   faint_pull_ = kFaintPull;
   nodes_ = scaled.nodes;
   const AxisWindow& window = *scaled.window;
-  const AxisChain chain(window.axis.omega_rad_s * window.period_s, window.axis.zeta);
-  transition_ = ChainMatrix::Identity() + chain.growth;
-  input_ = chain.input;
+  Square growth = Square::Zero();
+  for (std::size_t i = 0; i < kModels; ++i) {
+    const AxisVariant model = window.model(i);
+    share_(static_cast<Eigen::Index>(i)) = model.share;
+    const AxisChain chain(model.axis.omega_rad_s * window.period_s, model.axis.zeta);
+    const Eigen::Index p = nozzle(i);
+    growth.template block<2, 2>(p, p) = chain.growth.topLeftCorner<2, 2>();
+    growth.template block<2, 3>(p, kBase) = chain.growth.topRightCorner<2, 3>();
+    input_.template segment<2>(p) = chain.input.head<2>();
+    // The base is the same for all.
+    growth.template block<3, 3>(kBase, kBase) = chain.growth.bottomRightCorner<3, 3>();
+    input_.template segment<3>(kBase) = chain.input.tail<3>();
+  }
+  transition_ = Square::Identity() + growth;
   // p_c = (p₁ + p₂)/2 + (ṗ₁ − ṗ₂)/8.
-  ChainVector after = ChainVector::Zero();
-  after(AxisChain::kNozzle) = 0.5;
-  after(AxisChain::kNozzleRate) = -0.125;
-  ChainVector before = after;
-  before(AxisChain::kNozzleRate) = 0.125;
-  middle_ = before + transition_.transpose() * after;
-  middle_input_ = after.dot(input_);
+  for (std::size_t i = 0; i < kModels; ++i) {
+    State after = State::Zero();
+    after(nozzle(i)) = 0.5;
+    after(nozzle(i) + 1) = -0.125;
+    State before = after;
+    before(nozzle(i) + 1) = 0.125;
+    const auto column = static_cast<Eigen::Index>(i);
+    middle_.col(column) = before + transition_.transpose() * after;
+    middle_input_(column) = after.dot(input_);
+  }
 
   states_.resize(nodes_);
   state_steps_.resize(nodes_);
   stages_.resize(nodes_ - 1);
-  for (Padded* values : {&node_weight_, &node_pull_}) {
-    values->resize(nodes_);
-  }
-  for (Padded* values : {&inputs_, &input_steps_, &feedforward_, &middle_weight_, &middle_pull_}) {
+  node_weight_.resize(nodes_);
+  node_pull_.resize(nodes_);
+  middle_pull_.resize(nodes_ - 1);
+  for (Padded* values : {&inputs_, &input_steps_, &feedforward_, &middle_weight_}) {
     values->resize(nodes_ - 1);
   }
   for (std::size_t k = 0; k < nodes_; ++k) {
@@ -60,43 +72,48 @@ void StageForm::assign(const ScaledWindow& scaled) {
   first_guess();
 }
 
-bool StageForm::prescribed(std::size_t k) const {
+template <int kModels>
+bool StageForm<kModels>::prescribed(std::size_t k) const {
   return window_->end_base.has_value() && k + 3 >= nodes_;
 }
 
-ChainVector StageForm::prescribed_feedback(std::size_t k) const {
-  ChainVector feedback = ChainVector::Zero();
+template <int kModels>
+typename StageForm<kModels>::State StageForm<kModels>::prescribed_feedback(std::size_t k) const {
+  State feedback = State::Zero();
   if (k + 2 == nodes_) {
-    feedback(AxisChain::kBaseRate) = feedback(AxisChain::kBaseAccel) = -2.0;
+    feedback(kBaseRate) = feedback(kBaseAccel) = -2.0;
   } else {
-    const ChainVector row = resting_soon();
+    const State row = resting_soon();
     feedback = -transition_.transpose() * row / row.dot(input_);
   }
   return feedback;
 }
 
 // From the given start, or from rest at the reference, without any jerk until the end asks for it.
-void StageForm::first_guess() {
+template <int kModels>
+void StageForm<kModels>::first_guess() {
   const bool two_nodes_to_rest = window_->end_base && nodes_ == 2;
-  ChainVector first = ChainVector::Zero();
+  State first = State::Zero();
   if (window_->start) {
-    first.head<4>() = *window_->start;
-    start_basis_ = ChainVector::Unit(AxisChain::kBaseAccel);
+    for (std::size_t i = 0; i < kModels; ++i) {
+      first.template segment<2>(nozzle(i)) = window_->start->template head<2>();
+    }
+    first.template segment<2>(kBase) = window_->start->template tail<2>();
+    start_basis_ = State::Unit(kBaseAccel);
   } else {
-    start_basis_ = ChainMatrix::Identity();
+    start_basis_ = Square::Identity();
   }
   if (two_nodes_to_rest) {
     // The only input cannot keep both b and ḃ: b̈ at the first node is tied to the rest of it.
     const auto tie = [&](auto&& state, double target) {
-      state(AxisChain::kBaseAccel) =
-          6.0 * (target - state(AxisChain::kBase)) - 4.0 * state(AxisChain::kBaseRate);
+      state(kBaseAccel) = 6.0 * (target - state(kBase)) - 4.0 * state(kBaseRate);
     };
     tie(first, *window_->end_base);
     if (window_->start) {
-      start_basis_.resize(5, 0);
+      start_basis_.resize(kStates, 0);
     } else {
-      start_basis_ = ChainMatrix::Identity().leftCols<4>();
-      for (Eigen::Index i = 0; i < 4; ++i) {
+      start_basis_ = Square::Identity().template leftCols<kStates - 1>();
+      for (Eigen::Index i = 0; i + 1 < kStates; ++i) {
         tie(start_basis_.col(i), 0.0);
       }
     }
@@ -104,7 +121,8 @@ void StageForm::first_guess() {
   roll_out(first);
 }
 
-void StageForm::roll_out(const ChainVector& first) {
+template <int kModels>
+void StageForm<kModels>::roll_out(const State& first) {
   states_[0] = first;
   for (std::size_t k = 0; k + 1 < nodes_; ++k) {
     double input = 0.0;
@@ -119,30 +137,49 @@ void StageForm::roll_out(const ChainVector& first) {
   }
 }
 
-void StageForm::evaluate(const PerKind<bool>& kinds) {
+template <int kModels>
+typename StageForm<kModels>::PerModel StageForm<kModels>::errors(std::size_t k) const {
+  PerModel result;
+  for (std::size_t i = 0; i < kModels; ++i) {
+    result(static_cast<Eigen::Index>(i)) = states_[k](nozzle(i)) - window_->reference[2 * k];
+  }
+  return result;
+}
+
+template <int kModels>
+typename StageForm<kModels>::PerModel StageForm<kModels>::middle_errors(std::size_t k) const {
+  const State& z = states_[k];
+  const State& next = states_[k + 1];
+  PerModel result;
+  for (std::size_t i = 0; i < kModels; ++i) {
+    const Eigen::Index p = nozzle(i);
+    result(static_cast<Eigen::Index>(i)) =
+        0.5 * (z(p) + next(p)) + 0.125 * (z(p + 1) - next(p + 1)) - window_->reference[2 * k + 1];
+  }
+  return result;
+}
+
+template <int kModels>
+void StageForm<kModels>::evaluate(const PerKind<bool>& kinds) {
   half_cost_ = 0.0;
-  const std::vector<double>& reference = window_->reference;
   for (std::size_t k = 0; k < nodes_; ++k) {
-    const ChainVector& z = states_[k];
-    const double error = z(AxisChain::kNozzle) - reference[2 * k];
-    node_pull_[k] = node_weight_[k] * error;
-    half_cost_ += 0.5 * node_pull_[k] * error;
+    const PerModel error = errors(k);
+    node_pull_[k] = node_weight_[k] * share_.cwiseProduct(error);
+    half_cost_ += 0.5 * node_pull_[k].dot(error);
     if (k + 1 == nodes_) {
       break;
     }
-    const ChainVector& next = states_[k + 1];
-    const double middle_error = 0.5 * (z(AxisChain::kNozzle) + next(AxisChain::kNozzle)) +
-                                0.125 * (z(AxisChain::kNozzleRate) - next(AxisChain::kNozzleRate)) -
-                                reference[2 * k + 1];
-    middle_pull_[k] = middle_weight_[k] * middle_error;
-    half_cost_ +=
-        0.5 * middle_pull_[k] * middle_error + 0.5 * window_->jerk_weight * inputs_[k] * inputs_[k];
+    const PerModel middle_error = middle_errors(k);
+    middle_pull_[k] = middle_weight_[k] * share_.cwiseProduct(middle_error);
+    half_cost_ += 0.5 * middle_pull_[k].dot(middle_error) +
+                  0.5 * window_->jerk_weight * inputs_[k] * inputs_[k];
   }
   split_rows(states_, inputs_, kinds, rows_);
 }
 
-void StageForm::split_rows(const std::vector<ChainVector>& states, const Padded& inputs,
-                           const PerKind<bool>& kinds, PerKind<Padded>& rows) const {
+template <int kModels>
+void StageForm<kModels>::split_rows(const std::vector<State>& states, const Padded& inputs,
+                                    const PerKind<bool>& kinds, PerKind<Padded>& rows) const {
   for (const RowKind kind : kNodeKinds) {
     if (kinds[index_of(kind)]) {
       Padded& row = rows[index_of(kind)];
@@ -157,9 +194,12 @@ void StageForm::split_rows(const std::vector<ChainVector>& states, const Padded&
   }
 }
 
-bool StageForm::factor(const PerKind<const double*>& weights) {
-  const auto add_node = [&](std::size_t k, ChainMatrix& p) {
-    p(AxisChain::kNozzle, AxisChain::kNozzle) += node_weight_[k];
+template <int kModels>
+bool StageForm<kModels>::factor(const PerKind<const double*>& weights) {
+  const auto add_node = [&](std::size_t k, Square& p) {
+    for (std::size_t i = 0; i < kModels; ++i) {
+      p(nozzle(i), nozzle(i)) += share_(static_cast<Eigen::Index>(i)) * node_weight_[k];
+    }
     for (const RowKind kind : kNodeKinds) {
       if (weights[index_of(kind)] != nullptr) {
         p(component_of(kind), component_of(kind)) += weights[index_of(kind)][k];
@@ -167,24 +207,25 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
     }
   };
   const double* const jerk_weight = weights[index_of(RowKind::jerk)];
-  ChainMatrix p = ChainMatrix::Zero();
+  Square p = Square::Zero();
   add_node(nodes_ - 1, p);
   for (std::size_t k = nodes_ - 1; k-- > 0;) {
-    const ChainVector by_input = p * input_;
-    const ChainMatrix by_state = p * transition_;
-    const ChainVector weighted_middle = middle_weight_[k] * middle_;
+    const State by_input = p * input_;
+    const Square by_state = p * transition_;
+    const Middles weighted_middle = middle_weight_[k] * middle_ * share_.asDiagonal();
     const double curvature =
         window_->jerk_weight + (jerk_weight != nullptr ? jerk_weight[k] : 0.0) +
-        input_.dot(by_input) + middle_weight_[k] * middle_input_ * middle_input_;
-    const ChainVector cross = transition_.transpose() * by_input + weighted_middle * middle_input_;
+        input_.dot(by_input) +
+        middle_weight_[k] * middle_input_.dot(share_.cwiseProduct(middle_input_));
+    const State cross = transition_.transpose() * by_input + weighted_middle * middle_input_;
     if (!(curvature > 0.0)) {
       return false;
     }
     Stage& stage = stages_[k];
-    ChainMatrix next = transition_.transpose() * by_state + weighted_middle * middle_.transpose();
+    Square next = transition_.transpose() * by_state + weighted_middle * middle_.transpose();
     if (prescribed(k)) {
       stage = {prescribed_feedback(k), 0.0};
-      const ChainVector half = cross + 0.5 * curvature * stage.feedback;
+      const State half = cross + 0.5 * curvature * stage.feedback;
       next += half * stage.feedback.transpose() + stage.feedback * half.transpose();
     } else {
       stage = {-cross / curvature, 1.0 / curvature};
@@ -196,11 +237,11 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
   return factor_start(p);
 }
 
-bool StageForm::factor_start(const ChainMatrix& to_come) {
-  const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 5, 5> reduced =
-      start_basis_.transpose() * to_come * start_basis_;
+template <int kModels>
+bool StageForm<kModels>::factor_start(const Square& to_come) {
+  const Reduced reduced = start_basis_.transpose() * to_come * start_basis_;
   const Eigen::Index size = reduced.rows();
-  const Eigen::LLT<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 5, 5>> llt(reduced);
+  const Eigen::LLT<Reduced> llt(reduced);
   start_inverse_ = Eigen::MatrixXd::Identity(size, size);
   if (size > 0) {
     if (llt.info() != Eigen::Success) {
@@ -211,14 +252,17 @@ bool StageForm::factor_start(const ChainMatrix& to_come) {
   return true;
 }
 
-void StageForm::solve(const PerKind<const double*>& forces) {
+template <int kModels>
+void StageForm<kModels>::solve(const PerKind<const double*>& forces) {
   faint_pull_ = -faint_pull_;
   PerKind<bool> kinds{};
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     kinds[i] = forces[i] != nullptr;
   }
-  const auto add_node = [&](std::size_t k, ChainVector& g) {
-    g(AxisChain::kNozzle) += node_pull_[k] - faint_pull_;
+  const auto add_node = [&](std::size_t k, State& g) {
+    for (std::size_t i = 0; i < kModels; ++i) {
+      g(nozzle(i)) += node_pull_[k](static_cast<Eigen::Index>(i)) - faint_pull_;
+    }
     for (const RowKind kind : kNodeKinds) {
       if (forces[index_of(kind)] != nullptr) {
         g(component_of(kind)) -= forces[index_of(kind)][k];
@@ -228,20 +272,21 @@ void StageForm::solve(const PerKind<const double*>& forces) {
   const double* const jerk_force = forces[index_of(RowKind::jerk)];
   // The model's decrease is ½ Σ r²/R over the inputs, and the same for the start.
   decrement_ = 0.0;
-  ChainVector g = ChainVector::Zero();
+  State g = State::Zero();
   add_node(nodes_ - 1, g);
   for (std::size_t k = nodes_ - 1; k-- > 0;) {
     const Stage& stage = stages_[k];
     const double slope = window_->jerk_weight * inputs_[k] -
                          (jerk_force != nullptr ? jerk_force[k] : 0.0) +
-                         middle_pull_[k] * middle_input_ + input_.dot(g);
+                         middle_pull_[k].dot(middle_input_) + input_.dot(g);
     feedforward_[k] = -slope * stage.inverse_curvature;
     decrement_ -= 0.5 * slope * feedforward_[k];
-    g = transition_.transpose() * g + middle_pull_[k] * middle_ + slope * stage.feedback;
+    g = transition_.transpose() * g + middle_ * middle_pull_[k] + slope * stage.feedback;
     add_node(k, g);
   }
-  const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 5, 1> at_start = start_basis_.transpose() * g;
-  const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 5, 1> first = -start_inverse_ * at_start;
+  using Free = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kStates, 1>;
+  const Free at_start = start_basis_.transpose() * g;
+  const Free first = -start_inverse_ * at_start;
   decrement_ -= 0.5 * first.dot(at_start);
   state_steps_[0] = start_basis_ * first;
   for (std::size_t k = 0; k + 1 < nodes_; ++k) {
@@ -251,24 +296,28 @@ void StageForm::solve(const PerKind<const double*>& forces) {
   split_rows(state_steps_, input_steps_, kinds, row_steps_);
 }
 
-void StageForm::advance(double length) {
+template <int kModels>
+void StageForm<kModels>::advance(double length) {
   for (std::size_t k = 0; k < nodes_; ++k) {
     states_[k] += length * state_steps_[k];
   }
   as_array(inputs_) += length * as_array(input_steps_);
 }
 
-void StageForm::save() {
+template <int kModels>
+void StageForm<kModels>::save() {
   saved_states_ = states_;
   saved_inputs_ = inputs_;
 }
 
-void StageForm::restore() {
+template <int kModels>
+void StageForm<kModels>::restore() {
   states_ = saved_states_;
   inputs_ = saved_inputs_;
 }
 
-void StageForm::write(dynamics::AxisTrajectory& base) const {
+template <int kModels>
+void StageForm<kModels>::write(dynamics::AxisTrajectory& base) const {
   const auto put = [&](RowKind kind, double offset, std::vector<double>& to) {
     to.resize(nodes_);
     for (std::size_t k = 0; k < nodes_; ++k) {
@@ -280,5 +329,9 @@ void StageForm::write(dynamics::AxisTrajectory& base) const {
   put(RowKind::accel, 0.0, base.accel_mm_s2);
   window_->keep_ends(base);
 }
+
+template class StageForm<1>;
+template class StageForm<3>;
+template class StageForm<5>;
 
 }  // namespace unflex::compensate

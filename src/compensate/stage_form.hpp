@@ -1,7 +1,10 @@
 // The window stage by stage: states z_k and inputs j_k of axis_chain.hpp, stepped by a Riccati
 // recursion. Several times the work of the flat form (flat_form.hpp), but it takes any window: the
 // recursion never expresses the nozzle by differences of what the base does, so a small ωh costs no
-// digits, and any two nodes will do.
+// digits, and any two nodes will do. It also takes what an axis may be beside
+// (AxisWindow::variants): z then is
+//
+//   z_k = (p_1, ṗ_1, …, p_m, ṗ_m, b, ḃ, b̈)
 //
 // C. V. Rao, S. J. Wright, J. B. Rawlings, "Application of interior-point methods to model
 // predictive control", J. Optim. Theory Appl. 99 (1998) 723–757. With the quadratic
@@ -27,8 +30,14 @@
 
 namespace unflex::compensate {
 
+// kModels: m.
+template <int kModels>
 class StageForm {
  public:
+  static constexpr int kStates = 2 * kModels + 3;
+  using State = Eigen::Matrix<double, kStates, 1>;
+  using Square = Eigen::Matrix<double, kStates, kStates>;
+
   void assign(const ScaledWindow& window);
 
   void evaluate(const PerKind<bool>& kinds);
@@ -50,32 +59,52 @@ class StageForm {
 
  private:
   struct Stage {
-    ChainVector feedback;      // Kᵀ
+    State feedback;            // Kᵀ
     double inverse_curvature;  // 1/R; 0 where K is prescribed
   };
 
   // Whether the input of interval k keeps the end.
   [[nodiscard]] bool prescribed(std::size_t k) const;
-  [[nodiscard]] ChainVector prescribed_feedback(std::size_t k) const;
-  [[nodiscard]] bool factor_start(const ChainMatrix& to_come);
+  [[nodiscard]] State prescribed_feedback(std::size_t k) const;
+  [[nodiscard]] bool factor_start(const Square& to_come);
   void first_guess();
-  void roll_out(const ChainVector& first);
-  void split_rows(const std::vector<ChainVector>& states, const Padded& inputs,
+  void roll_out(const State& first);
+  void split_rows(const std::vector<State>& states, const Padded& inputs,
                   const PerKind<bool>& kinds, PerKind<Padded>& rows) const;
 
   const ScaledWindow* window_ = nullptr;
   std::size_t nodes_ = 0;
-  ChainMatrix transition_;     // Φ
-  ChainVector input_;          // B
-  ChainVector middle_;         // p_c by z_k …
-  double middle_input_ = 0.0;  // … and j_k
-  // δz_0 = start_basis_ y with y free, found by start_inverse_.
-  Eigen::Matrix<double, 5, Eigen::Dynamic, 0, 5, 5> start_basis_;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 5, 5> start_inverse_;
+  // Places in z.
+  static constexpr Eigen::Index kBase = 2 * kModels;
+  static constexpr Eigen::Index kBaseRate = kBase + 1;
+  static constexpr Eigen::Index kBaseAccel = kBase + 2;
+  static constexpr Eigen::Index nozzle(std::size_t model) {
+    return 2 * static_cast<Eigen::Index>(model);
+  }
+  static constexpr Eigen::Index component_of(RowKind kind) {
+    return kBase + static_cast<Eigen::Index>(kind);
+  }
+  [[nodiscard]] static State resting_soon();
 
-  std::vector<ChainVector> states_;
-  std::vector<ChainVector> saved_states_;
-  std::vector<ChainVector> state_steps_;
+  using Middles = Eigen::Matrix<double, kStates, kModels>;
+  using PerModel = Eigen::Matrix<double, kModels, 1>;
+  // p_c − r of the interval after node k, and p − r there.
+  [[nodiscard]] PerModel middle_errors(std::size_t k) const;
+  [[nodiscard]] PerModel errors(std::size_t k) const;
+
+  Square transition_;      // Φ
+  State input_;            // B
+  Middles middle_;         // p_c by z_k …
+  PerModel middle_input_;  // … and j_k
+  PerModel share_;         // α
+  // δz_0 = start_basis_ y with y free, found by start_inverse_.
+  Eigen::Matrix<double, kStates, Eigen::Dynamic, 0, kStates, kStates> start_basis_;
+  using Reduced = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kStates, kStates>;
+  Reduced start_inverse_;
+
+  std::vector<State> states_;
+  std::vector<State> saved_states_;
+  std::vector<State> state_steps_;
   Padded inputs_;
   Padded saved_inputs_;
   Padded input_steps_;
@@ -83,13 +112,17 @@ class StageForm {
   std::vector<Stage> stages_;
   Padded node_weight_;
   Padded middle_weight_;
-  Padded node_pull_;
-  Padded middle_pull_;
+  std::vector<PerModel> node_pull_;
+  std::vector<PerModel> middle_pull_;
   double half_cost_ = 0.0;
   double decrement_ = 0.0;
   double faint_pull_ = 0.0;
   PerKind<Padded> rows_;
   PerKind<Padded> row_steps_;
 };
+
+extern template class StageForm<1>;
+extern template class StageForm<3>;
+extern template class StageForm<5>;
 
 }  // namespace unflex::compensate

@@ -40,6 +40,7 @@ using P = PrinterSettings;
 using L = LimitSettings;
 using E = ExtruderSettings;
 using D = AxisDynamics;
+using R = DynamicsError;
 using M = MassSpringDamper;
 using B = BaseSettings;
 using O = SolveSettings;
@@ -282,6 +283,12 @@ constexpr std::array kKeys = {
         nullptr,
         {},
         true},
+
+    Key{"dynamics.freq_error", &setting<&S::dynamics_error, &R::freq>,
+        Bounds{.min = 0.0, .max = 0.5}, "",
+        "Share by which both frequencies may be off, either way: the base is to suit them all"},
+    Key{"dynamics.damping_error", &setting<&S::dynamics_error, &R::damping>,
+        Bounds{.min = 0.0, .max = 0.9}, "", "The same for both damping ratios"},
 
     Key{"base.max_velocity_mm_s", &setting<&S::base, &B::max_velocity_mm_s>, kPositive, "mm/s",
         "Speed the motor of an axis can do", "2 × limits.max_velocity_mm_s",

@@ -86,7 +86,8 @@ class Compensator {
         engine_(engines.threaded ? engines.threaded() : nullptr),
         pieces_(input, job.input_name, rules_.verify, slots, [this] { wake(); }),
         recorder_(recorder_for(job, rules_.verify)),
-        verifier_(rules_.verify, observation_of(recorder_.get()), job.input_name, job.output_name, slots),
+        verifier_(rules_.verify, observation_of(recorder_.get(), rules_.verify), job.input_name,
+                  job.output_name, slots),
         pool_(std::max(job.workers, 1U), slots) {}
 
   Status work() {
@@ -164,7 +165,7 @@ class Compensator {
             "the plan itself accelerates an axis by {:.0f} mm/s², more than base.max_accel_mm_s2",
             accel);
       } else if (nodes <= kMaxRunNodes) {
-        job->spans = compensate::cut(nodes, rules_.setup);
+        job->spans = compensate::mesh(job->course(), job->grid, rules_.setup);
       } else {
         job->failure = fmt::format("{:.0f} s of motion without a stop are too long to be handled",
                                    static_cast<double>(nodes) * rules_.setup.period_s);
@@ -172,7 +173,7 @@ class Compensator {
       job->results.resize(job->spans.size());
       job->missing = 2 * job->spans.size();
       job->prepared = job->spans.empty();
-      report_->windows_total += job->spans.size();
+      report_->windows_total += compensate::windows_to_solve(job->spans);
       nodes_queued_ += nodes_of(*job);
       if (checks_) {
         gaps_.choose(*job);
@@ -232,8 +233,14 @@ class Compensator {
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t axis = 0; axis < 2; ++axis) {
         tickets_.push_back({job, first + i, axis});
-        processes_->submit(first_ticket_ + tickets_.size() - 1,
-                           axis == 0 ? windows[i].x : windows[i].y);
+        const compensate::AxisWindow& window = axis == 0 ? windows[i].x : windows[i].y;
+        if (job->spans[first + i].cruise) {
+          // Never the last of a run, so that it will be prepared when that one is.
+          job->results[first + i][axis] = axis_result(compensate::along(window));
+          --job->missing;
+        } else {
+          processes_->submit(first_ticket_ + tickets_.size() - 1, window);
+        }
       }
     }
   }

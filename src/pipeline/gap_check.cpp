@@ -15,7 +15,7 @@ constexpr double kNothing_mm = 1e-6;
 
 void GapCheck::choose(RunJob& job) {
   for (std::size_t window = 0; window < job.spans.size(); ++window) {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
+    for (std::size_t axis = 0; axis < 2 && !job.spans[window].cruise; ++axis) {
       const std::uint64_t number = seen_++;
       // Not std::uniform_int_distribution, whose numbers are each library's own.
       const std::uint64_t slot = number < kProbes ? number : random_() % (number + 1);

@@ -76,10 +76,9 @@ class Inspector {
     if (piece.is_run) {
       result_->runs += piece.begins_run() ? 1 : 0;
       result_->run_time_s += planner::duration_s(piece.moves);
-      result_->windows +=
-          compensate::cut(
-              compensate::node_grid({piece.before, piece.moves, piece.after}, setup).count, setup)
-              .size();
+      const compensate::Course course(piece.before, piece.moves, piece.after);
+      result_->windows += compensate::windows_to_solve(
+          compensate::mesh(course, compensate::node_grid(course, setup), setup));
     }
   }
 
@@ -125,7 +124,7 @@ class Inspector {
   }
 
   void add_limits(const gcode::Event& event) {
-    for (const machine::LimitValue& limit : machine::limit_values(event.limits)) {
+    for (const machine::LimitValue& limit : machine::limit_values(*event.limits)) {
       LimitInPrint& known = result_->limits[limit.key];
       if (known.times++ == 0) {
         known.first_value = limit.value;
@@ -145,7 +144,7 @@ class Inspector {
   // By the firmware's own plan, which unlike that of the pieces goes through lifts without a stop.
   void plan(const gcode::Event& event) {
     if (event.kind != gcode::EventKind::move) {
-      planner_->apply(event.limits);
+      planner_->apply(*event.limits);
     }
     for (const gcode::Segment& segment : event.segments) {
       planner_->add(segment);

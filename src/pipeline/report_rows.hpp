@@ -23,8 +23,9 @@ void add_performance(std::chrono::steady_clock::time_point begin, report::Report
 // What gathers for an HTML report, if the job asks for one.
 [[nodiscard]] std::unique_ptr<record::Recorder> recorder_for(const Job& job,
                                                              const verify::Rules& rules);
-// What it asks of the verification; nothing without one.
-[[nodiscard]] verify::Observation observation_of(record::Recorder* recorder);
+// What a verification is to measure beside, for the report and for the recorder, if there is one.
+[[nodiscard]] verify::Observation observation_of(record::Recorder* recorder,
+                                                 const verify::Rules& rules);
 
 // Puts the figures of a verification, and what was recorded meanwhile, into the report.
 void add_verification(const verify::VerifyReport& verified, record::Recorder* recorder,

@@ -86,7 +86,8 @@ void solve_windows(RunJob& job, std::size_t first, std::size_t count,
   for (std::size_t i = 0; i < count; ++i) {
     compensate::AxisWindow* const problems[] = {&windows[i].x, &windows[i].y};
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      Result<compensate::AxisSolution> solution = engine.solve(*problems[axis]);
+      Result<compensate::AxisSolution> solution =
+          compensate::solve(engine, job.spans[first + i], *problems[axis]);
       for (Probe& probe : job.probes) {
         if (solution && probe.window == first + i && probe.axis == axis) {
           probe.problem = std::move(*problems[axis]);

@@ -48,11 +48,40 @@ double planned_base_accel(const machine::Settings& settings) {
          std::min(2.0 * grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);
 }
 
+// What the axis is in the middle of its band counts so much, the rest its edges.
+constexpr double kMiddleShare = 0.25;
+
+// The edges of the band that the axis may be in, if it is one.
+std::vector<compensate::AxisVariant> variants(const machine::AxisDynamics& dynamics,
+                                              const machine::DynamicsError& error) {
+  std::vector<compensate::AxisVariant> edges;
+  if (error.freq <= 0.0 && error.damping <= 0.0) {
+    return edges;
+  }
+  const auto add = [&](double freq_factor, double damping_factor) {
+    edges.push_back({dynamics::from_frequency(dynamics.freq_hz * freq_factor,
+                                              dynamics.damping_ratio * damping_factor)});
+  };
+  for (const double sign : {-1.0, 1.0}) {
+    if (error.freq > 0.0 && error.damping > 0.0) {
+      add(1.0 + sign * error.freq, 1.0 - error.damping);
+      add(1.0 + sign * error.freq, 1.0 + error.damping);
+    } else {
+      add(1.0 + sign * error.freq, 1.0 + sign * error.damping);
+    }
+  }
+  for (compensate::AxisVariant& edge : edges) {
+    edge.share = (1.0 - kMiddleShare) / static_cast<double>(edges.size());
+  }
+  return edges;
+}
+
 compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
                                  const std::optional<machine::Range>& travel,
                                  const machine::Settings& settings) {
   compensate::AxisSetup setup;
   setup.axis = axis(dynamics);
+  setup.variants = variants(dynamics, settings.dynamics_error);
   setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
   setup.limits.max_accel_mm_s2 = planned_base_accel(settings);
   if (settings.base.max_jerk_mm_s3 > 0.0) {

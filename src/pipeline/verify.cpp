@@ -19,6 +19,10 @@ report::DeviationRow row(const verify::DeviationStats& stats) {
           stats.tracking_rms_mm, stats.duration_s,     stats.contour_max_line};
 }
 
+report::Spread spread(const verify::Deviation& deviation) {
+  return {deviation.extruding.contour_max_mm, deviation.extruding.contour_rms_mm};
+}
+
 report::DeviationRows rows(const verify::Deviation& deviation) {
   return {row(deviation.extruding), row(deviation.all)};
 }
@@ -70,8 +74,8 @@ std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rul
   return std::make_unique<record::Recorder>(options);
 }
 
-verify::Observation observation_of(record::Recorder* recorder) {
-  return recorder != nullptr ? recorder->observation() : verify::Observation{};
+verify::Observation observation_of(record::Recorder* recorder, const verify::Rules& rules) {
+  return {verify::detuned(rules.nozzle), recorder != nullptr ? &recorder->observer() : nullptr};
 }
 
 void add_verification(const verify::VerifyReport& verified, record::Recorder* recorder,
@@ -81,6 +85,11 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder* re
   }
   report.uncompensated = rows(verified.uncompensated);
   report.compensated = rows(verified.compensated);
+  for (std::size_t i = 0; i < verified.detuned.size(); ++i) {
+    report.sensitivity.push_back({verify::kFrequencyErrors[i],
+                                  spread(verified.detuned[i].uncompensated),
+                                  spread(verified.detuned[i].compensated)});
+  }
   report.reference_time_s = verified.reference_time_s;
   report.emitted_time_s = verified.emitted_time_s;
   report.base_max_velocity_mm_s = verified.base_max_velocity_mm_s;
@@ -114,7 +123,7 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   const std::unique_ptr<record::Recorder> recorder = recorder_for(job, rules);
   const Result<verify::VerifyReport> result =
       verify::verify(input, job.input_name, output, job.output_name, rules, progress,
-                     observation_of(recorder.get()));
+                     observation_of(recorder.get(), rules));
   if (!result) {
     return tl::unexpected(result.error());
   }

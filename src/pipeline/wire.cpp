@@ -85,6 +85,10 @@ bool transfer(int socket, char* data, std::size_t size, bool sending) {
 std::string pack(const compensate::AxisWindow& window) {
   Writer writer;
   writer.value(window.axis);
+  writer.value(window.variants.size());
+  for (const compensate::AxisVariant& variant : window.variants) {
+    writer.value(variant);
+  }
   writer.value(window.period_s);
   writer.values(window.reference_mm);
   writer.values(window.weight);
@@ -99,6 +103,10 @@ compensate::AxisWindow unpack_window(std::string_view bytes) {
   Reader reader(bytes);
   compensate::AxisWindow window;
   window.axis = reader.value<dynamics::FlexibleAxis>();
+  window.variants.resize(reader.value<std::size_t>());
+  for (compensate::AxisVariant& variant : window.variants) {
+    variant = reader.value<compensate::AxisVariant>();
+  }
   window.period_s = reader.value<double>();
   window.reference_mm = reader.values();
   window.weight = reader.values();

@@ -7,20 +7,8 @@
 namespace unflex::record {
 namespace {
 
-// By how much true frequencies are off; in between they are as set.
-constexpr std::array<double, 4> kErrors = {-0.10, -0.05, 0.05, 0.10};
+// Errors below zero come before those above.
 constexpr std::size_t kBelow = 2;
-// The nozzle is a smooth function of time: for a tenth of the steps the maxima are the same within
-// one percent.
-constexpr double kCoarseStep_s = 1e-3;
-
-verify::NozzleModel detuned(const verify::NozzleModel& model, double error) {
-  verify::NozzleModel result = model;
-  result.x.omega_rad_s *= 1.0 + error;
-  result.y.omega_rad_s *= 1.0 + error;
-  result.step_s = std::max(model.step_s, kCoarseStep_s);
-  return result;
-}
 
 report::Spread spread(const verify::Deviation& deviation) {
   return {deviation.extruding.contour_max_mm, deviation.extruding.contour_rms_mm};
@@ -37,22 +25,17 @@ std::vector<Value> in_order(const Value& main, const std::vector<Value>& others)
 }  // namespace
 
 Recorder::Recorder(const Options& options)
-    : options_(options), gatherer_(std::make_unique<Gatherer>(options, kErrors.size() + 1)) {}
+    : options_(options),
+      gatherer_(std::make_unique<Gatherer>(options, verify::kFrequencyErrors.size() + 1)) {}
 
 Recorder::~Recorder() = default;
 
-verify::Observation Recorder::observation() {
-  verify::Observation observation;
-  for (const double error : kErrors) {
-    observation.detuned.push_back(detuned(options_.nozzle, error));
-  }
-  observation.observer = gatherer_.get();
-  return observation;
-}
+verify::Observer& Recorder::observer() { return *gatherer_; }
 
 report::Recording Recorder::finish(const verify::VerifyReport& verified) {
   report::Recording recording = gatherer_->finish();
-  recording.frequency_errors = in_order(0.0, {kErrors.begin(), kErrors.end()});
+  recording.frequency_errors =
+      in_order(0.0, {verify::kFrequencyErrors.begin(), verify::kFrequencyErrors.end()});
   std::vector<report::Spread> before;
   std::vector<report::Spread> after;
   for (const verify::Detuned& other : verified.detuned) {

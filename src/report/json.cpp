@@ -23,6 +23,19 @@ Json row_json(const DeviationRow& row) {
           {"contour_max_line", row.contour_max_line}};
 }
 
+Json sensitivity_json(const std::vector<Sensitivity>& sensitivity) {
+  const auto spread = [](const Spread& s) {
+    return Json{{"contour_max_mm", s.max_mm}, {"contour_rms_mm", s.rms_mm}};
+  };
+  Json array = Json::array();
+  for (const Sensitivity& one : sensitivity) {
+    array.push_back({{"frequency_error", one.frequency_error},
+                     {"uncompensated", spread(one.uncompensated)},
+                     {"compensated", spread(one.compensated)}});
+  }
+  return array;
+}
+
 Json rows_json(const DeviationRows& rows) {
   return {{"extruding", row_json(rows.extruding)}, {"all", row_json(rows.all)}};
 }
@@ -55,6 +68,7 @@ void add_motion(const Report& r, Json& json) {
   json["print_time_s"] = {{"reference", r.reference_time_s}, {"emitted", r.emitted_time_s}};
   json["deviation"] = {{"uncompensated", rows_json(r.uncompensated)},
                        {"compensated", rows_json(r.compensated)}};
+  json["sensitivity"] = sensitivity_json(r.sensitivity);
   json["base"] = {{"max_velocity_mm_s", r.base_max_velocity_mm_s},
                   {"max_accel_mm_s2", r.base_max_accel_mm_s2}};
 }

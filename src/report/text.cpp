@@ -25,6 +25,20 @@ void write_deviation(Sink out, std::string_view moves, const DeviationRow& befor
                  cell(before.contour_rms_mm, after.contour_rms_mm));
 }
 
+// What the frequency being off would do.
+void write_sensitivity(Sink out, const std::vector<Sensitivity>& sensitivity) {
+  if (sensitivity.empty()) {
+    return;
+  }
+  std::string errors;
+  std::string rms;
+  for (const Sensitivity& one : sensitivity) {
+    errors += fmt::format("{}{:+.0f}", errors.empty() ? "" : ", ", 100.0 * one.frequency_error);
+    rms += fmt::format("{}{}", rms.empty() ? "" : ", ", micrometres_text(one.compensated.rms_mm));
+  }
+  fmt::format_to(out, "sensitivity   {} µm RMS if frequencies are off by {} %\n", rms, errors);
+}
+
 void write_times(Sink out, const Report& r) {
   const double change = r.reference_time_s > 0.0
                             ? 100.0 * (r.emitted_time_s - r.reference_time_s) / r.reference_time_s
@@ -107,6 +121,7 @@ std::string to_text(const Report& report) {
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "contour, µm", "max", "p99", "RMS");
   write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
   write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
+  write_sensitivity(out, report.sensitivity);
   write_times(out, report);
   write_runs(out, report);
   write_output(out, report);

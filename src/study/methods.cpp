@@ -75,15 +75,16 @@ Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSe
   setup.x.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   const compensate::NodeGrid grid = compensate::node_grid(plan, setup);
-  const auto spans = compensate::cut(grid.count, setup);
+  const auto spans = compensate::mesh(plan, grid, setup);
   const gcode::Position& start = plan.front().segment.start_mm;
   const dynamics::NozzleXY nozzle{{start[gcode::X], 0.0}, {start[gcode::Y], 0.0}};
   std::vector<dynamics::AxisTrajectory> x;
   std::vector<dynamics::AxisTrajectory> y;
   BaseMotion result;
-  for (const compensate::RunWindow& window : compensate::windows(plan, spans, nozzle, setup)) {
-    Result<compensate::AxisSolution> of_x = engine.solve(window.x);
-    Result<compensate::AxisSolution> of_y = engine.solve(window.y);
+  const auto windows = compensate::windows(plan, spans, nozzle, setup);
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    Result<compensate::AxisSolution> of_x = compensate::solve(engine, spans[i], windows[i].x);
+    Result<compensate::AxisSolution> of_y = compensate::solve(engine, spans[i], windows[i].y);
     if (!of_x || !of_y) {
       return tl::unexpected(of_x ? of_y.error() : of_x.error());
     }

@@ -58,7 +58,7 @@ std::unique_ptr<RunJob> job_of(const machine::Settings& s, const RunRules& rules
                  {job->piece.moves.front().segment.start_mm[gcode::Y], 0.0}};
   job->setup = setup_for(rules.setup, job->piece.moves, s);
   job->grid = compensate::node_grid(job->course(), rules.setup);
-  job->spans = compensate::cut(job->grid.count, rules.setup);
+  job->spans = compensate::mesh(job->course(), job->grid, rules.setup);
   job->results.resize(job->spans.size());
   return job;
 }

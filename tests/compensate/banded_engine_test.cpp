@@ -108,6 +108,33 @@ TEST_P(BandedEngineUnder, FindsIpoptsOptimum) {
   EXPECT_GE(solved, 8);
 }
 
+TEST_P(BandedEngineUnder, FindsIpoptsOptimumForAnAxisThatMayBeSeveralThings) {
+  std::mt19937_64 random(8);
+  int solved = 0;
+  for (int trial = 0; trial < 6; ++trial) {
+    const WindowKind kind{.start = trial % 2 == 0, .end = trial % 4 < 2};
+    AxisWindow window = random_path(random, 60 + 40 * static_cast<std::size_t>(trial), kind);
+    GetParam().set(window);
+    window.variants = {{{1.1 * kind.omega_rad_s, kind.zeta}, 0.3},
+                       {{0.9 * kind.omega_rad_s, kind.zeta}, 0.4}};
+    if (trial % 3 == 0) {
+      window.variants.push_back({{0.9 * kind.omega_rad_s, 0.5 * kind.zeta}, 0.1});
+      window.variants.push_back({{1.1 * kind.omega_rad_s, 1.5 * kind.zeta}, 0.05});
+    }
+    const Result<AxisSolution> ipopt = solve_within_limits(window, [&](const ActiveLimits& active) {
+      return solve_by_ipopt(window, active, kIpoptTolerance);
+    });
+    const Result<AxisSolution> solution = make_banded_engine()->solve(window);
+    SCOPED_TRACE(std::string(GetParam().name) + ", window " + std::to_string(trial));
+    ASSERT_EQ(solution.has_value(), ipopt.has_value());
+    if (solution) {
+      ++solved;
+      expect_same(*solution, *ipopt, kSameBaseMm, kSameObjective);
+    }
+  }
+  EXPECT_GE(solved, 4);
+}
+
 TEST_P(BandedEngineUnder, FindsTheSameOptimumByBothForms) {
   std::mt19937_64 random(8);
   int held = 0;
@@ -160,6 +187,16 @@ TEST(BandedEngine, TakesAnyResonanceDampingAndPeriod) {
         expect_same(solution, *ipopt, kSameBaseMm, kSameObjective);
       }
     }
+  }
+}
+
+TEST(BandedEngine, TakesVariantsThatAreTheAxisItselfForOneThing) {
+  std::mt19937_64 random(12);
+  for (const std::size_t variants : {2U, 4U}) {
+    AxisWindow window = random_path(random, 200, {});
+    const AxisSolution alone = solve(window);
+    window.variants.assign(variants, {window.axis, 0.2});
+    expect_same(solve(window), alone, 1e-9, 1e-9);
   }
 }
 

@@ -110,7 +110,9 @@ inline Result<AxisSolution> solve_by_ipopt(AxisWindow window, const ActiveLimits
   result.objective = solution->objective * kLengthUnitMm * kLengthUnitMm * window.period_s;
   for (std::size_t k = 0; k < window.nodes(); ++k) {
     const auto z = collocation::node(problem, solution->x, static_cast<int>(k));
-    const auto at = [&](AxisProblem::Component c) { return problem.to_physical(c, z(c)); };
+    const auto at = [&](AxisProblem::Component c) {
+      return problem.to_physical(c, z(problem.place(c)));
+    };
     result.base.position_mm.push_back(at(AxisProblem::kBase));
     result.base.velocity_mm_s.push_back(at(AxisProblem::kBaseRate));
     result.base.accel_mm_s2.push_back(at(AxisProblem::kBaseAccel));

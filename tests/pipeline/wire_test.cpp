@@ -25,6 +25,12 @@ compensate::AxisWindow some_window() {
 void expect_same(const compensate::AxisWindow& a, const compensate::AxisWindow& b) {
   EXPECT_EQ(a.axis.omega_rad_s, b.axis.omega_rad_s);
   EXPECT_EQ(a.axis.zeta, b.axis.zeta);
+  ASSERT_EQ(a.variants.size(), b.variants.size());
+  for (std::size_t i = 0; i < a.variants.size(); ++i) {
+    EXPECT_EQ(a.variants[i].axis.omega_rad_s, b.variants[i].axis.omega_rad_s);
+    EXPECT_EQ(a.variants[i].axis.zeta, b.variants[i].axis.zeta);
+    EXPECT_EQ(a.variants[i].share, b.variants[i].share);
+  }
   EXPECT_EQ(a.period_s, b.period_s);
   EXPECT_EQ(a.reference_mm, b.reference_mm);
   EXPECT_EQ(a.weight, b.weight);
@@ -48,6 +54,7 @@ TEST(Wire, BringsAWindowAcrossUnchanged) {
   expect_same(window, unpack_window(pack(window)));
   window.start = compensate::AxisWindow::Start{{2.5, -31.0}, 2.25};
   window.end_base_mm = -0.125;
+  window.variants = {{{100.5, 0.03}, 0.25}, {{140.0, 0.3}, 0.125}};
   expect_same(window, unpack_window(pack(window)));
 }
 

@@ -74,7 +74,7 @@ Plan plan_file(const fs::path& path) {
   bool pressure_advance = false;
   while (reader.next(line).value_or(false)) {
     const gcode::Event event = interpreter.interpret(line);
-    if (event.kind == gcode::EventKind::limits) planner.apply(event.limits);
+    if (event.kind == gcode::EventKind::limits) planner.apply(*event.limits);
     for (const gcode::Segment& segment : event.segments) {
       if (!planner.add(segment)) continue;
       if (planner.pending() + plan.moves.size() > 1) plan.dwell_s += dwell_since_last_move_s;

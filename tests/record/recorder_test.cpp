@@ -44,8 +44,9 @@ struct Recorded {
     std::istringstream in(input);
     std::istringstream out(output);
     SilentProgress progress;
-    verified =
-        verify::verify(in, "in", out, "out", rules(), progress, recorder.observation()).value();
+    verified = verify::verify(in, "in", out, "out", rules(), progress,
+                              {verify::detuned(rules().nozzle), &recorder.observer()})
+                   .value();
     recording = recorder.finish(verified);
   }
 

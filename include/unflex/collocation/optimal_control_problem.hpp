@@ -9,12 +9,11 @@
 #pragma once
 
 #include <Eigen/Core>
-
 #include <string>
 
 namespace unflex::collocation {
 
-inline constexpr int kMaxStates = 8;
+inline constexpr int kMaxStates = 12;
 inline constexpr int kMaxControls = 4;
 inline constexpr int kMaxPoint = kMaxStates + kMaxControls;
 
@@ -57,7 +56,8 @@ class OptimalControlProblem {
   [[nodiscard]] virtual PointByPointPattern cost_pattern() const = 0;
   [[nodiscard]] virtual bool quadratic_cost() const = 0;
 
-  // Weight of the squared slope, the diagonal of R, and the largest absolute slope (kNoBound: free).
+  // Weight of the squared slope, the diagonal of R, and the largest absolute slope (kNoBound:
+  // free).
   [[nodiscard]] virtual ControlVector slope_weight() const = 0;
   [[nodiscard]] virtual ControlVector slope_limit() const = 0;
 

@@ -1,11 +1,13 @@
 // The optimal-control problem of one axis over one window, as plain data, and the interface behind
 // which its solvers stand.
 //
-//   min ∫ w(t) (p − r)² dt + ρ ∫ (d b̈/dt)² dt
-//   s.t.  p̈ = 2ζω(ḃ − ṗ) + ω²(b − p),   b̈ piecewise linear,
+//   min Σ_i α_i ∫ w(t) (p_i − r)² dt + ρ ∫ (d b̈/dt)² dt
+//   s.t.  p̈_i = 2ζ_i ω_i (ḃ − ṗ_i) + ω_i² (b − p_i),   b̈ piecewise linear,
 //         |ḃ| ≤ V,  |b̈| ≤ A,  |d b̈/dt| ≤ J,  b_min ≤ b ≤ b_max
 //
 //   r  reference, mm       p  nozzle, mm       b  base, mm       w  weight       h  node period, s
+//   i  what the axis may be: one thing where it is known, several that share the base where it is
+//      not; α_i, its share, adds up to 1
 //
 // Nozzle and base are both unknown: with the nozzle fixed to the plan the problem is
 // overdetermined (docs/theory.md).
@@ -34,16 +36,26 @@ struct BaseLimits {
   double max_position_mm = std::numeric_limits<double>::infinity();
 };
 
+// Something else an axis may be.
+struct AxisVariant {
+  dynamics::FlexibleAxis axis;
+  double share = 0.0;  // α
+};
+// An axis is one of 1, 3 or 5 things.
+inline constexpr std::size_t kMostVariants = 4;
+
 struct AxisWindow {
   dynamics::FlexibleAxis axis;
-  double period_s = 1e-3;  // h
+  std::vector<AxisVariant> variants;  // 0, 2 or 4; `axis` has the share that they leave
+  double period_s = 1e-3;             // h
   // r and w at the nodes and in the middles between them: 2n − 1 values for n nodes, n ≥ 2.
   std::vector<double> reference_mm;
   std::vector<double> weight;
   // ρ/h⁶: without dimension, so that one value serves all periods.
   double jerk_weight = 1e-2;
   BaseLimits limits;
-  // At the first node: the nozzle as given, the base at rest there. Unset: free.
+  // At the first node: the nozzle as given, whatever the axis is, the base at rest there. Unset:
+  // free.
   struct Start {
     dynamics::NozzleState nozzle;
     double base_mm = 0.0;
@@ -51,8 +63,8 @@ struct AxisWindow {
   std::optional<Start> start;
   // At the last node: the base at rest there. Unset: free.
   std::optional<double> end_base_mm;
-  // A motion not far from the solution, at the nodes: where an engine that iterates from a point may
-  // begin. It has no influence on the solution, and is not passed on to worker processes.
+  // A motion not far from the solution, at the nodes: where an engine that iterates from a point
+  // may begin. It has no influence on the solution, and is not passed on to worker processes.
   struct Guess {
     std::vector<dynamics::NozzleState> nozzle;
     dynamics::AxisTrajectory base;
@@ -60,6 +72,9 @@ struct AxisWindow {
   std::optional<Guess> guess;
 
   [[nodiscard]] std::size_t nodes() const { return (reference_mm.size() + 1) / 2; }
+  // Variant i, `axis` being the first.
+  [[nodiscard]] std::size_t models() const { return variants.size() + 1; }
+  [[nodiscard]] AxisVariant model(std::size_t i) const;
 };
 
 struct AxisSolution {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unflex/compensate/axis_window.hpp"
+#include "unflex/core/error.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/planner/planner.hpp"
 
@@ -17,6 +18,7 @@ namespace unflex::compensate {
 
 struct AxisSetup {
   dynamics::FlexibleAxis axis;
+  std::vector<AxisVariant> variants;  // as in AxisWindow
   // Position limits may be widened per run to where the sliced path itself goes.
   BaseLimits limits;
 };
@@ -63,11 +65,22 @@ struct WindowSpan {
   std::size_t last = 0;
   std::size_t core_first = 0;
   std::size_t core_last = 0;
+  // The reference moves evenly and has done so for long: the base goes with it, as any solution
+  // would, and there is nothing to solve.
+  bool cruise = false;
 };
 
-// The whole run if it is short enough, otherwise cores of equal length with overlap. Depends on
-// nothing but the numbers given, so that the result is the same for any number of workers.
+// All of so many nodes if they are few enough, otherwise cores of equal length with overlap.
+// Depends on nothing but the numbers given, so that the result is the same for any number of
+// workers.
 [[nodiscard]] std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup);
+
+// Windows where the plan accelerates, and cruises between them. The first and the last are windows.
+[[nodiscard]] std::vector<WindowSpan> mesh(const Course& course, const NodeGrid& grid,
+                                           const Setup& setup);
+
+// Those that are no cruises.
+[[nodiscard]] std::size_t windows_to_solve(const std::vector<WindowSpan>& spans);
 
 // Both axes of one window.
 struct RunWindow {
@@ -86,6 +99,13 @@ struct RunWindow {
                                              const std::vector<WindowSpan>& spans,
                                              std::size_t first, std::size_t count,
                                              const dynamics::NozzleXY& nozzle, const Setup& setup);
+
+// One axis of a cruise: the reference.
+[[nodiscard]] AxisSolution along(const AxisWindow& window);
+
+// One axis of a window: what the engine says, or in a cruise the reference.
+[[nodiscard]] Result<AxisSolution> solve(const Engine& engine, const WindowSpan& span,
+                                         const AxisWindow& window);
 
 // Joins the solutions of the windows, in the order of `spans`, blending over the middle of each
 // overlap.

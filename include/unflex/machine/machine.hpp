@@ -100,6 +100,12 @@ struct AxisDynamics {
   double damping_ratio = 0.06;
 };
 
+// By what share the axes' frequencies and damping ratios may be off, either way.
+struct DynamicsError {
+  double freq = 0.0;
+  double damping = 0.0;
+};
+
 // What the motors can do, per axis.
 struct BaseSettings {
   std::optional<double> max_velocity_mm_s;  // unset: 2 · limits.max_velocity_mm_s
@@ -141,6 +147,7 @@ struct Settings {
   ExtruderSettings extruder;
   AxisDynamics dynamics_x;
   AxisDynamics dynamics_y;
+  DynamicsError dynamics_error;
   BaseSettings base;
   SolveSettings solve;
   EmitSettings emit;
@@ -205,8 +212,8 @@ struct Sources {
 [[nodiscard]] Result<Settings> parse(std::string_view text, const std::string& name,
                                      const std::vector<std::string>& overrides);
 
-// Every key with its value in force as TOML text, and where it came from as a comment. Read again it
-// gives the same values.
+// Every key with its value in force as TOML text, and where it came from as a comment. Read again
+// it gives the same values.
 [[nodiscard]] std::string to_toml(const Settings& settings);
 
 // (key, value in force as TOML writes it, origin) for every key, in the order of the documentation.

@@ -23,8 +23,9 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // What verify::verify() is to be called with; once, and before the recorder ends.
-  [[nodiscard]] verify::Observation observation();
+  // Watches a verification that also measures verify::detuned(); once, and before the recorder
+  // ends.
+  [[nodiscard]] verify::Observer& observer();
   // Of the verification that came out so.
   [[nodiscard]] report::Recording finish(const verify::VerifyReport& verified);
 

@@ -27,6 +27,13 @@ struct DeviationRows {
   DeviationRow all;
 };
 
+// Of extruding moves, if the true frequencies are above those assumed by the share frequency_error.
+struct Sensitivity {
+  double frequency_error = 0.0;
+  Spread uncompensated;
+  Spread compensated;
+};
+
 // A run that kept its original moves, and why.
 struct Fallback {
   std::size_t first_line = 0;
@@ -77,6 +84,7 @@ struct Report {
 
   DeviationRows uncompensated;
   DeviationRows compensated;
+  std::vector<Sensitivity> sensitivity;  // by rising error
 
   double base_max_velocity_mm_s = 0.0;
   double base_max_accel_mm_s2 = 0.0;

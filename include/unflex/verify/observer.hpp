@@ -1,6 +1,7 @@
 // Watches a verification. Nothing of it costs anything when nobody does.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -59,6 +60,12 @@ class Observer {
  protected:
   Observer() = default;
 };
+
+// By how much true frequencies may be off, for what that would do.
+inline constexpr std::array<double, 4> kFrequencyErrors = {-0.10, -0.05, 0.05, 0.10};
+
+// The nozzle with each of these errors.
+[[nodiscard]] std::vector<NozzleModel> detuned(const NozzleModel& model);
 
 // What else to measure, and for whom.
 struct Observation {

@@ -1,0 +1,26 @@
+#include <algorithm>
+
+#include "unflex/verify/observer.hpp"
+
+namespace unflex::verify {
+namespace {
+
+// The nozzle is a smooth function of time: for a tenth of the steps the maxima are the same within
+// one percent.
+constexpr double kCoarseStep_s = 1e-3;
+
+}  // namespace
+
+std::vector<NozzleModel> detuned(const NozzleModel& model) {
+  std::vector<NozzleModel> result;
+  for (const double error : kFrequencyErrors) {
+    NozzleModel other = model;
+    other.x.omega_rad_s *= 1.0 + error;
+    other.y.omega_rad_s *= 1.0 + error;
+    other.step_s = std::max(model.step_s, kCoarseStep_s);
+    result.push_back(other);
+  }
+  return result;
+}
+
+}  // namespace unflex::verify

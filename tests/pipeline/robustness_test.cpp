@@ -1,0 +1,126 @@
+// What a frequency that is not quite the assumed one does to a print.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "jobs.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+using testing::complaints;
+using testing::JobFolder;
+
+// The walls of a ring at 10 000 mm/s², whatever the slicer asked for.
+std::string fast_walls(std::istream& print) {
+  std::string text;
+  for (std::string line; std::getline(print, line);) {
+    if (!line.starts_with("M204")) {
+      text += line + "\n";
+    }
+  }
+  return text;
+}
+
+report::Report compensated(const std::string& text, std::vector<std::string> overrides) {
+  overrides.insert(overrides.begin(), "limits.max_accel_mm_s2=10000");
+  const JobFolder folder(text, overrides);
+  Job job = folder.job(2);
+  job.record = true;
+  SilentProgress progress;
+  Result<report::Report> report = compensate(job, progress);
+  EXPECT_TRUE(report.has_value()) << to_string(report.error());
+  EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
+  return std::move(*report);
+}
+
+double worst_rms_mm(const report::Report& report, const std::string& name) {
+  for (const report::Contender& contender : report.recording->contenders) {
+    if (contender.name == name) {
+      double worst = 0.0;
+      for (const report::Spread& spread : contender.spreads) {
+        worst = std::max(worst, spread.rms_mm);
+      }
+      return worst;
+    }
+  }
+  ADD_FAILURE() << name << " has not been measured";
+  return 0.0;
+}
+
+// What the band of ±10 % gains at its edges and costs in its middle.
+void expect_robust(const std::string& text) {
+  const report::Report nominal = compensated(text, {});
+  const report::Report robust = compensated(text, {"dynamics.freq_error=0.1"});
+  EXPECT_LE(worst_rms_mm(robust, "unflex"), 0.8 * worst_rms_mm(nominal, "unflex"));
+  EXPECT_LE(worst_rms_mm(robust, "unflex"), worst_rms_mm(robust, "ZV"));
+  EXPECT_GT(robust.compensated.extruding.contour_rms_mm,
+            nominal.compensated.extruding.contour_rms_mm)
+      << "nothing is for nothing";
+  EXPECT_LT(robust.compensated.extruding.contour_rms_mm,
+            0.2 * robust.uncompensated.extruding.contour_rms_mm);
+}
+
+TEST(Robustness, OfABandOfFrequenciesIsWorthAFifthAtItsEdges) {
+  std::ifstream print(std::filesystem::path(UNFLEX_TEST_DATA) / "pipeline_wallring.gcode");
+  expect_robust(fast_walls(print));
+}
+
+TEST(SamplesRobustness, OfABandOfFrequenciesIsWorthAFifthAtItsEdges) {
+  const auto path =
+      std::filesystem::path(UNFLEX_SHARED) / "samples" / "wallring_mini_marlin2.gcode";
+  std::ifstream print(path);
+  if (!print) {
+    GTEST_SKIP() << "no shared samples beside the repository";
+  }
+  expect_robust(fast_walls(print));
+}
+
+TEST(Robustness, MayBeOfTheDampingToo) {
+  std::ifstream print(std::filesystem::path(UNFLEX_TEST_DATA) / "pipeline_wallring.gcode");
+  const std::string text = fast_walls(print);
+  const auto worst_mm = [&](const report::Report& report) {
+    return report.compensated.extruding.contour_rms_mm;
+  };
+  const report::Report band =
+      compensated(text, {"dynamics.freq_error=0.05", "dynamics.damping_error=0.5"});
+  EXPECT_LT(worst_mm(band), 0.1 * band.uncompensated.extruding.contour_rms_mm);
+  EXPECT_NE(worst_mm(band), worst_mm(compensated(text, {"dynamics.freq_error=0.05"})));
+}
+
+TEST(Robustness, IsReportedForEveryPrint) {
+  std::ifstream print(std::filesystem::path(UNFLEX_TEST_DATA) / "pipeline_wallring.gcode");
+  const std::string text = fast_walls(print);
+  const report::Report report = compensated(text, {});
+  ASSERT_EQ(report.sensitivity.size(), 4U);
+  const std::array<double, 4> errors = {-0.10, -0.05, 0.05, 0.10};
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    EXPECT_EQ(report.sensitivity[i].frequency_error, errors[i]);
+    EXPECT_GT(report.sensitivity[i].compensated.rms_mm,
+              report.compensated.extruding.contour_rms_mm);
+  }
+  // As if that were the frequency the file is measured with.
+  const JobFolder folder(text, {"limits.max_accel_mm_s2=10000"});
+  SilentProgress progress;
+  ASSERT_TRUE(compensate(folder.job(), progress).has_value());
+  Job job = folder.job();
+  job.settings.dynamics_x.freq_hz *= 1.1;
+  job.settings.dynamics_y.freq_hz *= 1.1;
+  const Result<report::Report> verified = verify(job, progress);
+  ASSERT_TRUE(verified.has_value());
+  EXPECT_NEAR(report.sensitivity[3].compensated.rms_mm,
+              verified->compensated.extruding.contour_rms_mm,
+              0.01 * verified->compensated.extruding.contour_rms_mm);
+}
+
+}  // namespace
+}  // namespace unflex::pipeline
