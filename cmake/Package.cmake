@@ -20,7 +20,7 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME unflex)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
-set(CPACK_COMPONENT_PROGRAM_DESCRIPTION
+set(CPACK_DEBIAN_PROGRAM_DESCRIPTION
 "G-code that takes the flex out of a 3D printer
  The print head of a 3D printer hangs on belts and swings when it takes a
  corner: walls show ringing, corners bulge. unflex reads sliced G-code, works
@@ -36,11 +36,11 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 string(JOIN ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   pkg-config coinor-libipopt-dev libblas-dev liblapack-dev libeigen3-dev libexpected-dev libfmt-dev
   libtomlplusplus-dev nlohmann-json3-dev)
-set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
+set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
 "library that takes the flex out of a 3D printer, for development
  unflex rewrites sliced G-code so that the nozzle of a 3D printer draws the
- sliced path in spite of swinging. This package has its stages as a static C++20
- library, with headers and the files by which CMake finds it.")
+ sliced path in spite of swinging. This package has its stages as a static
+ C++20 library, with headers and the files by which CMake finds it.")
 
 # Debian wants to know where each package comes from.
 configure_file(share/debian/changelog.in ${PROJECT_BINARY_DIR}/package/changelog @ONLY)

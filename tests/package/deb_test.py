@@ -1,4 +1,4 @@
-"""The Debian packages: deb_test.py BUILD VERSION
+"""The Debian packages: deb_test.py BUILD VERSION BUILD_TYPE
 
 Makes them from the build directory BUILD and looks at what is in them; bare_root.sh installs and runs
 them. Exits with 77, which skips the test, where this is not Debian.
@@ -13,7 +13,7 @@ import sys
 import tempfile
 import unittest
 
-BUILD, VERSION = sys.argv[1:3]
+BUILD, VERSION, BUILD_TYPE = sys.argv[1:4]
 PROGRAM = [
     "/usr/bin/unflex",
     "/usr/share/bash-completion/completions/unflex",
@@ -83,7 +83,14 @@ class Packages(unittest.TestCase):
         for package in ("unflex", "libunflex-dev"):
             self.assertEqual(self.field(package, "Version"), VERSION)
             self.assertRegex(self.field(package, "Maintainer"), r"^[^<>]+ <[^<>@ ]+@[^<>@ ]+>$")
-            self.assertGreater(len(self.field(package, "Description").splitlines()), 2)
+
+    def test_descriptions_begin_with_one_line_of_their_own(self):
+        for package, summary in (("unflex", "G-code that takes the flex out of a 3D printer"),
+                                 ("libunflex-dev", "library that takes the flex out of")):
+            lines = self.field(package, "Description").splitlines()
+            self.assertTrue(lines[0].startswith(summary), lines[0])
+            self.assertGreater(len(lines), 3)
+            self.assertEqual([line for line in lines[1:] if not re.match(r" \S", line)], [])
 
     def test_the_program_depends_on_the_libraries_it_links(self):
         depends = self.field("unflex", "Depends")
@@ -113,6 +120,8 @@ class Packages(unittest.TestCase):
     def test_lintian_finds_no_errors_or_warnings(self):
         if not shutil.which("lintian"):
             self.skipTest("there is no lintian")
+        if BUILD_TYPE != "Release":
+            self.skipTest(f"a {BUILD_TYPE} build is not for packages")
         found = subprocess.run(["lintian", "--allow-root", "--fail-on", "error,warning",
                                 self.package("unflex"), self.package("libunflex-dev")],
                                capture_output=True, text=True, check=False)
