@@ -7,6 +7,8 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_VERBATIM_VARIABLES ON)
 set(CPACK_PACKAGE_NAME unflex)
 set(CPACK_PACKAGE_VENDOR "unflex contributors")
+# CPack would put it before each package's own.
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
@@ -22,12 +24,12 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PROGRAM_DESCRIPTION
 "G-code that takes the flex out of a 3D printer
- The print head of a 3D printer hangs on belts and swings when it takes a
- corner: walls show ringing, corners bulge. unflex reads sliced G-code, works
- out how the motors must move so that the nozzle draws the sliced path, and
- writes that motion as G-code for Klipper, Marlin or RepRapFirmware. It replays
- what it wrote by the firmware's own rules and tells how far the nozzle strays,
- before and after.")
+The print head of a 3D printer hangs on belts and swings when it takes a
+corner: walls show ringing, corners bulge. unflex reads sliced G-code, works
+out how the motors must move so that the nozzle draws the sliced path, and
+writes that motion as G-code for Klipper, Marlin or RepRapFirmware. It replays
+what it wrote by the firmware's own rules and tells how far the nozzle strays,
+before and after.")
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libunflex-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SOURCE unflex)
@@ -38,9 +40,9 @@ string(JOIN ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   libtomlplusplus-dev nlohmann-json3-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
 "library that takes the flex out of a 3D printer, for development
- unflex rewrites sliced G-code so that the nozzle of a 3D printer draws the
- sliced path in spite of swinging. This package has its stages as a static
- C++20 library, with headers and the files by which CMake finds it.")
+unflex rewrites sliced G-code so that the nozzle of a 3D printer draws the
+sliced path in spite of swinging. This package has its stages as a static
+C++20 library, with headers and the files by which CMake finds it.")
 
 # Debian wants to know where each package comes from.
 configure_file(share/debian/changelog.in ${PROJECT_BINARY_DIR}/package/changelog @ONLY)
