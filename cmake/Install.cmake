@@ -50,6 +50,7 @@ install(FILES examples/printer.toml examples/washer.gcode
 # Headers of these libraries, by Debian's names of their packages, become part of what is built, and
 # their licences ask to go with it.
 set(copyright_file ${PROJECT_BINARY_DIR}/package/copyright)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS LICENSE)
 file(READ LICENSE copyright)
 string(PREPEND copyright "unflex, with all that its reports are made of (src/report/assets):\n\n")
 foreach(package libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev
