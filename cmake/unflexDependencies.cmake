@@ -1,5 +1,5 @@
-# What the library is built from, looked for by the build and, installed beside unflexConfig.cmake, by
-# every project that links the library. Sets unflex_NOT_FOUND_MESSAGE where something is missing.
+# What the library is built from, looked for by the build and, installed beside unflexConfig.cmake,
+# by every project that links the library. Sets unflex_NOT_FOUND_MESSAGE where something is missing.
 set(unflex_NOT_FOUND_MESSAGE)
 set(unflex_missing)
 

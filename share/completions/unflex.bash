@@ -1,6 +1,6 @@
 # Completion of unflex' command line for bash. It needs nothing but bash itself.
 
-# What a command takes besides files. `unflex COMMAND --help` and this have the same options.
+# What a command takes besides files. `unflex COMMAND --help` has the same options.
 _unflex_options() {
   local print='--printer --set --report -q --quiet'
   case $1 in

@@ -1,4 +1,4 @@
-# Completion of unflex' command line for fish. `unflex COMMAND --help` and this have the same options.
+# Completion of unflex' command line for fish. `unflex COMMAND --help` has the same options.
 
 # Of the words before the cursor those that are commands: "printer init".
 function __unflex_command

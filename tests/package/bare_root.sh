@@ -2,10 +2,10 @@
 # bare_root.sh BUILD [ROOT]
 #
 # Makes the Debian packages from the build directory BUILD, installs them with apt into a bare
-# Debian 12, compensates a print there with the program, then builds the library's example and
-# compensates the print with that. ROOT is a folder that debootstrap has filled or, if it is missing,
-# will fill; without it a temporary one is used. Needs root, debootstrap and Debian's archive
-# (MIRROR, http://deb.debian.org/debian by default), and some minutes.
+# Debian 12, compensates a print there with the program, then builds the library's example
+# and compensates the print with that. ROOT is a folder that debootstrap has filled or, if it is
+# missing, will fill; without it a temporary one is used. Needs root, debootstrap and Debian's
+# archive (MIRROR, http://deb.debian.org/debian by default), and some minutes.
 set -euo pipefail
 
 build=$(realpath -- "${1:?which build directory?}")

@@ -66,7 +66,8 @@ class Completion:
         self.assertEqual(self.candidates("unflex compensate --engine ip"), ["ipopt"])
 
     def test_values_of_options_are_offered(self):
-        self.assertEqual(set(self.candidates("unflex study --engine ")), {"auto", "banded", "ipopt"})
+        self.assertEqual(set(self.candidates("unflex study --engine ")),
+                         {"auto", "banded", "ipopt"})
         self.assertEqual(set(self.candidates("unflex identify --axis ")), {"x", "y"})
         self.assertIn("5B", self.candidates("unflex study --case "))
 

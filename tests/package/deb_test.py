@@ -1,7 +1,7 @@
 """The Debian packages: deb_test.py BUILD VERSION BUILD_TYPE
 
-Makes them from the build directory BUILD and looks at what is in them; bare_root.sh installs and runs
-them. Exits with 77, which skips the test, where this is not Debian.
+Makes them from the build directory BUILD and looks at what is in them; bare_root.sh installs and
+runs them. Exits with 77, which skips the test, where this is not Debian.
 """
 
 import glob

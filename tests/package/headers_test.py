@@ -1,7 +1,7 @@
 """Every installed header on its own: headers_test.py BUILD CXX SOURCES
 
-Installs the headers from the build directory BUILD and has the compiler CXX read each of them alone,
-but for those that a file of SOURCES includes before all others: the build has compiled them alone.
+Installs the headers from the build directory BUILD and has the compiler CXX read each of them
+alone, but for those that a file of SOURCES includes before all others: the build has compiled them alone.
 """
 
 import concurrent.futures
@@ -20,7 +20,8 @@ def output(*command):
 
 
 def files_below(folder):
-    return sorted(os.path.join(where, name) for where, _, names in os.walk(folder) for name in names)
+    return sorted(os.path.join(where, name) for where, _, names in os.walk(folder)
+                  for name in names)
 
 
 def first_includes(folder):
