@@ -77,7 +77,8 @@ class Library(unittest.TestCase):
 
     def test_manual_examples_and_completions_are_where_they_are_looked_for(self):
         for name in ("man/man1/unflex.1.gz", "doc/unflex/cli.md",
-                     "doc/unflex/examples/washer.gcode", "bash-completion/completions/unflex", "zsh/site-functions/_unflex",
+                     "doc/unflex/examples/washer.gcode",
+                     "bash-completion/completions/unflex", "zsh/site-functions/_unflex",
                      "fish/vendor_completions.d/unflex.fish"):
             self.assertTrue(os.path.isfile(os.path.join(self.prefix, "share", name)), name)
 
