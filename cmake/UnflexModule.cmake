@@ -6,7 +6,10 @@ function(unflex_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   add_library(unflex_${name} STATIC ${ARG_SOURCES})
   add_library(unflex::${name} ALIAS unflex_${name})
-  target_include_directories(unflex_${name} PUBLIC ${PROJECT_SOURCE_DIR}/include)
+  target_include_directories(unflex_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_features(unflex_${name} PUBLIC cxx_std_20)
   target_link_libraries(unflex_${name} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE_LINKS})
   unflex_flags(unflex_${name})
 endfunction()

@@ -15,6 +15,8 @@ test_packages=(
   libgmock-dev libgtest-dev
   # HTML reports are looked at in a real browser.
   chromium python3
+  # Packages are made, the manual page is formatted, shells complete command lines.
+  dpkg-dev file fish groff man-db mandoc zsh
 )
 
 if [[ ${1:-} == --tests ]]; then

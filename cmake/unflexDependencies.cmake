@@ -1,0 +1,37 @@
+# What the library is built from, looked for by the build and, installed beside unflexConfig.cmake,
+# by every project that links the library. Sets unflex_NOT_FOUND_MESSAGE where something is missing.
+set(unflex_NOT_FOUND_MESSAGE)
+set(unflex_missing)
+
+# unflex_need(found NAME DEBIAN...): unless found, what is called NAME and comes in Debian's
+# packages DEBIAN is missing.
+macro(unflex_need found name)
+  if(NOT ${found})
+    list(APPEND unflex_missing "${name} (in Debian ${ARGN})")
+  endif()
+endmacro()
+
+find_package(PkgConfig QUIET)
+unflex_need(PKG_CONFIG_FOUND pkg-config pkg-config)
+if(PKG_CONFIG_FOUND)
+  pkg_check_modules(IPOPT QUIET IMPORTED_TARGET ipopt)
+  # Ipopt links LAPACK and BLAS, which its package merely recommends.
+  unflex_need(IPOPT_FOUND Ipopt coinor-libipopt-dev libblas-dev liblapack-dev)
+  pkg_check_modules(TOMLPLUSPLUS QUIET IMPORTED_TARGET tomlplusplus)
+  unflex_need(TOMLPLUSPLUS_FOUND toml++ libtomlplusplus-dev)
+endif()
+find_package(Threads QUIET)
+unflex_need(Threads_FOUND threads libc6-dev)
+find_package(Eigen3 3.4 QUIET NO_MODULE)
+unflex_need(Eigen3_FOUND "Eigen 3.4" libeigen3-dev)
+find_package(fmt QUIET)
+unflex_need(fmt_FOUND fmt libfmt-dev)
+find_package(nlohmann_json QUIET)
+unflex_need(nlohmann_json_FOUND "JSON for Modern C++" nlohmann-json3-dev)
+find_package(tl-expected QUIET)
+unflex_need(tl-expected_FOUND tl::expected libexpected-dev)
+
+if(unflex_missing)
+  list(JOIN unflex_missing ", " unflex_missing)
+  set(unflex_NOT_FOUND_MESSAGE "unflex is built from what is missing here: ${unflex_missing}")
+endif()

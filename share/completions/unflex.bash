@@ -1,0 +1,91 @@
+# Completion of unflex' command line for bash. It needs nothing but bash itself.
+
+# What a command takes besides files. `unflex COMMAND --help` has the same options.
+_unflex_options() {
+  local print='--printer --set --report -q --quiet'
+  case $1 in
+    '') echo '-h --help --version' ;;
+    compensate)
+      echo "-h --help -o --output --in-place $print --max-deviation --engine -j --jobs" ;;
+    verify) echo "-h --help --against $print --max-deviation" ;;
+    inspect) echo "-h --help $print" ;;
+    study) echo "-h --help --case $print --engine -j --jobs" ;;
+    identify)
+      echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
+           '--report -q --quiet' ;;
+    printer) echo '-h --help' ;;
+    'printer init') echo '-h --help --from -o --output --set -q --quiet' ;;
+  esac
+}
+
+_unflex_commands() {
+  case $1 in
+    '') echo 'compensate verify inspect study identify printer' ;;
+    printer) echo 'init' ;;
+  esac
+}
+
+# What may follow a word: `files PATTERN`, `words WORD...`, `any` for what cannot be guessed, or
+# nothing where the word takes no value. Files of another name are offered where none matches.
+_unflex_value() {
+  local print='*.@(gcode|gco|g)' printer='*.@(toml|cfg|g|txt)'
+  case $1:$2 in
+    'printer init:-o' | 'printer init:--output') echo 'files *.toml' ;;
+    *:-o | *:--output | *:--against) echo "files $print" ;;
+    *:--from | *:--printer) echo "files $printer" ;;
+    *:--report) echo 'files *.@(json|html)' ;;
+    study:--engine | compensate:--engine) echo 'words auto banded ipopt' ;;
+    *:--axis) echo 'words x y' ;;
+    *:--case) echo 'words ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' ;;
+    *:--set | *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
+      *:--wave-spacing-mm | *:--speed-mm-s | *:--decay) echo 'any' ;;
+    compensate: | verify: | inspect: | study:) echo "files $print" ;;
+    identify:) echo 'files *.csv' ;;
+  esac
+}
+
+# Files that match the pattern and folders; all files where none matches.
+_unflex_files() {
+  local word=$1 pattern=$2 file extglob
+  extglob=$(shopt -p extglob)
+  shopt -s extglob
+  mapfile -t COMPREPLY < <(compgen -f -X "!$pattern" -- "$word"; compgen -d -- "$word")
+  eval "$extglob"
+  if ((${#COMPREPLY[@]} == 0)); then
+    mapfile -t COMPREPLY < <(compgen -f -- "$word")
+  fi
+  compopt -o filenames 2>/dev/null
+}
+
+_unflex() {
+  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command= word kind
+  # --engine=ipopt comes as three words.
+  if [[ $current == = ]]; then
+    current=
+  elif [[ $previous == = ]]; then
+    previous=${COMP_WORDS[COMP_CWORD - 2]}
+  fi
+  for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
+    if [[ " $(_unflex_commands "$command") " == *" $word "* ]]; then
+      command+=${command:+ }$word
+    fi
+  done
+  COMPREPLY=()
+  kind=
+  if [[ $previous == -* ]]; then
+    kind=$(_unflex_value "$command" "$previous")
+  fi
+  if [[ -z $kind && $current == -* ]]; then
+    kind="words $(_unflex_options "$command")"
+  elif [[ -z $kind && -n $(_unflex_commands "$command") ]]; then
+    kind="words $(_unflex_commands "$command")"
+  elif [[ -z $kind ]]; then
+    kind=$(_unflex_value "$command" '')
+  fi
+  case $kind in
+    files\ *) _unflex_files "$current" "${kind#files }" ;;
+    words\ *) mapfile -t COMPREPLY < <(compgen -W "${kind#words }" -- "$current") ;;
+  esac
+}
+
+complete -F _unflex unflex

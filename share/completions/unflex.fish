@@ -1,0 +1,70 @@
+# Completion of unflex' command line for fish. `unflex COMMAND --help` has the same options.
+
+# Of the words before the cursor those that are commands: "printer init".
+function __unflex_command
+    set -l words (commandline -opc)
+    set -l command
+    for word in $words[2..]
+        if test -z "$command"; and contains -- $word $__unflex_commands
+            set command $word
+        else if test "$command" = printer -a "$word" = init
+            set command 'printer init'
+        end
+    end
+    echo $command
+end
+
+# Whether the command is one of these.
+function __unflex_in
+    contains -- (__unflex_command) $argv
+end
+
+# Folders and files whose names end in one of these; all files where there are none.
+function __unflex_files
+    set -l ends (string escape --style=regex -- $argv | string join '|')
+    set -l all (__fish_complete_path (commandline -ct))
+    string match --regex -- "^[^\t]*(?:$ends|/)(?:\t.*)?\$" $all; or printf '%s\n' $all
+end
+
+set -g __unflex_commands compensate verify inspect study identify printer
+set -l gcode '(__unflex_files .gcode .gco .g)'
+set -l printer '(__unflex_files .toml .cfg .g .txt)'
+set -l prints compensate verify inspect study
+
+complete -c unflex -f
+complete -c unflex -s h -l help -d 'Print the options and exit'
+complete -c unflex -n '__unflex_in ""' -l version -d 'Print the version and exit'
+
+complete -c unflex -n '__unflex_in ""' -a compensate -d 'Write G-code whose motion makes the nozzle draw the sliced path'
+complete -c unflex -n '__unflex_in ""' -a verify -d 'Measure how far the nozzle strays when a compensated file is printed'
+complete -c unflex -n '__unflex_in ""' -a inspect -d 'Show what is understood of a G-code file'
+complete -c unflex -n '__unflex_in ""' -a study -d 'Measure all ways to move the base against each other'
+complete -c unflex -n '__unflex_in ""' -a identify -d 'Find the resonances in records of accelerometers or a ringing tower'
+complete -c unflex -n '__unflex_in ""' -a printer -d 'Printer files'
+complete -c unflex -n '__unflex_in printer' -a init -d 'Write a printer file from what already describes the printer'
+
+complete -c unflex -n "__unflex_in $prints" -a $gcode
+complete -c unflex -n '__unflex_in identify' -a '(__unflex_files .csv)'
+
+complete -c unflex -n '__unflex_in compensate' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
+complete -c unflex -n '__unflex_in compensate' -l in-place -d 'Replace the input'
+complete -c unflex -n '__unflex_in verify' -l against -x -a $gcode -d 'The sliced G-code it was made from'
+complete -c unflex -n '__unflex_in compensate verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'
+complete -c unflex -n '__unflex_in compensate study' -l engine -x -a 'auto banded ipopt' -d 'What solves'
+complete -c unflex -n '__unflex_in compensate study' -s j -l jobs -x -d 'How many to compute at once'
+complete -c unflex -n '__unflex_in study' -l case -x -a 'ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' -d 'Only this case of the corner'
+
+complete -c unflex -n '__unflex_in identify' -l axis -x -a 'x y' -d 'The axis the records are of'
+complete -c unflex -n '__unflex_in identify' -l freq-start -x -d 'Where the sweep began, Hz'
+complete -c unflex -n '__unflex_in identify' -l freq-end -x -d 'Where the sweep ended, Hz'
+complete -c unflex -n '__unflex_in identify' -l wave-spacing-mm -x -d 'Of a ringing tower: from wave to wave'
+complete -c unflex -n '__unflex_in identify' -l speed-mm-s -x -d 'Of a ringing tower: speed of its walls'
+complete -c unflex -n '__unflex_in identify' -l decay -x -d 'Of a ringing tower: height of a wave over that of the next'
+
+complete -c unflex -n '__unflex_in "printer init"' -l from -x -a $printer -d 'What describes the printer'
+complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unflex_files .toml)' -d 'Where to write, - for stdout'
+
+complete -c unflex -n "__unflex_in $prints" -l printer -x -a $printer -d 'The printer'
+complete -c unflex -n "__unflex_in $prints 'printer init'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n "__unflex_in $prints identify" -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
+complete -c unflex -n "__unflex_in $prints identify 'printer init'" -s q -l quiet -d 'No summary and no progress bar'
