@@ -15,6 +15,8 @@ test_packages=(
   libgmock-dev libgtest-dev
   # HTML reports are looked at in a real browser.
   chromium python3
+  # The hook is tried in a real slicer, the examples for continuous integration are read as YAML.
+  prusa-slicer python3-yaml
 )
 
 if [[ ${1:-} == --tests ]]; then
