@@ -17,6 +17,8 @@ test_packages=(
   chromium python3
   # Packages are made, the manual page is formatted, shells complete command lines.
   dpkg-dev file fish groff man-db mandoc zsh
+  # The hook is tried in a real slicer, the examples for continuous integration are read as YAML.
+  prusa-slicer python3-yaml
 )
 
 if [[ ${1:-} == --tests ]]; then

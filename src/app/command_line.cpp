@@ -31,12 +31,16 @@ void add_overrides(CLI::App& command, RunConfig& config) {
       ->allow_extra_args(false);
 }
 
-void add_common_options(CLI::App& command, RunConfig& config) {
+void add_settings(CLI::App& command, RunConfig& config) {
   command
       .add_option("--printer", config.printer_file,
                   "The printer: TOML, Klipper's printer.cfg, Marlin's M503, RRF's config.g")
       ->type_name("FILE");
   add_overrides(command, config);
+}
+
+void add_common_options(CLI::App& command, RunConfig& config) {
+  add_settings(command, config);
   command
       .add_option("--report", config.report,
                   "Write a report, FILE.json or FILE.html, or JSON to stdout with -")
@@ -76,12 +80,37 @@ void add_compensate(CLI::App& program, RunConfig& config) {
   command->add_option("-o,--output", config.output, "Where to write, - for stdout")
       ->type_name("OUT");
   command->add_flag("--in-place", config.in_place, "Replace IN");
+  command
+      ->add_option("--log", config.log, "Add what is said and the summary to FILE, with the time")
+      ->type_name("FILE");
   add_common_options(*command, config);
   add_max_deviation(*command, config);
   add_engine(*command, config,
              "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
   add_jobs(*command, config);
   command->callback([&config] { config.command = Command::compensate; });
+}
+
+void add_batch(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "batch", "Compensate all prints of a folder, those alone that have changed");
+  command->add_option("DIR", config.input, "The folder of the prints")->type_name("")->required();
+  command->add_option("-o,--output", config.output, "The folder to write to")
+      ->type_name("DIR")
+      ->required();
+  add_settings(*command, config);
+  command->add_option("--report", config.report, "A page for each print, in this folder")
+      ->type_name("DIR");
+  command
+      ->add_option("--summary", config.summary,
+                   "Write what became of each print, FILE.json, or FILE.xml for JUnit")
+      ->type_name("FILE");
+  command->add_flag("-q,--quiet", config.quiet, "No table and no progress");
+  add_max_deviation(*command, config);
+  add_engine(*command, config,
+             "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
+  add_jobs(*command, config);
+  command->callback([&config] { config.command = Command::batch; });
 }
 
 void add_verify(CLI::App& program, RunConfig& config) {
@@ -252,6 +281,21 @@ Status check_records(const IdentifyConfig& config) {
   return {};
 }
 
+Status check_batch(const RunConfig& config) {
+  for (const std::string& folder : {config.input, config.output, config.report.value_or(".")}) {
+    if (folder == kStandardStream) {
+      return usage("batch works on folders, not on streams; a folder of that name is ./-");
+    }
+    if (folder.empty()) {
+      return usage("the name of a folder is empty");
+    }
+  }
+  if (config.summary && !config.summary->ends_with(".json") && !config.summary->ends_with(".xml")) {
+    return usage(fmt::format("--summary {}: the name must end in .json or .xml", *config.summary));
+  }
+  return {};
+}
+
 Status complete(RunConfig& config) {
   if (config.command == Command::compensate) {
     if (Status checked = check_output(config); !checked) {
@@ -276,6 +320,9 @@ Status complete(RunConfig& config) {
     if (Status checked = check_records(config.identify); !checked) {
       return checked;
     }
+  }
+  if (config.command == Command::batch) {
+    return check_batch(config);
   }
   return config.report ? check_report(config) : Status{};
 }
@@ -325,6 +372,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   program.set_version_flag("--version", fmt::format("unflex {}", version()));
   program.require_subcommand(1);
   add_compensate(program, config);
+  add_batch(program, config);
   add_verify(program, config);
   add_inspect(program, config);
   add_printer(program, config);

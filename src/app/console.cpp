@@ -1,7 +1,6 @@
 #include "console.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 
@@ -28,22 +27,34 @@ std::string one_line(std::string_view text) {
   return line;
 }
 
-void print_line(std::string_view text) {
-  static_cast<void>(write_all(STDERR_FILENO, one_line(text) + "\n"));
-}
-
-void print_error(const Error& error) {
+std::string error_text(const Error& error) {
   const bool placed = !error.place.file.empty() || error.place.line != 0;
-  print_line(placed ? to_string(error) : fmt::format("unflex: {}", error.message));
+  return one_line(placed ? to_string(error) : fmt::format("unflex: {}", error.message));
 }
 
-void print_lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what) {
+void Console::line(std::string_view text) {
+  kept_.push_back(one_line(text));
+  if (fd_ >= 0) {
+    static_cast<void>(write_all(fd_, kept_.back() + "\n"));
+  }
+}
+
+void Console::lines(const std::vector<std::string>& lines, std::size_t total,
+                    std::string_view what) {
   const std::size_t listed = std::min(lines.size(), kMaxListed);
   for (std::size_t i = 0; i < listed; ++i) {
-    print_line(lines[i]);
+    line(lines[i]);
   }
   if (total > listed) {
-    print_line(fmt::format("unflex: and {} more {}; --report lists them", total - listed, what));
+    line(fmt::format("unflex: and {} more {}; --report lists them", total - listed, what));
+  }
+}
+
+void Console::note(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    kept_.push_back(one_line(text.substr(0, end)));
+    text.remove_prefix(std::min(end + 1, text.size()));
   }
 }
 

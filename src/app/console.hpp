@@ -1,6 +1,8 @@
 // Lines for people: one per message, whatever the message holds.
 #pragma once
 
+#include <unistd.h>
+
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,13 +15,30 @@ namespace unflex::app {
 // a second line or move the cursor.
 [[nodiscard]] std::string one_line(std::string_view text);
 
-// Writes one line to stderr. What cannot be written there is lost.
-void print_line(std::string_view text);
-
 // "file:line: message", or "unflex: message" for an error without a place.
-void print_error(const Error& error);
+[[nodiscard]] std::string error_text(const Error& error);
 
-// The first few of the lines, then how many of `total` are left; `what` names them ("warnings").
-void print_lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what);
+// What a command says while it works. Each message goes to stderr at once and is kept as well, for
+// a log and for those who started the work.
+class Console {
+ public:
+  // fd: where messages go, −1 to keep them only. What cannot be written there is lost.
+  explicit Console(int fd = STDERR_FILENO) : fd_(fd) {}
+
+  void line(std::string_view text);
+  void error(const Error& error) { line(error_text(error)); }
+  // The first few of the lines, then how many of `total` are left; `what` names them ("warnings").
+  void lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what);
+  void warnings(const std::vector<std::string>& all) { lines(all, all.size(), "warnings"); }
+
+  // Keeps what goes elsewhere, line by line.
+  void note(std::string_view text);
+
+  [[nodiscard]] const std::vector<std::string>& kept() const { return kept_; }
+
+ private:
+  int fd_;
+  std::vector<std::string> kept_;
+};
 
 }  // namespace unflex::app

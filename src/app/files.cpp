@@ -1,6 +1,7 @@
 #include "files.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -8,12 +9,14 @@
 #include <cstdlib>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "signals.hpp"
 
 namespace unflex::app {
 namespace {
 
+constexpr std::string_view kTemporaryName = ".unflex-XXXXXX";
 constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
 
 // A signal that does not end the program (a resized window) must not end a read either.
@@ -36,12 +39,34 @@ FileDescriptor::~FileDescriptor() {
 }
 
 tl::expected<TemporaryFile, int> TemporaryFile::create(const std::filesystem::path& directory) {
-  std::string name = (directory / ".unflex-XXXXXX").string();
+  std::string name = (directory / kTemporaryName).string();
   const int fd = ::mkostemp(name.data(), O_CLOEXEC);
   if (fd < 0) {
     return tl::unexpected(errno);
   }
+  // Tells remove_abandoned() that someone is at it, where the file system can.
+  static_cast<void>(::flock(fd, LOCK_EX | LOCK_NB));
   return TemporaryFile(name, fd, ::getpid());
+}
+
+bool TemporaryFile::remove_abandoned(const std::filesystem::path& directory) {
+  const std::string prefix(kTemporaryName.substr(0, kTemporaryName.find('X')));
+  std::error_code failed;
+  std::vector<std::filesystem::path> found;
+  for (std::filesystem::directory_iterator entry(directory, failed), end; !failed && entry != end;
+       entry.increment(failed)) {
+    const std::string name = entry->path().filename().string();
+    if (name.size() == kTemporaryName.size() && name.starts_with(prefix)) {
+      found.push_back(entry->path());
+    }
+  }
+  bool all_gone = true;
+  for (const std::filesystem::path& path : found) {
+    const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+    all_gone = file.valid() && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0 &&
+               ::unlink(path.c_str()) == 0 && all_gone;
+  }
+  return all_gone;
 }
 
 TemporaryFile::TemporaryFile(std::filesystem::path path, int fd, pid_t owner)

@@ -41,6 +41,9 @@ class TemporaryFile {
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] int fd() const { return fd_.get(); }
+  // Removes such files whose process was killed. False if some are left: they are in use, or by
+  // processes that are about to end.
+  static bool remove_abandoned(const std::filesystem::path& directory);
   // Removes the name now; the contents live on behind fd().
   void unlink();
   // The name is someone else's from here on.

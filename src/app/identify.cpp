@@ -129,12 +129,12 @@ Status write_report(const std::string& name, const Identification& all) {
 
 }  // namespace
 
-Result<ExitCode> run_identify(const RunConfig& config) {
+Result<ExitCode> run_identify(const RunConfig& config, Console& console) {
   const Result<Identification> all = identify_all(config.identify);
   if (!all) {
     return tl::unexpected(all.error());
   }
-  print_lines(all->warnings, all->warnings.size(), "warnings");
+  console.warnings(all->warnings);
   if (config.report) {
     if (Status written = write_report(*config.report, *all); !written) {
       return tl::unexpected(written.error());

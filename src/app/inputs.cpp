@@ -92,8 +92,7 @@ Status Input::make_seekable() {
 }
 
 std::filesystem::path Input::path() const {
-  return is_stream_ ? std::filesystem::path(fmt::format("/proc/self/fd/{}", fd_.get()))
-                    : std::filesystem::path(name_);
+  return is_stream_ ? std::filesystem::path(fmt::format("/proc/self/fd/{}", fd_.get())) : file_;
 }
 
 }  // namespace unflex::app

@@ -33,10 +33,14 @@ class Input {
   // Where to read it, and what the user calls it.
   [[nodiscard]] std::filesystem::path path() const;
   [[nodiscard]] const std::string& name() const { return name_; }
+  // Messages call it so from here on.
+  void call(std::string name) { name_ = std::move(name); }
 
  private:
-  Input(std::string name, FileDescriptor stream) : name_(std::move(name)), fd_(std::move(stream)) {}
+  Input(std::string name, FileDescriptor stream)
+      : file_(name), name_(std::move(name)), fd_(std::move(stream)) {}
 
+  std::filesystem::path file_;
   std::string name_;
   FileDescriptor fd_;
   bool is_stream_ = false;

@@ -49,7 +49,7 @@ Status print_summary(const RunConfig& config) {
 
 }  // namespace
 
-Result<ExitCode> run_printer_init(const RunConfig& config) {
+Result<ExitCode> run_printer_init(const RunConfig& config, Console& console) {
   Result<Input> input = Input::open(config.input);
   if (!input) {
     return tl::unexpected(input.error());
@@ -63,7 +63,7 @@ Result<ExitCode> run_printer_init(const RunConfig& config) {
     return tl::unexpected(settings.error());
   }
   for (const Diagnostic& note : settings->notes) {
-    print_line(to_string(note));
+    console.line(to_string(note));
   }
   return write_settings(config, *settings).and_then([&] { return print_summary(config); }).map([] {
     return ExitCode::done;

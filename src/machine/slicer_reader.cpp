@@ -51,6 +51,11 @@ void look_for_option(std::string_view line, const SourcePlace& place, Options& o
   }
 }
 
+// "SLIC3R_NOZZLE_DIAMETER" is the option nozzle_diameter.
+std::string option_of(std::string_view variable) {
+  return lower(variable.substr(variable.find('_') + 1));
+}
+
 // The first line with a command of Klipper's own or a macro, 0 if there is none: other firmwares
 // have no commands of that form.
 std::size_t klipper_line(std::string_view head) {
@@ -66,6 +71,9 @@ std::size_t klipper_line(std::string_view head) {
 class Reader {
  public:
   explicit Reader(const PrintText& print) : print_(&print) {
+    for (const auto& [name, value] : print.variables) {
+      options_[option_of(name)] = {std::string(trimmed(value)), {name, 0}};
+    }
     const auto look = [&](std::string_view line, std::size_t number) {
       constexpr std::string_view kCuraFlavor = ";FLAVOR:";
       const SourcePlace place{print.name, number};

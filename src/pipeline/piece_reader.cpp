@@ -176,8 +176,10 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
     return more;
   }
   if (is_own_comment(line.content())) {
-    return fail(ErrorKind::input, {lines_.name(), line.number},
-                "this file was already compensated by unflex; give the file as it was sliced");
+    return fail(
+        ErrorKind::input, {lines_.name(), line.number},
+        "this file was already compensated by unflex; give the file as it was sliced, and let "
+        "a slicer run unflex once");
   }
   any_command_ = any_command_ || looks_like_command(line.content());
   if (!any_bare_return_ && has_bare_return(line.content())) {

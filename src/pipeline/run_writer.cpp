@@ -231,13 +231,13 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   note_lines_above_budget(piece);
   emitter_ = std::move(trial);
   report_->runs_compensated += piece.begins_run() ? 1 : 0;
-  report_->windows_solved += job.spans.size();
+  report_->windows_solved += compensate::windows_to_solve(job.spans);
   return std::nullopt;
 }
 
 void RunWriter::note_fallback(const RunJob& job, std::string reason) {
   report_->runs_fallback += job.piece.begins_run() ? 1 : 0;
-  report_->windows_fallback += job.spans.size();
+  report_->windows_fallback += compensate::windows_to_solve(job.spans);
   if (report_->fallbacks.size() < kMostListed) {
     report_->fallbacks.push_back({job.piece.events.front().line.number,
                                   job.piece.events.back().line.number, std::move(reason)});

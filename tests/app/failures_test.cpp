@@ -51,11 +51,12 @@ INSTANTIATE_TEST_SUITE_P(
     OfUsage, Failures,
     ::testing::Values(
         Failure{"NoCommand", {}, 1, "unflex: a subcommand is required; run 'unflex --help'"},
-        Failure{"UnknownCommand",
-                {"frobnicate"},
-                1,
-                "unflex: unknown command 'frobnicate'; there are compensate, verify, inspect, "
-                "printer, identify, study"},
+        Failure{
+            "UnknownCommand",
+            {"frobnicate"},
+            1,
+            "unflex: unknown command 'frobnicate'; there are compensate, batch, verify, inspect, "
+            "printer, identify, study"},
         Failure{"NoInput", {"compensate"}, 1, "unflex: IN is required; run 'unflex compensate"},
         Failure{"NoOutput", {"compensate", "in.gcode"}, 1, "unflex: where to write? give -o OUT"},
         Failure{"UnknownOption",

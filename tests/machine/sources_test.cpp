@@ -38,6 +38,24 @@ constexpr const char* kMarlinBlock =
     "; machine_max_acceleration_travel = 0\n; machine_max_jerk_x = 8\n; nozzle_diameter = 0.6,0.4\n"
     "; filament_diameter = 2.85\n; bed_shape = 0x0,200x0,200x200,0x200\n";
 
+TEST(SlicerVariables, SayWhatTheTextDoesNot) {
+  PrintText print = print_of("", "; gcode_flavor = marlin2\n; machine_max_feedrate_x = 180\n");
+  print.variables = {{"SLIC3R_GCODE_FLAVOR", "klipper"},
+                     {"SLIC3R_MACHINE_MAX_FEEDRATE_X", "90"},
+                     {"SLIC3R_MACHINE_MAX_FEEDRATE_Y", " 170,80 "},
+                     {"SLIC3R_NOTES", "any text"}};
+  const Settings s = sliced(print);
+  EXPECT_EQ(told(s, "printer.firmware"), "\"marlin\" print.gcode:101");
+  EXPECT_EQ(told(s, "limits.max_x_velocity_mm_s"), "180 print.gcode:102");
+  EXPECT_EQ(told(s, "limits.max_y_velocity_mm_s"), "170 SLIC3R_MACHINE_MAX_FEEDRATE_Y");
+}
+
+TEST(SlicerVariables, MayTellTheLimitsToBeIgnored) {
+  PrintText print = print_of("", "; gcode_flavor = marlin2\n; machine_max_feedrate_x = 180\n");
+  print.variables = {{"SLIC3R_MACHINE_LIMITS_USAGE", "ignore"}};
+  EXPECT_THAT(told(sliced(print), "limits.max_x_velocity_mm_s"), HasSubstr("default"));
+}
+
 TEST(MarlinDump, IsRead) {
   const Result<Settings> loaded = load(fixture("m503.txt"), {});
   ASSERT_TRUE(loaded) << to_string(loaded.error());

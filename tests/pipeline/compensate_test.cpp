@@ -82,12 +82,12 @@ struct Failing {
 class Fallback : public ::testing::TestWithParam<Failing> {};
 
 TEST_P(Fallback, KeepsTheMovesOfTheRunsThatFailedAndSaysWhich) {
-  const std::string input = print_of({20, 200, 60, 160, 100});
+  const std::string input = print_of({140, 165, 145, 160, 142});
   const JobFolder folder(input);
   const Result<report::Report> report = run(folder, GetParam().solve);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-  // Islands at 200 and 160, and the travel from the one to the island at 60 and from the other on.
+  // Islands at 165 and 160, and the travel from either.
   EXPECT_EQ(report->runs_fallback, 4U) << testing::complaints(*report);
   EXPECT_EQ(report->runs_total, report->runs_compensated + report->runs_fallback);
   EXPECT_EQ(report->windows_total, report->windows_solved + report->windows_fallback);
@@ -96,24 +96,24 @@ TEST_P(Fallback, KeepsTheMovesOfTheRunsThatFailedAndSaysWhich) {
     EXPECT_THAT(fallback.reason, HasSubstr(GetParam().reason));
   }
   const std::string output = folder.output();
-  for (const int x : {200, 160}) {
+  for (const int x : {165, 160}) {
     EXPECT_THAT(output, HasSubstr(island(x))) << "not as it was";
   }
-  for (const int x : {20, 60, 100}) {
+  for (const int x : {140, 145, 142}) {
     EXPECT_THAT(output, ::testing::Not(HasSubstr(island(x)))) << "not compensated";
   }
 }
 
 // The places that the lines of the report's fallbacks have in the input.
 TEST_P(Fallback, NamesTheLinesOfTheRun) {
-  const std::string input = print_of({20, 200});
+  const std::string input = print_of({140, 165});
   const JobFolder folder(input);
   const Result<report::Report> report = run(folder, GetParam().solve);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   ASSERT_EQ(report->fallbacks.size(), 1U) << testing::complaints(*report);
   const std::size_t first =
       1 + static_cast<std::size_t>(std::count(
-              input.begin(), input.begin() + static_cast<std::ptrdiff_t>(input.find(island(200))),
+              input.begin(), input.begin() + static_cast<std::ptrdiff_t>(input.find(island(165))),
               '\n'));
   EXPECT_EQ(report->fallbacks[0].first_line, first);
   EXPECT_EQ(report->fallbacks[0].last_line, first + 5);

@@ -8,11 +8,12 @@
 
 #include "unflex/core/error.hpp"
 #include "unflex/identify/mode.hpp"
+#include "unflex/machine/print_text.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::app {
 
-enum class Command { compensate, verify, inspect, printer_init, identify, study };
+enum class Command { compensate, verify, inspect, printer_init, identify, study, batch };
 
 // The codes the program exits with, see docs/cli.md.
 enum class ExitCode : int {
@@ -39,12 +40,19 @@ struct RunConfig {
   // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
   // empty for the thesis' cases
   std::string input;
-  // compensate, printer init: -o, or the input with --in-place; verify: OUT
+  // batch: the folder of the prints
+  // compensate, printer init, batch: -o, or the input with --in-place; verify: OUT
   std::string output;
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"
-  std::optional<std::string> report;   // a file ending in .json or .html, or "-"
+  std::optional<std::string> report;   // a file ending in .json or .html, or "-"; batch: a folder
+  std::optional<std::string> summary;  // batch: a file ending in .json or .xml
+  std::optional<std::string> log;      // compensate: what was said is added to it
+  // compensate: what messages call the print, and what the slicer that started the program says of
+  // the printer (hook.hpp)
+  std::string print_name;
+  machine::SlicerVariables slicer_settings;
   std::optional<double> max_deviation_mm;
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;

@@ -5,10 +5,15 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "unflex/core/error.hpp"
 
 namespace unflex::machine {
+
+// Settings as slicers hand them to their scripts: ("SLIC3R_NOZZLE_DIAMETER", "0.4").
+using SlicerVariables = std::vector<std::pair<std::string, std::string>>;
 
 struct PrintText {
   std::string name;           // for messages
@@ -16,6 +21,8 @@ struct PrintText {
   std::string tail;           // whole lines to the last; empty where it is not to be had
   std::size_t tail_line = 0;  // number of the tail's first line
   bool is_stream = false;     // the tail comes too late
+  // What the slicer says besides. Where the text says it as well, the text holds.
+  SlicerVariables variables = {};
 };
 
 // The head and the tail of a file. Errors are of kind input.

@@ -1,0 +1,260 @@
+#include "batch.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "batch_files.hpp"
+#include "batch_manifest.hpp"
+#include "batch_print.hpp"
+#include "batch_processes.hpp"
+#include "batch_summary.hpp"
+#include "outputs.hpp"
+#include "results.hpp"
+#include "unflex/machine/machine.hpp"
+
+namespace unflex::app {
+namespace {
+
+constexpr int kStateColumns = 9;
+constexpr std::chrono::milliseconds kPatience{100};
+constexpr std::chrono::milliseconds kBetweenSweeps{2};
+
+// What is wrong with the settings themselves is said once, not of every print.
+Status check_settings(const RunConfig& config) {
+  std::error_code failed;
+  if (config.printer_file && std::filesystem::exists(*config.printer_file, failed) &&
+      !std::filesystem::is_regular_file(*config.printer_file, failed)) {
+    return fail(ErrorKind::usage, {*config.printer_file, 0},
+                "is read for every print; give --printer a file");
+  }
+  return machine::load(config.printer_file, config.overrides).map([](const machine::Settings&) {});
+}
+
+// The summary must not take the place of what is read or made.
+Status check_summary(const RunConfig& config, const BatchFiles& files) {
+  if (!config.summary) {
+    return {};
+  }
+  const auto clashes = [&](const std::string& other) { return same_file(*config.summary, other); };
+  const bool taken = (config.printer_file && clashes(*config.printer_file)) ||
+                     std::ranges::any_of(files.prints, [&](const BatchPrint& print) {
+                       return clashes(print.input) || clashes(print.output);
+                     });
+  return taken ? Status(fail(ErrorKind::usage, {*config.summary, 0},
+                             "is read or written already; give the summary a name of its own"))
+               : Status{};
+}
+
+// What `unflex compensate` would be asked for this print.
+RunConfig config_of(const RunConfig& config, const BatchPrint& print, unsigned workers) {
+  RunConfig one = config;
+  one.command = Command::compensate;
+  one.input = print.input;
+  one.output = print.output;
+  one.print_name = print.output;
+  one.report = print.report;
+  one.workers = workers;
+  one.quiet = true;
+  return one;
+}
+
+// Removes the temporary files of prints that were killed; false if some may be left.
+bool sweep(const std::vector<BatchPrint>& prints) {
+  std::set<std::filesystem::path> folders;
+  for (const BatchPrint& print : prints) {
+    folders.insert(std::filesystem::path(print.output).parent_path());
+    if (print.report) {
+      folders.insert(std::filesystem::path(*print.report).parent_path());
+    }
+  }
+  bool all_gone = true;
+  for (const std::filesystem::path& folder : folders) {
+    all_gone = TemporaryFile::remove_abandoned(folder) && all_gone;
+  }
+  return all_gone;
+}
+
+// The same where the prints' own workers may still be ending.
+void sweep_patiently(const std::vector<BatchPrint>& prints) {
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!sweep(prints) && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(kBetweenSweeps);
+  }
+}
+
+class Batch {
+ public:
+  Batch(const RunConfig& config, BatchFiles files, BatchManifest manifest, Console& console)
+      : config_(&config),
+        files_(std::move(files)),
+        manifest_(std::move(manifest)),
+        console_(&console) {
+    summary_.input = config.input;
+    summary_.output = config.output;
+    for (const Diagnostic& remark : files_.passed_by) {
+      summary_.passed_by.push_back(to_string(remark));
+      console.line(summary_.passed_by.back());
+    }
+  }
+
+  // Stops early when a signal asks for it.
+  Status work() {
+    const auto begin = std::chrono::steady_clock::now();
+    static_cast<void>(sweep(files_.prints));
+    for (const Error& error : files_.unreadable) {
+      add_unreadable(error);
+    }
+    // The longest first: what is left at the end is short.
+    std::vector<std::size_t> waiting(files_.prints.size());
+    std::iota(waiting.begin(), waiting.end(), std::size_t{0});
+    std::ranges::stable_sort(waiting,
+                             [&](std::size_t a, std::size_t b) { return bytes(a) < bytes(b); });
+    Status status = work_on(std::move(waiting));
+    if (ending_signal() != 0) {
+      sweep_patiently(files_.prints);
+      status = fail(ErrorKind::internal,
+                    "interrupted; what is finished stays, the same batch again does the rest");
+    }
+    summary_.wall_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    std::ranges::sort(summary_.rows, {}, &BatchRow::name);
+    return status;
+  }
+
+  [[nodiscard]] const BatchSummary& summary() const { return summary_; }
+
+ private:
+  [[nodiscard]] std::uintmax_t bytes(std::size_t print) const { return files_.prints[print].bytes; }
+
+  // waiting: the next at the end.
+  Status work_on(std::vector<std::size_t> waiting) {
+    BatchProcesses processes(config_->workers);
+    while (!waiting.empty() || processes.any()) {
+      while (const unsigned workers = processes.workers_for_next(waiting.size())) {
+        if (Status started = start(processes, waiting.back(), workers); !started) {
+          return started;
+        }
+        waiting.pop_back();
+      }
+      for (BatchProcesses::Done& done : processes.take()) {
+        if (Status taken = take(std::move(done)); !taken) {
+          return taken;
+        }
+      }
+      if (ending_signal() != 0) {
+        break;
+      }
+    }
+    return {};
+  }
+
+  Status start(BatchProcesses& processes, std::size_t number, unsigned workers) {
+    const BatchPrint& print = files_.prints[number];
+    return processes.start(number, workers, [&] {
+      return work_on_batch_print(config_of(*config_, print, workers), manifest_.find(print.name));
+    });
+  }
+
+  Status take(BatchProcesses::Done done) {
+    const BatchPrint& print = files_.prints[done.ticket];
+    Status remembered;
+    if (done.answer.state == BatchState::done) {
+      remembered = manifest_.put(print.name, done.answer.record);
+    }
+    // A print that a signal ended is told of by the message of the whole.
+    if (ending_signal() == 0 || done.answer.state != BatchState::failed) {
+      add({print.name, print.input, print.output, std::move(done.answer), done.wall_s});
+    }
+    return remembered;
+  }
+
+  void add_unreadable(const Error& error) {
+    BatchAnswer answer;
+    answer.exit_code = static_cast<int>(exit_code(error.kind));
+    answer.error = error_text(error);
+    answer.messages = {answer.error};
+    const std::string name =
+        std::filesystem::path(error.place.file).lexically_relative(config_->input).string();
+    add({name, error.place.file, {}, std::move(answer), 0.0});
+  }
+
+  void add(BatchRow row) {
+    for (const std::string& message : row.answer.messages) {
+      console_->line(message);
+    }
+    if (!config_->quiet) {
+      const std::size_t all = files_.prints.size() + files_.unreadable.size();
+      const std::string number = fmt::format("{}", summary_.rows.size() + 1);
+      console_->line(fmt::format(
+          "[{:>{}}/{}] {:<{}}  {:>7}  {}{}", number, fmt::formatted_size("{}", all), all,
+          to_string(row.answer.state), kStateColumns, report::duration_text(row.wall_s), row.name,
+          row.answer.state == BatchState::failed ? "" : ": " + result_text(row.answer)));
+    }
+    summary_.rows.push_back(std::move(row));
+  }
+
+  const RunConfig* config_;
+  BatchFiles files_;
+  BatchManifest manifest_;
+  Console* console_;
+  BatchSummary summary_;
+};
+
+Status write_summary(const RunConfig& config, std::optional<Output>& file,
+                     const BatchSummary& summary) {
+  if (!file) {
+    return {};
+  }
+  const bool xml = config.summary->ends_with(".xml");
+  return write_report(file, xml ? summary_junit(summary) : summary_json(summary));
+}
+
+Result<std::optional<Output>> open_summary(const RunConfig& config) {
+  if (!config.summary) {
+    return std::optional<Output>();
+  }
+  return Output::open(*config.summary).map([](Output output) {
+    return std::optional<Output>(std::move(output));
+  });
+}
+
+}  // namespace
+
+Result<ExitCode> run_batch(const RunConfig& config, Console& console) {
+  Result<BatchFiles> files = find_prints(config);
+  if (!files) {
+    return tl::unexpected(files.error());
+  }
+  const Status checked =
+      check_settings(config).and_then([&] { return check_summary(config, *files); });
+  if (!checked) {
+    return tl::unexpected(checked.error());
+  }
+  Result<std::optional<Output>> summary_file = open_summary(config);
+  if (!summary_file) {
+    return tl::unexpected(summary_file.error());
+  }
+  Result<BatchManifest> manifest = BatchManifest::open(config.output);
+  if (!manifest) {
+    return tl::unexpected(manifest.error());
+  }
+  Batch batch(config, std::move(*files), std::move(*manifest), console);
+  if (Status worked = batch.work(); !worked) {
+    return tl::unexpected(worked.error());
+  }
+  return write_summary(config, *summary_file, batch.summary())
+      .and_then([&] { return print_summary(config, summary_table(batch.summary()), console); })
+      .map([&] { return static_cast<ExitCode>(batch.summary().exit_code()); });
+}
+
+}  // namespace unflex::app

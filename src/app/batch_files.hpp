@@ -1,0 +1,43 @@
+// The prints of a folder, and where what is made of them goes.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "unflex/app/run_config.hpp"
+#include "unflex/core/error.hpp"
+
+namespace unflex::app {
+
+// Whether a file of that name is a print, by its suffix, in small or capital letters.
+[[nodiscard]] bool is_print(std::string_view name);
+
+// The suffixes, for messages: "*.gcode, *.g".
+[[nodiscard]] std::string print_suffixes();
+
+// The names are bytes, as the file system has them.
+struct BatchPrint {
+  std::string name;  // below the folder: "parts/lid.gcode"
+  std::string input;
+  std::string output;
+  std::optional<std::string> report;
+  std::uintmax_t bytes = 0;
+};
+
+struct BatchFiles {
+  std::vector<BatchPrint> prints;     // sorted by name
+  std::vector<Error> unreadable;      // folders that could not be looked into
+  std::vector<Diagnostic> passed_by;  // what looks like a print and was left out
+};
+
+// Looks through the folder config.input, and all below, for prints. The output mirrors it in
+// config.output, pages go to config.report. Names that begin with a dot, links to folders, and the
+// output's and the reports' own folders are passed by. Errors: of kind input if the folder cannot
+// be read or holds no print, of kind usage if an output would replace an input or another output.
+[[nodiscard]] Result<BatchFiles> find_prints(const RunConfig& config);
+
+}  // namespace unflex::app

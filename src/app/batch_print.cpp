@@ -1,0 +1,212 @@
+#include "batch_print.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <exception>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "console.hpp"
+#include "files.hpp"
+#include "print_run.hpp"
+#include "results.hpp"
+#include "unflex/core/sha256.hpp"
+#include "workspace.hpp"
+
+namespace unflex::app {
+namespace {
+
+Result<std::string> hash_of_file(const std::string& name) {
+  const FileDescriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC));
+  Sha256 hash;
+  for (;;) {
+    const tl::expected<std::string, int> block =
+        file.valid() ? read_some(file.get()) : tl::unexpected(errno);
+    if (!block) {
+      return fail(ErrorKind::input, {name, 0},
+                  fmt::format("cannot read: {}", errno_text(block.error())));
+    }
+    if (block->empty()) {
+      return hash.finish();
+    }
+    hash.add(*block);
+    if (ending_signal() != 0) {
+      return interrupted();
+    }
+  }
+}
+
+std::string_view name_of(pipeline::EngineChoice engine) {
+  switch (engine) {
+    case pipeline::EngineChoice::banded:
+      return "banded";
+    case pipeline::EngineChoice::ipopt:
+      return "ipopt";
+    case pipeline::EngineChoice::automatic:
+      break;
+  }
+  return "auto";
+}
+
+// Of the settings as they hold for this print, wherever they are from.
+Result<std::string> hash_of_settings(const RunConfig& config) {
+  Result<Input> input = Input::open(config.input);
+  if (!input) {
+    return tl::unexpected(input.error());
+  }
+  const Result<machine::Settings> settings = load_settings(config, *input);
+  if (!settings) {
+    return tl::unexpected(settings.error());
+  }
+  std::string text = fmt::format("engine={}\n", name_of(config.engine));
+  for (const machine::SettingRow& row : machine::rows(*settings)) {
+    text += fmt::format("{}={}\n", row.key, row.value);
+  }
+  return sha256(text);
+}
+
+// What an output made now would be made from; without the output itself.
+Result<BatchOrigin> origin_now(const RunConfig& config) {
+  Result<std::string> input = hash_of_file(config.input);
+  if (!input) {
+    return tl::unexpected(input.error());
+  }
+  Result<std::string> settings = hash_of_settings(config);
+  if (!settings) {
+    return tl::unexpected(settings.error());
+  }
+  return BatchOrigin{.version = std::string(version()),
+                     .input_sha256 = std::move(*input),
+                     .settings_sha256 = std::move(*settings),
+                     .output_sha256 = {},
+                     .report_sha256 = {}};
+}
+
+// The same with what is there of output and report.
+Result<BatchOrigin> with_outputs(const RunConfig& config, BatchOrigin origin) {
+  Result<std::string> output = hash_of_file(config.output);
+  if (!output) {
+    return tl::unexpected(output.error());
+  }
+  origin.output_sha256 = std::move(*output);
+  if (config.report) {
+    Result<std::string> report = hash_of_file(*config.report);
+    if (!report) {
+      return tl::unexpected(report.error());
+    }
+    origin.report_sha256 = std::move(*report);
+  }
+  return origin;
+}
+
+bool is_up_to_date(const RunConfig& config, const BatchOrigin& now,
+                   const std::optional<BatchRecord>& known) {
+  if (!known || known->origin.version != now.version ||
+      known->origin.input_sha256 != now.input_sha256 ||
+      known->origin.settings_sha256 != now.settings_sha256) {
+    return false;
+  }
+  if (config.max_deviation_mm && !(known->figures.max_after_mm <= *config.max_deviation_mm)) {
+    return false;
+  }
+  // A report from another time does no harm where none is asked for.
+  Result<BatchOrigin> there = with_outputs(config, now);
+  return there && there->output_sha256 == known->origin.output_sha256 &&
+         (!config.report || there->report_sha256 == known->origin.report_sha256);
+}
+
+Status make_folder_of(const std::string& file) {
+  std::error_code failed;
+  std::filesystem::create_directories(std::filesystem::path(file).parent_path(), failed);
+  return failed ? Status(fail(ErrorKind::usage, {file, 0},
+                              fmt::format("cannot make its folder: {}", failed.message())))
+                : Status{};
+}
+
+BatchFigures figures_of(const report::Report& report) {
+  const report::DeviationRow& before = report.uncompensated.extruding;
+  const report::DeviationRow& after = report.compensated.extruding;
+  return {.max_before_mm = before.contour_max_mm,
+          .max_after_mm = after.contour_max_mm,
+          .rms_before_mm = before.contour_rms_mm,
+          .rms_after_mm = after.contour_rms_mm,
+          .print_time_s = report.emitted_time_s};
+}
+
+// Compensates and remembers. Errors are those of compensating.
+Status compensate(const RunConfig& config, const BatchOrigin& now, Console& console,
+                  BatchAnswer& answer) {
+  if (Status made = make_folder_of(config.output); !made) {
+    return made;
+  }
+  if (Status made = config.report ? make_folder_of(*config.report) : Status{}; !made) {
+    return made;
+  }
+  const Result<PrintOutcome> outcome = work_on_print(config, console);
+  if (!outcome) {
+    return tl::unexpected(outcome.error());
+  }
+  answer.measured = true;
+  answer.record.figures = figures_of(outcome->report);
+  answer.exit_code = static_cast<int>(outcome->verdict);
+  if (outcome->verdict != ExitCode::done) {
+    // The last line says why.
+    answer.error = console.kept().empty() ? "" : console.kept().back();
+    return {};
+  }
+  Result<std::string> input = hash_of_file(config.input);
+  if (!input) {
+    return tl::unexpected(input.error());
+  }
+  if (*input != now.input_sha256) {
+    return fail(ErrorKind::input, {config.input, 0},
+                "changed while it was worked on; run the batch again");
+  }
+  return with_outputs(config, now).map([&](BatchOrigin origin) {
+    answer.record.origin = std::move(origin);
+    answer.state = BatchState::done;
+  });
+}
+
+Status work(const RunConfig& config, const std::optional<BatchRecord>& known, Console& console,
+            BatchAnswer& answer) {
+  const Result<BatchOrigin> now = origin_now(config);
+  if (!now) {
+    return tl::unexpected(now.error());
+  }
+  if (is_up_to_date(config, *now, known)) {
+    answer.state = BatchState::unchanged;
+    answer.exit_code = static_cast<int>(ExitCode::done);
+    answer.measured = true;
+    answer.record = *known;
+    return {};
+  }
+  return compensate(config, *now, console, answer);
+}
+
+}  // namespace
+
+BatchAnswer work_on_batch_print(const RunConfig& config, const std::optional<BatchRecord>& known) {
+  BatchAnswer answer;
+  Console console(-1);
+  try {
+    if (const Status worked = work(config, known, console, answer); !worked) {
+      console.error(worked.error());
+      answer.error = console.kept().back();
+      answer.exit_code = static_cast<int>(exit_code(worked.error().kind));
+    }
+  } catch (const std::exception& failure) {
+    // Out of memory, mostly.
+    console.line(fmt::format("{}: internal error: {}", config.input, failure.what()));
+    answer = {};
+    answer.error = console.kept().back();
+  }
+  answer.messages = console.kept();
+  return answer;
+}
+
+}  // namespace unflex::app

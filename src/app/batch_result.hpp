@@ -1,0 +1,62 @@
+// What became of one print of a batch, as it goes from the process that worked on it to the batch,
+// into the manifest and into the summary.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "unflex/app/run_config.hpp"
+#include "unflex/report/format.hpp"
+
+namespace unflex::app {
+
+// What was measured, of extruding moves.
+struct BatchFigures {
+  double max_before_mm = 0.0;
+  double max_after_mm = 0.0;
+  double rms_before_mm = 0.0;
+  double rms_after_mm = 0.0;
+  double print_time_s = 0.0;
+};
+
+// What an output was made from: an output is up to date if none of it has changed.
+struct BatchOrigin {
+  std::string version;
+  std::string input_sha256;
+  std::string settings_sha256;  // all that decides about the bytes beside the input
+  std::string output_sha256;
+  std::string report_sha256;  // empty without a report
+
+  friend bool operator==(const BatchOrigin&, const BatchOrigin&) = default;
+};
+
+// A print that is done.
+struct BatchRecord {
+  BatchOrigin origin;
+  BatchFigures figures;
+};
+
+enum class BatchState { done, unchanged, failed };
+
+struct BatchAnswer {
+  BatchState state = BatchState::failed;
+  int exit_code = static_cast<int>(ExitCode::internal);
+  bool measured = false;              // the figures are there
+  BatchRecord record;                 // the origin where the state is not failed
+  std::vector<std::string> messages;  // warnings and errors, one line each
+  std::string error;                  // why it failed, one line
+};
+
+[[nodiscard]] std::string_view to_string(BatchState state);
+
+[[nodiscard]] report::Json to_json(const BatchFigures& figures);
+[[nodiscard]] report::Json to_json(const BatchRecord& record);
+// Throws what the JSON library throws where something is missing.
+[[nodiscard]] BatchRecord record_from(const report::Json& json);
+
+// Between processes.
+[[nodiscard]] std::string pack(const BatchAnswer& answer);
+// An answer that is cut off is one that failed.
+[[nodiscard]] BatchAnswer unpack(const std::string& text);
+
+}  // namespace unflex::app

@@ -1,0 +1,65 @@
+#include "log.hpp"
+
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <ctime>
+#include <initializer_list>
+#include <utility>
+
+#include "console.hpp"
+
+namespace unflex::app {
+namespace {
+
+constexpr mode_t kMode = 0666;
+
+// What a log must not be: it would be read or replaced.
+Status check_distinct(const RunConfig& config) {
+  for (const std::string& other : {config.input, config.output, config.report.value_or(""),
+                                   config.printer_file.value_or("")}) {
+    if (!other.empty() && other != kStandardStream && same_file(*config.log, other)) {
+      return fail(ErrorKind::usage, {*config.log, 0},
+                  "is read or written already; give the log a name of its own");
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Log> Log::open(const RunConfig& config) {
+  if (!config.log) {
+    return Log({}, {}, FileDescriptor());
+  }
+  if (Status distinct = check_distinct(config); !distinct) {
+    return tl::unexpected(distinct.error());
+  }
+  FileDescriptor file(
+      ::open(config.log->c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, kMode));
+  if (!file.valid()) {
+    return fail(ErrorKind::usage, {*config.log, 0},
+                fmt::format("cannot write the log: {}", errno_text(errno)));
+  }
+  return Log(*config.log, config.print_name, std::move(file));
+}
+
+Status Log::append(const std::vector<std::string>& lines, int exit_code) {
+  if (!file_.valid()) {
+    return {};
+  }
+  std::string entry = fmt::format("{:%Y-%m-%dT%H:%M:%SZ} unflex {} {}\n",
+                                  fmt::gmtime(std::time(nullptr)), version(), one_line(print_));
+  for (const std::string& line : lines) {
+    entry += fmt::format("  {}\n", line);
+  }
+  entry += fmt::format("  exit code {}\n", exit_code);
+  const int error = write_all(file_.get(), entry);
+  return error == 0 ? Status{}
+                    : Status(fail(ErrorKind::internal, {name_, 0},
+                                  fmt::format("cannot write the log: {}", errno_text(error))));
+}
+
+}  // namespace unflex::app

@@ -1,0 +1,90 @@
+#include "print_run.hpp"
+
+#include <fmt/format.h>
+
+#include <string_view>
+#include <utility>
+
+#include "results.hpp"
+#include "workspace.hpp"
+
+namespace unflex::app {
+namespace {
+
+// What the results say about success: broken rules before deviation. passed_on: the output has gone
+// to a stream as it came.
+ExitCode judge(const RunConfig& config, bool passed_on, const report::Report& report,
+               Console& console) {
+  const std::string_view consequence =
+      passed_on ? "what was passed on must not be printed" : "nothing was written";
+
+  console.lines(report.violations, report.violation_count, "violations");
+  if (report.violation_count > 0 && config.command == Command::compensate) {
+    console.line(fmt::format("unflex: the result breaks rules, which is a fault of unflex; {}",
+                             consequence));
+    return ExitCode::internal;
+  }
+  if (report.violation_count > 0) {
+    return ExitCode::deviation;
+  }
+  const double deviation_mm = report.compensated.extruding.contour_max_mm;
+  if (config.max_deviation_mm && !(deviation_mm <= *config.max_deviation_mm)) {
+    console.line(
+        fmt::format("{}: extruding moves stray up to {:.4g} mm, more than --max-deviation {}{}",
+                    config.command == Command::compensate ? config.print_name : config.output,
+                    deviation_mm, *config.max_deviation_mm,
+                    config.command == Command::compensate ? fmt::format("; {}", consequence) : ""));
+    return ExitCode::deviation;
+  }
+  return ExitCode::done;
+}
+
+// An output that failed is not handed on, but what is known about it is.
+Status deliver(Workspace& space, ExitCode verdict, bool passed_on, const report::Report& report) {
+  if (space.output && verdict == ExitCode::done && !passed_on) {
+    if (Status committed = space.output->commit(); !committed) {
+      return committed;
+    }
+  }
+  return write_report(space.report,
+                      report.recording ? report::to_html(report) : report::to_json(report));
+}
+
+}  // namespace
+
+Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
+  Result<Workspace> space = prepare(config);
+  if (!space) {
+    return tl::unexpected(space.error());
+  }
+  const Result<pipeline::Job> job = job_of(config, *space);
+  if (!job) {
+    return tl::unexpected(job.error());
+  }
+  Result<report::Report> report = with_progress(config, [&](Progress& progress) {
+    return config.command == Command::compensate ? pipeline::compensate(*job, progress)
+                                                 : pipeline::verify(*job, progress);
+  });
+  if (!report) {
+    return tl::unexpected(report.error());
+  }
+  add_setting_warnings(space->settings, report->warnings);
+  console.warnings(report->warnings);
+  const bool passed_on = job->output_fd >= 0;
+  const ExitCode verdict = judge(config, passed_on, *report, console);
+  return deliver(*space, verdict, passed_on, *report).map([&] {
+    return PrintOutcome{verdict, std::move(*report)};
+  });
+}
+
+Result<ExitCode> run_on_print(const RunConfig& config, Console& console) {
+  const Result<PrintOutcome> outcome = work_on_print(config, console);
+  if (!outcome) {
+    return tl::unexpected(outcome.error());
+  }
+  return print_summary(config, report::to_text(outcome->report), console).map([&] {
+    return outcome->verdict;
+  });
+}
+
+}  // namespace unflex::app

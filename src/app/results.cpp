@@ -1,0 +1,68 @@
+#include "results.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "files.hpp"
+#include "unflex/machine/recommend.hpp"
+
+namespace unflex::app {
+
+ExitCode exit_code(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::usage:
+      return ExitCode::usage;
+    case ErrorKind::input:
+      return ExitCode::input;
+    case ErrorKind::internal:
+      return ExitCode::internal;
+  }
+  return ExitCode::internal;
+}
+
+tl::unexpected<Error> interrupted() {
+  return fail(ErrorKind::internal, "interrupted, no file was written");
+}
+
+void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings) {
+  std::vector<std::string> remarks;
+  for (const Diagnostic& note : settings.notes) {
+    remarks.push_back(to_string(note));
+  }
+  for (const std::string& remark : machine::recommendations(settings)) {
+    remarks.push_back(fmt::format("unflex: warning: {}", remark));
+  }
+  warnings.insert(warnings.begin(), remarks.begin(), remarks.end());
+}
+
+Status print_summary(const RunConfig& config, std::string_view text, Console& console) {
+  console.note(text);
+  if (config.quiet) {
+    return {};
+  }
+  const bool stdout_taken =
+      config.report == kStandardStream ||
+      (config.command == Command::compensate && config.output == kStandardStream);
+  if (stdout_taken) {
+    if (::isatty(STDERR_FILENO) == 1) {
+      static_cast<void>(write_all(STDERR_FILENO, text));
+    }
+    return {};
+  }
+  const int error = write_all(STDOUT_FILENO, text);
+  return error == 0 ? Status{}
+                    : Status(fail(ErrorKind::internal, {"stdout", 0},
+                                  fmt::format("cannot write: {}", errno_text(error))));
+}
+
+Status write_report(std::optional<Output>& report, std::string_view text) {
+  if (!report) {
+    return {};
+  }
+  if (Status written = report->write(text); !written) {
+    return written;
+  }
+  return report->commit();
+}
+
+}  // namespace unflex::app

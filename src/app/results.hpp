@@ -1,0 +1,50 @@
+// What commands do alike: work under a progress bar, and hand on what came of it.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "console.hpp"
+#include "outputs.hpp"
+#include "progress.hpp"
+#include "signals.hpp"
+#include "unflex/app/run_config.hpp"
+#include "unflex/core/error.hpp"
+#include "unflex/machine/machine.hpp"
+
+namespace unflex::app {
+
+// Of a process that a signal ended: 128 + signal.
+inline constexpr int kSignalExitBase = 128;
+
+[[nodiscard]] ExitCode exit_code(ErrorKind kind);
+
+// What a command returns that a signal ended.
+[[nodiscard]] tl::unexpected<Error> interrupted();
+
+// Runs one of the pipeline's commands with a progress bar that is gone when it returns.
+template <class Work>
+auto with_progress(const RunConfig& config, Work work)
+    -> decltype(work(std::declval<Progress&>())) {
+  const std::unique_ptr<Progress> progress = make_progress(config.quiet);
+  auto result = work(*progress);
+  if (ending_signal() != 0) {
+    return interrupted();
+  }
+  return result;
+}
+
+// Remarks about the settings come before those about the print.
+void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings);
+
+// The summary goes to stdout, unless a result is there; then to stderr if someone is looking.
+[[nodiscard]] Status print_summary(const RunConfig& config, std::string_view text,
+                                   Console& console);
+
+[[nodiscard]] Status write_report(std::optional<Output>& report, std::string_view text);
+
+}  // namespace unflex::app

@@ -1,0 +1,133 @@
+#include "workspace.hpp"
+
+#include <initializer_list>
+#include <string>
+#include <utility>
+
+#include "files.hpp"
+
+namespace unflex::app {
+namespace {
+
+// Two names for one file would have the result destroy what it was made from.
+Status check_distinct(const RunConfig& config) {
+  const std::string& report = config.report.value_or(std::string(kStandardStream));
+  const auto clash = [](const std::string& a, const std::string& b) {
+    return a != kStandardStream && b != kStandardStream && same_file(a, b);
+  };
+  if (config.command == Command::compensate && !config.in_place &&
+      clash(config.output, config.input)) {
+    return fail(ErrorKind::usage, {config.output, 0},
+                "is the input too; to replace it give --in-place");
+  }
+  if (config.command == Command::compensate && config.printer_file) {
+    const std::string& target = config.in_place ? config.input : config.output;
+    if (clash(target, *config.printer_file)) {
+      return fail(ErrorKind::usage, {target, 0},
+                  "is the printer file too; give the output a name of its own");
+    }
+  }
+  for (const std::string& other :
+       {config.input, config.output, config.printer_file.value_or(std::string(kStandardStream))}) {
+    if (!other.empty() && clash(report, other)) {
+      return fail(ErrorKind::usage, {report, 0},
+                  "is read or written already; give the report a name of its own");
+    }
+  }
+  return {};
+}
+
+Status open_outputs(const RunConfig& config, Workspace& space) {
+  if (config.command == Command::compensate) {
+    Result<Output> output = Output::open(config.output);
+    if (!output) {
+      return tl::unexpected(output.error());
+    }
+    space.output.emplace(std::move(*output));
+  }
+  if (config.report) {
+    Result<Output> report = Output::open(*config.report);
+    if (!report) {
+      return tl::unexpected(report.error());
+    }
+    space.report.emplace(std::move(*report));
+  }
+  return {};
+}
+
+// What is read more than once.
+Status spool(const RunConfig& config, Workspace& space) {
+  if (config.command == Command::compensate) {
+    return {};
+  }
+  if (Status copied = space.input.make_seekable(); !copied) {
+    return copied;
+  }
+  return space.compensated ? space.compensated->make_seekable() : Status{};
+}
+
+}  // namespace
+
+Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
+  Result<machine::PrintText> print = input.look();
+  if (!print) {
+    return tl::unexpected(print.error());
+  }
+  print->variables = config.slicer_settings;
+  return machine::load(
+      {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
+}
+
+Result<Workspace> prepare(const RunConfig& config) {
+  Result<Input> input = Input::open(config.input);
+  if (!input) {
+    return tl::unexpected(input.error());
+  }
+  if (config.in_place) {
+    input->call(config.print_name);
+  }
+  Workspace space{{}, std::move(*input), {}, {}, {}};
+  if (config.command == Command::verify) {
+    Result<Input> compensated = Input::open(config.output);
+    if (!compensated) {
+      return tl::unexpected(compensated.error());
+    }
+    space.compensated.emplace(std::move(*compensated));
+  }
+  const Status ready =
+      check_distinct(config)
+          .and_then([&] { return open_outputs(config, space); })
+          .and_then([&] { return spool(config, space); })
+          .and_then([&] { return load_settings(config, space.input); })
+          .map([&](machine::Settings settings) { space.settings = std::move(settings); });
+  if (!ready) {
+    return tl::unexpected(ready.error());
+  }
+  return space;
+}
+
+Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
+  pipeline::Job job;
+  job.input = space.input.path();
+  job.input_name = space.input.name();
+  job.output_name = config.command == Command::compensate ? config.print_name : config.output;
+  if (space.output) {
+    job.output = space.output->path();
+    const Result<int> stream = space.output->stream_fd();
+    if (!stream) {
+      return tl::unexpected(stream.error());
+    }
+    job.output_fd = *stream;
+    job.input_fd = space.input.stream_fd();
+    job.input_head = space.input.head();
+  } else if (space.compensated) {
+    job.output = space.compensated->path();
+  }
+  job.settings = space.settings;
+  job.engine = config.engine;
+  job.workers = config.workers;
+  job.record = config.report && is_html(*config.report);
+  return job;
+}
+
+}  // namespace unflex::app

@@ -1,0 +1,32 @@
+// What a command on a print works with, opened and checked before the long work begins.
+#pragma once
+
+#include <optional>
+
+#include "inputs.hpp"
+#include "outputs.hpp"
+#include "unflex/app/run_config.hpp"
+#include "unflex/core/error.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+
+namespace unflex::app {
+
+struct Workspace {
+  machine::Settings settings;
+  Input input;
+  std::optional<Input> compensated;  // verify
+  std::optional<Output> output;      // compensate
+  std::optional<Output> report;
+};
+
+// The settings in force for the print that is read.
+[[nodiscard]] Result<machine::Settings> load_settings(const RunConfig& config, Input& input);
+
+// Opens the prints, the output and the report, and reads the settings.
+[[nodiscard]] Result<Workspace> prepare(const RunConfig& config);
+
+// The same as the pipeline wants it.
+[[nodiscard]] Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space);
+
+}  // namespace unflex::app
