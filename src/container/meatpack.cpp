@@ -1,5 +1,6 @@
 #include "meatpack.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -18,6 +19,7 @@ constexpr unsigned char kDisableNoSpaces = 246;
 // character follows in a byte of its own.
 constexpr std::string_view kCharacters = "0123456789. \nGX";
 constexpr unsigned kSpaceCode = 11;
+constexpr unsigned kLineEndCode = 12;
 constexpr unsigned kWhole = 15;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -116,6 +118,7 @@ class MeatPacker {
   void pairs() {
     static const std::array<std::uint8_t, 256> codes = make_codes();
     set_packing(true);
+    const std::size_t begin = packed_.size();
     for (std::size_t i = 0; i < line_.size(); i += 2) {
       const char first = line_[i];
       const char second = i + 1 < line_.size() ? line_[i + 1] : '\n';
@@ -129,6 +132,17 @@ class MeatPacker {
         packed_ += second;
       }
     }
+    // libbgcode's reader (1.0) makes room for twice the packed bytes and loses characters beyond;
+    // empty lines, which its own writer adds too, are room without a meaning.
+    while (2 * (packed_.size() - begin) < most_text()) {
+      packed_ += static_cast<char>(kLineEndCode << 4U | kLineEndCode);
+    }
+  }
+
+  // The length of the line when it is unpacked with a space before each of its words.
+  [[nodiscard]] std::size_t most_text() const {
+    const auto capitals = std::ranges::count_if(line_, is_capital);
+    return line_.size() + (line_.starts_with('G') ? static_cast<std::size_t>(capitals) : 0);
   }
 
   bool comments_;

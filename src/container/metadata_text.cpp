@@ -205,10 +205,10 @@ Result<bool> MetadataLines::is_gcode(std::string_view line) {
   }
   std::string_view comment = line.substr(first + 1);
   comment.remove_suffix(comment.ends_with('\r') ? 1 : 0);
-  comment.remove_prefix(comment.starts_with(' ') ? 1 : 0);
-  if (comment.find_first_not_of(" \t") == std::string_view::npos) {
-    return false;
+  if (in_head_ && comment.empty()) {
+    return false;  // around thumbnails
   }
+  comment.remove_prefix(comment.starts_with(' ') ? 1 : 0);
   return is_metadata(comment).map([](bool metadata) { return !metadata; });
 }
 
