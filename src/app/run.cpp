@@ -103,7 +103,7 @@ Status open_outputs(const RunConfig& config, Workspace& space) {
 // What is read more than once.
 Status spool(const RunConfig& config, Workspace& space) {
   if (config.command == Command::compensate) {
-    return {};
+    return space.input.make_readable();
   }
   if (Status copied = space.input.make_seekable(); !copied) {
     return copied;
@@ -119,6 +119,12 @@ Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
   }
   return machine::load(
       {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
+}
+
+// What the output is to be packed in: in place and in a stream as the input is.
+container::Kind output_kind(const RunConfig& config, const Workspace& space) {
+  return config.in_place || space.output->is_stream() ? space.input.kind()
+                                                      : container::kind_of_name(config.output);
 }
 
 Result<Workspace> prepare(const RunConfig& config) {
@@ -152,7 +158,11 @@ Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   job.input_name = space.input.name();
   job.output_name = config.output;
   if (space.output) {
+    const std::optional<container::Metadata>& origin = space.input.metadata();
+    space.output->pack_as(output_kind(config, space), origin ? &*origin : nullptr);
     job.output = space.output->path();
+    job.input_fd_kind = space.input.kind();
+    job.output_fd_kind = space.output->kind();
     const Result<int> stream = space.output->stream_fd();
     if (!stream) {
       return tl::unexpected(stream.error());
