@@ -120,6 +120,11 @@ bool take_prefix(std::string_view& text, std::string_view prefix) {
   return starts;
 }
 
+tl::unexpected<Error> damaged_thumbnail() {
+  return fail(ErrorKind::input,
+              "the print has a damaged thumbnail, which cannot become binary; write plain G-code");
+}
+
 }  // namespace
 
 std::optional<KeyValues> key_values(std::string_view lines) {
@@ -268,7 +273,7 @@ Result<bool> MetadataLines::continue_section(std::string_view comment) {
     }
     thumbnail.data += comment;
     if (thumbnail.data.size() > expected_digits_) {
-      return tl::unexpected(end_thumbnail().error());
+      return damaged_thumbnail();
     }
     return true;
   }
@@ -287,8 +292,7 @@ Status MetadataLines::end_thumbnail() {
   std::string& data = found_.thumbnails.back().data;
   std::optional<std::string> bytes = from_base64(data);
   if (data.size() != expected_digits_ || !bytes) {
-    return fail(ErrorKind::input,
-                "the print has a damaged thumbnail, which cannot become binary; write plain G-code");
+    return damaged_thumbnail();
   }
   data = std::move(*bytes);
   return {};
@@ -328,7 +332,7 @@ bool MetadataLines::take_value(std::string_view comment) {
 
 Result<Metadata> MetadataLines::take() {
   if (section_ == Section::thumbnail) {
-    return tl::unexpected(end_thumbnail().error());
+    return damaged_thumbnail();
   }
   if (section_ != Section::none) {
     return fail(ErrorKind::input,

@@ -55,7 +55,10 @@ TEST(PrintMetadata, LeaveOtherCommentsInTheGcode) {
 }
 
 TEST(PrintMetadata, StayWhatTheyWereWhenPackedAgain) {
-  const std::string packed = *to_bgcode(kPrint);
+  std::string text(kPrint);
+  const std::string twice = "; filament used [mm] = 2\n";
+  text.erase(text.find(twice), twice.size());
+  const std::string packed = *to_bgcode(text);
   const Unpacked unpacked = *unpack(packed);
   EXPECT_EQ(*to_bgcode(unpacked.text), packed);
   EXPECT_EQ(*to_bgcode(unpacked.text, &unpacked.metadata), packed);

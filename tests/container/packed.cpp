@@ -70,11 +70,11 @@ std::string test_data(std::string_view name) {
 }
 
 std::string random_gcode(std::mt19937& random, std::size_t lines, bool comments) {
-  const auto below = [&](std::uint32_t limit) { return random() % limit; };
+  const auto below = [&](std::size_t limit) { return static_cast<std::size_t>(random()) % limit; };
   const auto number = [&] {
     std::string text = below(4) == 0 ? "-" : "";
-    text += below(3) == 0 ? "" : std::to_string(below(300));
-    return text + "." + std::to_string(below(100000));
+    text.append(below(3) == 0 ? "" : std::to_string(below(300)));
+    return text.append(".") + std::to_string(below(100000));
   };
   static constexpr std::array<std::string_view, 8> kOthers = {
       "M117 Layer G1 of E_3 xX",     "SET_VELOCITY_LIMIT ACCEL=5000 SQUARE_CORNER_VELOCITY=5",
@@ -85,7 +85,7 @@ std::string random_gcode(std::mt19937& random, std::size_t lines, bool comments)
       ";TYPE:External perimeter", ";LAYER_CHANGE", ";Z:0.25", ";  G1 X 5 = E", "; = = ;"};
   std::string text;
   for (std::size_t i = 0; i < lines; ++i) {
-    const std::uint32_t kind = below(10);
+    const std::size_t kind = below(10);
     if (kind == 0) {
       text += comments ? kComments[below(kComments.size())] : "M84";
     } else if (kind == 1) {
