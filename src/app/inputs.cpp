@@ -146,8 +146,8 @@ Status Input::make_readable() {
   if (Status known = look_at_kind(); !known) {
     return known;
   }
-  const bool as_it_comes = is_stream_ ? kind_ != container::Kind::bgcode
-                                      : kind_ == container::Kind::text;
+  const bool as_it_comes =
+      is_stream_ ? kind_ != container::Kind::bgcode : kind_ == container::Kind::text;
   return as_it_comes ? Status{} : copy_text();
 }
 

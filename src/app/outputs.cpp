@@ -113,8 +113,7 @@ Status Output::pack() {
   if (kind_ == container::Kind::text) {
     return {};
   }
-  tl::expected<TemporaryFile, int> packed =
-      TemporaryFile::create(temporary_.path().parent_path());
+  tl::expected<TemporaryFile, int> packed = TemporaryFile::create(temporary_.path().parent_path());
   if (!packed) {
     return cannot_write(packed.error());
   }

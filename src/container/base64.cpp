@@ -42,8 +42,7 @@ std::optional<std::string> from_base64(std::string_view text) {
   for (std::size_t at = 0; at < text.size(); at += 4) {
     std::uint32_t group = 0;
     for (std::size_t i = at; i < at + 4; ++i) {
-      const std::size_t digit =
-          i + padding >= text.size() ? 0 : kDigits.find(text[i]);
+      const std::size_t digit = i + padding >= text.size() ? 0 : kDigits.find(text[i]);
       if (digit == std::string_view::npos) {
         return std::nullopt;
       }

@@ -1,5 +1,6 @@
-// Prusa's binary G-code, version 1, as its specification has it (doc/specifications.md of libbgcode):
-// a header and blocks of five kinds of metadata and of G-code; all numbers little-endian.
+// Prusa's binary G-code, version 1, as its specification has it (doc/specifications.md of
+// libbgcode): a header and blocks of five kinds of metadata and of G-code; all numbers
+// little-endian.
 //
 //   file:  "GCDE", version (4 bytes), type of checksums (2)
 //   block: type (2), compression (2), size (4), packed size (4, if compressed), parameters (2, of
@@ -44,8 +45,8 @@ inline constexpr std::string_view kJsonConfigKey = "prusaslicer_json_config";
 inline constexpr std::size_t kGcodeBlockBytes = 65536;
 
 // What a block's data are before they are packed, or nothing if they are damaged.
-[[nodiscard]] std::optional<std::string> decompress(std::string_view packed, Compression compression,
-                                                    std::size_t size);
+[[nodiscard]] std::optional<std::string> decompress(std::string_view packed,
+                                                    Compression compression, std::size_t size);
 [[nodiscard]] std::string compress(std::string_view bytes, Compression compression);
 
 [[nodiscard]] std::uint32_t crc32_of(std::string_view bytes);

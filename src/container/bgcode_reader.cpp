@@ -18,7 +18,8 @@ constexpr std::size_t kMaxBlockBytes = std::size_t{16} << 20U;
 constexpr std::size_t kMaxMetadataBytes = std::size_t{64} << 20U;
 
 constexpr std::array<std::string_view, kBlockTypes> kTypeNames = {
-    "file metadata", "G-code", "slicer metadata", "printer metadata", "print metadata", "thumbnail"};
+    "file metadata",    "G-code",         "slicer metadata",
+    "printer metadata", "print metadata", "thumbnail"};
 
 // Where a type stands in the file.
 constexpr std::array<int, kBlockTypes> kRanks = {0, 5, 4, 1, 3, 2};
@@ -78,16 +79,17 @@ Result<bool> BgcodeUnpacker::take_file_header() {
   }
   const std::uint32_t version = number(4, 4);
   if (version != kVersion) {
-    return fail(ErrorKind::input, {name_, 0},
-                fmt::format("is binary G-code of version {}, of which only 1 is known; export it as "
-                            "plain G-code",
-                            version));
+    return fail(
+        ErrorKind::input, {name_, 0},
+        fmt::format("is binary G-code of version {}, of which only 1 is known; export it as "
+                    "plain G-code",
+                    version));
   }
   const std::uint32_t checksum = number(8, 2);
   if (checksum > 1) {
-    return fail(ErrorKind::input, {name_, 0},
-                fmt::format("has checksums of the unknown type {}; export it as plain G-code",
-                            checksum));
+    return fail(
+        ErrorKind::input, {name_, 0},
+        fmt::format("has checksums of the unknown type {}; export it as plain G-code", checksum));
   }
   has_checksums_ = checksum == 1;
   has_header_ = true;
@@ -119,8 +121,7 @@ Result<std::optional<BgcodeUnpacker::Block>> BgcodeUnpacker::block_header() cons
   block.packed_size = is_packed ? number(8, 4) : block.size;
   block.parameter_bytes = block.type == BlockType::thumbnail ? 6 : 2;
   if (std::max(block.size, block.packed_size) > kMaxBlockBytes) {
-    return broken(fmt::format("claims to be of {} bytes",
-                              std::max(block.size, block.packed_size)));
+    return broken(fmt::format("claims to be of {} bytes", std::max(block.size, block.packed_size)));
   }
   if (Status order = check_order(block.type); !order) {
     return tl::unexpected(order.error());
@@ -132,7 +133,8 @@ Status BgcodeUnpacker::check_order(BlockType type) const {
   const int before = last_ ? rank(*last_) : -1;
   const int now = rank(type);
   if (last_ && (now < before || (now == before && !may_repeat(type)))) {
-    return broken(fmt::format("is {} behind {}", kTypeNames[index(type)], kTypeNames[index(*last_)]));
+    return broken(
+        fmt::format("is {} behind {}", kTypeNames[index(type)], kTypeNames[index(*last_)]));
   }
   for (std::size_t other = 0; other < kBlockTypes; ++other) {
     const auto missing = static_cast<BlockType>(other);
@@ -149,9 +151,8 @@ Result<std::string> BgcodeUnpacker::take_block(const Block& block) {
   if (has_checksums_ && crc32_of(rest().substr(0, length)) != number(length, 4)) {
     return broken("does not match its checksum");
   }
-  std::optional<std::string> data =
-      decompress(rest().substr(length - block.packed_size, block.packed_size), block.compression,
-                 block.size);
+  std::optional<std::string> data = decompress(
+      rest().substr(length - block.packed_size, block.packed_size), block.compression, block.size);
   if (!data) {
     return broken("cannot be unpacked");
   }
@@ -225,7 +226,8 @@ Result<std::string> BgcodeUnpacker::end() {
                 fmt::format("ends at byte {} without any G-code; get the whole file", place()));
   }
   is_done_ = true;
-  return (ends_line_ ? "" : "\n") + tail_text(metadata_);
+  std::string text = tail_text(metadata_);
+  return ends_line_ ? text : text.insert(0, 1, '\n');
 }
 
 std::uint32_t BgcodeUnpacker::number(std::size_t at, std::size_t bytes) const {
@@ -237,9 +239,9 @@ std::uint32_t BgcodeUnpacker::number(std::size_t at, std::size_t bytes) const {
 }
 
 tl::unexpected<Error> BgcodeUnpacker::broken(std::string_view message) const {
-  return fail(ErrorKind::input, {name_, 0},
-              fmt::format("block at byte {} {}; the file is damaged, export it again", place(),
-                          message));
+  return fail(
+      ErrorKind::input, {name_, 0},
+      fmt::format("block at byte {} {}; the file is damaged, export it again", place(), message));
 }
 
 tl::unexpected<Error> BgcodeUnpacker::cut_off() const {

@@ -1,5 +1,5 @@
-// Binary G-code to the text that PrusaSlicer would have written: what printers look at and thumbnails
-// at the front, the G-code, then times, filament and settings, all as comments.
+// Binary G-code to the text that PrusaSlicer would have written: what printers look at and
+// thumbnails at the front, the G-code, then times, filament and settings, all as comments.
 #pragma once
 
 #include <cstddef>

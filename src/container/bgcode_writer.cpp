@@ -70,9 +70,11 @@ class BgcodePacker final : public Packer {
   }
 
   Result<std::string> push(std::string_view text) override {
-    return begin().and_then([&] {
-      return named(lines_.push(text, [this](std::string_view line) { return add(line); }));
-    }).map([this] { return std::exchange(packed_, {}); });
+    return begin()
+        .and_then([&] {
+          return named(lines_.push(text, [this](std::string_view line) { return add(line); }));
+        })
+        .map([this] { return std::exchange(packed_, {}); });
   }
 
   Result<std::string> finish() override {

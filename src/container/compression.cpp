@@ -14,9 +14,8 @@ std::optional<std::string> inflate_all(std::string_view packed, std::size_t size
   std::string bytes(size + 1, '\0');
   uLongf got = bytes.size();
   uLong taken = packed.size();
-  const int outcome =
-      uncompress2(reinterpret_cast<Bytef*>(bytes.data()), &got,
-                  reinterpret_cast<const Bytef*>(packed.data()), &taken);
+  const int outcome = uncompress2(reinterpret_cast<Bytef*>(bytes.data()), &got,
+                                  reinterpret_cast<const Bytef*>(packed.data()), &taken);
   if (outcome != Z_OK || got != size || taken != packed.size()) {
     return std::nullopt;
   }

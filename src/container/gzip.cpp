@@ -14,9 +14,7 @@ constexpr std::size_t kPieceBytes = std::size_t{1} << 16U;
 constexpr int kWindowBits = 15 + 16;
 constexpr int kMemoryLevel = 8;
 
-const Bytef* bytes_of(std::string_view text) {
-  return reinterpret_cast<const Bytef*>(text.data());
-}
+const Bytef* bytes_of(std::string_view text) { return reinterpret_cast<const Bytef*>(text.data()); }
 
 class GzipUnpacker final : public Unpacker {
  public:
@@ -62,17 +60,18 @@ class GzipUnpacker final : public Unpacker {
       if (members_ > 0 && rest.front() == '\0') {
         padded_ = true;
         ++next_;
-      } else if (!padded_ && (rest.starts_with(kGzipMagic) ||
-                              (rest == kGzipMagic.substr(0, 1) && !ended_))) {
+      } else if (!padded_ &&
+                 (rest.starts_with(kGzipMagic) || (rest == kGzipMagic.substr(0, 1) && !ended_))) {
         if (rest.size() < kGzipMagic.size()) {
           return {};
         }
         in_member_ = true;
         inflateReset(&stream_);
       } else {
-        return broken(fmt::format("after the gzip data comes something else (byte {}); cut it off "
-                                  "or get the file again",
-                                  taken_ + next_));
+        return broken(
+            fmt::format("after the gzip data comes something else (byte {}); cut it off "
+                        "or get the file again",
+                        taken_ + next_));
       }
     }
     return {};
@@ -94,8 +93,9 @@ class GzipUnpacker final : public Unpacker {
     }
     if (outcome == Z_BUF_ERROR || (outcome == Z_OK && text.empty() && next_ == packed_.size())) {
       return ended_ && text.empty()
-                 ? broken(fmt::format("the gzip data end too early (at byte {}); get the whole file",
-                                      taken_ + next_))
+                 ? broken(
+                       fmt::format("the gzip data end too early (at byte {}); get the whole file",
+                                   taken_ + next_))
                  : Status{};
     }
     if (outcome == Z_MEM_ERROR) {

@@ -134,8 +134,8 @@ std::vector<Match> all_matches(std::string_view bytes, std::size_t window) {
   return matches;
 }
 
-// The lengths to take so that the fewest bits are written, from the end backwards: a match costs the
-// same at any length up to its longest, 1 stands for a literal.
+// The lengths to take so that the fewest bits are written, from the end backwards: a match costs
+// the same at any length up to its longest, 1 stands for a literal.
 std::vector<std::uint8_t> cheapest_lengths(const std::vector<Match>& matches, unsigned match_bits) {
   std::vector<std::uint8_t> lengths(matches.size(), 1);
   std::vector<std::uint64_t> bits(matches.size() + 1, 0);

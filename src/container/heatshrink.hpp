@@ -1,6 +1,6 @@
-// Heatshrink (A. Vail, S. Vokes 2013): LZSS in a stream of bits, most significant first. Bit 1 and 8
-// bits are a byte; bit 0, W bits of distance − 1 and L bits of length − 1 repeat what was there. What
-// lies before the beginning counts as zeros, as in the original's decoder.
+// Heatshrink (A. Vail, S. Vokes 2013): LZSS in a stream of bits, most significant first. Bit 1 and
+// 8 bits are a byte; bit 0, W bits of distance − 1 and L bits of length − 1 repeat what was there.
+// What lies before the beginning counts as zeros, as in the original's decoder.
 #pragma once
 
 #include <cstddef>

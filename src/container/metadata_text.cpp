@@ -24,19 +24,19 @@ constexpr std::string_view kPreparerKey = "Prepared by";
 // What PrusaSlicer 2.8 tells printers, in its order. The settings among them stand in the block of
 // settings too, where they stay.
 constexpr std::array<std::string_view, 13> kPrinterSettings = {
-    "printer_model",   "filament_type", "filament_abrasive", "nozzle_diameter", "nozzle_high_flow",
-    "bed_temperature", "brim_width",    "fill_density",      "layer_height",    "temperature",
-    "ironing",         "support_material", "extruder_colour"};
-constexpr std::array<std::string_view, 9> kPrinterFacts = {
-    "max_layer_z",
-    "objects_info",
-    "filament used [mm]",
-    "filament used [g]",
-    "filament cost",
-    "filament used [cm3]",
-    "total filament used for wipe tower [g]",
-    "estimated printing time (normal mode)",
-    "estimated printing time (silent mode)"};
+    "printer_model",    "filament_type",   "filament_abrasive", "nozzle_diameter",
+    "nozzle_high_flow", "bed_temperature", "brim_width",        "fill_density",
+    "layer_height",     "temperature",     "ironing",           "support_material",
+    "extruder_colour"};
+constexpr std::array<std::string_view, 9> kPrinterFacts = {"max_layer_z",
+                                                           "objects_info",
+                                                           "filament used [mm]",
+                                                           "filament used [g]",
+                                                           "filament cost",
+                                                           "filament used [cm3]",
+                                                           "total filament used for wipe tower [g]",
+                                                           "estimated printing time (normal mode)",
+                                                           "estimated printing time (silent mode)"};
 constexpr std::array<std::string_view, 12> kPrintFacts = {
     "total toolchanges",
     "filament used [mm]",
@@ -176,8 +176,8 @@ std::string tail_text(const Metadata& metadata) {
     text += fmt::format("; {} = end\n", kJsonConfigKey);
   }
   if (!metadata.slicer.empty()) {
-    text += fmt::format("\n; {0} = begin\n{1}; {0} = end\n\n", kConfigKey,
-                        comments(metadata.slicer));
+    text +=
+        fmt::format("\n; {0} = begin\n{1}; {0} = end\n\n", kConfigKey, comments(metadata.slicer));
   }
   return text;
 }
@@ -302,8 +302,7 @@ bool MetadataLines::take_producer(std::string_view comment) {
   if (!in_head_ || (origin_ != nullptr && origin_->file.empty())) {
     return false;
   }
-  const bool may_be_prepared =
-      origin_ == nullptr || !value_in(origin_->file, kPreparerKey).empty();
+  const bool may_be_prepared = origin_ == nullptr || !value_in(origin_->file, kPreparerKey).empty();
   if (std::string_view rest = comment;
       may_be_prepared && take_prefix(rest, kPreparer) && !found_.file.empty()) {
     found_.file += fmt::format("{}={}\n", kPreparerKey, rest);
@@ -360,7 +359,8 @@ Metadata MetadataLines::sorted() const {
     return metadata;
   }
   Metadata metadata = found_;
-  const auto add = [](KeyValues& values, std::string_view key, std::initializer_list<std::string> places) {
+  const auto add = [](KeyValues& values, std::string_view key,
+                      std::initializer_list<std::string> places) {
     for (const std::string& place : places) {
       if (!place.empty()) {
         values.emplace_back(key, place);

@@ -48,7 +48,8 @@ class MetadataLines {
   [[nodiscard]] Metadata sorted() const;
 
   const Metadata* origin_;
-  std::set<std::string, std::less<>> head_keys_;  // those that are metadata before the first command
+  std::set<std::string, std::less<>>
+      head_keys_;  // those that are metadata before the first command
   std::set<std::string, std::less<>> tail_keys_;  // and after it
   bool in_head_ = true;
   Section section_ = Section::none;

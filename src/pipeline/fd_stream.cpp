@@ -34,11 +34,10 @@ bool ready(int fd, short events, const Progress& progress, CpuSlots& slots) {
 }  // namespace
 
 FdSource::FdSource(const Job& job, const Progress& progress, CpuSlots& slots)
-    : fd_(job.input_fd),
-      progress_(&progress),
-      slots_(&slots),
-      block_(job.input_head),
-      unpacker_(container::make_unpacker(job.input_fd_kind, job.input_name)) {
+    : fd_(job.input_fd), progress_(&progress), slots_(&slots), block_(job.input_head) {
+  if (fd_ >= 0) {
+    unpacker_ = container::make_unpacker(job.input_fd_kind, job.input_name);
+  }
   if (unpacker_) {
     unpacker_->push(block_);
   } else {
@@ -95,7 +94,7 @@ FdSource::int_type FdSource::underflow() {
 
 FdSink::FdSink(const Job& job, const Progress& progress, CpuSlots& slots)
     : fd_(job.output_fd), progress_(&progress), slots_(&slots) {
-  if (job.output_fd_kind == container::Kind::gzip) {
+  if (fd_ >= 0 && job.output_fd_kind == container::Kind::gzip) {
     packer_ = container::make_gzip_packer();
   }
 }

@@ -1,10 +1,11 @@
 // Packed prints through the program.
 
+#include "container/packed.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "app/program.hpp"
-#include "container/packed.hpp"
 
 namespace unflex::app {
 namespace {
@@ -113,7 +114,8 @@ TEST_F(PackedPrints, KeepTheirMetadataButForTimes) {
   EXPECT_EQ(after.print[0], before.print[0]);
   const std::string time_key = "estimated printing time (normal mode)";
   const auto time = [&](const container::KeyValues& values) {
-    const auto at = std::ranges::find(values, time_key, [](const auto& pair) { return pair.first; });
+    const auto at =
+        std::ranges::find(values, time_key, [](const auto& pair) { return pair.first; });
     return at == values.end() ? "" : at->second;
   };
   EXPECT_EQ(time(before.print), "2h 0m 0s");

@@ -65,8 +65,7 @@ TEST_P(LibbgcodeFiles, KeepAllThatIsNotGcodeByteForByte) {
   const Unpacked unpacked = *unpack(packed);
   const std::vector<Block> before = blocks(packed);
   const Compression metadata = static_cast<Compression>(before[3].compression);
-  const std::string again =
-      *to_bgcode(unpacked.text, &unpacked.metadata, {.metadata = metadata});
+  const std::string again = *to_bgcode(unpacked.text, &unpacked.metadata, {.metadata = metadata});
   const std::vector<Block> after = blocks(again);
   ASSERT_EQ(after.size(), before.size());
   for (std::size_t i = 0; i + 1 < before.size(); ++i) {
@@ -94,8 +93,8 @@ TEST(Bgcode, HasPrusaSlicersBlocks) {
 }
 
 TEST(Bgcode, IsTheSamePrintAsLibbgcodeMakesOfTheText) {
-  const Unpacked ours = *unpack(*to_bgcode(test_data("container_print.gcode"), nullptr,
-                                           {.encoding = Encoding::meatpack}));
+  const Unpacked ours = *unpack(
+      *to_bgcode(test_data("container_print.gcode"), nullptr, {.encoding = Encoding::meatpack}));
   const Unpacked theirs = *unpack(test_data("container_heatshrink_11_meatpack.bgcode"));
   EXPECT_EQ(ours.metadata.file, theirs.metadata.file);
   EXPECT_EQ(ours.metadata.slicer, theirs.metadata.slicer);
@@ -114,13 +113,14 @@ TEST(Bgcode, IsTheSamePrintAsLibbgcodeMakesOfTheText) {
 
 TEST(Bgcode, ComesBackInEveryCompressionAndEncoding) {
   std::mt19937 random(8);
-  for (const Compression compression : {Compression::none, Compression::deflate,
-                                        Compression::heatshrink_11_4, Compression::heatshrink_12_4}) {
+  for (const Compression compression :
+       {Compression::none, Compression::deflate, Compression::heatshrink_11_4,
+        Compression::heatshrink_12_4}) {
     for (const Encoding encoding :
          {Encoding::none, Encoding::meatpack, Encoding::meatpack_comments}) {
       for (const bool checksum : {false, true}) {
-        const std::string text = random_gcode(random, 1 + random() % 6000,
-                                              encoding != Encoding::meatpack);
+        const std::string text =
+            random_gcode(random, 1 + random() % 6000, encoding != Encoding::meatpack);
         const BgcodeOptions options{compression, compression, encoding, checksum};
         const Result<Unpacked> unpacked = unpack(*to_bgcode(text, nullptr, options));
         ASSERT_TRUE(unpacked) << to_string(unpacked.error());
@@ -166,8 +166,7 @@ TEST(Bgcode, TextThatWouldBeACommandOfMeatpackIsNotPacked) {
 }
 
 TEST(Bgcode, LinesMayEndAsInWindowsOrNotAtAll) {
-  EXPECT_EQ(unpack(*to_bgcode("G28\r\n\r\n;TYPE:X\r\nG1 X1"))->text,
-            "\nG28\n;TYPE:X\nG1 X1\n\n");
+  EXPECT_EQ(unpack(*to_bgcode("G28\r\n\r\n;TYPE:X\r\nG1 X1"))->text, "\nG28\n;TYPE:X\nG1 X1\n\n");
 }
 
 TEST(Bgcode, OfAnEmptyTextIsAnEmptyPrint) {

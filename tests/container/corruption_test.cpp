@@ -51,17 +51,26 @@ std::string file_of(const std::vector<Part>& parts) {
 constexpr std::uint32_t kFile = 0, kGcode = 1, kSlicer = 2, kPrinter = 3, kPrint = 4, kThumb = 5;
 
 TEST(BrokenBgcode, HandmadeFilesAreRead) {
-  EXPECT_EQ(message(file_of({{kFile, "a=b\n"}, {kPrinter}, {kThumb, "x"}, {kThumb, "x"}, {kPrint},
-                             {kSlicer, "a=b\n"}, {kSlicer, "{}", 1}, {kGcode, "G28\n"}, {kGcode}})),
+  EXPECT_EQ(message(file_of({{kFile, "a=b\n"},
+                             {kPrinter},
+                             {kThumb, "x"},
+                             {kThumb, "x"},
+                             {kPrint},
+                             {kSlicer, "a=b\n"},
+                             {kSlicer, "{}", 1},
+                             {kGcode, "G28\n"},
+                             {kGcode}})),
             "no error");
-  EXPECT_EQ(unpack(file_of({{kPrinter}, {kPrint}, {kSlicer}, {kGcode, "G1"}, {kGcode, " X1"}}))->text,
-            "\nG1 X1\n\n");
+  EXPECT_EQ(
+      unpack(file_of({{kPrinter}, {kPrint}, {kSlicer}, {kGcode, "G1"}, {kGcode, " X1"}}))->text,
+      "\nG1 X1\n\n");
 }
 
 TEST(BrokenBgcode, BlocksHaveAnOrder) {
-  EXPECT_EQ(message(file_of({{kPrinter}, {kPrint}, {kSlicer}, {kGcode}, {kPrint}})),
-            "print: block at byte 50 is print metadata behind G-code; the file is damaged, export it "
-            "again");
+  EXPECT_EQ(
+      message(file_of({{kPrinter}, {kPrint}, {kSlicer}, {kGcode}, {kPrint}})),
+      "print: block at byte 50 is print metadata behind G-code; the file is damaged, export it "
+      "again");
   EXPECT_THAT(message(file_of({{kPrinter}, {kPrinter}})),
               HasSubstr("is printer metadata behind printer metadata"));
   EXPECT_THAT(message(file_of({{kFile}, {kThumb}})),
@@ -97,8 +106,9 @@ TEST(BrokenBgcode, CodesAreKnownOrRefused) {
 TEST(BrokenBgcode, ClaimsOfEndlessBlocksCostNothing) {
   std::string file = file_of({{kPrinter}});
   file.replace(14, 4, "\xff\xff\xff\x7f");
-  EXPECT_EQ(message(file), "print: block at byte 10 claims to be of 2147483647 bytes; the file is "
-                           "damaged, export it again");
+  EXPECT_EQ(message(file),
+            "print: block at byte 10 claims to be of 2147483647 bytes; the file is "
+            "damaged, export it again");
 }
 
 TEST(BrokenBgcode, IsMissedWhereverItIsCutOff) {
@@ -108,7 +118,8 @@ TEST(BrokenBgcode, IsMissedWhereverItIsCutOff) {
                 AnyOf(HasSubstr("get the whole file"), HasSubstr("without any G-code")))
         << length;
   }
-  EXPECT_EQ(message(file.substr(0, 9)), "print: ends at byte 9, within its header; get the whole file");
+  EXPECT_EQ(message(file.substr(0, 9)),
+            "print: ends at byte 9, within its header; get the whole file");
   EXPECT_EQ(message(file.substr(0, 20)),
             "print: ends at byte 20, within the block at byte 10; get the whole file");
 }
@@ -133,8 +144,8 @@ TEST(BrokenBgcode, NeverPassesForAnother) {
   for (const bool checksum : {true, false}) {
     for (const Compression compression :
          {Compression::none, Compression::deflate, Compression::heatshrink_12_4}) {
-      const std::string file = *to_bgcode(text, nullptr, {compression, compression,
-                                                          Encoding::meatpack_comments, checksum});
+      const std::string file = *to_bgcode(
+          text, nullptr, {compression, compression, Encoding::meatpack_comments, checksum});
       const std::string whole = unpack(file)->text;
       for (int draw = 0; draw < 400; ++draw) {
         std::string damaged = file;
@@ -152,7 +163,8 @@ TEST(BrokenBgcode, NeverPassesForAnother) {
 TEST(BrokenBgcode, OfAnyBytesIsRefused) {
   std::mt19937 random(13);
   for (int draw = 0; draw < 2000; ++draw) {
-    std::string file = file_of({{kPrinter}, {kPrint}, {kSlicer}}).substr(0, 10 + 10 * (random() % 4));
+    std::string file =
+        file_of({{kPrinter}, {kPrint}, {kSlicer}}).substr(0, 10 + 10 * (random() % 4));
     for (std::size_t left = random() % 200; left > 0; --left) {
       file += static_cast<char>(random() % 2 == 0 ? random() % 6 : random());
     }

@@ -14,10 +14,10 @@ namespace {
 using ::testing::HasSubstr;
 
 // printf 'G28\n' | gzip --no-name
-constexpr std::string_view kG28 =
-    std::string_view("\x1f\x8b\x08\x00\x00\x00\x00\x00\x00\x03\x73\x37\xb2\xe0\x02\x00"
-                     "\x83\xdb\x22\xf7\x04\x00\x00\x00",
-                     24);
+constexpr std::string_view kG28 = std::string_view(
+    "\x1f\x8b\x08\x00\x00\x00\x00\x00\x00\x03\x73\x37\xb2\xe0\x02\x00"
+    "\x83\xdb\x22\xf7\x04\x00\x00\x00",
+    24);
 
 std::string message(std::string_view bytes) {
   const Result<Unpacked> unpacked = unpack(bytes);

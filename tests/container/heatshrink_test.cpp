@@ -19,9 +19,7 @@ TEST(Heatshrink, UnpacksAVectorMadeByHand) {
   EXPECT_EQ(unheatshrink(kAbabababPacked, 11, 8), "ABABABAB");
 }
 
-TEST(Heatshrink, PacksAVectorMadeByHand) {
-  EXPECT_EQ(heatshrink("ABABABAB", 11), kAbabababPacked);
-}
+TEST(Heatshrink, PacksAVectorMadeByHand) { EXPECT_EQ(heatshrink("ABABABAB", 11), kAbabababPacked); }
 
 TEST(Heatshrink, ReadsZerosFromBeforeTheBeginning) {
   // 0, twelve bits of 0, four bits of 2: three bytes from 1 back.

@@ -32,8 +32,7 @@ TEST(Meatpack, UnpacksWhatPrusaSlicerDoesAndOthers) {
   // With spaces packed, as Prusa's firmware had them first.
   EXPECT_EQ(unmeatpack("\xff\xff\xfb\x1d\xeb\xc1"), "G1 X1\n");
   // Line ends twice, as libbgcode writes them.
-  EXPECT_EQ(unmeatpack(std::string(kStart) + "\x1d\x1e\xcc\xcc\x1d\x1e\xcc\xcc"),
-            "G1 X1\nG1 X1\n");
+  EXPECT_EQ(unmeatpack(std::string(kStart) + "\x1d\x1e\xcc\xcc\x1d\x1e\xcc\xcc"), "G1 X1\nG1 X1\n");
   // Not packed at all.
   EXPECT_EQ(unmeatpack("G1X1\n"), "G1X1\n");
 }

@@ -32,8 +32,9 @@ constexpr std::string_view kPrint =
 
 TEST(PrintMetadata, AreFoundAmongComments) {
   const Metadata metadata = unpack(*to_bgcode(kPrint))->metadata;
-  EXPECT_EQ(metadata.file,
-            "Producer=PrusaSlicer 2.8.1\nProduced on=2024-10-21 at 06:38:01 UTC\nPrepared by=hand\n");
+  EXPECT_EQ(
+      metadata.file,
+      "Producer=PrusaSlicer 2.8.1\nProduced on=2024-10-21 at 06:38:01 UTC\nPrepared by=hand\n");
   EXPECT_EQ(metadata.slicer, "layer_height=0.2\nstart_gcode=G28\\nG1 X= 5 \nnotes=\n");
   EXPECT_THAT(metadata.print,
               ElementsAre(Pair("total toolchanges", "0"), Pair("filament used [mm]", "1"),

@@ -77,10 +77,14 @@ std::string random_gcode(std::mt19937& random, std::size_t lines, bool comments)
     return text.append(".") + std::to_string(below(100000));
   };
   static constexpr std::array<std::string_view, 8> kOthers = {
-      "M117 Layer G1 of E_3 xX",     "SET_VELOCITY_LIMIT ACCEL=5000 SQUARE_CORNER_VELOCITY=5",
-      "M862.3 P \"MK4S  G 28\"",     "G10",
-      "T0",                          "  M204 S1000",
-      "EXCLUDE_OBJECT NAME=GÄRTNER", "g1 x10 e1"};
+      "M117 Layer G1 of E_3 xX",
+      "SET_VELOCITY_LIMIT ACCEL=5000 SQUARE_CORNER_VELOCITY=5",
+      "M862.3 P \"MK4S  G 28\"",
+      "G10",
+      "T0",
+      "  M204 S1000",
+      "EXCLUDE_OBJECT NAME=GÄRTNER",
+      "g1 x10 e1"};
   static constexpr std::array<std::string_view, 5> kComments = {
       ";TYPE:External perimeter", ";LAYER_CHANGE", ";Z:0.25", ";  G1 X 5 = E", "; = = ;"};
   std::string text;
@@ -91,7 +95,7 @@ std::string random_gcode(std::mt19937& random, std::size_t lines, bool comments)
     } else if (kind == 1) {
       text += kOthers[below(kOthers.size())];
     } else {
-      text += "G" + std::to_string(below(4));
+      text.append("G").append(std::to_string(below(4)));
       for (const std::string_view letter : {"X", "Y", "Z", "I", "J", "E", "F"}) {
         if (below(2) == 0) {
           (text += " ") += letter;
