@@ -167,7 +167,8 @@ std::string head_text(const Metadata& metadata) {
 }
 
 std::string tail_text(const Metadata& metadata) {
-  std::string text = "\n" + comments(lines_of(metadata.print));
+  std::string text = "\n";
+  text += comments(lines_of(metadata.print));
   if (!metadata.slicer_json.empty()) {
     text += fmt::format("\n; {} = begin\n", kJsonConfigKey);
     for (std::string_view lines = metadata.slicer_json; !lines.empty();) {
