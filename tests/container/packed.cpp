@@ -65,7 +65,7 @@ Result<std::string> to_bgcode(std::string_view text, const Metadata* origin,
 std::string to_gzip(std::string_view text) { return *pack(*make_gzip_packer(), text); }
 
 std::string test_data(std::string_view name) {
-  std::ifstream stream(std::string(UNFLEX_TEST_DATA "/") + std::string(name), std::ios::binary);
+  std::ifstream stream(std::string(UNFLEX_TEST_DATA "/").append(name), std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
