@@ -58,7 +58,8 @@ Result<std::string> hash_of_settings(const RunConfig& config) {
   if (!input) {
     return tl::unexpected(input.error());
   }
-  const Result<machine::Settings> settings = load_settings(config, *input);
+  const Result<machine::Settings> settings =
+      input->make_readable().and_then([&] { return load_settings(config, *input); });
   if (!settings) {
     return tl::unexpected(settings.error());
   }

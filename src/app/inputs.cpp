@@ -6,10 +6,61 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <functional>
+#include <memory>
+#include <utility>
 
+#include "signals.hpp"
 #include "unflex/app/run_config.hpp"
 
 namespace unflex::app {
+namespace {
+
+// Text piece by piece, unpacked where it is packed.
+class TextReader {
+ public:
+  using ReadBlock = std::function<Result<std::string>()>;
+
+  // unpacker: null for plain text. head: what has been read already. read: the next bytes, none at
+  // the end.
+  TextReader(container::Unpacker* unpacker, std::string head, ReadBlock read)
+      : unpacker_(unpacker), head_(std::move(head)), read_(std::move(read)) {
+    if (unpacker_ != nullptr) {
+      unpacker_->push(head_);
+    }
+  }
+
+  // Empty at the end.
+  Result<std::string> next() {
+    if (unpacker_ == nullptr) {
+      return head_.empty() ? read_() : std::exchange(head_, {});
+    }
+    for (;;) {
+      Result<std::string> text = unpacker_->pull();
+      if (!text || !text->empty() || ended_) {
+        return text;
+      }
+      const Result<std::string> block = read_();
+      if (!block) {
+        return block;
+      }
+      ended_ = block->empty();
+      if (ended_) {
+        unpacker_->finish();
+      } else {
+        unpacker_->push(*block);
+      }
+    }
+  }
+
+ private:
+  container::Unpacker* unpacker_;
+  std::string head_;
+  ReadBlock read_;
+  bool ended_ = false;
+};
+
+}  // namespace
 
 Result<Input> Input::open(const std::string& name) {
   const SourcePlace place{name, 0};
@@ -29,23 +80,52 @@ Result<Input> Input::open(const std::string& name) {
   return input;
 }
 
-Result<machine::PrintText> Input::look() {
-  if (stream_fd() < 0) {
-    return machine::read_print_text(path(), name_);
-  }
-  while (machine::head_end(head_) == std::string::npos && head_.size() < machine::kMaxHeadBytes) {
-    const tl::expected<std::string, int> block = read_some(fd_.get());
+tl::unexpected<Error> Input::cannot_read(int error) const {
+  return fail(ErrorKind::input, {name_, 0}, fmt::format("cannot read: {}", errno_text(error)));
+}
+
+Result<std::string> Input::read_block() const {
+  return read_some(fd_.get()).map_error([this](int error) { return cannot_read(error).value(); });
+}
+
+Status Input::look_at_kind() {
+  while (head_.size() < container::kMagicBytes) {
+    const Result<std::string> block = read_block();
     if (!block) {
-      return fail(ErrorKind::input, {name_, 0},
-                  fmt::format("cannot read: {}", errno_text(block.error())));
+      return tl::unexpected(block.error());
     }
     if (block->empty()) {
       break;
     }
     head_ += *block;
   }
+  kind_ = container::detect(head_);
+  return {};
+}
+
+Result<machine::PrintText> Input::look() {
+  if (stream_fd() < 0) {
+    return machine::read_print_text(path(), name_);
+  }
+  const std::unique_ptr<container::Unpacker> unpacker = container::make_unpacker(kind_, name_);
+  TextReader reader(unpacker.get(), head_, [this] {
+    Result<std::string> block = read_block();
+    head_ += block.value_or("");
+    return block;
+  });
+  std::string text;
+  while (machine::head_end(text) == std::string::npos && text.size() < machine::kMaxHeadBytes) {
+    const Result<std::string> piece = reader.next();
+    if (!piece) {
+      return tl::unexpected(piece.error());
+    }
+    if (piece->empty()) {
+      break;
+    }
+    text += *piece;
+  }
   return machine::PrintText{.name = name_,
-                            .head = head_.substr(0, machine::head_end(head_)),
+                            .head = text.substr(0, machine::head_end(text)),
                             .tail = {},
                             .tail_line = 0,
                             .is_stream = true};
@@ -54,22 +134,31 @@ Result<machine::PrintText> Input::look() {
 Result<std::string> Input::read_all() {
   std::string text;
   for (;;) {
-    const tl::expected<std::string, int> block = read_some(fd_.get());
-    if (!block) {
-      return fail(ErrorKind::input, {name_, 0},
-                  fmt::format("cannot read: {}", errno_text(block.error())));
-    }
-    if (block->empty()) {
-      return text;
+    const Result<std::string> block = read_block();
+    if (!block || block->empty()) {
+      return block.map([&](const std::string&) { return text; });
     }
     text += *block;
   }
 }
 
-Status Input::make_seekable() {
-  if (!is_stream_) {
-    return {};
+Status Input::make_readable() {
+  if (Status known = look_at_kind(); !known) {
+    return known;
   }
+  const bool as_it_comes =
+      is_stream_ ? kind_ != container::Kind::bgcode : kind_ == container::Kind::text;
+  return as_it_comes ? Status{} : copy_text();
+}
+
+Status Input::make_seekable() {
+  if (Status known = look_at_kind(); !known) {
+    return known;
+  }
+  return is_stream_ || kind_ != container::Kind::text ? copy_text() : Status{};
+}
+
+Status Input::copy_text() {
   const std::filesystem::path directory = temporary_directory();
   tl::expected<TemporaryFile, int> copy = TemporaryFile::create(directory);
   if (!copy) {
@@ -77,10 +166,24 @@ Status Input::make_seekable() {
                 fmt::format("cannot keep {} here: {}; set TMPDIR to another directory", name_,
                             errno_text(copy.error())));
   }
-  if (const int error = copy_all(fd_.get(), copy->fd()); error != 0) {
-    return fail(error == EISDIR || error == EIO ? ErrorKind::input : ErrorKind::internal,
-                {name_, 0},
-                fmt::format("cannot copy to {}: {}", directory.string(), errno_text(error)));
+  const std::unique_ptr<container::Unpacker> unpacker = container::make_unpacker(kind_, name_);
+  TextReader reader(unpacker.get(), std::exchange(head_, {}), [this] { return read_block(); });
+  for (;;) {
+    const Result<std::string> piece = reader.next();
+    if (!piece) {
+      return tl::unexpected(piece.error());
+    }
+    if (piece->empty()) {
+      break;
+    }
+    const int error = ending_signal() != 0 ? EINTR : write_all(copy->fd(), *piece);
+    if (error != 0) {
+      return fail(ErrorKind::internal, {name_, 0},
+                  fmt::format("cannot copy to {}: {}", directory.string(), errno_text(error)));
+    }
+  }
+  if (unpacker && unpacker->metadata() != nullptr) {
+    metadata_ = *unpacker->metadata();
   }
   FileDescriptor kept(::fcntl(copy->fd(), F_DUPFD_CLOEXEC, 3));
   if (!kept.valid()) {
@@ -92,7 +195,9 @@ Status Input::make_seekable() {
 }
 
 std::filesystem::path Input::path() const {
-  return is_stream_ ? std::filesystem::path(fmt::format("/proc/self/fd/{}", fd_.get())) : file_;
+  return is_stream_ || is_copied_
+             ? std::filesystem::path(fmt::format("/proc/self/fd/{}", fd_.get()))
+             : file_;
 }
 
 }  // namespace unflex::app

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "files.hpp"
+#include "unflex/container/container.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/machine/print_text.hpp"
 
@@ -16,11 +18,20 @@ class Input {
   // kind input.
   [[nodiscard]] static Result<Input> open(const std::string& name);
 
-  // Copies what cannot be read twice (stdin, pipes) to a temporary file without a name.
+  // Copies what cannot be read twice (stdin, pipes), and the text of what is packed, to a temporary
+  // file without a name.
   [[nodiscard]] Status make_seekable();
 
-  // What of the print can be seen now. Of a stream its head is taken; it is to be had back from
-  // head(), before what stream_fd() still gives.
+  // The same but for text and gzip in a stream, which can be read once as they come.
+  [[nodiscard]] Status make_readable();
+
+  // What it is packed in, known once it was made readable or seekable, and what a binary file says
+  // beside its G-code.
+  [[nodiscard]] container::Kind kind() const { return kind_; }
+  [[nodiscard]] const std::optional<container::Metadata>& metadata() const { return metadata_; }
+
+  // What of the print can be seen now. Of a stream its head is taken; it is to be had back, as
+  // packed as it was, from head(), before what stream_fd() still gives.
   [[nodiscard]] Result<machine::PrintText> look();
   [[nodiscard]] const std::string& head() const { return head_; }
 
@@ -40,12 +51,22 @@ class Input {
   Input(std::string name, FileDescriptor stream)
       : file_(name), name_(std::move(name)), fd_(std::move(stream)) {}
 
+  // Reads as far as it takes to know kind_.
+  [[nodiscard]] Status look_at_kind();
+  // What can be read next, empty at the end.
+  [[nodiscard]] Result<std::string> read_block() const;
+  // All of it as text to a temporary file, which takes the input's place.
+  [[nodiscard]] Status copy_text();
+  [[nodiscard]] tl::unexpected<Error> cannot_read(int error) const;
+
   std::filesystem::path file_;
   std::string name_;
   FileDescriptor fd_;
   bool is_stream_ = false;
-  bool is_copied_ = false;
-  std::string head_;  // of a stream, read already
+  bool is_copied_ = false;  // its text is in a temporary file
+  container::Kind kind_ = container::Kind::text;
+  std::optional<container::Metadata> metadata_;
+  std::string head_;  // read already
 };
 
 }  // namespace unflex::app

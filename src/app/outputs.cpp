@@ -6,7 +6,9 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <memory>
 
+#include "signals.hpp"
 #include "unflex/app/run_config.hpp"
 
 namespace unflex::app {
@@ -103,20 +105,77 @@ Status Output::write(std::string_view text) {
   return error == 0 ? Status{} : Status(cannot_write(error));
 }
 
-Status Output::commit() { return target_.empty() ? copy_to_stream() : replace_target(); }
+Status Output::commit() {
+  return pack().and_then([this] { return is_stream() ? copy_to_stream() : replace_target(); });
+}
+
+Status Output::pack() {
+  if (kind_ == container::Kind::text) {
+    return {};
+  }
+  tl::expected<TemporaryFile, int> packed = TemporaryFile::create(temporary_.path().parent_path());
+  if (!packed) {
+    return cannot_write(packed.error());
+  }
+  packed_.emplace(std::move(*packed));
+  return pack_into(packed_->fd());
+}
+
+Status Output::pack_into(int to) {
+  const std::unique_ptr<container::Packer> packer =
+      kind_ == container::Kind::gzip ? container::make_gzip_packer()
+                                     : container::make_bgcode_packer(name_, origin_);
+  const auto write = [&](const std::string& bytes) {
+    const int error = write_all(to, bytes);
+    return error == 0 ? Status{} : Status(cannot_write(error));
+  };
+  if (packer->wants_survey()) {
+    const Status surveyed =
+        for_each_block([&](std::string_view text) { return packer->survey(text); });
+    if (!surveyed) {
+      return surveyed;
+    }
+  }
+  return for_each_block([&](std::string_view text) { return packer->push(text).and_then(write); })
+      .and_then([&] { return packer->finish(); })
+      .and_then(write);
+}
+
+Status Output::for_each_block(const std::function<Status(std::string_view)>& use) const {
+  const FileDescriptor text(::open(temporary_.path().c_str(), O_RDONLY | O_CLOEXEC));
+  if (!text.valid()) {
+    return cannot_write(errno);
+  }
+  for (;;) {
+    const tl::expected<std::string, int> block = read_some(text.get());
+    if (!block) {
+      return cannot_write(block.error());
+    }
+    if (block->empty()) {
+      return {};
+    }
+    if (ending_signal() != 0) {
+      return cannot_write(EINTR);
+    }
+    if (Status used = use(*block); !used) {
+      return used;
+    }
+  }
+}
 
 Status Output::replace_target() {
-  if (::fsync(temporary_.fd()) != 0) {
+  const TemporaryFile& made = result();
+  if (::fsync(made.fd()) != 0) {
     return cannot_write(errno);
   }
-  if (const int error = take_over_permissions(temporary_.fd(), target_); error != 0) {
+  if (const int error = take_over_permissions(made.fd(), target_); error != 0) {
     return cannot_write(error);
   }
-  if (::rename(temporary_.path().c_str(), target_.c_str()) != 0) {
+  if (::rename(made.path().c_str(), target_.c_str()) != 0) {
     return cannot_write(errno);
   }
-  const std::filesystem::path directory = temporary_.path().parent_path();
-  temporary_.release();
+  const std::filesystem::path directory = made.path().parent_path();
+  (packed_ ? *packed_ : temporary_).release();
   // The rename itself must survive a power cut; where directories cannot be synced it is done.
   const FileDescriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.valid()) {
@@ -132,14 +191,14 @@ Status Output::open_stream() {
 }
 
 Result<int> Output::stream_fd() {
-  if (!target_.empty()) {
+  if (!is_stream() || kind_ == container::Kind::bgcode) {
     return -1;
   }
   return open_stream().map([&] { return stream_.get(); });
 }
 
 Status Output::copy_to_stream() {
-  const FileDescriptor source(::open(temporary_.path().c_str(), O_RDONLY | O_CLOEXEC));
+  const FileDescriptor source(::open(result().path().c_str(), O_RDONLY | O_CLOEXEC));
   if (!source.valid()) {
     return cannot_write(errno);
   }

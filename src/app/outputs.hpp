@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "files.hpp"
+#include "unflex/container/container.hpp"
 #include "unflex/core/error.hpp"
 
 namespace unflex::app {
@@ -19,11 +21,21 @@ class Output {
   // Checks that the result can be written, before the work. What cannot is an error of kind usage.
   [[nodiscard]] static Result<Output> open(const std::string& name);
 
-  // Where to write meanwhile.
+  // Makes commit() pack the text that was written. origin: of the binary file it was made from, or
+  // null; it must outlive this.
+  void pack_as(container::Kind kind, const container::Metadata* origin) {
+    kind_ = kind;
+    origin_ = origin;
+  }
+  [[nodiscard]] container::Kind kind() const { return kind_; }
+  [[nodiscard]] bool is_stream() const { return target_.empty(); }
+
+  // Where to write meanwhile, always text.
   [[nodiscard]] const std::filesystem::path& path() const { return temporary_.path(); }
   [[nodiscard]] Status write(std::string_view text);
 
-  // Of a stream, to write to it at once and not commit(); otherwise −1. Errors as of commit().
+  // Of a stream, to write to it at once, packed as it is to be, and not commit(); otherwise −1, as
+  // for a binary file, which begins with what is known last. Errors as of commit().
   [[nodiscard]] Result<int> stream_fd();
 
   // Errors are of kind internal; the old file is then as it was.
@@ -33,6 +45,11 @@ class Output {
   Output(std::string name, std::filesystem::path target, TemporaryFile temporary)
       : name_(std::move(name)), target_(std::move(target)), temporary_(std::move(temporary)) {}
 
+  [[nodiscard]] Status pack();
+  [[nodiscard]] Status pack_into(int to);
+  // Goes through the text.
+  [[nodiscard]] Status for_each_block(const std::function<Status(std::string_view)>& use) const;
+  [[nodiscard]] const TemporaryFile& result() const { return packed_ ? *packed_ : temporary_; }
   [[nodiscard]] Status replace_target();
   [[nodiscard]] Status open_stream();
   [[nodiscard]] Status copy_to_stream();
@@ -41,6 +58,9 @@ class Output {
   std::string name_;
   std::filesystem::path target_;  // empty for a stream
   TemporaryFile temporary_;
+  std::optional<TemporaryFile> packed_;
+  container::Kind kind_ = container::Kind::text;
+  const container::Metadata* origin_ = nullptr;
   FileDescriptor stream_;
 };
 

@@ -58,12 +58,18 @@ Status open_outputs(const RunConfig& config, Workspace& space) {
 // What is read more than once.
 Status spool(const RunConfig& config, Workspace& space) {
   if (config.command == Command::compensate) {
-    return {};
+    return space.input.make_readable();
   }
   if (Status copied = space.input.make_seekable(); !copied) {
     return copied;
   }
   return space.compensated ? space.compensated->make_seekable() : Status{};
+}
+
+// What the output is to be packed in: in place and in a stream as the input is.
+container::Kind output_kind(const RunConfig& config, const Workspace& space) {
+  return config.in_place || space.output->is_stream() ? space.input.kind()
+                                                      : container::kind_of_name(config.output);
 }
 
 }  // namespace
@@ -112,7 +118,11 @@ Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   job.input_name = space.input.name();
   job.output_name = config.command == Command::compensate ? config.print_name : config.output;
   if (space.output) {
+    const std::optional<container::Metadata>& origin = space.input.metadata();
+    space.output->pack_as(output_kind(config, space), origin ? &*origin : nullptr);
     job.output = space.output->path();
+    job.input_fd_kind = space.input.kind();
+    job.output_fd_kind = space.output->kind();
     const Result<int> stream = space.output->stream_fd();
     if (!stream) {
       return tl::unexpected(stream.error());

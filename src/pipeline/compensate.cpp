@@ -418,8 +418,8 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       return tl::unexpected(pool.error());
     }
     CpuSlots slots(job.workers);
-    FdSource source(job.input_head, job.input_fd, progress, slots);
-    FdSink sink(job.output_fd, progress, slots);
+    FdSource source(job, progress, slots);
+    FdSink sink(job, progress, slots);
     std::istream in_stream(&source);
     std::ostream out_stream(&sink);
     std::ifstream in_file;
@@ -440,12 +440,15 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
     Compensator compensator(job, engines, *pool, job.input_fd < 0 ? in_file : in_stream, output,
                             progress, slots, report);
     const Status status = compensator.work();
+    if (status) {
+      sink.finish();
+    }
     if (sink.error() != 0) {
       return fail(ErrorKind::internal, {job.output_name == "-" ? "stdout" : job.output_name, 0},
                   fmt::format("cannot write: {}", std::strerror(sink.error())));
     }
     if (!status) {
-      return tl::unexpected(status.error());
+      return tl::unexpected(source.error().value_or(status.error()));
     }
     output.flush();
     if (!output) {

@@ -5,6 +5,8 @@
 
 #include <cerrno>
 #include <ios>
+#include <string_view>
+#include <utility>
 
 namespace unflex::pipeline {
 namespace {
@@ -31,39 +33,96 @@ bool ready(int fd, short events, const Progress& progress, CpuSlots& slots) {
 
 }  // namespace
 
-FdSource::int_type FdSource::underflow() {
+FdSource::FdSource(const Job& job, const Progress& progress, CpuSlots& slots)
+    : fd_(job.input_fd), progress_(&progress), slots_(&slots), block_(job.input_head) {
+  if (fd_ >= 0) {
+    unpacker_ = container::make_unpacker(job.input_fd_kind, job.input_name);
+  }
+  if (unpacker_) {
+    unpacker_->push(block_);
+  } else {
+    setg(block_.data(), block_.data(), block_.data() + block_.size());
+  }
+}
+
+bool FdSource::read_block() {
   block_.resize(kBlockBytes);
-  for (;;) {
-    if (!ready(fd_, POLLIN, *progress_, *slots_)) {
-      return traits_type::eof();
-    }
+  while (ready(fd_, POLLIN, *progress_, *slots_)) {
     const ssize_t count = read(fd_, block_.data(), block_.size());
-    if (count > 0) {
-      setg(block_.data(), block_.data(), block_.data() + count);
-      return traits_type::to_int_type(*gptr());
-    }
-    if (count == 0) {
-      return traits_type::eof();
+    if (count >= 0) {
+      block_.resize(static_cast<std::size_t>(count));
+      return count > 0;
     }
     if (errno != EINTR && errno != EAGAIN) {
       // Makes the stream bad.
       throw std::ios_base::failure("cannot read");
     }
   }
+  return false;
 }
 
-std::streamsize FdSink::xsputn(const char* text, std::streamsize count) {
-  std::streamsize written = 0;
-  while (written < count && ready(fd_, POLLOUT, *progress_, *slots_)) {
-    const ssize_t some = write(fd_, text + written, static_cast<std::size_t>(count - written));
+bool FdSource::unpack_block() {
+  for (bool more = true;;) {
+    Result<std::string> text = unpacker_->pull();
+    if (!text) {
+      error_ = text.error();
+      throw std::ios_base::failure("cannot unpack");
+    }
+    if (!text->empty() || !more) {
+      text_ = std::move(*text);
+      return !text_.empty();
+    }
+    more = read_block();
+    if (more) {
+      unpacker_->push(block_);
+    } else if (progress_->cancelled()) {
+      return false;
+    } else {
+      unpacker_->finish();
+    }
+  }
+}
+
+FdSource::int_type FdSource::underflow() {
+  if (!(unpacker_ ? unpack_block() : read_block())) {
+    return traits_type::eof();
+  }
+  std::string& text = unpacker_ ? text_ : block_;
+  setg(text.data(), text.data(), text.data() + text.size());
+  return traits_type::to_int_type(*gptr());
+}
+
+FdSink::FdSink(const Job& job, const Progress& progress, CpuSlots& slots)
+    : fd_(job.output_fd), progress_(&progress), slots_(&slots) {
+  if (fd_ >= 0 && job.output_fd_kind == container::Kind::gzip) {
+    packer_ = container::make_gzip_packer();
+  }
+}
+
+bool FdSink::write_out(std::string_view bytes) {
+  while (!bytes.empty() && ready(fd_, POLLOUT, *progress_, *slots_)) {
+    const ssize_t some = write(fd_, bytes.data(), bytes.size());
     if (some > 0) {
-      written += some;
+      bytes.remove_prefix(static_cast<std::size_t>(some));
     } else if (some < 0 && errno != EINTR && errno != EAGAIN) {
       error_ = errno;
       break;
     }
   }
-  return written;
+  return bytes.empty();
+}
+
+// Gzip cannot fail to pack.
+std::streamsize FdSink::xsputn(const char* text, std::streamsize count) {
+  const std::string_view piece(text, static_cast<std::size_t>(count));
+  const bool written = packer_ ? write_out(*packer_->push(piece)) : write_out(piece);
+  return written ? count : 0;
+}
+
+void FdSink::finish() {
+  if (packer_) {
+    write_out(*packer_->finish());
+  }
 }
 
 FdSink::int_type FdSink::overflow(int_type character) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "unflex/container/container.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/machine/machine.hpp"
@@ -29,6 +30,9 @@ struct Job {
   int input_fd = -1;
   std::string input_head = {};  // of input_fd, read already
   int output_fd = -1;
+  // What passes through these two: text or gzip. Files are of text.
+  container::Kind input_fd_kind = container::Kind::text;
+  container::Kind output_fd_kind = container::Kind::text;
   std::string output_name;
   machine::Settings settings;
   EngineChoice engine = EngineChoice::automatic;

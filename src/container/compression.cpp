@@ -1,0 +1,71 @@
+#include <zlib.h>
+
+#include "bgcode_format.hpp"
+#include "heatshrink.hpp"
+
+namespace unflex::container {
+namespace {
+
+constexpr unsigned kSmallWindowBits = 11;
+constexpr unsigned kLargeWindowBits = 12;
+
+std::optional<std::string> inflate_all(std::string_view packed, std::size_t size) {
+  // One byte more than there should be, so that more of them do not pass for the right number.
+  std::string bytes(size + 1, '\0');
+  uLongf got = bytes.size();
+  uLong taken = packed.size();
+  const int outcome = uncompress2(reinterpret_cast<Bytef*>(bytes.data()), &got,
+                                  reinterpret_cast<const Bytef*>(packed.data()), &taken);
+  if (outcome != Z_OK || got != size || taken != packed.size()) {
+    return std::nullopt;
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+std::string deflate_all(std::string_view bytes) {
+  std::string packed(compressBound(bytes.size()), '\0');
+  uLongf size = packed.size();
+  ::compress(reinterpret_cast<Bytef*>(packed.data()), &size,
+             reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  packed.resize(size);
+  return packed;
+}
+
+}  // namespace
+
+std::optional<std::string> decompress(std::string_view packed, Compression compression,
+                                      std::size_t size) {
+  switch (compression) {
+    case Compression::none:
+      break;
+    case Compression::deflate:
+      return inflate_all(packed, size);
+    case Compression::heatshrink_11_4:
+      return unheatshrink(packed, kSmallWindowBits, size);
+    case Compression::heatshrink_12_4:
+      return unheatshrink(packed, kLargeWindowBits, size);
+  }
+  return std::string(packed);
+}
+
+std::string compress(std::string_view bytes, Compression compression) {
+  switch (compression) {
+    case Compression::none:
+      break;
+    case Compression::deflate:
+      return deflate_all(bytes);
+    case Compression::heatshrink_11_4:
+      return heatshrink(bytes, kSmallWindowBits);
+    case Compression::heatshrink_12_4:
+      return heatshrink(bytes, kLargeWindowBits);
+  }
+  return std::string(bytes);
+}
+
+std::uint32_t crc32_of(std::string_view bytes) {
+  return static_cast<std::uint32_t>(
+      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+}  // namespace unflex::container

@@ -1,0 +1,64 @@
+// Metadata of binary G-code as comments of a text, and found again among them.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "unflex/container/metadata.hpp"
+#include "unflex/core/error.hpp"
+
+namespace unflex::container {
+
+// Nothing if a line is not key=value.
+[[nodiscard]] std::optional<KeyValues> key_values(std::string_view lines);
+[[nodiscard]] std::string lines_of(const KeyValues& values);
+
+// What stands before the G-code and after it: the layout of PrusaSlicer's own conversion to text.
+[[nodiscard]] std::string head_text(const Metadata& metadata);
+[[nodiscard]] std::string tail_text(const Metadata& metadata);
+
+// Goes through the lines of a text and tells which are metadata and which G-code.
+class MetadataLines {
+ public:
+  // origin: as of make_bgcode_packer().
+  explicit MetadataLines(const Metadata* origin);
+
+  // Whether the line (without its end) belongs into a G-code block: not blank, and not metadata.
+  // Errors have a message alone.
+  [[nodiscard]] Result<bool> is_gcode(std::string_view line);
+
+  // What there was, to be called once, after the last line.
+  [[nodiscard]] Result<Metadata> take();
+
+ private:
+  enum class Section { none, thumbnail, config, json_config };
+  using Values = std::map<std::string, std::string, std::less<>>;
+
+  [[nodiscard]] Result<bool> is_metadata(std::string_view comment);
+  [[nodiscard]] bool begins_section(std::string_view comment);
+  [[nodiscard]] bool begins_thumbnail(std::string_view comment);
+  [[nodiscard]] Result<bool> continue_section(std::string_view comment);
+  [[nodiscard]] Status end_thumbnail();
+  [[nodiscard]] bool take_value(std::string_view comment);
+  [[nodiscard]] bool take_producer(std::string_view comment);
+  [[nodiscard]] Metadata sorted() const;
+
+  const Metadata* origin_;
+  std::set<std::string, std::less<>>
+      head_keys_;  // those that are metadata before the first command
+  std::set<std::string, std::less<>> tail_keys_;  // and after it
+  bool in_head_ = true;
+  Section section_ = Section::none;
+  bool had_config_ = false;
+  bool had_json_config_ = false;
+  std::size_t expected_digits_ = 0;  // of the thumbnail being read
+  Values head_;
+  Values tail_;
+  Metadata found_;
+};
+
+}  // namespace unflex::container
