@@ -6,7 +6,8 @@ _unflex_options() {
   case $1 in
     '') echo '-h --help --version' ;;
     compensate)
-      echo "-h --help -o --output --in-place $print --max-deviation --engine -j --jobs" ;;
+      echo "-h --help -o --output --in-place --log $print --max-deviation --engine -j --jobs" ;;
+    batch) echo "-h --help -o --output $print --summary --max-deviation --engine -j --jobs" ;;
     verify) echo "-h --help --against $print --max-deviation" ;;
     inspect) echo "-h --help $print" ;;
     study) echo "-h --help --case $print --engine -j --jobs" ;;
@@ -20,21 +21,24 @@ _unflex_options() {
 
 _unflex_commands() {
   case $1 in
-    '') echo 'compensate verify inspect study identify printer' ;;
+    '') echo 'compensate batch verify inspect study identify printer' ;;
     printer) echo 'init' ;;
   esac
 }
 
-# What may follow a word: `files PATTERN`, `words WORD...`, `any` for what cannot be guessed, or
+# What may follow a word: `files PATTERN`, `folders`, `words WORD...`, `any` for what cannot be guessed, or
 # nothing where the word takes no value. Files of another name are offered where none matches.
 _unflex_value() {
-  local print='*.@(gcode|gco|g)' printer='*.@(toml|cfg|g|txt)'
+  local print='*.@(gcode|gco|g|bgcode|gcode.gz)' printer='*.@(toml|cfg|g|txt)'
   case $1:$2 in
     'printer init:-o' | 'printer init:--output') echo 'files *.toml' ;;
+    batch: | batch:-o | batch:--output | batch:--report) echo 'folders' ;;
+    batch:--summary) echo 'files *.@(json|xml)' ;;
+    *:--log) echo 'files *.@(log|txt)' ;;
     *:-o | *:--output | *:--against) echo "files $print" ;;
     *:--from | *:--printer) echo "files $printer" ;;
     *:--report) echo 'files *.@(json|html)' ;;
-    study:--engine | compensate:--engine) echo 'words auto banded ipopt' ;;
+    study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;
     *:--axis) echo 'words x y' ;;
     *:--case) echo 'words ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' ;;
     *:--set | *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
@@ -83,6 +87,9 @@ _unflex() {
     kind=$(_unflex_value "$command" '')
   fi
   case $kind in
+    folders)
+      mapfile -t COMPREPLY < <(compgen -d -- "$current")
+      compopt -o filenames 2>/dev/null ;;
     files\ *) _unflex_files "$current" "${kind#files }" ;;
     words\ *) mapfile -t COMPREPLY < <(compgen -W "${kind#words }" -- "$current") ;;
   esac

@@ -26,8 +26,8 @@ function __unflex_files
     string match --regex -- "^[^\t]*(?:$ends|/)(?:\t.*)?\$" $all; or printf '%s\n' $all
 end
 
-set -g __unflex_commands compensate verify inspect study identify printer
-set -l gcode '(__unflex_files .gcode .gco .g)'
+set -g __unflex_commands compensate batch verify inspect study identify printer
+set -l gcode '(__unflex_files .gcode .gco .g .bgcode .gcode.gz)'
 set -l printer '(__unflex_files .toml .cfg .g .txt)'
 set -l prints compensate verify inspect study
 
@@ -36,6 +36,7 @@ complete -c unflex -s h -l help -d 'Print the options and exit'
 complete -c unflex -n '__unflex_in ""' -l version -d 'Print the version and exit'
 
 complete -c unflex -n '__unflex_in ""' -a compensate -d 'Write G-code whose motion makes the nozzle draw the sliced path'
+complete -c unflex -n '__unflex_in ""' -a batch -d 'Compensate all prints of a folder, those alone that have changed'
 complete -c unflex -n '__unflex_in ""' -a verify -d 'Measure how far the nozzle strays when a compensated file is printed'
 complete -c unflex -n '__unflex_in ""' -a inspect -d 'Show what is understood of a G-code file'
 complete -c unflex -n '__unflex_in ""' -a study -d 'Measure all ways to move the base against each other'
@@ -48,10 +49,15 @@ complete -c unflex -n '__unflex_in identify' -a '(__unflex_files .csv)'
 
 complete -c unflex -n '__unflex_in compensate' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
 complete -c unflex -n '__unflex_in compensate' -l in-place -d 'Replace the input'
+complete -c unflex -n '__unflex_in compensate' -l log -r -F -d 'Add what is said and the summary to a file'
+complete -c unflex -n '__unflex_in batch' -a '(__fish_complete_directories (commandline -ct))'
+complete -c unflex -n '__unflex_in batch' -s o -l output -x -a '(__fish_complete_directories (commandline -ct))' -d 'The folder to write to'
+complete -c unflex -n '__unflex_in batch' -l report -x -a '(__fish_complete_directories (commandline -ct))' -d 'A page for each print, in this folder'
+complete -c unflex -n '__unflex_in batch' -l summary -x -a '(__unflex_files .json .xml)' -d 'Write what became of each print'
 complete -c unflex -n '__unflex_in verify' -l against -x -a $gcode -d 'The sliced G-code it was made from'
-complete -c unflex -n '__unflex_in compensate verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'
-complete -c unflex -n '__unflex_in compensate study' -l engine -x -a 'auto banded ipopt' -d 'What solves'
-complete -c unflex -n '__unflex_in compensate study' -s j -l jobs -x -d 'How many to compute at once'
+complete -c unflex -n '__unflex_in compensate batch verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'
+complete -c unflex -n '__unflex_in compensate batch study' -l engine -x -a 'auto banded ipopt' -d 'What solves'
+complete -c unflex -n '__unflex_in compensate batch study' -s j -l jobs -x -d 'How many to compute at once'
 complete -c unflex -n '__unflex_in study' -l case -x -a 'ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' -d 'Only this case of the corner'
 
 complete -c unflex -n '__unflex_in identify' -l axis -x -a 'x y' -d 'The axis the records are of'
@@ -64,7 +70,7 @@ complete -c unflex -n '__unflex_in identify' -l decay -x -d 'Of a ringing tower:
 complete -c unflex -n '__unflex_in "printer init"' -l from -x -a $printer -d 'What describes the printer'
 complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unflex_files .toml)' -d 'Where to write, - for stdout'
 
-complete -c unflex -n "__unflex_in $prints" -l printer -x -a $printer -d 'The printer'
-complete -c unflex -n "__unflex_in $prints 'printer init'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n "__unflex_in $prints batch" -l printer -x -a $printer -d 'The printer'
+complete -c unflex -n "__unflex_in $prints batch 'printer init'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
 complete -c unflex -n "__unflex_in $prints identify" -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
-complete -c unflex -n "__unflex_in $prints identify 'printer init'" -s q -l quiet -d 'No summary and no progress bar'
+complete -c unflex -n "__unflex_in $prints batch identify 'printer init'" -s q -l quiet -d 'No summary and no progress bar'

@@ -70,7 +70,9 @@ bool TemporaryFile::remove_abandoned(const std::filesystem::path& directory) {
 }
 
 TemporaryFile::TemporaryFile(std::filesystem::path path, int fd, pid_t owner)
-    : path_(std::move(path)), fd_(fd), owner_(owner) {}
+    : path_(std::move(path)), fd_(fd), owner_(owner) {
+  remove_if_cut_short(path_.string());
+}
 
 TemporaryFile::TemporaryFile(TemporaryFile&& other) noexcept
     : path_(std::exchange(other.path_, {})),
@@ -86,8 +88,13 @@ TemporaryFile::~TemporaryFile() {
 void TemporaryFile::unlink() {
   if (!path_.empty()) {
     ::unlink(path_.c_str());
-    path_.clear();
+    release();
   }
+}
+
+void TemporaryFile::release() {
+  keep_if_cut_short(path_.string());
+  path_.clear();
 }
 
 int write_all(int fd, std::string_view data) {

@@ -47,7 +47,7 @@ class TemporaryFile {
   // Removes the name now; the contents live on behind fd().
   void unlink();
   // The name is someone else's from here on.
-  void release() { path_.clear(); }
+  void release();
 
  private:
   TemporaryFile(std::filesystem::path path, int fd, pid_t owner);

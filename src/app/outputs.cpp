@@ -92,6 +92,8 @@ Result<Output> Output::open(const std::string& name) {
   if (!directory) {
     return tl::unexpected(directory.error());
   }
+  // What a killed run may have left there.
+  static_cast<void>(TemporaryFile::remove_abandoned(*directory));
   tl::expected<TemporaryFile, int> temporary = TemporaryFile::create(*directory);
   if (!temporary) {
     return refuse(name, fmt::format("cannot write to the directory {}: {}", directory->string(),

@@ -1,16 +1,53 @@
 #include "signals.hpp"
 
+#include <sys/time.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+#include <array>
+#include <climits>
 #include <csignal>
+#include <cstring>
 #include <initializer_list>
+#include <mutex>
 
 namespace unflex::app {
 namespace {
 
+constexpr int kSignalExitBase = 128;
+// For what is under way to end by itself, µs.
+constexpr suseconds_t kPatience_us = 400'000;
+
 volatile std::sig_atomic_t received = 0;
+
+struct Slot {
+  volatile std::sig_atomic_t used = 0;
+  pid_t owner = 0;
+  std::array<char, PATH_MAX> file{};
+};
+std::array<Slot, 8> unfinished;
+std::mutex unfinished_mutex;
+
+// Nothing here but what a signal handler may call.
+extern "C" void give_up(int /*signal*/) {
+  bool removed = false;
+  for (const Slot& slot : unfinished) {
+    if (slot.used != 0 && slot.owner == ::getpid()) {
+      removed = ::unlink(slot.file.data()) == 0 || removed;
+    }
+  }
+  if (removed) {
+    constexpr char kMessage[] = "unflex: interrupted, no file was written\n";
+    static_cast<void>(::write(STDERR_FILENO, kMessage, sizeof kMessage - 1));
+  }
+  ::_exit(kSignalExitBase + received);
+}
 
 extern "C" void remember(int signal) {
   if (received == 0) {
     received = signal;
+    constexpr itimerval kOnce{{0, 0}, {0, kPatience_us}};
+    ::setitimer(ITIMER_REAL, &kOnce, nullptr);
   }
 }
 
@@ -27,10 +64,32 @@ void catch_signals() {
       ::sigaction(signal, &action, nullptr);
     }
   }
+  ::signal(SIGALRM, give_up);
   ::signal(SIGPIPE, SIG_IGN);
   ::signal(SIGXFSZ, SIG_IGN);
 }
 
 int ending_signal() { return received; }
+
+void remove_if_cut_short(const std::string& file) {
+  const std::lock_guard lock(unfinished_mutex);
+  for (Slot& slot : unfinished) {
+    if (slot.used == 0 && file.size() < slot.file.size()) {
+      std::strcpy(slot.file.data(), file.c_str());
+      slot.owner = ::getpid();
+      slot.used = 1;
+      return;
+    }
+  }
+}
+
+void keep_if_cut_short(const std::string& file) {
+  const std::lock_guard lock(unfinished_mutex);
+  for (Slot& slot : unfinished) {
+    if (slot.used != 0 && file == slot.file.data()) {
+      slot.used = 0;
+    }
+  }
+}
 
 }  // namespace unflex::app

@@ -1,15 +1,23 @@
 // The signals that ask the program to end.
 #pragma once
 
+#include <string>
+
 namespace unflex::app {
 
 // From here on SIGINT, SIGTERM and SIGHUP are remembered instead of killing the process, and
 // writing to a closed pipe or beyond a size limit is an error instead of a signal. A signal that is
-// ignored already (nohup) stays ignored.
+// ignored already (nohup) stays ignored. Should the process not have ended by itself 0.4 s after
+// one, it is ended: a run may take longer to solve.
 void catch_signals();
 
-// The first of them that came, or 0. What a signal handler tells the rest of the process cannot
-// live anywhere but in a static variable; this is the only one.
+// The first of them that came, or 0. What a signal handler tells the rest of the process, and what
+// it has to know, cannot live anywhere but in static variables; these are the only ones.
 [[nodiscard]] int ending_signal();
+
+// A file that this process must not leave behind if it is ended so, until it is to be kept. There
+// is room for a few; more are left.
+void remove_if_cut_short(const std::string& file);
+void keep_if_cut_short(const std::string& file);
 
 }  // namespace unflex::app

@@ -1,6 +1,7 @@
 // A program that is asked to end leaves nothing behind.
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -56,6 +57,39 @@ TEST_P(EndingSignal, RemovesTheTemporaryFileAndKeepsTheTarget) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OfEveryKind, EndingSignal, ::testing::Values(SIGINT, SIGTERM, SIGHUP));
+
+TEST_F(ProgramTest, EndsSoonEvenWhereARunTakesLong) {
+  // Marlin's whole steps make a run of a minute a matter of many seconds.
+  std::string text = "G28\nG90\nM83\nG1 X20 Y20 F6000\n";
+  for (int i = 0; i < 2000; ++i) {
+    text += fmt::format("G1 X{} Y{} E0.05\n", i % 2 == 0 ? 40 : 20, 20.0 + 0.01 * i);
+  }
+  write_file(path("in.gcode"), text);
+  Program program(directory(), {"compensate", "in.gcode", "-o", "out.gcode", "-j", "1", "--set",
+                                "printer.firmware=marlin"});
+  ASSERT_TRUE(wait_for_names(directory(), 2));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const auto begin = std::chrono::steady_clock::now();
+  program.signal(SIGINT);
+  const Outcome outcome = program.wait();
+  EXPECT_EQ(outcome.exit_code, 128 + SIGINT);
+  EXPECT_EQ(outcome.err, "unflex: interrupted, no file was written\n");
+  EXPECT_THAT(names(), ElementsAre("in.gcode"));
+  // Half a second, and room for a busy machine; the work takes far longer.
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(3));
+}
+
+TEST_F(ProgramTest, RemovesWhatAKilledRunHasLeft) {
+  write_file(path("in.gcode"), long_print());
+  Program program(directory(), {"compensate", "in.gcode", "-o", "out.gcode"});
+  ASSERT_TRUE(wait_for_names(directory(), 2));
+  program.signal(SIGKILL);
+  EXPECT_EQ(program.wait().exit_code, 128 + SIGKILL);
+  EXPECT_EQ(names().size(), 2U);
+  write_file(path("small.gcode"), small_print());
+  EXPECT_EQ(run({"compensate", "small.gcode", "-o", "out.gcode"}).exit_code, 0);
+  EXPECT_THAT(names(), ElementsAre("in.gcode", "out.gcode", "small.gcode"));
+}
 
 TEST_F(ProgramTest, EndsWithoutASignalWhenNobodyReadsItsOutput) {
   write_file(path("in.gcode"), small_print());

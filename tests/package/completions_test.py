@@ -15,9 +15,9 @@ import program_help
 
 UNFLEX, COMPLETIONS = sys.argv[1:3]
 HERE = os.path.dirname(os.path.abspath(__file__))
-FILES = ["print.gcode", "printer.toml", "printer.cfg", "config.g", "m503.txt", "sweep.csv",
+FILES = ["print.gcode", "print.bgcode", "print.gcode.gz", "printer.toml", "printer.cfg", "config.g", "m503.txt", "sweep.csv",
          "report.json", "report.html", "picture.png"]
-PRINTS = {"print.gcode", "config.g", "prints/"}
+PRINTS = {"print.gcode", "print.bgcode", "print.gcode.gz", "config.g", "prints/"}
 PRINTERS = {"printer.toml", "printer.cfg", "config.g", "m503.txt", "prints/"}
 
 
@@ -82,6 +82,9 @@ class Completion:
         self.assertEqual(self.files("unflex verify --report "),
                          {"report.json", "report.html", "prints/"})
         self.assertEqual(self.files("unflex identify "), {"sweep.csv", "prints/"})
+        self.assertEqual(self.files("unflex batch "), {"prints/"})
+        self.assertEqual(self.files("unflex batch prints -o "), {"prints/"})
+        self.assertEqual(self.files("unflex batch prints --summary "), {"report.json", "prints/"})
 
     def test_files_of_any_name_are_offered_where_no_other_matches(self):
         self.assertEqual(self.candidates("unflex inspect pict"), ["picture.png"])
