@@ -5,6 +5,23 @@
 #include <cstddef>
 
 namespace unflex::pipeline {
+namespace {
+
+// Over one node period. Acceleration is linear between nodes; for the nozzle each half's mean does
+// as well.
+dynamics::NozzleState follow(const dynamics::AxisTrajectory& base, std::size_t k, double h,
+                             const dynamics::FlexibleAxis& axis, dynamics::NozzleState state) {
+  const double change = base.accel_mm_s2[k + 1] - base.accel_mm_s2[k];
+  const dynamics::AxisMotion middle = dynamics::between(base, k, 0.5 * h, h);
+  state = dynamics::exact_step(
+      axis, state,
+      {base.position_mm[k], base.velocity_mm_s[k], base.accel_mm_s2[k] + 0.25 * change}, 0.5 * h);
+  return dynamics::exact_step(
+      axis, state, {middle.position_mm, middle.velocity_mm_s, base.accel_mm_s2[k] + 0.75 * change},
+      0.5 * h);
+}
+
+}  // namespace
 
 dynamics::NozzleXY at_rest(const gcode::Position& position) {
   return {{position[gcode::X], 0.0}, {position[gcode::Y], 0.0}};
@@ -41,6 +58,17 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
     nozzle.y = step(gcode::Y, model.y, nozzle.y);
     t = until_s;
   }
+}
+
+void advance(const dynamics::BaseTrajectory& base, std::size_t k, const verify::NozzleModel& model,
+             dynamics::NozzleXY& nozzle) {
+  nozzle = {follow(base.x, k, base.period_s, model.x, nozzle.x),
+            follow(base.y, k, base.period_s, model.y, nozzle.y)};
+}
+
+double across_mm(const gcode::Segment& segment, double x_mm, double y_mm) {
+  return std::abs(segment.delta(gcode::X) * y_mm - segment.delta(gcode::Y) * x_mm) /
+         segment.length_xy_mm();
 }
 
 dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,

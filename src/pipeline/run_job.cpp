@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <exception>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "judge.hpp"
@@ -24,18 +26,56 @@ std::string failure_of(const RunJob& job) {
 }
 
 // From the course's first node on; of a part also what comes after its last.
-dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
-  std::vector<dynamics::AxisTrajectory> solutions;
-  for (std::array<AxisResult, 2>& result : job.results) {
-    solutions.push_back(std::move(result[axis].base));
-    job.iterations += static_cast<std::size_t>(result[axis].iterations);
-  }
+dynamics::AxisTrajectory joined(const RunJob& job,
+                                const std::vector<dynamics::AxisTrajectory>& solutions) {
   dynamics::AxisTrajectory base = compensate::join(job.spans, solutions);
   const auto before = static_cast<std::ptrdiff_t>(job.grid.first);
   for (std::vector<double>* values : {&base.position_mm, &base.velocity_mm_s, &base.accel_mm_s2}) {
     values->erase(values->begin(), values->begin() + before);
   }
   return base;
+}
+
+// Of what the solvers have found.
+dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
+  std::vector<dynamics::AxisTrajectory> solutions;
+  for (std::array<AxisResult, 2>& result : job.results) {
+    solutions.push_back(std::move(result[axis].base));
+    job.iterations += static_cast<std::size_t>(result[axis].iterations);
+  }
+  return joined(job, solutions);
+}
+
+// The base that would be best if the axes were as given and nothing else.
+std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
+  compensate::Setup setup = job.setup;
+  setup.x.variants.clear();
+  setup.y.variants.clear();
+  const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
+  const auto windows = compensate::windows(job.course(), job.spans, job.nozzle, setup);
+  std::vector<dynamics::AxisTrajectory> x;
+  std::vector<dynamics::AxisTrajectory> y;
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    auto of_x = compensate::solve(*engine, job.spans[i], windows[i].x);
+    auto of_y = compensate::solve(*engine, job.spans[i], windows[i].y);
+    if (!of_x || !of_y) {
+      return std::nullopt;
+    }
+    x.push_back(std::move(of_x->base));
+    y.push_back(std::move(of_y->base));
+  }
+  return dynamics::BaseTrajectory{job.grid.period_s, joined(job, x), joined(job, y)};
+}
+
+void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
+  if (job.setup.x.variants.empty()) {
+    return;
+  }
+  if (const std::optional<dynamics::BaseTrajectory> nominal = nominal_base(job)) {
+    const std::vector<planner::PlannedMove>& plan = job.piece.moves;
+    job.robust = path_error(plan, job.lead_in_s(), job.base, job.nozzle, model);
+    job.nominal = path_error(plan, job.lead_in_s(), *nominal, job.nozzle, model);
+  }
 }
 
 // Where the firmware counts steps, how lines are cut depends on those before the run. What these
@@ -107,6 +147,7 @@ void prepare(RunJob& job, const RunRules& rules) noexcept {
     job.failure = failure_of(job);
     if (job.failure.empty()) {
       job.base = {job.grid.period_s, joined(job, 0), joined(job, 1)};
+      measure_robustness(job, rules.verify.nozzle);
       job.plan = emit::plan_run(job.run(1.0, 1.0, even_lines_before_s(rules.emit.lines)),
                                 job.piece.start, rules.emit);
       job.before = deviation_of(job.piece, job.piece.moves, job.nozzle, rules.verify, 0.0);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "path_error.hpp"
 #include "piece_reader.hpp"
 #include "unflex/compensate/axis_window.hpp"
 #include "unflex/compensate/run.hpp"
@@ -52,6 +53,10 @@ struct RunJob {
   dynamics::BaseTrajectory base;
   emit::RunPlan plan;
   verify::RunDeviation before;  // of its own moves
+  // Where the axes may be several things, of the axes as given: on this base, and on the one that
+  // would be best for them.
+  PathError robust;
+  PathError nominal;
   std::size_t iterations = 0;
   std::string failure;
   std::atomic<bool> prepared = false;

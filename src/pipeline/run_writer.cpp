@@ -99,6 +99,9 @@ std::string RunWriter::finish() {
   report_->line_budget.max_lines_per_s = max_lines_per_s_;
   report_->line_budget.cost_rms_mm = cost_.rms_mm();
   report_->line_budget.cost_max_mm = cost_.max_mm();
+  if (!rules_->setup.x.variants.empty()) {
+    report_->robustness = {robust_.rms_mm(), nominal_.rms_mm()};
+  }
   return text;
 }
 
@@ -223,6 +226,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   written_s_ += planner::duration_s(verdict.replayed);
   cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, nozzle_,
             rules_->verify.nozzle);
+  robust_.add(job.robust);
+  nominal_.add(job.nominal);
   late_s_ +=
       planner::duration_s(verdict.replayed) - planner::duration_s(piece.moves) - job.lead_in_s();
   last_lines_ = piece.ends_run() ? std::vector<gcode::Segment>() : last_lines(verdict.replayed);

@@ -57,6 +57,8 @@ class RunWriter {
   double late_s_ = 0.0;                     // by how much it ended late
   bool run_stands_ = false;                 // the first part of the run at hand stands as it is
   EmissionCost cost_;
+  PathError robust_;
+  PathError nominal_;
   double sliced_s_ = 0.0;   // time that what has been written took …
   double written_s_ = 0.0;  // … and takes
 };

@@ -76,7 +76,8 @@ VerifyThread::VerifyThread(const verify::Rules& rules, const verify::Observation
         try {
           std::istream input(&input_);
           std::istream output(&output_);
-          result_ = verify::verify(input, input_name, output, output_name, rules, stopped_, observation);
+          result_ =
+              verify::verify(input, input_name, output, output_name, rules, stopped_, observation);
         } catch (const std::exception& exception) {
           result_ = fail(ErrorKind::internal, exception.what());
         }

@@ -69,6 +69,11 @@ void add_motion(const Report& r, Json& json) {
   json["deviation"] = {{"uncompensated", rows_json(r.uncompensated)},
                        {"compensated", rows_json(r.compensated)}};
   json["sensitivity"] = sensitivity_json(r.sensitivity);
+  json["robustness"] = nullptr;
+  if (r.robustness) {
+    json["robustness"] = {{"rms_mm", r.robustness->rms_mm},
+                          {"nominal_rms_mm", r.robustness->nominal_rms_mm}};
+  }
   json["base"] = {{"max_velocity_mm_s", r.base_max_velocity_mm_s},
                   {"max_accel_mm_s2", r.base_max_accel_mm_s2}};
 }

@@ -122,6 +122,11 @@ std::string to_text(const Report& report) {
   write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
   write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
   write_sensitivity(out, report.sensitivity);
+  if (report.robustness) {
+    fmt::format_to(out, "robustness    {} µm RMS of the base as optimised, {} without a band\n",
+                   micrometres_text(report.robustness->rms_mm),
+                   micrometres_text(report.robustness->nominal_rms_mm));
+  }
   write_times(out, report);
   write_runs(out, report);
   write_output(out, report);

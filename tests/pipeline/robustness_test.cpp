@@ -66,6 +66,13 @@ void expect_robust(const std::string& text) {
   EXPECT_GT(robust.compensated.extruding.contour_rms_mm,
             nominal.compensated.extruding.contour_rms_mm)
       << "nothing is for nothing";
+  EXPECT_FALSE(nominal.robustness.has_value());
+  ASSERT_TRUE(robust.robustness.has_value());
+  // What lines cost is small beside it.
+  EXPECT_NEAR(robust.robustness->rms_mm, robust.compensated.extruding.contour_rms_mm,
+              0.15 * robust.robustness->rms_mm);
+  EXPECT_LT(robust.robustness->nominal_rms_mm, nominal.compensated.extruding.contour_rms_mm);
+  EXPECT_GT(robust.robustness->nominal_rms_mm, 0.0);
   EXPECT_LT(robust.compensated.extruding.contour_rms_mm,
             0.2 * robust.uncompensated.extruding.contour_rms_mm);
 }

@@ -20,6 +20,7 @@ TEST(Summary, IsExactlyThis) {
       "  extruding       800 → 12.5          400 → 6.25          200 → 3.12\n"
       "  all moves       1600 → 25.0         800 → 12.5          400 → 6.25\n"
       "sensitivity   12.0, 6.10 µm RMS if frequencies are off by -10, +5 %\n"
+      "robustness    3.00 µm RMS of the base as optimised, 0.50 without a band\n"
       "print time    1h 00m 00s planned, 1h 00m 18s emitted (+0.50 %)\n"
       "base          at most 123 mm/s and 19999 mm/s²\n"
       "runs          895 of 900 compensated, 5 fell back to their original moves\n"

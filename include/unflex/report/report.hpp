@@ -22,6 +22,13 @@ struct DeviationRow {
   std::size_t contour_max_line = 0;
 };
 
+// What it costs that the base is to suit a band of frequencies: the error across the path, of
+// extruding moves and before lines are made of it, where the axes are as given.
+struct Robustness {
+  double rms_mm = 0.0;
+  double nominal_rms_mm = 0.0;  // of the base that would be best for them
+};
+
 struct DeviationRows {
   DeviationRow extruding;
   DeviationRow all;
@@ -85,6 +92,7 @@ struct Report {
   DeviationRows uncompensated;
   DeviationRows compensated;
   std::vector<Sensitivity> sensitivity;  // by rising error
+  std::optional<Robustness> robustness;  // where a band was asked for
 
   double base_max_velocity_mm_s = 0.0;
   double base_max_accel_mm_s2 = 0.0;
