@@ -19,7 +19,12 @@ void print_line(std::string_view text);
 // "file:line: message", or "unflex: message" for an error without a place.
 void print_error(const Error& error);
 
-// The first few of the lines, then how many of `total` are left; `what` names them ("warnings").
+// The first few lines of each kind, which differ in place, numbers and quoted text alone, and how
+// many more there are; then how many of `total` are left. `what` names them ("warnings").
+[[nodiscard]] std::vector<std::string> summarised(const std::vector<std::string>& lines,
+                                                  std::size_t total, std::string_view what);
+
+// Writes them so to stderr.
 void print_lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what);
 
 }  // namespace unflex::app

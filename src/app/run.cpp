@@ -182,8 +182,7 @@ auto with_progress(const RunConfig& config, Work work)
   return result;
 }
 
-// Remarks about the settings come before those about the print.
-void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings) {
+std::vector<std::string> setting_warnings(const machine::Settings& settings) {
   std::vector<std::string> remarks;
   for (const Diagnostic& note : settings.notes) {
     remarks.push_back(to_string(note));
@@ -191,11 +190,32 @@ void add_setting_warnings(const machine::Settings& settings, std::vector<std::st
   for (const std::string& remark : machine::recommendations(settings)) {
     remarks.push_back(fmt::format("unflex: warning: {}", remark));
   }
+  return remarks;
+}
+
+// Remarks about the settings come before those about the print.
+void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings) {
+  const std::vector<std::string> remarks = setting_warnings(settings);
   warnings.insert(warnings.begin(), remarks.begin(), remarks.end());
 }
 
 void print_warnings(const std::vector<std::string>& warnings) {
   print_lines(warnings, warnings.size(), "warnings");
+}
+
+// Whether --strict ends the work here; the warnings are then shown as the errors they are.
+bool ends_strictly(const RunConfig& config, std::vector<std::string> warnings) {
+  if (!config.strict || warnings.empty()) {
+    return false;
+  }
+  constexpr std::string_view kWarning = ": warning: ";
+  for (std::string& warning : warnings) {
+    if (const std::size_t at = warning.find(kWarning); at != std::string::npos) {
+      warning.replace(at, kWarning.size(), ": ");
+    }
+  }
+  print_lines(warnings, warnings.size(), "errors");
+  return true;
 }
 
 // The summary goes to stdout, unless a result is there; then to stderr if someone is looking.
@@ -273,6 +293,9 @@ Result<ExitCode> run_on_prints(const RunConfig& config) {
   if (!space) {
     return tl::unexpected(space.error());
   }
+  if (ends_strictly(config, setting_warnings(space->settings))) {
+    return ExitCode::input;
+  }
   const Result<pipeline::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
@@ -283,6 +306,9 @@ Result<ExitCode> run_on_prints(const RunConfig& config) {
   });
   if (!report) {
     return tl::unexpected(report.error());
+  }
+  if (ends_strictly(config, report->warnings)) {
+    return ExitCode::input;
   }
   add_setting_warnings(space->settings, report->warnings);
   print_warnings(report->warnings);
@@ -307,6 +333,9 @@ Result<ExitCode> run_inspect(const RunConfig& config) {
     return tl::unexpected(inspection.error());
   }
   add_setting_warnings(space->settings, inspection->warnings);
+  if (ends_strictly(config, inspection->warnings)) {
+    return ExitCode::input;
+  }
   print_warnings(inspection->warnings);
   const std::string json = inspection_json(*inspection, config.input, space->settings);
   const std::string text = inspection_text(*inspection, config.input, space->settings);

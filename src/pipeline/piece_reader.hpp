@@ -14,6 +14,7 @@
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/planner/planner.hpp"
+#include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
 
@@ -41,10 +42,12 @@ void count_kept_moves(const gcode::Event& event, Firmware firmware,
 class PieceReader {
  public:
   PieceReader(std::istream& input, std::string name, gcode::InterpreterOptions interpreter,
-              planner::Limits limits, planner::FirmwareConfig fixed);
+              planner::Limits limits, planner::FirmwareConfig fixed,
+              verify::TravelLimits travel = {});
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
-  // read, was written by unflex, or ends without a single G-code command in it.
+  // read, was written by unflex, ends without a single G-code command in it, or has a move without
+  // end.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
@@ -52,7 +55,10 @@ class PieceReader {
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
 
  private:
+  Result<bool> cut(Piece& piece);
   Result<bool> read_event(gcode::Event& event);
+  void warn(std::size_t line, std::string message);
+  void warn_of_travel(const gcode::Event& event);
   void append(gcode::Event event);
   void append_between();
   void mark_border(const gcode::Event& event);
@@ -64,6 +70,7 @@ class PieceReader {
   gcode::Interpreter interpreter_;
   std::unique_ptr<planner::Planner> planner_;
   Firmware firmware_;
+  verify::TravelLimits travel_;
   // Where a run that turns out to be long may be parted: before a move of it.
   struct Border {
     std::size_t event = 0;
@@ -78,7 +85,6 @@ class PieceReader {
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;
   bool any_command_ = false;
-  bool any_bare_return_ = false;
 };
 
 }  // namespace unflex::pipeline
