@@ -9,6 +9,7 @@
 
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
+#include "unflex/verify/endless.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -219,6 +220,9 @@ void PieceReader::warn_of_travel(const gcode::Event& event) {
 
 // Puts the event into the open piece, after the lines that turned out to stand between.
 void PieceReader::append(gcode::Event event) {
+  if (open_.events.empty()) {
+    open_.from_mm = machine_mm_;
+  }
   append_between();
   if (open_.is_run && open_.events.empty()) {
     // The move itself changes nothing of it.
@@ -229,7 +233,10 @@ void PieceReader::append(gcode::Event event) {
   }
   std::size_t count = 0;
   for (const gcode::Segment& segment : event.segments) {
-    count += planner_->add(segment) ? 1 : 0;
+    if (planner_->add(segment)) {
+      ++count;
+      machine_mm_ = segment.end_mm;
+    }
   }
   if (event.kind == gcode::EventKind::barrier) {
     planner_->stop();

@@ -69,6 +69,25 @@ void Meter::begin_section(ReferencePath& path) {
     current_ = path.first();
   }
   time_s_ = path.section_start_s();
+  section_error_ = {};
+}
+
+double Meter::base_offset_mm() {
+  static_cast<void>(next_reference_change());
+  const auto away = [&](double x, double y) { return std::hypot(base_x_mm_ - x, base_y_mm_ - y); };
+  if (current_ < path_->end()) {
+    const PathPiece& piece = (*path_)[current_];
+    if (piece.start_s > time_s_) {
+      return away(piece.x_mm, piece.y_mm);
+    }
+    const ReferencePhase reference = reference_phase(0.0);
+    return away(reference.x.position, reference.y.position);
+  }
+  if (path_->first() == path_->end()) {
+    return 0.0;
+  }
+  const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
+  return away(end[gcode::X], end[gcode::Y]);
 }
 
 void Meter::follow_lag(bool on) {
@@ -228,6 +247,7 @@ Meter::Sample Meter::sample(const ReferencePhase& reference, double h) {
   all_.add(contour2, tracking2, h, line);
   if (reference.extruding) {
     extruding_.add(contour2, tracking2, h, line);
+    section_error_.add(contour2, h, line);
   }
   if (follow_lag_) {
     const double v_x = reference.x.velocity;

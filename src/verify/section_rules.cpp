@@ -1,0 +1,108 @@
+#include "section_rules.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace unflex::verify {
+namespace {
+
+// A line more within 100 ms is a matter of the clock's last digits.
+constexpr double kOneLine_per_s = 10.0;
+// How far the clock of a run may be off its plan.
+constexpr double kClock_s = 2e-3;
+constexpr double kRounding_mm = 0.02;
+// What the nozzle may stray more than before: by these, whichever is more. A run is judged by
+// itself when it is written; what the runs before left swinging makes a little of a difference.
+constexpr double kTimes = 1.1;
+constexpr double kBearableRms_mm = 2e-3;
+constexpr double kBearable_mm = 10e-3;
+
+double speed_mm_s(const planner::PlannedMove& move) {
+  return move.duration_s() > 0.0 ? move.segment.length_xy_mm() / move.duration_s() : 0.0;
+}
+
+// How far the base may be from the plan at a speed.
+double largest_offset_mm(const Rules& rules, double v_mm_s) {
+  const auto of_axis = [&](const dynamics::FlexibleAxis& axis) {
+    const double omega = axis.omega_rad_s;
+    return rules.base_max_accel_mm_s2 / (omega * omega) +
+           (2.0 * axis.zeta / omega + kClock_s) * v_mm_s;
+  };
+  return kRounding_mm + std::hypot(of_axis(rules.nozzle.x), of_axis(rules.nozzle.y));
+}
+
+}  // namespace
+
+void SectionRules::Worst::offer(double a_value, double limit, std::size_t a_line) {
+  if (a_value - limit > excess) {
+    excess = a_value - limit;
+    value = a_value;
+    line = a_line;
+  }
+}
+
+void SectionRules::begin(const LineRate& rate_before) {
+  sliced_rate_ = rate_before;
+  sliced_rate_.forget();
+  sliced_rate_.change_text();
+  first_line_ = 0;
+  offset_ = {};
+  tail_ = {};
+}
+
+void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late,
+                       double filament_tolerance_mm) {
+  const std::size_t line = move.segment.line;
+  first_line_ = first_line_ == 0 ? line : first_line_;
+  offset_.offer(meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), line);
+  if (std::getenv("UNFLEX_STATS")) fmt::print(stderr, "OFF {:.4f} {:.4f} v {:.1f}\n", meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), speed_mm_s(move));
+  if (late && std::getenv("UNFLEX_STATS")) fmt::print(stderr, "TAIL {:.6f} {:.6f}\n", move.segment.delta(gcode::E), filament_tolerance_mm);
+  if (late) {
+    tail_.offer(std::abs(move.segment.delta(gcode::E)), filament_tolerance_mm, line);
+  }
+}
+
+void SectionRules::end(const LineRate& rate, const SectionError& sliced,
+                       const SectionError& emitted) {
+  check_rate(rate);
+  check_nozzle(sliced, emitted);
+  if (offset_.line != 0) {
+    violations_->in_output(
+        offset_.line, fmt::format("the base is {:.3f} mm away from where the sliced file is by then",
+                                  offset_.value));
+  }
+  if (tail_.line != 0) {
+    violations_->in_output(tail_.line,
+                           fmt::format("{:.5f} mm of filament in the tail of a run, after all that "
+                                       "the sliced file lays",
+                                       tail_.value));
+  }
+}
+
+void SectionRules::check_rate(const LineRate& rate) {
+  if (std::getenv("UNFLEX_STATS")) fmt::print(stderr, "RATE {:.0f} {:.0f} {:.0f}\n", rate.max_per_s(), rules_->max_lines_per_s, sliced_rate_.max_per_s());
+  const double most = std::max(rules_->max_lines_per_s, sliced_rate_.max_per_s()) + kOneLine_per_s;
+  if (rate.max_per_s() > most) {
+    violations_->in_output(rate.densest_line(),
+                           fmt::format("{:.0f} lines per second are more than {:.0f}",
+                                       rate.max_per_s(), rules_->max_lines_per_s));
+  }
+}
+
+void SectionRules::check_nozzle(const SectionError& sliced, const SectionError& emitted) {
+  if (std::getenv("UNFLEX_STATS")) fmt::print(stderr, "DEV {:.2f} {:.2f} {:.2f} {:.2f}  {:.3f} s line {}\n", sliced.rms_mm()*1e3, emitted.rms_mm()*1e3, sliced.max_mm()*1e3, emitted.max_mm()*1e3, emitted.duration_s(), first_line_);
+  if (emitted.rms_mm() > std::max(kTimes * sliced.rms_mm(), kBearableRms_mm) ||
+      emitted.max_mm() > std::max(kTimes * sliced.max_mm(), kBearable_mm)) {
+    violations_->in_output(
+        first_line_,
+        fmt::format("in this run the nozzle strays more than in the sliced file (line {}): contour "
+                    "RMS {:.3f} instead of {:.3f} µm, largest {:.3f} instead of {:.3f} µm",
+                    emitted.line(), emitted.rms_mm() * 1e3, sliced.rms_mm() * 1e3,
+                    emitted.max_mm() * 1e3, sliced.max_mm() * 1e3));
+  }
+}
+
+}  // namespace unflex::verify
