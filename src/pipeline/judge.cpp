@@ -78,9 +78,28 @@ struct Replayed {
   std::vector<planner::PlannedMove> moves;
 };
 
-Replayed replay(std::string_view text, gcode::Interpreter printer, const planner::Limits& limits,
-                const planner::FirmwareConfig& config, const InMotion& in_motion) {
+// Marlin leaves a move of a few steps to the next one: it is not where the text says.
+std::optional<gcode::Segment> left_to_next(const Piece& run, const gcode::Position& at_mm) {
+  constexpr double kFewSteps_mm = 0.5;
+  constexpr double kSamePlace_mm = 1e-6;
+  gcode::Segment left;
+  left.start_mm = left.end_mm = at_mm;
+  left.feed_mm_s = 1.0;
+  left.line = kNoLine;
+  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z}) {
+    left.start_mm[axis] = run.from_mm[axis];
+  }
+  const bool is_left = left.length_mm() > kSamePlace_mm && left.length_mm() < kFewSteps_mm;
+  return is_left && run.begins_run() ? std::optional(left) : std::nullopt;
+}
+
+Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter printer,
+                const planner::Limits& limits, const planner::FirmwareConfig& config,
+                const InMotion& in_motion) {
   const std::unique_ptr<planner::Planner> planner = planner::make_planner(limits, config);
+  if (const auto left = left_to_next(run, printer.state().position_mm)) {
+    planner->add(*left);
+  }
   for (gcode::Segment line : in_motion.lines_before) {
     line.line = kNoLine;
     planner->add(line);
@@ -166,7 +185,7 @@ Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_
               const dynamics::NozzleXY& nozzle, const verify::Rules& rules, double lead_in_s,
               verify::LineRate rate, double max_lines_per_s, const InMotion& in_motion) {
   Verdict verdict;
-  Replayed replayed = replay(text, std::move(printer), printer_limits, rules.fixed, in_motion);
+  Replayed replayed = replay(run, text, std::move(printer), printer_limits, rules.fixed, in_motion);
   verdict.replayed = std::move(replayed.moves);
   verdict.objection = verify::broken_rule(run.moves, verdict.replayed, rules,
                                           replayed.before ? &*replayed.before : nullptr);
