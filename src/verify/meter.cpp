@@ -74,20 +74,23 @@ void Meter::begin_section(ReferencePath& path) {
 
 double Meter::base_offset_mm() {
   static_cast<void>(next_reference_change());
-  const auto away = [&](double x, double y) { return std::hypot(base_x_mm_ - x, base_y_mm_ - y); };
-  if (current_ < path_->end()) {
-    const PathPiece& piece = (*path_)[current_];
-    if (piece.start_s > time_s_) {
-      return away(piece.x_mm, piece.y_mm);
-    }
-    const ReferencePhase reference = reference_phase(0.0);
-    return away(reference.x.position, reference.y.position);
+  if (path_->first() == path_->end()) {
+    return 0.0;
   }
+  // Before the reference starts and after it has ended, of what is near then.
+  near_.slide(*path_, std::clamp(time_s_, (*path_)[path_->first()].start_s, path_->end_s()));
+  std::size_t nearest = 0;
+  return std::sqrt(near_.squared_contour_error(*path_, base_x_mm_, base_y_mm_, nearest));
+}
+
+double Meter::swing_mm() const {
   if (path_->first() == path_->end()) {
     return 0.0;
   }
   const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
-  return away(end[gcode::X], end[gcode::Y]);
+  return std::hypot(nozzle_.x.position - end[gcode::X], nozzle_.x.velocity / model_.x.omega_rad_s,
+                    std::hypot(nozzle_.y.position - end[gcode::Y],
+                               nozzle_.y.velocity / model_.y.omega_rad_s));
 }
 
 void Meter::follow_lag(bool on) {

@@ -93,8 +93,10 @@ class Meter {
   [[nodiscard]] double reach_s() const { return near_.reach_s(); }
   // While the reference lays filament, in the section that began last.
   [[nodiscard]] const SectionError& section_error() const { return section_error_; }
-  // How far the base is now from where the reference is.
+  // How far the base is now from the path the reference passes about now.
   [[nodiscard]] double base_offset_mm();
+  // How far the nozzle will swing from the end of the path known so far.
+  [[nodiscard]] double swing_mm() const;
 
  private:
   struct Phase {

@@ -10,9 +10,8 @@ namespace {
 
 // A line more within 100 ms is a matter of the clock's last digits.
 constexpr double kOneLine_per_s = 10.0;
-// How far the clock of a run may be off its plan.
-constexpr double kClock_s = 2e-3;
-constexpr double kRounding_mm = 0.02;
+// Rounding to steps, and what the nozzle strays.
+constexpr double kRounding_mm = 0.05;
 // Filament of a line that this makes late.
 constexpr double kLate_mm = 5e-4;
 // What the nozzle may stray more than the sliced run's would, by whichever is more. When a run is
@@ -26,21 +25,20 @@ double speed_mm_s(const planner::PlannedMove& move) {
   return move.duration_s() > 0.0 ? move.segment.length_xy_mm() / move.duration_s() : 0.0;
 }
 
-// How far the base may be from the plan at a speed.
+// How far the base may be from the path at a speed.
 double largest_offset_mm(const Rules& rules, double v_mm_s) {
   const auto of_axis = [&](const dynamics::FlexibleAxis& axis) {
     const double omega = axis.omega_rad_s;
     return rules.base_max_accel_mm_s2 / (omega * omega) +
-           (2.0 * axis.zeta / omega + kClock_s) * v_mm_s;
+           2.0 * axis.zeta / omega * v_mm_s;
   };
   return kRounding_mm + std::hypot(of_axis(rules.nozzle.x), of_axis(rules.nozzle.y));
 }
 
 }  // namespace
 
-void SectionRules::Worst::offer(double a_value, double limit, std::size_t a_line) {
-  if (a_value - limit > excess) {
-    excess = a_value - limit;
+void SectionRules::Breach::offer(double a_value, double limit, std::size_t a_line) {
+  if (line == 0 && a_value > limit) {
     value = a_value;
     line = a_line;
   }
@@ -52,7 +50,9 @@ void SectionRules::begin(const LineRate& rate_before) {
   sliced_rate_.change_text();
   first_line_ = 0;
   offset_ = {};
-  tail_ = {};
+  filament_in_tail_ = {};
+  swing_in_tail_mm_ = 0.0;
+  swing_line_ = 0;
 }
 
 void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late,
@@ -61,24 +61,40 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
   first_line_ = first_line_ == 0 ? line : first_line_;
   offset_.offer(meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), line);
   if (late) {
-    tail_.offer(std::abs(move.segment.delta(gcode::E)), kLate_mm + filament_tolerance_mm, line);
+    filament_in_tail_.offer(std::abs(move.segment.delta(gcode::E)),
+                            kLate_mm + filament_tolerance_mm, line);
+    const double swing_mm = meter.swing_mm();
+    if (swing_mm > swing_in_tail_mm_) {
+      swing_in_tail_mm_ = swing_mm;
+      swing_line_ = line;
+    }
   }
 }
 
-void SectionRules::end(const LineRate& rate, const SectionError& sliced,
-                       const SectionError& emitted) {
+void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emitted) {
   check_rate(rate);
-  check_nozzle(sliced, emitted);
+  check_nozzle(kept.section_error(), emitted.section_error());
+  check_tail(kept);
   if (offset_.line != 0) {
     violations_->in_output(
-        offset_.line, fmt::format("the base is {:.3f} mm away from where the sliced file is by then",
+        offset_.line, fmt::format("the base is {:.3f} mm away from the sliced path",
                                   offset_.value));
   }
-  if (tail_.line != 0) {
-    violations_->in_output(tail_.line,
+}
+
+void SectionRules::check_tail(const Meter& kept) {
+  if (filament_in_tail_.line != 0) {
+    violations_->in_output(filament_in_tail_.line,
                            fmt::format("{:.5f} mm of filament in the tail of a run, after all that "
                                        "the sliced file lays",
-                                       tail_.value));
+                                       filament_in_tail_.value));
+  }
+  const double kept_mm = kept.swing_mm();
+  if (swing_in_tail_mm_ > std::max(kTimes * kept_mm, kBearable_mm)) {
+    violations_->in_output(
+        swing_line_, fmt::format("in the tail of a run the nozzle swings by {:.3f} µm instead of "
+                                 "{:.3f} µm as sliced",
+                                 swing_in_tail_mm_ * 1e3, kept_mm * 1e3));
   }
 }
 
@@ -91,15 +107,15 @@ void SectionRules::check_rate(const LineRate& rate) {
   }
 }
 
-void SectionRules::check_nozzle(const SectionError& sliced, const SectionError& emitted) {
-  if (emitted.rms_mm() > std::max(kTimes * sliced.rms_mm(), kBearableRms_mm) ||
-      emitted.max_mm() > std::max(kTimes * sliced.max_mm(), kBearable_mm)) {
+void SectionRules::check_nozzle(const SectionError& kept, const SectionError& emitted) {
+  if (emitted.rms_mm() > std::max(kTimes * kept.rms_mm(), kBearableRms_mm) ||
+      emitted.max_mm() > std::max(kTimes * kept.max_mm(), kBearable_mm)) {
     violations_->in_output(
         first_line_,
         fmt::format("in this run the nozzle strays more than in the sliced file (line {}): contour "
                     "RMS {:.3f} instead of {:.3f} µm, largest {:.3f} instead of {:.3f} µm",
-                    emitted.line(), emitted.rms_mm() * 1e3, sliced.rms_mm() * 1e3,
-                    emitted.max_mm() * 1e3, sliced.max_mm() * 1e3));
+                    emitted.line(), emitted.rms_mm() * 1e3, kept.rms_mm() * 1e3,
+                    emitted.max_mm() * 1e3, kept.max_mm() * 1e3));
   }
 }
 

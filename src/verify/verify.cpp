@@ -425,7 +425,7 @@ void Verifier::check_run(bool compensated) {
                 std::abs(difference_mm)});
   if (compensated) {
     base_.end_run();
-    rules_of_run_.end(rate_, kept_.section_error(), emitted_.main().section_error());
+    rules_of_run_.end(rate_, kept_, emitted_.main());
     if (path_.end() == section_first_) {
       violations_.in_output(output_.following().line.number,
                             "the run before is not in the sliced file");

@@ -97,8 +97,8 @@ struct VerifyReport {
 // error but a report with violations: a line lost, changed or moved; filament not conserved; a
 // position outside the travel (and further out than the input itself goes); base velocity or
 // acceleration above its limit (by more than 0.1 % and than the rounding of coordinates explains);
-// more lines per second than the budget and than the sliced file has there; a base further from its
-// plan than the machine bends; filament laid after the plan of a run has ended; a nozzle that strays
+// more lines per second than the budget and than the sliced file has there; a base further from
+// the path than the machine bends; filament laid after the plan of a run has ended; a nozzle that strays
 // more than in the sliced file; a move the firmware refuses (extrusion ratio); limits, modes or
 // shaper not restored. Where the sequence
 // of stops differs, nothing can be compared any further; the figures are then of what came before.
