@@ -97,8 +97,10 @@ Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter prin
                 const planner::Limits& limits, const planner::FirmwareConfig& config,
                 const InMotion& in_motion) {
   const std::unique_ptr<planner::Planner> planner = planner::make_planner(limits, config);
-  if (const auto left = left_to_next(run, printer.state().position_mm)) {
-    planner->add(*left);
+  if (in_motion.lines_before.empty()) {
+    if (const auto left = left_to_next(run, printer.state().position_mm)) {
+      planner->add(*left);
+    }
   }
   for (gcode::Segment line : in_motion.lines_before) {
     line.line = kNoLine;
@@ -111,6 +113,9 @@ Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter prin
     const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), ++number});
     text.remove_prefix(end);
     planner->apply(event.limits);
+    if (event.kind == gcode::EventKind::barrier) {
+      planner->stop();
+    }
     for (const gcode::Segment& segment : event.segments) {
       planner->add(segment);
       last = segment;
@@ -126,7 +131,7 @@ Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter prin
     return move.segment.line == kNoLine;
   };
   const auto first = std::ranges::find_if_not(replayed.moves, is_around);
-  if (first != replayed.moves.begin()) {
+  if (first != replayed.moves.begin() && !run.begins_run()) {
     replayed.before = *(first - 1);
   }
   std::erase_if(replayed.moves, is_around);

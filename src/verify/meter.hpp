@@ -20,6 +20,10 @@ class LagEstimate {
   // Starts afresh, keeping the largest lag found.
   void restart();
   [[nodiscard]] double worst_s() const { return worst_s_; }
+  // As it is now; 0 where the reference rests.
+  [[nodiscard]] double present_s() const {
+    return velocity2_ > 0.0 ? std::abs(error_dot_velocity_) / velocity2_ : 0.0;
+  }
 
  private:
   double error_dot_velocity_ = 0.0;
@@ -83,6 +87,7 @@ class Meter {
 
   void follow_lag(bool on);
   [[nodiscard]] double worst_lag_s() const { return lag_.worst_s(); }
+  [[nodiscard]] double lag_s() const { return lag_.present_s(); }
 
   [[nodiscard]] double time_s() const { return time_s_; }
   [[nodiscard]] const NozzleXY& nozzle() const { return nozzle_; }

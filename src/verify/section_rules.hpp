@@ -21,7 +21,8 @@ class SectionRules {
   SectionRules(const Rules& rules, Violations& violations)
       : rules_(&rules), violations_(&violations) {}
 
-  void begin(const LineRate& rate_before);
+  // ringing: motion that was kept has just set the nozzle swinging.
+  void begin(const LineRate& rate_before, bool ringing);
   // A move of the sliced file's run by itself, as it would come here.
   void add_sliced(const planner::PlannedMove& move) { sliced_rate_.add(move); }
   // A move of the emitted run, after it has been played. late: the plan had ended when it began.
@@ -38,11 +39,14 @@ class SectionRules {
   };
   void check_rate(const LineRate& rate);
   void check_nozzle(const SectionError& kept, const SectionError& emitted);
-  void check_tail(const Meter& kept);
+  void check_swing(const Meter& kept);
+  void check_filament();
 
   const Rules* rules_;
   Violations* violations_;
   LineRate sliced_rate_;
+  bool ringing_ = false;
+  double duration_s_ = 0.0;
   std::size_t first_line_ = 0;
   Breach offset_;
   Breach filament_in_tail_;

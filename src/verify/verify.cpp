@@ -30,8 +30,9 @@ constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 constexpr double kLeastPlaceTolerance_mm = 0.5;
 constexpr std::size_t kMovesPerUpdate = 1024;
 constexpr double kApart_s = 10.0;
-// By which the clock of a run may lag behind its plan where that ends.
+// By which the clock of a run may lag behind its plan where that ends, besides what is known of it.
 constexpr double kLate_s = 5e-4;
+constexpr double kRingsFor_s = 1.0;
 
 double place_tolerance_mm(const Rules& rules) {
   const double omega = std::min(rules.nozzle.x.omega_rad_s, rules.nozzle.y.omega_rad_s);
@@ -158,6 +159,7 @@ class Verifier {
   std::size_t refused_line_ = 0;  // the same in the output; 0: none
   LineRate rate_;
   double max_lines_per_s_ = 0.0;
+  double since_kept_motion_s_ = 0.0;
   std::optional<Error> failure_;  // a move without end
   std::size_t section_first_ = 0;  // first piece of the path in this section
   std::size_t original_next_ = 0;  // the one the original plays next
@@ -224,7 +226,7 @@ bool Verifier::ends_here(const planner::PlannedMove& move, const Replay& file) {
 void Verifier::begin_section(bool compensated) {
   max_lines_per_s_ = std::max(max_lines_per_s_, rate_.max_per_s());
   rate_.forget();
-  rules_of_run_.begin(rate_);
+  rules_of_run_.begin(rate_, since_kept_motion_s_ < kRingsFor_s);
   path_.begin_section();
   original_.begin_section(path_);
   if (compensated) {
@@ -325,11 +327,16 @@ void Verifier::play_run_moves(bool compensated) {
 void Verifier::play(const planner::PlannedMove& move) {
   rate_.add(move);
   const double start_s = emitted_.main().time_s();
-  const bool late =
-      emitted_path_->section_complete() && start_s >= emitted_path_->end_s() + kLate_s;
+  const bool compensated = emitted_path_ == &run_path_;
+  const bool late = emitted_path_->section_complete() &&
+                    start_s >= emitted_path_->end_s() + kLate_s + emitted_.main().lag_s();
+  since_kept_motion_s_ += move.duration_s();
+  if (!compensated && move.segment.length_xy_mm() > 0.0) {
+    since_kept_motion_s_ = 0.0;
+  }
   emitted_.play(move);
   filament_.play(move, start_s);
-  if (emitted_path_ == &run_path_) {
+  if (compensated) {
     rules_of_run_.add(move, emitted_.main(), late, filament_tolerance_mm());
   }
   totals_.emitted_time_s += move.duration_s();
@@ -486,6 +493,7 @@ void Verifier::play_kept_line() {
     path_.rest(dwell_s);
     original_.hold(dwell_s);
     emitted_.hold(dwell_s);
+    since_kept_motion_s_ += dwell_s;
     if (observer_ != nullptr) {
       observer_->hold(dwell_s);
     }
