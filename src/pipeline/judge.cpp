@@ -79,7 +79,8 @@ struct Replayed {
 };
 
 // Marlin leaves a move of a few steps to the next one: it is not where the text says.
-std::optional<gcode::Segment> left_to_next(const Piece& run, const gcode::Position& at_mm) {
+std::optional<gcode::Segment> left_to_next(const gcode::Position& machine_mm,
+                                           const gcode::Position& at_mm) {
   constexpr double kFewSteps_mm = 0.5;
   constexpr double kSamePlace_mm = 1e-6;
   gcode::Segment left;
@@ -87,18 +88,18 @@ std::optional<gcode::Segment> left_to_next(const Piece& run, const gcode::Positi
   left.feed_mm_s = 1.0;
   left.line = kNoLine;
   for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z}) {
-    left.start_mm[axis] = run.from_mm[axis];
+    left.start_mm[axis] = machine_mm[axis];
   }
   const bool is_left = left.length_mm() > kSamePlace_mm && left.length_mm() < kFewSteps_mm;
-  return is_left && run.begins_run() ? std::optional(left) : std::nullopt;
+  return is_left ? std::optional(left) : std::nullopt;
 }
 
 Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter printer,
                 const planner::Limits& limits, const planner::FirmwareConfig& config,
                 const InMotion& in_motion) {
   const std::unique_ptr<planner::Planner> planner = planner::make_planner(limits, config);
-  if (in_motion.lines_before.empty()) {
-    if (const auto left = left_to_next(run, printer.state().position_mm)) {
+  if (in_motion.lines_before.empty() && in_motion.machine_mm) {
+    if (const auto left = left_to_next(*in_motion.machine_mm, printer.state().position_mm)) {
       planner->add(*left);
     }
   }

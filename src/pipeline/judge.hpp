@@ -28,6 +28,8 @@ struct InMotion {
   std::vector<gcode::Segment> lines_before;  // the last ones of what is before; none: from rest
   bool goes_on = false;                      // another part follows
   bool may_be_worse = false;                 // by little: there is no other way left
+  // Where the last move led that the firmware has made.
+  std::optional<gcode::Position> machine_mm = std::nullopt;
 };
 
 struct Verdict {

@@ -121,6 +121,9 @@ std::string RunWriter::finish() {
 void RunWriter::keep_motion(const Piece& piece) {
   nozzle_ = after_motion(piece, nozzle_, rules_->verify.nozzle);
   follow_motion(piece, kept_lines_);
+  if (!piece.moves.empty()) {
+    machine_mm_ = piece.moves.back().segment.end_mm;
+  }
   line_rate_.change_text();
   line_rate_.forget();
   for (const planner::PlannedMove& move : piece.moves) {
@@ -225,7 +228,7 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   Verdict verdict = judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(),
                           nozzle_, rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
                           {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(),
-                           may_be_worse});
+                           may_be_worse, machine_mm_});
   if (verdict.objection) {
     return std::move(verdict.objection);
   }
@@ -244,6 +247,9 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
       planner::duration_s(verdict.replayed) - planner::duration_s(piece.moves) - job.lead_in_s();
   last_lines_ = piece.ends_run() ? std::vector<gcode::Segment>() : last_lines(verdict.replayed);
   kept_lines_.clear();
+  if (!verdict.replayed.empty()) {
+    machine_mm_ = verdict.replayed.back().segment.end_mm;
+  }
   nozzle_ = verdict.nozzle;
   line_rate_ = std::move(verdict.rate);
   note_lines_above_budget(piece);
