@@ -48,8 +48,8 @@ std::optional<Axis> axis_of(char letter) {
   }
 }
 
-// What the firmware makes of a speed that is none: Klipper refuses the line (gcode_move.py, cmd_G1),
-// RepRapFirmware goes on at its minimum speed; Marlin does not mind.
+// What the firmware makes of a speed that is none: Klipper refuses the line (gcode_move.py,
+// cmd_G1), RepRapFirmware goes on at its minimum speed; Marlin does not mind.
 const char* problem_of_feed(double feed, Firmware firmware) {
   if (feed > 0.0 || firmware == Firmware::marlin) {
     return nullptr;
@@ -58,8 +58,8 @@ const char* problem_of_feed(double feed, Firmware firmware) {
                                        : "F must be above zero, or the printer creeps";
 }
 
-// A line of several commands, or of one word twice, was hardly meant so. Klipper and Marlin take the
-// last of equal words and a second command for words without meaning; RepRapFirmware's reader
+// A line of several commands, or of one word twice, was hardly meant so. Klipper and Marlin take
+// the last of equal words and a second command for words without meaning; RepRapFirmware's reader
 // knows better.
 std::string_view oddity(const Command& command) {
   unsigned seen = 0;
@@ -265,9 +265,10 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   }
   arc.centre_offset_mm = *offset;
   if (const double gap_mm = gap_at_end_mm(arc); gap_mm > kLargestGap_mm) {
-    event.warnings.push_back(fmt::format(
-        "the arc's end is {:.2f} mm off its circle: the printer goes there straight; check the line",
-        gap_mm));
+    event.warnings.push_back(
+        fmt::format("the arc's end is {:.2f} mm off its circle: the printer goes there straight; "
+                    "check the line",
+                    gap_mm));
   }
   set_feed(event, target.feed);
   const double feed_mm_s = state_.feed_mm_s * state_.speed_factor;

@@ -26,7 +26,7 @@ struct Piece {
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
   std::vector<planner::PlannedMove> moves;
-  emit::RunStart start;  // of a run
+  emit::RunStart start;       // of a run
   gcode::Position from_mm{};  // where the piece's first move finds the machine
   // Of a part of a run, some of its moves around: none before the first part and after the last.
   std::vector<planner::PlannedMove> before;
@@ -79,9 +79,9 @@ class PieceReader {
     emit::RunStart start;
   };
 
-  Piece open_;                   // being filled
-  std::deque<Border> borders_;   // of it
-  double since_border_s_ = 0.0;  // roughly
+  Piece open_;                    // being filled
+  std::deque<Border> borders_;    // of it
+  double since_border_s_ = 0.0;   // roughly
   gcode::Position machine_mm_{};  // after the last planned move
   std::size_t borders_since_look_ = 0;
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows

@@ -88,9 +88,9 @@ double Meter::swing_mm() const {
     return 0.0;
   }
   const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
-  return std::hypot(nozzle_.x.position - end[gcode::X], nozzle_.x.velocity / model_.x.omega_rad_s,
-                    std::hypot(nozzle_.y.position - end[gcode::Y],
-                               nozzle_.y.velocity / model_.y.omega_rad_s));
+  return std::hypot(
+      nozzle_.x.position - end[gcode::X], nozzle_.x.velocity / model_.x.omega_rad_s,
+      std::hypot(nozzle_.y.position - end[gcode::Y], nozzle_.y.velocity / model_.y.omega_rad_s));
 }
 
 void Meter::follow_lag(bool on) {

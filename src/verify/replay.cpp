@@ -19,7 +19,7 @@ constexpr std::string_view kRunEndComment = ";unflex end";
 // Of filament alone, and no more than rounding to five digits may leave until E is next told to be
 // somewhere.
 bool is_nothing(const gcode::Event& event, const gcode::ModalState& modal) {
-  constexpr double kRounding_mm = 2e-5;
+  constexpr double kRounding_mm = 3.5e-5;
   if (event.segments.size() != 1 || event.segments.front().length_mm() > 0.0) {
     return false;
   }

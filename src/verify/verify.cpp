@@ -26,7 +26,7 @@ namespace {
 // One rounding step of E, and half of one for a remainder carried in.
 constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 // A line inside a compensated run stands this near to its place: the base leads the nozzle, by up
-// to a/ω² when it accelerates.
+// to a/ω² when it accelerates, and lines of motion, between which it stands, have a length.
 constexpr double kLeastPlaceTolerance_mm = 0.5;
 constexpr std::size_t kMovesPerUpdate = 1024;
 constexpr double kApart_s = 10.0;
@@ -36,7 +36,8 @@ constexpr double kRingsFor_s = 1.0;
 
 double place_tolerance_mm(const Rules& rules) {
   const double omega = std::min(rules.nozzle.x.omega_rad_s, rules.nozzle.y.omega_rad_s);
-  return std::max(kLeastPlaceTolerance_mm, rules.base_max_accel_mm_s2 / (omega * omega));
+  return std::max(kLeastPlaceTolerance_mm, rules.base_max_accel_mm_s2 / (omega * omega)) +
+         0.5 * rules.base_max_velocity_mm_s / rules.max_lines_per_s;
 }
 
 // Length of a seekable stream in bytes, otherwise 0.
@@ -160,7 +161,7 @@ class Verifier {
   LineRate rate_;
   double max_lines_per_s_ = 0.0;
   double since_kept_motion_s_ = 0.0;
-  std::optional<Error> failure_;  // a move without end
+  std::optional<Error> failure_;   // a move without end
   std::size_t section_first_ = 0;  // first piece of the path in this section
   std::size_t original_next_ = 0;  // the one the original plays next
   std::size_t kept_next_ = 0;      // of run_path_, the one that kept_ plays next

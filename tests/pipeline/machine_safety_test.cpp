@@ -1,5 +1,5 @@
-// What the judge finds in an emitted file that someone, or a fault of unflex, has spoilt: every rule
-// broken once for every firmware, and edits by chance.
+// What the judge finds in an emitted file that someone, or a fault of unflex, has spoilt: every
+// rule broken once for every firmware, and edits by chance.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,8 @@ constexpr const char* kPrint =
     "G28\nG90\nM83\nG1 X60 Y60 Z0.2 F6000\nG4 P500\nM106 S128\n"
     "G1 X100 E1.6 F7200\nM104 S210\nG1 Y100 E1.6\nM106 S200\nG1 X60 E1.6\nG1 Y60 E1.6\n"
     "G1 E-1 F1800\nG1 X80 Y80 F9000\nG1 E1 F1800\n"
-    "M204 P800 T800\nG1 X90 E.4 F900\nM106 S90\nG1 X92 Y81 E.09\nM105\nG1 X92 Y90 E.36\nG1 X85 Y92 E.3\n"
+    "M204 P800 T800\nG1 X90 E.4 F900\nM106 S90\nG1 X92 Y81 E.09\nM105\nG1 X92 Y90 E.36\nG1 X85 Y92 "
+    "E.3\n"
     "M140 S0\nG4 P500\nM104 S0\nM84\n";
 
 std::vector<std::string> overrides(Firmware firmware) {
@@ -225,10 +226,10 @@ TEST_P(Emitted, WithALineTooFast) {
   const std::size_t i = run(0)[50];
   Lines bad = good_;
   bad[i] = with(bad[i], 'F', 6.0 * value(bad[i], 'F'));
-  EXPECT_THAT(found_in(bad), AnyOf(HasSubstr(at(i, "base velocity")), HasSubstr(at(i, "base acceleration")),
-                                   HasSubstr(at(i + 1, "base acceleration")),
-                                   HasSubstr(at(i, "the base is ")),
-                                   HasSubstr("the nozzle strays more")));
+  EXPECT_THAT(found_in(bad),
+              AnyOf(HasSubstr(at(i, "base velocity")), HasSubstr(at(i, "base acceleration")),
+                    HasSubstr(at(i + 1, "base acceleration")), HasSubstr(at(i, "the base is ")),
+                    HasSubstr("the nozzle strays more")));
 }
 
 TEST_P(Emitted, WithLinesAboveTheBudget) {
@@ -265,8 +266,8 @@ TEST_P(Emitted, WithANozzleThatStrays) {
     const std::string& line = good_[moves[n]];
     y = has(line, 'Y') ? value(line, 'Y') : y;
     if (n >= first) {
-      const double s = std::sin(std::acos(-1.0) * static_cast<double>(n - first) /
-                                static_cast<double>(count));
+      const double s =
+          std::sin(std::acos(-1.0) * static_cast<double>(n - first) / static_cast<double>(count));
       bad[moves[n]] = with(line, 'Y', y + 0.15 * s * s);
     }
   }
@@ -333,8 +334,8 @@ TEST_P(Emitted, WithVerticesMovedByChance) {
   std::mt19937_64 random(7);
   int counted = 0;
   for (int edit = 0; edit < 40; ++edit) {
-    const std::size_t i = moves[std::uniform_int_distribution<std::size_t>(
-        1, moves.size() - 2)(random)];
+    const std::size_t i =
+        moves[std::uniform_int_distribution<std::size_t>(1, moves.size() - 2)(random)];
     const char axis = std::uniform_int_distribution<int>(0, 1)(random) == 0 ? 'X' : 'Y';
     if (!has(good_[i], axis)) {
       continue;
@@ -354,8 +355,8 @@ TEST_P(Emitted, WithFilamentChangedByChance) {
   std::mt19937_64 random(8);
   for (int edit = 0; edit < 20; ++edit) {
     const std::vector<std::size_t> moves = run(2 * (edit % 2));
-    const std::size_t i = moves[std::uniform_int_distribution<std::size_t>(
-        1, moves.size() - 1)(random)];
+    const std::size_t i =
+        moves[std::uniform_int_distribution<std::size_t>(1, moves.size() - 1)(random)];
     const double least = GetParam() == Firmware::marlin ? 0.0125 : 1.1e-4;
     const double by = std::uniform_real_distribution<double>(least, 0.03)(random);
     Lines bad = good_;

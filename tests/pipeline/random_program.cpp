@@ -235,11 +235,10 @@ class Writer {
                             : fmt::format("M204 P{:.1f} T{:.1f}\n", number(500, 8000) / unit,
                                           number(500, 8000) / unit);
       case 1:
-        return is_klipper()
-                   ? fmt::format("SET_VELOCITY_LIMIT ACCEL={} VELOCITY={}\n", 500 + 250 * pick(30),
-                                 50 + 10 * pick(45))
-                   : fmt::format("M201 X{:.1f} Y{:.1f}\n", number(500, 8000) / unit,
-                                 number(500, 8000) / unit);
+        return is_klipper() ? fmt::format("SET_VELOCITY_LIMIT ACCEL={} VELOCITY={}\n",
+                                          500 + 250 * pick(30), 50 + 10 * pick(45))
+                            : fmt::format("M201 X{:.1f} Y{:.1f}\n", number(500, 8000) / unit,
+                                          number(500, 8000) / unit);
       case 2:
         return is_klipper() ? fmt::format("SET_VELOCITY_LIMIT SQUARE_CORNER_VELOCITY={:.2f}\n",
                                           number(0.5, 12.0))
@@ -265,9 +264,9 @@ class Writer {
 
   std::string no_motion() {
     constexpr std::array<std::string_view, 12> kLines = {
-        "M106 S128\n",         "M107\n",       "M104 S210\n",      "M105\n",
+        "M106 S128\n",         "M107\n",       "M104 S210\n",       "M105\n",
         "M73 P12 R34\n",       "\n",           ";TYPE:Perimeter\n", "; a (comment) with *stars\n",
-        "M117 layer 1 of 2\n", "M106 S77.5\n", "M140 S60\n",       "   ; indented\n"};
+        "M117 layer 1 of 2\n", "M106 S77.5\n", "M140 S60\n",        "   ; indented\n"};
     return one_of(kLines);
   }
 
