@@ -191,7 +191,7 @@ void Interpreter::marlin_linear_move(Event& event) {
     return linear_move(event);
   }
   if (const auto feed = command_.value('F')) {
-    set_feed(event, feed);
+    set_feed(feed);
   }
   state_.base_mm[E] -= change * scale;
   retraction_and_hop(event, change < 0.0);

@@ -224,7 +224,7 @@ void Interpreter::linear_move(Event& event) {
     return not_understood(event, target.problem);
   }
   remark_oddity(event, command_, options_.firmware);
-  set_feed(event, target.feed);
+  set_feed(target.feed);
   if (!target.moves()) {
     return;
   }
@@ -270,7 +270,7 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
                     "check the line",
                     gap_mm));
   }
-  set_feed(event, target.feed);
+  set_feed(target.feed);
   const double feed_mm_s = state_.feed_mm_s * state_.speed_factor;
   const ArcPieces pieces = is_klipper ? plan_arc(arc, options_.arc_resolution_mm)
                            : options_.firmware == Firmware::marlin
@@ -303,7 +303,7 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   }
 }
 
-void Interpreter::set_feed(Event& /*event*/, std::optional<double> feed_word) {
+void Interpreter::set_feed(std::optional<double> feed_word) {
   if (feed_word && *feed_word > 0.0) {
     state_.feed_mm_s = *feed_word * state_.unit_mm / kSecondsPerMinute;
     feed_uncertain_ = false;

@@ -1,4 +1,5 @@
 // What the firmware itself made of a program of moves and arcs in all modes.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <sstream>
@@ -25,7 +26,9 @@ TEST(Interpreter, MovesAsKlipperDoes) {
   while (std::getline(program, line.text)) {
     ++line.number;
     const Event event = interpreter.interpret(line);
-    EXPECT_TRUE(event.warnings.empty()) << line.number << ": " << line.text;
+    // Arcs by chance end anywhere.
+    EXPECT_THAT(event.warnings, ::testing::Each(::testing::HasSubstr("off its circle")))
+        << line.number << ": " << line.text;
     EXPECT_FALSE(event.position_lost) << line.number << ": " << line.text;
     for (const Segment& segment : event.segments) {
       ASSERT_LT(row, expected.size());
