@@ -83,6 +83,14 @@ double Meter::base_offset_mm() {
   return std::sqrt(near_.squared_contour_error(*path_, base_x_mm_, base_y_mm_, nearest));
 }
 
+double Meter::to_path_end_mm(const gcode::Position& from) const {
+  if (path_->first() == path_->end()) {
+    return 0.0;
+  }
+  const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
+  return std::hypot(from[gcode::X] - end[gcode::X], from[gcode::Y] - end[gcode::Y]);
+}
+
 double Meter::swing_mm() const {
   if (path_->first() == path_->end()) {
     return 0.0;

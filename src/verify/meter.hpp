@@ -100,6 +100,8 @@ class Meter {
   [[nodiscard]] const SectionError& section_error() const { return section_error_; }
   // How far the base is now from the path the reference passes about now.
   [[nodiscard]] double base_offset_mm();
+  // From a place to the end of the path known so far.
+  [[nodiscard]] double to_path_end_mm(const gcode::Position& from) const;
   // How far the nozzle will swing from the end of the path known so far.
   [[nodiscard]] double swing_mm() const;
 

@@ -14,6 +14,8 @@ constexpr double kOneLine_per_s = 10.0;
 constexpr double kRounding_mm = 0.05;
 // Filament of a line that this makes late.
 constexpr double kLate_mm = 5e-4;
+// Lines that tell how much filament there is on a way are longer.
+constexpr double kShort_mm = 0.1;
 // What the nozzle may stray more than if the run had been kept, by whichever is more. When a run is
 // written it may not stray more at all; this leaves room for the steps it is sampled in then, and
 // for parts of long runs, which may be a little worse.
@@ -52,6 +54,7 @@ void SectionRules::Breach::offer(double a_value, double limit, std::size_t a_lin
 void SectionRules::begin(const LineRate& rate_before, bool ringing) {
   ringing_ = ringing;
   duration_s_ = 0.0;
+  densest_ = 0.0;
   sliced_rate_ = rate_before;
   sliced_rate_.forget();
   sliced_rate_.change_text();
@@ -68,9 +71,15 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
   first_line_ = first_line_ == 0 ? line : first_line_;
   duration_s_ += move.duration_s();
   offset_.offer(meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), line);
+  const double filament_mm = std::abs(move.segment.delta(gcode::E));
+  if (!late && move.segment.length_xy_mm() > kShort_mm) {
+    densest_ = std::max(densest_, filament_mm / move.segment.length_xy_mm());
+  }
   if (late) {
-    filament_in_tail_.offer(std::abs(move.segment.delta(gcode::E)),
-                            kLate_mm + filament_tolerance_mm, line);
+    // A run whose clock is late has some of its way still to go.
+    const double to_go_mm = meter.to_path_end_mm(move.segment.start_mm);
+    filament_in_tail_.offer(filament_mm,
+                            kLate_mm + filament_tolerance_mm + kTimes * densest_ * to_go_mm, line);
     const double swing_mm = meter.swing_mm();
     if (swing_mm > swing_in_tail_mm_) {
       swing_in_tail_mm_ = swing_mm;

@@ -47,6 +47,7 @@ class SectionRules {
   LineRate sliced_rate_;
   bool ringing_ = false;
   double duration_s_ = 0.0;
+  double densest_ = 0.0;  // most filament on a way, mm/mm
   std::size_t first_line_ = 0;
   Breach offset_;
   Breach filament_in_tail_;
