@@ -264,12 +264,6 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
     return not_understood(event, "an arc whose radius is too small to reach its end");
   }
   arc.centre_offset_mm = *offset;
-  if (const double gap_mm = gap_at_end_mm(arc); gap_mm > kLargestGap_mm) {
-    event.warnings.push_back(
-        fmt::format("the arc's end is {:.2f} mm off its circle: the printer goes there straight; "
-                    "check the line",
-                    gap_mm));
-  }
   set_feed(target.feed);
   const double feed_mm_s = state_.feed_mm_s * state_.speed_factor;
   const ArcPieces pieces = is_klipper ? plan_arc(arc, options_.arc_resolution_mm)
@@ -282,6 +276,12 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   }
   if (pieces->empty()) {
     return not_understood(event, "an arc of no angle, which Marlin leaves out");
+  }
+  if (const double gap_mm = gap_at_end_mm(arc); gap_mm > kLargestGap_mm) {
+    event.warnings.push_back(
+        fmt::format("the arc's end is {:.2f} mm off its circle: the printer goes there straight; "
+                    "check the line",
+                    gap_mm));
   }
   const bool start_known = starts_known(target, state_) && modes_certain();
   settle(target, state_);

@@ -15,7 +15,7 @@ constexpr double kRounding_mm = 0.05;
 // Filament of a line that this makes late.
 constexpr double kLate_mm = 5e-4;
 // Lines that tell how much filament there is on a way are longer.
-constexpr double kShort_mm = 0.1;
+constexpr double kShort_mm = 0.2;
 // What the nozzle may stray more than if the run had been kept, by whichever is more. When a run is
 // written it may not stray more at all; this leaves room for the steps it is sampled in then, and
 // for parts of long runs, which may be a little worse.
@@ -25,7 +25,7 @@ constexpr double kParted_s = 60.0;
 constexpr double kBearableRms_mm = 5e-3;
 constexpr double kBearable_mm = 30e-3;
 // How it swings in a tail is not looked at when a run is written.
-constexpr double kBearableSwing_mm = 60e-3;
+constexpr double kBearableSwing_mm = 45e-3;
 
 double bearable_times(double duration_s) { return duration_s < kParted_s ? kTimes : kTimesInParts; }
 
@@ -69,9 +69,11 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
                        double filament_tolerance_mm) {
   const std::size_t line = move.segment.line;
   first_line_ = first_line_ == 0 ? line : first_line_;
+  last_line_ = line;
   duration_s_ += move.duration_s();
   offset_.offer(meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), line);
-  const double filament_mm = std::abs(move.segment.delta(gcode::E));
+  // Where along its way a wipe pulls filament back does not matter.
+  const double filament_mm = std::max(0.0, move.segment.delta(gcode::E));
   if (!late && move.segment.length_xy_mm() > kShort_mm) {
     densest_ = std::max(densest_, filament_mm / move.segment.length_xy_mm());
   }
@@ -94,7 +96,7 @@ void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emi
   // written it was taken to begin at rest, so that how it rings is not known as exactly.
   if (!ringing_) {
     check_nozzle(kept.section_error(), emitted.section_error());
-    check_swing(kept);
+    check_swing(kept, emitted);
   }
   check_filament();
   if (offset_.line != 0) {
@@ -113,7 +115,11 @@ void SectionRules::check_filament() {
   }
 }
 
-void SectionRules::check_swing(const Meter& kept) {
+void SectionRules::check_swing(const Meter& kept, const Meter& emitted) {
+  if (emitted.swing_mm() > swing_in_tail_mm_) {
+    swing_in_tail_mm_ = emitted.swing_mm();
+    swing_line_ = last_line_;
+  }
   const double kept_mm = kept.swing_mm();
   if (swing_in_tail_mm_ > std::max(kTimesInParts * kept_mm, kBearableSwing_mm)) {
     violations_->in_output(

@@ -39,7 +39,7 @@ class SectionRules {
   };
   void check_rate(const LineRate& rate);
   void check_nozzle(const SectionError& kept, const SectionError& emitted);
-  void check_swing(const Meter& kept);
+  void check_swing(const Meter& kept, const Meter& emitted);
   void check_filament();
 
   const Rules* rules_;
@@ -49,6 +49,7 @@ class SectionRules {
   double duration_s_ = 0.0;
   double densest_ = 0.0;  // most filament on a way, mm/mm
   std::size_t first_line_ = 0;
+  std::size_t last_line_ = 0;
   Breach offset_;
   Breach filament_in_tail_;
   double swing_in_tail_mm_ = 0.0;  // the largest

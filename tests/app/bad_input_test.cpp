@@ -261,8 +261,8 @@ INSTANTIATE_TEST_SUITE_P(
         line("ThatEndsOffItsCircle", "G2 X110 Y100 I1 J0 E.2",
              remarks(":11: warning: the arc's end is 8.00 mm off its circle")),
         line("InRelativeMode", "G91\nG2 X4 Y4 I4 J0 E.2\nG90\nM83",
-             warns(":12: warning: an arc in relative mode (G91), which Klipper refuses"), passes(),
-             passes())),
+             remarks(":12: warning: an arc in relative mode (G91), which Klipper refuses"),
+             passes(), passes())),
     [](const auto& tested) { return tested.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(

