@@ -6,10 +6,10 @@ _unflex_options() {
   case $1 in
     '') echo '-h --help --version' ;;
     compensate)
-      echo "-h --help -o --output --in-place --log $print --max-deviation --engine -j --jobs" ;;
+      echo "-h --help -o --output --in-place --log --strict $print --max-deviation --engine -j --jobs" ;;
     batch) echo "-h --help -o --output $print --summary --max-deviation --engine -j --jobs" ;;
-    verify) echo "-h --help --against $print --max-deviation" ;;
-    inspect) echo "-h --help $print" ;;
+    verify) echo "-h --help --against --strict $print --max-deviation" ;;
+    inspect) echo "-h --help --strict $print" ;;
     study) echo "-h --help --case $print --engine -j --jobs" ;;
     identify)
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \

@@ -57,6 +57,9 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
+  if (ends_strictly(config, setting_warnings(space->settings), console)) {
+    return PrintOutcome{ExitCode::input, {}, true};
+  }
   const Result<pipeline::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
@@ -68,12 +71,15 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!report) {
     return tl::unexpected(report.error());
   }
+  if (ends_strictly(config, report->warnings, console)) {
+    return PrintOutcome{ExitCode::input, {}, true};
+  }
   add_setting_warnings(space->settings, report->warnings);
   console.warnings(report->warnings);
   const bool passed_on = job->output_fd >= 0;
   const ExitCode verdict = judge(config, passed_on, *report, console);
   return deliver(*space, verdict, passed_on, *report).map([&] {
-    return PrintOutcome{verdict, std::move(*report)};
+    return PrintOutcome{verdict, std::move(*report), false};
   });
 }
 
@@ -81,6 +87,9 @@ Result<ExitCode> run_on_print(const RunConfig& config, Console& console) {
   const Result<PrintOutcome> outcome = work_on_print(config, console);
   if (!outcome) {
     return tl::unexpected(outcome.error());
+  }
+  if (outcome->ended_strictly) {
+    return outcome->verdict;
   }
   return print_summary(config, report::to_text(outcome->report), console).map([&] {
     return outcome->verdict;
