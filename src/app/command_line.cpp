@@ -48,6 +48,11 @@ void add_common_options(CLI::App& command, RunConfig& config) {
   command.add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
 }
 
+void add_strict(CLI::App& command, RunConfig& config) {
+  command.add_flag("--strict", config.strict,
+                   "Take warnings for errors: exit code 2, and nothing is written");
+}
+
 void add_max_deviation(CLI::App& command, RunConfig& config) {
   command
       .add_option("--max-deviation", config.max_deviation_mm,
@@ -84,6 +89,7 @@ void add_compensate(CLI::App& program, RunConfig& config) {
       ->add_option("--log", config.log, "Add what is said and the summary to FILE, with the time")
       ->type_name("FILE");
   add_common_options(*command, config);
+  add_strict(*command, config);
   add_max_deviation(*command, config);
   add_engine(*command, config,
              "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
@@ -123,6 +129,7 @@ void add_verify(CLI::App& program, RunConfig& config) {
       ->type_name("IN")
       ->required();
   add_common_options(*command, config);
+  add_strict(*command, config);
   add_max_deviation(*command, config);
   command->callback([&config] { config.command = Command::verify; });
 }
@@ -132,6 +139,7 @@ void add_inspect(CLI::App& program, RunConfig& config) {
       program.add_subcommand("inspect", "Show what is understood of a G-code file");
   command->add_option("IN", config.input, "G-code, - for stdin")->type_name("")->required();
   add_common_options(*command, config);
+  add_strict(*command, config);
   command->callback([&config] { config.command = Command::inspect; });
 }
 

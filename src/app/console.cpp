@@ -3,13 +3,31 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "files.hpp"
 
 namespace unflex::app {
 namespace {
 
-constexpr std::size_t kMaxListed = 10;
+// So many lines of a kind, and so many kinds.
+constexpr std::size_t kMaxAlike = 3;
+constexpr std::size_t kMaxKinds = 10;
+
+// What is left of the line without its place, numbers, and what is quoted.
+std::string kind_of(std::string_view line) {
+  line.remove_prefix(std::min(line.find(": "), line.size()));
+  std::string kind;
+  bool quoted = false;
+  for (const char c : line) {
+    const bool quotes = c == '\'';
+    quoted = quoted != quotes;
+    if (!quoted && !quotes && !(c >= '0' && c <= '9') && c != '.' && c != '-') {
+      kind += c;
+    }
+  }
+  return kind;
+}
 
 }  // namespace
 
@@ -32,6 +50,37 @@ std::string error_text(const Error& error) {
   return one_line(placed ? to_string(error) : fmt::format("unflex: {}", error.message));
 }
 
+std::vector<std::string> summarised(const std::vector<std::string>& lines, std::size_t total,
+                                    std::string_view what) {
+  std::vector<std::string> kinds;  // in the order of their first line
+  std::map<std::string, std::vector<const std::string*>> of_kind;
+  for (const std::string& line : lines) {
+    std::vector<const std::string*>& alike = of_kind[kind_of(line)];
+    if (alike.empty()) {
+      kinds.push_back(kind_of(line));
+    }
+    alike.push_back(&line);
+  }
+  std::vector<std::string> result;
+  std::size_t left = total;
+  for (std::size_t i = 0; i < std::min(kinds.size(), kMaxKinds); ++i) {
+    const std::vector<const std::string*>& alike = of_kind[kinds[i]];
+    left -= alike.size();
+    // Of two too many, the second is shorter than the remark.
+    const std::size_t shown = alike.size() <= kMaxAlike + 1 ? alike.size() : kMaxAlike;
+    for (std::size_t n = 0; n < shown; ++n) {
+      result.push_back(*alike[n]);
+    }
+    if (alike.size() > shown) {
+      result.push_back(fmt::format("unflex: … and {} more like it", alike.size() - shown));
+    }
+  }
+  if (left > 0) {
+    result.push_back(fmt::format("unflex: and {} more {}; --report lists them", left, what));
+  }
+  return result;
+}
+
 void Console::line(std::string_view text) {
   kept_.push_back(one_line(text));
   if (fd_ >= 0) {
@@ -41,12 +90,8 @@ void Console::line(std::string_view text) {
 
 void Console::lines(const std::vector<std::string>& lines, std::size_t total,
                     std::string_view what) {
-  const std::size_t listed = std::min(lines.size(), kMaxListed);
-  for (std::size_t i = 0; i < listed; ++i) {
-    line(lines[i]);
-  }
-  if (total > listed) {
-    line(fmt::format("unflex: and {} more {}; --report lists them", total - listed, what));
+  for (const std::string& text : summarised(lines, total, what)) {
+    line(text);
   }
 }
 

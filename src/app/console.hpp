@@ -18,6 +18,11 @@ namespace unflex::app {
 // "file:line: message", or "unflex: message" for an error without a place.
 [[nodiscard]] std::string error_text(const Error& error);
 
+// The first few lines of each kind, which differ in place, numbers and quoted text alone, and how
+// many more there are; then how many of `total` are left. `what` names them ("warnings").
+[[nodiscard]] std::vector<std::string> summarised(const std::vector<std::string>& lines,
+                                                  std::size_t total, std::string_view what);
+
 // What a command says while it works. Each message goes to stderr at once and is kept as well, for
 // a log and for those who started the work.
 class Console {
@@ -27,7 +32,7 @@ class Console {
 
   void line(std::string_view text);
   void error(const Error& error) { line(error_text(error)); }
-  // The first few of the lines, then how many of `total` are left; `what` names them ("warnings").
+  // The lines, summarised.
   void lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what);
   void warnings(const std::vector<std::string>& all) { lines(all, all.size(), "warnings"); }
 

@@ -57,6 +57,9 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
+  if (Status accepted = accept(config, setting_warnings(space->settings), console); !accepted) {
+    return tl::unexpected(accepted.error());
+  }
   const Result<pipeline::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
@@ -67,6 +70,9 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   });
   if (!report) {
     return tl::unexpected(report.error());
+  }
+  if (Status accepted = accept(config, report->warnings, console); !accepted) {
+    return tl::unexpected(accepted.error());
   }
   add_setting_warnings(space->settings, report->warnings);
   console.warnings(report->warnings);

@@ -13,6 +13,8 @@
 namespace unflex::gcode {
 namespace {
 
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && is_blank(text.front())) {
     text.remove_prefix(1);
@@ -305,7 +307,9 @@ void Parser::unreadable(std::size_t from) {
   while (!at_end() && !is_blank(line_[cursor_]) && line_[cursor_] != ';') {
     ++cursor_;
   }
-  if (command_.letter != 'M' || command_.number < 0) {
+  if (line_.starts_with(kByteOrderMark)) {
+    malformed("a byte order mark, which printers take for part of the command; save without it");
+  } else if (command_.letter != 'M' || command_.number < 0) {
     malformed(fmt::format("cannot read '{}'", line_.substr(from, cursor_ - from)));
   }
 }

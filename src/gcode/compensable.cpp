@@ -8,9 +8,9 @@
 namespace unflex::gcode {
 namespace {
 
-// Machine positions of filament are running sums of thousands of mm; an E word that repeats the
-// last one can leave a difference of their last digits.
-constexpr double kFilamentRoundoff_mm = 1e-9;
+// An absolute E word that repeats the last one leaves a difference where that was approached in
+// five decimals. It pulls nothing back: a step of an extruder is fifty times as long.
+constexpr double kFilamentRoundoff_mm = 2e-5;
 
 bool has_axis_word(const Command& command) {
   return std::any_of(command.words.begin(), command.words.end(), [](const Word& word) {

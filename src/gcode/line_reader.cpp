@@ -9,6 +9,11 @@ namespace {
 constexpr std::size_t kBlockBytes = 256 * 1024;
 constexpr std::size_t kLongestLineBytes = 1024 * 1024;
 
+// By its byte order mark.
+bool is_utf16(std::string_view text) {
+  return text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff");
+}
+
 }  // namespace
 
 std::string_view Line::content() const {
@@ -50,6 +55,10 @@ Result<bool> LineReader::next(Line& line) {
       }
     }
     const char* const begin = block_.data() + cursor_;
+    if (bytes_read_ == 0 && line.text.empty() && is_utf16({begin, filled_ - cursor_})) {
+      return fail(ErrorKind::input, {name_, line.number},
+                  "the text is UTF-16; save it as UTF-8 without a byte order mark");
+    }
     const std::size_t left = filled_ - cursor_;
     const void* const newline = std::memchr(begin, '\n', left);
     const std::size_t taken =

@@ -1,4 +1,6 @@
 // G0 to G3: from the words of a line to segments.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -16,6 +18,8 @@ constexpr double kShortestMove_mm = 1e-9;
 // No machine is a thousand kilometres long; beyond that a number is a mistake.
 constexpr double kLargestCoordinate_mm = 1e9;
 constexpr double kSecondsPerMinute = 60.0;
+// More than rounding to three digits does to an arc of any size.
+constexpr double kLargestGap_mm = 0.1;
 
 // Where a motion line wants the machine to be.
 struct Target {
@@ -23,6 +27,7 @@ struct Target {
   std::array<bool, 4> named{};  // axes the line names …
   bool e_absolute = false;      // … E by its absolute reading
   std::optional<double> feed;   // F word
+  bool feed_is_none = false;
   const char* problem = nullptr;
 
   [[nodiscard]] bool moves() const { return named[X] || named[Y] || named[Z] || named[E]; }
@@ -43,9 +48,44 @@ std::optional<Axis> axis_of(char letter) {
   }
 }
 
+// What the firmware makes of a speed that is none: Klipper refuses the line (gcode_move.py,
+// cmd_G1), RepRapFirmware goes on at its minimum speed; Marlin does not mind.
+const char* problem_of_feed(double feed, Firmware firmware) {
+  if (feed > 0.0 || firmware == Firmware::marlin) {
+    return nullptr;
+  }
+  return firmware == Firmware::klipper ? "F must be above zero, or Klipper refuses the line"
+                                       : "F must be above zero, or the printer creeps";
+}
+
+// A line of several commands, or of one word twice, was hardly meant so. Klipper and Marlin take
+// the last of equal words and a second command for words without meaning; RepRapFirmware's reader
+// knows better.
+std::string_view oddity(const Command& command) {
+  unsigned seen = 0;
+  for (const Word& word : command.words) {
+    if (word.letter == 'G' || word.letter == 'M' || word.letter == 'T') {
+      return "the second command in the line counts for nothing; give it a line of its own";
+    }
+    const unsigned bit = 1U << static_cast<unsigned>(word.letter - 'A');
+    if ((seen & bit) != 0U) {
+      return "a word is given twice, and the last one counts; check the line";
+    }
+    seen |= bit;
+  }
+  return "";
+}
+
+void remark_oddity(Event& event, const Command& command, Firmware firmware) {
+  if (const std::string_view remark = oddity(command);
+      firmware != Firmware::rrf && !remark.empty()) {
+    event.warnings.emplace_back(remark);
+  }
+}
+
 // Klipper: gcode_move.py, cmd_G1. Marlin: gcode.cpp, get_destination_from_command. RepRapFirmware:
 // GCodes.cpp, DoStraightMove and LoadExtrusionAndFeedrateFromGCode.
-Target read_target(const Command& command, const ModalState& state) {
+Target read_target(const Command& command, const ModalState& state, Firmware firmware) {
   Target target;
   target.position_mm = state.position_mm;
   target.e_absolute = state.e_is_absolute();
@@ -58,6 +98,10 @@ Target read_target(const Command& command, const ModalState& state) {
       target.problem = "a motion word has no number";
     } else if (!axis) {
       target.feed = word.value;
+      if (const char* const problem = problem_of_feed(*word.value, firmware)) {
+        target.problem = problem;
+        target.feed_is_none = true;
+      }
     } else {
       const bool is_e = *axis == E;
       const bool absolute = is_e ? target.e_absolute : state.absolute_xyz;
@@ -152,6 +196,14 @@ bool radius_reaches(const Command& command, double unit_mm, const Arc& arc) {
   return radius_mm * radius_mm * (1.0 + kMissingShare) >= half_chord_mm * half_chord_mm;
 }
 
+// How far the end is from the circle on which the arc starts.
+double gap_at_end_mm(const Arc& arc) {
+  const double x = arc.start_mm[0] + arc.centre_offset_mm[0];
+  const double y = arc.start_mm[1] + arc.centre_offset_mm[1];
+  return std::abs(std::hypot(arc.end_mm[0] - x, arc.end_mm[1] - y) -
+                  std::hypot(arc.centre_offset_mm[0], arc.centre_offset_mm[1]));
+}
+
 int whole_circles(const Command& command, const MarlinArcs& rules) {
   constexpr double kMostCircles = 100.0;
   return rules.circles
@@ -166,11 +218,13 @@ double Segment::length_xy_mm() const { return length(delta(X), delta(Y), 0.0); }
 double Segment::length_mm() const { return length(delta(X), delta(Y), delta(Z)); }
 
 void Interpreter::linear_move(Event& event) {
-  const Target target = read_target(command_, state_);
+  const Target target = read_target(command_, state_, options_.firmware);
   if (target.problem != nullptr) {
+    feed_uncertain_ = feed_uncertain_ || target.feed_is_none;
     return not_understood(event, target.problem);
   }
-  set_feed(event, target.feed);
+  remark_oddity(event, command_, options_.firmware);
+  set_feed(target.feed);
   if (!target.moves()) {
     return;
   }
@@ -187,10 +241,15 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   if (is_klipper && !state_.absolute_xyz) {
     return not_understood(event, "an arc in relative mode (G91), which Klipper refuses");
   }
-  const Target target = read_target(command_, state_);
+  if (is_klipper && command_.has('R')) {
+    return not_understood(event, "an arc with R, which Klipper refuses");
+  }
+  const Target target = read_target(command_, state_, options_.firmware);
   if (target.problem != nullptr) {
+    feed_uncertain_ = feed_uncertain_ || target.feed_is_none;
     return not_understood(event, target.problem);
   }
+  remark_oddity(event, command_, options_.firmware);
   const ArcPlane plane = arc_plane(state_.plane, options_.firmware);
   Arc arc;
   arc.start_mm = in_plane(state_.position_mm, plane);
@@ -205,7 +264,7 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
     return not_understood(event, "an arc whose radius is too small to reach its end");
   }
   arc.centre_offset_mm = *offset;
-  set_feed(event, target.feed);
+  set_feed(target.feed);
   const double feed_mm_s = state_.feed_mm_s * state_.speed_factor;
   const ArcPieces pieces = is_klipper ? plan_arc(arc, options_.arc_resolution_mm)
                            : options_.firmware == Firmware::marlin
@@ -217,6 +276,12 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   }
   if (pieces->empty()) {
     return not_understood(event, "an arc of no angle, which Marlin leaves out");
+  }
+  if (const double gap_mm = gap_at_end_mm(arc); gap_mm > kLargestGap_mm) {
+    event.warnings.push_back(
+        fmt::format("the arc's end is {:.2f} mm off its circle: the printer goes there straight; "
+                    "check the line",
+                    gap_mm));
   }
   const bool start_known = starts_known(target, state_) && modes_certain();
   settle(target, state_);
@@ -238,15 +303,10 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   }
 }
 
-void Interpreter::set_feed(Event& event, std::optional<double> feed_word) {
-  if (!feed_word) {
-    return;
-  }
-  if (*feed_word > 0.0) {
+void Interpreter::set_feed(std::optional<double> feed_word) {
+  if (feed_word && *feed_word > 0.0) {
     state_.feed_mm_s = *feed_word * state_.unit_mm / kSecondsPerMinute;
     feed_uncertain_ = false;
-  } else if (options_.firmware != Firmware::marlin) {  // which does not mind
-    event.warnings.emplace_back("F must be above zero; it is ignored");
   }
 }
 

@@ -78,9 +78,31 @@ struct Replayed {
   std::vector<planner::PlannedMove> moves;
 };
 
-Replayed replay(std::string_view text, gcode::Interpreter printer, const planner::Limits& limits,
-                const planner::FirmwareConfig& config, const InMotion& in_motion) {
+// Marlin leaves a move of a few steps to the next one: it is not where the text says.
+std::optional<gcode::Segment> left_to_next(const gcode::Position& machine_mm,
+                                           const gcode::Position& at_mm) {
+  constexpr double kFewSteps_mm = 0.5;
+  constexpr double kSamePlace_mm = 1e-6;
+  gcode::Segment left;
+  left.start_mm = left.end_mm = at_mm;
+  left.feed_mm_s = 1.0;
+  left.line = kNoLine;
+  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z}) {
+    left.start_mm[axis] = machine_mm[axis];
+  }
+  const bool is_left = left.length_mm() > kSamePlace_mm && left.length_mm() < kFewSteps_mm;
+  return is_left ? std::optional(left) : std::nullopt;
+}
+
+Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter printer,
+                const planner::Limits& limits, const planner::FirmwareConfig& config,
+                const InMotion& in_motion) {
   const std::unique_ptr<planner::Planner> planner = planner::make_planner(limits, config);
+  if (in_motion.lines_before.empty() && in_motion.machine_mm) {
+    if (const auto left = left_to_next(*in_motion.machine_mm, printer.state().position_mm)) {
+      planner->add(*left);
+    }
+  }
   for (gcode::Segment line : in_motion.lines_before) {
     line.line = kNoLine;
     planner->add(line);
@@ -92,6 +114,9 @@ Replayed replay(std::string_view text, gcode::Interpreter printer, const planner
     const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), ++number});
     text.remove_prefix(end);
     planner->apply(*event.limits);
+    if (event.kind == gcode::EventKind::barrier) {
+      planner->stop();
+    }
     for (const gcode::Segment& segment : event.segments) {
       planner->add(segment);
       last = segment;
@@ -107,7 +132,7 @@ Replayed replay(std::string_view text, gcode::Interpreter printer, const planner
     return move.segment.line == kNoLine;
   };
   const auto first = std::ranges::find_if_not(replayed.moves, is_around);
-  if (first != replayed.moves.begin()) {
+  if (first != replayed.moves.begin() && !run.begins_run()) {
     replayed.before = *(first - 1);
   }
   std::erase_if(replayed.moves, is_around);
@@ -166,7 +191,7 @@ Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_
               const dynamics::NozzleXY& nozzle, const verify::Rules& rules, double lead_in_s,
               verify::LineRate rate, double max_lines_per_s, const InMotion& in_motion) {
   Verdict verdict;
-  Replayed replayed = replay(text, std::move(printer), printer_limits, rules.fixed, in_motion);
+  Replayed replayed = replay(run, text, std::move(printer), printer_limits, rules.fixed, in_motion);
   verdict.replayed = std::move(replayed.moves);
   verdict.objection = verify::broken_rule(run.moves, verdict.replayed, rules,
                                           replayed.before ? &*replayed.before : nullptr);

@@ -23,11 +23,13 @@ namespace unflex::pipeline {
                                                 const dynamics::NozzleXY& nozzle,
                                                 const verify::Rules& rules, double lead_in_s);
 
-// Where the text is a part of a run.
+// Where the text is a part of a run, or the printer passes into it from lines that are kept.
 struct InMotion {
-  std::vector<gcode::Segment> lines_before;  // the last ones of the part before; none: from rest
+  std::vector<gcode::Segment> lines_before;  // the last ones of what is before; none: from rest
   bool goes_on = false;                      // another part follows
   bool may_be_worse = false;                 // by little: there is no other way left
+  // Where the last move led that the firmware has made.
+  std::optional<gcode::Position> machine_mm = std::nullopt;
 };
 
 struct Verdict {

@@ -64,10 +64,8 @@ dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
                             double base) {
         return dynamics::exact_step(axis, state, {base, 0.0, 0.0}, event.dwell_s);
       };
-      if (next > 0) {
-        const gcode::Position& at = piece.moves[next - 1].segment.end_mm;
-        nozzle = {rest(model.x, nozzle.x, at[gcode::X]), rest(model.y, nozzle.y, at[gcode::Y])};
-      }
+      const gcode::Position& at = next > 0 ? piece.moves[next - 1].segment.end_mm : piece.from_mm;
+      nozzle = {rest(model.x, nozzle.x, at[gcode::X]), rest(model.y, nozzle.y, at[gcode::Y])};
     }
   }
   return nozzle;

@@ -1,5 +1,7 @@
 #include "piece_reader.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -8,6 +10,7 @@
 
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
+#include "unflex/verify/endless.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -30,6 +33,7 @@ constexpr std::size_t kMostMoves = 100'000;
 constexpr double kAround_s = 0.3;
 // After how many borders it is looked whether a run is that long.
 constexpr std::size_t kBordersPerLook = 8;
+constexpr double kOnTheEdge_mm = 1e-3;
 
 // How much velocity changes from the move before to this one.
 double turn_before(const std::vector<planner::PlannedMove>& moves, std::size_t move) {
@@ -102,14 +106,25 @@ void count_kept_moves(const gcode::Event& event, Firmware firmware,
 
 PieceReader::PieceReader(std::istream& input, std::string name,
                          gcode::InterpreterOptions interpreter, planner::Limits limits,
-                         planner::FirmwareConfig fixed)
+                         planner::FirmwareConfig fixed, verify::TravelLimits travel)
     : lines_(input, std::move(name)),
       interpreter_(interpreter),
       planner_(planner::make_planner(limits, fixed)),
-      firmware_(fixed.firmware) {}
+      firmware_(fixed.firmware),
+      travel_(travel) {}
 
 Result<bool> PieceReader::next(Piece& piece) {
   recycle(piece);
+  const Result<bool> more = cut(piece);
+  if (more && *more) {
+    if (const planner::PlannedMove* const move = verify::endless(piece.moves)) {
+      return tl::unexpected(verify::endless_move(*move, lines_.name()));
+    }
+  }
+  return more;
+}
+
+Result<bool> PieceReader::cut(Piece& piece) {
   for (;;) {
     gcode::Event event;
     if (!spare_.empty()) {
@@ -182,26 +197,51 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
         "a slicer run unflex once");
   }
   any_command_ = any_command_ || looks_like_command(line.content());
-  if (!any_bare_return_ && has_bare_return(line.content())) {
-    any_bare_return_ = true;
-    warnings_.push_back({{lines_.name(), line.number},
-                         "a carriage return without a line feed ends no line, neither here nor in "
-                         "the printer: convert the file's line ends to LF"});
+  // Of Marlin's, which it ends, the interpreter tells.
+  if (firmware_ != Firmware::marlin && has_bare_return(line.content())) {
+    warn(line.number,
+         "a carriage return without a line feed ends no line, neither here nor in the printer: "
+         "convert the file's line ends to LF");
   }
   interpreter_.interpret(event);
   for (std::string& warning : event.warnings) {
-    if (warnings_.size() < kMaxWarnings) {
-      warnings_.push_back({{lines_.name(), event.line.number}, std::move(warning)});
-    }
+    warn(event.line.number, std::move(warning));
   }
+  warn_of_travel(event);
   if (event.kind != gcode::EventKind::move) {
     planner_->apply(*event.limits);
   }
   return true;
 }
 
+void PieceReader::warn(std::size_t line, std::string message) {
+  if (warnings_.size() < kMaxWarnings) {
+    warnings_.push_back({{lines_.name(), line}, std::move(message)});
+  }
+}
+
+// The printer refuses the move, or cuts it off; unflex leaves the way there as it is.
+void PieceReader::warn_of_travel(const gcode::Event& event) {
+  const auto outside = [](double at, double min, double max, bool min_assumed) {
+    return at > max + kOnTheEdge_mm || (at < min - kOnTheEdge_mm && !min_assumed);
+  };
+  for (const gcode::Segment& segment : event.segments) {
+    const double x = segment.end_mm[gcode::X];
+    const double y = segment.end_mm[gcode::Y];
+    if (outside(x, travel_.x_min_mm, travel_.x_max_mm, travel_.x_min_assumed) ||
+        outside(y, travel_.y_min_mm, travel_.y_max_mm, travel_.y_min_assumed)) {
+      warn(segment.line,
+           fmt::format("the move leads out of the printer's travel, to X{:.4g} Y{:.4g}", x, y));
+      return;
+    }
+  }
+}
+
 // Puts the event into the open piece, after the lines that turned out to stand between.
 void PieceReader::append(gcode::Event event) {
+  if (open_.events.empty()) {
+    open_.from_mm = machine_mm_;
+  }
   append_between();
   if (open_.is_run && open_.events.empty()) {
     // The move itself changes nothing of it.
@@ -212,7 +252,10 @@ void PieceReader::append(gcode::Event event) {
   }
   std::size_t count = 0;
   for (const gcode::Segment& segment : event.segments) {
-    count += planner_->add(segment) ? 1 : 0;
+    if (planner_->add(segment)) {
+      ++count;
+      machine_mm_ = segment.end_mm;
+    }
   }
   if (event.kind == gcode::EventKind::barrier) {
     planner_->stop();

@@ -14,6 +14,7 @@
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/planner/planner.hpp"
+#include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
 
@@ -25,7 +26,8 @@ struct Piece {
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
   std::vector<planner::PlannedMove> moves;
-  emit::RunStart start;  // of a run
+  emit::RunStart start;       // of a run
+  gcode::Position from_mm{};  // where the piece's first move finds the machine
   // Of a part of a run, some of its moves around: none before the first part and after the last.
   std::vector<planner::PlannedMove> before;
   std::vector<planner::PlannedMove> after;
@@ -41,11 +43,12 @@ void count_kept_moves(const gcode::Event& event, Firmware firmware,
 class PieceReader {
  public:
   PieceReader(std::istream& input, std::string name, gcode::InterpreterOptions interpreter,
-              planner::Limits limits, planner::FirmwareConfig fixed);
+              planner::Limits limits, planner::FirmwareConfig fixed,
+              verify::TravelLimits travel = {});
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
-  // read, was written by unflex, or ends without a single G-code command in it. What the piece held
-  // before is gone; the storage of its lines is used again.
+  // read, was written by unflex, ends without a single G-code command in it, or has a move without
+  // end. What the piece held before is gone; the storage of its lines is used again.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
@@ -54,7 +57,10 @@ class PieceReader {
 
  private:
   void recycle(Piece& piece);
+  Result<bool> cut(Piece& piece);
   Result<bool> read_event(gcode::Event& event);
+  void warn(std::size_t line, std::string message);
+  void warn_of_travel(const gcode::Event& event);
   void append(gcode::Event event);
   void append_between();
   void mark_border(const gcode::Event& event);
@@ -66,6 +72,7 @@ class PieceReader {
   gcode::Interpreter interpreter_;
   std::unique_ptr<planner::Planner> planner_;
   Firmware firmware_;
+  verify::TravelLimits travel_;
   // Where a run that turns out to be long may be parted: before a move of it.
   struct Border {
     std::size_t event = 0;
@@ -73,15 +80,15 @@ class PieceReader {
     emit::RunStart start;
   };
 
-  Piece open_;                   // being filled
-  std::deque<Border> borders_;   // of it
-  double since_border_s_ = 0.0;  // roughly
+  Piece open_;                    // being filled
+  std::deque<Border> borders_;    // of it
+  double since_border_s_ = 0.0;   // roughly
+  gcode::Position machine_mm_{};  // after the last planned move
   std::size_t borders_since_look_ = 0;
   std::vector<gcode::Event> spare_;    // storage for the next ones
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;
   bool any_command_ = false;
-  bool any_bare_return_ = false;
 };
 
 }  // namespace unflex::pipeline

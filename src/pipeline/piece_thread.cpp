@@ -16,7 +16,7 @@ constexpr std::size_t kMostAhead = 10'000;
 PieceThread::PieceThread(std::istream& input, std::string name, const verify::Rules& rules,
                          CpuSlots& slots, std::function<void()> wake)
     : slots_(&slots),
-      reader_(input, std::move(name), rules.interpreter, rules.limits, rules.fixed),
+      reader_(input, std::move(name), rules.interpreter, rules.limits, rules.fixed, rules.travel),
       thread_([this, wake = std::move(wake)] { read(wake); }) {}
 
 PieceThread::~PieceThread() {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "judge.hpp"
@@ -22,6 +23,7 @@ constexpr double kLowest[] = {0.7, 0.5};
 // What of a part's last lines tells the printer how it arrives at the next part.
 constexpr double kLastLines_s = 0.05;
 constexpr double kApart_mm = 1e-3;
+constexpr std::ptrdiff_t kKeptLines = 16;
 // Parts that begin less late are written as they were planned.
 constexpr double kLate_s = 2e-5;
 constexpr double kSamePlace_mm = 1e-7;
@@ -43,6 +45,19 @@ std::vector<gcode::Segment> last_lines(const std::vector<planner::PlannedMove>& 
     lines.push_back(move.segment);
   }
   return lines;
+}
+
+// Of kept lines and those of the piece, the last since the machine has stopped.
+void follow_motion(const Piece& piece, std::vector<gcode::Segment>& lines) {
+  for (const gcode::Event& event : piece.events) {
+    if (event.kind == gcode::EventKind::barrier) {
+      lines.clear();
+    }
+    lines.insert(lines.end(), event.segments.begin(), event.segments.end());
+    if (std::ssize(lines) > kKeptLines) {
+      lines.erase(lines.begin(), lines.end() - kKeptLines);
+    }
+  }
 }
 
 }  // namespace
@@ -105,6 +120,10 @@ std::string RunWriter::finish() {
 // The printer moves as the input has it.
 void RunWriter::keep_motion(const Piece& piece) {
   nozzle_ = after_motion(piece, nozzle_, rules_->verify.nozzle);
+  follow_motion(piece, kept_lines_);
+  if (!piece.moves.empty()) {
+    machine_mm_ = piece.moves.back().segment.end_mm;
+  }
   line_rate_.change_text();
   line_rate_.forget();
   for (const planner::PlannedMove& move : piece.moves) {
@@ -208,7 +227,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   trial.run(job.run(), plan, text);
   Verdict verdict = judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(),
                           nozzle_, rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
-                          {last_lines_, !piece.ends_run(), may_be_worse});
+                          {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(),
+                           may_be_worse, machine_mm_});
   if (verdict.objection) {
     return std::move(verdict.objection);
   }
@@ -226,6 +246,10 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   late_s_ +=
       planner::duration_s(verdict.replayed) - planner::duration_s(piece.moves) - job.lead_in_s();
   last_lines_ = piece.ends_run() ? std::vector<gcode::Segment>() : last_lines(verdict.replayed);
+  kept_lines_.clear();
+  if (!verdict.replayed.empty()) {
+    machine_mm_ = verdict.replayed.back().segment.end_mm;
+  }
   nozzle_ = verdict.nozzle;
   line_rate_ = std::move(verdict.rate);
   note_lines_above_budget(piece);

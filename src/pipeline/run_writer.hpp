@@ -50,6 +50,9 @@ class RunWriter {
   double max_lines_per_s_;
   report::Report* report_;
   emit::Emitter emitter_;
+  // The last lines that were kept, where the printer passes from them into what follows.
+  std::vector<gcode::Segment> kept_lines_;
+  std::optional<gcode::Position> machine_mm_;  // where the last move led that the firmware made
   dynamics::NozzleXY nozzle_;               // as it really swings after what has been written
   verify::RunDeviation before_;             // of the run at hand, if it were left as it is
   verify::LineRate line_rate_;              // of what has been written

@@ -69,6 +69,36 @@ void Meter::begin_section(ReferencePath& path) {
     current_ = path.first();
   }
   time_s_ = path.section_start_s();
+  section_error_ = {};
+}
+
+double Meter::base_offset_mm() {
+  static_cast<void>(next_reference_change());
+  if (path_->first() == path_->end()) {
+    return 0.0;
+  }
+  // Before the reference starts and after it has ended, of what is near then.
+  near_.slide(*path_, std::clamp(time_s_, (*path_)[path_->first()].start_s, path_->end_s()));
+  std::size_t nearest = 0;
+  return std::sqrt(near_.squared_contour_error(*path_, base_x_mm_, base_y_mm_, nearest));
+}
+
+double Meter::to_path_end_mm(const gcode::Position& from) const {
+  if (path_->first() == path_->end()) {
+    return 0.0;
+  }
+  const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
+  return std::hypot(from[gcode::X] - end[gcode::X], from[gcode::Y] - end[gcode::Y]);
+}
+
+double Meter::swing_mm() const {
+  if (path_->first() == path_->end()) {
+    return 0.0;
+  }
+  const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
+  return std::hypot(
+      nozzle_.x.position - end[gcode::X], nozzle_.x.velocity / model_.x.omega_rad_s,
+      std::hypot(nozzle_.y.position - end[gcode::Y], nozzle_.y.velocity / model_.y.omega_rad_s));
 }
 
 void Meter::follow_lag(bool on) {
@@ -228,6 +258,7 @@ Meter::Sample Meter::sample(const ReferencePhase& reference, double h) {
   all_.add(contour2, tracking2, h, line);
   if (reference.extruding) {
     extruding_.add(contour2, tracking2, h, line);
+    section_error_.add(contour2, h, line);
   }
   if (follow_lag_) {
     const double v_x = reference.x.velocity;

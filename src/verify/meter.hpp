@@ -1,6 +1,7 @@
 // Hangs the nozzle on a base that is moved, and measures it against the reference.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 
 #include "unflex/verify/deviation.hpp"
@@ -19,6 +20,10 @@ class LagEstimate {
   // Starts afresh, keeping the largest lag found.
   void restart();
   [[nodiscard]] double worst_s() const { return worst_s_; }
+  // As it is now; 0 where the reference rests.
+  [[nodiscard]] double present_s() const {
+    return velocity2_ > 0.0 ? std::abs(error_dot_velocity_) / velocity2_ : 0.0;
+  }
 
  private:
   double error_dot_velocity_ = 0.0;
@@ -27,6 +32,31 @@ class LagEstimate {
   double worst_s_ = 0.0;
   double last_h_ = 0.0;  // h of the last sample, for which …
   double keep_ = 1.0;    // … so much of the memory stays
+};
+
+// The contour error of a nozzle in one section.
+class SectionError {
+ public:
+  void add(double contour2_mm2, double weight_s, std::size_t line) {
+    sum_contour2_ += weight_s * contour2_mm2;
+    weight_s_ += weight_s;
+    if (contour2_mm2 > contour2_max_) {
+      contour2_max_ = contour2_mm2;
+      line_ = line;
+    }
+  }
+  [[nodiscard]] double max_mm() const { return std::sqrt(contour2_max_); }
+  [[nodiscard]] double rms_mm() const {
+    return weight_s_ > 0.0 ? std::sqrt(sum_contour2_ / weight_s_) : 0.0;
+  }
+  [[nodiscard]] double duration_s() const { return weight_s_; }
+  [[nodiscard]] std::size_t line() const { return line_; }  // of the largest
+
+ private:
+  double sum_contour2_ = 0.0;
+  double weight_s_ = 0.0;
+  double contour2_max_ = 0.0;
+  std::size_t line_ = 0;
 };
 
 class Meter {
@@ -52,9 +82,12 @@ class Meter {
   void wait_for_reference();
   // The base stands still; nothing is measured.
   void hold(double duration_s);
+  // Puts the clock forward, within a section.
+  void skip(double duration_s) { time_s_ += duration_s; }
 
   void follow_lag(bool on);
   [[nodiscard]] double worst_lag_s() const { return lag_.worst_s(); }
+  [[nodiscard]] double lag_s() const { return lag_.present_s(); }
 
   [[nodiscard]] double time_s() const { return time_s_; }
   [[nodiscard]] const NozzleXY& nozzle() const { return nozzle_; }
@@ -63,6 +96,14 @@ class Meter {
   [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
   [[nodiscard]] const DeviationAccumulator& all() const { return all_; }
   [[nodiscard]] double reach_s() const { return near_.reach_s(); }
+  // While the reference lays filament, in the section that began last.
+  [[nodiscard]] const SectionError& section_error() const { return section_error_; }
+  // How far the base is now from the path the reference passes about now.
+  [[nodiscard]] double base_offset_mm();
+  // From a place to the end of the path known so far.
+  [[nodiscard]] double to_path_end_mm(const gcode::Position& from) const;
+  // How far the nozzle will swing from the end of the path known so far.
+  [[nodiscard]] double swing_mm() const;
 
  private:
   struct Phase {
@@ -103,6 +144,7 @@ class Meter {
   NearPath near_;
   DeviationAccumulator extruding_;
   DeviationAccumulator all_;
+  SectionError section_error_;
   LagEstimate lag_;
   bool follow_lag_ = false;
   bool waiting_ = false;

@@ -24,6 +24,7 @@ class Nozzles {
   }
 
   [[nodiscard]] const Meter& main() const { return main_; }
+  [[nodiscard]] Meter& main() { return main_; }
   [[nodiscard]] const std::vector<Meter>& detuned() const { return detuned_; }
 
   void begin_section(ReferencePath& path) {

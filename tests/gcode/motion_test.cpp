@@ -57,13 +57,26 @@ TEST(Moves, OfFilamentAloneStayInPlace) {
   EXPECT_EQ(segment.length_mm(), 0.0);
 }
 
-TEST(Moves, IgnoreASpeedThatIsNotPositive) {
+TEST(Moves, WithASpeedThatIsNotPositiveAreRefusedByKlipper) {
+  for (const char* line : {"G1 X5 F0", "G1 X6 F-100", "G1 F0"}) {
+    Session session;
+    const Event event = session.read(line);
+    EXPECT_EQ(event.kind, EventKind::barrier) << line;
+    EXPECT_TRUE(event.segments.empty()) << line;
+    EXPECT_THAT(event.warnings, SizeIs(1)) << line;
+    EXPECT_DOUBLE_EQ(session.move("G1 X7").feed_mm_s, 25.0);
+  }
+}
+
+TEST(Moves, OfSeveralCommandsOrWithAWordTwiceAreRemarkedOn) {
+  for (const char* line : {"G1 X5 X6", "G1 X5 G1 Y6", "G1 X6 M106 S255"}) {
+    Session session;
+    const Event event = session.read(line);
+    EXPECT_EQ(event.kind, EventKind::move) << line;
+    EXPECT_THAT(event.warnings, SizeIs(1)) << line;
+  }
   Session session;
-  const Event event = session.read("G1 X5 F0");
-  EXPECT_EQ(event.kind, EventKind::move);
-  EXPECT_THAT(event.warnings, SizeIs(1));
-  EXPECT_DOUBLE_EQ(event.segments.at(0).feed_mm_s, 25.0);
-  EXPECT_THAT(session.read("G1 X6 F-100").warnings, SizeIs(1));
+  EXPECT_EQ(session.move("G1 X5 X6").end_mm[X], 6.0) << "the last one counts";
 }
 
 TEST(Moves, ThatCannotBeReadStopAndLoseThePosition) {
@@ -186,28 +199,19 @@ TEST(Arcs, LieInTheChosenPlane) {
   EXPECT_EQ(session.read("G17\nG1 X0 Y0\nG2 X10 I5").segments.size(), 15U);
 }
 
-TEST(Arcs, GivenByRadiusTakeTheShortWayAndByNegativeRadiusTheLong) {
-  // From (10, 0) to (0, 10), radius 10: the centre is (0, 0) or (10, 10).
-  struct Case {
-    const char* line;
-    double centre;
-    std::size_t pieces;
-  };
-  for (const Case& expected : {Case{"G3 X0 Y10 R10", 0, 15}, Case{"G2 X0 Y10 R10", 10, 15},
-                               Case{"G3 X0 Y10 R-10", 10, 47}, Case{"G2 X0 Y10 R-10", 0, 47}}) {
-    Session session;
-    const Event event = session.read(std::string("G1 X10 Y0 Z1\n") + expected.line);
-    EXPECT_EQ(event.segments.size(), expected.pieces) << expected.line;
-    expect_on_circle(event, expected.centre, expected.centre, 10);
-    EXPECT_THAT(event.segments.back().end_mm, ElementsAre(0, 10, 1, 0));
-  }
+TEST(Arcs, GivenByRadiusAreRefusedByKlipper) {
+  Session session;
+  const Event event = session.read("G1 X10 Y0 Z1\nG3 X0 Y10 R10");
+  EXPECT_EQ(event.kind, EventKind::barrier);
+  EXPECT_THAT(event.warnings, SizeIs(1));
 }
 
-TEST(Arcs, GivenByTooSmallARadiusBecomeHalfCircles) {
+TEST(Arcs, ThatEndOffTheirCircleAreRemarkedOn) {
   Session session;
-  const Event event = session.read("G1 X10 Y0 Z1\nG3 X0 R1");
-  expect_on_circle(event, 5, 0, 5);
-  EXPECT_EQ(event.segments.size(), 15U);
+  const Event event = session.read("G1 X10 Y0 Z1\nG3 X0 Y10.2 I-10");
+  EXPECT_THAT(event.segments.back().end_mm, ElementsAre(0, 10.2, 1, 0));
+  EXPECT_THAT(event.warnings, SizeIs(1));
+  EXPECT_THAT(session.read("G1 X10 Y0\nG3 X0 Y10.002 I-10").warnings, SizeIs(0));
 }
 
 TEST(Arcs, FollowTheResolution) {

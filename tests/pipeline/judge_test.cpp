@@ -160,6 +160,16 @@ TEST(AfterMotion, APauseLetsTheNozzleRingOn) {
   EXPECT_NE(after.x.velocity, before.x.velocity);
 }
 
+TEST(AfterMotion, APauseRightAfterARunDoesSo) {
+  const std::string moved = "G90\nG1 X10 Y10 Z1 F6000\nG1 X17.5 Y12\n";
+  const dynamics::NozzleXY before = nozzle_after(moved);
+  const dynamics::NozzleXY after = nozzle_after(moved + "G4 P7\n");
+  const dynamics::NozzleState expected =
+      dynamics::exact_step(rules().nozzle.x, before.x, {17.5, 0.0, 0.0}, 7e-3);
+  EXPECT_NEAR(after.x.position, expected.position, 1e-9);
+  EXPECT_NE(after.x.velocity, before.x.velocity);
+}
+
 TEST(AfterMotion, HomingLetsTheNozzleComeToRest) {
   const dynamics::NozzleXY after = nozzle_after("G90\nG1 X10 Y10 Z1 F6000\nG1 X17.5 Z8\nG28\n");
   EXPECT_EQ(after.x.velocity, 0.0);

@@ -57,6 +57,7 @@ struct RunConfig {
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;
   bool quiet = false;
+  bool strict = false;  // compensate, verify, inspect: warnings are errors
   IdentifyConfig identify;
   std::vector<std::string> cases;  // study: names, none for all
 };

@@ -282,7 +282,7 @@ class Interpreter {
 
   // False behind a line that may or may not have set a mode or F.
   [[nodiscard]] bool modes_certain() const { return !modes_uncertain_ && !feed_uncertain_; }
-  void set_feed(Event& event, std::optional<double> feed_word);
+  void set_feed(std::optional<double> feed_word);
   // Adds the straight piece to `target`, unless it has no length, and moves the state there.
   void append_segment(Event& event, const Position& target, double feed_mm_s, bool start_known,
                       double curve_radius_mm = 0.0);

@@ -21,7 +21,10 @@ class LineRate {
       while (starts_s_.front() <= time_s_ - kSpan_s) {
         starts_s_.pop_front();
       }
-      most_ = std::max(most_, starts_s_.size());
+      if (starts_s_.size() > most_) {
+        most_ = starts_s_.size();
+        most_line_ = line_;
+      }
     }
     time_s_ += move.duration_s();
   }
@@ -45,7 +48,9 @@ class LineRate {
   }
   // Most lines begun within any 100 ms, per second, since the beginning or forget().
   [[nodiscard]] double max_per_s() const { return static_cast<double>(most_) / kSpan_s; }
-  void forget() { most_ = 0; }
+  // The line with which there were so many; 0: none.
+  [[nodiscard]] std::size_t densest_line() const { return most_line_; }
+  void forget() { most_ = most_line_ = 0; }
   // When the lines of the last 100 ms began, against the end of the last one.
   [[nodiscard]] std::vector<double> last_begins_s() const {
     std::vector<double> result;
@@ -61,6 +66,7 @@ class LineRate {
   double time_s_ = 0.0;
   std::size_t line_ = 0;
   std::size_t most_ = 0;
+  std::size_t most_line_ = 0;
 };
 
 }  // namespace unflex::verify

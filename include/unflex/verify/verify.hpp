@@ -3,6 +3,7 @@
 #pragma once
 
 #include <istream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct Rules {
   TravelLimits travel;
   double base_max_velocity_mm_s = 600.0;
   double base_max_accel_mm_s2 = 20000.0;
+  double max_lines_per_s = std::numeric_limits<double>::infinity();
   double lead_in_s = 0.0;  // by which compensated runs start before their plan
 };
 
@@ -95,7 +97,10 @@ struct VerifyReport {
 // error but a report with violations: a line lost, changed or moved; filament not conserved; a
 // position outside the travel (and further out than the input itself goes); base velocity or
 // acceleration above its limit (by more than 0.1 % and than the rounding of coordinates explains);
-// a move the firmware refuses (extrusion ratio); limits or modes not restored. Where the sequence
+// more lines per second than the budget and than the sliced file has there; a base further from
+// the path than the machine bends; filament laid after the plan of a run has ended; a nozzle that strays
+// more than in the sliced file; a move the firmware refuses (extrusion ratio); limits, modes or
+// shaper not restored. Where the sequence
 // of stops differs, nothing can be compared any further; the figures are then of what came before.
 // Nothing but VerifyReport::detuned depends on the observation.
 [[nodiscard]] Result<VerifyReport> verify(std::istream& input, const std::string& input_name,

@@ -1,0 +1,154 @@
+#include "section_rules.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace unflex::verify {
+namespace {
+
+// A line more within 100 ms is a matter of the clock's last digits.
+constexpr double kOneLine_per_s = 10.0;
+// Rounding to steps, and what the nozzle strays.
+constexpr double kRounding_mm = 0.05;
+// Filament of a line that this makes late.
+constexpr double kLate_mm = 5e-4;
+// Lines that tell how much filament there is on a way are longer.
+constexpr double kShort_mm = 0.2;
+// What the nozzle may stray more than if the run had been kept, by whichever is more. When a run is
+// written it may not stray more at all; this leaves room for the steps it is sampled in then, and
+// for parts of long runs, which may be a little worse.
+constexpr double kTimes = 1.25;
+constexpr double kTimesInParts = 2.2;
+constexpr double kParted_s = 60.0;
+constexpr double kBearableRms_mm = 5e-3;
+constexpr double kBearable_mm = 30e-3;
+// How it swings in a tail is not looked at when a run is written.
+constexpr double kBearableSwing_mm = 80e-3;
+
+double bearable_times(double duration_s) { return duration_s < kParted_s ? kTimes : kTimesInParts; }
+
+double speed_mm_s(const planner::PlannedMove& move) {
+  return move.duration_s() > 0.0 ? move.segment.length_xy_mm() / move.duration_s() : 0.0;
+}
+
+// How far the base may be from the path at a speed.
+double largest_offset_mm(const Rules& rules, double v_mm_s) {
+  const auto of_axis = [&](const dynamics::FlexibleAxis& axis) {
+    const double omega = axis.omega_rad_s;
+    return rules.base_max_accel_mm_s2 / (omega * omega) + 2.0 * axis.zeta / omega * v_mm_s;
+  };
+  return kRounding_mm + std::hypot(of_axis(rules.nozzle.x), of_axis(rules.nozzle.y));
+}
+
+}  // namespace
+
+void SectionRules::Breach::offer(double a_value, double limit, std::size_t a_line) {
+  if (line == 0 && a_value > limit) {
+    value = a_value;
+    line = a_line;
+  }
+}
+
+void SectionRules::begin(const LineRate& rate_before, bool ringing) {
+  ringing_ = ringing;
+  duration_s_ = 0.0;
+  densest_ = 0.0;
+  sliced_rate_ = rate_before;
+  sliced_rate_.forget();
+  sliced_rate_.change_text();
+  first_line_ = 0;
+  offset_ = {};
+  filament_in_tail_ = {};
+  swing_in_tail_mm_ = 0.0;
+  swing_line_ = 0;
+}
+
+void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late,
+                       double filament_tolerance_mm) {
+  const std::size_t line = move.segment.line;
+  first_line_ = first_line_ == 0 ? line : first_line_;
+  last_line_ = line;
+  duration_s_ += move.duration_s();
+  offset_.offer(meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), line);
+  // Where along its way a wipe pulls filament back does not matter.
+  const double filament_mm = std::max(0.0, move.segment.delta(gcode::E));
+  if (!late && move.segment.length_xy_mm() > kShort_mm) {
+    densest_ = std::max(densest_, filament_mm / move.segment.length_xy_mm());
+  }
+  if (late) {
+    // A run whose clock is late has some of its way still to go.
+    const double to_go_mm = meter.to_path_end_mm(move.segment.start_mm);
+    filament_in_tail_.offer(filament_mm,
+                            kLate_mm + filament_tolerance_mm + kTimes * densest_ * to_go_mm, line);
+    const double swing_mm = meter.swing_mm();
+    if (swing_mm > swing_in_tail_mm_) {
+      swing_in_tail_mm_ = swing_mm;
+      swing_line_ = line;
+    }
+  }
+}
+
+void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emitted) {
+  check_rate(rate);
+  // The firmware may pass from motion that was kept into the run without a stop. When the run was
+  // written it was taken to begin at rest, so that how it rings is not known as exactly.
+  if (!ringing_) {
+    check_nozzle(kept.section_error(), emitted.section_error());
+    check_swing(kept, emitted);
+  }
+  check_filament();
+  if (offset_.line != 0) {
+    violations_->in_output(
+        offset_.line,
+        fmt::format("the base is {:.3f} mm away from the sliced path", offset_.value));
+  }
+}
+
+void SectionRules::check_filament() {
+  if (filament_in_tail_.line != 0) {
+    violations_->in_output(filament_in_tail_.line,
+                           fmt::format("{:.5f} mm of filament in the tail of a run, after all that "
+                                       "the sliced file lays",
+                                       filament_in_tail_.value));
+  }
+}
+
+void SectionRules::check_swing(const Meter& kept, const Meter& emitted) {
+  if (emitted.swing_mm() > swing_in_tail_mm_) {
+    swing_in_tail_mm_ = emitted.swing_mm();
+    swing_line_ = last_line_;
+  }
+  const double kept_mm = kept.swing_mm();
+  if (swing_in_tail_mm_ > std::max(kTimesInParts * kept_mm, kBearableSwing_mm)) {
+    violations_->in_output(
+        swing_line_, fmt::format("in the tail of a run the nozzle swings by {:.3f} µm instead of "
+                                 "{:.3f} µm as sliced",
+                                 swing_in_tail_mm_ * 1e3, kept_mm * 1e3));
+  }
+}
+
+void SectionRules::check_rate(const LineRate& rate) {
+  const double most = std::max(rules_->max_lines_per_s, sliced_rate_.max_per_s()) + kOneLine_per_s;
+  if (rate.max_per_s() > most) {
+    violations_->in_output(rate.densest_line(),
+                           fmt::format("{:.0f} lines per second are more than {:.0f}",
+                                       rate.max_per_s(), rules_->max_lines_per_s));
+  }
+}
+
+void SectionRules::check_nozzle(const SectionError& kept, const SectionError& emitted) {
+  const double times = bearable_times(duration_s_);
+  if (emitted.rms_mm() > std::max(times * kept.rms_mm(), kBearableRms_mm) ||
+      emitted.max_mm() > std::max(times * kept.max_mm(), kBearable_mm)) {
+    violations_->in_output(
+        first_line_,
+        fmt::format("in this run the nozzle strays more than in the sliced file (line {}): contour "
+                    "RMS {:.3f} instead of {:.3f} µm, largest {:.3f} instead of {:.3f} µm",
+                    emitted.line(), emitted.rms_mm() * 1e3, kept.rms_mm() * 1e3,
+                    emitted.max_mm() * 1e3, kept.max_mm() * 1e3));
+  }
+}
+
+}  // namespace unflex::verify

@@ -1,0 +1,59 @@
+// What the motion of a compensated run must keep to besides the limits of BaseCheck: the budget of
+// lines, the neighbourhood of the path, a tail without filament, and a nozzle that strays no more
+// than if the run had been kept as it was sliced, the tail included.
+//
+// Notation:
+//   ω, ζ   of the softer axis              A, v   largest acceleration of a base, its speed
+//   A/ω² + 2ζv/ω   how far a base is from the nozzle that follows it, and so from the path
+#pragma once
+
+#include <cstddef>
+
+#include "meter.hpp"
+#include "unflex/verify/line_rate.hpp"
+#include "unflex/verify/verify.hpp"
+#include "violations.hpp"
+
+namespace unflex::verify {
+
+class SectionRules {
+ public:
+  SectionRules(const Rules& rules, Violations& violations)
+      : rules_(&rules), violations_(&violations) {}
+
+  // ringing: motion that was kept has just set the nozzle swinging.
+  void begin(const LineRate& rate_before, bool ringing);
+  // A move of the sliced file's run by itself, as it would come here.
+  void add_sliced(const planner::PlannedMove& move) { sliced_rate_.add(move); }
+  // A move of the emitted run, after it has been played. late: the plan had ended when it began.
+  void add(const planner::PlannedMove& move, Meter& meter, bool late, double filament_tolerance_mm);
+  // The whole run has been played: emitted, and kept as it was sliced.
+  void end(const LineRate& rate, const Meter& kept, const Meter& emitted);
+
+ private:
+  // The first breach of a rule.
+  struct Breach {
+    double value = 0.0;
+    std::size_t line = 0;
+    void offer(double a_value, double limit, std::size_t a_line);
+  };
+  void check_rate(const LineRate& rate);
+  void check_nozzle(const SectionError& kept, const SectionError& emitted);
+  void check_swing(const Meter& kept, const Meter& emitted);
+  void check_filament();
+
+  const Rules* rules_;
+  Violations* violations_;
+  LineRate sliced_rate_;
+  bool ringing_ = false;
+  double duration_s_ = 0.0;
+  double densest_ = 0.0;  // most filament on a way, mm/mm
+  std::size_t first_line_ = 0;
+  std::size_t last_line_ = 0;
+  Breach offset_;
+  Breach filament_in_tail_;
+  double swing_in_tail_mm_ = 0.0;  // the largest
+  std::size_t swing_line_ = 0;
+};
+
+}  // namespace unflex::verify
