@@ -90,8 +90,8 @@ void Console::line(std::string_view text) {
 
 void Console::lines(const std::vector<std::string>& lines, std::size_t total,
                     std::string_view what) {
-  for (const std::string& one : summarised(lines, total, what)) {
-    line(one);
+  for (const std::string& text : summarised(lines, total, what)) {
+    line(text);
   }
 }
 

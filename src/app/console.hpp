@@ -32,7 +32,7 @@ class Console {
 
   void line(std::string_view text);
   void error(const Error& error) { line(error_text(error)); }
-  // As summarised.
+  // The lines, summarised.
   void lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what);
   void warnings(const std::vector<std::string>& all) { lines(all, all.size(), "warnings"); }
 

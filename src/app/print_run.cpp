@@ -57,8 +57,8 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  if (ends_strictly(config, setting_warnings(space->settings), console)) {
-    return PrintOutcome{ExitCode::input, {}, true};
+  if (Status accepted = accept(config, setting_warnings(space->settings), console); !accepted) {
+    return tl::unexpected(accepted.error());
   }
   const Result<pipeline::Job> job = job_of(config, *space);
   if (!job) {
@@ -71,8 +71,8 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!report) {
     return tl::unexpected(report.error());
   }
-  if (ends_strictly(config, report->warnings, console)) {
-    return PrintOutcome{ExitCode::input, {}, true};
+  if (Status accepted = accept(config, report->warnings, console); !accepted) {
+    return tl::unexpected(accepted.error());
   }
   add_setting_warnings(space->settings, report->warnings);
   console.warnings(report->warnings);

@@ -35,6 +35,20 @@ std::vector<std::string> setting_warnings(const machine::Settings& settings) {
   return remarks;
 }
 
+Status accept(const RunConfig& config, std::vector<std::string> warnings, Console& console) {
+  if (!config.strict || warnings.empty()) {
+    return {};
+  }
+  constexpr std::string_view kWarning = ": warning: ";
+  for (std::string& warning : warnings) {
+    if (const std::size_t at = warning.find(kWarning); at != std::string::npos) {
+      warning.replace(at, kWarning.size(), ": ");
+    }
+  }
+  console.lines(warnings, warnings.size(), "errors");
+  return fail(ErrorKind::input, "--strict lets none of this pass; nothing was written");
+}
+
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings) {
   const std::vector<std::string> remarks = setting_warnings(settings);
   warnings.insert(warnings.begin(), remarks.begin(), remarks.end());

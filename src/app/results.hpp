@@ -40,6 +40,10 @@ auto with_progress(const RunConfig& config, Work work)
 
 [[nodiscard]] std::vector<std::string> setting_warnings(const machine::Settings& settings);
 
+// With --strict, an error where there are warnings, which are shown as the errors they then are.
+[[nodiscard]] Status accept(const RunConfig& config, std::vector<std::string> warnings,
+                            Console& console);
+
 // Remarks about the settings come before those about the print.
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings);
 

@@ -43,8 +43,8 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
     return tl::unexpected(inspection.error());
   }
   add_setting_warnings(space->settings, inspection->warnings);
-  if (ends_strictly(config, inspection->warnings, console)) {
-    return ExitCode::input;
+  if (Status accepted = accept(config, inspection->warnings, console); !accepted) {
+    return tl::unexpected(accepted.error());
   }
   console.warnings(inspection->warnings);
   const std::string json = inspection_json(*inspection, config.input, space->settings);

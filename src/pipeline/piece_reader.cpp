@@ -125,6 +125,16 @@ Result<bool> PieceReader::next(Piece& piece) {
 
 Result<bool> PieceReader::cut(Piece& piece) {
   recycle(piece);
+  const Result<bool> more = cut(piece);
+  if (more && *more) {
+    if (const planner::PlannedMove* const move = verify::endless(piece.moves)) {
+      return tl::unexpected(verify::endless_move(*move, lines_.name()));
+    }
+  }
+  return more;
+}
+
+Result<bool> PieceReader::cut(Piece& piece) {
   for (;;) {
     gcode::Event event;
     if (!spare_.empty()) {

@@ -25,7 +25,7 @@ constexpr double kParted_s = 60.0;
 constexpr double kBearableRms_mm = 5e-3;
 constexpr double kBearable_mm = 30e-3;
 // How it swings in a tail is not looked at when a run is written.
-constexpr double kBearableSwing_mm = 45e-3;
+constexpr double kBearableSwing_mm = 80e-3;
 
 double bearable_times(double duration_s) { return duration_s < kParted_s ? kTimes : kTimesInParts; }
 

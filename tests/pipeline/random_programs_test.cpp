@@ -94,37 +94,77 @@ void expect_same_end(const std::string& input, const std::string& output, Firmwa
   EXPECT_EQ(out.unit_mm, in.unit_mm);
 }
 
+struct Counts {
+  std::size_t runs = 0;
+  std::size_t kept = 0;
+};
+
+void expect_faultless(Firmware firmware, unsigned seed, Counts& counts) {
+  SCOPED_TRACE(fmt::format("{}, UNFLEX_RANDOM_SEED={}", to_string(firmware), seed));
+  const RandomProgram program = testing::random_program(firmware, seed);
+  const JobFolder folder(program.text, program.overrides);
+  Job job = folder.job();
+  job.engine = EngineChoice::banded;
+  SilentProgress progress;
+  const Result<report::Report> report = compensate(job, progress);
+  if (!report) {
+    ADD_FAILURE() << to_string(report.error());
+    return;
+  }
+  EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
+  const std::string output = folder.output();
+  expect_commands_kept(program.text, output);
+  expect_same_end(program.text, output, firmware);
+  counts.runs += report->runs_total;
+  counts.kept += report->runs_fallback;
+}
+
 class RandomPrograms : public ::testing::TestWithParam<Firmware> {};
 
 TEST_P(RandomPrograms, AreCompensatedWithoutFault) {
-  const Firmware firmware = GetParam();
   const unsigned first = from_environment("UNFLEX_RANDOM_SEED", 1);
   const unsigned count = from_environment("UNFLEX_RANDOM_PROGRAMS", kPrograms);
-  std::size_t runs = 0;
-  std::size_t kept = 0;
+  Counts counts;
   for (unsigned seed = first; seed < first + count; ++seed) {
-    SCOPED_TRACE(fmt::format("{}, UNFLEX_RANDOM_SEED={}", to_string(firmware), seed));
-    const RandomProgram program = testing::random_program(firmware, seed);
-    const JobFolder folder(program.text, program.overrides);
-    Job job = folder.job();
-    job.engine = EngineChoice::banded;
-    SilentProgress progress;
-    const Result<report::Report> report = compensate(job, progress);
-    if (!report) {
-      ADD_FAILURE() << to_string(report.error());
-      continue;
-    }
-    EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-    const std::string output = folder.output();
-    expect_commands_kept(program.text, output);
-    expect_same_end(program.text, output, firmware);
-    runs += report->runs_total;
-    kept += report->runs_fallback;
+    expect_faultless(GetParam(), seed, counts);
   }
-  RecordProperty("runs", static_cast<int>(runs));
-  RecordProperty("kept", static_cast<int>(kept));
+  RecordProperty("runs", static_cast<int>(counts.runs));
+  RecordProperty("kept", static_cast<int>(counts.kept));
   // Most is compensated: keeping all of it would be no fault either.
-  EXPECT_LT(static_cast<double>(kept), 0.2 * static_cast<double>(runs));
+  EXPECT_LT(static_cast<double>(counts.kept), 0.2 * static_cast<double>(counts.runs));
+}
+
+// Programs that once were not.
+
+TEST(RandomProgramsFoundFaulty, WhereARunIsEnteredFromKeptMotionAtSpeed) {
+  Counts counts;
+  expect_faultless(Firmware::rrf, 10038, counts);
+  expect_faultless(Firmware::klipper, 5075, counts);
+}
+
+TEST(RandomProgramsFoundFaulty, WhereMarlinLeavesTheMoveBeforeARunToItsFirstLine) {
+  Counts counts;
+  for (const unsigned seed : {5050U, 10121U, 10809U}) {
+    expect_faultless(Firmware::marlin, seed, counts);
+  }
+}
+
+TEST(RandomProgramsFoundFaulty, WhereAQuickRunHasLongLinesAroundACommand) {
+  Counts counts;
+  expect_faultless(Firmware::rrf, 31010, counts);
+  expect_faultless(Firmware::marlin, 30345, counts);
+}
+
+TEST(RandomProgramsFoundFaulty, WhereTheClockOfARunIsLate) {
+  Counts counts;
+  expect_faultless(Firmware::marlin, 10058, counts);
+  expect_faultless(Firmware::rrf, 10393, counts);
+  expect_faultless(Firmware::rrf, 10641, counts);
+}
+
+TEST(RandomProgramsFoundFaulty, WhereAWipePullsItsFilamentBackAtItsEnd) {
+  Counts counts;
+  expect_faultless(Firmware::marlin, 50785, counts);
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, RandomPrograms,

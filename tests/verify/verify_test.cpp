@@ -419,6 +419,24 @@ TEST(Verify, AnInputWithoutFinalLineEndingMayGetOne) {
   EXPECT_NE(violations_of(verify_text("G90\n; end\n", "G90\n; end")), "");
 }
 
+// Where filament was rounded to five digits, a line that repeats the last E moves it by that.
+TEST(Verify, ALineThatMovesByRoundingAloneIsNoSectionOfItsOwn) {
+  const std::string start = "G90\nM82\nG92 E0\nG1 Z0.3 F600\nG1 X20 Y20 F6000\n";
+  const std::string input = start + "G1 E1.00000 F1800\nG1 Z0.5\nG1 X20 Y20 E1.00001\nG1 Z0.7\n";
+  EXPECT_EQ(violations_of(verify_text(input, input)), "");
+  EXPECT_EQ(verify_text(input, input).emitted_time_s, verify_text(input, input).reference_time_s);
+}
+
+TEST(Verify, AMoveOfMoreThanAnHourIsAnInputError) {
+  std::istringstream input("G90\nG1 Z1 F600\nG1 X1 Y1 F6000\nG1 X100 F0.001\n");
+  std::istringstream output(input.str());
+  SilentProgress progress;
+  const auto report = verify(input, "in.gcode", output, "out.gcode", Rules{}, progress);
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().kind, ErrorKind::input);
+  EXPECT_EQ(report.error().place.line, 4U);
+}
+
 TEST(Verify, KeepsAHundredViolationsAndCountsAll) {
   std::string input;
   for (int i = 0; i < 150; ++i) {
