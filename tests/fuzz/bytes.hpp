@@ -22,7 +22,9 @@ class Bytes {
     return value;
   }
   // Of `count` variants, '0' the first.
-  std::size_t variant(std::size_t count) { return (byte() + 256 - '0') % count; }
+  std::size_t variant(std::size_t count) {
+    return static_cast<unsigned char>(byte() - '0') % count;
+  }
   // From a grid of 65 536 values.
   double number(double from, double to) {
     const std::size_t high = byte();

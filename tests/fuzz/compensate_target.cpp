@@ -162,8 +162,10 @@ void check_report(const report::Report& report) {
   require(report.runs_total == report.runs_compensated + report.runs_fallback,
           "a run is neither compensated nor kept");
   for (const std::string& warning : report.warnings) {
-    require_printable(warning);
+    require_one_line(warning);
   }
+  require(!report::to_json(report).empty() && !report::to_text(report).empty(),
+          "nothing to report");
 }
 
 }  // namespace

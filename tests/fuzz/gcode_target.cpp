@@ -43,22 +43,30 @@ PrinterSetup printer_setup(std::size_t variant) {
   return setup;
 }
 
-// What the firmware may add to a limit: a speed it never goes below, and rounding to whole steps.
-double allowance_mm_s(const planner::PlannedMove& move, const planner::FirmwareConfig& fixed) {
-  if (fixed.firmware != Firmware::marlin) {
-    return 0.0;
+// What rounding to whole steps may add to the speed of an axis, and in Marlin a speed that no move
+// is slower than.
+double allowance_mm_s(const planner::PlannedMove& move, const planner::FirmwareConfig& fixed,
+                      std::size_t axis) {
+  if (fixed.firmware == Firmware::rrf) {
+    // The direction is that between whole steps and coordinates in floats.
+    const double coordinate_mm =
+        2e-7 * (std::abs(move.segment.start_mm[axis]) + std::abs(move.segment.end_mm[axis]));
+    return move.cruise_v_mm_s * (1.0 / fixed.steps_per_mm[axis] + coordinate_mm) / move.length_mm;
   }
   double steps = 1.0;
-  for (std::size_t axis = 0; axis < 4; ++axis) {
-    steps = std::max(steps, std::abs(move.segment.delta(static_cast<gcode::Axis>(axis))) *
-                                fixed.steps_per_mm[axis]);
+  for (std::size_t i = 0; i < 4; ++i) {
+    steps = std::max(
+        steps, std::abs(move.segment.delta(static_cast<gcode::Axis>(i))) * fixed.steps_per_mm[i]);
   }
-  return 120.0 * move.length_mm / steps + fixed.minimum_planner_speed_mm_s;
+  return std::abs(move.direction[axis]) *
+         (120.0 * move.length_mm / steps + fixed.minimum_planner_speed_mm_s);
 }
 
 void check_speeds(const planner::PlannedMove& move, const Given& given,
                   const planner::FirmwareConfig& fixed) {
-  const planner::Limits& limits = given.limits;
+  const planner::Limits limits = fixed.firmware == Firmware::rrf
+                                     ? planner::rrf_raised(given.limits)
+                                     : given.limits;
   const std::string place = fmt::format("line {}: ", move.segment.line);
   if (fixed.firmware == Firmware::klipper) {
     const double fastest = move.kinematic
@@ -69,14 +77,13 @@ void check_speeds(const planner::PlannedMove& move, const Given& given,
             place + "accelerates more than allowed");
     return;
   }
-  const double allowance = allowance_mm_s(move, fixed);
   for (std::size_t axis = 0; axis < 4; ++axis) {
     const double share = std::abs(move.direction[axis]);
     const double least = std::max({0.0, limits.min_velocity_mm_s, limits.min_travel_velocity_mm_s,
                                    limits.min_movement_velocity_mm_s});
     require(share * move.cruise_v_mm_s <=
                 std::max(limits.axis_max_velocity_mm_s[axis], share * least) * (1.0 + 1e-3) +
-                    share * allowance,
+                    allowance_mm_s(move, fixed, axis),
             place + fmt::format("axis {} at {} mm/s is faster than {} mm/s", axis,
                                 share * move.cruise_v_mm_s, limits.axis_max_velocity_mm_s[axis]));
   }

@@ -20,7 +20,7 @@ bool all_finite(const gcode::Position& position) {
 void check_event(const gcode::Event& event, const gcode::ModalState& state) {
   const std::string place = fmt::format("line {}: ", event.line.number);
   for (const std::string& warning : event.warnings) {
-    require_printable(warning);
+    require_one_line(warning);
   }
   require(all_finite(state.position_mm) && all_finite(state.base_mm),
           place + "the position is no number");

@@ -25,7 +25,7 @@ void check_mode(const identify::Mode& mode) {
               mode.curve.fitted.size() == mode.curve.x.size(),
           "a curve in parts of different lengths");
   for (const std::string& warning : mode.warnings) {
-    require_printable(warning);
+    require_one_line(warning);
   }
 }
 
@@ -43,7 +43,7 @@ void records(std::string_view bytes) {
   std::vector<identify::Mode> modes;
   for (const identify::DataSet& set : *sets) {
     for (const std::string& note : set.notes) {
-      require_printable(note);
+      require_one_line(note);
     }
     const Result<identify::Mode> mode =
         identify::fit(set, set.axis.value_or(identify::dominant_axis(set)), {});

@@ -57,10 +57,10 @@ void settings(std::string_view bytes) {
     return require_fault_of_input(settings.error());
   }
   for (const Diagnostic& note : settings->notes) {
-    require_printable(to_string(note));
+    require_one_line(to_string(note));
   }
   for (const std::string& recommendation : machine::recommendations(*settings)) {
-    require_printable(recommendation);
+    require_one_line(recommendation);
   }
   turn_into_options(*settings);
   const std::string toml = machine::to_toml(*settings);
