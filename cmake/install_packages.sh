@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # install_packages.sh [--tests | --fuzz]
 #
-# Installs what unflex is built from, on Debian 12, and with --tests what its tests, with --fuzz what
-# fuzzing needs as well.
+# Installs what unflex is built from, on Debian 12, and with --tests what its tests need as well,
+# with --fuzz what sanitizers and fuzzing need besides.
 # Does nothing where all is installed; otherwise it needs root or sudo.
 set -euo pipefail
 
@@ -28,7 +28,7 @@ fuzz_packages=(clang-16 libclang-rt-16-dev llvm-16)
 if [[ ${1:-} == --tests ]]; then
   packages+=("${test_packages[@]}")
 elif [[ ${1:-} == --fuzz ]]; then
-  packages+=("${fuzz_packages[@]}")
+  packages+=("${test_packages[@]}" "${fuzz_packages[@]}")
 fi
 
 if ! command -v dpkg-query >/dev/null; then
