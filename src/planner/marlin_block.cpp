@@ -84,6 +84,8 @@ Vector limit_speeds(const Settings& settings, const Travel& travel, float per_se
         to_unsigned(static_cast<float>(block.nominal_rate_steps_s) * factor);
     block.nominal_speed_mm_s *= factor;
   }
+  // The firmware divides by it, and nothing comes of a rate of none.
+  block.nominal_rate_steps_s = std::max(block.nominal_rate_steps_s, 1U);
   return speed_mm_s;
 }
 

@@ -25,9 +25,20 @@
 namespace unflex::fuzz {
 namespace {
 
-// Longer prints say no more and take long.
+// More motion says no more and takes long; where whole steps are reckoned with, the sooner.
 constexpr std::size_t kMostSegments = 3000;
-constexpr double kMost_s = 3.0;
+double most_s(Firmware firmware) { return firmware == Firmware::klipper ? 2.0 : 0.6; }
+
+// Of the motion that may be rewritten, and of all that is printed.
+bool is_short(const Playback& print, Firmware firmware) {
+  constexpr double kMost_s = 100.0;
+  double rewritten_s = 0.0;
+  for (const planner::PlannedMove& move : print.moves) {
+    rewritten_s += gcode::compensable(move.segment, firmware) ? move.duration_s() : 0.0;
+  }
+  return print.whole && rewritten_s < most_s(firmware) &&
+         planner::duration_s(print.moves) < kMost_s;
+}
 
 // '0' to '2': the bytes are a print for Klipper, Marlin, RepRapFirmware; '3' to '5': the bytes are
 // turned into one. Behind '6' to ';', 'B' to 'G' and so on they are given with other settings.
@@ -176,10 +187,11 @@ void compensate(std::string_view bytes) {
   const machine::Settings settings = settings_of(variant);
   const PrinterSetup setup{pipeline::interpreter_options(settings),
                            pipeline::planner_limits(settings), pipeline::firmware_config(settings)};
-  const std::string text = variant.written ? ProgramWriter(setup.interpreter).program(source)
-                                           : std::string(source.rest());
+  const std::string text =
+      variant.written ? ProgramWriter(setup.interpreter, most_s(variant.firmware)).program(source)
+                      : std::string(source.rest());
   const Playback input = play(text, setup, kMostSegments);
-  if (!input.whole || planner::duration_s(input.moves) > kMost_s) {
+  if (!is_short(input, variant.firmware)) {
     return;
   }
   const Result<Compensated> done = run(text, settings, 1);

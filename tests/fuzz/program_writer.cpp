@@ -18,18 +18,20 @@ using gcode::Z;
 constexpr double kLow_mm = 20.0;
 constexpr double kHigh_mm = 80.0;
 constexpr std::size_t kMostLines = 60;
+// What gaining speed and losing it takes, about.
+constexpr double kRamps_s = 0.02;
 // Filament of 1.75 mm in a line of 0.4 by 0.2 mm.
 constexpr double kFilamentPerMm = 0.033;
 
 }  // namespace
 
-ProgramWriter::ProgramWriter(const gcode::InterpreterOptions& options)
-    : firmware_(options.firmware), interpreter_(options) {
+ProgramWriter::ProgramWriter(const gcode::InterpreterOptions& options, double duration_s)
+    : firmware_(options.firmware), interpreter_(options), left_s_(duration_s) {
   add("G28\nG90\nM83\nG1 X50 Y50 Z0.3 F6000\n");
 }
 
 std::string ProgramWriter::program(Bytes source) {
-  for (std::size_t line = 0; line < kMostLines && !source.empty(); ++line) {
+  for (std::size_t line = 0; line < kMostLines && !source.empty() && left_s_ > 0.0; ++line) {
     add(next(source));
   }
   return text_;
@@ -38,7 +40,11 @@ std::string ProgramWriter::program(Bytes source) {
 void ProgramWriter::add(const std::string& text) {
   Bytes lines(text);
   while (!lines.empty()) {
-    static_cast<void>(interpreter_.interpret({std::string(lines.line()) + "\n", 0}));
+    const gcode::Event event = interpreter_.interpret({std::string(lines.line()) + "\n", 0});
+    for (const gcode::Segment& segment : event.segments) {
+      left_s_ -= segment.start_known ? segment.length_xy_mm() / segment.feed_mm_s : 0.0;
+    }
+    left_s_ -= event.kind == gcode::EventKind::move ? kRamps_s : 0.0;
   }
   text_ += text;
 }
@@ -72,7 +78,7 @@ std::string ProgramWriter::next(Bytes& source) {
       return arc(source);
     case 12:
     case 13:
-      return draw(source, 5.0, 60.0);
+      return draw(source, 4.0, 20.0);
     case 14:
       return draw(source, 0.0, 0.02);
     default:
@@ -97,7 +103,7 @@ std::string ProgramWriter::draw(Bytes& source, double least_mm, double most_mm) 
 std::string ProgramWriter::arc(Bytes& source) {
   const gcode::ModalState& state = interpreter_.state();
   const gcode::Position& at = state.position_mm;
-  const double radius = source.number(0.2, 10.0);
+  const double radius = source.number(0.2, 4.0);
   const double begin = source.number(0.0, 2.0 * std::numbers::pi);
   const double angle = source.number(0.05, 2.0 * std::numbers::pi);
   const bool clockwise = source.byte() % 2 == 0;
@@ -174,7 +180,7 @@ std::string ProgramWriter::filament(Bytes& source, double length_mm) const {
 
 std::string ProgramWriter::speed(Bytes& source) const {
   const std::size_t value = source.byte();
-  return value % 3 == 0 ? fmt::format(" F{:.1f}", (1200.0 + 50.0 * static_cast<double>(value)) /
+  return value % 3 == 0 ? fmt::format(" F{:.1f}", (1200.0 + 60.0 * static_cast<double>(value)) /
                                                       interpreter_.state().unit_mm)
                         : "";
 }

@@ -14,7 +14,7 @@ namespace unflex::fuzz {
 // of each line says what it is.
 class ProgramWriter {
  public:
-  explicit ProgramWriter(const gcode::InterpreterOptions& options);
+  ProgramWriter(const gcode::InterpreterOptions& options, double duration_s);
 
   [[nodiscard]] std::string program(Bytes source);
 
@@ -34,6 +34,7 @@ class ProgramWriter {
   gcode::Interpreter interpreter_;
   std::string text_;
   double heading_ = 0.0;
+  double left_s_;
 };
 
 }  // namespace unflex::fuzz
