@@ -38,6 +38,7 @@ void expect_holds(const std::string& target, void (*holds)(std::string_view)) {
 TEST(FuzzCorpus, HoldsForGcode) { expect_holds("gcode", gcode); }
 TEST(FuzzCorpus, HoldsForWholePrints) { expect_holds("compensate", compensate); }
 TEST(FuzzCorpus, HoldsForSettings) { expect_holds("settings", settings); }
+TEST(FuzzCorpus, HoldsForPackedFiles) { expect_holds("container", container); }
 TEST(FuzzCorpus, HoldsForRecords) { expect_holds("records", records); }
 
 }  // namespace

@@ -12,7 +12,7 @@ build=$root/build-fuzz
 seconds=${1:-12}
 targets=("${@:2}")
 if ((${#targets[@]} == 0)); then
-  targets=(gcode settings records compensate)
+  targets=(gcode settings records container compensate)
 fi
 
 "$root/cmake/install_packages.sh" --fuzz

@@ -28,6 +28,8 @@ void gcode(std::string_view bytes);
 void compensate(std::string_view bytes);
 // What describes a printer. First byte: as a file, at the head of a print, in a stream, as --set.
 void settings(std::string_view bytes);
+// What G-code comes packed in. First byte: unpacked from gzip, from binary G-code, packed so.
+void container(std::string_view bytes);
 // What people record of a printer. First byte: what the file is called.
 void records(std::string_view bytes);
 
