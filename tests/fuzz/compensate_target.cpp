@@ -58,14 +58,13 @@ CompensateVariant variant_of(Bytes& source) {
 
 machine::Settings settings_of(const CompensateVariant& variant) {
   const std::array<std::vector<std::string>, kSettings> kOverrides = {
-    {{"printer.travel_x_mm=[0, 250]", "printer.travel_y_mm=[0, 210]"},
-     {"dynamics.x.freq_hz=25", "dynamics.y.damping_ratio=0.15", "solve.lead_in_ms=4",
-      "limits.max_accel_mm_s2=2000"},
-     {"printer.travel_x_mm=[10, 81]", "printer.travel_y_mm=[19, 90]",
-      "printer.retract_length_mm=0.6", "base.max_jerk_mm_s3=5e6", "emit.max_lines_per_s=150"},
-     {"solve.window_s=0.3", "solve.overlap_s=0.03",
-      "limits.max_accel_mm_s2=12000" std::vector<std::string> overrides =
-          kOverrides[variant.settings];
+      {{"printer.travel_x_mm=[0, 250]", "printer.travel_y_mm=[0, 210]"},
+       {"dynamics.x.freq_hz=25", "dynamics.y.damping_ratio=0.15", "solve.lead_in_ms=4",
+        "limits.max_accel_mm_s2=2000"},
+       {"printer.travel_x_mm=[10, 81]", "printer.travel_y_mm=[19, 90]",
+        "printer.retract_length_mm=0.6", "base.max_jerk_mm_s3=5e6", "emit.max_lines_per_s=150"},
+       {"solve.window_s=0.3", "solve.overlap_s=0.03", "limits.max_accel_mm_s2=12000"}}};
+  std::vector<std::string> overrides = kOverrides[variant.settings];
   overrides.push_back(fmt::format("printer.firmware=\"{}\"", to_string(variant.firmware)));
   const Result<machine::Settings> settings = machine::load(std::nullopt, overrides);
   require(settings.has_value(), settings ? "" : to_string(settings.error()));
