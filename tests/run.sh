@@ -18,5 +18,5 @@ cmake --build "$root/build" --parallel "$(nproc)"
 
 ctest --test-dir "$root/build" --output-on-failure --parallel "$(nproc)" "$@"
 if (($# == 0)); then
-  "$root/tests/fuzz/run.sh" 15
+  "$root/tests/fuzz/run.sh" 12
 fi
