@@ -24,7 +24,8 @@ function(unflex_flags target)
   # Contraction into fused multiply-adds would make the emitted bytes depend on the machine.
   target_compile_options(${target} PRIVATE -ffp-contract=off)
   if(UNFLEX_SANITIZE)
-    target_compile_options(${target} PRIVATE -fsanitize=${UNFLEX_SANITIZE} -fno-omit-frame-pointer)
+    target_compile_options(${target} PRIVATE -fsanitize=${UNFLEX_SANITIZE} -fno-omit-frame-pointer
+                                             -fno-sanitize-recover=all)
     target_link_options(${target} PUBLIC -fsanitize=${UNFLEX_SANITIZE})
   endif()
 endfunction()

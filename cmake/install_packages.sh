@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# install_packages.sh [--tests]
+# install_packages.sh [--tests | --fuzz]
 #
-# Installs what unflex is built from, on Debian 12, and with --tests what its tests need as well.
+# Installs what unflex is built from, on Debian 12, and with --tests what its tests need as well,
+# with --fuzz what sanitizers and fuzzing need besides.
 # Does nothing where all is installed; otherwise it needs root or sudo.
 set -euo pipefail
 
@@ -21,9 +22,13 @@ test_packages=(
   # The hook is tried in a real slicer, the examples for continuous integration are read as YAML.
   prusa-slicer python3-yaml
 )
+# Debian's default clang, 14, does not understand the ranges of libstdc++ 12.
+fuzz_packages=(clang-16 libclang-rt-16-dev llvm-16)
 
 if [[ ${1:-} == --tests ]]; then
   packages+=("${test_packages[@]}")
+elif [[ ${1:-} == --fuzz ]]; then
+  packages+=("${test_packages[@]}" "${fuzz_packages[@]}")
 fi
 
 if ! command -v dpkg-query >/dev/null; then

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # run.sh [CTEST OPTION]...
 #
-# Installs what is missing on Debian 12, builds unflex and its tests into build/ and runs them all.
+# Installs what is missing on Debian 12, builds unflex and its tests into build/ and runs them all,
+# or those that the options choose. Then, unless there are options, fuzzes for a minute.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
@@ -15,4 +16,7 @@ fi
 cmake "${generator[@]}" -S "$root" -B "$root/build" -DCMAKE_BUILD_TYPE=Release -DUNFLEX_TESTS=ON
 cmake --build "$root/build" --parallel "$(nproc)"
 
-exec ctest --test-dir "$root/build" --output-on-failure --parallel "$(nproc)" "$@"
+ctest --test-dir "$root/build" --output-on-failure --parallel "$(nproc)" "$@"
+if (($# == 0)); then
+  "$root/tests/fuzz/run.sh" 12
+fi

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "characters.hpp"
+#include "printer_number.hpp"
 #include "shell_words.hpp"
 #include "unflex/core/number.hpp"
 
@@ -179,7 +180,7 @@ void Parser::read_word() {
       ++cursor_;
     }
     if (cursor_ != digits) {
-      word.value = parse_number(line_.substr(digits, cursor_ - digits));
+      word.value = as_printers_take_it(parse_number(line_.substr(digits, cursor_ - digits)));
       if (!word.value) {
         unreadable(from);
       }

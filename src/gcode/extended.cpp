@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "firmware_commands.hpp"
+#include "printer_number.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
@@ -45,7 +46,7 @@ Parameter number_of(const Command& command, std::string_view key) {
   if (!text) {
     return {};
   }
-  return {true, parse_parameter_number(*text)};
+  return {true, as_printers_take_it(parse_parameter_number(*text))};
 }
 
 std::string state_name(const Command& command) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "marlin_integers.hpp"
 #include "marlin_junction.hpp"
 
 namespace unflex::planner::marlin {
@@ -21,8 +22,8 @@ Vector to_floats(const std::array<double, 4>& values) {
   return result;
 }
 
-std::uint32_t magnitude(std::int32_t steps) {
-  return static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
+std::uint32_t magnitude(std::int64_t steps) {
+  return to_unsigned(std::abs(static_cast<double>(steps)));
 }
 
 // The motion of a block per axis.
@@ -54,11 +55,11 @@ float length_mm(const Settings& settings, const Travel& travel) {
 float stretched(const Settings& settings, float per_second, std::size_t moves_queued) {
   constexpr float kSecond_us = 1000000.0F;
   if (moves_queued < 2 || moves_queued >= settings.block_buffer_size / 2) return per_second;
-  const auto time_us = static_cast<std::int32_t>(std::lround(kSecond_us / per_second));
-  const std::int32_t missing_us = settings.min_segment_time_us - time_us;
+  const auto time_us = saturated<std::int64_t>(std::round(kSecond_us / per_second));
+  const std::int64_t missing_us = settings.min_segment_time_us - time_us;
   if (missing_us <= 0) return per_second;
   return kSecond_us /
-         static_cast<float>(time_us + 2 * missing_us / static_cast<std::int32_t>(moves_queued));
+         static_cast<float>(time_us + 2 * missing_us / static_cast<std::int64_t>(moves_queued));
 }
 
 // Nominal speed and rate as asked for, then slowed until each axis keeps its limit (M203). Returns
@@ -67,7 +68,7 @@ Vector limit_speeds(const Settings& settings, const Travel& travel, float per_se
                     Block& block) {
   block.nominal_speed_mm_s = block.length_mm * per_second;
   const float rate = std::ceil(static_cast<float>(block.step_events) * per_second);
-  block.nominal_rate_steps_s = static_cast<std::uint32_t>(rate);
+  block.nominal_rate_steps_s = to_unsigned(rate);
   Vector speed_mm_s{};
   float factor = 1.0F;
   for (std::size_t axis = 0; axis < speed_mm_s.size(); ++axis) {
@@ -80,9 +81,11 @@ Vector limit_speeds(const Settings& settings, const Travel& travel, float per_se
   if (factor < 1.0F) {
     for (float& v : speed_mm_s) v *= factor;
     block.nominal_rate_steps_s =
-        static_cast<std::uint32_t>(static_cast<float>(block.nominal_rate_steps_s) * factor);
+        to_unsigned(static_cast<float>(block.nominal_rate_steps_s) * factor);
     block.nominal_speed_mm_s *= factor;
   }
+  // The firmware divides by it, and nothing comes of a rate of none.
+  block.nominal_rate_steps_s = std::max(block.nominal_rate_steps_s, 1U);
   return speed_mm_s;
 }
 
@@ -94,7 +97,7 @@ void limit_accel(const Settings& settings, const Travel& travel, float inverse_l
   const float asked_mm_s2 = filament_only          ? settings.retract_accel_mm_s2
                             : travel.steps[E] != 0 ? settings.print_accel_mm_s2
                                                    : settings.travel_accel_mm_s2;
-  auto accel = static_cast<std::uint32_t>(std::ceil(asked_mm_s2 * steps_per_mm));
+  auto accel = to_unsigned(std::ceil(asked_mm_s2 * steps_per_mm));
   for (std::size_t axis = 0; axis < travel.steps.size() && !filament_only; ++axis) {
     const std::uint32_t steps = travel.steps[axis];
     const std::uint32_t limit = settings.max_accel_steps_s2[axis];
@@ -105,7 +108,7 @@ void limit_accel(const Settings& settings, const Travel& travel, float inverse_l
     }
     const float possible = static_cast<float>(limit) * static_cast<float>(block.step_events) /
                            static_cast<float>(steps);
-    if (possible < static_cast<float>(accel)) accel = static_cast<std::uint32_t>(possible);
+    if (possible < static_cast<float>(accel)) accel = to_unsigned(possible);
   }
   block.accel_steps_s2 = accel;
   block.accel_mm_s2 = static_cast<float>(accel) / steps_per_mm;
@@ -121,9 +124,9 @@ Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
   std::uint32_t highest = 1;
   for (std::size_t axis = 0; axis < s.steps_per_mm.size(); ++axis) {
     s.mm_per_step[axis] = 1.0F / s.steps_per_mm[axis];
-    s.max_accel_mm_s2[axis] = static_cast<std::uint32_t>(limits.axis_max_accel_mm_s2[axis]);
-    s.max_accel_steps_s2[axis] = static_cast<std::uint32_t>(
-        static_cast<float>(s.max_accel_mm_s2[axis]) * s.steps_per_mm[axis]);
+    s.max_accel_mm_s2[axis] = to_unsigned(limits.axis_max_accel_mm_s2[axis]);
+    s.max_accel_steps_s2[axis] =
+        to_unsigned(static_cast<float>(s.max_accel_mm_s2[axis]) * s.steps_per_mm[axis]);
     highest = std::max(highest, s.max_accel_steps_s2[axis]);
   }
   s.accel_integer_limit_steps = std::numeric_limits<std::uint32_t>::max() / highest;
@@ -133,7 +136,7 @@ Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
   s.junction_deviation_mm = static_cast<float>(limits.junction_deviation_mm);
   s.min_velocity_mm_s = static_cast<float>(limits.min_velocity_mm_s);
   s.min_travel_velocity_mm_s = static_cast<float>(limits.min_travel_velocity_mm_s);
-  s.min_segment_time_us = static_cast<std::int32_t>(std::lround(limits.min_segment_time_s * 1e6));
+  s.min_segment_time_us = saturated<std::int32_t>(std::round(limits.min_segment_time_s * 1e6));
   s.minimum_speed_mm_s = static_cast<float>(config.minimum_planner_speed_mm_s);
   s.classic_jerk = config.classic_jerk;
   s.handle_small_segments = config.jd_handle_small_segments;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "marlin_block.hpp"
+#include "marlin_integers.hpp"
 #include "marlin_trapezoid.hpp"
 
 namespace unflex::planner {
@@ -22,10 +23,11 @@ constexpr double kSamePlace_mm = 1e-6;
 
 // X, Y and Z fit the firmware's floats, and its products decide ties. E, counted from the beginning
 // of the file, does not.
-std::int32_t to_steps(std::size_t axis, double mm, double steps_per_mm) {
-  if (axis == E) return static_cast<std::int32_t>(std::lround(mm * steps_per_mm));
-  return static_cast<std::int32_t>(
-      std::lround(static_cast<float>(mm) * static_cast<float>(steps_per_mm)));
+std::int64_t to_steps(std::size_t axis, double mm, double steps_per_mm) {
+  constexpr double kMost = 0x1p53;
+  const double steps =
+      axis == E ? mm * steps_per_mm : static_cast<float>(mm) * static_cast<float>(steps_per_mm);
+  return marlin::saturated<std::int64_t>(std::clamp(std::round(steps), -kMost, kMost));
 }
 
 }  // namespace
@@ -127,10 +129,10 @@ void MarlinPlanner::set_move(const gcode::Segment& segment, const marlin::Steps&
     if (axis == E) {
       move.segment.start_mm[E] = filament_mm_;
     } else {
-      move.segment.start_mm[axis] = position_[axis] / steps_per_mm;
-      move.segment.end_mm[axis] = target[axis] / steps_per_mm;
+      move.segment.start_mm[axis] = static_cast<double>(position_[axis]) / steps_per_mm;
+      move.segment.end_mm[axis] = static_cast<double>(target[axis]) / steps_per_mm;
     }
-    delta[axis] = (target[axis] - position_[axis]) / steps_per_mm;
+    delta[axis] = static_cast<double>(target[axis] - position_[axis]) / steps_per_mm;
   }
   const double xyz_mm = std::sqrt(delta[X] * delta[X] + delta[Y] * delta[Y] + delta[Z] * delta[Z]);
   move.kinematic = xyz_mm > 0.0;

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "marlin_integers.hpp"
+
 namespace unflex::planner::marlin {
 namespace {
 
@@ -16,9 +18,6 @@ constexpr std::uint32_t kMinRate = 120;
 
 float square(float x) { return x * x; }
 double square(double x) { return x * x; }
-
-// As a 32-bit processor converts: what is below zero becomes zero.
-std::uint32_t to_unsigned(float x) { return x > 0.0F ? static_cast<std::uint32_t>(x) : 0U; }
 
 std::uint32_t rate(const Block& block, float factor) {
   const float exact = static_cast<float>(block.nominal_rate_steps_s) * factor;
@@ -42,7 +41,7 @@ Trapezoid make_trapezoid(const Block& block, float entry, float exit) {
       half_inverse_accel * (nominal2 - square(static_cast<float>(result.final_rate)));
   result.accel_steps = to_unsigned(std::ceil(accel));
   result.decel_steps = to_unsigned(std::floor(decel));
-  if (result.accel_steps + result.decel_steps > block.step_events) {
+  if (std::uint64_t{result.accel_steps} + result.decel_steps > block.step_events) {
     // The nominal rate is out of reach: accelerate up to where the ramps meet.
     const float meet = std::ceil((static_cast<float>(block.step_events) + accel - decel) * 0.5F);
     result.accel_steps = std::min(to_unsigned(meet), block.step_events);

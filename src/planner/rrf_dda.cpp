@@ -76,6 +76,13 @@ void set_single_ramp(Dda& dda) {
 
 float ramp_clocks(float high, float low, float accel) { return (high - low) / accel; }
 
+// Rounded down. The firmware's 32 bits are full after 95 minutes; a move that takes longer counts
+// for as long as it takes, up to eleven years.
+std::int64_t whole_clocks(float clocks) {
+  constexpr float kMost = 0x1p48F;
+  return clocks > 0.0F ? static_cast<std::int64_t>(std::min(clocks, kMost)) : 0;
+}
+
 }  // namespace
 
 Settings make_settings(const Limits& asked, const FirmwareConfig& config) {
@@ -152,7 +159,7 @@ void set_trapezoid(Dda& dda) {
       ramp_clocks(dda.top_speed, dda.start_speed, dda.accel) +
       ramp_clocks(dda.top_speed, dda.end_speed, dda.decel) +
       (dda.length_mm - dda.accel_distance_mm - dda.decel_distance_mm) / dda.top_speed;
-  dda.clocks = static_cast<std::uint32_t>(std::max(total, 0.0F));
+  dda.clocks = whole_clocks(total);
 }
 
 void finish(const Settings& settings, Dda& dda) {
@@ -161,7 +168,7 @@ void finish(const Settings& settings, Dda& dda) {
   const float accel_clocks = ramp_clocks(dda.top_speed, dda.start_speed, dda.accel);
   const float decel_clocks = ramp_clocks(dda.top_speed, dda.end_speed, dda.decel);
   const float steady_clocks = steady_mm <= 0.0F ? 0.0F : steady_mm / dda.top_speed;
-  dda.clocks = static_cast<std::uint32_t>(accel_clocks + steady_clocks + decel_clocks);
+  dda.clocks = whole_clocks(accel_clocks + steady_clocks + decel_clocks);
 
   const double clock_hz = settings.clock_hz;
   PlannedMove& move = dda.move;
@@ -174,7 +181,7 @@ void finish(const Settings& settings, Dda& dda) {
   move.decel_s = decel_clocks / clock_hz;
   double& longest =
       std::max({std::ref(move.cruise_s), std::ref(move.decel_s), std::ref(move.accel_s)}).get();
-  longest += dda.clocks / clock_hz - move.duration_s();
+  longest += static_cast<double>(dda.clocks) / clock_hz - move.duration_s();
 }
 
 float speed_after(float start_speed, float accel, float length_mm) {

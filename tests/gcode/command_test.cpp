@@ -134,6 +134,14 @@ TEST(Parse, CallsAnythingThatBeginsNoCommandMalformed) {
   }
 }
 
+TEST(Parse, TakesNumbersThatNoPrinterHoldsForNone) {
+  EXPECT_EQ(parse("G1 X10000000001").kind, CommandKind::malformed);
+  EXPECT_EQ(parse("G1 X-" + std::string(300, '9')).kind, CommandKind::malformed);
+  EXPECT_EQ(words("M221 S" + std::string(300, '9')), "S");
+  EXPECT_EQ(words("M200 D0." + std::string(40, '0') + "1"), "D=0");
+  EXPECT_EQ(words("G1 X10000000000 F0.0000000001"), "X=1e+10 F=1e-10");
+}
+
 TEST(Parse, ChecksLineNumbersAndChecksums) {
   const std::string line = with_checksum("N12 G1 X1 Y2 ") + " ; remark";
   const Command command = parse(line);

@@ -309,5 +309,35 @@ TEST(MarlinPlanner, RatesBelowTheSlowestHaveNoRamps) {
   EXPECT_DOUBLE_EQ(moves[0].duration_s(), 5.0);
 }
 
+// Slower than 32 bits of microseconds can say, and the queue is filled with stretching.
+TEST(MarlinPlanner, MovesOfHoursAreNotStretched) {
+  Limits limits = marlin_limits();
+  limits.min_segment_time_s = 0.02;
+  const auto moves = marlin_plan(dense_line(6, 300.0, 0.1), limits);
+  ASSERT_EQ(moves.size(), 6U);
+  for (const PlannedMove& move : moves) {
+    EXPECT_NEAR(move.duration_s(), 3000.0, 400.0);  // at whole steps per second
+  }
+}
+
+TEST(MarlinPlanner, LimitsBeyondTheFirmwaresIntegersAreTheirLargest) {
+  Limits limits = marlin_limits();
+  limits.axis_max_accel_mm_s2 = {1e12, 1e12, 1e12, 1e12};
+  limits.print_accel_mm_s2 = limits.travel_accel_mm_s2 = 1e12;
+  limits.min_segment_time_s = 1e12;
+  const auto moves = marlin_plan(dense_line(8, 10.0, 100.0), limits);
+  ASSERT_EQ(moves.size(), 8U);
+  EXPECT_GT(moves[0].accel_mm_s2, 4e7);  // 2³² steps/s²
+  for (const PlannedMove& move : moves) EXPECT_TRUE(std::isfinite(move.duration_s()));
+}
+
+TEST(MarlinPlanner, PlacesBeyondTheFirmwaresStepsAreReached) {
+  const auto moves = marlin_plan(polyline({{1e8, 0, 0, 0}, {-1e8, 0, 0, 6e6}}, 1000.0));
+  ASSERT_EQ(moves.size(), 2U);
+  EXPECT_NEAR(moves[1].segment.start_mm[X], 1e8, 10.0);
+  EXPECT_NEAR(moves[1].segment.end_mm[X], -1e8, 10.0);
+  EXPECT_NEAR(moves[1].length_mm, 2e8, 20.0);
+}
+
 }  // namespace
 }  // namespace unflex::planner

@@ -298,5 +298,13 @@ TEST(RrfPlanner, AMoveAfterAStopBeginsAtAStandstill) {
   EXPECT_EQ(moves.at(1).start_v_mm_s, 0.0);
 }
 
+// Its 32 bits of step clocks are full after 95 minutes.
+TEST(RrfPlanner, MovesOfHoursTakeAsLongAsTheirSpeedSays) {
+  const auto moves = rrf_plan(polyline({{5000, 0, 0, 0}, {5001, 0, 0, 0}}, 0.5), fast_limits(0));
+  ASSERT_EQ(moves.size(), 2U);
+  EXPECT_NEAR(moves[0].duration_s(), 10000.0, 0.1);
+  EXPECT_NEAR(moves[0].distance_mm(moves[0].duration_s()), 5000.0, 1e-2);
+}
+
 }  // namespace
 }  // namespace unflex::planner

@@ -42,7 +42,8 @@
 namespace unflex::planner {
 namespace marlin {
 
-using Steps = std::array<std::int32_t, 4>;  // X Y Z E
+// X Y Z E. The firmware's 32 bits are full after 4 km of filament.
+using Steps = std::array<std::int64_t, 4>;
 using Vector = std::array<float, 4>;        // X Y Z E
 
 // Limits and configuration in the firmware's own types (planner_settings_t).

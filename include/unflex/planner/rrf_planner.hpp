@@ -73,7 +73,7 @@ struct Dda {
   float accel_distance_mm = 0.0F;
   float decel_distance_mm = 0.0F;
   float target_end_speed = 0.0F;    // what the next move asks for
-  std::uint32_t clocks = 0;         // whole duration
+  std::int64_t clocks = 0;          // whole duration
   bool moves_xy = false;            // xyMoving
   bool prints = false;              // isPrintingMove
   bool extruder_not_print = false;  // isNonPrintingExtruderMove

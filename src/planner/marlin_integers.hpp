@@ -1,0 +1,27 @@
+// Numbers as the firmware's 32-bit processors convert them (ARM, VCVT).
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace unflex::planner::marlin {
+
+// Towards zero; the nearest there is where the type cannot hold it, and 0 for what is no number.
+template <class Integer>
+[[nodiscard]] Integer saturated(double value) {
+  using Range = std::numeric_limits<Integer>;
+  if (std::isnan(value)) {
+    return 0;
+  }
+  if (value <= static_cast<double>(Range::min())) {
+    return Range::min();
+  }
+  return value >= static_cast<double>(Range::max()) ? Range::max() : static_cast<Integer>(value);
+}
+
+[[nodiscard]] inline std::uint32_t to_unsigned(double value) {
+  return saturated<std::uint32_t>(value);
+}
+
+}  // namespace unflex::planner::marlin

@@ -1,0 +1,210 @@
+// Whole prints, from their bytes to the bytes that the printer gets.
+//
+// What the output must be is told by the text alone, read as the printer reads it.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bytes.hpp"
+#include "playback.hpp"
+#include "program_writer.hpp"
+#include "stage_options.hpp"
+#include "text_checks.hpp"
+#include "unflex/gcode/compensable.hpp"
+#include "unflex/gcode/time_note.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+
+namespace unflex::fuzz {
+namespace {
+
+// More motion says no more and takes long; where whole steps are reckoned with, the sooner.
+constexpr std::size_t kMostSegments = 3000;
+double most_s(Firmware firmware) { return firmware == Firmware::klipper ? 2.0 : 0.3; }
+
+// Of the motion that may be rewritten, and of all that is printed.
+bool is_short(const Playback& print, Firmware firmware) {
+  constexpr double kMost_s = 100.0;
+  double rewritten_s = 0.0;
+  for (const planner::PlannedMove& move : print.moves) {
+    rewritten_s += gcode::compensable(move.segment, firmware) ? move.duration_s() : 0.0;
+  }
+  return print.whole && rewritten_s < most_s(firmware) &&
+         planner::duration_s(print.moves) < kMost_s;
+}
+
+// '0' to '2': the bytes are a print for Klipper, Marlin, RepRapFirmware; '3' to '5': the bytes are
+// turned into one. Behind '6' to ';', 'B' to 'G' and so on they are given with other settings.
+struct CompensateVariant {
+  Firmware firmware;
+  bool written;
+  std::size_t settings;
+};
+
+constexpr std::size_t kSettings = 4;
+
+CompensateVariant variant_of(Bytes& source) {
+  constexpr std::array kFirmwares = {Firmware::klipper, Firmware::marlin, Firmware::rrf};
+  const std::size_t variant = source.variant(6 * kSettings);
+  return {kFirmwares[variant % 3], variant / 3 % 2 == 1, variant / 6};
+}
+
+machine::Settings settings_of(const CompensateVariant& variant) {
+  const std::array<std::vector<std::string>, kSettings> kOverrides = {
+      {{"printer.travel_x_mm=[0, 250]", "printer.travel_y_mm=[0, 210]"},
+       {"dynamics.x.freq_hz=25", "dynamics.y.damping_ratio=0.15", "solve.lead_in_ms=4",
+        "limits.max_accel_mm_s2=2000"},
+       {"printer.travel_x_mm=[10, 81]", "printer.travel_y_mm=[19, 90]",
+        "printer.retract_length_mm=0.6", "base.max_jerk_mm_s3=5e6", "emit.max_lines_per_s=150"},
+       {"solve.window_s=0.3", "solve.overlap_s=0.03", "limits.max_accel_mm_s2=12000"}}};
+  std::vector<std::string> overrides = kOverrides[variant.settings];
+  overrides.push_back(fmt::format("printer.firmware=\"{}\"", to_string(variant.firmware)));
+  const Result<machine::Settings> settings = machine::load(std::nullopt, overrides);
+  require(settings.has_value(), settings ? "" : to_string(settings.error()));
+  return *settings;
+}
+
+// A file that is nowhere but in memory.
+class MemoryFile {
+ public:
+  explicit MemoryFile(std::string_view text) : fd_(memfd_create("unflex", MFD_CLOEXEC)) {
+    require(fd_ >= 0 && write(fd_, text.data(), text.size()) == std::ssize(text),
+            "no memory for a file");
+  }
+  ~MemoryFile() { close(fd_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", fd_); }
+  [[nodiscard]] std::string text() const {
+    std::string text(static_cast<std::size_t>(lseek(fd_, 0, SEEK_END)), '\0');
+    require(pread(fd_, text.data(), text.size(), 0) == std::ssize(text), "cannot read a file");
+    return text;
+  }
+
+ private:
+  int fd_;
+};
+
+struct Compensated {
+  report::Report report;
+  std::string text;
+};
+
+Result<Compensated> run(const std::string& text, const machine::Settings& settings,
+                        unsigned workers) {
+  const MemoryFile input(text);
+  const MemoryFile output("");
+  const pipeline::Job job{.input = input.path(),
+                          .input_name = "in.gcode",
+                          .output = output.path(),
+                          .output_name = "out.gcode",
+                          .settings = settings,
+                          .engine = pipeline::EngineChoice::banded,
+                          .workers = workers};
+  SilentProgress progress;
+  return pipeline::compensate(job, progress).map([&](report::Report report) {
+    return Compensated{std::move(report), output.text()};
+  });
+}
+
+// Lines that must come through: all that do not move the machine.
+std::vector<std::string> standing_lines(const Playback& playback) {
+  std::vector<std::string> lines;
+  for (const gcode::Event& event : playback.events) {
+    if (event.kind != gcode::EventKind::move && !gcode::names_position(event.line.content())) {
+      lines.emplace_back(event.line.content());
+    }
+  }
+  return lines;
+}
+
+void check_lines_kept(const Playback& input, const Playback& output) {
+  auto next = output.events.begin();
+  for (const std::string& line : standing_lines(input)) {
+    while (next != output.events.end() && !gcode::same_but_for_times(next->line.content(), line)) {
+      ++next;
+    }
+    require(next != output.events.end(), "lost: " + line);
+    ++next;
+  }
+}
+
+void check_end(const Playback& input, const Playback& output, const machine::Settings& settings) {
+  for (const auto axis : {gcode::X, gcode::Y, gcode::Z, gcode::E}) {
+    const double expected = input.end.position_mm[axis];
+    const double tolerance = 2e-5 + 1e-12 * std::abs(expected);
+    require(std::abs(output.end.position_mm[axis] - expected) <= tolerance,
+            fmt::format("{} ends at {} mm instead of {} mm", "XYZE"[axis],
+                        output.end.position_mm[axis], expected));
+    require(std::abs(output.end.base_mm[axis] - input.end.base_mm[axis]) <= tolerance,
+            fmt::format("the zero of {} is {} mm instead of {} mm", "XYZE"[axis],
+                        output.end.base_mm[axis], input.end.base_mm[axis]));
+  }
+  const auto modes = [](const gcode::ModalState& state) {
+    return std::tuple(state.known, state.absolute_xyz, state.absolute_e, state.unit_mm,
+                      state.speed_factor, state.flow_factor, state.retracted, state.plane,
+                      state.shaper_freq_x_hz, state.shaper_freq_y_hz);
+  };
+  require(modes(input.end) == modes(output.end), "a mode is another at the end");
+  require(std::abs(input.end.feed_mm_s - output.end.feed_mm_s) <= 1e-5 * input.end.feed_mm_s,
+          fmt::format("F is {} mm/s at the end instead of {} mm/s", output.end.feed_mm_s,
+                      input.end.feed_mm_s));
+  const bool is_klipper = settings.printer.firmware == Firmware::klipper;
+  require(is_klipper ? input.limits.max_accel_mm_s2 == output.limits.max_accel_mm_s2 &&
+                           input.limits.max_velocity_mm_s == output.limits.max_velocity_mm_s &&
+                           input.limits.square_corner_velocity_mm_s ==
+                               output.limits.square_corner_velocity_mm_s
+                     : input.limits == output.limits,
+          "limits are others at the end");
+}
+
+void check_report(const report::Report& report) {
+  require(report.violation_count == 0, fmt::format("{} violations: {}", report.violation_count,
+                                                   fmt::join(report.violations, "; ")));
+  require(report.runs_total == report.runs_compensated + report.runs_fallback,
+          "a run is neither compensated nor kept");
+  for (const std::string& warning : report.warnings) {
+    require_one_line(warning);
+  }
+  require(!report::to_json(report).empty() && !report::to_text(report).empty(),
+          "nothing to report");
+}
+
+}  // namespace
+
+void compensate(std::string_view bytes) {
+  Bytes source(bytes);
+  const CompensateVariant variant = variant_of(source);
+  const machine::Settings settings = settings_of(variant);
+  const PrinterSetup setup{pipeline::interpreter_options(settings),
+                           pipeline::planner_limits(settings), pipeline::firmware_config(settings)};
+  const std::string text =
+      variant.written ? ProgramWriter(setup.interpreter, most_s(variant.firmware)).program(source)
+                      : std::string(source.rest());
+  const Playback input = play(text, setup, kMostSegments);
+  if (!is_short(input, variant.firmware)) {
+    return;
+  }
+  const Result<Compensated> done = run(text, settings, 1);
+  if (!done) {
+    return require_fault_of_input(done.error());
+  }
+  check_report(done->report);
+  const Playback output = play(done->text, setup, kMostSegments + text.size() * 100'000);
+  check_lines_kept(input, output);
+  check_end(input, output, settings);
+  if (variant.settings == kSettings - 1) {
+    const Result<Compensated> again = run(text, settings, 2);
+    require(again && again->text == done->text, "two threads write another text than one");
+  }
+}
+
+}  // namespace unflex::fuzz

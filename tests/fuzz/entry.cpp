@@ -1,0 +1,10 @@
+// libFuzzer's way in.
+#include <cstddef>
+#include <cstdint>
+
+#include "targets.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  unflex::fuzz::UNFLEX_FUZZ_TARGET({reinterpret_cast<const char*>(data), size});
+  return 0;
+}

@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# run.sh [SECONDS [TARGET]...]
+#
+# Builds the fuzzing programs into build-fuzz/ with clang, and has each of them, or those named, look
+# for what breaks for so many seconds (12) on all cores, beginning with the stored corpus. What it
+# finds is left in build-fuzz/finds/, what reached new code in build-fuzz/corpus/.
+set -euo pipefail
+
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+root=$(cd -- "$here/../.." && pwd)
+build=$root/build-fuzz
+seconds=${1:-12}
+targets=("${@:2}")
+if ((${#targets[@]} == 0)); then
+  targets=(gcode settings records container compensate)
+fi
+
+"$root/cmake/install_packages.sh" --fuzz
+
+if [[ ! -e $build/CMakeCache.txt ]]; then
+  cmake -G Ninja -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=RelWithDebInfo -DUNFLEX_FUZZ=ON \
+    -DCMAKE_CXX_COMPILER=clang++-16
+fi
+cmake --build "$build" --parallel "$(nproc)" --target fuzz
+
+for target in "${targets[@]}"; do
+  echo "Fuzzing $target for $seconds s"
+  mkdir -p "$build/corpus/$target" "$build/finds/$target"
+  # A second and half a gigabyte are more than any such small input may take; with sanitizers, ten
+  # times and twice as much.
+  "$build/tests/fuzz/fuzz_$target" -fork="$(nproc)" -max_total_time="$seconds" -timeout=10 \
+    -rss_limit_mb=1024 -max_len=4096 -dict="$here/${target}.dict" \
+    -artifact_prefix="$build/finds/$target/" "$build/corpus/$target" "$here/corpus/$target"
+done

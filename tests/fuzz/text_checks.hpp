@@ -1,0 +1,24 @@
+// What must hold of texts that users are shown. The program itself takes control characters out.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "targets.hpp"
+#include "unflex/core/error.hpp"
+
+namespace unflex::fuzz {
+
+inline void require_one_line(std::string_view text) {
+  require(!text.empty(), "a message is empty");
+  require(text.find('\n') == std::string_view::npos,
+          "a message of several lines: " + std::string(text));
+}
+
+// That the input is to blame.
+inline void require_fault_of_input(const Error& error) {
+  require(error.kind != ErrorKind::internal, "internal error: " + to_string(error));
+  require_one_line(to_string(error));
+}
+
+}  // namespace unflex::fuzz
