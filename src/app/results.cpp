@@ -52,7 +52,7 @@ Status print_summary(const RunConfig& config, std::string_view text, Console& co
   const int error = write_all(STDOUT_FILENO, text);
   return error == 0 ? Status{}
                     : Status(fail(ErrorKind::internal, {"stdout", 0},
-                                  fmt::format("cannot write: {}", errno_text(error))));
+                                  fmt::format("cannot write: {}", write_error_text(error))));
 }
 
 Status write_report(std::optional<Output>& report, std::string_view text) {

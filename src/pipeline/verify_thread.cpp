@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "unflex/core/caught.hpp"
+
 namespace unflex::pipeline {
 namespace {
 
@@ -76,9 +78,10 @@ VerifyThread::VerifyThread(const verify::Rules& rules, const verify::Observation
         try {
           std::istream input(&input_);
           std::istream output(&output_);
-          result_ = verify::verify(input, input_name, output, output_name, rules, stopped_, observation);
+          result_ =
+              verify::verify(input, input_name, output, output_name, rules, stopped_, observation);
         } catch (const std::exception& exception) {
-          result_ = fail(ErrorKind::internal, exception.what());
+          result_ = tl::unexpected(error_of(exception));
         }
         done_ = true;
       }) {}

@@ -346,7 +346,7 @@ TEST_F(BatchTest, KilledAndStartedAgainDoesOnlyWhatIsMissing) {
   }
   ASSERT_FALSE(fs::exists(path("out/long.g"))) << "too fast to be killed half-way";
   // What the print that was killed leaves behind.
-  write_file(path("out/.unflex-AbCdEf"), "half a print");
+  write_file(path("out/.unflex-AbCdEf.tmp"), "half a print");
   const ino_t kept = identity("out/short.g");
   const States states_now = states();
   EXPECT_EQ(last().exit_code, 0);
