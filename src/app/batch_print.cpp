@@ -14,6 +14,7 @@
 #include "files.hpp"
 #include "print_run.hpp"
 #include "results.hpp"
+#include "unflex/core/caught.hpp"
 #include "unflex/core/sha256.hpp"
 #include "workspace.hpp"
 
@@ -202,7 +203,9 @@ BatchAnswer work_on_batch_print(const RunConfig& config, const std::optional<Bat
     }
   } catch (const std::exception& failure) {
     // Out of memory, mostly.
-    console.line(fmt::format("{}: internal error: {}", config.input, failure.what()));
+    Error error = error_of(failure);
+    error.place.file = config.input;
+    console.error(error);
     answer = {};
     answer.error = console.kept().back();
   }

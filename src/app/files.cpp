@@ -16,11 +16,35 @@
 namespace unflex::app {
 namespace {
 
-constexpr std::string_view kTemporaryName = ".unflex-XXXXXX";
+// Its ending keeps it apart from names that people choose, such as .unflex-backup.
+constexpr std::string_view kTemporaryName = ".unflex-XXXXXX.tmp";
+constexpr std::string_view kTemporaryEnding = ".tmp";
 constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
 
 // A signal that does not end the program (a resized window) must not end a read either.
 bool try_again() { return errno == EINTR && ending_signal() == 0; }
+
+bool exists(const std::string& name) {
+  struct stat status {};
+  return ::lstat(name.c_str(), &status) == 0;
+}
+
+// What can be done about a file that cannot be written, if that can be told.
+std::string_view remedy(int error) {
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT:
+      return "; make room there";
+    case EFBIG:
+      return "; raise the limit on the size of files (ulimit -f)";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "; choose another place or change its permissions";
+    default:
+      return "";
+  }
+}
 
 }  // namespace
 
@@ -39,14 +63,20 @@ FileDescriptor::~FileDescriptor() {
 }
 
 tl::expected<TemporaryFile, int> TemporaryFile::create(const std::filesystem::path& directory) {
-  std::string name = (directory / kTemporaryName).string();
-  const int fd = ::mkostemp(name.data(), O_CLOEXEC);
-  if (fd < 0) {
-    return tl::unexpected(errno);
+  for (;;) {
+    std::string name = (directory / kTemporaryName).string();
+    FileDescriptor file(
+        ::mkostemps(name.data(), static_cast<int>(kTemporaryEnding.size()), O_CLOEXEC));
+    if (!file.valid()) {
+      return tl::unexpected(errno);
+    }
+    // Tells remove_abandoned() that someone is at it, where the file system can. Another process
+    // may have found and removed the file before.
+    static_cast<void>(::flock(file.get(), LOCK_EX));
+    if (exists(name)) {
+      return TemporaryFile(std::move(name), std::move(file), ::getpid());
+    }
   }
-  // Tells remove_abandoned() that someone is at it, where the file system can.
-  static_cast<void>(::flock(fd, LOCK_EX | LOCK_NB));
-  return TemporaryFile(name, fd, ::getpid());
 }
 
 bool TemporaryFile::remove_abandoned(const std::filesystem::path& directory) {
@@ -56,7 +86,8 @@ bool TemporaryFile::remove_abandoned(const std::filesystem::path& directory) {
   for (std::filesystem::directory_iterator entry(directory, failed), end; !failed && entry != end;
        entry.increment(failed)) {
     const std::string name = entry->path().filename().string();
-    if (name.size() == kTemporaryName.size() && name.starts_with(prefix)) {
+    if (name.size() == kTemporaryName.size() && name.starts_with(prefix) &&
+        name.ends_with(kTemporaryEnding)) {
       found.push_back(entry->path());
     }
   }
@@ -69,8 +100,8 @@ bool TemporaryFile::remove_abandoned(const std::filesystem::path& directory) {
   return all_gone;
 }
 
-TemporaryFile::TemporaryFile(std::filesystem::path path, int fd, pid_t owner)
-    : path_(std::move(path)), fd_(fd), owner_(owner) {
+TemporaryFile::TemporaryFile(std::filesystem::path path, FileDescriptor fd, pid_t owner)
+    : path_(std::move(path)), fd_(std::move(fd)), owner_(owner) {
   remove_if_cut_short(path_.string());
 }
 
@@ -147,6 +178,8 @@ std::filesystem::path temporary_directory() {
 }
 
 std::string errno_text(int error) { return std::generic_category().message(error); }
+
+std::string write_error_text(int error) { return errno_text(error).append(remedy(error)); }
 
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code failed;

@@ -50,7 +50,7 @@ class TemporaryFile {
   void release();
 
  private:
-  TemporaryFile(std::filesystem::path path, int fd, pid_t owner);
+  TemporaryFile(std::filesystem::path path, FileDescriptor fd, pid_t owner);
 
   std::filesystem::path path_;
   FileDescriptor fd_;
@@ -69,6 +69,9 @@ class TemporaryFile {
 
 // "No such file or directory".
 [[nodiscard]] std::string errno_text(int error);
+
+// The same of what could not be written, with what can be done about it.
+[[nodiscard]] std::string write_error_text(int error);
 
 // Whether both names lead to one file, existing or not.
 [[nodiscard]] bool same_file(const std::string& a, const std::string& b);

@@ -60,6 +60,11 @@ class TextReader {
   bool ended_ = false;
 };
 
+InputVersion version_of(const struct stat& status) {
+  return {status.st_dev, status.st_ino, status.st_size, status.st_mtim.tv_sec,
+          status.st_mtim.tv_nsec};
+}
+
 }  // namespace
 
 Result<Input> Input::open(const std::string& name) {
@@ -74,7 +79,7 @@ Result<Input> Input::open(const std::string& name) {
   if (S_ISDIR(status.st_mode)) {
     return fail(ErrorKind::input, place, "is a directory, not a G-code file");
   }
-  Input input(name, std::move(fd));
+  Input input(name, std::move(fd), version_of(status));
   // Even a file on stdin may stand anywhere but at its start, so it is copied too.
   input.is_stream_ = is_stdin || !S_ISREG(status.st_mode);
   return input;
@@ -82,6 +87,20 @@ Result<Input> Input::open(const std::string& name) {
 
 tl::unexpected<Error> Input::cannot_read(int error) const {
   return fail(ErrorKind::input, {name_, 0}, fmt::format("cannot read: {}", errno_text(error)));
+}
+
+Status Input::check_unchanged() const {
+  struct stat status {};
+  if (is_stream_) {
+    return {};
+  }
+  if (::stat(file_.c_str(), &status) != 0) {
+    return fail(ErrorKind::input, {name_, 0}, "vanished while it was worked on; run unflex again");
+  }
+  return version_of(status) == version_
+             ? Status{}
+             : Status(fail(ErrorKind::input, {name_, 0},
+                           "changed while it was worked on; run unflex again"));
 }
 
 Result<std::string> Input::read_block() const {
@@ -166,6 +185,8 @@ Status Input::copy_text() {
                 fmt::format("cannot keep {} here: {}; set TMPDIR to another directory", name_,
                             errno_text(copy.error())));
   }
+  // Whatever happens, nothing is left.
+  copy->unlink();
   const std::unique_ptr<container::Unpacker> unpacker = container::make_unpacker(kind_, name_);
   TextReader reader(unpacker.get(), std::exchange(head_, {}), [this] { return read_block(); });
   for (;;) {
@@ -179,7 +200,8 @@ Status Input::copy_text() {
     const int error = ending_signal() != 0 ? EINTR : write_all(copy->fd(), *piece);
     if (error != 0) {
       return fail(ErrorKind::internal, {name_, 0},
-                  fmt::format("cannot copy to {}: {}", directory.string(), errno_text(error)));
+                  fmt::format("cannot be kept in {}: {}; set TMPDIR to another directory",
+                              directory.string(), errno_text(error)));
     }
   }
   if (unpacker && unpacker->metadata() != nullptr) {

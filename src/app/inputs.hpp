@@ -1,6 +1,9 @@
 // Input files, and streams made into files.
 #pragma once
 
+#include <sys/types.h>
+
+#include <ctime>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -11,6 +14,17 @@
 #include "unflex/machine/print_text.hpp"
 
 namespace unflex::app {
+
+// A file that is written to or replaced gets another one.
+struct InputVersion {
+  dev_t device = 0;
+  ino_t number = 0;
+  off_t bytes = 0;
+  time_t written_s = 0;
+  long written_ns = 0;
+
+  [[nodiscard]] bool operator==(const InputVersion&) const = default;
+};
 
 class Input {
  public:
@@ -35,6 +49,10 @@ class Input {
   [[nodiscard]] Result<machine::PrintText> look();
   [[nodiscard]] const std::string& head() const { return head_; }
 
+  // Whether the file is still what it was when it was opened. If not, what was read may be of two
+  // files, and is no base for a result: an error of kind input.
+  [[nodiscard]] Status check_unchanged() const;
+
   // All of it, of what is small enough to be held.
   [[nodiscard]] Result<std::string> read_all();
 
@@ -48,8 +66,8 @@ class Input {
   void call(std::string name) { name_ = std::move(name); }
 
  private:
-  Input(std::string name, FileDescriptor stream)
-      : file_(name), name_(std::move(name)), fd_(std::move(stream)) {}
+  Input(std::string name, FileDescriptor stream, const InputVersion& version)
+      : file_(name), name_(std::move(name)), fd_(std::move(stream)), version_(version) {}
 
   // Reads as far as it takes to know kind_.
   [[nodiscard]] Status look_at_kind();
@@ -62,6 +80,7 @@ class Input {
   std::filesystem::path file_;
   std::string name_;
   FileDescriptor fd_;
+  InputVersion version_;
   bool is_stream_ = false;
   bool is_copied_ = false;  // its text is in a temporary file
   container::Kind kind_ = container::Kind::text;

@@ -41,7 +41,7 @@ Result<Log> Log::open(const RunConfig& config) {
       ::open(config.log->c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, kMode));
   if (!file.valid()) {
     return fail(ErrorKind::usage, {*config.log, 0},
-                fmt::format("cannot write the log: {}", errno_text(errno)));
+                fmt::format("cannot write the log: {}", write_error_text(errno)));
   }
   return Log(*config.log, config.print_name, std::move(file));
 }
@@ -57,9 +57,10 @@ Status Log::append(const std::vector<std::string>& lines, int exit_code) {
   }
   entry += fmt::format("  exit code {}\n", exit_code);
   const int error = write_all(file_.get(), entry);
-  return error == 0 ? Status{}
-                    : Status(fail(ErrorKind::internal, {name_, 0},
-                                  fmt::format("cannot write the log: {}", errno_text(error))));
+  return error == 0
+             ? Status{}
+             : Status(fail(ErrorKind::internal, {name_, 0},
+                           fmt::format("cannot write the log: {}", write_error_text(error))));
 }
 
 }  // namespace unflex::app

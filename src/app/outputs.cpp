@@ -50,7 +50,7 @@ Result<std::filesystem::path> find_target(const std::string& name) {
     return refuse(name, "is a directory; name a file in it");
   }
   if (::access(name.c_str(), W_OK) != 0) {
-    return refuse(name, fmt::format("cannot write: {}", errno_text(errno)));
+    return refuse(name, fmt::format("cannot write: {}", write_error_text(errno)));
   }
   if (!S_ISREG(status.st_mode)) {
     return std::filesystem::path();
@@ -97,7 +97,7 @@ Result<Output> Output::open(const std::string& name) {
   tl::expected<TemporaryFile, int> temporary = TemporaryFile::create(*directory);
   if (!temporary) {
     return refuse(name, fmt::format("cannot write to the directory {}: {}", directory->string(),
-                                    errno_text(temporary.error())));
+                                    write_error_text(temporary.error())));
   }
   return Output(name, std::move(*target), std::move(*temporary));
 }
@@ -107,8 +107,17 @@ Status Output::write(std::string_view text) {
   return error == 0 ? Status{} : Status(cannot_write(error));
 }
 
+Status Output::seal() {
+  if (sealed_) {
+    return {};
+  }
+  return pack().and_then([this] { return is_stream() ? Status{} : settle(); }).map([this] {
+    sealed_ = true;
+  });
+}
+
 Status Output::commit() {
-  return pack().and_then([this] { return is_stream() ? copy_to_stream() : replace_target(); });
+  return seal().and_then([this] { return is_stream() ? copy_to_stream() : replace_target(); });
 }
 
 Status Output::pack() {
@@ -165,14 +174,17 @@ Status Output::for_each_block(const std::function<Status(std::string_view)>& use
   }
 }
 
-Status Output::replace_target() {
-  const TemporaryFile& made = result();
-  if (::fsync(made.fd()) != 0) {
-    return cannot_write(errno);
-  }
-  if (const int error = take_over_permissions(made.fd(), target_); error != 0) {
+// What is renamed must be on the disk before: after a power cut the name may be there without it.
+Status Output::settle() const {
+  const int fd = result().fd();
+  if (const int error = take_over_permissions(fd, target_); error != 0) {
     return cannot_write(error);
   }
+  return ::fsync(fd) == 0 ? Status{} : Status(cannot_write(errno));
+}
+
+Status Output::replace_target() {
+  const TemporaryFile& made = result();
   if (::rename(made.path().c_str(), target_.c_str()) != 0) {
     return cannot_write(errno);
   }
@@ -214,7 +226,7 @@ Status Output::copy_to_stream() {
 
 tl::unexpected<Error> Output::cannot_write(int error) const {
   return fail(ErrorKind::internal, {name_ == kStandardStream ? "stdout" : name_, 0},
-              fmt::format("cannot write: {}", errno_text(error)));
+              fmt::format("cannot write: {}", write_error_text(error)));
 }
 
 }  // namespace unflex::app

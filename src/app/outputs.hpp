@@ -38,6 +38,10 @@ class Output {
   // for a binary file, which begins with what is known last. Errors as of commit().
   [[nodiscard]] Result<int> stream_fd();
 
+  // Does all of commit() that takes room on the disk, which is what fails mostly. Nothing is
+  // written after it.
+  [[nodiscard]] Status seal();
+
   // Errors are of kind internal; the old file is then as it was.
   [[nodiscard]] Status commit();
 
@@ -50,6 +54,7 @@ class Output {
   // Goes through the text.
   [[nodiscard]] Status for_each_block(const std::function<Status(std::string_view)>& use) const;
   [[nodiscard]] const TemporaryFile& result() const { return packed_ ? *packed_ : temporary_; }
+  [[nodiscard]] Status settle() const;
   [[nodiscard]] Status replace_target();
   [[nodiscard]] Status open_stream();
   [[nodiscard]] Status copy_to_stream();
@@ -62,6 +67,7 @@ class Output {
   container::Kind kind_ = container::Kind::text;
   const container::Metadata* origin_ = nullptr;
   FileDescriptor stream_;
+  bool sealed_ = false;
 };
 
 }  // namespace unflex::app

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -39,15 +40,30 @@ ExitCode judge(const RunConfig& config, bool passed_on, const report::Report& re
   return ExitCode::done;
 }
 
+// A print that was changed meanwhile explains whatever else went wrong.
+Status check_inputs(const Workspace& space) {
+  return space.input.check_unchanged().and_then(
+      [&] { return space.compensated ? space.compensated->check_unchanged() : Status{}; });
+}
+
+// Both or none: where there is no room for the report, the output must not be there either. The
+// last moment to see that a print to be replaced is still the one that was read.
+Status deliver_output(Workspace& space, std::string_view report) {
+  return space.output->seal()
+      .and_then([&] { return space.report ? space.report->write(report) : Status{}; })
+      .and_then([&] { return space.report ? space.report->seal() : Status{}; })
+      .and_then([&] { return check_inputs(space); })
+      .and_then([&] { return space.output->commit(); })
+      .and_then([&] { return space.report ? space.report->commit() : Status{}; });
+}
+
 // An output that failed is not handed on, but what is known about it is.
 Status deliver(Workspace& space, ExitCode verdict, bool passed_on, const report::Report& report) {
-  if (space.output && verdict == ExitCode::done && !passed_on) {
-    if (Status committed = space.output->commit(); !committed) {
-      return committed;
-    }
-  }
-  return write_report(space.report,
-                      report.recording ? report::to_html(report) : report::to_json(report));
+  const std::string text = !space.report      ? std::string()
+                           : report.recording ? report::to_html(report)
+                                              : report::to_json(report);
+  const bool wanted = space.output && verdict == ExitCode::done && !passed_on;
+  return wanted ? deliver_output(space, text) : write_report(space.report, text);
 }
 
 }  // namespace
@@ -68,6 +84,9 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
     return config.command == Command::compensate ? pipeline::compensate(*job, progress)
                                                  : pipeline::verify(*job, progress);
   });
+  if (const Status unchanged = check_inputs(*space); !unchanged) {
+    return tl::unexpected(unchanged.error());
+  }
   if (!report) {
     return tl::unexpected(report.error());
   }
@@ -79,7 +98,7 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   const bool passed_on = job->output_fd >= 0;
   const ExitCode verdict = judge(config, passed_on, *report, console);
   return deliver(*space, verdict, passed_on, *report).map([&] {
-    return PrintOutcome{verdict, std::move(*report), false};
+    return PrintOutcome{verdict, std::move(*report)};
   });
 }
 
@@ -87,9 +106,6 @@ Result<ExitCode> run_on_print(const RunConfig& config, Console& console) {
   const Result<PrintOutcome> outcome = work_on_print(config, console);
   if (!outcome) {
     return tl::unexpected(outcome.error());
-  }
-  if (outcome->ended_strictly) {
-    return outcome->verdict;
   }
   return print_summary(config, report::to_text(outcome->report), console).map([&] {
     return outcome->verdict;

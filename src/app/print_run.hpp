@@ -11,7 +11,6 @@ namespace unflex::app {
 struct PrintOutcome {
   ExitCode verdict = ExitCode::done;
   report::Report report;
-  bool ended_strictly = false;  // by a warning under --strict: there is no report
 };
 
 // All but the summary: output and report are in place when it returns, or as they were.

@@ -54,20 +54,6 @@ void add_setting_warnings(const machine::Settings& settings, std::vector<std::st
   warnings.insert(warnings.begin(), remarks.begin(), remarks.end());
 }
 
-bool ends_strictly(const RunConfig& config, std::vector<std::string> warnings, Console& console) {
-  if (!config.strict || warnings.empty()) {
-    return false;
-  }
-  constexpr std::string_view kWarning = ": warning: ";
-  for (std::string& warning : warnings) {
-    if (const std::size_t at = warning.find(kWarning); at != std::string::npos) {
-      warning.replace(at, kWarning.size(), ": ");
-    }
-  }
-  console.lines(warnings, warnings.size(), "errors");
-  return true;
-}
-
 Status print_summary(const RunConfig& config, std::string_view text, Console& console) {
   console.note(text);
   if (config.quiet) {
@@ -85,7 +71,7 @@ Status print_summary(const RunConfig& config, std::string_view text, Console& co
   const int error = write_all(STDOUT_FILENO, text);
   return error == 0 ? Status{}
                     : Status(fail(ErrorKind::internal, {"stdout", 0},
-                                  fmt::format("cannot write: {}", errno_text(error))));
+                                  fmt::format("cannot write: {}", write_error_text(error))));
 }
 
 Status write_report(std::optional<Output>& report, std::string_view text) {

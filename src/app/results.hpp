@@ -47,10 +47,6 @@ auto with_progress(const RunConfig& config, Work work)
 // Remarks about the settings come before those about the print.
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings);
 
-// Whether --strict ends the work here; the warnings are then shown as the errors they are.
-[[nodiscard]] bool ends_strictly(const RunConfig& config, std::vector<std::string> warnings,
-                                 Console& console);
-
 // The summary goes to stdout, unless a result is there; then to stderr if someone is looking.
 [[nodiscard]] Status print_summary(const RunConfig& config, std::string_view text,
                                    Console& console);

@@ -1,7 +1,6 @@
 #include "unflex/app/run.hpp"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -19,6 +18,7 @@
 #include "printer_init.hpp"
 #include "results.hpp"
 #include "signals.hpp"
+#include "unflex/core/caught.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 #include "unflex/pipeline/study_print.hpp"
 #include "unflex/report/report.hpp"
@@ -191,7 +191,7 @@ int run_program(const std::vector<std::string>& arguments) {
     return static_cast<int>(error == 0 ? ExitCode::done : ExitCode::internal);
   } catch (const std::exception& failure) {
     // Out of memory, mostly; the temporary files are gone with the stack.
-    Console().line(fmt::format("unflex: internal error: {}", failure.what()));
+    Console().error(error_of(failure));
     return static_cast<int>(ExitCode::internal);
   }
 }

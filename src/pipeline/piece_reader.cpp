@@ -114,16 +114,6 @@ PieceReader::PieceReader(std::istream& input, std::string name,
       travel_(travel) {}
 
 Result<bool> PieceReader::next(Piece& piece) {
-  const Result<bool> more = cut(piece);
-  if (more && *more) {
-    if (const planner::PlannedMove* const move = verify::endless(piece.moves)) {
-      return tl::unexpected(verify::endless_move(*move, lines_.name()));
-    }
-  }
-  return more;
-}
-
-Result<bool> PieceReader::cut(Piece& piece) {
   recycle(piece);
   const Result<bool> more = cut(piece);
   if (more && *more) {

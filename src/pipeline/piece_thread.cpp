@@ -5,6 +5,8 @@
 #include <iterator>
 #include <utility>
 
+#include "unflex/core/caught.hpp"
+
 namespace unflex::pipeline {
 namespace {
 
@@ -17,7 +19,14 @@ PieceThread::PieceThread(std::istream& input, std::string name, const verify::Ru
                          CpuSlots& slots, std::function<void()> wake)
     : slots_(&slots),
       reader_(input, std::move(name), rules.interpreter, rules.limits, rules.fixed, rules.travel),
-      thread_([this, wake = std::move(wake)] { read(wake); }) {}
+      thread_([this, wake = std::move(wake)] {
+        try {
+          read(wake);
+        } catch (const std::exception& exception) {
+          give_up(exception);
+          wake();
+        }
+      }) {}
 
 PieceThread::~PieceThread() {
   {
@@ -27,7 +36,16 @@ PieceThread::~PieceThread() {
   room_.notify_one();
 }
 
-void PieceThread::read(std::function<void()> wake) {
+void PieceThread::give_up(const std::exception& exception) {
+  {
+    const std::lock_guard lock(mutex_);
+    error_ = error_of(exception);
+    ended_ = true;
+  }
+  news_.notify_one();
+}
+
+void PieceThread::read(const std::function<void()>& wake) {
   const CpuSlot slot(*slots_);
   bool ended = false;
   std::deque<std::unique_ptr<Piece>> returned;
@@ -41,15 +59,10 @@ void PieceThread::read(std::function<void()> wake) {
     }
     std::optional<Error> error;
     std::size_t lines_ahead = 0;
-    try {
-      const Result<bool> more = reader_.next(*piece);
-      ended = !more || !*more;
-      if (!more) {
-        error = more.error();
-      }
-    } catch (const std::exception& exception) {
-      ended = true;
-      error = fail(ErrorKind::internal, exception.what()).value();
+    const Result<bool> more = reader_.next(*piece);
+    ended = !more || !*more;
+    if (!more) {
+      error = more.error();
     }
     const CpuSlot::Without without(*slots_);
     {

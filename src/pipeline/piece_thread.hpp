@@ -42,7 +42,9 @@ class PieceThread {
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return reader_.warnings(); }
 
  private:
-  void read(std::function<void()> wake);
+  void read(const std::function<void()>& wake);
+  // The thread ends with what it could not handle, such as memory that ran out.
+  void give_up(const std::exception& exception);
 
   CpuSlots* slots_;
   PieceReader reader_;

@@ -1,12 +1,18 @@
 #include "task_pool.hpp"
 
+#include <system_error>
 #include <utility>
 
 namespace unflex::pipeline {
 
 TaskPool::TaskPool(unsigned threads, CpuSlots& slots) : slots_(&slots) {
-  for (unsigned i = 0; i < threads; ++i) {
-    threads_.emplace_back([this] { work(); });
+  threads_.reserve(threads);
+  try {
+    for (unsigned i = 0; i < threads; ++i) {
+      threads_.emplace_back([this] { work(); });
+    }
+  } catch (const std::system_error&) {
+    // The system gives no more of them; fewer, or none, do the same.
   }
 }
 

@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "unflex/core/caught.hpp"
+
 namespace unflex::pipeline {
 namespace {
 
@@ -79,7 +81,7 @@ VerifyThread::VerifyThread(const verify::Rules& rules, const verify::Observation
           result_ =
               verify::verify(input, input_name, output, output_name, rules, stopped_, observation);
         } catch (const std::exception& exception) {
-          result_ = fail(ErrorKind::internal, exception.what());
+          result_ = tl::unexpected(error_of(exception));
         }
         done_ = true;
       }) {}

@@ -36,12 +36,17 @@ Result<compensate::AxisSolution> solve(const compensate::Engine& engine,
   // Ctrl-C reaches the whole group; the parent decides when its workers end.
   std::signal(SIGINT, SIG_IGN);
   std::signal(SIGTERM, SIG_DFL);
-  const auto engine = factory();
-  std::string message;
-  while (receive_message(socket, message)) {
-    if (!send_message(socket, pack(solve(*engine, unpack_window(message))))) {
-      break;
+  try {
+    const auto engine = factory();
+    std::string message;
+    while (receive_message(socket, message)) {
+      if (!send_message(socket, pack(solve(*engine, unpack_window(message))))) {
+        break;
+      }
     }
+  } catch (const std::exception&) {
+    // Not even the message fits into memory. The parent sees a worker that died.
+    _exit(1);
   }
   _exit(0);
 }

@@ -77,20 +77,12 @@ class BatchTest : public ProgramTest {
   Outcome last_;
 };
 
-std::string print_of(int squares) {
-  std::string text = "G28\nG90\nM83\nG1 X20 Y20 F6000\n";
-  for (int i = 0; i < squares; ++i) {
-    text += "G1 X40 Y20 E0.8 F3000\nG1 X40 Y40 E0.8\nG1 X20 Y40 E0.8\nG1 X20 Y20 E0.8\nG1 E-1\n";
-  }
-  return text;
-}
-
 using States = std::map<std::string, std::string>;
 
 TEST_F(BatchTest, MirrorsTheFolderWithTheBytesOfCompensate) {
   add("in/a.gcode");
-  add("in/deep/er/b.GCO", print_of(3));
-  add("in/deep/c.g", print_of(1));
+  add("in/deep/er/b.GCO", squares(3));
+  add("in/deep/c.g", squares(1));
   add("in/readme.txt", "not a print");
   add("in/.hidden/d.gcode");
   add("in/._a.gcode", "what another system leaves");
@@ -318,8 +310,8 @@ bool wait_for_temporary(const fs::path& folder) {
 }
 
 TEST_F(BatchTest, EndsSoonWhenAskedAndLeavesNothingHalfDone) {
-  add("in/sub/long.g", print_of(4000));
-  add("in/sub/long2.g", print_of(4000));
+  add("in/sub/long.g", squares(4000));
+  add("in/sub/long2.g", squares(4000));
   Program program(directory(), batch({"-j", "2"}));
   ASSERT_TRUE(wait_for_temporary(path("out/sub")));
   const auto asked = steady_clock::now();
@@ -334,9 +326,9 @@ TEST_F(BatchTest, EndsSoonWhenAskedAndLeavesNothingHalfDone) {
 
 TEST_F(BatchTest, KilledAndStartedAgainDoesOnlyWhatIsMissing) {
   // The longest comes first, the short ones meanwhile.
-  add("in/long.g", print_of(1200));
-  add("in/short.g", print_of(20));
-  add("in/shorter.g", print_of(10));
+  add("in/long.g", squares(1200));
+  add("in/short.g", squares(20));
+  add("in/shorter.g", squares(10));
   {
     Program program(directory(), batch({"-j", "2"}));
     // It was begun when the one before had been remembered.
@@ -346,7 +338,7 @@ TEST_F(BatchTest, KilledAndStartedAgainDoesOnlyWhatIsMissing) {
   }
   ASSERT_FALSE(fs::exists(path("out/long.g"))) << "too fast to be killed half-way";
   // What the print that was killed leaves behind.
-  write_file(path("out/.unflex-AbCdEf"), "half a print");
+  write_file(path("out/.unflex-AbCdEf.tmp"), "half a print");
   const ino_t kept = identity("out/short.g");
   const States states_now = states();
   EXPECT_EQ(last().exit_code, 0);
@@ -358,7 +350,7 @@ TEST_F(BatchTest, KilledAndStartedAgainDoesOnlyWhatIsMissing) {
 }
 
 TEST_F(BatchTest, HasAFolderToItself) {
-  add("in/long.g", print_of(4000));
+  add("in/long.g", squares(4000));
   Program first(directory(), batch());
   ASSERT_TRUE(wait_for_temporary(path("out")));
   const Outcome second = run(batch());

@@ -23,13 +23,17 @@ std::filesystem::path make_directory() {
 }
 
 [[noreturn]] void become_program(const std::filesystem::path& directory,
-                                 const std::filesystem::path& scratch, std::vector<char*> argv) {
+                                 const std::filesystem::path& scratch, std::vector<char*> argv,
+                                 const std::function<void()>& prepare) {
   const int in = ::open((scratch / "in").c_str(), O_RDONLY);
   const int out = ::open((scratch / "out").c_str(), O_WRONLY | O_CREAT, 0600);
   const int err = ::open((scratch / "err").c_str(), O_WRONLY | O_CREAT, 0600);
   if (::dup2(in, 0) != 0 || ::dup2(out, 1) != 1 || ::dup2(err, 2) != 2 ||
       ::chdir(directory.c_str()) != 0) {
     ::_exit(kCannotStart);
+  }
+  if (prepare) {
+    prepare();
   }
   ::execv(UNFLEX_PROGRAM, argv.data());
   ::_exit(kCannotStart);
@@ -38,7 +42,7 @@ std::filesystem::path make_directory() {
 }  // namespace
 
 Program::Program(const std::filesystem::path& directory, const std::vector<std::string>& arguments,
-                 const std::string& input)
+                 const std::string& input, const std::function<void()>& prepare)
     : scratch_(make_directory()) {
   write_file(scratch_ / "in", input);
   std::vector<std::string> words = {"unflex"};
@@ -50,7 +54,7 @@ Program::Program(const std::filesystem::path& directory, const std::vector<std::
   argv.push_back(nullptr);
   child_ = ::fork();
   if (child_ == 0) {
-    become_program(directory, scratch_, argv);
+    become_program(directory, scratch_, argv, prepare);
   }
 }
 
@@ -107,6 +111,14 @@ std::string small_print() {
             "G1 X20 Y20 F9000\n";
   }
   return text + "M107\nM84\n";
+}
+
+std::string squares(int count) {
+  std::string text = "G28\nG90\nM83\nG1 X20 Y20 F6000\n";
+  for (int i = 0; i < count; ++i) {
+    text += "G1 X40 Y20 E0.8 F3000\nG1 X40 Y40 E0.8\nG1 X20 Y40 E0.8\nG1 X20 Y20 E0.8\nG1 E-1\n";
+  }
+  return text;
 }
 
 }  // namespace unflex::app

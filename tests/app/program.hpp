@@ -5,6 +5,7 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -19,10 +20,12 @@ struct Outcome {
 // A started program whose stdout and stderr go to files.
 class Program {
  public:
-  // `input` becomes stdin; the program runs in `directory`.
+  // `input` becomes stdin; the program runs in `directory`. prepare: called in the new process just
+  // before it becomes the program, to limit it, say.
   Program(const std::filesystem::path& directory, const std::vector<std::string>& arguments,
-          const std::string& input = "");
+          const std::string& input = "", const std::function<void()>& prepare = {});
   void signal(int number) const;
+  [[nodiscard]] pid_t pid() const { return child_; }
   [[nodiscard]] Outcome wait();
 
  private:
@@ -44,8 +47,9 @@ class ProgramTest : public ::testing::Test {
   // The names in the test's directory, sorted.
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] Outcome run(const std::vector<std::string>& arguments,
-                            const std::string& input = "") const {
-    return Program(directory_, arguments, input).wait();
+                            const std::string& input = "",
+                            const std::function<void()>& prepare = {}) const {
+    return Program(directory_, arguments, input, prepare).wait();
   }
   [[nodiscard]] const std::filesystem::path& directory() const { return directory_; }
 
@@ -55,5 +59,8 @@ class ProgramTest : public ::testing::Test {
 
 // A print of two small squares, with everything a slicer does between moves.
 [[nodiscard]] std::string small_print();
+
+// A print of as many larger squares, one run each.
+[[nodiscard]] std::string squares(int count);
 
 }  // namespace unflex::app

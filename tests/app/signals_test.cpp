@@ -19,13 +19,7 @@ namespace {
 using ::testing::ElementsAre;
 
 // Long enough that it cannot be done before the signal comes.
-std::string long_print() {
-  std::string text = "G28\nG90\nM83\nG1 X20 Y20 F6000\n";
-  for (int i = 0; i < 3000; ++i) {
-    text += "G1 X40 Y20 E0.8 F3000\nG1 X40 Y40 E0.8\nG1 X20 Y40 E0.8\nG1 X20 Y20 E0.8\nG1 E-1\n";
-  }
-  return text;
-}
+std::string long_print() { return squares(3000); }
 
 // Waits until the work has begun, which its temporary file shows.
 bool wait_for_names(const std::filesystem::path& directory, std::ptrdiff_t count) {

@@ -1,0 +1,353 @@
+// What fails around the program: the input stays as it is, the output is whole or absent, and one
+// line says why.
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <functional>
+#include <random>
+#include <thread>
+
+#include "app/program.hpp"
+#include "files.hpp"
+
+namespace unflex::app {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::microseconds;
+using std::chrono::steady_clock;
+using ::testing::AnyOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+using ::testing::StartsWith;
+using Words = std::vector<std::string>;
+
+constexpr uid_t kNobody = 65534;
+
+bool is_temporary(const std::string& name) {
+  return name.starts_with(".unflex-") && name.ends_with(".tmp");
+}
+
+std::function<void()> limited(int resource, rlim_t most) {
+  return [resource, most] {
+    const rlimit limit{most, most};
+    ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
+  };
+}
+
+// With the calls that fail, see fault_shim.cpp.
+std::function<void()> faulty(const std::vector<std::pair<std::string, std::string>>& faults) {
+  return [faults] {
+    ::setenv("LD_PRELOAD", UNFLEX_FAULT_SHIM, 1);
+    ::setenv("ASAN_OPTIONS", "verify_asan_link_order=0", 1);
+    for (const auto& [name, value] : faults) {
+      ::setenv(name.c_str(), value.c_str(), 1);
+    }
+  };
+}
+
+class Faults : public ProgramTest {
+ protected:
+  Faults() {
+    write_file(path("in.gcode"), small_print());
+    write_file(path("out.gcode"), "precious\n");
+  }
+
+  // What the small print becomes when nothing fails.
+  [[nodiscard]] std::string whole() const { return run({"compensate", "in.gcode", "-o", "-"}).out; }
+
+  // One line, this exit code, and everything is as it was.
+  void expect_refusal(const Outcome& outcome, int exit_code, const std::string& message) const {
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    EXPECT_THAT(outcome.err, StartsWith(message));
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    expect_untouched();
+  }
+  void expect_untouched() const {
+    EXPECT_EQ(read_file(path("in.gcode")), small_print());
+    EXPECT_EQ(read_file(path("out.gcode")), "precious\n");
+    EXPECT_THAT(names(), ElementsAre("in.gcode", "out.gcode"));
+  }
+};
+
+const Words kToFile = {"compensate", "in.gcode", "-o", "out.gcode"};
+
+Words operator+(Words words, const Words& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+// A limit on files stands for a disk that is full when that much is written.
+TEST_F(Faults, OfAFullDiskLeaveTheOldOutput) {
+  const std::string result = whole();
+  for (const double share : {0.0, 0.1, 0.5, 0.9, 0.999}) {
+    const auto room = static_cast<rlim_t>(share * static_cast<double>(result.size()));
+    expect_refusal(run(kToFile, "", limited(RLIMIT_FSIZE, room)), 4,
+                   "out.gcode: cannot write the output; is the disk full?");
+    expect_refusal(run({"compensate", "in.gcode", "--in-place"}, "", limited(RLIMIT_FSIZE, room)),
+                   4, "in.gcode: cannot write the output; is the disk full?");
+  }
+}
+
+TEST_F(Faults, OfPackingLeaveTheOldOutput) {
+  const std::string result = whole();
+  for (const std::string name : {"new.gcode.gz", "new.bgcode"}) {
+    // The shim counts nothing; a limit that the text keeps to, the packed file does too. So the
+    // file system must fail.
+    expect_refusal(
+        run({"compensate", "in.gcode", "-o", name}, "", faulty({{"FAULT_FAIL", "fsync"}})), 4,
+        name + ": cannot write: Input/output error\n");
+  }
+}
+
+TEST_F(Faults, OfAReportWithoutRoomLeaveTheOldOutput) {
+  // The page is longer than the output.
+  const rlim_t room = whole().size() + 1000;
+  expect_refusal(run(kToFile + Words{"--report", "r.html"}, "", limited(RLIMIT_FSIZE, room)), 4,
+                 "r.html: cannot write: File too large; raise the limit");
+  expect_refusal(run({"inspect", "in.gcode", "--report", "r.json"}, "", limited(RLIMIT_FSIZE, 100)),
+                 4, "r.json: cannot write: File too large; raise the limit");
+}
+
+TEST_F(Faults, OfStreamsThatAreFullAreTold) {
+  const auto full = [] { ::dup2(::open("/dev/full", O_WRONLY | O_CLOEXEC), STDOUT_FILENO); };
+  for (const Words& words : {Words{"compensate", "in.gcode", "-o", "-"},
+                             Words{"inspect", "in.gcode", "--report", "-"}}) {
+    expect_refusal(run(words, "", full), 4, "stdout: cannot write: No space left on device");
+  }
+}
+
+TEST_F(Faults, OfTheLogAreToldAndDoNotUndoTheWork) {
+  const std::string result = whole();
+  const Outcome outcome = run(kToFile + Words{"--log", "/dev/full"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err,
+            "/dev/full: cannot write the log: No space left on device; make room there\n");
+  EXPECT_EQ(read_file(path("out.gcode")), result);
+}
+
+TEST_F(Faults, OfTheSummaryLeaveAnOutputThatIsWhole) {
+  const std::string result = whole();
+  const Outcome outcome =
+      run(kToFile, "", [] { ::dup2(::open("/dev/full", O_WRONLY | O_CLOEXEC), STDOUT_FILENO); });
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_EQ(outcome.err, "stdout: cannot write: No space left on device; make room there\n");
+  EXPECT_EQ(read_file(path("out.gcode")), result);
+}
+
+TEST_F(Faults, OfTheTemporaryFolderNameIt) {
+  expect_refusal(run({"inspect", "-"}, small_print(), limited(RLIMIT_FSIZE, 100)), 4,
+                 "-: cannot be kept in /tmp: File too large; set TMPDIR to another directory");
+}
+
+TEST_F(Faults, OfABatchFailItsPrintsAndLeaveNothingHalf) {
+  fs::create_directory(path("in"));
+  write_file(path("in/a.g"), small_print());
+  write_file(path("in/b.g"), squares(40));
+  const Words batch = {"batch", "in", "-o", "out", "-q", "-j", "1"};
+  // Room for the first alone.
+  const Outcome outcome = run(batch, "", limited(RLIMIT_FSIZE, 2 * whole().size()));
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_EQ(outcome.err, "out/b.g: cannot write the output; is the disk full?\n");
+  EXPECT_EQ(read_file(path("out/a.g")), whole());
+  EXPECT_FALSE(fs::exists(path("out/b.g")));
+  // No room for what it remembers: that is the end of it.
+  fs::remove_all(path("out"));
+  const Outcome forgetful =
+      run(batch + Words{"--summary", "s.json"}, "", faulty({{"FAULT_FAIL", "rename"}}));
+  EXPECT_EQ(forgetful.exit_code, 4);
+  EXPECT_THAT(names(), ElementsAre("in", "in.gcode", "out", "out.gcode"));
+  for (const auto& entry : fs::directory_iterator(path("out"))) {
+    ADD_FAILURE() << entry.path();
+  }
+}
+
+// As a user whom permissions stop.
+class AsNobody : public Faults {
+ protected:
+  AsNobody() {
+    if (::geteuid() == 0) {
+      for (const char* const name : {"", "in.gcode", "out.gcode"}) {
+        EXPECT_EQ(::chown(path(name).c_str(), kNobody, kNobody), 0);
+      }
+      fs::permissions(directory(), fs::perms::all);
+    }
+  }
+  ~AsNobody() override { fs::permissions(directory(), fs::perms::owner_all); }
+
+  [[nodiscard]] Outcome run_there(const Words& arguments, const std::string& input = "") const {
+    return run(arguments, input, [] {
+      if (::geteuid() == 0 && (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) {
+        ::_exit(126);
+      }
+    });
+  }
+};
+
+TEST_F(AsNobody, IsToldWhatCannotBeWritten) {
+  if (run_there({"--version"}).exit_code != 0) {
+    GTEST_SKIP() << "the program cannot be run as another user";
+  }
+  fs::permissions(path("out.gcode"), fs::perms::owner_read);
+  expect_refusal(run_there(kToFile), 1,
+                 "out.gcode: cannot write: Permission denied; choose another place");
+  fs::permissions(path("in.gcode"), fs::perms::owner_read);
+  expect_refusal(run_there({"compensate", "in.gcode", "--in-place"}), 1,
+                 "in.gcode: cannot write: Permission denied; choose another place");
+  fs::permissions(directory(), fs::perms::owner_read | fs::perms::owner_exec);
+  const std::string folder = "cannot write to the directory .: Permission denied; choose another";
+  expect_refusal(run_there({"compensate", "in.gcode", "-o", "new.gcode"}), 1,
+                 "new.gcode: " + folder);
+  expect_refusal(run_there({"compensate", "in.gcode", "-o", "-", "--report", "r.json"}), 1,
+                 "r.json: " + folder);
+  expect_refusal(run_there(Words{"compensate", "in.gcode", "-o", "-", "--log", "log"}), 1,
+                 "log: cannot write the log: Permission denied; choose another place");
+  expect_refusal(run_there({"batch", ".", "-o", "new"}), 1, "new: cannot make the folder: Perm");
+}
+
+TEST_F(AsNobody, IsToldWhatCannotBeRead) {
+  if (run_there({"--version"}).exit_code != 0) {
+    GTEST_SKIP() << "the program cannot be run as another user";
+  }
+  fs::permissions(path("in.gcode"), fs::perms::none);
+  const Outcome outcome = run_there(kToFile);
+  fs::permissions(path("in.gcode"), fs::perms::owner_read);
+  expect_refusal(outcome, 2, "in.gcode: cannot read: Permission denied");
+}
+
+TEST_F(Faults, OfReadingHalfWayAreTold) {
+  write_file(path("bad.gcode"), squares(1000));
+  const Outcome outcome = run({"compensate", "bad.gcode", "-o", "out.gcode"}, "",
+                              faulty({{"FAULT_UNREADABLE", "bad.gcode"}}));
+  EXPECT_THAT(outcome.exit_code, AnyOf(2, 4));
+  EXPECT_THAT(outcome.err, MatchesRegex("bad.gcode(:[0-9]+)?: cannot read.*\n"));
+  EXPECT_EQ(read_file(path("out.gcode")), "precious\n");
+  EXPECT_THAT(names(), ElementsAre("bad.gcode", "in.gcode", "out.gcode"));
+}
+
+TEST_F(Faults, OfAProgramWithoutMemoryLeaveNothing) {
+  const std::string result = whole();
+  int failed = 0;
+  for (const std::string jobs : {"2", "200"}) {
+    for (rlim_t megabytes = 28; megabytes <= 76; megabytes += 6) {
+      const Outcome outcome =
+          run(kToFile + Words{"-q", "-j", jobs}, "", limited(RLIMIT_AS, megabytes << 20U));
+      if (outcome.exit_code == 0) {
+        // Runs that there was no memory for stand as they were sliced.
+        EXPECT_THAT(read_file(path("out.gcode")), HasSubstr("M107\nM84\n"));
+        write_file(path("out.gcode"), "precious\n");
+      } else if (outcome.exit_code != 127) {  // the libraries did not fit in
+        ++failed;
+        expect_refusal(outcome, 4, "unflex: ");
+        EXPECT_THAT(outcome.err, HasSubstr("; give -j a smaller number, or end other programs"));
+      }
+    }
+  }
+#ifndef __SANITIZE_ADDRESS__
+  EXPECT_GT(failed, 0);
+#endif
+}
+
+TEST_F(Faults, OfKillingLeaveTheOldFileOrTheWholeNewOne) {
+  constexpr int kKills = 200;
+  const std::string result = whole();
+  const auto begin = steady_clock::now();
+  static_cast<void>(run(kToFile + Words{"-q"}));
+  const auto took = std::chrono::duration_cast<microseconds>(steady_clock::now() - begin);
+  std::mt19937 random(20240229);  // NOLINT: the same moments every time
+  std::uniform_int_distribution<microseconds::rep> moment(0, took.count());
+  int whole_ones = 0;
+  for (int i = 0; i < kKills; ++i) {
+    const bool in_place = i % 2 == 0;
+    write_file(path("in.gcode"), small_print());
+    write_file(path("out.gcode"), "precious\n");
+    Program program(directory(), in_place ? Words{"compensate", "in.gcode", "--in-place", "-q"}
+                                          : kToFile + Words{"-q"});
+    std::this_thread::sleep_for(microseconds(moment(random)));
+    program.signal(SIGKILL);
+    static_cast<void>(program.wait());
+    const std::string target = read_file(path(in_place ? "in.gcode" : "out.gcode"));
+    const std::string old = in_place ? small_print() : "precious\n";
+    ASSERT_TRUE(target == old || target == result) << "after " << i << " kills";
+    ASSERT_EQ(read_file(path(in_place ? "out.gcode" : "in.gcode")),
+              in_place ? "precious\n" : small_print());
+    whole_ones += target == result ? 1 : 0;
+    Words others = names();
+    std::erase_if(others, is_temporary);
+    ASSERT_THAT(others, ElementsAre("in.gcode", "out.gcode"));
+    // Its solver process goes too, but need not be gone yet, and holds the file until then.
+    ASSERT_LE(names().size(), 4U);
+  }
+  EXPECT_LT(whole_ones, kKills);
+  write_file(path("in.gcode"), small_print());
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  ASSERT_EQ(run(kToFile).exit_code, 0);
+  EXPECT_EQ(read_file(path("out.gcode")), result);
+  EXPECT_THAT(names(), ElementsAre("in.gcode", "out.gcode"));
+}
+
+// Only what has been synced survives the power; a name may survive without its bytes.
+TEST_F(Faults, OfThePowerFindTheBytesOnTheDiskBeforeTheName) {
+  ASSERT_EQ(run(kToFile, "", faulty({{"FAULT_LIST", path("list")}})).exit_code, 0);
+  EXPECT_EQ(read_file(path("list")), "fsync\nrename\nfsync-folder\n");
+}
+
+TEST_F(Faults, OfThePowerLeaveTheOldFileOrTheWholeNewOne) {
+  const std::string result = whole();
+  for (const std::string call : {"fsync", "rename", "fsync-folder"}) {
+    write_file(path("out.gcode"), "precious\n");
+    const Outcome outcome = run(kToFile, "", faulty({{"FAULT_KILL", call}}));
+    EXPECT_EQ(outcome.exit_code, 128 + SIGKILL) << call;
+    EXPECT_EQ(read_file(path("out.gcode")), call == "fsync-folder" ? result : "precious\n");
+    EXPECT_EQ(read_file(path("in.gcode")), small_print());
+  }
+}
+
+TEST_F(Faults, OfRenamingLeaveTheOldFile) {
+  for (const std::string call : {"fsync", "rename"}) {
+    expect_refusal(run(kToFile, "", faulty({{"FAULT_FAIL", call}})), 4,
+                   "out.gcode: cannot write: Input/output error\n");
+  }
+}
+
+TEST_F(Faults, OfTheClockChangeNothing) {
+  const std::string result = whole();
+  ASSERT_EQ(run(kToFile, "", faulty({{"FAULT_CLOCK", "1"}})).exit_code, 0);
+  EXPECT_EQ(read_file(path("out.gcode")), result);
+}
+
+TEST_F(Faults, OfASolverProcessChangeNothing) {
+  write_file(path("in.gcode"), squares(6));
+  const Words ipopt = kToFile + Words{"--engine", "ipopt", "-j", "1"};
+  ASSERT_EQ(run(ipopt).exit_code, 0);
+  const std::string result = read_file(path("out.gcode"));
+  Program program(directory(), ipopt);
+  pid_t worker = 0;
+  const auto deadline = steady_clock::now() + std::chrono::seconds(10);
+  while (worker == 0 && steady_clock::now() < deadline) {
+    std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", program.pid()));
+    children >> worker;
+  }
+  if (worker != 0) {
+    ::kill(worker, SIGKILL);
+  }
+  const Outcome outcome = program.wait();
+  if (worker == 0) {
+    GTEST_SKIP() << "the kernel does not list children";
+  }
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(read_file(path("out.gcode")), result);
+}
+
+}  // namespace
+}  // namespace unflex::app
