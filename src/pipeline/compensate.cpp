@@ -92,7 +92,7 @@ class Compensator {
 
   Status work() {
     const CpuSlot slot(*slots_);
-    while (!(all_read_ && queue_.empty())) {
+    while (!is_done()) {
       feed();
       while (can_write()) {
         if (Status status = write(*queue_.front()); !status) {
@@ -106,7 +106,8 @@ class Compensator {
       if (!*output_) {
         return disk_full(job_);
       }
-      if (!(has_room() && take_piece())) {
+      // Once all is written there is nothing to wait for.
+      if (!is_done() && !(has_room() && take_piece())) {
         wait();
       }
     }
@@ -126,6 +127,8 @@ class Compensator {
     const std::lock_guard lock(mutex_);
     news_.notify_one();
   }
+
+  [[nodiscard]] bool is_done() const { return all_read_ && queue_.empty(); }
 
   // Whether more should be read. However long the only run is, what follows it must be known.
   [[nodiscard]] bool has_room() {

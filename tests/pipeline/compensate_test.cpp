@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <numbers>
@@ -437,6 +439,21 @@ TEST(Compensate, TellsItsProgressFromNothingToAll) {
   EXPECT_LT(progress.fractions.front(), 0.2);
   EXPECT_GE(progress.fractions.back(), 0.8);
   EXPECT_LE(progress.fractions.back(), 1.0);
+}
+
+// However little there is to do: what is waited for has a patience of 0.1 s.
+TEST(Compensate, WaitsForNothingOnceAllIsWritten) {
+  const JobFolder folder("G28\nG1 X10 Y10 F3000\n");
+  Job job = folder.job();
+  job.engine = EngineChoice::banded;
+  SilentProgress progress;
+  auto shortest = std::chrono::steady_clock::duration::max();
+  for (int i = 0; i < 10; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    ASSERT_TRUE(compensate(job, progress));
+    shortest = std::min(shortest, std::chrono::steady_clock::now() - begin);
+  }
+  EXPECT_LT(shortest, std::chrono::milliseconds(90));
 }
 
 TEST(Compensate, StopsWhenItIsToldTo) {
