@@ -29,23 +29,6 @@ bool exists(const std::string& name) {
   return ::lstat(name.c_str(), &status) == 0;
 }
 
-// What can be done about a file that cannot be written, if that can be told.
-std::string_view remedy(int error) {
-  switch (error) {
-    case ENOSPC:
-    case EDQUOT:
-      return "; make room there";
-    case EFBIG:
-      return "; raise the limit on the size of files (ulimit -f)";
-    case EACCES:
-    case EPERM:
-    case EROFS:
-      return "; choose another place or change its permissions";
-    default:
-      return "";
-  }
-}
-
 }  // namespace
 
 FileDescriptor::FileDescriptor(FileDescriptor&& other) noexcept
@@ -176,10 +159,6 @@ std::filesystem::path temporary_directory() {
   const char* const chosen = std::getenv("TMPDIR");
   return chosen != nullptr && *chosen != '\0' ? chosen : "/tmp";
 }
-
-std::string errno_text(int error) { return std::generic_category().message(error); }
-
-std::string write_error_text(int error) { return errno_text(error).append(remedy(error)); }
 
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code failed;

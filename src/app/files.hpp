@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "unflex/core/errno_text.hpp"
 #include "unflex/core/error.hpp"
 
 namespace unflex::app {
@@ -66,12 +67,6 @@ class TemporaryFile {
 
 // $TMPDIR or /tmp.
 [[nodiscard]] std::filesystem::path temporary_directory();
-
-// "No such file or directory".
-[[nodiscard]] std::string errno_text(int error);
-
-// The same of what could not be written, with what can be done about it.
-[[nodiscard]] std::string write_error_text(int error);
 
 // Whether both names lead to one file, existing or not.
 [[nodiscard]] bool same_file(const std::string& a, const std::string& b);

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
-#include <cstring>
 #include <deque>
 #include <filesystem>
 #include <fstream>
@@ -22,6 +21,7 @@
 #include "run_writer.hpp"
 #include "stage_options.hpp"
 #include "task_pool.hpp"
+#include "unflex/core/errno_text.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 #include "verify_thread.hpp"
 #include "worker_pool.hpp"
@@ -448,7 +448,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
     }
     if (sink.error() != 0) {
       return fail(ErrorKind::internal, {job.output_name == "-" ? "stdout" : job.output_name, 0},
-                  fmt::format("cannot write: {}", std::strerror(sink.error())));
+                  fmt::format("cannot write: {}", write_error_text(sink.error())));
     }
     if (!status) {
       return tl::unexpected(source.error().value_or(status.error()));

@@ -234,7 +234,7 @@ INSTANTIATE_TEST_SUITE_P(
         // To the firmwares that is X1 E400.
         line("OfFourHundredDigits", "G1 X1e400", passes(), kLowerCase, passes()),
         line("OfCommandTooLarge", "G99999999999 X1", cannot_read("G99999999999")),
-        line("BeyondAnyMachine", "G1 X99999999999 E.2",
+        line("BeyondAnyMachine", "G1 X9999999999 E.2",
              warns(":11: warning: the move leads further than any machine reaches")),
         line("OfSpeedZero", "G1 X102 E.1 F0",
              warns(":11: warning: F must be above zero, or Klipper refuses the line"), passes(),
@@ -244,8 +244,7 @@ INSTANTIATE_TEST_SUITE_P(
              warns(":11: warning: F must be above zero, or the printer creeps")),
         line("OfSpeedNextToZero", "G1 X200 E.2 F0.0001", fails(":11: this move would take "),
              fails(":11: this move would take "), passes()),
-        line("OfALifetime", "G1 X999999999", fails(":11: this move would take "),
-             fails(":11: this move would take "), passes())),
+        line("OfALifetime", "G1 X999999999", fails(":11: this move would take "))),
     [](const auto& tested) { return tested.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(

@@ -1,0 +1,14 @@
+// What the operating system's errors mean, for messages.
+#pragma once
+
+#include <string>
+
+namespace unflex {
+
+// "No such file or directory".
+[[nodiscard]] std::string errno_text(int error);
+
+// The same of what could not be written, with what can be done about it.
+[[nodiscard]] std::string write_error_text(int error);
+
+}  // namespace unflex

@@ -1,0 +1,33 @@
+#include "unflex/core/errno_text.hpp"
+
+#include <cerrno>
+#include <string_view>
+#include <system_error>
+
+namespace unflex {
+namespace {
+
+// What can be done about a file that cannot be written, if that can be told.
+std::string_view remedy(int error) {
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT:
+      return "; make room there";
+    case EFBIG:
+      return "; raise the limit on the size of files (ulimit -f)";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "; choose another place or change its permissions";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+std::string errno_text(int error) { return std::generic_category().message(error); }
+
+std::string write_error_text(int error) { return errno_text(error).append(remedy(error)); }
+
+}  // namespace unflex
