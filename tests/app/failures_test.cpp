@@ -216,7 +216,7 @@ INSTANTIATE_TEST_SUITE_P(OfDevices, Failures,
                              "Full",
                              {"compensate", "in.gcode", "-o", "/dev/full"},
                              4,
-                             "/dev/full: cannot write: No space left on device\n"}),
+                             "/dev/full: cannot write: No space left on device; make room there\n"}),
                          [](const auto& failure) { return failure.param.name; });
 
 TEST_F(ProgramTest, RefusesWhatIsNotGcode) {
