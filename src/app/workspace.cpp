@@ -107,7 +107,9 @@ Result<Workspace> prepare(const RunConfig& config) {
           .and_then([&] { return load_settings(config, space.input); })
           .map([&](machine::Settings settings) { space.settings = std::move(settings); });
   if (!ready) {
-    return tl::unexpected(ready.error());
+    // A print that is gone already explains what went wrong.
+    const Status unchanged = space.input.check_unchanged();
+    return tl::unexpected(unchanged ? ready.error() : unchanged.error());
   }
   return space;
 }
