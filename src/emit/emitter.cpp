@@ -237,8 +237,10 @@ void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::st
 void Emitter::restore_modes(std::string& out) {
   const gcode::ModalState& wanted = input_.state();
   const gcode::ModalState& state = printer_.state();
-  if (!same(wanted.base_mm[E], state.base_mm[E])) {
-    // A G92 E of the input fell between two lines that split its moment: put the zero right.
+  // A G92 E of the input fell between two lines that split its moment: put the zero right. Not
+  // where a macro has left a reading that nobody knows, since the next E would be taken from
+  // another.
+  if (wanted.known[E] && !same(wanted.base_mm[E], state.base_mm[E])) {
     std::string text = "G92";
     append_word(text, 'E', (state.position_mm[E] - wanted.base_mm[E]) / state.filament_per_e_mm(),
                 9);

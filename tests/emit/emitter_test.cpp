@@ -12,6 +12,7 @@
 namespace unflex::emit {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using testing::emit;
 using ::testing::HasSubstr;
@@ -161,6 +162,18 @@ TEST(Emitter, PutsTheZeroOfFilamentRightThatARunHasSplit) {
   EXPECT_NEAR(laid, 0.123456 + 0.7, 1e-5);
   EXPECT_NEAR(interpreter.state().position_mm[gcode::E] - interpreter.state().base_mm[gcode::E],
               0.7, 1e-5);
+}
+
+// Whatever the macro did to E: the file's next absolute E is meant from there.
+TEST(Emitter, SaysNothingOfAReadingOfFilamentThatAMacroHasLeft) {
+  const std::string beginning = "G90\nM83\nG92 E0\nG1 X0 Y0 Z0.2 F6000\n";
+  const std::string run = "G1 X10 E0.3333\nG1 X20 E0.3333\nM221 S90\nG1 Y10 E0.3333\n";
+  const std::string after = "SOME_MACRO\nG1 X0 Y0 Z0.2\n";
+  const std::string known = emit(beginning + run + "G4 P1\n", options()).text;
+  EXPECT_THAT(lines_of(known), Contains(StartsWith("G92 E0.")));
+  const std::string unknown = emit(beginning + after + run + "G4 P1\n", options()).text;
+  EXPECT_THAT(lines_of(unknown), Contains(";unflex run\n"));
+  EXPECT_THAT(lines_of(unknown), Not(Contains(StartsWith("G92 E0."))));
 }
 
 TEST(Emitter, WritesMillimetresAndAbsolutePlacesWhateverTheFileDoes) {
