@@ -211,13 +211,14 @@ INSTANTIATE_TEST_SUITE_P(
                           "none/r.json: the directory none does not exist; create it\n"}),
     [](const auto& failure) { return failure.param.name; });
 
-INSTANTIATE_TEST_SUITE_P(OfDevices, Failures,
-                         ::testing::Values(Failure{
-                             "Full",
-                             {"compensate", "in.gcode", "-o", "/dev/full"},
-                             4,
-                             "/dev/full: cannot write: No space left on device; make room there\n"}),
-                         [](const auto& failure) { return failure.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    OfDevices, Failures,
+    ::testing::Values(Failure{
+        "Full",
+        {"compensate", "in.gcode", "-o", "/dev/full"},
+        4,
+        "/dev/full: cannot write: No space left on device; make room there\n"}),
+    [](const auto& failure) { return failure.param.name; });
 
 TEST_F(ProgramTest, RefusesWhatIsNotGcode) {
   const std::string bytes(4096, '\0');
