@@ -9,6 +9,7 @@
 #include <fstream>
 #include <mutex>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "compensate_with.hpp"
@@ -60,6 +61,14 @@ std::string text_of(const Piece& piece) {
   return text;
 }
 
+// 0 where it is not known: of a stream, or a file whose name is gone since it was opened.
+double input_bytes(const Job& job) {
+  std::error_code unknown;
+  const std::uintmax_t bytes =
+      job.input_fd < 0 ? std::filesystem::file_size(job.input, unknown) : 0;
+  return unknown ? 0.0 : static_cast<double>(bytes);
+}
+
 tl::unexpected<Error> disk_full(const Job& job) {
   return fail(ErrorKind::internal, {job.output_name, 0},
               "cannot write the output; is the disk full?");
@@ -81,8 +90,7 @@ class Compensator {
         slots_(&slots),
         report_(&report),
         writer_(rules_, job.input_name, job.settings.max_lines_per_s(), report),
-        input_bytes_(job.input_fd < 0 ? static_cast<double>(std::filesystem::file_size(job.input))
-                                      : 0.0),
+        input_bytes_(input_bytes(job)),
         engine_(engines.threaded ? engines.threaded() : nullptr),
         pieces_(input, job.input_name, rules_.verify, slots, [this] { wake(); }),
         recorder_(recorder_for(job, rules_.verify)),
