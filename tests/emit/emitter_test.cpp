@@ -167,7 +167,7 @@ TEST(Emitter, PutsTheZeroOfFilamentRightThatARunHasSplit) {
 // Whatever the macro did to E: the file's next absolute E is meant from there.
 TEST(Emitter, SaysNothingOfAReadingOfFilamentThatAMacroHasLeft) {
   const std::string beginning = "G90\nM83\nG92 E0\nG1 X0 Y0 Z0.2 F6000\n";
-  const std::string run = "G1 X10 E0.3333\nG1 X20 E0.3333\nM221 S90\nG1 Y10 E0.3333\n";
+  const std::string run = "G1 X10 E0.333333\nG1 X20 E0.333333\nM221 S90\nG1 Y10 E0.333333\n";
   const std::string after = "SOME_MACRO\nG1 X0 Y0 Z0.2\n";
   const auto zeros = [](const std::string& input) {
     return std::ranges::count_if(lines_of(emit(input, options()).text),
