@@ -23,7 +23,7 @@ PRINTERS = {"printer.toml", "printer.cfg", "config.g", "m503.txt", "prints/"}
 
 def lines_of(command, folder, **environment):
     run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True,
-                         timeout=60, env={**os.environ, **environment})
+                         timeout=120, env={**os.environ, **environment})
     assert run.stderr == "", run.stderr
     return run.stdout.splitlines()
 

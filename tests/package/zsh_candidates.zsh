@@ -14,7 +14,7 @@ zpty -w shell 'compadd() {
 zpty -w shell 'report() { _main_complete; print -r -- "end of candidates" >>$found }'
 zpty -w shell 'zle -C report complete-word report; bindkey "^I" report; print -r ready >$found'
 wait_for() {
-  for (( i = 0; i < 500; ++i )); do
+  for (( i = 0; i < 4000; ++i )); do
     [[ "$(<$found)" == *$1* ]] && return
     zpty -rt shell line 2>/dev/null
     sleep 0.02
