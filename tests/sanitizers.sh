@@ -33,6 +33,7 @@ for kind in "${kinds[@]}"; do
   fi
   cmake --build "$build" --parallel "$(nproc)"
   # The thread sanitizer has its memory at fixed places, which random ones get in the way of.
-  TSAN_OPTIONS=halt_on_error=1 setarch --addr-no-randomize ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" \
+  TSAN_OPTIONS=halt_on_error=1 setarch --addr-no-randomize \
+    ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" \
     --exclude-regex "$left_out" "$@"
 done
