@@ -26,9 +26,11 @@ cmake --build "$build" --parallel "$(nproc)" --target fuzz
 for target in "${targets[@]}"; do
   echo "Fuzzing $target for $seconds s"
   mkdir -p "$build/corpus/$target" "$build/finds/$target"
+  # Prints are made of the same words as lines.
+  dictionary=$here/${target/compensate/gcode}.dict
   # A second and half a gigabyte are more than any such small input may take; with sanitizers, ten
   # times and twice as much.
   "$build/tests/fuzz/fuzz_$target" -fork="$(nproc)" -max_total_time="$seconds" -timeout=10 \
-    -rss_limit_mb=1024 -max_len=4096 -dict="$here/${target}.dict" \
+    -rss_limit_mb=1024 -max_len=4096 -dict="$dictionary" \
     -artifact_prefix="$build/finds/$target/" "$build/corpus/$target" "$here/corpus/$target"
 done
