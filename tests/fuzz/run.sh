@@ -19,7 +19,8 @@ fi
 
 if [[ ! -e $build/CMakeCache.txt ]]; then
   cmake -G Ninja -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=RelWithDebInfo -DUNFLEX_FUZZ=ON \
-    -DCMAKE_CXX_COMPILER=clang++-16
+    -DCMAKE_CXX_COMPILER=clang++-16 \
+    -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -gline-tables-only -DNDEBUG"
 fi
 cmake --build "$build" --parallel "$(nproc)" --target fuzz
 
