@@ -122,8 +122,7 @@ class Batch {
     Status status = work_on(std::move(waiting));
     if (ending_signal() != 0) {
       sweep_patiently(files_.prints);
-      status = fail(ErrorKind::internal,
-                    "interrupted; what is finished stays, the same batch again does the rest");
+      status = interrupted(Command::batch);
     }
     summary_.wall_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

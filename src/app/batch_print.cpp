@@ -36,7 +36,7 @@ Result<std::string> hash_of_file(const std::string& name) {
     }
     hash.add(*block);
     if (ending_signal() != 0) {
-      return interrupted();
+      return interrupted(Command::batch);
     }
   }
 }

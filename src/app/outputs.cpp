@@ -185,6 +185,7 @@ Status Output::settle() const {
 
 Status Output::replace_target() {
   const TemporaryFile& made = result();
+  expect_a_result();
   if (::rename(made.path().c_str(), target_.c_str()) != 0) {
     return cannot_write(errno);
   }

@@ -20,8 +20,11 @@ ExitCode exit_code(ErrorKind kind) {
   return ExitCode::internal;
 }
 
-tl::unexpected<Error> interrupted() {
-  return fail(ErrorKind::internal, "interrupted, no file was written");
+tl::unexpected<Error> interrupted(Command command) {
+  return fail(ErrorKind::internal,
+              command == Command::batch
+                  ? "interrupted; what is finished stays, the same batch again does the rest"
+                  : "interrupted, no file was written");
 }
 
 std::vector<std::string> setting_warnings(const machine::Settings& settings) {

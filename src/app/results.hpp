@@ -24,7 +24,7 @@ inline constexpr int kSignalExitBase = 128;
 [[nodiscard]] ExitCode exit_code(ErrorKind kind);
 
 // What a command returns that a signal ended.
-[[nodiscard]] tl::unexpected<Error> interrupted();
+[[nodiscard]] tl::unexpected<Error> interrupted(Command command);
 
 // Runs one of the pipeline's commands with a progress bar that is gone when it returns.
 template <class Work>
@@ -33,7 +33,7 @@ auto with_progress(const RunConfig& config, Work work)
   const std::unique_ptr<Progress> progress = make_progress(config.quiet);
   auto result = work(*progress);
   if (ending_signal() != 0) {
-    return interrupted();
+    return interrupted(config.command);
   }
   return result;
 }

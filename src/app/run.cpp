@@ -142,10 +142,9 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
 int run_said(const RunConfig& config, Console& console) {
   const Result<ExitCode> result = run_command(config, console);
   if (!result) {
+    say_last_words_yourself();
     const bool ended = ending_signal() != 0;
-    // A batch has words of its own for it.
-    console.error(ended && config.command != Command::batch ? interrupted().value()
-                                                            : result.error());
+    console.error(ended ? interrupted(config.command).value() : result.error());
     return ended ? kSignalExitBase + ending_signal()
                  : static_cast<int>(exit_code(result.error().kind));
   }
@@ -160,7 +159,7 @@ int refused(const Error& error) {
 }  // namespace
 
 int run(const RunConfig& asked) {
-  catch_signals();
+  catch_signals(error_text(interrupted(asked.command).value()));
   const Result<RunConfig> config = with_slicer(asked, read_slicer());
   if (!config) {
     return refused(config.error());

@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
 
 #include "axis_chain.hpp"
 #include "flat_form.hpp"
@@ -80,40 +84,79 @@ Result<AxisSolution> solve_by(Form& form, InteriorPoint& interior_point, const S
   });
 }
 
+// What one window is solved in. Kept from window to window, as allocating would take longer than
+// solving.
+struct Workspace {
+  ScaledWindow scaled;
+  InteriorPoint interior_point;
+  FlatForm flat;
+  StageForm<1> stages;
+  StageForm<3> stages_of_three;
+  StageForm<5> stages_of_five;
+};
+
+// As many as windows were ever solved at once. They belong to no thread: a thread's own ones end by
+// a destructor that the C library aborts the process over if it has no memory to remember it.
+class Workspaces {
+ public:
+  std::unique_ptr<Workspace> take() {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!idle_.empty()) {
+        std::unique_ptr<Workspace> workspace = std::move(idle_.back());
+        idle_.pop_back();
+        return workspace;
+      }
+    }
+    return std::make_unique<Workspace>();
+  }
+
+  void give_back(std::unique_ptr<Workspace> workspace) {
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(std::move(workspace));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Workspace>> idle_;
+};
+
 class BandedEngine final : public Engine {
  public:
   explicit BandedEngine(BandedForm form) : form_(form) {}
 
   Result<AxisSolution> solve(const AxisWindow& window) const override {
-    // Kept from window to window, as allocating would take longer than solving.
-    thread_local ScaledWindow scaled;
-    thread_local InteriorPoint interior_point;
-    thread_local FlatForm flat;
-    thread_local StageForm<1> stages;
-    thread_local StageForm<3> stages_of_three;
-    thread_local StageForm<5> stages_of_five;
-    scaled.assign(window);
-    if (window.models() > 3) {
-      return solve_by(stages_of_five, interior_point, scaled, false);
-    }
-    if (window.models() > 1) {
-      return solve_by(stages_of_three, interior_point, scaled, false);
-    }
-    if (form_ == BandedForm::flat || (form_ == BandedForm::fitting && FlatForm::suits(scaled))) {
-      // Where it runs out of digits, stages have some left.
-      Result<AxisSolution> solution =
-          solve_by(flat, interior_point, scaled, form_ == BandedForm::fitting);
-      if (solution || form_ == BandedForm::flat) {
-        return solution;
-      }
-    }
-    return solve_by(stages, interior_point, scaled, false);
+    std::unique_ptr<Workspace> workspace = workspaces_.take();
+    Result<AxisSolution> solution = solve_in(*workspace, window);
+    workspaces_.give_back(std::move(workspace));
+    return solution;
   }
 
   std::string name() const override { return "banded"; }
 
  private:
+  Result<AxisSolution> solve_in(Workspace& work, const AxisWindow& window) const {
+    ScaledWindow& scaled = work.scaled;
+    scaled.assign(window);
+    if (window.models() > 3) {
+      return solve_by(work.stages_of_five, work.interior_point, scaled, false);
+    }
+    if (window.models() > 1) {
+      return solve_by(work.stages_of_three, work.interior_point, scaled, false);
+    }
+    if (form_ == BandedForm::flat || (form_ == BandedForm::fitting && FlatForm::suits(scaled))) {
+      // Where it runs out of digits, stages have some left.
+      Result<AxisSolution> solution =
+          solve_by(work.flat, work.interior_point, scaled, form_ == BandedForm::fitting);
+      if (solution || form_ == BandedForm::flat) {
+        return solution;
+      }
+    }
+    return solve_by(work.stages, work.interior_point, scaled, false);
+  }
+
   BandedForm form_;
+  mutable Workspaces workspaces_;
 };
 
 }  // namespace

@@ -1,11 +1,8 @@
 #include "piece_thread.hpp"
 
 #include <algorithm>
-#include <exception>
 #include <iterator>
 #include <utility>
-
-#include "unflex/core/caught.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -22,8 +19,8 @@ PieceThread::PieceThread(std::istream& input, std::string name, const verify::Ru
       thread_([this, wake = std::move(wake)] {
         try {
           read(wake);
-        } catch (const std::exception& exception) {
-          give_up(exception);
+        } catch (...) {
+          give_up();
           wake();
         }
       }) {}
@@ -36,10 +33,10 @@ PieceThread::~PieceThread() {
   room_.notify_one();
 }
 
-void PieceThread::give_up(const std::exception& exception) {
+void PieceThread::give_up() {
   {
     const std::lock_guard lock(mutex_);
-    error_ = error_of(exception);
+    failure_ = std::current_exception();
     ended_ = true;
   }
   news_.notify_one();
@@ -115,6 +112,13 @@ std::unique_ptr<Piece> PieceThread::take() {
 bool PieceThread::has_news() {
   const std::lock_guard lock(mutex_);
   return !pieces_.empty() || ended_;
+}
+
+const std::optional<Error>& PieceThread::error() const {
+  if (failure_) {
+    std::rethrow_exception(failure_);
+  }
+  return error_;
 }
 
 bool PieceThread::at_end() {

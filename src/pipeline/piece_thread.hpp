@@ -3,6 +3,7 @@
 
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <istream>
 #include <memory>
@@ -37,14 +38,15 @@ class PieceThread {
   [[nodiscard]] bool has_news();
   // Whether the last piece has been taken: the input has ended, or could not be read on.
   [[nodiscard]] bool at_end();
-  // At the end.
-  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+  // At the end. Throws what the thread could not handle, such as memory that ran out: where there
+  // is none left, no error could be made of it.
+  [[nodiscard]] const std::optional<Error>& error() const;
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return reader_.warnings(); }
 
  private:
   void read(const std::function<void()>& wake);
-  // The thread ends with what it could not handle, such as memory that ran out.
-  void give_up(const std::exception& exception);
+  // The thread ends with the exception that is being handled.
+  void give_up();
 
   CpuSlots* slots_;
   PieceReader reader_;
@@ -55,6 +57,7 @@ class PieceThread {
   std::deque<std::unique_ptr<Piece>> returned_;
   std::size_t lines_ahead_ = 0;  // in pieces_
   std::optional<Error> error_;
+  std::exception_ptr failure_;
   bool ended_ = false;
   bool stopped_ = false;
   std::jthread thread_;

@@ -1,6 +1,6 @@
 #include "task_pool.hpp"
 
-#include <system_error>
+#include <exception>
 #include <utility>
 
 namespace unflex::pipeline {
@@ -11,8 +11,8 @@ TaskPool::TaskPool(unsigned threads, CpuSlots& slots) : slots_(&slots) {
     for (unsigned i = 0; i < threads; ++i) {
       threads_.emplace_back([this] { work(); });
     }
-  } catch (const std::system_error&) {
-    // The system gives no more of them; fewer, or none, do the same.
+  } catch (const std::exception&) {
+    // The system gives no more of them, or no memory for them; fewer, or none, do the same.
   }
 }
 

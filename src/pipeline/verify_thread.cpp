@@ -1,9 +1,6 @@
 #include "verify_thread.hpp"
 
-#include <exception>
 #include <utility>
-
-#include "unflex/core/caught.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -80,8 +77,8 @@ VerifyThread::VerifyThread(const verify::Rules& rules, const verify::Observation
           std::istream output(&output_);
           result_ =
               verify::verify(input, input_name, output, output_name, rules, stopped_, observation);
-        } catch (const std::exception& exception) {
-          result_ = tl::unexpected(error_of(exception));
+        } catch (...) {
+          failure_ = std::current_exception();
         }
         done_ = true;
       }) {}
@@ -108,6 +105,9 @@ void VerifyThread::end() {
 
 Result<verify::VerifyReport> VerifyThread::result() {
   thread_.join();
+  if (failure_) {
+    std::rethrow_exception(failure_);
+  }
   return std::move(result_);
 }
 

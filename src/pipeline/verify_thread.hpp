@@ -4,6 +4,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <istream>
 #include <mutex>
 #include <optional>
@@ -60,7 +61,8 @@ class VerifyThread {
   [[nodiscard]] bool is_behind();
   // Both texts have ended.
   void end();
-  // After end(): waits for the result.
+  // After end(): waits for the result. Throws what the thread could not handle, such as memory that
+  // ran out.
   [[nodiscard]] Result<verify::VerifyReport> result();
 
  private:
@@ -77,6 +79,7 @@ class VerifyThread {
   Stopped stopped_;
   std::atomic<bool> done_ = false;
   Result<verify::VerifyReport> result_;
+  std::exception_ptr failure_;
   std::jthread thread_;
 };
 

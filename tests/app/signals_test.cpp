@@ -55,7 +55,7 @@ INSTANTIATE_TEST_SUITE_P(OfEveryKind, EndingSignal, ::testing::Values(SIGINT, SI
 TEST_F(ProgramTest, EndsSoonEvenWhereARunTakesLong) {
   // Marlin's whole steps make a run of a minute a matter of many seconds.
   std::string text = "G28\nG90\nM83\nG1 X20 Y20 F6000\n";
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < 4000; ++i) {
     text += fmt::format("G1 X{} Y{} E0.05\n", i % 2 == 0 ? 40 : 20, 20.0 + 0.01 * i);
   }
   write_file(path("in.gcode"), text);
@@ -70,7 +70,7 @@ TEST_F(ProgramTest, EndsSoonEvenWhereARunTakesLong) {
   EXPECT_EQ(outcome.err, "unflex: interrupted, no file was written\n");
   EXPECT_THAT(names(), ElementsAre("in.gcode"));
   // Half a second, and room for a busy machine; the work takes far longer.
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(3));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
 }
 
 TEST_F(ProgramTest, RemovesWhatAKilledRunHasLeft) {
