@@ -18,11 +18,11 @@ constexpr int kExactDigits = 15;
 constexpr std::array<double, kExactDigits + 1> kExactPowersOfTen = {
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
 
-std::optional<double> parse_short(std::string_view text) {
+bool parse_short(std::string_view text, double& value) {
   const bool negative = !text.empty() && text.front() == '-';
   text.remove_prefix(negative ? 1 : 0);
   if (text.size() > kExactDigits) {
-    return std::nullopt;
+    return false;
   }
   std::int64_t digits = 0;
   std::size_t point = text.size();
@@ -32,15 +32,16 @@ std::optional<double> parse_short(std::string_view text) {
     } else if (text[i] == '.' && point == text.size()) {
       point = i;
     } else {
-      return std::nullopt;
+      return false;
     }
   }
   const std::size_t decimals = point == text.size() ? 0 : text.size() - point - 1;
   if (text.size() == (point == text.size() ? 0U : 1U)) {
-    return std::nullopt;  // no digit
+    return false;  // no digit
   }
   const double magnitude = static_cast<double>(digits) / kExactPowersOfTen[decimals];
-  return negative ? -magnitude : magnitude;
+  value = negative ? -magnitude : magnitude;
+  return true;
 }
 
 }  // namespace
@@ -54,8 +55,9 @@ std::optional<double> parse_number(std::string_view text) {
       return std::nullopt;
     }
   }
-  if (const std::optional<double> number = parse_short(text)) {
-    return number;
+  double value = 0.0;
+  if (parse_short(text, value)) {
+    return value;
   }
   bool any_digit = false;
   for (const char c : text) {
@@ -67,7 +69,6 @@ std::optional<double> parse_number(std::string_view text) {
   if (!any_digit) {
     return std::nullopt;
   }
-  double value = 0.0;
   const char* const end = text.data() + text.size();
   const auto [stop, failure] = std::from_chars(text.data(), end, value, std::chars_format::fixed);
   if (failure != std::errc{} || stop != end || !std::isfinite(value)) {

@@ -27,14 +27,10 @@ std::string_view trimmed(std::string_view text) {
 }
 
 template <class Integer>
-std::optional<Integer> parse_integer(std::string_view digits) {
-  Integer value = 0;
+bool read_number(std::string_view digits, Integer& value) {
   const char* const end = digits.data() + digits.size();
   const auto [stop, failure] = std::from_chars(digits.data(), end, value);
-  if (failure != std::errc{} || stop != end) {
-    return std::nullopt;
-  }
-  return value;
+  return failure == std::errc{} && stop == end;
 }
 
 bool is_number_character(char c) { return is_digit(c) || c == '.' || c == '+' || c == '-'; }
@@ -109,7 +105,10 @@ void Parser::run() {
 void Parser::read_line_number() {
   const std::size_t from = cursor_++;
   skip_blanks();
-  command_.line_number = parse_integer<std::int64_t>(take_digits());
+  std::int64_t number = 0;
+  if (read_number(take_digits(), number)) {
+    command_.line_number = number;
+  }
   if (!command_.line_number || is_number_character(peek()) || peek() == '_') {
     unreadable(from);
   }
@@ -123,20 +122,20 @@ void Parser::read_traditional() {
   skip_blanks();
   const int sign = peek() == '-' ? -1 : 1;
   cursor_ += sign < 0 ? 1 : 0;
-  const auto number = parse_integer<int>(take_digits());
-  std::optional<int> subnumber = -1;
+  int number = 0;
+  const bool has_number = read_number(take_digits(), number);
+  bool has_subnumber = true;
   if (peek() == '.') {
     ++cursor_;
-    subnumber = parse_integer<int>(take_digits());
+    has_subnumber = read_number(take_digits(), command_.subnumber);
   }
-  if (!number || !subnumber) {
+  if (!has_number || !has_subnumber) {
     malformed(fmt::format("cannot read '{}'", line_.substr(from, cursor_ - from)));
     return;
   }
-  command_.number = sign * *number;
-  command_.subnumber = *subnumber;
-  const bool takes_text =
-      command_.letter == 'M' && subnumber == -1 && (number == 117 || number == 118 || number == 23);
+  command_.number = sign * number;
+  const bool takes_text = command_.letter == 'M' && command_.subnumber == -1 &&
+                          (number == 117 || number == 118 || number == 23);
   if (takes_text) {
     read_text();
   } else {
@@ -153,6 +152,7 @@ void Parser::read_words() {
       break;
     }
     if (c == '(') {
+      command_.has_parentheses = true;
       skip_parentheses();
     } else if (is_letter(c)) {
       read_word();
@@ -170,7 +170,9 @@ void Parser::read_words() {
 
 void Parser::read_word() {
   const std::size_t from = cursor_;
-  Word word{to_upper(line_[cursor_++]), std::nullopt};
+  // Filled in where it stays: copying what was written in parts just before stalls the processor.
+  Word& word = command_.words.emplace_back();
+  word.letter = to_upper(line_[cursor_++]);
   skip_blanks();
   if (peek() == '"') {
     skip_string();
@@ -180,13 +182,14 @@ void Parser::read_word() {
       ++cursor_;
     }
     if (cursor_ != digits) {
-      word.value = as_printers_take_it(parse_number(line_.substr(digits, cursor_ - digits)));
-      if (!word.value) {
+      if (const auto number = parse_number(line_.substr(digits, cursor_ - digits));
+          number && fits_printers(*number)) {
+        word.value.emplace(as_printers_take_it(*number));
+      } else {
         unreadable(from);
       }
     }
   }
-  command_.words.push_back(word);
 }
 
 void Parser::read_text() {
@@ -250,7 +253,10 @@ void Parser::read_checksum() {
   ++cursor_;
   skip_blanks();
   const std::string_view digits = take_digits();
-  command_.checksum = parse_integer<int>(digits);
+  int checksum = 0;
+  if (read_number(digits, checksum)) {
+    command_.checksum = checksum;
+  }
   if (command_.checksum != sum) {
     malformed(fmt::format("the checksum is {} but should be {}", digits, sum));
   }
@@ -329,6 +335,21 @@ char Parser::peek_past_blanks(std::size_t from) const {
 
 }  // namespace
 
+void Command::reset() {
+  kind = CommandKind::none;
+  letter = '\0';
+  number = -1;
+  subnumber = -1;
+  words.clear();
+  name.clear();
+  arguments = {};
+  has_parentheses = false;
+  comment = {};
+  line_number.reset();
+  checksum.reset();
+  problem.clear();
+}
+
 std::optional<double> Command::value(char a_letter) const {
   for (auto word = words.rbegin(); word != words.rend(); ++word) {
     if (word->letter == a_letter) {
@@ -367,11 +388,8 @@ Command parse(std::string_view line) {
 
 void parse(std::string_view line, Command& command) {
   constexpr std::size_t kUsualWords = 8;
-  std::vector<Word> words = std::move(command.words);
-  words.clear();
-  words.reserve(kUsualWords);
-  command = Command{};
-  command.words = std::move(words);
+  command.reset();
+  command.words.reserve(kUsualWords);
   Parser(line, command).run();
 }
 

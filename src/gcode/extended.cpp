@@ -46,7 +46,9 @@ Parameter number_of(const Command& command, std::string_view key) {
   if (!text) {
     return {};
   }
-  return {true, as_printers_take_it(parse_parameter_number(*text))};
+  const std::optional<double> number = parse_parameter_number(*text);
+  return {true, number && fits_printers(*number) ? std::optional(as_printers_take_it(*number))
+                                                 : std::nullopt};
 }
 
 std::string state_name(const Command& command) {

@@ -128,7 +128,7 @@ void Interpreter::klipper_traditional(Event& event) {
 }
 
 void Interpreter::klipper_g_code(Event& event) {
-  if (command_.number <= 3 && command_.arguments.find('(') != std::string_view::npos) {
+  if (command_.number <= 3 && command_.has_parentheses) {
     return not_understood(event, "parentheses, which are no comment to Klipper");
   }
   switch (command_.number) {

@@ -27,6 +27,16 @@ std::string_view Line::content() const {
   return view;
 }
 
+bool Line::has_bare_return() const {
+  if (!may_hold_return) {
+    return false;
+  }
+  const std::string_view view = content();
+  const std::size_t at = view.find('\r');
+  return at != std::string_view::npos &&
+         view.find_first_not_of("\r \t", at) != std::string_view::npos;
+}
+
 LineReader::LineReader(std::istream& stream, std::string name)
     : stream_(&stream), name_(std::move(name)), block_(kBlockBytes) {}
 
@@ -38,11 +48,16 @@ void LineReader::fill_block() {
     filled_ = static_cast<std::size_t>(
         stream_->readsome(block_.data(), static_cast<std::streamsize>(block_.size())));
   }
+  // Looked for once instead of line by line.
+  const std::string_view block(block_.data(), filled_);
+  block_has_return_ = block.find('\r') != std::string_view::npos;
+  block_has_nul_ = block.find('\0') != std::string_view::npos;
 }
 
 Result<bool> LineReader::next(Line& line) {
   line.text.clear();
   line.number = line_number_ + 1;
+  line.may_hold_return = false;
   while (!line.text.ends_with('\n')) {
     if (cursor_ == filled_) {
       fill_block();
@@ -65,7 +80,7 @@ Result<bool> LineReader::next(Line& line) {
         newline == nullptr
             ? left
             : static_cast<std::size_t>(static_cast<const char*>(newline) - begin) + 1;
-    if (std::memchr(begin, '\0', taken) != nullptr) {
+    if (block_has_nul_ && std::memchr(begin, '\0', taken) != nullptr) {
       return fail(ErrorKind::input, {name_, line.number},
                   "not a text file (NUL byte); pass G-code as plain text");
     }
@@ -73,6 +88,7 @@ Result<bool> LineReader::next(Line& line) {
       return fail(ErrorKind::input, {name_, line.number},
                   "line longer than 1 MiB; pass G-code as plain text");
     }
+    line.may_hold_return = line.may_hold_return || block_has_return_;
     line.text.append(begin, taken);
     cursor_ += taken;
   }

@@ -20,13 +20,6 @@ std::optional<double> whole(std::optional<double> value) {
   return value ? std::optional<double>(std::trunc(*value)) : std::nullopt;
 }
 
-// Something follows it.
-bool has_bare_return(std::string_view content) {
-  const std::size_t at = content.find('\r');
-  return at != std::string_view::npos &&
-         content.find_first_not_of("\r \t", at) != std::string_view::npos;
-}
-
 bool has_any(const Command& command, std::string_view letters) {
   return std::any_of(letters.begin(), letters.end(),
                      [&](char letter) { return command.has(letter); });
@@ -47,9 +40,9 @@ std::string_view doubt(std::string_view content, const Command& command) {
 }  // namespace
 
 void Interpreter::marlin(Event& event, std::string_view content) {
-  if (has_bare_return(content)) {
-    return not_understood(
-        event, "a carriage return without a line feed, which ends the line for Marlin");
+  if (event.line.has_bare_return()) {
+    return not_understood(event,
+                          "a carriage return without a line feed, which ends the line for Marlin");
   }
   switch (command_.kind) {
     case CommandKind::none:

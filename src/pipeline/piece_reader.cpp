@@ -19,6 +19,7 @@ namespace {
 constexpr std::size_t kMaxEventsOutsideRuns = 4096;
 constexpr std::size_t kMaxWarnings = 1000;
 constexpr std::size_t kMostSpareEvents = 10'000;
+constexpr std::size_t kUsualEvents = 8;
 // Runs up to this long are handled as a whole, so that they can be left as they are …
 constexpr double kWhole_s = 60.0;
 // … of longer ones parts, which end near borders this far apart, …
@@ -77,13 +78,6 @@ bool is_own_comment(std::string_view content) {
          (content.size() > 1 && content[0] == ' ' && content[1] >= '0' && content[1] <= '9');
 }
 
-// What other programs take for the end of a line.
-bool has_bare_return(std::string_view content) {
-  const std::size_t at = content.find('\r');
-  return at != std::string_view::npos &&
-         content.find_first_not_of("\r \t", at) != std::string_view::npos;
-}
-
 // A letter that printers know and a number: enough to tell G-code from prose.
 bool looks_like_command(std::string_view content) {
   const gcode::Command command = gcode::parse(content);
@@ -127,10 +121,7 @@ Result<bool> PieceReader::next(Piece& piece) {
 Result<bool> PieceReader::cut(Piece& piece) {
   for (;;) {
     gcode::Event event;
-    if (!spare_.empty()) {
-      event = std::move(spare_.back());
-      spare_.pop_back();
-    }
+    take_spare(event);
     const Result<bool> more = read_event(event);
     if (!more) {
       return more;
@@ -177,11 +168,23 @@ Result<bool> PieceReader::cut(Piece& piece) {
 // Empties the piece. Lines are what there is most of; pieces that kept their storage would all grow
 // to the size of the largest.
 void PieceReader::recycle(Piece& piece) {
-  const std::size_t room = kMostSpareEvents - std::min(kMostSpareEvents, spare_.size());
-  const std::size_t kept = std::min(room, piece.events.size());
-  spare_.insert(spare_.end(), std::make_move_iterator(piece.events.begin()),
-                std::make_move_iterator(piece.events.begin() + static_cast<std::ptrdiff_t>(kept)));
+  if (!piece.events.empty() && spare_events_ + piece.events.size() <= kMostSpareEvents) {
+    spare_events_ += piece.events.size();
+    spare_.push_back(std::move(piece.events));
+  }
   piece = {};
+}
+
+void PieceReader::take_spare(gcode::Event& event) {
+  if (!spare_.empty()) {
+    std::vector<gcode::Event>& events = spare_.back();
+    event = std::move(events.back());
+    events.pop_back();
+    --spare_events_;
+    if (events.empty()) {
+      spare_.pop_back();
+    }
+  }
 }
 
 Result<bool> PieceReader::read_event(gcode::Event& event) {
@@ -198,7 +201,7 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
   }
   any_command_ = any_command_ || looks_like_command(line.content());
   // Of Marlin's, which it ends, the interpreter tells.
-  if (firmware_ != Firmware::marlin && has_bare_return(line.content())) {
+  if (firmware_ != Firmware::marlin && line.has_bare_return()) {
     warn(line.number,
          "a carriage return without a line feed ends no line, neither here nor in the printer: "
          "convert the file's line ends to LF");
@@ -238,9 +241,11 @@ void PieceReader::warn_of_travel(const gcode::Event& event) {
 }
 
 // Puts the event into the open piece, after the lines that turned out to stand between.
-void PieceReader::append(gcode::Event event) {
+void PieceReader::append(gcode::Event&& event) {
   if (open_.events.empty()) {
     open_.from_mm = machine_mm_;
+    open_.events.reserve(kUsualEvents);
+    open_.move_counts.reserve(kUsualEvents);
   }
   append_between();
   if (open_.is_run && open_.events.empty()) {

@@ -57,11 +57,12 @@ class PieceReader {
 
  private:
   void recycle(Piece& piece);
+  void take_spare(gcode::Event& event);
   Result<bool> cut(Piece& piece);
   Result<bool> read_event(gcode::Event& event);
   void warn(std::size_t line, std::string message);
   void warn_of_travel(const gcode::Event& event);
-  void append(gcode::Event event);
+  void append(gcode::Event&& event);
   void append_between();
   void mark_border(const gcode::Event& event);
   [[nodiscard]] std::optional<std::size_t> border_to_split_at() const;
@@ -85,7 +86,8 @@ class PieceReader {
   double since_border_s_ = 0.0;   // roughly
   gcode::Position machine_mm_{};  // after the last planned move
   std::size_t borders_since_look_ = 0;
-  std::vector<gcode::Event> spare_;    // storage for the next ones
+  std::vector<std::vector<gcode::Event>> spare_;  // storage for the next ones
+  std::size_t spare_events_ = 0;                  // in it
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;
   bool any_command_ = false;

@@ -8,7 +8,7 @@ namespace unflex::pipeline {
 namespace {
 
 // Lines that are read ahead.
-constexpr std::size_t kMostAhead = 10'000;
+constexpr std::size_t kMostAhead = 4'000;
 
 }  // namespace
 

@@ -32,11 +32,14 @@ struct Command {
   std::string name;         // extended: the command's name in upper case
   // What follows the command's name or number, comment and checksum cut off, trimmed.
   std::string_view arguments;
-  std::string_view comment;  // text after ';' (or Klipper's '#'), without it; else empty
+  bool has_parentheses = false;  // traditional: a comment in parentheses among the words
+  std::string_view comment;      // text after ';' (or Klipper's '#'), without it; else empty
   std::optional<std::int64_t> line_number;  // N word
   std::optional<int> checksum;              // after '*'
   std::string problem;                      // malformed: what is wrong, for a message
 
+  // As before it was parsed; keeps the storage.
+  void reset();
   // True for letter and number, e.g. is('G', 1).
   [[nodiscard]] bool is(char a_letter, int a_number) const {
     return kind == CommandKind::traditional && letter == a_letter && number == a_number;
