@@ -55,6 +55,12 @@ double motion(const DataSet& set, std::size_t axis) {
   return sum;
 }
 
+// Whether something is known of it.
+bool is_known(const Estimate& estimate) {
+  return estimate.low > 0.0 && estimate.low <= estimate.value && estimate.value <= estimate.high &&
+         std::isfinite(estimate.high);
+}
+
 }  // namespace
 
 std::string_view to_string(Method method) {
@@ -83,7 +89,8 @@ Result<Mode> fit(const DataSet& set, Axis axis, const Sweep& sweep) {
     return fail(mode.error().kind, {set.name, 0}, mode.error().message);
   }
   // Not what a resonance looks like, whatever the numbers.
-  if (!std::isfinite(mode->freq_hz.value) || !(mode->damping_ratio.value < 1.0)) {
+  if (!is_known(mode->freq_hz) || !is_known(mode->damping_ratio) ||
+      !(mode->damping_ratio.value < 1.0)) {
     return fail(ErrorKind::input, {set.name, 0}, "no resonance can be made out in it");
   }
   return mode;

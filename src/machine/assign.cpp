@@ -24,7 +24,7 @@ std::string store(const Value& value, const Key& key, double& target) {
   if (!key.bounds.contains(*number)) {
     return fmt::format("{} is {}, but must be {}", key.name, *number, range_text(key));
   }
-  target = *number;
+  target = *number + 0.0;  // no zero with a sign
   return {};
 }
 

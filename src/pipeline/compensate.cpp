@@ -1,395 +1,23 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <condition_variable>
-#include <deque>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
-#include <optional>
-#include <system_error>
+#include <iterator>
 #include <utility>
+#include <vector>
 
-#include "compensate_with.hpp"
+#include "compensate_pass.hpp"
 #include "fd_stream.hpp"
-#include "gap_check.hpp"
-#include "nozzle_motion.hpp"
-#include "piece_thread.hpp"
 #include "report_rows.hpp"
 #include "retime.hpp"
-#include "run_writer.hpp"
-#include "stage_options.hpp"
-#include "task_pool.hpp"
 #include "unflex/core/errno_text.hpp"
-#include "unflex/pipeline/pipeline.hpp"
-#include "verify_thread.hpp"
-#include "worker_pool.hpp"
 
 namespace unflex::pipeline {
 namespace {
 
-// Nodes of runs that have been read and not yet been written, per worker, and windows that solver
-// processes are given ahead.
-constexpr std::size_t kNodesAhead = 200'000;
-constexpr std::size_t kWindowsAhead = 24;
-// Windows built at once.
-constexpr std::size_t kWindowsAtOnce = 8;
-// The trajectory of a run or part is held as a whole, 48 bytes per node; longer ones are left as
-// they are. Only a single move makes a part so long.
-constexpr std::size_t kMaxRunNodes = 8'000'000;
-constexpr std::chrono::milliseconds kPatience{100};
-constexpr std::chrono::milliseconds kShortPatience{2};
-
-double largest_axis_accel(const std::vector<planner::PlannedMove>& moves) {
-  double largest = 0.0;
-  for (const planner::PlannedMove& move : moves) {
-    if (move.accel_s + move.decel_s > 0.0) {
-      largest = std::max(largest, move.accel_mm_s2 * std::max(std::abs(move.direction[gcode::X]),
-                                                              std::abs(move.direction[gcode::Y])));
-    }
-  }
-  return largest;
-}
-
-std::string text_of(const Piece& piece) {
-  std::string text;
-  for (const gcode::Event& event : piece.events) {
-    text += event.line.text;
-  }
-  return text;
-}
-
-// 0 where it is not known: of a stream, or a file whose name is gone since it was opened.
-double input_bytes(const Job& job) {
-  std::error_code unknown;
-  const std::uintmax_t bytes =
-      job.input_fd < 0 ? std::filesystem::file_size(job.input, unknown) : 0;
-  return unknown ? 0.0 : static_cast<double>(bytes);
-}
-
-tl::unexpected<Error> disk_full(const Job& job) {
-  return fail(ErrorKind::internal, {job.output_name, 0},
-              "cannot write the output; is the disk full?");
-}
-
-// Reads pieces, has runs worked on, and writes them in order. All of it in the calling thread but
-// for what is in the pools.
-class Compensator {
- public:
-  Compensator(const Job& job, const Engines& engines, WorkerPool& processes, std::istream& input,
-              std::ostream& output, Progress& progress, CpuSlots& slots, report::Report& report)
-      : job_(job),
-        checks_(engines.threaded && engines.second),
-        rules_{compensate_setup(job.settings), emit_options(job.settings, UNFLEX_VERSION),
-               verify_rules(job.settings)},
-        processes_(&processes),
-        output_(&output),
-        progress_(&progress),
-        slots_(&slots),
-        report_(&report),
-        writer_(rules_, job.input_name, job.settings.max_lines_per_s(), report),
-        input_bytes_(input_bytes(job)),
-        engine_(engines.threaded ? engines.threaded() : nullptr),
-        pieces_(input, job.input_name, rules_.verify, slots, [this] { wake(); }),
-        recorder_(recorder_for(job, rules_.verify)),
-        verifier_(rules_.verify, observation_of(recorder_.get(), rules_.verify), job.input_name,
-                  job.output_name, slots),
-        pool_(std::max(job.workers, 1U), slots) {}
-
-  Status work() {
-    const CpuSlot slot(*slots_);
-    while (!is_done()) {
-      feed();
-      while (can_write()) {
-        if (Status status = write(*queue_.front()); !status) {
-          return status;
-        }
-        queue_.pop_front();
-      }
-      if (progress_->cancelled()) {
-        return fail(ErrorKind::internal, "cancelled");
-      }
-      if (!*output_) {
-        return disk_full(job_);
-      }
-      // Once all is written there is nothing to wait for.
-      if (!is_done() && !(has_room() && take_piece())) {
-        wait();
-      }
-    }
-    if (pieces_.error()) {
-      return tl::unexpected(*pieces_.error());
-    }
-    put({}, writer_.finish());
-    for (const Diagnostic& warning : pieces_.warnings()) {
-      report_->warnings.push_back(to_string(warning));
-    }
-    verifier_.end();
-    return check_engine().and_then([&] { return finish_verification(); });
-  }
-
- private:
-  void wake() {
-    const std::lock_guard lock(mutex_);
-    news_.notify_one();
-  }
-
-  [[nodiscard]] bool is_done() const { return all_read_ && queue_.empty(); }
-
-  // Whether more should be read. However long the only run is, what follows it must be known.
-  [[nodiscard]] bool has_room() {
-    return (nodes_queued_ <= kNodesAhead * std::max(job_.workers, 1U) || queue_.size() <= 1) &&
-           !verifier_.is_behind();
-  }
-
-  // Takes what has been read; false when nothing has.
-  bool take_piece() {
-    if (std::unique_ptr<Piece> piece = pieces_.take()) {
-      auto job = std::make_shared<RunJob>();
-      job->piece = std::move(*piece);
-      admit(std::move(job));
-      return true;
-    }
-    if (!all_read_ && pieces_.at_end()) {
-      all_read_ = true;
-      return true;
-    }
-    return false;
-  }
-
-  // Queues the piece.
-  void admit(std::shared_ptr<RunJob> job) {
-    const Piece& piece = job->piece;
-    if (piece.is_run) {
-      report_->runs_total += piece.begins_run() ? 1 : 0;
-      job->nozzle = nozzle_;
-      nozzle_ = piece.ends_run() ? at_rest(piece.moves.back().segment.end_mm)
-                                 : at_end_of(piece.moves.back());
-      job->setup = setup_for(rules_.setup, piece.moves, job_.settings);
-      job->grid = compensate::node_grid(job->course(), rules_.setup);
-      const std::size_t nodes = job->grid.count;
-      const double accel = largest_axis_accel(piece.moves);
-      if (accel > rules_.verify.base_max_accel_mm_s2) {
-        job->failure = fmt::format(
-            "the plan itself accelerates an axis by {:.0f} mm/s², more than base.max_accel_mm_s2",
-            accel);
-      } else if (nodes <= kMaxRunNodes) {
-        job->spans = compensate::mesh(job->course(), job->grid, rules_.setup);
-      } else {
-        job->failure = fmt::format("{:.0f} s of motion without a stop are too long to be handled",
-                                   static_cast<double>(nodes) * rules_.setup.period_s);
-      }
-      job->results.resize(job->spans.size());
-      job->missing = 2 * job->spans.size();
-      job->prepared = job->spans.empty();
-      report_->windows_total += compensate::windows_to_solve(job->spans);
-      nodes_queued_ += nodes_of(*job);
-      if (checks_) {
-        gaps_.choose(*job);
-      }
-    } else {
-      nozzle_ = after_motion(piece, nozzle_, rules_.verify.nozzle);
-      for (const gcode::Event& event : piece.events) {
-        count_kept_moves(event, rules_.verify.fixed.firmware, report_->kept_moves);
-      }
-      job->prepared = true;
-    }
-    if (!queue_.empty()) {
-      // The lines of a run where they are counted have to fit those after it.
-      queue_.back()->lines_after = verify::LineRate::first_lines(piece.moves);
-    }
-    queue_.push_back(std::move(job));
-  }
-
-  static std::size_t nodes_of(const RunJob& job) {
-    return job.spans.empty() ? 0 : job.spans.back().last + 1;
-  }
-
-  // Gives the solvers what they can take, in the order of the file.
-  void feed() {
-    for (std::size_t piece = 0; piece < queue_.size(); ++piece) {
-      // A run is known in full when it is known what follows.
-      if (!all_read_ && piece + 1 == queue_.size() && rules_.emit.lines.burst_lines > 0) {
-        return;
-      }
-      RunJob& job = *queue_[piece];
-      while (job.submitted < job.spans.size()) {
-        const std::size_t count = std::min(kWindowsAtOnce, job.spans.size() - job.submitted);
-        if (engine_) {
-          solve_in_thread(queue_[piece], job.submitted, count);
-        } else if (processes_->under_way() < kWindowsAhead * std::max(job_.workers, 1U)) {
-          solve_in_process(queue_[piece], job.submitted, count);
-        } else {
-          return;
-        }
-        job.submitted += count;
-      }
-    }
-  }
-
-  void solve_in_thread(const std::shared_ptr<RunJob>& job, std::size_t first, std::size_t count) {
-    pool_.submit([this, job, first, count] {
-      solve_windows(*job, first, count, *engine_);
-      if (job->missing.fetch_sub(2 * count) == 2 * count) {
-        prepare(*job, rules_);
-        wake();
-      }
-    });
-  }
-
-  void solve_in_process(const std::shared_ptr<RunJob>& job, std::size_t first, std::size_t count) {
-    const std::vector<compensate::RunWindow> windows = windows_of(*job, first, count);
-    for (std::size_t i = 0; i < count; ++i) {
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        tickets_.push_back({job, first + i, axis});
-        const compensate::AxisWindow& window = axis == 0 ? windows[i].x : windows[i].y;
-        if (job->spans[first + i].cruise) {
-          // Never the last of a run, so that it will be prepared when that one is.
-          job->results[first + i][axis] = axis_result(compensate::along(window));
-          --job->missing;
-        } else {
-          processes_->submit(first_ticket_ + tickets_.size() - 1, window);
-        }
-      }
-    }
-  }
-
-  // For something to do.
-  void wait() {
-    if (processes_->under_way() > 0) {
-      const CpuSlot::Without without(*slots_);
-      if (std::optional<WorkerPool::Done> done = processes_->take(kShortPatience.count())) {
-        place(std::move(*done));
-      }
-      return;
-    }
-    const CpuSlot::Without without(*slots_);
-    std::unique_lock lock(mutex_);
-    // The verifier does not say when it has caught up.
-    news_.wait_for(lock, verifier_.is_behind() ? kShortPatience : kPatience, [this] {
-      return can_write() || (has_room() && !all_read_ && pieces_.has_news());
-    });
-  }
-
-  // Where lines are counted, it must be known what follows a run.
-  [[nodiscard]] bool can_write() const {
-    return !queue_.empty() && queue_.front()->prepared &&
-           (queue_.size() > 1 || all_read_ || rules_.emit.lines.burst_lines == 0);
-  }
-
-  void place(WorkerPool::Done done) {
-    const Ticket& ticket = tickets_[done.ticket - first_ticket_];
-    RunJob& job = *ticket.job;
-    job.results[ticket.window][ticket.axis] = axis_result(std::move(done.solution));
-    if (--job.missing == 0) {
-      pool_.submit([this, job = ticket.job] {
-        prepare(*job, rules_);
-        wake();
-      });
-    }
-  }
-
-  Status write(RunJob& job) {
-    Result<std::string> text = writer_.write(job);
-    if (!text) {
-      return tl::unexpected(text.error());
-    }
-    put(text_of(job.piece), std::move(*text));
-    report_->solver_iterations += job.iterations;
-    nodes_queued_ -= nodes_of(job);
-    gaps_.take(job);
-    if (!engine_) {
-      const std::size_t tickets = 2 * job.spans.size();
-      tickets_.erase(tickets_.begin(), tickets_.begin() + static_cast<std::ptrdiff_t>(tickets));
-      first_ticket_ += tickets;
-    }
-    progress_->update("compensating", input_bytes_ > 0.0
-                                          ? static_cast<double>(bytes_written_) / input_bytes_
-                                          : -1.0);
-    return {};
-  }
-
-  void put(std::string input, std::string output) {
-    bytes_written_ += input.size();
-    if (job_.output_fd >= 0) {
-      // How long the print takes is not known yet.
-      output = scaled_lines(output, writer_.time_factor());
-    }
-    *output_ << output;
-    verifier_.push(std::move(input), std::move(output));
-  }
-
-  // Has the probes solved by the second engine.
-  Status check_engine() {
-    for (std::size_t i = 0; i < gaps_.probes().size(); ++i) {
-      // Windows of runs that failed have none.
-      if (!gaps_.probes()[i].solution.base.position_mm.empty()) {
-        processes_->submit(i, gaps_.probes()[i].problem);
-      }
-    }
-    const CpuSlot::Without without(*slots_);
-    while (processes_->under_way() > 0) {
-      if (std::optional<WorkerPool::Done> done =
-              processes_->take(static_cast<int>(kPatience.count()))) {
-        if (done->solution) {
-          GapCheck::compare(gaps_.probes()[done->ticket], *done->solution, report_->solver_check);
-        }
-      }
-      if (progress_->cancelled()) {
-        return fail(ErrorKind::internal, "cancelled");
-      }
-    }
-    return {};
-  }
-
-  Status finish_verification() {
-    const CpuSlot::Without without(*slots_);
-    Result<verify::VerifyReport> verified = verifier_.result();
-    if (!verified) {
-      return tl::unexpected(verified.error());
-    }
-    add_verification(*verified, recorder_.get(), *report_);
-    return {};
-  }
-
-  // Which solution a number given to the processes stands for.
-  struct Ticket {
-    std::shared_ptr<RunJob> job;
-    std::size_t window;
-    std::size_t axis;
-  };
-
-  const Job& job_;
-  bool checks_;
-  RunRules rules_;
-  WorkerPool* processes_;
-  std::ostream* output_;
-  Progress* progress_;
-  CpuSlots* slots_;
-  report::Report* report_;
-  RunWriter writer_;
-  GapCheck gaps_;
-  // The nozzle where the reader is, if every run before was compensated: what motion left as it is
-  // has set ringing, the next run starts with.
-  dynamics::NozzleXY nozzle_;
-  std::deque<std::shared_ptr<RunJob>> queue_;
-  std::size_t nodes_queued_ = 0;
-  std::deque<Ticket> tickets_;    // of the windows of queue_
-  std::size_t first_ticket_ = 0;  // number of tickets_' front
-  double input_bytes_;            // 0: not known
-  std::size_t bytes_written_ = 0;
-  bool all_read_ = false;
-  std::mutex mutex_;
-  std::condition_variable news_;                // a piece has been read or a run been prepared
-  std::unique_ptr<compensate::Engine> engine_;  // in threads; otherwise the processes solve
-  // Last, so that threads end before what they use.
-  PieceThread pieces_;
-  std::unique_ptr<record::Recorder> recorder_;  // none where nobody asks
-  VerifyThread verifier_;
-  TaskPool pool_;
-};
+// Over a print of which runs turn out to break rules; each leaves those as they were sliced.
+constexpr int kMostPasses = 5;
 
 Engines engines_of(EngineChoice choice) {
   switch (choice) {
@@ -411,6 +39,67 @@ std::string name_of(const Engines& engines) {
   return engines.second ? fmt::format("{}, checked by {}", name, engines.second()->name()) : name;
 }
 
+tl::unexpected<Error> disk_full(const Job& job) {
+  return fail(ErrorKind::internal, {job.output_name, 0},
+              "cannot write the output; is the disk full?");
+}
+
+PassOutcome failed(tl::unexpected<Error> error) { return {std::move(error), {}}; }
+
+// Opens what the job names and goes over it once.
+PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verify::BlamedRun>& kept,
+                 Progress& progress, report::Report& report) {
+  // Before there is any thread.
+  Result<WorkerPool> processes =
+      WorkerPool::start(engines.threaded ? (engines.second ? 1 : 0) : job.workers, engines.second);
+  if (!processes) {
+    return failed(tl::unexpected(processes.error()));
+  }
+  CpuSlots slots(job.workers);
+  FdSource source(job, progress, slots);
+  FdSink sink(job, progress, slots);
+  std::istream in_stream(&source);
+  std::ostream out_stream(&sink);
+  std::ifstream in_file;
+  std::ofstream out_file;
+  if (job.input_fd < 0) {
+    in_file.open(job.input, std::ios::binary);
+  }
+  if (job.output_fd < 0) {
+    out_file.open(job.output, std::ios::binary | std::ios::trunc);
+  }
+  if (!in_file) {
+    return failed(fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file"));
+  }
+  if (!out_file) {
+    return failed(fail(ErrorKind::internal, {job.output_name, 0}, "cannot write the output"));
+  }
+  std::istream& input = job.input_fd < 0 ? in_file : in_stream;
+  std::ostream& output = job.output_fd < 0 ? out_file : out_stream;
+  PassOutcome outcome =
+      compensate_pass(job, engines, kept, {input, output, *processes, slots}, progress, report);
+  if (outcome.status) {
+    sink.finish();
+  }
+  if (sink.error() != 0) {
+    return failed(fail(ErrorKind::internal,
+                       {job.output_name == "-" ? "stdout" : job.output_name, 0},
+                       fmt::format("cannot write: {}", write_error_text(sink.error()))));
+  }
+  if (!outcome.status) {
+    outcome.status = tl::unexpected(source.error().value_or(outcome.status.error()));
+    return outcome;
+  }
+  output.flush();
+  if (!output) {
+    return failed(disk_full(job));
+  }
+  return outcome;
+}
+
+// Whether the output can be written once more.
+bool can_repeat(const Job& job) { return job.input_fd < 0 && job.output_fd < 0; }
+
 }  // namespace
 
 Result<report::Report> compensate(const Job& job, Progress& progress) {
@@ -419,62 +108,29 @@ Result<report::Report> compensate(const Job& job, Progress& progress) {
 
 Result<report::Report> compensate_with(const Job& job, const Engines& engines, Progress& progress) {
   const auto begin = std::chrono::steady_clock::now();
-  report::Report report = new_report("compensate", job);
-  report.solver_engine = name_of(engines);
-  {
-    // Before there is any thread.
-    Result<WorkerPool> pool = WorkerPool::start(
-        engines.threaded ? (engines.second ? 1 : 0) : job.workers, engines.second);
-    if (!pool) {
-      return tl::unexpected(pool.error());
+  std::vector<verify::BlamedRun> kept;
+  for (int number = 1;; ++number) {
+    report::Report report = new_report("compensate", job);
+    report.solver_engine = name_of(engines);
+    PassOutcome outcome = pass(job, engines, kept, progress, report);
+    if (!outcome.blamed.empty() && number < kMostPasses && can_repeat(job) &&
+        !progress.cancelled()) {
+      std::ranges::move(outcome.blamed, std::back_inserter(kept));
+      continue;
     }
-    CpuSlots slots(job.workers);
-    FdSource source(job, progress, slots);
-    FdSink sink(job, progress, slots);
-    std::istream in_stream(&source);
-    std::ostream out_stream(&sink);
-    std::ifstream in_file;
-    std::ofstream out_file;
-    if (job.input_fd < 0) {
-      in_file.open(job.input, std::ios::binary);
+    if (!outcome.status) {
+      return tl::unexpected(outcome.status.error());
     }
-    if (job.output_fd < 0) {
-      out_file.open(job.output, std::ios::binary | std::ios::trunc);
+    if (report.reference_time_s > 0.0 && job.output_fd < 0) {
+      const double factor = report.emitted_time_s / report.reference_time_s;
+      if (Status status = retime(job.output, job.output_name, factor); !status) {
+        return tl::unexpected(status.error());
+      }
+      report.output_bytes = std::filesystem::file_size(job.output);
     }
-    if (!in_file) {
-      return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
-    }
-    if (!out_file) {
-      return fail(ErrorKind::internal, {job.output_name, 0}, "cannot write the output");
-    }
-    std::ostream& output = job.output_fd < 0 ? out_file : out_stream;
-    Compensator compensator(job, engines, *pool, job.input_fd < 0 ? in_file : in_stream, output,
-                            progress, slots, report);
-    const Status status = compensator.work();
-    if (status) {
-      sink.finish();
-    }
-    if (sink.error() != 0) {
-      return fail(ErrorKind::internal, {job.output_name == "-" ? "stdout" : job.output_name, 0},
-                  fmt::format("cannot write: {}", write_error_text(sink.error())));
-    }
-    if (!status) {
-      return tl::unexpected(source.error().value_or(status.error()));
-    }
-    output.flush();
-    if (!output) {
-      return disk_full(job);
-    }
+    add_performance(begin, report);
+    return report;
   }
-  if (report.reference_time_s > 0.0 && job.output_fd < 0) {
-    const double factor = report.emitted_time_s / report.reference_time_s;
-    if (Status status = retime(job.output, job.output_name, factor); !status) {
-      return tl::unexpected(status.error());
-    }
-    report.output_bytes = std::filesystem::file_size(job.output);
-  }
-  add_performance(begin, report);
-  return report;
 }
 
 }  // namespace unflex::pipeline

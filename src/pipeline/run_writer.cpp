@@ -84,6 +84,7 @@ Result<std::string> RunWriter::write(const RunJob& job) {
     last_lines_.clear();
     late_s_ = 0.0;
     run_stands_ = false;
+    run_line_ = piece.moves.front().segment.line;
   }
   std::optional<std::string> failure =
       run_stands_ ? "the run's beginning stands as it is" : write_run(job, text);
@@ -92,6 +93,7 @@ Result<std::string> RunWriter::write(const RunJob& job) {
     failure = insist(job, text);
     if (failure) {
       const std::size_t line = piece.events.front().line.number;
+      blocked_ = {run_line_, piece.moves.back().segment.line, *failure};
       return fail(ErrorKind::input, {input_name_, line},
                   fmt::format("up to line {} the print cannot be compensated, and it does not stop "
                               "before: {}; print it as it was sliced",

@@ -27,6 +27,9 @@ class RunWriter {
   // What follows the last piece.
   [[nodiscard]] std::string finish();
 
+  // The run whose parts could not be gone on with, so far.
+  [[nodiscard]] const std::optional<verify::BlamedRun>& blocked() const { return blocked_; }
+
   // How much longer what has been written takes than it would have.
   [[nodiscard]] double time_factor() const {
     return sliced_s_ > 0.0 ? written_s_ / sliced_s_ : 1.0;
@@ -53,12 +56,14 @@ class RunWriter {
   // The last lines that were kept, where the printer passes from them into what follows.
   std::vector<gcode::Segment> kept_lines_;
   std::optional<gcode::Position> machine_mm_;  // where the last move led that the firmware made
-  dynamics::NozzleXY nozzle_;               // as it really swings after what has been written
-  verify::RunDeviation before_;             // of the run at hand, if it were left as it is
-  verify::LineRate line_rate_;              // of what has been written
-  std::vector<gcode::Segment> last_lines_;  // of the part before, of a run in parts
-  double late_s_ = 0.0;                     // by how much it ended late
-  bool run_stands_ = false;                 // the first part of the run at hand stands as it is
+  dynamics::NozzleXY nozzle_;                  // as it really swings after what has been written
+  verify::RunDeviation before_;                // of the run at hand, if it were left as it is
+  verify::LineRate line_rate_;                 // of what has been written
+  std::vector<gcode::Segment> last_lines_;     // of the part before, of a run in parts
+  double late_s_ = 0.0;                        // by how much it ended late
+  bool run_stands_ = false;                    // the first part of the run at hand stands as it is
+  std::size_t run_line_ = 0;                   // where it begins
+  std::optional<verify::BlamedRun> blocked_;
   EmissionCost cost_;
   PathError robust_;
   PathError nominal_;

@@ -102,6 +102,12 @@ bool Replay::next_resting(planner::PlannedMove& move) {
   return true;
 }
 
+double Replay::filament_factor() const {
+  const double read = interpreter_.state().filament_factor();
+  const std::optional<Regime>& begun = section().regime;
+  return begun ? std::max(begun->modal.filament_factor(), read) : read;
+}
+
 void Replay::next_section() {
   for_each_plan([](PlanQueue& plan) { plan.next_section(); });
   sections_.pop_front();

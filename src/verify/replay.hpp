@@ -86,6 +86,9 @@ class Replay {
 
   // The current section. `compensated` and `regime` of a run are known once has_move() was asked.
   [[nodiscard]] const Section& section() const { return sections_.front(); }
+  // The largest that M221 and M200 make of a mm of E where the current section began and where
+  // reading has come to.
+  [[nodiscard]] double filament_factor() const;
   // The section after the current one, all of whose moves must have been taken.
   [[nodiscard]] const Section& following() const { return sections_[1]; }
   void next_section();

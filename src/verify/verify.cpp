@@ -213,6 +213,7 @@ bool Verifier::next_resting_move(planner::PlannedMove& move) {
     return false;
   }
   rules_of_run_.add_sliced(move);
+  violations_.add_to_run(move.segment.line);
   return true;
 }
 
@@ -231,6 +232,7 @@ void Verifier::begin_section(bool compensated) {
   path_.begin_section();
   original_.begin_section(path_);
   if (compensated) {
+    violations_.begin_run();
     // Far from the run before, which is not the path that leads here.
     run_path_.rest(kApart_s);
     run_path_.begin_section(rules_.lead_in_s);
@@ -399,17 +401,13 @@ void Verifier::finish_reference() {
 
 // A step of E is as much filament as M221 makes of it.
 double Verifier::filament_tolerance_mm() const {
-  double factor = output_.following().regime->modal.filament_factor();
-  if (output_.section().regime.has_value()) {
-    factor = std::max(factor, output_.section().regime->modal.filament_factor());
-  }
   // Marlin lays the filament of a move that is too short for it with the next one, which may be
   // after the run.
   const planner::FirmwareConfig& firmware = rules_.fixed;
   const double too_short_mm = firmware.firmware == Firmware::marlin
                                   ? firmware.min_steps_per_segment / firmware.steps_per_mm[gcode::E]
                                   : 0.0;
-  return too_short_mm + kFilamentTolerance_mm * std::max(1.0, factor);
+  return too_short_mm + kFilamentTolerance_mm * std::max(1.0, output_.filament_factor());
 }
 
 void Verifier::check_run(bool compensated) {
@@ -533,6 +531,7 @@ VerifyReport Verifier::report() {
   report.output_bytes = output_.reader().bytes_read();
   report.violation_count = violations_.count();
   report.violations = violations_.take();
+  report.blamed_runs = violations_.take_blamed();
   return report;
 }
 

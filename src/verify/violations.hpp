@@ -15,6 +15,17 @@ class Violations {
   Violations(std::string input_name, std::string output_name)
       : input_name_(std::move(input_name)), output_name_(std::move(output_name)) {}
 
+  // A compensated run begins; until the next one does, what is broken is blamed on it.
+  void begin_run() {
+    settle();
+    run_ = {};
+  }
+  // A line of the sliced file that belongs to the run.
+  void add_to_run(std::size_t line) {
+    run_.first_line = run_.first_line == 0 ? line : run_.first_line;
+    run_.last_line = line;
+  }
+
   void in_output(std::size_t line, std::string message) {
     add({output_name_, line}, std::move(message));
   }
@@ -25,14 +36,27 @@ class Violations {
 
   [[nodiscard]] std::size_t count() const { return count_; }
   [[nodiscard]] std::vector<Violation> take() { return std::move(kept_); }
+  [[nodiscard]] std::vector<BlamedRun> take_blamed() {
+    begin_run();
+    return std::move(blamed_);
+  }
 
  private:
   static constexpr std::size_t kKept = 100;
 
   void add(SourcePlace place, std::string message) {
     ++count_;
+    if (run_.reason.empty()) {
+      run_.reason = message;
+    }
     if (kept_.size() < kKept) {
       kept_.push_back({std::move(place), std::move(message)});
+    }
+  }
+
+  void settle() {
+    if (run_.first_line != 0 && !run_.reason.empty()) {
+      blamed_.push_back(std::move(run_));
     }
   }
 
@@ -40,6 +64,8 @@ class Violations {
   std::string output_name_;
   std::vector<Violation> kept_;
   std::size_t count_ = 0;
+  BlamedRun run_;  // the present one
+  std::vector<BlamedRun> blamed_;
 };
 
 }  // namespace unflex::verify

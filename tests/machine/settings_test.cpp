@@ -24,6 +24,14 @@ Settings read(std::string_view text, const std::vector<std::string>& overrides =
   return settings.value_or(Settings{});
 }
 
+// Found by fuzzing: it was written as -0 and read again as 0.
+TEST(Settings, HoldNoZeroWithASign) {
+  const Result<Settings> settings =
+      parse("[printer]\nunretract_extra_length_mm = -0.0\n", "printer.toml", {});
+  ASSERT_TRUE(settings.has_value());
+  EXPECT_FALSE(std::signbit(settings->printer.unretract_extra_length_mm));
+}
+
 std::string origin(const Settings& settings, std::string_view key) {
   for (const auto& [name, from] : settings.origins) {
     if (name == key) {

@@ -47,6 +47,14 @@ struct Violation {
   std::string message;
 };
 
+// A compensated run that broke a rule, or after which one was found broken, by its lines in the
+// sliced file.
+struct BlamedRun {
+  std::size_t first_line = 0;
+  std::size_t last_line = 0;
+  std::string reason;  // the first
+};
+
 // What another nozzle on the same two bases does.
 struct Detuned {
   Deviation uncompensated;
@@ -80,8 +88,9 @@ struct VerifyReport {
   std::size_t runs = 0;            // compensated ones
   std::size_t output_lines = 0;
   std::size_t output_bytes = 0;
-  std::vector<Violation> violations;  // at most 100 are kept …
-  std::size_t violation_count = 0;    // … all are counted
+  std::vector<Violation> violations;   // at most 100 are kept …
+  std::size_t violation_count = 0;     // … all are counted
+  std::vector<BlamedRun> blamed_runs;  // in order; empty where nothing was compensated before
 };
 
 // The first hard rule that `base`, the replayed moves of one compensated run, breaks: the base's
@@ -98,11 +107,11 @@ struct VerifyReport {
 // position outside the travel (and further out than the input itself goes); base velocity or
 // acceleration above its limit (by more than 0.1 % and than the rounding of coordinates explains);
 // more lines per second than the budget and than the sliced file has there; a base further from
-// the path than the machine bends; filament laid after the plan of a run has ended; a nozzle that strays
-// more than in the sliced file; a move the firmware refuses (extrusion ratio); limits, modes or
-// shaper not restored. Where the sequence
-// of stops differs, nothing can be compared any further; the figures are then of what came before.
-// Nothing but VerifyReport::detuned depends on the observation.
+// the path than the machine bends; filament laid after the plan of a run has ended; a nozzle that
+// strays more than in the sliced file; a move the firmware refuses (extrusion ratio); limits, modes
+// or shaper not restored. Where the sequence of stops differs, nothing can be compared any further;
+// the figures are then of what came before. Nothing but VerifyReport::detuned depends on the
+// observation.
 [[nodiscard]] Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
                                           std::istream& output, const std::string& output_name,
                                           const Rules& rules, Progress& progress,

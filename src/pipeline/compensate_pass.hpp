@@ -1,0 +1,39 @@
+// One pass over a print: reads pieces, has runs worked on, writes them in order, verifies.
+#pragma once
+
+#include <istream>
+#include <ostream>
+#include <vector>
+
+#include "compensate_with.hpp"
+#include "cpu_slots.hpp"
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/report/report.hpp"
+#include "unflex/verify/verify.hpp"
+#include "worker_pool.hpp"
+
+namespace unflex::pipeline {
+
+// What a pass works with; all must outlive it.
+struct PassStreams {
+  std::istream& input;
+  std::ostream& output;
+  WorkerPool& processes;
+  CpuSlots& slots;
+};
+
+struct PassOutcome {
+  Status status;
+  // Runs with which the result breaks rules, and one whose parts could not be gone on with.
+  std::vector<verify::BlamedRun> blamed;
+};
+
+// kept: runs that are left as they were sliced.
+[[nodiscard]] PassOutcome compensate_pass(const Job& job, const Engines& engines,
+                                          const std::vector<verify::BlamedRun>& kept,
+                                          const PassStreams& streams, Progress& progress,
+                                          report::Report& report);
+
+}  // namespace unflex::pipeline
