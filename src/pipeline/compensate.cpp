@@ -39,11 +39,6 @@ std::string name_of(const Engines& engines) {
   return engines.second ? fmt::format("{}, checked by {}", name, engines.second()->name()) : name;
 }
 
-tl::unexpected<Error> disk_full(const Job& job) {
-  return fail(ErrorKind::internal, {job.output_name, 0},
-              "cannot write the output; is the disk full?");
-}
-
 PassOutcome failed(tl::unexpected<Error> error) { return {std::move(error), {}}; }
 
 // Opens what the job names and goes over it once.

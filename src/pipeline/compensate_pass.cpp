@@ -66,9 +66,13 @@ double input_bytes(const Job& job) {
   return unknown ? 0.0 : static_cast<double>(bytes);
 }
 
-tl::unexpected<Error> disk_full(const Job& job) {
-  return fail(ErrorKind::internal, {job.output_name, 0},
-              "cannot write the output; is the disk full?");
+// What has been passed on cannot be written once more with a run left as it was.
+verify::Rules rules_of_pass(const Job& job) {
+  verify::Rules rules = verify_rules(job.settings);
+  if (job.output_fd >= 0) {
+    rules.leeway = {2.2, 5e-3, 30e-3};
+  }
+  return rules;
 }
 
 // Reads pieces, has runs worked on, and writes them in order. All of it in the calling thread but
@@ -81,7 +85,7 @@ class Compensator {
         kept_(kept),
         checks_(engines.threaded && engines.second),
         rules_{compensate_setup(job.settings), emit_options(job.settings, UNFLEX_VERSION),
-               verify_rules(job.settings)},
+               rules_of_pass(job)},
         processes_(&streams.processes),
         output_(&streams.output),
         progress_(&progress),
@@ -180,7 +184,7 @@ class Compensator {
       const std::size_t nodes = job->grid.count;
       const double accel = largest_axis_accel(piece.moves);
       if (const verify::BlamedRun* const known = blamed_before(piece)) {
-        job->failure = fmt::format("when it was verified: {}", known->reason);
+        job->failure = known->reason;
       } else if (accel > rules_.verify.base_max_accel_mm_s2) {
         job->failure = fmt::format(
             "the plan itself accelerates an axis by {:.0f} mm/s², more than base.max_accel_mm_s2",
@@ -372,6 +376,9 @@ class Compensator {
     }
     add_verification(*verified, recorder_.get(), *report_);
     blamed_ = std::move(verified->blamed_runs);
+    for (verify::BlamedRun& run : blamed_) {
+      run.reason = fmt::format("when it was verified: {}", run.reason);
+    }
     return {};
   }
 
@@ -415,6 +422,11 @@ class Compensator {
 };
 
 }  // namespace
+
+tl::unexpected<Error> disk_full(const Job& job) {
+  return fail(ErrorKind::internal, {job.output_name, 0},
+              "cannot write the output; is the disk full?");
+}
 
 PassOutcome compensate_pass(const Job& job, const Engines& engines,
                             const std::vector<verify::BlamedRun>& kept, const PassStreams& streams,

@@ -93,10 +93,12 @@ Result<std::string> RunWriter::write(const RunJob& job) {
     failure = insist(job, text);
     if (failure) {
       const std::size_t line = piece.events.front().line.number;
-      blocked_ = {run_line_, piece.moves.back().segment.line, *failure};
+      blocked_ = {run_line_, piece.moves.back().segment.line,
+                  fmt::format("at line {}: {}", line, *failure)};
       return fail(ErrorKind::input, {input_name_, line},
                   fmt::format("up to line {} the print cannot be compensated, and it does not stop "
-                              "before: {}; print it as it was sliced",
+                              "before: {}; write to a file, where all of it can be left as it was "
+                              "sliced",
                               piece.events.back().line.number, *failure));
     }
   }

@@ -16,18 +16,11 @@ constexpr double kRounding_mm = 0.05;
 constexpr double kLate_mm = 5e-4;
 // Lines that tell how much filament there is on a way are longer.
 constexpr double kShort_mm = 0.2;
-// What the nozzle may stray more than if the run had been kept, by whichever is more. When a run is
-// written it may not stray more at all; this leaves room for the steps it is sampled in then, and
-// for parts of long runs, which may be a little worse.
-constexpr double kTimes = 1.25;
-constexpr double kTimesInParts = 2.2;
-constexpr double kParted_s = 60.0;
-constexpr double kBearableRms_mm = 5e-3;
-constexpr double kBearable_mm = 30e-3;
-// How it swings in a tail is not looked at when a run is written.
-constexpr double kBearableSwing_mm = 80e-3;
-
-double bearable_times(double duration_s) { return duration_s < kParted_s ? kTimes : kTimesInParts; }
+// Lines may lay more than on the densest way, by what their lengths are rounded to.
+constexpr double kDenser = 1.25;
+// How it swings in a tail, where it lays nothing, is another matter.
+constexpr double kTimesInTail = 2.2;
+constexpr double kLittleSwing_mm = 80e-3;
 
 double speed_mm_s(const planner::PlannedMove& move) {
   return move.duration_s() > 0.0 ? move.segment.length_xy_mm() / move.duration_s() : 0.0;
@@ -53,7 +46,6 @@ void SectionRules::Breach::offer(double a_value, double limit, std::size_t a_lin
 
 void SectionRules::begin(const LineRate& rate_before, bool ringing) {
   ringing_ = ringing;
-  duration_s_ = 0.0;
   densest_ = 0.0;
   sliced_rate_ = rate_before;
   sliced_rate_.forget();
@@ -70,7 +62,6 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
   const std::size_t line = move.segment.line;
   first_line_ = first_line_ == 0 ? line : first_line_;
   last_line_ = line;
-  duration_s_ += move.duration_s();
   offset_.offer(meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), line);
   // Where along its way a wipe pulls filament back does not matter.
   const double filament_mm = std::max(0.0, move.segment.delta(gcode::E));
@@ -81,7 +72,7 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
     // A run whose clock is late has some of its way still to go.
     const double to_go_mm = meter.to_path_end_mm(move.segment.start_mm);
     filament_in_tail_.offer(filament_mm,
-                            kLate_mm + filament_tolerance_mm + kTimes * densest_ * to_go_mm, line);
+                            kLate_mm + filament_tolerance_mm + kDenser * densest_ * to_go_mm, line);
     const double swing_mm = meter.swing_mm();
     if (swing_mm > swing_in_tail_mm_) {
       swing_in_tail_mm_ = swing_mm;
@@ -92,10 +83,10 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
 
 void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emitted) {
   check_rate(rate);
+  check_nozzle(kept.section_error(), emitted.section_error());
   // The firmware may pass from motion that was kept into the run without a stop. When the run was
   // written it was taken to begin at rest, so that how it rings is not known as exactly.
   if (!ringing_) {
-    check_nozzle(kept.section_error(), emitted.section_error());
     check_swing(kept, emitted);
   }
   check_filament();
@@ -121,7 +112,7 @@ void SectionRules::check_swing(const Meter& kept, const Meter& emitted) {
     swing_line_ = last_line_;
   }
   const double kept_mm = kept.swing_mm();
-  if (swing_in_tail_mm_ > std::max(kTimesInParts * kept_mm, kBearableSwing_mm)) {
+  if (swing_in_tail_mm_ > std::max(kTimesInTail * kept_mm, kLittleSwing_mm)) {
     violations_->in_output(
         swing_line_, fmt::format("in the tail of a run the nozzle swings by {:.3f} µm instead of "
                                  "{:.3f} µm as sliced",
@@ -139,9 +130,9 @@ void SectionRules::check_rate(const LineRate& rate) {
 }
 
 void SectionRules::check_nozzle(const SectionError& kept, const SectionError& emitted) {
-  const double times = bearable_times(duration_s_);
-  if (emitted.rms_mm() > std::max(times * kept.rms_mm(), kBearableRms_mm) ||
-      emitted.max_mm() > std::max(times * kept.max_mm(), kBearable_mm)) {
+  const Leeway& leeway = rules_->leeway;
+  if (emitted.rms_mm() > std::max(leeway.times * kept.rms_mm(), leeway.rms_mm) ||
+      emitted.max_mm() > std::max(leeway.times * kept.max_mm(), leeway.max_mm)) {
     violations_->in_output(
         first_line_,
         fmt::format("in this run the nozzle strays more than in the sliced file (line {}): contour "

@@ -46,7 +46,6 @@ class SectionRules {
   Violations* violations_;
   LineRate sliced_rate_;
   bool ringing_ = false;
-  double duration_s_ = 0.0;
   double densest_ = 0.0;  // most filament on a way, mm/mm
   std::size_t first_line_ = 0;
   std::size_t last_line_ = 0;

@@ -27,6 +27,14 @@ struct TravelLimits {
   bool y_min_assumed = false;
 };
 
+// By how much the nozzle may stray more in a compensated run than if that had been kept, by
+// whichever is more. There is a little for the steps in which the two are sampled.
+struct Leeway {
+  double times = 1.02;
+  double rms_mm = 0.5e-3;
+  double max_mm = 3e-3;
+};
+
 struct Rules {
   gcode::InterpreterOptions interpreter;
   planner::Limits limits;
@@ -38,6 +46,7 @@ struct Rules {
   double base_max_velocity_mm_s = 600.0;
   double base_max_accel_mm_s2 = 20000.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
+  Leeway leeway;
   double lead_in_s = 0.0;  // by which compensated runs start before their plan
 };
 
