@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# install_packages.sh [--tests | --fuzz]
+# install_packages.sh [--tests | --fuzz | --coverage]
 #
 # Installs what unflex is built from, on Debian 12, and with --tests what its tests need as well,
-# with --fuzz what sanitizers and fuzzing need besides.
+# with --fuzz what sanitizers and fuzzing need besides, with --coverage what counting lines does.
 # Does nothing where all is installed; otherwise it needs root or sudo.
 set -euo pipefail
 
@@ -29,6 +29,8 @@ if [[ ${1:-} == --tests ]]; then
   packages+=("${test_packages[@]}")
 elif [[ ${1:-} == --fuzz ]]; then
   packages+=("${test_packages[@]}" "${fuzz_packages[@]}")
+elif [[ ${1:-} == --coverage ]]; then
+  packages+=("${test_packages[@]}" gcovr)
 fi
 
 if ! command -v dpkg-query >/dev/null; then

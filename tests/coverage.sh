@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# coverage.sh [CTEST OPTION]...
+#
+# Builds unflex and its tests into build-coverage/ so that they count which lines run, runs the tests but
+# for whole sample prints, of which cuts run the same code, and lists how much of each file of src/ and
+# include/ they reached. Fails where that is less than 90 % of all lines.
+set -euo pipefail
+
+root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
+build=$root/build-coverage
+
+whole_prints='RealPrint|WholePrint|DialectPrint|All/Sample\.|FirstTwentyLayers'
+
+"$root/cmake/install_packages.sh" --coverage
+
+if [[ ! -e $build/CMakeCache.txt ]]; then
+  cmake -G Ninja -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=Debug -DUNFLEX_TESTS=ON \
+    -DCMAKE_CXX_FLAGS="--coverage -fprofile-update=atomic" -DCMAKE_CXX_FLAGS_DEBUG="-O1"
+fi
+cmake --build "$build" --parallel "$(nproc)"
+
+find "$build" -name '*.gcda' -delete
+ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" \
+  --exclude-regex "$whole_prints" "$@"
+
+gcovr --root "$root" --object-directory "$build" --filter "$root/src/" --filter "$root/include/" \
+  --exclude-unreachable-branches --sort-uncovered --fail-under-line 90 --print-summary
