@@ -40,12 +40,6 @@ ExitCode judge(const RunConfig& config, bool passed_on, const report::Report& re
   return ExitCode::done;
 }
 
-// A print that was changed meanwhile explains whatever else went wrong.
-Status check_inputs(const Workspace& space) {
-  return space.input.check_unchanged().and_then(
-      [&] { return space.compensated ? space.compensated->check_unchanged() : Status{}; });
-}
-
 // Both or none: where there is no room for the report, the output must not be there either. The
 // last moment to see that a print to be replaced is still the one that was read.
 Status deliver_output(Workspace& space, std::string_view report) {

@@ -39,6 +39,9 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
   }
   Result<pipeline::Inspection> inspection =
       with_progress(config, [&](Progress& progress) { return pipeline::inspect(*job, progress); });
+  if (const Status unchanged = check_inputs(*space); !unchanged) {
+    return tl::unexpected(unchanged.error());
+  }
   if (!inspection) {
     return tl::unexpected(inspection.error());
   }
@@ -71,6 +74,9 @@ Result<study::Outcome> study_outcome(const RunConfig& config, std::optional<Work
   }
   Result<study::Outcome> outcome = with_progress(
       config, [&](Progress& progress) { return pipeline::study_print(*job, traces, progress); });
+  if (const Status unchanged = check_inputs(*print); !unchanged) {
+    return tl::unexpected(unchanged.error());
+  }
   if (outcome) {
     outcome->printer = settings_in_force(print->settings);
     add_setting_warnings(print->settings, outcome->warnings);

@@ -114,6 +114,11 @@ Result<Workspace> prepare(const RunConfig& config) {
   return space;
 }
 
+Status check_inputs(const Workspace& space) {
+  return space.input.check_unchanged().and_then(
+      [&] { return space.compensated ? space.compensated->check_unchanged() : Status{}; });
+}
+
 Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   pipeline::Job job;
   job.input = space.input.path();

@@ -26,6 +26,9 @@ struct Workspace {
 // Opens the prints, the output and the report, and reads the settings.
 [[nodiscard]] Result<Workspace> prepare(const RunConfig& config);
 
+// A print that was changed meanwhile explains whatever else went wrong.
+[[nodiscard]] Status check_inputs(const Workspace& space);
+
 // The same as the pipeline wants it.
 [[nodiscard]] Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space);
 

@@ -11,10 +11,10 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <system_error>
 #include <utility>
 
 #include "gap_check.hpp"
+#include "input_bytes.hpp"
 #include "nozzle_motion.hpp"
 #include "piece_thread.hpp"
 #include "report_rows.hpp"
@@ -56,14 +56,6 @@ std::string text_of(const Piece& piece) {
     text += event.line.text;
   }
   return text;
-}
-
-// 0 where it is not known: of a stream, or a file whose name is gone since it was opened.
-double input_bytes(const Job& job) {
-  std::error_code unknown;
-  const std::uintmax_t bytes =
-      job.input_fd < 0 ? std::filesystem::file_size(job.input, unknown) : 0;
-  return unknown ? 0.0 : static_cast<double>(bytes);
 }
 
 // What has been passed on cannot be written once more with a run left as it was.
@@ -329,9 +321,8 @@ class Compensator {
       tickets_.erase(tickets_.begin(), tickets_.begin() + static_cast<std::ptrdiff_t>(tickets));
       first_ticket_ += tickets;
     }
-    progress_->update("compensating", input_bytes_ > 0.0
-                                          ? static_cast<double>(bytes_written_) / input_bytes_
-                                          : -1.0);
+    progress_->update("compensating",
+                      share_of_input(static_cast<double>(bytes_written_), input_bytes_));
     return {};
   }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "cpu_slots.hpp"
+#include "input_bytes.hpp"
 #include "piece_reader.hpp"
 #include "piece_thread.hpp"
 #include "stage_options.hpp"
@@ -199,7 +200,7 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
   if (!input) {
     return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
   }
-  const double bytes = static_cast<double>(std::filesystem::file_size(job.input));
+  const double bytes = input_bytes(job);
   const compensate::Setup setup = compensate_setup(job.settings);
   Inspection result;
   Inspector inspector(result, job.settings);
@@ -210,7 +211,7 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
     for (const std::unique_ptr<Piece>& piece : read) {
       inspector.add(*piece, setup);
     }
-    progress.update("reading", static_cast<double>(result.bytes) / bytes);
+    progress.update("reading", share_of_input(static_cast<double>(result.bytes), bytes));
     if (progress.cancelled()) {
       return fail(ErrorKind::internal, "cancelled");
     }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "input_bytes.hpp"
 #include "piece_reader.hpp"
 #include "stage_options.hpp"
 
@@ -42,7 +43,7 @@ Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progre
   if (!input) {
     return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
   }
-  const double bytes = static_cast<double>(std::filesystem::file_size(job.input));
+  const double bytes = input_bytes(job);
   PieceReader reader(input, job.input_name, interpreter_options(job.settings),
                      planner_limits(job.settings), firmware_config(job.settings));
   const study::BenchSetup setup = bench_setup(job.settings);
@@ -82,7 +83,7 @@ Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progre
       batch.clear();
       batch_s = 0.0;
     }
-    progress.update("studying", static_cast<double>(reader.bytes_read()) / bytes);
+    progress.update("studying", share_of_input(static_cast<double>(reader.bytes_read()), bytes));
     if (progress.cancelled()) {
       return fail(ErrorKind::internal, "cancelled");
     }

@@ -134,6 +134,16 @@ TEST_P(WhileItIsRead, AChangedPrintIsNotCompensated) {
   }
 }
 
+TEST_P(WhileItIsRead, AChangedPrintIsNotInspected) {
+  write_file(path("in.gcode"), squares(60'000));
+  const Outcome outcome = run_with_change({"inspect", "in.gcode", "--report", "new.json"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err, GetParam().message);
+  EXPECT_EQ(outcome.out, "");
+  fs::remove(path("in.gcode"));
+  EXPECT_THAT(names(), ElementsAre("out.gcode"));
+}
+
 const std::string kChanged = "in.gcode: changed while it was worked on; run unflex again\n";
 
 INSTANTIATE_TEST_SUITE_P(

@@ -1,0 +1,25 @@
+// How much there is to read, for progress.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <system_error>
+
+#include "unflex/pipeline/pipeline.hpp"
+
+namespace unflex::pipeline {
+
+// 0 where it is not known: of a stream, or a file whose name is gone since it was opened.
+[[nodiscard]] inline double input_bytes(const Job& job) {
+  std::error_code unknown;
+  const std::uintmax_t bytes =
+      job.input_fd < 0 ? std::filesystem::file_size(job.input, unknown) : 0;
+  return unknown ? 0.0 : static_cast<double>(bytes);
+}
+
+// Progress is unknown where the size is.
+[[nodiscard]] inline double share_of_input(double done_bytes, double input_bytes) {
+  return input_bytes > 0.0 ? done_bytes / input_bytes : -1.0;
+}
+
+}  // namespace unflex::pipeline
