@@ -8,23 +8,12 @@
 #include <numbers>
 #include <utility>
 
-#include "filament_ledger.hpp"
-#include "line_check.hpp"
-#include "nozzles.hpp"
-#include "regime_check.hpp"
-#include "replay.hpp"
-#include "run_check.hpp"
-#include "section_rules.hpp"
 #include "unflex/verify/endless.hpp"
-#include "unflex/verify/line_rate.hpp"
-#include "unflex/verify/reference_path.hpp"
-#include "violations.hpp"
+#include "verifier.hpp"
 
 namespace unflex::verify {
 namespace {
 
-// One rounding step of E, and half of one for a remainder carried in.
-constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 // A line inside a compensated run stands this near to its place: the base leads the nozzle, by up
 // to a/ω² when it accelerates, and lines of motion, between which it stands, have a length.
 constexpr double kLeastPlaceTolerance_mm = 0.5;
@@ -62,112 +51,34 @@ NozzleModel coarse(NozzleModel model) {
   return model;
 }
 
-// Type and damping of a shaper that is off are of no effect.
-bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
-  const bool same_x =
-      a.shaper_freq_x_hz == 0.0 ||
-      (a.shaper.type_x == b.shaper.type_x && a.shaper.damping_ratio_x == b.shaper.damping_ratio_x &&
-       a.shaper.custom_words == b.shaper.custom_words);
-  const bool same_y =
-      a.shaper_freq_y_hz == 0.0 ||
-      (a.shaper.type_y == b.shaper.type_y && a.shaper.damping_ratio_y == b.shaper.damping_ratio_y);
-  return a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper_freq_y_hz == b.shaper_freq_y_hz &&
-         same_x && same_y;
-}
-
 Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), meter.all().stats()}; }
 
-// Both files side by side, section by section. `original_` is the nozzle if the sliced file were
-// printed as it is, measured against the plan of the whole file, `path_`. `emitted_` is the nozzle
-// of the emitted file. In compensated runs, which begin and end at rest, it is measured against the
-// plan of the run by itself, `run_path_`: where the sliced file passes from one section into the
-// next at speed, that plan takes some ms longer.
-class Verifier {
- public:
-  Verifier(std::istream& input, const std::string& input_name, std::istream& output,
-           const std::string& output_name, const Rules& rules, Progress& progress,
-           const Observation& observation)
-      : rules_(rules),
-        progress_(&progress),
-        observer_(observation.observer),
-        output_bytes_(stream_bytes(output)),
-        violations_(input_name, output_name),
-        input_(input, input_name, rules.interpreter, rules.limits, rules.fixed, false),
-        output_(output, output_name, rules.interpreter, rules.limits, rules.fixed, true),
-        lines_(input_, output_, place_tolerance_mm(rules), violations_),
-        path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
-        run_path_([this](planner::PlannedMove& move) { return next_resting_move(move); }),
-        original_(rules.nozzle, observation, false),
-        kept_(coarse(rules.nozzle)),
-        emitted_(rules.nozzle, observation, true),
-        base_(rules_, violations_),
-        rules_of_run_(rules_, violations_),
-        input_excursion_(rules_.travel),
-        output_excursion_(rules_.travel) {
-    if (observer_ != nullptr) {
-      input_.on_line([observer = observer_](const gcode::Line& line) { observer->line(line); });
-    }
+}  // namespace
+
+Verifier::Verifier(std::istream& input, const std::string& input_name, std::istream& output,
+                   const std::string& output_name, const Rules& rules, Progress& progress,
+                   const Observation& observation)
+    : rules_(rules),
+      progress_(&progress),
+      observer_(observation.observer),
+      output_bytes_(stream_bytes(output)),
+      violations_(input_name, output_name),
+      input_(input, input_name, rules.interpreter, rules.limits, rules.fixed, false),
+      output_(output, output_name, rules.interpreter, rules.limits, rules.fixed, true),
+      lines_(input_, output_, place_tolerance_mm(rules), violations_),
+      path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
+      run_path_([this](planner::PlannedMove& move) { return next_resting_move(move); }),
+      original_(rules.nozzle, observation, false),
+      kept_(coarse(rules.nozzle)),
+      emitted_(rules.nozzle, observation, true),
+      base_(rules_, violations_),
+      rules_of_run_(rules_, violations_),
+      input_excursion_(rules_.travel),
+      output_excursion_(rules_.travel) {
+  if (observer_ != nullptr) {
+    input_.on_line([observer = observer_](const gcode::Line& line) { observer->line(line); });
   }
-
-  Verifier(const Verifier&) = delete;
-  Verifier& operator=(const Verifier&) = delete;
-
-  Result<VerifyReport> verify();
-
- private:
-  bool next_input_move(planner::PlannedMove& move);
-  bool next_resting_move(planner::PlannedMove& move);
-  bool ends_here(const planner::PlannedMove& move, const Replay& file);
-  void begin_section(bool compensated);
-  void play_run();
-  void skip_added_barriers();
-  void play_run_moves(bool compensated);
-  void play(const planner::PlannedMove& move);
-  void end_section();
-  void let_original_follow(double until_s);
-  void let_kept_follow(double until_s);
-  void finish_reference();
-  [[nodiscard]] double filament_tolerance_mm() const;
-  void check_run(bool compensated);
-  bool sections_agree();
-  void check_regime(const Section& input, const Section& output);
-  void play_kept_line();
-  void hold();
-  void report_progress();
-  [[nodiscard]] VerifyReport report();
-
-  Rules rules_;
-  Progress* progress_;
-  Observer* observer_;
-  double output_bytes_;
-  Violations violations_;
-  Replay input_;
-  Replay output_;
-  LineCheck lines_;
-  ReferencePath path_;
-  ReferencePath run_path_;
-  ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
-  Nozzles original_;
-  // Were the sliced moves of a compensated run kept, from where emitted_ is, against run_path_.
-  Meter kept_;
-  Nozzles emitted_;
-  FilamentLedger filament_;
-  BaseCheck base_;
-  SectionRules rules_of_run_;
-  Excursion input_excursion_;
-  Excursion output_excursion_;
-  bool input_refused_ = false;    // a move of the section is refused by the firmware
-  std::size_t refused_line_ = 0;  // the same in the output; 0: none
-  LineRate rate_;
-  double max_lines_per_s_ = 0.0;
-  double since_kept_motion_s_ = 0.0;
-  std::optional<Error> failure_;   // a move without end
-  std::size_t section_first_ = 0;  // first piece of the path in this section
-  std::size_t original_next_ = 0;  // the one the original plays next
-  std::size_t kept_next_ = 0;      // of run_path_, the one that kept_ plays next
-  std::size_t moves_ = 0;
-  VerifyReport totals_;
-};
+}
 
 Result<VerifyReport> Verifier::verify() {
   for (;;) {
@@ -403,87 +314,6 @@ void Verifier::finish_reference() {
   let_original_follow(std::numeric_limits<double>::infinity());
 }
 
-// A step of E is as much filament as M221 makes of it.
-double Verifier::filament_tolerance_mm() const {
-  // Marlin lays the filament of a move that is too short for it with the next one, which may be
-  // after the run.
-  const planner::FirmwareConfig& firmware = rules_.fixed;
-  const double too_short_mm = firmware.firmware == Firmware::marlin
-                                  ? firmware.min_steps_per_segment / firmware.steps_per_mm[gcode::E]
-                                  : 0.0;
-  return too_short_mm + kFilamentTolerance_mm * std::max(1.0, output_.filament_factor());
-}
-
-void Verifier::check_run(bool compensated) {
-  if (const Excursion::Side* const side = output_excursion_.worse_than(input_excursion_)) {
-    violations_.in_output(
-        side->line, fmt::format("X{:.4f} Y{:.4f} is out of the travel by {:.4f} mm", side->x_mm,
-                                side->y_mm, side->beyond_mm));
-  }
-  if (refused_line_ != 0 && !input_refused_) {
-    violations_.in_output(refused_line_, "the firmware refuses so much filament on so short a way");
-  }
-  const double difference_mm = filament_.output_mm() - filament_.input_mm();
-  if (std::abs(difference_mm) > filament_tolerance_mm()) {
-    violations_.in_output(
-        output_.following().line.number,
-        fmt::format("the run before lays {:.5f} mm of filament instead of {:.5f} mm",
-                    filament_.output_mm(), filament_.input_mm()));
-  }
-  totals_.worst_move_extrusion_error_mm =
-      std::max({totals_.worst_move_extrusion_error_mm, filament_.worst_move_error_mm(),
-                std::abs(difference_mm)});
-  if (compensated) {
-    base_.end_run();
-    rules_of_run_.end(rate_, kept_, emitted_.main());
-    if (path_.end() == section_first_) {
-      violations_.in_output(output_.following().line.number,
-                            "the run before is not in the sliced file");
-    }
-  }
-}
-
-bool Verifier::sections_agree() {
-  const Section& input = input_.section();
-  const Section& output = output_.section();
-  if (input.kind != output.kind || !same_line(input.line, output.line)) {
-    const auto name = [](const Section& section) {
-      return section.kind == SectionKind::end ? std::string("the end of the file")
-                                              : fmt::format("'{}'", section.line.content());
-    };
-    violations_.in_output(
-        output.line.number,
-        fmt::format(
-            "structure differs: {} instead of {} (line {} of the sliced file); not compared "
-            "any further",
-            name(output), name(input), input.line.number));
-    return false;
-  }
-  check_regime(input, output);
-  return true;
-}
-
-void Verifier::check_regime(const Section& input, const Section& output) {
-  const std::size_t line = output.line.number;
-  const Regime& before = *input.regime;
-  const Regime& after = *output.regime;
-  if (const std::string difference = modal_difference(before.modal, after.modal);
-      !difference.empty()) {
-    violations_.in_output(line, fmt::format("state before this line: {}", difference));
-  }
-  if (const std::string difference = limits_difference(before.limits, after.limits);
-      !difference.empty()) {
-    violations_.in_output(line, fmt::format("limits not restored: {}", difference));
-  }
-  // Between compensated runs a single kept move may pass without the shaper, which costs Klipper a
-  // stop to switch.
-  const bool shaper_matters = input.kind == SectionKind::run || input.kind == SectionKind::end ||
-                              (input.kind == SectionKind::barrier && input.may_be_left);
-  if (shaper_matters && !same_shaper(before.modal, after.modal)) {
-    violations_.in_output(line, "the printer's input shaper is not restored");
-  }
-}
-
 void Verifier::play_kept_line() {
   begin_section(false);
   planner::PlannedMove move;
@@ -538,8 +368,6 @@ VerifyReport Verifier::report() {
   report.blamed_runs = violations_.take_blamed();
   return report;
 }
-
-}  // namespace
 
 Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
                             std::istream& output, const std::string& output_name,

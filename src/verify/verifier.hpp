@@ -1,0 +1,96 @@
+// Both files side by side.
+#pragma once
+
+#include <cstddef>
+#include <istream>
+#include <optional>
+#include <string>
+
+#include "filament_ledger.hpp"
+#include "line_check.hpp"
+#include "nozzles.hpp"
+#include "replay.hpp"
+#include "run_check.hpp"
+#include "section_rules.hpp"
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/verify/line_rate.hpp"
+#include "unflex/verify/reference_path.hpp"
+#include "unflex/verify/verify.hpp"
+#include "violations.hpp"
+
+namespace unflex::verify {
+
+// Goes through both files section by section. `original_` is the nozzle if the sliced file were
+// printed as it is, measured against the plan of the whole file, `path_`. `emitted_` is the nozzle
+// of the emitted file. In compensated runs, which begin and end at rest, it is measured against the
+// plan of the run by itself, `run_path_`: where the sliced file passes from one section into the
+// next at speed, that plan takes some ms longer.
+class Verifier {
+ public:
+  // What is given must outlive it.
+  Verifier(std::istream& input, const std::string& input_name, std::istream& output,
+           const std::string& output_name, const Rules& rules, Progress& progress,
+           const Observation& observation);
+
+  Verifier(const Verifier&) = delete;
+  Verifier& operator=(const Verifier&) = delete;
+
+  Result<VerifyReport> verify();
+
+ private:
+  bool next_input_move(planner::PlannedMove& move);
+  bool next_resting_move(planner::PlannedMove& move);
+  bool ends_here(const planner::PlannedMove& move, const Replay& file);
+  void begin_section(bool compensated);
+  void play_run();
+  void skip_added_barriers();
+  void play_run_moves(bool compensated);
+  void play(const planner::PlannedMove& move);
+  void end_section();
+  void let_original_follow(double until_s);
+  void let_kept_follow(double until_s);
+  void finish_reference();
+  [[nodiscard]] double filament_tolerance_mm() const;
+  void check_run(bool compensated);
+  bool sections_agree();
+  void check_regime(const Section& input, const Section& output);
+  void play_kept_line();
+  void hold();
+  void report_progress();
+  [[nodiscard]] VerifyReport report();
+
+  Rules rules_;
+  Progress* progress_;
+  Observer* observer_;
+  double output_bytes_;
+  Violations violations_;
+  Replay input_;
+  Replay output_;
+  LineCheck lines_;
+  ReferencePath path_;
+  ReferencePath run_path_;
+  ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
+  Nozzles original_;
+  // Were the sliced moves of a compensated run kept, from where emitted_ is, against run_path_.
+  Meter kept_;
+  Nozzles emitted_;
+  FilamentLedger filament_;
+  BaseCheck base_;
+  SectionRules rules_of_run_;
+  Excursion input_excursion_;
+  Excursion output_excursion_;
+  bool input_refused_ = false;    // a move of the section is refused by the firmware
+  std::size_t refused_line_ = 0;  // the same in the output; 0: none
+  LineRate rate_;
+  double max_lines_per_s_ = 0.0;
+  double since_kept_motion_s_ = 0.0;
+  std::optional<Error> failure_;   // a move without end
+  std::size_t section_first_ = 0;  // first piece of the path in this section
+  std::size_t original_next_ = 0;  // the one the original plays next
+  std::size_t kept_next_ = 0;      // of run_path_, the one that kept_ plays next
+  std::size_t moves_ = 0;
+  VerifyReport totals_;
+};
+
+}  // namespace unflex::verify

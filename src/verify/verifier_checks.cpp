@@ -1,0 +1,113 @@
+// What a run must keep to besides the rules of its motion, and what must be the same in both files.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "regime_check.hpp"
+#include "verifier.hpp"
+
+namespace unflex::verify {
+namespace {
+
+// One rounding step of E, and half of one for a remainder carried in.
+constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
+
+// Type and damping of a shaper that is off are of no effect.
+bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
+  const bool same_x =
+      a.shaper_freq_x_hz == 0.0 ||
+      (a.shaper.type_x == b.shaper.type_x && a.shaper.damping_ratio_x == b.shaper.damping_ratio_x &&
+       a.shaper.custom_words == b.shaper.custom_words);
+  const bool same_y =
+      a.shaper_freq_y_hz == 0.0 ||
+      (a.shaper.type_y == b.shaper.type_y && a.shaper.damping_ratio_y == b.shaper.damping_ratio_y);
+  return a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper_freq_y_hz == b.shaper_freq_y_hz &&
+         same_x && same_y;
+}
+
+}  // namespace
+
+// A step of E is as much filament as M221 makes of it.
+double Verifier::filament_tolerance_mm() const {
+  // Marlin lays the filament of a move that is too short for it with the next one, which may be
+  // after the run.
+  const planner::FirmwareConfig& firmware = rules_.fixed;
+  const double too_short_mm = firmware.firmware == Firmware::marlin
+                                  ? firmware.min_steps_per_segment / firmware.steps_per_mm[gcode::E]
+                                  : 0.0;
+  return too_short_mm + kFilamentTolerance_mm * std::max(1.0, output_.filament_factor());
+}
+
+void Verifier::check_run(bool compensated) {
+  if (const Excursion::Side* const side = output_excursion_.worse_than(input_excursion_)) {
+    violations_.in_output(
+        side->line, fmt::format("X{:.4f} Y{:.4f} is out of the travel by {:.4f} mm", side->x_mm,
+                                side->y_mm, side->beyond_mm));
+  }
+  if (refused_line_ != 0 && !input_refused_) {
+    violations_.in_output(refused_line_, "the firmware refuses so much filament on so short a way");
+  }
+  const double difference_mm = filament_.output_mm() - filament_.input_mm();
+  if (std::abs(difference_mm) > filament_tolerance_mm()) {
+    violations_.in_output(
+        output_.following().line.number,
+        fmt::format("the run before lays {:.5f} mm of filament instead of {:.5f} mm",
+                    filament_.output_mm(), filament_.input_mm()));
+  }
+  totals_.worst_move_extrusion_error_mm =
+      std::max({totals_.worst_move_extrusion_error_mm, filament_.worst_move_error_mm(),
+                std::abs(difference_mm)});
+  if (compensated) {
+    base_.end_run();
+    rules_of_run_.end(rate_, kept_, emitted_.main());
+    if (path_.end() == section_first_) {
+      violations_.in_output(output_.following().line.number,
+                            "the run before is not in the sliced file");
+    }
+  }
+}
+
+bool Verifier::sections_agree() {
+  const Section& input = input_.section();
+  const Section& output = output_.section();
+  if (input.kind != output.kind || !same_line(input.line, output.line)) {
+    const auto name = [](const Section& section) {
+      return section.kind == SectionKind::end ? std::string("the end of the file")
+                                              : fmt::format("'{}'", section.line.content());
+    };
+    violations_.in_output(
+        output.line.number,
+        fmt::format(
+            "structure differs: {} instead of {} (line {} of the sliced file); not compared "
+            "any further",
+            name(output), name(input), input.line.number));
+    return false;
+  }
+  check_regime(input, output);
+  return true;
+}
+
+void Verifier::check_regime(const Section& input, const Section& output) {
+  const std::size_t line = output.line.number;
+  const Regime& before = *input.regime;
+  const Regime& after = *output.regime;
+  if (const std::string difference = modal_difference(before.modal, after.modal);
+      !difference.empty()) {
+    violations_.in_output(line, fmt::format("state before this line: {}", difference));
+  }
+  if (const std::string difference = limits_difference(before.limits, after.limits);
+      !difference.empty()) {
+    violations_.in_output(line, fmt::format("limits not restored: {}", difference));
+  }
+  // Between compensated runs a single kept move may pass without the shaper, which costs Klipper a
+  // stop to switch.
+  const bool shaper_matters = input.kind == SectionKind::run || input.kind == SectionKind::end ||
+                              (input.kind == SectionKind::barrier && input.may_be_left);
+  if (shaper_matters && !same_shaper(before.modal, after.modal)) {
+    violations_.in_output(line, "the printer's input shaper is not restored");
+  }
+}
+
+}  // namespace unflex::verify
