@@ -29,7 +29,7 @@ namespace {
 
 // Nodes of runs that have been read and not yet been written, per worker, and windows that solver
 // processes are given ahead.
-constexpr std::size_t kNodesAhead = 200'000;
+constexpr std::size_t kNodesAhead = 20'000;
 constexpr std::size_t kWindowsAhead = 24;
 // Windows built at once.
 constexpr std::size_t kWindowsAtOnce = 8;
