@@ -8,7 +8,7 @@
 namespace unflex::gcode {
 namespace {
 
-constexpr double kMostPieces = 1e6;
+constexpr double kMostPieces = 1e5;
 // Klipper compares start and end exactly, after the angle has suffered from round-off, and so loses
 // some full circles; what the file asks for is the circle.
 constexpr double kClosedWithin_mm = 1e-9;

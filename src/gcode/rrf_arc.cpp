@@ -14,7 +14,7 @@ constexpr double kMaxDeviation_mm = 0.005;
 constexpr double kMinSegment_mm = 0.02;
 constexpr double kMaxSegment_mm = 1.0;
 constexpr double kMaxSegmentsPerSecond = 200.0;
-constexpr double kMostPieces = 1e6;
+constexpr double kMostPieces = 1e5;
 
 // Positive whichever way round. A whole circle where start and end are the same 32 bit numbers.
 double angle_of(const Arc& arc) {
