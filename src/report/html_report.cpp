@@ -152,6 +152,11 @@ Json facts_json(const Report& r) {
     add("Solver", fmt::format("{}, {} windows, {} iterations", r.solver_engine, r.windows_total,
                               r.solver_iterations));
   }
+  if (r.robustness) {
+    add("Band of models", fmt::format("{} µm RMS as optimised, {} without the band",
+                                      micrometres_text(r.robustness->rms_mm),
+                                      micrometres_text(r.robustness->nominal_rms_mm)));
+  }
   add("Base", fmt::format("at most {:.0f} mm/s and {:.0f} mm/s²", r.base_max_velocity_mm_s,
                           r.base_max_accel_mm_s2));
   add("Output", fmt::format("{} lines, {:.1f} MB, at most {:.0f} lines/s", r.output_lines,

@@ -102,6 +102,18 @@ TEST(HtmlReport, HoldsTheDataThatItsScriptReads) {
   EXPECT_EQ(data["remarks"]["violations"][0], "out.gcode:7: outside the travel");
 }
 
+TEST(HtmlReport, TellsWhatABandOfModelsCosts) {
+  Report report = recorded_report();
+  report.robustness = {0.003, 0.0005};
+  const auto facts = [&] {
+    return nlohmann::json::parse(element(to_html(report), "data"))["facts"];
+  };
+  EXPECT_NE(facts().dump().find("3.00 µm RMS as optimised, 0.50 without the band"),
+            std::string::npos);
+  report.robustness.reset();
+  EXPECT_EQ(facts().dump().find("band"), std::string::npos);
+}
+
 TEST(HtmlReport, LetsNoTextFromOutsideBecomeMarkup) {
   Report report = recorded_report();
   report.input = report.output = kHostile;
