@@ -60,7 +60,9 @@ void Interpreter::retraction_and_hop(Event& event, bool retract) {
     Position target = state_.position_mm;
     target[axis] += by_mm;
     state_.base_mm[axis] += by_mm;
-    append_segment(event, target, feed_mm_s, known);
+    // Without a speed (M207 F0) Marlin goes as fast as it went last (module/motion.cpp,
+    // _internal_move_to_destination).
+    append_segment(event, target, feed_mm_s > 0.0 ? feed_mm_s : state_.feed_mm_s, known);
   };
   if (retract) {
     shift(E, -options_.retract_length_mm, options_.retract_speed_mm_s);

@@ -148,6 +148,13 @@ TEST(MarlinRetraction, IsUnknownToMostMarlins) {
   EXPECT_FALSE(session.state().retracted);
 }
 
+// Found by fuzzing.
+TEST(MarlinRetraction, WithoutASpeedGoesAsFastAsTheMoveBefore) {
+  Session session = retracting();
+  session.read("G1 X1 Y1 Z1 E10 F1200\nM220 S200\nM207 S2 F0");
+  EXPECT_DOUBLE_EQ(session.move("G10").feed_mm_s, 20.0);
+}
+
 TEST(MarlinRetraction, IgnoresFlowAndSpeedFactorsAndKeepsTheReading) {
   Session session = retracting();
   session.read("G1 X1 Y1 Z1 E10\nM221 S50\nM220 S200\nM207 S2 F1800\nM208 S0.5 F600");
