@@ -202,8 +202,9 @@ class Compensator {
       }
       job->prepared = true;
     }
-    if (!queue_.empty()) {
-      // The lines of a run where they are counted have to fit those after it.
+    if (!queue_.empty() && rules_.emit.lines.burst_lines > 0) {
+      // The lines of a run where they are counted have to fit those after it. Where they are not,
+      // it is being worked on already.
       queue_.back()->lines_after = verify::LineRate::first_lines(piece.moves);
     }
     queue_.push_back(std::move(job));
