@@ -9,7 +9,7 @@ set -euo pipefail
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 build=$root/build-coverage
 
-whole_prints='RealPrint|WholePrint|DialectPrint|All/Sample\.|FirstTwentyLayers'
+source "$root/tests/whole_prints.sh"
 
 "$root/cmake/install_packages.sh" --coverage
 

@@ -9,7 +9,7 @@ set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 
-whole_prints='RealPrint|WholePrint|DialectPrint|All/Sample\.|FirstTwentyLayers'
+source "$root/tests/whole_prints.sh"
 kinds=(address thread)
 if [[ ${1:-} == address || ${1:-} == thread ]]; then
   kinds=("$1")

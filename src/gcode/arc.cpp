@@ -8,7 +8,6 @@
 namespace unflex::gcode {
 namespace {
 
-constexpr double kMostPieces = 1e5;
 // Klipper compares start and end exactly, after the angle has suffered from round-off, and so loses
 // some full circles; what the file asks for is the circle.
 constexpr double kClosedWithin_mm = 1e-9;
@@ -37,7 +36,7 @@ ArcPieces plan_arc(const Arc& arc, double resolution_mm) {
   const double rise = arc.end_mm[2] - arc.start_mm[2];
   const double travel = std::hypot(std::hypot(i, j) * angle, rise);
   const double count = std::max(1.0, std::floor(travel / resolution_mm));
-  if (!(count <= kMostPieces)) {
+  if (!(count <= kMostArcPieces)) {
     return std::nullopt;
   }
   std::vector<ArcPiece> pieces(static_cast<std::size_t>(count));

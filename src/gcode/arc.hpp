@@ -23,8 +23,11 @@ struct ArcPiece {
   double share = 1.0;              // of the travel along the normal and of the filament
 };
 
+// A file of one line may not take the memory of millions.
+inline constexpr double kMostArcPieces = 1e5;
+
 // The pieces in order; the last ends exactly at the arc's end. nullopt if the arc would fall into
-// more than a million pieces.
+// more than kMostArcPieces, or than the firmware counts.
 using ArcPieces = std::optional<std::vector<ArcPiece>>;
 
 // Source: Klipper, klippy/extras/gcode_arcs.py, ArcSupport.planArc (after Marlin's plan_arc).

@@ -14,7 +14,6 @@ constexpr double kMaxDeviation_mm = 0.005;
 constexpr double kMinSegment_mm = 0.02;
 constexpr double kMaxSegment_mm = 1.0;
 constexpr double kMaxSegmentsPerSecond = 200.0;
-constexpr double kMostPieces = 1e5;
 
 // Positive whichever way round. A whole circle where start and end are the same 32 bit numbers.
 double angle_of(const Arc& arc) {
@@ -51,7 +50,7 @@ ArcPieces plan_rrf_arc(const Arc& arc, double feed_mm_s) {
   const double radius_mm = std::hypot(i, j);
   const double angle = angle_of(arc);
   const double count = segment_count(radius_mm, angle, feed_mm_s);
-  if (!(count <= kMostPieces)) {
+  if (!(count <= kMostArcPieces)) {
     return std::nullopt;
   }
   const double first = std::atan2(-j, -i);

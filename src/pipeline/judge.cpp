@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 namespace unflex::pipeline {
@@ -15,9 +13,7 @@ namespace {
 constexpr double kResolutionMm = 1e-4;
 // Where the firmware rounds to steps, a single place may be off by part of one by chance.
 constexpr double kShareOfStep = 0.1;
-// Of the faster axis' ringing.
-constexpr double kSamplesPerPeriod = 40.0;
-// What that may leave unseen of an error.
+// What coarse steps may leave unseen of an error.
 constexpr double kSampling = 2e-4;
 
 double chance_mm(const planner::FirmwareConfig& config) {
@@ -27,23 +23,12 @@ double chance_mm(const planner::FirmwareConfig& config) {
                    std::min(config.steps_per_mm[gcode::X], config.steps_per_mm[gcode::Y]);
 }
 
-// How far the nozzle will swing around a base that rests at `at`.
-double swing_mm(const dynamics::NozzleXY& nozzle, const gcode::Position& at,
-                const verify::NozzleModel& model) {
-  return std::hypot(
-      nozzle.x.position - at[gcode::X], nozzle.x.velocity / model.x.omega_rad_s,
-      std::hypot(nozzle.y.position - at[gcode::Y], nozzle.y.velocity / model.y.omega_rad_s));
-}
-
 }  // namespace
 
 verify::RunDeviation deviation_of(const Piece& run, const std::vector<planner::PlannedMove>& base,
                                   const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
                                   double lead_in_s) {
-  verify::NozzleModel model = rules.nozzle;
-  const double fastest_rad_s = std::max(model.x.omega_rad_s, model.y.omega_rad_s);
-  model.step_s =
-      std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));
+  const verify::NozzleModel model = verify::coarse(rules.nozzle);
   if (run.begins_run() && run.ends_run()) {
     return verify::measure(run.moves, base, nozzle, model, lead_in_s);
   }
@@ -165,8 +150,8 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
   const verify::DeviationStats a = after.all.stats();
   if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm) ||
       (rules.fixed.firmware != Firmware::klipper &&
-       no_worse(swing_mm(after.end, end, rules.nozzle),
-                swing_mm(before.end, end, rules.nozzle) + chance_mm(rules.fixed)))) {
+       no_worse(verify::swing_mm(after.end, end, rules.nozzle),
+                verify::swing_mm(before.end, end, rules.nozzle) + chance_mm(rules.fixed)))) {
     return std::nullopt;
   }
   return fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",

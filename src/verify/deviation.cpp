@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "meter.hpp"
 #include "unflex/verify/reference_path.hpp"
@@ -21,6 +22,20 @@ DeviationStats DeviationAccumulator::stats() const {
   stats.duration_s = weight_s_;
   stats.contour_max_line = line_;
   return stats;
+}
+
+NozzleModel coarse(NozzleModel model) {
+  constexpr double kSamplesPerPeriod = 40.0;
+  const double fastest_rad_s = std::max(model.x.omega_rad_s, model.y.omega_rad_s);
+  model.step_s =
+      std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));
+  return model;
+}
+
+double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleModel& model) {
+  return std::hypot(
+      nozzle.x.position - at[gcode::X], nozzle.x.velocity / model.x.omega_rad_s,
+      std::hypot(nozzle.y.position - at[gcode::Y], nozzle.y.velocity / model.y.omega_rad_s));
 }
 
 RunDeviation measure(const std::vector<planner::PlannedMove>& reference,

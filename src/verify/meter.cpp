@@ -95,10 +95,7 @@ double Meter::swing_mm() const {
   if (path_->first() == path_->end()) {
     return 0.0;
   }
-  const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
-  return std::hypot(
-      nozzle_.x.position - end[gcode::X], nozzle_.x.velocity / model_.x.omega_rad_s,
-      std::hypot(nozzle_.y.position - end[gcode::Y], nozzle_.y.velocity / model_.y.omega_rad_s));
+  return verify::swing_mm(nozzle_, (*path_)[path_->end() - 1].move.segment.end_mm, model_);
 }
 
 void Meter::follow_lag(bool on) {

@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include "unflex/verify/endless.hpp"
@@ -43,14 +41,6 @@ double stream_bytes(std::istream& stream) {
 }
 
 // The same model in the longest steps that see its ringing.
-NozzleModel coarse(NozzleModel model) {
-  constexpr double kSamplesPerPeriod = 40.0;
-  const double fastest_rad_s = std::max(model.x.omega_rad_s, model.y.omega_rad_s);
-  model.step_s =
-      std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));
-  return model;
-}
-
 Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), meter.all().stats()}; }
 
 }  // namespace

@@ -68,7 +68,15 @@ struct NozzleModel {
   double hold_s = 0.5;   // how long the base is held after the end of the file
 };
 
+// The same, integrated as coarsely as comparing two motions bears: 40 steps to a period of the
+// faster axis.
+[[nodiscard]] NozzleModel coarse(NozzleModel model);
+
 using dynamics::NozzleXY;
+
+// How far the nozzle will swing around a base that rests at `at`.
+[[nodiscard]] double swing_mm(const NozzleXY& nozzle, const gcode::Position& at,
+                              const NozzleModel& model);
 
 struct RunDeviation {
   DeviationAccumulator extruding;
