@@ -29,9 +29,6 @@ Result<std::filesystem::path> directory_for(const std::string& name,
                                                       parent.string())
                                         : fmt::format("cannot write: {}", errno_text(errno)));
   }
-  if (!S_ISDIR(status.st_mode)) {
-    return refuse(name, fmt::format("cannot write: {} is not a directory", parent.string()));
-  }
   return parent;
 }
 

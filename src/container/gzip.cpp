@@ -99,7 +99,7 @@ class GzipUnpacker final : public Unpacker {
                  : Status{};
     }
     if (outcome == Z_MEM_ERROR) {
-      return fail(ErrorKind::internal, {name_, 0}, "out of memory");
+      return fail(ErrorKind::internal, {name_, 0}, "out of memory; end other programs");
     }
     if (outcome != Z_OK) {
       return broken(fmt::format("the gzip data are damaged near byte {} ({}); get the file again",

@@ -139,10 +139,10 @@ std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, double rate_hz) 
 Result<Mode> fit_ringing(const std::vector<double>& samples, double rate_hz) {
   const Eigen::Map<const Eigen::ArrayXd> given(samples.data(),
                                                static_cast<Eigen::Index>(samples.size()));
-  const double height = (given - given.mean()).abs().maxCoeff();
-  if (given.size() < 2 * kFewestSamples || !(height > 0.0)) {
+  if (given.size() < 2 * kFewestSamples || !(given.minCoeff() < given.maxCoeff())) {
     return fail(ErrorKind::input, "there is no motion in it, or it is too short");
   }
+  const double height = (given - given.mean()).abs().maxCoeff();
   const std::optional<Ringing> ring = earliest_good((given - given.mean()) / height, rate_hz);
   if (!ring) {
     return fail(

@@ -28,12 +28,14 @@ std::optional<SourcePlace> place_of(const Draft& draft, std::string_view key) {
 // An error at the first of the keys that was given anywhere; with defaults alone it has no place.
 tl::unexpected<Error> conflict(const Draft& draft, std::initializer_list<std::string_view> keys,
                                std::string message) {
+  SourcePlace first;
   for (const std::string_view key : keys) {
     if (const std::optional<SourcePlace> place = place_of(draft, key)) {
-      return fail(ErrorKind::usage, *place, std::move(message));
+      first = *place;
+      break;
     }
   }
-  return fail(ErrorKind::usage, std::move(message));
+  return fail(ErrorKind::usage, std::move(first), std::move(message));
 }
 
 constexpr std::array<std::string_view, 2> kModalKeys = {"freq_hz", "damping_ratio"};

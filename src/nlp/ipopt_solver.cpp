@@ -1,14 +1,14 @@
 #include "unflex/nlp/ipopt_solver.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
+#include <IpoptConfig.h>
+#include <fmt/format.h>
 
 #include <IpIpoptApplication.hpp>
 #include <IpSolveStatistics.hpp>
 #include <IpTNLP.hpp>
-#include <IpoptConfig.h>
-#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace unflex::nlp {
 namespace {
@@ -73,8 +73,8 @@ class Adapter final : public Ipopt::TNLP {
     return true;
   }
 
-  bool eval_jac_g(Index n, const Number* x, bool /*new_x*/, Index /*m*/, Index nonzeros,
-                  Index* row, Index* column, Number* values) override {
+  bool eval_jac_g(Index n, const Number* x, bool /*new_x*/, Index /*m*/, Index nonzeros, Index* row,
+                  Index* column, Number* values) override {
     if (values == nullptr) {
       std::ranges::copy(problem_->jacobian_sparsity().row, row);
       std::ranges::copy(problem_->jacobian_sparsity().column, column);
@@ -84,9 +84,9 @@ class Adapter final : public Ipopt::TNLP {
     return true;
   }
 
-  bool eval_h(Index n, const Number* x, bool /*new_x*/, Number sigma, Index m,
-              const Number* lambda, bool /*new_lambda*/, Index nonzeros, Index* row,
-              Index* column, Number* values) override {
+  bool eval_h(Index n, const Number* x, bool /*new_x*/, Number sigma, Index m, const Number* lambda,
+              bool /*new_lambda*/, Index nonzeros, Index* row, Index* column,
+              Number* values) override {
     if (values == nullptr) {
       std::ranges::copy(problem_->hessian_sparsity().row, row);
       std::ranges::copy(problem_->hessian_sparsity().column, column);
@@ -98,8 +98,7 @@ class Adapter final : public Ipopt::TNLP {
 
   void finalize_solution(Ipopt::SolverReturn status, Index n, const Number* x,
                          const Number* /*z_L*/, const Number* /*z_U*/, Index m, const Number* g,
-                         const Number* lambda, Number objective,
-                         const Ipopt::IpoptData* /*data*/,
+                         const Number* lambda, Number objective, const Ipopt::IpoptData* /*data*/,
                          Ipopt::IpoptCalculatedQuantities* /*quantities*/) override {
     solution_.x.assign(x, x + n);
     solution_.lambda.assign(lambda, lambda + m);
@@ -200,12 +199,12 @@ Result<Solution> solve(const Problem& problem, const SolverOptions& options) {
       setter.set("hessian_constant", "yes");
     }
   }
-  if (!setter.refused().empty()) {
-    return fail(ErrorKind::internal,
-                fmt::format("ipopt refuses the option '{}'", setter.refused()));
-  }
-  if (application->Initialize("") != Ipopt::Solve_Succeeded) {
-    return fail(ErrorKind::internal, "ipopt cannot be initialised");
+  if (!setter.refused().empty() || application->Initialize("") != Ipopt::Solve_Succeeded) {
+    return fail(
+        ErrorKind::internal,
+        fmt::format("ipopt refuses {}", setter.refused().empty()
+                                            ? "to begin"
+                                            : fmt::format("the option '{}'", setter.refused())));
   }
   Ipopt::SmartPtr<Adapter> adapter = new Adapter(problem);
   const Ipopt::ApplicationReturnStatus status =
@@ -213,8 +212,8 @@ Result<Solution> solve(const Problem& problem, const SolverOptions& options) {
   Solution solution = adapter->take();
   if (solution.x.empty() && solution.message.empty()) {
     // finalize_solution was never reached: too few degrees of freedom, a bad number, no memory.
-    solution.message = fmt::format("ipopt stopped with application status {}",
-                                   static_cast<int>(status));
+    solution.message =
+        fmt::format("ipopt stopped with application status {}", static_cast<int>(status));
   }
   if (Ipopt::IsValid(application->Statistics())) {
     solution.iterations = application->Statistics()->IterationCount();

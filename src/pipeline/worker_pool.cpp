@@ -19,16 +19,6 @@
 namespace unflex::pipeline {
 namespace {
 
-// Whatever the solver throws is an answer too, such as memory that ran out.
-Result<compensate::AxisSolution> solve(const compensate::Engine& engine,
-                                       const compensate::AxisWindow& window) {
-  try {
-    return engine.solve(window);
-  } catch (const std::exception& exception) {
-    return fail(ErrorKind::internal, exception.what());
-  }
-}
-
 // The life of a worker: read a window, solve it, answer, until the parent hangs up. Leaves by _exit
 // so that nothing the parent has open is flushed twice, and lets no exception out, which would go
 // through the parent's code and clean up after the parent.
@@ -40,7 +30,7 @@ Result<compensate::AxisSolution> solve(const compensate::Engine& engine,
     const auto engine = factory();
     std::string message;
     while (receive_message(socket, message)) {
-      if (!send_message(socket, pack(solve(*engine, unpack_window(message))))) {
+      if (!send_message(socket, answer(*engine, message))) {
         break;
       }
     }
@@ -52,6 +42,14 @@ Result<compensate::AxisSolution> solve(const compensate::Engine& engine,
 }
 
 }  // namespace
+
+std::string answer(const compensate::Engine& engine, std::string_view window) {
+  try {
+    return pack(engine.solve(unpack_window(window)));
+  } catch (const std::exception& exception) {
+    return pack(Result<compensate::AxisSolution>(fail(ErrorKind::internal, exception.what())));
+  }
+}
 
 Result<WorkerPool> WorkerPool::start(unsigned workers, const EngineFactory& factory) {
   WorkerPool pool(factory);

@@ -9,12 +9,17 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "unflex/compensate/axis_window.hpp"
 #include "unflex/core/error.hpp"
 
 namespace unflex::pipeline {
+
+// What a worker answers to a packed window: its solution, or what the solver threw, such as memory
+// that ran out; packed.
+[[nodiscard]] std::string answer(const compensate::Engine& engine, std::string_view window);
 
 class WorkerPool {
  public:

@@ -214,6 +214,17 @@ TEST_F(BatchTest, FollowsLinksToPrintsAndNotToFolders) {
   EXPECT_THAT(files_in("out"), ElementsAre("a.g", "b.g"));
 }
 
+TEST_F(BatchTest, NamesWhatItCannotMake) {
+  add("in/a.g");
+  add("in/b/c.g");
+  add("out/b");
+  add("in/p.json", "[limits]\nmax_accel_mm_s2 = 3000\n");
+  EXPECT_EQ(states(), (States{{"a.g", "done"}, {"b/c.g", "failed"}}));
+  EXPECT_THAT(last().err, HasSubstr("out/b/c.g: cannot make its folder: Not a directory"));
+  EXPECT_EQ(run(batch({"--printer", "in/p.json", "--summary", "in/p.json"})).err,
+            "in/p.json: is read or written already; give the summary a name of its own\n");
+}
+
 TEST_F(BatchTest, NamesWhatItCannotRead) {
   add("in/a.g");
   fs::create_symlink("nowhere.g", path("in/b.g"));
@@ -330,7 +341,7 @@ TEST_F(BatchTest, KilledAndStartedAgainDoesOnlyWhatIsMissing) {
   add("in/short.g", squares(20));
   add("in/shorter.g", squares(10));
   {
-    Program program(directory(), batch({"-j", "2"}));
+    Program program(directory(), batch({"-j", "2"}), "", leave_uncounted);
     // It was begun when the one before had been remembered.
     ASSERT_TRUE(wait_for(path("out/shorter.g")));
     program.signal(SIGKILL);

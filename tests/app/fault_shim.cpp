@@ -1,14 +1,17 @@
-// Loaded before the C library (LD_PRELOAD): calls that matter to files and clocks are listed, fail
-// or kill the program, as its environment says.
+// Loaded before the C library (LD_PRELOAD): calls that matter to files, processes and clocks are
+// listed, fail or kill the program, as its environment says.
 //
 //   FAULT_LIST=FILE        a line there for each fsync and rename
 //   FAULT_KILL=CALL        die of SIGKILL before the first such call: fsync, rename, fsync-folder
-//   FAULT_FAIL=CALL        the call fails with EIO instead
+//   FAULT_FAIL=CALL        the call fails with EIO instead; also fork, pipe2 and socketpair, and
+//   for
+//                          want of memory inflate
 //   FAULT_UNREADABLE=NAME  reads of files whose name ends so fail with EIO behind 64 KiB
 //   FAULT_CLOCK=1          each look at the calendar's clock finds it an hour earlier
 
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -84,6 +87,27 @@ int fsync(int fd) {
 
 int rename(const char* from, const char* to) noexcept {
   return meet("rename") ? failure() : original<int(const char*, const char*)>("rename")(from, to);
+}
+
+pid_t fork() noexcept {
+  return asks("FAULT_FAIL", "fork") ? failure() : original<pid_t()>("fork")();
+}
+
+int pipe2(int* ends, int flags) noexcept {
+  return asks("FAULT_FAIL", "pipe2") ? failure() : original<int(int*, int)>("pipe2")(ends, flags);
+}
+
+int socketpair(int domain, int type, int protocol, int* pair) noexcept {
+  return asks("FAULT_FAIL", "socketpair")
+             ? failure()
+             : original<int(int, int, int, int*)>("socketpair")(domain, type, protocol, pair);
+}
+
+// zlib's.
+int inflate(void* stream, int flush) {
+  constexpr int kOutOfMemory = -4;
+  return asks("FAULT_FAIL", "inflate") ? kOutOfMemory
+                                       : original<int(void*, int)>("inflate")(stream, flush);
 }
 
 ssize_t read(int fd, void* block, size_t bytes) {

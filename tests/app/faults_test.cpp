@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "app/program.hpp"
+#include "container/packed.hpp"
 #include "files.hpp"
 
 namespace unflex::app {
@@ -40,6 +41,7 @@ bool is_temporary(const std::string& name) {
 
 std::function<void()> limited(int resource, rlim_t most) {
   return [resource, most] {
+    leave_uncounted();
     const rlimit limit{most, most};
     ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
   };
@@ -278,7 +280,8 @@ TEST_F(Faults, OfKillingLeaveTheOldFileOrTheWholeNewOne) {
     write_file(path("in.gcode"), small_print());
     write_file(path("out.gcode"), "precious\n");
     const Words words = in_place ? Words{"compensate", "in.gcode", "--in-place"} : kToFile;
-    Program program(directory(), words + Words{"-q", "--engine", engines[engine]});
+    Program program(directory(), words + Words{"-q", "--engine", engines[engine]}, "",
+                    leave_uncounted);
     std::this_thread::sleep_for(microseconds(
         static_cast<microseconds::rep>(share(random) * static_cast<double>(took[engine]))));
     program.signal(SIGKILL);
@@ -328,10 +331,40 @@ TEST_F(Faults, OfRenamingLeaveTheOldFile) {
   }
 }
 
+TEST_F(Faults, OfUnpackingAreTold) {
+  write_file(path("in.gcode.gz"), container::to_gzip(small_print()));
+  const Outcome outcome = run({"compensate", "in.gcode.gz", "-o", "out.gcode"}, "",
+                              faulty({{"FAULT_FAIL", "inflate"}}));
+  std::filesystem::remove(path("in.gcode.gz"));
+  expect_refusal(outcome, 4, "in.gcode.gz: out of memory; end other programs\n");
+}
+
 TEST_F(Faults, OfTheClockChangeNothing) {
   const std::string result = whole();
   ASSERT_EQ(run(kToFile, "", faulty({{"FAULT_CLOCK", "1"}})).exit_code, 0);
   EXPECT_EQ(read_file(path("out.gcode")), result);
+}
+
+TEST_F(Faults, OfStartingProcessesAreTold) {
+  const Words solver = kToFile + Words{"--engine", "ipopt"};
+  expect_refusal(run(solver, "", faulty({{"FAULT_FAIL", "socketpair"}})), 4,
+                 "unflex: cannot open a socket to a solver process: Input/output error\n");
+  expect_refusal(run(solver, "", faulty({{"FAULT_FAIL", "fork"}})), 4,
+                 "unflex: cannot fork a solver process: Input/output error\n");
+}
+
+TEST_F(Faults, OfStartingPrintsOfABatchAreTold) {
+  std::filesystem::create_directory(path("in"));
+  write_file(path("in/a.gcode"), small_print());
+  const Words batch = {"batch", "in", "-o", "out", "-q", "-j", "1"};
+  for (const auto& [call, message] : std::vector<std::pair<std::string, std::string>>{
+           {"pipe2", "unflex: cannot open a pipe: Input/output error\n"},
+           {"fork", "unflex: cannot fork: Input/output error\n"}}) {
+    const Outcome outcome = run(batch, "", faulty({{"FAULT_FAIL", call}}));
+    EXPECT_EQ(outcome.exit_code, 4) << outcome.err;
+    EXPECT_EQ(outcome.err, message);
+    EXPECT_FALSE(std::filesystem::exists(path("out/a.gcode")));
+  }
 }
 
 TEST_F(Faults, OfASolverProcessChangeNothing) {

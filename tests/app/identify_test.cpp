@@ -1,6 +1,8 @@
 // Records become lines for the printer file.
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -100,6 +102,20 @@ TEST_F(Identify, TakesARingingTower) {
                                "--decay", "1.5", "--axis", "y", "-q"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, StartsWith("[dynamics.y]\nfreq_hz = 50"));
+}
+
+TEST_F(Identify, SaysWhatItCannotUse) {
+  const std::string diagonal = "raw_data_axis=1.000,1.000,0.000_a.csv";
+  write_file(path(diagonal), ringing(50.0, 40.0));
+  Outcome outcome = run({"identify", diagonal});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err, diagonal +
+                             ": is a test along a diagonal, of a belt; unflex needs one "
+                             "along X or Y, or --axis\n");
+  outcome = run({"identify", "a_x.csv"}, "",
+                [] { ::dup2(::open("/dev/full", O_WRONLY | O_CLOEXEC), STDOUT_FILENO); });
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_EQ(outcome.err, "stdout: cannot write: No space left on device\n");
 }
 
 TEST_F(Identify, SaysWhatIsMissing) {

@@ -70,6 +70,8 @@ Outcome Program::wait() {
   return outcome;
 }
 
+void leave_uncounted() { ::setenv("GCOV_PREFIX", "/dev/null/nowhere", 1); }
+
 std::string read_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};

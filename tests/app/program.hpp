@@ -33,6 +33,10 @@ class Program {
   pid_t child_ = -1;
 };
 
+// Called before a program that may be stopped while it writes: where lines are counted
+// (coverage.sh) its counts would spoil those of all others.
+void leave_uncounted();
+
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
 void write_file(const std::filesystem::path& file, const std::string& text);
 

@@ -75,7 +75,7 @@ TEST_F(ProgramTest, EndsSoonEvenWhereARunTakesLong) {
 
 TEST_F(ProgramTest, RemovesWhatAKilledRunHasLeft) {
   write_file(path("in.gcode"), long_print());
-  Program program(directory(), {"compensate", "in.gcode", "-o", "out.gcode"});
+  Program program(directory(), {"compensate", "in.gcode", "-o", "out.gcode"}, "", leave_uncounted);
   ASSERT_TRUE(wait_for_names(directory(), 2));
   program.signal(SIGKILL);
   EXPECT_EQ(program.wait().exit_code, 128 + SIGKILL);

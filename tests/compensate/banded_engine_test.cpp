@@ -37,6 +37,18 @@ AxisSolution solve(const AxisWindow& window, BandedForm form = BandedForm::fitti
   return solution.value_or(AxisSolution{});
 }
 
+TEST(BandedEngine, RefusesAWindowThatHoldsNoNumbers) {
+  std::mt19937_64 random(3);
+  AxisWindow window = random_path(random, 40, {});
+  window.weight.assign(window.weight.size(), std::numeric_limits<double>::quiet_NaN());
+  for (const BandedForm form : {BandedForm::flat, BandedForm::stages}) {
+    const Result<AxisSolution> solution = make_banded_engine(form)->solve(window);
+    ASSERT_FALSE(solution.has_value());
+    EXPECT_EQ(solution.error().message,
+              "the window's program cannot be solved even without limits");
+  }
+}
+
 void expect_same(const AxisSolution& a, const AxisSolution& b, double base_mm, double objective) {
   EXPECT_LE(largest_difference(a.base.position_mm, b.base.position_mm), base_mm);
   EXPECT_NEAR(a.objective, b.objective, objective * b.objective + kIdle);

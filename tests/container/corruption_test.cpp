@@ -111,6 +111,12 @@ TEST(BrokenBgcode, ClaimsOfEndlessBlocksCostNothing) {
             "damaged, export it again");
 }
 
+TEST(BrokenBgcode, MetadataHaveAnEnd) {
+  const Part picture{kThumb, std::string(std::size_t{14} << 20U, 'x')};
+  EXPECT_THAT(message(file_of({{kPrinter}, picture, picture, picture, picture, picture})),
+              HasSubstr("is the one with which metadata exceed 67108864 bytes"));
+}
+
 TEST(BrokenBgcode, IsMissedWhereverItIsCutOff) {
   const std::string file = test_data("container_default.bgcode");
   for (std::size_t length = 4; length < file.size(); ++length) {

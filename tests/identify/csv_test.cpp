@@ -104,6 +104,14 @@ TEST(RrfRecording, IsRead) {
   EXPECT_THAT(good(rrf_samples("Rate 1344, overflows 3\n"), "a.csv")[0].notes, SizeIs(1));
 }
 
+std::string repeated(const std::string& row, int times) {
+  std::string rows;
+  for (int i = 0; i < times; ++i) {
+    rows += row;
+  }
+  return rows;
+}
+
 TEST(Records, ThatAreNoneNameTheirPlace) {
   const auto failure = [](const std::string& text) {
     const auto sets = parse_csv(text, "a.csv");
@@ -117,6 +125,10 @@ TEST(Records, ThatAreNoneNameTheirPlace) {
   EXPECT_EQ(failure(klipper_samples(40) + "1,2,nan,4\n"), "a.csv:42: must be a row of 4 numbers");
   EXPECT_EQ(failure(klipper_samples(4)), "a.csv: has 4 rows, too few to tell a resonance");
   EXPECT_THAT(failure(rrf_samples("")), HasSubstr("was broken off"));
+  EXPECT_EQ(failure("#time,accel_x,accel_y,accel_z\n" + repeated("1,2,3,4\n", 40)),
+            "a.csv: its times do not grow");
+  EXPECT_EQ(failure("freq,psd_x,psd_y,psd_z,psd_xyz\n" + repeated("5,1,1,1,3\n", 40)),
+            "a.csv: its frequencies do not grow");
 }
 
 TEST(AxisInName, IsALetterThatStandsAlone) {

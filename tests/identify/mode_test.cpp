@@ -40,6 +40,14 @@ TEST(Ringing, AfterAMoveTellsTheMode) {
   }
 }
 
+TEST(Ringing, WithoutMotionIsRefused) {
+  Recording still{.rate_hz = 1344.0, .accel = {}};
+  still.accel.fill(std::vector<double>(1000, 9.81));
+  const Result<Mode> mode = fit_recording(still, Axis::x, {});
+  ASSERT_FALSE(mode);
+  EXPECT_EQ(mode.error().message, "there is no motion in it, or it is too short");
+}
+
 TEST(Ringing, ThatDrownsInNoiseIsRefusedOrDoubted) {
   Recording noise{.rate_hz = 1344.0, .accel = {}};
   std::mt19937 random(5);
@@ -66,6 +74,15 @@ TEST(Tower, TellsFrequencyBySpacingAndDampingByDecay) {
   EXPECT_NEAR(mode->damping_ratio.value, damping_ratio, 1e-12);
   EXPECT_LT(mode->damping_ratio.low, damping_ratio);
   EXPECT_GT(mode->damping_ratio.high, damping_ratio);
+}
+
+TEST(Tower, NeedsASpacingAndASpeed) {
+  for (const Tower& tower : {Tower{.spacing_mm = 0.0, .speed_mm_s = 100.0},
+                             Tower{.spacing_mm = 2.0, .speed_mm_s = -1.0}}) {
+    const Result<Mode> mode = fit_tower(tower);
+    ASSERT_FALSE(mode);
+    EXPECT_EQ(mode.error().message, "the waves' spacing and the speed must be above 0");
+  }
 }
 
 TEST(Tower, WithoutDecayLeavesTheDampingAGuess) {

@@ -109,16 +109,30 @@ TEST(RecordedSweep, ThatEndsBelowTheResonanceBringsAWarning) {
   EXPECT_THAT(mode->warnings.back(), HasSubstr("at the edge of the sweep"));
 }
 
+std::string refusal(const Result<Mode>& mode) { return mode ? "" : mode.error().message; }
+
 TEST(RecordedSweep, WithoutMotionIsRefused) {
   Recording still{.rate_hz = 3200.0, .accel = {}};
   still.accel.fill(std::vector<double>(100000, 9.81));
-  EXPECT_FALSE(fit_recording(still, Axis::x, {}));
+  EXPECT_EQ(refusal(fit_recording(still, Axis::x, {})),
+            "there is no motion in the band of the sweep");
   std::mt19937 random(4);
   std::normal_distribution<double> chance;
   for (double& sample : still.accel[1]) {
     sample += chance(random);
   }
-  EXPECT_FALSE(fit_recording(still, Axis::y, {}));
+  EXPECT_EQ(refusal(fit_recording(still, Axis::y, {})),
+            "no resonance stands out of the noise in it");
+}
+
+TEST(Spectrum, WithoutMotionOrOutsideTheSweepIsRefused) {
+  Spectrum spectrum{.step_hz = 1.5625, .density = {}};
+  spectrum.density.fill(std::vector<double>(20, 1.0));
+  EXPECT_EQ(refusal(fit_spectrum(spectrum, Axis::x, {})),
+            "it has too few frequencies in the band of the sweep");
+  spectrum.density.fill(std::vector<double>(120, 0.0));
+  EXPECT_EQ(refusal(fit_spectrum(spectrum, Axis::x, {})),
+            "there is no motion in the band of the sweep");
 }
 
 TEST(Spectrum, OfASweepTellsTheModeNormalizedOrNot) {

@@ -223,6 +223,19 @@ INSTANTIATE_TEST_SUITE_P(
                 {},
                 "printer.toml:2: limits.max_z_velocity_mm_s must not exceed "
                 "limits.max_velocity_mm_s"},
+        Mistake{"QuickZ",
+                "[limits]\nmax_z_accel_mm_s2 = 6000\n",
+                {},
+                "printer.toml:2: limits.max_z_accel_mm_s2 must not exceed limits.max_accel_mm_s2"},
+        Mistake{"EmittedCornersTooSlow",
+                "[emit]\nsquare_corner_velocity_mm_s = 1\n",
+                {},
+                "printer.toml:2: emit.square_corner_velocity_mm_s must not be below "
+                "limits.square_corner_velocity_mm_s"},
+        Mistake{"OverlapLongerThanTheWindow",
+                "[solve]\nwindow_s = 1\noverlap_s = 2\n",
+                {},
+                "printer.toml:3: solve.overlap_s must not exceed solve.window_s"},
         Mistake{"FilamentThinnerThanNozzle",
                 "[extruder]\nfilament_diameter_mm = 0.3\n",
                 {},
@@ -263,6 +276,14 @@ TEST(DirectoryAsFile, IsAUsageError) {
   const Result<Settings> settings = load(::testing::TempDir(), {});
   ASSERT_FALSE(settings);
   EXPECT_THAT(to_string(settings.error()), HasSubstr("is a directory"));
+}
+
+// Opens, and fails to be read.
+TEST(UnreadableFile, IsAUsageError) {
+  const Result<Settings> settings = load("/proc/self/mem", {});
+  ASSERT_FALSE(settings.has_value());
+  EXPECT_EQ(settings.error().kind, ErrorKind::usage);
+  EXPECT_EQ(to_string(settings.error()), "/proc/self/mem: cannot read the printer file");
 }
 
 TEST(EndlessFile, IsAUsageError) {

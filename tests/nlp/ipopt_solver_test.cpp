@@ -347,6 +347,15 @@ TEST(Ipopt, GivesTheSameBytesAgain) {
   EXPECT_EQ(first.iterations, again.iterations);
 }
 
+TEST(Ipopt, NamesTheOptionItRefuses) {
+  SolverOptions options;
+  options.tolerance = -1.0;
+  const Result<Solution> solution = solve(rosenbrock(), options);
+  ASSERT_FALSE(solution);
+  EXPECT_EQ(solution.error().kind, ErrorKind::internal);
+  EXPECT_EQ(solution.error().message, "ipopt refuses the option 'tol'");
+}
+
 TEST(Ipopt, PrintsNothing) {
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 
 #include <cstdlib>
@@ -12,6 +13,7 @@
 #include <string>
 
 #include "engines.hpp"
+#include "wire.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -123,6 +125,24 @@ TEST(WorkerPool, EndsAtOnceWithWorkersStillBusy) {
   EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1) << "a child is left";
 }
 
+TEST(WorkerPool, FailsWhatIsLeftWhereNoProcessCanBeStarted) {
+  WorkerPool pool = pool_of(1);
+  rlimit descriptors{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &descriptors), 0);
+  // poll() wants as many as it waits for.
+  const rlimit none{1, descriptors.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  pool.submit(7, window(kDie));
+  pool.submit(8, window(kSolve));
+  const auto taken = take_all(pool);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &descriptors), 0);
+  ASSERT_EQ(taken.size(), 2U);
+  for (const auto& [ticket, solution] : taken) {
+    ASSERT_FALSE(solution.has_value()) << ticket;
+    EXPECT_EQ(solution.error().message, "no solver process is left");
+  }
+}
+
 TEST(WorkerPool, PassesAnErrorOfTheEngineOn) {
   WorkerPool pool = pool_of(1);
   pool.submit(7, window(kRefuse));
@@ -131,6 +151,14 @@ TEST(WorkerPool, PassesAnErrorOfTheEngineOn) {
   ASSERT_FALSE(taken.at(7).has_value());
   EXPECT_EQ(taken.at(7).error().message, "the window asks for it");
   EXPECT_TRUE(taken.at(8).has_value());
+}
+
+TEST(Answer, IsWhatTheEngineThrew) {
+  const Result<compensate::AxisSolution> there =
+      unpack_solution(answer(testing::TestEngine(obey), pack(window(kThrow))));
+  ASSERT_FALSE(there.has_value());
+  EXPECT_EQ(there.error().kind, ErrorKind::internal);
+  EXPECT_EQ(there.error().message, "out of luck");
 }
 
 TEST(WorkerPool, PassesAnExceptionOfTheEngineOn) {

@@ -119,6 +119,16 @@ TEST_F(ThesisCases, StrayAlikeWithAllInversesWhereTheFrequencyIsWrong) {
   EXPECT_NEAR(max_um(0, Method::thesis_least_squares, kTenPercentMore), unflex, 0.2 * unflex);
 }
 
+TEST(StudyCorner, StopsWhenItIsTold) {
+  class Told final : public Progress {
+    void update(std::string_view /*stage*/, double /*share*/) override {}
+    [[nodiscard]] bool cancelled() const override { return true; }
+  } progress;
+  const Result<Outcome> outcome = study_corner({}, progress);
+  ASSERT_FALSE(outcome);
+  EXPECT_EQ(outcome.error().message, "cancelled");
+}
+
 TEST_F(ThesisCases, AreTheSameInAnyNumberOfThreads) {
   SilentProgress progress;
   Options options{.ipopt = false, .workers = 1, .cases = {"ref", "3A"}, .traces = false};

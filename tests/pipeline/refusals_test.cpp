@@ -1,0 +1,110 @@
+// What every command of the pipeline refuses, in the same words.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "jobs.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/pipeline/study_print.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+using testing::JobFolder;
+
+const std::string kPrint =
+    "G28\nG90\nM83\nG1 Z0.2 F600\nG1 X20 Y20 F6000\nG1 X26 Y20 E0.24 F3000\nG1 X26 Y26 E0.24\n"
+    "G1 X20 Y26 E0.24\nM107\n";
+
+struct Task {
+  std::string name;
+  std::function<Status(const Job&, Progress&)> run;
+};
+
+void PrintTo(const Task& task, std::ostream* out) { *out << task.name; }
+
+template <class Outcome>
+Status status_of(const Result<Outcome>& outcome) {
+  return outcome ? Status{} : Status(tl::unexpected(outcome.error()));
+}
+
+class Told final : public Progress {
+ public:
+  explicit Told(bool to_stop) : to_stop_(to_stop) {}
+  void update(std::string_view /*stage*/, double /*share*/) override {}
+  [[nodiscard]] bool cancelled() const override { return to_stop_; }
+
+ private:
+  bool to_stop_;
+};
+
+class EveryTask : public ::testing::TestWithParam<Task> {
+ protected:
+  // The error, "file: message".
+  static std::string refusal(const Job& job, bool to_stop = false) {
+    Told progress(to_stop);
+    const Status status = GetParam().run(job, progress);
+    return status ? "no error" : to_string(status.error());
+  }
+};
+
+TEST_P(EveryTask, TakesTheFile) {
+  const JobFolder folder(kPrint);
+  folder.set_output(kPrint);
+  EXPECT_EQ(refusal(folder.job()), "no error");
+}
+
+TEST_P(EveryTask, NeedsAFileThatIsThere) {
+  const JobFolder folder(kPrint);
+  folder.set_output(kPrint);
+  Job job = folder.job();
+  job.input += "-missing";
+  job.input_name = "print";
+  EXPECT_EQ(refusal(job), "print: cannot read the file");
+}
+
+TEST_P(EveryTask, StopsWhenItIsTold) {
+  const JobFolder folder(kPrint);
+  folder.set_output(kPrint);
+  EXPECT_EQ(refusal(folder.job(), true), "cancelled");
+}
+
+// A print that would never end is a slip in the file.
+TEST_P(EveryTask, RefusesAMoveOfHours) {
+  const std::string text = kPrint + "G1 X10 F0.001\nG1 X20 F6000\n";
+  const JobFolder folder(text);
+  folder.set_output(text);
+  Job job = folder.job();
+  job.input_name = job.output_name = "print";
+  EXPECT_EQ(refusal(job),
+            "print:10: this move would take 167 hours; check its length, its F and the limits");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Of, EveryTask,
+    ::testing::Values(
+        Task{"Compensate",
+             [](const Job& job, Progress& told) { return status_of(compensate(job, told)); }},
+        Task{"Verify", [](const Job& job, Progress& told) { return status_of(verify(job, told)); }},
+        Task{"Inspect",
+             [](const Job& job, Progress& told) { return status_of(inspect(job, told)); }},
+        Task{"Study", [](const Job& job,
+                         Progress& told) { return status_of(study_print(job, false, told)); }}),
+    [](const auto& task) { return task.param.name; });
+
+TEST(Verify, NeedsAnOutputThatIsThere) {
+  const JobFolder folder(kPrint);
+  Job job = folder.job();
+  job.output_name = "made";
+  Told progress(false);
+  const Result<report::Report> report = verify(job, progress);
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(to_string(report.error()), "made: cannot read the file");
+}
+
+}  // namespace
+}  // namespace unflex::pipeline

@@ -1,0 +1,1 @@
+// Brings the headers that tests/CMakeLists.txt compiles once for all tests.
