@@ -129,6 +129,11 @@ INSTANTIATE_TEST_SUITE_P(
                 {"verify", "out.gcode"},
                 1,
                 "unflex: --against is required; run 'unflex verify --help'"},
+        Failure{"ReportBesideStdout",
+                {"compensate", "in.gcode", "-o", "-", "--report", ".html"},
+                1,
+                "unflex: --report .html: stdout has no file to stand beside; name one, as "
+                "print.html\n"},
         Failure{"BatchOfAFile",
                 {"batch", "in.gcode", "-o", "out"},
                 2,

@@ -6,6 +6,7 @@
 //   FAULT_FAIL=CALL        the call fails with EIO instead; also fork, pipe2 and socketpair, and
 //   for
 //                          want of memory inflate
+//   FAULT_CHANGE=FILE      somebody else adds a line to FILE before each rename
 //   FAULT_UNREADABLE=NAME  reads of files whose name ends so fail with EIO behind 64 KiB
 //   FAULT_CLOCK=1          each look at the calendar's clock finds it an hour earlier
 
@@ -52,6 +53,14 @@ bool meet(std::string_view call) {
   return asks("FAULT_FAIL", call);
 }
 
+void change_file() {
+  const char* const changed = std::getenv("FAULT_CHANGE");
+  if (std::FILE* const file = changed != nullptr ? std::fopen(changed, "a") : nullptr) {
+    std::fputs("M400\n", file);
+    std::fclose(file);
+  }
+}
+
 int failure() {
   errno = EIO;
   return -1;
@@ -86,6 +95,7 @@ int fsync(int fd) {
 }
 
 int rename(const char* from, const char* to) noexcept {
+  change_file();
   return meet("rename") ? failure() : original<int(const char*, const char*)>("rename")(from, to);
 }
 

@@ -129,6 +129,11 @@ TEST_F(Faults, OfStreamsThatAreFullAreTold) {
   }
 }
 
+TEST_F(Faults, OfKeepingAStreamAreTold) {
+  expect_refusal(run({"inspect", "-"}, squares(20), limited(RLIMIT_FSIZE, 1000)), 4,
+                 "-: cannot be kept in /tmp: File too large; set TMPDIR to another directory\n");
+}
+
 TEST_F(Faults, OfTheLogAreToldAndDoNotUndoTheWork) {
   const std::string result = whole();
   const Outcome outcome = run(kToFile + Words{"--log", "/dev/full"});
@@ -221,6 +226,12 @@ TEST_F(AsNobody, IsToldWhatCannotBeRead) {
   if (run_there({"--version"}).exit_code != 0) {
     GTEST_SKIP() << "the program cannot be run as another user";
   }
+  fs::create_directories(path("prints/shut"));
+  fs::permissions(path("prints/shut"), fs::perms::none);
+  EXPECT_THAT(run_there({"batch", "prints", "-o", "made"}).err,
+              HasSubstr("prints/shut: cannot read the folder: Permission denied\n"));
+  fs::remove_all(path("prints"));
+  fs::remove_all(path("made"));
   fs::permissions(path("in.gcode"), fs::perms::none);
   const Outcome outcome = run_there(kToFile);
   fs::permissions(path("in.gcode"), fs::perms::owner_read);
@@ -351,6 +362,18 @@ TEST_F(Faults, OfStartingProcessesAreTold) {
                  "unflex: cannot open a socket to a solver process: Input/output error\n");
   expect_refusal(run(solver, "", faulty({{"FAULT_FAIL", "fork"}})), 4,
                  "unflex: cannot fork a solver process: Input/output error\n");
+}
+
+TEST_F(Faults, OfAPrintOfABatchThatChangesAreTold) {
+  std::filesystem::create_directory(path("in"));
+  write_file(path("in/a.gcode"), small_print());
+  const Outcome outcome =
+      run({"batch", "in", "-o", "out", "-q"}, "", faulty({{"FAULT_CHANGE", path("in/a.gcode")}}));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err, "in/a.gcode: changed while it was worked on; run the batch again\n");
+  // It is not taken for done.
+  EXPECT_EQ(run({"batch", "in", "-o", "out", "-q"}).exit_code, 0);
+  EXPECT_TRUE(read_file(path("out/a.gcode")).ends_with("M400\n"));
 }
 
 TEST_F(Faults, OfStartingPrintsOfABatchAreTold) {
