@@ -168,7 +168,8 @@ void finish(const Settings& settings, Dda& dda) {
   const float accel_clocks = ramp_clocks(dda.top_speed, dda.start_speed, dda.accel);
   const float decel_clocks = ramp_clocks(dda.top_speed, dda.end_speed, dda.decel);
   const float steady_clocks = steady_mm <= 0.0F ? 0.0F : steady_mm / dda.top_speed;
-  dda.clocks = whole_clocks(accel_clocks + steady_clocks + decel_clocks);
+  // Of less than one clock each phase would have to give more than it has.
+  dda.clocks = std::max<std::int64_t>(1, whole_clocks(accel_clocks + steady_clocks + decel_clocks));
 
   const double clock_hz = settings.clock_hz;
   PlannedMove& move = dda.move;

@@ -96,6 +96,20 @@ TEST(RrfPlanner, MovesLastWholeStepClocksRoundedDown) {
   }
 }
 
+// A tenth of a micrometre in the middle of a fast straight line, whether steady or on a ramp.
+TEST(RrfPlanner, MovesOfLessThanAStepClockLastOne) {
+  for (const double end_mm : {15.0, 60.0}) {
+    const auto moves = rrf_plan(
+        polyline({{10, 0, 0, 0}, {10.0001, 0, 0, 0}, {end_mm, 0, 0, 0}}, 200.0), fast_limits(1));
+    ASSERT_EQ(moves.size(), 3U);
+    EXPECT_LT(moves[1].length_mm, moves[1].start_v_mm_s * kClock_s);
+    EXPECT_NEAR(moves[1].duration_s(), kClock_s, 1e-12);
+    for (const double phase_s : {moves[1].accel_s, moves[1].cruise_s, moves[1].decel_s}) {
+      EXPECT_GE(phase_s, 0.0);
+    }
+  }
+}
+
 TEST(RrfPlanner, CornerSpeedIsTheJerkOverTheChangeOfDirection) {
   for (const int policy : {0, 1}) {
     EXPECT_NEAR(corner_speed(0.0, policy), 100.0, 1e-4);
