@@ -23,7 +23,8 @@ cmake --build "$build" --parallel "$(nproc)"
 find "$build" -name '*.gcda' -delete
 # Programs that tests keep from writing cannot write their counts, and may not say so where the tests
 # read; nobody has no right to the counts of all others.
-GCOV_ERROR_FILE=/dev/null UNFLEX_UNCOUNTED=$build/uncounted ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" \
+export GCOV_ERROR_FILE=/dev/null UNFLEX_UNCOUNTED=$build/uncounted
+ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" \
   --exclude-regex "$whole_prints|^AsNobody" "$@"
 
 gcovr --root "$root" --object-directory "$build" --filter "$root/src/" --filter "$root/include/" \

@@ -209,7 +209,7 @@ Status Input::copy_text() {
   }
   FileDescriptor kept(::fcntl(copy->fd(), F_DUPFD_CLOEXEC, 3));
   if (!kept.valid()) {
-    return cannot_read(errno);
+    return fail(ErrorKind::internal, {name_, 0}, errno_text(errno));
   }
   fd_ = std::move(kept);
   is_copied_ = true;

@@ -28,17 +28,6 @@ constexpr std::ptrdiff_t kKeptLines = 16;
 constexpr double kLate_s = 2e-5;
 constexpr double kSamePlace_mm = 1e-7;
 
-// How differently two nozzles swing.
-double apart_mm(const dynamics::NozzleXY& a, const dynamics::NozzleXY& b,
-                const verify::NozzleModel& model) {
-  const auto on_axis = [](const dynamics::NozzleState& from, const dynamics::NozzleState& to,
-                          const dynamics::FlexibleAxis& axis) {
-    return std::hypot(from.position - to.position,
-                      (from.velocity - to.velocity) / axis.omega_rad_s);
-  };
-  return std::hypot(on_axis(a.x, b.x, model.x), on_axis(a.y, b.y, model.y));
-}
-
 std::vector<gcode::Segment> last_lines(const std::vector<planner::PlannedMove>& moves) {
   std::vector<gcode::Segment> lines;
   for (const planner::PlannedMove& move : planner::last_moves(moves, kLastLines_s)) {
@@ -189,7 +178,7 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   }
   // Its own moves would find the nozzle as it is, which after motion that was kept is not as
   // reckoned with.
-  before_ = apart_mm(nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
+  before_ = verify::apart_mm(nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
                 ? deviation_of(job.piece, job.piece.moves, nozzle_, rules_->verify, 0.0)
                 : job.before;
   const bool counts_steps = rules_->emit.lines.burst_lines > 0;

@@ -32,10 +32,14 @@ NozzleModel coarse(NozzleModel model) {
   return model;
 }
 
-double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleModel& model) {
+double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model) {
   return std::hypot(
-      nozzle.x.position - at[gcode::X], nozzle.x.velocity / model.x.omega_rad_s,
-      std::hypot(nozzle.y.position - at[gcode::Y], nozzle.y.velocity / model.y.omega_rad_s));
+      a.x.position - b.x.position, (a.x.velocity - b.x.velocity) / model.x.omega_rad_s,
+      std::hypot(a.y.position - b.y.position, (a.y.velocity - b.y.velocity) / model.y.omega_rad_s));
+}
+
+double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleModel& model) {
+  return apart_mm(nozzle, {{at[gcode::X], 0.0}, {at[gcode::Y], 0.0}}, model);
 }
 
 RunDeviation measure(const std::vector<planner::PlannedMove>& reference,

@@ -40,7 +40,6 @@ double stream_bytes(std::istream& stream) {
   return length;
 }
 
-// The same model in the longest steps that see its ringing.
 Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), meter.all().stats()}; }
 
 }  // namespace

@@ -3,9 +3,8 @@
 //
 //   FAULT_LIST=FILE        a line there for each fsync and rename
 //   FAULT_KILL=CALL        die of SIGKILL before the first such call: fsync, rename, fsync-folder
-//   FAULT_FAIL=CALL        the call fails with EIO instead; also fork, pipe2 and socketpair, and
-//   for
-//                          want of memory inflate
+//   FAULT_FAIL=CALL        the call fails with EIO instead; also fork, pipe2 and socketpair,
+//                          and inflate for want of memory
 //   FAULT_CHANGE=FILE      somebody else adds a line to FILE before each rename
 //   FAULT_UNREADABLE=NAME  reads of files whose name ends so fail with EIO behind 64 KiB
 //   FAULT_CLOCK=1          each look at the calendar's clock finds it an hour earlier

@@ -122,10 +122,9 @@ TEST_F(Faults, OfAReportWithoutRoomLeaveTheOldOutput) {
 }
 
 TEST_F(Faults, OfStreamsThatAreFullAreTold) {
-  const auto full = [] { ::dup2(::open("/dev/full", O_WRONLY | O_CLOEXEC), STDOUT_FILENO); };
   for (const Words& words : {Words{"compensate", "in.gcode", "-o", "-"},
                              Words{"inspect", "in.gcode", "--report", "-"}}) {
-    expect_refusal(run(words, "", full), 4, "stdout: cannot write: No space left on device");
+    expect_refusal(run(words, "", fill_stdout), 4, "stdout: cannot write: No space left on device");
   }
 }
 
@@ -145,8 +144,7 @@ TEST_F(Faults, OfTheLogAreToldAndDoNotUndoTheWork) {
 
 TEST_F(Faults, OfTheSummaryLeaveAnOutputThatIsWhole) {
   const std::string result = whole();
-  const Outcome outcome =
-      run(kToFile, "", [] { ::dup2(::open("/dev/full", O_WRONLY | O_CLOEXEC), STDOUT_FILENO); });
+  const Outcome outcome = run(kToFile, "", fill_stdout);
   EXPECT_EQ(outcome.exit_code, 4);
   EXPECT_EQ(outcome.err, "stdout: cannot write: No space left on device; make room there\n");
   EXPECT_EQ(read_file(path("out.gcode")), result);

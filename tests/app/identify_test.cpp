@@ -1,8 +1,6 @@
 // Records become lines for the printer file.
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -112,8 +110,7 @@ TEST_F(Identify, SaysWhatItCannotUse) {
   EXPECT_EQ(outcome.err, diagonal +
                              ": is a test along a diagonal, of a belt; unflex needs one "
                              "along X or Y, or --axis\n");
-  outcome = run({"identify", "a_x.csv"}, "",
-                [] { ::dup2(::open("/dev/full", O_WRONLY | O_CLOEXEC), STDOUT_FILENO); });
+  outcome = run({"identify", "a_x.csv"}, "", fill_stdout);
   EXPECT_EQ(outcome.exit_code, 4);
   EXPECT_EQ(outcome.err, "stdout: cannot write: No space left on device\n");
 }

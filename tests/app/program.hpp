@@ -37,6 +37,9 @@ class Program {
 // (coverage.sh) its counts would spoil those of all others.
 void leave_uncounted();
 
+// Called before a program whose stdout is to be full.
+void fill_stdout();
+
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
 void write_file(const std::filesystem::path& file, const std::string& text);
 

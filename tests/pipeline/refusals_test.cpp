@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 
+#include "core/stopped_progress.hpp"
 #include "jobs.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/pipeline/pipeline.hpp"
@@ -27,28 +28,18 @@ struct Task {
 
 void PrintTo(const Task& task, std::ostream* out) { *out << task.name; }
 
-template <class Outcome>
-Status status_of(const Result<Outcome>& outcome) {
-  return outcome ? Status{} : Status(tl::unexpected(outcome.error()));
-}
-
-class Told final : public Progress {
- public:
-  explicit Told(bool to_stop) : to_stop_(to_stop) {}
-  void update(std::string_view /*stage*/, double /*share*/) override {}
-  [[nodiscard]] bool cancelled() const override { return to_stop_; }
-
- private:
-  bool to_stop_;
-};
+constexpr auto kForget = [](const auto&) {};
 
 class EveryTask : public ::testing::TestWithParam<Task> {
  protected:
   // The error, "file: message".
-  static std::string refusal(const Job& job, bool to_stop = false) {
-    Told progress(to_stop);
+  static std::string refusal(const Job& job, Progress& progress) {
     const Status status = GetParam().run(job, progress);
     return status ? "no error" : to_string(status.error());
+  }
+  static std::string refusal(const Job& job) {
+    SilentProgress progress;
+    return refusal(job, progress);
   }
 };
 
@@ -70,7 +61,8 @@ TEST_P(EveryTask, NeedsAFileThatIsThere) {
 TEST_P(EveryTask, StopsWhenItIsTold) {
   const JobFolder folder(kPrint);
   folder.set_output(kPrint);
-  EXPECT_EQ(refusal(folder.job(), true), "cancelled");
+  unflex::testing::StoppedProgress progress;
+  EXPECT_EQ(refusal(folder.job(), progress), "cancelled");
 }
 
 // A print that would never end is a slip in the file.
@@ -88,19 +80,18 @@ INSTANTIATE_TEST_SUITE_P(
     Of, EveryTask,
     ::testing::Values(
         Task{"Compensate",
-             [](const Job& job, Progress& told) { return status_of(compensate(job, told)); }},
-        Task{"Verify", [](const Job& job, Progress& told) { return status_of(verify(job, told)); }},
-        Task{"Inspect",
-             [](const Job& job, Progress& told) { return status_of(inspect(job, told)); }},
-        Task{"Study", [](const Job& job,
-                         Progress& told) { return status_of(study_print(job, false, told)); }}),
+             [](const Job& job, Progress& p) { return compensate(job, p).map(kForget); }},
+        Task{"Verify", [](const Job& job, Progress& p) { return verify(job, p).map(kForget); }},
+        Task{"Inspect", [](const Job& job, Progress& p) { return inspect(job, p).map(kForget); }},
+        Task{"Study",
+             [](const Job& job, Progress& p) { return study_print(job, false, p).map(kForget); }}),
     [](const auto& task) { return task.param.name; });
 
 TEST(Verify, NeedsAnOutputThatIsThere) {
   const JobFolder folder(kPrint);
   Job job = folder.job();
   job.output_name = "made";
-  Told progress(false);
+  SilentProgress progress;
   const Result<report::Report> report = verify(job, progress);
   ASSERT_FALSE(report.has_value());
   EXPECT_EQ(to_string(report.error()), "made: cannot read the file");

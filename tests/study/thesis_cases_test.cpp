@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 
+#include "core/stopped_progress.hpp"
 #include "unflex/study/study.hpp"
 
 namespace unflex::study {
@@ -120,10 +121,7 @@ TEST_F(ThesisCases, StrayAlikeWithAllInversesWhereTheFrequencyIsWrong) {
 }
 
 TEST(StudyCorner, StopsWhenItIsTold) {
-  class Told final : public Progress {
-    void update(std::string_view /*stage*/, double /*share*/) override {}
-    [[nodiscard]] bool cancelled() const override { return true; }
-  } progress;
+  unflex::testing::StoppedProgress progress;
   const Result<Outcome> outcome = study_corner({}, progress);
   ASSERT_FALSE(outcome);
   EXPECT_EQ(outcome.error().message, "cancelled");

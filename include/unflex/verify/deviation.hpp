@@ -74,6 +74,9 @@ struct NozzleModel {
 
 using dynamics::NozzleXY;
 
+// How differently two nozzles swing.
+[[nodiscard]] double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model);
+
 // How far the nozzle will swing around a base that rests at `at`.
 [[nodiscard]] double swing_mm(const NozzleXY& nozzle, const gcode::Position& at,
                               const NozzleModel& model);
