@@ -114,9 +114,9 @@ Status apply_overrides(const std::vector<std::string>& overrides, Draft& draft) 
 // What a print's slicer says of the printer holds where nobody else says anything.
 Status read_print(const Sources& sources, Draft& draft) {
   const bool by_default = !draft.places[*find_key("printer.firmware")];
-  Reading reading = sources.firmware_as_sliced
-                        ? read_slicer(*sources.print, std::nullopt)
-                        : read_slicer(*sources.print, draft.settings.printer.firmware, by_default);
+  const std::optional<Firmware> runs =
+      sources.firmware_as_sliced ? std::nullopt : std::optional(draft.settings.printer.firmware);
+  Reading reading = read_slicer(*sources.print, runs, by_default);
   // What does not hold must be right as well.
   Draft alone = defaults();
   if (Status applied = apply(reading, alone); !applied) {

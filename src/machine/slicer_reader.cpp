@@ -89,7 +89,7 @@ class Reader {
   Reading read(std::optional<Firmware> runs, bool by_default) {
     diameter("nozzle_diameter", "extruder.nozzle_diameter_mm");
     diameter("filament_diameter", "extruder.filament_diameter_mm");
-    const std::optional<Firmware> named = flavor();
+    const std::optional<Firmware> named = flavor(by_default);
     if (!named) {
       return std::move(reading_);
     }
@@ -139,20 +139,22 @@ class Reader {
 
   void diameter(const std::string& name, const std::string& key) { add(key, number(name), name); }
 
-  std::optional<Firmware> flavor() {
+  std::optional<Firmware> flavor(bool by_default) {
     const SlicerOption* const given = option("gcode_flavor");
     if (given == nullptr) {
       return std::nullopt;
     }
     const auto* const known = std::ranges::find(kFlavors, lower(given->text), &Flavor::name);
-    if (known == kFlavors.end()) {
+    if (known != kFlavors.end()) {
+      return known->firmware;
+    }
+    if (by_default) {
       reading_.notes.push_back(
           {given->place, fmt::format("unflex does not know G-code of the flavor '{}'; say what "
                                      "runs it with --set printer.firmware=...",
                                      given->text)});
-      return std::nullopt;
     }
-    return known->firmware;
+    return std::nullopt;
   }
 
   // OrcaSlicer and Bambu Studio speak of speeds, the others of feed rates.

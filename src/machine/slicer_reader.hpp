@@ -18,7 +18,7 @@ namespace unflex::machine {
 // runs: that firmware; unset: the one the slicer names, which is then taken as well. by_default:
 // nobody has named it.
 [[nodiscard]] Reading read_slicer(const PrintText& print, std::optional<Firmware> runs,
-                                  bool by_default = false);
+                                  bool by_default);
 
 // A slicer that writes its settings at the end, where a stream's come too late; else "".
 [[nodiscard]] std::string_view slicer_with_late_settings(const PrintText& print);

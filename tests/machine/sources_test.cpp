@@ -201,10 +201,19 @@ TEST(Slicers, AreNotBelievedWhatTheyWereToldToIgnore) {
 TEST(Slicers, NameTheFlavorAloneInCura) {
   EXPECT_EQ(sliced(print_of(";FLAVOR:Marlin\n;TIME:12\n", "")).printer.firmware, Firmware::marlin);
   EXPECT_EQ(sliced(print_of(";FLAVOR:RepRap (RepRap)\n", "")).printer.firmware, Firmware::rrf);
-  const Settings odd = sliced(print_of(";FLAVOR:Makerbot\n", ""));
+  const PrintText print = print_of(";FLAVOR:Makerbot\n", "");
+  const Settings odd = sliced(print);
   EXPECT_EQ(odd.printer.firmware, Firmware::klipper);
   ASSERT_THAT(odd.notes, SizeIs(1));
-  EXPECT_THAT(to_string(odd.notes[0]), HasSubstr("print.gcode:1: warning: "));
+  EXPECT_EQ(to_string(odd.notes[0]),
+            "print.gcode:1: warning: unflex does not know G-code of the flavor 'Makerbot'; say "
+            "what runs it with --set printer.firmware=...");
+  // Whoever does as told is not told again.
+  const std::vector<std::string> said = {"printer.firmware=marlin"};
+  EXPECT_THAT(sliced(print, said).notes, IsEmpty());
+  const Result<Settings> to_run = load({.print = &print, .printer_file = {}, .overrides = said});
+  ASSERT_TRUE(to_run);
+  EXPECT_THAT(to_run->notes, IsEmpty());
 }
 
 TEST(Slicers, ThatWriteAtTheEndAreMissedInAPipe) {
