@@ -28,8 +28,6 @@ install(FILES ${PROJECT_BINARY_DIR}/package/unflexConfig.cmake
 install(DIRECTORY include/unflex DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
   FILES_MATCHING PATTERN "*.hpp" PATTERN app EXCLUDE)
 set(UNFLEX_DEVELOPMENT_DOCDIR ${CMAKE_INSTALL_DATADIR}/doc/libunflex-dev)
-install(DIRECTORY examples/library DESTINATION ${UNFLEX_DEVELOPMENT_DOCDIR}/examples
-  COMPONENT development)
 
 # --- manual, examples and the terms under which all this may be used
 find_program(UNFLEX_GZIP gzip REQUIRED)
@@ -42,10 +40,14 @@ unflex_gzip(${PROJECT_SOURCE_DIR}/docs/unflex.1 ${PROJECT_BINARY_DIR}/package/un
 add_custom_target(unflex_manual ALL DEPENDS ${PROJECT_BINARY_DIR}/package/unflex.1.gz)
 install(FILES ${PROJECT_BINARY_DIR}/package/unflex.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
   COMPONENT program)
-install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program
+# They lie as they do here, for the sake of their links.
+install(FILES README.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program
   FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.png")
-install(FILES examples/printer.toml examples/washer.gcode
-  DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples COMPONENT program)
+install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program
+  PATTERN library EXCLUDE PATTERN quickstart.sh EXCLUDE)
+install(DIRECTORY examples/library DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
+  COMPONENT development)
 
 # Headers of these libraries, by Debian's names of their packages, become part of what is built, and
 # their licences ask to go with it.

@@ -44,7 +44,7 @@ examples=/usr/share/doc/unflex/examples
 cmp -- "$root/tmp/out.gcode" "$scratch/out.gcode"
 
 "${install[@]}" /tmp/libunflex-dev.deb cmake g++ make
-"${in_root[@]}" cmake -S /usr/share/doc/libunflex-dev/examples/library -B /tmp/example
+"${in_root[@]}" cmake -S $examples/library -B /tmp/example
 "${in_root[@]}" cmake --build /tmp/example
 "${in_root[@]}" /tmp/example/compensate_file $examples/washer.gcode /tmp/example.gcode \
   $examples/printer.toml

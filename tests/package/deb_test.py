@@ -18,8 +18,10 @@ PROGRAM = [
     "/usr/bin/unflex",
     "/usr/share/bash-completion/completions/unflex",
     "/usr/share/doc/unflex/changelog.gz",
-    "/usr/share/doc/unflex/cli.md",
+    "/usr/share/doc/unflex/README.md",
     "/usr/share/doc/unflex/copyright",
+    "/usr/share/doc/unflex/docs/cli.md",
+    "/usr/share/doc/unflex/examples/cura/UnflexCompensate.py",
     "/usr/share/doc/unflex/examples/printer.toml",
     "/usr/share/doc/unflex/examples/washer.gcode",
     "/usr/share/fish/vendor_completions.d/unflex.fish",
@@ -31,7 +33,7 @@ DEVELOPMENT = [
     "/usr/lib/cmake/unflex/unflexConfig.cmake",
     "/usr/lib/libunflex_pipeline.a",
     "/usr/share/doc/libunflex-dev/copyright",
-    "/usr/share/doc/libunflex-dev/examples/library/main.cpp",
+    "/usr/share/doc/unflex/examples/library/main.cpp",
 ]
 
 
@@ -107,6 +109,22 @@ class Packages(unittest.TestCase):
                   for word in line.split()}
         # Tools for building and what the program alone is made of.
         self.assertEqual(depends, needed - {"g++", "cmake", "ninja-build", "libcli11-dev"})
+
+    def test_links_of_the_documentation_lead_somewhere(self):
+        for package in ("unflex", "libunflex-dev"):
+            output("dpkg-deb", "--extract", self.package(package), self.folder)
+        there = os.path.join(self.folder, "usr/share/doc/unflex")
+        links = 0
+        for document in glob.glob(os.path.join(there, "**", "*.md"), recursive=True):
+            with open(document, encoding="utf-8") as file:
+                found = re.findall(r"\]\(([^)#]+)[^)]*\)", file.read())
+            # What LICENSE says, packages say in `copyright`.
+            for link in found:
+                if link != "LICENSE" and not link.startswith("https://"):
+                    links += 1
+                    self.assertTrue(os.path.exists(os.path.join(os.path.dirname(document), link)),
+                                    f"{document}: {link}")
+        self.assertGreater(links, 40)
 
     def test_the_terms_of_what_is_compiled_in_are_named(self):
         output("dpkg-deb", "--extract", self.package("unflex"), self.folder)

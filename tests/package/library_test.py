@@ -76,7 +76,7 @@ class Library(unittest.TestCase):
         self.assertIn("requested version", configured.stderr)
 
     def test_manual_examples_and_completions_are_where_they_are_looked_for(self):
-        for name in ("man/man1/unflex.1.gz", "doc/unflex/cli.md",
+        for name in ("man/man1/unflex.1.gz", "doc/unflex/docs/cli.md",
                      "doc/unflex/examples/washer.gcode",
                      "bash-completion/completions/unflex", "zsh/site-functions/_unflex",
                      "fish/vendor_completions.d/unflex.fish"):
