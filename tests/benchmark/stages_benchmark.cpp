@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "heatshrink.hpp"
 #include "judge.hpp"
 #include "run_job.hpp"
 #include "stage_options.hpp"
@@ -137,6 +138,16 @@ void Measure(benchmark::State& state) {
   per(state, "per_ms_of_print", 1e3 * planner::duration_s(job->piece.moves));
 }
 BENCHMARK(Measure)->Unit(benchmark::kMillisecond);
+
+// What repeats itself has the most places to look at.
+void PackRepeats(benchmark::State& state) {
+  const std::string bytes(static_cast<std::size_t>(state.range(0)), 'a');
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(container::heatshrink(bytes, 12));
+  }
+  state.SetBytesProcessed(state.iterations() * state.range(0));
+}
+BENCHMARK(PackRepeats)->Range(1 << 16, 1 << 20)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace unflex::pipeline
