@@ -262,12 +262,13 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  if (is_html(name)) {
-    return config.command == Command::inspect
-               ? Status(usage(fmt::format("--report {}: inspect writes .json only", name)))
-               : Status{};
+  if (name.ends_with(".json")) {
+    return {};
   }
-  if (!name.ends_with(".json")) {
+  if (config.command == Command::inspect) {
+    return usage(fmt::format("--report {}: the name must end in .json", name));
+  }
+  if (!is_html(name)) {
     return usage(fmt::format("--report {}: the name must end in .json or .html", name));
   }
   return {};
@@ -342,12 +343,14 @@ std::string parser_message(const CLI::App& program, const CLI::Error& error) {
   if (message.size() > 1 && (is_lower(message[1]) || message[1] == ' ')) {
     message.front() = static_cast<char>(std::tolower(static_cast<unsigned char>(message.front())));
   }
-  const std::vector<const CLI::App*> chosen =
-      program.get_subcommands([](const CLI::App* command) { return command->parsed(); });
-  const std::string help = chosen.empty()
-                               ? "unflex --help"
-                               : fmt::format("unflex {} --help", chosen.front()->get_name());
-  return fmt::format("{}; run '{}'", message, help);
+  std::string command = "unflex";
+  for (const CLI::App* app = &program; app != nullptr;) {
+    const std::vector<const CLI::App*> chosen =
+        app->get_subcommands([](const CLI::App* below) { return below->parsed(); });
+    app = chosen.empty() ? nullptr : chosen.front();
+    command += app == nullptr ? "" : " " + app->get_name();
+  }
+  return fmt::format("{}; run '{} --help'", message, command);
 }
 
 // The library would call an unknown command an unexpected argument, or a missing command.

@@ -76,7 +76,7 @@ std::vector<std::string> summarised(const std::vector<std::string>& lines, std::
     }
   }
   if (left > 0) {
-    result.push_back(fmt::format("unflex: and {} more {}; --report lists them", left, what));
+    result.push_back(fmt::format("unflex: and {} more {}", left, what));
   }
   return result;
 }

@@ -19,7 +19,8 @@ namespace unflex::app {
 [[nodiscard]] std::string error_text(const Error& error);
 
 // The first few lines of each kind, which differ in place, numbers and quoted text alone, and how
-// many more there are; then how many of `total` are left. `what` names them ("warnings").
+// many more there are; then how many of `total` are left. `what` names them, and may say where
+// they are.
 [[nodiscard]] std::vector<std::string> summarised(const std::vector<std::string>& lines,
                                                   std::size_t total, std::string_view what);
 
@@ -34,7 +35,9 @@ class Console {
   void error(const Error& error) { line(error_text(error)); }
   // The lines, summarised.
   void lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what);
-  void warnings(const std::vector<std::string>& all) { lines(all, all.size(), "warnings"); }
+  void warnings(const std::vector<std::string>& all) {
+    lines(all, all.size(), "warnings; --report lists them");
+  }
 
   // Keeps what goes elsewhere, line by line.
   void note(std::string_view text);

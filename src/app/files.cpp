@@ -155,6 +155,11 @@ int copy_all(int from, int to) {
   }
 }
 
+std::string temporary_error_text(int error) {
+  return error == EFBIG ? write_error_text(error)
+                        : errno_text(error) + "; set TMPDIR to another directory";
+}
+
 std::filesystem::path temporary_directory() {
   const char* const chosen = std::getenv("TMPDIR");
   return chosen != nullptr && *chosen != '\0' ? chosen : "/tmp";

@@ -65,6 +65,9 @@ class TemporaryFile {
 [[nodiscard]] int write_all(int fd, std::string_view data);
 [[nodiscard]] int copy_all(int from, int to);
 
+// What stands in the way of a file there.
+[[nodiscard]] std::string temporary_error_text(int error);
+
 // $TMPDIR or /tmp.
 [[nodiscard]] std::filesystem::path temporary_directory();
 

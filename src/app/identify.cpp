@@ -24,18 +24,18 @@ Result<std::string> read_record(const std::string& name) {
   return input ? input->read_all() : Result<std::string>(tl::unexpected(input.error()));
 }
 
-// Which axis a record is of: as told, as its name says, or along which it moved the more.
+// Which axis a record is of: as its name says, as told, or along which it moved the more.
 Result<identify::Axis> axis_of(const IdentifyConfig& config, const identify::DataSet& set,
                                Identification& all) {
+  if (set.axis) {
+    return *set.axis;
+  }
   if (config.axis) {
     return *config.axis;
   }
   if (set.is_diagonal) {
     return fail(ErrorKind::input, {set.name, 0},
                 "is a test along a diagonal, of a belt; unflex needs one along X or Y, or --axis");
-  }
-  if (set.axis) {
-    return *set.axis;
   }
   const identify::Axis axis = dominant_axis(set);
   warn(all, set.name,

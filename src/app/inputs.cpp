@@ -182,8 +182,7 @@ Status Input::copy_text() {
   tl::expected<TemporaryFile, int> copy = TemporaryFile::create(directory);
   if (!copy) {
     return fail(ErrorKind::internal, {directory.string(), 0},
-                fmt::format("cannot keep {} here: {}; set TMPDIR to another directory", name_,
-                            errno_text(copy.error())));
+                fmt::format("cannot keep {} here: {}", name_, temporary_error_text(copy.error())));
   }
   // Whatever happens, nothing is left.
   copy->unlink();
@@ -199,9 +198,9 @@ Status Input::copy_text() {
     }
     const int error = ending_signal() != 0 ? EINTR : write_all(copy->fd(), *piece);
     if (error != 0) {
-      return fail(ErrorKind::internal, {name_, 0},
-                  fmt::format("cannot be kept in {}: {}; set TMPDIR to another directory",
-                              directory.string(), errno_text(error)));
+      return fail(
+          ErrorKind::internal, {name_, 0},
+          fmt::format("cannot be kept in {}: {}", directory.string(), temporary_error_text(error)));
     }
   }
   if (unpacker && unpacker->metadata() != nullptr) {

@@ -92,6 +92,11 @@ Result<Output> Output::open(const std::string& name) {
   // What a killed run may have left there.
   static_cast<void>(TemporaryFile::remove_abandoned(*directory));
   tl::expected<TemporaryFile, int> temporary = TemporaryFile::create(*directory);
+  if (!temporary && target->empty()) {
+    return fail(ErrorKind::internal, {name, 0},
+                fmt::format("cannot be kept in {}: {}", directory->string(),
+                            temporary_error_text(temporary.error())));
+  }
   if (!temporary) {
     return refuse(name, fmt::format("cannot write to the directory {}: {}", directory->string(),
                                     write_error_text(temporary.error())));

@@ -12,14 +12,16 @@
 namespace unflex::app {
 namespace {
 
-// What the results say about success: broken rules before deviation. passed_on: the output has gone
-// to a stream as it came.
+// What the results say about success: broken rules before deviation.
 ExitCode judge(const RunConfig& config, bool passed_on, const report::Report& report,
                Console& console) {
-  const std::string_view consequence =
-      passed_on ? "what was passed on must not be printed" : "nothing was written";
+  const std::string_view consequence = consequence_of(passed_on);
 
-  console.lines(report.violations, report.violation_count, "violations");
+  console.lines(
+      report.violations, report.violation_count,
+      report.violation_count > report.violations.size()
+          ? fmt::format("violations; --report lists the first {}", report.violations.size())
+          : "violations; --report lists them");
   if (report.violation_count > 0 && config.command == Command::compensate) {
     console.line(fmt::format("unflex: the result breaks rules, which is a fault of unflex; {}",
                              consequence));
@@ -67,13 +69,15 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  if (Status accepted = accept(config, setting_warnings(space->settings), console); !accepted) {
+  if (Status accepted = accept(config, setting_warnings(space->settings), false, console);
+      !accepted) {
     return tl::unexpected(accepted.error());
   }
   const Result<pipeline::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
   }
+  const bool passed_on = job->output_fd >= 0;
   Result<report::Report> report = with_progress(config, [&](Progress& progress) {
     return config.command == Command::compensate ? pipeline::compensate(*job, progress)
                                                  : pipeline::verify(*job, progress);
@@ -84,12 +88,11 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!report) {
     return tl::unexpected(report.error());
   }
-  if (Status accepted = accept(config, report->warnings, console); !accepted) {
+  if (Status accepted = accept(config, report->warnings, passed_on, console); !accepted) {
     return tl::unexpected(accepted.error());
   }
   add_setting_warnings(space->settings, report->warnings);
   console.warnings(report->warnings);
-  const bool passed_on = job->output_fd >= 0;
   const ExitCode verdict = judge(config, passed_on, *report, console);
   return deliver(*space, verdict, passed_on, *report).map([&] {
     return PrintOutcome{verdict, std::move(*report)};

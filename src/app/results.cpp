@@ -38,7 +38,12 @@ std::vector<std::string> setting_warnings(const machine::Settings& settings) {
   return remarks;
 }
 
-Status accept(const RunConfig& config, std::vector<std::string> warnings, Console& console) {
+std::string_view consequence_of(bool passed_on) {
+  return passed_on ? "what was passed on must not be printed" : "nothing was written";
+}
+
+Status accept(const RunConfig& config, std::vector<std::string> warnings, bool passed_on,
+              Console& console) {
   if (!config.strict || warnings.empty()) {
     return {};
   }
@@ -48,8 +53,10 @@ Status accept(const RunConfig& config, std::vector<std::string> warnings, Consol
       warning.replace(at, kWarning.size(), ": ");
     }
   }
-  console.lines(warnings, warnings.size(), "errors");
-  return fail(ErrorKind::input, "--strict lets none of this pass; nothing was written");
+  console.lines(warnings, warnings.size(),
+                "errors; without --strict they are warnings, which --report lists");
+  return fail(ErrorKind::input,
+              fmt::format("--strict lets none of this pass; {}", consequence_of(passed_on)));
 }
 
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings) {

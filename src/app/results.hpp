@@ -40,9 +40,12 @@ auto with_progress(const RunConfig& config, Work work)
 
 [[nodiscard]] std::vector<std::string> setting_warnings(const machine::Settings& settings);
 
+// What an error leaves: passed_on: the output has gone to a stream as it came.
+[[nodiscard]] std::string_view consequence_of(bool passed_on);
+
 // With --strict, an error where there are warnings, which are shown as the errors they then are.
 [[nodiscard]] Status accept(const RunConfig& config, std::vector<std::string> warnings,
-                            Console& console);
+                            bool passed_on, Console& console);
 
 // Remarks about the settings come before those about the print.
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings);

@@ -46,7 +46,7 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
     return tl::unexpected(inspection.error());
   }
   add_setting_warnings(space->settings, inspection->warnings);
-  if (Status accepted = accept(config, inspection->warnings, console); !accepted) {
+  if (Status accepted = accept(config, inspection->warnings, false, console); !accepted) {
     return tl::unexpected(accepted.error());
   }
   console.warnings(inspection->warnings);

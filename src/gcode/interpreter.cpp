@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <numbers>
 #include <utility>
 
@@ -36,6 +37,8 @@ InterpreterOptions default_options(Firmware firmware) {
     options.retract_length_mm = 2.0;
     options.retract_speed_mm_s = 1000.0 / kSecondsPerMinute;
     options.unretract_speed_mm_s = 1000.0 / kSecondsPerMinute;
+    // DefaultAxisDriveStepsPerUnit, DefaultZDriveStepsPerUnit, DefaultEDriveStepsPerUnit.
+    options.steps_per_mm = {80.0, 80.0, 800.0, 420.0};
   }
   return options;
 }
@@ -373,18 +376,19 @@ void Interpreter::axis_limits(Event& event, double scale, double least, AxisValu
 
 // M92. What the planner knows of steps stays its configuration's.
 void Interpreter::steps_per_mm(Event& event) {
-  bool changed = false;
   for (const Axis axis : {X, Y, Z, E}) {
-    const std::optional<double> steps = command_.value(kAxisLetters[axis]);
-    if (steps && *steps > 0.0) {
-      changed = changed || state_.steps_per_mm[axis] != steps;
-      state_.steps_per_mm[axis] = steps;
+    const char letter = kAxisLetters[axis];
+    const std::optional<double> steps = command_.value(letter);
+    if (!steps || *steps <= 0.0 || state_.steps_per_mm[axis] == steps) {
+      continue;
     }
-  }
-  if (changed) {
     event.kind = EventKind::barrier;
-    event.warnings.emplace_back(
-        "M92 sets steps per mm: they must be those of the printer's configuration");
+    state_.steps_per_mm[axis] = steps;
+    if (*steps != options_.steps_per_mm[axis]) {
+      event.warnings.push_back(fmt::format(
+          "M92 sets {} steps per mm along {}, but printer.{}_steps_per_mm is {}; they must agree",
+          *steps, letter, static_cast<char>(std::tolower(letter)), options_.steps_per_mm[axis]));
+    }
   }
 }
 

@@ -69,7 +69,10 @@ std::string store(const Value& value, const Key& key, std::string& target) {
 
 std::string store(const Value& value, const Key& key, std::optional<Range>& target) {
   const auto* list = std::get_if<std::vector<Value>>(&value.content);
-  if (list == nullptr || list->size() != 2) {
+  const auto is_number = [](const Value& element) {
+    return std::holds_alternative<double>(element.content);
+  };
+  if (list == nullptr || list->size() != 2 || !std::ranges::all_of(*list, is_number)) {
     return fmt::format("{} must be two numbers, as in [0, 250]", key.name);
   }
   Range range;
@@ -108,8 +111,7 @@ Status apply(const Reading& reading, Draft& draft) {
       return fail(ErrorKind::usage, assignment.place, std::move(wrong));
     }
   }
-  draft.settings.notes.insert(draft.settings.notes.end(), reading.notes.begin(),
-                              reading.notes.end());
+  draft.notes.insert(draft.notes.end(), reading.notes.begin(), reading.notes.end());
   return {};
 }
 

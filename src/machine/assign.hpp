@@ -40,10 +40,13 @@ struct Assignment {
 // What a reader understood of a printer's or a slicer's own settings.
 struct Reading {
   std::vector<Assignment> assignments;  // a later one of a key wins
-  std::vector<Diagnostic> notes;        // what the user should know
+  std::vector<Note> notes;
 
   void add(std::string key, Value value, SourcePlace place) {
     assignments.push_back({std::move(key), std::move(value), std::move(place)});
+  }
+  void note(SourcePlace place, std::string message, std::vector<std::string> keys = {}) {
+    notes.push_back({{std::move(place), std::move(message)}, std::move(keys)});
   }
 };
 

@@ -4,9 +4,11 @@
 #include "command_reader.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <optional>
 #include <utility>
 
@@ -52,14 +54,18 @@ class CommandReader {
     reading.add("printer.firmware", std::string(to_string(firmware)), {file_, 0});
   }
 
-  // Has the interpreter read a line, and takes what it sets.
-  void take(std::string text, std::size_t number) {
+  // Has the interpreter read a line, and takes what it sets. False if it can't.
+  bool take(std::string text, std::size_t number) {
     const gcode::Command command = gcode::parse(text);
     const SourcePlace place{file_, number};
     const gcode::Event event = interpreter_.interpret({std::move(text), number});
-    if (command.number != 92) {  // in a print steps are a reason to warn
+    if (event.position_lost) {
+      return false;
+    }
+    // In a print steps and inches are a reason to warn.
+    if (command.number != 92 && command.letter != 'G') {
       for (const std::string& warning : event.warnings) {
-        note(place, warning);
+        reading.note(place, warning);
       }
     }
     for (const LimitValue& limit : limit_values(*event.limits)) {
@@ -82,6 +88,7 @@ class CommandReader {
       default:
         break;
     }
+    return true;
   }
 
   // Of what both axes can do; the motors' limits follow from it: enough for the faster axis, not
@@ -93,10 +100,6 @@ class CommandReader {
     if (accel_) {
       reading.add("limits.max_accel_mm_s2", accel_->first, accel_->second);
     }
-  }
-
-  void note(SourcePlace place, std::string message) {
-    reading.notes.push_back({std::move(place), std::move(message)});
   }
 
   // A shaper's frequency is the resonance as it was measured.
@@ -155,16 +158,77 @@ class CommandReader {
   Found accel_;
 };
 
+// The keys of what a line says.
+std::vector<std::string> keys_of(const gcode::Command& command) {
+  std::vector<std::string> keys;
+  const auto add_axes = [&](std::string_view pattern) {
+    for (const std::string_view axis : kAxes) {
+      if (command.has(static_cast<char>(std::toupper(axis.front())))) {
+        keys.push_back(fmt::format(fmt::runtime(pattern), axis));
+      }
+    }
+  };
+  const auto add = [&](char letter, std::string_view key) {
+    if (command.has(letter)) {
+      keys.emplace_back(key);
+    }
+  };
+  switch (command.number) {
+    case 92:
+      add_axes("printer.{}_steps_per_mm");
+      break;
+    case 201:
+      add_axes("limits.max_{}_accel_mm_s2");
+      break;
+    case 203:
+      add_axes("limits.max_{}_velocity_mm_s");
+      break;
+    case 204:
+      add('P', "limits.print_accel_mm_s2");
+      add('T', "limits.travel_accel_mm_s2");
+      break;
+    case 205:
+    case 566:
+      add_axes("limits.jerk_{}_mm_s");
+      break;
+    case 593:
+      keys = {"dynamics.x.freq_hz", "dynamics.y.freq_hz"};
+      break;
+    default:
+      break;
+  }
+  return keys;
+}
+
+// Takes a line, or says that it can't.
+void take(CommandReader& reader, const std::string& text, const gcode::Command& command,
+          const SourcePlace& place) {
+  if (reader.take(text, place.line)) {
+    return;
+  }
+  const std::string_view why = text.find('{') != std::string::npos
+                                   ? "an expression, which unflex does not evaluate"
+                                   : "two commands, or a word given twice";
+  const std::vector<std::string> keys = keys_of(command);
+  reader.reading.note(
+      place,
+      fmt::format("{}: nothing of this line is taken; {}", why,
+                  keys.empty() ? "write values there"
+                               : fmt::format("give {} with --set", fmt::join(keys, " and "))),
+      keys);
+}
+
 void marlin_junctions(CommandReader& reader, const gcode::Command& command,
                       const SourcePlace& place) {
   // Which of the two Marlin was built with shows in which it lists.
   if (command.has('J')) {
     reader.reading.add("printer.classic_jerk", false, place);
     // M503 shows two decimals of it.
-    if (command.value('J') == 0.01) {
-      reader.note(place,
-                  "M503 rounds J, and Marlin's default of 0.013 shows as 0.01; if it was never "
-                  "changed give --set limits.junction_deviation_mm=0.013");
+    if (command.value('J') == 0.01 && reader.state().unit_mm == 1.0) {
+      reader.reading.note(place,
+                          "M503 rounds J, and Marlin's default of 0.013 shows as 0.01; if it was "
+                          "never changed give --set limits.junction_deviation_mm=0.013",
+                          {"limits.junction_deviation_mm"});
     }
   } else if (command.has('X')) {
     reader.reading.add("printer.classic_jerk", true, place);
@@ -194,16 +258,17 @@ void read_marlin_line(CommandReader& reader, std::string_view line, std::size_t 
     return;
   }
   if (is_g_unit || is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 208, 593})) {
-    reader.take(text, number);
+    take(reader, text, command, place);
   }
   if (command.number == 205) {
     marlin_junctions(reader, command, place);
   } else if (command.number == 593) {
     marlin_shaper(reader, command, place);
   } else if (command.number == 665) {
-    reader.note(place,
-                "the resonances of a delta or a SCARA change with the place; unflex takes them for "
-                "the same everywhere");
+    reader.reading.note(
+        place,
+        "the resonances of a delta or a SCARA change with the place; unflex takes them for "
+        "the same everywhere");
   }
 }
 
@@ -242,9 +307,10 @@ Status check_rrf_kinematics(CommandReader& reader, const gcode::Command& command
   const int type = static_cast<int>(command.value('K').value_or(0.0));
   // linearDelta and rotaryDelta; scara, hangprinter, polar and fiveBarScara.
   if (command.number == 665 || is_one_of(type, {3, 10})) {
-    reader.note(place,
-                "the resonances of a delta change with the place; unflex takes them for the same "
-                "everywhere");
+    reader.reading.note(
+        place,
+        "the resonances of a delta change with the place; unflex takes them for the same "
+        "everywhere");
   } else if (is_one_of(type, {4, 6, 7, 9})) {
     return fail(ErrorKind::usage, place,
                 fmt::format("kinematics K{} has no carriages along X and Y; unflex models one "
@@ -258,9 +324,10 @@ void rrf_shaper(CommandReader& reader, const SourcePlace& place) {
   const gcode::ModalState& state = reader.state();
   constexpr double kDefaultDampingRatio = 0.1;  // AxisShaper.h
   if (state.shaper.type_x == "custom") {
-    return reader.note(place,
-                       "a custom shaper cannot be set back after the print; unflex leaves it to "
-                       "the file's own M593");
+    return reader.reading.note(
+        place,
+        "a custom shaper cannot be set back after the print; unflex leaves it to "
+        "the file's own M593");
   }
   for (const std::string axis : {"x", "y"}) {
     reader.shaper(axis, state.shaper_freq_x_hz,
@@ -284,11 +351,11 @@ Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t n
     return {};
   }
   if (is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 566, 593})) {
-    reader.take(text, number);
+    take(reader, text, command, place);
   }
   switch (command.number) {
     case 98:
-      reader.note(place, "M98 runs another file, which unflex does not read");
+      reader.reading.note(place, "M98 runs another file, which unflex does not read");
       break;
     case 208:
       travel = read_travel(command, line.substr(line.find("208") + 3), travel, place);

@@ -18,8 +18,16 @@ struct MassSpringDamper {
   std::optional<double> damping_n_s_mm;
 };
 
+// What the user should know, and the keys that speak of the same: once others have given all of
+// them it is known.
+struct Note {
+  Diagnostic diagnostic;
+  std::vector<std::string> keys;
+};
+
 struct Draft {
   Settings settings;
+  std::vector<Note> notes;
   MassSpringDamper mass_x;
   MassSpringDamper mass_y;
   // Parallel to key_table(): where the key was given last; empty while it has its default.

@@ -70,7 +70,7 @@ constexpr std::array kKeys = {
         Bounds{.min = 1.0}, "mm/s", "Speed of G10", "Klipper 20, Marlin 45, RRF 16.7",
         &derived<&S::retract_speed_mm_s>},
     Key{"printer.unretract_extra_length_mm", &setting<&S::printer, &P::unretract_extra_length_mm>,
-        kNotNegative, "mm", "Filament G11 pushes beyond what G10 pulled"},
+        kAny, "mm", "Filament G11 pushes beyond what G10 pulled; below 0 not on Klipper"},
     Key{"printer.unretract_speed_mm_s", &setting<&S::printer, &P::unretract_speed_mm_s>,
         Bounds{.min = 1.0}, "mm/s", "Speed of G11", "Klipper 10, Marlin 8, RRF 16.7",
         &derived<&S::unretract_speed_mm_s>},

@@ -130,7 +130,7 @@ class Reader {
   }
 
   void note(SourcePlace at, std::string message) {
-    reading_.notes.push_back({std::move(at), std::move(message)});
+    reading_.note(std::move(at), std::move(message));
   }
 
   Status kinematics() {
@@ -233,7 +233,9 @@ Result<Reading> read_klipper(std::string_view text, const std::string& file) {
   }
   Result<Reading> reading = Reader(*config, file).read();
   if (reading) {
-    reading->notes.insert(reading->notes.begin(), config->notes.begin(), config->notes.end());
+    for (const Diagnostic& note : config->notes) {
+      reading->note(note.place, note.message);
+    }
   }
   return reading;
 }

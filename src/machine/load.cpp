@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <tuple>
 #include <utility>
 
 #include "command_reader.hpp"
@@ -90,15 +91,48 @@ void note_unknown_resonances(Draft& draft) {
   draft.settings.notes.push_back(std::move(note));
 }
 
-void note_late_settings(const PrintText& print, std::vector<Diagnostic>& notes) {
+bool is_known(const Note& note, const Draft& draft) {
+  const auto given_by_others = [&](const std::string& key) {
+    const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
+    return place && *place != note.diagnostic.place;
+  };
+  return !note.keys.empty() && std::ranges::all_of(note.keys, given_by_others);
+}
+
+void tell_notes(Draft& draft) {
+  for (const Note& note : draft.notes) {
+    if (!is_known(note, draft)) {
+      draft.settings.notes.push_back(note.diagnostic);
+    }
+  }
+}
+
+// To Klipper a Z faster than the tool may be is a mistake, but slicers say what the axis can do.
+void bound_z(const Reading& slicer, Draft& draft) {
+  const Settings& s = draft.settings;
+  if (s.printer.firmware != Firmware::klipper) {
+    return;
+  }
+  constexpr std::size_t kZ = 2;
+  for (const auto& [key, value, most] :
+       {std::tuple{"limits.max_z_velocity_mm_s", s.axis_max_velocity_mm_s()[kZ],
+                   s.limits.max_velocity_mm_s},
+        std::tuple{"limits.max_z_accel_mm_s2", s.axis_max_accel_mm_s2()[kZ],
+                   s.limits.max_accel_mm_s2}}) {
+    const auto said = std::ranges::find(slicer.assignments, key, &Assignment::key);
+    if (said != slicer.assignments.end() && value > most) {
+      static_cast<void>(assign(key, most, said->place, draft));
+    }
+  }
+}
+
+void note_late_settings(const PrintText& print, Reading& reading) {
   const std::string_view late = slicer_with_late_settings(print);
   if (!late.empty()) {
-    Diagnostic note;
-    note.place.file = print.name;
-    note.message = fmt::format(
-        "{} writes its settings at the end, where a pipe's come too late; give a file or --printer",
-        late);
-    notes.push_back(std::move(note));
+    reading.note({print.name, 0},
+                 fmt::format("{} writes its settings at the end, where a pipe's come too late; "
+                             "give a file or --printer",
+                             late));
   }
 }
 
@@ -117,24 +151,18 @@ Status read_print(const Sources& sources, Draft& draft) {
   const std::optional<Firmware> runs =
       sources.firmware_as_sliced ? std::nullopt : std::optional(draft.settings.printer.firmware);
   Reading reading = read_slicer(*sources.print, runs, by_default);
-  // What does not hold must be right as well.
-  Draft alone = defaults();
-  if (Status applied = apply(reading, alone); !applied) {
-    return applied;
+  if (!sources.printer_file) {
+    note_late_settings(*sources.print, reading);
   }
   std::erase_if(reading.assignments, [&](const Assignment& assignment) {
     return draft.places[*find_key(assignment.key)].has_value();
   });
-  std::vector<Diagnostic> notes_of_others = std::exchange(draft.settings.notes, {});
-  if (Status applied = apply(reading, draft); !applied) {
-    return applied;
+  std::ranges::move(std::exchange(draft.notes, {}), std::back_inserter(reading.notes));
+  Status applied = apply(reading, draft);
+  if (applied) {
+    bound_z(reading, draft);
   }
-  std::vector<Diagnostic>& notes = draft.settings.notes;
-  if (!sources.printer_file) {
-    note_late_settings(*sources.print, notes);
-  }
-  std::ranges::move(notes_of_others, std::back_inserter(notes));
-  return {};
+  return applied;
 }
 
 Status read_sources(const Sources& sources, Draft& draft) {
@@ -159,6 +187,7 @@ Result<Settings> finish(Draft draft) {
   if (Status checked = check_consistency(draft); !checked) {
     return tl::unexpected(checked.error());
   }
+  tell_notes(draft);
   note_unknown_resonances(draft);
   record_origins(draft);
   return draft.settings;
@@ -221,7 +250,8 @@ std::string toml_line(const Key& key, std::string_view name, const std::string& 
 }  // namespace
 
 std::string to_toml(const Settings& settings) {
-  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}, .foreign_file = {}};
+  Draft draft;
+  draft.settings = settings;
   std::string text =
       "# A printer as unflex sees it; docs/configuration.md explains each key. Behind a value "
       "stands\n"
@@ -248,7 +278,8 @@ std::string to_toml(const Settings& settings) {
 }
 
 std::vector<SettingRow> rows(const Settings& settings) {
-  Draft draft{.settings = settings, .mass_x = {}, .mass_y = {}, .places = {}, .foreign_file = {}};
+  Draft draft;
+  draft.settings = settings;
   std::vector<SettingRow> rows;
   std::size_t next_origin = 0;
   for (const Key& key : key_table()) {

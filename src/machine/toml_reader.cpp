@@ -41,8 +41,7 @@ Value value_of(const toml::node& node) {
 }
 
 std::string check_schema(const toml::node& node) {
-  const auto* version = node.as_integer();
-  if (version != nullptr && version->get() == kSchemaVersion) {
+  if (node.value<double>() == static_cast<double>(kSchemaVersion)) {
     return {};
   }
   return fmt::format("{} must be {}, the only one this version of unflex reads", kSchemaKey,

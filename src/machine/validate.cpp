@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "key_table.hpp"
+#include "toml_reader.hpp"
 #include "unflex/machine/recommend.hpp"
 
 namespace unflex::machine {
@@ -24,6 +25,14 @@ std::optional<SourcePlace> place_of(const Draft& draft, std::string_view key) {
   const std::optional<std::size_t> index = find_key(key);
   return index ? draft.places[*index] : std::nullopt;
 }
+
+// Rounded to three digits that a user may type: not above a bound, or not below.
+double typed(double value, double (*round)(double)) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
+  return round(value / unit) * unit;
+}
+std::string at_most(double value) { return fmt::format("{:.3g}", typed(value, std::floor)); }
+std::string at_least(double value) { return fmt::format("{:.3g}", typed(value, std::ceil)); }
 
 // An error at the first of the keys that was given anywhere; with defaults alone it has no place.
 tl::unexpected<Error> conflict(const Draft& draft, std::initializer_list<std::string_view> keys,
@@ -51,11 +60,19 @@ AxisDynamics from_mass(double mass_g, double stiffness_n_mm, double damping_n_s_
           .damping_ratio = c / (2.0 * std::sqrt(k * m))};
 }
 
+bool is_overridden(const Draft& draft, std::string_view key) {
+  const std::optional<SourcePlace> place = place_of(draft, key);
+  return place && place->file.starts_with(kOverrideMark);
+}
+
+// One form overrides the other.
 Status check_mass_keys(const Draft& draft, const std::string& section) {
   std::optional<std::string> given;
   std::optional<std::string> missing;
+  bool overridden = false;
   for (const std::string_view key : kMassKeys) {
     std::string name = fmt::format("{}.{}", section, key);
+    overridden = overridden || is_overridden(draft, name);
     (place_of(draft, name) ? given : missing) = std::move(name);
   }
   if (given && missing) {
@@ -66,7 +83,7 @@ Status check_mass_keys(const Draft& draft, const std::string& section) {
   }
   for (const std::string_view key : kModalKeys) {
     const std::string name = fmt::format("{}.{}", section, key);
-    if (given && place_of(draft, name)) {
+    if (given && place_of(draft, name) && is_overridden(draft, name) == overridden) {
       return conflict(draft, {name},
                       fmt::format("{} cannot stand beside mass_g, stiffness_n_mm and "
                                   "damping_n_s_mm; give one form only",
@@ -84,17 +101,22 @@ Status resolve_axis(Draft& draft, const std::string& section, const MassSpringDa
   if (!mass.mass_g || !mass.stiffness_n_mm || !mass.damping_n_s_mm) {
     return {};
   }
-  axis = from_mass(*mass.mass_g, *mass.stiffness_n_mm, *mass.damping_n_s_mm);
+  const AxisDynamics alone = from_mass(*mass.mass_g, *mass.stiffness_n_mm, *mass.damping_n_s_mm);
   const std::string mass_key = fmt::format("{}.{}", section, kMassKeys[0]);
-  const std::array<double, 2> values = {axis.freq_hz, axis.damping_ratio};
+  const std::array<std::pair<double, double*>, 2> values = {
+      std::pair{alone.freq_hz, &axis.freq_hz}, std::pair{alone.damping_ratio, &axis.damping_ratio}};
   for (std::size_t i = 0; i < kModalKeys.size(); ++i) {
     const std::size_t index = *find_key(fmt::format("{}.{}", section, kModalKeys[i]));
-    if (!key_table()[index].bounds.contains(values[i])) {
+    if (is_overridden(draft, key_table()[index].name)) {
+      continue;
+    }
+    if (!key_table()[index].bounds.contains(values[i].first)) {
       return conflict(draft, {mass_key},
                       fmt::format("mass, stiffness and damping give {} = {:.4g}, which is out of "
                                   "range; check their units",
-                                  key_table()[index].name, values[i]));
+                                  key_table()[index].name, values[i].first));
     }
+    *values[i].second = values[i].first;
     draft.places[index] = place_of(draft, mass_key);
   }
   return {};
@@ -129,6 +151,12 @@ Status check_printer(const Draft& draft) {
                                 "printer.max_arc_segment_mm, {}",
                                 s.printer.min_arc_segment_mm, s.printer.max_arc_segment_mm));
   }
+  const double least_extra_mm = klipper ? 0.0 : -s.retract_length_mm();
+  if (s.printer.unretract_extra_length_mm < least_extra_mm) {
+    return conflict(draft, {"printer.unretract_extra_length_mm"},
+                    fmt::format("printer.unretract_extra_length_mm is {}, but must be at least {}",
+                                s.printer.unretract_extra_length_mm, least_extra_mm));
+  }
   if (s.extruder.filament_diameter_mm < s.extruder.nozzle_diameter_mm) {
     return conflict(draft, {"extruder.filament_diameter_mm", "extruder.nozzle_diameter_mm"},
                     "extruder.filament_diameter_mm must not be below nozzle_diameter_mm");
@@ -156,8 +184,8 @@ Status check_shaper(const Draft& draft) {
   if (freq_hz != 0.0 && (freq_hz < least_hz || freq_hz > kMost_hz)) {
     return conflict(draft, {"printer.input_shaper_freq_x_hz"},
                     fmt::format("printer.input_shaper_freq_x_hz is {}, but must be 0 for none or "
-                                "{:.3g} to {}, what RepRapFirmware takes",
-                                freq_hz, least_hz, kMost_hz));
+                                "{} to {}, what RepRapFirmware takes",
+                                freq_hz, at_least(least_hz), kMost_hz));
   }
   return {};
 }
@@ -206,9 +234,9 @@ Status check_grid(const Draft& draft) {
   if (s.period_ms() > longest_ms) {
     return conflict(draft, {"emit.period_ms", "dynamics.x.freq_hz", "dynamics.y.freq_hz"},
                     fmt::format("emit.period_ms is {}, too long for a resonance at {:.4g} Hz; "
-                                "at most {:.3g}, better {:.3g}",
-                                s.period_ms(), fastest_freq_hz(s), longest_ms,
-                                longest_ms * kLeastNodesPerPeriod / kGoodNodesPerPeriod));
+                                "at most {}, better {}",
+                                s.period_ms(), fastest_freq_hz(s), at_most(longest_ms),
+                                at_most(longest_ms * kLeastNodesPerPeriod / kGoodNodesPerPeriod)));
   }
   if (s.solve.overlap_s > s.solve.window_s) {
     return conflict(draft, {"solve.overlap_s", "solve.window_s"},
@@ -240,8 +268,8 @@ std::vector<std::string> recommendations(const Settings& settings) {
   const double good_ms = 1e3 / (kGoodNodesPerPeriod * fastest_freq_hz(settings));
   if (settings.period_ms() > good_ms) {
     remarks.push_back(
-        fmt::format("emit.period_ms is {}; at {:.4g} Hz {:.3g} or less follows the path better",
-                    settings.period_ms(), fastest_freq_hz(settings), good_ms));
+        fmt::format("emit.period_ms is {}; at {:.4g} Hz {} or less follows the path better",
+                    settings.period_ms(), fastest_freq_hz(settings), at_most(good_ms)));
   }
   return remarks;
 }

@@ -88,7 +88,7 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
   }
   output.flush();
   if (!output) {
-    return failed(disk_full(job));
+    return failed(output_failed(job.output_name));
   }
   return outcome;
 }

@@ -116,7 +116,7 @@ class Compensator {
         return fail(ErrorKind::internal, "cancelled");
       }
       if (!*output_) {
-        return disk_full(job_);
+        return output_failed(job_.output_name);
       }
       // Once all is written there is nothing to wait for.
       if (!is_done() && !(has_room() && take_piece())) {
@@ -413,11 +413,6 @@ class Compensator {
 };
 
 }  // namespace
-
-tl::unexpected<Error> disk_full(const Job& job) {
-  return fail(ErrorKind::internal, {job.output_name, 0},
-              "cannot write the output; is the disk full?");
-}
 
 PassOutcome compensate_pass(const Job& job, const Engines& engines,
                             const std::vector<verify::BlamedRun>& kept, const PassStreams& streams,

@@ -30,9 +30,6 @@ struct PassOutcome {
   std::vector<verify::BlamedRun> blamed;
 };
 
-// What writing comes to where a file takes no more.
-[[nodiscard]] tl::unexpected<Error> disk_full(const Job& job);
-
 // kept: runs that are left as they were sliced.
 [[nodiscard]] PassOutcome compensate_pass(const Job& job, const Engines& engines,
                                           const std::vector<verify::BlamedRun>& kept,

@@ -87,8 +87,10 @@ class Inspector {
     gcode::Event end;
     end.kind = gcode::EventKind::barrier;
     plan(end);
-    if (result_->moves == 0) {
+    if (result_->x_min_mm > result_->x_max_mm) {
       result_->x_min_mm = result_->x_max_mm = result_->y_min_mm = result_->y_max_mm = 0.0;
+    }
+    if (result_->moves == 0) {
       result_->lowest_accel_mm_s2 = 0.0;
     }
     if (linear_moves_ > 0) {

@@ -220,7 +220,14 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
 void PieceReader::warn(std::size_t line, std::string message) {
   if (warnings_.size() < kMaxWarnings) {
     warnings_.push_back({{lines_.name(), line}, std::move(message)});
+    return;
   }
+  ++unlisted_warnings_;
+  warnings_.resize(kMaxWarnings);
+  Diagnostic rest;
+  rest.place.file = lines_.name();
+  rest.message = fmt::format("{} more warnings are not listed", unlisted_warnings_);
+  warnings_.push_back(std::move(rest));
 }
 
 // The printer refuses the move, or cuts it off; unflex leaves the way there as it is.

@@ -90,6 +90,7 @@ class PieceReader {
   std::size_t spare_events_ = 0;                  // in it
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
   std::vector<Diagnostic> warnings_;
+  std::size_t unlisted_warnings_ = 0;
   bool any_command_ = false;
 };
 

@@ -30,6 +30,12 @@ std::string scaled_lines(std::string_view text, double factor) {
   return out;
 }
 
+tl::unexpected<Error> output_failed(const std::string& name) {
+  return fail(ErrorKind::internal, {name, 0},
+              "cannot write the output; make room there, or raise the limit on the size of files "
+              "(ulimit -f)");
+}
+
 Status retime(const std::string& path, const std::string& name, double factor) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
   std::string chunk(kChunk, '\0');
@@ -65,7 +71,7 @@ Status retime(const std::string& path, const std::string& name, double factor) {
     std::filesystem::resize_file(path, static_cast<std::uintmax_t>(written_to), error);
   }
   if (!file || error) {
-    return fail(ErrorKind::internal, {name, 0}, "cannot write the output; is the disk full?");
+    return output_failed(name);
   }
   return {};
 }

@@ -16,4 +16,7 @@ namespace unflex::pipeline {
 // error calls it.
 [[nodiscard]] Status retime(const std::string& path, const std::string& name, double factor);
 
+// What writing comes to where a file takes no more.
+[[nodiscard]] tl::unexpected<Error> output_failed(const std::string& name);
+
 }  // namespace unflex::pipeline

@@ -153,6 +153,7 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
   options.shaper_type = settings.printer.input_shaper_type;
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
+  options.steps_per_mm = settings.steps_per_mm();
   return options;
 }
 

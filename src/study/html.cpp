@@ -257,6 +257,17 @@ void write_chains(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "</tbody></table></div></section>\n");
 }
 
+void write_warnings(Sink out, const Outcome& outcome) {
+  if (outcome.warnings.empty()) {
+    return;
+  }
+  fmt::format_to(out, "<section class=\"card\"><h2>Warnings</h2><ul>\n");
+  for (const std::string& warning : outcome.warnings) {
+    fmt::format_to(out, "<li>{}</li>\n", escape_html(warning));
+  }
+  fmt::format_to(out, "</ul></section>\n");
+}
+
 void write_settings(Sink out, const Outcome& outcome) {
   fmt::format_to(out,
                  "<section class=\"card\"><h2>How it was made</h2><dl class=\"facts\">"
@@ -281,6 +292,7 @@ std::string to_html(const Outcome& outcome) {
   write_depth(out, outcome.cases.front());
   write_figures(out, outcome);
   write_chains(out, outcome);
+  write_warnings(out, outcome);
   write_settings(out, outcome);
   return report::html_page(
       {.title = outcome.input.empty() ? "Study of the thesis' corner" : "Study of " + outcome.input,

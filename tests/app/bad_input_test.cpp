@@ -13,6 +13,7 @@
 namespace unflex::app {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -327,6 +328,25 @@ TEST_F(Strict, MakesErrorsOfInspectsWarnings) {
   EXPECT_THAT(strict.err, HasSubstr("in.gcode:11: a motion word has no number"));
   EXPECT_THAT(strict.err, Not(HasSubstr("warning")));
   EXPECT_EQ(names(), std::vector<std::string>{"in.gcode"});
+}
+
+TEST_F(Strict, TellsOfAStreamThatItMustNotBePrinted) {
+  write_file(path("in.gcode"), among("G1 X E.2"));
+  const Outcome strict = run({"compensate", "in.gcode", "-o", "-", "--strict"});
+  EXPECT_EQ(strict.exit_code, 2);
+  EXPECT_THAT(strict.out, HasSubstr("G28"));
+  EXPECT_THAT(strict.err, EndsWith("unflex: --strict lets none of this pass; what was passed on "
+                                   "must not be printed\n"));
+}
+
+TEST_F(Strict, CountsWarningsItDoesNotKeep) {
+  std::string lines;
+  for (int i = 0; i < 1500; ++i) {
+    lines += "G1 X1.1.2\n";
+  }
+  write_file(path("in.gcode"), among(lines));
+  EXPECT_THAT(run({"inspect", "in.gcode"}).err,
+              HasSubstr("in.gcode: warning: 500 more warnings are not listed\n"));
 }
 
 TEST_F(Strict, WarningsOfAKindAreShownThreeTimes) {

@@ -12,6 +12,7 @@
 namespace unflex::app {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -100,6 +101,10 @@ TEST_F(Identify, TakesARingingTower) {
                                "--decay", "1.5", "--axis", "y", "-q"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, StartsWith("[dynamics.y]\nfreq_hz = 50"));
+  // --axis is the tower's; a record's name tells its own.
+  const Outcome both = run({"identify", "a_x.csv", "--wave-spacing-mm", "2", "--speed-mm-s", "100",
+                            "--decay", "1.5", "--axis", "y", "-q"});
+  EXPECT_THAT(both.out, AllOf(HasSubstr("[dynamics.x]"), HasSubstr("[dynamics.y]")));
 }
 
 TEST_F(Identify, SaysWhatItCannotUse) {

@@ -69,6 +69,11 @@ TEST_F(PrinterFile, IsMadeFromAPrintToo) {
   EXPECT_THAT(outcome.out, HasSubstr("max_accel_mm_s2 = 1500  # sliced.gcode:"));
 }
 
+TEST_F(PrinterFile, HasHelpOfItsOwn) {
+  EXPECT_THAT(run({"printer", "init", "-o", "p.toml"}).err,
+              ::testing::EndsWith("; run 'unflex printer init --help'\n"));
+}
+
 TEST_F(PrinterFile, IsNotWrittenOverWhatItIsMadeFrom) {
   write_file(path("p.toml"), "[limits]\nmax_accel_mm_s2 = 1\n");
   const Outcome outcome = run({"printer", "init", "--from", "p.toml", "-o", "p.toml"});

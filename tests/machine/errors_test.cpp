@@ -106,7 +106,16 @@ INSTANTIATE_TEST_SUITE_P(
                 "[printer]\nfirmware = \"rrf\"\ninput_shaper_freq_x_hz = 5\n",
                 {},
                 "printer.toml:3: printer.input_shaper_freq_x_hz is 5, but must be 0 for none or "
-                "5.72 to 1000, what RepRapFirmware takes"},
+                "5.73 to 1000, what RepRapFirmware takes"},
+        Mistake{
+            "FilamentThatKlipperDoesNotLeaveOut",
+            "[printer]\nunretract_extra_length_mm = -0.5\n",
+            {},
+            "printer.toml:2: printer.unretract_extra_length_mm is -0.5, but must be at least 0"},
+        Mistake{"TravelInWords",
+                "[printer]\ntravel_x_mm = [0, \"far\"]\n",
+                {},
+                "printer.toml:2: printer.travel_x_mm must be two numbers, as in [0, 250]"},
         Mistake{"NotANumber",
                 "[emit]\nperiod_ms = nan\n",
                 {},

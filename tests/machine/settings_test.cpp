@@ -1,5 +1,6 @@
 // What a printer file says arrives, and what it does not say follows from the rest.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <numbers>
+#include <regex>
 
 #include "unflex/machine/machine.hpp"
 #include "unflex/machine/recommend.hpp"
@@ -128,6 +130,49 @@ TEST(Dynamics, FollowFromMassStiffnessAndDamping) {
   EXPECT_NEAR(s.dynamics_x.damping_ratio, 0.5, 1e-12);
   EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 45.0);
   EXPECT_EQ(origin(s, "dynamics.x.freq_hz"), "printer.toml:2");
+}
+
+// --set gives the axis in another form than the file.
+TEST(Overrides, OfOneFormOfTheDynamicsReplaceTheOther) {
+  const std::string modal = "[dynamics.x]\nfreq_hz = 30\ndamping_ratio = 0.2\n";
+  const std::vector<std::string> by_mass = {
+      "dynamics.x.mass_g=1000", "dynamics.x.stiffness_n_mm=10", "dynamics.x.damping_n_s_mm=0.1"};
+  const Settings mass = read(modal, by_mass);
+  EXPECT_NEAR(mass.dynamics_x.freq_hz, 100.0 / (2.0 * std::numbers::pi), 1e-12);
+  EXPECT_NEAR(mass.dynamics_x.damping_ratio, 0.5, 1e-12);
+  EXPECT_EQ(origin(mass, "dynamics.x.freq_hz"), "--set");
+  const Settings freq =
+      read("[dynamics.x]\nmass_g = 1000\nstiffness_n_mm = 10\ndamping_n_s_mm = 0.1\n",
+           {"dynamics.x.freq_hz=30"});
+  EXPECT_DOUBLE_EQ(freq.dynamics_x.freq_hz, 30.0);
+  EXPECT_NEAR(freq.dynamics_x.damping_ratio, 0.5, 1e-12);
+  std::vector<std::string> both = by_mass;
+  both.emplace_back("dynamics.x.freq_hz=30");
+  EXPECT_FALSE(parse(modal, "printer.toml", both));
+}
+
+TEST(Overrides, MayNameTheSchema) {
+  EXPECT_TRUE(parse("", "printer.toml", {"schema_version=1"}));
+  EXPECT_FALSE(parse("", "printer.toml", {"schema_version=2"}));
+}
+
+// Whoever types the bound a message names is not refused again.
+TEST(Bounds, ThatMessagesNameAreAccepted) {
+  for (double freq_hz = 20.0; freq_hz < 300.0; freq_hz *= 1.003) {
+    const std::string dynamics =
+        fmt::format("[dynamics.x]\nfreq_hz = {0}\n[dynamics.y]\nfreq_hz = {0}\n", freq_hz);
+    const Result<Settings> refused = parse(dynamics, "printer.toml", {"emit.period_ms=50"});
+    ASSERT_FALSE(refused);
+    std::smatch bounds;
+    ASSERT_TRUE(std::regex_search(refused.error().message, bounds,
+                                  std::regex("at most ([0-9.]+), better ([0-9.]+)$")))
+        << refused.error().message;
+    EXPECT_TRUE(parse(dynamics, "printer.toml", {"emit.period_ms=" + bounds[1].str()})) << freq_hz;
+    EXPECT_THAT(recommendations(read(dynamics, {"emit.period_ms=" + bounds[2].str()})), IsEmpty())
+        << freq_hz;
+  }
+  EXPECT_TRUE(
+      parse("[printer]\nfirmware = \"rrf\"\ninput_shaper_freq_x_hz = 5.73\n", "printer.toml", {}));
 }
 
 TEST(UnsetKeys, FollowKlippersFormulas) {

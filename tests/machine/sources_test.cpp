@@ -97,7 +97,19 @@ TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsANote) {
   EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 40.0);
 }
 
+TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsNoNoteToWhoKnows) {
+  const std::string dump = "echo:  M92 X80 Y80\necho:  M205 J0.01\necho:  M593 F40 D0.1\n";
+  for (const char* deviation : {"0.013", "0.01"}) {
+    const Result<Settings> s =
+        parse(dump, "dump.txt", {fmt::format("limits.junction_deviation_mm={}", deviation)});
+    ASSERT_TRUE(s);
+    EXPECT_THAT(s->notes, IsEmpty());
+  }
+}
+
 TEST(MarlinDump, InInchesIsConverted) {
+  EXPECT_THAT(read("echo:  G20\necho:  M92 X80\necho:  M205 J0.01\necho:  M593 F40 D0.1\n").notes,
+              IsEmpty());
   EXPECT_NEAR(*read("echo:  G20\necho:  M201 X10 Y10\n").limits.axis_max_accel_mm_s2[0], 254.0,
               1e-9);
 }
@@ -122,6 +134,36 @@ TEST(RrfConfig, IsRead) {
   EXPECT_EQ(told(s, "printer.unretract_speed_mm_s"), "20 config.g:13");
   EXPECT_EQ(told(s, "printer.retract_z_hop_mm"), "0.2 config.g:13");
   EXPECT_THAT(s.notes, IsEmpty());
+}
+
+// What cannot be evaluated is for the user to say.
+TEST(RrfConfig, WithExpressionsAsksForTheirKeys) {
+  const std::string text =
+      "M550 P\"x\"\nM566 X{global.jerk} Y900\nM201 X3000 Y3000\nM593 P\"zvd\" F40\n";
+  const Settings s = read(text, "config.g");
+  EXPECT_EQ(told(s, "limits.max_x_accel_mm_s2"), "3000 config.g:3");
+  EXPECT_THAT(told(s, "limits.jerk_y_mm_s"), HasSubstr("default"));
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_EQ(to_string(s.notes[0]),
+            "config.g:2: warning: an expression, which unflex does not evaluate: nothing of this "
+            "line is taken; give limits.jerk_x_mm_s and limits.jerk_y_mm_s with --set");
+  std::vector<std::string> given = {"limits.jerk_x_mm_s=10"};
+  EXPECT_THAT(parse(text, "config.g", given)->notes, SizeIs(1));
+  given.emplace_back("limits.jerk_y_mm_s=15");
+  EXPECT_THAT(parse(text, "config.g", given)->notes, IsEmpty());
+}
+
+TEST(RrfConfig, WithAWordTwiceSaysThatTheLineIsNotTaken) {
+  const Settings s = read("M550 P\"x\"\nM204 P2000 P3000\nM593 P\"zvd\" F40\n", "config.g");
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_EQ(to_string(s.notes[0]),
+            "config.g:2: warning: two commands, or a word given twice: nothing of this line is "
+            "taken; give limits.print_accel_mm_s2 with --set");
+}
+
+TEST(RrfConfig, MayPushLessThanItPulled) {
+  const Settings s = read("M550 P\"x\"\nM207 S2 R-0.5 F1800\nM593 P\"zvd\" F40\n", "config.g");
+  EXPECT_EQ(told(s, "printer.unretract_extra_length_mm"), "-0.5 config.g:2");
 }
 
 TEST(RrfConfig, GivesTravelAsPairsToo) {
@@ -161,6 +203,28 @@ TEST(Slicers, TellAKlippersLimitsAtTheHead) {
   EXPECT_DOUBLE_EQ(s.limits.max_velocity_mm_s, 400.0);
   EXPECT_DOUBLE_EQ(s.limits.max_accel_mm_s2, 12000.0);
   EXPECT_DOUBLE_EQ(s.axis_max_accel_mm_s2()[2], 12000.0);
+}
+
+// A tool slower than the slicer thinks takes Z along.
+TEST(Slicers, TellAZThatIsNotFasterThanTheTool) {
+  const PrintText print =
+      print_of("",
+               "; gcode_flavor = klipper\n; machine_max_acceleration_x = 20000\n"
+               "; machine_max_acceleration_z = 10000\n; machine_max_feedrate_x = 300\n"
+               "; machine_max_feedrate_z = 200\n");
+  const Settings s = sliced(print, {"limits.max_accel_mm_s2=5000", "limits.max_velocity_mm_s=100"});
+  EXPECT_EQ(told(s, "limits.max_z_accel_mm_s2"), "5000 print.gcode:103");
+  EXPECT_EQ(told(s, "limits.max_z_velocity_mm_s"), "100 print.gcode:105");
+  EXPECT_EQ(told(sliced(print), "limits.max_z_accel_mm_s2"), "10000 print.gcode:103");
+}
+
+TEST(Slicers, AreNotListenedToWhereTheUserSaysOtherwise) {
+  const PrintText print =
+      print_of("", "; gcode_flavor = marlin2\n; machine_max_junction_deviation = 0.5\n");
+  EXPECT_FALSE(
+      load({.print = &print, .printer_file = {}, .overrides = {}, .firmware_as_sliced = true}));
+  EXPECT_DOUBLE_EQ(sliced(print, {"limits.junction_deviation_mm=0.1"}).limits.junction_deviation_mm,
+                   0.1);
 }
 
 TEST(Slicers, ThatSayMarlinMeanKlipperWhereThePrintHasItsMacros) {

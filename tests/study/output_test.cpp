@@ -79,11 +79,13 @@ TEST(StudyHtml, EscapesWhatComesFromOutside) {
   Outcome print = outcome();
   print.input = "<script>alert(1)</script>.gcode";
   print.printer.push_back({"printer.name", "\"</dd><script>\"", "a&b.toml:3"});
+  print.warnings = {"line <i>7</i>"};
   const std::string html = to_html(print);
   EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
   EXPECT_THAT(html, HasSubstr("&lt;script&gt;alert(1)"));
   EXPECT_THAT(html, Not(HasSubstr("</dd><script>")));
   EXPECT_THAT(html, HasSubstr("a&amp;b.toml:3"));
+  EXPECT_THAT(html, HasSubstr("<li>line &lt;i&gt;7&lt;/i&gt;</li>"));
 }
 
 // Nothing but travel, or a plan that the nozzle follows exactly.

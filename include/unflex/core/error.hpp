@@ -4,9 +4,8 @@
 
 #include <cstddef>
 #include <string>
-#include <utility>
-
 #include <tl/expected.hpp>
+#include <utility>
 
 namespace unflex {
 
@@ -21,6 +20,8 @@ enum class ErrorKind {
 struct SourcePlace {
   std::string file;
   std::size_t line = 0;
+
+  friend bool operator==(const SourcePlace&, const SourcePlace&) = default;
 };
 
 struct Error {

@@ -124,6 +124,8 @@ struct InterpreterOptions {
   std::string shaper_type{};
   // Of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
   double filament_diameter_mm = 1.75;
+  // The configuration's, which an M92 has to agree with.
+  std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 500.0};
 };
 
 // The options with the values the firmware's own source has before anyone configures it.
