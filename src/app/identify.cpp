@@ -146,7 +146,7 @@ Result<ExitCode> run_identify(const RunConfig& config, Console& console) {
         write_all(STDOUT_FILENO, config.quiet ? snippet(*all) : identification_text(*all));
     if (error != 0) {
       return fail(ErrorKind::internal, {"stdout", 0},
-                  fmt::format("cannot write: {}", errno_text(error)));
+                  fmt::format("cannot write: {}", write_error_text(error)));
     }
   }
   return ExitCode::done;

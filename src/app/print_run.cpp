@@ -33,7 +33,7 @@ ExitCode judge(const RunConfig& config, bool passed_on, const report::Report& re
   const double deviation_mm = report.compensated.extruding.contour_max_mm;
   if (config.max_deviation_mm && !(deviation_mm <= *config.max_deviation_mm)) {
     console.line(
-        fmt::format("{}: extruding moves stray up to {:.4g} mm, more than --max-deviation {}{}",
+        fmt::format("{}: extruding moves stray up to {:.6g} mm, more than --max-deviation {}{}",
                     config.command == Command::compensate ? config.print_name : config.output,
                     deviation_mm, *config.max_deviation_mm,
                     config.command == Command::compensate ? fmt::format("; {}", consequence) : ""));

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "console.hpp"
 #include "files.hpp"
 #include "inputs.hpp"
@@ -12,7 +14,25 @@
 namespace unflex::app {
 namespace {
 
-// The printer as the file describes it, or as the print's slicer does.
+// The printer as the print's slicer describes it.
+Result<machine::Settings> settings_from_slicer(const RunConfig& config,
+                                               const machine::PrintText& print) {
+  Result<machine::Settings> settings = machine::load({.print = &print,
+                                                      .printer_file = {},
+                                                      .overrides = config.overrides,
+                                                      .firmware_as_sliced = true});
+  const auto is_of_print = [&](const auto& origin) {
+    return origin.second.starts_with(print.name + ":");
+  };
+  if (settings && std::ranges::none_of(settings->origins, is_of_print)) {
+    return fail(ErrorKind::input, {config.input, 0},
+                "says nothing of a printer; give its configuration, or a print that holds its "
+                "slicer's settings");
+  }
+  return settings;
+}
+
+// The printer as the file describes it.
 Result<machine::Settings> settings_from(const RunConfig& config, Input& input) {
   if (Status copied = input.make_seekable(); !copied) {
     return tl::unexpected(copied.error());
@@ -23,10 +43,7 @@ Result<machine::Settings> settings_from(const RunConfig& config, Input& input) {
   }
   return machine::describes_printer(*text)
              ? machine::parse(text->tail, config.input, config.overrides)
-             : machine::load({.print = &*text,
-                              .printer_file = {},
-                              .overrides = config.overrides,
-                              .firmware_as_sliced = true});
+             : settings_from_slicer(config, *text);
 }
 
 Status write_settings(const RunConfig& config, const machine::Settings& settings) {
@@ -44,7 +61,7 @@ Status print_summary(const RunConfig& config) {
   const int error = write_all(STDOUT_FILENO, fmt::format("{} → {}\n", config.input, config.output));
   return error == 0 ? Status{}
                     : Status(fail(ErrorKind::internal, {"stdout", 0},
-                                  fmt::format("cannot write: {}", errno_text(error))));
+                                  fmt::format("cannot write: {}", write_error_text(error))));
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ std::vector<std::string> setting_warnings(const machine::Settings& settings) {
 }
 
 std::string_view consequence_of(bool passed_on) {
-  return passed_on ? "what was passed on must not be printed" : "nothing was written";
+  return passed_on ? "what was passed on must not be printed" : "no output was written";
 }
 
 Status accept(const RunConfig& config, std::vector<std::string> warnings, bool passed_on,

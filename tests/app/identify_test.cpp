@@ -117,7 +117,7 @@ TEST_F(Identify, SaysWhatItCannotUse) {
                              "along X or Y, or --axis\n");
   outcome = run({"identify", "a_x.csv"}, "", fill_stdout);
   EXPECT_EQ(outcome.exit_code, 4);
-  EXPECT_EQ(outcome.err, "stdout: cannot write: No space left on device\n");
+  EXPECT_EQ(outcome.err, "stdout: cannot write: No space left on device; make room there\n");
 }
 
 TEST_F(Identify, SaysWhatIsMissing) {

@@ -69,6 +69,16 @@ TEST_F(PrinterFile, IsMadeFromAPrintToo) {
   EXPECT_THAT(outcome.out, HasSubstr("max_accel_mm_s2 = 1500  # sliced.gcode:"));
 }
 
+TEST_F(PrinterFile, IsNotMadeFromWhatSaysNothingOfAPrinter) {
+  write_file(path("in.gcode"), small_print());
+  const Outcome outcome = run({"printer", "init", "--from", "in.gcode", "-o", "p.toml"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err,
+            "in.gcode: says nothing of a printer; give its configuration, or a print that holds "
+            "its slicer's settings\n");
+  EXPECT_FALSE(std::filesystem::exists(path("p.toml")));
+}
+
 TEST_F(PrinterFile, HasHelpOfItsOwn) {
   EXPECT_THAT(run({"printer", "init", "-o", "p.toml"}).err,
               ::testing::EndsWith("; run 'unflex printer init --help'\n"));

@@ -114,7 +114,7 @@ TEST_F(SmallPrint, AboveTheAllowedDeviationIsNotWritten) {
       {"compensate", "in.gcode", "--in-place", "--max-deviation", "1e-9", "--report", "r.json"});
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_THAT(outcome.err, StartsWith("in.gcode: extruding moves stray up to "));
-  EXPECT_THAT(outcome.err, HasSubstr("more than --max-deviation 1e-09; nothing was written\n"));
+  EXPECT_THAT(outcome.err, HasSubstr("more than --max-deviation 1e-09; no output was written\n"));
   EXPECT_EQ(read_file(path("in.gcode")), small_print());
   EXPECT_EQ(nlohmann::json::parse(read_file(path("r.json")))["command"], "compensate");
 }
