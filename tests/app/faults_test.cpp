@@ -248,6 +248,9 @@ TEST_F(Faults, OfReadingHalfWayAreTold) {
 }
 
 TEST_F(Faults, OfAProgramWithoutMemoryLeaveNothing) {
+#ifdef UNFLEX_SANITIZED
+  GTEST_SKIP() << "sanitizers need more memory than there is room for in any limit";
+#endif
   const std::string result = whole();
   int failed = 0;
   for (const std::string jobs : {"2", "200"}) {
@@ -265,9 +268,7 @@ TEST_F(Faults, OfAProgramWithoutMemoryLeaveNothing) {
       }
     }
   }
-#ifndef __SANITIZE_ADDRESS__
   EXPECT_GT(failed, 0);
-#endif
 }
 
 TEST_F(Faults, OfKillingLeaveTheOldFileOrTheWholeNewOne) {
