@@ -75,9 +75,8 @@ Axis dominant_axis(const DataSet& set) {
 
 Result<Mode> fit_recording(const Recording& recording, Axis axis, const Sweep& sweep) {
   const std::vector<double>& samples = recording.accel[axis == Axis::x ? 0 : 1];
-  return holds_sweep(samples, recording.rate_hz, sweep)
-             ? fit_sweep(samples, recording.rate_hz, sweep)
-             : fit_ringing(samples, recording.rate_hz);
+  return holds_sweep(samples, recording.rate_hz) ? fit_sweep(samples, recording.rate_hz, sweep)
+                                                 : fit_ringing(samples, recording.rate_hz);
 }
 
 Result<Mode> fit(const DataSet& set, Axis axis, const Sweep& sweep) {

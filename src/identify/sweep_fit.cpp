@@ -7,6 +7,8 @@
 // what was before meets the fundamental; it changes fast enough with ν to count as noise.
 #include "sweep_fit.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -25,6 +27,7 @@ struct Band {
   double values_each = 1.0;
 };
 
+constexpr double kSamplesPerPeriod = 2.5;
 constexpr double kGroup_hz = 0.04;
 // Lower, the slow to and fro that newer Klippers add to the sweep is the stronger.
 constexpr double kLowest_hz = 12.0;
@@ -141,13 +144,18 @@ Curve curve_of(const Band& band, const Eigen::ArrayXd& fitted) {
 
 }  // namespace
 
-bool holds_sweep(const std::vector<double>& samples, double rate_hz, const Sweep& sweep) {
+bool holds_sweep(const std::vector<double>& samples, double rate_hz) {
   constexpr double kShortest_s = 10.0;
-  return static_cast<double>(samples.size()) / rate_hz > kShortest_s &&
-         rate_hz > 2.5 * sweep.end_hz;
+  return static_cast<double>(samples.size()) / rate_hz > kShortest_s;
 }
 
 Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const Sweep& sweep) {
+  if (rate_hz < kSamplesPerPeriod * sweep.end_hz) {
+    return fail(ErrorKind::input,
+                fmt::format("{:.0f} samples a second do not show a sweep up to {:g} Hz; say with "
+                            "--freq-end, at most {:.0f}, where the test ended",
+                            rate_hz, sweep.end_hz, std::floor(rate_hz / kSamplesPerPeriod)));
+  }
   const auto [least, most] = std::ranges::minmax(samples);
   Band band = band_of(energy_spectrum(samples, rate_hz), sweep);
   if (band.energy.size() < 100 || !(least < most)) {

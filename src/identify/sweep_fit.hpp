@@ -7,9 +7,8 @@
 
 namespace unflex::identify {
 
-// Whether the samples hold a sweep: seconds of motion over a wide band.
-[[nodiscard]] bool holds_sweep(const std::vector<double>& samples, double rate_hz,
-                               const Sweep& sweep);
+// Whether the samples hold a sweep: ringing is over within seconds.
+[[nodiscard]] bool holds_sweep(const std::vector<double>& samples, double rate_hz);
 
 [[nodiscard]] Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz,
                                      const Sweep& sweep);

@@ -111,6 +111,15 @@ TEST(RecordedSweep, ThatEndsBelowTheResonanceBringsAWarning) {
 
 std::string refusal(const Result<Mode>& mode) { return mode ? "" : mode.error().message; }
 
+TEST(RecordedSweep, BeyondWhatItsSamplesShowIsRefused) {
+  const Recording slow{.rate_hz = 1000.0, .accel = {std::vector<double>(20000, 1.0), {}, {}}};
+  EXPECT_EQ(refusal(fit_recording(slow, Axis::x, {5.0, 1000.0})),
+            "1000 samples a second do not show a sweep up to 1000 Hz; say with --freq-end, at most "
+            "400, where the test ended");
+  EXPECT_EQ(refusal(fit_recording(slow, Axis::x, {5.0, 400.0})),
+            "there is no motion in the band of the sweep");
+}
+
 TEST(RecordedSweep, WithoutMotionIsRefused) {
   Recording still{.rate_hz = 3200.0, .accel = {}};
   still.accel.fill(std::vector<double>(100000, 9.81));
