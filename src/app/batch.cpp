@@ -47,9 +47,12 @@ Status check_summary(const RunConfig& config, const BatchFiles& files) {
   }
   const auto clashes = [&](const std::string& other) { return same_file(*config.summary, other); };
   const bool taken = (config.printer_file && clashes(*config.printer_file)) ||
-                     std::ranges::any_of(files.prints, [&](const BatchPrint& print) {
-                       return clashes(print.input) || clashes(print.output);
-                     });
+                     std::ranges::any_of(files.prints,
+                                         [&](const BatchPrint& print) {
+                                           return clashes(print.input) || clashes(print.output) ||
+                                                  (print.report && clashes(*print.report));
+                                         }) ||
+                     clashes((std::filesystem::path(config.output) / kManifestName).string());
   return taken ? Status(fail(ErrorKind::usage, {*config.summary, 0},
                              "is read or written already; give the summary a name of its own"))
                : Status{};

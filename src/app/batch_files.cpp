@@ -151,6 +151,13 @@ Status check_distinct(const std::vector<BatchPrint>& prints) {
                               other->second->input, print.input));
     }
   }
+  for (const BatchPrint& print : prints) {
+    const fs::path place = print.report ? place_of(*print.report) : fs::path();
+    if (print.report && (inputs.contains(place) || outputs.contains(place))) {
+      return fail(ErrorKind::usage, {*print.report, 0},
+                  "is a print too, by a link; give --report a folder without links");
+    }
+  }
   return {};
 }
 

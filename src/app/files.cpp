@@ -1,6 +1,7 @@
 #include "files.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "signals.hpp"
+#include "unflex/app/run_config.hpp"
 
 namespace unflex::app {
 namespace {
@@ -27,6 +29,13 @@ bool try_again() { return errno == EINTR && ending_signal() == 0; }
 bool exists(const std::string& name) {
   struct stat status {};
   return ::lstat(name.c_str(), &status) == 0;
+}
+
+// What unflex makes: neither a pipe that somebody gave such a name, nor another's file.
+bool is_ours(int fd) {
+  struct stat status {};
+  return ::fstat(fd, &status) == 0 && S_ISREG(status.st_mode) && status.st_nlink == 1 &&
+         status.st_uid == ::geteuid();
 }
 
 }  // namespace
@@ -76,7 +85,10 @@ bool TemporaryFile::remove_abandoned(const std::filesystem::path& directory) {
   }
   bool all_gone = true;
   for (const std::filesystem::path& path : found) {
-    const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+    const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    if (file.valid() && !is_ours(file.get())) {
+      continue;
+    }
     all_gone = file.valid() && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0 &&
                ::unlink(path.c_str()) == 0 && all_gone;
   }
@@ -176,6 +188,29 @@ bool same_file(const std::string& a, const std::string& b) {
   };
   const std::filesystem::path place_a = place(a);
   return !failed && place_a == place(b) && !failed;
+}
+
+std::string name_of_file(const std::string& name, int fd) {
+  if (name != kStandardStream) {
+    return name;
+  }
+  struct stat status {};
+  const bool is_file = ::fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
+  return is_file ? fmt::format("/dev/fd/{}", fd) : "";
+}
+
+bool is_descriptor(const std::filesystem::path& name) {
+  std::error_code failed;
+  std::filesystem::path at = std::filesystem::absolute(name, failed);
+  // As many links as Linux follows.
+  for (int links = 0; !failed && links < 40 && std::filesystem::is_symlink(at, failed); ++links) {
+    const std::filesystem::path folder = std::filesystem::canonical(at.parent_path(), failed);
+    if (folder.string().starts_with("/proc/") && folder.filename() == "fd") {
+      return true;
+    }
+    at = folder / std::filesystem::read_symlink(at, failed);
+  }
+  return false;
 }
 
 }  // namespace unflex::app

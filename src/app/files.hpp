@@ -74,4 +74,10 @@ class TemporaryFile {
 // Whether both names lead to one file, existing or not.
 [[nodiscard]] bool same_file(const std::string& a, const std::string& b);
 
+// The name, or of "-" one of the file that descriptor `fd` was redirected to; "" for other streams.
+[[nodiscard]] std::string name_of_file(const std::string& name, int fd);
+
+// Whether the name leads to a file by an open descriptor, as /dev/stdout does.
+[[nodiscard]] bool is_descriptor(const std::filesystem::path& name);
+
 }  // namespace unflex::app

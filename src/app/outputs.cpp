@@ -39,6 +39,10 @@ Result<std::filesystem::path> find_target(const std::string& name) {
     return std::filesystem::path();
   }
   if (::stat(name.c_str(), &status) != 0) {
+    struct stat link {};
+    if (errno == ENOENT && ::lstat(name.c_str(), &link) == 0) {
+      return refuse(name, "is a link that leads nowhere; make what it leads to, or remove it");
+    }
     // A missing directory is told apart later, with a remedy.
     return errno == ENOENT ? Result<std::filesystem::path>(name)
                            : refuse(name, fmt::format("cannot write: {}", errno_text(errno)));
@@ -51,6 +55,9 @@ Result<std::filesystem::path> find_target(const std::string& name) {
   }
   if (!S_ISREG(status.st_mode)) {
     return std::filesystem::path();
+  }
+  if (is_descriptor(name)) {
+    return refuse(name, "leads to a file that is open already; give its name, or - for stdout");
   }
   // A symbolic link stays; the file it points to is replaced.
   std::error_code failed;

@@ -1,5 +1,7 @@
 #include "workspace.hpp"
 
+#include <unistd.h>
+
 #include <initializer_list>
 #include <string>
 #include <utility>
@@ -9,28 +11,30 @@
 namespace unflex::app {
 namespace {
 
-// Two names for one file would have the result destroy what it was made from.
+// Two names for one file would have the result destroy what it was made from. So would a stream
+// that is redirected to it.
 Status check_distinct(const RunConfig& config) {
-  const std::string& report = config.report.value_or(std::string(kStandardStream));
   const auto clash = [](const std::string& a, const std::string& b) {
-    return a != kStandardStream && b != kStandardStream && same_file(a, b);
+    return !a.empty() && !b.empty() && same_file(a, b);
   };
-  if (config.command == Command::compensate && !config.in_place &&
-      clash(config.output, config.input)) {
+  const bool compensates = config.command == Command::compensate;
+  const std::string input = name_of_file(config.input, STDIN_FILENO);
+  const std::string output =
+      name_of_file(config.output, compensates ? STDOUT_FILENO : STDIN_FILENO);
+  const std::string printer_file = config.printer_file.value_or("");
+  if (compensates && !config.in_place && clash(output, input)) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the input too; to replace it give --in-place");
   }
-  if (config.command == Command::compensate && config.printer_file) {
-    const std::string& target = config.in_place ? config.input : config.output;
-    if (clash(target, *config.printer_file)) {
-      return fail(ErrorKind::usage, {target, 0},
-                  "is the printer file too; give the output a name of its own");
-    }
+  if (compensates && clash(config.in_place ? input : output, printer_file)) {
+    return fail(ErrorKind::usage, {config.in_place ? config.input : config.output, 0},
+                "is the printer file too; give the output a name of its own");
   }
-  for (const std::string& other :
-       {config.input, config.output, config.printer_file.value_or(std::string(kStandardStream))}) {
-    if (!other.empty() && clash(report, other)) {
-      return fail(ErrorKind::usage, {report, 0},
+  const std::string report =
+      config.report ? name_of_file(*config.report, STDOUT_FILENO) : std::string();
+  for (const std::string& other : {input, output, printer_file}) {
+    if (clash(report, other)) {
+      return fail(ErrorKind::usage, {*config.report, 0},
                   "is read or written already; give the report a name of its own");
     }
   }

@@ -223,6 +223,21 @@ TEST_F(BatchTest, NamesWhatItCannotMake) {
   EXPECT_THAT(last().err, HasSubstr("out/b/c.g: cannot make its folder: Not a directory"));
   EXPECT_EQ(run(batch({"--printer", "in/p.json", "--summary", "in/p.json"})).err,
             "in/p.json: is read or written already; give the summary a name of its own\n");
+  EXPECT_THAT(run(batch({"--summary", "out/.unflex-batch.json"})).err,
+              HasSubstr("is read or written already; give the summary a name of its own\n"));
+}
+
+TEST_F(BatchTest, RefusesToReplaceAPrintByAPage) {
+  add("in/a.g");
+  const std::string print = read_file(path("in/a.g"));
+  fs::create_directories(path("pages"));
+  fs::create_symlink("../in/a.g", path("pages/a.g.html"));
+  fs::create_symlink("../in/a.g", path("pages/a.html"));
+  const Outcome outcome = run(batch({"--report", "pages"}));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("is a print too, by a link; give --report a folder without "
+                                     "links\n"));
+  EXPECT_EQ(read_file(path("in/a.g")), print);
 }
 
 TEST_F(BatchTest, NamesWhatItCannotRead) {

@@ -131,6 +131,13 @@ TEST_F(Faults, OfStreamsThatAreFullAreTold) {
   }
 }
 
+TEST_F(Faults, OfAReportToAStreamLeaveTheOldOutput) {
+  for (const Words& words : {kToFile, Words{"compensate", "--in-place", "in.gcode"}}) {
+    expect_refusal(run(words + Words{"--report", "-"}, "", fill_stdout), 4,
+                   "stdout: cannot write: No space left on device");
+  }
+}
+
 TEST_F(Faults, OfKeepingAStreamAreTold) {
   expect_refusal(run({"inspect", "-"}, squares(20), limited(RLIMIT_FSIZE, 1000)), 4,
                  "-: cannot be kept in /tmp: File too large; raise the limit on the size of files "

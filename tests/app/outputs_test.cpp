@@ -2,11 +2,15 @@
 
 #include "outputs.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <filesystem>
+#include <functional>
 
 #include "app/program.hpp"
 #include "inputs.hpp"
@@ -101,6 +105,59 @@ TEST_F(Outputs, AreTheSameFileByEveryName) {
   EXPECT_TRUE(same_file(path("a").string(), path("c").string()));
   EXPECT_TRUE(same_file(path("new").string(), path("./new").string()));
   EXPECT_FALSE(same_file(path("a").string(), path("new").string()));
+}
+
+// The program's stream `to` is a file of the folder.
+std::function<void()> redirected(const std::string& file, int flags, int to) {
+  return [=] { ::dup2(::open(file.c_str(), flags | O_CLOEXEC), to); };
+}
+
+// A shell gives a file to a stream without its name.
+TEST_F(Outputs, AreNotTheInputByAStreamEither) {
+  write_file(path("in.gcode"), small_print());
+  const auto expect_refusal = [&](const Outcome& outcome, const std::string& message) {
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_EQ(outcome.err, message);
+    EXPECT_EQ(read_file(path("in.gcode")), small_print());
+  };
+  const auto appends = redirected(path("in.gcode"), O_WRONLY | O_APPEND, STDOUT_FILENO);
+  const auto reads = redirected(path("in.gcode"), O_RDONLY, STDIN_FILENO);
+  expect_refusal(run({"compensate", "in.gcode", "-o", "-"}, "", appends),
+                 "-: is the input too; to replace it give --in-place\n");
+  expect_refusal(run({"compensate", "-", "-o", "in.gcode"}, "", reads),
+                 "in.gcode: is the input too; to replace it give --in-place\n");
+  expect_refusal(run({"inspect", "in.gcode", "--report", "-"}, "", appends),
+                 "-: is read or written already; give the report a name of its own\n");
+  expect_refusal(run({"printer", "init", "--from", "-", "-o", "in.gcode"}, "", reads),
+                 "in.gcode: is what it is made from too; give it a name of its own\n");
+}
+
+TEST_F(Outputs, DoNotReplaceWhatADescriptorWritesTo) {
+  write_file(path("in.gcode"), small_print());
+  write_file(path("all"), "precious\n");
+  const Outcome outcome = run({"compensate", "in.gcode", "-o", "/dev/stdout"}, "",
+                              redirected(path("all"), O_WRONLY | O_APPEND, STDOUT_FILENO));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.err,
+            "/dev/stdout: leads to a file that is open already; give its name, or - for stdout\n");
+  EXPECT_EQ(read_file(path("all")), "precious\n");
+}
+
+TEST_F(Outputs, DoNotReplaceALinkThatLeadsNowhere) {
+  std::filesystem::create_symlink("card/out.gcode", path("out.gcode"));
+  const Result<Output> output = Output::open(path("out.gcode").string());
+  ASSERT_FALSE(output);
+  EXPECT_EQ(output.error().message,
+            "is a link that leads nowhere; make what it leads to, or remove it");
+}
+
+// Whoever may write to the folder could stop all others with it.
+TEST_F(Outputs, DoNotWaitForAPipeWithTheNameOfATemporaryFile) {
+  ASSERT_EQ(::mkfifo(path(".unflex-ffffff.tmp").c_str(), 0600), 0);
+  Result<Output> output = Output::open(path("new").string());
+  ASSERT_TRUE(output);
+  ASSERT_TRUE(output->commit());
+  EXPECT_THAT(names(), ElementsAre(".unflex-ffffff.tmp", "new"));
 }
 
 TEST_F(ProgramTest, ReadsAPipeAsASeekableFileWithoutAName) {
