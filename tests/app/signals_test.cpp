@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <thread>
@@ -51,6 +52,35 @@ TEST_P(EndingSignal, RemovesTheTemporaryFileAndKeepsTheTarget) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OfEveryKind, EndingSignal, ::testing::Values(SIGINT, SIGTERM, SIGHUP));
+
+// stdout is a pipe that is full and that nobody reads.
+void stop_stdout() {
+  std::array<int, 2> pipe{};
+  if (::pipe(pipe.data()) == 0) {
+    ::fcntl(pipe[1], F_SETFL, O_NONBLOCK);
+    while (::write(pipe[1], "x", 1) == 1) {
+    }
+    ::fcntl(pipe[1], F_SETFL, 0);
+    ::dup2(pipe[1], STDOUT_FILENO);
+  }
+}
+
+// Its summary is all that is missing.
+TEST_F(ProgramTest, DoesNotSayThatNothingWasWrittenOnceItWas) {
+  write_file(path("in.gcode"), small_print());
+  Program program(directory(), {"compensate", "in.gcode", "--in-place"}, "", stop_stdout);
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (read_file(path("in.gcode")) == small_print() &&
+         std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  program.signal(SIGINT);
+  const Outcome outcome = program.wait();
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(read_file(path("in.gcode")), ::testing::HasSubstr(";unflex"));
+}
 
 TEST_F(ProgramTest, EndsSoonEvenWhereARunTakesLong) {
   // Marlin's whole steps make a run of a minute a matter of many seconds.
