@@ -149,9 +149,7 @@ class Batch {
         waiting.pop_back();
       }
       for (BatchProcesses::Done& done : processes.take()) {
-        if (Status taken = take(std::move(done)); !taken) {
-          return taken;
-        }
+        take(std::move(done));
       }
       if (ending_signal() != 0) {
         break;
@@ -167,17 +165,22 @@ class Batch {
     });
   }
 
-  Status take(BatchProcesses::Done done) {
+  void take(BatchProcesses::Done done) {
     const BatchPrint& print = files_.prints[done.ticket];
-    Status remembered;
-    if (done.answer.state == BatchState::done) {
-      remembered = manifest_.put(print.name, done.answer.record);
+    BatchAnswer& answer = done.answer;
+    if (answer.state == BatchState::done) {
+      if (const Status remembered = manifest_.put(print.name, answer.record); !remembered) {
+        // The output is whole, but the next batch will make it once more.
+        answer.state = BatchState::failed;
+        answer.exit_code = static_cast<int>(exit_code(remembered.error().kind));
+        answer.error = error_text(remembered.error());
+        answer.messages.push_back(answer.error);
+      }
     }
     // A print that a signal ended is told of by the message of the whole.
     if (ending_signal() == 0 || done.answer.state != BatchState::failed) {
-      add({print.name, print.input, print.output, std::move(done.answer), done.wall_s});
+      add({print.name, print.input, print.output, std::move(answer), done.wall_s});
     }
-    return remembered;
   }
 
   void add_unreadable(const Error& error) {

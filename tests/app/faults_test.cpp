@@ -174,7 +174,6 @@ TEST_F(Faults, OfABatchFailItsPrintsAndLeaveNothingHalf) {
             "files (ulimit -f)\n");
   EXPECT_EQ(read_file(path("out/a.g")), whole());
   EXPECT_FALSE(fs::exists(path("out/b.g")));
-  // No room for what it remembers: that is the end of it.
   fs::remove_all(path("out"));
   const Outcome forgetful =
       run(batch + Words{"--summary", "s.json"}, "", faulty({{"FAULT_FAIL", "rename"}}));
@@ -242,6 +241,24 @@ TEST_F(AsNobody, IsToldWhatCannotBeRead) {
   const Outcome outcome = run_there(kToFile);
   fs::permissions(path("in.gcode"), fs::perms::owner_read);
   expect_refusal(outcome, 2, "in.gcode: cannot read: Permission denied");
+}
+
+TEST_F(Faults, OfWhatABatchRemembersDoNotStopIt) {
+  fs::create_directory(path("in"));
+  for (const char* const name : {"a.g", "b.g", "c.g", "d.g", "e.g", "f.g"}) {
+    write_file(path("in") / name, "G28\nG1 X10 Y10 F600\n");
+  }
+  // Room for each print, and for the memory of some.
+  const Outcome outcome =
+      run({"batch", "in", "-o", "out", "-j", "1"}, "", limited(RLIMIT_FSIZE, 2500));
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr("out/.unflex-batch.json: cannot write: File too large"));
+  EXPECT_THAT(outcome.err, HasSubstr("[6/6] failed"));
+  EXPECT_THAT(outcome.err, HasSubstr("[1/6] done"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(path("out")), {}), 7);
+  const Outcome again = run({"batch", "in", "-o", "out", "-j", "1"});
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_THAT(again.err, HasSubstr("unchanged"));
 }
 
 TEST_F(Faults, OfReadingHalfWayAreTold) {
