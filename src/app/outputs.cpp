@@ -79,6 +79,10 @@ int take_over_permissions(int fd, const std::filesystem::path& target) {
     return ::fchmod(fd, mode_of_new_files()) == 0 ? 0 : errno;
   }
   const bool same_owner = ::fchown(fd, status.st_uid, status.st_gid) == 0;
+  if (!same_owner) {
+    // Of a folder that is shared by a group; otherwise its rights would pass to another.
+    static_cast<void>(::fchown(fd, static_cast<uid_t>(-1), status.st_gid));
+  }
   // Rights to run as someone must not pass to another owner.
   const mode_t kept = status.st_mode & (same_owner ? 07777U : 0777U);
   return ::fchmod(fd, kept) == 0 ? 0 : errno;

@@ -4,8 +4,10 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -241,6 +243,28 @@ TEST_F(AsNobody, IsToldWhatCannotBeRead) {
   const Outcome outcome = run_there(kToFile);
   fs::permissions(path("in.gcode"), fs::perms::owner_read);
   expect_refusal(outcome, 2, "in.gcode: cannot read: Permission denied");
+}
+
+// Somebody who shares a print with a group replaces another's.
+TEST_F(AsNobody, LeavesThePrintToItsGroup) {
+  constexpr uid_t kOther = 65001;
+  constexpr gid_t kShared = 65002;
+  const std::string print = path("in.gcode").string();
+  if (::chown(print.c_str(), kOther, kShared) != 0 || ::chmod(print.c_str(), 0660) != 0) {
+    GTEST_SKIP() << "files cannot be given to other users";
+  }
+  const Outcome outcome = run({"compensate", "in.gcode", "--in-place", "-q"}, "", [] {
+    const gid_t shared = kShared;
+    if (::setgroups(1, &shared) != 0 || ::setgid(kNobody) != 0 || ::setuid(kNobody) != 0) {
+      ::_exit(126);
+    }
+  });
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  struct stat status {};
+  ASSERT_EQ(::stat(print.c_str(), &status), 0);
+  EXPECT_EQ(status.st_uid, kNobody);
+  EXPECT_EQ(status.st_gid, kShared);
+  EXPECT_EQ(status.st_mode & 07777U, 0660U);
 }
 
 TEST_F(Faults, OfWhatABatchRemembersDoNotStopIt) {
