@@ -168,6 +168,10 @@ class Batch {
   void take(BatchProcesses::Done done) {
     const BatchPrint& print = files_.prints[done.ticket];
     BatchAnswer& answer = done.answer;
+    if (!done.answered) {
+      answer.error = error_text({ErrorKind::internal, {print.input, 0}, answer.error});
+      answer.messages = {answer.error};
+    }
     if (answer.state == BatchState::done) {
       if (const Status remembered = manifest_.put(print.name, answer.record); !remembered) {
         // The output is whole, but the next batch will make it once more.

@@ -65,11 +65,12 @@ Result<BatchManifest> BatchManifest::open(const std::filesystem::path& folder) {
     return tl::unexpected(free.error());
   }
   BatchManifest manifest(folder / kManifestName, std::move(claimed));
-  manifest.read();
   // That it can be written is known before the work begins.
-  const Result<Output> probe = Output::open(manifest.file_.string());
-  return probe ? Result<BatchManifest>(std::move(manifest))
-               : Result<BatchManifest>(tl::unexpected(probe.error()));
+  if (const Result<Output> probe = Output::open(manifest.file_.string()); !probe) {
+    return tl::unexpected(probe.error());
+  }
+  manifest.read();
+  return manifest;
 }
 
 void BatchManifest::read() {

@@ -46,10 +46,9 @@ int wait_for(pid_t pid, int options, int& status) {
 
 BatchAnswer died(int status) {
   BatchAnswer answer;
-  answer.error = WIFSIGNALED(status) ? fmt::format("unflex: the process died of signal {} ({})",
+  answer.error = WIFSIGNALED(status) ? fmt::format("the process died of signal {} ({})",
                                                    WTERMSIG(status), ::strsignal(WTERMSIG(status)))
-                                     : "unflex: the process ended without an answer";
-  answer.messages = {answer.error};
+                                     : "the process ended without an answer";
   return answer;
 }
 
@@ -135,7 +134,7 @@ BatchProcesses::Done BatchProcesses::finish(Process& process) {
   free_workers_ += process.workers;
   const bool answered = WIFEXITED(status) && WEXITSTATUS(status) == 0 && !process.text.empty();
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - process.start;
-  return {process.ticket, answered ? unpack(process.text) : died(status), wall.count()};
+  return {process.ticket, answered, answered ? unpack(process.text) : died(status), wall.count()};
 }
 
 }  // namespace unflex::app

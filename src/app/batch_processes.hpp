@@ -23,6 +23,7 @@ class BatchProcesses {
 
   struct Done {
     std::size_t ticket = 0;
+    bool answered = false;  // otherwise the error says how the process ended, without a place
     BatchAnswer answer;
     double wall_s = 0.0;
   };

@@ -184,6 +184,14 @@ TEST_F(Faults, OfABatchFailItsPrintsAndLeaveNothingHalf) {
   for (const auto& entry : fs::directory_iterator(path("out"))) {
     ADD_FAILURE() << entry.path();
   }
+  const Outcome killed = run(batch, "", faulty({{"FAULT_KILL", "rename"}}));
+  EXPECT_EQ(killed.exit_code, 4);
+  EXPECT_EQ(killed.err,
+            "in/b.g: the process died of signal 9 (Killed)\n"
+            "in/a.g: the process died of signal 9 (Killed)\n");
+  fs::remove_all(path("out"));
+  fs::create_directories(path("out/.unflex-batch.json"));
+  EXPECT_EQ(run(batch).err, "out/.unflex-batch.json: is a directory; name a file in it\n");
 }
 
 // As a user whom permissions stop.
