@@ -45,14 +45,14 @@ Status check_summary(const RunConfig& config, const BatchFiles& files) {
   if (!config.summary) {
     return {};
   }
-  const auto clashes = [&](const std::string& other) { return same_file(*config.summary, other); };
-  const bool taken = (config.printer_file && clashes(*config.printer_file)) ||
-                     std::ranges::any_of(files.prints,
-                                         [&](const BatchPrint& print) {
-                                           return clashes(print.input) || clashes(print.output) ||
-                                                  (print.report && clashes(*print.report));
-                                         }) ||
-                     clashes((std::filesystem::path(config.output) / kManifestName).string());
+  std::vector<std::string> others = {
+      (std::filesystem::path(config.output) / kManifestName).string(),
+      config.printer_file.value_or("")};
+  for (const BatchPrint& print : files.prints) {
+    others.insert(others.end(), {print.input, print.output, print.report.value_or("")});
+  }
+  const bool taken = std::ranges::any_of(
+      others, [&](const std::string& other) { return same_file(*config.summary, other); });
   return taken ? Status(fail(ErrorKind::usage, {*config.summary, 0},
                              "is read or written already; give the summary a name of its own"))
                : Status{};
@@ -93,6 +93,13 @@ void sweep_patiently(const std::vector<BatchPrint>& prints) {
   while (!sweep(prints) && std::chrono::steady_clock::now() < end) {
     std::this_thread::sleep_for(kBetweenSweeps);
   }
+}
+
+void fail_by(const Error& error, BatchAnswer& answer) {
+  answer.state = BatchState::failed;
+  answer.exit_code = static_cast<int>(exit_code(error.kind));
+  answer.error = error_text(error);
+  answer.messages.push_back(answer.error);
 }
 
 class Batch {
@@ -169,29 +176,22 @@ class Batch {
     const BatchPrint& print = files_.prints[done.ticket];
     BatchAnswer& answer = done.answer;
     if (!done.answered) {
-      answer.error = error_text({ErrorKind::internal, {print.input, 0}, answer.error});
-      answer.messages = {answer.error};
-    }
-    if (answer.state == BatchState::done) {
+      fail_by({ErrorKind::internal, {print.input, 0}, answer.error}, answer);
+    } else if (answer.state == BatchState::done) {
       if (const Status remembered = manifest_.put(print.name, answer.record); !remembered) {
         // The output is whole, but the next batch will make it once more.
-        answer.state = BatchState::failed;
-        answer.exit_code = static_cast<int>(exit_code(remembered.error().kind));
-        answer.error = error_text(remembered.error());
-        answer.messages.push_back(answer.error);
+        fail_by(remembered.error(), answer);
       }
     }
     // A print that a signal ended is told of by the message of the whole.
-    if (ending_signal() == 0 || done.answer.state != BatchState::failed) {
+    if (ending_signal() == 0 || answer.state != BatchState::failed) {
       add({print.name, print.input, print.output, std::move(answer), done.wall_s});
     }
   }
 
   void add_unreadable(const Error& error) {
     BatchAnswer answer;
-    answer.exit_code = static_cast<int>(exit_code(error.kind));
-    answer.error = error_text(error);
-    answer.messages = {answer.error};
+    fail_by(error, answer);
     const std::string name =
         std::filesystem::path(error.place.file).lexically_relative(config_->input).string();
     add({name, error.place.file, {}, std::move(answer), 0.0});

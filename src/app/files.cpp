@@ -178,6 +178,9 @@ std::filesystem::path temporary_directory() {
 }
 
 bool same_file(const std::string& a, const std::string& b) {
+  if (a.empty() || b.empty()) {
+    return false;
+  }
   std::error_code failed;
   if (std::filesystem::equivalent(a, b, failed)) {
     return true;

@@ -71,7 +71,7 @@ class TemporaryFile {
 // $TMPDIR or /tmp.
 [[nodiscard]] std::filesystem::path temporary_directory();
 
-// Whether both names lead to one file, existing or not.
+// Whether both names lead to one file, existing or not. An empty name leads to none.
 [[nodiscard]] bool same_file(const std::string& a, const std::string& b);
 
 // The name, or of "-" one of the file that descriptor `fd` was redirected to; "" for other streams.

@@ -20,7 +20,7 @@ constexpr mode_t kMode = 0666;
 Status check_distinct(const RunConfig& config) {
   for (const std::string& other : {config.input, config.output, config.report.value_or(""),
                                    config.printer_file.value_or("")}) {
-    if (!other.empty() && other != kStandardStream && same_file(*config.log, other)) {
+    if (other != kStandardStream && same_file(*config.log, other)) {
       return fail(ErrorKind::usage, {*config.log, 0},
                   "is read or written already; give the log a name of its own");
     }

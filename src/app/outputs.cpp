@@ -39,13 +39,15 @@ Result<std::filesystem::path> find_target(const std::string& name) {
     return std::filesystem::path();
   }
   if (::stat(name.c_str(), &status) != 0) {
-    struct stat link {};
-    if (errno == ENOENT && ::lstat(name.c_str(), &link) == 0) {
+    if (errno != ENOENT) {
+      return refuse(name, fmt::format("cannot write: {}", errno_text(errno)));
+    }
+    std::error_code failed;
+    if (std::filesystem::is_symlink(name, failed)) {
       return refuse(name, "is a link that leads nowhere; make what it leads to, or remove it");
     }
     // A missing directory is told apart later, with a remedy.
-    return errno == ENOENT ? Result<std::filesystem::path>(name)
-                           : refuse(name, fmt::format("cannot write: {}", errno_text(errno)));
+    return name;
   }
   if (S_ISDIR(status.st_mode)) {
     return refuse(name, "is a directory; name a file in it");
@@ -103,14 +105,14 @@ Result<Output> Output::open(const std::string& name) {
   // What a killed run may have left there.
   static_cast<void>(TemporaryFile::remove_abandoned(*directory));
   tl::expected<TemporaryFile, int> temporary = TemporaryFile::create(*directory);
-  if (!temporary && target->empty()) {
-    return fail(ErrorKind::internal, {name, 0},
-                fmt::format("cannot be kept in {}: {}", directory->string(),
-                            temporary_error_text(temporary.error())));
-  }
   if (!temporary) {
-    return refuse(name, fmt::format("cannot write to the directory {}: {}", directory->string(),
-                                    write_error_text(temporary.error())));
+    const int error = temporary.error();
+    return target->empty()
+               ? fail(ErrorKind::internal, {name, 0},
+                      fmt::format("cannot be kept in {}: {}", directory->string(),
+                                  temporary_error_text(error)))
+               : refuse(name, fmt::format("cannot write to the directory {}: {}",
+                                          directory->string(), write_error_text(error)));
   }
   return Output(name, std::move(*target), std::move(*temporary));
 }

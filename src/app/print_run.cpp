@@ -42,21 +42,21 @@ ExitCode judge(const RunConfig& config, bool passed_on, const report::Report& re
   return ExitCode::done;
 }
 
-bool is_stream(const std::optional<Output>& output) { return output && output->is_stream(); }
-
 // Both or none: where there is no room for the report, the output must not be there either. The
 // last moment to see that a print to be replaced is still the one that was read.
 Status deliver_output(Workspace& space, std::string_view report) {
+  const auto commit_report = [&](bool to_stream) {
+    return space.report && space.report->is_stream() == to_stream ? space.report->commit()
+                                                                  : Status{};
+  };
   return space.output->seal()
       .and_then([&] { return space.report ? space.report->write(report) : Status{}; })
       .and_then([&] { return space.report ? space.report->seal() : Status{}; })
       .and_then([&] { return check_inputs(space); })
       // What a stream does not take is known when it has it.
-      .and_then([&] { return is_stream(space.report) ? space.report->commit() : Status{}; })
+      .and_then([&] { return commit_report(true); })
       .and_then([&] { return space.output->commit(); })
-      .and_then([&] {
-        return space.report && !is_stream(space.report) ? space.report->commit() : Status{};
-      });
+      .and_then([&] { return commit_report(false); });
 }
 
 // An output that failed is not handed on, but what is known about it is.

@@ -71,9 +71,8 @@ Result<ExitCode> run_printer_init(const RunConfig& config, Console& console) {
   if (!input) {
     return tl::unexpected(input.error());
   }
-  const std::string from = name_of_file(config.input, STDIN_FILENO);
-  const std::string to = name_of_file(config.output, STDOUT_FILENO);
-  if (!from.empty() && !to.empty() && same_file(from, to)) {
+  if (same_file(name_of_file(config.output, STDOUT_FILENO),
+                name_of_file(config.input, STDIN_FILENO))) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is what it is made from too; give it a name of its own");
   }

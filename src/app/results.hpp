@@ -40,7 +40,7 @@ auto with_progress(const RunConfig& config, Work work)
 
 [[nodiscard]] std::vector<std::string> setting_warnings(const machine::Settings& settings);
 
-// What an error leaves: passed_on: the output has gone to a stream as it came.
+// What an error leaves. passed_on: the output has gone to a stream as it came.
 [[nodiscard]] std::string_view consequence_of(bool passed_on);
 
 // With --strict, an error where there are warnings, which are shown as the errors they then are.

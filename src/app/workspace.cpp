@@ -14,26 +14,23 @@ namespace {
 // Two names for one file would have the result destroy what it was made from. So would a stream
 // that is redirected to it.
 Status check_distinct(const RunConfig& config) {
-  const auto clash = [](const std::string& a, const std::string& b) {
-    return !a.empty() && !b.empty() && same_file(a, b);
-  };
   const bool compensates = config.command == Command::compensate;
   const std::string input = name_of_file(config.input, STDIN_FILENO);
   const std::string output =
       name_of_file(config.output, compensates ? STDOUT_FILENO : STDIN_FILENO);
   const std::string printer_file = config.printer_file.value_or("");
-  if (compensates && !config.in_place && clash(output, input)) {
+  if (compensates && !config.in_place && same_file(output, input)) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the input too; to replace it give --in-place");
   }
-  if (compensates && clash(config.in_place ? input : output, printer_file)) {
+  if (compensates && same_file(config.in_place ? input : output, printer_file)) {
     return fail(ErrorKind::usage, {config.in_place ? config.input : config.output, 0},
                 "is the printer file too; give the output a name of its own");
   }
   const std::string report =
       config.report ? name_of_file(*config.report, STDOUT_FILENO) : std::string();
   for (const std::string& other : {input, output, printer_file}) {
-    if (clash(report, other)) {
+    if (same_file(report, other)) {
       return fail(ErrorKind::usage, {*config.report, 0},
                   "is read or written already; give the report a name of its own");
     }

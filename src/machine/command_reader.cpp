@@ -46,118 +46,6 @@ gcode::InterpreterOptions options_of(Firmware firmware) {
   return options;
 }
 
-// What both dialects share.
-class CommandReader {
- public:
-  CommandReader(Firmware firmware, std::string file)
-      : file_(std::move(file)), interpreter_(options_of(firmware)) {
-    reading.add("printer.firmware", std::string(to_string(firmware)), {file_, 0});
-  }
-
-  // Has the interpreter read a line, and takes what it sets. False if it can't.
-  bool take(std::string text, std::size_t number) {
-    const gcode::Command command = gcode::parse(text);
-    const SourcePlace place{file_, number};
-    const gcode::Event event = interpreter_.interpret({std::move(text), number});
-    if (event.position_lost) {
-      return false;
-    }
-    // In a print steps and inches are a reason to warn.
-    if (command.number != 92 && command.letter != 'G') {
-      for (const std::string& warning : event.warnings) {
-        reading.note(place, warning);
-      }
-    }
-    for (const LimitValue& limit : limit_values(*event.limits)) {
-      reading.add(limit.key, limit.value, place);
-      remember(limit, place);
-    }
-    switch (command.number) {
-      case 92:
-        steps(place);
-        break;
-      case 200:
-        if (command.value('D').value_or(0.0) > 0.0) {
-          reading.add("extruder.filament_diameter_mm", *command.value('D'), place);
-        }
-        break;
-      case 207:
-      case 208:
-        retraction(place);
-        break;
-      default:
-        break;
-    }
-    return true;
-  }
-
-  // Of what both axes can do; the motors' limits follow from it: enough for the faster axis, not
-  // too much for the weaker.
-  void finish() {
-    if (velocity_) {
-      reading.add("limits.max_velocity_mm_s", velocity_->first, velocity_->second);
-    }
-    if (accel_) {
-      reading.add("limits.max_accel_mm_s2", accel_->first, accel_->second);
-    }
-  }
-
-  // A shaper's frequency is the resonance as it was measured.
-  void shaper(const std::string& axis, double freq_hz, std::optional<double> damping_ratio,
-              const SourcePlace& place) {
-    reading.add("printer.input_shaper_freq_" + axis + "_hz", freq_hz, place);
-    if (freq_hz > 0.0) {
-      reading.add("dynamics." + axis + ".freq_hz", freq_hz, place);
-      if (damping_ratio) {
-        reading.add("dynamics." + axis + ".damping_ratio", *damping_ratio, place);
-      }
-    }
-  }
-
-  [[nodiscard]] const gcode::ModalState& state() const { return interpreter_.state(); }
-  [[nodiscard]] const std::string& file() const { return file_; }
-
-  Reading reading;
-
- private:
-  using Found = std::optional<std::pair<double, SourcePlace>>;
-
-  void remember(const LimitValue& limit, const SourcePlace& place) {
-    if (limit.key == "limits.max_x_velocity_mm_s" ||
-        (limit.key == "limits.max_y_velocity_mm_s" &&
-         (!velocity_ || limit.value > velocity_->first))) {
-      velocity_ = {limit.value, place};
-    }
-    if (limit.key == "limits.max_x_accel_mm_s2" ||
-        (limit.key == "limits.max_y_accel_mm_s2" && (!accel_ || limit.value < accel_->first))) {
-      accel_ = {limit.value, place};
-    }
-  }
-
-  void steps(const SourcePlace& place) {
-    for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
-      if (const auto value = state().steps_per_mm[axis]) {
-        reading.add(fmt::format("printer.{}_steps_per_mm", kAxes[axis]), *value, place);
-      }
-    }
-  }
-
-  void retraction(const SourcePlace& place) {
-    const gcode::InterpreterOptions& o = interpreter_.options();
-    reading.add("printer.firmware_retraction", true, place);
-    reading.add("printer.retract_length_mm", o.retract_length_mm, place);
-    reading.add("printer.retract_speed_mm_s", o.retract_speed_mm_s, place);
-    reading.add("printer.unretract_extra_length_mm", o.unretract_extra_length_mm, place);
-    reading.add("printer.unretract_speed_mm_s", o.unretract_speed_mm_s, place);
-    reading.add("printer.retract_z_hop_mm", o.retract_z_hop_mm, place);
-  }
-
-  std::string file_;
-  gcode::Interpreter interpreter_;
-  Found velocity_;
-  Found accel_;
-};
-
 // The keys of what a line says.
 std::vector<std::string> keys_of(const gcode::Command& command) {
   std::vector<std::string> keys;
@@ -200,23 +88,127 @@ std::vector<std::string> keys_of(const gcode::Command& command) {
   return keys;
 }
 
-// Takes a line, or says that it can't.
-void take(CommandReader& reader, const std::string& text, const gcode::Command& command,
-          const SourcePlace& place) {
-  if (reader.take(text, place.line)) {
-    return;
+// What both dialects share.
+class CommandReader {
+ public:
+  CommandReader(Firmware firmware, std::string file)
+      : file_(std::move(file)), interpreter_(options_of(firmware)) {
+    reading.add("printer.firmware", std::string(to_string(firmware)), {file_, 0});
   }
-  const std::string_view why = text.find('{') != std::string::npos
-                                   ? "an expression, which unflex does not evaluate"
-                                   : "two commands, or a word given twice";
-  const std::vector<std::string> keys = keys_of(command);
-  reader.reading.note(
-      place,
-      fmt::format("{}: nothing of this line is taken; {}", why,
-                  keys.empty() ? "write values there"
-                               : fmt::format("give {} with --set", fmt::join(keys, " and "))),
-      keys);
-}
+
+  // Has the interpreter read a line, the command, and takes what it sets, or says that it can't.
+  void take(const std::string& text, const gcode::Command& command, const SourcePlace& place) {
+    const gcode::Event event = interpreter_.interpret({text, place.line});
+    if (event.position_lost) {
+      return not_taken(text, command, place);
+    }
+    // In a print steps and inches are a reason to warn.
+    if (command.number != 92 && command.letter != 'G') {
+      for (const std::string& warning : event.warnings) {
+        reading.note(place, warning);
+      }
+    }
+    for (const LimitValue& limit : limit_values(*event.limits)) {
+      reading.add(limit.key, limit.value, place);
+      remember(limit, place);
+    }
+    switch (command.number) {
+      case 92:
+        steps(place);
+        break;
+      case 200:
+        if (command.value('D').value_or(0.0) > 0.0) {
+          reading.add("extruder.filament_diameter_mm", *command.value('D'), place);
+        }
+        break;
+      case 207:
+      case 208:
+        retraction(place);
+        break;
+      default:
+        break;
+    }
+  }
+
+  // Of what both axes can do; the motors' limits follow from it: enough for the faster axis, not
+  // too much for the weaker.
+  void finish() {
+    if (velocity_) {
+      reading.add("limits.max_velocity_mm_s", velocity_->first, velocity_->second);
+    }
+    if (accel_) {
+      reading.add("limits.max_accel_mm_s2", accel_->first, accel_->second);
+    }
+  }
+
+  // A shaper's frequency is the resonance as it was measured.
+  void shaper(const std::string& axis, double freq_hz, std::optional<double> damping_ratio,
+              const SourcePlace& place) {
+    reading.add("printer.input_shaper_freq_" + axis + "_hz", freq_hz, place);
+    if (freq_hz > 0.0) {
+      reading.add("dynamics." + axis + ".freq_hz", freq_hz, place);
+      if (damping_ratio) {
+        reading.add("dynamics." + axis + ".damping_ratio", *damping_ratio, place);
+      }
+    }
+  }
+
+  [[nodiscard]] const gcode::ModalState& state() const { return interpreter_.state(); }
+  [[nodiscard]] const std::string& file() const { return file_; }
+
+  Reading reading;
+
+ private:
+  using Found = std::optional<std::pair<double, SourcePlace>>;
+
+  void not_taken(const std::string& text, const gcode::Command& command, const SourcePlace& place) {
+    const std::string_view why = text.find('{') != std::string::npos
+                                     ? "an expression, which unflex does not evaluate"
+                                     : "two commands, or a word given twice";
+    const std::vector<std::string> keys = keys_of(command);
+    reading.note(
+        place,
+        fmt::format("{}: nothing of this line is taken; {}", why,
+                    keys.empty() ? "write values there"
+                                 : fmt::format("give {} with --set", fmt::join(keys, " and "))),
+        keys);
+  }
+
+  void remember(const LimitValue& limit, const SourcePlace& place) {
+    if (limit.key == "limits.max_x_velocity_mm_s" ||
+        (limit.key == "limits.max_y_velocity_mm_s" &&
+         (!velocity_ || limit.value > velocity_->first))) {
+      velocity_ = {limit.value, place};
+    }
+    if (limit.key == "limits.max_x_accel_mm_s2" ||
+        (limit.key == "limits.max_y_accel_mm_s2" && (!accel_ || limit.value < accel_->first))) {
+      accel_ = {limit.value, place};
+    }
+  }
+
+  void steps(const SourcePlace& place) {
+    for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+      if (const auto value = state().steps_per_mm[axis]) {
+        reading.add(fmt::format("printer.{}_steps_per_mm", kAxes[axis]), *value, place);
+      }
+    }
+  }
+
+  void retraction(const SourcePlace& place) {
+    const gcode::InterpreterOptions& o = interpreter_.options();
+    reading.add("printer.firmware_retraction", true, place);
+    reading.add("printer.retract_length_mm", o.retract_length_mm, place);
+    reading.add("printer.retract_speed_mm_s", o.retract_speed_mm_s, place);
+    reading.add("printer.unretract_extra_length_mm", o.unretract_extra_length_mm, place);
+    reading.add("printer.unretract_speed_mm_s", o.unretract_speed_mm_s, place);
+    reading.add("printer.retract_z_hop_mm", o.retract_z_hop_mm, place);
+  }
+
+  std::string file_;
+  gcode::Interpreter interpreter_;
+  Found velocity_;
+  Found accel_;
+};
 
 void marlin_junctions(CommandReader& reader, const gcode::Command& command,
                       const SourcePlace& place) {
@@ -258,7 +250,7 @@ void read_marlin_line(CommandReader& reader, std::string_view line, std::size_t 
     return;
   }
   if (is_g_unit || is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 208, 593})) {
-    take(reader, text, command, place);
+    reader.take(text, command, place);
   }
   if (command.number == 205) {
     marlin_junctions(reader, command, place);
@@ -351,7 +343,7 @@ Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t n
     return {};
   }
   if (is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 566, 593})) {
-    take(reader, text, command, place);
+    reader.take(text, command, place);
   }
   switch (command.number) {
     case 98:

@@ -222,12 +222,10 @@ void PieceReader::warn(std::size_t line, std::string message) {
     warnings_.push_back({{lines_.name(), line}, std::move(message)});
     return;
   }
-  ++unlisted_warnings_;
-  warnings_.resize(kMaxWarnings);
-  Diagnostic rest;
-  rest.place.file = lines_.name();
-  rest.message = fmt::format("{} more warnings are not listed", unlisted_warnings_);
-  warnings_.push_back(std::move(rest));
+  if (unlisted_warnings_++ == 0) {
+    warnings_.emplace_back().place.file = lines_.name();
+  }
+  warnings_.back().message = fmt::format("{} more warnings are not listed", unlisted_warnings_);
 }
 
 // The printer refuses the move, or cuts it off; unflex leaves the way there as it is.

@@ -84,6 +84,8 @@ class Faults : public ProgramTest {
   }
 };
 
+const std::string kNoRoom =
+    "cannot write the output; make room there, or raise the limit on the size of files (ulimit -f)";
 const Words kToFile = {"compensate", "in.gcode", "-o", "out.gcode"};
 
 Words operator+(Words words, const Words& more) {
@@ -96,13 +98,9 @@ TEST_F(Faults, OfAFullDiskLeaveTheOldOutput) {
   const std::string result = whole();
   for (const double share : {0.1, 0.5, 0.9, 0.999}) {
     const auto room = static_cast<rlim_t>(share * static_cast<double>(result.size()));
-    expect_refusal(run(kToFile, "", limited(RLIMIT_FSIZE, room)), 4,
-                   "out.gcode: cannot write the output; make room there, or raise the limit on the "
-                   "size of files (ulimit -f)");
+    expect_refusal(run(kToFile, "", limited(RLIMIT_FSIZE, room)), 4, "out.gcode: " + kNoRoom);
     expect_refusal(run({"compensate", "in.gcode", "--in-place"}, "", limited(RLIMIT_FSIZE, room)),
-                   4,
-                   "in.gcode: cannot write the output; make room there, or raise the limit on the "
-                   "size of files (ulimit -f)");
+                   4, "in.gcode: " + kNoRoom);
   }
 }
 
@@ -171,9 +169,7 @@ TEST_F(Faults, OfABatchFailItsPrintsAndLeaveNothingHalf) {
   // Room for the shorter one alone.
   const Outcome outcome = run(batch, "", limited(RLIMIT_FSIZE, 2 * whole().size()));
   EXPECT_EQ(outcome.exit_code, 4);
-  EXPECT_EQ(outcome.err,
-            "out/b.g: cannot write the output; make room there, or raise the limit on the size of "
-            "files (ulimit -f)\n");
+  EXPECT_EQ(outcome.err, "out/b.g: " + kNoRoom + "\n");
   EXPECT_EQ(read_file(path("out/a.g")), whole());
   EXPECT_FALSE(fs::exists(path("out/b.g")));
   fs::remove_all(path("out"));
