@@ -124,17 +124,25 @@ Status check_folders(const RunConfig& config) {
     return fail(ErrorKind::input, {config.input, 0},
                 "is not a folder; for one print there is unflex compensate");
   }
-  if (place_of(config.input) == place_of(config.output)) {
+  // Not by their names, of which a folder may have several where capitals do not count.
+  if (fs::equivalent(config.input, config.output, failed)) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the folder of the prints too; give -o another");
   }
   return {};
 }
 
-// Links can lead two names to one file.
+std::string in_small_letters(std::string text) {
+  std::ranges::transform(text, text.begin(), small);
+  return text;
+}
+
+// Links can lead two names to one file, and so can folders and printers' cards to which capitals
+// are small letters.
 Status check_distinct(const std::vector<BatchPrint>& prints) {
   std::map<fs::path, const BatchPrint*> inputs;
   std::map<fs::path, const BatchPrint*> outputs;
+  std::map<std::string, const BatchPrint*> names;
   for (const BatchPrint& print : prints) {
     inputs.emplace(place_of(print.input), &print);
   }
@@ -149,6 +157,12 @@ Status check_distinct(const std::vector<BatchPrint>& prints) {
       return fail(ErrorKind::usage, {print.output, 0},
                   fmt::format("would come from {} and from {}; give -o a folder without links",
                               other->second->input, print.input));
+    }
+    if (const auto [other, is_new] = names.emplace(in_small_letters(print.name), &print); !is_new) {
+      return fail(ErrorKind::usage, {print.input, 0},
+                  fmt::format("differs from {} in capitals alone, and many folders and cards hold "
+                              "only one of the two; rename one",
+                              other->second->input));
     }
   }
   for (const BatchPrint& print : prints) {

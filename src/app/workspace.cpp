@@ -1,5 +1,6 @@
 #include "workspace.hpp"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <initializer_list>
@@ -61,10 +62,21 @@ Status spool(const RunConfig& config, Workspace& space) {
   if (config.command == Command::compensate) {
     return space.input.make_readable();
   }
-  if (Status copied = space.input.make_seekable(); !copied) {
+  if (Status copied = space.input.make_seekable(); !copied || !space.compensated) {
     return copied;
   }
-  return space.compensated ? space.compensated->make_seekable() : Status{};
+  if (Status copied = space.compensated->make_seekable(); !copied) {
+    return copied;
+  }
+  if (space.compensated->kind() == container::Kind::bgcode &&
+      space.input.kind() != container::Kind::bgcode) {
+    return fail(
+        ErrorKind::usage, {config.output, 0},
+        fmt::format("is binary G-code and {} is not, so that metadata stand in other places; "
+                    "have the output written as plain G-code and verify that",
+                    config.input));
+  }
+  return {};
 }
 
 // What the output is to be packed in: in place and in a stream as the input is.

@@ -61,7 +61,7 @@ class Lines {
 class BgcodePacker final : public Packer {
  public:
   BgcodePacker(std::string name, const Metadata* origin, BgcodeOptions options)
-      : name_(std::move(name)), options_(options), surveyed_(origin), sorted_(origin) {}
+      : name_(std::move(name)), options_(options), origin_(origin), surveyed_(origin) {}
 
   [[nodiscard]] bool wants_survey() const override { return true; }
 
@@ -103,6 +103,7 @@ class BgcodePacker final : public Packer {
         lines_.finish([this](std::string_view line) { return look_at(line); }).and_then([this] {
           return surveyed_.take();
         });
+    sorted_.emplace(origin_, surveyed_);
     if (!metadata) {
       return named(tl::unexpected(metadata.error()));
     }
@@ -155,7 +156,7 @@ class BgcodePacker final : public Packer {
 
   Status add(std::string_view line) {
     line.remove_suffix(line.ends_with('\r') ? 1 : 0);
-    const Result<bool> kept = sorted_.is_gcode(line);
+    const Result<bool> kept = sorted_->is_gcode(line);
     if (!kept || !*kept) {
       return kept.map([](bool) {});
     }
@@ -198,8 +199,9 @@ class BgcodePacker final : public Packer {
 
   std::string name_;
   BgcodeOptions options_;
+  const Metadata* origin_;
   MetadataLines surveyed_;
-  MetadataLines sorted_;  // the same again: it says again which lines are metadata
+  std::optional<MetadataLines> sorted_;  // says again which lines are metadata
   Lines lines_;
   bool has_begun_ = false;
   bool has_gcode_ = false;

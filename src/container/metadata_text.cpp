@@ -200,6 +200,11 @@ MetadataLines::MetadataLines(const Metadata* origin) : origin_(origin) {
   }
 }
 
+MetadataLines::MetadataLines(const Metadata* origin, const MetadataLines& surveyed)
+    : MetadataLines(origin) {
+  tail_ends_ = surveyed.tail_counts_;
+}
+
 Result<bool> MetadataLines::is_gcode(std::string_view line) {
   const std::size_t first = line.find_first_not_of(" \t\r");
   if (first == std::string_view::npos) {
@@ -321,13 +326,19 @@ bool MetadataLines::take_producer(std::string_view comment) {
   return true;
 }
 
-// The first of a key counts; what comes a second time may be the G-code's own.
+// Metadata come before and after the G-code: of a key that comes several times the first before any
+// command and the last of all others count. The rest are comments of the G-code.
 bool MetadataLines::take_value(std::string_view comment) {
   const auto pair = split(comment);
   if (!pair || !(in_head_ ? head_keys_ : tail_keys_).contains(pair->first)) {
     return false;
   }
-  return (in_head_ ? head_ : tail_).emplace(pair->first, pair->second).second;
+  if (in_head_) {
+    return head_.emplace(pair->first, pair->second).second;
+  }
+  tail_.insert_or_assign(std::string(pair->first), std::string(pair->second));
+  const std::size_t count = ++tail_counts_.try_emplace(std::string(pair->first)).first->second;
+  return !tail_ends_ || count == tail_ends_->find(pair->first)->second;
 }
 
 Result<Metadata> MetadataLines::take() {

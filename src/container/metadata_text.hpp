@@ -26,6 +26,8 @@ class MetadataLines {
  public:
   // origin: as of make_bgcode_packer().
   explicit MetadataLines(const Metadata* origin);
+  // For a second time through the same text, when it is known which comment is a key's last.
+  MetadataLines(const Metadata* origin, const MetadataLines& surveyed);
 
   // Whether the line (without its end) belongs into a G-code block: not blank, and not metadata.
   // Errors have a message alone.
@@ -58,6 +60,9 @@ class MetadataLines {
   std::size_t expected_digits_ = 0;  // of the thumbnail being read
   Values head_;
   Values tail_;
+  using Counts = std::map<std::string, std::size_t, std::less<>>;
+  Counts tail_counts_;               // how often a key came after the first command
+  std::optional<Counts> tail_ends_;  // and will have come at the end
   Metadata found_;
 };
 

@@ -14,6 +14,11 @@ namespace {
 // The base rests at the rounded end of the path before it.
 constexpr double kRestTolerance_mm = 1e-4 + 1e-9;
 
+// Nothing to any firmware, and not in what unflex writes of binary G-code.
+bool is_blank(const gcode::Line& line) {
+  return line.content().find_first_not_of(" \t\r") == std::string_view::npos;
+}
+
 std::string_view text_end(const gcode::Line& line) {
   return std::string_view(line.text).substr(line.content().size());
 }
@@ -21,15 +26,17 @@ std::string_view text_end(const gcode::Line& line) {
 }  // namespace
 
 bool same_line(const gcode::Line& input, const gcode::Line& output) {
+  const std::string_view end = text_end(input);
   return gcode::same_but_for_times(input.content(), output.content()) &&
-         (text_end(input).empty() || text_end(input) == text_end(output));
+         (end.empty() || end == text_end(output) || (end == "\r\n" && text_end(output) == "\n"));
 }
 
 // The next line of the current run that has to be compared.
 PlacedLine* LineCheck::front(Replay& file) const {
   std::deque<PlacedLine>& lines = file.lines();
   while (!lines.empty() && lines.front().section <= file.section().id) {
-    if (!(lines.front().motion && output_->section().compensated)) {
+    const bool replaced = lines.front().motion && output_->section().compensated;
+    if (!replaced && !is_blank(lines.front().line)) {
       return &lines.front();
     }
     lines.pop_front();

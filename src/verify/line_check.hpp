@@ -1,5 +1,6 @@
 // Checks that the lines of the sliced file stand in the emitted one: all, unchanged, in their
-// order, where they stood along the path, and none but lines of known forms between them.
+// order, where they stood along the path, and none but lines of known forms between them. Blank
+// lines mean nothing.
 #pragma once
 
 #include "replay.hpp"
@@ -8,7 +9,7 @@
 namespace unflex::verify {
 
 // Equal byte for byte but for durations in M73 and comments; an input that ends without a line
-// ending may have got one.
+// ending may have got one, and one that ends as in Windows the short one, as in binary G-code.
 [[nodiscard]] bool same_line(const gcode::Line& input, const gcode::Line& output);
 
 class LineCheck {

@@ -240,6 +240,17 @@ TEST_F(BatchTest, RefusesToReplaceAPrintByAPage) {
   EXPECT_EQ(read_file(path("in/a.g")), print);
 }
 
+TEST_F(BatchTest, RefusesNamesThatDifferInCapitalsAlone) {
+  add("in/sub/Part.gcode");
+  add("in/Sub/part.gcode");
+  const Outcome outcome = run(batch());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.err,
+            "in/sub/Part.gcode: differs from in/Sub/part.gcode in capitals alone, and many folders "
+            "and cards hold only one of the two; rename one\n");
+  EXPECT_FALSE(fs::exists(path("out")));
+}
+
 TEST_F(BatchTest, NamesWhatItCannotRead) {
   add("in/a.g");
   fs::create_symlink("nowhere.g", path("in/b.g"));

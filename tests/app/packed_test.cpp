@@ -12,6 +12,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 using container::essential;
@@ -30,6 +31,14 @@ std::string sliced_print() {
          "machine_max_acceleration_y = 1234,1\n"
          "; machine_max_acceleration_extruding = 1234,1\n"
          "; prusaslicer_config = end\n";
+}
+
+std::string replaced_all(std::string text, std::string_view what, std::string_view with) {
+  for (std::size_t at = text.find(what); at != std::string::npos;
+       at = text.find(what, at + with.size())) {
+    text.replace(at, what.size(), with);
+  }
+  return text;
 }
 
 std::string text_of(const std::filesystem::path& file) {
@@ -143,6 +152,29 @@ TEST_F(PackedPrints, GiveTheirSettingsAndAreMeasured) {
     EXPECT_THAT(read_file(path("printer.toml")), HasSubstr("2.8125")) << name;
   }
   EXPECT_EQ(run({"inspect", "-"}, read_file(path("in.bgcode"))).exit_code, 0);
+}
+
+TEST_F(PackedPrints, AreMeasuredAgainstTextThatBinaryGcodeHasNoPlaceFor) {
+  // Blank lines and line ends as in Windows, in a block that is packed in no way.
+  const std::string text = replaced_all(sliced_print(), "\nG1 ", "\n;12345\nG1 ");
+  const std::string packed = *to_bgcode(text, nullptr,
+                                        {.gcode = container::Compression::none,
+                                         .encoding = container::Encoding::none,
+                                         .checksum = false});
+  write_file(path("blank.bgcode"), replaced_all(packed, ";12345\n", "\n;2\r\n\r\n"));
+  ASSERT_THAT(text_of(path("blank.bgcode")), HasSubstr("\n\n;2\r\n\r\nG1 "));
+  compensate("blank.bgcode", "out.bgcode");
+  ASSERT_THAT(text_of(path("out.bgcode")), Not(HasSubstr("\r")));
+  succeeds({"verify", "out.bgcode", "--against", "blank.bgcode"});
+}
+
+TEST_F(PackedPrints, AreNotMeasuredAgainstAText) {
+  compensate("in.gcode", "out.bgcode");
+  const Outcome outcome = run({"verify", "out.bgcode", "--against", "in.gcode"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.err,
+            "out.bgcode: is binary G-code and in.gcode is not, so that metadata stand in other "
+            "places; have the output written as plain G-code and verify that\n");
 }
 
 TEST_F(PackedPrints, ThatAreDamagedLeaveNoOutput) {

@@ -11,8 +11,10 @@
 namespace unflex::container {
 namespace {
 
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::Pair;
 
 constexpr std::size_t kFileHeaderBytes = 10;
 
@@ -129,6 +131,18 @@ TEST(Bgcode, ComesBackInEveryCompressionAndEncoding) {
       }
     }
   }
+}
+
+TEST(Bgcode, TakesMetadataFromTheEndAlone) {
+  const std::string body =
+      "; total toolchanges = 0\nG28\n; filament cost = 99\nG1 X1\n; filament cost = 98\nM84\n";
+  const std::string packed = *to_bgcode(body + "; filament cost = 1.25\n");
+  const Unpacked unpacked = *unpack(packed);
+  EXPECT_THAT(unpacked.text, HasSubstr(body.substr(body.find("G28"))));
+  EXPECT_THAT(unpacked.metadata.print, Contains(Pair("filament cost", "1.25")));
+  const Unpacked again = *unpack(*to_bgcode(unpacked.text, &unpacked.metadata));
+  EXPECT_EQ(again.text, unpacked.text);
+  EXPECT_EQ(again.metadata.print, unpacked.metadata.print);
 }
 
 TEST(Bgcode, IsTheSameHoweverTheTextIsCut) {

@@ -190,6 +190,11 @@ TEST_F(Emitted, AChangedLineEndingIsFound) {
                    "'M106 S128' is lost or changed");
 }
 
+TEST_F(Emitted, BlankLinesAndWindowsLineEndingsAreNotMissed) {
+  const std::string sliced = replaced(kPrint, "M106 S128\n", "\n \t\nM106 S128\r\n\r\n");
+  EXPECT_EQ(violations_of(verify_text(sliced, good_, on_a_bed())), "");
+}
+
 TEST_F(Emitted, SwappedLinesAreFound) {
   expect_violation(replaced(good_, ";TYPE:Infill\nM73 P50 R1\n", "M73 P50 R1\n;TYPE:Infill\n"),
                    "';TYPE:Infill'");
