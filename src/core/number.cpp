@@ -1,8 +1,10 @@
 #include "unflex/core/number.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <system_error>
 
 namespace unflex {
@@ -107,6 +109,11 @@ void append_scaled(std::string& out, std::int64_t scaled, int decimals) {
     *--cursor = '-';
   }
   out.append(cursor, end);
+}
+
+int to_int(double value) {
+  using Limits = std::numeric_limits<int>;
+  return static_cast<int>(std::clamp<double>(value, Limits::min(), Limits::max()));
 }
 
 std::int64_t to_scaled(double value, int decimals) {

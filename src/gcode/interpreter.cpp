@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "firmware_commands.hpp"
+#include "unflex/core/number.hpp"
 
 namespace unflex::gcode {
 namespace {
@@ -336,7 +337,7 @@ void Interpreter::select_tool(Event& event, int tool) {
 // Without a tool, of the one in use.
 void Interpreter::set_flow_of(std::optional<double> tool, double factor) {
   const int in_use = tool_.value_or(0);
-  const int number = tool ? static_cast<int>(*tool) : in_use;
+  const int number = tool ? to_int(*tool) : in_use;
   if (number == in_use) {
     set_flow_factor(factor);
   } else {

@@ -6,6 +6,7 @@
 
 #include "firmware_commands.hpp"
 #include "rrf_meta.hpp"
+#include "unflex/core/number.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -319,7 +320,7 @@ void Interpreter::rrf_dwell(Event& event) {
 void Interpreter::rrf_wait_for_heater(Event& event) {
   event.kind = EventKind::barrier;
   if (has_any(command_, "RS") && tool_.value_or(-1) < 0) {
-    tool_ = static_cast<int>(command_.value('T').value_or(0.0));
+    tool_ = to_int(command_.value('T').value_or(0.0));
     lose_position(event);
   }
 }

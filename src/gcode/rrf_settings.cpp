@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "unflex/core/number.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -61,7 +62,7 @@ void Interpreter::rrf_jerk(Event& event, double scale) {
   raise(event.limits.edit().axis_jerk_mm_s, kMinJerk_mm_s);
   const std::optional<double> policy = command_.value('P');
   if (command_.number == 566 && policy && *policy >= 0.0) {
-    event.limits.edit().jerk_policy = static_cast<int>(*policy);
+    event.limits.edit().jerk_policy = to_int(*policy);
     event.kind = EventKind::limits;
   }
 }

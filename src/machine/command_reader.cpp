@@ -296,7 +296,7 @@ std::array<Travel, 2> read_travel(const gcode::Command& command, std::string_vie
 
 Status check_rrf_kinematics(CommandReader& reader, const gcode::Command& command,
                             const SourcePlace& place) {
-  const int type = static_cast<int>(command.value('K').value_or(0.0));
+  const int type = to_int(command.value('K').value_or(0.0));
   // linearDelta and rotaryDelta; scara, hangprinter, polar and fiveBarScara.
   if (command.number == 665 || is_one_of(type, {3, 10})) {
     reader.reading.note(

@@ -85,6 +85,14 @@ TEST(AppendScaled, AppendsToWhatIsThere) {
   EXPECT_EQ(line, "G1 X0.5");
 }
 
+TEST(ToInt, CutsTowardsZeroAndKeepsWithinWhatAnIntHolds) {
+  EXPECT_EQ(to_int(2.9), 2);
+  EXPECT_EQ(to_int(-2.9), -2);
+  EXPECT_EQ(to_int(2147483647.0), std::numeric_limits<int>::max());
+  EXPECT_EQ(to_int(2147483648.0), std::numeric_limits<int>::max());
+  EXPECT_EQ(to_int(-1e300), std::numeric_limits<int>::min());
+}
+
 TEST(ToScaled, RoundsHalfAwayFromZero) {
   EXPECT_EQ(to_scaled(0.25, 1), 3);
   EXPECT_EQ(to_scaled(-0.25, 1), -3);

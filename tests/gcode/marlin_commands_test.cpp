@@ -91,7 +91,7 @@ TEST(MarlinTool, InUseKeepsThePosition) {
 
 TEST(MarlinTool, HasItsOwnFlow) {
   Session session(default_options(Firmware::marlin));
-  session.read("T0\nM83\nM221 S50\nM221 T1 S200\nG1 X1 Y1 Z1");
+  session.read("T0\nM83\nM221 S50\nM221 T1 S200\nM221 T2147483648 S10\nG1 X1 Y1 Z1");
   EXPECT_DOUBLE_EQ(session.move("G1 X2 E1").delta(E), 0.5);
   session.read("T1\nG1 X1 Y1 Z1");
   EXPECT_DOUBLE_EQ(session.move("G1 X2 E1").delta(E), 2.0);

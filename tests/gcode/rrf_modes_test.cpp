@@ -102,7 +102,7 @@ TEST(RrfFactors, BelongToAnExtruder) {
   Session session = rrf();
   session.read("T0\nM83\nM221 D1 S50\nG1 X1 Y1 Z1");
   EXPECT_DOUBLE_EQ(session.move("G1 X2 E1").delta(E), 1.0);
-  session.read("M221 D0 S80");
+  session.read("M221 D0 S80\nM221 D99999999999 S10");
   EXPECT_DOUBLE_EQ(session.move("G1 X3 E1").delta(E), 0.8);
   session.read("T1\nG1 X1 Y1 Z1");
   EXPECT_DOUBLE_EQ(session.move("G1 X2 E1").delta(E), 0.5);

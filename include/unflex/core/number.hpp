@@ -12,6 +12,9 @@ namespace unflex {
 // "-.8", "3.". Exponents, "inf", "nan", hexadecimal, and anything left over give nullopt.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text);
 
+// Towards zero, and what no int can hold to the nearest that can. value is a number.
+[[nodiscard]] int to_int(double value);
+
 // Appends `scaled / 10^decimals` without trailing zeros or a needless point: (12500, 4) is "1.25",
 // (-3, 1) is "-0.3", (0, 5) is "0". There is no "-0".
 void append_scaled(std::string& out, std::int64_t scaled, int decimals);
