@@ -17,14 +17,22 @@ using planner::Limits;
 constexpr double kMinute_s = 60.0;
 constexpr double kMicroseconds = 1e6;
 
+// Whose a limit is. What a run leaves as the file has it is never set to what nobody has said.
+enum class Of { run, file };
+
+constexpr std::array kWithoutZ = {Of::run, Of::run, Of::file, Of::run};
+constexpr std::array kXAndY = {Of::run, Of::run, Of::file, Of::file};
+
 // One command with those of its words that have to be sent.
 class CommandLine {
  public:
+  // all: what a run sets, whatever it was.
   CommandLine(std::string_view command, bool all) : text_(command), all_(all) {}
 
   // Word and value without anything between, as in X1000; or with it, as in ACCEL=1000.
-  void word(std::string_view name, double wanted, double current, double factor = 1.0) {
-    if (all_ || wanted != current) {
+  void word(std::string_view name, double wanted, double current, double factor = 1.0,
+            Of of = Of::run) {
+    if (wanted != current || (all_ && of == Of::run)) {
       // Twelve digits: 0.1 · 60 is 6, not 6.000000000000001.
       text_ += fmt::format(" {}{:.12g}", name, wanted * factor);
       empty_ = false;
@@ -32,10 +40,10 @@ class CommandLine {
   }
 
   void axes(const std::array<double, 4>& wanted, const std::array<double, 4>& current,
-            double factor = 1.0) {
+            const std::array<Of, 4>& of, double factor = 1.0) {
     constexpr std::array<std::string_view, 4> kNames = {"X", "Y", "Z", "E"};
     for (std::size_t axis = 0; axis < kNames.size(); ++axis) {
-      word(kNames[axis], wanted[axis], current[axis], factor);
+      word(kNames[axis], wanted[axis], current[axis], factor, of[axis]);
     }
   }
 
@@ -65,19 +73,19 @@ void klipper(const Limits& wanted, const Limits& current, bool all,
 void marlin(const Limits& wanted, const Limits& current, bool all, bool classic_jerk,
             std::vector<std::string>& lines) {
   CommandLine accel("M201", all);
-  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2);
+  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2, kWithoutZ);
   accel.finish(lines);
   CommandLine velocity("M203", all);
-  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s);
+  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s, kXAndY);
   velocity.finish(lines);
   CommandLine used("M204", all);
   used.word("P", wanted.print_accel_mm_s2, current.print_accel_mm_s2);
-  used.word("R", wanted.retract_accel_mm_s2, current.retract_accel_mm_s2);
+  used.word("R", wanted.retract_accel_mm_s2, current.retract_accel_mm_s2, 1.0, Of::file);
   used.word("T", wanted.travel_accel_mm_s2, current.travel_accel_mm_s2);
   used.finish(lines);
   CommandLine advanced("M205", all);
   if (classic_jerk) {
-    advanced.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s);
+    advanced.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s, kWithoutZ);
   } else {
     advanced.word("J", wanted.junction_deviation_mm, current.junction_deviation_mm);
   }
@@ -89,10 +97,10 @@ void marlin(const Limits& wanted, const Limits& current, bool all, bool classic_
 
 void rrf(const Limits& wanted, const Limits& current, bool all, std::vector<std::string>& lines) {
   CommandLine accel("M201", all);
-  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2);
+  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2, kWithoutZ);
   accel.finish(lines);
   CommandLine velocity("M203", all);
-  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s, kMinute_s);
+  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s, kXAndY, kMinute_s);
   velocity.word("I", wanted.min_movement_velocity_mm_s, current.min_movement_velocity_mm_s,
                 kMinute_s);
   velocity.finish(lines);
@@ -101,7 +109,7 @@ void rrf(const Limits& wanted, const Limits& current, bool all, std::vector<std:
   used.word("T", wanted.travel_accel_mm_s2, current.travel_accel_mm_s2);
   used.finish(lines);
   CommandLine jerk("M566", all);
-  jerk.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s, kMinute_s);
+  jerk.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s, kWithoutZ, kMinute_s);
   jerk.word("P", wanted.jerk_policy, current.jerk_policy);
   jerk.finish(lines);
 }

@@ -18,8 +18,8 @@ namespace unflex::emit {
 [[nodiscard]] planner::Limits limits_in_run(Firmware firmware, const planner::Limits& file,
                                             planner::Limits raised);
 
-// The lines, without their endings, that put `wanted` in force: what differs from `current`, or
-// everything unless it is `known`.
+// The lines, without their endings, that put `wanted` in force: what differs from `current`, and
+// unless that is `known` all that a run sets.
 [[nodiscard]] std::vector<std::string> limit_lines(const planner::FirmwareConfig& config,
                                                    const planner::Limits& wanted,
                                                    const planner::Limits& current, bool known);

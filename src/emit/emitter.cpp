@@ -24,6 +24,10 @@ constexpr int kExactDecimals = 9;  // where a run ends on a finer place than the
 constexpr int kFilamentDecimals = 5;
 constexpr double kFeedToleranceMmS = 1e-6;  // what restoring F with its decimals may leave
 
+// Marlin adds what a relative line extrudes to the reading of E in single precision (gcode.cpp,
+// get_destination_from_command). Below this reading a line loses less than 4 nm.
+constexpr double kMostReadingOfE_mm = 64.0;
+
 bool same(double a, double b) { return std::abs(a - b) < 1e-9; }
 
 void append_word(std::string& text, char letter, double value, int decimals) {
@@ -167,6 +171,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   for (const Stroke& stroke : *plan.strokes) {
     write_events(stroke.events);
     set_run_modes(out);
+    keep_reading_of_e_small(out);
     write_stroke(stroke, filament_origin, out);
   }
   if (run.until_s) {
@@ -203,6 +208,17 @@ void Emitter::set_run_modes(std::string& out) {
   }
   if (state.absolute_e) {
     write("M83", out);
+  }
+}
+
+// Where the file's own reading is known, and so put back after the run.
+void Emitter::keep_reading_of_e_small(std::string& out) {
+  const gcode::ModalState& state = printer_.state();
+  const double reading_mm =
+      std::abs(state.position_mm[E] - state.base_mm[E]) / state.filament_factor();
+  if (options_.fixed.firmware == Firmware::marlin && input_.state().known[E] && state.known[E] &&
+      reading_mm > kMostReadingOfE_mm) {
+    write("G92 E0", out);
   }
 }
 

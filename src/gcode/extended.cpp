@@ -87,6 +87,12 @@ void Interpreter::extended(Event& event) {
   if (name == "EXCLUDE_OBJECT_START" || name == "EXCLUDE_OBJECT_END") {
     return object_label(event);
   }
+  if (name == "TUNING_TOWER") {
+    return uncertain_modes(event, "TUNING_TOWER sets what it tunes with every new Z");
+  }
+  if (name == "RESPOND" && command_.arguments.find("action:") != std::string_view::npos) {
+    return lose_position(event);  // to the host, which may move the machine
+  }
   switch (extended_effect(name)) {
     case Effect::passive:
       return;

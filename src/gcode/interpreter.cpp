@@ -22,6 +22,16 @@ constexpr double kSecondsPerMinute = 60.0;
 // Room for so many is kept from line to line.
 constexpr std::size_t kKeptSegments = 4;
 
+// What a line that may not run must leave alone, or what follows is uncertain. F and places are not
+// among it: they are known again with the next word that gives them.
+bool same_modes(const ModalState& a, const ModalState& b) {
+  return a.absolute_xyz == b.absolute_xyz && a.absolute_e == b.absolute_e &&
+         a.unit_mm == b.unit_mm && a.speed_factor == b.speed_factor &&
+         a.filament_factor() == b.filament_factor() && a.plane == b.plane &&
+         a.retracted == b.retracted && a.inverse_time == b.inverse_time &&
+         a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper == b.shaper;
+}
+
 }  // namespace
 
 InterpreterOptions default_options(Firmware firmware) {
@@ -228,16 +238,18 @@ void Interpreter::dwell(Event& event) {
 }
 
 // Position values stay: what the axes read afterwards is the printer's configuration, not in the
-// text. Homing takes the effect of G92 off an axis (Klipper's gcode_move.py,
-// _handle_home_rails_end; Marlin's motion.cpp, set_axis_is_at_home; RepRapFirmware's G92 sets the
-// very position that homing sets).
+// text. Nor is where the axes are that a line does not name: Z is probed above some place of the
+// bed (Klipper's safe_z_home.py, Marlin's G28.cpp, home_z_safely, RepRapFirmware's homez.g), and X
+// and Y are homed with Z lifted. Homing takes the effect of G92 off an axis (Klipper's
+// gcode_move.py, _handle_home_rails_end; Marlin's motion.cpp, set_axis_is_at_home; RepRapFirmware's
+// G92 sets the very position that homing sets).
 void Interpreter::home(Event& event) {
   event.kind = EventKind::barrier;
   event.position_lost = true;
   const bool some_named = command_.has('X') || command_.has('Y') || command_.has('Z');
   for (const Axis axis : {X, Y, Z}) {
+    state_.known[axis] = false;
     if (!some_named || command_.has(kAxisLetters[axis])) {
-      state_.known[axis] = false;
       state_.base_mm[axis] = state_.offset_mm[axis];
       state_.base_known[axis] = true;
     }
@@ -323,15 +335,25 @@ void Interpreter::select_tool(Event& event, int tool) {
   if (tool_ == tool) {
     return;
   }
-  if (tool_) {
-    flow_factors_[*tool_] = state_.flow_factor;
-    const auto kept = flow_factors_.find(tool);
-    set_flow_factor(kept == flow_factors_.end() ? 1.0 : kept->second);
+  const bool from_another = tool_.has_value();
+  lose_tool();
+  if (const auto kept = flow_factors_.find(tool); kept != flow_factors_.end()) {
+    set_flow_factor(kept->second);
+  } else if (from_another) {
+    set_flow_factor(1.0);
   }
-  tool_ = tool;
   state_.retracted = false;
   state_.hop_mm = 0.0;
   lose_position(event);
+  tool_ = tool;
+}
+
+// Another may be in use from here on.
+void Interpreter::lose_tool() {
+  if (tool_) {
+    flow_factors_[*tool_] = state_.flow_factor;
+    tool_.reset();
+  }
 }
 
 // Without a tool, of the one in use.
@@ -408,10 +430,23 @@ void Interpreter::uncertain_modes(Event& event, std::string_view cause) {
   }
 }
 
+void Interpreter::may_have_happened(Event& event, const Interpreter& trial, const Event& tried,
+                                    std::string_view cause) {
+  if (!same_modes(state_, trial.state_) || tried.kind == EventKind::limits ||
+      trial.modes_uncertain_ != modes_uncertain_) {
+    return uncertain_modes(event, cause);
+  }
+  feed_uncertain_ = feed_uncertain_ || trial.state_.feed_mm_s != state_.feed_mm_s;
+  lose_position(event);
+}
+
 void Interpreter::lose_position(Event& event) {
   event.kind = EventKind::barrier;
   event.position_lost = true;
   state_.known.fill(false);
+  if (options_.firmware == Firmware::rrf) {
+    lose_tool();  // a macro may select one
+  }
 }
 
 void Interpreter::not_understood(Event& event, std::string_view problem) {

@@ -25,16 +25,25 @@ bool has_any(const Command& command, std::string_view letters) {
                      [&](char letter) { return command.has(letter); });
 }
 
-// Why a motion line may mean something else to a Marlin as it is usually built; empty if not.
+// By a word of its own, not one of a second command that counts for nothing.
+bool sets_laser(const Command& command) { return command.has('S') && !has_any(command, "GMT"); }
+
+// Why a line may mean something else to a Marlin as it is usually built; empty if not.
 std::string_view doubt(std::string_view content, const Command& command) {
-  const std::string_view code = content.substr(0, content.find(';'));
-  if (command.letter == 'G' && code.find('(') != std::string_view::npos) {
-    return "a comment in parentheses, which Marlin reads only if PAREN_COMMENTS is set";
+  std::string_view code = content.substr(0, content.find(';'));
+  const std::size_t parenthesis = code.find('(');
+  const bool has_words = command.number <= 4 || command.number == 92;
+  if (command.letter == 'G' && parenthesis != std::string_view::npos) {
+    if (has_words) {
+      return "a comment in parentheses, which Marlin reads only if PAREN_COMMENTS is set";
+    }
+    code = code.substr(0, parenthesis);
   }
-  if (command.letter == 'G' && std::any_of(code.begin(), code.end(), is_lower)) {
-    return "lower case, which Marlin reads only if GCODE_CASE_INSENSITIVE is set";
-  }
-  return "";
+  // Texts and names stand behind M and its number.
+  const std::size_t first = code.find_first_not_of(" \t");
+  const bool lower = command.letter == 'G' ? std::any_of(code.begin(), code.end(), is_lower)
+                                           : first < code.size() && is_lower(code[first]);
+  return lower ? "lower case, which Marlin reads only if GCODE_CASE_INSENSITIVE is set" : "";
 }
 
 }  // namespace
@@ -58,8 +67,23 @@ void Interpreter::marlin(Event& event, std::string_view content) {
       break;
   }
   if (const std::string_view problem = doubt(content, command_); !problem.empty()) {
-    return not_understood(event, problem);
+    return marlin_doubtful_line(event, problem);
   }
+  marlin_command(event);
+}
+
+// What the line would do is tried on a copy.
+void Interpreter::marlin_doubtful_line(Event& event, std::string_view problem) {
+  Interpreter trial = *this;
+  Event tried;
+  trial.marlin_command(tried);
+  may_have_happened(event, trial, tried, problem);
+  if (event.warnings.empty()) {
+    not_understood(event, problem);
+  }
+}
+
+void Interpreter::marlin_command(Event& event) {
   const bool is_m = command_.letter == 'M';
   if (command_.subnumber > 0) {
     const bool passive =
@@ -84,6 +108,9 @@ void Interpreter::marlin_g_code(Event& event) {
       return marlin_linear_move(event);
     case 2:
     case 3:
+      if (has_any(command_, "ABCUVW") || sets_laser(command_)) {
+        return lose_position(event);
+      }
       return state_.plane == 17 ? arc_move(event, command_.number == 2)
                                 : not_understood(event, "an arc outside the XY plane");
     case 4:
@@ -132,6 +159,10 @@ void Interpreter::marlin_m_code(Event& event) {
       return;
     case 92:
       return steps_per_mm(event);
+    case 118:
+      // "A1 action:pause": the host may move the machine, from the file's limits.
+      return command_.arguments.find("action:") == std::string_view::npos ? void()
+                                                                          : lose_position(event);
     case 200:
       return marlin_volumetric(event);
     case 201:
@@ -171,8 +202,8 @@ void Interpreter::marlin_m_code(Event& event) {
 void Interpreter::marlin_linear_move(Event& event) {
   constexpr double kShortest_mm = 0.1;  // MIN_AUTORETRACT
   constexpr double kLongest_mm = 10.0;  // MAX_AUTORETRACT
-  if (has_any(command_, "ABCHIJKUVW")) {
-    return lose_position(event);  // further axes, or a mixing extruder
+  if (has_any(command_, "ABCHIJKUVW") || sets_laser(command_)) {
+    return lose_position(event);  // further axes, a mixing extruder, or a laser's power
   }
   const std::optional<double> word = command_.value('E');
   if (!state_.auto_retract || !word || has_any(command_, "XYZ")) {

@@ -217,6 +217,14 @@ double Segment::length_xy_mm() const { return length(delta(X), delta(Y), 0.0); }
 
 double Segment::length_mm() const { return length(delta(X), delta(Y), delta(Z)); }
 
+// RepRapFirmware: a relative E is no part of the reading that an absolute one is taken from
+// (GCodes.cpp, LoadExtrusionAndFeedrateFromGCode, latestVirtualExtruderPosition).
+void Interpreter::keep_reading_of_e(bool e_absolute, double before_mm) {
+  if (options_.firmware == Firmware::rrf && !e_absolute) {
+    state_.base_mm[E] += state_.position_mm[E] - before_mm;
+  }
+}
+
 void Interpreter::linear_move(Event& event) {
   const Target target = read_target(command_, state_, options_.firmware);
   if (target.problem != nullptr) {
@@ -230,7 +238,9 @@ void Interpreter::linear_move(Event& event) {
   }
   const bool start_known = starts_known(target, state_) && modes_certain();
   const bool from_unknown = settle(target, state_);
+  const double e_before_mm = state_.position_mm[E];
   append_segment(event, target.position_mm, state_.feed_mm_s * state_.speed_factor, start_known);
+  keep_reading_of_e(target.e_absolute, e_before_mm);
   if (event.segments.empty() && from_unknown) {
     event.kind = EventKind::barrier;
   }
@@ -301,6 +311,7 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
     }
     append_segment(event, next, feed_mm_s, start_known, i == 0 || is_last ? 0.0 : radius_mm);
   }
+  keep_reading_of_e(target.e_absolute, start_mm[E]);
 }
 
 void Interpreter::set_feed(std::optional<double> feed_word) {

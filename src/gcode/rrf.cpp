@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <string_view>
+#include <vector>
 
 #include "firmware_commands.hpp"
 #include "rrf_meta.hpp"
@@ -17,28 +19,33 @@ bool has_any(const Command& command, std::string_view letters) {
                      [&](char letter) { return command.has(letter); });
 }
 
-// A second command in the same line, or a word that comes twice, of which RepRapFirmware takes the
-// first.
-bool is_ambiguous(const Command& command) {
+// Of words that come twice RepRapFirmware takes the first.
+bool repeats_a_word(const Command& command) {
   for (auto word = command.words.begin(); word != command.words.end(); ++word) {
-    const bool is_command = word->value && (word->letter == 'G' || word->letter == 'M');
-    const bool again = std::any_of(command.words.begin(), word,
-                                   [&](const Word& w) { return w.letter == word->letter; });
-    if (is_command || again) {
+    if (std::any_of(command.words.begin(), word,
+                    [&](const Word& w) { return w.letter == word->letter; })) {
       return true;
     }
   }
   return false;
 }
 
-// What a line that may not run must leave alone, or what follows is uncertain. F and places are not
-// among it: they are known again with the next word that gives them.
-bool same_modes(const ModalState& a, const ModalState& b) {
-  return a.absolute_xyz == b.absolute_xyz && a.absolute_e == b.absolute_e &&
-         a.unit_mm == b.unit_mm && a.speed_factor == b.speed_factor &&
-         a.filament_factor() == b.filament_factor() && a.plane == b.plane &&
-         a.retracted == b.retracted && a.inverse_time == b.inverse_time &&
-         a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper == b.shaper;
+bool begins_command(const Word& word) {
+  return word.value && (word.letter == 'G' || word.letter == 'M');
+}
+
+// Commands that set a mode, whatever words they have.
+bool sets_mode(char letter, int number) {
+  constexpr std::array kModes = {17, 18, 19, 20, 21, 90, 91, 93, 94};
+  return letter == 'G' ? std::ranges::find(kModes, number) != kModes.end()
+                       : letter == 'M' && (number == 82 || number == 83);
+}
+
+// Commands that leave all modes but F as they are. G53 is for its line alone.
+bool leaves_modes(char letter, int number) {
+  constexpr std::array kCodes = {0, 1, 2, 3, 4, 28, 53};
+  return letter == 'G' ? std::ranges::find(kCodes, number) != kCodes.end()
+                       : letter == 'M' && rrf_m_code_effect(number) != Effect::unknown;
 }
 
 }  // namespace
@@ -76,28 +83,32 @@ bool Interpreter::rrf_meta_line(Event& event, std::string_view content) {
       lose_position(event);
       return true;
     case MetaCommand::harmless:
+      // What it reads must be what the file has set, not what a run has.
+      if (reads_machine(content)) {
+        lose_position(event);
+      }
       return true;
     case MetaCommand::none:
       break;
   }
   if (block_indent_) {
-    rrf_conditional_line(event);
+    rrf_conditional_line(event, content);
     return true;
   }
   return false;
 }
 
 // What the line would do is tried on a copy.
-void Interpreter::rrf_conditional_line(Event& event) {
+void Interpreter::rrf_conditional_line(Event& event, std::string_view content) {
+  lose_tool();  // it may have been changed, or not
+  if (has_expression(content)) {
+    rrf_expression(event);
+    return lose_position(event);
+  }
   Interpreter trial = *this;
   Event tried;
   trial.rrf_command(tried);
-  if (!same_modes(state_, trial.state_) || tried.kind == EventKind::limits ||
-      trial.modes_uncertain_ != modes_uncertain_) {
-    return uncertain_modes(event, "a mode or a limit set under a condition");
-  }
-  feed_uncertain_ = feed_uncertain_ || trial.state_.feed_mm_s != state_.feed_mm_s;
-  lose_position(event);
+  may_have_happened(event, trial, tried, "a mode or a limit set under a condition");
 }
 
 // What is not evaluated here: harmless where the command is.
@@ -123,7 +134,7 @@ void Interpreter::rrf_expression(Event& event) {
     default:
       feed_uncertain_ = feed_uncertain_ || is_g;
       if (!is_g && !is_m) {
-        tool_.reset();  // T{…}
+        lose_tool();  // T{…}
       }
       return lose_position(event);
   }
@@ -138,7 +149,10 @@ void Interpreter::rrf_command(Event& event) {
   }
   const bool is_m = command_.letter == 'M';
   const bool is_g = command_.letter == 'G';
-  if ((is_g || is_m) && is_ambiguous(command_)) {
+  if (std::ranges::any_of(command_.words, begins_command)) {
+    return rrf_several_commands(event);
+  }
+  if ((is_g || is_m) && repeats_a_word(command_)) {
     return is_m && rrf_m_code_effect(command_.number) != Effect::unknown
                ? other_m_code(event)
                : not_understood(event, "two commands in one line, or a word given twice");
@@ -160,6 +174,45 @@ void Interpreter::rrf_command(Event& event) {
   }
 }
 
+// StringParser.cpp, FindParameters and FinishedCommand: a command ends where the next begins, and
+// each is carried out. Followed where all of them do no more than set modes.
+void Interpreter::rrf_several_commands(Event& event) {
+  const std::vector<Word> words = command_.words;
+  const char letter = command_.letter;
+  const int number = command_.number;
+  const auto all_begun = [&](auto&& is_such) {
+    return is_such(letter, number) && std::ranges::all_of(words, [&](const Word& word) {
+             return !begins_command(word) || is_such(word.letter, to_int(*word.value));
+           });
+  };
+  if (all_begun(sets_mode) && std::ranges::all_of(words, begins_command)) {
+    command_.words.clear();
+    rrf_command(event);
+    for (const Word& word : words) {
+      command_.letter = word.letter;
+      command_.number = to_int(*word.value);
+      rrf_command(event);
+    }
+    return;
+  }
+  if (!all_begun(leaves_modes)) {
+    return uncertain_modes(event, "several commands in one line");
+  }
+  feed_uncertain_ = feed_uncertain_ || command_.has('F');
+  const bool moves = letter == 'G' || std::ranges::any_of(words, [](const Word& word) {
+                       return begins_command(word) && word.letter == 'G';
+                     });
+  if (moves) {
+    return not_understood(event, "two commands in one line, or a word given twice");
+  }
+  other_m_code(event);
+  for (const Word& word : words) {
+    if (begins_command(word) && rrf_m_code_effect(to_int(*word.value)) == Effect::stop) {
+      event.kind = EventKind::barrier;
+    }
+  }
+}
+
 void Interpreter::rrf_g_code(Event& event) {
   switch (command_.number) {
     case 0:
@@ -167,7 +220,7 @@ void Interpreter::rrf_g_code(Event& event) {
       return rrf_linear_move(event);
     case 2:
     case 3:
-      return state_.inverse_time || has_any(command_, "ABCDUVW")
+      return state_.inverse_time || has_any(command_, "ABCDPSUVW")
                  ? lose_position(event)
                  : arc_move(event, command_.number == 2);
     case 4:
@@ -267,13 +320,14 @@ void Interpreter::rrf_m_code(Event& event) {
   }
 }
 
-// GCodes.cpp, DoStraightMove: H is a homing move, R starts from a restore point. M220 and M221
+// GCodes.cpp, DoStraightMove: H is a homing move, R starts from a restore point, P sets outputs and
+// S a laser's power. M220 and M221
 // apply only where an axis is named (LoadExtrusionAndFeedrateFromGCode).
 void Interpreter::rrf_linear_move(Event& event) {
   if (state_.inverse_time) {
     return not_understood(event, "a move in inverse time mode (G93)");
   }
-  if (command_.value('H').value_or(0.0) != 0.0 || has_any(command_, "ABCDRUVW")) {
+  if (command_.value('H').value_or(0.0) != 0.0 || has_any(command_, "ABCDPRSUVW")) {
     return lose_position(event);
   }
   if (has_any(command_, "XYZ") || !command_.has('E')) {
@@ -320,8 +374,8 @@ void Interpreter::rrf_dwell(Event& event) {
 void Interpreter::rrf_wait_for_heater(Event& event) {
   event.kind = EventKind::barrier;
   if (has_any(command_, "RS") && tool_.value_or(-1) < 0) {
-    tool_ = to_int(command_.value('T').value_or(0.0));
     lose_position(event);
+    tool_ = to_int(command_.value('T').value_or(0.0));
   }
 }
 

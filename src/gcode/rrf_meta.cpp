@@ -72,6 +72,12 @@ bool has_expression(std::string_view content) {
   return false;
 }
 
+bool reads_machine(std::string_view content) {
+  constexpr std::array<std::string_view, 3> kParts = {"move.", "state.", "tools["};
+  return std::ranges::any_of(
+      kParts, [&](std::string_view part) { return content.find(part) != std::string_view::npos; });
+}
+
 bool labels_object(std::string_view comment) {
   const std::size_t first = comment.find_first_not_of(' ');
   if (first == std::string_view::npos) {

@@ -22,6 +22,10 @@ enum class MetaCommand {
 // Whether braces outside quotes and comments make part of the line an expression.
 [[nodiscard]] bool has_expression(std::string_view content);
 
+// Whether a meta command may ask for limits, factors, modes or places: the object model's move,
+// state and tools.
+[[nodiscard]] bool reads_machine(std::string_view content);
+
 // GCodes3.cpp, ProcessWholeLineComment: a comment that begins or ends an object, so that motion up
 // to the next such comment is left out when the object has been cancelled.
 [[nodiscard]] bool labels_object(std::string_view comment);

@@ -37,23 +37,23 @@ planner::Limits some_limits() {
   return limits;
 }
 
-TEST(LimitLines, AreAllOfThemWhereNothingIsKnown) {
+TEST(LimitLines, AreAllThatARunSetsWhereNothingIsKnown) {
   const planner::Limits limits = some_limits();
   EXPECT_THAT(limit_lines(config_of(Firmware::klipper), limits, limits, false),
               ElementsAre("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
                           "MINIMUM_CRUISE_RATIO=0.5"));
   EXPECT_THAT(limit_lines(config_of(Firmware::marlin), limits, limits, false),
-              ElementsAre("M201 X1250 Y1000 Z400 E4000", "M203 X180 Y175.5 Z12 E80",
-                          "M204 P1500 R1250 T1800", "M205 J0.02 S0 T0 B20000"));
+              ElementsAre("M201 X1250 Y1000 E4000", "M203 X180 Y175.5", "M204 P1500 T1800",
+                          "M205 J0.02 S0 T0 B20000"));
   EXPECT_THAT(limit_lines(config_of(Firmware::rrf), limits, limits, false),
-              ElementsAre("M201 X1250 Y1000 Z400 E4000", "M203 X10800 Y10530 Z720 E4800 I6",
-                          "M204 P1500 T1800", "M566 X480 Y420 Z120 E600 P1"));
+              ElementsAre("M201 X1250 Y1000 E4000", "M203 X10800 Y10530 I6", "M204 P1500 T1800",
+                          "M566 X480 Y420 E600 P1"));
 }
 
 TEST(LimitLines, TellMarlinWithClassicJerkTheJerks) {
   const planner::Limits limits = some_limits();
   EXPECT_EQ(limit_lines(config_of(Firmware::marlin, true), limits, limits, false).back(),
-            "M205 X8 Y7 Z2 E10 S0 T0 B20000");
+            "M205 X8 Y7 E10 S0 T0 B20000");
 }
 
 TEST(LimitLines, AreOnlyWhatDiffers) {

@@ -73,13 +73,22 @@ TEST_P(Losing, LeavesTheMachineAnywhere) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Commands, Losing,
-                         ::testing::Values("G28", "G28 W", "G29", "G80", "G32", "G30 X1 Y1", "G34",
+                         ::testing::Values("RESPOND TYPE=command MSG=\"action:pause\"", "G28",
+                                           "G28 W", "G29", "G80", "G32", "G30 X1 Y1", "G34",
                                            "G1009", "G1.5 X3", "G5 X1 Y1 I1 J1 P1 Q1", "T0", "T12",
                                            "Tx", "M0", "M1", "M25", "M226", "M600", "M601", "M18",
                                            "M84", "M84 S5", "M42 P1 S1", "M112", "M999", "M109.1",
                                            "X5", "PRINT_START BED=60", "print_end", "PAUSE",
                                            "BED_MESH_PROFILE LOAD=default",
                                            "SET_GCODE_OFFSET Z=1 MOVE=1"));
+
+TEST(TuningTower, LeavesTheRestAsItIs) {
+  Session session;
+  EXPECT_THAT(session.read("TUNING_TOWER COMMAND=SET_VELOCITY_LIMIT PARAMETER=ACCEL").warnings,
+              SizeIs(1));
+  session.read("G1 X1 Y1 Z1");
+  EXPECT_FALSE(session.move("G1 X2").start_known);
+}
 
 TEST_P(NotUnderstood, PassesAsABarrierWithAWarning) {
   const Event event = session_.read(GetParam());

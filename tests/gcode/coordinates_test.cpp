@@ -119,14 +119,15 @@ TEST(Coordinates, MoveFromAnUnknownPlaceToTheSameReadingStops) {
   EXPECT_EQ(event.kind, EventKind::passive);
 }
 
-TEST(Coordinates, HomingForgetsTheNamedAxesAndKeepsTheirReadings) {
+// Z is probed somewhere else, and X and Y are homed with Z lifted.
+TEST(Coordinates, HomingAnyAxisForgetsAllAndKeepsTheirReadings) {
   Session session;
   Event event = session.read("G1 X1 Y2 Z3\nG28 X0");
   EXPECT_EQ(event.kind, EventKind::barrier);
   EXPECT_TRUE(event.position_lost);
-  EXPECT_THAT(session.state().known, ElementsAre(false, true, true, true));
+  EXPECT_THAT(session.state().known, ElementsAre(false, false, false, true));
   EXPECT_THAT(session.state().position_mm, ElementsAre(1, 2, 3, 0));
-  session.read("G28 Y Z");
+  session.read("G1 X1 Y2 Z3\nG28 Z");
   EXPECT_THAT(session.state().known, ElementsAre(false, false, false, true));
   for (const char* all : {"G28", "G28 W", "G28 O"}) {
     session.read("G1 X1 Y2 Z3");

@@ -136,7 +136,8 @@ class DialectWriter {
         const double value = number();
         const bool relative = axis == E ? model_.e_relative : model_.relative;
         delta[axis] = relative ? value : value - model_.reading[axis];
-        model_.reading[axis] += delta[axis];
+        // RepRapFirmware leaves the reading of E out of it.
+        model_.reading[axis] += relative && axis == E && !model_.is_marlin() ? 0.0 : delta[axis];
         axes = axes || axis != E;
         line += fmt::format(" {}{}", "XYZE"[axis], value);
       }

@@ -7,6 +7,7 @@
 namespace unflex::gcode {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
@@ -37,10 +38,11 @@ INSTANTIATE_TEST_SUITE_P(
                       "M141 S40", "M201", "M203", "M204", "M205", "M566", "M207 S2", "M220", "M221",
                       "M220 S90", "M221 S95", "M280 P0 S90", "M290 S0.05", "M291 P\"hi\" S1",
                       "M300 S440 P50", "M42 P1 S1", "M568 P0 S210", "M591 D0", "M593 H1",
-                      "G10 P0 S210", "G10 R150 S200", "G11", "G31 P500", "G92", "G92 E0",
-                      "G17", "G20", "G21", "G90", "G91", "G94", "M121", "M201.1 X100",
-                      "var x = 3", "global y = {1+2}", "set var.x = 4", "echo \"G28\"",
-                      "M104 S{global.temperature}", "M117 {state.status}", "M200"));
+                      "G10 P0 S210", "G10 R150 S200", "G11", "G31 P500", "G92", "G92 E0", "G17",
+                      "G20", "G21", "G90", "G91", "G94", "M121", "M201.1 X100", "var x = 3",
+                      "global y = {1+2}", "set var.x = 4", "echo \"G28\"",
+                      "M104 S{global.temperature}", "M117 {state.status}", "M200",
+                      "M106 S1 M104 S210", "G21 G90 M83", "M82 M83"));
 
 TEST_P(RrfStopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());
@@ -53,10 +55,10 @@ TEST_P(RrfStopping, FinishesAllMotionAndKeepsThePosition) {
 INSTANTIATE_TEST_SUITE_P(Commands, RrfStopping,
                          ::testing::Values("G4", "G4 P100", "M400", "M109 S210", "M109", "M116",
                                            "M190 S60", "M191 S40", "M17", "M84 S5", "G92 X0", "G18",
-                                           "T0", "M572 D0 S0.05", "M593 P\"none\"", "M593 F40", "M593 L0.2", "M120", "G60 S1",
-                                           "M302 P1", "M569 P0 S1", "M574 X1", "M150 R255",
-                                           "M906 X800", "M913 X50", "M577 P1",
-                                           "M190 S{global.bed}"));
+                                           "T0", "M572 D0 S0.05", "M593 P\"none\"", "M593 F40",
+                                           "M593 L0.2", "M120", "G60 S1", "M302 P1", "M569 P0 S1",
+                                           "M574 X1", "M150 R255", "M906 X800", "M913 X50",
+                                           "M577 P1", "M190 S{global.bed}", "M104 S210 M400"));
 
 TEST_P(RrfLosing, LeavesTheMachineAnywhere) {
   const Event event = session_.read(GetParam());
@@ -76,7 +78,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "M665 L200", "M669 K0", "M701 S\"PLA\"", "M702", "M703", "M28 \"x\"",
                       "M900 K0.1", "M862.3 P\"MK3S\"", "M999", "M1234", "T1", "T-1", "T{var.tool}",
                       "G1 H1 X-300", "G1 R2 X0", "G1 U5", "START_PRINT BED=60", "if true",
-                      "while iterations < 3", "abort", "else", "G1 X{var.x}"));
+                      "while iterations < 3", "abort", "else", "G1 X{var.x}",
+                      "var before = move.axes[0].acceleration", "G1 X5 S1", "G1 X5 P1"));
 
 TEST_P(RrfDoubtful, PassesAsABarrierWithAWarning) {
   const Event event = session_.read(GetParam());
@@ -87,9 +90,42 @@ TEST_P(RrfDoubtful, PassesAsABarrierWithAWarning) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Lines, RrfDoubtful,
-                         ::testing::Values("G1 X5 G1 Y5", "G1 X5 M106 S1", "G53 G1 X5", "G1 X5 X6",
-                                           "G1 X5 E1:2", "N5 G1 X3*0", "G1 X", "?", "M501", "M502",
-                                           "M220 S{global.speed}", "M204 P{global.accel}"));
+                         ::testing::Values("G1 X5 G1 Y5", "G1 X5 M106 S1", "M106 S1 G1 X5",
+                                           "M106 S1 M82", "T0 M83", "G91 G1 X5", "G53 G1 X5",
+                                           "G1 X5 X6", "G1 X5 E1:2", "N5 G1 X3*0", "G1 X", "?",
+                                           "M501", "M502", "M220 S{global.speed}",
+                                           "M204 P{global.accel}"));
+
+TEST(RrfLines, OfSeveralModesSetThemAll) {
+  Session session(default_options(Firmware::rrf));
+  session.read("G20\nG91\nG21 G90 M83");
+  EXPECT_EQ(session.state().unit_mm, 1.0);
+  EXPECT_TRUE(session.state().absolute_xyz);
+  EXPECT_FALSE(session.state().absolute_e);
+}
+
+TEST(RrfLines, OfSeveralCommandsThatMayChangeModesLeaveTheRestAsItIs) {
+  for (const char* line : {"M106 S1 M82", "T0 M83", "G91 G1 X5", "G1 X5 M220 S50"}) {
+    Session session(default_options(Firmware::rrf));
+    EXPECT_THAT(
+        session.read(line).warnings,
+        ElementsAre("several commands in one line: what follows is passed through unchanged"))
+        << line;
+    session.read("G1 X1 Y1 Z1");
+    EXPECT_FALSE(session.move("G1 X2").start_known) << line;
+  }
+}
+
+TEST(RrfTool, IsNotKnownAfterAMacroOrACondition) {
+  for (const char* line : {"M98 P\"purge.g\"", "if true\n  T1"}) {
+    Session session(default_options(Firmware::rrf));
+    session.read("T0\nM83\nM221 S50");
+    session.read(line);
+    session.read("G1 X1 Y1 Z1");
+    EXPECT_TRUE(session.read("T0").position_lost) << line;
+    EXPECT_EQ(session.state().flow_factor, 0.5) << line;
+  }
+}
 
 TEST(RrfTool, InUseKeepsThePosition) {
   Session session(default_options(Firmware::rrf));
@@ -163,8 +199,9 @@ TEST(RrfBlocks, EndWhereTheIndentationDoes) {
 }
 
 TEST(RrfBlocks, ThatSetAModeLeaveTheRestAsItIs) {
-  for (const char* line : {"  M82", "  G91", "  G20", "  M220 S50", "  M204 P500", "  M200 D1.75",
-                           "  M593 P\"none\"", "  M121"}) {
+  for (const char* line :
+       {"  M220 S{global.factor}", "  M204 P{global.accel}", "  M82", "  G91", "  G20",
+        "  M220 S50", "  M204 P500", "  M200 D1.75", "  M593 P\"none\"", "  M121"}) {
     Session session(default_options(Firmware::rrf));
     session.read("M120\nM83\nG1 X1 Y1 Z1\nif true");
     EXPECT_THAT(session.read(line).warnings, SizeIs(1)) << line;

@@ -65,13 +65,22 @@ TEST(RrfLimits, ThatAreInvalidChangeNothing) {
   }
 }
 
+// GCodes.cpp, LoadExtrusionAndFeedrateFromGCode: latestVirtualExtruderPosition.
+TEST(RrfExtrusionMode, RelativeLengthsAreNoPartOfTheReading) {
+  Session session = rrf();
+  session.read("G1 X1 Y1 Z1 E10\nM83");
+  EXPECT_DOUBLE_EQ(session.move("G1 X2 E2").delta(E), 2.0);
+  EXPECT_NEAR(session.read("G2 X4 Y1 I1 E2").segments.back().end_mm[E], 14.0, 1e-12);
+  EXPECT_NEAR(session.move("M82\nG1 X5 E11").delta(E), 1.0, 1e-12);
+}
+
 TEST(RrfExtrusionMode, HasNothingToDoWithG90AndG91) {
   Session session = rrf();
   session.read("G1 X1 Y1 Z1 E10");
   EXPECT_DOUBLE_EQ(session.move("G91\nG1 X1 E11").delta(E), 1.0);
   EXPECT_DOUBLE_EQ(session.move("M83\nG90\nG1 X5 E2").delta(E), 2.0);
   EXPECT_FALSE(session.state().e_is_absolute());
-  EXPECT_DOUBLE_EQ(session.move("G91\nM82\nG1 X1 E14").delta(E), 1.0);
+  EXPECT_DOUBLE_EQ(session.move("G91\nM82\nG1 X1 E14").delta(E), 3.0);
   EXPECT_TRUE(session.state().e_is_absolute());
 }
 
@@ -102,7 +111,7 @@ TEST(RrfFactors, BelongToAnExtruder) {
   Session session = rrf();
   session.read("T0\nM83\nM221 D1 S50\nG1 X1 Y1 Z1");
   EXPECT_DOUBLE_EQ(session.move("G1 X2 E1").delta(E), 1.0);
-  session.read("M221 D0 S80\nM221 D99999999999 S10");
+  session.read("M221 D0 S80\nM221 D2147483648 S10");
   EXPECT_DOUBLE_EQ(session.move("G1 X3 E1").delta(E), 0.8);
   session.read("T1\nG1 X1 Y1 Z1");
   EXPECT_DOUBLE_EQ(session.move("G1 X2 E1").delta(E), 0.5);

@@ -238,6 +238,7 @@ class Interpreter {
   void retraction_and_hop(Event& event, bool retract);
   void steps_per_mm(Event& event);
   void select_tool(Event& event, int tool);
+  void lose_tool();
   void set_flow_of(std::optional<double> tool, double factor);
   void limits_unknown(Event& event);
   void uncertain_modes(Event& event, std::string_view cause);
@@ -246,6 +247,8 @@ class Interpreter {
   void axis_limits(Event& event, double scale, double least, AxisValues& values);
 
   void marlin(Event& event, std::string_view content);
+  void marlin_doubtful_line(Event& event, std::string_view problem);
+  void marlin_command(Event& event);
   void marlin_g_code(Event& event);
   void marlin_m_code(Event& event);
   void marlin_linear_move(Event& event);
@@ -261,9 +264,10 @@ class Interpreter {
 
   void rrf(Event& event, std::string_view content);
   bool rrf_meta_line(Event& event, std::string_view content);
-  void rrf_conditional_line(Event& event);
+  void rrf_conditional_line(Event& event, std::string_view content);
   void rrf_expression(Event& event);
   void rrf_command(Event& event);
+  void rrf_several_commands(Event& event);
   void rrf_g_code(Event& event);
   void rrf_m_code(Event& event);
   void rrf_linear_move(Event& event);
@@ -284,6 +288,10 @@ class Interpreter {
 
   // False behind a line that may or may not have set a mode or F.
   [[nodiscard]] bool modes_certain() const { return !modes_uncertain_ && !feed_uncertain_; }
+  // What the line did to a copy of this, which may or may not happen to the printer.
+  void may_have_happened(Event& event, const Interpreter& trial, const Event& tried,
+                         std::string_view cause);
+  void keep_reading_of_e(bool e_absolute, double before_mm);
   void set_feed(std::optional<double> feed_word);
   // Adds the straight piece to `target`, unless it has no length, and moves the state there.
   void append_segment(Event& event, const Position& target, double feed_mm_s, bool start_known,
