@@ -40,6 +40,32 @@ Status check_settings(const RunConfig& config) {
   return machine::load(config.printer_file, config.overrides).map([](const machine::Settings&) {});
 }
 
+// The folders on the way to the output that are not there yet. Until they are kept, what a refusal
+// leaves of them empty goes again.
+class NewFolders {
+ public:
+  explicit NewFolders(const std::filesystem::path& folder) {
+    std::error_code failed;
+    for (std::filesystem::path at = folder;
+         !at.empty() && !std::filesystem::exists(std::filesystem::symlink_status(at, failed));
+         at = at.parent_path()) {
+      missing_.push_back(at);
+    }
+  }
+  NewFolders(const NewFolders&) = delete;
+  NewFolders& operator=(const NewFolders&) = delete;
+  ~NewFolders() {
+    for (const std::filesystem::path& folder : missing_) {
+      std::error_code failed;
+      std::filesystem::remove(folder, failed);
+    }
+  }
+  void keep() { missing_.clear(); }
+
+ private:
+  std::vector<std::filesystem::path> missing_;  // the innermost first
+};
+
 // The summary must not take the place of what is read or made.
 Status check_summary(const RunConfig& config, const BatchFiles& files) {
   if (!config.summary) {
@@ -249,14 +275,17 @@ Result<ExitCode> run_batch(const RunConfig& config, Console& console) {
   if (!checked) {
     return tl::unexpected(checked.error());
   }
-  Result<std::optional<Output>> summary_file = open_summary(config);
-  if (!summary_file) {
-    return tl::unexpected(summary_file.error());
-  }
+  NewFolders folders(config.output);
   Result<BatchManifest> manifest = BatchManifest::open(config.output);
   if (!manifest) {
     return tl::unexpected(manifest.error());
   }
+  // In the output's folder, maybe, which is there only now.
+  Result<std::optional<Output>> summary_file = open_summary(config);
+  if (!summary_file) {
+    return tl::unexpected(summary_file.error());
+  }
+  folders.keep();
   Batch batch(config, std::move(*files), std::move(*manifest), console);
   if (Status worked = batch.work(); !worked) {
     return tl::unexpected(worked.error());

@@ -142,6 +142,7 @@ std::string in_small_letters(std::string text) {
 Status check_distinct(const std::vector<BatchPrint>& prints) {
   std::map<fs::path, const BatchPrint*> inputs;
   std::map<fs::path, const BatchPrint*> outputs;
+  std::map<fs::path, const BatchPrint*> reports;
   std::map<std::string, const BatchPrint*> names;
   for (const BatchPrint& print : prints) {
     inputs.emplace(place_of(print.input), &print);
@@ -166,10 +167,19 @@ Status check_distinct(const std::vector<BatchPrint>& prints) {
     }
   }
   for (const BatchPrint& print : prints) {
-    const fs::path place = print.report ? place_of(*print.report) : fs::path();
-    if (print.report && (inputs.contains(place) || outputs.contains(place))) {
+    if (!print.report) {
+      continue;
+    }
+    const fs::path place = place_of(*print.report);
+    if (inputs.contains(place) || outputs.contains(place)) {
       return fail(ErrorKind::usage, {*print.report, 0},
                   "is a print too, by a link; give --report a folder without links");
+    }
+    if (const auto [other, is_new] = reports.emplace(place, &print); !is_new) {
+      return fail(
+          ErrorKind::usage, {*print.report, 0},
+          fmt::format("would come from {} and from {}; give --report a folder without links",
+                      other->second->input, print.input));
     }
   }
   return {};

@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <exception>
 #include <thread>
 #include <utility>
 
@@ -32,15 +33,22 @@ int wait_for(pid_t pid, int options, int& status) {
   return got;
 }
 
-// Leaves by _exit so that nothing the parent has open is flushed or removed twice.
-[[noreturn]] void answer_and_exit(pid_t parent, int pipe, const BatchProcesses::Work& work) {
+// Leaves by _exit so that nothing the parent has open is flushed or removed twice, and lets no
+// exception out, which would go through the parent's code and end the other prints.
+[[noreturn]] void answer_and_exit(pid_t parent, int pipe,
+                                  const BatchProcesses::Work& work) noexcept {
   // Should the parent be killed, its prints go with it at once: they hold its claim on the folder.
   // Their temporary files go when the batch is started again.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) {
     ::_exit(0);
   }
-  static_cast<void>(write_all(pipe, pack(work())));
+  try {
+    static_cast<void>(write_all(pipe, pack(work())));
+  } catch (const std::exception&) {
+    // Not even the answer fits into memory. The parent sees a print without one.
+    ::_exit(1);
+  }
   ::_exit(0);
 }
 

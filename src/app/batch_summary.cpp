@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 #include <string_view>
 
 #include "console.hpp"
+#include "unflex/core/utf8.hpp"
 
 namespace unflex::app {
 namespace {
@@ -17,37 +17,6 @@ using report::Json;
 constexpr std::size_t kLeastNameColumns = 24;
 constexpr std::size_t kMostNameColumns = 60;
 constexpr std::string_view kNoCharacter = "\uFFFD";
-
-// Length and value of the UTF-8 character the text begins with; length 0 if there is none.
-struct Utf8 {
-  std::size_t length = 0;
-  char32_t value = 0;
-};
-
-Utf8 first_character(std::string_view text) {
-  const auto lead = static_cast<unsigned char>(text.front());
-  const std::size_t length = lead < 0x80   ? 1
-                             : lead < 0xc2 ? 0
-                             : lead < 0xe0 ? 2
-                             : lead < 0xf0 ? 3
-                             : lead < 0xf5 ? 4
-                                           : 0;
-  if (length == 0 || length > text.size()) {
-    return {};
-  }
-  char32_t value = length == 1 ? lead : lead & (0x7fU >> length);
-  for (std::size_t i = 1; i < length; ++i) {
-    const auto next = static_cast<unsigned char>(text[i]);
-    if ((next & 0xc0U) != 0x80) {
-      return {};
-    }
-    value = value << 6U | (next & 0x3fU);
-  }
-  constexpr std::array<char32_t, 5> kSmallest = {0, 0, 0x80, 0x800, 0x10000};
-  const bool is_surrogate = value >= 0xd800 && value < 0xe000;
-  return value < kSmallest[length] || value > 0x10ffff || is_surrogate ? Utf8{}
-                                                                       : Utf8{length, value};
-}
 
 bool is_xml_character(char32_t value) {
   return value == '\t' || value == '\n' || value == '\r' ||
@@ -210,7 +179,7 @@ std::string summary_junit(const BatchSummary& summary) {
 std::string xml_text(std::string_view text) {
   std::string xml;
   while (!text.empty()) {
-    const Utf8 character = first_character(text);
+    const Utf8Character character = first_utf8(text);
     const std::size_t length = std::max<std::size_t>(character.length, 1);
     const std::string_view entity = xml_entity(character.value);
     if (character.length == 0 || !is_xml_character(character.value)) {

@@ -133,7 +133,7 @@ Result<machine::PrintText> Input::look() {
     return block;
   });
   std::string text;
-  while (machine::head_end(text) == std::string::npos && text.size() < machine::kMaxHeadBytes) {
+  while (machine::head_end(text) == std::string::npos) {
     const Result<std::string> piece = reader.next();
     if (!piece) {
       return tl::unexpected(piece.error());

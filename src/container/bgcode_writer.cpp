@@ -21,7 +21,12 @@ void put(std::string& bytes, std::uint32_t value, std::size_t count) {
   }
 }
 
-// Cuts a text that comes in pieces into lines.
+// Without any of the carriage returns that some tools leave several of.
+std::string_view without_end(std::string_view line) {
+  return line.substr(0, line.find_last_not_of('\r') + 1);
+}
+
+// Cuts a text that comes in pieces into lines, without their ends.
 class Lines {
  public:
   using Use = std::function<Status(std::string_view line)>;
@@ -30,10 +35,10 @@ class Lines {
     for (std::size_t end = text.find('\n'); end != std::string_view::npos; end = text.find('\n')) {
       Status used;
       if (begun_.empty()) {
-        used = use(text.substr(0, end));
+        used = use(without_end(text.substr(0, end)));
       } else {
         begun_ += text.substr(0, end);
-        used = use(begun_);
+        used = use(without_end(begun_));
         begun_.clear();
       }
       if (!used) {
@@ -49,7 +54,7 @@ class Lines {
   }
 
   Status finish(const Use& use) {
-    Status used = begun_.empty() ? Status{} : use(begun_);
+    Status used = begun_.empty() ? Status{} : use(without_end(begun_));
     begun_.clear();
     return used;
   }
@@ -155,7 +160,6 @@ class BgcodePacker final : public Packer {
   }
 
   Status add(std::string_view line) {
-    line.remove_suffix(line.ends_with('\r') ? 1 : 0);
     const Result<bool> kept = sorted_->is_gcode(line);
     if (!kept || !*kept) {
       return kept.map([](bool) {});

@@ -215,7 +215,6 @@ Result<bool> MetadataLines::is_gcode(std::string_view line) {
     return true;
   }
   std::string_view comment = line.substr(first + 1);
-  comment.remove_suffix(comment.ends_with('\r') ? 1 : 0);
   if (in_head_ && comment.empty()) {
     return false;  // around thumbnails
   }
@@ -338,7 +337,11 @@ bool MetadataLines::take_value(std::string_view comment) {
   }
   tail_.insert_or_assign(std::string(pair->first), std::string(pair->second));
   const std::size_t count = ++tail_counts_.try_emplace(std::string(pair->first)).first->second;
-  return !tail_ends_ || count == tail_ends_->find(pair->first)->second;
+  if (!tail_ends_) {
+    return true;
+  }
+  const auto end = tail_ends_->find(pair->first);
+  return end != tail_ends_->end() && count == end->second;
 }
 
 Result<Metadata> MetadataLines::take() {

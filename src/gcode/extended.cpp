@@ -155,6 +155,7 @@ void Interpreter::object_label(Event& event) {
   event.kind = EventKind::barrier;
   event.may_jump = true;
   state_.known[X] = state_.known[Y] = false;
+  z_left_out_ = options_.firmware == Firmware::marlin;
 }
 
 // kinematics/extruder.py, _set_pressure_advance: a new smoothing time stops the machine, and

@@ -236,8 +236,10 @@ void Interpreter::linear_move(Event& event) {
   if (!target.moves()) {
     return;
   }
-  const bool start_known = starts_known(target, state_) && modes_certain();
-  const bool from_unknown = settle(target, state_);
+  const bool brings_z_back = z_left_out_ && target.named[Z] && state_.absolute_xyz;
+  z_left_out_ = z_left_out_ && !brings_z_back;
+  const bool start_known = starts_known(target, state_) && modes_certain() && !brings_z_back;
+  const bool from_unknown = settle(target, state_) || brings_z_back;
   const double e_before_mm = state_.position_mm[E];
   append_segment(event, target.position_mm, state_.feed_mm_s * state_.speed_factor, start_known);
   keep_reading_of_e(target.e_absolute, e_before_mm);

@@ -80,6 +80,12 @@ class Parser {
       return table(4).and_then([&](const Table& t) { return rrf_recording(t); });
     }
     if ((first == "freq" || first == "#freq") && header_.size() >= 2) {
+      if (value_columns() < 2) {
+        return fail(
+            ErrorKind::input, {file_, line_},
+            "has no column between the frequencies and 'shapers:'; give the file as Klipper "
+            "wrote it");
+      }
       return table(value_columns()).and_then([&](const Table& t) { return spectra(t); });
     }
     return fail(ErrorKind::input, {file_, line_},
@@ -207,15 +213,25 @@ class Parser {
     if (!(step_hz > 0.0)) {
       return fail(ErrorKind::input, {file_, 0}, "its frequencies do not grow");
     }
+    // Klipper samples at no more than 4.5 kHz (icm20948.py), so its spectra end below 2.5 kHz. The
+    // grid begins at 0 Hz wherever the rows do, and must fit into memory.
+    constexpr double kHighest_hz = 10e3;
+    if (const double last_hz = table.rows.back()[0]; last_hz > kHighest_hz) {
+      return fail(ErrorKind::input, {file_, 0},
+                  fmt::format("ends at {} Hz, but no printer's accelerometer measures above {} "
+                              "Hz; the first column must be in Hz",
+                              last_hz, kHighest_hz));
+    }
     const bool is_normalized = std::ranges::find(header_, "shapers:") != header_.end();
-    if (header_[1] == "psd_x" && header_.size() >= 4) {
+    const std::size_t columns = table.rows.front().size();
+    if (header_[1] == "psd_x" && columns >= 4) {
       DataSet set = set_of(file_);
       set.data = spectrum(table, step_hz, is_normalized, {1, 2, 3});
       return std::vector{std::move(set)};
     }
     // The sum over all three axes, at each of several points.
     std::vector<DataSet> sets;
-    for (std::size_t column = 1; column < table.rows.front().size(); ++column) {
+    for (std::size_t column = 1; column < columns; ++column) {
       DataSet set = set_of(fmt::format("{} ({})", file_, header_[column]));
       set.data = spectrum(table, step_hz, is_normalized, {column, column, column});
       sets.push_back(std::move(set));

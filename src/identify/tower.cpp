@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <cmath>
 #include <numbers>
 
@@ -26,9 +28,19 @@ Result<Mode> fit_tower(const Tower& tower) {
     return fail(ErrorKind::usage,
                 "the decay is how many times lower a wave is than the one before, above 1");
   }
+  // Those that dynamics.x.freq_hz may have.
+  constexpr double kLeast_hz = 1.0;
+  constexpr double kMost_hz = 1000.0;
+  const double freq_hz = tower.speed_mm_s / tower.spacing_mm;
+  if (!(freq_hz >= kLeast_hz) || !(freq_hz <= kMost_hz)) {
+    return fail(
+        ErrorKind::usage,
+        fmt::format("waves {:g} mm apart at {:g} mm/s are a frequency of {:.4g} Hz, which no "
+                    "printer's belts have; give the spacing in mm and the speed in mm/s",
+                    tower.spacing_mm, tower.speed_mm_s, freq_hz));
+  }
   Mode mode;
   mode.method = Method::tower;
-  const double freq_hz = tower.speed_mm_s / tower.spacing_mm;
   const double spread = std::max(tower.spacing_spread_mm / tower.spacing_mm, kLeast);
   mode.freq_hz = estimate_of(freq_hz, std::pow(spread / kQuantile, 2));
   if (tower.decay == 0.0) {

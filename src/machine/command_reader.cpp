@@ -9,8 +9,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <map>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "text_lines.hpp"
 #include "unflex/core/number.hpp"
@@ -22,6 +24,7 @@ namespace unflex::machine {
 namespace {
 
 constexpr std::array kAxes = {"x", "y", "z", "e"};
+constexpr std::string_view kInNumbers = "0123456789.+-";
 
 bool is_one_of(int number, std::initializer_list<int> numbers) {
   return std::ranges::find(numbers, number) != numbers.end();
@@ -133,11 +136,15 @@ class CommandReader {
   // Of what both axes can do; the motors' limits follow from it: enough for the faster axis, not
   // too much for the weaker.
   void finish() {
-    if (velocity_) {
-      reading.add("limits.max_velocity_mm_s", velocity_->first, velocity_->second);
+    const auto& [x_velocity, y_velocity] = velocity_;
+    const bool y_is_faster = y_velocity && (!x_velocity || y_velocity->first > x_velocity->first);
+    if (const Found& faster = y_is_faster ? y_velocity : x_velocity) {
+      reading.add("limits.max_velocity_mm_s", faster->first, faster->second);
     }
-    if (accel_) {
-      reading.add("limits.max_accel_mm_s2", accel_->first, accel_->second);
+    const auto& [x_accel, y_accel] = accel_;
+    const bool y_is_weaker = y_accel && (!x_accel || y_accel->first < x_accel->first);
+    if (const Found& weaker = y_is_weaker ? y_accel : x_accel) {
+      reading.add("limits.max_accel_mm_s2", weaker->first, weaker->second);
     }
   }
 
@@ -175,14 +182,12 @@ class CommandReader {
   }
 
   void remember(const LimitValue& limit, const SourcePlace& place) {
-    if (limit.key == "limits.max_x_velocity_mm_s" ||
-        (limit.key == "limits.max_y_velocity_mm_s" &&
-         (!velocity_ || limit.value > velocity_->first))) {
-      velocity_ = {limit.value, place};
-    }
-    if (limit.key == "limits.max_x_accel_mm_s2" ||
-        (limit.key == "limits.max_y_accel_mm_s2" && (!accel_ || limit.value < accel_->first))) {
-      accel_ = {limit.value, place};
+    for (std::size_t axis = 0; axis < velocity_.size(); ++axis) {
+      if (limit.key == fmt::format("limits.max_{}_velocity_mm_s", kAxes[axis])) {
+        velocity_[axis] = {limit.value, place};
+      } else if (limit.key == fmt::format("limits.max_{}_accel_mm_s2", kAxes[axis])) {
+        accel_[axis] = {limit.value, place};
+      }
     }
   }
 
@@ -206,8 +211,9 @@ class CommandReader {
 
   std::string file_;
   gcode::Interpreter interpreter_;
-  Found velocity_;
-  Found accel_;
+  // The latest of X and of Y.
+  std::array<Found, 2> velocity_;
+  std::array<Found, 2> accel_;
 };
 
 void marlin_junctions(CommandReader& reader, const gcode::Command& command,
@@ -264,34 +270,97 @@ void read_marlin_line(CommandReader& reader, std::string_view line, std::size_t 
   }
 }
 
-// M208: X0:220, or X0 with S1 for the least and X220 for the most.
-struct Travel {
-  std::optional<double> min;
-  std::optional<double> max;
-  SourcePlace place;
-};
-
-std::array<Travel, 2> read_travel(const gcode::Command& command, std::string_view arguments,
-                                  std::array<Travel, 2> travel, const SourcePlace& place) {
-  for (const auto& [letter, index] : {std::pair{'X', 0U}, std::pair{'Y', 1U}}) {
-    const std::size_t at = arguments.find(letter);
-    if (at == std::string_view::npos) {
-      continue;
-    }
-    std::string_view value = arguments.substr(at + 1);
-    value = value.substr(0, value.find_first_of(" \tYZUVWABCS"));
-    const std::size_t colon = value.find(':');
-    const std::optional<double> first = parse_number(value.substr(0, colon));
-    Travel& axis = travel[index];
-    axis.place = place;
-    if (colon != std::string_view::npos) {
-      axis.min = first;
-      axis.max = parse_number(value.substr(colon + 1));
-    } else {
-      (command.value('S') == 1.0 ? axis.min : axis.max) = first;
+// How long the value is that the text begins with: a number, an expression in braces, or a text in
+// quotes.
+std::size_t value_length(std::string_view text) {
+  int depth = 0;
+  bool in_quotes = false;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    in_quotes = in_quotes != (c == '"');
+    depth += in_quotes ? 0 : (c == '{') - (c == '}');
+    const bool goes_on = in_quotes || depth > 0 || c == '"' || c == '}' ||
+                         kInNumbers.find(c) != std::string_view::npos;
+    if (!goes_on) {
+      return at;
     }
   }
-  return travel;
+  return text.size();
+}
+
+// Each letter, in upper case, with its value or the values between its colons, as they stand.
+std::map<char, std::vector<std::string_view>> values_of(std::string_view arguments) {
+  std::map<char, std::vector<std::string_view>> values;
+  while (!arguments.empty()) {
+    const auto letter = static_cast<char>(std::toupper(static_cast<unsigned char>(arguments[0])));
+    arguments = trimmed(arguments.substr(1));
+    values.erase(letter);
+    for (bool is_value = letter >= 'A' && letter <= 'Z'; is_value;) {
+      const std::size_t length = value_length(arguments);
+      values[letter].push_back(arguments.substr(0, length));
+      arguments.remove_prefix(length);
+      is_value = arguments.starts_with(':');
+      arguments.remove_prefix(is_value ? 1 : 0);
+    }
+  }
+  return values;
+}
+
+// What M208 says of one end of an axis.
+struct TravelEnd {
+  std::optional<double> mm;
+  SourcePlace place;
+  bool is_outdated = false;  // by a later line that gave no number
+};
+
+struct Travel {
+  TravelEnd min;
+  TravelEnd max;
+};
+
+// X0:220, or X0 with S1 for the least and X220 for the most.
+void read_travel(CommandReader& reader, std::string_view arguments, std::array<Travel, 2>& travel,
+                 const SourcePlace& place) {
+  const std::map<char, std::vector<std::string_view>> values = values_of(arguments);
+  const auto s = values.find('S');
+  const bool is_min = s != values.end() && parse_number(s->second.front()) == 1.0;
+  for (std::size_t axis = 0; axis < travel.size(); ++axis) {
+    const char letter = static_cast<char>(std::toupper(kAxes[axis][0]));
+    const auto given = values.find(letter);
+    if (given == values.end()) {
+      continue;
+    }
+    std::string_view why;
+    const auto take = [&](TravelEnd& end, std::string_view text) {
+      if (const std::optional<double> mm = parse_number(text)) {
+        end = {mm, place};
+      } else {
+        end.is_outdated = true;
+        why = text.starts_with('{') ? "an expression, which unflex does not evaluate" : "no number";
+      }
+    };
+    const std::vector<std::string_view>& list = given->second;
+    take(is_min || list.size() > 1 ? travel[axis].min : travel[axis].max, list.front());
+    if (list.size() > 1) {
+      take(travel[axis].max, list[1]);
+    }
+    if (!why.empty()) {
+      const std::string key = fmt::format("printer.travel_{}_mm", kAxes[axis]);
+      reader.reading.note(
+          place, fmt::format("{}: {} is not taken; give {} with --set", why, letter, key), {key});
+    }
+  }
+}
+
+// The place is that of an outdated end, if there is one: before the note that says so.
+void add_travel(CommandReader& reader, const Travel& travel, std::string_view axis) {
+  const auto& [min, max] = travel;
+  if (!max.mm || (min.is_outdated && !min.mm)) {
+    return;
+  }
+  const bool of_min = min.is_outdated || (!max.is_outdated && min.place.line > max.place.line);
+  reader.reading.add(fmt::format("printer.travel_{}_mm", axis),
+                     Range{min.mm.value_or(0.0), *max.mm}, of_min ? min.place : max.place);
 }
 
 Status check_rrf_kinematics(CommandReader& reader, const gcode::Command& command,
@@ -350,7 +419,7 @@ Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t n
       reader.reading.note(place, "M98 runs another file, which unflex does not read");
       break;
     case 208:
-      travel = read_travel(command, line.substr(line.find("208") + 3), travel, place);
+      read_travel(reader, original.arguments, travel, place);
       break;
     case 593:
       rrf_shaper(reader, place);
@@ -390,11 +459,7 @@ Result<Reading> read_rrf_config(std::string_view text, const std::string& file) 
     return tl::unexpected(status.error());
   }
   for (std::size_t axis = 0; axis < travel.size(); ++axis) {
-    if (travel[axis].max) {
-      reader.reading.add(fmt::format("printer.travel_{}_mm", kAxes[axis]),
-                         Range{travel[axis].min.value_or(0.0), *travel[axis].max},
-                         travel[axis].place);
-    }
+    add_travel(reader, travel[axis], kAxes[axis]);
   }
   reader.finish();
   return std::move(reader.reading);

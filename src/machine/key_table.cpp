@@ -323,7 +323,7 @@ constexpr std::array kKeys = {
         "How far what a line leaves out of the base's motion may move the nozzle",
         "0.3 at 45 Hz, in proportion to the lower frequency", &derived<&S::tolerance_um>},
     Key{"emit.max_lines_per_s", &setting<&S::emit, &T::max_lines_per_s>, Bounds{.min = 1.0}, "1/s",
-        "Lines the printer can take in a second of print; never exceeded",
+        "Lines the printer can take in a second of print; compensated ones never exceed it",
         "Klipper 1000, Marlin 200, RRF 500", &derived<&S::max_lines_per_s>},
     Key{"emit.max_speed_step_mm_s", &setting<&S::emit, &T::max_speed_step_mm_s>, kPositive, "mm/s",
         "How much an axis' speed may change from line to line, where lines can be short enough"},

@@ -15,6 +15,7 @@
 #include "slicer_reader.hpp"
 #include "source_kind.hpp"
 #include "toml_reader.hpp"
+#include "unflex/core/utf8.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
 
@@ -94,7 +95,9 @@ void note_unknown_resonances(Draft& draft) {
 bool is_known(const Note& note, const Draft& draft) {
   const auto given_by_others = [&](const std::string& key) {
     const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
-    return place && *place != note.diagnostic.place;
+    const SourcePlace& noted = note.diagnostic.place;
+    // What stands before it in the same file is what the note says is outdated.
+    return place && (place->file != noted.file || place->line > noted.line);
   };
   return !note.keys.empty() && std::ranges::all_of(note.keys, given_by_others);
 }
@@ -224,11 +227,16 @@ namespace {
 
 std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
 
-// A file's name must not end the comment it stands in.
-std::string printable(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
-  return text;
+// A file's name is bytes, but must neither end the comment it stands in nor be what TOML refuses.
+std::string printable(std::string_view text) {
+  std::string shown;
+  while (!text.empty()) {
+    const std::size_t length = first_utf8(text).length;
+    const bool is_control = static_cast<unsigned char>(text.front()) < 0x20 || text.front() == 0x7f;
+    shown += length == 0 || is_control ? "?" : text.substr(0, length);
+    text.remove_prefix(std::max<std::size_t>(length, 1));
+  }
+  return shown;
 }
 
 // Keys left at their default are comments: they stay so when the text is read again, and what

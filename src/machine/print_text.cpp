@@ -26,6 +26,9 @@ bool is_move(std::string_view line) {
 }  // namespace
 
 std::size_t head_end(std::string_view text) {
+  const bool is_full = text.size() >= kMaxHeadBytes;
+  // However much of the text has come, the same is looked at.
+  text = text.substr(0, kMaxHeadBytes);
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = text.find('\n', at);
     if (end == std::string_view::npos) {
@@ -36,7 +39,7 @@ std::size_t head_end(std::string_view text) {
     }
     at = end + 1;
   }
-  return std::string_view::npos;
+  return is_full ? text.rfind('\n') + 1 : std::string_view::npos;
 }
 
 Result<PrintText> read_print_text(const std::filesystem::path& file, const std::string& name) {
@@ -53,7 +56,7 @@ Result<PrintText> read_print_text(const std::filesystem::path& file, const std::
     if (in_head) {
       print.head += read;
       const std::size_t end = head_end(print.head);
-      in_head = end == std::string_view::npos && print.head.size() < kMaxHeadBytes;
+      in_head = end == std::string_view::npos;
       print.head.resize(std::min(end, print.head.size()));
     }
     print.tail += read;

@@ -11,22 +11,60 @@ namespace unflex::machine {
 namespace {
 
 // Commands of RepRapFirmware's that make a machine and that no print and no dump of Marlin's has:
-// drives, axes and their drivers, end stops, heaters, kinematics, board's name.
-constexpr std::array kRrfCodes = {550, 558, 563, 569, 574, 584, 665, 667, 669, 906, 950};
+// drives, axes, end stops, heaters, kinematics, board's name, jerk, other files.
+constexpr std::array kRrfCodes = {98, 550, 558, 563, 566, 574, 584, 667, 669, 950};
+// What Marlin's M503 lists and RepRapFirmware does not know: temperatures' presets and units,
+// automatic retraction, bed levelling, the probe's offset, linear advance, filament change.
+constexpr std::array kMarlinCodes = {145, 149, 209, 420, 603, 851, 900};
 
 struct Traces {
   int echoes = 0;
   int rrf_settings = 0;
+  int marlin_settings = 0;
   int settings = 0;  // M92, M201 and the like
   int moves = 0;
   int klipper = 0;  // sections and options no TOML of ours has
   int headers = 0;
 };
 
-bool is_setting(const gcode::Command& command) {
-  constexpr std::array kCodes = {92, 201, 203, 204, 205, 207, 208, 566, 593};
-  return command.kind == gcode::CommandKind::traditional && command.letter == 'M' &&
-         std::ranges::find(kCodes, command.number) != kCodes.end();
+bool has_any(const gcode::Command& command, std::string_view letters) {
+  return std::ranges::any_of(letters, [&](char letter) { return command.has(letter); });
+}
+
+bool is_one_of(int number, const auto& codes) {
+  return std::ranges::find(codes, number) != codes.end();
+}
+
+// What both know is told apart by its words. M203 is in mm/min, and in Marlin in mm/s.
+bool is_rrf_setting(const gcode::Command& command) {
+  constexpr double kFasterThanAnyMarlin = 1500.0;
+  switch (command.number) {
+    case 203:
+      return std::max(command.value('X').value_or(0.0), command.value('Y').value_or(0.0)) >
+             kFasterThanAnyMarlin;
+    case 208:
+      return has_any(command, "XYZ");
+    case 350:
+      return command.has('I');
+    case 569:
+    case 593:
+      return command.has('P');
+    default:
+      return is_one_of(command.number, kRrfCodes);
+  }
+}
+
+bool is_marlin_setting(const gcode::Command& command) {
+  switch (command.number) {
+    case 205:
+      return has_any(command, "BSTJ");
+    case 569:
+      return command.has('S') && !command.has('P');
+    case 593:
+      return has_any(command, "XYD");
+    default:
+      return is_one_of(command.number, kMarlinCodes);
+  }
 }
 
 void look_at_command(std::string_view line, Traces& traces) {
@@ -35,9 +73,12 @@ void look_at_command(std::string_view line, Traces& traces) {
     return;
   }
   traces.moves += command.letter == 'G' && command.number >= 0 && command.number <= 3 ? 1 : 0;
-  traces.settings += is_setting(command) ? 1 : 0;
-  traces.rrf_settings +=
-      command.letter == 'M' && std::ranges::find(kRrfCodes, command.number) != kRrfCodes.end();
+  if (command.letter == 'M') {
+    constexpr std::array kOfBoth = {92, 201, 203, 204, 205, 207, 208, 566, 593};
+    traces.settings += is_one_of(command.number, kOfBoth) ? 1 : 0;
+    traces.rrf_settings += is_rrf_setting(command) ? 1 : 0;
+    traces.marlin_settings += is_marlin_setting(command) ? 1 : 0;
+  }
 }
 
 void look_at(std::string_view line, Traces& traces) {
@@ -80,7 +121,7 @@ SourceKind source_kind(std::string_view text) {
   if (traces.echoes > 1 && traces.settings > 0) {
     return SourceKind::marlin_dump;
   }
-  if (traces.rrf_settings > 0) {
+  if (traces.rrf_settings > traces.marlin_settings) {
     return SourceKind::rrf_config;
   }
   return traces.settings > 1 && traces.headers == 0 ? SourceKind::marlin_dump : SourceKind::toml;

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdlib>
+#include <new>
+#include <thread>
 
 #include "batch_files.hpp"
 #include "batch_manifest.hpp"
@@ -134,6 +137,20 @@ TEST(Processes, SayOfWhatOneDied) {
   EXPECT_EQ(done[0].answer.exit_code, 4);
   EXPECT_THAT(done[0].answer.error, HasSubstr("died of signal 6"));
   EXPECT_THAT(done[1].answer.error, HasSubstr("without an answer"));
+}
+
+TEST(Processes, OutliveOneThatRunsOutOfMemory) {
+  BatchProcesses processes(2);
+  ASSERT_TRUE(processes.start(1, 1, [] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    return BatchAnswer{};
+  }));
+  ASSERT_TRUE(processes.start(2, 1, []() -> BatchAnswer { throw std::bad_alloc(); }));
+  const std::vector<BatchProcesses::Done> done = take_all(processes);
+  ASSERT_EQ(done.size(), 2U);
+  EXPECT_EQ(done[0].ticket, 2U);
+  EXPECT_THAT(done[0].answer.error, HasSubstr("without an answer"));
+  EXPECT_TRUE(done[1].answered) << done[1].answer.error;
 }
 
 }  // namespace

@@ -214,6 +214,26 @@ TEST_F(BatchTest, FollowsLinksToPrintsAndNotToFolders) {
   EXPECT_THAT(files_in("out"), ElementsAre("a.g", "b.g"));
 }
 
+TEST_F(BatchTest, WritesItsSummaryIntoTheFolderItMakes) {
+  add("in/a.g");
+  const Outcome first = run({"batch", "in", "-o", "new/out", "--summary", "new/out/s.json"});
+  EXPECT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_THAT(files_in("new/out"), ElementsAre("a.g", "s.json"));
+}
+
+TEST_F(BatchTest, LeavesNoFolderWhereItRefuses) {
+  add("in/a.g");
+  for (const char* folder : {"new/deep/out", "new/", "./new"}) {
+    const Outcome outcome = run({"batch", "in", "-o", folder, "--summary", "nowhere/s.json"});
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_THAT(outcome.err, StartsWith("nowhere/s.json: the directory nowhere does not exist"));
+    EXPECT_FALSE(fs::exists(path("new"))) << folder;
+  }
+  fs::create_directories(path("new/deep"));
+  EXPECT_EQ(run({"batch", "in", "-o", "new/deep", "--summary", "nowhere/s.json"}).exit_code, 1);
+  EXPECT_TRUE(fs::exists(path("new/deep"))) << "it was there before";
+}
+
 TEST_F(BatchTest, NamesWhatItCannotMake) {
   add("in/a.g");
   add("in/b/c.g");
@@ -238,6 +258,19 @@ TEST_F(BatchTest, RefusesToReplaceAPrintByAPage) {
   EXPECT_THAT(outcome.err, HasSubstr("is a print too, by a link; give --report a folder without "
                                      "links\n"));
   EXPECT_EQ(read_file(path("in/a.g")), print);
+}
+
+TEST_F(BatchTest, RefusesToReplaceAPageByAnother) {
+  add("in/a/x.g");
+  add("in/b/x.g");
+  fs::create_directories(path("pages/a"));
+  fs::create_directory_symlink("a", path("pages/b"));
+  const Outcome outcome = run(batch({"--report", "pages"}));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.err,
+            "pages/b/x.g.html: would come from in/a/x.g and from in/b/x.g; give --report a folder "
+            "without links\n");
+  EXPECT_FALSE(fs::exists(path("out")));
 }
 
 TEST_F(BatchTest, RefusesNamesThatDifferInCapitalsAlone) {

@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 
@@ -175,6 +176,36 @@ TEST_F(ProgramTest, ReadsAPipeAsASeekableFileWithoutAName) {
   EXPECT_EQ(read_file(input->path()), small_print());
   EXPECT_EQ(read_file(input->path()), small_print());
   EXPECT_EQ(input->name(), path("pipe").string());
+}
+
+TEST_F(ProgramTest, SeesAsMuchOfALongHeadInAPipeAsInAFile) {
+  std::string text;
+  while (text.size() < machine::kMaxHeadBytes + 200'000) {
+    text += "; comment without end\n";
+  }
+  write_file(path("file"), text);
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  const pid_t writer = ::fork();
+  if (writer == 0) {
+    const int pipe = ::open(path("pipe").c_str(), O_WRONLY);
+    for (std::size_t at = 0; at < text.size(); at += 60'000) {
+      static_cast<void>(
+          ::write(pipe, text.data() + at, std::min(text.size() - at, std::size_t{60'000})));
+    }
+    ::_exit(0);
+  }
+  Result<Input> file = Input::open(path("file").string());
+  Result<Input> pipe = Input::open(path("pipe").string());
+  ASSERT_TRUE(file && pipe);
+  ASSERT_TRUE(file->make_readable() && pipe->make_readable());
+  const Result<machine::PrintText> of_file = file->look();
+  const Result<machine::PrintText> of_pipe = pipe->look();
+  pipe = fail(ErrorKind::input, "closed, so that the writer ends");
+  ::waitpid(writer, nullptr, 0);
+  ASSERT_TRUE(of_file && of_pipe);
+  EXPECT_TRUE(of_file->head == of_pipe->head)
+      << of_file->head.size() << " " << of_pipe->head.size();
+  EXPECT_TRUE(of_pipe->head.ends_with("end\n"));
 }
 
 }  // namespace

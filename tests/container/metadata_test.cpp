@@ -37,10 +37,10 @@ TEST(PrintMetadata, AreFoundAmongComments) {
       "Producer=PrusaSlicer 2.8.1\nProduced on=2024-10-21 at 06:38:01 UTC\nPrepared by=hand\n");
   EXPECT_EQ(metadata.slicer, "layer_height=0.2\nstart_gcode=G28\\nG1 X= 5 \nnotes=\n");
   EXPECT_THAT(metadata.print,
-              ElementsAre(Pair("total toolchanges", "0"), Pair("filament used [mm]", "1"),
+              ElementsAre(Pair("total toolchanges", "0"), Pair("filament used [mm]", "2"),
                           Pair("estimated printing time (normal mode)", "1h 2m 3s")));
   EXPECT_THAT(metadata.printer,
-              ElementsAre(Pair("layer_height", "0.2"), Pair("filament used [mm]", "1"),
+              ElementsAre(Pair("layer_height", "0.2"), Pair("filament used [mm]", "2"),
                           Pair("estimated printing time (normal mode)", "1h 2m 3s")));
   ASSERT_EQ(metadata.thumbnails.size(), 1U);
   EXPECT_EQ(metadata.thumbnails[0].format, 2);
@@ -51,8 +51,20 @@ TEST(PrintMetadata, AreFoundAmongComments) {
 
 TEST(PrintMetadata, LeaveOtherCommentsInTheGcode) {
   const std::string text = unpack(*to_bgcode(kPrint))->text;
-  EXPECT_THAT(text, HasSubstr("\n; external perimeters extrusion width = 0.45mm\nG28\nG1 X1\n"
-                              "; filament used [mm] = 2\n"));
+  EXPECT_THAT(text, HasSubstr("\n; external perimeters extrusion width = 0.45mm\nG28\n"
+                              "; filament used [mm] = 1\nG1 X1\n"));
+}
+
+TEST(PrintMetadata, AreFoundHoweverManyCarriageReturnsEndTheLines) {
+  const std::string packed = *to_bgcode(kPrint);
+  for (const std::string end : {"\r\n", "\r\r\n", "\r\r\r\n"}) {
+    std::string text;
+    for (const char c : kPrint) {
+      text += c == '\n' ? end : std::string(1, c);
+    }
+    EXPECT_EQ(to_bgcode(text), packed) << end.size();
+    EXPECT_EQ(pack(*make_bgcode_packer("out.bgcode", nullptr, {}), text, 1), packed) << end.size();
+  }
 }
 
 TEST(PrintMetadata, StayWhatTheyWereWhenPackedAgain) {

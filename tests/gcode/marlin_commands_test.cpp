@@ -106,6 +106,18 @@ TEST(MarlinModes, InLowerCaseLeaveTheRestAsItIs) {
   }
 }
 
+// A cancelled object may have left Z anywhere.
+TEST(MarlinObjects, AreFollowedByAMoveThatBringsZBack) {
+  Session session(default_options(Firmware::marlin));
+  session.read("G1 X1 Y1 Z0.3\nM486 S1\nG1 X2 Y2");
+  EXPECT_TRUE(session.move("G1 X3").start_known);
+  EXPECT_EQ(session.read("G1 Z0.3").kind, EventKind::barrier);
+  EXPECT_EQ(session.read("G1 Z0.3").kind, EventKind::passive);
+  session.read("M486 S0\nG1 X2 Y2");
+  EXPECT_FALSE(session.move("G1 X3 Z0.3").start_known);
+  EXPECT_TRUE(session.move("G1 X4 Z0.3").start_known);
+}
+
 TEST(MarlinTool, HasItsOwnFlow) {
   Session session(default_options(Firmware::marlin));
   session.read("T0\nM83\nM221 S50\nM221 T1 S200\nM221 T2147483648 S10\nG1 X1 Y1 Z1");

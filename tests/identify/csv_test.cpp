@@ -86,6 +86,17 @@ TEST(KlipperSpectrum, OfSeveralPointsIsSeveralSets) {
   EXPECT_NEAR(spectrum.density[0][32], 500.0, 1e-6);
 }
 
+TEST(KlipperSpectrum, WithFewColumnsBeforeTheShapersReadsNoOthers) {
+  std::string text = "freq,psd_x,shapers:,mzv\n";
+  for (int i = 0; i < 100; ++i) {
+    text += line("%.1f,%.3e,,0.5", i * 1.5625, 1.0 * i);
+  }
+  const auto sets = good(text, "a.csv");
+  ASSERT_THAT(sets, SizeIs(1));
+  EXPECT_EQ(sets[0].name, "a.csv (psd_x)");
+  EXPECT_NEAR(std::get<Spectrum>(sets[0].data).density[2][40], 40.0, 0.1);
+}
+
 std::string rrf_samples(const std::string& last) {
   std::string text = "Sample,X,Y,Z\n";
   for (int i = 0; i < 40; ++i) {
@@ -129,6 +140,16 @@ TEST(Records, ThatAreNoneNameTheirPlace) {
             "a.csv: its times do not grow");
   EXPECT_EQ(failure("freq,psd_x,psd_y,psd_z,psd_xyz\n" + repeated("5,1,1,1,3\n", 40)),
             "a.csv: its frequencies do not grow");
+  EXPECT_EQ(failure("freq,shapers:,mzv\n" + repeated("5,,1\n", 40)),
+            "a.csv:1: has no column between the frequencies and 'shapers:'; give the file as "
+            "Klipper wrote it");
+  std::string far = "freq,psd_x,psd_y,psd_z,psd_xyz\n";
+  for (int i = 0; i < 100; ++i) {
+    far += line("%.1f,1,1,1,3", 2e7 + i);
+  }
+  EXPECT_EQ(failure(far),
+            "a.csv: ends at 20000099 Hz, but no printer's accelerometer measures above 10000 Hz; "
+            "the first column must be in Hz");
 }
 
 TEST(AxisInName, IsALetterThatStandsAlone) {

@@ -85,6 +85,14 @@ TEST(Tower, NeedsASpacingAndASpeed) {
   }
 }
 
+TEST(Tower, OfNoPrintersFrequencyIsRefused) {
+  const Result<Mode> mode = fit_tower({.spacing_mm = 0.01, .speed_mm_s = 80.0});
+  ASSERT_FALSE(mode);
+  EXPECT_EQ(mode.error().message,
+            "waves 0.01 mm apart at 80 mm/s are a frequency of 8000 Hz, which no printer's belts "
+            "have; give the spacing in mm and the speed in mm/s");
+}
+
 TEST(Tower, WithoutDecayLeavesTheDampingAGuess) {
   const Result<Mode> mode = fit_tower({.spacing_mm = 2.0, .speed_mm_s = 100.0});
   ASSERT_TRUE(mode);

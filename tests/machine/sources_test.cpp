@@ -82,6 +82,16 @@ TEST(MarlinDump, IsRead) {
   EXPECT_THAT(s.notes, IsEmpty());
 }
 
+// M503 S0 writes no echo; M906 and M569 are both firmwares'.
+TEST(MarlinDump, WithoutEchoesIsKnownByItsWords) {
+  const Settings s = read(
+      "M149 C\nM92 X80 Y80 Z400 E93\nM203 X500 Y500 Z12 E120\nM201 X1000 Y900\n"
+      "M205 B20000 S0 T0 J0.02\nM906 X800 Y800\nM569 S1 X Y\nM593 X F41 D0.1\nM593 Y F33\n");
+  EXPECT_EQ(told(s, "printer.firmware"), "\"marlin\" print.gcode");
+  EXPECT_EQ(told(s, "limits.max_velocity_mm_s"), "500 print.gcode:3");
+  EXPECT_EQ(told(s, "dynamics.y.freq_hz"), "33 print.gcode:9");
+}
+
 TEST(MarlinDump, OfClassicJerkIsRead) {
   const Settings s = read("echo:  M92 X80 Y80\necho:  M205 B20000 S0 T0 X8.00 Y9.00 Z0.40 E5.00\n");
   EXPECT_TRUE(s.printer.classic_jerk);
@@ -136,6 +146,18 @@ TEST(RrfConfig, IsRead) {
   EXPECT_THAT(s.notes, IsEmpty());
 }
 
+// Speeds are in mm/min, sixty times what they would be to Marlin.
+TEST(RrfConfig, OfSpeedsAloneIsKnownByItsWords) {
+  for (const std::string text :
+       {"M566 X900 Y900\nM203 X12000 Y12000\nM201 X1000 Y1000\n",
+        "M92 X80 Y80\nM203 X12000 Y12000\nM201 X1000 Y1000\n",
+        "M208 X0:200 Y0:200\nM350 X16 Y16 I1\nM92 X80\nM203 X12000\nM593 P\"zvd\" F40\n"}) {
+    const Settings s = read(text);
+    EXPECT_THAT(told(s, "printer.firmware"), HasSubstr("rrf")) << text;
+    EXPECT_THAT(told(s, "limits.max_velocity_mm_s"), HasSubstr("200 ")) << text;
+  }
+}
+
 // What cannot be evaluated is for the user to say.
 TEST(RrfConfig, WithExpressionsAsksForTheirKeys) {
   const std::string text =
@@ -171,6 +193,58 @@ TEST(RrfConfig, GivesTravelAsPairsToo) {
   EXPECT_EQ(by_key(s)["printer.travel_x_mm"].value, "[-2, 210]");
   EXPECT_EQ(by_key(s)["printer.travel_y_mm"].value, "[0, 200.5]");
   EXPECT_DOUBLE_EQ(s.shaper_freq_x_hz(), 0.0);
+}
+
+TEST(RrfConfig, GivesTravelWhateverStandsAroundItsNumbers) {
+  const std::string first = "M550 P\"x\"\nM593 P\"none\"\n";
+  for (const char* line :
+       {"M208 X220 Y210 S0\nM208 Z200 S0 ; X and Y above", "M208 X220 Y210;max", "M208 x220 y210",
+        "M208 Y210X220", "M208 X 220 Y\t210", "M208 Z{\"X1Y\"} X220 Y210",
+        "M208 X0:220 Y0:210 ; X:Y", "M208 X9 Y210 X220"}) {
+    const Settings s = read(first + line + "\n", "config.g");
+    EXPECT_EQ(by_key(s)["printer.travel_x_mm"].value, "[0, 220]") << line;
+    EXPECT_EQ(by_key(s)["printer.travel_y_mm"].value, "[0, 210]") << line;
+  }
+}
+
+TEST(RrfConfig, WithTravelInExpressionsKeepsWhatItKnowsAndAsksForTheRest) {
+  const std::string first = "M550 P\"x\"\nM593 P\"zvd\" F40\n";
+  const std::string later = first + "M208 X-5 S1\nM208 X220 S0\nM208 X{global.a + 2} Y200 S0\n";
+  const Settings s = read(later, "config.g");
+  EXPECT_EQ(told(s, "printer.travel_x_mm"), "[-5, 220] config.g:4");
+  EXPECT_EQ(told(s, "printer.travel_y_mm"), "[0, 200] config.g:5");
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_EQ(to_string(s.notes[0]),
+            "config.g:5: warning: an expression, which unflex does not evaluate: X is not taken; "
+            "give printer.travel_x_mm with --set");
+  EXPECT_THAT(parse(later, "config.g", {"printer.travel_x_mm=[0, 9]"})->notes, IsEmpty());
+  EXPECT_THAT(read(later + "M208 X230\n", "config.g").notes, IsEmpty());
+
+  const Settings half = read(first + "M208 X0:{b ? 1 : 2} Y{a}:200\n", "config.g");
+  EXPECT_THAT(told(half, "printer.travel_x_mm"), HasSubstr("default"));
+  EXPECT_THAT(told(half, "printer.travel_y_mm"), HasSubstr("default"));
+  EXPECT_THAT(half.notes, SizeIs(2));
+  EXPECT_EQ(to_string(read(first + "M208 X Y200\n", "config.g").notes.at(0)),
+            "config.g:3: warning: no number: X is not taken; give printer.travel_x_mm with --set");
+}
+
+TEST(RrfConfig, SaysWhereAnExpressionOutdatesAnEarlierLine) {
+  const std::string text = "M550 P\"x\"\nM201 X3000\nM201 X{global.a}\nM593 P\"zvd\" F40\n";
+  const Settings s = read(text, "config.g");
+  EXPECT_EQ(told(s, "limits.max_x_accel_mm_s2"), "3000 config.g:2");
+  EXPECT_THAT(s.notes, SizeIs(1));
+  EXPECT_THAT(read(text + "M201 X2000\n", "config.g").notes, IsEmpty());
+}
+
+TEST(RrfConfig, GivesTheSameLimitsInWhateverOrder) {
+  const std::string first = "M550 P\"x\"\nM593 P\"zvd\" F40\n";
+  const std::string x = "M201 X3000\nM203 X6000\n";
+  const std::string y = "M201 Y1000\nM203 Y30000\n";
+  for (const std::string& lines : {x + y, y + x, "M201 X500 Y500\nM203 X60000\n" + x + y}) {
+    const Settings s = read(first + lines);
+    EXPECT_DOUBLE_EQ(s.limits.max_accel_mm_s2, 1000.0) << lines;
+    EXPECT_DOUBLE_EQ(s.limits.max_velocity_mm_s, 500.0) << lines;
+  }
 }
 
 TEST(RrfConfig, OfAScaraIsRefused) {
@@ -318,6 +392,23 @@ TEST_F(Sources, OfAPrintAreItsHeadAndItsTailWithTheirLines) {
   EXPECT_FALSE(describes_printer(*print));
 }
 
+TEST_F(Sources, OfAPrintWithALongHeadEndWithTheLastLineWithinTheLimit) {
+  std::string text;
+  while (text.size() < kMaxHeadBytes + 100'000) {
+    text += "; comment without end\n";
+  }
+  const std::string head = text.substr(0, text.rfind('\n', kMaxHeadBytes - 1) + 1);
+  text += "G1 X1 F600\n";
+  const Result<PrintText> print = read_print_text(write("p.gcode", text), "p.gcode");
+  ASSERT_TRUE(print);
+  EXPECT_EQ(print->head.size(), head.size());
+  EXPECT_EQ(head_end(text.substr(0, kMaxHeadBytes - 1)), std::string::npos);
+  for (const std::size_t come : {kMaxHeadBytes, kMaxHeadBytes + 60'000, text.size()}) {
+    EXPECT_EQ(head_end(text.substr(0, come)), head.size()) << come;
+  }
+  EXPECT_EQ(head_end(std::string(kMaxHeadBytes + 1, ';')), 0U);
+}
+
 TEST_F(Sources, OfAShortFileAreAllOfIt) {
   const Result<PrintText> print = read_print_text(write("p.cfg", "[printer]\na: 1\n"), "p.cfg");
   ASSERT_TRUE(print);
@@ -336,6 +427,20 @@ TEST(ToToml, OfEverySourceReadsBackAsTheSameSettings) {
       EXPECT_EQ(row.value, before.at(key).value) << name << " " << key;
     }
     EXPECT_THAT(to_toml(*first), HasSubstr("  # " + fixture(name) + ":")) << name;
+  }
+}
+
+TEST(ToToml, ReadsBackWhateverTheFileIsCalled) {
+  const std::string text = "[limits]\nmax_accel_mm_s2 = 1234\n";
+  // Bytes that are no UTF-8: stray, cut off, longer than need be, a surrogate, too large.
+  for (const auto& [name, shown] :
+       {std::pair{"a\xff.toml", "a?.toml"}, std::pair{"a\xc3", "a?"}, std::pair{"\xe2\x82", "??"},
+        std::pair{"\xc0\xaf.toml", "??.toml"}, std::pair{"\xe0\x80\x80", "???"},
+        std::pair{"\xed\xa0\x80", "???"}, std::pair{"\xf4\x90\x80\x80", "????"},
+        std::pair{"a\nb\x7f", "a?b?"}, std::pair{"Gerät → 𝄞.toml", "Gerät → 𝄞.toml"}}) {
+    const std::string toml = to_toml(read(text, name));
+    EXPECT_THAT(toml, HasSubstr(fmt::format("max_accel_mm_s2 = 1234  # {}:2\n", shown)));
+    EXPECT_DOUBLE_EQ(read(toml, "printer.toml").limits.max_accel_mm_s2, 1234.0) << shown;
   }
 }
 

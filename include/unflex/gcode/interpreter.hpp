@@ -310,6 +310,9 @@ class Interpreter {
   std::map<int, double> flow_factors_;     // M221, of the tools not in use
   // RepRapFirmware: the indentation of the outermost `if`, `while` or `else` whose block is open.
   std::optional<std::size_t> block_indent_;
+  // Marlin: behind the label of an object, until Z is named. Motion of a cancelled object is left
+  // out along Z too (gcode.cpp, get_destination_from_command), and not made up for.
+  bool z_left_out_ = false;
   bool modes_uncertain_ = false;  // a line that may not run has set a mode or a limit
   bool feed_uncertain_ = false;   // the same for F alone
   Command command_;               // of the line being read; kept for its storage

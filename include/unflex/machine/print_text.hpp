@@ -30,7 +30,8 @@ struct PrintText {
                                                 const std::string& name);
 
 // Where the head of a print ends that begins like `text`: behind the line of the first move
-// (G0 to G3), or npos while that has not come. No head is longer than kMaxHeadBytes.
+// (G0 to G3), or where none comes within kMaxHeadBytes, behind the last whole line in these; npos
+// while neither has come. It is the same in whatever pieces the text comes.
 inline constexpr std::size_t kMaxHeadBytes = std::size_t{1} << 20U;
 [[nodiscard]] std::size_t head_end(std::string_view text);
 
