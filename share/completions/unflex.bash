@@ -37,6 +37,7 @@ _unflex_value() {
     *:--log) echo 'files *.@(log|txt)' ;;
     *:-o | *:--output | *:--against) echo "files $print" ;;
     *:--from | *:--printer) echo "files $printer" ;;
+    inspect:--report) echo 'files *.json' ;;
     *:--report) echo 'files *.@(json|html)' ;;
     study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;
     *:--axis) echo 'words x y' ;;

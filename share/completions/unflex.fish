@@ -73,5 +73,6 @@ complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unfl
 
 complete -c unflex -n "__unflex_in $prints batch" -l printer -x -a $printer -d 'The printer'
 complete -c unflex -n "__unflex_in $prints batch 'printer init'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
-complete -c unflex -n "__unflex_in $prints identify" -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
+complete -c unflex -n '__unflex_in inspect' -l report -x -a '(__unflex_files .json)' -d 'Write a report, - for stdout'
+complete -c unflex -n '__unflex_in compensate verify study identify' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
 complete -c unflex -n "__unflex_in $prints batch identify 'printer init'" -s q -l quiet -d 'No summary and no progress bar'

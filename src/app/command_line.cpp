@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <initializer_list>
+#include <string_view>
 #include <thread>
 
 #include "console.hpp"
@@ -39,12 +41,12 @@ void add_settings(CLI::App& command, RunConfig& config) {
   add_overrides(command, config);
 }
 
-void add_common_options(CLI::App& command, RunConfig& config) {
+constexpr const char* kReportOrPage =
+    "Write a report, FILE.json or FILE.html, or JSON to stdout with -";
+
+void add_common_options(CLI::App& command, RunConfig& config, const char* report = kReportOrPage) {
   add_settings(command, config);
-  command
-      .add_option("--report", config.report,
-                  "Write a report, FILE.json or FILE.html, or JSON to stdout with -")
-      ->type_name("FILE");
+  command.add_option("--report", config.report, report)->type_name("FILE");
   command.add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
 }
 
@@ -138,7 +140,7 @@ void add_inspect(CLI::App& program, RunConfig& config) {
   CLI::App* const command =
       program.add_subcommand("inspect", "Show what is understood of a G-code file");
   command->add_option("IN", config.input, "G-code, - for stdin")->type_name("")->required();
-  add_common_options(*command, config);
+  add_common_options(*command, config, "Write a report, FILE.json, or to stdout with -");
   add_strict(*command, config);
   command->callback([&config] { config.command = Command::inspect; });
 }
@@ -256,22 +258,32 @@ Status check_output(const RunConfig& config) {
   return {};
 }
 
+// An ending alone would make a hidden file.
+Status check_has_name(std::string_view option, const std::string& file,
+                      std::initializer_list<std::string_view> endings) {
+  if (std::ranges::find(endings, file) == endings.end()) {
+    return {};
+  }
+  return usage(fmt::format("{} {}: is an ending without a name; give it one, as report{}", option,
+                           file, file));
+}
+
 Status check_report(const RunConfig& config) {
   const std::string& name = *config.report;
   if (name == kStandardStream) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  if (name.ends_with(".json")) {
-    return {};
-  }
-  if (config.command == Command::inspect) {
+  if (config.command == Command::inspect && !name.ends_with(".json")) {
     return usage(fmt::format("--report {}: the name must end in .json", name));
   }
-  if (!is_html(name)) {
+  if (!name.ends_with(".json") && !is_html(name)) {
     return usage(fmt::format("--report {}: the name must end in .json or .html", name));
   }
-  return {};
+  // Of compensate it stands for the output's name.
+  return config.command == Command::compensate
+             ? Status{}
+             : check_has_name("--report", name, {".json", ".html"});
 }
 
 Status check_records(const IdentifyConfig& config) {
@@ -302,7 +314,8 @@ Status check_batch(const RunConfig& config) {
   if (config.summary && !config.summary->ends_with(".json") && !config.summary->ends_with(".xml")) {
     return usage(fmt::format("--summary {}: the name must end in .json or .xml", *config.summary));
   }
-  return {};
+  return config.summary ? check_has_name("--summary", *config.summary, {".json", ".xml"})
+                        : Status{};
 }
 
 Status complete(RunConfig& config) {

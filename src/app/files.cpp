@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -23,8 +24,20 @@ constexpr std::string_view kTemporaryName = ".unflex-XXXXXX.tmp";
 constexpr std::string_view kTemporaryEnding = ".tmp";
 constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
 
-// A signal that does not end the program (a resized window) must not end a read either.
-bool try_again() { return errno == EINTR && ending_signal() == 0; }
+// How often a wait is interrupted to see whether a signal has come just before it.
+constexpr int kPatience_ms = 50;
+
+// Whether what has failed is to be tried again. A signal that does not end the program (a resized
+// window) must not end a read either; a stream that does not block, as whoever shares it may want,
+// is waited for.
+bool try_again(int fd, short events) {
+  if (errno == EAGAIN) {
+    pollfd what{fd, events, 0};
+    ::poll(&what, 1, kPatience_ms);  // an error shows when it is tried again
+    errno = EINTR;
+  }
+  return errno == EINTR && ending_signal() == 0;
+}
 
 bool exists(const std::string& name) {
   struct stat status {};
@@ -128,7 +141,7 @@ int write_all(int fd, std::string_view data) {
     const ssize_t written = ::write(fd, data.data(), data.size());
     if (written >= 0) {
       data.remove_prefix(static_cast<std::size_t>(written));
-    } else if (!try_again()) {
+    } else if (!try_again(fd, POLLOUT)) {
       return errno;
     }
   }
@@ -143,7 +156,7 @@ tl::expected<std::string, int> read_some(int fd) {
       block.resize(static_cast<std::size_t>(got));
       return block;
     }
-    if (!try_again()) {
+    if (!try_again(fd, POLLIN)) {
       return tl::unexpected(errno);
     }
   }

@@ -1,13 +1,12 @@
 #include "identify.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "console.hpp"
-#include "files.hpp"
 #include "identification.hpp"
 #include "inputs.hpp"
 #include "outputs.hpp"
+#include "results.hpp"
 
 namespace unflex::app {
 namespace {
@@ -141,15 +140,10 @@ Result<ExitCode> run_identify(const RunConfig& config, Console& console) {
     }
   }
   // Without figures and drawings what is left is the lines to paste.
-  if (config.report != kStandardStream) {
-    const int error =
-        write_all(STDOUT_FILENO, config.quiet ? snippet(*all) : identification_text(*all));
-    if (error != 0) {
-      return fail(ErrorKind::internal, {"stdout", 0},
-                  fmt::format("cannot write: {}", write_error_text(error)));
-    }
-  }
-  return ExitCode::done;
+  const Status written = config.report == kStandardStream
+                             ? Status{}
+                             : write_last(config.quiet ? snippet(*all) : identification_text(*all));
+  return written.map([] { return ExitCode::done; });
 }
 
 }  // namespace unflex::app

@@ -204,6 +204,7 @@ Status Output::replace_target() {
   if (::rename(made.path().c_str(), target_.c_str()) != 0) {
     return cannot_write(errno);
   }
+  note_result();
   const std::filesystem::path directory = made.path().parent_path();
   (packed_ ? *packed_ : temporary_).release();
   // The rename itself must survive a power cut; where directories cannot be synced it is done.
@@ -237,7 +238,11 @@ Status Output::copy_to_stream() {
   }
   const int error = copy_all(source.get(), stream_.get());
   stream_ = FileDescriptor();  // whoever reads it learns that this was all
-  return error == 0 ? Status{} : Status(cannot_write(error));
+  if (error != 0) {
+    return cannot_write(error);
+  }
+  note_result();
+  return {};
 }
 
 tl::unexpected<Error> Output::cannot_write(int error) const {

@@ -64,6 +64,9 @@ Status deliver(Workspace& space, ExitCode verdict, bool passed_on, const report:
   const std::string text = !space.report      ? std::string()
                            : report.recording ? report::to_html(report)
                                               : report::to_json(report);
+  if (passed_on) {
+    note_result();
+  }
   const bool wanted = space.output && verdict == ExitCode::done && !passed_on;
   return wanted ? deliver_output(space, text) : write_report(space.report, text);
 }

@@ -9,6 +9,7 @@
 #include "files.hpp"
 #include "inputs.hpp"
 #include "outputs.hpp"
+#include "results.hpp"
 #include "unflex/machine/machine.hpp"
 
 namespace unflex::app {
@@ -58,10 +59,7 @@ Status print_summary(const RunConfig& config) {
   if (config.quiet || config.output == kStandardStream) {
     return {};
   }
-  const int error = write_all(STDOUT_FILENO, fmt::format("{} → {}\n", config.input, config.output));
-  return error == 0 ? Status{}
-                    : Status(fail(ErrorKind::internal, {"stdout", 0},
-                                  fmt::format("cannot write: {}", write_error_text(error))));
+  return write_last(fmt::format("{} → {}\n", config.input, config.output));
 }
 
 }  // namespace

@@ -22,11 +22,13 @@ ExitCode exit_code(ErrorKind kind) {
   return ExitCode::internal;
 }
 
-tl::unexpected<Error> interrupted(Command command) {
-  return fail(ErrorKind::internal,
-              command == Command::batch
-                  ? "interrupted; what is finished stays, the same batch again does the rest"
-                  : "interrupted, no file was written");
+tl::unexpected<Error> interrupted(Command command, bool with_result) {
+  if (command == Command::batch) {
+    return fail(ErrorKind::internal,
+                "interrupted; what is finished stays, the same batch again does the rest");
+  }
+  return fail(ErrorKind::internal, with_result ? "interrupted; what was written before is whole"
+                                               : "interrupted, no file was written");
 }
 
 std::vector<std::string> setting_warnings(const machine::Settings& settings) {
@@ -80,9 +82,13 @@ Status print_summary(const RunConfig& config, std::string_view text, Console& co
     }
     return {};
   }
+  return write_last(text);
+}
+
+Status write_last(std::string_view text) {
   const int error = write_all(STDOUT_FILENO, text);
   // Whoever ends the program here has the files already: it must not say that there are none.
-  const bool is_done = error == EINTR && (config.command == Command::compensate || config.report);
+  const bool is_done = error == EINTR && has_result();
   return error == 0 || is_done
              ? Status{}
              : Status(fail(ErrorKind::internal, {"stdout", 0},

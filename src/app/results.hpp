@@ -23,8 +23,8 @@ inline constexpr int kSignalExitBase = 128;
 
 [[nodiscard]] ExitCode exit_code(ErrorKind kind);
 
-// What a command returns that a signal ended.
-[[nodiscard]] tl::unexpected<Error> interrupted(Command command);
+// What a command returns that a signal ended. with_result: one of its results is in place.
+[[nodiscard]] tl::unexpected<Error> interrupted(Command command, bool with_result = false);
 
 // Runs one of the pipeline's commands with a progress bar that is gone when it returns.
 template <class Work>
@@ -53,6 +53,9 @@ void add_setting_warnings(const machine::Settings& settings, std::vector<std::st
 // The summary goes to stdout, unless a result is there; then to stderr if someone is looking.
 [[nodiscard]] Status print_summary(const RunConfig& config, std::string_view text,
                                    Console& console);
+
+// To stdout, as the last thing a command does.
+[[nodiscard]] Status write_last(std::string_view text);
 
 [[nodiscard]] Status write_report(std::optional<Output>& report, std::string_view text);
 

@@ -149,7 +149,8 @@ int run_said(const RunConfig& config, Console& console) {
   const Result<ExitCode> result = run_command(config, console);
   if (!result) {
     say_last_words_yourself();
-    const bool ended = ending_signal() != 0;
+    // What fails once a result is in place is told as it is, or it would be taken for missing.
+    const bool ended = ending_signal() != 0 && (!has_result() || config.command == Command::batch);
     console.error(ended ? interrupted(config.command).value() : result.error());
     return ended ? kSignalExitBase + ending_signal()
                  : static_cast<int>(exit_code(result.error().kind));
@@ -165,7 +166,8 @@ int refused(const Error& error) {
 }  // namespace
 
 int run(const RunConfig& asked) {
-  catch_signals(error_text(interrupted(asked.command).value()));
+  catch_signals(error_text(interrupted(asked.command).value()),
+                error_text(interrupted(asked.command, true).value()));
   const Result<RunConfig> config = with_slicer(asked, read_slicer());
   if (!config) {
     return refused(config.error());

@@ -29,9 +29,12 @@ struct Slot {
 std::array<Slot, 8> unfinished;
 std::mutex unfinished_mutex;
 
-std::array<char, 256> last_words{};
+using Words = std::array<char, 256>;
+Words last_words{};
+Words last_words_with_result{};
 pid_t main_process = 0;
 volatile std::sig_atomic_t expected = 0;
+volatile std::sig_atomic_t in_place = 0;
 
 // Nothing here but what a signal handler may call.
 extern "C" void give_up(int /*signal*/) {
@@ -41,8 +44,10 @@ extern "C" void give_up(int /*signal*/) {
       removed = ::unlink(slot.file.data()) == 0 || removed;
     }
   }
-  if (main_process == ::getpid() && (removed || expected == 0)) {
-    static_cast<void>(::write(STDERR_FILENO, last_words.data(), std::strlen(last_words.data())));
+  // Between the two nobody knows.
+  if (main_process == ::getpid() && (in_place != 0 || removed || expected == 0)) {
+    const Words& words = in_place != 0 ? last_words_with_result : last_words;
+    static_cast<void>(::write(STDERR_FILENO, words.data(), std::strlen(words.data())));
   }
   ::_exit(kSignalExitBase + received);
 }
@@ -55,11 +60,16 @@ extern "C" void remember(int signal) {
   }
 }
 
+void keep(const std::string& text, Words& words) {
+  const std::size_t length = std::min(text.size(), words.size() - 2);
+  std::ranges::copy(text.substr(0, length) + '\n', words.begin());
+}
+
 }  // namespace
 
-void catch_signals(const std::string& words) {
-  const std::size_t length = std::min(words.size(), last_words.size() - 2);
-  std::ranges::copy(words.substr(0, length) + '\n', last_words.begin());
+void catch_signals(const std::string& words, const std::string& words_with_result) {
+  keep(words, last_words);
+  keep(words_with_result, last_words_with_result);
   main_process = ::getpid();
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction action {};
@@ -105,5 +115,9 @@ void keep_if_cut_short(const std::string& file) {
 }
 
 void expect_a_result() { expected = 1; }
+
+void note_result() { in_place = 1; }
+
+bool has_result() { return in_place != 0; }
 
 }  // namespace unflex::app

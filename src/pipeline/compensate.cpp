@@ -73,10 +73,9 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
   std::istream& input = job.input_fd < 0 ? in_file : in_stream;
   std::ostream& output = job.output_fd < 0 ? out_file : out_stream;
   PassOutcome outcome =
-      compensate_pass(job, engines, kept, {input, output, *processes, slots}, progress, report);
-  if (outcome.status) {
-    sink.finish();
-  }
+      compensate_pass(job, engines, kept,
+                      {input, output, *processes, slots, [&] { source.stop(); }}, progress, report);
+  const bool is_whole = !outcome.status || sink.finish();
   if (sink.error() != 0) {
     return failed(fail(ErrorKind::internal,
                        {job.output_name == "-" ? "stdout" : job.output_name, 0},
@@ -86,11 +85,29 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
     outcome.status = tl::unexpected(source.error().value_or(outcome.status.error()));
     return outcome;
   }
+  if (!is_whole) {
+    return failed(fail(ErrorKind::internal, "cancelled"));
+  }
   output.flush();
   if (!output) {
     return failed(output_failed(job.output_name));
   }
   return outcome;
+}
+
+// Of single runs the report tells. Where it is all of them, the print is as good as not
+// compensated.
+void warn_of_no_run(const Job& job, report::Report& report) {
+  if (report.runs_total == 0 || report.runs_compensated > 0 || report.fallbacks.empty()) {
+    return;
+  }
+  const report::Fallback& first = report.fallbacks.front();
+  report.warnings.push_back(to_string(Diagnostic{
+      {job.input_name, first.first_line},
+      fmt::format("nothing is compensated: {} as sliced, this one since {}",
+                  report.runs_total == 1 ? "its only run stays"
+                                         : fmt::format("all {} runs stay", report.runs_total),
+                  first.reason)}));
 }
 
 // Whether the output can be written once more.
@@ -124,6 +141,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       }
       report.output_bytes = std::filesystem::file_size(job.output);
     }
+    warn_of_no_run(job, report);
     add_performance(begin, report);
     return report;
   }

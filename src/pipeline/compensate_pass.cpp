@@ -30,6 +30,8 @@ namespace {
 // processes are given ahead.
 constexpr std::size_t kNodesAhead = 20'000;
 constexpr std::size_t kWindowsAhead = 24;
+// Lines of them and of what stands between; no print has so many to so few nodes.
+constexpr std::size_t kLinesAhead = 200'000;
 // Windows built at once.
 constexpr std::size_t kWindowsAtOnce = 8;
 // The trajectory of a run or part is held as a whole, 48 bytes per node; longer ones are left as
@@ -85,7 +87,9 @@ class Compensator {
         writer_(rules_, job.input_name, job.settings.max_lines_per_s(), report),
         input_bytes_(input_bytes(job)),
         engine_(engines.threaded ? engines.threaded() : nullptr),
-        pieces_(streams.input, job.input_name, rules_.verify, streams.slots, [this] { wake(); }),
+        pieces_(
+            streams.input, job.input_name, rules_.verify, streams.slots, [this] { wake(); },
+            streams.stop_input),
         recorder_(recorder_for(job, rules_.verify)),
         verifier_(rules_.verify, observation_of(recorder_.get(), rules_.verify), job.input_name,
                   job.output_name, streams.slots),
@@ -123,6 +127,10 @@ class Compensator {
         wait();
       }
     }
+    if (progress_->cancelled()) {
+      // A stream that is cancelled ends wherever it is.
+      return fail(ErrorKind::internal, "cancelled");
+    }
     if (pieces_.error()) {
       return tl::unexpected(*pieces_.error());
     }
@@ -143,8 +151,9 @@ class Compensator {
 
   // Whether more should be read. However long the only run is, what follows it must be known.
   [[nodiscard]] bool has_room() {
-    return (nodes_queued_ <= kNodesAhead * std::max(job_.workers, 1U) || queue_.size() <= 1) &&
-           !verifier_.is_behind();
+    const bool is_little =
+        nodes_queued_ <= kNodesAhead * std::max(job_.workers, 1U) && lines_queued_ <= kLinesAhead;
+    return (is_little || queue_.size() <= 1) && !verifier_.is_behind();
   }
 
   // Takes what has been read; false when nothing has.
@@ -176,10 +185,13 @@ class Compensator {
       const double accel = largest_axis_accel(piece.moves);
       if (const verify::BlamedRun* const known = blamed_before(piece)) {
         job->failure = known->reason;
+      } else if (piece.cut_off) {
+        job->failure = "too many lines without motion stand in a row in the middle of the motion";
       } else if (accel > rules_.verify.base_max_accel_mm_s2) {
         job->failure = fmt::format(
-            "the plan itself accelerates an axis by {:.0f} mm/s², more than base.max_accel_mm_s2",
-            accel);
+            "the plan itself accelerates an axis by {:.0f} mm/s², more than base.max_accel_mm_s2, "
+            "{:.0f}; raise that if the motors can",
+            accel, rules_.verify.base_max_accel_mm_s2);
       } else if (nodes <= kMaxRunNodes) {
         job->spans = compensate::mesh(job->course(), job->grid, rules_.setup);
       } else {
@@ -206,6 +218,7 @@ class Compensator {
       // it is being worked on already.
       queue_.back()->lines_after = verify::LineRate::first_lines(piece.moves);
     }
+    lines_queued_ += job->piece.events.size();
     queue_.push_back(std::move(job));
   }
 
@@ -315,6 +328,7 @@ class Compensator {
     put(text_of(job.piece), std::move(*text));
     report_->solver_iterations += job.iterations;
     nodes_queued_ -= nodes_of(job);
+    lines_queued_ -= job.piece.events.size();
     gaps_.take(job);
     if (!engine_) {
       const std::size_t tickets = 2 * job.spans.size();
@@ -397,6 +411,7 @@ class Compensator {
   dynamics::NozzleXY nozzle_;
   std::deque<std::shared_ptr<RunJob>> queue_;
   std::size_t nodes_queued_ = 0;
+  std::size_t lines_queued_ = 0;
   std::deque<Ticket> tickets_;    // of the windows of queue_
   std::size_t first_ticket_ = 0;  // number of tickets_' front
   double input_bytes_;            // 0: not known

@@ -1,6 +1,7 @@
 // One pass over a print: reads pieces, has runs worked on, writes them in order, verifies.
 #pragma once
 
+#include <functional>
 #include <istream>
 #include <ostream>
 #include <vector>
@@ -22,6 +23,7 @@ struct PassStreams {
   std::ostream& output;
   WorkerPool& processes;
   CpuSlots& slots;
+  std::function<void()> stop_input;  // see PieceThread
 };
 
 struct PassOutcome {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <functional>
 #include <ios>
 #include <string_view>
 #include <utility>
@@ -15,14 +16,14 @@ constexpr std::size_t kBlockBytes = 256 * 1024;
 // How often a wait is interrupted to see whether it is still wanted.
 constexpr int kPatience_ms = 50;
 
-// Whether the descriptor is ready; false when cancelled.
-bool ready(int fd, short events, const Progress& progress, CpuSlots& slots) {
+// Whether the descriptor is ready; false once it is unwanted.
+bool ready(int fd, short events, CpuSlots& slots, const std::function<bool()>& is_unwanted) {
   pollfd what{fd, events, 0};
   if (poll(&what, 1, 0) > 0) {
     return true;
   }
   const CpuSlot::Without without(slots);
-  while (!progress.cancelled()) {
+  while (!is_unwanted()) {
     const int count = poll(&what, 1, kPatience_ms);
     if (count > 0 || (count < 0 && errno != EINTR)) {
       return true;  // an error shows when it is read or written
@@ -47,7 +48,7 @@ FdSource::FdSource(const Job& job, const Progress& progress, CpuSlots& slots)
 
 bool FdSource::read_block() {
   block_.resize(kBlockBytes);
-  while (ready(fd_, POLLIN, *progress_, *slots_)) {
+  while (!stopped_ && ready(fd_, POLLIN, *slots_, [this] { return is_unwanted(); })) {
     const ssize_t count = read(fd_, block_.data(), block_.size());
     if (count >= 0) {
       block_.resize(static_cast<std::size_t>(count));
@@ -75,7 +76,7 @@ bool FdSource::unpack_block() {
     more = read_block();
     if (more) {
       unpacker_->push(block_);
-    } else if (progress_->cancelled()) {
+    } else if (is_unwanted()) {
       return false;
     } else {
       unpacker_->finish();
@@ -100,7 +101,8 @@ FdSink::FdSink(const Job& job, const Progress& progress, CpuSlots& slots)
 }
 
 bool FdSink::write_out(std::string_view bytes) {
-  while (!bytes.empty() && ready(fd_, POLLOUT, *progress_, *slots_)) {
+  const auto cancelled = [this] { return progress_->cancelled(); };
+  while (!bytes.empty() && ready(fd_, POLLOUT, *slots_, cancelled)) {
     const ssize_t some = write(fd_, bytes.data(), bytes.size());
     if (some > 0) {
       bytes.remove_prefix(static_cast<std::size_t>(some));
@@ -109,6 +111,7 @@ bool FdSink::write_out(std::string_view bytes) {
       break;
     }
   }
+  is_whole_ = is_whole_ && bytes.empty();
   return bytes.empty();
 }
 
@@ -119,10 +122,11 @@ std::streamsize FdSink::xsputn(const char* text, std::streamsize count) {
   return written ? count : 0;
 }
 
-void FdSink::finish() {
-  if (packer_) {
+bool FdSink::finish() {
+  if (packer_ && is_whole_) {
     write_out(*packer_->finish());
   }
+  return is_whole_;
 }
 
 FdSink::int_type FdSink::overflow(int_type character) {

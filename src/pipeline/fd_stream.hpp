@@ -1,6 +1,7 @@
 // Streams over file descriptors: a pipe is read as its text comes and written to at once.
 #pragma once
 
+#include <atomic>
 #include <istream>
 #include <memory>
 #include <optional>
@@ -14,10 +15,13 @@
 
 namespace unflex::pipeline {
 
-// The reader gives its slot back while it waits. Ends early when cancelled.
+// The reader gives its slot back while it waits. Ends early when cancelled or stopped.
 class FdSource final : public std::streambuf {
  public:
   FdSource(const Job& job, const Progress& progress, CpuSlots& slots);
+
+  // Nothing more is wanted: ends a read that is under way in another thread.
+  void stop() { stopped_ = true; }
 
   // What was wrong with packed text, where the stream is bad for that.
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
@@ -29,8 +33,10 @@ class FdSource final : public std::streambuf {
   // The next bytes into block_; false at the end.
   bool read_block();
   bool unpack_block();
+  [[nodiscard]] bool is_unwanted() const { return stopped_ || progress_->cancelled(); }
 
   int fd_;
+  std::atomic<bool> stopped_ = false;
   const Progress* progress_;
   CpuSlots* slots_;
   std::string block_;
@@ -43,8 +49,9 @@ class FdSink final : public std::streambuf {
  public:
   FdSink(const Job& job, const Progress& progress, CpuSlots& slots);
 
-  // To be called once after all of the text; what is packed is incomplete without.
-  void finish();
+  // To be called once after all of the text; what is packed is incomplete without. False when not
+  // all of it was written: cancelled, or for the error below.
+  [[nodiscard]] bool finish();
 
   // The errno of what has gone wrong, or 0.
   [[nodiscard]] int error() const { return error_; }
@@ -58,6 +65,7 @@ class FdSink final : public std::streambuf {
 
   int fd_;
   int error_ = 0;
+  bool is_whole_ = true;  // what was to be written has been
   const Progress* progress_;
   CpuSlots* slots_;
   std::unique_ptr<container::Packer> packer_;

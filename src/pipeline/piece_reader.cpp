@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "own_output.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
 #include "unflex/verify/endless.hpp"
@@ -17,6 +18,10 @@ namespace {
 
 // Lines between runs are handed on in portions, so that a long file without motion stays small.
 constexpr std::size_t kMaxEventsOutsideRuns = 4096;
+// In a run they are held until it is known what follows. So many in a row, or in what is held of
+// the run, no print has; the run ends there as if the machine stopped.
+constexpr std::size_t kMostInARow = 20'000;
+constexpr std::size_t kMostInARun = 400'000;
 constexpr std::size_t kMaxWarnings = 1000;
 constexpr std::size_t kMostSpareEvents = 10'000;
 constexpr std::size_t kUsualEvents = 8;
@@ -66,16 +71,6 @@ std::vector<Value> split_off(std::vector<Value>& values, std::size_t first) {
 
 bool stands_anywhere(const gcode::Event& event) {
   return event.kind == gcode::EventKind::passive || event.kind == gcode::EventKind::limits;
-}
-
-// ";unflex run" or ";unflex 1.2.3: …".
-bool is_own_comment(std::string_view content) {
-  if (!content.starts_with(emit::kComment)) {
-    return false;
-  }
-  content.remove_prefix(emit::kComment.size());
-  return content == " run" || content == " end" ||
-         (content.size() > 1 && content[0] == ' ' && content[1] >= '0' && content[1] <= '9');
 }
 
 // A letter that printers know and a number: enough to tell G-code from prose.
@@ -130,8 +125,16 @@ Result<bool> PieceReader::cut(Piece& piece) {
       break;
     }
     if (stands_anywhere(event)) {
+      if (open_.is_run && (between_.size() >= kMostInARow || still_lines_ >= kMostInARun)) {
+        open_.cut_off = true;
+        after_cut_ = true;
+        close(piece);
+        append(std::move(event));
+        return true;
+      }
       if (open_.is_run) {
         between_.push_back(std::move(event));
+        ++still_lines_;
       } else {
         append(std::move(event));
       }
@@ -193,11 +196,8 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
   if (!more || !*more) {
     return more;
   }
-  if (is_own_comment(line.content())) {
-    return fail(
-        ErrorKind::input, {lines_.name(), line.number},
-        "this file was already compensated by unflex; give the file as it was sliced, and let "
-        "a slicer run unflex once");
+  if (Status sliced = check_as_sliced(line, lines_.name()); !sliced) {
+    return tl::unexpected(sliced.error());
   }
   any_command_ = any_command_ || looks_like_command(line.content());
   // Of Marlin's, which it ends, the interpreter tells.
@@ -256,7 +256,9 @@ void PieceReader::append(gcode::Event&& event) {
   if (open_.is_run && open_.events.empty()) {
     // The move itself changes nothing of it.
     open_.start = emit::run_start(interpreter_.state(), planner_->limits());
+    open_.cut_off = after_cut_;
   }
+  after_cut_ = after_cut_ && stands_anywhere(event);
   if (open_.is_run) {
     mark_border(event);
   }
@@ -356,6 +358,7 @@ bool PieceReader::split(Piece& piece) {
   const auto before = planner::last_moves(open_.moves, kAround_s);
   rest.before.assign(before.begin(), before.end());
   open_.after = first_of(rest.moves);
+  still_lines_ = static_cast<std::size_t>(std::ranges::count(rest.move_counts, 0U));
   piece = std::exchange(open_, std::move(rest));
   return true;
 }
@@ -370,6 +373,7 @@ void PieceReader::close(Piece& piece) {
   // Marlin leaves moves of a few steps to the next one.
   open_.is_run = open_.is_run && !open_.moves.empty();
   piece = std::exchange(open_, Piece{});
+  still_lines_ = 0;
   borders_.clear();
   since_border_s_ = 0.0;
 }

@@ -31,6 +31,9 @@ struct Piece {
   // Of a part of a run, some of its moves around: none before the first part and after the last.
   std::vector<planner::PlannedMove> before;
   std::vector<planner::PlannedMove> after;
+  // Of a run: it meets another one where the machine does not stop, but for the lines without
+  // motion there, which are too many to be held. Its own moves have to stand.
+  bool cut_off = false;
 
   [[nodiscard]] bool begins_run() const { return is_run && before.empty(); }
   [[nodiscard]] bool ends_run() const { return is_run && after.empty(); }
@@ -89,6 +92,8 @@ class PieceReader {
   std::vector<std::vector<gcode::Event>> spare_;  // storage for the next ones
   std::size_t spare_events_ = 0;                  // in it
   std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
+  bool after_cut_ = false;             // and nothing but lines without motion since
+  std::size_t still_lines_ = 0;        // without motion, of the open run and after it
   std::vector<Diagnostic> warnings_;
   std::size_t unlisted_warnings_ = 0;
   bool any_command_ = false;

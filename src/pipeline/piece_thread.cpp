@@ -13,8 +13,10 @@ constexpr std::size_t kMostAhead = 4'000;
 }  // namespace
 
 PieceThread::PieceThread(std::istream& input, std::string name, const verify::Rules& rules,
-                         CpuSlots& slots, std::function<void()> wake)
+                         CpuSlots& slots, std::function<void()> wake,
+                         std::function<void()> stop_input)
     : slots_(&slots),
+      stop_input_(std::move(stop_input)),
       reader_(input, std::move(name), rules.interpreter, rules.limits, rules.fixed, rules.travel),
       thread_([this, wake = std::move(wake)] {
         try {
@@ -30,6 +32,7 @@ PieceThread::~PieceThread() {
     const std::lock_guard lock(mutex_);
     stopped_ = true;
   }
+  stop_input_();
   room_.notify_one();
 }
 

@@ -21,9 +21,11 @@ namespace unflex::pipeline {
 
 class PieceThread {
  public:
-  // The stream is read in the thread; wake: called there whenever something has come.
-  PieceThread(std::istream& input, std::string name, const verify::Rules& rules, CpuSlots& slots,
-              std::function<void()> wake);
+  // The stream is read in the thread; wake: called there whenever something has come. stop_input:
+  // ends a read of a stream that need not end soon.
+  PieceThread(
+      std::istream& input, std::string name, const verify::Rules& rules, CpuSlots& slots,
+      std::function<void()> wake, std::function<void()> stop_input = [] {});
   // Stops reading; waits for a read that is under way.
   ~PieceThread();
   PieceThread(const PieceThread&) = delete;
@@ -49,6 +51,7 @@ class PieceThread {
   void give_up();
 
   CpuSlots* slots_;
+  std::function<void()> stop_input_;
   PieceReader reader_;
   std::mutex mutex_;
   std::condition_variable room_;

@@ -5,10 +5,14 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <istream>
+#include <string>
 #include <utility>
 
+#include "own_output.hpp"
 #include "report_rows.hpp"
 #include "stage_options.hpp"
+#include "unflex/gcode/line.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::pipeline {
@@ -25,6 +29,27 @@ report::Spread spread(const verify::Deviation& deviation) {
 
 report::DeviationRows rows(const verify::Deviation& deviation) {
   return {row(deviation.extruding), row(deviation.all)};
+}
+
+// What was compensated already is no measure: it would be found to be as good as itself.
+Status check_measure(std::istream& input, const std::string& name) {
+  gcode::LineReader lines(input, name);
+  gcode::Line line;
+  for (;;) {
+    const Result<bool> more = lines.next(line);
+    if (!more) {
+      return tl::unexpected(more.error());
+    }
+    if (!*more) {
+      break;
+    }
+    if (Status sliced = check_as_sliced(line, name); !sliced) {
+      return sliced;
+    }
+  }
+  input.clear();
+  input.seekg(0);
+  return {};
 }
 
 double cpu_s(int who) {
@@ -119,6 +144,9 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   if (!output) {
     return fail(ErrorKind::input, {job.output_name, 0}, "cannot read the file");
   }
+  if (Status sliced = check_measure(input, job.input_name); !sliced) {
+    return sliced;
+  }
   const verify::Rules rules = verify_rules(job.settings);
   const std::unique_ptr<record::Recorder> recorder = recorder_for(job, rules);
   const Result<verify::VerifyReport> result =
@@ -137,8 +165,7 @@ Result<report::Report> verify(const Job& job, Progress& progress) {
   if (Status status = add_verification(job, progress, report); !status) {
     return tl::unexpected(status.error());
   }
-  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
+  add_performance(begin, report);
   return report;
 }
 

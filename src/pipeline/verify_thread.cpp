@@ -12,6 +12,9 @@ constexpr std::size_t kLong_bytes = 4U << 20U;
 void TextQueue::push(std::string text) {
   {
     const std::lock_guard lock(mutex_);
+    if (dropped_) {
+      return;
+    }
     bytes_ += text.size();
     reader_waits_ = reader_waits_ && text.empty();
     texts_.push_back(std::move(text));
@@ -25,6 +28,13 @@ void TextQueue::end() {
     ended_ = true;
   }
   changed_.notify_one();
+}
+
+void TextQueue::drop() {
+  const std::lock_guard lock(mutex_);
+  dropped_ = true;
+  texts_.clear();
+  bytes_ = 0;
 }
 
 bool TextQueue::is_long() {
@@ -80,7 +90,9 @@ VerifyThread::VerifyThread(const verify::Rules& rules, const verify::Observation
         } catch (...) {
           failure_ = std::current_exception();
         }
-        done_ = true;
+        // It may have ended early, and a print is long.
+        input_.drop();
+        output_.drop();
       }) {}
 
 VerifyThread::~VerifyThread() {
@@ -94,8 +106,7 @@ void VerifyThread::push(std::string input, std::string output) {
 }
 
 bool VerifyThread::is_behind() {
-  return !done_ && (input_.is_long() || output_.is_long()) && !input_.is_starved() &&
-         !output_.is_starved();
+  return (input_.is_long() || output_.is_long()) && !input_.is_starved() && !output_.is_starved();
 }
 
 void VerifyThread::end() {

@@ -25,6 +25,8 @@ class TextQueue final : public std::streambuf {
 
   void push(std::string text);
   void end();
+  // Nobody reads any more: drops what is there and what is still to come.
+  void drop();
   // Whether more than a few MB are still to be read.
   [[nodiscard]] bool is_long();
   // Whether the reader waits for more.
@@ -41,6 +43,7 @@ class TextQueue final : public std::streambuf {
   std::size_t bytes_ = 0;
   bool reader_waits_ = false;
   bool ended_ = false;
+  bool dropped_ = false;
   std::string current_;  // the reader's
 };
 
@@ -77,7 +80,6 @@ class VerifyThread {
   TextQueue input_;
   TextQueue output_;
   Stopped stopped_;
-  std::atomic<bool> done_ = false;
   Result<verify::VerifyReport> result_;
   std::exception_ptr failure_;
   std::jthread thread_;

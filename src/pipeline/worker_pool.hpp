@@ -47,7 +47,7 @@ class WorkerPool {
   [[nodiscard]] std::optional<Done> take(int timeout_ms);
 
   // Windows submitted and not yet taken.
-  [[nodiscard]] std::size_t under_way() const { return queue_.size() + busy_; }
+  [[nodiscard]] std::size_t under_way() const { return queue_.size() + busy_ + failed_.size(); }
 
  private:
   struct Task {

@@ -9,6 +9,9 @@ namespace unflex::app {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 RunConfig read(const std::vector<std::string>& arguments) {
   const Result<CommandLine> line = parse_command_line(arguments);
@@ -71,6 +74,41 @@ TEST(CommandLine, HelpAndVersionAreTexts) {
             std::string("unflex ") + std::string(version()) + "\n");
   EXPECT_THAT(parse_command_line({"--help"})->text, ::testing::HasSubstr("inspect"));
   EXPECT_THAT(parse_command_line({"verify", "--help"})->text, ::testing::HasSubstr("--against"));
+}
+
+// What the command line is refused with.
+std::string refusal(const std::vector<std::string>& arguments) {
+  const Result<CommandLine> line = parse_command_line(arguments);
+  return line ? "no error" : line.error().message;
+}
+
+TEST(CommandLine, OffersAPageWhereThereIsOne) {
+  EXPECT_THAT(parse_command_line({"verify", "--help"})->text, HasSubstr("FILE.html"));
+  const std::string of_inspect = parse_command_line({"inspect", "--help"})->text;
+  EXPECT_THAT(of_inspect, HasSubstr("FILE.json"));
+  EXPECT_THAT(of_inspect, Not(HasSubstr("html")));
+}
+
+TEST(CommandLine, TakesAnEndingForTheNameOfAReportWhereItStandsForOne) {
+  EXPECT_EQ(read({"compensate", "in.gcode", "-o", "out.gcode", "--report", ".json"}).report,
+            ".json");
+  const std::vector<std::string> verify = {"verify", "out.gcode", "--against", "in.gcode",
+                                           "--report"};
+  const std::vector<std::string> inspect = {"inspect", "in.gcode", "--report"};
+  const std::vector<std::string> study = {"study", "--report"};
+  const std::vector<std::string> identify = {"identify", "a.csv", "--report"};
+  const std::vector<std::string> batch = {"batch", "prints", "-o", "made", "--summary"};
+  for (std::vector<std::string> arguments : {verify, inspect, study, identify, batch}) {
+    arguments.emplace_back(".json");
+    EXPECT_THAT(refusal(arguments),
+                EndsWith(" .json: is an ending without a name; give it one, as report.json"));
+    arguments.back() = "folder/.json";
+    EXPECT_EQ(refusal(arguments), "no error");
+  }
+  for (std::vector<std::string> arguments : {verify, study, identify}) {
+    arguments.emplace_back(".html");
+    EXPECT_THAT(refusal(arguments), EndsWith("as report.html"));
+  }
 }
 
 }  // namespace

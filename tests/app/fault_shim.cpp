@@ -5,6 +5,7 @@
 //   FAULT_KILL=CALL        die of SIGKILL before the first such call: fsync, rename, fsync-folder
 //   FAULT_FAIL=CALL        the call fails with EIO instead; also fork, pipe2 and socketpair,
 //                          and inflate for want of memory
+//   FAULT_SIGNAL=CALL      SIGINT comes before each such call, of the same
 //   FAULT_CHANGE=FILE      somebody else adds a line to FILE before each rename
 //   FAULT_UNREADABLE=NAME  reads of files whose name ends so fail with EIO behind 64 KiB
 //   FAULT_CLOCK=1          each look at the calendar's clock finds it an hour earlier
@@ -49,6 +50,9 @@ bool meet(std::string_view call) {
   }
   if (asks("FAULT_KILL", call)) {
     ::raise(SIGKILL);
+  }
+  if (asks("FAULT_SIGNAL", call)) {
+    ::raise(SIGINT);
   }
   return asks("FAULT_FAIL", call);
 }

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <fstream>
@@ -159,6 +160,60 @@ TEST_F(Faults, OfTheSummaryLeaveAnOutputThatIsWhole) {
   EXPECT_EQ(outcome.exit_code, 4);
   EXPECT_EQ(outcome.err, "stdout: cannot write: No space left on device; make room there\n");
   EXPECT_EQ(read_file(path("out.gcode")), result);
+}
+
+// stdout is a pipe that nobody reads any more.
+void break_stdout() {
+  std::array<int, 2> pipe{};
+  if (::pipe(pipe.data()) == 0) {
+    ::dup2(pipe[1], STDOUT_FILENO);
+    ::close(pipe[0]);
+    ::close(pipe[1]);
+  }
+}
+
+// stdout is a pipe that is full and that nobody reads.
+void stop_stdout() {
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_NONBLOCK) == 0) {
+    while (::write(pipe[1], "x", 1) == 1) {
+    }
+    ::fcntl(pipe[1], F_SETFL, 0);
+    ::dup2(pipe[1], STDOUT_FILENO);
+  }
+}
+
+TEST_F(Faults, OfTheSummaryAreToldAsTheyAreWhenASignalCameAfterTheOutput) {
+  const std::string result = whole();
+  const auto interrupt = faulty({{"FAULT_SIGNAL", "fsync-folder"}});
+  const Outcome outcome = run(kToFile + Words{"--report", "r.html"}, "", [&] {
+    break_stdout();
+    interrupt();
+  });
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_EQ(outcome.err, "stdout: cannot write: Broken pipe\n");
+  EXPECT_EQ(read_file(path("out.gcode")), result);
+  EXPECT_TRUE(read_file(path("r.html")).ends_with("</html>\n"));
+}
+
+TEST_F(Faults, OfASummaryThatNobodyTakesDoNotHideWhatWasWritten) {
+  write_file(path("p.cfg"),
+             "[printer]\nkinematics: cartesian\nmax_velocity: 300\nmax_accel: 3000\n");
+  const auto interrupt = faulty({{"FAULT_SIGNAL", "fsync-folder"}});
+  for (const Words& words : {Words{"printer", "init", "--from", "p.cfg", "-o", "new.json"},
+                             Words{"inspect", "in.gcode", "--report", "new.json"},
+                             Words{"identify", "--axis", "x", "--wave-spacing-mm", "2",
+                                   "--speed-mm-s", "100", "--report", "new.json"}}) {
+    fs::remove(path("new.json"));
+    const Outcome outcome = run(words, "", [&] {
+      stop_stdout();
+      interrupt();
+    });
+    EXPECT_EQ(outcome.exit_code, 128 + SIGINT) << words.front();
+    EXPECT_THAT(outcome.err,
+                ::testing::EndsWith("unflex: interrupted; what was written before is whole\n"));
+    EXPECT_NE(read_file(path("new.json")), "") << words.front();
+  }
 }
 
 TEST_F(Faults, OfABatchFailItsPrintsAndLeaveNothingHalf) {

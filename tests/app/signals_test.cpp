@@ -82,6 +82,44 @@ TEST_F(ProgramTest, DoesNotSayThatNothingWasWrittenOnceItWas) {
   EXPECT_THAT(read_file(path("in.gcode")), ::testing::HasSubstr(";unflex"));
 }
 
+TEST_F(ProgramTest, DoesNotSayThatNoReportWasWrittenOnceItWas) {
+  write_file(path("in.gcode"), small_print());
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"inspect", "in.gcode", "--report", "new.json"},
+        std::vector<std::string>{"printer", "init", "--from", "p.toml", "-o", "new.json"}}) {
+    std::filesystem::remove(path("new.json"));
+    write_file(path("p.toml"), "[limits]\nmax_accel_mm_s2 = 3000\n");
+    Program program(directory(), words, "", stop_stdout);
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (!std::filesystem::exists(path("new.json")) &&
+           std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    program.signal(SIGINT);
+    const Outcome outcome = program.wait();
+    EXPECT_EQ(outcome.exit_code, 0) << words.front();
+    EXPECT_EQ(outcome.err, "") << words.front();
+  }
+}
+
+// stdout does not block and nobody reads it.
+TEST_F(ProgramTest, EndsWhileItWaitsForAStreamThatDoesNotBlock) {
+  write_file(path("in.gcode"), small_print());
+  Program program(directory(), {"compensate", "in.gcode", "-o", "out.gcode", "--report", "-"}, "",
+                  [] {
+                    stop_stdout();
+                    ::fcntl(STDOUT_FILENO, F_SETFL, O_NONBLOCK);
+                  });
+  ASSERT_TRUE(wait_for_names(directory(), 2));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  program.signal(SIGINT);
+  const Outcome outcome = program.wait();
+  EXPECT_EQ(outcome.exit_code, 128 + SIGINT);
+  EXPECT_EQ(outcome.err, "unflex: interrupted, no file was written\n");
+  EXPECT_THAT(names(), ElementsAre("in.gcode"));
+}
+
 TEST_F(ProgramTest, EndsSoonEvenWhereARunTakesLong) {
   // Marlin's whole steps make a run of a minute a matter of many seconds.
   std::string text = "G28\nG90\nM83\nG1 X20 Y20 F6000\n";

@@ -1,15 +1,24 @@
 // Text goes through the program as it comes.
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <iterator>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include "app/program.hpp"
 
@@ -45,7 +54,7 @@ class Filter {
   }
   ~Filter() {
     close_input();
-    ::close(out_);
+    close_output();
   }
   Filter(const Filter&) = delete;
   Filter& operator=(const Filter&) = delete;
@@ -58,6 +67,27 @@ class Filter {
       ::close(in_);
       in_ = -1;
     }
+  }
+
+  void close_output() {
+    if (out_ >= 0) {
+      ::close(out_);
+      out_ = -1;
+    }
+  }
+  // The exit code, or −1 if it has not ended within ten seconds; it is ended then.
+  [[nodiscard]] int wait() const {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    int status = 0;
+    while (::waitpid(pid_, &status, WNOHANG) == 0) {
+      if (std::chrono::steady_clock::now() > deadline) {
+        ::kill(pid_, SIGKILL);
+        ::waitpid(pid_, &status, 0);
+        return -1;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
   // Reads until `what` has come; all that has come. Not longer than half a minute.
@@ -123,6 +153,83 @@ TEST_F(ProgramTest, EndsWhenItsInputEndsBeforeAnything) {
   filter.close_input();
   EXPECT_EQ(filter.finish(), 2);
   EXPECT_EQ(filter.text(), "");
+}
+
+// Whoever writes has nothing to say for now.
+TEST_F(ProgramTest, EndsWhenNobodyReadsItThoughItsInputGoesOn) {
+  Filter filter(path("err"));
+  filter.close_output();
+  filter.write(kFirstRun);
+  EXPECT_EQ(filter.wait(), 4);
+  EXPECT_EQ(read_file(path("err")), "stdout: cannot write: Broken pipe\n");
+}
+
+// A pipe whose ends do not block, as event loops make them.
+class LoosePipe {
+ public:
+  LoosePipe() {
+    EXPECT_EQ(::pipe2(ends_.data(), O_NONBLOCK | O_CLOEXEC), 0);
+    // A page.
+    EXPECT_GT(::fcntl(ends_[1], F_SETPIPE_SZ, 4096), 0);
+  }
+  ~LoosePipe() {
+    close_writer();
+    ::close(ends_[0]);
+  }
+  LoosePipe(const LoosePipe&) = delete;
+  LoosePipe& operator=(const LoosePipe&) = delete;
+
+  [[nodiscard]] int reader() const { return ends_[0]; }
+  [[nodiscard]] int writer() const { return ends_[1]; }
+  void close_writer() { ::close(std::exchange(ends_[1], -1)); }
+
+  // Some bytes at a time, late, until the other end is closed.
+  [[nodiscard]] std::string read_slowly() const {
+    std::string text;
+    std::array<char, 4096> block{};
+    for (;;) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      const ssize_t count = ::read(reader(), block.data(), block.size());
+      if (count == 0 || (count < 0 && errno != EAGAIN)) {
+        return text;
+      }
+      text.append(block.data(), static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+    }
+  }
+
+ private:
+  std::array<int, 2> ends_{};
+};
+
+TEST_F(ProgramTest, WaitsForInputThatDoesNotBlock) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"inspect", "-"},
+        std::vector<std::string>{"compensate", "-", "-o", "out.gcode"}}) {
+    LoosePipe pipe;
+    Program program(directory(), words, "", [&] { ::dup2(pipe.reader(), STDIN_FILENO); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    const std::string text = small_print();
+    ASSERT_LT(text.size(), 4096U);
+    ASSERT_EQ(::write(pipe.writer(), text.data(), text.size()), std::ssize(text));
+    pipe.close_writer();
+    const Outcome outcome = program.wait();
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+}
+
+TEST_F(ProgramTest, WaitsForWhoeverReadsAStreamThatDoesNotBlock) {
+  write_file(path("in.gcode"), small_print());
+  for (const std::string report : {"r.json", "r.html"}) {
+    LoosePipe pipe;
+    std::filesystem::create_symlink("/dev/stdout", path(report));
+    Program program(directory(), {"compensate", "in.gcode", "-o", "out.gcode", "--report", report},
+                    "", [&] { ::dup2(pipe.writer(), STDOUT_FILENO); });
+    pipe.close_writer();
+    const std::string text = pipe.read_slowly();
+    const Outcome outcome = program.wait();
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_GT(text.size(), 4096U);
+  }
 }
 
 }  // namespace

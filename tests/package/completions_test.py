@@ -81,6 +81,7 @@ class Completion:
         self.assertEqual(self.files("unflex printer init -o "), {"printer.toml", "prints/"})
         self.assertEqual(self.files("unflex verify --report "),
                          {"report.json", "report.html", "prints/"})
+        self.assertEqual(self.files("unflex inspect --report "), {"report.json", "prints/"})
         self.assertEqual(self.files("unflex identify "), {"sweep.csv", "prints/"})
         self.assertEqual(self.files("unflex batch "), {"prints/"})
         self.assertEqual(self.files("unflex batch prints -o "), {"prints/"})

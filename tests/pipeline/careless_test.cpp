@@ -101,7 +101,7 @@ INSTANTIATE_TEST_SUITE_P(
         File{"SwitchedExtrusion",
              std::string(kStart) + "M82\nG92 E7\nG1 X104 E7.2 F3600\nM83\nG1 Y104 E.2\nM82\n"
                                    "G1 X100 E7.6\nG92 E0\nG1 Y100 E.2\nG92 E-3\nG1 X104 E-2.8\n",
-             1.0, 1.0},
+             1.0, 1.2},
         File{"Inches",
              "G28\nG20\nG90\nM83\nG1 X4 Y4 Z.008 F240\nG1 X4.2 E.01 F140\nM204 P100 T120\n"
              "M201 X100 Y90 Z12\nG1 Y4.2 E.01\nM203 Z.3\nG1 X4 E.01\nG21\nG1 Y101.6 E.2\n",

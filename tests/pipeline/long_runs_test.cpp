@@ -25,6 +25,31 @@ using testing::factory;
 using ::testing::HasSubstr;
 using testing::JobFolder;
 
+// Which the printer goes through without a stop, so that they cannot be compensated apart.
+TEST(LongRuns, AreLeftWhereTheyMeetAtTooManyLinesWithoutMotion) {
+  std::string text = "G28\nG90\nM83\nG1 X20 Y20 Z0.4 F6000\nG4 P0\nG1 X60 Y20 E1\n";
+  for (int i = 0; i < 30'000; ++i) {
+    text += "; nothing\n";
+  }
+  text += "G1 X90 Y25 E1\nG1 E-1\nG1 X60 Y60\nG1 E1\nM84\n";
+  const JobFolder folder(text);
+  std::string first;
+  for (const unsigned workers : {1U, 3U}) {
+    SilentProgress progress;
+    const Result<report::Report> report = compensate(folder.job(workers), progress);
+    ASSERT_TRUE(report.has_value()) << to_string(report.error());
+    EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
+    EXPECT_EQ(report->runs_total, 3U);
+    EXPECT_EQ(report->runs_fallback, 2U) << testing::complaints(*report);
+    EXPECT_EQ(report->runs_compensated, 1U);
+    EXPECT_THAT(testing::complaints(*report), HasSubstr("too many lines without motion"));
+    first = first.empty() ? folder.output() : first;
+    EXPECT_EQ(folder.output(), first);
+  }
+  EXPECT_THAT(first, HasSubstr("\nG1 X60 Y20 E1\n; nothing\n"));
+  EXPECT_THAT(first, HasSubstr("; nothing\nG1 X90 Y25 E1\n"));
+}
+
 // A lobed spiral that rises and widens, without a stop, with lines that do not move in between.
 std::string spiral(double duration_s) {
   constexpr double kSpeed_mm_s = 40.0;

@@ -146,6 +146,50 @@ TEST(PieceReader, HandsLongStretchesWithoutMotionOutInPortions) {
   EXPECT_EQ(reading.all(), text);
 }
 
+std::string comments(int count) {
+  std::string text;
+  for (int i = 0; i < count; ++i) {
+    text += "; " + std::to_string(i) + "\n";
+  }
+  return text;
+}
+
+TEST(PieceReader, EndsARunWhereTooManyLinesWithoutMotionStand) {
+  const std::string text = std::string(kKnown) + "G1 X50 E1\nG1 X100 E1\n" + comments(70'000) +
+                           "G1 X150 E1\nM204 S700\nG1 X200 E1\nG4 P0\nG1 X0 E1\n";
+  const Reading reading(text);
+  EXPECT_EQ(reading.all(), text);
+  std::vector<bool> cut_off;
+  for (const Piece& piece : reading.pieces) {
+    EXPECT_LE(piece.events.size(), 20'002U);
+    if (piece.is_run) {
+      cut_off.push_back(piece.cut_off);
+      EXPECT_EQ(piece.moves.front().start_v_mm_s, 0.0);
+      EXPECT_NEAR(piece.moves.back().end_v_mm_s, 0.0, 1e-9);
+    }
+  }
+  // The last one begins where the machine has stopped.
+  EXPECT_THAT(cut_off, ElementsAre(true, true, false));
+}
+
+TEST(PieceReader, KeepsRunsWithManyLinesWithoutMotionWhole) {
+  const std::string run = "G1 X50 E1\n" + comments(10'000) + "G1 X100 E1\n";
+  EXPECT_THAT(Reading(kKnown + run).outline(),
+              ElementsAre("rest: " + std::string(kKnown), "run: " + run));
+}
+
+TEST(PieceReader, EndsARunThatHoldsTooManyLinesWithoutMotionInAll) {
+  std::string text(kKnown);
+  for (int i = 0; i < 50; ++i) {
+    text += "G1 X" + std::to_string(i) + " E1\n" + comments(15'000);
+  }
+  const Reading reading(text);
+  EXPECT_EQ(reading.all(), text);
+  for (const Piece& piece : reading.pieces) {
+    EXPECT_LE(piece.events.size(), 401'000U);
+  }
+}
+
 TEST(PieceReader, RefusesWhatHoldsNoCommand) {
   for (const char* text : {"", " \t", "; a comment\n", "Dear printer,\nplease print a cube\n"}) {
     EXPECT_THAT(Reading(text).error, HasSubstr("in.gcode: there is no G-code command in it"))

@@ -97,5 +97,22 @@ TEST(Verify, NeedsAnOutputThatIsThere) {
   EXPECT_EQ(to_string(report.error()), "made: cannot read the file");
 }
 
+// It would be found to be as good as itself.
+TEST(Verify, RefusesWhatWasCompensatedAsTheMeasure) {
+  const JobFolder folder(kPrint);
+  SilentProgress progress;
+  ASSERT_TRUE(compensate(folder.job(), progress));
+  ASSERT_TRUE(verify(folder.job(), progress));
+  Job job = folder.job();
+  job.input = job.output;
+  job.input_name = "made";
+  const Result<report::Report> report = verify(job, progress);
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().kind, ErrorKind::input);
+  EXPECT_THAT(to_string(report.error()),
+              ::testing::MatchesRegex("made:[0-9]+: this file was already compensated by unflex; "
+                                      "give the file as it was sliced, and .*"));
+}
+
 }  // namespace
 }  // namespace unflex::pipeline

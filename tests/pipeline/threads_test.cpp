@@ -1,12 +1,20 @@
 // What runs beside the main thread.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <malloc.h>
+#include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <iterator>
 #include <memory>
+#include <string>
+#include <string_view>
 #include <thread>
 
 #include "cpu_slots.hpp"
+#include "fd_stream.hpp"
 #include "gap_check.hpp"
 #include "jobs.hpp"
 #include "stage_options.hpp"
@@ -45,17 +53,17 @@ TEST(TaskPool, CarriesOutEveryTaskAndNoMoreAtATimeThanThereAreSlots) {
 
 TEST(TaskPool, DropsWhatIsLeftWhenItEnds) {
   CpuSlots slots(1);
-  std::atomic<int> begun = 0;
+  std::atomic<int> kBegun = 0;
   {
     TaskPool pool(1, slots);
     for (int i = 0; i < 1000; ++i) {
       pool.submit([&] {
-        ++begun;
+        ++kBegun;
         std::this_thread::sleep_for(1ms);
       });
     }
   }
-  EXPECT_LT(begun, 1000);
+  EXPECT_LT(kBegun, 1000);
 }
 
 TEST(TaskPool, WithoutThreadsWorksAtOnce) {
@@ -125,6 +133,101 @@ TEST(VerifyThread, IsNotWaitedForWhileItWaitsForOneOfTheTexts) {
   while (thread.is_behind()) {
     std::this_thread::sleep_for(1ms);
   }
+}
+
+// What is held on the heap.
+std::size_t held_bytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
+
+TEST(VerifyThread, DropsTheTextsOnceItHasEndedEarly) {
+  CpuSlots slots(1);
+  VerifyThread thread(verify_rules(testing::settings()), {}, "in", "out", slots);
+  // A move that takes for ever.
+  const std::string endless = std::string(kPrint) + "G1 X0 F0.001\nM400\n";
+  thread.push(endless, endless);
+  const std::string text(6U << 20U, ';');
+  const std::size_t before = held_bytes();
+  for (int i = 0; i < 20; ++i) {
+    thread.push(text, text);
+    const auto deadline = std::chrono::steady_clock::now() + 10s;
+    while (thread.is_behind() && std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(1ms);
+    }
+    ASSERT_FALSE(thread.is_behind());
+  }
+  EXPECT_LT(held_bytes(), before + 3 * text.size());
+  thread.end();
+  EXPECT_FALSE(thread.result().has_value());
+}
+
+TEST(TextQueue, HoldsNothingThatNobodyReads) {
+  CpuSlots slots(1);
+  TextQueue queue(slots);
+  queue.push(std::string(5U << 20U, ';'));
+  EXPECT_TRUE(queue.is_long());
+  queue.drop();
+  EXPECT_FALSE(queue.is_long());
+  queue.push(std::string(5U << 20U, ';'));
+  EXPECT_FALSE(queue.is_long());
+}
+
+// Cancelled from the beginning.
+class CancelledProgress final : public Progress {
+ public:
+  void update(std::string_view /*stage*/, double /*fraction*/) override {}
+  [[nodiscard]] bool cancelled() const override { return true; }
+};
+
+TEST(FdSink, SaysWhereItWasCancelledBeforeAllWasWritten) {
+  std::array<int, 2> pipe{};
+  ASSERT_EQ(::pipe2(pipe.data(), O_NONBLOCK), 0);
+  while (::write(pipe[1], "x", 1) == 1) {
+  }
+  CpuSlots slots(1);
+  const CpuSlot slot(slots);
+  Job job;
+  job.output_fd = pipe[1];
+  job.output_fd_kind = container::Kind::gzip;
+  const CancelledProgress progress;
+  FdSink sink(job, progress, slots);
+  EXPECT_FALSE(sink.finish());
+  EXPECT_EQ(sink.error(), 0);
+  ::close(pipe[0]);
+  ::close(pipe[1]);
+}
+
+// Cancelled for the reading thread, and for the other one when it asks the second time after its
+// piece was written.
+class CancelledInTheReader final : public Progress {
+ public:
+  void update(std::string_view /*stage*/, double /*fraction*/) override { is_written_ = true; }
+  [[nodiscard]] bool cancelled() const override {
+    return std::this_thread::get_id() != owner_ || (is_written_ && asked_since_++ > 0);
+  }
+
+ private:
+  std::thread::id owner_ = std::this_thread::get_id();
+  bool is_written_ = false;
+  mutable int asked_since_ = 0;
+};
+
+TEST(Compensate, IsNotDoneWhereItsInputEndedForBeingCancelled) {
+  const testing::JobFolder folder("");
+  std::array<int, 2> pipe{};
+  ASSERT_EQ(::pipe(pipe.data()), 0);
+  // There is more to come.
+  constexpr std::string_view kBegun = "G28\nM106 S9\n";
+  ASSERT_EQ(::write(pipe[1], kBegun.data(), kBegun.size()), std::ssize(kBegun));
+  Job job = folder.job();
+  job.input_fd = pipe[0];
+  CancelledInTheReader progress;
+  const Result<report::Report> report = compensate(job, progress);
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().message, "cancelled");
+  ::close(pipe[0]);
+  ::close(pipe[1]);
 }
 
 TEST(VerifyThread, EndsUnaskedWhenItIsNoLongerWanted) {

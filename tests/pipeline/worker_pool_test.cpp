@@ -217,6 +217,21 @@ TEST(WorkerPool, SurvivesTheDeathOfAnIdleWorker) {
   }
 }
 
+TEST(WorkerPool, HasAWindowUnderWayUntilTheDeathsOfItAreTold) {
+  Result<WorkerPool> pool =
+      WorkerPool::start(1, []() -> std::unique_ptr<compensate::Engine> { throw std::bad_alloc(); });
+  ASSERT_TRUE(pool.has_value());
+  // More than a socket takes: both deaths are noticed while it is sent.
+  compensate::AxisWindow large = window(kSolve);
+  large.reference_mm.resize(1'000'000);
+  pool->submit(7, large);
+  EXPECT_EQ(pool->under_way(), 1U);
+  const auto taken = take_all(*pool);
+  ASSERT_EQ(taken.size(), 1U);
+  ASSERT_FALSE(taken.at(7).has_value());
+  EXPECT_EQ(taken.at(7).error().message, "two solver processes died of it");
+}
+
 // As when the system runs out of memory: the window itself is all right.
 TEST(WorkerPool, SolvesAWindowAgainWhoseWorkerWasKilled) {
   WorkerPool pool = pool_of(1);

@@ -1,0 +1,31 @@
+#include "own_output.hpp"
+
+#include <string_view>
+
+#include "unflex/emit/emitter.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// ";unflex run" or ";unflex 1.2.3: …".
+bool is_own_comment(std::string_view content) {
+  if (!content.starts_with(emit::kComment)) {
+    return false;
+  }
+  content.remove_prefix(emit::kComment.size());
+  return content == " run" || content == " end" ||
+         (content.size() > 1 && content[0] == ' ' && content[1] >= '0' && content[1] <= '9');
+}
+
+}  // namespace
+
+Status check_as_sliced(const gcode::Line& line, const std::string& file) {
+  if (!is_own_comment(line.content())) {
+    return {};
+  }
+  return fail(ErrorKind::input, {file, line.number},
+              "this file was already compensated by unflex; give the file as it was sliced, and "
+              "let a slicer run unflex once");
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,86 @@
+"""The example of a printer file: printer_test.py UNFLEX EXAMPLES DOCS
+
+UNFLEX is the program, EXAMPLES the folder with the file, DOCS the one whose page has a table of all
+keys.
+"""
+
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+UNFLEX, EXAMPLES, DOCS = (os.path.abspath(path) for path in sys.argv[1:4])
+
+PRINT = "G28\nG90\nM83\nG1 X20 Y20 F6000\nG1 X40 Y20 E0.8 F3000\n"
+KEY = r"(# )?(\w+) = "
+MASS = re.compile(r"(# )?(mass_g|stiffness_n_mm|damping_n_s_mm) = ")
+MODAL = re.compile(r"(# )?(freq_hz|damping_ratio) = ")
+
+
+def text_of(folder, name):
+    with open(os.path.join(folder, name), encoding="utf-8") as file:
+        return file.read()
+
+
+def uncommented(lines):
+    """The lines with each key and section that is a comment put in force."""
+    return [re.sub(r"^# (?=\[[a-z.]+\]|\w+ = )", "", line) for line in lines]
+
+
+class PrinterFile(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.lines = text_of(EXAMPLES, "printer.toml").splitlines()
+
+    def settings(self, lines):
+        """The value of each key that the program takes from the lines."""
+        with tempfile.TemporaryDirectory() as folder:
+            for name, text in (("in.gcode", PRINT), ("printer.toml", "\n".join(lines))):
+                with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+                    file.write(text)
+            done = subprocess.run(
+                [UNFLEX, "inspect", "in.gcode", "--printer", "printer.toml", "--report", "-"],
+                cwd=folder, capture_output=True, text=True, check=False)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        return {key: row["value"] for key, row in json.loads(done.stdout)["printer"].items()}
+
+    def test_what_is_a_comment_is_the_default(self):
+        given = self.settings(self.lines)
+        shown = self.settings(uncommented([line for line in self.lines if not MASS.match(line)]))
+        self.assertEqual(given.keys(), shown.keys())
+        for key, value in given.items():
+            if isinstance(value, float):
+                # Some are rounded.
+                self.assertTrue(math.isclose(value, shown[key], rel_tol=0.01), (key, value))
+            else:
+                self.assertEqual(shown[key], value, key)
+
+    def test_the_mass_may_stand_for_the_frequency(self):
+        shown = self.settings(uncommented([line for line in self.lines if not MODAL.match(line)]))
+        for axis in "xy":
+            self.assertAlmostEqual(shown[f"dynamics.{axis}.freq_hz"], 45, places=1)
+            self.assertAlmostEqual(shown[f"dynamics.{axis}.damping_ratio"], 0.06, places=3)
+
+    def test_every_key_that_klipper_needs_is_there(self):
+        there = set()
+        section = ""
+        for line in self.lines:
+            if found := re.match(r"(?:# )?\[([a-z.]+)\]", line):
+                section = found.group(1)
+            elif found := re.match(KEY, line):
+                there.add(f"{section}.{found.group(2)}")
+        rows = re.findall(r"^\| `([\w.]+)` \|.*\| (.*) \|$", text_of(DOCS, "configuration.md"),
+                          re.MULTILINE)
+        needed = {key for key, meaning in rows
+                  if "Klipper" in meaning or not re.search(r"\b(Marlin|RRF)\b", meaning)}
+        self.assertGreater(len(needed), 40)
+        self.assertEqual(needed - there, set())
+        self.assertEqual(there - {key for key, _ in rows}, {".schema_version"})
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
