@@ -97,6 +97,7 @@ void Emitter::copy(const gcode::Event& event, std::string& out) {
   open_line_ = !event.line.text.ends_with('\n');
   newline_ = event.line.text.ends_with("\r\n") ? "\r\n" : "\n";
   planner::apply(*printer_.interpret(event.line).limits, limits_);
+  limits_known_ = limits_known_ && !event.may_set_limits;
 }
 
 void Emitter::follow_input(const gcode::Event& event) {

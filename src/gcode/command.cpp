@@ -364,6 +364,12 @@ bool Command::has(char a_letter) const {
                      [a_letter](const Word& word) { return word.letter == a_letter; });
 }
 
+bool Command::has_any(std::string_view letters) const {
+  return std::any_of(words.begin(), words.end(), [letters](const Word& word) {
+    return letters.find(word.letter) != std::string_view::npos;
+  });
+}
+
 std::optional<std::string> Command::parameter(std::string_view key) const {
   std::optional<std::string> found;
   ShellWords tokens(arguments);

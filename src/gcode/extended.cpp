@@ -84,7 +84,8 @@ void Interpreter::extended(Event& event) {
   if (name == "SET_INPUT_SHAPER") {
     return input_shaper(event);
   }
-  if (name == "EXCLUDE_OBJECT_START" || name == "EXCLUDE_OBJECT_END") {
+  // EXCLUDE_OBJECT may leave out all that follows of the object.
+  if (name == "EXCLUDE_OBJECT_START" || name == "EXCLUDE_OBJECT_END" || name == "EXCLUDE_OBJECT") {
     return object_label(event);
   }
   if (name == "TUNING_TOWER") {

@@ -86,6 +86,7 @@ void Event::reset() {
   dwell_s = 0.0;
   position_lost = false;
   may_jump = false;
+  may_set_limits = false;
   warnings.clear();
 }
 
@@ -148,6 +149,9 @@ void Interpreter::klipper_g_code(Event& event) {
   switch (command_.number) {
     case 0:
     case 1:
+      if (command_.has_any("ABCUVW")) {
+        return lose_position(event);  // steppers that MANUAL_STEPPER has made axes of
+      }
       return linear_move(event);
     case 2:
     case 3:
@@ -196,6 +200,12 @@ void Interpreter::klipper_m_code(Event& event) {
       return flow_factor(event);
     case 486:
       return object_label(event);
+    case 201:
+    case 203:
+    case 205:
+    case 566:
+      event.may_set_limits = true;
+      break;
     default:
       break;
   }
@@ -444,6 +454,9 @@ void Interpreter::lose_position(Event& event) {
   event.kind = EventKind::barrier;
   event.position_lost = true;
   state_.known.fill(false);
+  // Of another extruder, maybe.
+  pressure_advance_on_.reset();
+  state_.pressure_advance_s.reset();
   if (options_.firmware == Firmware::rrf) {
     lose_tool();  // a macro may select one
   }

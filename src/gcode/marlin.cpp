@@ -20,13 +20,8 @@ std::optional<double> whole(std::optional<double> value) {
   return value ? std::optional<double>(std::trunc(*value)) : std::nullopt;
 }
 
-bool has_any(const Command& command, std::string_view letters) {
-  return std::any_of(letters.begin(), letters.end(),
-                     [&](char letter) { return command.has(letter); });
-}
-
 // By a word of its own, not one of a second command that counts for nothing.
-bool sets_laser(const Command& command) { return command.has('S') && !has_any(command, "GMT"); }
+bool sets_laser(const Command& command) { return command.has('S') && !command.has_any("GMT"); }
 
 // Why a line may mean something else to a Marlin as it is usually built; empty if not.
 std::string_view doubt(std::string_view content, const Command& command) {
@@ -108,7 +103,7 @@ void Interpreter::marlin_g_code(Event& event) {
       return marlin_linear_move(event);
     case 2:
     case 3:
-      if (has_any(command_, "ABCUVW") || sets_laser(command_)) {
+      if (command_.has_any("ABCUVW") || sets_laser(command_)) {
         return lose_position(event);
       }
       return state_.plane == 17 ? arc_move(event, command_.number == 2)
@@ -179,6 +174,9 @@ void Interpreter::marlin_m_code(Event& event) {
     case 208:
     case 209:
       return marlin_retraction_settings(event);
+    case 217:
+      // tool/M217.cpp: Q primes, T changes to another extruder.
+      return command_.has_any("QT") ? lose_position(event) : void();
     case 220:
       return marlin_speed_factor(event);
     case 221:
@@ -202,11 +200,11 @@ void Interpreter::marlin_m_code(Event& event) {
 void Interpreter::marlin_linear_move(Event& event) {
   constexpr double kShortest_mm = 0.1;  // MIN_AUTORETRACT
   constexpr double kLongest_mm = 10.0;  // MAX_AUTORETRACT
-  if (has_any(command_, "ABCHIJKUVW") || sets_laser(command_)) {
+  if (command_.has_any("ABCHIJKUVW") || sets_laser(command_)) {
     return lose_position(event);  // further axes, a mixing extruder, or a laser's power
   }
   const std::optional<double> word = command_.value('E');
-  if (!state_.auto_retract || !word || has_any(command_, "XYZ")) {
+  if (!state_.auto_retract || !word || command_.has_any("XYZ")) {
     return linear_move(event);
   }
   const double scale = state_.filament_factor();
@@ -298,7 +296,7 @@ void Interpreter::marlin_flow_factor(Event& event) {
 
 // config/M200-M205.cpp, M200: a diameter switches volumes on, D0 and S0 switch them off.
 void Interpreter::marlin_volumetric(Event& event) {
-  if (!has_any(command_, "DS")) {
+  if (!command_.has_any("DS")) {
     return;
   }
   bool on = state_.volumetric;
@@ -355,6 +353,11 @@ void Interpreter::marlin_retraction_settings(Event& event) {
 void Interpreter::marlin_pressure_advance(Event& event) {
   constexpr double kMost = 10.0;
   const std::optional<double> k = command_.value('K');
+  if (command_.has_any("LST")) {  // another extruder, or another of its two values
+    event.kind = EventKind::barrier;
+    state_.pressure_advance_s.reset();
+    return;
+  }
   if (k && *k >= 0.0 && *k <= kMost && state_.pressure_advance_s != k) {
     state_.pressure_advance_s = k;
     event.kind = EventKind::barrier;

@@ -21,11 +21,8 @@ void Interpreter::firmware_retraction(Event& event, bool retract) {
   if (!options_.firmware_retraction) {
     return;
   }
-  if (!command_.words.empty()) {
-    event.kind = EventKind::barrier;  // "G10 S210 P0" sets a temperature in RepRapFirmware
-    return;
-  }
   if (state_.retracted == retract) {
+    event.kind = EventKind::barrier;  // unless a macro has done what was there to be done
     return;
   }
   state_.retracted = retract;
@@ -52,6 +49,8 @@ void Interpreter::firmware_retraction(Event& event, bool retract) {
 // lifted after the filament is drawn back and lowered before it is pushed on.
 void Interpreter::retraction_and_hop(Event& event, bool retract) {
   if (state_.retracted == retract) {
+    // Unless a macro has done what was there to be done, or the tool is another.
+    event.kind = EventKind::barrier;
     return;
   }
   state_.retracted = retract;

@@ -14,11 +14,6 @@
 namespace unflex::gcode {
 namespace {
 
-bool has_any(const Command& command, std::string_view letters) {
-  return std::any_of(letters.begin(), letters.end(),
-                     [&](char letter) { return command.has(letter); });
-}
-
 // Of words that come twice RepRapFirmware takes the first.
 bool repeats_a_word(const Command& command) {
   for (auto word = command.words.begin(); word != command.words.end(); ++word) {
@@ -158,9 +153,10 @@ void Interpreter::rrf_command(Event& event) {
                : not_understood(event, "two commands in one line, or a word given twice");
   }
   if (command_.subnumber > 0 && command_.letter != 'T') {
-    constexpr int kReducedAccelerations = 201;  // M201.1, for probing
-    const bool passive = is_m && (command_.number == kReducedAccelerations ||
-                                  rrf_m_code_effect(command_.number) == Effect::passive);
+    // GCodes2.cpp, HandleMcode: all other codes with a fraction are macros. M201.1 is for probing.
+    constexpr std::array kWithFraction = {36, 201, 586, 587};
+    const bool passive =
+        is_m && std::ranges::find(kWithFraction, command_.number) != kWithFraction.end();
     return passive ? void() : lose_position(event);
   }
   if (is_g) {
@@ -220,7 +216,7 @@ void Interpreter::rrf_g_code(Event& event) {
       return rrf_linear_move(event);
     case 2:
     case 3:
-      return state_.inverse_time || has_any(command_, "ABCDPSUVW")
+      return state_.inverse_time || command_.has_any("ABCDPSUVW")
                  ? lose_position(event)
                  : arc_move(event, command_.number == 2);
     case 4:
@@ -263,7 +259,7 @@ void Interpreter::rrf_m_code(Event& event) {
   switch (command_.number) {
     case 18:
     case 84:
-      return has_any(command_, "S") && !has_any(command_, "XYZE")
+      return command_.has_any("S") && !command_.has_any("XYZE")
                  ? static_cast<void>(event.kind = EventKind::barrier)  // S: a time-out
                  : lose_position(event);
     case 82:
@@ -327,10 +323,10 @@ void Interpreter::rrf_linear_move(Event& event) {
   if (state_.inverse_time) {
     return not_understood(event, "a move in inverse time mode (G93)");
   }
-  if (command_.value('H').value_or(0.0) != 0.0 || has_any(command_, "ABCDPRSUVW")) {
+  if (command_.value('H').value_or(0.0) != 0.0 || command_.has_any("ABCDPRSUVW")) {
     return lose_position(event);
   }
-  if (has_any(command_, "XYZ") || !command_.has('E')) {
+  if (command_.has_any("XYZ") || !command_.has('E')) {
     return linear_move(event);
   }
   const double speed_factor = state_.speed_factor;
@@ -344,10 +340,10 @@ void Interpreter::rrf_linear_move(Event& event) {
 
 // GCodes2.cpp, HandleGcode: with L, P, R, S or an axis it sets a tool or a workplace.
 void Interpreter::rrf_g10(Event& event) {
-  if (has_any(command_, "LXYZUVWABCD")) {
+  if (command_.has_any("LXYZUVWABCD")) {
     return lose_position(event);
   }
-  if (!has_any(command_, "PRS")) {
+  if (!command_.has_any("PRS")) {
     retraction_and_hop(event, true);
   }
 }
@@ -373,7 +369,7 @@ void Interpreter::rrf_dwell(Event& event) {
 // and that runs macros.
 void Interpreter::rrf_wait_for_heater(Event& event) {
   event.kind = EventKind::barrier;
-  if (has_any(command_, "RS") && tool_.value_or(-1) < 0) {
+  if (command_.has_any("RS") && tool_.value_or(-1) < 0) {
     lose_position(event);
     tool_ = to_int(command_.value('T').value_or(0.0));
   }

@@ -27,10 +27,6 @@ struct Traces {
   int headers = 0;
 };
 
-bool has_any(const gcode::Command& command, std::string_view letters) {
-  return std::ranges::any_of(letters, [&](char letter) { return command.has(letter); });
-}
-
 bool is_one_of(int number, const auto& codes) {
   return std::ranges::find(codes, number) != codes.end();
 }
@@ -43,7 +39,7 @@ bool is_rrf_setting(const gcode::Command& command) {
       return std::max(command.value('X').value_or(0.0), command.value('Y').value_or(0.0)) >
              kFasterThanAnyMarlin;
     case 208:
-      return has_any(command, "XYZ");
+      return command.has_any("XYZ");
     case 350:
       return command.has('I');
     case 569:
@@ -57,11 +53,11 @@ bool is_rrf_setting(const gcode::Command& command) {
 bool is_marlin_setting(const gcode::Command& command) {
   switch (command.number) {
     case 205:
-      return has_any(command, "BSTJ");
+      return command.has_any("BSTJ");
     case 569:
       return command.has('S') && !command.has('P');
     case 593:
-      return has_any(command, "XYD");
+      return command.has_any("XYD");
     default:
       return is_one_of(command.number, kMarlinCodes);
   }

@@ -106,6 +106,13 @@ TEST(Emitter, KeepsVelocityLimitsInsideARunAndRaisesThemAgainAtOnce) {
                   "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
+// M205 is a macro that sets the square corner velocity on many a printer.
+TEST(Emitter, SetsAllLimitsOfARunAgainAfterWhatMayBeAMacroOfLimits) {
+  EXPECT_THAT(from_first_run(kHead + "G1 X10 E1\nM205 X8 Y8\nG1 Y10 E1\nG4 P1\n"),
+              ElementsAre(";unflex run\n", kRaise, "~", "M205 X8 Y8\n", kRaise, "~", kEnd, kRestore,
+                          "G1 F6000\n", "G4 P1\n", kShaperOn));
+}
+
 TEST(Emitter, RestoresLimitsThatWereSetBeforeTheRun) {
   EXPECT_THAT(from_first_run("M204 S1234.5\n" + kHead + "G1 X10 E1\nG4 P1\n"),
               ::testing::Contains("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=1234.5 "

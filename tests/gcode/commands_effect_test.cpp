@@ -33,18 +33,18 @@ TEST_P(Passive, LetsTheMotionGoOn) {
 
 INSTANTIATE_TEST_SUITE_P(
     Commands, Passive,
-    ::testing::Values(
-        "", "; comment", "(comment)", "N5", "M73 P10 R5", "M82", "M104 S210", "M105", "M106 S255",
-        "M107", "M110 N0", "M115 U3.9.0", "M117 G28 now", "M118 A1 text", "M140 S60", "M141 S40",
-        "M201 X1000 Y1000", "M203 X200", "M205 X8 Y8", "M204 P500", "M566 X300 P1", "M569 P0 S1",
-        "M572 D0 S0.05", "M593 F0", "M862.3 P \"MK3S\"", "M862.1 P0.4", "M900 K0.05", "M906 X800",
-        "M907 E430", "M75", "M76", "M77", "M155 S2", "M250 C50", "M302 S0", "M355 S1",
-        "SET_FAN_SPEED FAN=a SPEED=.5", "SET_PIN PIN=a VALUE=1", "SET_LED LED=a RED=1",
-        "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210", "RESPOND MSG=\"G28\"",
-        "SET_PRINT_STATS_INFO CURRENT_LAYER=3", "EXCLUDE_OBJECT_DEFINE NAME=a",
-        "EXCLUDE_OBJECT NAME=a", "SET_DISPLAY_TEXT MSG=hi", "set_filament_sensor SENSOR=a ENABLE=0",
-        "SET_IDLE_TIMEOUT TIMEOUT=60", "SET_GCODE_VARIABLE MACRO=a VARIABLE=b VALUE=1",
-        "TURN_OFF_HEATERS", "SET_SERVO SERVO=a ANGLE=1", "SET_RETRACTION"));
+    ::testing::Values("", "; comment", "(comment)", "N5", "M73 P10 R5", "M82", "M104 S210", "M105",
+                      "M106 S255", "M107", "M110 N0", "M115 U3.9.0", "M117 G28 now", "M118 A1 text",
+                      "M140 S60", "M141 S40", "M201 X1000 Y1000", "M203 X200", "M205 X8 Y8",
+                      "M204 P500", "M566 X300 P1", "M569 P0 S1", "M593 F0", "M862.3 P \"MK3S\"",
+                      "M862.1 P0.4", "M906 X800", "M907 E430", "M75", "M76", "M77", "M155 S2",
+                      "M250 C50", "M302 S0", "M355 S1", "SET_FAN_SPEED FAN=a SPEED=.5",
+                      "SET_PIN PIN=a VALUE=1", "SET_LED LED=a RED=1",
+                      "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210", "RESPOND MSG=\"G28\"",
+                      "EXCLUDE_OBJECT_DEFINE NAME=a", "SET_DISPLAY_TEXT MSG=hi",
+                      "set_filament_sensor SENSOR=a ENABLE=0", "SET_IDLE_TIMEOUT TIMEOUT=60",
+                      "SET_GCODE_VARIABLE MACRO=a VARIABLE=b VALUE=1", "TURN_OFF_HEATERS",
+                      "SET_SERVO SERVO=a ANGLE=1", "SET_RETRACTION"));
 
 TEST_P(Stopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());
@@ -55,14 +55,14 @@ TEST_P(Stopping, FinishesAllMotionAndKeepsThePosition) {
   EXPECT_TRUE(session_.move("G1 X2").start_known);
 }
 
-INSTANTIATE_TEST_SUITE_P(Commands, Stopping,
-                         ::testing::Values("G4", "M400", "M109 S210", "M190 S60", "M191 S40",
-                                           "M116", "M17", "M119", "M300 S440 P50", "G92 X0", "G92",
-                                           "G10 P0 S210", "SET_INPUT_SHAPER TYPE=mzv",
-                                           "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=.04",
-                                           "SET_GCODE_OFFSET Z=0",
-                                           "TEMPERATURE_WAIT SENSOR=a MINIMUM=50",
-                                           "SET_TMC_CURRENT STEPPER=stepper_x CURRENT=1"));
+INSTANTIATE_TEST_SUITE_P(
+    Commands, Stopping,
+    ::testing::Values("M900 K0.05", "M572 D0 S0.05", "SET_PRINT_STATS_INFO CURRENT_LAYER=3", "G4",
+                      "M400", "M109 S210", "M190 S60", "M191 S40", "M116", "M17", "M119",
+                      "M300 S440 P50", "G92 X0", "G92", "G10 P0 S210", "SET_INPUT_SHAPER TYPE=mzv",
+                      "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=.04", "SET_GCODE_OFFSET Z=0",
+                      "TEMPERATURE_WAIT SENSOR=a MINIMUM=50",
+                      "SET_TMC_CURRENT STEPPER=stepper_x CURRENT=1"));
 
 TEST_P(Losing, LeavesTheMachineAnywhere) {
   const Event event = session_.read(GetParam());
@@ -72,15 +72,30 @@ TEST_P(Losing, LeavesTheMachineAnywhere) {
   EXPECT_FALSE(session_.move("G1 X2").start_known);
 }
 
-INSTANTIATE_TEST_SUITE_P(Commands, Losing,
-                         ::testing::Values("RESPOND TYPE=command MSG=\"action:pause\"", "G28",
-                                           "G28 W", "G29", "G80", "G32", "G30 X1 Y1", "G34",
-                                           "G1009", "G1.5 X3", "G5 X1 Y1 I1 J1 P1 Q1", "T0", "T12",
-                                           "Tx", "M0", "M1", "M25", "M226", "M600", "M601", "M18",
-                                           "M84", "M84 S5", "M42 P1 S1", "M112", "M999", "M109.1",
-                                           "X5", "PRINT_START BED=60", "print_end", "PAUSE",
-                                           "BED_MESH_PROFILE LOAD=default",
-                                           "SET_GCODE_OFFSET Z=1 MOVE=1"));
+INSTANTIATE_TEST_SUITE_P(
+    Commands, Losing,
+    ::testing::Values("G1 X5 A2", "G1 A9 F600", "RESPOND TYPE=command MSG=\"action:pause\"", "G28",
+                      "G28 W", "G29", "G80", "G32", "G30 X1 Y1", "G34", "G1009", "G1.5 X3",
+                      "G5 X1 Y1 I1 J1 P1 Q1", "T0", "T12", "Tx", "M0", "M1", "M25", "M226", "M600",
+                      "M601", "M18", "M84", "M84 S5", "M42 P1 S1", "M112", "M999", "M109.1", "X5",
+                      "PRINT_START BED=60", "print_end", "PAUSE", "BED_MESH_PROFILE LOAD=default",
+                      "SET_GCODE_OFFSET Z=1 MOVE=1"));
+
+TEST(ExcludeObject, MayLeaveOutWhatFollows) {
+  Session session;
+  session.read("G1 X1 Y1 Z1");
+  EXPECT_TRUE(session.read("EXCLUDE_OBJECT NAME=a").may_jump);
+  EXPECT_FALSE(session.move("G1 X2").start_known);
+}
+
+// kinematics/extruder.py, _set_pressure_advance: from none to some is another smoothing time.
+TEST(PressureAdvance, OfAnotherExtruderMayStop) {
+  Session session;
+  EXPECT_EQ(session.read("SET_PRESSURE_ADVANCE ADVANCE=.05").kind, EventKind::barrier);
+  EXPECT_EQ(session.read("SET_PRESSURE_ADVANCE ADVANCE=.04").kind, EventKind::passive);
+  session.read("T1");
+  EXPECT_EQ(session.read("SET_PRESSURE_ADVANCE ADVANCE=.04").kind, EventKind::barrier);
+}
 
 TEST(TuningTower, LeavesTheRestAsItIs) {
   Session session;

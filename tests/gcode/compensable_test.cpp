@@ -15,7 +15,8 @@ TEST(Compensable, AreMovesInThePlane) {
   EXPECT_TRUE(compensable(by(1, 0, 0, 0), Firmware::klipper)) << "travel";
   EXPECT_TRUE(compensable(by(0, -1, 0, 0.1), Firmware::klipper)) << "extrusion";
   EXPECT_TRUE(compensable(by(3, 4, 0.099, 0.1), Firmware::klipper)) << "a spiral vase";
-  EXPECT_TRUE(compensable(by(1, 0, 0, -1e-12), Firmware::klipper)) << "round-off of the running filament sum";
+  EXPECT_TRUE(compensable(by(1, 0, 0, -1e-12), Firmware::klipper))
+      << "round-off of the running filament sum";
   EXPECT_EQ(kept_reason(by(1, 0, 0, 0), Firmware::klipper), "");
 }
 

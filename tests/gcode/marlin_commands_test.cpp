@@ -37,8 +37,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "M140 S60", "M141 S40", "M155 S2", "M201", "M203", "M204", "M205", "M207 S2",
                       "M211 S0", "M220 S90", "M221 S95", "M300 S440 P50", "M302 S0", "M412 S1",
                       "M569 S1 X", "M593 D0.1", "M862.3 P \"MK3S\"", "M900", "M906 X800",
-                      "M907 E430", "M75", "M77", "M84 S30", "M18 S0", "G10", "G11", "G92", "G92 E0",
-                      "G17", "G21", "G90", "G91", "G1 F0", "M851 Z-1.2", "M200 D0"));
+                      "M907 E430", "M75", "M77", "M84 S30", "M18 S0", "G92", "G92 E0", "G17", "G21",
+                      "G90", "G91", "G1 F0", "M851 Z-1.2", "M200 D0"));
 
 TEST_P(MarlinStopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());
@@ -51,7 +51,8 @@ TEST_P(MarlinStopping, FinishesAllMotionAndKeepsThePosition) {
 INSTANTIATE_TEST_SUITE_P(Commands, MarlinStopping,
                          ::testing::Values("G4", "G4 P100", "M400", "M109 S210", "M190 S60",
                                            "M191 S40", "M17", "G60", "M3 S5", "M5", "M7", "G92 X0",
-                                           "M593 F40", "M593 X F0", "M900 K0.05", "M303 E0 S210"));
+                                           "M593 F40", "M593 X F0", "M900 K0.05", "M900 T1 K0.04",
+                                           "G10", "G11", "M303 E0 S210"));
 
 TEST_P(MarlinLosing, LeavesTheMachineAnywhere) {
   const Event event = session_.read(GetParam());
@@ -65,11 +66,11 @@ INSTANTIATE_TEST_SUITE_P(Commands, MarlinLosing,
                          ::testing::Values("G28", "G28 X", "G29", "G80", "G27", "G12", "G5 X1 Y1",
                                            "G6", "G30", "G34", "G38.2 Z0", "G53", "G54", "G59.2",
                                            "G61", "G92.1", "M0", "M1", "M25", "M226 P2", "M48",
-                                           "M500", "M118 A1 action:pause", "G1 X5 S200", "M84",
-                                           "M18 X", "M112", "M125", "M206 X1", "M410", "M420 S1",
-                                           "M428", "M524", "M600", "M605 S1", "M701", "M810",
-                                           "M999", "M1234", "T0", "T1", "X5", "PRINT_START BED=60",
-                                           "@pause", "G1 U5", "G1 X5 A1"));
+                                           "M500", "M217 Q", "M118 A1 action:pause", "G1 X5 S200",
+                                           "M84", "M18 X", "M112", "M125", "M206 X1", "M410",
+                                           "M420 S1", "M428", "M524", "M600", "M605 S1", "M701",
+                                           "M810", "M999", "M1234", "T0", "T1", "X5",
+                                           "PRINT_START BED=60", "@pause", "G1 U5", "G1 X5 A1"));
 
 TEST_P(MarlinDoubtful, PassesAsABarrierWithAWarning) {
   const Event event = session_.read(GetParam());
@@ -88,6 +89,15 @@ TEST(MarlinTool, InUseKeepsThePosition) {
   session.read("T0\nG1 X1 Y1 Z1");
   EXPECT_FALSE(session.read("T0").position_lost);
   EXPECT_TRUE(session.read("T1").position_lost);
+}
+
+TEST(MarlinTool, HasItsOwnPressureAdvance) {
+  Session session(default_options(Firmware::marlin));
+  session.read("T0\nM900 K0.05\nT1");
+  EXPECT_EQ(session.read("M900 K0.05").kind, EventKind::barrier);
+  EXPECT_EQ(session.read("M900 K0.05").kind, EventKind::passive);
+  session.read("M900 T0 K0.04");
+  EXPECT_EQ(session.read("M900 K0.05").kind, EventKind::barrier) << "of the other one, maybe";
 }
 
 TEST(MarlinModes, AreSetWhateverStandsInParentheses) {

@@ -161,7 +161,7 @@ TEST(MarlinRetraction, IgnoresFlowAndSpeedFactorsAndKeepsTheReading) {
   const Segment back = session.move("G10");
   EXPECT_DOUBLE_EQ(back.delta(E), -2.0);
   EXPECT_DOUBLE_EQ(back.feed_mm_s, 30.0);
-  EXPECT_EQ(session.read("G10").kind, EventKind::passive) << "once only";
+  EXPECT_EQ(session.read("G10").kind, EventKind::barrier) << "once only";
   const Segment on = session.move("G11");
   EXPECT_DOUBLE_EQ(on.delta(E), 2.5);
   EXPECT_DOUBLE_EQ(on.feed_mm_s, 10.0);

@@ -97,7 +97,7 @@ TEST(Moves, ThatCannotBeReadStopAndLoseThePosition) {
 
 TEST(Moves, IgnoreWordsOfOtherAxes) {
   Session session;
-  EXPECT_THAT(session.move("G1 X1 A5 B S2 P").end_mm, ElementsAre(1, 0, 0, 0));
+  EXPECT_THAT(session.move("G1 X1 H5 D S2 P").end_mm, ElementsAre(1, 0, 0, 0));
 }
 
 // Every piece starts where the one before ended, on the circle, and the last ends at the target.

@@ -38,8 +38,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "M141 S40", "M201", "M203", "M204", "M205", "M566", "M207 S2", "M220", "M221",
                       "M220 S90", "M221 S95", "M280 P0 S90", "M290 S0.05", "M291 P\"hi\" S1",
                       "M300 S440 P50", "M42 P1 S1", "M568 P0 S210", "M591 D0", "M593 H1",
-                      "G10 P0 S210", "G10 R150 S200", "G11", "G31 P500", "G92", "G92 E0", "G17",
-                      "G20", "G21", "G90", "G91", "G94", "M121", "M201.1 X100", "var x = 3",
+                      "G10 P0 S210", "G10 R150 S200", "G31 P500", "G92", "G92 E0", "G17", "G20",
+                      "G21", "G90", "G91", "G94", "M121", "M201.1 X100", "var x = 3",
                       "global y = {1+2}", "set var.x = 4", "echo \"G28\"",
                       "M104 S{global.temperature}", "M117 {state.status}", "M200",
                       "M106 S1 M104 S210", "G21 G90 M83", "M82 M83"));
@@ -55,10 +55,11 @@ TEST_P(RrfStopping, FinishesAllMotionAndKeepsThePosition) {
 INSTANTIATE_TEST_SUITE_P(Commands, RrfStopping,
                          ::testing::Values("G4", "G4 P100", "M400", "M109 S210", "M109", "M116",
                                            "M190 S60", "M191 S40", "M17", "M84 S5", "G92 X0", "G18",
-                                           "T0", "M572 D0 S0.05", "M593 P\"none\"", "M593 F40",
-                                           "M593 L0.2", "M120", "G60 S1", "M302 P1", "M569 P0 S1",
-                                           "M574 X1", "M150 R255", "M906 X800", "M913 X50",
-                                           "M577 P1", "M190 S{global.bed}", "M104 S210 M400"));
+                                           "T0", "G11", "M572 D0 S0.05", "M593 P\"none\"",
+                                           "M593 F40", "M593 L0.2", "M120", "G60 S1", "M302 P1",
+                                           "M569 P0 S1", "M574 X1", "M150 R255", "M906 X800",
+                                           "M913 X50", "M577 P1", "M190 S{global.bed}",
+                                           "M104 S210 M400"));
 
 TEST_P(RrfLosing, LeavesTheMachineAnywhere) {
   const Event event = session_.read(GetParam());
@@ -76,10 +77,11 @@ INSTANTIATE_TEST_SUITE_P(
                       "M206 X1", "M226", "M291 P\"go?\" S2", "M375", "M401", "M402", "M451", "M561",
                       "M563 P0", "M579 X2", "M584 X0", "M585 X", "M596 P1", "M600", "M601", "M606",
                       "M665 L200", "M669 K0", "M701 S\"PLA\"", "M702", "M703", "M28 \"x\"",
-                      "M900 K0.1", "M862.3 P\"MK3S\"", "M999", "M1234", "T1", "T-1", "T{var.tool}",
-                      "G1 H1 X-300", "G1 R2 X0", "G1 U5", "START_PRINT BED=60", "if true",
-                      "while iterations < 3", "abort", "else", "G1 X{var.x}",
-                      "var before = move.axes[0].acceleration", "G1 X5 S1", "G1 X5 P1"));
+                      "M900 K0.1", "M862.3 P\"MK3S\"", "M999", "M1234", "M106.1", "M558.1", "T1",
+                      "T-1", "T{var.tool}", "G1 H1 X-300", "G1 R2 X0", "G1 U5",
+                      "START_PRINT BED=60", "if true", "while iterations < 3", "abort", "else",
+                      "G1 X{var.x}", "var before = move.axes[0].acceleration", "G1 X5 S1",
+                      "G1 X5 P1"));
 
 TEST_P(RrfDoubtful, PassesAsABarrierWithAWarning) {
   const Event event = session_.read(GetParam());

@@ -49,6 +49,8 @@ struct Command {
   [[nodiscard]] std::optional<double> value(char a_letter) const;
   // Whether a word with this letter is there, with or without a value.
   [[nodiscard]] bool has(char a_letter) const;
+  // The same of any of several letters.
+  [[nodiscard]] bool has_any(std::string_view letters) const;
   // extended: the value of KEY=VALUE, key in upper case, shell-style quotes taken off.
   [[nodiscard]] std::optional<std::string> parameter(std::string_view key) const;
 };

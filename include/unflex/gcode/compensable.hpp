@@ -13,8 +13,8 @@ namespace unflex::gcode {
 inline constexpr double kMaxSlope = 0.02;
 
 // Whether unflex may replace this motion: it starts at a known place, moves in X or Y and hardly in
-// Z. Klipper limits one that pulls filament back by its extruder's own acceleration, which no G-code
-// raises (kinematics/extruder.py, check_move): there it stays.
+// Z. Klipper limits one that pulls filament back by its extruder's own acceleration, which no
+// G-code raises (kinematics/extruder.py, check_move): there it stays.
 [[nodiscard]] bool compensable(const Segment& segment, Firmware firmware);
 
 // The same for a whole line: a move all of whose segments are compensable. A line is rewritten as a

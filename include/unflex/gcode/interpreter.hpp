@@ -86,6 +86,8 @@ struct Event {
   bool position_lost = false;
   // barrier: the label of an object; if that was cancelled, the next motion starts elsewhere.
   bool may_jump = false;
+  // Klipper's macros may make limits of it (M205), others than those known.
+  bool may_set_limits = false;
   std::vector<std::string> warnings;  // remarks for the user about this line
 
   // As before it was interpreted; keeps the line and the storage.

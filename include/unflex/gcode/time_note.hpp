@@ -8,8 +8,8 @@ namespace unflex::gcode {
 
 // The line (without its ending) with every duration in it multiplied by `factor`: minutes in M73
 // R S C D, `;TIME:` and `;TIME_ELAPSED:` (Cura), `; estimated printing time (…) = 1h 2m 3s`
-// (PrusaSlicer, SuperSlicer), `; total estimated time: 2m 3s` (OrcaSlicer, Bambu Studio). Rounded to
-// the digits that stand there. Any other line, and one with a checksum, comes back as it is.
+// (PrusaSlicer, SuperSlicer), `; total estimated time: 2m 3s` (OrcaSlicer, Bambu Studio). Rounded
+// to the digits that stand there. Any other line, and one with a checksum, comes back as it is.
 [[nodiscard]] std::string with_times_scaled(std::string_view line, double factor);
 
 // Whether the lines are equal, or such lines that differ in nothing but durations.
