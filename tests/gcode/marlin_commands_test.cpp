@@ -37,8 +37,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "M140 S60", "M141 S40", "M155 S2", "M201", "M203", "M204", "M205", "M207 S2",
                       "M211 S0", "M220 S90", "M221 S95", "M300 S440 P50", "M302 S0", "M412 S1",
                       "M569 S1 X", "M593 D0.1", "M862.3 P \"MK3S\"", "M900", "M906 X800",
-                      "M907 E430", "M75", "M77", "M84 S30", "M18 S0", "G92", "G92 E0", "G17", "G21",
-                      "G90", "G91", "G1 F0", "M851 Z-1.2", "M200 D0"));
+                      "M907 E430", "M75", "M77", "M84 S30", "M18 S0", "G10", "G11", "G92", "G92 E0",
+                      "G17", "G21", "G90", "G91", "G1 F0", "M851 Z-1.2", "M200 D0"));
 
 TEST_P(MarlinStopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());
@@ -52,7 +52,7 @@ INSTANTIATE_TEST_SUITE_P(Commands, MarlinStopping,
                          ::testing::Values("G4", "G4 P100", "M400", "M109 S210", "M190 S60",
                                            "M191 S40", "M17", "G60", "M3 S5", "M5", "M7", "G92 X0",
                                            "M593 F40", "M593 X F0", "M900 K0.05", "M900 T1 K0.04",
-                                           "G10", "G11", "M303 E0 S210"));
+                                           "M303 E0 S210"));
 
 TEST_P(MarlinLosing, LeavesTheMachineAnywhere) {
   const Event event = session_.read(GetParam());
