@@ -32,6 +32,13 @@ bool same_modes(const ModalState& a, const ModalState& b) {
          a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper == b.shaper;
 }
 
+// "Xnan" names none: to Klipper it is an X without a number.
+bool names_further_axis(const Command& command) {
+  return std::ranges::any_of(command.words, [](const Word& word) {
+    return word.value && std::string_view("ABCUVW").find(word.letter) != std::string_view::npos;
+  });
+}
+
 }  // namespace
 
 InterpreterOptions default_options(Firmware firmware) {
@@ -149,7 +156,7 @@ void Interpreter::klipper_g_code(Event& event) {
   switch (command_.number) {
     case 0:
     case 1:
-      if (command_.has_any("ABCUVW")) {
+      if (names_further_axis(command_)) {
         return lose_position(event);  // steppers that MANUAL_STEPPER has made axes of
       }
       return linear_move(event);
