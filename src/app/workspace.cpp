@@ -62,13 +62,15 @@ Status spool(const RunConfig& config, Workspace& space) {
   if (config.command == Command::compensate) {
     return space.input.make_readable();
   }
-  if (Status copied = space.input.make_seekable(); !copied || !space.compensated) {
+  if (Status copied = space.input.make_seekable(); !copied) {
     return copied;
   }
-  if (Status copied = space.compensated->make_seekable(); !copied) {
-    return copied;
-  }
-  if (space.compensated->kind() == container::Kind::bgcode &&
+  return space.compensated ? space.compensated->make_seekable() : Status{};
+}
+
+// Of a binary print and a text the metadata stand in different places.
+Status check_kinds(const RunConfig& config, const Workspace& space) {
+  if (space.compensated && space.compensated->kind() == container::Kind::bgcode &&
       space.input.kind() != container::Kind::bgcode) {
     return fail(
         ErrorKind::usage, {config.output, 0},
@@ -117,6 +119,7 @@ Result<Workspace> prepare(const RunConfig& config) {
       check_distinct(config)
           .and_then([&] { return open_outputs(config, space); })
           .and_then([&] { return spool(config, space); })
+          .and_then([&] { return check_kinds(config, space); })
           .and_then([&] { return load_settings(config, space.input); })
           .map([&](machine::Settings settings) { space.settings = std::move(settings); });
   if (!ready) {

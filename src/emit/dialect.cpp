@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace unflex::emit {
@@ -17,22 +18,34 @@ using planner::Limits;
 constexpr double kMinute_s = 60.0;
 constexpr double kMicroseconds = 1e6;
 
-// Whose a limit is. What a run leaves as the file has it is never set to what nobody has said.
-enum class Of { run, file };
-
-constexpr std::array kWithoutZ = {Of::run, Of::run, Of::file, Of::run};
-constexpr std::array kXAndY = {Of::run, Of::run, Of::file, Of::file};
+// Unlike any limit that is wanted.
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr std::array kUnknownAxes = {kUnknown, kUnknown, kUnknown, kUnknown};
+constexpr Limits kUnknownLimits = {.max_velocity_mm_s = kUnknown,
+                                   .max_accel_mm_s2 = kUnknown,
+                                   .square_corner_velocity_mm_s = kUnknown,
+                                   .minimum_cruise_ratio = kUnknown,
+                                   .axis_max_velocity_mm_s = kUnknownAxes,
+                                   .axis_max_accel_mm_s2 = kUnknownAxes,
+                                   .axis_jerk_mm_s = kUnknownAxes,
+                                   .print_accel_mm_s2 = kUnknown,
+                                   .travel_accel_mm_s2 = kUnknown,
+                                   .retract_accel_mm_s2 = kUnknown,
+                                   .junction_deviation_mm = kUnknown,
+                                   .min_velocity_mm_s = kUnknown,
+                                   .min_travel_velocity_mm_s = kUnknown,
+                                   .min_segment_time_s = kUnknown,
+                                   .min_movement_velocity_mm_s = kUnknown,
+                                   .jerk_policy = -1};
 
 // One command with those of its words that have to be sent.
 class CommandLine {
  public:
-  // all: what a run sets, whatever it was.
-  CommandLine(std::string_view command, bool all) : text_(command), all_(all) {}
+  explicit CommandLine(std::string_view command) : text_(command) {}
 
   // Word and value without anything between, as in X1000; or with it, as in ACCEL=1000.
-  void word(std::string_view name, double wanted, double current, double factor = 1.0,
-            Of of = Of::run) {
-    if (wanted != current || (all_ && of == Of::run)) {
+  void word(std::string_view name, double wanted, double current, double factor = 1.0) {
+    if (wanted != current) {
       // Twelve digits: 0.1 · 60 is 6, not 6.000000000000001.
       text_ += fmt::format(" {}{:.12g}", name, wanted * factor);
       empty_ = false;
@@ -40,10 +53,10 @@ class CommandLine {
   }
 
   void axes(const std::array<double, 4>& wanted, const std::array<double, 4>& current,
-            const std::array<Of, 4>& of, double factor = 1.0) {
+            double factor = 1.0) {
     constexpr std::array<std::string_view, 4> kNames = {"X", "Y", "Z", "E"};
     for (std::size_t axis = 0; axis < kNames.size(); ++axis) {
-      word(kNames[axis], wanted[axis], current[axis], factor, of[axis]);
+      word(kNames[axis], wanted[axis], current[axis], factor);
     }
   }
 
@@ -55,13 +68,11 @@ class CommandLine {
 
  private:
   std::string text_;
-  bool all_;
   bool empty_ = true;
 };
 
-void klipper(const Limits& wanted, const Limits& current, bool all,
-             std::vector<std::string>& lines) {
-  CommandLine line("SET_VELOCITY_LIMIT", all);
+void klipper(const Limits& wanted, const Limits& current, std::vector<std::string>& lines) {
+  CommandLine line("SET_VELOCITY_LIMIT");
   line.word("VELOCITY=", wanted.max_velocity_mm_s, current.max_velocity_mm_s);
   line.word("ACCEL=", wanted.max_accel_mm_s2, current.max_accel_mm_s2);
   line.word("SQUARE_CORNER_VELOCITY=", wanted.square_corner_velocity_mm_s,
@@ -70,22 +81,22 @@ void klipper(const Limits& wanted, const Limits& current, bool all,
   line.finish(lines);
 }
 
-void marlin(const Limits& wanted, const Limits& current, bool all, bool classic_jerk,
+void marlin(const Limits& wanted, const Limits& current, bool classic_jerk,
             std::vector<std::string>& lines) {
-  CommandLine accel("M201", all);
-  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2, kWithoutZ);
+  CommandLine accel("M201");
+  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2);
   accel.finish(lines);
-  CommandLine velocity("M203", all);
-  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s, kXAndY);
+  CommandLine velocity("M203");
+  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s);
   velocity.finish(lines);
-  CommandLine used("M204", all);
+  CommandLine used("M204");
   used.word("P", wanted.print_accel_mm_s2, current.print_accel_mm_s2);
-  used.word("R", wanted.retract_accel_mm_s2, current.retract_accel_mm_s2, 1.0, Of::file);
+  used.word("R", wanted.retract_accel_mm_s2, current.retract_accel_mm_s2);
   used.word("T", wanted.travel_accel_mm_s2, current.travel_accel_mm_s2);
   used.finish(lines);
-  CommandLine advanced("M205", all);
+  CommandLine advanced("M205");
   if (classic_jerk) {
-    advanced.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s, kWithoutZ);
+    advanced.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s);
   } else {
     advanced.word("J", wanted.junction_deviation_mm, current.junction_deviation_mm);
   }
@@ -95,21 +106,21 @@ void marlin(const Limits& wanted, const Limits& current, bool all, bool classic_
   advanced.finish(lines);
 }
 
-void rrf(const Limits& wanted, const Limits& current, bool all, std::vector<std::string>& lines) {
-  CommandLine accel("M201", all);
-  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2, kWithoutZ);
+void rrf(const Limits& wanted, const Limits& current, std::vector<std::string>& lines) {
+  CommandLine accel("M201");
+  accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2);
   accel.finish(lines);
-  CommandLine velocity("M203", all);
-  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s, kXAndY, kMinute_s);
+  CommandLine velocity("M203");
+  velocity.axes(wanted.axis_max_velocity_mm_s, current.axis_max_velocity_mm_s, kMinute_s);
   velocity.word("I", wanted.min_movement_velocity_mm_s, current.min_movement_velocity_mm_s,
                 kMinute_s);
   velocity.finish(lines);
-  CommandLine used("M204", all);
+  CommandLine used("M204");
   used.word("P", wanted.print_accel_mm_s2, current.print_accel_mm_s2);
   used.word("T", wanted.travel_accel_mm_s2, current.travel_accel_mm_s2);
   used.finish(lines);
-  CommandLine jerk("M566", all);
-  jerk.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s, kWithoutZ, kMinute_s);
+  CommandLine jerk("M566");
+  jerk.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s, kMinute_s);
   jerk.word("P", wanted.jerk_policy, current.jerk_policy);
   jerk.finish(lines);
 }
@@ -165,18 +176,22 @@ Limits limits_in_run(Firmware firmware, const Limits& file, Limits raised) {
   return raised;
 }
 
+Limits unknown_to_run(Firmware firmware, const Limits& file) {
+  return limits_in_run(firmware, file, kUnknownLimits);
+}
+
 std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, const Limits& wanted,
-                                     const Limits& current, bool known) {
+                                     const Limits& current) {
   std::vector<std::string> lines;
   switch (config.firmware) {
     case Firmware::klipper:
-      klipper(wanted, current, !known, lines);
+      klipper(wanted, current, lines);
       break;
     case Firmware::marlin:
-      marlin(wanted, current, !known, config.classic_jerk, lines);
+      marlin(wanted, current, config.classic_jerk, lines);
       break;
     case Firmware::rrf:
-      rrf(wanted, current, !known, lines);
+      rrf(wanted, current, lines);
       break;
   }
   return lines;

@@ -18,11 +18,14 @@ namespace unflex::emit {
 [[nodiscard]] planner::Limits limits_in_run(Firmware firmware, const planner::Limits& file,
                                             planner::Limits raised);
 
-// The lines, without their endings, that put `wanted` in force: what differs from `current`, and
-// unless that is `known` all that a run sets.
+// Where a macro may have set limits: what a run sets is unlike any limits, what it leaves to the
+// file is as the file has it, so as not to be set to what nobody has said.
+[[nodiscard]] planner::Limits unknown_to_run(Firmware firmware, const planner::Limits& file);
+
+// The lines, without their endings, that put `wanted` in force: what differs from `current`.
 [[nodiscard]] std::vector<std::string> limit_lines(const planner::FirmwareConfig& config,
                                                    const planner::Limits& wanted,
-                                                   const planner::Limits& current, bool known);
+                                                   const planner::Limits& current);
 
 // The firmware's own input shaping.
 struct Shaper {

@@ -215,10 +215,8 @@ void Emitter::set_run_modes(std::string& out) {
 // Where the file's own reading is known, and so put back after the run.
 void Emitter::keep_reading_of_e_small(std::string& out) {
   const gcode::ModalState& state = printer_.state();
-  const double reading_mm =
-      std::abs(state.position_mm[E] - state.base_mm[E]) / state.filament_factor();
   if (options_.fixed.firmware == Firmware::marlin && input_.state().known[E] && state.known[E] &&
-      reading_mm > kMostReadingOfE_mm) {
+      std::abs(state.e_reading()) > kMostReadingOfE_mm) {
     write("G92 E0", out);
   }
 }
@@ -279,7 +277,9 @@ void Emitter::restore_modes(std::string& out) {
 }
 
 void Emitter::set_limits(const planner::Limits& limits, std::string& out) {
-  for (const std::string& text : limit_lines(options_.fixed, limits, limits_, limits_known_)) {
+  const planner::Limits current =
+      limits_known_ ? limits_ : unknown_to_run(options_.fixed.firmware, limits_);
+  for (const std::string& text : limit_lines(options_.fixed, limits, current)) {
     write(text, out);
   }
   limits_known_ = true;

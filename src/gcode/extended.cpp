@@ -91,8 +91,8 @@ void Interpreter::extended(Event& event) {
   if (name == "TUNING_TOWER") {
     return uncertain_modes(event, "TUNING_TOWER sets what it tunes with every new Z");
   }
-  if (name == "RESPOND" && command_.arguments.find("action:") != std::string_view::npos) {
-    return lose_position(event);  // to the host, which may move the machine
+  if (name == "RESPOND" && asks_host_to_act(command_)) {
+    return lose_position(event);
   }
   switch (extended_effect(name)) {
     case Effect::passive:

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "unflex/core/firmware.hpp"
+#include "unflex/gcode/command.hpp"
 
 namespace unflex::gcode {
 
@@ -14,6 +15,12 @@ enum class Effect {
   stop,     // all motion is finished first; position and modes stay
   unknown,  // may move the machine or change its modes: homing, macros, tool changes
 };
+
+// "M118 A1 action:pause", "RESPOND TYPE=command MSG=action:pause": the host may move the machine,
+// and by the file's limits.
+[[nodiscard]] inline bool asks_host_to_act(const Command& command) {
+  return command.arguments.find("action:") != std::string_view::npos;
+}
 
 // What an M-code without a handler of its own does.
 [[nodiscard]] Effect m_code_effect(Firmware firmware, int number);

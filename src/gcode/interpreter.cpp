@@ -263,7 +263,7 @@ void Interpreter::dwell(Event& event) {
 void Interpreter::home(Event& event) {
   event.kind = EventKind::barrier;
   event.position_lost = true;
-  const bool some_named = command_.has('X') || command_.has('Y') || command_.has('Z');
+  const bool some_named = command_.has_any("XYZ");
   for (const Axis axis : {X, Y, Z}) {
     state_.known[axis] = false;
     if (!some_named || command_.has(kAxisLetters[axis])) {
@@ -340,7 +340,7 @@ void Interpreter::flow_factor(Event& event) {
 
 // The zero of E moves so that its reading stays (Klipper: gcode_move.py, cmd_M221).
 void Interpreter::set_flow_factor(double factor) {
-  const double reading = (state_.position_mm[E] - state_.base_mm[E]) / state_.filament_factor();
+  const double reading = state_.e_reading();
   state_.flow_factor = factor;
   state_.base_mm[E] = state_.position_mm[E] - reading * state_.filament_factor();
 }
@@ -386,7 +386,7 @@ void Interpreter::set_flow_of(std::optional<double> tool, double factor) {
 
 // The same for M200.
 void Interpreter::set_volumetric(bool on, double filament_diameter_mm) {
-  const double reading = (state_.position_mm[E] - state_.base_mm[E]) / state_.filament_factor();
+  const double reading = state_.e_reading();
   state_.volumetric = on;
   state_.filament_diameter_mm = filament_diameter_mm;
   state_.base_mm[E] = state_.position_mm[E] - reading * state_.filament_factor();
@@ -447,8 +447,11 @@ void Interpreter::uncertain_modes(Event& event, std::string_view cause) {
   }
 }
 
-void Interpreter::may_have_happened(Event& event, const Interpreter& trial, const Event& tried,
-                                    std::string_view cause) {
+void Interpreter::maybe(Event& event, void (Interpreter::*carry_out)(Event&),
+                        std::string_view cause) {
+  Interpreter trial = *this;
+  Event tried;
+  (trial.*carry_out)(tried);
   if (!same_modes(state_, trial.state_) || tried.kind == EventKind::limits ||
       trial.modes_uncertain_ != modes_uncertain_) {
     return uncertain_modes(event, cause);

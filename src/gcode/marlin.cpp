@@ -67,12 +67,8 @@ void Interpreter::marlin(Event& event, std::string_view content) {
   marlin_command(event);
 }
 
-// What the line would do is tried on a copy.
 void Interpreter::marlin_doubtful_line(Event& event, std::string_view problem) {
-  Interpreter trial = *this;
-  Event tried;
-  trial.marlin_command(tried);
-  may_have_happened(event, trial, tried, problem);
+  maybe(event, &Interpreter::marlin_command, problem);
   if (event.warnings.empty()) {
     not_understood(event, problem);
   }
@@ -155,9 +151,7 @@ void Interpreter::marlin_m_code(Event& event) {
     case 92:
       return steps_per_mm(event);
     case 118:
-      // "A1 action:pause": the host may move the machine, from the file's limits.
-      return command_.arguments.find("action:") == std::string_view::npos ? void()
-                                                                          : lose_position(event);
+      return asks_host_to_act(command_) ? lose_position(event) : other_m_code(event);
     case 200:
       return marlin_volumetric(event);
     case 201:
@@ -176,7 +170,7 @@ void Interpreter::marlin_m_code(Event& event) {
       return marlin_retraction_settings(event);
     case 217:
       // tool/M217.cpp: Q primes, T changes to another extruder.
-      return command_.has_any("QT") ? lose_position(event) : void();
+      return command_.has_any("QT") ? lose_position(event) : other_m_code(event);
     case 220:
       return marlin_speed_factor(event);
     case 221:
@@ -208,7 +202,7 @@ void Interpreter::marlin_linear_move(Event& event) {
     return linear_move(event);
   }
   const double scale = state_.filament_factor();
-  const double reading = (state_.position_mm[E] - state_.base_mm[E]) / scale;
+  const double reading = state_.e_reading();
   const double change = state_.absolute_e ? *word * state_.e_unit - reading : *word * state_.e_unit;
   if (std::abs(change) < kShortest_mm || std::abs(change) > kLongest_mm ||
       state_.retracted != (change > 0.0)) {

@@ -29,18 +29,25 @@ bool begins_command(const Word& word) {
   return word.value && (word.letter == 'G' || word.letter == 'M');
 }
 
+// Letter and number of a command.
+struct Code {
+  char letter;
+  int number;
+};
+
 // Commands that set a mode, whatever words they have.
-bool sets_mode(char letter, int number) {
+bool sets_mode(const Code& code) {
   constexpr std::array kModes = {17, 18, 19, 20, 21, 90, 91, 93, 94};
-  return letter == 'G' ? std::ranges::find(kModes, number) != kModes.end()
-                       : letter == 'M' && (number == 82 || number == 83);
+  return code.letter == 'G' ? std::ranges::find(kModes, code.number) != kModes.end()
+                            : code.letter == 'M' && (code.number == 82 || code.number == 83);
 }
 
 // Commands that leave all modes but F as they are. G53 is for its line alone.
-bool leaves_modes(char letter, int number) {
+bool leaves_modes(const Code& code) {
   constexpr std::array kCodes = {0, 1, 2, 3, 4, 28, 53};
-  return letter == 'G' ? std::ranges::find(kCodes, number) != kCodes.end()
-                       : letter == 'M' && rrf_m_code_effect(number) != Effect::unknown;
+  return code.letter == 'G'
+             ? std::ranges::find(kCodes, code.number) != kCodes.end()
+             : code.letter == 'M' && rrf_m_code_effect(code.number) != Effect::unknown;
 }
 
 }  // namespace
@@ -93,17 +100,13 @@ bool Interpreter::rrf_meta_line(Event& event, std::string_view content) {
   return false;
 }
 
-// What the line would do is tried on a copy.
 void Interpreter::rrf_conditional_line(Event& event, std::string_view content) {
   lose_tool();  // it may have been changed, or not
   if (has_expression(content)) {
     rrf_expression(event);
     return lose_position(event);
   }
-  Interpreter trial = *this;
-  Event tried;
-  trial.rrf_command(tried);
-  may_have_happened(event, trial, tried, "a mode or a limit set under a condition");
+  maybe(event, &Interpreter::rrf_command, "a mode or a limit set under a condition");
 }
 
 // What is not evaluated here: harmless where the command is.
@@ -128,9 +131,6 @@ void Interpreter::rrf_expression(Event& event) {
       return uncertain_modes(event, "a limit set by an expression");
     default:
       feed_uncertain_ = feed_uncertain_ || is_g;
-      if (!is_g && !is_m) {
-        lose_tool();  // T{…}
-      }
       return lose_position(event);
   }
 }
@@ -173,39 +173,32 @@ void Interpreter::rrf_command(Event& event) {
 // StringParser.cpp, FindParameters and FinishedCommand: a command ends where the next begins, and
 // each is carried out. Followed where all of them do no more than set modes.
 void Interpreter::rrf_several_commands(Event& event) {
-  const std::vector<Word> words = command_.words;
-  const char letter = command_.letter;
-  const int number = command_.number;
-  const auto all_begun = [&](auto&& is_such) {
-    return is_such(letter, number) && std::ranges::all_of(words, [&](const Word& word) {
-             return !begins_command(word) || is_such(word.letter, to_int(*word.value));
-           });
-  };
-  if (all_begun(sets_mode) && std::ranges::all_of(words, begins_command)) {
+  std::vector<Code> codes = {{command_.letter, command_.number}};
+  for (const Word& word : command_.words) {
+    if (begins_command(word)) {
+      codes.push_back({word.letter, to_int(*word.value)});
+    }
+  }
+  const bool is_all_codes = codes.size() == command_.words.size() + 1;
+  if (is_all_codes && std::ranges::all_of(codes, sets_mode)) {
     command_.words.clear();
-    rrf_command(event);
-    for (const Word& word : words) {
-      command_.letter = word.letter;
-      command_.number = to_int(*word.value);
+    for (const Code& code : codes) {
+      command_.letter = code.letter;
+      command_.number = code.number;
       rrf_command(event);
     }
     return;
   }
-  if (!all_begun(leaves_modes)) {
+  if (!std::ranges::all_of(codes, leaves_modes)) {
     return uncertain_modes(event, "several commands in one line");
   }
   feed_uncertain_ = feed_uncertain_ || command_.has('F');
-  const bool moves = letter == 'G' || std::ranges::any_of(words, [](const Word& word) {
-                       return begins_command(word) && word.letter == 'G';
-                     });
-  if (moves) {
+  if (std::ranges::any_of(codes, [](const Code& code) { return code.letter == 'G'; })) {
     return not_understood(event, "two commands in one line, or a word given twice");
   }
-  other_m_code(event);
-  for (const Word& word : words) {
-    if (begins_command(word) && rrf_m_code_effect(to_int(*word.value)) == Effect::stop) {
-      event.kind = EventKind::barrier;
-    }
+  for (const Code& code : codes) {
+    command_.number = code.number;
+    other_m_code(event);
   }
 }
 
@@ -317,8 +310,8 @@ void Interpreter::rrf_m_code(Event& event) {
 }
 
 // GCodes.cpp, DoStraightMove: H is a homing move, R starts from a restore point, P sets outputs and
-// S a laser's power. M220 and M221
-// apply only where an axis is named (LoadExtrusionAndFeedrateFromGCode).
+// S a laser's power. M220 and M221 apply only where an axis is named
+// (LoadExtrusionAndFeedrateFromGCode).
 void Interpreter::rrf_linear_move(Event& event) {
   if (state_.inverse_time) {
     return not_understood(event, "a move in inverse time mode (G93)");

@@ -39,20 +39,24 @@ planner::Limits some_limits() {
 
 TEST(LimitLines, AreAllThatARunSetsWhereNothingIsKnown) {
   const planner::Limits limits = some_limits();
-  EXPECT_THAT(limit_lines(config_of(Firmware::klipper), limits, limits, false),
-              ElementsAre("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
-                          "MINIMUM_CRUISE_RATIO=0.5"));
-  EXPECT_THAT(limit_lines(config_of(Firmware::marlin), limits, limits, false),
-              ElementsAre("M201 X1250 Y1000 E4000", "M203 X180 Y175.5", "M204 P1500 T1800",
-                          "M205 J0.02 S0 T0 B20000"));
-  EXPECT_THAT(limit_lines(config_of(Firmware::rrf), limits, limits, false),
+  EXPECT_THAT(
+      limit_lines(config_of(Firmware::klipper), limits, unknown_to_run(Firmware::klipper, limits)),
+      ElementsAre("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
+                  "MINIMUM_CRUISE_RATIO=0.5"));
+  EXPECT_THAT(
+      limit_lines(config_of(Firmware::marlin), limits, unknown_to_run(Firmware::marlin, limits)),
+      ElementsAre("M201 X1250 Y1000 E4000", "M203 X180 Y175.5", "M204 P1500 T1800",
+                  "M205 J0.02 S0 T0 B20000"));
+  EXPECT_THAT(limit_lines(config_of(Firmware::rrf), limits, unknown_to_run(Firmware::rrf, limits)),
               ElementsAre("M201 X1250 Y1000 E4000", "M203 X10800 Y10530 I6", "M204 P1500 T1800",
                           "M566 X480 Y420 E600 P1"));
 }
 
 TEST(LimitLines, TellMarlinWithClassicJerkTheJerks) {
   const planner::Limits limits = some_limits();
-  EXPECT_EQ(limit_lines(config_of(Firmware::marlin, true), limits, limits, false).back(),
+  EXPECT_EQ(limit_lines(config_of(Firmware::marlin, true), limits,
+                        unknown_to_run(Firmware::marlin, limits))
+                .back(),
             "M205 X8 Y7 E10 S0 T0 B20000");
 }
 
@@ -60,14 +64,13 @@ TEST(LimitLines, AreOnlyWhatDiffers) {
   const planner::Limits current = some_limits();
   planner::Limits wanted = current;
   for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
-    EXPECT_THAT(limit_lines(config_of(firmware), wanted, current, true), IsEmpty());
+    EXPECT_THAT(limit_lines(config_of(firmware), wanted, current), IsEmpty());
   }
   wanted.axis_max_accel_mm_s2[gcode::Y] = 1100.0;
   wanted.axis_jerk_mm_s[gcode::E] = 5.0;
-  EXPECT_THAT(limit_lines(config_of(Firmware::rrf), wanted, current, true),
+  EXPECT_THAT(limit_lines(config_of(Firmware::rrf), wanted, current),
               ElementsAre("M201 Y1100", "M566 E300"));
-  EXPECT_THAT(limit_lines(config_of(Firmware::marlin), wanted, current, true),
-              ElementsAre("M201 Y1100"));
+  EXPECT_THAT(limit_lines(config_of(Firmware::marlin), wanted, current), ElementsAre("M201 Y1100"));
 }
 
 // Whatever is told is understood, by the same firmware's interpreter, as what was meant.
@@ -77,7 +80,7 @@ TEST(LimitLines, AreReadBackAsTheyWereMeant) {
     planner::Limits read;
     gcode::Interpreter printer(gcode::default_options(firmware));
     for (const std::string& text :
-         limit_lines(config_of(firmware), wanted, planner::Limits{}, false)) {
+         limit_lines(config_of(firmware), wanted, unknown_to_run(firmware, planner::Limits{}))) {
       const gcode::Event event = printer.interpret({text + "\n", 1});
       EXPECT_EQ(event.kind, gcode::EventKind::limits) << text;
       planner::apply(*event.limits, read);

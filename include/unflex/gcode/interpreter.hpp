@@ -184,6 +184,10 @@ struct ModalState {
   [[nodiscard]] double filament_factor() const;
   // Filament, in mm, that one unit of an E word stands for.
   [[nodiscard]] double filament_per_e_mm() const { return e_unit * filament_factor(); }
+  // What E reads, in mm or mm³, whatever the unit of its words.
+  [[nodiscard]] double e_reading() const {
+    return (position_mm[E] - base_mm[E]) / filament_factor();
+  }
 };
 
 // Reads lines in the order of the file and says what each means to the firmware:
@@ -290,9 +294,8 @@ class Interpreter {
 
   // False behind a line that may or may not have set a mode or F.
   [[nodiscard]] bool modes_certain() const { return !modes_uncertain_ && !feed_uncertain_; }
-  // What the line did to a copy of this, which may or may not happen to the printer.
-  void may_have_happened(Event& event, const Interpreter& trial, const Event& tried,
-                         std::string_view cause);
+  // The line may be carried out or not: what it would do is tried on a copy.
+  void maybe(Event& event, void (Interpreter::*carry_out)(Event&), std::string_view cause);
   void keep_reading_of_e(bool e_absolute, double before_mm);
   void set_feed(std::optional<double> feed_word);
   // Adds the straight piece to `target`, unless it has no length, and moves the state there.
