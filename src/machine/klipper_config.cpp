@@ -64,7 +64,9 @@ Status parse_line(Parser& parser, std::string_view line, std::size_t number) {
   }
   const std::size_t indent = text.find(content);
   if (parser.option != nullptr && indent > parser.indent) {
-    parser.option->text += fmt::format("{}{}", parser.option->text.empty() ? "" : "\n", content);
+    // Klipper joins the lines by their ends. No value that is read here has several, and a message
+    // that quotes it is to have one.
+    parser.option->text += fmt::format("{}{}", parser.option->text.empty() ? "" : " ", content);
     return {};
   }
   parser.indent = indent;

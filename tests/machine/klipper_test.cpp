@@ -117,6 +117,9 @@ TEST_F(KlipperFiles, IgnoreWhatWasSavedOnceSomeoneHasWrittenBelow) {
 TEST_F(KlipperFiles, NameTheLineOfWhatIsWrong) {
   EXPECT_THAT(failure(write("a.cfg", std::string(kWhole) + "[extruder]\nnozzle_diameter: wide\n")),
               EndsWith("a.cfg:9: nozzle_diameter in [extruder] must be a number, not 'wide'"));
+  EXPECT_THAT(failure(write("over_lines.cfg",
+                            std::string(kWhole) + "[extruder]\nnozzle_diameter: 0.4\n  wide\n")),
+              EndsWith("cfg:9: nozzle_diameter in [extruder] must be a number, not '0.4 wide'"));
   EXPECT_THAT(failure(write("b.cfg", std::string(kWhole) + "[extruder]\nnozzle_diameter: 0\n")),
               EndsWith("b.cfg:9: extruder.nozzle_diameter_mm is 0, but must be > 0"));
   EXPECT_THAT(failure(write("c.cfg", std::string(kWhole) + "[mcu]\nnonsense\n")),
