@@ -25,6 +25,7 @@ constexpr Limits kUnknownLimits = {.max_velocity_mm_s = kUnknown,
                                    .max_accel_mm_s2 = kUnknown,
                                    .square_corner_velocity_mm_s = kUnknown,
                                    .minimum_cruise_ratio = kUnknown,
+                                   .accel_to_decel_mm_s2 = kUnknown,
                                    .axis_max_velocity_mm_s = kUnknownAxes,
                                    .axis_max_accel_mm_s2 = kUnknownAxes,
                                    .axis_jerk_mm_s = kUnknownAxes,
@@ -77,7 +78,13 @@ void klipper(const Limits& wanted, const Limits& current, std::vector<std::strin
   line.word("ACCEL=", wanted.max_accel_mm_s2, current.max_accel_mm_s2);
   line.word("SQUARE_CORNER_VELOCITY=", wanted.square_corner_velocity_mm_s,
             current.square_corner_velocity_mm_s);
-  line.word("MINIMUM_CRUISE_RATIO=", wanted.minimum_cruise_ratio, current.minimum_cruise_ratio);
+  // ACCEL_TO_DECEL is heeded before March 2024, when MINIMUM_CRUISE_RATIO is not, and ignored from
+  // August 2025 on. Between these it stands for a ratio where none is given (toolhead.py,
+  // cmd_SET_VELOCITY_LIMIT, commits 0105aa3 and 3ef760c), so one is.
+  const bool to_decel = wanted.accel_to_decel_mm_s2 != current.accel_to_decel_mm_s2;
+  line.word("MINIMUM_CRUISE_RATIO=", wanted.minimum_cruise_ratio,
+            to_decel ? kUnknown : current.minimum_cruise_ratio);
+  line.word("ACCEL_TO_DECEL=", wanted.accel_to_decel_mm_s2, current.accel_to_decel_mm_s2);
   line.finish(lines);
 }
 

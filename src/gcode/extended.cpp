@@ -111,6 +111,7 @@ void Interpreter::velocity_limit(Event& event) {
   const Parameter accel = number_of(command_, "ACCEL");
   const Parameter corner = number_of(command_, "SQUARE_CORNER_VELOCITY");
   const Parameter cruise = number_of(command_, "MINIMUM_CRUISE_RATIO");
+  const Parameter to_decel = number_of(command_, "ACCEL_TO_DECEL");
   const bool invalid = (velocity.given && !(velocity.value.value_or(0.0) > 0.0)) ||
                        (accel.given && !(accel.value.value_or(0.0) > 0.0)) ||
                        (corner.given && !(corner.value.value_or(-1.0) >= 0.0)) ||
@@ -120,12 +121,17 @@ void Interpreter::velocity_limit(Event& event) {
     event.warnings.emplace_back("SET_VELOCITY_LIMIT with an invalid value is ignored");
     return;
   }
-  if (velocity.given || accel.given || corner.given || cruise.given) {
+  // From March 2024 to August 2025 it sets the ratio, unless that is given.
+  event.may_set_limits = to_decel.given && !cruise.given;
+  if (velocity.given || accel.given || corner.given || cruise.given || to_decel.given) {
     event.kind = EventKind::limits;
     event.limits.edit().max_velocity_mm_s = velocity.value;
     event.limits.edit().max_accel_mm_s2 = accel.value;
     event.limits.edit().square_corner_velocity_mm_s = corner.value;
     event.limits.edit().minimum_cruise_ratio = cruise.value;
+    if (to_decel.value.value_or(0.0) > 0.0) {
+      event.limits.edit().accel_to_decel_mm_s2 = to_decel.value;
+    }
   }
 }
 

@@ -106,6 +106,7 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
       limits.max_accel_mm_s2 = accel;
       limits.square_corner_velocity_mm_s = corner;
       limits.minimum_cruise_ratio = 0.0;
+      limits.accel_to_decel_mm_s2 = accel;
       return limits;
     case Firmware::marlin:
       // The most M205 J takes (Marlin 2.1.2, M200-M205.cpp).
@@ -163,6 +164,7 @@ planner::Limits planner_limits(const machine::Settings& settings) {
   limits.max_accel_mm_s2 = settings.limits.max_accel_mm_s2;
   limits.square_corner_velocity_mm_s = settings.limits.square_corner_velocity_mm_s;
   limits.minimum_cruise_ratio = settings.limits.minimum_cruise_ratio;
+  limits.accel_to_decel_mm_s2 = (1.0 - limits.minimum_cruise_ratio) * limits.max_accel_mm_s2;
   limits.axis_max_velocity_mm_s = settings.axis_max_velocity_mm_s();
   limits.axis_max_accel_mm_s2 = settings.axis_max_accel_mm_s2();
   limits.axis_jerk_mm_s = settings.jerk_mm_s();

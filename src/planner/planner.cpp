@@ -27,6 +27,7 @@ void apply(const gcode::LimitChange& change, Limits& limits) {
   put(change.max_accel_mm_s2, limits.max_accel_mm_s2);
   put(change.square_corner_velocity_mm_s, limits.square_corner_velocity_mm_s);
   put(change.minimum_cruise_ratio, limits.minimum_cruise_ratio);
+  put(change.accel_to_decel_mm_s2, limits.accel_to_decel_mm_s2);
   put(change.axis_max_velocity_mm_s, limits.axis_max_velocity_mm_s);
   put(change.axis_max_accel_mm_s2, limits.axis_max_accel_mm_s2);
   put(change.axis_jerk_mm_s, limits.axis_jerk_mm_s);

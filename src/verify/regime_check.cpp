@@ -78,6 +78,8 @@ std::string limits_difference(const planner::Limits& input, const planner::Limit
                                output.square_corner_velocity_mm_s);
   differences.compare_relative("minimum cruise ratio", input.minimum_cruise_ratio,
                                output.minimum_cruise_ratio);
+  differences.compare_relative("acceleration to deceleration", input.accel_to_decel_mm_s2,
+                               output.accel_to_decel_mm_s2);
   constexpr std::array<std::string_view, 4> kAxes = {"X", "Y", "Z", "E"};
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
     differences.compare_relative(fmt::format("maximum velocity of {}", kAxes[axis]),

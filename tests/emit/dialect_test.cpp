@@ -42,7 +42,7 @@ TEST(LimitLines, AreAllThatARunSetsWhereNothingIsKnown) {
   EXPECT_THAT(
       limit_lines(config_of(Firmware::klipper), limits, unknown_to_run(Firmware::klipper, limits)),
       ElementsAre("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
-                  "MINIMUM_CRUISE_RATIO=0.5"));
+                  "MINIMUM_CRUISE_RATIO=0.5 ACCEL_TO_DECEL=2500"));
   EXPECT_THAT(
       limit_lines(config_of(Firmware::marlin), limits, unknown_to_run(Firmware::marlin, limits)),
       ElementsAre("M201 X1250 Y1000 E4000", "M203 X180 Y175.5", "M204 P1500 T1800",

@@ -16,6 +16,7 @@ namespace {
 using ::testing::ElementsAre;
 using testing::emit;
 using ::testing::HasSubstr;
+using ::testing::IsSupersetOf;
 using testing::lines_of;
 using ::testing::Not;
 using testing::options;
@@ -24,10 +25,10 @@ using ::testing::StartsWith;
 const std::string kHead = "G90\nM83\nG1 X0 Y0 Z0.2 F6000\n";
 const std::string kRaise =
     "SET_VELOCITY_LIMIT VELOCITY=1200 ACCEL=1000000 SQUARE_CORNER_VELOCITY=1000 "
-    "MINIMUM_CRUISE_RATIO=0\n";
+    "MINIMUM_CRUISE_RATIO=0 ACCEL_TO_DECEL=1000000\n";
 const std::string kRestore =
     "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
-    "MINIMUM_CRUISE_RATIO=0.5\n";
+    "MINIMUM_CRUISE_RATIO=0.5 ACCEL_TO_DECEL=2500\n";
 const std::string kEnd = ";unflex end\n";
 const std::string kShaperOff = "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\n";
 const std::string kShaperOn = "SET_INPUT_SHAPER SHAPER_FREQ_X=45 SHAPER_FREQ_Y=45\n";
@@ -90,7 +91,7 @@ TEST(Emitter, KeepsAnAccelerationInsideARunAndRaisesItAgainAtOnce) {
               ElementsAre(";unflex run\n", kRaise, "~", "M204 S700\n",
                           "SET_VELOCITY_LIMIT ACCEL=1000000\n", "~", kEnd,
                           "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=700 SQUARE_CORNER_VELOCITY=5 "
-                          "MINIMUM_CRUISE_RATIO=0.5\n",
+                          "MINIMUM_CRUISE_RATIO=0.5 ACCEL_TO_DECEL=2500\n",
                           "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
@@ -102,7 +103,7 @@ TEST(Emitter, KeepsVelocityLimitsInsideARunAndRaisesThemAgainAtOnce) {
                   "set_velocity_limit velocity=80 square_corner_velocity=3\n",
                   "SET_VELOCITY_LIMIT VELOCITY=1200 SQUARE_CORNER_VELOCITY=1000\n", "~", kEnd,
                   "SET_VELOCITY_LIMIT VELOCITY=80 ACCEL=5000 SQUARE_CORNER_VELOCITY=3 "
-                  "MINIMUM_CRUISE_RATIO=0.5\n",
+                  "MINIMUM_CRUISE_RATIO=0.5 ACCEL_TO_DECEL=2500\n",
                   "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
@@ -113,10 +114,32 @@ TEST(Emitter, SetsAllLimitsOfARunAgainAfterWhatMayBeAMacroOfLimits) {
                           "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
+// Klipper of 2024 takes it for a ratio, which must not hold in the run.
+TEST(Emitter, SetsAllLimitsOfARunAgainAfterAccelToDecel) {
+  EXPECT_THAT(
+      from_first_run(kHead + "G1 X10 E1\nSET_VELOCITY_LIMIT ACCEL=5000 ACCEL_TO_DECEL=2000\n"
+                             "G1 Y10 E1\nG4 P1\n"),
+      ElementsAre(";unflex run\n", kRaise, "~",
+                  "SET_VELOCITY_LIMIT ACCEL=5000 ACCEL_TO_DECEL=2000\n", kRaise, "~", kEnd,
+                  "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 SQUARE_CORNER_VELOCITY=5 "
+                  "MINIMUM_CRUISE_RATIO=0.5 ACCEL_TO_DECEL=2000\n",
+                  "G1 F6000\n", "G4 P1\n", kShaperOn));
+}
+
+// Where the ratio has not changed, it is given all the same.
+TEST(Emitter, SetsNoAccelToDecelWithoutARatio) {
+  EXPECT_THAT(
+      from_first_run("SET_VELOCITY_LIMIT MINIMUM_CRUISE_RATIO=0\n" + kHead + "G1 X10 E1\nG4 P1\n"),
+      IsSupersetOf({kRaise, std::string("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=5000 "
+                                        "SQUARE_CORNER_VELOCITY=5 MINIMUM_CRUISE_RATIO=0 "
+                                        "ACCEL_TO_DECEL=2500\n")}));
+}
+
 TEST(Emitter, RestoresLimitsThatWereSetBeforeTheRun) {
   EXPECT_THAT(from_first_run("M204 S1234.5\n" + kHead + "G1 X10 E1\nG4 P1\n"),
-              ::testing::Contains("SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=1234.5 "
-                                  "SQUARE_CORNER_VELOCITY=5 MINIMUM_CRUISE_RATIO=0.5\n"));
+              ::testing::Contains(
+                  "SET_VELOCITY_LIMIT VELOCITY=300 ACCEL=1234.5 "
+                  "SQUARE_CORNER_VELOCITY=5 MINIMUM_CRUISE_RATIO=0.5 ACCEL_TO_DECEL=2500\n"));
 }
 
 TEST(Emitter, GivesTheShaperBackBeforeTheMachineMovesByItself) {

@@ -58,7 +58,7 @@ inline dynamics::BaseTrajectory plan_as_base(const std::vector<planner::PlannedM
 
 inline EmitOptions options() {
   EmitOptions options;
-  options.run_limits = {1200.0, 1e6, 1000.0, 0.0};
+  options.run_limits = {1200.0, 1e6, 1000.0, 0.0, 1e6};
   options.interpreter.shaper_freq_x_hz = 45.0;
   options.interpreter.shaper_freq_y_hz = 45.0;
   options.version = "test";

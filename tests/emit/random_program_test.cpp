@@ -129,6 +129,7 @@ void expect_same_limits(const planner::Limits& a, const planner::Limits& b) {
   EXPECT_EQ(a.max_accel_mm_s2, b.max_accel_mm_s2);
   EXPECT_EQ(a.square_corner_velocity_mm_s, b.square_corner_velocity_mm_s);
   EXPECT_EQ(a.minimum_cruise_ratio, b.minimum_cruise_ratio);
+  EXPECT_EQ(a.accel_to_decel_mm_s2, b.accel_to_decel_mm_s2);
 }
 
 void expect_same_state(const gcode::ModalState& printer, const gcode::ModalState& input) {

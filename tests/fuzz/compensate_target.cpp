@@ -149,6 +149,7 @@ void check_limits(const planner::Limits& input, const planner::Limits& output, F
     require_near("corner velocity", output.square_corner_velocity_mm_s,
                  input.square_corner_velocity_mm_s);
     require_near("cruise ratio", output.minimum_cruise_ratio, input.minimum_cruise_ratio);
+    require_near("ACCEL_TO_DECEL", output.accel_to_decel_mm_s2, input.accel_to_decel_mm_s2);
     return;
   }
   for (std::size_t axis = 0; axis < 4; ++axis) {

@@ -52,6 +52,15 @@ TEST(Limits, ComeFromSetVelocityLimit) {
   EXPECT_EQ(one.limits->max_accel_mm_s2, 3000.0);
   EXPECT_EQ(one.limits->max_velocity_mm_s, std::nullopt);
   EXPECT_EQ(one.limits->minimum_cruise_ratio, std::nullopt);
+  EXPECT_EQ(one.limits->accel_to_decel_mm_s2, 1500.0);
+  EXPECT_TRUE(one.may_set_limits);
+  const Event both =
+      session.read("SET_VELOCITY_LIMIT MINIMUM_CRUISE_RATIO=0.4 ACCEL_TO_DECEL=1500");
+  EXPECT_EQ(both.limits->minimum_cruise_ratio, 0.4);
+  EXPECT_FALSE(both.may_set_limits);
+  const Event none = session.read("SET_VELOCITY_LIMIT ACCEL=3000 ACCEL_TO_DECEL=0");
+  EXPECT_EQ(none.limits->max_accel_mm_s2, 3000.0);
+  EXPECT_EQ(none.limits->accel_to_decel_mm_s2, std::nullopt);
 }
 
 TEST(Limits, ThatAreInvalidChangeNothing) {
@@ -66,7 +75,6 @@ TEST(Limits, ThatAreInvalidChangeNothing) {
     EXPECT_EQ(event.limits->max_accel_mm_s2, std::nullopt) << line;
   }
   EXPECT_EQ(session.read("SET_VELOCITY_LIMIT").kind, EventKind::passive);
-  EXPECT_EQ(session.read("SET_VELOCITY_LIMIT ACCEL_TO_DECEL=500").kind, EventKind::passive);
 }
 
 TEST(Dwell, LastsPMilliseconds) {

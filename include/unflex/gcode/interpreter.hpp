@@ -54,6 +54,7 @@ struct LimitChange {
   std::optional<double> max_accel_mm_s2;
   std::optional<double> square_corner_velocity_mm_s;
   std::optional<double> minimum_cruise_ratio;
+  std::optional<double> accel_to_decel_mm_s2;
   AxisValues axis_max_velocity_mm_s;
   AxisValues axis_max_accel_mm_s2;
   AxisValues axis_jerk_mm_s;

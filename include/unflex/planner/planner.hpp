@@ -23,6 +23,8 @@ struct Limits {
   double max_accel_mm_s2 = 5000.0;
   double square_corner_velocity_mm_s = 5.0;
   double minimum_cruise_ratio = 0.5;
+  // What Klipper had in its place before March 2024. Later ones are planned for, which do without.
+  double accel_to_decel_mm_s2 = 2500.0;
   // Marlin and RepRapFirmware. The defaults, and those for Marlin alone, are of Marlin 2.1.2:
   // Configuration.h (DEFAULT_MAX_FEEDRATE, DEFAULT_MAX_ACCELERATION, DEFAULT_ACCELERATION,
   // DEFAULT_XJERK, JUNCTION_DEVIATION_MM) and Configuration_adv.h (DEFAULT_MINIMUMFEEDRATE,
