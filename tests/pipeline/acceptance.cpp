@@ -11,10 +11,14 @@
 #include <vector>
 
 #include "jobs.hpp"
-#include "unflex/gcode/interpreter.hpp"
+#include "own_limits.hpp"
+#include "same_print.hpp"
 
 namespace unflex::pipeline::testing {
 namespace {
+
+using unflex::testing::Printer;
+using unflex::testing::TextMachine;
 
 // What one line of output may add: half a step of E in rounding, and noise of summing.
 constexpr double kFilamentStepMm = 1e-5 + 1e-8;
@@ -65,29 +69,30 @@ bool is_own(std::string_view line) {
 // A line that is no motion, and where the machine was when it came.
 struct Standing {
   std::string text;
-  gcode::Position at_mm{};
+  std::array<double, 3> at_mm{};
+  double filament_mm = 0.0;
 };
 
-std::vector<Standing> standing_lines(const std::string& text) {
+std::vector<Standing> standing_lines(const std::string& text, const Printer& printer) {
   std::vector<Standing> lines;
-  gcode::Interpreter interpreter;
+  TextMachine machine(printer.firmware, printer.retraction);
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size() - 1) + 1;
     const std::string line = text.substr(begin, end - begin);
     if (!is_motion(line)) {
-      lines.push_back({line, interpreter.state().position_mm});
+      lines.push_back({line, machine.reading().position_mm, machine.reading().filament_mm});
     }
-    static_cast<void>(interpreter.interpret({line, 0}));
+    machine.read(line.substr(0, line.find('\n')));
     begin = end;
   }
   return lines;
 }
 
 void expect_same_place(const Standing& in, const Standing& out) {
-  EXPECT_NEAR(out.at_mm[gcode::X], in.at_mm[gcode::X], kPlaceMm) << in.text;
-  EXPECT_NEAR(out.at_mm[gcode::Y], in.at_mm[gcode::Y], kPlaceMm) << in.text;
-  EXPECT_NEAR(out.at_mm[gcode::Z], in.at_mm[gcode::Z], 0.02) << in.text;
-  EXPECT_NEAR(out.at_mm[gcode::E], in.at_mm[gcode::E], kPlaceFilamentMm) << in.text;
+  EXPECT_NEAR(out.at_mm[0], in.at_mm[0], kPlaceMm) << in.text;
+  EXPECT_NEAR(out.at_mm[1], in.at_mm[1], kPlaceMm) << in.text;
+  EXPECT_NEAR(out.at_mm[2], in.at_mm[2], 0.02) << in.text;
+  EXPECT_NEAR(out.filament_mm, in.filament_mm, kPlaceFilamentMm) << in.text;
 }
 
 // The line without what it says of durations, which follow the emitted print time.
@@ -136,11 +141,13 @@ void expect_true_path(const report::Report& report, double improvement) {
       << "from " << before.contour_rms_mm;
 }
 
-}  // namespace
-
-void expect_lines_kept(const std::string& input, const std::string& output) {
-  const std::vector<Standing> in = standing_lines(input);
-  const std::vector<Standing> out = standing_lines(output);
+// Every line of the input that is no motion stands in the output, byte for byte, in order, and at
+// the same place along the path; whatever else the output holds is motion or a line of unflex's
+// own.
+void expect_lines_kept(const std::string& input, const std::string& output,
+                       const Printer& printer) {
+  const std::vector<Standing> in = standing_lines(input, printer);
+  const std::vector<Standing> out = standing_lines(output, printer);
   std::size_t next = 0;
   for (const Standing& line : in) {
     const std::string wanted = but_for_durations(line.text);
@@ -160,15 +167,21 @@ void expect_lines_kept(const std::string& input, const std::string& output) {
   }
 }
 
+}  // namespace
+
 void expect_compensated(const std::string& input, const Expectation& expectation) {
-  const JobFolder folder(input);
+  const std::string sliced = unflex::testing::numbered(input);
+  const JobFolder folder(sliced);
   const Job job = folder.job(expectation.workers);
   SilentProgress progress;
   const Result<report::Report> report = compensate(job, progress);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   expect_kept(*report, job.settings);
   expect_true_path(*report, expectation.improvement);
-  expect_lines_kept(input, folder.output());
+  const std::string emitted = folder.output();
+  const Printer printer = unflex::testing::printer_with(job.settings);
+  expect_lines_kept(sliced, emitted, printer);
+  EXPECT_EQ(unflex::testing::difference(sliced, emitted, printer), "");
   for (const auto& [name, value] :
        {std::pair{"before_rms_um", report->uncompensated.extruding.contour_rms_mm * 1e3},
         std::pair{"rms_um", report->compensated.extruding.contour_rms_mm * 1e3},

@@ -14,9 +14,4 @@ struct Expectation {
 // Compensates the text with the default settings and checks the result.
 void expect_compensated(const std::string& input, const Expectation& expectation);
 
-// Every line of the input that is no motion stands in the output, byte for byte, in order, and at
-// the same place along the path; whatever else the output holds is motion or a line of unflex's
-// own.
-void expect_lines_kept(const std::string& input, const std::string& output);
-
 }  // namespace unflex::pipeline::testing

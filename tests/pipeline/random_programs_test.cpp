@@ -11,7 +11,9 @@
 #include <vector>
 
 #include "jobs.hpp"
+#include "own_limits.hpp"
 #include "random_program.hpp"
+#include "same_print.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
@@ -104,7 +106,8 @@ struct Counts {
 void expect_faultless(Firmware firmware, unsigned seed, Counts& counts) {
   SCOPED_TRACE(fmt::format("{}, UNFLEX_RANDOM_SEED={}", to_string(firmware), seed));
   const RandomProgram program = testing::random_program(firmware, seed);
-  const JobFolder folder(program.text, program.overrides);
+  const std::string text = unflex::testing::numbered(program.text);
+  const JobFolder folder(text, program.overrides);
   Job job = folder.job();
   job.engine = EngineChoice::banded;
   SilentProgress progress;
@@ -115,8 +118,10 @@ void expect_faultless(Firmware firmware, unsigned seed, Counts& counts) {
   }
   EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
   const std::string output = folder.output();
-  expect_commands_kept(program.text, output);
-  expect_same_end(program.text, output, firmware);
+  expect_commands_kept(text, output);
+  expect_same_end(text, output, firmware);
+  EXPECT_EQ(unflex::testing::difference(text, output, unflex::testing::printer_with(job.settings)),
+            "");
   counts.runs += report->runs_total;
   counts.kept += report->runs_fallback;
   for (const report::Fallback& fallback : report->fallbacks) {

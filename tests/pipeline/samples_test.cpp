@@ -11,6 +11,8 @@
 
 #include "acceptance.hpp"
 #include "jobs.hpp"
+#include "own_limits.hpp"
+#include "same_print.hpp"
 
 namespace unflex::pipeline::testing {
 namespace {
@@ -110,10 +112,15 @@ class OtherFirmware : public ::testing::TestWithParam<OnFirmware> {};
 TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
   const std::filesystem::path path =
       std::filesystem::path(UNFLEX_TEST_DATA) / ("pipeline_" + GetParam().piece + ".gcode");
-  const JobFolder folder(read_file(path), {"printer.firmware=" + GetParam().firmware});
+  const std::string sliced = unflex::testing::numbered(read_file(path));
+  const JobFolder folder(sliced, {"printer.firmware=" + GetParam().firmware});
+  const Job job = folder.job(2);
   SilentProgress progress;
-  const Result<report::Report> report = compensate(folder.job(2), progress);
+  const Result<report::Report> report = compensate(job, progress);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
+  EXPECT_EQ(unflex::testing::difference(sliced, folder.output(),
+                                        unflex::testing::printer_with(job.settings)),
+            "");
   EXPECT_EQ(report->violation_count, 0U);
   EXPECT_GT(report->runs_compensated, 0U);
   EXPECT_LE(report->max_lines_per_s, GetParam().max_lines_per_s);

@@ -1,0 +1,232 @@
+#include "same_print.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <set>
+
+namespace unflex::testing {
+namespace {
+
+constexpr std::string_view kMark = ";line ";
+constexpr std::array<const char*, 3> kAxes = {"X", "Y", "Z"};
+
+// Coordinates are written in four decimals.
+constexpr double kPosition_mm = 0.6e-4;
+constexpr double kOffset_mm = 1e-9;
+// Filament comes in five decimals, with what is left over of each line.
+constexpr double kFilament_mm = 2e-5;
+// What Marlin and RepRapFirmware count in single precision, far from zero or many times.
+constexpr double kSingle_mm = 5e-3;
+constexpr double kFeed = 1e-6;
+// Of a limit, which these two keep in single precision as well.
+constexpr double kLimit = 2e-7;
+// How far a base may swing out.
+constexpr double kSwing_mm = 2.0;
+// Half a step of Z, at whole ones of which Marlin and RepRapFirmware are sent.
+constexpr double kStep_mm = 1.3e-3;
+
+std::string_view take_line(std::string_view& text) {
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(std::min(end + 1, text.size()));
+  return line;
+}
+
+// Such lines are written anew.
+bool tells_duration(std::string_view line) {
+  return line.starts_with("M73") || line.starts_with(";TIME") ||
+         line.find("estimated printing time") != std::string_view::npos;
+}
+
+// The first of the lines that put the file's own limits in force.
+bool sets_limits(std::string_view line) {
+  return line.starts_with("SET_VELOCITY_LIMIT ") || line.starts_with("M201 ");
+}
+
+// Lines without motion come behind the last stroke of a run and before its limits are taken back.
+enum class Part { kept, run, end_of_run };
+
+// What space a stretch of lines takes.
+struct Extent {
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  std::array<double, 3> least_mm{kNone, kNone, kNone};
+  std::array<double, 3> most_mm{-kNone, -kNone, -kNone};
+
+  void add(const std::array<double, 3>& place) {
+    for (std::size_t axis = 0; axis < place.size(); ++axis) {
+      least_mm[axis] = std::min(least_mm[axis], place[axis]);
+      most_mm[axis] = std::max(most_mm[axis], place[axis]);
+    }
+  }
+  [[nodiscard]] bool empty() const { return least_mm[0] > most_mm[0]; }
+};
+
+// Reads both texts side by side: a mark of the emitted one has the sliced one read up to there.
+class Comparison {
+ public:
+  Comparison(std::string_view sliced, const Printer& printer)
+      : printer_(printer),
+        rest_(sliced),
+        sliced_(printer.firmware, printer.retraction),
+        emitted_(printer.firmware, printer.retraction) {}
+
+  std::string run(std::string_view emitted) {
+    while (!emitted.empty() && difference_.empty()) {
+      const std::string_view line = take_line(emitted);
+      emitted_.read(line);
+      follow(line);
+    }
+    place_ = "the end";
+    expect(rest_.empty(), "lines are lost");
+    expect(part_ == Part::kept, "a run does not end");
+    compare();
+    // Off from the first run on, but for what moves by itself.
+    compare_limits(true);
+    expect(emitted_.refused() == sliced_.refused(), "a line is refused");
+    return difference_;
+  }
+
+ private:
+  void follow(std::string_view line) {
+    if (line == ";unflex run") {
+      part_ = Part::run;
+      run_seen_ = true;
+    } else if (line == ";unflex end") {
+      part_ = Part::end_of_run;
+    } else if (part_ == Part::end_of_run && sets_limits(line)) {
+      part_ = Part::kept;
+    }
+    for (const std::array<double, 3>& place : emitted_.path()) {
+      expect(part_ != Part::end_of_run, "motion by the limits of a run");
+      if (part_ == Part::run) {
+        run_.add(place);
+      }
+    }
+    if (line.starts_with(kMark)) {
+      follow_mark(line);
+    } else {
+      since_mark_.insert(line);
+    }
+  }
+
+  void follow_mark(std::string_view mark) {
+    const std::string_view own = read_sliced_line();
+    place_ = fmt::format("{}: {}", mark.substr(1), own);
+    expect(take_line(rest_) == mark, "lines are out of order");
+    if (part_ == Part::kept) {
+      compare();
+      compare_extents();
+      expect(run_seen_ || tells_duration(own) || since_mark_.contains(own), "the line is lost");
+      lines_ = {};
+      run_ = {};
+      run_seen_ = false;
+    }
+    since_mark_.clear();
+  }
+
+  std::string_view read_sliced_line() {
+    const std::string_view line = take_line(rest_);
+    lines_.add(sliced_.reading().position_mm);
+    sliced_.read(line);
+    for (const std::array<double, 3>& place : sliced_.path()) {
+      lines_.add(place);
+    }
+    return line;
+  }
+
+  // The first difference is told.
+  void expect(bool holds, std::string_view otherwise) {
+    if (!holds && difference_.empty()) {
+      difference_ = fmt::format("{}: {}", place_, otherwise);
+    }
+  }
+  void expect_near(std::string_view what, double emitted, double sliced, double leeway) {
+    expect(std::abs(emitted - sliced) <= leeway,
+           fmt::format("{} is {:.9g} instead of {:.9g}", what, emitted, sliced));
+  }
+
+  void compare_extents() {
+    if (run_.empty()) {
+      return;
+    }
+    for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+      const double leeway_mm = axis == 2 ? kStep_mm : kSwing_mm;
+      const double least_mm = lines_.least_mm[axis] - leeway_mm;
+      const double most_mm = lines_.most_mm[axis] + leeway_mm;
+      expect(run_.least_mm[axis] >= least_mm && run_.most_mm[axis] <= most_mm,
+             fmt::format("a run leaves its lines along {}", kAxes[axis]));
+    }
+  }
+
+  void compare() {
+    const Reading& sliced = sliced_.reading();
+    const Reading& emitted = emitted_.reading();
+    for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+      expect(emitted.known[axis] == sliced.known[axis], "it is homed otherwise");
+      expect_near(kAxes[axis], emitted.position_mm[axis], sliced.position_mm[axis], kPosition_mm);
+      expect_near("zero", emitted.offset_mm[axis], sliced.offset_mm[axis], kOffset_mm);
+    }
+    const bool in_double = printer_.firmware == Firmware::klipper;
+    const double leeway_mm = kFilament_mm + (in_double ? 0.0 : kSingle_mm);
+    expect_near("filament", emitted.filament_mm, sliced.filament_mm, leeway_mm);
+    expect_near("the reading of E", emitted.e_reading_mm, sliced.e_reading_mm, leeway_mm);
+    expect_near("F", emitted.feed_mm_s, sliced.feed_mm_s, kFeed * sliced.feed_mm_s);
+    expect_near("M220", emitted.speed_factor, sliced.speed_factor, 0.0);
+    expect_near("M221", emitted.flow_factor, sliced.flow_factor, 0.0);
+    expect(emitted.absolute_xyz == sliced.absolute_xyz, "G90 and G91 differ");
+    expect(emitted.absolute_e == sliced.absolute_e, "M82 and M83 differ");
+    expect(emitted.inches == sliced.inches, "G20 and G21 differ");
+    expect(emitted.retracted == sliced.retracted, "G10 and G11 differ");
+    compare_limits(false);
+  }
+
+  void compare_limits(bool shaper) {
+    const std::map<std::string, double>& set = sliced_.reading().limits;
+    for (const auto& [name, value] : emitted_.reading().limits) {
+      if (name.starts_with("shaper") != shaper) {
+        continue;
+      }
+      const bool is_set = set.contains(name);
+      if (is_set || printer_.limits.contains(name)) {
+        const double wanted = is_set ? set.at(name) : printer_.limits.at(name);
+        expect_near(name, value, wanted, kLimit * std::abs(wanted));
+      } else {
+        expect(false, fmt::format("{} is set to {}, which nobody has said", name, value));
+      }
+    }
+  }
+
+  const Printer& printer_;
+  std::string_view rest_;  // of the sliced text
+  TextMachine sliced_;
+  TextMachine emitted_;
+  Part part_ = Part::kept;
+  std::string place_;
+  std::string difference_;
+  // Since the last mark.
+  std::set<std::string_view> since_mark_;
+  // Since the last mark outside of a run.
+  Extent lines_;
+  Extent run_;
+  bool run_seen_ = false;
+};
+
+}  // namespace
+
+std::string numbered(std::string_view gcode) {
+  std::string text;
+  for (std::size_t number = 0; !gcode.empty(); ++number) {
+    text += fmt::format("{}\n{}{}\n", take_line(gcode), kMark, number);
+  }
+  return text;
+}
+
+std::string difference(std::string_view sliced, std::string_view emitted, const Printer& printer) {
+  return Comparison(sliced, printer).run(emitted);
+}
+
+}  // namespace unflex::testing
