@@ -79,6 +79,7 @@ void Parser::run() {
   skip_blanks();
   start_ = cursor_;
   while (peek() == '(') {
+    command_.spelling.behind_parentheses = true;
     skip_parentheses();
     skip_blanks();
   }
@@ -119,11 +120,14 @@ void Parser::read_traditional() {
   command_.kind = CommandKind::traditional;
   command_.letter = to_upper(line_[cursor_]);
   const std::size_t from = cursor_++;
+  command_.spelling.number_apart = is_blank(peek());
   skip_blanks();
   const int sign = peek() == '-' ? -1 : 1;
   cursor_ += sign < 0 ? 1 : 0;
   int number = 0;
-  const bool has_number = read_number(take_digits(), number);
+  const std::string_view digits = take_digits();
+  const bool has_number = read_number(digits, number);
+  command_.spelling.number_padded = digits.size() > 1 && digits.front() == '0';
   bool has_subnumber = true;
   if (peek() == '.') {
     ++cursor_;
@@ -152,7 +156,7 @@ void Parser::read_words() {
       break;
     }
     if (c == '(') {
-      command_.has_parentheses = true;
+      command_.spelling.parentheses = true;
       skip_parentheses();
     } else if (is_letter(c)) {
       read_word();
@@ -170,6 +174,10 @@ void Parser::read_words() {
 
 void Parser::read_word() {
   const std::size_t from = cursor_;
+  const char before = line_[from - 1];
+  command_.spelling.joined_letters |= is_letter(before) || before == '_';
+  command_.spelling.exponent |= to_upper(line_[from]) == 'E' &&
+                                (is_digit(before) || before == '.') && !command_.words.empty();
   // Filled in where it stays: copying what was written in parts just before stalls the processor.
   Word& word = command_.words.emplace_back();
   word.letter = to_upper(line_[cursor_++]);
@@ -309,16 +317,21 @@ std::string_view Parser::take_digits() {
   return line_.substr(from, cursor_ - from);
 }
 
-// Skips to the next blank. In an M-code that is text; in anything else the line makes no sense.
+// In an M-code that is text or an expression, and what comes next may be a word again; anything
+// else makes no sense.
 void Parser::unreadable(std::size_t from) {
+  if (command_.letter == 'M' && command_.number >= 0) {
+    command_.spelling.other_text = true;
+    const std::size_t close = peek() == '{' ? line_.find('}', cursor_) : std::string_view::npos;
+    cursor_ = close != std::string_view::npos ? close + 1 : std::max(cursor_, from + 1);
+    return;
+  }
   while (!at_end() && !is_blank(line_[cursor_]) && line_[cursor_] != ';') {
     ++cursor_;
   }
-  if (line_.starts_with(kByteOrderMark)) {
-    malformed("a byte order mark, which printers take for part of the command; save without it");
-  } else if (command_.letter != 'M' || command_.number < 0) {
-    malformed(fmt::format("cannot read '{}'", line_.substr(from, cursor_ - from)));
-  }
+  malformed(line_.starts_with(kByteOrderMark)
+                ? "a byte order mark, which printers take for part of the command; save without it"
+                : fmt::format("cannot read '{}'", line_.substr(from, cursor_ - from)));
 }
 
 void Parser::malformed(std::string problem) {
@@ -343,7 +356,7 @@ void Command::reset() {
   words.clear();
   name.clear();
   arguments = {};
-  has_parentheses = false;
+  spelling = {};
   comment = {};
   line_number.reset();
   checksum.reset();

@@ -138,6 +138,13 @@ void Interpreter::velocity_limit(Event& event) {
 // extras/input_shaper.py, cmd_SET_INPUT_SHAPER: SHAPER_TYPE is for both axes.
 void Interpreter::input_shaper(Event& event) {
   event.kind = EventKind::barrier;
+  for (const char* const key :
+       {"SHAPER_FREQ_X", "SHAPER_FREQ_Y", "DAMPING_RATIO_X", "DAMPING_RATIO_Y"}) {
+    if (const Parameter given = number_of(command_, key); given.given && !given.value) {
+      event.warnings.emplace_back("SET_INPUT_SHAPER with an invalid value is ignored");
+      return;
+    }
+  }
   const auto type = [&](std::string_view key, std::string& target) {
     const std::optional<std::string> both = command_.parameter("SHAPER_TYPE");
     target = command_.parameter(key).value_or(both.value_or(target));

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <initializer_list>
 #include <numbers>
 #include <utility>
 
@@ -32,7 +33,30 @@ bool same_modes(const ModalState& a, const ModalState& b) {
          a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper == b.shaper;
 }
 
-// "Xnan" names none: to Klipper it is an X without a number.
+// gcode.py, _process_commands: the line is split at runs of letters, and all that stands between
+// them, blanks, zeros and parentheses, belongs to the command's number or to a value.
+std::string_view klipper_misspelling(const Command& command) {
+  const Spelling& spelling = command.spelling;
+  const auto is_one_of = [&](char letter, std::initializer_list<int> numbers) {
+    return command.letter == letter && std::ranges::find(numbers, command.number) != numbers.end();
+  };
+  if (spelling.number_apart || spelling.number_padded) {
+    return "Klipper knows no command that is written with a blank or a zero before its number";
+  }
+  if (spelling.parentheses || spelling.behind_parentheses) {
+    return "parentheses, which are no comment to Klipper";
+  }
+  if (spelling.other_text && is_one_of('M', {82, 83, 204, 220, 221})) {
+    return "more than a number behind a letter, which Klipper refuses";
+  }
+  const bool reads_words =
+      is_one_of('G', {0, 1, 2, 3, 4, 10, 28, 92}) || is_one_of('M', {204, 220, 221});
+  return spelling.joined_letters && reads_words
+             ? "letters without a number between them, which are one word to Klipper"
+             : "";
+}
+
+// "Xnan" names none.
 bool names_further_axis(const Command& command) {
   return std::ranges::any_of(command.words, [](const Word& word) {
     return word.value && std::string_view("ABCUVW").find(word.letter) != std::string_view::npos;
@@ -119,6 +143,12 @@ void Interpreter::interpret(Event& event) {
 }
 
 void Interpreter::klipper(Event& event) {
+  const bool is_command =
+      command_.kind == CommandKind::traditional || command_.kind == CommandKind::extended;
+  if (const std::string_view problem = klipper_misspelling(command_);
+      is_command && !problem.empty()) {
+    return not_understood(event, problem);
+  }
   switch (command_.kind) {
     case CommandKind::none:
       break;
@@ -150,9 +180,6 @@ void Interpreter::klipper_traditional(Event& event) {
 }
 
 void Interpreter::klipper_g_code(Event& event) {
-  if (command_.number <= 3 && command_.has_parentheses) {
-    return not_understood(event, "parentheses, which are no comment to Klipper");
-  }
   switch (command_.number) {
     case 0:
     case 1:
@@ -174,8 +201,11 @@ void Interpreter::klipper_g_code(Event& event) {
       state_.plane = command_.number;
       return;
     case 20:
+      set_units(true);
+      event.warnings.emplace_back("Klipper refuses G20, and ends the print");
+      return;
     case 21:
-      return set_units(command_.number == 20);
+      return set_units(false);
     case 28:
       return home(event);
     case 90:
@@ -458,6 +488,14 @@ void Interpreter::maybe(Event& event, void (Interpreter::*carry_out)(Event&),
   }
   feed_uncertain_ = feed_uncertain_ || trial.state_.feed_mm_s != state_.feed_mm_s;
   lose_position(event);
+}
+
+void Interpreter::doubtful_line(Event& event, void (Interpreter::*carry_out)(Event&),
+                                std::string_view problem) {
+  maybe(event, carry_out, problem);
+  if (event.warnings.empty()) {
+    not_understood(event, problem);
+  }
 }
 
 void Interpreter::lose_position(Event& event) {

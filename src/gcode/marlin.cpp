@@ -28,8 +28,9 @@ std::string_view doubt(std::string_view content, const Command& command) {
   std::string_view code = content.substr(0, content.find(';'));
   const std::size_t parenthesis = code.find('(');
   const bool has_words = command.number <= 4 || command.number == 92;
-  if (command.letter == 'G' && parenthesis != std::string_view::npos) {
-    if (has_words) {
+  const bool is_first = command.spelling.behind_parentheses;
+  if (is_first || (command.letter == 'G' && parenthesis != std::string_view::npos)) {
+    if (is_first || has_words) {
       return "a comment in parentheses, which Marlin reads only if PAREN_COMMENTS is set";
     }
     code = code.substr(0, parenthesis);
@@ -62,16 +63,9 @@ void Interpreter::marlin(Event& event, std::string_view content) {
       break;
   }
   if (const std::string_view problem = doubt(content, command_); !problem.empty()) {
-    return marlin_doubtful_line(event, problem);
+    return doubtful_line(event, &Interpreter::marlin_command, problem);
   }
   marlin_command(event);
-}
-
-void Interpreter::marlin_doubtful_line(Event& event, std::string_view problem) {
-  maybe(event, &Interpreter::marlin_command, problem);
-  if (event.warnings.empty()) {
-    not_understood(event, problem);
-  }
 }
 
 void Interpreter::marlin_command(Event& event) {

@@ -50,6 +50,23 @@ bool leaves_modes(const Code& code) {
              : code.letter == 'M' && rrf_m_code_effect(code.number) != Effect::unknown;
 }
 
+// StringParser.cpp, Put, DecodeCommand and FindParameters.
+std::string_view rrf_misspelling(const Command& command) {
+  const Spelling& spelling = command.spelling;
+  if (spelling.number_apart) {
+    return "a blank before the command's number, which RepRapFirmware refuses";
+  }
+  const bool has_words = command.number <= 4 || command.number == 10 || command.number == 92;
+  if (spelling.behind_parentheses || (command.letter == 'G' && has_words && spelling.parentheses)) {
+    return "parentheses, which are a comment to RepRapFirmware on a CNC machine alone";
+  }
+  const bool harmless =
+      command.letter == 'M' && rrf_m_code_effect(command.number) != Effect::unknown;
+  return spelling.exponent && !harmless
+             ? "an E right behind a number, which is an exponent to RepRapFirmware"
+             : "";
+}
+
 }  // namespace
 
 void Interpreter::rrf(Event& event, std::string_view content) {
@@ -144,6 +161,10 @@ void Interpreter::rrf_command(Event& event) {
   }
   const bool is_m = command_.letter == 'M';
   const bool is_g = command_.letter == 'G';
+  if (const std::string_view problem = rrf_misspelling(command_); !problem.empty()) {
+    command_.spelling = {};
+    return doubtful_line(event, &Interpreter::rrf_command, problem);
+  }
   if (std::ranges::any_of(command_.words, begins_command)) {
     return rrf_several_commands(event);
   }

@@ -171,6 +171,8 @@ TEST_P(BadInput, IsKeptOrToldOf) {
 const Answer kNoNumber = warns(":11: warning: a motion word has no number: passed through");
 const Answer kNoCentre = warns(":11: warning: an arc without a centre: passed through");
 const Answer kTwice = warns(":11: warning: two commands in one line, or a word given twice");
+const Answer kJoined = warns(":11: warning: letters without a number between them");
+const Answer kExponent = warns(":11: warning: an E right behind a number");
 const Answer kLowerCase = warns(":11: warning: lower case, which Marlin reads only if");
 Answer cannot_read(const std::string& what) {
   return warns(":11: warning: cannot read '" + what + "': passed through unchanged");
@@ -229,11 +231,11 @@ INSTANTIATE_TEST_SUITE_P(
         line("WithTwoPoints", "G1 X1.2.3 E.2", cannot_read("X1.2.3")),
         line("WithTwoSigns", "G1 X--4 E.2", cannot_read("X--4")),
         line("WithACommaInside", "G1 X102,5 E0,2", cannot_read(",5")),
-        line("NaN", "G1 Xnan", kNoNumber, kLowerCase, kTwice),
-        line("Infinity", "G1 Xinf E.2", kNoNumber, kLowerCase, kNoNumber),
+        line("NaN", "G1 Xnan", kJoined, kLowerCase, kTwice),
+        line("Infinity", "G1 Xinf E.2", kJoined, kLowerCase, kNoNumber),
         line("MinusInfinity", "G1 X-inf", cannot_read("X-inf")),
-        // To the firmwares that is X1 E400.
-        line("OfFourHundredDigits", "G1 X1e400", passes(), kLowerCase, passes()),
+        // To Klipper that is X1 E400.
+        line("OfFourHundredDigits", "G1 X1e400", passes(), kLowerCase, kExponent),
         line("OfCommandTooLarge", "G99999999999 X1", cannot_read("G99999999999")),
         line("BeyondAnyMachine", "G1 X9999999999 E.2",
              warns(":11: warning: the move leads further than any machine reaches")),
@@ -279,7 +281,8 @@ INSTANTIATE_TEST_SUITE_P(
         line("WithNestedParentheses", "G1 X102 (a (b) c) E.1", cannot_read(")")),
         line("WithOpenParentheses", "G1 X102 (open E.1",
              warns(":11: warning: parentheses, which are no comment to Klipper"),
-             warns(":11: warning: a comment in parentheses, which Marlin reads only if"), passes()),
+             warns(":11: warning: a comment in parentheses, which Marlin reads only if"),
+             warns(":11: warning: parentheses, which are a comment to RepRapFirmware")),
         line("WithAnOpenQuote", "SET_X A=\"open", warns(":11: warning: a quote is not closed")),
         line("WithAnOpenQuoteInAText", "M117 \"open", passes()),
         line("OfATemplate", "G1 X{params.X} E.2", cannot_read("{params.X}"),

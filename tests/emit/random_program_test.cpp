@@ -186,7 +186,7 @@ TEST(RandomProgram, EndsAsItWouldWithoutRunsWhenTheTextIsRead) {
     }
     for (const std::string& line : testing::lines_of(text)) {
       const gcode::Event event = printer.interpret({line, 0});
-      EXPECT_TRUE(event.warnings.empty()) << line;
+      EXPECT_EQ(event.warnings.empty(), !line.starts_with("G20")) << line;
       planner::apply(*event.limits, limits);
     }
     SCOPED_TRACE(fmt::format("seed {}", seed));

@@ -21,8 +21,7 @@ TEST(Coordinates, StartAbsoluteAtAnUnknownPlace) {
 
 TEST(Coordinates, ChangeModesWithoutStopping) {
   Session session;
-  for (const char* line :
-       {"G17", "G18", "G19", "G20", "G21", "G90", "G91", "M82", "M83", "G92 E0"}) {
+  for (const char* line : {"G17", "G18", "G19", "G21", "G90", "G91", "M82", "M83", "G92 E0"}) {
     const Event event = session.read(line);
     EXPECT_EQ(event.kind, EventKind::passive) << line;
     EXPECT_THAT(event.warnings, IsEmpty()) << line;

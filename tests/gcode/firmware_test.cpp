@@ -30,7 +30,7 @@ TEST(Limits, OfM204WithOneOfPAndTAreRefused) {
     EXPECT_EQ(event.kind, EventKind::passive) << line;
     EXPECT_THAT(event.warnings, IsEmpty()) << line;
   }
-  for (const char* line : {"M204 S0", "M204 S-1", "M204 S", "M204 P0 T100", "M204 P100 Tx"}) {
+  for (const char* line : {"M204 S0", "M204 S-1", "M204 S", "M204 P0 T100", "M204 P100 T"}) {
     const Event event = session.read(line);
     EXPECT_EQ(event.kind, EventKind::passive) << line;
     EXPECT_THAT(event.warnings, SizeIs(1)) << line;

@@ -69,7 +69,7 @@ TEST(Interpreter, CutsTheArcsOfARealPrintAsKlipperDoes) {
 TEST(Interpreter, ReadsEveryMannerOfWriting) {
   std::istringstream stream(file_text(kData + "/gcode_forms.gcode"));
   LineReader reader(stream, "forms");
-  // Parentheses in a move are refused by Klipper.
+  // Klipper knows no G01, Marlin no lower case.
   Interpreter interpreter(default_options(Firmware::rrf));
   std::vector<Position> ends;
   Line line;

@@ -124,7 +124,7 @@ TEST(RandomPrograms, EndWhereAnIndependentModelEnds) {
     for (std::size_t number = 1; number <= 500; ++number) {
       const std::string line = writer.next(model);
       const Event event = interpreter.interpret(Line{line, number});
-      ASSERT_TRUE(event.warnings.empty()) << line;
+      ASSERT_EQ(event.warnings.empty(), line != "G20") << line;
       ASSERT_EQ(event.line.text, line);
       for (const Segment& segment : event.segments) {
         ASSERT_EQ(segment.start_mm, last) << line << ", seed " << seed;

@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(
         File{"NoLastLineEnd", kCorner + "G1 X104 E.2", 0.8, 0.8},
         File{"NumbersAndChecksums", numbered(kCorner), 0.6, 0.6},
         File{"Comments", kCorner + "(wall)\nG1 X104 E.2 ;(a) *5\nG1 Y104 E.2\n", 1.0, 1.0},
-        File{"NoSpaces", std::string(kStart) + "G1X104E.2F3600\nG1 X 100 Y 104 E .2\n", 0.4, 0.4},
+        File{"NoSpaces", std::string(kStart) + "G1E.2X104F3600\nG1 X 100 Y 104 E .2\n", 0.4, 0.4},
         // In Marlin G90 and G91 are E's modes too.
         File{"RelativeMoves",
              std::string(kStart) + "G91\nG1 X4 E.2 F3600\nG1 Y4 E.2\nG90\nM83\nG1 X100 E.2\n", 0.6,

@@ -45,6 +45,8 @@ std::map<std::string, double> others(const machine::Settings& settings) {
   return limits;
 }
 
+}  // namespace
+
 Firmware kind_of(unflex::Firmware firmware) {
   switch (firmware) {
     case unflex::Firmware::marlin:
@@ -56,8 +58,6 @@ Firmware kind_of(unflex::Firmware firmware) {
   }
   return Firmware::klipper;
 }
-
-}  // namespace
 
 Printer printer_with(const machine::Settings& settings) {
   const bool is_klipper = settings.printer.firmware == unflex::Firmware::klipper;

@@ -242,13 +242,14 @@ void TextMachine::arc() {
 }
 
 // firmware_retraction.py, cmd_G10: a relative G1 between SAVE_GCODE_STATE and RESTORE_GCODE_STATE,
-// so that the flow factor counts and the reading stays. fwretract.cpp, retract(), with planner.cpp,
-// apply_retract(): the same. GCodes.cpp, RetractFilament(): the flow factor does not count.
+// so that the flow factor counts and the reading stays. It does not count in fwretract.cpp,
+// retract(), for motion.cpp, _internal_move_to_destination(), puts it by, nor in GCodes.cpp,
+// RetractFilament().
 void TextMachine::retract(bool back, double length_mm) {
   if (std::exchange(reading_.retracted, back) == back) {
     return;
   }
-  const double filament_mm = length_mm * (is(Firmware::rrf) ? 1.0 : reading_.flow_factor);
+  const double filament_mm = length_mm * (is(Firmware::klipper) ? reading_.flow_factor : 1.0);
   reading_.filament_mm += filament_mm;
   if (is(Firmware::klipper)) {
     at_[E] += filament_mm;

@@ -281,12 +281,12 @@ TEST(TextMachine, SpeedFactorLeavesTheFeed) {
   EXPECT_DOUBLE_EQ(marlin.feed_mm_s, 20.0);
 }
 
-// firmware_retraction.py, cmd_G10 and cmd_G11; fwretract.cpp, retract(), with planner.cpp,
-// apply_retract(); GCodes.cpp, RetractFilament().
+// firmware_retraction.py, cmd_G10 and cmd_G11; motion.cpp, _internal_move_to_destination();
+// GCodes.cpp, RetractFilament().
 TEST(TextMachine, RetractionByTheFirmware) {
   for (const Firmware firmware : kFirmwares) {
     TextMachine machine = after(firmware, {"G1 E4 F1200", "M221 S50", "G10", "G10"});
-    const double factor = firmware == Firmware::rrf ? 1.0 : 0.5;
+    const double factor = firmware == Firmware::klipper ? 0.5 : 1.0;
     EXPECT_TRUE(machine.reading().retracted);
     EXPECT_NEAR(machine.reading().filament_mm, 4.0 - 0.8 * factor, 1e-6);
     EXPECT_NEAR(machine.reading().e_reading_mm, 4.0, 1e-12);

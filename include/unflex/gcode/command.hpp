@@ -22,6 +22,17 @@ enum class CommandKind {
   malformed,    // neither: `problem` says why
 };
 
+// How a traditional command is written, where printers do not take it alike.
+struct Spelling {
+  bool number_apart = false;    // "G 1"
+  bool number_padded = false;   // "G01"
+  bool joined_letters = false;  // "AX5": a word right behind a letter
+  bool exponent = false;        // "Y20E2", "Y2.E1": an E right behind the number of another word
+  bool parentheses = false;     // a comment in parentheses among the words
+  bool behind_parentheses = false;  // such a comment before the command
+  bool other_text = false;          // M-codes: what is no word
+};
+
 // The parsed line. Views point into the text handed to parse(), which must outlive the command.
 struct Command {
   CommandKind kind = CommandKind::none;
@@ -32,8 +43,8 @@ struct Command {
   std::string name;         // extended: the command's name in upper case
   // What follows the command's name or number, comment and checksum cut off, trimmed.
   std::string_view arguments;
-  bool has_parentheses = false;  // traditional: a comment in parentheses among the words
-  std::string_view comment;      // text after ';' (or Klipper's '#'), without it; else empty
+  Spelling spelling;
+  std::string_view comment;  // text after ';' (or Klipper's '#'), without it; else empty
   std::optional<std::int64_t> line_number;  // N word
   std::optional<int> checksum;              // after '*'
   std::string problem;                      // malformed: what is wrong, for a message

@@ -254,7 +254,6 @@ class Interpreter {
   void axis_limits(Event& event, double scale, double least, AxisValues& values);
 
   void marlin(Event& event, std::string_view content);
-  void marlin_doubtful_line(Event& event, std::string_view problem);
   void marlin_command(Event& event);
   void marlin_g_code(Event& event);
   void marlin_m_code(Event& event);
@@ -297,6 +296,9 @@ class Interpreter {
   [[nodiscard]] bool modes_certain() const { return !modes_uncertain_ && !feed_uncertain_; }
   // The line may be carried out or not: what it would do is tried on a copy.
   void maybe(Event& event, void (Interpreter::*carry_out)(Event&), std::string_view cause);
+  // The same with a warning, whatever it would do.
+  void doubtful_line(Event& event, void (Interpreter::*carry_out)(Event&),
+                     std::string_view problem);
   void keep_reading_of_e(bool e_absolute, double before_mm);
   void set_feed(std::optional<double> feed_word);
   // Adds the straight piece to `target`, unless it has no length, and moves the state there.
