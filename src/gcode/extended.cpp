@@ -138,26 +138,28 @@ void Interpreter::velocity_limit(Event& event) {
 // extras/input_shaper.py, cmd_SET_INPUT_SHAPER: SHAPER_TYPE is for both axes.
 void Interpreter::input_shaper(Event& event) {
   event.kind = EventKind::barrier;
-  for (const char* const key :
-       {"SHAPER_FREQ_X", "SHAPER_FREQ_Y", "DAMPING_RATIO_X", "DAMPING_RATIO_Y"}) {
-    if (const Parameter given = number_of(command_, key); given.given && !given.value) {
-      event.warnings.emplace_back("SET_INPUT_SHAPER with an invalid value is ignored");
-      return;
-    }
+  const Parameter freq_x = number_of(command_, "SHAPER_FREQ_X");
+  const Parameter freq_y = number_of(command_, "SHAPER_FREQ_Y");
+  const Parameter damping_x = number_of(command_, "DAMPING_RATIO_X");
+  const Parameter damping_y = number_of(command_, "DAMPING_RATIO_Y");
+  if (freq_x.unreadable() || freq_y.unreadable() || damping_x.unreadable() ||
+      damping_y.unreadable()) {
+    event.warnings.emplace_back("SET_INPUT_SHAPER with an invalid value is ignored");
+    return;
   }
   const auto type = [&](std::string_view key, std::string& target) {
     const std::optional<std::string> both = command_.parameter("SHAPER_TYPE");
     target = command_.parameter(key).value_or(both.value_or(target));
   };
-  const auto number = [&](std::string_view key, auto& target) {
-    if (const auto value = number_of(command_, key).value) {
-      target = *value;
+  const auto number = [](const Parameter& given, auto& target) {
+    if (given.value) {
+      target = *given.value;
     }
   };
-  number("SHAPER_FREQ_X", state_.shaper_freq_x_hz);
-  number("SHAPER_FREQ_Y", state_.shaper_freq_y_hz);
-  number("DAMPING_RATIO_X", state_.shaper.damping_ratio_x);
-  number("DAMPING_RATIO_Y", state_.shaper.damping_ratio_y);
+  number(freq_x, state_.shaper_freq_x_hz);
+  number(freq_y, state_.shaper_freq_y_hz);
+  number(damping_x, state_.shaper.damping_ratio_x);
+  number(damping_y, state_.shaper.damping_ratio_y);
   type("SHAPER_TYPE_X", state_.shaper.type_x);
   type("SHAPER_TYPE_Y", state_.shaper.type_y);
 }

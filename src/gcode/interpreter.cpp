@@ -49,11 +49,9 @@ std::string_view klipper_misspelling(const Command& command) {
   if (spelling.other_text && is_one_of('M', {82, 83, 204, 220, 221})) {
     return "more than a number behind a letter, which Klipper refuses";
   }
-  const bool reads_words =
-      is_one_of('G', {0, 1, 2, 3, 4, 10, 28, 92}) || is_one_of('M', {204, 220, 221});
-  return spelling.joined_letters && reads_words
-             ? "letters without a number between them, which are one word to Klipper"
-             : "";
+  const bool may_matter = spelling.joined_letters && (is_one_of('G', {0, 1, 2, 3, 4, 10, 28, 92}) ||
+                                                      is_one_of('M', {204, 220, 221}));
+  return may_matter ? "letters without a number between them, which are one word to Klipper" : "";
 }
 
 // "Xnan" names none.

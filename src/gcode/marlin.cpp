@@ -28,11 +28,11 @@ std::string_view doubt(std::string_view content, const Command& command) {
   std::string_view code = content.substr(0, content.find(';'));
   const std::size_t parenthesis = code.find('(');
   const bool has_words = command.number <= 4 || command.number == 92;
-  const bool is_first = command.spelling.behind_parentheses;
-  if (is_first || (command.letter == 'G' && parenthesis != std::string_view::npos)) {
-    if (is_first || has_words) {
-      return "a comment in parentheses, which Marlin reads only if PAREN_COMMENTS is set";
-    }
+  if (command.spelling.behind_parentheses ||
+      (command.letter == 'G' && has_words && parenthesis != std::string_view::npos)) {
+    return "a comment in parentheses, which Marlin reads only if PAREN_COMMENTS is set";
+  }
+  if (command.letter == 'G') {
     code = code.substr(0, parenthesis);
   }
   // Texts and names stand behind M and its number.

@@ -60,11 +60,10 @@ std::string_view rrf_misspelling(const Command& command) {
   if (spelling.behind_parentheses || (command.letter == 'G' && has_words && spelling.parentheses)) {
     return "parentheses, which are a comment to RepRapFirmware on a CNC machine alone";
   }
-  const bool harmless =
-      command.letter == 'M' && rrf_m_code_effect(command.number) != Effect::unknown;
-  return spelling.exponent && !harmless
-             ? "an E right behind a number, which is an exponent to RepRapFirmware"
-             : "";
+  const bool may_matter =
+      spelling.exponent &&
+      (command.letter != 'M' || rrf_m_code_effect(command.number) == Effect::unknown);
+  return may_matter ? "an E right behind a number, which is an exponent to RepRapFirmware" : "";
 }
 
 }  // namespace

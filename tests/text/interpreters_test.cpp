@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 
-#include "own_limits.hpp"
 #include "random_program.hpp"
 #include "text_machine.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -65,7 +64,7 @@ class Scribbler {
   std::mt19937_64 random_;
 };
 
-class Interpreters : public ::testing::TestWithParam<unflex::Firmware> {
+class Interpreters : public ::testing::TestWithParam<Firmware> {
  protected:
   void read_both(const std::string& text) {
     std::size_t begin = 0;
@@ -103,10 +102,10 @@ class Interpreters : public ::testing::TestWithParam<unflex::Firmware> {
     return options;
   }
 
-  static TextMachine fresh_machine() { return {kind_of(GetParam()), {kRetraction_mm, 0.0}}; }
+  static TextMachine fresh_machine() { return {GetParam(), {kRetraction_mm, 0.0}}; }
 
   static void expect_same(const gcode::ModalState& state, const Reading& reading) {
-    const double leeway_mm = GetParam() == unflex::Firmware::klipper ? 1e-9 : kSingle_mm;
+    const double leeway_mm = GetParam() == Firmware::klipper ? 1e-9 : kSingle_mm;
     for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z}) {
       if (state.known[axis]) {
         EXPECT_NEAR(state.position_mm[axis], reading.position_mm[axis], leeway_mm) << axis;
@@ -151,8 +150,7 @@ TEST_P(Interpreters, ReadLinesAlikeHoweverTheyAreWritten) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, Interpreters,
-                         ::testing::Values(unflex::Firmware::klipper, unflex::Firmware::marlin,
-                                           unflex::Firmware::rrf),
+                         ::testing::Values(Firmware::klipper, Firmware::marlin, Firmware::rrf),
                          [](const auto& tested) { return std::string(to_string(tested.param)); });
 
 }  // namespace

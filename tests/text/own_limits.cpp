@@ -25,7 +25,7 @@ std::map<std::string, double> klipper(const machine::Settings& settings) {
 
 // Marlin's and RepRapFirmware's.
 std::map<std::string, double> others(const machine::Settings& settings) {
-  const bool is_marlin = settings.printer.firmware == unflex::Firmware::marlin;
+  const bool is_marlin = settings.printer.firmware == Firmware::marlin;
   std::map<std::string, double> limits;
   add(limits, "M201", settings.axis_max_accel_mm_s2());
   add(limits, "M203", settings.axis_max_velocity_mm_s());
@@ -47,21 +47,9 @@ std::map<std::string, double> others(const machine::Settings& settings) {
 
 }  // namespace
 
-Firmware kind_of(unflex::Firmware firmware) {
-  switch (firmware) {
-    case unflex::Firmware::marlin:
-      return Firmware::marlin;
-    case unflex::Firmware::rrf:
-      return Firmware::rrf;
-    case unflex::Firmware::klipper:
-      break;
-  }
-  return Firmware::klipper;
-}
-
 Printer printer_with(const machine::Settings& settings) {
-  const bool is_klipper = settings.printer.firmware == unflex::Firmware::klipper;
-  Printer printer{kind_of(settings.printer.firmware),
+  const bool is_klipper = settings.printer.firmware == Firmware::klipper;
+  Printer printer{settings.printer.firmware,
                   {settings.retract_length_mm(), 0.0},
                   is_klipper ? klipper(settings) : others(settings)};
   printer.limits["shaper X freq"] = printer.limits["shaper freq"] = settings.shaper_freq_x_hz();

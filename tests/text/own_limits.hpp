@@ -6,8 +6,6 @@
 
 namespace unflex::testing {
 
-[[nodiscard]] Firmware kind_of(unflex::Firmware firmware);
-
 [[nodiscard]] Printer printer_with(const machine::Settings& settings);
 
 }  // namespace unflex::testing

@@ -26,6 +26,8 @@ constexpr double kFeed = 1e-6;
 constexpr double kLimit = 2e-7;
 // How far a base may swing out.
 constexpr double kSwing_mm = 2.0;
+// What a run may pull back or push that its lines do not.
+constexpr double kPulled_mm = 5e-3;
 // Half a step of Z, at whole ones of which Marlin and RepRapFirmware are sent.
 constexpr double kStep_mm = 1.3e-3;
 // Marlin leaves motion of less than six steps to the next line (MIN_STEPS_PER_SEGMENT), so a run
@@ -53,16 +55,23 @@ bool sets_limits(std::string_view line) {
 // Lines without motion come behind the last stroke of a run and before its limits are taken back.
 enum class Part { kept, run, end_of_run };
 
-// What space a stretch of lines takes.
+// What space a stretch of lines takes, and between what the filament is.
 struct Extent {
   static constexpr double kNone = std::numeric_limits<double>::infinity();
-  std::array<double, 3> least_mm{kNone, kNone, kNone};
-  std::array<double, 3> most_mm{-kNone, -kNone, -kNone};
+  std::array<double, 4> least_mm{kNone, kNone, kNone, kNone};
+  std::array<double, 4> most_mm{-kNone, -kNone, -kNone, -kNone};
 
-  void add(const std::array<double, 3>& place) {
-    for (std::size_t axis = 0; axis < place.size(); ++axis) {
-      least_mm[axis] = std::min(least_mm[axis], place[axis]);
-      most_mm[axis] = std::max(most_mm[axis], place[axis]);
+  void add(const std::array<double, 3>& place, double filament_mm) {
+    const std::array<double, 4> at = {place[0], place[1], place[2], filament_mm};
+    for (std::size_t axis = 0; axis < at.size(); ++axis) {
+      least_mm[axis] = std::min(least_mm[axis], at[axis]);
+      most_mm[axis] = std::max(most_mm[axis], at[axis]);
+    }
+  }
+  void add_line(const TextMachine& machine) {
+    add(machine.reading().position_mm, machine.reading().filament_mm);
+    for (const std::array<double, 3>& place : machine.path()) {
+      add(place, machine.reading().filament_mm);
     }
   }
   [[nodiscard]] bool empty() const { return least_mm[0] > most_mm[0]; }
@@ -103,11 +112,9 @@ class Comparison {
     } else if (part_ == Part::end_of_run && sets_limits(line)) {
       part_ = Part::kept;
     }
-    for (const std::array<double, 3>& place : emitted_.path()) {
-      expect(part_ != Part::end_of_run, "motion by the limits of a run");
-      if (part_ == Part::run) {
-        run_.add(place);
-      }
+    expect(part_ != Part::end_of_run || emitted_.path().empty(), "motion by the limits of a run");
+    if (part_ == Part::run) {
+      run_.add_line(emitted_);
     }
     if (line.starts_with(kMark)) {
       follow_mark(line);
@@ -133,11 +140,9 @@ class Comparison {
 
   std::string_view read_sliced_line() {
     const std::string_view line = take_line(rest_);
-    lines_.add(sliced_.reading().position_mm);
+    lines_.add(sliced_.reading().position_mm, sliced_.reading().filament_mm);
     sliced_.read(line);
-    for (const std::array<double, 3>& place : sliced_.path()) {
-      lines_.add(place);
-    }
+    lines_.add_line(sliced_);
     return line;
   }
 
@@ -158,12 +163,12 @@ class Comparison {
     }
     const bool leaves_steps = printer_.firmware == Firmware::marlin;
     const double height_mm = kStep_mm + (leaves_steps ? kUnqueued_mm : 0.0);
-    for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
-      const double leeway_mm = axis == 2 ? height_mm : kSwing_mm;
-      const double least_mm = lines_.least_mm[axis] - leeway_mm;
-      const double most_mm = lines_.most_mm[axis] + leeway_mm;
+    const std::array<double, 4> leeway_mm = {kSwing_mm, kSwing_mm, height_mm, kPulled_mm};
+    for (std::size_t axis = 0; axis < leeway_mm.size(); ++axis) {
+      const double least_mm = lines_.least_mm[axis] - leeway_mm[axis];
+      const double most_mm = lines_.most_mm[axis] + leeway_mm[axis];
       expect(run_.least_mm[axis] >= least_mm && run_.most_mm[axis] <= most_mm,
-             fmt::format("a run leaves its lines along {}", kAxes[axis]));
+             fmt::format("a run leaves its lines along {}", "XYZE"[axis]));
     }
   }
 

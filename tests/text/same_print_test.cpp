@@ -62,6 +62,8 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"LimitOfTheRun", "SET_VELOCITY_LIMIT ACCEL=3000\nG1 F6000\nG4 P1\n;line 7\n",
               "G1 F6000\nG4 P1\n;line 7\n", "motion by the limits of a run"},
         Fault{"Excursion", "X20.5", "X22.1", "a run leaves its lines along X"},
+        Fault{"Retraction", "E1.05 F4000", "E-1.05 F4000\nG1 E2.1",
+              "a run leaves its lines along E"},
         Fault{"Plunge", "Y10.1", "Y10.1 Z0.1", "Z is 0.1 instead of 0.2"},
         Fault{"LostLine", "M106 S100\n", "", "line 9: M106 S100: the line is lost"},
         Fault{"LostMark", ";line 4\n", "", "lines are out of order"},

@@ -7,9 +7,9 @@
 #include <string>
 #include <string_view>
 
-namespace unflex::testing {
+#include "unflex/core/firmware.hpp"
 
-enum class Firmware { klipper, marlin, rrf };
+namespace unflex::testing {
 
 // What is thrown where the firmware answers with an error.
 struct Refused {};

@@ -49,7 +49,6 @@ struct Reading {
 
 class TextMachine {
  public:
-  using Firmware = testing::Firmware;
   struct Retraction {
     double length_mm = 0.0;  // of G10
     double extra_mm = 0.0;   // that G11 pushes beyond it
