@@ -14,8 +14,10 @@
 #include <vector>
 
 #include "bytes.hpp"
+#include "own_limits.hpp"
 #include "playback.hpp"
 #include "program_writer.hpp"
+#include "same_print.hpp"
 #include "stage_options.hpp"
 #include "text_checks.hpp"
 #include "unflex/gcode/compensable.hpp"
@@ -191,6 +193,17 @@ void check_end(const Playback& input, const Playback& output, const machine::Set
   check_limits(input.limits, output.limits, settings.printer.firmware);
 }
 
+// As another interpreter reads them, at every line.
+void check_places(const std::string& print, const std::string& output,
+                  const machine::Settings& settings) {
+  if (print.find(";line ") != std::string::npos || print.find(";unflex ") != std::string::npos) {
+    return;  // lines are told by such marks
+  }
+  const std::string difference =
+      testing::difference(testing::numbered(print), output, testing::printer_with(settings));
+  require(difference.empty(), difference);
+}
+
 void check_report(const report::Report& report) {
   require(report.violation_count == 0, fmt::format("{} violations: {}", report.violation_count,
                                                    fmt::join(report.violations, "; ")));
@@ -212,9 +225,10 @@ void compensate(std::string_view bytes) {
   const machine::Settings settings = settings_of(variant);
   const PrinterSetup setup{pipeline::interpreter_options(settings),
                            pipeline::planner_limits(settings), pipeline::firmware_config(settings)};
-  const std::string text =
+  const std::string print =
       variant.written ? ProgramWriter(setup.interpreter, most_s(variant.firmware)).program(source)
                       : std::string(source.rest());
+  const std::string text = testing::numbered(print);
   const Playback input = play(text, setup, kMostSegments);
   if (!is_short(input, variant.firmware)) {
     return;
@@ -227,6 +241,7 @@ void compensate(std::string_view bytes) {
   const Playback output = play(done->text, setup, kMostSegments + text.size() * 100'000);
   check_lines_kept(input, output);
   check_end(input, output, settings);
+  check_places(print, done->text, settings);
   if (variant.settings == kSettings - 1) {
     const Result<Compensated> again = run(text, settings, 2);
     require(again && again->text == done->text, "two threads write another text than one");

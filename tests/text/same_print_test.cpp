@@ -29,6 +29,16 @@ const std::string kEmitted =
 
 TEST(SamePrint, IsFoundTheSame) { EXPECT_EQ(difference(kSliced, kEmitted, kPrinter), ""); }
 
+TEST(SamePrint, EndsWhereKlipperRefusesALine) {
+  const std::string sliced = numbered("G28\nG20\nG1 X1\n");
+  EXPECT_EQ(difference(sliced, "G28\n;line 0\nG20\n;line 1\nG1 X2\n;line 2\n", kPrinter), "");
+  EXPECT_THAT(difference(sliced,
+                         "G28\n;line 0\n;unflex run\nG1 X0 F60\n;unflex end\n"
+                         "SET_VELOCITY_LIMIT ACCEL=3000\nG1 F1500\n;line 1\nG1 X1\n;line 2\n",
+                         kPrinter),
+              HasSubstr("what is refused is not"));
+}
+
 struct Fault {
   std::string name;
   std::string text;

@@ -219,11 +219,11 @@ void TextMachine::arc() {
   double angle = std::atan2(j * end[0] - i * end[1], -i * end[0] - j * end[1]);
   const double near_mm = marlin ? 1e-6 : 0.0;
   const bool closed = std::abs(dx) <= near_mm && std::abs(dy) <= near_mm;
-  if (klipper) {
-    angle += (angle < 0.0 ? kTurn : 0.0) - (clockwise ? kTurn : 0.0);
-    angle = angle == 0.0 && closed ? kTurn : angle;
-  } else if (closed) {
+  if (closed) {
+    // Rounding makes Klipper leave out some full circles.
     angle = clockwise ? -kTurn : kTurn;
+  } else if (klipper) {
+    angle += (angle < 0.0 ? kTurn : 0.0) - (clockwise ? kTurn : 0.0);
   } else if (angle == 0.0 && marlin) {
     return;  // straight to the centre or away from it: dropped, E and all
   } else if (clockwise ? angle > 0.0 : angle < 0.0) {
