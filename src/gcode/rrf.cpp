@@ -158,12 +158,15 @@ void Interpreter::rrf_command(Event& event) {
   if (command_.kind == CommandKind::malformed) {
     return not_understood(event, command_.problem);
   }
+  if (const std::string_view problem = rrf_misspelling(command_); !problem.empty()) {
+    return doubtful_line(event, &Interpreter::rrf_as_meant, problem);
+  }
+  rrf_as_meant(event);
+}
+
+void Interpreter::rrf_as_meant(Event& event) {
   const bool is_m = command_.letter == 'M';
   const bool is_g = command_.letter == 'G';
-  if (const std::string_view problem = rrf_misspelling(command_); !problem.empty()) {
-    command_.spelling = {};
-    return doubtful_line(event, &Interpreter::rrf_command, problem);
-  }
   if (std::ranges::any_of(command_.words, begins_command)) {
     return rrf_several_commands(event);
   }
@@ -205,7 +208,7 @@ void Interpreter::rrf_several_commands(Event& event) {
     for (const Code& code : codes) {
       command_.letter = code.letter;
       command_.number = code.number;
-      rrf_command(event);
+      rrf_as_meant(event);
     }
     return;
   }

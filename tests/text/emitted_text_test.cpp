@@ -37,9 +37,8 @@ void expect_same_when_compensated(const std::string& gcode, Firmware firmware,
 
 double filament_mm(std::string_view gcode, Firmware firmware) {
   TextMachine machine(firmware, {});
-  for (std::size_t end = gcode.find('\n'); end != std::string_view::npos; end = gcode.find('\n')) {
-    machine.read(gcode.substr(0, end));
-    gcode.remove_prefix(end + 1);
+  while (!gcode.empty()) {
+    machine.read(take_line(gcode));
   }
   return machine.reading().filament_mm;
 }

@@ -66,16 +66,13 @@ class Scribbler {
 
 class Interpreters : public ::testing::TestWithParam<Firmware> {
  protected:
-  void read_both(const std::string& text) {
-    std::size_t begin = 0;
-    for (std::size_t number = 1; begin < text.size() && !HasFailure(); ++number) {
-      const std::size_t end = text.find('\n', begin);
-      const std::string line = text.substr(begin, end - begin);
+  void read_both(std::string_view text) {
+    for (std::size_t number = 1; !text.empty() && !HasFailure(); ++number) {
+      const std::string line(take_line(text));
       SCOPED_TRACE(fmt::format("line {}: {}", number, line));
       static_cast<void>(interpreter_.interpret({line + "\n", number}));
       machine_.read(line);
       expect_same(interpreter_.state(), machine_.reading());
-      begin = end + 1;
     }
   }
 

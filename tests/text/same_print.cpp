@@ -12,6 +12,7 @@ namespace unflex::testing {
 namespace {
 
 constexpr std::string_view kMark = ";line ";
+constexpr std::string_view kOwn = ";unflex ";
 constexpr std::array<const char*, 3> kAxes = {"X", "Y", "Z"};
 
 // Coordinates are written in four decimals.
@@ -37,13 +38,6 @@ constexpr double kStep_mm = 1.3e-3;
 // Marlin leaves motion of less than six steps to the next line (MIN_STEPS_PER_SEGMENT), so a run
 // may begin that much lower than its lines.
 constexpr double kUnqueued_mm = 6.0 / 400.0;
-
-std::string_view take_line(std::string_view& text) {
-  const std::size_t end = std::min(text.find('\n'), text.size());
-  const std::string_view line = text.substr(0, end);
-  text.remove_prefix(std::min(end + 1, text.size()));
-  return line;
-}
 
 // Such lines are written anew.
 bool tells_duration(std::string_view line) {
@@ -239,6 +233,10 @@ class Comparison {
 };
 
 }  // namespace
+
+bool has_marks(std::string_view gcode) {
+  return gcode.find(kMark) != std::string_view::npos || gcode.find(kOwn) != std::string_view::npos;
+}
 
 std::string numbered(std::string_view gcode) {
   std::string text;

@@ -17,6 +17,9 @@ struct Printer {
   std::map<std::string, double> limits;  // its own, by the names of Reading::limits
 };
 
+// True of a print with comments like those that difference() goes by.
+[[nodiscard]] bool has_marks(std::string_view gcode);
+
 // The print with a comment behind each line that says which it was. A comment stays where it is, so
 // the lines of the emitted text outside of runs can be told.
 [[nodiscard]] std::string numbered(std::string_view gcode);

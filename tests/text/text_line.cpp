@@ -36,6 +36,13 @@ std::string capitals(std::string text) {
   return text;
 }
 
+std::string_view take_line(std::string_view& text) {
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(std::min(end + 1, text.size()));
+  return line;
+}
+
 TextLine::TextLine(Firmware firmware, std::string_view text) : firmware_(firmware) {
   const std::string line = stripped(text.substr(0, text.find(';')));
   if (firmware == Firmware::klipper) {

@@ -18,6 +18,9 @@ struct Refused {};
 double kept(Firmware firmware, double value);
 std::string capitals(std::string text);
 
+// Cuts the first line off, without its end.
+std::string_view take_line(std::string_view& text);
+
 class TextLine {
  public:
   TextLine(Firmware firmware, std::string_view text);

@@ -273,6 +273,7 @@ class Interpreter {
   void rrf_conditional_line(Event& event, std::string_view content);
   void rrf_expression(Event& event);
   void rrf_command(Event& event);
+  void rrf_as_meant(Event& event);
   void rrf_several_commands(Event& event);
   void rrf_g_code(Event& event);
   void rrf_m_code(Event& event);
