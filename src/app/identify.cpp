@@ -1,6 +1,6 @@
 #include "identify.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "console.hpp"
 #include "identification.hpp"

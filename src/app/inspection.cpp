@@ -1,6 +1,6 @@
 #include "inspection.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <iterator>
 #include <optional>

@@ -1,6 +1,6 @@
 #include "workspace.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <initializer_list>

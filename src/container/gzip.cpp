@@ -1,6 +1,6 @@
 #include "gzip.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <zlib.h>
 
 #include <new>

@@ -1,6 +1,6 @@
 #include "unflex/core/caught.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <new>
 #include <string>

@@ -1,6 +1,6 @@
 #include "unflex/core/error.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 namespace unflex {
 namespace {

@@ -3,7 +3,7 @@
 // src/GCodes/GCodes2.cpp and GCodes.cpp (M203 and M566 in mm/min).
 #include "dialect.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <cmath>

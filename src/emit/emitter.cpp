@@ -1,6 +1,6 @@
 #include "unflex/emit/emitter.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cctype>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "unflex/gcode/command.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <charconv>

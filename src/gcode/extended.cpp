@@ -1,5 +1,5 @@
 // Klipper's extended commands, NAME KEY=VALUE.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <charconv>

@@ -3,7 +3,7 @@
 // RepRapFirmware's own in marlin.cpp and rrf.cpp.
 #include "unflex/gcode/interpreter.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cctype>

@@ -1,5 +1,5 @@
 // Marlin 2.1.2. Each function names its source below src/gcode.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // G0 to G3: from the words of a line to segments.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // RepRapFirmware 3.5. Each function names its source below src/GCodes.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -7,7 +7,7 @@
 // what was before meets the fundamental; it changes fast enough with ν to count as noise.
 #include "sweep_fit.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

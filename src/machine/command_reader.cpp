@@ -3,7 +3,7 @@
 //   RepRapFirmware 3.6 src/GCodes, Movement/Kinematics/Kinematics.h (KinematicsType).
 #include "command_reader.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>

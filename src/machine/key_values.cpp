@@ -1,6 +1,6 @@
 #include "key_values.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <fmt/ranges.h>
 
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "klipper_config.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <glob.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "unflex/machine/limit_keys.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <optional>

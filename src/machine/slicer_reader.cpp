@@ -1,6 +1,6 @@
 #include "slicer_reader.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 #include "unflex/nlp/ipopt_solver.hpp"
 
 #include <IpoptConfig.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <IpIpoptApplication.hpp>
 #include <IpSolveStatistics.hpp>

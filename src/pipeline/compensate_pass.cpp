@@ -1,6 +1,6 @@
 #include "compensate_pass.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,6 @@
 #include "run_job.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <exception>
 #include <memory>

@@ -1,6 +1,6 @@
 #include "unflex/pipeline/study_print.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <fstream>

@@ -1,6 +1,6 @@
 #include "unflex/report/html_page.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "assets.hpp"
 

@@ -1,6 +1,6 @@
 // The page is complete without its script but for the pictures; what the script shows it reads from
 // one JSON object and the bytes of the paths.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <bit>

@@ -1,5 +1,5 @@
 // The keys are documented in docs/study.md; a test holds the two together.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "unflex/report/format.hpp"
 #include "unflex/study/study.hpp"

@@ -1,5 +1,5 @@
 // What each method makes of a run.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "unflex/study/study.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <atomic>

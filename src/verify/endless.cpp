@@ -1,6 +1,6 @@
 #include "unflex/verify/endless.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 

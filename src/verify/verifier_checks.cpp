@@ -1,5 +1,5 @@
 // What a run must keep to besides the rules of its motion, and what must be the same in both files.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

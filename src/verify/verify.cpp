@@ -1,6 +1,6 @@
 #include "unflex/verify/verify.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <limits>

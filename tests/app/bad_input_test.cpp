@@ -1,6 +1,6 @@
 // What people and programs hand over instead of a sliced print: each either passes through with its
 // meaning kept, or is told of in one line with its place and what to do. docs/cli.md has the table.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

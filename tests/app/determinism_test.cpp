@@ -1,6 +1,6 @@
 // The same print becomes the same bytes, wherever, whenever and however the program is run.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pty.h>

@@ -2,7 +2,7 @@
 // line says why.
 
 #include <fcntl.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <grp.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // Random programs with every mode a file can change: whatever stands outside of runs must find the
 // printer as the input would have it.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // What the printer makes of the text: it plans the lines anew.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,7 +1,7 @@
 // Whole prints, from their bytes to the bytes that the printer gets.
 //
 // What the output must be is told by the text alone, read as the printer reads it.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <fmt/ranges.h>
 #include <sys/mman.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // Lines, what they mean to each firmware, and its plan of them.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // G2 and G3 as Marlin's plan_arc cuts them, against numbers from its rules.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

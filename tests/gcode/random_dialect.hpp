@@ -2,7 +2,7 @@
 // axes and the machine side by side, and never a base position.
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // Random programs against a model that thinks the other way round: it tracks the readings of the
 // axes and the machine side by side, and never a base position.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <array>

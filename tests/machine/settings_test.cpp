@@ -1,6 +1,6 @@
 // What a printer file says arrives, and what it does not say follows from the rest.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Marlin's M503, RepRapFirmware's config.g and slicers say what they know, in their order.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 
 #include "reading.hpp"

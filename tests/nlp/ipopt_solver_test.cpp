@@ -1,6 +1,6 @@
 #include "unflex/nlp/ipopt_solver.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

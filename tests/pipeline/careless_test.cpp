@@ -1,5 +1,5 @@
 // Files as people write them, for the firmwares whose own rules decide what such files mean.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The whole of compensate() on small prints, with solvers that fail at will.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

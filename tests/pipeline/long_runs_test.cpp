@@ -1,6 +1,6 @@
 // Runs that are too long to be handled as a whole: spiral vases, mostly.
 #include <fcntl.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,6 +1,6 @@
 // What the judge finds in an emitted file that someone, or a fault of unflex, has spoilt: every
 // rule broken once for every firmware, and edits by chance.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

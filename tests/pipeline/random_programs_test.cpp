@@ -1,6 +1,6 @@
 // Programs by chance, compensated and verified. UNFLEX_RANDOM_PROGRAMS says how many for each
 // firmware, UNFLEX_RANDOM_SEED which the first is.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 //
 // The texts are read here by a reader of its own, which knows no more than which word of which
 // command sets what: nothing that unflex reads its output with decides whether that is right.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

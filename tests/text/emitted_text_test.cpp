@@ -1,5 +1,5 @@
 // Filament in the emitted text, read by a machine of the tests' own.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <array>

@@ -1,6 +1,6 @@
 // The reader of the program and the text machine, line by line: two readings of the firmwares'
 // sources that know nothing of each other.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>

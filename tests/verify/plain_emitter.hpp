@@ -2,7 +2,7 @@
 // rest, in short lines.
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <deque>
