@@ -1,5 +1,3 @@
-#include <fmt/core.h>
-
 #include <functional>
 #include <optional>
 #include <utility>

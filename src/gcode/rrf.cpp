@@ -1,5 +1,4 @@
 // RepRapFirmware 3.5. Each function names its source below src/GCodes.
-#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,4 @@
 // The keys are documented in docs/study.md; a test holds the two together.
-#include <fmt/core.h>
 
 #include "unflex/report/format.hpp"
 #include "unflex/study/study.hpp"

@@ -1,7 +1,5 @@
 #include "unflex/verify/verify.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <limits>
 #include <utility>

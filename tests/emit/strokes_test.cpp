@@ -1,6 +1,5 @@
 #include "strokes.hpp"
 
-#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>

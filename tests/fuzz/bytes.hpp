@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <string_view>
 
+#include "text_line.hpp"
+
 namespace unflex::fuzz {
 
 class Bytes {
@@ -31,11 +33,7 @@ class Bytes {
     return from + (to - from) * static_cast<double>(256 * high + byte()) / 65535.0;
   }
   // Up to the next line feed, which is left out.
-  std::string_view line() {
-    const std::string_view line = rest_.substr(0, rest_.find('\n'));
-    rest_.remove_prefix(line.size() < rest_.size() ? line.size() + 1 : line.size());
-    return line;
-  }
+  std::string_view line() { return testing::take_line(rest_); }
 
  private:
   std::string_view rest_;

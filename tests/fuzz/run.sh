@@ -33,7 +33,7 @@ for target in "${targets[@]}"; do
   # and its branches counted, sixty times (the fit of a record: 0.09 s and 4.5 s) and twice as much.
   # What is freed stays in quarantine: at the default of 256 MB a few hundred records, one after
   # another, come to 1.3 GB, with this to 0.6 GB, whichever they are.
-  ASAN_OPTIONS=quarantine_size_mb=64 "$build/tests/fuzz/fuzz_$target" -fork="$(nproc)" -max_total_time="$seconds" -timeout=30 \
-    -rss_limit_mb=1024 -max_len=4096 -dict="$dictionary" \
+  ASAN_OPTIONS=quarantine_size_mb=64 "$build/tests/fuzz/fuzz_$target" -fork="$(nproc)" \
+    -max_total_time="$seconds" -timeout=30 -rss_limit_mb=1024 -max_len=4096 -dict="$dictionary" \
     -artifact_prefix="$build/finds/$target/" "$build/corpus/$target" "$here/corpus/$target"
 done
