@@ -1,6 +1,6 @@
 #include "inspection.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <iterator>
 #include <optional>
