@@ -102,9 +102,9 @@ INSTANTIATE_TEST_SUITE_P(
         Failure{
             "UnknownCase", {"study", "--case", "9Z"}, 1, "unflex: --case 9Z: there are ref, 1A"},
         Failure{"ReportOfNoKind",
-                {"inspect", "in.gcode", "--report", "r.txt"},
+                {"compensate", "in.gcode", "-o", "out.gcode", "--report", "r.txt"},
                 1,
-                "unflex: --report r.txt: the name must end in .json"},
+                "unflex: --report r.txt: the name must end in .json or .html"},
         Failure{"TwoResultsOnStdout",
                 {"compensate", "in.gcode", "-o", "-", "--report", "-"},
                 1,
