@@ -95,6 +95,18 @@ TEST(Emitter, KeepsAnAccelerationInsideARunAndRaisesItAgainAtOnce) {
                           "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
+// Though the motion behind it is too short for a line of its own.
+TEST(Emitter, EndsARunBehindWhatTheInputHasBeforeItsLastMove) {
+  EmitOptions how = options();
+  how.lines.min_line_s = 0.03;
+  EXPECT_THAT(
+      from_first_run(kHead + "G1 X10 E1\nM204 S700\nG1 X10.01 E.001\nM104 S0\nG4 P1\n", how),
+      ElementsAre(";unflex run\n", kRaise, "~", "M204 S700\n", kEnd,
+                  "SET_VELOCITY_LIMIT VELOCITY=300 SQUARE_CORNER_VELOCITY=5 "
+                  "MINIMUM_CRUISE_RATIO=0.5 ACCEL_TO_DECEL=2500\n",
+                  "G1 F6000\n", "M104 S0\n", "G4 P1\n", kShaperOn));
+}
+
 TEST(Emitter, KeepsVelocityLimitsInsideARunAndRaisesThemAgainAtOnce) {
   EXPECT_THAT(
       from_first_run(kHead + "G1 X10 E1\nset_velocity_limit velocity=80 square_corner_velocity=3\n"
