@@ -65,10 +65,11 @@ Grid grid_of(const RunStart& start, const planner::FirmwareConfig& config) {
           axis_grid(config, Z, start.zero_mm[Z]), start.speed_factor};
 }
 
-// How many of a run's events there are up to its last move, that one counted.
-std::size_t events_to_last_move(const std::vector<std::size_t>& move_counts) {
-  std::size_t count = move_counts.size();
-  while (count > 0 && move_counts[count - 1] == 0) {
+// How many of a run's events there are up to its last move, that one counted, though Marlin may
+// not queue it.
+std::size_t events_to_last_move(const std::vector<gcode::Event>& events) {
+  std::size_t count = events.size();
+  while (count > 0 && events[count - 1].segments.empty()) {
     --count;
   }
   return count;
@@ -189,7 +190,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
     return;
   }
   // What the input has before its last move belongs to the run, though the motion is over.
-  write_events(events_to_last_move(*run.move_counts));
+  write_events(events_to_last_move(*run.events));
   write(fmt::format("{} end", kComment), out);
   write_events(run.events->size());
   set_unit(1.0, out);
