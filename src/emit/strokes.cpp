@@ -88,6 +88,16 @@ gcode::Position start_of(const Run& run) {
   return run.moves->front().segment.start_mm;
 }
 
+// What the run's lines have laid at time t. The filament that the firmware is behind by comes with
+// the run's first line, laid or drawn back, so that much of the first move's is none of theirs.
+double filament_of_lines(const Timetable& table, double behind_mm, double t) {
+  const double filament_mm = table.filament_mm(t);
+  if (t >= table.start_s(1)) {
+    return filament_mm - behind_mm;
+  }
+  return filament_mm - std::clamp(filament_mm, std::min(behind_mm, 0.0), std::max(behind_mm, 0.0));
+}
+
 gcode::Position start_position(const Run& run, const Grid& grid) {
   gcode::Position start = run.moves->front().segment.start_mm;
   start[X] = start_of_lines(run, grid)[0];
@@ -233,10 +243,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     stroke.x_mm = is_end ? end[X] : vertices.x_mm[i];
     stroke.y_mm = is_end ? end[Y] : vertices.y_mm[i];
     stroke.z_mm = is_end ? end[Z] : grid.z.nearest(table.along_path_mm(times[i], Z));
-    stroke.e_mm = table.filament_mm(times[i]);
-    if (behind_mm > 0.0) {
-      stroke.e_mm = std::max(stroke.e_mm - behind_mm, 0.0);
-    }
+    stroke.e_mm = filament_of_lines(table, behind_mm, times[i]);
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_times_s.size() &&
            event_times_s[event] <= times[i] - 0.5 * rules.min_line_s) {

@@ -92,6 +92,34 @@ TEST(Strokes, EndExactlyWhereAndWithWhatTheMovesEnd) {
   }
 }
 
+// Which is filament that the file has told of before and Marlin lays or draws back with the run's
+// first line.
+TEST(Strokes, LayWhatTheFileHasThoughTheFirmwareIsBehindIt) {
+  constexpr double kFirst_mm = 0.5;
+  constexpr double kAlong_mm = 0.005;  // filament follows the base in time, its lines in place
+  for (const double first_mm : {kFirst_mm, 0.0, -kFirst_mm}) {
+    for (const double behind_mm : {0.05, -0.05}) {
+      Path path({{100.0, 100.0, 0.2, 3.0},
+                 {110.0, 100.0, 0.2, 3.0 + first_mm},
+                 {110.0, 110.0, 0.2, 4.0 + first_mm}});
+      for (std::size_t i = 0; i < path.moves.size(); ++i) {
+        path.events[i].segments = {path.moves[i].segment};
+      }
+      path.moves.front().segment.start_mm[E] -= behind_mm;
+      for (const Stroke& stroke : path.draw(testing::plan_as_base(path.moves))) {
+        const double share = (stroke.x_mm - 100.0) / 10.0;
+        if (share < 1.0) {
+          EXPECT_NEAR(stroke.e_mm, share * first_mm, std::abs(behind_mm) + kAlong_mm);
+          EXPECT_GE(stroke.e_mm, std::min(0.0, first_mm));
+          EXPECT_LE(stroke.e_mm, std::max(0.0, first_mm));
+        } else {
+          EXPECT_NEAR(stroke.e_mm, first_mm + (stroke.y_mm - 100.0) / 10.0, kAlong_mm);
+        }
+      }
+    }
+  }
+}
+
 // Most strokes that begin within any 100 ms.
 std::size_t most_at_once(const std::vector<Stroke>& drawn) {
   std::size_t most = 0;

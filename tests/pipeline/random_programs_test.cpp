@@ -182,6 +182,11 @@ TEST(RandomProgramsFoundFaulty, WhereAWipePullsItsFilamentBackAtItsEnd) {
   expect_faultless(Firmware::marlin, 50785, counts);
 }
 
+TEST(RandomProgramsFoundFaulty, WhereMarlinLeavesTheWipeBeforeARunToItsFirstLine) {
+  Counts counts;
+  expect_faultless(Firmware::marlin, 600674, counts);
+}
+
 INSTANTIATE_TEST_SUITE_P(Of, RandomPrograms,
                          ::testing::Values(Firmware::klipper, Firmware::marlin, Firmware::rrf),
                          [](const auto& tested) { return std::string(to_string(tested.param)); });
