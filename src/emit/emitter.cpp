@@ -65,16 +65,6 @@ Grid grid_of(const RunStart& start, const planner::FirmwareConfig& config) {
           axis_grid(config, Z, start.zero_mm[Z]), start.speed_factor};
 }
 
-// How many of a run's events there are up to its last move, that one counted, though Marlin may
-// not queue it.
-std::size_t events_to_last_move(const std::vector<gcode::Event>& events) {
-  std::size_t count = events.size();
-  while (count > 0 && events[count - 1].segments.empty()) {
-    --count;
-  }
-  return count;
-}
-
 EmitOptions in_run(const RunStart& start, EmitOptions options) {
   options.run_limits = limits_in_run(options.fixed.firmware, start.limits, options.run_limits);
   return options;
@@ -185,14 +175,12 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
     keep_reading_of_e_small(out);
     write_stroke(stroke, filament_origin, out);
   }
+  // What stands between moves belongs to the run, though its motion may be over.
+  write_events(run.events->size());
   if (run.until_s) {
-    write_events(run.events->size());
     return;
   }
-  // What the input has before its last move belongs to the run, though the motion is over.
-  write_events(events_to_last_move(*run.events));
   write(fmt::format("{} end", kComment), out);
-  write_events(run.events->size());
   set_unit(1.0, out);
   set_limits(input_limits_, out);
   restore_modes(out);

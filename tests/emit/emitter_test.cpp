@@ -96,7 +96,7 @@ TEST(Emitter, KeepsAnAccelerationInsideARunAndRaisesItAgainAtOnce) {
 }
 
 // Though the motion behind it is too short for a line of its own.
-TEST(Emitter, EndsARunBehindWhatTheInputHasBeforeItsLastMove) {
+TEST(Emitter, EndsARunBehindAllThatTheInputHasInIt) {
   EmitOptions how = options();
   how.lines.min_line_s = 0.03;
   EXPECT_THAT(

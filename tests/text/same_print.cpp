@@ -50,7 +50,7 @@ bool sets_limits(std::string_view line) {
   return line.starts_with("SET_VELOCITY_LIMIT ") || line.starts_with("M201 ");
 }
 
-// Lines without motion come behind the last stroke of a run and before its limits are taken back.
+// Behind a run nothing moves before its limits are taken back.
 enum class Part { kept, run, end_of_run };
 
 // What space a stretch of lines takes, and between what the filament is.
