@@ -133,7 +133,7 @@ void rrf(const Limits& wanted, const Limits& current, std::vector<std::string>& 
 }
 
 // Switched off it has no type; switched on again it has that which it is told, or another one.
-bool same_rrf_shaper(const Shaper& one, const Shaper& other) {
+bool same_rrf_shaper(const gcode::Shaper& one, const gcode::Shaper& other) {
   return one.freq_x_hz == other.freq_x_hz &&
          (one.freq_x_hz == 0.0 || (one.settings.type_x == other.settings.type_x &&
                                    one.settings.damping_ratio_x == other.settings.damping_ratio_x &&
@@ -141,7 +141,7 @@ bool same_rrf_shaper(const Shaper& one, const Shaper& other) {
 }
 
 // One shaper for both axes.
-std::string rrf_shaper(const Shaper& wanted) {
+std::string rrf_shaper(const gcode::Shaper& wanted) {
   if (wanted.freq_x_hz == 0.0) {
     return "M593 P\"none\"";
   }
@@ -204,12 +204,8 @@ std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, cons
   return lines;
 }
 
-Shaper shaper_of(const gcode::ModalState& state) {
-  return {state.shaper_freq_x_hz, state.shaper_freq_y_hz, state.shaper};
-}
-
-std::vector<std::string> shaper_lines(Firmware firmware, const Shaper& wanted,
-                                      const Shaper& current) {
+std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
+                                      const gcode::Shaper& current) {
   std::vector<std::string> lines;
   const bool x = wanted.freq_x_hz != current.freq_x_hz;
   const bool y = wanted.freq_y_hz != current.freq_y_hz;

@@ -27,17 +27,9 @@ namespace unflex::emit {
                                                    const planner::Limits& wanted,
                                                    const planner::Limits& current);
 
-// The firmware's own input shaping.
-struct Shaper {
-  double freq_x_hz = 0.0;  // 0: off
-  double freq_y_hz = 0.0;
-  gcode::ShaperSettings settings;  // RepRapFirmware's, which forgets its type while it is off
-};
-
-[[nodiscard]] Shaper shaper_of(const gcode::ModalState& state);
-
-// The lines that put `wanted` in place of `current`. A default Shaper is none.
-[[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const Shaper& wanted,
-                                                    const Shaper& current);
+// The lines that put `wanted` in place of `current`. A default Shaper is none. RepRapFirmware is told
+// all of its settings, since it forgets its type while the shaper is off.
+[[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
+                                                    const gcode::Shaper& current);
 
 }  // namespace unflex::emit

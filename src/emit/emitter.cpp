@@ -106,11 +106,9 @@ void Emitter::follow_input(const gcode::Event& event) {
 }
 
 void Emitter::line(const gcode::Event& event, std::string& out) {
-  if (event.position_lost || event.may_jump) {
-    // Homing, macros and tool changes move the machine by themselves, and may leave other limits.
-    // From a cancelled object it goes to the next in one line.
+  if (moves_by_itself(event)) {
     restore_shaper(out);
-    limits_known_ = limits_known_ && !event.position_lost;
+    limits_known_ = false;
   }
   copy(event, out);
   follow_input(event);
@@ -121,11 +119,12 @@ void Emitter::line(const gcode::Event& event, std::string& out) {
 }
 
 void Emitter::keep(const std::vector<gcode::Event>& events, std::string& out) {
-  restore_shaper(out);
   for (const gcode::Event& event : events) {
     line(event, out);
   }
 }
+
+bool moves_by_itself(const gcode::Event& event) { return event.position_lost; }
 
 RunStart run_start(const gcode::ModalState& state, const planner::Limits& limits) {
   return {{state.base_mm[X], state.base_mm[Y], state.base_mm[Z]}, state.speed_factor, limits};
@@ -285,11 +284,11 @@ void Emitter::set_limits(const planner::Limits& limits, std::string& out) {
   limits_known_ = true;
 }
 
-void Emitter::restore_shaper(std::string& out) { set_shaper(shaper_of(input_.state()), out); }
+void Emitter::restore_shaper(std::string& out) { set_shaper(input_.state().input_shaper(), out); }
 
-void Emitter::set_shaper(const Shaper& wanted, std::string& out) {
+void Emitter::set_shaper(const gcode::Shaper& wanted, std::string& out) {
   for (const std::string& text :
-       shaper_lines(options_.fixed.firmware, wanted, shaper_of(printer_.state()))) {
+       shaper_lines(options_.fixed.firmware, wanted, printer_.state().input_shaper())) {
     write(text, out);
   }
 }

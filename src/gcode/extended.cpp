@@ -162,6 +162,7 @@ void Interpreter::input_shaper(Event& event) {
   number(damping_y, state_.shaper.damping_ratio_y);
   type("SHAPER_TYPE_X", state_.shaper.type_x);
   type("SHAPER_TYPE_Y", state_.shaper.type_y);
+  note_shaper(event);
 }
 
 // extras/exclude_object.py: Klipper does not stop for it. But when the user has cancelled the
@@ -183,12 +184,14 @@ void Interpreter::pressure_advance(Event& event) {
   if (extruder != pressure_advance_extruder_) {
     pressure_advance_extruder_ = extruder;
     pressure_advance_on_.reset();
+    state_.pressure_advance_s.reset();
   }
   bool stops = smooth_time_given;
   if (advance.value) {
     const bool on = *advance.value > 0.0;
     stops = stops || pressure_advance_on_ != on;
     pressure_advance_on_ = on;
+    state_.pressure_advance_s = *advance.value;
   }
   if (stops) {
     event.kind = EventKind::barrier;

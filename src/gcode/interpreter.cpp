@@ -112,6 +112,8 @@ void Event::reset() {
   }
   segments.clear();
   limits.reset();
+  sets_shaper = false;
+  shaper.reset();
   dwell_s = 0.0;
   position_lost = false;
   may_jump = false;
@@ -458,6 +460,11 @@ void Interpreter::steps_per_mm(Event& event) {
           *steps, letter, static_cast<char>(std::tolower(letter)), options_.steps_per_mm[axis]));
     }
   }
+}
+
+void Interpreter::note_shaper(Event& event) {
+  event.sets_shaper = true;
+  event.shaper.edit() = state_.input_shaper();
 }
 
 void Interpreter::limits_unknown(Event& event) {

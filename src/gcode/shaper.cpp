@@ -51,6 +51,7 @@ void Interpreter::marlin_shaper(Event& event) {
   event.kind = EventKind::barrier;
   state_.shaper_freq_x_hz = for_x ? *freq_hz : state_.shaper_freq_x_hz;
   state_.shaper_freq_y_hz = for_y ? *freq_hz : state_.shaper_freq_y_hz;
+  note_shaper(event);
 }
 
 // Movement/AxisShaper.cpp, AxisShaper::Configure. One shaper for both axes; all but L waits for the
@@ -80,6 +81,7 @@ void Interpreter::rrf_shaper(Event& event) {
   shaper.custom_words = shaper.type_x == "custom" ? std::string(command_.arguments) : "";
   state_.shaper_freq_x_hz = shaper.type_x == "none" ? 0.0 : *shaper.kept_freq_hz;
   state_.shaper_freq_y_hz = state_.shaper_freq_x_hz;
+  note_shaper(event);
 }
 
 }  // namespace unflex::gcode

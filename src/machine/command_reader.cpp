@@ -155,6 +155,7 @@ class CommandReader {
     if (freq_hz > 0.0) {
       reading.add("dynamics." + axis + ".freq_hz", freq_hz, place);
       if (damping_ratio) {
+        reading.add("printer.input_shaper_damping_ratio_" + axis, *damping_ratio, place);
         reading.add("dynamics." + axis + ".damping_ratio", *damping_ratio, place);
       }
     }

@@ -49,10 +49,10 @@ using V = VerifySettings;
 
 constexpr std::string_view kNotLimited = "not limited";
 constexpr std::string_view kOtherForm = "not used";
-// RepRapFirmware's AxisShaper.h. Not "custom", whose impulses are no key: such a shaper has to be
-// set by the file's own M593.
-constexpr std::array<std::string_view, 6> kShaperTypes = {"ei2", "ei3",  "mzv",
-                                                          "zvd", "zvdd", "zvddd"};
+// Klipper's shaper_defs.py and RepRapFirmware's AxisShaper.h. Not "custom", whose impulses are no
+// key: such a shaper has to be set by the file's own M593.
+constexpr std::array<std::string_view, 11> kShaperTypes = {
+    "auto", "zv", "mzv", "zvd", "zvdd", "zvddd", "ei", "2hump_ei", "3hump_ei", "ei2", "ei3"};
 
 constexpr std::array kKeys = {
     Key{"printer.firmware", &setting<&S::printer, &P::firmware>, kAny, "",
@@ -126,10 +126,28 @@ constexpr std::array kKeys = {
         &setting<&S::printer, &P::input_shaper_type>,
         kAny,
         "",
-        "RRF: M593 P, which has to be set back with the frequency",
+        "Its type as the firmware spells it; auto: Klipper mzv, Marlin zv, RRF zvd",
         {},
         nullptr,
         kShaperTypes},
+    Key{"printer.input_shaper_type_y",
+        &setting<&S::printer, &P::input_shaper_type_y>,
+        kAny,
+        "",
+        "Klipper: its type along Y; auto: as along X",
+        {},
+        nullptr,
+        kShaperTypes},
+    Key{"printer.input_shaper_damping_ratio_x",
+        &setting<&S::printer, &P::input_shaper_damping_ratio_x>,
+        Bounds{.min = 0.0, .max = 1.0, .max_open = true}, "",
+        "The damping ratio that the printer's own shaper is built for", "0.1, Marlin 0.15",
+        &derived<&S::shaper_damping_ratio_x>},
+    Key{"printer.input_shaper_damping_ratio_y",
+        &setting<&S::printer, &P::input_shaper_damping_ratio_y>,
+        Bounds{.min = 0.0, .max = 1.0, .max_open = true}, "",
+        "The damping ratio that the printer's own shaper is built for", "0.1, Marlin 0.15",
+        &derived<&S::shaper_damping_ratio_y>},
 
     Key{"limits.max_velocity_mm_s", &setting<&S::limits, &L::max_velocity_mm_s>, kPositive, "mm/s",
         "Klipper: [printer] max_velocity; the others: of X and Y"},
@@ -220,6 +238,11 @@ constexpr std::array kKeys = {
     Key{"extruder.instantaneous_corner_velocity_mm_s",
         &setting<&S::extruder, &E::instantaneous_corner_velocity_mm_s>, kNotNegative, "mm/s",
         "Klipper: [extruder] instantaneous_corner_velocity"},
+    Key{"extruder.pressure_advance_s", &setting<&S::extruder, &E::pressure_advance_s>, kNotNegative,
+        "s", "Klipper: [extruder] pressure_advance; where it is on, the shaper switches later"},
+    Key{"extruder.pressure_advance_smooth_s", &setting<&S::extruder, &E::pressure_advance_smooth_s>,
+        Bounds{.min = 0.0, .max = 0.2, .min_open = true}, "s",
+        "Klipper: [extruder] pressure_advance_smooth_time"},
 
     Key{"dynamics.x.freq_hz", &setting<&S::dynamics_x, &D::freq_hz>,
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along X"},

@@ -33,6 +33,8 @@ constexpr std::array kRows = {
     Row{"extruder", "max_extrude_only_velocity", "extruder.max_extrude_only_velocity_mm_s"},
     Row{"extruder", "max_extrude_only_accel", "extruder.max_extrude_only_accel_mm_s2"},
     Row{"extruder", "instantaneous_corner_velocity", "extruder.instantaneous_corner_velocity_mm_s"},
+    Row{"extruder", "pressure_advance", "extruder.pressure_advance_s"},
+    Row{"extruder", "pressure_advance_smooth_time", "extruder.pressure_advance_smooth_s"},
     Row{"firmware_retraction", "retract_length", "printer.retract_length_mm"},
     Row{"firmware_retraction", "retract_speed", "printer.retract_speed_mm_s"},
     Row{"firmware_retraction", "unretract_extra_length", "printer.unretract_extra_length_mm"},
@@ -202,6 +204,30 @@ class Reader {
     }
   }
 
+  // Types that Klipper has (shaper_defs.py). Newer ones may carry parameters, "mzv(n=4,t=0.9)".
+  void shaper_type(const std::string& axis) {
+    constexpr std::array<std::string_view, 6> kTypes = {"zv", "mzv",      "zvd",
+                                                        "ei", "2hump_ei", "3hump_ei"};
+    const KlipperSection* const section = config_->find("input_shaper");
+    if (section == nullptr) {
+      return;
+    }
+    const KlipperOption* type = section->find("shaper_type_" + axis);
+    type = type != nullptr ? type : section->find("shaper_type");
+    const std::string_view text = type != nullptr ? std::string_view(type->text) : "mzv";
+    const SourcePlace at = type != nullptr ? type->place : section->place;
+    const std::string key = axis == "x" ? "printer.input_shaper_type" : "printer.input_shaper_type_y";
+    if (std::ranges::find(kTypes, text) != kTypes.end()) {
+      reading_.add(key, std::string(text), at);
+    } else {
+      reading_.note(at,
+                    fmt::format("the input shaper '{}' is not known to unflex; what the printer "
+                                "plays by it is reckoned with as if it were mzv",
+                                text),
+                    {key});
+    }
+  }
+
   // A shaper's frequency is the resonance as it was measured. input_shaper.py, shaper_defs.py.
   void input_shaper(const std::string& axis) {
     constexpr double kDefaultDampingRatio = 0.1;
@@ -210,8 +236,12 @@ class Reader {
     const double freq_hz = number("input_shaper", frequency).value_or(0.0);
     const SourcePlace at = place("input_shaper", frequency);
     reading_.add("printer.input_shaper_freq_" + axis + "_hz", freq_hz, at);
+    shaper_type(axis);
     if (freq_hz > 0.0) {
       const auto ratio = number("input_shaper", damping);
+      reading_.add("printer.input_shaper_damping_ratio_" + axis,
+                   ratio.value_or(kDefaultDampingRatio),
+                   ratio ? place("input_shaper", damping) : at);
       reading_.add("dynamics." + axis + ".freq_hz", freq_hz, at);
       reading_.add("dynamics." + axis + ".damping_ratio", ratio.value_or(kDefaultDampingRatio),
                    ratio ? place("input_shaper", damping) : at);

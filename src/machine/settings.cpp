@@ -53,6 +53,12 @@ double by_firmware(Firmware firmware, double klipper, double marlin, double rrf)
   return firmware == Firmware::klipper ? klipper : firmware == Firmware::marlin ? marlin : rrf;
 }
 
+// Of a shaper that nobody describes: Klipper's shaper_defs.py, DEFAULT_DAMPING_RATIO; Marlin's
+// Configuration_adv.h, SHAPING_ZETA_X; RepRapFirmware's AxisShaper.h, DefaultDamping.
+constexpr double kKlipperDampingRatio = 0.1;
+constexpr double kMarlinDampingRatio = 0.15;
+constexpr double kRrfDampingRatio = 0.1;
+
 }  // namespace
 
 // Defaults: Marlin 2.1.2 Configuration.h (DEFAULT_*) and Configuration_adv.h; RepRapFirmware 3.6
@@ -183,6 +189,36 @@ double Settings::period_ms() const {
 double Settings::tolerance_um() const {
   constexpr double kPerHz = 0.3 / 45.0;
   return emit.tolerance_um.value_or(kPerHz * std::min(dynamics_x.freq_hz, dynamics_y.freq_hz));
+}
+
+// Klipper's input_shaper.py; Marlin has no other; RepRapFirmware's AxisShaper::Configure.
+std::string Settings::shaper_type_x() const {
+  if (printer.input_shaper_type != "auto") {
+    return printer.input_shaper_type;
+  }
+  switch (printer.firmware) {
+    case Firmware::marlin:
+      return "zv";
+    case Firmware::rrf:
+      return "zvd";
+    case Firmware::klipper:
+      break;
+  }
+  return "mzv";
+}
+
+std::string Settings::shaper_type_y() const {
+  return printer.input_shaper_type_y == "auto" ? shaper_type_x() : printer.input_shaper_type_y;
+}
+
+double Settings::shaper_damping_ratio_x() const {
+  return printer.input_shaper_damping_ratio_x.value_or(
+      by_firmware(printer.firmware, kKlipperDampingRatio, kMarlinDampingRatio, kRrfDampingRatio));
+}
+
+double Settings::shaper_damping_ratio_y() const {
+  return printer.input_shaper_damping_ratio_y.value_or(
+      by_firmware(printer.firmware, kKlipperDampingRatio, kMarlinDampingRatio, kRrfDampingRatio));
 }
 
 double Settings::shaper_freq_x_hz() const {

@@ -44,7 +44,7 @@ PassOutcome failed(tl::unexpected<Error> error) { return {std::move(error), {}};
 
 // Opens what the job names and goes over it once.
 PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verify::BlamedRun>& kept,
-                 Progress& progress, report::Report& report) {
+                 bool last, Progress& progress, report::Report& report) {
   // Before there is any thread.
   Result<WorkerPool> processes =
       WorkerPool::start(engines.threaded ? (engines.second ? 1 : 0) : job.workers, engines.second);
@@ -74,7 +74,7 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
   std::ostream& output = job.output_fd < 0 ? out_file : out_stream;
   PassOutcome outcome =
       compensate_pass(job, engines, kept,
-                      {input, output, *processes, slots, [&] { source.stop(); }}, progress, report);
+                      {input, output, *processes, slots, [&] { source.stop(); }, last}, progress, report);
   const bool is_whole = !outcome.status || sink.finish();
   if (sink.error() != 0) {
     return failed(fail(ErrorKind::internal,
@@ -125,7 +125,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
   for (int number = 1;; ++number) {
     report::Report report = new_report("compensate", job);
     report.solver_engine = name_of(engines);
-    PassOutcome outcome = pass(job, engines, kept, progress, report);
+    PassOutcome outcome = pass(job, engines, kept, number == kMostPasses, progress, report);
     if (!outcome.blamed.empty() && number < kMostPasses && can_repeat(job) &&
         !progress.cancelled()) {
       std::ranges::move(outcome.blamed, std::back_inserter(kept));

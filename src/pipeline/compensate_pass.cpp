@@ -60,9 +60,9 @@ std::string text_of(const Piece& piece) {
 }
 
 // What has been passed on cannot be written once more with a run left as it was.
-verify::Rules rules_of_pass(const Job& job) {
+verify::Rules rules_of_pass(const Job& job, bool last) {
   verify::Rules rules = verify_rules(job.settings);
-  if (job.output_fd >= 0) {
+  if (job.output_fd >= 0 || last) {
     rules.leeway = {2.2, 5e-3, 30e-3};
   }
   return rules;
@@ -78,13 +78,15 @@ class Compensator {
         kept_(kept),
         checks_(engines.threaded && engines.second),
         rules_{compensate_setup(job.settings), emit_options(job.settings, UNFLEX_VERSION),
-               rules_of_pass(job)},
+               rules_of_pass(job, streams.last)},
         processes_(&streams.processes),
         output_(&streams.output),
         progress_(&progress),
         slots_(&streams.slots),
         report_(&report),
         writer_(rules_, job.input_name, job.settings.max_lines_per_s(), report),
+        nozzle_(rules_.verify.nozzle, rules_.verify.fixed,
+                gcode::Interpreter(rules_.emit.interpreter).state().input_shaper()),
         input_bytes_(input_bytes(job)),
         engine_(engines.threaded ? engines.threaded() : nullptr),
         pieces_(
@@ -176,9 +178,11 @@ class Compensator {
     const Piece& piece = job->piece;
     if (piece.is_run) {
       report_->runs_total += piece.begins_run() ? 1 : 0;
-      job->nozzle = nozzle_;
-      nozzle_ = piece.ends_run() ? at_rest(piece.moves.back().segment.end_mm)
-                                 : at_end_of(piece.moves.back());
+      static_cast<void>(nozzle_.begin_run(piece));
+      job->nozzle = nozzle_.nozzle();
+      const planner::PlannedMove& last = piece.moves.back();
+      nozzle_.set(piece.ends_run() ? at_rest(last.segment.end_mm) : at_end_of(last),
+                  last.segment.end_mm);
       job->setup = setup_for(rules_.setup, piece.moves, job_.settings);
       job->grid = compensate::node_grid(job->course(), rules_.setup);
       const std::size_t nodes = job->grid.count;
@@ -207,7 +211,7 @@ class Compensator {
         gaps_.choose(*job);
       }
     } else {
-      nozzle_ = after_motion(piece, nozzle_, rules_.verify.nozzle);
+      static_cast<void>(nozzle_.follow(piece));
       for (const gcode::Event& event : piece.events) {
         count_kept_moves(event, rules_.verify.fixed.firmware, report_->kept_moves);
       }
@@ -408,7 +412,7 @@ class Compensator {
   GapCheck gaps_;
   // The nozzle where the reader is, if every run before was compensated: what motion left as it is
   // has set ringing, the next run starts with.
-  dynamics::NozzleXY nozzle_;
+  NozzleFollower nozzle_;
   std::deque<std::shared_ptr<RunJob>> queue_;
   std::size_t nodes_queued_ = 0;
   std::size_t lines_queued_ = 0;

@@ -24,6 +24,7 @@ struct PassStreams {
   WorkerPool& processes;
   CpuSlots& slots;
   std::function<void()> stop_input;  // see PieceThread
+  bool last = false;                 // nothing is written once more after this pass
 };
 
 struct PassOutcome {

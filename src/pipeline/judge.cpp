@@ -9,8 +9,9 @@
 namespace unflex::pipeline {
 namespace {
 
-// Deviations below the grid that positions are written on say nothing.
-constexpr double kResolutionMm = 1e-4;
+// Below these no print shows a difference.
+constexpr double kNothingRms_mm = 0.5e-3;
+constexpr double kNothing_mm = 3e-3;
 // Where the firmware rounds to steps, a single place may be off by part of one by chance.
 constexpr double kShareOfStep = 0.1;
 // What coarse steps may leave unseen of an error.
@@ -124,38 +125,42 @@ Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter prin
   return replayed;
 }
 
-// Why the deviation `after` is worse than the one before.
+verify::RunError error_of(const verify::DeviationStats& stats, double swing_mm,
+                          const verify::NozzleModel& model) {
+  return verify::run_error(stats.contour_rms_mm * stats.contour_rms_mm * stats.duration_s,
+                           stats.contour_max_mm, stats.duration_s, swing_mm, model);
+}
+
+// Why the deviation `after` is worse than the one before. Each counts with the swing that it leaves
+// to what follows.
 std::optional<std::string> worse(const verify::RunDeviation& before,
                                  const verify::RunDeviation& after, const gcode::Position& end,
                                  const verify::Rules& rules) {
-  const auto no_worse = [](double a, double b) {
-    return a <= std::max((1.0 + kSampling) * b, kResolutionMm);
+  const auto no_worse = [](double a, double b, double nothing) {
+    return a <= std::max((1.0 + kSampling) * b, nothing);
   };
+  const double chance = chance_mm(rules.fixed);
+  const double swing_before_mm = verify::swing_mm(before.end, end, rules.nozzle);
+  const double swing_after_mm = verify::swing_mm(after.end, end, rules.nozzle);
   if (before.extruding.stats().duration_s > 0.0) {
-    const verify::DeviationStats b = before.extruding.stats();
-    const verify::DeviationStats a = after.extruding.stats();
-    if (no_worse(a.contour_rms_mm, b.contour_rms_mm) &&
-        no_worse(a.contour_max_mm, b.contour_max_mm + chance_mm(rules.fixed))) {
+    const verify::RunError b =
+        error_of(before.extruding.stats(), swing_before_mm, rules.nozzle);
+    const verify::RunError a = error_of(after.extruding.stats(), swing_after_mm, rules.nozzle);
+    if (no_worse(a.rms_mm, b.rms_mm, kNothingRms_mm) &&
+        no_worse(a.max_mm, b.max_mm + chance, kNothing_mm)) {
       return std::nullopt;
     }
     return fmt::format(
-        "compensation would be worse: contour RMS {:.3f} to {:.3f} µm, largest {:.3f} to {:.3f} µm",
-        b.contour_rms_mm * 1e3, a.contour_rms_mm * 1e3, b.contour_max_mm * 1e3,
-        a.contour_max_mm * 1e3);
+        "compensation would be worse: with the swing that is left, contour RMS {:.3f} to {:.3f} µm, "
+        "largest {:.3f} to {:.3f} µm",
+        b.rms_mm * 1e3, a.rms_mm * 1e3, b.max_mm * 1e3, a.max_mm * 1e3);
   }
-  // Travel draws nothing, and a straight one has no contour error whatever it does: what counts is
-  // how well the nozzle keeps to where it should be, and so what it leaves to the next run. Where
-  // the firmware rounds the clock of each line, only the latter.
-  const verify::DeviationStats b = before.all.stats();
-  const verify::DeviationStats a = after.all.stats();
-  if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm) ||
-      (rules.fixed.firmware != Firmware::klipper &&
-       no_worse(verify::swing_mm(after.end, end, rules.nozzle),
-                verify::swing_mm(before.end, end, rules.nozzle) + chance_mm(rules.fixed)))) {
+  // Travel draws nothing: what counts is what it leaves to the next run.
+  if (no_worse(swing_after_mm, swing_before_mm + chance, kNothing_mm)) {
     return std::nullopt;
   }
-  return fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",
-                     b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
+  return fmt::format("compensation would be worse: swing after travel {:.3f} to {:.3f} µm",
+                     swing_before_mm * 1e3, swing_after_mm * 1e3);
 }
 
 // Whether a print could bear it although it is worse.

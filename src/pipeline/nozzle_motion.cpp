@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+
+#include "unflex/emit/emitter.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -19,6 +22,12 @@ dynamics::NozzleState follow(const dynamics::AxisTrajectory& base, std::size_t k
   return dynamics::exact_step(
       axis, state, {middle.position_mm, middle.velocity_mm_s, base.accel_mm_s2[k] + 0.75 * change},
       0.5 * h);
+}
+
+// Of a nozzle whose base stands still: its deviation some time later.
+dynamics::NozzleState swing(const dynamics::FlexibleAxis& axis,
+                            const dynamics::NozzleState& deviation, double duration_s) {
+  return dynamics::exact_step(axis, deviation, {}, duration_s);
 }
 
 }  // namespace
@@ -71,32 +80,102 @@ double across_mm(const gcode::Segment& segment, double x_mm, double y_mm) {
          segment.length_xy_mm();
 }
 
-dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
-                                const verify::NozzleModel& model) {
+NozzleFollower::NozzleFollower(const verify::NozzleModel& model,
+                               const planner::FirmwareConfig& config, const gcode::Shaper& shaper)
+    : model_(model),
+      config_(config),
+      printer_(shaper),
+      present_(shaper),
+      shaping_(planner::shaping(config, shaper)) {}
+
+double NozzleFollower::follow(const Piece& piece) {
+  double stops_s = 0.0;
   std::size_t next = 0;
   for (std::size_t i = 0; i < piece.events.size(); ++i) {
     const gcode::Event& event = piece.events[i];
+    if (emit::moves_by_itself(event)) {
+      stops_s += change(printer_, std::nullopt);
+    }
     for (std::size_t k = 0; k < piece.move_counts[i]; ++k, ++next) {
       const planner::PlannedMove& move = piece.moves[next];
       if (!move.segment.start_known) {
         // From wherever the machine was: nothing is known but that it starts at rest.
-        nozzle = at_rest(move.segment.start_mm);
+        set(at_rest(move.segment.start_mm), move.segment.start_mm);
       }
-      advance(move, 0.0, move.duration_s(), model, nozzle);
+      advance(move, 0.0, move.duration_s(), model_, driven_);
+      ringing_ = {swing(model_.x, ringing_.x, move.duration_s()),
+                  swing(model_.y, ringing_.y, move.duration_s())};
+      base_mm_ = {move.segment.end_mm[gcode::X], move.segment.end_mm[gcode::Y]};
     }
     if (event.position_lost) {
       // Homing and macros take their time: the nozzle has come to rest.
-      nozzle.x.velocity = nozzle.y.velocity = 0.0;
+      set(at_rest({base_mm_[0], base_mm_[1], 0.0, 0.0}), {base_mm_[0], base_mm_[1], 0.0, 0.0});
     } else if (event.dwell_s > 0.0) {
-      const auto rest = [&](const dynamics::FlexibleAxis& axis, dynamics::NozzleState state,
-                            double base) {
-        return dynamics::exact_step(axis, state, {base, 0.0, 0.0}, event.dwell_s);
-      };
-      const gcode::Position& at = next > 0 ? piece.moves[next - 1].segment.end_mm : piece.from_mm;
-      nozzle = {rest(model.x, nozzle.x, at[gcode::X]), rest(model.y, nozzle.y, at[gcode::Y])};
+      pause(event.dwell_s);
+    }
+    if (event.sets_shaper) {
+      // The sliced file has this stop too.
+      printer_ = *event.shaper;
+      static_cast<void>(change(printer_, std::nullopt));
     }
   }
-  return nozzle;
+  return stops_s;
+}
+
+double NozzleFollower::begin_run(const Piece& run) { return change({}, run.pressure_advance_s); }
+
+void NozzleFollower::set(const dynamics::NozzleXY& nozzle, const gcode::Position& base) {
+  driven_ = nozzle;
+  ringing_ = {};
+  base_mm_ = {base[gcode::X], base[gcode::Y]};
+}
+
+void NozzleFollower::pause(double duration_s) {
+  driven_.x = dynamics::exact_step(model_.x, driven_.x, {base_mm_[0], 0.0, 0.0}, duration_s);
+  driven_.y = dynamics::exact_step(model_.y, driven_.y, {base_mm_[1], 0.0, 0.0}, duration_s);
+  ringing_ = {swing(model_.x, ringing_.x, duration_s), swing(model_.y, ringing_.y, duration_s)};
+}
+
+// The machine stands still, all that the shaper before has delayed is over, and the nozzle rings.
+double NozzleFollower::change(const gcode::Shaper& next, std::optional<double> pressure_advance_s) {
+  const double stop_s = planner::switching_s(config_, present_, next, pressure_advance_s);
+  if (stop_s == 0.0) {
+    return stop_s;
+  }
+  const auto after_stop = [&](const dynamics::FlexibleAxis& axis,
+                              const dynamics::ShaperPulses& pulses,
+                              const dynamics::NozzleState& driven,
+                              const dynamics::NozzleState& ringing, double base_mm) {
+    const dynamics::NozzleState deviation{driven.position - base_mm, driven.velocity};
+    dynamics::NozzleState sum = swing(axis, ringing, stop_s);
+    const auto add = [&](double weight, double since_s) {
+      const dynamics::NozzleState part = swing(axis, deviation, std::max(0.0, since_s));
+      sum.position += weight * part.position;
+      sum.velocity += weight * part.velocity;
+    };
+    if (pulses.empty()) {
+      add(1.0, stop_s);
+    }
+    for (const dynamics::Pulse& pulse : pulses) {
+      add(pulse.weight, stop_s - pulse.time_s);
+    }
+    return sum;
+  };
+  const dynamics::NozzleXY ringing{
+      after_stop(model_.x, shaping_.x, driven_.x, ringing_.x, base_mm_[0]),
+      after_stop(model_.y, shaping_.y, driven_.y, ringing_.y, base_mm_[1])};
+  present_ = next;
+  shaping_ = planner::shaping(config_, next);
+  const dynamics::NozzleXY rest{{base_mm_[0], 0.0}, {base_mm_[1], 0.0}};
+  if (shaping_.acts()) {
+    driven_ = rest;
+    ringing_ = ringing;
+    return stop_s;
+  }
+  driven_ = {{rest.x.position + ringing.x.position, ringing.x.velocity},
+             {rest.y.position + ringing.y.position, ringing.y.velocity}};
+  ringing_ = {};
+  return stop_s;
 }
 
 }  // namespace unflex::pipeline

@@ -1,10 +1,14 @@
 // What the nozzle does while the base moves as planned, exactly.
 #pragma once
 
+#include <array>
+#include <optional>
+
 #include "piece_reader.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/planner.hpp"
+#include "unflex/planner/printer_shaper.hpp"
 #include "unflex/verify/deviation.hpp"
 
 namespace unflex::pipeline {
@@ -25,8 +29,48 @@ void advance(const dynamics::BaseTrajectory& base, std::size_t k, const verify::
 // The part of an offset that is across the segment, which moves in X or Y; without sign.
 [[nodiscard]] double across_mm(const gcode::Segment& segment, double x_mm, double y_mm);
 
-// The nozzle after the piece's own moves and pauses, starting from `nozzle`.
-[[nodiscard]] dynamics::NozzleXY after_motion(const Piece& piece, dynamics::NozzleXY nozzle,
-                                              const verify::NozzleModel& model);
+// The nozzle from piece to piece, the printer's own shaper included.
+//
+// A shaper's base is a weighted sum of shifted motions, b_s(t) = Σ A_i b(t − t_i), and the nozzle's
+// response is linear. So the shaped nozzle is the same sum of a nozzle that hangs on the unshaped
+// base, and only that one is followed, from rest:
+//
+//   p(t) = Σ A_i u(t − t_i) + e^{-ζωt}(…)
+//
+//   u   the nozzle on the unshaped base        the second term: what still rings from the time
+//                                              before the shaper was switched on
+//
+// The shaper is switched where the machine stands still for at least as long as its pulses reach, so
+// that all u(t − t_i) needed then are of a base at rest.
+class NozzleFollower {
+ public:
+  // At rest at the origin, under the shaper that the printer starts with.
+  NozzleFollower(const verify::NozzleModel& model, const planner::FirmwareConfig& config,
+                 const gcode::Shaper& shaper);
+
+  // The piece's own moves and pauses, with the shaper as the emitter leaves it there. Returns for
+  // how long the machine stands still while the emitter switches it, s.
+  double follow(const Piece& piece);
+  // The emitter switches the shaper off, for a run that begins. Returns the same.
+  double begin_run(const Piece& run);
+  // The nozzle is known to be so, the base at rest at this place.
+  void set(const dynamics::NozzleXY& nozzle, const gcode::Position& base);
+
+  // Meaningful where no shaper acts, as in and after runs.
+  [[nodiscard]] const dynamics::NozzleXY& nozzle() const { return driven_; }
+
+ private:
+  double change(const gcode::Shaper& next, std::optional<double> pressure_advance_s);
+  void pause(double duration_s);
+
+  verify::NozzleModel model_;
+  planner::FirmwareConfig config_;
+  gcode::Shaper printer_;   // as the input has it
+  gcode::Shaper present_;   // as the output has it
+  planner::Shaping shaping_;  // of the latter
+  std::array<double, 2> base_mm_{};
+  dynamics::NozzleXY driven_;  // u; without a shaper the nozzle itself
+  dynamics::NozzleXY ringing_;  // the rest, as a deviation
+};
 
 }  // namespace unflex::pipeline

@@ -256,6 +256,7 @@ void PieceReader::append(gcode::Event&& event) {
   if (open_.is_run && open_.events.empty()) {
     // The move itself changes nothing of it.
     open_.start = emit::run_start(interpreter_.state(), planner_->limits());
+    open_.pressure_advance_s = interpreter_.state().pressure_advance_s;
     open_.cut_off = after_cut_;
   }
   after_cut_ = after_cut_ && stands_anywhere(event);

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "judge.hpp"
-#include "nozzle_motion.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -57,7 +56,8 @@ RunWriter::RunWriter(const RunRules& rules, std::string input_name, double max_l
       input_name_(std::move(input_name)),
       max_lines_per_s_(max_lines_per_s),
       report_(&report),
-      emitter_(rules.emit) {}
+      emitter_(rules.emit),
+      nozzle_(rules.verify.nozzle, rules.verify.fixed, emitter_.printer().state().input_shaper()) {}
 
 Result<std::string> RunWriter::write(const RunJob& job) {
   const Piece& piece = job.piece;
@@ -75,6 +75,9 @@ Result<std::string> RunWriter::write(const RunJob& job) {
     run_stands_ = false;
     run_line_ = piece.moves.front().segment.line;
   }
+  NozzleFollower at_run = nozzle_;
+  switching_s_ = at_run.begin_run(piece);
+  run_nozzle_ = at_run.nozzle();
   std::optional<std::string> failure =
       run_stands_ ? "the run's beginning stands as it is" : write_run(job, text);
   if (failure && !last_lines_.empty()) {
@@ -115,7 +118,7 @@ std::string RunWriter::finish() {
 
 // The printer moves as the input has it.
 void RunWriter::keep_motion(const Piece& piece) {
-  nozzle_ = after_motion(piece, nozzle_, rules_->verify.nozzle);
+  written_s_ += nozzle_.follow(piece);
   follow_motion(piece, kept_lines_);
   if (!piece.moves.empty()) {
     machine_mm_ = piece.moves.back().segment.end_mm;
@@ -178,8 +181,8 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   }
   // Its own moves would find the nozzle as it is, which after motion that was kept is not as
   // reckoned with.
-  before_ = verify::apart_mm(nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
-                ? deviation_of(job.piece, job.piece.moves, nozzle_, rules_->verify, 0.0)
+  before_ = verify::apart_mm(run_nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
+                ? deviation_of(job.piece, job.piece.moves, run_nozzle_, rules_->verify, 0.0)
                 : job.before;
   const bool counts_steps = rules_->emit.lines.burst_lines > 0;
   std::optional<std::string> objection = "planned for another start";
@@ -222,7 +225,7 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   text.clear();
   trial.run(job.run(), plan, text);
   Verdict verdict = judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(),
-                          nozzle_, rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
+                          run_nozzle_, rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
                           {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(),
                            may_be_worse, machine_mm_});
   if (verdict.objection) {
@@ -236,8 +239,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
                                piece.events.back().line.number)}));
   }
   sliced_s_ += planner::duration_s(piece.moves);
-  written_s_ += planner::duration_s(verdict.replayed);
-  cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, nozzle_,
+  written_s_ += planner::duration_s(verdict.replayed) + switching_s_;
+  cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, run_nozzle_,
             rules_->verify.nozzle);
   robust_.add(job.robust);
   nominal_.add(job.nominal);
@@ -248,7 +251,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   if (!verdict.replayed.empty()) {
     machine_mm_ = verdict.replayed.back().segment.end_mm;
   }
-  nozzle_ = verdict.nozzle;
+  static_cast<void>(nozzle_.begin_run(piece));
+  nozzle_.set(verdict.nozzle, piece.moves.back().segment.end_mm);
   line_rate_ = std::move(verdict.rate);
   note_lines_above_budget(piece);
   emitter_ = std::move(trial);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "emission_cost.hpp"
+#include "nozzle_motion.hpp"
 #include "run_job.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/emit/emitter.hpp"
@@ -56,7 +57,9 @@ class RunWriter {
   // The last lines that were kept, where the printer passes from them into what follows.
   std::vector<gcode::Segment> kept_lines_;
   std::optional<gcode::Position> machine_mm_;  // where the last move led that the firmware made
-  dynamics::NozzleXY nozzle_;                  // as it really swings after what has been written
+  NozzleFollower nozzle_;                      // as it really swings after what has been written
+  dynamics::NozzleXY run_nozzle_;              // … and where the run or part at hand begins
+  double switching_s_ = 0.0;                   // how long that run waits for the shaper to be off
   verify::RunDeviation before_;                // of the run at hand, if it were left as it is
   verify::LineRate line_rate_;                 // of what has been written
   std::vector<gcode::Segment> last_lines_;     // of the part before, of a run in parts

@@ -152,7 +152,7 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
       .circles = settings.printer.arc_p_circles};
   options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
   options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
-  options.shaper_type = settings.printer.input_shaper_type;
+  options.shaper_type = settings.shaper_type_x();
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
   options.steps_per_mm = settings.steps_per_mm();
   return options;
@@ -188,6 +188,10 @@ planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
   config.max_extrude_only_velocity_mm_s = settings.max_extrude_only_velocity_mm_s();
   config.max_extrude_only_accel_mm_s2 = settings.max_extrude_only_accel_mm_s2();
   config.instantaneous_corner_velocity_mm_s = settings.extruder.instantaneous_corner_velocity_mm_s;
+  config.pressure_advance_s = settings.extruder.pressure_advance_s;
+  config.pressure_advance_smooth_s = settings.extruder.pressure_advance_smooth_s;
+  config.shaper = {settings.shaper_type_x(), settings.shaper_type_y(),
+                   settings.shaper_damping_ratio_x(), settings.shaper_damping_ratio_y()};
   config.steps_per_mm = settings.steps_per_mm();
   config.classic_jerk = settings.printer.classic_jerk;
   config.min_steps_per_segment = static_cast<int>(settings.printer.min_steps_per_segment);

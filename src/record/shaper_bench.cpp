@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "unflex/rivals/shapers.hpp"
+#include "unflex/dynamics/shapers.hpp"
 
 namespace unflex::record {
 namespace {
@@ -37,10 +37,10 @@ ShaperBench::ShaperBench(const verify::NozzleModel& model, std::size_t machines)
       last_add_s_(machines, -1.0),
       last_(machines),
       near_(verify::reach_s(model)) {
-  for (const rivals::ShaperKind kind : rivals::kShaperKinds) {
-    Shaper shaper{std::string(rivals::name(kind)), {}};
-    const auto x = rivals::shaper_pulses(kind, frequency_hz(model.x), model.x.zeta);
-    const auto y = rivals::shaper_pulses(kind, frequency_hz(model.y), model.y.zeta);
+  for (const dynamics::ShaperKind kind : dynamics::kShaperKinds) {
+    Shaper shaper{std::string(dynamics::name(kind)), {}};
+    const auto x = dynamics::shaper_pulses(kind, frequency_hz(model.x), model.x.zeta);
+    const auto y = dynamics::shaper_pulses(kind, frequency_hz(model.y), model.y.zeta);
     if (x && y) {
       shaper.nozzles.assign(machines, Nozzle{rivals::ShapedNozzle(*x, *y)});
       lookahead_s_ = std::max(lookahead_s_, shaper.nozzles.front().shaped.lookahead_s());

@@ -51,9 +51,9 @@ AxisPath reference_path(const std::vector<planner::PlannedMove>& moves, gcode::A
   return path;
 }
 
-AxisPath shaped(const AxisPath& path, const ShaperPulses& pulses) {
+AxisPath shaped(const AxisPath& path, const dynamics::ShaperPulses& pulses) {
   std::vector<double> starts_s;
-  for (const Pulse& pulse : pulses) {
+  for (const dynamics::Pulse& pulse : pulses) {
     for (const Parabola& piece : path) {
       starts_s.push_back(piece.start_s + pulse.time_s);
     }

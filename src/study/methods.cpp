@@ -8,7 +8,7 @@
 
 #include "unflex/rivals/filtered_spline.hpp"
 #include "unflex/rivals/s_curve.hpp"
-#include "unflex/rivals/shapers.hpp"
+#include "unflex/dynamics/shapers.hpp"
 #include "unflex/rivals/thesis_method.hpp"
 #include "unflex/study/bench.hpp"
 
@@ -24,25 +24,25 @@ constexpr double kSplineEndKnots = 5.0;
 
 // The shaper of an axis, built for its damping or the most that the shaper is defined for.
 struct BuiltShaper {
-  rivals::ShaperPulses pulses;
+  dynamics::ShaperPulses pulses;
   std::string remark;
 };
 
-Result<BuiltShaper> build(rivals::ShaperKind kind, const dynamics::FlexibleAxis& axis) {
+Result<BuiltShaper> build(dynamics::ShaperKind kind, const dynamics::FlexibleAxis& axis) {
   if (axis.zeta >= 1.0) {
     return fail(ErrorKind::input, "undefined at ζ = 1: without vibration there is no period");
   }
-  const double most = rivals::max_damping_ratio(kind);
+  const double most = dynamics::max_damping_ratio(kind);
   const double zeta = std::min(axis.zeta, most);
   const double freq_hz = axis.omega_rad_s / (2.0 * std::numbers::pi);
-  BuiltShaper built{*rivals::shaper_pulses(kind, freq_hz, zeta), {}};
+  BuiltShaper built{*dynamics::shaper_pulses(kind, freq_hz, zeta), {}};
   if (zeta < axis.zeta) {
     built.remark = fmt::format("built for ζ = {}, the most it is defined for", most);
   }
   return built;
 }
 
-Result<BaseMotion> shaped_base(rivals::ShaperKind kind, const Moves& plan,
+Result<BaseMotion> shaped_base(dynamics::ShaperKind kind, const Moves& plan,
                                const compensate::Setup& setup) {
   const Result<BuiltShaper> x = build(kind, setup.x.axis);
   const Result<BuiltShaper> y = build(kind, setup.y.axis);
@@ -101,19 +101,19 @@ Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSe
   return result;
 }
 
-std::optional<rivals::ShaperKind> shaper_of(Method method) {
+std::optional<dynamics::ShaperKind> shaper_of(Method method) {
   const int number = static_cast<int>(method) - static_cast<int>(Method::zv);
-  if (number < 0 || number >= static_cast<int>(rivals::kShaperKinds.size())) {
+  if (number < 0 || number >= static_cast<int>(dynamics::kShaperKinds.size())) {
     return std::nullopt;
   }
-  return rivals::kShaperKinds[static_cast<std::size_t>(number)];
+  return dynamics::kShaperKinds[static_cast<std::size_t>(number)];
 }
 
 }  // namespace
 
 std::string_view name(Method method) {
   if (const auto kind = shaper_of(method)) {
-    return rivals::name(*kind);
+    return dynamics::name(*kind);
   }
   switch (method) {
     case Method::s_curve:

@@ -3,7 +3,6 @@
 #include "meter.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -103,43 +102,40 @@ void Meter::follow_lag(bool on) {
   follow_lag_ = on;
 }
 
-void Meter::play(const planner::PlannedMove& move) {
-  const double x = move.segment.start_mm[gcode::X];
-  const double y = move.segment.start_mm[gcode::Y];
-  nozzle_.x = shifted(nozzle_.x, x - base_x_mm_);
-  nozzle_.y = shifted(nozzle_.y, y - base_y_mm_);
+void Meter::shift_to(double x_mm, double y_mm) {
+  nozzle_.x = shifted(nozzle_.x, x_mm - base_x_mm_);
+  nozzle_.y = shifted(nozzle_.y, y_mm - base_y_mm_);
+  base_x_mm_ = x_mm;
+  base_y_mm_ = y_mm;
+}
 
-  struct Ramp {
-    double velocity;
-    double acceleration;
-    double duration_s;
-  };
-  const std::array<Ramp, 3> ramps = {
-      Ramp{move.start_v_mm_s, move.accel_mm_s2, move.accel_s},
-      Ramp{move.cruise_v_mm_s, 0.0, move.cruise_s},
-      Ramp{move.cruise_v_mm_s, -move.accel_mm_s2, move.decel_s},
-  };
-  const double along_x = move.direction[gcode::X];
-  const double along_y = move.direction[gcode::Y];
+void Meter::play(const planner::PlannedMove& move) {
+  shift_to(move.segment.start_mm[gcode::X], move.segment.start_mm[gcode::Y]);
+  phases_.clear();
+  append_phases(move, phases_);
   const double start_s = time_s_;
-  double elapsed = 0.0;
-  for (const Ramp& ramp : ramps) {
-    if (ramp.duration_s <= 0.0) {
-      continue;
-    }
-    const double distance = move.distance_mm(elapsed);
-    play(Phase{{x + along_x * distance, along_x * ramp.velocity, along_x * ramp.acceleration},
-               {y + along_y * distance, along_y * ramp.velocity, along_y * ramp.acceleration},
-               ramp.duration_s});
-    elapsed += ramp.duration_s;
-    time_s_ = start_s + elapsed;
+  double elapsed_s = 0.0;
+  for (const BasePhase& phase : phases_) {
+    play(phase);
+    elapsed_s += phase.duration_s;
+    time_s_ = start_s + elapsed_s;
   }
   base_x_mm_ = move.segment.end_mm[gcode::X];
   base_y_mm_ = move.segment.end_mm[gcode::Y];
 }
 
+void Meter::settle(const BasePhase& phase) {
+  nozzle_.x = dynamics::exact_step(model_.x, nozzle_.x, phase.x, phase.duration_s);
+  nozzle_.y = dynamics::exact_step(model_.y, nozzle_.y, phase.y, phase.duration_s);
+  BasePhase end = phase;
+  advance(end.x, phase.duration_s);
+  advance(end.y, phase.duration_s);
+  base_x_mm_ = end.x.position;
+  base_y_mm_ = end.y.position;
+}
+
 // Splits a phase of the base where the reference changes its acceleration or its move.
-void Meter::play(Phase phase) {
+void Meter::play(BasePhase phase) {
   const double end_s = time_s_ + phase.duration_s;
   while (end_s - time_s_ > kSameTime_s) {
     const double change_s = next_reference_change();
@@ -149,6 +145,8 @@ void Meter::play(Phase phase) {
     integrate(phase, until_s - time_s_, measured);
     time_s_ = until_s;
   }
+  base_x_mm_ = phase.x.position;
+  base_y_mm_ = phase.y.position;
 }
 
 // The first time after now at which the reference begins another phase or move; infinity once its
@@ -173,7 +171,7 @@ double Meter::next_reference_change() {
   return piece.end_s;
 }
 
-void Meter::integrate(Phase& phase, double duration_s, bool measured) {
+void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   // For fewer steps it does not pay to set up maps.
   constexpr double kManySteps = 8.0;
   const double steps = std::max(1.0, std::ceil(duration_s / model_.step_s - 1e-9));
@@ -194,7 +192,7 @@ void Meter::integrate(Phase& phase, double duration_s, bool measured) {
 }
 
 template <typename Step>
-void Meter::integrate(Phase& phase, double steps, double h, bool measured, const Step& step) {
+void Meter::integrate(BasePhase& phase, double steps, double h, bool measured, const Step& step) {
   const double start_s = time_s_;
   ReferencePhase reference;
   if (measured) {
@@ -265,7 +263,7 @@ Meter::Sample Meter::sample(const ReferencePhase& reference, double h) {
   return {contour2, line};
 }
 
-void Meter::tell(const Phase& phase, double h, bool measured, const ReferencePhase& reference,
+void Meter::tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
                  const Sample& sample) {
   Step step;
   step.time_s = time_s_;
@@ -301,7 +299,7 @@ void Meter::wait_for_reference() {
   waiting_ = true;
   path_->extend_to(time_s_ + kSameTime_s);
   while (path_->end_s() - time_s_ > kSameTime_s) {
-    play(Phase{{base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, path_->end_s() - time_s_});
+    play(BasePhase{{base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, path_->end_s() - time_s_});
     path_->extend_to(time_s_ + kSameTime_s);
   }
   waiting_ = false;

@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <cstddef>
+#include <vector>
 
+#include "shaped_base.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/near_path.hpp"
 #include "unflex/verify/observer.hpp"
@@ -75,6 +77,12 @@ class Meter {
   void begin_section(ReferencePath& path);
   // Moves the base. If it does not start where the base stands, base and nozzle are shifted there.
   void play(const planner::PlannedMove& move);
+  // The same of motion that goes on from where the base stands.
+  void play(BasePhase phase);
+  // The base moves so while nothing is measured and the clock stands.
+  void settle(const BasePhase& phase);
+  // Takes base and nozzle to another place, as they are.
+  void shift_to(double x_mm, double y_mm);
   // Lets the present count among the largest errors.
   void look();
   // The base stands still until the reference has ended, and the nozzle is measured meanwhile;
@@ -106,12 +114,6 @@ class Meter {
   [[nodiscard]] double swing_mm() const;
 
  private:
-  struct Phase {
-    dynamics::BaseSegment x;
-    dynamics::BaseSegment y;
-    double duration_s = 0.0;
-  };
-
   // The reference during one phase of one of its moves.
   struct ReferencePhase {
     dynamics::BaseSegment x;
@@ -119,10 +121,9 @@ class Meter {
     bool extruding = false;
   };
 
-  void play(Phase phase);
-  void integrate(Phase& phase, double duration_s, bool measured);
+  void integrate(BasePhase& phase, double duration_s, bool measured);
   template <typename Step>
-  void integrate(Phase& phase, double steps, double h, bool measured, const Step& step);
+  void integrate(BasePhase& phase, double steps, double h, bool measured, const Step& step);
   [[nodiscard]] double next_reference_change();
   [[nodiscard]] ReferencePhase reference_phase(double duration_s) const;
   // What was measured of the nozzle.
@@ -131,10 +132,11 @@ class Meter {
     std::size_t line = 0;
   };
   Sample sample(const ReferencePhase& reference, double h);
-  void tell(const Phase& phase, double h, bool measured, const ReferencePhase& reference,
+  void tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
             const Sample& sample);
 
   NozzleModel model_;
+  std::vector<BasePhase> phases_;  // of the move at hand
   ReferencePath* path_ = nullptr;
   double time_s_ = 0.0;
   NozzleXY nozzle_;

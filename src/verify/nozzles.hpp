@@ -1,6 +1,8 @@
 // Nozzles of different dynamics on one base.
 #pragma once
 
+#include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "meter.hpp"
@@ -30,14 +32,36 @@ class Nozzles {
   void begin_section(ReferencePath& path) {
     for_each([&](Meter& meter) { meter.begin_section(path); });
   }
+  // From now on the printer's own shaper does this to the motion.
+  void shape(const planner::Shaping& shaping) {
+    finish_shaped();
+    shaping_ = shaping;
+  }
   void play(const planner::PlannedMove& move) {
-    for_each([&](Meter& meter) { meter.play(move); });
+    if (!shaping_.acts()) {
+      for_each([&](Meter& meter) { meter.play(move); });
+      return;
+    }
+    const gcode::Position& from = move.segment.start_mm;
+    if (!shaped_ || from[gcode::X] != to_mm_[gcode::X] || from[gcode::Y] != to_mm_[gcode::Y]) {
+      finish_shaped();
+      for_each([&](Meter& meter) { meter.shift_to(from[gcode::X], from[gcode::Y]); });
+      shaped_.emplace(shaping_, from[gcode::X], from[gcode::Y]);
+    }
+    to_mm_ = move.segment.end_mm;
+    phases_.clear();
+    shaped_->add(move, phases_);
+    for (const BasePhase& phase : phases_) {
+      for_each([&](Meter& meter) { meter.play(phase); });
+    }
   }
   void wait_for_reference() {
     for_each([](Meter& meter) { meter.wait_for_reference(); });
   }
+  // The machine stands still so long; what a shaper has delayed comes first.
   void hold(double duration_s) {
-    for_each([&](Meter& meter) { meter.hold(duration_s); });
+    const double rest_s = std::max(0.0, duration_s - finish_shaped());
+    for_each([&](Meter& meter) { meter.hold(rest_s); });
   }
   void follow_lag(bool on) { main_.follow_lag(on); }
 
@@ -50,6 +74,25 @@ class Nozzles {
     }
   }
 
+  // Plays the end of the shaped motion and returns how long that takes.
+  double finish_shaped() {
+    double duration_s = 0.0;
+    if (shaped_) {
+      phases_.clear();
+      shaped_->finish(phases_);
+      for (const BasePhase& phase : phases_) {
+        for_each([&](Meter& meter) { meter.settle(phase); });
+        duration_s += phase.duration_s;
+      }
+      shaped_.reset();
+    }
+    return duration_s;
+  }
+
+  planner::Shaping shaping_;
+  std::optional<ShapedBase> shaped_;  // while motion is shaped
+  gcode::Position to_mm_{};           // where that leads
+  std::vector<BasePhase> phases_;
   Meter main_;
   std::vector<Meter> detuned_;
   Observer* observer_;

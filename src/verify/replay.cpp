@@ -8,6 +8,7 @@
 
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
+#include "unflex/planner/printer_shaper.hpp"
 
 namespace unflex::verify {
 namespace {
@@ -68,7 +69,7 @@ Replay::Replay(std::istream& stream, std::string name, const gcode::InterpreterO
       interpreter_(interpreter),
       plan_(limits, fixed),
       resting_plan_(limits, fixed),
-      firmware_(fixed.firmware),
+      fixed_(fixed),
       in_output_(in_output) {
   sections_.push_back(Section{});
 }
@@ -185,7 +186,7 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
 bool Replay::stays_in_run(const gcode::Event& event) const {
   // What a line of emitted text may replace is known from the sliced file; by itself one of a few
   // µm may well look steep.
-  return in_compensated_run_ || gcode::compensable(event, firmware_);
+  return in_compensated_run_ || gcode::compensable(event, fixed_.firmware);
 }
 
 void Replay::read_run_moves(gcode::Event event, const Regime& before) {
@@ -204,9 +205,14 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   section.kind = kind;
   section.regime = before;
   section.dwell_s = event.dwell_s;
+  if (event.sets_shaper) {
+    section.switching_s = planner::switching_s(fixed_, before.modal.input_shaper(), *event.shaper,
+                                               before.modal.pressure_advance_s);
+  }
+  section.moves_by_itself = event.position_lost;
   section.may_be_left = event.position_lost || event.may_jump;
   section.may_be_added =
-      kind == SectionKind::barrier && is_known_addition(event.line.content(), firmware_);
+      kind == SectionKind::barrier && is_known_addition(event.line.content(), fixed_.firmware);
   section.line = std::move(event.line);
 
   // An announcement holds although unflex stops the machine before the first move.

@@ -42,7 +42,10 @@ struct Section {
   gcode::Line line;
   std::optional<Regime> regime;  // runs: at the first move
   double dwell_s = 0.0;
+  // barrier: for how long the machine stands still to switch its input shaper.
+  double switching_s = 0.0;
   bool may_be_left = false;  // barrier: the machine moves by itself, or may go elsewhere next
+  bool moves_by_itself = false;
   // barrier: of a form unflex adds, so that it may be no section at all of the sliced file.
   bool may_be_added = false;
   // run: announced as compensated.
@@ -77,7 +80,7 @@ class Replay {
   [[nodiscard]] bool next(planner::PlannedMove& move);
   // Whether next() would give one. Every line before it has then been read.
   [[nodiscard]] bool has_move();
-  [[nodiscard]] Firmware firmware() const { return firmware_; }
+  [[nodiscard]] Firmware firmware() const { return fixed_.firmware; }
   // The moves of the sliced file by another plan, in which the machine rests at both ends of every
   // section. The two plans are independent of each other; what is not asked for of this one is
   // dropped at the section's end, or by skip_resting().
@@ -125,7 +128,7 @@ class Replay {
   gcode::Interpreter interpreter_;
   PlanQueue plan_;
   PlanQueue resting_plan_;
-  Firmware firmware_;
+  planner::FirmwareConfig fixed_;
   std::function<void(const gcode::Line&)> listener_;
   bool in_output_;
   bool in_compensated_run_ = false;  // between the lines that announce its begin and its end

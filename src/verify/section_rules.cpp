@@ -83,7 +83,7 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
 
 void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emitted) {
   check_rate(rate);
-  check_nozzle(kept.section_error(), emitted.section_error());
+  check_nozzle(kept, emitted);
   // The firmware may pass from motion that was kept into the run without a stop. When the run was
   // written it was taken to begin at rest, so that how it rings is not known as exactly.
   if (!ringing_) {
@@ -129,16 +129,24 @@ void SectionRules::check_rate(const LineRate& rate) {
   }
 }
 
-void SectionRules::check_nozzle(const SectionError& kept, const SectionError& emitted) {
+void SectionRules::check_nozzle(const Meter& kept, const Meter& emitted) {
+  const auto error_of = [&](const Meter& meter) {
+    const SectionError& error = meter.section_error();
+    return run_error(error.rms_mm() * error.rms_mm() * error.duration_s(), error.max_mm(),
+                     error.duration_s(), meter.swing_mm(), rules_->nozzle);
+  };
   const Leeway& leeway = rules_->leeway;
-  if (emitted.rms_mm() > std::max(leeway.times * kept.rms_mm(), leeway.rms_mm) ||
-      emitted.max_mm() > std::max(leeway.times * kept.max_mm(), leeway.max_mm)) {
+  const RunError before = error_of(kept);
+  const RunError after = error_of(emitted);
+  if (after.rms_mm > std::max(leeway.times * before.rms_mm, leeway.rms_mm) ||
+      after.max_mm > std::max(leeway.times * before.max_mm, leeway.max_mm)) {
     violations_->in_output(
         first_line_,
-        fmt::format("in this run the nozzle strays more than in the sliced file (line {}): contour "
-                    "RMS {:.3f} instead of {:.3f} µm, largest {:.3f} instead of {:.3f} µm",
-                    emitted.line(), emitted.rms_mm() * 1e3, kept.rms_mm() * 1e3,
-                    emitted.max_mm() * 1e3, kept.max_mm() * 1e3));
+        fmt::format("in this run the nozzle strays more than in the sliced file (line {}): with the "
+                    "swing that is left, contour RMS {:.3f} instead of {:.3f} µm, largest {:.3f} "
+                    "instead of {:.3f} µm",
+                    emitted.section_error().line(), after.rms_mm * 1e3, before.rms_mm * 1e3,
+                    after.max_mm * 1e3, before.max_mm * 1e3));
   }
 }
 

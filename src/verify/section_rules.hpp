@@ -38,7 +38,7 @@ class SectionRules {
     void offer(double a_value, double limit, std::size_t a_line);
   };
   void check_rate(const LineRate& rate);
-  void check_nozzle(const SectionError& kept, const SectionError& emitted);
+  void check_nozzle(const Meter& kept, const Meter& emitted);
   void check_swing(const Meter& kept, const Meter& emitted);
   void check_filament();
 

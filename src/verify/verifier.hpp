@@ -45,6 +45,8 @@ class Verifier {
   void begin_section(bool compensated);
   void play_run();
   void skip_added_barriers();
+  void join_over_barrier();
+  void set_shaping(const gcode::Shaper& shaper);
   void play_run_moves(bool compensated);
   void play(const planner::PlannedMove& move);
   void end_section();
@@ -75,6 +77,7 @@ class Verifier {
   // Were the sliced moves of a compensated run kept, from where emitted_ is, against run_path_.
   Meter kept_;
   Nozzles emitted_;
+  gcode::Shaper emitted_shaper_;  // what emitted_ is shaped by
   FilamentLedger filament_;
   BaseCheck base_;
   SectionRules rules_of_run_;

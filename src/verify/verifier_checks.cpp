@@ -101,10 +101,9 @@ void Verifier::check_regime(const Section& input, const Section& output) {
       !difference.empty()) {
     violations_.in_output(line, fmt::format("limits not restored: {}", difference));
   }
-  // Between compensated runs a single kept move may pass without the shaper, which costs Klipper a
-  // stop to switch.
-  const bool shaper_matters = input.kind == SectionKind::run || input.kind == SectionKind::end ||
-                              (input.kind == SectionKind::barrier && input.may_be_left);
+  // Motion that the file has between compensated runs passes without the shaper: each switch is a
+  // stop. What the machine does by itself is its owner's.
+  const bool shaper_matters = input.kind == SectionKind::end || input.moves_by_itself;
   if (shaper_matters && !same_shaper(before.modal, after.modal)) {
     violations_.in_output(line, "the printer's input shaper is not restored");
   }

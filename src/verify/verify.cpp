@@ -136,6 +136,9 @@ void Verifier::begin_section(bool compensated) {
     run_path_.begin_section(rules_.lead_in_s);
   }
   emitted_path_ = compensated ? &run_path_ : &path_;
+  if (output_.section().regime) {
+    set_shaping(output_.section().regime->modal.input_shaper());
+  }
   emitted_.begin_section(*emitted_path_);
   if (compensated) {
     const Meter& emitted = emitted_.main();
@@ -193,7 +196,25 @@ void Verifier::play_run() {
 void Verifier::skip_added_barriers() {
   while (!output_.has_move() && output_.following().may_be_added &&
          (input_.has_move() || !same_line(input_.following().line, output_.following().line))) {
-    output_.join_over_barrier();
+    join_over_barrier();
+  }
+}
+
+// The machine stands still where unflex switches its shaper.
+void Verifier::join_over_barrier() {
+  const double switching_s = output_.following().switching_s;
+  emitted_.hold(switching_s);
+  totals_.emitted_time_s += switching_s;
+  since_kept_motion_s_ += switching_s;
+  output_.join_over_barrier();
+}
+
+void Verifier::set_shaping(const gcode::Shaper& shaper) {
+  if (shaper.freq_x_hz != emitted_shaper_.freq_x_hz ||
+      shaper.freq_y_hz != emitted_shaper_.freq_y_hz ||
+      shaper.settings != emitted_shaper_.settings) {
+    emitted_shaper_ = shaper;
+    emitted_.shape(planner::shaping(rules_.fixed, shaper));
   }
 }
 
@@ -225,7 +246,7 @@ void Verifier::play_run_moves(bool compensated) {
     if (same_line(input_.following().line, output_.following().line)) {
       return;
     }
-    output_.join_over_barrier();
+    join_over_barrier();
   }
 }
 
@@ -308,18 +329,21 @@ void Verifier::play_kept_line() {
     play(move);
   }
   end_section();
-  const double dwell_s = input_.section().dwell_s;
-  if (dwell_s > 0.0) {
-    path_.rest(dwell_s);
-    original_.hold(dwell_s);
-    emitted_.hold(dwell_s);
-    since_kept_motion_s_ += dwell_s;
+  const double input_s = input_.section().dwell_s + input_.section().switching_s;
+  const double output_s = output_.section().dwell_s + output_.section().switching_s;
+  if (input_s > 0.0) {
+    path_.rest(input_s);
+    original_.hold(input_s);
     if (observer_ != nullptr) {
-      observer_->hold(dwell_s);
+      observer_->hold(input_s);
     }
-    totals_.reference_time_s += dwell_s;
-    totals_.emitted_time_s += dwell_s;
   }
+  if (output_s > 0.0) {
+    emitted_.hold(output_s);
+    since_kept_motion_s_ += output_s;
+  }
+  totals_.reference_time_s += input_s;
+  totals_.emitted_time_s += output_s;
 }
 
 // After the end of the file the base is held: what the nozzle still does then counts as well.

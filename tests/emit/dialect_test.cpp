@@ -106,7 +106,7 @@ TEST(LimitsInRun, LeaveZAndRetractionAsTheFileHasThem) {
 }
 
 TEST(ShaperLines, SwitchOffAndBackOn) {
-  Shaper on;
+  gcode::Shaper on;
   on.freq_x_hz = 40.0;
   on.freq_y_hz = 42.5;
   EXPECT_THAT(shaper_lines(Firmware::klipper, {}, on),

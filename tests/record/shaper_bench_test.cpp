@@ -8,7 +8,7 @@
 
 #include "planner/plan_helpers.hpp"
 #include "unflex/rivals/axis_path.hpp"
-#include "unflex/rivals/shapers.hpp"
+#include "unflex/dynamics/shapers.hpp"
 
 namespace unflex::record {
 namespace {
@@ -57,9 +57,9 @@ struct Benched {
   ShaperBench bench;
 };
 
-report::Spread exactly(rivals::ShaperKind kind, double error) {
+report::Spread exactly(dynamics::ShaperKind kind, double error) {
   const std::vector<planner::PlannedMove> moves = corner();
-  const rivals::ShaperPulses pulses = rivals::shaper_pulses(kind, kFreq_hz, kZeta).value();
+  const dynamics::ShaperPulses pulses = dynamics::shaper_pulses(kind, kFreq_hz, kZeta).value();
   const double end_s = planner::duration_s(moves);
   const rivals::TimeGrid grid{-0.1, 1e-4, static_cast<std::size_t>((end_s + 0.2) / 1e-4)};
   const auto nozzle = [&](gcode::Axis axis) {
@@ -90,12 +90,12 @@ report::Spread exactly(rivals::ShaperKind kind, double error) {
 TEST(ShaperBench, FindsWhatTheClosedFormFinds) {
   const std::vector<double> errors = {0.0, -0.1, 0.1};
   const std::vector<report::Contender> found = Benched(errors).bench.contenders();
-  ASSERT_EQ(found.size(), rivals::kShaperKinds.size());
+  ASSERT_EQ(found.size(), dynamics::kShaperKinds.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
-    EXPECT_EQ(found[i].name, rivals::name(rivals::kShaperKinds[i]));
+    EXPECT_EQ(found[i].name, dynamics::name(dynamics::kShaperKinds[i]));
     ASSERT_EQ(found[i].spreads.size(), errors.size());
     for (std::size_t k = 0; k < errors.size(); ++k) {
-      const report::Spread wanted = exactly(rivals::kShaperKinds[i], errors[k]);
+      const report::Spread wanted = exactly(dynamics::kShaperKinds[i], errors[k]);
       EXPECT_NEAR(found[i].spreads[k].max_mm, wanted.max_mm, 0.02 * wanted.max_mm) << found[i].name;
       // Of a single corner, with sixteen moments in a period.
       EXPECT_NEAR(found[i].spreads[k].rms_mm, wanted.rms_mm, 0.08 * wanted.rms_mm) << found[i].name;

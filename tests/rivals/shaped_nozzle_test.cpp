@@ -31,12 +31,12 @@ TEST(AxisPath, OfAPlanIsThePlan) {
 
 TEST(AxisPath, OfAShapedPlanMovesInWeightedSteps) {
   const AxisPath plan = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const ShaperPulses pulses = *shaper_pulses(ShaperKind::mzv, 45.0, 0.06);
+  const dynamics::ShaperPulses pulses = *dynamics::shaper_pulses(dynamics::ShaperKind::mzv, 45.0, 0.06);
   const AxisPath path = shaped(plan, pulses);
   PathCursor cursor(path);
   for (double t = -0.02; t < 0.3; t += 1.3e-3) {
     double expected = 0.0;
-    for (const Pulse& pulse : pulses) {
+    for (const dynamics::Pulse& pulse : pulses) {
       PathCursor delayed(plan);
       expected += pulse.weight * delayed.at(t - pulse.time_s).position;
     }
@@ -74,9 +74,9 @@ TEST(AxisPath, CarriesTheNozzleAsFineStepsDo) {
 TEST(ShapedNozzle, IsTheNozzleOnTheShapedBase) {
   const auto moves = testing::corner_plan(100.0, 5000.0, 5.0);
   const dynamics::FlexibleAxis axis = dynamics::from_frequency(45.0 * 1.1, 0.06);
-  for (const ShaperKind kind : kShaperKinds) {
-    const ShaperPulses x = *shaper_pulses(kind, 45.0, 0.06);
-    const ShaperPulses y = *shaper_pulses(kind, 38.0, 0.06);
+  for (const dynamics::ShaperKind kind : dynamics::kShaperKinds) {
+    const dynamics::ShaperPulses x = *dynamics::shaper_pulses(kind, 45.0, 0.06);
+    const dynamics::ShaperPulses y = *dynamics::shaper_pulses(kind, 38.0, 0.06);
     const TimeGrid grid{-0.1, 5e-4, 1000};
     const AxisPath path_x = reference_path(moves, gcode::X);
     const AxisPath path_y = reference_path(moves, gcode::Y);
@@ -90,9 +90,9 @@ TEST(ShapedNozzle, IsTheNozzleOnTheShapedBase) {
       nozzle.add(grid.at(k), {plain_x[k], plain_y[k]});
       for (; next < grid.count && grid.at(next) <= nozzle.known_until_s(); ++next) {
         const dynamics::NozzleXY at = nozzle.at(grid.at(next));
-        EXPECT_NEAR(at.x.position, shaped_x[next].position, 1e-6) << name(kind);
-        EXPECT_NEAR(at.y.position, shaped_y[next].position, 1e-6) << name(kind);
-        EXPECT_NEAR(at.x.velocity, shaped_x[next].velocity, 5e-3) << name(kind);
+        EXPECT_NEAR(at.x.position, shaped_x[next].position, 1e-6) << dynamics::name(kind);
+        EXPECT_NEAR(at.y.position, shaped_y[next].position, 1e-6) << dynamics::name(kind);
+        EXPECT_NEAR(at.x.velocity, shaped_x[next].velocity, 5e-3) << dynamics::name(kind);
       }
     }
     EXPECT_GT(next, 900U);

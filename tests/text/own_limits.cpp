@@ -53,7 +53,7 @@ Printer printer_with(const machine::Settings& settings) {
                   {settings.retract_length_mm(), 0.0},
                   is_klipper ? klipper(settings) : others(settings)};
   printer.limits["shaper X freq"] = printer.limits["shaper freq"] = settings.shaper_freq_x_hz();
-  printer.limits["shaper type"] = shaper_type(settings.printer.input_shaper_type);
+  printer.limits["shaper type"] = shaper_type(settings.shaper_type_x());
   printer.limits["shaper Y freq"] = settings.shaper_freq_y_hz();
   return printer;
 }

@@ -66,7 +66,6 @@ struct EmitOptions {
   std::string version;  // for the comment at the first run
 };
 
-struct Shaper;  // the printer's own, see src/emit/dialect.hpp
 struct Stroke;  // a line to be, see src/emit/strokes.hpp
 
 // What a run finds when it begins and has to fit into.
@@ -120,6 +119,10 @@ struct RunPlan {
 // The same lines for a run that begins later or less late.
 [[nodiscard]] RunPlan retimed(const RunPlan& plan, const Run& run, const EmitOptions& options);
 
+// Homing, macros and tool changes, which move the machine by themselves and may leave other limits.
+// Before them the printer gets its own shaper back, which is off from the first run on.
+[[nodiscard]] bool moves_by_itself(const gcode::Event& event);
+
 // Writes the output in the order of the input. Follows both texts with an interpreter of its own,
 // so that whatever stands outside the runs finds the modes, positions and limits the input left
 // there. Copyable: a copy tries a run, and is kept or thrown away.
@@ -131,8 +134,8 @@ class Emitter {
   // before it.
   void line(const gcode::Event& event, std::string& out);
 
-  // Lines that were to be a compensated run but stand as they are: moved as the printer would have
-  // moved them, its own shaper included.
+  // Lines that were to be a compensated run but stand as they are. The printer's own shaper stays
+  // as it is, on before the first run and off after it: each switch is a stop.
   void keep(const std::vector<gcode::Event>& events, std::string& out);
 
   // What a run that follows now would start from.
@@ -161,7 +164,7 @@ class Emitter {
   void restore_modes(std::string& out);
   void restore_shaper(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out);
-  void set_shaper(const Shaper& wanted, std::string& out);
+  void set_shaper(const gcode::Shaper& wanted, std::string& out);
 
   EmitOptions options_;
   gcode::Interpreter input_;      // has read the input so far

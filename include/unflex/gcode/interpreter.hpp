@@ -69,6 +69,29 @@ struct LimitChange {
   std::optional<int> jerk_policy;
 };
 
+// What a line that sets the input shaper again must say besides the frequencies. Empty: nothing in
+// the file has changed what the configuration says.
+struct ShaperSettings {
+  std::string type_x;  // Klipper SHAPER_TYPE, RepRapFirmware P (one type for both axes)
+  std::string type_y;
+  std::optional<double> damping_ratio_x;  // Klipper DAMPING_RATIO, Marlin D, RepRapFirmware S
+  std::optional<double> damping_ratio_y;
+  // RepRapFirmware keeps the frequency while P"none" switches the shaper off.
+  std::optional<double> kept_freq_hz;
+  std::string custom_words;  // RepRapFirmware: the words of M593 P"custom", H and T among them
+
+  friend bool operator==(const ShaperSettings&, const ShaperSettings&) = default;
+};
+
+// The firmware's own input shaper.
+struct Shaper {
+  double freq_x_hz = 0.0;  // 0: off
+  double freq_y_hz = 0.0;
+  ShaperSettings settings;
+
+  [[nodiscard]] bool is_on() const { return freq_x_hz > 0.0 || freq_y_hz > 0.0; }
+};
+
 enum class EventKind {
   passive,  // neither moves nor stops the machine: comments, modes, fans, M73, G1 with F alone …
   limits,   // changes the planner's limits from here on; does not stop
@@ -82,6 +105,8 @@ struct Event {
   Line line;
   std::vector<Segment> segments;  // move
   Lazy<LimitChange> limits;       // limits
+  bool sets_shaper = false;       // barrier: from here on the input shaper is …
+  Lazy<Shaper> shaper;            // … this one
   double dwell_s = 0.0;           // barrier: G4's pause
   // barrier: the machine may be anywhere afterwards, in any mode (homing, macro, tool change).
   bool position_lost = false;
@@ -134,20 +159,6 @@ struct InterpreterOptions {
 // The options with the values the firmware's own source has before anyone configures it.
 [[nodiscard]] InterpreterOptions default_options(Firmware firmware);
 
-// What a line that sets the input shaper again must say besides the frequencies. Empty: nothing in
-// the file has changed what the configuration says.
-struct ShaperSettings {
-  std::string type_x;  // Klipper SHAPER_TYPE, RepRapFirmware P (one type for both axes)
-  std::string type_y;
-  std::optional<double> damping_ratio_x;  // Klipper DAMPING_RATIO, Marlin D, RepRapFirmware S
-  std::optional<double> damping_ratio_y;
-  // RepRapFirmware keeps the frequency while P"none" switches the shaper off.
-  std::optional<double> kept_freq_hz;
-  std::string custom_words;  // RepRapFirmware: the words of M593 P"custom", H and T among them
-
-  friend bool operator==(const ShaperSettings&, const ShaperSettings&) = default;
-};
-
 // The state a line is read in.
 struct ModalState {
   Position position_mm{};  // machine
@@ -174,10 +185,14 @@ struct ModalState {
   double shaper_freq_x_hz = 0.0;       // SET_INPUT_SHAPER, M593; 0: off
   double shaper_freq_y_hz = 0.0;
   ShaperSettings shaper;
-  std::optional<double> pressure_advance_s;  // M900 K, M572 S, where the file sets it
+  // SET_PRESSURE_ADVANCE ADVANCE, M900 K, M572 S, where the file sets it.
+  std::optional<double> pressure_advance_s;
   AxisValues steps_per_mm;                   // M92, where the file sets it
   bool inverse_time = false;                 // RepRapFirmware, G93: F is one over minutes
 
+  [[nodiscard]] Shaper input_shaper() const {
+    return {shaper_freq_x_hz, shaper_freq_y_hz, shaper};
+  }
   // Whether an E word is a reading of the axis and not a difference.
   [[nodiscard]] bool e_is_absolute() const { return absolute_e && (absolute_xyz || !g91_covers_e); }
   // Filament per unit of E before unit and mode: M221 times, if E is a volume, one over the
@@ -249,6 +264,7 @@ class Interpreter {
   void set_flow_of(std::optional<double> tool, double factor);
   void limits_unknown(Event& event);
   void uncertain_modes(Event& event, std::string_view cause);
+  void note_shaper(Event& event);
   // Reads one limit; a value below `least` is left out with a warning.
   void limit(Event& event, char letter, double scale, double least, std::optional<double>& value);
   void axis_limits(Event& event, double scale, double least, AxisValues& values);

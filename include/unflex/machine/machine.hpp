@@ -57,8 +57,13 @@ struct PrinterSettings {
   // 0: the printer has none. Unset: the frequency of the axis' dynamics.
   std::optional<double> input_shaper_freq_x_hz;
   std::optional<double> input_shaper_freq_y_hz;
-  // RepRapFirmware, which forgets the type when its shaper is switched off: M593 P.
-  std::string input_shaper_type = "zvd";
+  // As the firmware spells it, or "auto": what it takes when it is told none. RepRapFirmware forgets
+  // its type when its shaper is switched off (M593 P). Klipper may have another one along Y.
+  std::string input_shaper_type = "auto";
+  std::string input_shaper_type_y = "auto";  // "auto": as along X
+  // Unset: the firmware's default.
+  std::optional<double> input_shaper_damping_ratio_x;
+  std::optional<double> input_shaper_damping_ratio_y;
 };
 
 // What the firmware knows as M201, M203 and so on is named by what it limits; docs/configuration.md
@@ -91,6 +96,9 @@ struct ExtruderSettings {
   std::optional<double> max_extrude_only_velocity_mm_s;  // unset: Klipper's formula
   std::optional<double> max_extrude_only_accel_mm_s2;    // unset: Klipper's formula
   double instantaneous_corner_velocity_mm_s = 1.0;
+  // Klipper's [extruder], where the file does not set it: how long a switch of the shaper takes.
+  double pressure_advance_s = 0.0;
+  double pressure_advance_smooth_s = 0.04;
 };
 
 // Either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and damping_n_s_mm; the latter are
@@ -182,6 +190,10 @@ struct Settings {
   [[nodiscard]] double emit_accel_mm_s2() const;
   [[nodiscard]] double shaper_freq_x_hz() const;
   [[nodiscard]] double shaper_freq_y_hz() const;
+  [[nodiscard]] std::string shaper_type_x() const;
+  [[nodiscard]] std::string shaper_type_y() const;
+  [[nodiscard]] double shaper_damping_ratio_x() const;
+  [[nodiscard]] double shaper_damping_ratio_y() const;
 };
 
 // Where settings come from.

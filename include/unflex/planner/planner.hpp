@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "unflex/core/firmware.hpp"
@@ -50,6 +51,15 @@ struct Limits {
 // Puts the limits that the change sets in place of those in force.
 void apply(const gcode::LimitChange& change, Limits& limits);
 
+// The printer's own input shaper as its configuration has it, where a file says nothing else. The
+// defaults are Klipper's (klippy/extras/shaper_defs.py).
+struct InstalledShaper {
+  std::string type_x = "mzv";  // as the firmware spells it, in lower case
+  std::string type_y = "mzv";
+  double damping_ratio_x = 0.1;
+  double damping_ratio_y = 0.1;
+};
+
 // What only the firmware's configuration decides.
 struct FirmwareConfig {
   Firmware firmware = Firmware::klipper;
@@ -59,6 +69,9 @@ struct FirmwareConfig {
   double max_extrude_only_velocity_mm_s = 79.8243241107433;
   double max_extrude_only_accel_mm_s2 = 1330.40540184572;
   double instantaneous_corner_velocity_mm_s = 1.0;
+  double pressure_advance_s = 0.0;
+  double pressure_advance_smooth_s = 0.04;
+  InstalledShaper shaper;
   // Marlin and RepRapFirmware, per axis X Y Z E; Marlin's DEFAULT_AXIS_STEPS_PER_UNIT.
   std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 500.0};
   // Marlin; defaults of its Configuration.h and Configuration_adv.h.

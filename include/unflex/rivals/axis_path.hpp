@@ -11,7 +11,7 @@
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
-#include "unflex/rivals/shapers.hpp"
+#include "unflex/dynamics/shapers.hpp"
 
 namespace unflex::rivals {
 
@@ -30,7 +30,7 @@ using AxisPath = std::vector<Parabola>;
                                       gcode::Axis axis);
 
 // Σ weight · b(t − time_s), exactly.
-[[nodiscard]] AxisPath shaped(const AxisPath& path, const ShaperPulses& pulses);
+[[nodiscard]] AxisPath shaped(const AxisPath& path, const dynamics::ShaperPulses& pulses);
 
 // Motion given at nodes, the first at start_s, with b̈ linear between them: each interval becomes
 // `parts` parabolas whose ends are exact and whose acceleration is the mean.

@@ -15,14 +15,14 @@
 #include <vector>
 
 #include "unflex/dynamics/flexible_axis.hpp"
-#include "unflex/rivals/shapers.hpp"
+#include "unflex/dynamics/shapers.hpp"
 
 namespace unflex::rivals {
 
 class ShapedNozzle {
  public:
   // Either train may be that of another shaper; an empty one leaves its axis as it is.
-  ShapedNozzle(const ShaperPulses& x, const ShaperPulses& y);
+  ShapedNozzle(const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y);
 
   // The unshaped nozzle, at times that increase; in between it is the cubic through position and
   // velocity (off by less than 1e-6 mm for samples 0.5 ms apart at 100 Hz and 10 000 mm/s²). Before
@@ -44,7 +44,7 @@ class ShapedNozzle {
     dynamics::NozzleXY nozzle;
   };
   struct Tap {
-    Pulse pulse;
+    dynamics::Pulse pulse;
     std::size_t index = 0;  // of the sample at or before the delayed time, never forgotten ones
   };
 

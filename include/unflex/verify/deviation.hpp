@@ -81,6 +81,17 @@ using dynamics::NozzleXY;
 [[nodiscard]] double swing_mm(const NozzleXY& nozzle, const gcode::Position& at,
                               const NozzleModel& model);
 
+// What a run does to the print: how far the nozzle strays while it draws, and how it swings
+// afterwards, as if what follows drew with that swing.
+struct RunError {
+  double rms_mm = 0.0;  // √((∫ c² dt + A²/(4ζω)) / T); A, the swing, rings out as e^{−ζωt}
+  double max_mm = 0.0;  // of c and A
+};
+
+// contour2_mm2_s: ∫ c² dt over duration_s, T.
+[[nodiscard]] RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration_s,
+                                 double swing_mm, const NozzleModel& model);
+
 struct RunDeviation {
   DeviationAccumulator extruding;
   DeviationAccumulator all;

@@ -1,10 +1,10 @@
-#include "unflex/rivals/shapers.hpp"
+#include "unflex/dynamics/shapers.hpp"
 
 #include <cmath>
 #include <cstddef>
 #include <numbers>
 
-namespace unflex::rivals {
+namespace unflex::dynamics {
 namespace {
 
 // The vibration that EI admits at the frequency it is built for.
@@ -19,14 +19,17 @@ double decay(double zeta, double periods) {
   return std::exp(-2.0 * std::numbers::pi * zeta * periods / std::sqrt(1.0 - zeta * zeta));
 }
 
-ShaperPulses zv(double freq_hz, double zeta) {
-  return {{0.0, 1.0}, {0.5 * damped_period(freq_hz, zeta), decay(zeta, 0.5)}};
-}
-
-ShaperPulses zvd(double freq_hz, double zeta) {
+// ZV convolved with itself: half periods apart, weights C(n, i) Kⁱ.
+ShaperPulses repeated_zv(int repeats, double freq_hz, double zeta) {
   const double period = damped_period(freq_hz, zeta);
   const double k = decay(zeta, 0.5);
-  return {{0.0, 1.0}, {0.5 * period, 2.0 * k}, {period, k * k}};
+  ShaperPulses pulses;
+  double weight = 1.0;
+  for (int i = 0; i <= repeats; ++i) {
+    pulses.push_back({0.5 * i * period, weight});
+    weight *= k * (repeats - i) / (i + 1);
+  }
+  return pulses;
 }
 
 // Three pulses over three quarters of the period. Without damping they stand at 0°, 135° and 270°
@@ -89,11 +92,15 @@ ShaperPulses fitted(const std::array<FittedPulse, N>& fits, double freq_hz, doub
 ShaperPulses raw_pulses(ShaperKind kind, double freq_hz, double zeta) {
   switch (kind) {
     case ShaperKind::zv:
-      return zv(freq_hz, zeta);
+      return repeated_zv(1, freq_hz, zeta);
     case ShaperKind::mzv:
       return mzv(freq_hz, zeta);
     case ShaperKind::zvd:
-      return zvd(freq_hz, zeta);
+      return repeated_zv(2, freq_hz, zeta);
+    case ShaperKind::zvdd:
+      return repeated_zv(3, freq_hz, zeta);
+    case ShaperKind::zvddd:
+      return repeated_zv(4, freq_hz, zeta);
     case ShaperKind::ei:
       return ei(freq_hz, zeta);
     case ShaperKind::two_hump_ei:
@@ -114,6 +121,10 @@ std::string_view name(ShaperKind kind) {
       return "MZV";
     case ShaperKind::zvd:
       return "ZVD";
+    case ShaperKind::zvdd:
+      return "ZVDD";
+    case ShaperKind::zvddd:
+      return "ZVDDD";
     case ShaperKind::ei:
       return "EI";
     case ShaperKind::two_hump_ei:
@@ -155,4 +166,4 @@ std::optional<ShaperPulses> shaper_pulses(ShaperKind kind, double freq_hz, doubl
   return pulses;
 }
 
-}  // namespace unflex::rivals
+}  // namespace unflex::dynamics

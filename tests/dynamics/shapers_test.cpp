@@ -1,4 +1,4 @@
-#include "unflex/rivals/shapers.hpp"
+#include "unflex/dynamics/shapers.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <ostream>
 #include <vector>
 
-namespace unflex::rivals {
+namespace unflex::dynamics {
 namespace {
 
 struct Recorded {
@@ -150,4 +150,4 @@ TEST(Shaper, WithMoreHumpsStandsMoreFrequencyError) {
 }
 
 }  // namespace
-}  // namespace unflex::rivals
+}  // namespace unflex::dynamics

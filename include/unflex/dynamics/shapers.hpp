@@ -12,6 +12,8 @@
 //   2HUMP_EI, 3HUMP_EI    Singhose, Porter, Tuttle & Singer, "Vibration reduction using multi-hump
 //               input shapers", J. Dyn. Syst. Meas. Control 119 (1997) 320–326
 //   MZV         Klipper's own
+//   ZVDD, ZVDDD the same as ZV and ZVD with one and two pulses more (binomial weights), as in
+//               RepRapFirmware, Movement/AxisShaper.cpp
 #pragma once
 
 #include <array>
@@ -19,10 +21,11 @@
 #include <string_view>
 #include <vector>
 
-namespace unflex::rivals {
+namespace unflex::dynamics {
 
-enum class ShaperKind { zv, mzv, zvd, ei, two_hump_ei, three_hump_ei };
+enum class ShaperKind { zv, mzv, zvd, ei, two_hump_ei, three_hump_ei, zvdd, zvddd };
 
+// Those that Klipper has; the last two are RepRapFirmware's alone.
 inline constexpr std::array<ShaperKind, 6> kShaperKinds = {
     ShaperKind::zv, ShaperKind::mzv,         ShaperKind::zvd,
     ShaperKind::ei, ShaperKind::two_hump_ei, ShaperKind::three_hump_ei};
@@ -49,4 +52,4 @@ using ShaperPulses = std::vector<Pulse>;
 [[nodiscard]] std::optional<ShaperPulses> shaper_pulses(ShaperKind kind, double freq_hz,
                                                         double damping_ratio);
 
-}  // namespace unflex::rivals
+}  // namespace unflex::dynamics

@@ -1,0 +1,112 @@
+#include "unflex/planner/printer_shaper.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace unflex::planner {
+namespace {
+
+using dynamics::ShaperKind;
+using dynamics::ShaperPulses;
+
+// motion_queuing.py, SDS_CHECK_TIME.
+constexpr double kLeastScan_s = 0.001;
+constexpr double kRrfGrace_s = 0.010;
+
+constexpr std::array<std::pair<std::string_view, ShaperKind>, 10> kKinds = {
+    {{"zv", ShaperKind::zv},
+     {"mzv", ShaperKind::mzv},
+     {"zvd", ShaperKind::zvd},
+     {"ei", ShaperKind::ei},
+     {"2hump_ei", ShaperKind::two_hump_ei},
+     {"3hump_ei", ShaperKind::three_hump_ei},
+     {"ei2", ShaperKind::two_hump_ei},
+     {"ei3", ShaperKind::three_hump_ei},
+     {"zvdd", ShaperKind::zvdd},
+     {"zvddd", ShaperKind::zvddd}}};
+
+ShaperKind kind_of(std::string type, Firmware firmware) {
+  std::ranges::transform(type, type.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  for (const auto& [name, kind] : kKinds) {
+    if (name == type) {
+      return kind;
+    }
+  }
+  switch (firmware) {
+    case Firmware::marlin:
+      return ShaperKind::zv;
+    case Firmware::rrf:
+      return ShaperKind::zvd;
+    case Firmware::klipper:
+      break;
+  }
+  return ShaperKind::mzv;
+}
+
+ShaperPulses pulses(Firmware firmware, double freq_hz, const std::string& type,
+                    double damping_ratio) {
+  if (!(freq_hz > 0.0)) {
+    return {};
+  }
+  const ShaperKind kind = kind_of(type, firmware);
+  return *dynamics::shaper_pulses(kind, freq_hz,
+                                  std::min(damping_ratio, dynamics::max_damping_ratio(kind)));
+}
+
+double reach_s(const ShaperPulses& pulses) {
+  return pulses.empty() ? 0.0 : std::max(-pulses.front().time_s, pulses.back().time_s);
+}
+
+double length_s(const ShaperPulses& pulses) {
+  return pulses.empty() ? 0.0 : pulses.back().time_s - pulses.front().time_s;
+}
+
+bool same(const gcode::Shaper& a, const gcode::Shaper& b) {
+  return a.freq_x_hz == b.freq_x_hz && a.freq_y_hz == b.freq_y_hz && a.settings == b.settings;
+}
+
+}  // namespace
+
+double Shaping::reach_s() const { return std::max(planner::reach_s(x), planner::reach_s(y)); }
+
+double Shaping::length_s() const { return std::max(planner::length_s(x), planner::length_s(y)); }
+
+Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper) {
+  const gcode::ShaperSettings& set = shaper.settings;
+  const InstalledShaper& installed = config.shaper;
+  return {pulses(config.firmware, shaper.freq_x_hz,
+                 set.type_x.empty() ? installed.type_x : set.type_x,
+                 set.damping_ratio_x.value_or(installed.damping_ratio_x)),
+          pulses(config.firmware, shaper.freq_y_hz,
+                 set.type_y.empty() ? installed.type_y : set.type_y,
+                 set.damping_ratio_y.value_or(installed.damping_ratio_y))};
+}
+
+double switching_s(const FirmwareConfig& config, const gcode::Shaper& before,
+                   const gcode::Shaper& after, std::optional<double> pressure_advance_s) {
+  if (same(before, after)) {
+    return 0.0;
+  }
+  const Shaping from = shaping(config, before);
+  const Shaping to = shaping(config, after);
+  switch (config.firmware) {
+    case Firmware::marlin:
+      return from.length_s();
+    case Firmware::rrf:
+      return from.length_s() + kRrfGrace_s;
+    case Firmware::klipper:
+      break;
+  }
+  const bool advances = pressure_advance_s.value_or(config.pressure_advance_s) > 0.0;
+  const double scan_s =
+      std::max(kLeastScan_s, advances ? 0.5 * config.pressure_advance_smooth_s : 0.0);
+  return std::max(scan_s, from.reach_s()) + std::max(scan_s, to.reach_s());
+}
+
+}  // namespace unflex::planner

@@ -1,0 +1,121 @@
+#include "shaped_base.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace unflex::verify {
+namespace {
+
+constexpr double kSameTime_s = 1e-10;
+
+dynamics::BaseSegment later(const dynamics::BaseSegment& base, double h) {
+  return {base.position + h * (base.velocity + 0.5 * base.acceleration * h),
+          base.velocity + base.acceleration * h, base.acceleration};
+}
+
+}  // namespace
+
+void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& phases) {
+  const std::array<double, 3> durations_s = {move.accel_s, move.cruise_s, move.decel_s};
+  const std::array<double, 3> accels = {move.accel_mm_s2, 0.0, -move.accel_mm_s2};
+  const std::array<double, 3> speeds = {move.start_v_mm_s, move.cruise_v_mm_s, move.cruise_v_mm_s};
+  double elapsed_s = 0.0;
+  for (std::size_t i = 0; i < durations_s.size(); ++i) {
+    if (durations_s[i] <= 0.0) {
+      continue;
+    }
+    const double distance_mm = move.distance_mm(elapsed_s);
+    const auto along = [&](gcode::Axis axis) {
+      const double ratio = move.kinematic ? move.direction[axis] : 0.0;
+      return dynamics::BaseSegment{move.segment.start_mm[axis] + ratio * distance_mm,
+                                   ratio * speeds[i], ratio * accels[i]};
+    };
+    phases.push_back({along(gcode::X), along(gcode::Y), durations_s[i]});
+    elapsed_s += durations_s[i];
+  }
+}
+
+ShapedBase::ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm) {
+  const auto set = [&](std::vector<Tap>& taps, const dynamics::ShaperPulses& pulses) {
+    if (pulses.empty()) {
+      taps.push_back({0.0, 1.0});
+    }
+    for (const dynamics::Pulse& pulse : pulses) {
+      taps.push_back({pulse.time_s - pulses.front().time_s, pulse.weight});
+      memory_s_ = std::max(memory_s_, taps.back().delay_s);
+    }
+  };
+  set(x_, shaping.x);
+  set(y_, shaping.y);
+  // It has rested for as long as the pulses look back.
+  given_until_s_ = -memory_s_ - 1.0;
+  give({{x_mm, 0.0, 0.0}, {y_mm, 0.0, 0.0}, memory_s_ + 1.0});
+}
+
+void ShapedBase::give(const BasePhase& phase) {
+  given_.push_back({given_until_s_, phase});
+  given_until_s_ += phase.duration_s;
+}
+
+void ShapedBase::add(const planner::PlannedMove& move, std::vector<BasePhase>& shaped) {
+  std::vector<BasePhase> phases;
+  append_phases(move, phases);
+  for (const BasePhase& phase : phases) {
+    give(phase);
+  }
+  advance(shaped);
+}
+
+void ShapedBase::finish(std::vector<BasePhase>& shaped) {
+  const Timed& last = given_.back();
+  BasePhase rest{later(last.phase.x, last.phase.duration_s),
+                 later(last.phase.y, last.phase.duration_s), memory_s_};
+  rest.x.velocity = rest.x.acceleration = 0.0;
+  rest.y.velocity = rest.y.acceleration = 0.0;
+  give(rest);
+  advance(shaped);
+}
+
+void ShapedBase::advance(std::vector<BasePhase>& shaped) {
+  while (given_until_s_ - time_s_ > kSameTime_s) {
+    const double until_s = std::min({given_until_s_, next_change(x_), next_change(y_)});
+    shaped.push_back({sum(x_, &BasePhase::x), sum(y_, &BasePhase::y), until_s - time_s_});
+    time_s_ = until_s;
+  }
+  while (given_.size() > 1 && given_[1].start_s <= time_s_ - memory_s_) {
+    given_.pop_front();
+    ++forgotten_;
+  }
+}
+
+// The first time after now at which a tap comes to another phase. Puts the taps to those of now.
+double ShapedBase::next_change(std::vector<Tap>& taps) {
+  double change_s = std::numeric_limits<double>::infinity();
+  for (Tap& tap : taps) {
+    tap.index = std::max(tap.index, forgotten_);
+    const double t = time_s_ - tap.delay_s;
+    while (tap.index - forgotten_ + 1 < given_.size() &&
+           given_[tap.index - forgotten_ + 1].start_s <= t + kSameTime_s) {
+      ++tap.index;
+    }
+    const Timed& at = given_[tap.index - forgotten_];
+    change_s = std::min(change_s, at.start_s + at.phase.duration_s + tap.delay_s);
+  }
+  return change_s;
+}
+
+dynamics::BaseSegment ShapedBase::sum(const std::vector<Tap>& taps,
+                                      dynamics::BaseSegment BasePhase::*axis) const {
+  dynamics::BaseSegment result;
+  for (const Tap& tap : taps) {
+    const Timed& at = given_[tap.index - forgotten_];
+    const dynamics::BaseSegment base =
+        later(at.phase.*axis, time_s_ - tap.delay_s - at.start_s);
+    result.position += tap.weight * base.position;
+    result.velocity += tap.weight * base.velocity;
+    result.acceleration += tap.weight * base.acceleration;
+  }
+  return result;
+}
+
+}  // namespace unflex::verify

@@ -1,0 +1,68 @@
+// The base that the motors make of planned motion where the printer's own input shaper is on.
+//
+//   b_s(t) = Σ A_i b(t − d_i)     per axis; the pulses' delays counted from the first of them
+//
+// Of motion in phases of constant acceleration that is again motion in such phases, with an end
+// wherever a delayed phase ends. It comes later than the firmware's by the time from the first pulse
+// to their mean, some ms, which a distance from the path does not notice.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <deque>
+#include <vector>
+
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/planner/printer_shaper.hpp"
+
+namespace unflex::verify {
+
+// Both axes during a time in which neither changes its acceleration.
+struct BasePhase {
+  dynamics::BaseSegment x;
+  dynamics::BaseSegment y;
+  double duration_s = 0.0;
+};
+
+// The phases of one move, those without duration left out.
+void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& phases);
+
+class ShapedBase {
+ public:
+  // The base rests at x, y.
+  ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm);
+
+  // Takes motion that goes on from what it was given before and appends as much as is known of the
+  // shaped motion by then: as long as what was given.
+  void add(const planner::PlannedMove& move, std::vector<BasePhase>& shaped);
+  // The machine stands still: what is left of the shaped motion.
+  void finish(std::vector<BasePhase>& shaped);
+
+ private:
+  struct Tap {
+    double delay_s = 0.0;
+    double weight = 0.0;
+    std::size_t index = 0;  // of the phase that it has come to, counted from the very first
+  };
+  struct Timed {
+    double start_s = 0.0;
+    BasePhase phase;
+  };
+
+  void give(const BasePhase& phase);
+  void advance(std::vector<BasePhase>& shaped);
+  [[nodiscard]] double next_change(std::vector<Tap>& taps);
+  [[nodiscard]] dynamics::BaseSegment sum(const std::vector<Tap>& taps,
+                                          dynamics::BaseSegment BasePhase::*axis) const;
+
+  std::vector<Tap> x_;
+  std::vector<Tap> y_;
+  double memory_s_ = 0.0;
+  std::deque<Timed> given_;
+  std::size_t forgotten_ = 0;
+  double given_until_s_ = 0.0;
+  double time_s_ = 0.0;  // of the shaped motion
+};
+
+}  // namespace unflex::verify
