@@ -127,14 +127,14 @@ double nozzle_by_convolution(const std::vector<planner::PlannedMove>& moves) {
 
 // x of the nozzle after the last piece of the text.
 dynamics::NozzleXY nozzle_after(const std::string& text) {
-  dynamics::NozzleXY nozzle = at_rest({});
+  NozzleFollower follower(rules().nozzle, rules().fixed, {});
   for (const Piece& piece : pieces_of(text)) {
-    nozzle = after_motion(piece, nozzle, rules().nozzle);
+    follower.follow(piece);
   }
-  return nozzle;
+  return follower.nozzle();
 }
 
-TEST(AfterMotion, TheNozzleIsWhereTheConvolutionPutsIt) {
+TEST(NozzleFollower, TheNozzleIsWhereTheConvolutionPutsIt) {
   const std::string text = "G90\nG1 X10 Y10 Z1 F6000\nM400\nG1 X12 Z5\nG1 X17.5 Z8\n";
   const std::vector<Piece> pieces = pieces_of(text);
   std::vector<planner::PlannedMove> moves(pieces.back().moves.end() - 2, pieces.back().moves.end());
@@ -143,13 +143,16 @@ TEST(AfterMotion, TheNozzleIsWhereTheConvolutionPutsIt) {
   last.events.erase(last.events.begin(), last.events.end() - 2);
   last.move_counts.assign(2, 1);
   last.moves = moves;
-  nozzle = after_motion(last, nozzle, rules().nozzle);
+  NozzleFollower follower(rules().nozzle, rules().fixed, {});
+  follower.set(nozzle, {10.0, 10.0, 1.0, 0.0});
+  follower.follow(last);
+  nozzle = follower.nozzle();
   EXPECT_NEAR(nozzle.x.position, nozzle_by_convolution(moves), 1e-6);
   EXPECT_GT(std::abs(nozzle.x.position - 17.5), 1e-3) << "the case shows nothing";
   EXPECT_NEAR(nozzle.y.position, 10.0, 1e-12);
 }
 
-TEST(AfterMotion, APauseLetsTheNozzleRingOn) {
+TEST(NozzleFollower, APauseLetsTheNozzleRingOn) {
   const std::string moved = "G90\nG1 X10 Y10 Z1 F6000\nM400\nG1 X17.5 Z8\n";
   const dynamics::NozzleXY before = nozzle_after(moved);
   const dynamics::NozzleXY after = nozzle_after(moved + "G4 P7\n");
@@ -160,7 +163,7 @@ TEST(AfterMotion, APauseLetsTheNozzleRingOn) {
   EXPECT_NE(after.x.velocity, before.x.velocity);
 }
 
-TEST(AfterMotion, APauseRightAfterARunDoesSo) {
+TEST(NozzleFollower, APauseRightAfterARunDoesSo) {
   const std::string moved = "G90\nG1 X10 Y10 Z1 F6000\nG1 X17.5 Y12\n";
   const dynamics::NozzleXY before = nozzle_after(moved);
   const dynamics::NozzleXY after = nozzle_after(moved + "G4 P7\n");
@@ -170,7 +173,7 @@ TEST(AfterMotion, APauseRightAfterARunDoesSo) {
   EXPECT_NE(after.x.velocity, before.x.velocity);
 }
 
-TEST(AfterMotion, HomingLetsTheNozzleComeToRest) {
+TEST(NozzleFollower, HomingLetsTheNozzleComeToRest) {
   const dynamics::NozzleXY after = nozzle_after("G90\nG1 X10 Y10 Z1 F6000\nG1 X17.5 Z8\nG28\n");
   EXPECT_EQ(after.x.velocity, 0.0);
   EXPECT_EQ(after.y.velocity, 0.0);
