@@ -27,8 +27,8 @@ namespace unflex::emit {
                                                    const planner::Limits& wanted,
                                                    const planner::Limits& current);
 
-// The lines that put `wanted` in place of `current`. A default Shaper is none. RepRapFirmware is told
-// all of its settings, since it forgets its type while the shaper is off.
+// The lines that put `wanted` in place of `current`. A default Shaper is none. RepRapFirmware is
+// told all of its settings, since it forgets its type while the shaper is off.
 [[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                     const gcode::Shaper& current);
 

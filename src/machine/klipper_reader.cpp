@@ -216,7 +216,8 @@ class Reader {
     type = type != nullptr ? type : section->find("shaper_type");
     const std::string_view text = type != nullptr ? std::string_view(type->text) : "mzv";
     const SourcePlace at = type != nullptr ? type->place : section->place;
-    const std::string key = axis == "x" ? "printer.input_shaper_type" : "printer.input_shaper_type_y";
+    const std::string key =
+        axis == "x" ? "printer.input_shaper_type" : "printer.input_shaper_type_y";
     if (std::ranges::find(kTypes, text) != kTypes.end()) {
       reading_.add(key, std::string(text), at);
     } else {

@@ -72,9 +72,9 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
   }
   std::istream& input = job.input_fd < 0 ? in_file : in_stream;
   std::ostream& output = job.output_fd < 0 ? out_file : out_stream;
-  PassOutcome outcome =
-      compensate_pass(job, engines, kept,
-                      {input, output, *processes, slots, [&] { source.stop(); }, last}, progress, report);
+  PassOutcome outcome = compensate_pass(
+      job, engines, kept, {input, output, *processes, slots, [&] { source.stop(); }, last},
+      progress, report);
   const bool is_whole = !outcome.status || sink.finish();
   if (sink.error() != 0) {
     return failed(fail(ErrorKind::internal,

@@ -143,24 +143,30 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
   const double swing_before_mm = verify::swing_mm(before.end, end, rules.nozzle);
   const double swing_after_mm = verify::swing_mm(after.end, end, rules.nozzle);
   if (before.extruding.stats().duration_s > 0.0) {
-    const verify::RunError b =
-        error_of(before.extruding.stats(), swing_before_mm, rules.nozzle);
+    const verify::RunError b = error_of(before.extruding.stats(), swing_before_mm, rules.nozzle);
     const verify::RunError a = error_of(after.extruding.stats(), swing_after_mm, rules.nozzle);
     if (no_worse(a.rms_mm, b.rms_mm, kNothingRms_mm) &&
         no_worse(a.max_mm, b.max_mm + chance, kNothing_mm)) {
       return std::nullopt;
     }
     return fmt::format(
-        "compensation would be worse: with the swing that is left, contour RMS {:.3f} to {:.3f} µm, "
+        "compensation would be worse: with the swing that is left, contour RMS {:.3f} to {:.3f} "
+        "µm, "
         "largest {:.3f} to {:.3f} µm",
         b.rms_mm * 1e3, a.rms_mm * 1e3, b.max_mm * 1e3, a.max_mm * 1e3);
   }
-  // Travel draws nothing: what counts is what it leaves to the next run.
-  if (no_worse(swing_after_mm, swing_before_mm + chance, kNothing_mm)) {
+  // Travel draws nothing, and a straight one has no contour error whatever it does: what counts is
+  // how well the nozzle keeps to where it should be, and so what it leaves to the next run. Where
+  // the firmware rounds the clock of each line, only the latter.
+  const verify::DeviationStats b = before.all.stats();
+  const verify::DeviationStats a = after.all.stats();
+  if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm, kNothingRms_mm) ||
+      (rules.fixed.firmware != Firmware::klipper &&
+       no_worse(swing_after_mm, swing_before_mm + chance, kNothing_mm))) {
     return std::nullopt;
   }
-  return fmt::format("compensation would be worse: swing after travel {:.3f} to {:.3f} µm",
-                     swing_before_mm * 1e3, swing_after_mm * 1e3);
+  return fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",
+                     b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
 }
 
 // Whether a print could bear it although it is worse.

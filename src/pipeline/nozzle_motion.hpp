@@ -40,8 +40,8 @@ void advance(const dynamics::BaseTrajectory& base, std::size_t k, const verify::
 //   u   the nozzle on the unshaped base        the second term: what still rings from the time
 //                                              before the shaper was switched on
 //
-// The shaper is switched where the machine stands still for at least as long as its pulses reach, so
-// that all u(t − t_i) needed then are of a base at rest.
+// The shaper is switched where the machine stands still for at least as long as its pulses reach,
+// so that all u(t − t_i) needed then are of a base at rest.
 class NozzleFollower {
  public:
   // At rest at the origin, under the shaper that the printer starts with.
@@ -65,11 +65,11 @@ class NozzleFollower {
 
   verify::NozzleModel model_;
   planner::FirmwareConfig config_;
-  gcode::Shaper printer_;   // as the input has it
-  gcode::Shaper present_;   // as the output has it
+  gcode::Shaper printer_;     // as the input has it
+  gcode::Shaper present_;     // as the output has it
   planner::Shaping shaping_;  // of the latter
   std::array<double, 2> base_mm_{};
-  dynamics::NozzleXY driven_;  // u; without a shaper the nozzle itself
+  dynamics::NozzleXY driven_;   // u; without a shaper the nozzle itself
   dynamics::NozzleXY ringing_;  // the rest, as a deviation
 };
 

@@ -26,7 +26,7 @@ struct Piece {
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
   std::vector<planner::PlannedMove> moves;
-  emit::RunStart start;       // of a run
+  emit::RunStart start;  // of a run
   // Where a run begins: what the file has set, if it has.
   std::optional<double> pressure_advance_s;
   gcode::Position from_mm{};  // where the piece's first move finds the machine

@@ -224,10 +224,11 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   emit::Emitter trial = emitter_;
   text.clear();
   trial.run(job.run(), plan, text);
-  Verdict verdict = judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(),
-                          run_nozzle_, rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
-                          {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(),
-                           may_be_worse, machine_mm_});
+  Verdict verdict =
+      judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(), run_nozzle_,
+            rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
+            {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(), may_be_worse,
+             machine_mm_});
   if (verdict.objection) {
     return std::move(verdict.objection);
   }

@@ -80,12 +80,11 @@ double Shaping::length_s() const { return std::max(planner::length_s(x), planner
 Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper) {
   const gcode::ShaperSettings& set = shaper.settings;
   const InstalledShaper& installed = config.shaper;
-  return {pulses(config.firmware, shaper.freq_x_hz,
-                 set.type_x.empty() ? installed.type_x : set.type_x,
-                 set.damping_ratio_x.value_or(installed.damping_ratio_x)),
-          pulses(config.firmware, shaper.freq_y_hz,
-                 set.type_y.empty() ? installed.type_y : set.type_y,
-                 set.damping_ratio_y.value_or(installed.damping_ratio_y))};
+  return {
+      pulses(config.firmware, shaper.freq_x_hz, set.type_x.empty() ? installed.type_x : set.type_x,
+             set.damping_ratio_x.value_or(installed.damping_ratio_x)),
+      pulses(config.firmware, shaper.freq_y_hz, set.type_y.empty() ? installed.type_y : set.type_y,
+             set.damping_ratio_y.value_or(installed.damping_ratio_y))};
 }
 
 double switching_s(const FirmwareConfig& config, const gcode::Shaper& before,

@@ -22,7 +22,8 @@ dynamics::NozzleState hermite(const dynamics::NozzleState& a, const dynamics::No
 
 ShapedNozzle::ShapedNozzle(const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y) {
   const auto set = [&](std::vector<Tap>& taps, const dynamics::ShaperPulses& pulses) {
-    for (const dynamics::Pulse& pulse : pulses.empty() ? dynamics::ShaperPulses{{0.0, 1.0}} : pulses) {
+    for (const dynamics::Pulse& pulse :
+         pulses.empty() ? dynamics::ShaperPulses{{0.0, 1.0}} : pulses) {
       taps.push_back({pulse});
       lookahead_s_ = std::max(lookahead_s_, -pulse.time_s);
       memory_s_ = std::max(memory_s_, pulse.time_s);

@@ -6,9 +6,9 @@
 #include <numbers>
 #include <optional>
 
+#include "unflex/dynamics/shapers.hpp"
 #include "unflex/rivals/filtered_spline.hpp"
 #include "unflex/rivals/s_curve.hpp"
-#include "unflex/dynamics/shapers.hpp"
 #include "unflex/rivals/thesis_method.hpp"
 #include "unflex/study/bench.hpp"
 

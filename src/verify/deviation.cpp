@@ -42,8 +42,8 @@ double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleM
   return apart_mm(nozzle, {{at[gcode::X], 0.0}, {at[gcode::Y], 0.0}}, model);
 }
 
-RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration_s,
-                   double swing_mm, const NozzleModel& model) {
+RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration_s, double swing_mm,
+                   const NozzleModel& model) {
   if (duration_s <= 0.0) {
     return {};
   }
@@ -52,8 +52,7 @@ RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration
   const auto ringing_s = [](const dynamics::FlexibleAxis& axis) {
     return 1.0 / (4.0 * std::max(axis.zeta, kLeastDamping) * axis.omega_rad_s);
   };
-  const double left_mm2_s =
-      swing_mm * swing_mm * std::max(ringing_s(model.x), ringing_s(model.y));
+  const double left_mm2_s = swing_mm * swing_mm * std::max(ringing_s(model.x), ringing_s(model.y));
   return {std::sqrt((contour2_mm2_s + left_mm2_s) / duration_s),
           std::max(contour_max_mm, swing_mm)};
 }

@@ -142,11 +142,12 @@ void SectionRules::check_nozzle(const Meter& kept, const Meter& emitted) {
       after.max_mm > std::max(leeway.times * before.max_mm, leeway.max_mm)) {
     violations_->in_output(
         first_line_,
-        fmt::format("in this run the nozzle strays more than in the sliced file (line {}): with the "
-                    "swing that is left, contour RMS {:.3f} instead of {:.3f} µm, largest {:.3f} "
-                    "instead of {:.3f} µm",
-                    emitted.section_error().line(), after.rms_mm * 1e3, before.rms_mm * 1e3,
-                    after.max_mm * 1e3, before.max_mm * 1e3));
+        fmt::format(
+            "in this run the nozzle strays more than in the sliced file (line {}): with the "
+            "swing that is left, contour RMS {:.3f} instead of {:.3f} µm, largest {:.3f} "
+            "instead of {:.3f} µm",
+            emitted.section_error().line(), after.rms_mm * 1e3, before.rms_mm * 1e3,
+            after.max_mm * 1e3, before.max_mm * 1e3));
   }
 }
 

@@ -109,8 +109,7 @@ dynamics::BaseSegment ShapedBase::sum(const std::vector<Tap>& taps,
   dynamics::BaseSegment result;
   for (const Tap& tap : taps) {
     const Timed& at = given_[tap.index - forgotten_];
-    const dynamics::BaseSegment base =
-        later(at.phase.*axis, time_s_ - tap.delay_s - at.start_s);
+    const dynamics::BaseSegment base = later(at.phase.*axis, time_s_ - tap.delay_s - at.start_s);
     result.position += tap.weight * base.position;
     result.velocity += tap.weight * base.velocity;
     result.acceleration += tap.weight * base.acceleration;

@@ -3,8 +3,8 @@
 //   b_s(t) = Σ A_i b(t − d_i)     per axis; the pulses' delays counted from the first of them
 //
 // Of motion in phases of constant acceleration that is again motion in such phases, with an end
-// wherever a delayed phase ends. It comes later than the firmware's by the time from the first pulse
-// to their mean, some ms, which a distance from the path does not notice.
+// wherever a delayed phase ends. It comes later than the firmware's by the time from the first
+// pulse to their mean, some ms, which a distance from the path does not notice.
 #pragma once
 
 #include <array>

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "planner/plan_helpers.hpp"
-#include "unflex/rivals/axis_path.hpp"
 #include "unflex/dynamics/shapers.hpp"
+#include "unflex/rivals/axis_path.hpp"
 
 namespace unflex::record {
 namespace {

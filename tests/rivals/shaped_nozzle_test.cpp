@@ -31,7 +31,8 @@ TEST(AxisPath, OfAPlanIsThePlan) {
 
 TEST(AxisPath, OfAShapedPlanMovesInWeightedSteps) {
   const AxisPath plan = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const dynamics::ShaperPulses pulses = *dynamics::shaper_pulses(dynamics::ShaperKind::mzv, 45.0, 0.06);
+  const dynamics::ShaperPulses pulses =
+      *dynamics::shaper_pulses(dynamics::ShaperKind::mzv, 45.0, 0.06);
   const AxisPath path = shaped(plan, pulses);
   PathCursor cursor(path);
   for (double t = -0.02; t < 0.3; t += 1.3e-3) {

@@ -187,12 +187,10 @@ struct ModalState {
   ShaperSettings shaper;
   // SET_PRESSURE_ADVANCE ADVANCE, M900 K, M572 S, where the file sets it.
   std::optional<double> pressure_advance_s;
-  AxisValues steps_per_mm;                   // M92, where the file sets it
-  bool inverse_time = false;                 // RepRapFirmware, G93: F is one over minutes
+  AxisValues steps_per_mm;    // M92, where the file sets it
+  bool inverse_time = false;  // RepRapFirmware, G93: F is one over minutes
 
-  [[nodiscard]] Shaper input_shaper() const {
-    return {shaper_freq_x_hz, shaper_freq_y_hz, shaper};
-  }
+  [[nodiscard]] Shaper input_shaper() const { return {shaper_freq_x_hz, shaper_freq_y_hz, shaper}; }
   // Whether an E word is a reading of the axis and not a difference.
   [[nodiscard]] bool e_is_absolute() const { return absolute_e && (absolute_xyz || !g91_covers_e); }
   // Filament per unit of E before unit and mode: M221 times, if E is a volume, one over the

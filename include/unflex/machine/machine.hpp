@@ -57,8 +57,9 @@ struct PrinterSettings {
   // 0: the printer has none. Unset: the frequency of the axis' dynamics.
   std::optional<double> input_shaper_freq_x_hz;
   std::optional<double> input_shaper_freq_y_hz;
-  // As the firmware spells it, or "auto": what it takes when it is told none. RepRapFirmware forgets
-  // its type when its shaper is switched off (M593 P). Klipper may have another one along Y.
+  // As the firmware spells it, or "auto": what it takes when it is told none. RepRapFirmware
+  // forgets its type when its shaper is switched off (M593 P). Klipper may have another one along
+  // Y.
   std::string input_shaper_type = "auto";
   std::string input_shaper_type_y = "auto";  // "auto": as along X
   // Unset: the firmware's default.

@@ -38,9 +38,10 @@ struct Shaping {
 // back, once by the old settings and once by the new (flush_all_steps, calc_step_gen_restart):
 //   stop = d(before) + d(after),   d = max(1 ms, reach of the shaper, half of the smooth time of
 //   pressure advance)
-// Marlin waits until the delayed part of the motion is over. RepRapFirmware does as well, and starts
-// from standstill when it has waited 10 ms for further lines (Configuration.h, DefaultGracePeriod).
-// pressure_advance_s: the one in force, where the file says so; otherwise the configuration's is.
+// Marlin waits until the delayed part of the motion is over. RepRapFirmware does as well, and
+// starts from standstill when it has waited 10 ms for further lines (Configuration.h,
+// DefaultGracePeriod). pressure_advance_s: the one in force, where the file says so; otherwise the
+// configuration's is.
 [[nodiscard]] double switching_s(const FirmwareConfig& config, const gcode::Shaper& before,
                                  const gcode::Shaper& after,
                                  std::optional<double> pressure_advance_s);

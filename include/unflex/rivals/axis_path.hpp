@@ -9,9 +9,9 @@
 
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/shapers.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
-#include "unflex/dynamics/shapers.hpp"
 
 namespace unflex::rivals {
 
