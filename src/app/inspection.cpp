@@ -60,6 +60,11 @@ void write_time(Sink out, const Inspection& i) {
   for (const auto& [reason, moves] : i.kept_moves) {
     fmt::format_to(out, "              {} moves stay as they are: {}\n", moves, reason);
   }
+  if (i.extruded_path.total_mm > 0.0) {
+    fmt::format_to(out, "              {} of {:.0f} mm extruded can be compensated\n",
+                   report::share_text(i.extruded_path.compensated_share()),
+                   i.extruded_path.total_mm);
+  }
 }
 
 void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
@@ -117,6 +122,7 @@ std::string inspection_text(const Inspection& inspection, const std::string& inp
   const Sink out = std::back_inserter(text);
   write_counts(out, inspection);
   write_time(out, inspection);
+  text += report::unknown_text(inspection.unknown_commands);
   write_limits(out, inspection, settings);
   write_settings(out, settings);
   write_limits_in_print(out, inspection, input);
@@ -142,6 +148,8 @@ std::string inspection_json(const Inspection& i, const std::string& input,
   json["runs"] = {{"total", i.runs}};
   json["windows"] = {{"total", i.windows}};
   json["kept_moves"] = Json(i.kept_moves);
+  json["extruded_path"] = report::path_json(i.extruded_path);
+  json["unknown_commands"] = report::unknown_json(i.unknown_commands);
   json["extrusion"] = {{"input_mm", i.filament_mm}};
   json["extent_mm"] = {{"x_min", i.x_min_mm},
                        {"x_max", i.x_max_mm},

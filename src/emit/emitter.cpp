@@ -237,7 +237,10 @@ void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::st
   };
   axis(X, 'X', stroke.x_mm);
   axis(Y, 'Y', stroke.y_mm);
-  axis(Z, 'Z', stroke.z_mm);
+  if (state.known[Z]) {
+    // Where nobody has told the height, the run's moves do not leave it.
+    axis(Z, 'Z', stroke.z_mm);
+  }
   // What rounding left over so far is part of the difference.
   const double filament =
       (filament_origin + stroke.e_mm - state.position_mm[E]) / state.filament_per_e_mm();

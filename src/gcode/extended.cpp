@@ -266,6 +266,10 @@ void Interpreter::restore_state(Event& event) {
   state_.absolute_e = state.absolute_e;
   state_.base_mm = state.base_mm;
   state_.base_mm[E] += state_.position_mm[E] - state.position_mm[E];
+  for (const Axis axis : {X, Y, Z}) {
+    // A zero that was set at an unknown place lies nowhere on the bed that the other is told from.
+    state_.known[axis] = state_.known[axis] && state_.base_known[axis] && state.base_known[axis];
+  }
   state_.base_known = state.base_known;
   state_.offset_mm = state.offset_mm;
   state_.feed_mm_s = state.feed_mm_s;

@@ -1,5 +1,6 @@
 // Which commands stop the machine: each firmware's rule. The lists are in klipper_commands.cpp,
-// marlin_commands.cpp and rrf_commands.cpp.
+// marlin_commands.cpp and rrf_commands.cpp, that of codes unknown to all three in
+// foreign_commands.cpp.
 #pragma once
 
 #include <algorithm>
@@ -31,6 +32,11 @@ enum class Effect {
 [[nodiscard]] Effect klipper_m_code_effect(int number);
 [[nodiscard]] Effect marlin_m_code_effect(int number);
 [[nodiscard]] Effect rrf_m_code_effect(int number);
+// What the firmwares answer "Unknown command" to.
+[[nodiscard]] Effect foreign_m_code_effect(int number);
+
+// What a code with a part behind the point (M201.2) does to Klipper.
+[[nodiscard]] Effect klipper_subcode_effect(int number);
 
 // Looks a key up in two sorted lists.
 template <class Passive, class Stopping, class Key>

@@ -165,9 +165,8 @@ void Interpreter::klipper(Event& event) {
 }
 
 void Interpreter::klipper_traditional(Event& event) {
-  constexpr int kPrinterCheck = 862;  // M862.1 to M862.6
   if (command_.subnumber >= 0) {
-    if (command_.letter != 'M' || command_.number != kPrinterCheck) {
+    if (command_.letter != 'M' || klipper_subcode_effect(command_.number) == Effect::unknown) {
       lose_position(event);
     }
   } else if (command_.letter == 'G') {
@@ -216,6 +215,8 @@ void Interpreter::klipper_g_code(Event& event) {
       return;
     case 92:
       return set_position(event);
+    case 392:
+      return;  // Bambu: clog detection; Klipper does not know it
     default:
       return lose_position(event);
   }
@@ -238,6 +239,7 @@ void Interpreter::klipper_m_code(Event& event) {
     case 486:
       return object_label(event);
     case 201:
+    case 202:
     case 203:
     case 205:
     case 566:
@@ -320,11 +322,12 @@ void Interpreter::set_position(Event& event) {
       const double scale = axis == E ? state_.filament_per_e_mm() : state_.unit_mm;
       const double reading = bare ? 0.0 : *command_.value(kAxisLetters[axis]);
       state_.base_mm[axis] = state_.position_mm[axis] - reading * scale;
-      state_.base_known[axis] = axis == E || state_.known[axis];
+      // Of an unknown place, all that follows is told from here: it is counted as if the machine
+      // were where it was last.
+      state_.base_known[axis] = state_.base_known[axis] && (axis == E || state_.known[axis]);
+      state_.known[axis] = true;
     }
   }
-  // E is only ever used as a difference, so naming it anew makes it known.
-  state_.known[E] = state_.known[E] || bare || named[E];
   // Of the firmwares only RepRapFirmware stops for it; but rewritten motion must not reach across a
   // change of the zero.
   if (bare || named[X] || named[Y] || named[Z]) {

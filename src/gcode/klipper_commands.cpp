@@ -12,21 +12,35 @@ namespace {
 // Handled without a stop:
 //   73 117 display_status.py; 104 140 heaters.py set_temperature; 105 report; 106 107 fan.py;
 //   110 115 118 gcode.py and respond.py; 114 gcode_move.py.
-// Not known to Klipper, which ignores them, and not usually taken over by macros: 74 75 76 77 78
-// (job records), 92 (steps), 108, 113, 141 (chamber), 155 (reports), 200, 201 203 205 566 (limits),
-// 207 208 209 (retraction), 211 (end stops), 250 (contrast), 301 304 (PID), 302 (cold extrusion),
-// 355 (light), 413 (power loss), 555 (print area), 569 (drivers), 591 (filament sensor), 592 593
-// (extrusion, shaping), 862 (printer check), 906 907 (currents). For those of limits
-// may_set_limits() is asked.
-constexpr std::array kPassiveCodes = {73,  74,  75,  76,  77,  78,  92,  104, 105, 106, 107,
-                                      108, 110, 113, 114, 115, 117, 118, 140, 141, 155, 200,
-                                      201, 203, 205, 207, 208, 209, 211, 250, 301, 302, 304,
-                                      355, 413, 555, 566, 569, 591, 592, 593, 862, 906, 907};
+// Not known to Klipper, which ignores them, and not usually taken over by macros. Beside those of
+// foreign_commands.cpp:
+//   74 75 76 77 78 (job records), 92 (steps), 101 103 (extruder on and off, of Skeinforge's time),
+//   108, 113, 141 (chamber), 155 (reports), 200, 201 203 205 566 (limits), 207 208 209
+//   (retraction), 211 (end stops), 250 (contrast), 301 304 305 (PID), 302 (cold extrusion), 350
+//   (microsteps), 355 (light), 403 (MMU), 404 405 406 407 (filament width), 413 (power loss), 503,
+//   540, 555 (print area), 563 567 568 (tools of RepRapFirmware), 569 (drivers), 575 (serial), 591
+//   (filament sensor), 592 593 (extrusion, shaping), 620 621 (Bambu: filament change), 622 623
+//   (Bambu: a condition, so that what stands between always happens here), 624 625 (Bambu: labels),
+//   906 to 914 919 920 (drivers), 960 (Bambu: lights), 993 1015 (Bambu: detectors).
+// For those of limits Event::may_set_limits is set.
+constexpr std::array kPassiveCodes = {
+    73,  74,  75,  76,  77,  78,  92,  101, 103, 104, 105, 106, 107, 108, 110, 113, 114, 115, 117,
+    118, 140, 141, 155, 200, 201, 203, 205, 207, 208, 209, 211, 250, 301, 302, 304, 305, 350, 355,
+    403, 404, 405, 406, 407, 413, 503, 540, 555, 563, 566, 567, 568, 569, 575, 591, 592, 593, 620,
+    621, 622, 623, 624, 625, 906, 907, 908, 909, 910, 911, 912, 913, 914, 919, 920, 960, 993, 1015};
 
 // 17 motors on; 109 116 190 191 wait for temperatures; 119 end stops; 300 beep (a macro with a
-// pause in Klipper's own examples); 400 wait. Macros make SET_PRESSURE_ADVANCE of 572 and 900,
-// which may stop.
-constexpr std::array kStoppingCodes = {17, 109, 116, 119, 190, 191, 300, 400, 572, 900};
+// pause in Klipper's own examples); 400 wait. Macros make of 126 127 (valves), 150 (light), 280
+// (servo), 412 (filament sensor), 420 (BED_MESH_PROFILE LOAD) and of 572 900 (SET_PRESSURE_ADVANCE)
+// what may stop.
+constexpr std::array kStoppingCodes = {17,  109, 116, 119, 126, 127, 150, 190,
+                                       191, 280, 300, 400, 412, 420, 572, 900};
+
+// With a part behind the point Klipper knows none of them (gcode.py takes M201.2 for a name), and
+// the codes themselves move nothing: 73 201 204 205 (Bambu: scales), 569 572 593 (drivers and
+// shaping of RepRapFirmware), 620 622 982 1002 1015 (Bambu), 862 (Prusa: printer check), 900.
+constexpr std::array kCodesWithPoint = {73,  201, 204, 205, 569, 572,  593,
+                                        620, 622, 862, 900, 982, 1002, 1015};
 
 constexpr std::array<std::string_view, 22> kPassiveNames = {
     "ECHO",
@@ -68,6 +82,7 @@ constexpr std::array<std::string_view, 9> kStoppingNames = {
 };
 
 static_assert(std::is_sorted(kPassiveCodes.begin(), kPassiveCodes.end()));
+static_assert(std::is_sorted(kCodesWithPoint.begin(), kCodesWithPoint.end()));
 static_assert(std::is_sorted(kStoppingCodes.begin(), kStoppingCodes.end()));
 static_assert(std::is_sorted(kPassiveNames.begin(), kPassiveNames.end()));
 static_assert(std::is_sorted(kStoppingNames.begin(), kStoppingNames.end()));
@@ -75,7 +90,12 @@ static_assert(std::is_sorted(kStoppingNames.begin(), kStoppingNames.end()));
 }  // namespace
 
 Effect klipper_m_code_effect(int number) {
-  return effect_by_lists(kPassiveCodes, kStoppingCodes, number);
+  const Effect own = effect_by_lists(kPassiveCodes, kStoppingCodes, number);
+  return own == Effect::unknown ? foreign_m_code_effect(number) : own;
+}
+
+Effect klipper_subcode_effect(int number) {
+  return std::ranges::binary_search(kCodesWithPoint, number) ? Effect::passive : Effect::unknown;
 }
 
 Effect extended_effect(std::string_view name) {

@@ -117,10 +117,12 @@ Target read_target(const Command& command, const ModalState& state, Firmware fir
   return target;
 }
 
-// Whether the text says where a motion to the target starts.
-bool starts_known(const Target& target, const ModalState& state) {
+// Whether the text says where a motion to the target starts. A plane may be at any height as long
+// as the line does not leave it.
+bool starts_known(const Target& target, const ModalState& state, bool in_xy_plane = true) {
   const bool e_known = state.known[E] || !target.named[E] || !target.e_absolute;
-  return state.known[X] && state.known[Y] && state.known[Z] && e_known;
+  const bool z_known = state.known[Z] || (in_xy_plane && !target.named[Z]);
+  return state.known[X] && state.known[Y] && z_known && e_known;
 }
 
 // Once an axis has been sent to an absolute reading, its position is known. True if one was not
@@ -131,7 +133,7 @@ bool settle(const Target& target, ModalState& state) {
     const bool absolute = axis == E ? target.e_absolute : state.absolute_xyz;
     if (target.named[axis] && absolute && !state.known[axis]) {
       was_unknown = true;
-      state.known[axis] = state.base_known[axis];
+      state.known[axis] = true;
     }
   }
   return was_unknown;
@@ -295,7 +297,7 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
                     "check the line",
                     gap_mm));
   }
-  const bool start_known = starts_known(target, state_) && modes_certain();
+  const bool start_known = starts_known(target, state_, plane.normal == Z) && modes_certain();
   settle(target, state_);
   const Position start_mm = state_.position_mm;
   const double radius_mm = std::hypot((*offset)[0], (*offset)[1]);

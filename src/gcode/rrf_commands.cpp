@@ -36,7 +36,8 @@ static_assert(std::is_sorted(kStoppingCodes.begin(), kStoppingCodes.end()));
 }  // namespace
 
 Effect rrf_m_code_effect(int number) {
-  return effect_by_lists(kPassiveCodes, kStoppingCodes, number);
+  const Effect own = effect_by_lists(kPassiveCodes, kStoppingCodes, number);
+  return own == Effect::unknown ? foreign_m_code_effect(number) : own;
 }
 
 }  // namespace unflex::gcode

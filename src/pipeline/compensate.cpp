@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "compensate_pass.hpp"
+#include "extruded_path.hpp"
 #include "fd_stream.hpp"
 #include "report_rows.hpp"
 #include "retime.hpp"
@@ -97,9 +98,9 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
 
 // Of single runs the report tells. Where it is all of them, the print is as good as not
 // compensated.
-void warn_of_no_run(const Job& job, report::Report& report) {
+bool warn_of_no_run(const Job& job, report::Report& report) {
   if (report.runs_total == 0 || report.runs_compensated > 0 || report.fallbacks.empty()) {
-    return;
+    return false;
   }
   const report::Fallback& first = report.fallbacks.front();
   report.warnings.push_back(to_string(Diagnostic{
@@ -108,6 +109,7 @@ void warn_of_no_run(const Job& job, report::Report& report) {
                   report.runs_total == 1 ? "its only run stays"
                                          : fmt::format("all {} runs stay", report.runs_total),
                   first.reason)}));
+  return true;
 }
 
 // Whether the output can be written once more.
@@ -141,7 +143,10 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       }
       report.output_bytes = std::filesystem::file_size(job.output);
     }
-    warn_of_no_run(job, report);
+    if (!warn_of_no_run(job, report)) {
+      std::ranges::move(remarks(report.extruded_path, report.unknown_commands, job.input_name),
+                        std::back_inserter(report.warnings));
+    }
     add_performance(begin, report);
     return report;
   }

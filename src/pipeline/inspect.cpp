@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "cpu_slots.hpp"
+#include "extruded_path.hpp"
 #include "input_bytes.hpp"
 #include "piece_reader.hpp"
 #include "piece_thread.hpp"
@@ -64,6 +65,7 @@ class Inspector {
   Inspector(Inspection& result, const machine::Settings& settings)
       : result_(&result),
         firmware_(settings.printer.firmware),
+        path_(firmware_),
         planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))) {
     result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
     result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
@@ -74,6 +76,7 @@ class Inspector {
     for (const gcode::Event& event : piece.events) {
       add_event(event);
     }
+    piece.is_run ? path_.compensate(piece) : path_.keep(piece);
     if (piece.is_run) {
       result_->runs += piece.begins_run() ? 1 : 0;
       result_->run_time_s += planner::duration_s(piece.moves);
@@ -96,6 +99,8 @@ class Inspector {
     if (linear_moves_ > 0) {
       result_->commands["G1"] += linear_moves_;
     }
+    result_->extruded_path = path_.path();
+    result_->unknown_commands = path_.unknown_commands();
     result_->absolute_e = extruded_absolute_ >= 0;
     result_->dialect = slicers_.empty() ? "unknown slicer" : slicers_;
   }
@@ -187,6 +192,7 @@ class Inspector {
 
   Inspection* result_;
   Firmware firmware_;
+  ExtrudedPath path_;
   std::unique_ptr<planner::Planner> planner_;
   std::vector<planner::PlannedMove> planned_;
   std::string slicers_;

@@ -82,14 +82,18 @@ bool looks_like_command(std::string_view content) {
 
 }  // namespace
 
+std::string_view kept_move_reason(const gcode::Segment& segment, Firmware firmware) {
+  const std::string_view reason = gcode::kept_reason(segment, firmware);
+  return reason.empty() ? "part of an arc that is kept" : reason;
+}
+
 void count_kept_moves(const gcode::Event& event, Firmware firmware,
                       std::map<std::string, std::size_t>& kept) {
   if (gcode::compensable(event, firmware)) {
     return;
   }
   for (const gcode::Segment& segment : event.segments) {
-    const std::string_view reason = gcode::kept_reason(segment, firmware);
-    ++kept[std::string(reason.empty() ? "part of an arc that is kept" : reason)];
+    ++kept[std::string(kept_move_reason(segment, firmware))];
   }
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "unflex/core/error.hpp"
@@ -40,6 +41,9 @@ struct Piece {
   [[nodiscard]] bool begins_run() const { return is_run && before.empty(); }
   [[nodiscard]] bool ends_run() const { return is_run && after.empty(); }
 };
+
+// Why a move of a line that is no part of a run stays as it is.
+[[nodiscard]] std::string_view kept_move_reason(const gcode::Segment& segment, Firmware firmware);
 
 // Counts the event's moves that unflex leaves as they are, by reason.
 void count_kept_moves(const gcode::Event& event, Firmware firmware,

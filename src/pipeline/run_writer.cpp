@@ -57,7 +57,8 @@ RunWriter::RunWriter(const RunRules& rules, std::string input_name, double max_l
       max_lines_per_s_(max_lines_per_s),
       report_(&report),
       emitter_(rules.emit),
-      nozzle_(rules.verify.nozzle, rules.verify.fixed, emitter_.printer().state().input_shaper()) {}
+      nozzle_(rules.verify.nozzle, rules.verify.fixed, emitter_.printer().state().input_shaper()),
+      path_(rules.emit.fixed.firmware) {}
 
 Result<std::string> RunWriter::write(const RunJob& job) {
   const Piece& piece = job.piece;
@@ -66,6 +67,7 @@ Result<std::string> RunWriter::write(const RunJob& job) {
     for (const gcode::Event& event : piece.events) {
       emitter_.line(event, text);
     }
+    path_.keep(piece);
     keep_motion(piece);
     return text;
   }
@@ -97,9 +99,12 @@ Result<std::string> RunWriter::write(const RunJob& job) {
   if (failure) {
     text.clear();
     emitter_.keep(piece.events, text);
+    path_.keep(piece);
     keep_motion(piece);
     note_fallback(job, std::move(*failure));
     run_stands_ = true;
+  } else {
+    path_.compensate(piece);
   }
   return text;
 }
@@ -107,6 +112,8 @@ Result<std::string> RunWriter::write(const RunJob& job) {
 std::string RunWriter::finish() {
   std::string text;
   emitter_.finish(text);
+  report_->extruded_path = path_.path();
+  report_->unknown_commands = path_.unknown_commands();
   report_->line_budget.max_lines_per_s = max_lines_per_s_;
   report_->line_budget.cost_rms_mm = cost_.rms_mm();
   report_->line_budget.cost_max_mm = cost_.max_mm();

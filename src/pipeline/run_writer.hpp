@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "emission_cost.hpp"
+#include "extruded_path.hpp"
 #include "nozzle_motion.hpp"
 #include "run_job.hpp"
 #include "unflex/core/error.hpp"
@@ -67,6 +68,7 @@ class RunWriter {
   bool run_stands_ = false;                    // the first part of the run at hand stands as it is
   std::size_t run_line_ = 0;                   // where it begins
   std::optional<verify::BlamedRun> blocked_;
+  ExtrudedPath path_;
   EmissionCost cost_;
   PathError robust_;
   PathError nominal_;

@@ -149,8 +149,18 @@ Json facts_json(const Report& r) {
   if (!r.solver_engine.empty()) {
     add("Runs", fmt::format("{} of {} compensated, {} keep their original moves",
                             r.runs_compensated, r.runs_total, r.runs_fallback));
+    add("Extruded path",
+        fmt::format("{} of {:.0f} mm compensated", share_text(r.extruded_path.compensated_share()),
+                    r.extruded_path.total_mm));
     add("Solver", fmt::format("{}, {} windows, {} iterations", r.solver_engine, r.windows_total,
                               r.solver_iterations));
+  }
+  for (std::size_t i = 0; i < std::min(r.unknown_commands.size(), kMostListed); ++i) {
+    const UnknownCommand& unknown = r.unknown_commands[i];
+    add("Unknown command",
+        fmt::format("{}, {}×, first in line {}: {} moves behind it stay as they are",
+                    unknown.command.substr(0, kLongestText), unknown.count, unknown.first_line,
+                    unknown.moves_kept));
   }
   if (r.robustness) {
     add("Band of models", fmt::format("{} µm RMS as optimised, {} without the band",

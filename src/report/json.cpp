@@ -81,7 +81,8 @@ void add_motion(const Report& r, Json& json) {
 void add_work(const Report& r, Json& json) {
   if (r.solver_engine.empty()) {
     // Nothing was solved, a file was verified: what was tried for it is not known.
-    for (const char* const key : {"windows", "fallbacks", "kept_moves", "line_budget", "solver"}) {
+    for (const char* const key : {"windows", "fallbacks", "kept_moves", "extruded_path",
+                                  "unknown_commands", "line_budget", "solver"}) {
       json[key] = nullptr;
     }
     json["runs"] = {{"total", nullptr}, {"compensated", r.runs_compensated}, {"fallback", nullptr}};
@@ -93,6 +94,8 @@ void add_work(const Report& r, Json& json) {
       {"total", r.runs_total}, {"compensated", r.runs_compensated}, {"fallback", r.runs_fallback}};
   json["fallbacks"] = fallbacks_json(r.fallbacks);
   json["kept_moves"] = Json(r.kept_moves);
+  json["extruded_path"] = path_json(r.extruded_path);
+  json["unknown_commands"] = unknown_json(r.unknown_commands);
   json["line_budget"] = budget_json(r.line_budget);
   json["solver"] = {{"engine", r.solver_engine},
                     {"iterations", r.solver_iterations},
@@ -120,6 +123,25 @@ void add_output(const Report& r, Json& json) {
 }
 
 }  // namespace
+
+Json path_json(const ExtrudedPath& path) {
+  return {{"total_mm", path.total_mm},
+          {"compensated_mm", path.compensated_mm},
+          {"compensated_share", path.compensated_share()},
+          {"kept_mm", Json(path.kept_mm)}};
+}
+
+Json unknown_json(const std::vector<UnknownCommand>& commands) {
+  Json array = Json::array();
+  for (const UnknownCommand& unknown : commands) {
+    array.push_back({{"command", unknown.command},
+                     {"count", unknown.count},
+                     {"first_line", unknown.first_line},
+                     {"moves_kept", unknown.moves_kept},
+                     {"kept_mm", unknown.kept_mm}});
+  }
+  return array;
+}
 
 Json settings_json(const std::vector<Setting>& settings) {
   Json object = Json::object();

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <string_view>
 
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double kMicrometresPerMm = 1e3;
 constexpr std::size_t kListedFallbacks = 3;
+constexpr std::size_t kListedCommands = 5;
 
 using Sink = std::back_insert_iterator<std::string>;
 
@@ -72,6 +74,17 @@ void write_runs(Sink out, const Report& r) {
                  r.windows_total, r.solver_iterations);
 }
 
+void write_path(Sink out, const Report& r) {
+  if (r.solver_engine.empty() || !(r.extruded_path.total_mm > 0.0)) {
+    return;
+  }
+  fmt::format_to(out, "path          {} of {:.0f} mm extruded are compensated\n",
+                 share_text(r.extruded_path.compensated_share()), r.extruded_path.total_mm);
+  for (const auto& [reason, length_mm] : r.extruded_path.kept_mm) {
+    fmt::format_to(out, "              {:.1f} mm stay as they are: {}\n", length_mm, reason);
+  }
+}
+
 void write_output(Sink out, const Report& r) {
   fmt::format_to(out, "output        {} lines, {:.1f} MB, {:.0f} lines/s at peak\n", r.output_lines,
                  static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s);
@@ -102,6 +115,32 @@ std::string micrometres_text(double mm) {
   return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
 }
 
+std::string unknown_text(const std::vector<UnknownCommand>& commands) {
+  std::string text;
+  const Sink out = std::back_inserter(text);
+  std::string_view title = "unknown";
+  const std::size_t listed = std::min(commands.size(), kListedCommands);
+  for (std::size_t i = 0; i < listed; ++i) {
+    const UnknownCommand& one = commands[i];
+    fmt::format_to(
+        out,
+        "{:<14}{}, {}×, first in line {}: {} moves behind it stay as they are, {:.1f} mm "
+        "of them extruded\n",
+        title, one.command, one.count, one.first_line, one.moves_kept, one.kept_mm);
+    title = "";
+  }
+  if (commands.size() > listed) {
+    fmt::format_to(out, "              and {} more, listed by --report\n",
+                   commands.size() - listed);
+  }
+  return text;
+}
+
+std::string share_text(double share) {
+  constexpr double kTenths = 1000.0;
+  return fmt::format("{:.1f} %", share < 1.0 ? std::floor(share * kTenths) / 10.0 : 100.0);
+}
+
 std::string duration_text(double seconds) {
   // Just below a minute tenths would round to 60.0.
   if (!(seconds >= 59.95)) {
@@ -129,6 +168,8 @@ std::string to_text(const Report& report) {
   }
   write_times(out, report);
   write_runs(out, report);
+  write_path(out, report);
+  text += unknown_text(report.unknown_commands);
   write_output(out, report);
   if (report.violation_count > 0) {
     fmt::format_to(out, "violations    {}\n", report.violation_count);

@@ -29,6 +29,8 @@ pipeline::Inspection sample() {
   i.windows = 410;
   i.run_time_s = 2400.0;
   i.kept_moves = {{"Z move", 200}};
+  i.extruded_path = {8000.0, 7900.0, {{"start unknown", 100.0}}};
+  i.unknown_commands = {{"M1234", 40, 12, 7, 100.0}};
   i.reference_time_s = 2488.0;
   i.moving_time_s = 2450.0;
   i.filament_mm = 1234.5;
@@ -49,6 +51,8 @@ TEST(InspectionText, ShowsWhatWasUnderstood) {
   EXPECT_THAT(text, HasSubstr("print time    41m 28s, 40m 50s of it moving"));
   EXPECT_THAT(text, HasSubstr("400 in 410 windows, 40m 00s can be compensated"));
   EXPECT_THAT(text, HasSubstr("200 moves stay as they are: Z move"));
+  EXPECT_THAT(text, HasSubstr("98.7 % of 8000 mm extruded can be compensated\n"));
+  EXPECT_THAT(text, HasSubstr("\nunknown       M1234, 40×, first in line 12: 7 moves"));
   EXPECT_THAT(text, HasSubstr("500 to 1500 mm/s²"));
   EXPECT_THAT(text, HasSubstr("X 45 Hz, ζ 0.06"));
 }
@@ -74,6 +78,8 @@ TEST(InspectionJson, HoldsThePrintTimeAndTheSettings) {
   EXPECT_EQ(json["print_time_s"]["reference"], 2488.0);
   EXPECT_EQ(json["moves"]["extruding"], 15000);
   EXPECT_EQ(json["commands"]["M204"], 12);
+  EXPECT_EQ(json["extruded_path"]["compensated_share"], 0.9875);
+  EXPECT_EQ(json["unknown_commands"][0]["command"], "M1234");
   EXPECT_EQ(json["printer"]["emit.period_ms"]["value"], 1);
   EXPECT_EQ(json["printer"]["emit.period_ms"]["origin"], "default");
 }

@@ -44,7 +44,14 @@ INSTANTIATE_TEST_SUITE_P(
                       "EXCLUDE_OBJECT_DEFINE NAME=a", "SET_DISPLAY_TEXT MSG=hi",
                       "set_filament_sensor SENSOR=a ENABLE=0", "SET_IDLE_TIMEOUT TIMEOUT=60",
                       "SET_GCODE_VARIABLE MACRO=a VARIABLE=b VALUE=1", "TURN_OFF_HEATERS",
-                      "SET_SERVO SERVO=a ANGLE=1", "SET_RETRACTION"));
+                      "SET_SERVO SERVO=a ANGLE=1", "SET_RETRACTION", "M70 P5", "M73.2 R1.0", "M101",
+                      "M103", "M142 S36", "M201.2 K1.0", "M202 X1000 Y1000", "M205.1 X5",
+                      "M330 SYSLOG", "M567 P0 E1.0:0.0", "M569.1 P0", "M620.1 E F523 T240",
+                      "M620 S0A", "M621 S0A", "M622.1 S1", "M622 J1", "M623",
+                      "M624 AQAAAAAAAAA=", "M625", "M862.6 P\"Input shaper\"", "M900.1 K1",
+                      "M914 X50", "M960 S5 P1", "M971 S11 C11 O0", "M975 S1", "M981 S1 P20000",
+                      "M991 S0 P3", "M1002 gcode_claim_action : 0",
+                      "M1002 judge_flag timelapse_record_flag", "M1006 S1", "G392 S0"));
 
 TEST_P(Stopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());
@@ -59,7 +66,8 @@ INSTANTIATE_TEST_SUITE_P(
     Commands, Stopping,
     ::testing::Values("M900 K0.05", "M572 D0 S0.05", "SET_PRINT_STATS_INFO CURRENT_LAYER=3", "G4",
                       "M400", "M109 S210", "M190 S60", "M191 S40", "M116", "M17", "M119",
-                      "M300 S440 P50", "G92 X0", "G92", "G10 P0 S210", "SET_INPUT_SHAPER TYPE=mzv",
+                      "M300 S440 P50", "M150 R255", "M280 P0 S90", "M412 S1", "M420 S1", "G92 X0",
+                      "G92", "G10 P0 S210", "SET_INPUT_SHAPER TYPE=mzv",
                       "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=.04", "SET_GCODE_OFFSET Z=0",
                       "TEMPERATURE_WAIT SENSOR=a MINIMUM=50",
                       "SET_TMC_CURRENT STEPPER=stepper_x CURRENT=1"));
@@ -78,8 +86,26 @@ INSTANTIATE_TEST_SUITE_P(
                       "G28 W", "G29", "G80", "G32", "G30 X1 Y1", "G34", "G1009", "G1.5 X3",
                       "G5 X1 Y1 I1 J1 P1 Q1", "T0", "T12", "Tx", "M0", "M1", "M25", "M226", "M600",
                       "M601", "M18", "M84", "M84 S5", "M42 P1 S1", "M112", "M999", "M109.1", "X5",
-                      "PRINT_START BED=60", "print_end", "PAUSE", "BED_MESH_PROFILE LOAD=default",
-                      "SET_GCODE_OFFSET Z=1 MOVE=1"));
+                      "M970.3 Q1 A7 B30 C80", "M976 S1 P1", "M240", "M1234", "M600.1", "G29.2 S0",
+                      "PRINT_START BED=60", "print_end", "PAUSE", "MY_LAYER_MACRO A=1",
+                      "BED_MESH_PROFILE LOAD=default", "SET_GCODE_OFFSET Z=1 MOVE=1"));
+
+// Bambu's firmware decides about them; Klipper does not know M622 and carries them out.
+TEST(LinesUnderBambusCondition, AreCarriedOut) {
+  Session session;
+  session.read("G1 X1 Y1 Z1\nM1002 judge_flag timelapse_record_flag\nM622 J1\nG1 X5\nG91\nM623");
+  EXPECT_FALSE(session.state().absolute_xyz);
+  const Segment next = session.move("G1 X2");
+  EXPECT_TRUE(next.start_known);
+  EXPECT_EQ(next.end_mm[X], 7.0);
+}
+
+TEST(ForeignLimits, MayBeSetByAMacro) {
+  Session session;
+  for (const char* line : {"M201 X1000", "M202 X1000", "M203 X100", "M205 X8", "M566 X300"}) {
+    EXPECT_TRUE(session.read(line).may_set_limits) << line;
+  }
+}
 
 TEST(ExcludeObject, MayLeaveOutWhatFollows) {
   Session session;

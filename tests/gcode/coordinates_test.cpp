@@ -87,8 +87,15 @@ TEST(Coordinates, BecomeKnownAxisByAxis) {
   Session session;
   EXPECT_FALSE(session.move("G1 X1 Y1").start_known);
   EXPECT_THAT(session.state().known, ElementsAre(true, true, false, true));
-  EXPECT_FALSE(session.move("G1 X2").start_known);
-  EXPECT_FALSE(session.move("G1 Z1").start_known);
+  EXPECT_TRUE(session.move("G1 X2").start_known) << "in its plane, wherever that is";
+  EXPECT_TRUE(session.move("G91\nG1 Y2 E1").start_known);
+  EXPECT_FALSE(session.move("G1 X1 Z0.1").start_known) << "from a height that nobody knows";
+  EXPECT_FALSE(session.move("G90\nG1 X3 Z1").start_known);
+  EXPECT_TRUE(session.move("G1 X2 Z2").start_known);
+  EXPECT_TRUE(session.move("T0\nG1 X1 Y1\nG1 X2").start_known);
+  EXPECT_FALSE(session.move("T0\nG1 X1 Z1\nG1 X2").start_known) << "Y is not known";
+  EXPECT_FALSE(session.move("T0\nG1 Y1 Z1\nG1 Y2").start_known) << "X is not known";
+  EXPECT_FALSE(session.move("T0\nG1 X2 Y2\nG1 Z3").start_known);
   EXPECT_TRUE(session.move("G1 X3").start_known);
   EXPECT_TRUE(session.move("G91\nG1 X3").start_known);
 }
@@ -99,13 +106,28 @@ TEST(Coordinates, StayUnknownThroughRelativeMoves) {
   EXPECT_THAT(session.state().known, ElementsAre(false, false, false, true));
 }
 
-TEST(Coordinates, StayUnknownWhenTheZeroIsSetAtAnUnknownPlace) {
+// Kiri:Moto begins so. Where on the bed that is does not matter.
+TEST(Coordinates, AreToldFromAZeroThatIsSetAtAnUnknownPlace) {
   Session session;
-  session.read("G92 X0 Y0 Z0");
-  EXPECT_THAT(session.state().known, ElementsAre(false, false, false, true));
-  session.read("G1 X1 Y1 Z1\nG1 X2");
-  EXPECT_THAT(session.state().known, ElementsAre(false, false, false, true));
-  EXPECT_TRUE(session.move("G28\nG1 X1 Y1 Z1\nG1 X2").start_known) << "homing takes G92 away";
+  EXPECT_EQ(session.read("G28\nG92 X0 Y0 Z0").kind, EventKind::barrier);
+  EXPECT_THAT(session.state().known, ElementsAre(true, true, true, true));
+  const Segment segment = session.move("G1 X1 Y1 Z1");
+  EXPECT_TRUE(segment.start_known);
+  EXPECT_EQ(segment.delta(X), 1.0);
+  EXPECT_FALSE(session.move("PRINT_START\nG1 X2 Y2").start_known);
+  EXPECT_TRUE(session.move("G1 X3").start_known);
+  EXPECT_FALSE(session.move("G28\nG1 X4 Y4 Z1").start_known);
+  EXPECT_TRUE(session.move("G92 X0\nG1 X3").start_known);
+}
+
+TEST(Coordinates, AreNotToldFromAZeroElsewhere) {
+  Session session;
+  session.read("G28\nG1 X1 Y1 Z1\nSAVE_GCODE_STATE\nG28\nG92 X0 Y0\nG1 Z1\nG1 X1 Y1");
+  EXPECT_THAT(session.state().known, ElementsAre(true, true, true, true));
+  session.read("RESTORE_GCODE_STATE");
+  EXPECT_THAT(session.state().known, ElementsAre(false, false, true, true));
+  session.read("G1 X5 Y5\nSAVE_GCODE_STATE\nG1 X6\nRESTORE_GCODE_STATE");
+  EXPECT_THAT(session.state().known, ElementsAre(true, true, true, true));
 }
 
 TEST(Coordinates, MoveFromAnUnknownPlaceToTheSameReadingStops) {

@@ -38,7 +38,9 @@ INSTANTIATE_TEST_SUITE_P(
                       "M211 S0", "M220 S90", "M221 S95", "M300 S440 P50", "M302 S0", "M412 S1",
                       "M569 S1 X", "M593 D0.1", "M862.3 P \"MK3S\"", "M900", "M906 X800",
                       "M907 E430", "M75", "M77", "M84 S30", "M18 S0", "G10", "G11", "G92", "G92 E0",
-                      "G17", "G21", "G90", "G91", "G1 F0", "M851 Z-1.2", "M200 D0"));
+                      "G17", "G21", "G90", "G91", "G1 F0", "M851 Z-1.2", "M200 D0", "M202 X1000",
+                      "M142 S36", "M567 P0 E1", "M708 A3", "M971 S11 C11 O0", "M991 S0 P1",
+                      "M1002 gcode_claim_action : 0"));
 
 TEST_P(MarlinStopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());
@@ -69,8 +71,9 @@ INSTANTIATE_TEST_SUITE_P(Commands, MarlinLosing,
                                            "M500", "M217 Q", "M118 A1 action:pause", "G1 X5 S200",
                                            "M84", "M18 X", "M112", "M125", "M206 X1", "M410",
                                            "M420 S1", "M428", "M524", "M600", "M605 S1", "M701",
-                                           "M810", "M999", "M1234", "T0", "T1", "X5",
-                                           "PRINT_START BED=60", "@pause", "G1 U5", "G1 X5 A1"));
+                                           "M810", "M999", "M1234", "M240", "M622 J1", "M620 S0A",
+                                           "M970", "T0", "T1", "X5", "PRINT_START BED=60", "@pause",
+                                           "G1 U5", "G1 X5 A1"));
 
 TEST_P(MarlinDoubtful, PassesAsABarrierWithAWarning) {
   const Event event = session_.read(GetParam());

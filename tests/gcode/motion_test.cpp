@@ -241,6 +241,19 @@ TEST(Arcs, InRelativeModeAreRefusedAsByKlipper) {
   EXPECT_THAT(event.warnings, SizeIs(1));
 }
 
+TEST(Arcs, LieInAPlaneOfUnknownHeightOnlyWhereTheyDoNotLeaveIt) {
+  const auto start_known = [](const char* lines) {
+    Session session;
+    const Event event = session.read(lines);
+    EXPECT_FALSE(event.segments.empty()) << lines;
+    return !event.segments.empty() && event.segments.back().start_known;
+  };
+  EXPECT_TRUE(start_known("G28\nG1 X0 Y0\nG2 X10 Y0 I5"));
+  EXPECT_FALSE(start_known("G28\nG1 X0 Y0\nG2 X10 Y0 Z1 I5"));
+  EXPECT_FALSE(start_known("G28\nG1 X0 Y0\nG18\nG2 X10 I5")) << "in X and Z";
+  EXPECT_TRUE(start_known("G28\nG1 X0 Y0 Z0\nG18\nG2 X10 I5"));
+}
+
 TEST(Arcs, FromAnUnknownPlaceSayItOnEveryPiece) {
   Session session;
   const Event event = session.read("G28\nG2 X10 Y0 I5");

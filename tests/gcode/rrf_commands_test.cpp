@@ -42,7 +42,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "G21", "G90", "G91", "G94", "M121", "M201.1 X100", "var x = 3",
                       "global y = {1+2}", "set var.x = 4", "echo \"G28\"",
                       "M104 S{global.temperature}", "M117 {state.status}", "M200",
-                      "M106 S1 M104 S210", "G21 G90 M83", "M82 M83"));
+                      "M106 S1 M104 S210", "G21 G90 M83", "M82 M83", "M202 X1000", "M862 P1",
+                      "M971 S11 C11 O0", "M981 S1 P20000"));
 
 TEST_P(RrfStopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());

@@ -20,8 +20,9 @@ inline void collect_keys(const nlohmann::json& node, const std::string& path,
     keys.insert(path);
     return;
   }
-  const std::set<std::string> open = {"deviation", "deviation.*",     "printer", "kept_moves",
-                                      "commands",  "limits_in_print", "dynamics"};
+  const std::set<std::string> open = {
+      "deviation", "deviation.*",     "printer", "kept_moves", "extruded_path.kept_mm",
+      "commands",  "limits_in_print", "dynamics"};
   for (const auto& [name, value] : node.items()) {
     const std::string part = open.contains(path) ? "*" : name;
     collect_keys(value, path.empty() ? part : path + "." + part, keys);

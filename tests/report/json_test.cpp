@@ -27,10 +27,10 @@ TEST(JsonReport, HasEveryValueUnderItsKey) {
   EXPECT_EQ(json["runs"], (nlohmann::json{{"total", 900}, {"compensated", 895}, {"fallback", 5}}));
   EXPECT_EQ(json["kept_moves"], (nlohmann::json{{"Z move", 12}}));
   EXPECT_EQ(json["solver"], (nlohmann::json{{"engine", "ipopt 3.11.9"},
-                                           {"iterations", 4242},
-                                           {"checked_windows", 8},
-                                           {"largest_gap", 3e-9},
-                                           {"largest_difference_mm", 2e-6}}));
+                                            {"iterations", 4242},
+                                            {"checked_windows", 8},
+                                            {"largest_gap", 3e-9},
+                                            {"largest_difference_mm", 2e-6}}));
   EXPECT_EQ(json["output_stats"], (nlohmann::json{{"lines", 123456},
                                                   {"bytes", 4500000},
                                                   {"max_lines_per_s", 890.0},
@@ -89,11 +89,31 @@ TEST(JsonReport, ListsWhereTheBudgetOfLinesIsExceeded) {
   EXPECT_EQ(budget["cost_max_mm"], 0.0075);
 }
 
+TEST(JsonReport, SaysWhatShareOfTheExtrudedPathIsCompensated) {
+  EXPECT_EQ(
+      parsed(sample_report())["extruded_path"],
+      (nlohmann::json{{"total_mm", 8000.0},
+                      {"compensated_mm", 7000.0},
+                      {"compensated_share", 0.875},
+                      {"kept_mm", {{"run left as sliced", 900.0}, {"start unknown", 100.0}}}}));
+}
+
+TEST(JsonReport, ListsUnknownCommandsAndWhatTheyCost) {
+  const nlohmann::json unknown = parsed(sample_report())["unknown_commands"];
+  ASSERT_EQ(unknown.size(), 2U);
+  EXPECT_EQ(unknown[0], (nlohmann::json{{"command", "M1234"},
+                                        {"count", 40},
+                                        {"first_line", 12},
+                                        {"moves_kept", 7},
+                                        {"kept_mm", 100.0}}));
+}
+
 TEST(JsonReport, SaysNothingOfTheWorkBehindAFileThatWasOnlyVerified) {
   Report verified = sample_report();
   verified.solver_engine.clear();
   const nlohmann::json json = parsed(verified);
-  for (const char* const key : {"windows", "fallbacks", "kept_moves", "line_budget", "solver"}) {
+  for (const char* const key : {"windows", "fallbacks", "kept_moves", "extruded_path",
+                                "unknown_commands", "line_budget", "solver"}) {
     EXPECT_TRUE(json[key].is_null()) << key;
   }
   EXPECT_TRUE(json["runs"]["total"].is_null());

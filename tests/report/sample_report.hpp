@@ -43,6 +43,8 @@ inline Report sample_report() {
   r.windows_fallback = 6;
   r.fallbacks = {{10, 20, "no solution"}, {30, 44, "worse than the original"}};
   r.kept_moves = {{"Z move", 12}};
+  r.extruded_path = {8000.0, 7000.0, {{"run left as sliced", 900.0}, {"start unknown", 100.0}}};
+  r.unknown_commands = {{"M1234", 40, 12, 7, 100.0}, {"MY_MACRO", 1, 90, 0, 0.0}};
   r.line_budget = {850.0, 2, {{70, 75, 880.0}, {90, 91, 890.0}}, 0.0005, 0.0075};
   r.solver_engine = "ipopt 3.11.9";
   r.solver_iterations = 4242;

@@ -29,6 +29,13 @@ TEST(Summary, IsExactlyThis) {
       "              and 3 more, listed by --report\n"
       "              12 other moves stay as they are: Z move\n"
       "solver        ipopt 3.11.9, 1000 windows, 4242 iterations\n"
+      "path          87.5 % of 8000 mm extruded are compensated\n"
+      "              900.0 mm stay as they are: run left as sliced\n"
+      "              100.0 mm stay as they are: start unknown\n"
+      "unknown       M1234, 40×, first in line 12: 7 moves behind it stay as they are, 100.0 mm of "
+      "them extruded\n"
+      "              MY_MACRO, 1×, first in line 90: 0 moves behind it stay as they are, 0.0 mm of "
+      "them extruded\n"
       "output        123456 lines, 4.5 MB, 890 lines/s at peak\n"
       "lines         cost 0.50 µm RMS, 7.50 µm at most; more than 850 per second in 2 places, "
       "the first at line 70\n"
@@ -51,6 +58,21 @@ TEST(Summary, SaysThatTheBudgetOfLinesHolds) {
   Report report = sample_report();
   report.line_budget.places_above = 0;
   EXPECT_THAT(to_text(report), HasSubstr("7.50 µm at most; never more than 850 per second\n"));
+}
+
+TEST(Summary, NamesAFewUnknownCommandsAndCountsTheRest) {
+  EXPECT_EQ(unknown_text({}), "");
+  const std::string text = unknown_text(std::vector<UnknownCommand>(8, {"MACRO", 2, 3, 0, 0.0}));
+  EXPECT_EQ(std::ranges::count(text, '\n'), 6);
+  EXPECT_THAT(text, ::testing::EndsWith("and 3 more, listed by --report\n"));
+}
+
+TEST(Shares, AreWholeOnlyWhereNothingIsLeft) {
+  EXPECT_EQ(share_text(1.0), "100.0 %");
+  EXPECT_EQ(share_text(0.99999), "99.9 %");
+  EXPECT_EQ(share_text(0.5), "50.0 %");
+  EXPECT_EQ(share_text(0.0), "0.0 %");
+  EXPECT_EQ(ExtrudedPath{}.compensated_share(), 1.0);
 }
 
 TEST(Summary, OfAnEmptyPrintHasNoInfinities) {

@@ -27,9 +27,9 @@ struct Segment {
   Position end_mm{};
   double feed_mm_s = 0.0;  // what the file asks for, after M220
   std::size_t line = 0;    // line number in the input
-  // False when the machine's X, Y or Z at the start is not known from the text (beginning of the
-  // file, after homing, a macro or a tool change), or when the filament it takes is not (absolute E
-  // after a macro): such a motion must not be rewritten.
+  // False when the machine's X or Y at the start is not known from the text (beginning of the file,
+  // after homing, a macro or a tool change), its Z where the line names Z, or the filament that the
+  // line takes (absolute E after a macro): such a motion must not be rewritten.
   bool start_known = true;
   // Radius of the arc this piece continues; 0 for a straight move and an arc's first and last
   // piece. Marlin hands it to its planner, which then limits the junction by centripetal

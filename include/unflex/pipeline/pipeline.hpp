@@ -71,6 +71,8 @@ struct Inspection {
   std::size_t windows = 0;
   double run_time_s = 0.0;        // in those runs
   std::map<std::string, std::size_t> kept_moves;  // reason → moves outside runs
+  report::ExtrudedPath extruded_path;  // compensated: what can be
+  std::vector<report::UnknownCommand> unknown_commands;  // by their first lines
   double reference_time_s = 0.0;
   double moving_time_s = 0.0;
   double filament_mm = 0.0;

@@ -55,6 +55,27 @@ struct AboveBudget {
   double lines_per_s = 0.0;
 };
 
+// The way in X and Y on which filament is laid.
+struct ExtrudedPath {
+  double total_mm = 0.0;
+  double compensated_mm = 0.0;
+  std::map<std::string, double> kept_mm;  // of the rest, by reason
+
+  // 1 where there is none.
+  [[nodiscard]] double compensated_share() const {
+    return total_mm > 0.0 ? compensated_mm / total_mm : 1.0;
+  }
+};
+
+// A command that may do anything: a macro, a code of another firmware.
+struct UnknownCommand {
+  std::string command;  // "MY_MACRO", "M1234"
+  std::size_t count = 0;
+  std::size_t first_line = 0;
+  std::size_t moves_kept = 0;  // behind it, because it is not known where they start …
+  double kept_mm = 0.0;        // … and their extruded path
+};
+
 struct LineBudget {
   double max_lines_per_s = 0.0;
   std::size_t places_above = 0;
@@ -106,6 +127,9 @@ struct Report {
   std::vector<Fallback> fallbacks;   // at most 1000 are listed
   std::map<std::string, std::size_t>
       kept_moves;  // reason → moves outside runs ("wipe", "Z move" …)
+
+  ExtrudedPath extruded_path;
+  std::vector<UnknownCommand> unknown_commands;  // by their first lines
 
   LineBudget line_budget;
 

@@ -1,0 +1,48 @@
+// What share of the extruded path is compensated, and what keeps the rest as it was sliced.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "piece_reader.hpp"
+#include "unflex/core/firmware.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::pipeline {
+
+class ExtrudedPath {
+ public:
+  explicit ExtrudedPath(Firmware firmware) : firmware_(firmware) {}
+
+  // Of the pieces in the order of the file, one that stands as it was sliced …
+  void keep(const Piece& piece);
+  // … and a run that does not.
+  void compensate(const Piece& piece);
+
+  [[nodiscard]] const report::ExtrudedPath& path() const { return path_; }
+  // By their first lines.
+  [[nodiscard]] const std::vector<report::UnknownCommand>& unknown_commands() const {
+    return unknown_;
+  }
+
+ private:
+  void keep_moves(const Piece& piece, const gcode::Event& event);
+  void note_command(const gcode::Event& event);
+
+  Firmware firmware_;
+  report::ExtrudedPath path_;
+  std::vector<report::UnknownCommand> unknown_;
+  std::map<std::string, std::size_t> places_;  // in unknown_, by command
+  std::optional<std::size_t> lost_by_;         // the last to leave the machine nobody knows where
+};
+
+// What the user should hear of them: commands that cost extruded path, and a share that is low.
+[[nodiscard]] std::vector<std::string> remarks(const report::ExtrudedPath& path,
+                                               const std::vector<report::UnknownCommand>& unknown,
+                                               const std::string& input_name);
+
+}  // namespace unflex::pipeline
