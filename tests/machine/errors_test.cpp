@@ -77,8 +77,9 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"WordThatIsNone",
                 "[printer]\ninput_shaper_type = \"custom\"\n",
                 {},
-                "printer.toml:2: printer.input_shaper_type must be one of \"ei2\", \"ei3\", "
-                "\"mzv\", \"zvd\", \"zvdd\", \"zvddd\", not the text \"custom\""},
+                "printer.toml:2: printer.input_shaper_type must be one of \"auto\", \"zv\", "
+                "\"mzv\", \"zvd\", \"zvdd\", \"zvddd\", \"ei\", \"2hump_ei\", \"3hump_ei\", "
+                "\"ei2\", \"ei3\", not the text \"custom\""},
         Mistake{"HalfACircleSegment",
                 "[printer]\nmin_circle_segments = 0.5\n",
                 {},

@@ -240,7 +240,28 @@ TEST(ShaperFrequency, IsOneForBothAxesOfRepRapFirmware) {
   EXPECT_DOUBLE_EQ(read("", rrf).shaper_freq_y_hz(), 0.0);
   const Settings s = read("[printer]\ninput_shaper_freq_x_hz = 41\n", rrf);
   EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 41.0);
-  EXPECT_EQ(s.printer.input_shaper_type, "zvd");
+}
+
+// Each firmware's own, which is what its switch means where no type is named.
+TEST(ShaperType, IsTheFirmwaresDefaultUnlessNamed) {
+  EXPECT_EQ(read("").shaper_type_x(), "mzv");
+  EXPECT_EQ(read("", {"printer.firmware=marlin"}).shaper_type_x(), "zv");
+  EXPECT_EQ(read("", {"printer.firmware=rrf"}).shaper_type_y(), "zvd");
+  const Settings named = read("[printer]\ninput_shaper_type = \"ei\"\n");
+  EXPECT_EQ(named.shaper_type_x(), "ei");
+  EXPECT_EQ(named.shaper_type_y(), "ei");
+  const Settings two = read("[printer]\ninput_shaper_type_y = \"zv\"\n");
+  EXPECT_EQ(two.shaper_type_x(), "mzv");
+  EXPECT_EQ(two.shaper_type_y(), "zv");
+}
+
+TEST(ShaperDampingRatio, IsTheFirmwaresDefaultUnlessGiven) {
+  EXPECT_DOUBLE_EQ(read("").shaper_damping_ratio_x(), 0.1);
+  EXPECT_DOUBLE_EQ(read("", {"printer.firmware=marlin"}).shaper_damping_ratio_y(), 0.15);
+  EXPECT_DOUBLE_EQ(read("", {"printer.firmware=rrf"}).shaper_damping_ratio_y(), 0.1);
+  const Settings given = read("[printer]\ninput_shaper_damping_ratio_x = 0.05\n");
+  EXPECT_DOUBLE_EQ(given.shaper_damping_ratio_x(), 0.05);
+  EXPECT_DOUBLE_EQ(given.shaper_damping_ratio_y(), 0.1);
 }
 
 TEST(ShaperType, IsAWordInAFileAndInAnOverride) {
