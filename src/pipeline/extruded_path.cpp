@@ -19,6 +19,8 @@ constexpr double kEnough = 0.95;
 constexpr std::size_t kNamedReasons = 3;
 // Of path; less is not worth a warning.
 constexpr double kLeast_mm = 0.1;
+// Of a whole file; a share of less says nothing.
+constexpr double kLeastFile_mm = 100.0;
 
 std::vector<std::pair<double, std::string>> largest(const std::map<std::string, double>& kept_mm) {
   std::vector<std::pair<double, std::string>> reasons;
@@ -101,7 +103,7 @@ std::vector<std::string> remarks(const report::ExtrudedPath& path,
                                             : fmt::format("{} moves", command.moves_kept),
                     command.kept_mm)}));
   }
-  if (path.total_mm > 0.0 && path.compensated_share() < kEnough) {
+  if (path.total_mm >= kLeastFile_mm && path.compensated_share() < kEnough) {
     std::string reasons;
     for (const auto& [length_mm, reason] : largest(path.kept_mm)) {
       reasons += fmt::format("{}{:.0f} mm: {}", reasons.empty() ? "" : ", ", length_mm, reason);

@@ -122,6 +122,7 @@ TEST(Remarks, NameTheLargestReasons) {
                                     "300 mm: d, 150 mm: c)")));
   path.compensated_mm = 950.0;
   EXPECT_THAT(remarks(path, {}, "in.gcode"), IsEmpty());
+  EXPECT_THAT(remarks({99.0, 0.0, {{"a", 99.0}}}, {}, "in.gcode"), IsEmpty()) << "no print";
   EXPECT_THAT(remarks({}, {{"MACRO", 5, 3, 5, 0.0}}, "in.gcode"), IsEmpty());
 }
 
