@@ -20,6 +20,9 @@ using dynamics::BaseTrajectory;
 using dynamics::FlexibleAxis;
 
 constexpr int kMaxSamples = 128;
+// What the base itself may take of the largest change of speed. The rest is for its lines' places,
+// which are not on its curve.
+constexpr double kOwnShare = 0.8;
 
 // e at kMaxSamples points at most, `steps` + 1 of them equally spaced over the line.
 std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, AxisAt at,
@@ -73,26 +76,43 @@ double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double t
   return largest;
 }
 
+// When the shortest line from `start` ends. Where no more than two lines go, they share the time,
+// as speed changes most between long ones.
+double first_end(double start, double to, const LineRules& rules) {
+  return to - start < 3.0 * rules.even_line_s()
+             ? std::max(0.5 * (start + to), start + rules.min_line_s)
+             : start + rules.min_line_s;
+}
+
 // How a line would do.
 class Candidate {
  public:
   Candidate(const BaseTrajectory& base, const LineRules& rules) : base_(&base), rules_(&rules) {}
 
   // Moves the nozzle little, and speed changes little from the line before, which began at
-  // `before`.
+  // `before`, and to the shortest line that may come behind.
   [[nodiscard]] bool good(double before, double from, double to) const {
-    const auto change = [&](AxisAt axis) {
-      const double at = (base_->*axis)(from).position_mm;
-      const double last =
-          before < from ? (at - (base_->*axis)(before).position_mm) / (from - before) : 0.0;
-      return std::abs(((base_->*axis)(to).position_mm - at) / (to - from) - last);
-    };
-    return std::max(change(&BaseTrajectory::x_at), change(&BaseTrajectory::y_at)) <=
-               rules_->max_speed_step_mm_s &&
+    const double after = to + rules_->min_line_s;
+    return std::max(change(before, from, to), change(from, to, after)) <=
+               kOwnShare * rules_->max_speed_step_mm_s &&
            largest_nozzle_error_mm(*base_, from, to, *rules_) <= rules_->tolerance_mm;
   }
 
  private:
+  // Of either axis' speed where lines from a to b and from b to c join. A line without time stands
+  // for rest.
+  [[nodiscard]] double change(double a, double b, double c) const {
+    const auto along = [&](AxisAt axis) {
+      const auto speed = [&](double from, double to) {
+        return from < to ? ((base_->*axis)(to).position_mm - (base_->*axis)(from).position_mm) /
+                               (to - from)
+                         : 0.0;
+      };
+      return std::abs(speed(b, c) - speed(a, b));
+    };
+    return std::max(along(&BaseTrajectory::x_at), along(&BaseTrajectory::y_at));
+  }
+
   const BaseTrajectory* base_;
   const LineRules* rules_;
 };
@@ -124,7 +144,7 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     // What is left must be long enough for a line too. The shortest line goes in any case, longer
     // ones as long as they are good.
     double end = 0.0;
-    for (double t = start + rules.min_line_s; t < to; t += h) {
+    for (double t = first_end(start, to, rules); t < to; t += h) {
       if (long_enough(base, start, t, rules) && long_enough(base, t, to, rules)) {
         end = t;
         break;

@@ -21,6 +21,9 @@ using gcode::Z;
 // Rounding to a grid as coarse as this is what limits accuracy.
 constexpr double kCoarse_mm = 1e-3;
 
+// What a place may take of the largest change of speed; the rest is for the lines' times.
+constexpr double kOfSpeedStep = 0.95;
+
 // Moments at which a line should end: lines that stand between moves, changes of filament per mm,
 // the ends of motion. In order.
 std::vector<double> wanted_times(const Run& run, const Timetable& table,
@@ -147,10 +150,11 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
   }
   const VertexChooser along_x(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x);
   const VertexChooser along_y(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y);
+  const SpeedSteps steps{kOfSpeedStep * rules.max_speed_step_mm_s, rules.max_accel_mm_s2};
   const auto choose = [&] {
     const Ends ends{!run.goes_on, !run.until_s};
-    return std::pair{along_x.choose(times, grid.x, rules.reach_x, rules.max_accel_mm_s2, ends),
-                     along_y.choose(times, grid.y, rules.reach_y, rules.max_accel_mm_s2, ends)};
+    return std::pair{along_x.choose(times, grid.x, rules.reach_x, steps, ends),
+                     along_y.choose(times, grid.y, rules.reach_y, steps, ends)};
   };
   auto vertices = choose();
   while (split_lines(base, vertices.first.nozzle_error_mm, vertices.second.nozzle_error_mm, rules,

@@ -1,8 +1,9 @@
 // Notation, for one axis:
 //   t_k, T     end of line k, its duration          b     base, chords between the b(t_k)
 //   o_k        vertex k minus b(t_k)                p     nozzle that follows the base
+//   v_k, c_k   speed of line k, of the chord there  g_k   v_k − c_k
 //   y          state (e, ė) of the nozzle that follows the polygon, minus (p, ṗ)
-//   z_k        (y, o_k);  u = o_{k+1}
+//   z_k        (y, o_k, g_{k−1});  u = g_k − g_{k−1}
 //   ε          weight of the polygon's own distance from the base
 //
 // A linear-quadratic regulator: min Σ ∫ e² + ε d² dt with z_{k+1} = M (z_k, u) + m_k, where d is
@@ -10,6 +11,11 @@
 // Anderson & Moore, Optimal Control: Linear Quadratic Methods, § 2.4 and 4.1), then the vertices
 // from the beginning on. Each is put on the grid before the next one is chosen, so that those to
 // come make up for its rounding.
+//
+// The change of speed v_k − v_{k−1} = u + c_k − c_{k−1} has bounds. Where the law above goes beyond
+// them, u is drawn to w, which is within them, by ρ/2 (u − w + λ)², and w to u in turn; the gains
+// stay what they are (O'Donoghue, Stathopoulos & Boyd, A splitting method for optimal control, IEEE
+// Trans. Control Syst. Technol. 21, 2013).
 #include "vertices.hpp"
 
 #include <Eigen/Core>
@@ -17,6 +23,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 
 namespace unflex::emit {
@@ -25,32 +32,54 @@ namespace {
 using dynamics::BaseTrajectory;
 using dynamics::FlexibleAxis;
 
-// One line: where it takes y, and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
+using Vector5 = Eigen::Matrix<double, 5, 1>;
+using Matrix5 = Eigen::Matrix<double, 5, 5>;
+
+// What the last vertex is away from the base costs against e² over a second: it is the base's own.
+constexpr double kAtEnd = 1e3;
+// Of the splitting: its rounds at most, the change at which it ends, and ρ against what u costs
+// without.
+constexpr int kMostRounds = 60;
+constexpr double kSettled_mm_s = 0.02;
+constexpr double kPull = 0.03;
+
+// One line: where it takes (y, o), and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
 struct Stage {
-  Eigen::Matrix<double, 2, 4> move = Eigen::Matrix<double, 2, 4>::Zero();
-  Eigen::Vector2d shift = Eigen::Vector2d::Zero();
-  Eigen::Matrix4d cost = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d slope = Eigen::Vector4d::Zero();
-  // The law u = feedback · z + feed_forward.
-  Eigen::RowVector3d feedback = Eigen::RowVector3d::Zero();
+  Eigen::Matrix<double, 4, 5> move = Eigen::Matrix<double, 4, 5>::Zero();
+  Eigen::Vector4d shift = Eigen::Vector4d::Zero();
+  Matrix5 cost = Matrix5::Zero();
+  Vector5 slope = Vector5::Zero();
+  double duration_s = 0.0;
+  double chord_mm_s = 0.0;
+  // Bounds of u.
+  double least = 0.0;
+  double most = 0.0;
+  // The law u = feedback · z + feed_forward, and what it is found by.
+  Eigen::RowVector4d feedback = Eigen::RowVector4d::Zero();
   double feed_forward = 0.0;
+  double curvature = 0.0;          // of the cost along u
+  Vector5 pull = Vector5::Zero();  // the cost's slope but for that of the cost to go and of w
+  double target = 0.0;             // w − λ
 };
 
 Stage stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed, const Step& step,
             double from, double to) {
-  Stage result;
   const double duration = to - from;
   const int steps = static_cast<int>(std::lround(duration / step.dt()));
   const double b0 = (base.*axis)(from).position_mm;
   const double slope = ((base.*axis)(to).position_mm - b0) / duration;
+  // First in terms of where the line begins and ends, (y, o_k, o_{k+1}).
+  Eigen::Matrix4d cost = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
   const auto add_square = [&](const Eigen::RowVector4d& row, double value, double weight) {
-    result.cost += weight * row.transpose() * row;
-    result.slope += weight * value * row.transpose();
+    cost += weight * row.transpose() * row;
+    gradient += weight * value * row.transpose();
   };
-  // The nozzle's answer to (y, o, u), and to the chord alone.
+  // The nozzle's answer to them, and to the chord alone.
   Eigen::Matrix<double, 2, 4> answer = Eigen::Matrix<double, 2, 4>::Zero();
   answer.leftCols<2>().setIdentity();
   Eigen::Vector2d chord = followed.at(from) - Eigen::Vector2d(b0, 0.0);
+  Eigen::Vector2d off = Eigen::Vector2d::Zero();
   for (int i = 0; i < steps; ++i) {
     const double s = static_cast<double>(i) / steps;
     answer = step.free() * answer;
@@ -59,43 +88,108 @@ Stage stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed, c
     chord = step.free() * chord + step.base(slope * s * duration, slope);
     const double end = s + 1.0 / steps;
     const double t = from + end * duration;
-    const Eigen::Vector2d off = chord - (followed.at(t) - Eigen::Vector2d(b0, 0.0));
+    off = chord - (followed.at(t) - Eigen::Vector2d(b0, 0.0));
     add_square(answer.row(0), off[0], step.dt());
     const double chord_off = slope * end * duration - ((base.*axis)(t).position_mm - b0);
     add_square({0.0, 0.0, 1.0 - end, end}, chord_off, kBaseWeight * step.dt());
-    if (i + 1 == steps) {
-      result.shift = off;
-    }
   }
-  result.move = answer;
+  // o_{k+1} = o_k + T (g_{k−1} + u)
+  Eigen::Matrix<double, 4, 5> of_speed = Eigen::Matrix<double, 4, 5>::Zero();
+  of_speed.leftCols<3>().topRows<3>().setIdentity();
+  of_speed.row(3) << 0.0, 0.0, 1.0, duration, duration;
+  Stage result;
+  result.cost = of_speed.transpose() * cost * of_speed;
+  result.slope = of_speed.transpose() * gradient;
+  result.move.topRows<2>() = answer * of_speed;
+  result.move.row(2) = of_speed.row(3);
+  result.move.row(3) << 0.0, 0.0, 0.0, 1.0, 1.0;
+  result.shift.head<2>() = off;
+  result.duration_s = duration;
+  result.chord_mm_s = slope;
   return result;
 }
 
-// ½ zᵀPz + pᵀz: what is still to come.
-struct CostToGo {
-  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d slope = Eigen::Vector3d::Zero();
-};
+// Sets the feedback of all laws for a pull of ρ towards the targets; at_end: P behind the last
+// line.
+void set_feedback(Eigen::Matrix4d at_end, double rho, std::vector<Stage>& stages) {
+  Eigen::Matrix4d& to_go = at_end;
+  for (std::size_t k = stages.size(); k-- > 0;) {
+    Stage& line = stages[k];
+    Matrix5 cost = line.cost + line.move.transpose() * to_go * line.move;
+    cost(4, 4) += rho;
+    line.pull = line.slope + line.move.transpose() * (to_go * line.shift);
+    line.curvature = cost(4, 4);
+    line.feedback = -cost.row(4).head<4>() / cost(4, 4);
+    to_go = cost.topLeftCorner<4, 4>() + cost.col(4).head<4>() * line.feedback;
+  }
+}
 
-// Sets the line's law and takes its cost to the cost to go. A pinned vertex is not free: u = 0.
-void regulate(Stage& line, CostToGo& to_go, bool pinned) {
-  Eigen::Matrix<double, 3, 4> next = Eigen::Matrix<double, 3, 4>::Zero();
-  next.topRows<2>() = line.move;
-  next(2, 3) = 1.0;
-  const Eigen::Vector3d constant(line.shift[0], line.shift[1], 0.0);
-  const Eigen::Matrix4d cost = line.cost + next.transpose() * to_go.matrix * next;
-  const Eigen::Vector4d slope =
-      line.slope + next.transpose() * (to_go.matrix * constant + to_go.slope);
-  to_go.matrix = cost.topLeftCorner<3, 3>();
-  to_go.slope = slope.head<3>();
-  if (pinned) {
-    line.feedback.setZero();
-    line.feed_forward = 0.0;
-  } else {
-    line.feedback = -cost.row(3).head<3>() / cost(3, 3);
-    line.feed_forward = -slope[3] / cost(3, 3);
-    to_go.matrix += cost.col(3).head<3>() * line.feedback;
-    to_go.slope += line.feedback.transpose() * slope[3];
+// … and their feed-forward, once the feedback is set.
+void set_feed_forward(double rho, std::vector<Stage>& stages) {
+  Eigen::Vector4d to_go = Eigen::Vector4d::Zero();
+  for (std::size_t k = stages.size(); k-- > 0;) {
+    Stage& line = stages[k];
+    Vector5 slope = line.pull + line.move.transpose() * to_go;
+    slope[4] -= rho * line.target;
+    line.feed_forward = -slope[4] / line.curvature;
+    to_go = slope.head<4>() + line.feedback.transpose() * slope[4];
+  }
+}
+
+// Calls use(k, u) for each line with what its law says, off the grid.
+template <typename Use>
+void follow(const std::vector<Stage>& stages, Use use) {
+  Eigen::Vector4d z = Eigen::Vector4d::Zero();
+  for (std::size_t k = 0; k < stages.size(); ++k) {
+    const Stage& line = stages[k];
+    const double u = line.feedback * z + line.feed_forward;
+    use(k, u);
+    Vector5 w;
+    w << z, u;
+    z = line.move * w + line.shift;
+  }
+}
+
+// The median.
+double middle_curvature(const std::vector<Stage>& stages) {
+  std::vector<double> curvatures;
+  for (const Stage& line : stages) {
+    curvatures.push_back(line.curvature);
+  }
+  const auto middle = curvatures.begin() + static_cast<std::ptrdiff_t>(curvatures.size() / 2);
+  std::ranges::nth_element(curvatures, middle);
+  return *middle;
+}
+
+// Sets the laws of all lines so that what they say lies within the bounds, nearly.
+void regulate(const Eigen::Matrix4d& at_end, std::vector<Stage>& stages) {
+  set_feedback(at_end, 0.0, stages);
+  set_feed_forward(0.0, stages);
+  bool within = true;
+  std::vector<double> w(stages.size());
+  follow(stages, [&](std::size_t k, double u) {
+    w[k] = std::clamp(u, stages[k].least, stages[k].most);
+    within = within && w[k] == u;
+  });
+  if (within) {
+    return;
+  }
+  const double rho = kPull * middle_curvature(stages);
+  set_feedback(at_end, rho, stages);
+  std::vector<double> lambda(stages.size());
+  double change = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < kMostRounds && change > kSettled_mm_s; ++round) {
+    for (std::size_t k = 0; k < stages.size(); ++k) {
+      stages[k].target = w[k] - lambda[k];
+    }
+    set_feed_forward(rho, stages);
+    change = 0.0;
+    follow(stages, [&](std::size_t k, double u) {
+      const double before = w[k];
+      w[k] = std::clamp(u + lambda[k], stages[k].least, stages[k].most);
+      lambda[k] += u - w[k];
+      change = std::max({change, std::abs(u - w[k]), std::abs(w[k] - before)});
+    });
   }
 }
 
@@ -109,27 +203,34 @@ Reach with_base(Reach reach, const BaseTrajectory& base, AxisAt axis) {
   return reach;
 }
 
-// Pins the vertices around changes of speed that are too quick, those from and to rest at the ends
-// included; whether there were any to pin.
-bool pin_where_too_quick(const std::vector<double>& times, const std::vector<double>& at,
-                         double max_accel_mm_s2, Ends ends, std::size_t around,
-                         std::vector<bool>& pinned) {
-  bool found = false;
-  const std::size_t last = times.size() - 1;
-  for (std::size_t i = ends.from_rest ? 0 : 1; i + (ends.to_rest ? 0 : 1) <= last; ++i) {
-    const double before_s = i > 0 ? times[i] - times[i - 1] : 0.0;
-    const double after_s = i < last ? times[i + 1] - times[i] : 0.0;
-    const double before = i > 0 ? (at[i] - at[i - 1]) / before_s : 0.0;
-    const double after = i < last ? (at[i + 1] - at[i]) / after_s : 0.0;
-    if (std::abs(after - before) <= max_accel_mm_s2 * 0.5 * (before_s + after_s)) {
-      continue;
-    }
-    for (std::size_t k = i > around ? i - around : 0; k <= std::min(i + around, last); ++k) {
-      found = found || !pinned[k];
-      pinned[k] = true;
-    }
+// How fast the base is where the lines begin, if it does not rest there.
+double speed_before(const BaseTrajectory& base, AxisAt axis, const Ends& ends) {
+  return ends.from_rest ? 0.0 : (base.*axis)(0.0).velocity_mm_s;
+}
+
+// What u may be. Where other lines go on, half of a change is theirs.
+void set_bounds(const SpeedSteps& most, double before_mm_s, const Ends& ends,
+                std::vector<Stage>& stages) {
+  for (std::size_t k = 0; k < stages.size(); ++k) {
+    Stage& line = stages[k];
+    const double own = line.chord_mm_s - (k > 0 ? stages[k - 1].chord_mm_s : before_mm_s);
+    const double middles_s =
+        k > 0 ? 0.5 * (stages[k - 1].duration_s + line.duration_s) : 0.5 * line.duration_s;
+    const double shared = k == 0 && !ends.from_rest ? 0.5 : 1.0;
+    const double step =
+        std::max(shared * std::min(most.step_mm_s, most.accel_mm_s2 * middles_s), std::abs(own));
+    line.least = -step - own;
+    line.most = step - own;
   }
-  return found;
+}
+
+// The place on the grid that is nearest to `wish` within the bounds, as far as any is.
+double place_within(const AxisGrid& grid, double wish, double least, double most) {
+  const double at = grid.nearest(std::clamp(wish, least, std::max(least, most)));
+  if (at > most && at - grid.step_mm >= least) {
+    return at - grid.step_mm;
+  }
+  return at < least && at + grid.step_mm <= most ? at + grid.step_mm : at;
 }
 
 }  // namespace
@@ -142,7 +243,7 @@ VertexChooser::VertexChooser(const BaseTrajectory& base, AxisAt axis, const Flex
     : base_(&base), axis_(axis), nozzle_(nozzle), followed_(base, axis, nozzle) {}
 
 AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisGrid& grid,
-                                   const Reach& reach, double max_accel_mm_s2, Ends ends) const {
+                                   const Reach& reach, const SpeedSteps& most, Ends ends) const {
   const BaseTrajectory& base = *base_;
   const AxisAt axis = axis_;
   const std::size_t lines = times.size() - 1;
@@ -157,37 +258,34 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
     stages.push_back(stage(base, axis, followed_, step, times[k], times[k + 1]));
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
+  const double before_mm_s = speed_before(base, axis, ends);
+  set_bounds(most, before_mm_s, ends, stages);
   const Reach within = with_base(reach, base, axis);
   // After the run e rings down.
-  CostToGo at_end;
-  at_end.matrix.topLeftCorner<2, 2>() = ring_down_square(nozzle_);
-  std::vector<bool> pinned(lines + 1, false);
-  pinned.front() = pinned.back() = true;
-  AxisVertices result;
-  // Pinning moves the neighbours; the further around, the sooner that ends.
-  for (std::size_t around = 1;; around *= 2) {
-    CostToGo to_go = at_end;
-    for (std::size_t k = lines; k-- > 0;) {
-      regulate(stages[k], to_go, pinned[k + 1]);
+  Eigen::Matrix4d at_end = Eigen::Matrix4d::Zero();
+  at_end.topLeftCorner<2, 2>() = ring_down_square(nozzle_);
+  at_end(2, 2) = kAtEnd;
+  regulate(at_end, stages);
+  AxisVertices result = {{on_curve.front()}, {0.0}};
+  Eigen::Vector4d z = Eigen::Vector4d::Zero();
+  for (std::size_t k = 0; k < lines; ++k) {
+    const Stage& line = stages[k];
+    const auto end_of = [&](double change) {
+      return on_curve[k + 1] + z[2] + line.duration_s * (z[3] + change);
+    };
+    double vertex = on_curve[k + 1];
+    if (k + 1 < lines) {
+      const double wish = end_of(line.feedback * z + line.feed_forward);
+      vertex = place_within(grid, std::clamp(wish, within.min_mm, within.max_mm),
+                            end_of(line.least), end_of(line.most));
     }
-    result = {{on_curve.front()}, {0.0}};
-    Eigen::Vector3d z = Eigen::Vector3d::Zero();
-    for (std::size_t k = 0; k < lines; ++k) {
-      double vertex = on_curve[k + 1];
-      if (k + 1 < lines) {
-        const double offset = stages[k].feedback * z + stages[k].feed_forward;
-        vertex = grid.nearest(std::clamp(vertex + offset, within.min_mm, within.max_mm));
-      }
-      Eigen::Vector4d w;
-      w << z, vertex - on_curve[k + 1];
-      z << stages[k].move * w + stages[k].shift, w[3];
-      result.position_mm.push_back(vertex);
-      result.nozzle_error_mm.push_back(z[0]);
-    }
-    if (!pin_where_too_quick(times, result.position_mm, max_accel_mm_s2, ends, around, pinned)) {
-      return result;
-    }
+    Vector5 w;
+    w << z, (vertex - on_curve[k + 1] - z[2]) / line.duration_s - z[3];
+    z = line.move * w + line.shift;
+    result.position_mm.push_back(vertex);
+    result.nozzle_error_mm.push_back(z[0]);
   }
+  return result;
 }
 
 }  // namespace unflex::emit

@@ -1,6 +1,7 @@
 // Where the lines of a run meet.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "followed.hpp"
@@ -24,6 +25,13 @@ struct Ends {
   bool to_rest = true;
 };
 
+// How much an axis' speed may change where two lines join: by step_mm_s, and by accel_mm_s2 times
+// the time between the lines' middles.
+struct SpeedSteps {
+  double step_mm_s = std::numeric_limits<double>::infinity();
+  double accel_mm_s2 = std::numeric_limits<double>::infinity();
+};
+
 // One axis at the ends of the lines.
 struct AxisVertices {
   std::vector<double> position_mm;
@@ -41,9 +49,9 @@ class VertexChooser {
 
   // For lines that end at times[1], times[2] …; the first vertex and the last are the base's own,
   // the others on the grid. None goes further out than `reach` or the base itself, and no change of
-  // speed from line to line exceeds max_accel, unless the base's own does.
+  // speed from line to line exceeds `most`, unless the base's own does.
   [[nodiscard]] AxisVertices choose(const std::vector<double>& times, const AxisGrid& grid,
-                                    const Reach& reach, double max_accel_mm_s2,
+                                    const Reach& reach, const SpeedSteps& most,
                                     Ends ends = {}) const;
 
  private:

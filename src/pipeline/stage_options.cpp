@@ -17,6 +17,10 @@ namespace {
 // below the limit so that the text keeps it.
 constexpr double kGridMm = 1e-4;
 constexpr double kAccelShare = 0.98;
+// What the base may take of the largest change of speed from line to line; the rest lets the lines
+// make up for each other. But never less acceleration than this times the plan's.
+constexpr double kSpeedStepShare = 0.8;
+constexpr double kLeastHeadroom = 1.2;
 // The firmware's clock differs a little from line to line; no more than the budget of lines may
 // begin within any 100 ms all the same.
 constexpr double kClockRoom = 1.002;
@@ -40,10 +44,17 @@ dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
   return dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio);
 }
 
-// What the base may be accelerated by so that the text stays within the limit.
+// What the base may be accelerated by so that the text stays within the limits: that of
+// acceleration and, where lines end on a fine grid, that of speed from line to line. Whole steps of
+// a motor are too coarse for the second.
 double planned_base_accel(const machine::Settings& settings) {
   const double shortest_s = min_line_s(settings);
-  const double limit = settings.base_max_accel_mm_s2();
+  double limit = settings.base_max_accel_mm_s2();
+  if (grid_mm(settings) <= kGridMm) {
+    limit =
+        std::min(limit, std::max(kSpeedStepShare * settings.emit.max_speed_step_mm_s / shortest_s,
+                                 kLeastHeadroom * settings.limits.max_accel_mm_s2));
+  }
   return kAccelShare * limit -
          std::min(2.0 * grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);
 }

@@ -269,7 +269,7 @@ TEST_F(Turn, MakesUpForACoarseGrid) {
   const auto rms_mm = [&](double step_mm, double then_rounded_to_mm) {
     const auto place = [&](AxisAt axis) {
       std::vector<double> at = VertexChooser(base_, axis, how.lines.nozzle_x)
-                                   .choose(times, {0.0, step_mm}, {}, 1e6)
+                                   .choose(times, {0.0, step_mm}, {}, {})
                                    .position_mm;
       for (std::size_t i = 1; i + 1 < at.size(); ++i) {
         EXPECT_NEAR(at[i] / step_mm, std::round(at[i] / step_mm), 1e-6);

@@ -181,5 +181,51 @@ TEST(NozzleFollower, HomingLetsTheNozzleComeToRest) {
   EXPECT_EQ(after.y.velocity, 0.0);
 }
 
+// A shaper that is tuned exactly leaves no swing, which is what it is for.
+TEST(NozzleFollower, AnExactShaperLeavesTheRunAfterItAtRest) {
+  const std::string text =
+      "G90\nM83\nG1 X10 Y10 Z1 F6000\nM400\nG1 X17.5 Y12 Z1.5\nM400\nG1 X20 E1\nG1 Y15 E1\n";
+  verify::Rules exact = rules();
+  exact.fixed.shaper = {"zv", "zv", exact.nozzle.x.zeta, exact.nozzle.y.zeta};
+  gcode::Shaper shaper;
+  shaper.freq_x_hz = 45.0;
+  shaper.freq_y_hz = 30.0;
+  std::vector<Piece> pieces = pieces_of(text);
+  const Piece run = pieces.back();
+  pieces.pop_back();
+  const auto before_run = [&](const gcode::Shaper& printers) {
+    NozzleFollower follower(exact.nozzle, exact.fixed, printers);
+    for (const Piece& piece : pieces) {
+      EXPECT_EQ(follower.follow(piece), 0.0) << "nothing switches it";
+    }
+    const double stop_s = follower.begin_run(run);
+    EXPECT_EQ(stop_s, planner::switching_s(exact.fixed, printers, {}, {}));
+    EXPECT_EQ(follower.begin_run(run), 0.0) << "it is off";
+    return follower.nozzle();
+  };
+  const dynamics::NozzleXY shaped = before_run(shaper);
+  EXPECT_NEAR(shaped.x.position, 17.5, 1e-9);
+  EXPECT_NEAR(shaped.x.velocity, 0.0, 1e-6);
+  EXPECT_NEAR(shaped.y.position, 12.0, 1e-9);
+  EXPECT_NEAR(shaped.y.velocity, 0.0, 1e-6);
+  EXPECT_GT(std::abs(before_run({}).x.velocity), 0.1) << "the case shows nothing";
+}
+
+// Ahead of what may move the machine by itself the shaper is on again, and the wipe behind it is
+// shaped; ahead of other lines it stays off.
+TEST(NozzleFollower, TheShaperComesBackBeforeWhatMovesByItself) {
+  gcode::Shaper shaper;
+  shaper.freq_x_hz = shaper.freq_y_hz = 40.0;
+  const std::string text = "G90\nM83\nG1 X10 Y10 Z1 F6000\nG1 X20 E1\nM117 a\nM400\nG28\n";
+  NozzleFollower follower(rules().nozzle, rules().fixed, shaper);
+  double stops_s = 0.0;
+  for (const Piece& piece : pieces_of(text)) {
+    stops_s += piece.is_run ? follower.begin_run(piece) : follower.follow(piece);
+  }
+  const double once_s = planner::switching_s(rules().fixed, shaper, {}, {});
+  EXPECT_GT(once_s, 0.0);
+  EXPECT_DOUBLE_EQ(stops_s, once_s + planner::switching_s(rules().fixed, {}, shaper, {}));
+}
+
 }  // namespace
 }  // namespace unflex::pipeline

@@ -1,0 +1,163 @@
+#include "vertices.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <random>
+#include <vector>
+
+namespace unflex::emit {
+namespace {
+
+constexpr double kNode_s = 1e-3;
+constexpr double kGrid_mm = 1e-4;
+
+// From rest to rest: the acceleration is a sum of sines under a window, drawn at random, with the
+// largest value given.
+dynamics::BaseTrajectory random_base(unsigned seed, double max_accel_mm_s2) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  constexpr std::size_t kNodes = 401;
+  constexpr int kWaves = 12;
+  std::vector<double> accel(kNodes, 0.0);
+  for (int wave = 1; wave <= kWaves; ++wave) {
+    const double size = uniform(random);
+    const double phase = std::numbers::pi * uniform(random);
+    for (std::size_t k = 0; k < kNodes; ++k) {
+      const double s = static_cast<double>(k) / (kNodes - 1);
+      const double window = std::sin(std::numbers::pi * s);
+      accel[k] += size * window * window * std::sin(2.0 * std::numbers::pi * wave * s + phase);
+    }
+  }
+  // Without what would leave it in motion.
+  double sum = 0.0;
+  double windows = 0.0;
+  for (std::size_t k = 0; k < kNodes; ++k) {
+    sum += accel[k];
+    windows += std::sin(std::numbers::pi * static_cast<double>(k) / (kNodes - 1));
+  }
+  double largest = 0.0;
+  for (std::size_t k = 0; k < kNodes; ++k) {
+    accel[k] -= sum / windows * std::sin(std::numbers::pi * static_cast<double>(k) / (kNodes - 1));
+    largest = std::max(largest, std::abs(accel[k]));
+  }
+  dynamics::BaseTrajectory base;
+  base.period_s = kNode_s;
+  double position = 50.0;
+  double velocity = 0.0;
+  for (std::size_t k = 0; k < kNodes; ++k) {
+    const double a = accel[k] * max_accel_mm_s2 / largest;
+    base.x.position_mm.push_back(position);
+    base.x.velocity_mm_s.push_back(velocity);
+    base.x.accel_mm_s2.push_back(a);
+    const double next = (k + 1 < kNodes ? accel[k + 1] : 0.0) * max_accel_mm_s2 / largest;
+    position += kNode_s * (velocity + kNode_s * (2.0 * a + next) / 6.0);
+    velocity += kNode_s * 0.5 * (a + next);
+  }
+  base.y = base.x;
+  return base;
+}
+
+struct Measured {
+  double largest_step_mm_s = 0.0;
+  double rms_um = 0.0;
+};
+
+class Vertices : public ::testing::TestWithParam<unsigned> {
+ protected:
+  [[nodiscard]] Measured measure(const std::vector<double>& times, const SpeedSteps& most,
+                                 const Ends& ends = {}) const {
+    const AxisVertices chosen = VertexChooser(base_, &dynamics::BaseTrajectory::x_at, nozzle_)
+                                    .choose(times, {0.0, kGrid_mm}, {}, most, ends);
+    Measured result;
+    double last = ends.from_rest ? 0.0 : base_.x.velocity_mm_s.front();
+    double square = 0.0;
+    for (std::size_t k = 1; k < times.size(); ++k) {
+      const double v =
+          (chosen.position_mm[k] - chosen.position_mm[k - 1]) / (times[k] - times[k - 1]);
+      result.largest_step_mm_s = std::max(result.largest_step_mm_s, std::abs(v - last));
+      last = v;
+      square += chosen.nozzle_error_mm[k] * chosen.nozzle_error_mm[k];
+      if (k + 1 < times.size()) {
+        EXPECT_NEAR(std::remainder(chosen.position_mm[k], kGrid_mm), 0.0, 1e-9);
+      }
+    }
+    result.rms_um = 1e3 * std::sqrt(square / static_cast<double>(times.size() - 1));
+    return result;
+  }
+
+  // Lines of one to one and a half node periods.
+  [[nodiscard]] std::vector<double> short_lines() const {
+    std::mt19937 random(GetParam() + 1000U);
+    std::uniform_real_distribution<double> length(1.0, 1.5);
+    std::vector<double> times = {0.0};
+    while (times.back() + 3.0 * kNode_s < base_.duration_s()) {
+      times.push_back(times.back() + kNode_s * length(random));
+    }
+    times.push_back(base_.duration_s());
+    return times;
+  }
+
+  dynamics::FlexibleAxis nozzle_ = dynamics::from_frequency(45.0, 0.06);
+  dynamics::BaseTrajectory base_ = random_base(GetParam(), 18000.0);
+};
+
+// A bound of 28.5 is what a base of 18000 mm/s² needs nearly all of: lines of 1.5 ms take 27.
+TEST_P(Vertices, ChangeSpeedByNoMoreThanIsAllowed) {
+  const std::vector<double> times = short_lines();
+  const Measured free = measure(times, {});
+  const Measured bound = measure(times, {28.5, 1e9});
+  EXPECT_LE(bound.largest_step_mm_s, 28.5 + 1e-6);
+  // It costs something only where there is something to cut.
+  EXPECT_LE(bound.rms_um, 1.5 * free.rms_um + 0.02);
+}
+
+TEST_P(Vertices, KeepTheAccelerationBetweenTheMiddlesOfLines) {
+  const std::vector<double> times = short_lines();
+  const AxisVertices chosen = VertexChooser(base_, &dynamics::BaseTrajectory::x_at, nozzle_)
+                                  .choose(times, {0.0, kGrid_mm}, {}, {1e9, 19500.0});
+  for (std::size_t k = 2; k < times.size(); ++k) {
+    const double before_s = times[k - 1] - times[k - 2];
+    const double after_s = times[k] - times[k - 1];
+    const double step = (chosen.position_mm[k] - chosen.position_mm[k - 1]) / after_s -
+                        (chosen.position_mm[k - 1] - chosen.position_mm[k - 2]) / before_s;
+    // The last line's is what is left.
+    const double room = k + 1 == times.size() ? 1.05 : 1.0 + 1e-9;
+    EXPECT_LE(std::abs(step), room * 19500.0 * 0.5 * (before_s + after_s)) << k;
+  }
+}
+
+// Where a part goes on from another, the two share the change of speed.
+TEST_P(Vertices, TakeHalfOfTheChangeWhereOthersGoOn) {
+  dynamics::BaseTrajectory moving = base_;
+  constexpr std::size_t kFirst = 120;
+  for (auto* values : {&moving.x.position_mm, &moving.x.velocity_mm_s, &moving.x.accel_mm_s2}) {
+    values->erase(values->begin(), values->begin() + kFirst);
+  }
+  moving.y = moving.x;
+  base_ = moving;
+  const AxisVertices chosen =
+      VertexChooser(base_, &dynamics::BaseTrajectory::x_at, nozzle_)
+          .choose(short_lines(), {0.0, kGrid_mm}, {}, {28.5, 1e9}, {false, true});
+  const double first = (chosen.position_mm[1] - chosen.position_mm[0]) / short_lines()[1];
+  EXPECT_LE(std::abs(first - moving.x.velocity_mm_s.front()), 0.5 * 28.5 + 1e-6);
+}
+
+TEST_P(Vertices, StayWithinReach) {
+  const std::vector<double>& x = base_.x.position_mm;
+  const Reach reach{*std::ranges::min_element(x) + 1.0, *std::ranges::max_element(x) + 1e-3};
+  const AxisVertices chosen = VertexChooser(base_, &dynamics::BaseTrajectory::x_at, nozzle_)
+                                  .choose(short_lines(), {0.0, kGrid_mm}, reach, {28.5, 1e9});
+  for (const double at : chosen.position_mm) {
+    EXPECT_GE(at, *std::ranges::min_element(x) - kGrid_mm) << "the base's own reach counts";
+    EXPECT_LE(at, reach.max_mm + kGrid_mm);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, Vertices, ::testing::Range(1U, 9U));
+
+}  // namespace
+}  // namespace unflex::emit
