@@ -90,14 +90,25 @@ void Emitter::write(std::string_view text, std::string& out) {
   out += newline_;
   const gcode::Event event = printer_.interpret({out.substr(begin), 0});
   planner::apply(*event.limits, limits_);
+  note_motion(event);
+}
+
+void Emitter::note_motion(const gcode::Event& event) {
+  if (!event.segments.empty()) {
+    moving_ = event.segments.back().length_xy_mm() > 0.0;
+  } else if (event.kind == gcode::EventKind::barrier) {
+    moving_ = false;
+  }
 }
 
 void Emitter::copy(const gcode::Event& event, std::string& out) {
   out += event.line.text;
   open_line_ = !event.line.text.ends_with('\n');
   newline_ = event.line.text.ends_with("\r\n") ? "\r\n" : "\n";
-  planner::apply(*printer_.interpret(event.line).limits, limits_);
+  const gcode::Event read = printer_.interpret(event.line);
+  planner::apply(*read.limits, limits_);
   limits_known_ = limits_known_ && !event.may_set_limits;
+  note_motion(read);
 }
 
 void Emitter::follow_input(const gcode::Event& event) {
@@ -195,6 +206,11 @@ void Emitter::enter_run(std::string& out) {
           out);
   }
   set_shaper({}, out);
+  if (moving_) {
+    // A run begins at rest, but no firmware stops by itself between the move before it and its
+    // first line. G4 without a time has all three end their motion and goes on at once.
+    write("G4 P0", out);
+  }
   write(fmt::format("{} run", kComment), out);
 }
 

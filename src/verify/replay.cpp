@@ -50,6 +50,9 @@ bool is_known_addition(std::string_view content, Firmware firmware) {
   } else if (command.kind == gcode::CommandKind::extended) {
     return command.name == "SET_VELOCITY_LIMIT" || command.name == "SET_INPUT_SHAPER";
   }
+  if (command.is('G', 4)) {
+    return only_word(command, 'P') && *command.words.front().value == 0.0;
+  }
   if (command.is('G', 92)) {
     return only_word(command, 'E');
   }

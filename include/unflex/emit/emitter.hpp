@@ -155,6 +155,7 @@ class Emitter {
  private:
   void write(std::string_view text, std::string& out);     // a line of ours
   void copy(const gcode::Event& event, std::string& out);  // a line of the input
+  void note_motion(const gcode::Event& event);
   void follow_input(const gcode::Event& event);
   void enter_run(std::string& out);
   void set_run_modes(std::string& out);
@@ -173,6 +174,7 @@ class Emitter {
   planner::Limits limits_;        // as the output has them …
   bool limits_known_ = true;      // … unless a macro may have changed them
   bool started_ = false;          // a run has been written
+  bool moving_ = false;           // the last line moves X or Y; what follows may pass on at speed
   std::string newline_ = "\n";    // as the input has it
   bool open_line_ = false;        // the last line written has no line ending
 };
