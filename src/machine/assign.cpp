@@ -58,6 +58,19 @@ std::string store(const Value& value, const Key& key, Firmware& target) {
   return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), value.kind);
 }
 
+std::string store(const Value& value, const Key& key, Kinematics& target) {
+  if (const auto* text = std::get_if<std::string>(&value.content)) {
+    for (const Kinematics kinematics : all_kinematics()) {
+      if (*text == to_string(kinematics)) {
+        target = kinematics;
+        return {};
+      }
+    }
+  }
+  return fmt::format("{} must be one of {}, not {}; unflex does not support other machines yet",
+                     key.name, range_text(key), value.kind);
+}
+
 std::string store(const Value& value, const Key& key, std::string& target) {
   const auto* text = std::get_if<std::string>(&value.content);
   if (text == nullptr || std::ranges::find(key.words, *text) == key.words.end()) {

@@ -25,6 +25,8 @@ namespace {
 
 constexpr std::array kAxes = {"x", "y", "z", "e"};
 constexpr std::string_view kInNumbers = "0123456789.+-";
+constexpr std::string_view kNotSupported =
+    "unflex does not support yet; print the sliced file as it is on it";
 
 bool is_one_of(int number, std::initializer_list<int> numbers) {
   return std::ranges::find(numbers, number) != numbers.end();
@@ -245,7 +247,8 @@ void marlin_shaper(CommandReader& reader, const gcode::Command& command, const S
   }
 }
 
-void read_marlin_line(CommandReader& reader, std::string_view line, std::size_t number) {
+// M503 lists M665 for deltas and SCARAs alone; of cores it does not tell.
+Status read_marlin_line(CommandReader& reader, std::string_view line, std::size_t number) {
   constexpr std::string_view kEcho = "echo:";
   const std::size_t echo = line.rfind(kEcho);
   const std::string text(
@@ -254,7 +257,7 @@ void read_marlin_line(CommandReader& reader, std::string_view line, std::size_t 
   const SourcePlace place{reader.file(), number};
   const bool is_g_unit = command.is('G', 20) || command.is('G', 21);
   if (!is_g_unit && (command.kind != gcode::CommandKind::traditional || command.letter != 'M')) {
-    return;
+    return {};
   }
   if (is_g_unit || is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 208, 593})) {
     reader.take(text, command, place);
@@ -264,11 +267,10 @@ void read_marlin_line(CommandReader& reader, std::string_view line, std::size_t 
   } else if (command.number == 593) {
     marlin_shaper(reader, command, place);
   } else if (command.number == 665) {
-    reader.reading.note(
-        place,
-        "the resonances of a delta or a SCARA change with the place; unflex takes them for "
-        "the same everywhere");
+    return fail(ErrorKind::usage, place,
+                fmt::format("M665 is of a delta or a SCARA, which {}", kNotSupported));
   }
+  return {};
 }
 
 // How long the value is that the text begins with: a number, an expression in braces, or a text in
@@ -364,21 +366,32 @@ void add_travel(CommandReader& reader, const Travel& travel, std::string_view ax
                      Range{min.mm.value_or(0.0), *max.mm}, of_min ? min.place : max.place);
 }
 
-Status check_rrf_kinematics(CommandReader& reader, const gcode::Command& command,
-                            const SourcePlace& place) {
-  const int type = to_int(command.value('K').value_or(0.0));
-  // linearDelta and rotaryDelta; scara, hangprinter, polar and fiveBarScara.
-  if (command.number == 665 || is_one_of(type, {3, 10})) {
-    reader.reading.note(
-        place,
-        "the resonances of a delta change with the place; unflex takes them for the same "
-        "everywhere");
-  } else if (is_one_of(type, {4, 6, 7, 9})) {
-    return fail(ErrorKind::usage, place,
-                fmt::format("kinematics K{} has no carriages along X and Y; unflex models one "
-                            "resonance along each and cannot compensate such a machine",
-                            type));
+Status read_rrf_kinematics(CommandReader& reader, const gcode::Command& command,
+                           const SourcePlace& place) {
+  const auto refuse = [&](std::string message) {
+    return fail(ErrorKind::usage, place, std::move(message));
+  };
+  if (command.number == 665) {
+    return refuse(fmt::format("M665 makes this machine a delta, which {}", kNotSupported));
   }
+  if (command.has('X') || command.has('Y') || command.has('Z')) {
+    return refuse(
+        "M669 gives a matrix of its own, which unflex does not read; give a printer file of "
+        "unflex with the kinematics.type that it stands for (unflex printer writes one)");
+  }
+  if (!command.has('K')) {
+    return {};
+  }
+  // KinematicsType.
+  constexpr std::array kTypes = {std::pair{0, Kinematics::cartesian},
+                                 std::pair{1, Kinematics::corexy}, std::pair{2, Kinematics::corexz},
+                                 std::pair{11, Kinematics::hybrid_corexy}};
+  const int number = to_int(command.value('K').value_or(-1.0));
+  const auto* type = std::ranges::find(kTypes, number, &std::pair<int, Kinematics>::first);
+  if (type == kTypes.end()) {
+    return refuse(fmt::format("kinematics K{} is a machine that {}", number, kNotSupported));
+  }
+  reader.reading.add("kinematics.type", std::string(to_string(type->second)), place);
   return {};
 }
 
@@ -427,7 +440,7 @@ Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t n
       break;
     case 665:
     case 669:
-      return check_rrf_kinematics(reader, command, place);
+      return read_rrf_kinematics(reader, command, place);
     default:
       break;
   }
@@ -440,9 +453,15 @@ Result<Reading> read_marlin_dump(std::string_view text, const std::string& file)
   CommandReader reader(Firmware::marlin, file);
   // What the dump does not list was not built in.
   reader.reading.add("printer.firmware_retraction", false, {file, 0});
+  Status status;
   for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
-    read_marlin_line(reader, line, number);
+    if (status) {
+      status = read_marlin_line(reader, line, number);
+    }
   });
+  if (!status) {
+    return tl::unexpected(status.error());
+  }
   reader.finish();
   return std::move(reader.reading);
 }

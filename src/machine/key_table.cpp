@@ -40,6 +40,7 @@ using P = PrinterSettings;
 using L = LimitSettings;
 using E = ExtruderSettings;
 using D = AxisDynamics;
+using K = KinematicsSettings;
 using R = DynamicsError;
 using M = MassSpringDamper;
 using B = BaseSettings;
@@ -313,14 +314,17 @@ constexpr std::array kKeys = {
     Key{"dynamics.damping_error", &setting<&S::dynamics_error, &R::damping>,
         Bounds{.min = 0.0, .max = 0.9}, "", "The same for both damping ratios"},
 
+    Key{"kinematics.type", &setting<&S::kinematics, &K::type>, kAny, "",
+        "Which motors move which axes. base.* limits are those of motors"},
+
     Key{"base.max_velocity_mm_s", &setting<&S::base, &B::max_velocity_mm_s>, kPositive, "mm/s",
-        "Speed the motor of an axis can do", "2 × limits.max_velocity_mm_s",
+        "Speed a motor can do", "2 × limits.max_velocity_mm_s",
         &derived<&S::base_max_velocity_mm_s>},
     Key{"base.max_accel_mm_s2", &setting<&S::base, &B::max_accel_mm_s2>, kPositive, "mm/s²",
-        "Acceleration the motor of an axis can do", "4 × limits.max_accel_mm_s2",
+        "Acceleration a motor can do", "4 × limits.max_accel_mm_s2",
         &derived<&S::base_max_accel_mm_s2>},
     Key{"base.max_jerk_mm_s3", &setting<&S::base, &B::max_jerk_mm_s3>, kNotNegative, "mm/s³",
-        "Jerk the motor of an axis can do; 0 does not limit it"},
+        "Jerk a motor can do; 0 does not limit it"},
 
     Key{"solve.window_s", &setting<&S::solve, &O::window_s>, Bounds{.min = 0.05, .max = 60.0}, "s",
         "Part of a long run that is solved at once"},

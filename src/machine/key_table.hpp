@@ -25,7 +25,7 @@ struct Bounds {
 
 // The member behind a key. The alternative held says what type of value the key takes.
 using Member = std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&),
-                            bool& (*)(Draft&), Firmware& (*)(Draft&),
+                            bool& (*)(Draft&), Firmware& (*)(Draft&), Kinematics& (*)(Draft&),
                             std::optional<Range>& (*)(Draft&), std::string& (*)(Draft&)>;
 
 struct Key {

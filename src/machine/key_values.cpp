@@ -38,6 +38,8 @@ std::string to_toml_value(bool value) { return value ? "true" : "false"; }
 
 std::string to_toml_value(Firmware value) { return fmt::format("\"{}\"", to_string(value)); }
 
+std::string to_toml_value(Kinematics value) { return fmt::format("\"{}\"", to_string(value)); }
+
 std::string to_toml_value(const std::string& value) { return fmt::format("\"{}\"", value); }
 
 std::string to_toml_value(const Range& value) {
@@ -62,6 +64,13 @@ std::string range_text(const Key& key) {
   }
   if (std::holds_alternative<Firmware& (*)(Draft&)>(key.member)) {
     return "\"klipper\", \"marlin\", \"rrf\"";
+  }
+  if (std::holds_alternative<Kinematics& (*)(Draft&)>(key.member)) {
+    std::vector<std::string> words;
+    for (const Kinematics kinematics : all_kinematics()) {
+      words.push_back(to_toml_value(kinematics));
+    }
+    return fmt::format("{}", fmt::join(words, ", "));
   }
   if (std::holds_alternative<std::optional<Range>& (*)(Draft&)>(key.member)) {
     return "min < max";

@@ -12,6 +12,7 @@ namespace unflex::machine {
 [[nodiscard]] std::string to_toml_value(double value);
 [[nodiscard]] std::string to_toml_value(bool value);
 [[nodiscard]] std::string to_toml_value(Firmware value);
+[[nodiscard]] std::string to_toml_value(Kinematics value);
 [[nodiscard]] std::string to_toml_value(const std::string& value);
 [[nodiscard]] std::string to_toml_value(const Range& value);
 

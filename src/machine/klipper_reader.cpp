@@ -42,30 +42,23 @@ constexpr std::array kRows = {
     Row{"gcode_arcs", "resolution", "printer.arc_resolution_mm"},
 };
 
-// What a kinematics means for a model with one resonance along X and one along Y.
-enum class Fit {
-  good,         // carriages move along X and Y
-  approximate,  // the resonances change with the place
-  none,         // there is no X and Y of the machine's own
-};
-
-struct Kinematics {
+struct KnownKinematics {
   std::string_view name;
-  Fit fit;
+  Kinematics type;
 };
 
-constexpr std::array kKinematics = {Kinematics{"cartesian", Fit::good},
-                                    Kinematics{"corexy", Fit::good},
-                                    Kinematics{"corexz", Fit::good},
-                                    Kinematics{"hybrid_corexy", Fit::good},
-                                    Kinematics{"hybrid_corexz", Fit::good},
-                                    Kinematics{"generic_cartesian", Fit::good},
-                                    Kinematics{"delta", Fit::approximate},
-                                    Kinematics{"rotary_delta", Fit::approximate},
-                                    Kinematics{"deltesian", Fit::approximate},
-                                    Kinematics{"polar", Fit::none},
-                                    Kinematics{"winch", Fit::none},
-                                    Kinematics{"none", Fit::none}};
+// Kalico's limited_ ones move as those without that word (klippy/kinematics).
+constexpr std::array kKinematics = {
+    KnownKinematics{"cartesian", Kinematics::cartesian},
+    KnownKinematics{"corexy", Kinematics::corexy},
+    KnownKinematics{"corexz", Kinematics::corexz},
+    KnownKinematics{"hybrid_corexy", Kinematics::hybrid_corexy},
+    KnownKinematics{"hybrid_corexz", Kinematics::hybrid_corexz},
+    KnownKinematics{"generic_cartesian", Kinematics::cartesian},
+    KnownKinematics{"limited_cartesian", Kinematics::cartesian},
+    KnownKinematics{"limited_corexy", Kinematics::corexy},
+    KnownKinematics{"limited_corexz", Kinematics::corexz},
+};
 
 // Python's float(), as far as printers use it.
 std::optional<double> number_of(std::string_view text) {
@@ -145,20 +138,31 @@ class Reader {
       }
     }
     const KlipperOption& given = *option("printer", "kinematics");
-    const auto* known = std::ranges::find(kKinematics, given.text, &Kinematics::name);
+    const auto* known = std::ranges::find(kKinematics, given.text, &KnownKinematics::name);
     if (known == kKinematics.end()) {
-      note(given.place, fmt::format("unflex does not know kinematics '{}' and takes X and Y for "
-                                    "the axes that swing",
-                                    given.text));
-    } else if (known->fit == Fit::none) {
-      return fail(ErrorKind::usage, given.place,
-                  fmt::format("kinematics '{}' has no carriages along X and Y; unflex models one "
-                              "resonance along each and cannot compensate such a machine",
-                              given.text));
-    } else if (known->fit == Fit::approximate) {
-      note(given.place, fmt::format("the resonances of kinematics '{}' change with the place; "
-                                    "unflex takes them for the same everywhere",
-                                    given.text));
+      return fail(
+          ErrorKind::usage, given.place,
+          fmt::format("unflex does not support kinematics '{}' yet, only cartesian, corexy, "
+                      "corexz, hybrid_corexy and hybrid_corexz; print the sliced file as "
+                      "it is on this machine",
+                      given.text));
+    }
+    reading_.add("kinematics.type", std::string(to_string(known->type)), given.place);
+    return own_carriages();
+  }
+
+  // generic_cartesian: whether each stepper moves one carriage.
+  [[nodiscard]] Status own_carriages() const {
+    for (const auto& [name, section] : config_->sections) {
+      const KlipperOption* const moves =
+          name.starts_with("stepper ") ? section.find("carriages") : nullptr;
+      if (moves != nullptr && moves->text.find_first_of("+-*") != std::string::npos) {
+        return fail(ErrorKind::usage, moves->place,
+                    fmt::format("[{}] moves several carriages, '{}', which unflex does not "
+                                "understand; give a printer file of unflex, with kinematics.type "
+                                "= \"corexy\" or what it is (unflex printer writes one)",
+                                name, moves->text));
+      }
     }
     return {};
   }

@@ -190,19 +190,63 @@ Status check_shaper(const Draft& draft) {
   return {};
 }
 
+// What a firmware can plan for.
+Status check_kinematics(const Draft& draft) {
+  const Settings& s = draft.settings;
+  const auto refuse = [&](std::string_view why) {
+    return conflict(draft, {"kinematics.type", "printer.firmware"},
+                    fmt::format("kinematics.type is \"{}\", which {}; print the sliced file as it "
+                                "is on this machine",
+                                to_string(s.kinematics.type), why));
+  };
+  switch (s.kinematics.type) {
+    case Kinematics::cartesian:
+    case Kinematics::corexy:
+    case Kinematics::corexz:
+      return {};
+    case Kinematics::hybrid_corexy:
+      if (s.printer.firmware == Firmware::marlin) {
+        return refuse("Marlin's MARKFORGED_XY limits by x + y in places and by x - y in others");
+      }
+      return {};
+    case Kinematics::hybrid_corexz:
+      if (s.printer.firmware != Firmware::klipper) {
+        return refuse("Klipper alone has");
+      }
+      return {};
+  }
+  return {};
+}
+
+// How much more a motor may be asked for than the limits say that the plan keeps: Klipper limits
+// what the tool does, the others what motors do.
+double most_of_motor(const Settings& s) {
+  if (s.printer.firmware != Firmware::klipper) {
+    return 1.0;
+  }
+  double most = 0.0;
+  for (const auto& row : Motors(s.kinematics.type, s.printer.firmware).rows()) {
+    most = std::max(most, std::hypot(row[0], row[1]));
+  }
+  return most;
+}
+
 Status check_base(const Draft& draft) {
   const Settings& s = draft.settings;
-  if (s.base_max_velocity_mm_s() < s.limits.max_velocity_mm_s) {
+  const double most = most_of_motor(s);
+  // 1 or √2.
+  const std::string_view times = most > 1.0 ? "√2 × " : "";
+  if (s.base_max_velocity_mm_s() < most * s.limits.max_velocity_mm_s) {
     return conflict(draft, {"base.max_velocity_mm_s", "limits.max_velocity_mm_s"},
-                    fmt::format("base.max_velocity_mm_s is {}, but must be at least "
+                    fmt::format("base.max_velocity_mm_s is {}, but must be at least {}"
                                 "limits.max_velocity_mm_s, {}",
-                                s.base_max_velocity_mm_s(), s.limits.max_velocity_mm_s));
+                                s.base_max_velocity_mm_s(), times, s.limits.max_velocity_mm_s));
   }
-  if (s.base_max_accel_mm_s2() < s.limits.max_accel_mm_s2) {
+  if (s.base_max_accel_mm_s2() < most * s.limits.max_accel_mm_s2) {
     return conflict(draft, {"base.max_accel_mm_s2", "limits.max_accel_mm_s2"},
-                    fmt::format("base.max_accel_mm_s2 is {}, but must be at least "
+                    fmt::format("base.max_accel_mm_s2 is {}, but must be at least {}"
                                 "limits.max_accel_mm_s2, {}; 2 to 10 times that is usual",
-                                s.base_max_accel_mm_s2(), s.limits.max_accel_mm_s2));
+                                s.base_max_accel_mm_s2(), times, s.limits.max_accel_mm_s2));
   }
   return {};
 }
@@ -255,7 +299,8 @@ Status resolve_dynamics(Draft& draft) {
 }
 
 Status check_consistency(const Draft& draft) {
-  for (auto* check : {check_printer, check_shaper, check_base, check_emission, check_grid}) {
+  for (auto* check :
+       {check_printer, check_shaper, check_kinematics, check_base, check_emission, check_grid}) {
     if (Status checked = check(draft); !checked) {
       return checked;
     }

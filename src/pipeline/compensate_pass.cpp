@@ -40,12 +40,14 @@ constexpr std::size_t kMaxRunNodes = 8'000'000;
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kShortPatience{2};
 
-double largest_axis_accel(const std::vector<planner::PlannedMove>& moves) {
+double largest_motor_accel(const std::vector<planner::PlannedMove>& moves, const Motors& motors) {
   double largest = 0.0;
   for (const planner::PlannedMove& move : moves) {
     if (move.accel_s + move.decel_s > 0.0) {
-      largest = std::max(largest, move.accel_mm_s2 * std::max(std::abs(move.direction[gcode::X]),
-                                                              std::abs(move.direction[gcode::Y])));
+      largest =
+          std::max(largest, move.accel_mm_s2 * motors.largest_of_xy(move.direction[gcode::X],
+                                                                    move.direction[gcode::Y],
+                                                                    move.direction[gcode::Z]));
     }
   }
   return largest;
@@ -186,14 +188,14 @@ class Compensator {
       job->setup = setup_for(rules_.setup, piece.moves, job_.settings);
       job->grid = compensate::node_grid(job->course(), rules_.setup);
       const std::size_t nodes = job->grid.count;
-      const double accel = largest_axis_accel(piece.moves);
+      const double accel = largest_motor_accel(piece.moves, rules_.verify.fixed.motors());
       if (const verify::BlamedRun* const known = blamed_before(piece)) {
         job->failure = known->reason;
       } else if (piece.cut_off) {
         job->failure = "too many lines without motion stand in a row in the middle of the motion";
       } else if (accel > rules_.verify.base_max_accel_mm_s2) {
         job->failure = fmt::format(
-            "the plan itself accelerates an axis by {:.0f} mm/s², more than base.max_accel_mm_s2, "
+            "the plan itself accelerates a motor by {:.0f} mm/s², more than base.max_accel_mm_s2, "
             "{:.0f}; raise that if the motors can",
             accel, rules_.verify.base_max_accel_mm_s2);
       } else if (nodes <= kMaxRunNodes) {

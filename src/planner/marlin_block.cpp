@@ -1,4 +1,4 @@
-// A block's rates, speed and acceleration, within the limits of each axis.
+// A block's rates, speed and acceleration, within the limits of each motor.
 //
 // Source: Marlin 2.1.2, src/module/planner.cpp, Planner::_populate_block and
 // refresh_acceleration_rates.
@@ -26,24 +26,37 @@ std::uint32_t magnitude(std::int64_t steps) {
   return to_unsigned(std::abs(static_cast<double>(steps)));
 }
 
-// The motion of a block per axis.
+// The motion of a block per motor, and that of the head.
 struct Travel {
   std::array<std::uint32_t, 4> steps{};
   Vector distance_mm{};
+  Vector head_mm{};
 };
 
 Travel travel(const Settings& settings, const Steps& delta) {
   Travel result;
   for (std::size_t axis = 0; axis < delta.size(); ++axis) {
     result.steps[axis] = magnitude(delta[axis]);
-    result.distance_mm[axis] = static_cast<float>(delta[axis]) * settings.mm_per_step[axis];
+    result.head_mm[axis] = static_cast<float>(delta[axis]) * settings.mm_per_step[axis];
+  }
+  result.distance_mm = result.head_mm;
+  for (std::size_t motor = 0; settings.shares_motors && motor < settings.motors.size(); ++motor) {
+    std::int64_t steps = 0;
+    float distance_mm = 0.0F;
+    for (const auto axis : {X, Y, Z}) {
+      const int share = settings.motors[motor][axis];
+      steps += share * delta[axis];
+      distance_mm += static_cast<float>(share) * result.head_mm[axis];
+    }
+    result.steps[motor] = magnitude(steps);
+    result.distance_mm[motor] = distance_mm;
   }
   return result;
 }
 
 // A motion in X, Y and Z too short to be one counts as a move of filament.
 float length_mm(const Settings& settings, const Travel& travel) {
-  const Vector& d = travel.distance_mm;
+  const Vector& d = travel.head_mm;
   if (std::max({travel.steps[X], travel.steps[Y], travel.steps[Z]}) <
       settings.min_steps_per_segment) {
     return std::abs(d[E]);
@@ -62,8 +75,8 @@ float stretched(const Settings& settings, float per_second, std::size_t moves_qu
          static_cast<float>(time_us + 2 * missing_us / static_cast<std::int64_t>(moves_queued));
 }
 
-// Nominal speed and rate as asked for, then slowed until each axis keeps its limit (M203). Returns
-// the speeds of the axes.
+// Nominal speed and rate as asked for, then slowed until each motor keeps its limit (M203). Returns
+// the speeds of the motors.
 Vector limit_speeds(const Settings& settings, const Travel& travel, float per_second,
                     Block& block) {
   block.nominal_speed_mm_s = block.length_mm * per_second;
@@ -89,7 +102,7 @@ Vector limit_speeds(const Settings& settings, const Travel& travel, float per_se
   return speed_mm_s;
 }
 
-// M204, then M201 for each axis that moves. Filament alone has no limit but M204 R.
+// M204, then M201 for each motor that moves. Filament alone has no limit but M204 R.
 void limit_accel(const Settings& settings, const Travel& travel, float inverse_length,
                  Block& block) {
   const float steps_per_mm = static_cast<float>(block.step_events) * inverse_length;
@@ -118,6 +131,13 @@ void limit_accel(const Settings& settings, const Travel& travel, float inverse_l
 
 Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
   Settings s;
+  const Motors motors = config.motors();
+  for (std::size_t motor = 0; motor < s.motors.size(); ++motor) {
+    for (const auto axis : {X, Y, Z}) {
+      s.motors[motor][axis] = static_cast<int>(motors.rows()[motor][axis]);
+      s.shares_motors = s.shares_motors || (axis != motor && s.motors[motor][axis] != 0);
+    }
+  }
   s.steps_per_mm = to_floats(config.steps_per_mm);
   s.max_velocity_mm_s = to_floats(limits.axis_max_velocity_mm_s);
   s.jerk_mm_s = to_floats(limits.axis_jerk_mm_s);

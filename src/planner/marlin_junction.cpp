@@ -3,7 +3,8 @@
 // Source: Marlin 2.1.2, src/module/planner.cpp, Planner::_populate_block; planner.h,
 // limit_value_by_axis_maximum.
 //
-//   u, w   unit vectors of the block before and of this one; with E, if the latter takes filament
+//   u, w   unit vectors of the motors' motion in the block before and in this one; with E, if the
+//          latter takes filament
 //   θ      angle at the junction, 0 for a reversal: cos θ = −u·w
 //   δ      junction deviation
 //   a_j    acceleration along w − u within the limits of the axes
@@ -106,7 +107,8 @@ float deviation_v2(const Settings& settings, const Block& block, float curve_rad
 float junction_deviation_v2(const Settings& settings, const Block& block, const Approach& approach,
                             bool joined, Previous& previous) {
   Vector unit = approach.distance_mm;
-  if (approach.with_filament) {
+  // That of motors is longer than that of the head.
+  if (approach.with_filament || settings.shares_motors) {
     normalise(unit);
   } else {
     for (float& x : unit) x *= approach.inverse_length;

@@ -83,11 +83,38 @@ std::int64_t whole_clocks(float clocks) {
   return clocks > 0.0F ? static_cast<std::int64_t>(std::min(clocks, kMost)) : 0;
 }
 
+// Whether an axis is moved by others' motors too, or its motor moves others (HasSharedMotor).
+bool shares_motor(const Motors::Rows& rows, std::size_t axis) {
+  for (std::size_t other = 0; other < rows.size(); ++other) {
+    if (other != axis && (rows[axis][other] != 0.0 || rows[other][axis] != 0.0)) return true;
+  }
+  return false;
+}
+
+// CoreKinematics::LimitSpeedAndAcceleration. What it is told of the direction has lost its signs.
+void limit_by_motors(const Settings& settings, Dda& dda) {
+  const Motors::Rows& rows = settings.motors.rows();
+  for (std::size_t motor = 0; motor < rows.size(); ++motor) {
+    float part = 0.0F;
+    for (const auto axis : {X, Y, Z}) {
+      if (shares_motor(rows, axis)) {
+        part += static_cast<float>(rows[motor][axis]) * std::abs(dda.direction[axis]);
+      }
+    }
+    part = std::abs(part);
+    if (part == 0.0F) continue;
+    dda.requested_speed = std::min(dda.requested_speed, settings.max_speed[motor] / part);
+    dda.accel = std::min(dda.accel, settings.max_accel[motor] / part);
+    dda.decel = std::min(dda.decel, settings.max_accel[motor] / part);
+  }
+}
+
 }  // namespace
 
 Settings make_settings(const Limits& asked, const FirmwareConfig& config) {
   const Limits limits = rrf_raised(asked);
   Settings result;
+  result.motors = config.motors();
   const auto clock = static_cast<float>(config.step_clock_hz);
   const float per_clock2 = 1.0F / static_cast<float>(config.step_clock_hz * config.step_clock_hz);
   result.clock_hz = clock;
@@ -128,6 +155,7 @@ bool start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda
   dda.requested_speed =
       std::min(std::max(per_clock(segment.feed_mm_s, settings.clock_hz), settings.min_speed),
                reach(dda.direction, settings.max_speed));
+  limit_by_motors(settings, dda);
   dda.start_speed = 0.0F;
   dda.end_speed = 0.0F;
   return true;

@@ -60,6 +60,7 @@ Limits rrf_raised(Limits limits) {
 RrfPlanner::RrfPlanner(const Limits& limits, const FirmwareConfig& config)
     : Planner(limits),
       config_(config),
+      motors_(config.motors()),
       settings_limits_(limits),
       settings_(rrf::make_settings(limits, config)),
       ring_length_(static_cast<std::size_t>(config.ring_length)),
@@ -159,14 +160,20 @@ std::int64_t RrfPlanner::next_event() const {
 std::int64_t RrfPlanner::last_finish() const { return finish_.empty() ? now_ : finish_.back(); }
 
 gcode::Position RrfPlanner::on_steps(const gcode::Position& position_mm) const {
-  gcode::Position result = position_mm;
-  for (const auto axis : {X, Y, Z}) {
-    const double steps_per_mm = config_.steps_per_mm[axis];
-    if (steps_per_mm > 0.0) {
-      const float steps = static_cast<float>(position_mm[axis]) * static_cast<float>(steps_per_mm);
-      result[axis] = std::rint(static_cast<double>(steps)) / steps_per_mm;
+  std::array<double, Motors::kCount> motors_mm{};
+  for (std::size_t motor = 0; motor < motors_mm.size(); ++motor) {
+    float at_mm = 0.0F;
+    for (const auto axis : {X, Y, Z}) {
+      at_mm +=
+          static_cast<float>(motors_.rows()[motor][axis]) * static_cast<float>(position_mm[axis]);
     }
+    const double steps_per_mm = config_.steps_per_mm[motor];
+    const float steps = at_mm * static_cast<float>(steps_per_mm);
+    motors_mm[motor] =
+        steps_per_mm > 0.0 ? std::rint(static_cast<double>(steps)) / steps_per_mm : at_mm;
   }
+  gcode::Position result = position_mm;
+  std::ranges::copy(motors_.axes(motors_mm), result.begin());
   return result;
 }
 

@@ -12,11 +12,6 @@ namespace {
 constexpr double kRounding_mm = 1e-4;
 constexpr double kLimitTolerance = 1e-3;
 
-std::array<double, 2> mean_velocity(const planner::PlannedMove& move) {
-  return {move.segment.delta(gcode::X) / move.duration_s(),
-          move.segment.delta(gcode::Y) / move.duration_s()};
-}
-
 }  // namespace
 
 void Excursion::add(const gcode::Segment& segment) {
@@ -74,22 +69,41 @@ void BaseCheck::go_on(const planner::PlannedMove& before) {
   }
 }
 
+BaseCheck::PerMotor BaseCheck::of_motors(double x, double y, double z) const {
+  PerMotor result{};
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    result[i] = motors_.moves_xy(i) ? motors_.of(i, x, y, z) : 0.0;
+  }
+  return result;
+}
+
+BaseCheck::PerMotor BaseCheck::mean_velocity(const planner::PlannedMove& move) const {
+  const double duration = move.duration_s();
+  return of_motors(move.segment.delta(gcode::X) / duration, move.segment.delta(gcode::Y) / duration,
+                   move.segment.delta(gcode::Z) / duration);
+}
+
+BaseCheck::PerMotor BaseCheck::velocity_at(const planner::PlannedMove& move, double v_mm_s) const {
+  return of_motors(v_mm_s * move.direction[gcode::X], v_mm_s * move.direction[gcode::Y],
+                   v_mm_s * move.direction[gcode::Z]);
+}
+
 void BaseCheck::add(const planner::PlannedMove& move) {
   const double duration = move.duration_s();
   if (duration <= 0.0) {
     return;
   }
   const gcode::Segment& segment = move.segment;
-  const std::array<double, 2> velocity = mean_velocity(move);
-  for (const double v : velocity) {
-    max_velocity_ = std::max(max_velocity_, std::abs(v));
-    velocity_excess_.offer(std::abs(v) - kRounding_mm / duration, rules_->base_max_velocity_mm_s,
-                           segment.line);
+  const PerMotor velocity = mean_velocity(move);
+  for (std::size_t motor = 0; motor < velocity.size(); ++motor) {
+    const double v = std::abs(velocity[motor]);
+    max_velocity_ = std::max(max_velocity_, v);
+    velocity_excess_.offer(v - motors_.uncertainty(motor) * kRounding_mm / duration,
+                           rules_->base_max_velocity_mm_s, segment.line);
   }
   // The firmware may pass from motion left as it is into the run, and out of it, at some speed.
-  const std::array<double, 2> along = {move.direction[gcode::X], move.direction[gcode::Y]};
   if (last_duration_s_ == 0.0) {
-    last_velocity_ = {move.start_v_mm_s * along[0], move.start_v_mm_s * along[1]};
+    last_velocity_ = velocity_at(move, move.start_v_mm_s);
   }
   change_of_velocity(velocity, duration, segment.line);
   keep(move);
@@ -98,24 +112,23 @@ void BaseCheck::add(const planner::PlannedMove& move) {
 
 void BaseCheck::keep(const planner::PlannedMove& move) {
   last_velocity_ = mean_velocity(move);
-  end_velocity_ = {move.end_v_mm_s * move.direction[gcode::X],
-                   move.end_v_mm_s * move.direction[gcode::Y]};
+  end_velocity_ = velocity_at(move, move.end_v_mm_s);
   last_duration_s_ = move.duration_s();
   last_line_ = move.segment.line;
 }
 
-void BaseCheck::change_of_velocity(const std::array<double, 2>& velocity, double duration_s,
-                                   std::size_t line) {
+void BaseCheck::change_of_velocity(const PerMotor& velocity, double duration_s, std::size_t line) {
   const double between_s = 0.5 * (last_duration_s_ + duration_s);
   if (between_s <= 0.0) {
     return;
   }
   const auto uncertainty = [](double move_s) { return move_s > 0.0 ? kRounding_mm / move_s : 0.0; };
   const double uncertain = (uncertainty(last_duration_s_) + uncertainty(duration_s)) / between_s;
-  for (std::size_t axis = 0; axis < velocity.size(); ++axis) {
-    const double accel = std::abs(velocity[axis] - last_velocity_[axis]) / between_s;
+  for (std::size_t motor = 0; motor < velocity.size(); ++motor) {
+    const double accel = std::abs(velocity[motor] - last_velocity_[motor]) / between_s;
     max_accel_ = std::max(max_accel_, accel);
-    accel_excess_.offer(accel - uncertain, rules_->base_max_accel_mm_s2, line);
+    accel_excess_.offer(accel - motors_.uncertainty(motor) * uncertain,
+                        rules_->base_max_accel_mm_s2, line);
   }
 }
 

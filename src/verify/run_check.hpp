@@ -1,9 +1,10 @@
-// Checks the motion of the base in the runs against what the machine can do.
+// Checks the motion of the base in the runs against what the machine's motors can do.
 //
-// Notation, for neighbouring moves 1 and 2 of the emitted file, per axis:
+// Notation, for neighbouring moves 1 and 2 of the emitted file, per motor that moves X or Y:
 //   Δ, T   travel and duration        v̄ = Δ/T
 //   a = (v̄₂ − v̄₁) / ((T₁ + T₂)/2); before the first and after the last move the base rests: T/2
-//   q      rounding step of coordinates: Δ is uncertain by q, a by q (1/T₁ + 1/T₂) / ((T₁ + T₂)/2)
+//   q      rounding step of coordinates, times the axes that the motor moves: Δ is uncertain by q,
+//          a by q (1/T₁ + 1/T₂) / ((T₁ + T₂)/2)
 #pragma once
 
 #include <array>
@@ -45,7 +46,7 @@ class Excursion {
 class BaseCheck {
  public:
   BaseCheck(const Rules& rules, Violations& violations)
-      : rules_(&rules), violations_(&violations) {}
+      : rules_(&rules), violations_(&violations), motors_(rules.fixed.motors()) {}
 
   void begin_run();
   // In the middle of a run, after this move.
@@ -65,16 +66,22 @@ class BaseCheck {
     std::size_t line = 0;
     void offer(double a_value, double limit, std::size_t a_line);
   };
+  using PerMotor = std::array<double, Motors::kCount>;
+  // Of a motion per axis; 0 for motors that move neither X nor Y.
+  [[nodiscard]] PerMotor of_motors(double x, double y, double z) const;
+  [[nodiscard]] PerMotor mean_velocity(const planner::PlannedMove& move) const;
+  // Where a move goes at this speed along its way.
+  [[nodiscard]] PerMotor velocity_at(const planner::PlannedMove& move, double v_mm_s) const;
   void keep(const planner::PlannedMove& move);
-  void change_of_velocity(const std::array<double, 2>& velocity, double duration_s,
-                          std::size_t line);
+  void change_of_velocity(const PerMotor& velocity, double duration_s, std::size_t line);
   void report(const Excess& excess, std::string_view what, std::string_view unit, double limit);
 
   const Rules* rules_;
   Violations* violations_;
-  std::array<double, 2> last_velocity_{};  // on the mean over the last move
-  std::array<double, 2> end_velocity_{};   // at its end
-  double last_duration_s_ = 0.0;           // 0: at rest
+  Motors motors_;
+  PerMotor last_velocity_{};      // on the mean over the last move
+  PerMotor end_velocity_{};       // at its end
+  double last_duration_s_ = 0.0;  // 0: at rest
   std::size_t last_line_ = 0;
   Excess velocity_excess_;
   Excess accel_excess_;

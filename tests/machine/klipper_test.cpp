@@ -129,18 +129,37 @@ TEST_F(KlipperFiles, NameTheLineOfWhatIsWrong) {
               HasSubstr("d.cfg: max_velocity in [printer] is missing"));
 }
 
-TEST_F(KlipperFiles, OfMachinesWithoutCarriagesAlongXAndYAreRefused) {
-  std::string text = kWhole;
-  text.replace(text.find("cartesian"), 9, "polar");
-  EXPECT_THAT(failure(write("a.cfg", text)), HasSubstr("a.cfg:2: kinematics 'polar' has no"));
+TEST_F(KlipperFiles, TellTheKinematics) {
+  const auto told = [&](std::string_view name) {
+    std::string text = kWhole;
+    text.replace(text.find("cartesian"), 9, name);
+    return good(write("a.cfg", text)).kinematics.type;
+  };
+  EXPECT_EQ(told("cartesian"), Kinematics::cartesian);
+  EXPECT_EQ(told("generic_cartesian"), Kinematics::cartesian);
+  EXPECT_EQ(told("corexy"), Kinematics::corexy);
+  EXPECT_EQ(told("limited_corexy"), Kinematics::corexy);
+  EXPECT_EQ(told("corexz"), Kinematics::corexz);
+  EXPECT_EQ(told("hybrid_corexy"), Kinematics::hybrid_corexy);
+  EXPECT_EQ(told("hybrid_corexz"), Kinematics::hybrid_corexz);
 }
 
-TEST_F(KlipperFiles, OfDeltasBringANote) {
-  std::string text = kWhole;
-  text.replace(text.find("cartesian"), 9, "delta");
-  const Settings s = good(write("a.cfg", text));
-  ASSERT_THAT(s.notes, SizeIs(1));
-  EXPECT_THAT(s.notes[0].message, HasSubstr("change with the place"));
+TEST_F(KlipperFiles, OfOtherMachinesAreRefused) {
+  for (const std::string name :
+       {"delta", "rotary_delta", "deltesian", "polar", "winch", "none", "cartesianer"}) {
+    std::string text = kWhole;
+    text.replace(text.find("cartesian"), 9, name);
+    EXPECT_THAT(failure(write("a.cfg", text)),
+                HasSubstr("a.cfg:2: unflex does not support kinematics '" + name + "' yet, only"));
+  }
+}
+
+TEST_F(KlipperFiles, OfSteppersThatMoveSeveralCarriagesAreRefused) {
+  const std::string text = std::string(kWhole) +
+                           "[carriage x]\naxis: x\n[stepper a]\ncarriages: x+y\n"
+                           "[stepper b]\ncarriages: x-y\n";
+  EXPECT_THAT(failure(write("a.cfg", text)),
+              HasSubstr("a.cfg:11: [stepper a] moves several carriages, 'x+y'"));
 }
 
 TEST_F(KlipperFiles, AreToldByTheirContentAndNotByTheirName) {

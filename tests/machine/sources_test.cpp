@@ -247,10 +247,61 @@ TEST(RrfConfig, GivesTheSameLimitsInWhateverOrder) {
   }
 }
 
-TEST(RrfConfig, OfAScaraIsRefused) {
-  const Result<Settings> settings = parse("M550 P\"x\"\nM669 K4\n", "config.g", {});
+TEST(RrfConfig, TellsTheKinematics) {
+  for (const auto& [line, kinematics] :
+       {std::pair{"M669 K0", Kinematics::cartesian}, std::pair{"M669 K1", Kinematics::corexy},
+        std::pair{"M669 K2 S100 T0.5", Kinematics::corexz},
+        std::pair{"M669 K11", Kinematics::hybrid_corexy}}) {
+    const Result<Settings> settings =
+        parse(std::string("M550 P\"x\"\n") + line + "\n", "config.g", {});
+    ASSERT_TRUE(settings) << to_string(settings.error());
+    EXPECT_EQ(settings->kinematics.type, kinematics) << line;
+  }
+}
+
+TEST(RrfConfig, OfOtherMachinesIsRefused) {
+  for (const auto& [line, reason] :
+       {std::pair{"M669 K4", "kinematics K4 is a machine that unflex does not support yet"},
+        std::pair{"M669 K3", "kinematics K3"}, std::pair{"M669 K12", "kinematics K12"},
+        std::pair{"M665 L200 R100", "M665 makes this machine a delta"},
+        std::pair{"M669 X1:1:0 Y1:-1:0", "M669 gives a matrix of its own"}}) {
+    const Result<Settings> settings =
+        parse(std::string("M550 P\"x\"\n") + line + "\n", "config.g", {});
+    ASSERT_FALSE(settings) << line;
+    EXPECT_THAT(to_string(settings.error()),
+                ::testing::StartsWith(std::string("config.g:2: ") + reason));
+  }
+}
+
+TEST(MarlinDump, OfADeltaIsRefused) {
+  const Result<Settings> settings =
+      parse("echo:  M92 X80 Y80\necho:  M205 J0.01\necho:  M665 L250.00 R100.00\n", "m503.txt", {});
   ASSERT_FALSE(settings);
-  EXPECT_THAT(to_string(settings.error()), ::testing::StartsWith("config.g:2: kinematics K4"));
+  EXPECT_THAT(to_string(settings.error()), ::testing::StartsWith("m503.txt:3: M665 is of a delta"));
+}
+
+TEST(Kinematics, ThatTheFirmwareHasNotAreRefused) {
+  const auto refused = [](const std::string& type, const std::string& firmware) {
+    return !load(std::nullopt, {"kinematics.type=" + type, "printer.firmware=" + firmware});
+  };
+  EXPECT_TRUE(refused("delta", "klipper"));
+  EXPECT_TRUE(refused("hybrid_corexy", "marlin"));
+  EXPECT_TRUE(refused("hybrid_corexz", "marlin"));
+  EXPECT_TRUE(refused("hybrid_corexz", "rrf"));
+  EXPECT_FALSE(refused("hybrid_corexz", "klipper"));
+  EXPECT_FALSE(refused("hybrid_corexy", "rrf"));
+  EXPECT_FALSE(refused("corexy", "marlin"));
+}
+
+TEST(Kinematics, MakeMotorsFasterThanTheToolWhereTheFirmwareLimitsTheTool) {
+  const auto refused = [](const std::string& type, const std::string& firmware, double times) {
+    return !load(std::nullopt, {"kinematics.type=" + type, "printer.firmware=" + firmware,
+                                "base.max_accel_mm_s2=" + std::to_string(times * 5000.0)});
+  };
+  EXPECT_TRUE(refused("corexy", "klipper", 1.41));
+  EXPECT_FALSE(refused("corexy", "klipper", 1.42));
+  EXPECT_FALSE(refused("corexz", "klipper", 1.0));
+  EXPECT_FALSE(refused("corexy", "marlin", 1.0));
 }
 
 TEST(Slicers, TellAMarlinsLimits) {

@@ -12,6 +12,7 @@
 
 #include "unflex/core/error.hpp"
 #include "unflex/core/firmware.hpp"
+#include "unflex/core/kinematics.hpp"
 #include "unflex/machine/print_text.hpp"
 
 namespace unflex::machine {
@@ -115,7 +116,11 @@ struct DynamicsError {
   double damping = 0.0;
 };
 
-// What the motors can do, per axis.
+struct KinematicsSettings {
+  Kinematics type = Kinematics::cartesian;
+};
+
+// What each motor can do.
 struct BaseSettings {
   std::optional<double> max_velocity_mm_s;  // unset: 2 · limits.max_velocity_mm_s
   std::optional<double> max_accel_mm_s2;    // unset: 4 · limits.max_accel_mm_s2
@@ -157,6 +162,7 @@ struct Settings {
   AxisDynamics dynamics_x;
   AxisDynamics dynamics_y;
   DynamicsError dynamics_error;
+  KinematicsSettings kinematics;
   BaseSettings base;
   SolveSettings solve;
   EmitSettings emit;

@@ -37,17 +37,21 @@
 #include <cstdint>
 #include <vector>
 
+#include "unflex/core/kinematics.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::planner {
 namespace marlin {
 
-// X Y Z E. The firmware's 32 bits are full after 4 km of filament.
+// Of the axes X Y Z E, or of the motors. The firmware's 32 bits are full after 4 km of filament.
 using Steps = std::array<std::int64_t, 4>;
-using Vector = std::array<float, 4>;        // X Y Z E
+using Vector = std::array<float, 4>;
 
-// Limits and configuration in the firmware's own types (planner_settings_t).
+// Limits and configuration in the firmware's own types (planner_settings_t). Limits are of motors,
+// which on a core are not the axes.
 struct Settings {
+  std::array<std::array<int, 3>, 3> motors{};  // by axes, as in unflex::Motors
+  bool shares_motors = false;                  // IS_CORE
   Vector steps_per_mm{};
   Vector mm_per_step{};
   Vector max_velocity_mm_s{};

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "unflex/core/firmware.hpp"
+#include "unflex/core/kinematics.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::planner {
@@ -63,6 +64,7 @@ struct InstalledShaper {
 // What only the firmware's configuration decides.
 struct FirmwareConfig {
   Firmware firmware = Firmware::klipper;
+  Kinematics kinematics = Kinematics::cartesian;
   // Klipper; for a 0.4 mm nozzle, 1.75 mm filament, max_velocity 300 and max_accel 5000.
   double max_z_velocity_mm_s = 300.0;
   double max_z_accel_mm_s2 = 5000.0;
@@ -85,6 +87,8 @@ struct FirmwareConfig {
   // src/RepRapFirmware.h: StepClockRate).
   int ring_length = 60;  // at least 4
   double step_clock_hz = 750000.0;
+
+  [[nodiscard]] Motors motors() const { return {kinematics, firmware}; }
 };
 
 // A segment with its trapezoid.

@@ -30,8 +30,8 @@
 // junctions that are reckoned from then on, which includes those of provisional moves.
 //
 // Left out: pressure advance (its default of 0 leaves acceleration alone; M572), input shaping, the
-// reduced accelerations of M201.1, kinematics other than Cartesian, tools with several X or Y
-// motors or extruders, M595 R (grace period), babystepping, movements of drives on CAN boards,
+// reduced accelerations of M201.1, kinematics other than Cartesian and cores, tools with several X
+// or Y motors or extruders, M595 R (grace period), babystepping, movements of drives on CAN boards,
 // which may last one clock longer.
 #pragma once
 
@@ -41,6 +41,7 @@
 #include <deque>
 #include <vector>
 
+#include "unflex/core/kinematics.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::planner {
@@ -50,6 +51,7 @@ using Vector = std::array<float, 4>;  // X Y Z E
 
 // Limits in the firmware's own units: mm and step clocks.
 struct Settings {
+  Motors motors;
   float clock_hz = 0.0F;
   Vector max_speed{};     // M203
   Vector max_accel{};     // M201
@@ -110,9 +112,11 @@ class RrfPlanner final : public Planner {
   void freeze();
   [[nodiscard]] std::int64_t next_event() const;
   [[nodiscard]] std::int64_t last_finish() const;
+  // Where the motors' whole steps put it.
   [[nodiscard]] gcode::Position on_steps(const gcode::Position& position_mm) const;
 
   FirmwareConfig config_;
+  Motors motors_;
   Limits settings_limits_;  // those that settings_ were made from
   rrf::Settings settings_;
   std::size_t ring_length_;

@@ -80,9 +80,10 @@ struct VerifyReport {
   std::vector<Detuned> detuned;   // one for each of Observation::detuned
   double reference_time_s = 0.0;  // duration of the input by the firmware's plan, dwells included
   double emitted_time_s = 0.0;    // of the output
-  // Of the replayed base, larger axis, compensated runs only: mean velocity of one move.
+  // Of the replayed base, largest motor of X and Y, compensated runs only: mean velocity of one
+  // move.
   double base_max_velocity_mm_s = 0.0;
-  // Of the replayed base, larger axis, compensated runs only: change of mean velocity between
+  // Of the replayed base, the same motors, compensated runs only: change of mean velocity between
   // neighbouring moves over the time between their middles.
   double base_max_accel_mm_s2 = 0.0;
   double input_extrusion_mm = 0.0;  // net filament

@@ -1,0 +1,65 @@
+// How a machine's motors move its axes.
+//
+//   q_i = Σ_j g_ij p_j      q  where motor i is      p  where the tool is: X, Y, Z
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string_view>
+
+#include "unflex/core/firmware.hpp"
+
+namespace unflex {
+
+enum class Kinematics { cartesian, corexy, corexz, hybrid_corexy, hybrid_corexz };
+
+// As the configuration spells it, which is Klipper's way: "cartesian", "corexy", "corexz",
+// "hybrid_corexy", "hybrid_corexz".
+[[nodiscard]] std::string_view to_string(Kinematics kinematics);
+
+// All of them, in the order above.
+[[nodiscard]] std::span<const Kinematics> all_kinematics();
+
+// The linear map from axes to motors: 3 × 3, motors by axes, without unit.
+class Motors {
+ public:
+  static constexpr std::size_t kCount = 3;
+  using Rows = std::array<std::array<double, kCount>, kCount>;
+
+  // Each axis has a motor of its own.
+  Motors() = default;
+  // Klipper: klippy/kinematics; Marlin 2.1: src/module/planner.cpp, _populate_block;
+  // RepRapFirmware 3.5: src/Movement/Kinematics/CoreKinematics.cpp, whose coreXZ turns a motor
+  // three times as far for Z as for X.
+  Motors(Kinematics kinematics, Firmware firmware);
+
+  [[nodiscard]] const Rows& rows() const { return rows_; }
+
+  // Whether motor i has a part in moving X or Y.
+  [[nodiscard]] bool moves_xy(std::size_t i) const {
+    return rows_[i][0] != 0.0 || rows_[i][1] != 0.0;
+  }
+  // Whether there is a motor that moves both X and Y.
+  [[nodiscard]] bool shared_by_xy() const;
+
+  // What motor i does where the axes do x, y, z: travel, velocity or acceleration.
+  [[nodiscard]] double of(std::size_t i, double x, double y, double z) const {
+    return rows_[i][0] * x + rows_[i][1] * y + rows_[i][2] * z;
+  }
+  // Where the axes are when the motors are at q.
+  [[nodiscard]] std::array<double, kCount> axes(const std::array<double, kCount>& q) const;
+
+  // The most that a motor of X or Y does at it, either way.
+  [[nodiscard]] double largest_of_xy(double x, double y, double z) const;
+  // How much of an uncertainty, the same in all axes, motor i has.
+  [[nodiscard]] double uncertainty(std::size_t i) const {
+    return std::abs(rows_[i][0]) + std::abs(rows_[i][1]) + std::abs(rows_[i][2]);
+  }
+
+ private:
+  Rows rows_{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
+};
+
+}  // namespace unflex
