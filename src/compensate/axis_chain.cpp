@@ -91,9 +91,26 @@ PerKind<std::optional<RowBounds>> row_bounds(const ScaledWindow& scaled_window,
       result[i] = bounds;
     }
   };
+  // Of the kinds whose bounds may differ from node to node.
+  const auto set_each = [&](RowKind kind, const std::vector<double>& differing, const auto& of) {
+    std::optional<RowBounds>& bounds = result[index_of(kind)];
+    if (differing.empty() || !bounds) {
+      return;
+    }
+    for (std::size_t k = 0; k < scaled_window.nodes; ++k) {
+      bounds->each.push_back(scaled(of(at(k)), 0.0, scaled_window.unit[index_of(kind)]));
+      if (k > 0 && k + 1 < scaled_window.nodes) {
+        bounds->inner.lower = std::min(bounds->inner.lower, bounds->each.back().lower);
+        bounds->inner.upper = std::max(bounds->inner.upper, bounds->each.back().upper);
+      }
+    }
+  };
   set(RowKind::position, scaled_window.origin_mm, [](const BaseBounds& b) { return b.position; });
   set(RowKind::velocity, 0.0, [](const BaseBounds& b) { return b.velocity; });
   set(RowKind::accel, 0.0, [](const BaseBounds& b) { return b.accel; });
+  set_each(RowKind::velocity, window.max_velocity_at_mm_s,
+           [](const BaseBounds& b) { return b.velocity; });
+  set_each(RowKind::accel, window.max_accel_at_mm_s2, [](const BaseBounds& b) { return b.accel; });
   if (active.jerk) {
     const Interval jerk{-window.limits.max_jerk_mm_s3, window.limits.max_jerk_mm_s3};
     set(RowKind::jerk, 0.0, [&](const BaseBounds&) { return jerk; });

@@ -78,8 +78,9 @@ struct ScaledWindow {
 // Lower and upper bounds of the rows of one kind: the same at all nodes but the first and the last.
 struct RowBounds {
   Interval first;
-  Interval inner;
+  Interval inner;  // the widest of them, if they differ
   Interval last;
+  std::vector<Interval> each = {};  // of all nodes, if they differ
 };
 
 // Of the kinds that the active limits bound.

@@ -57,14 +57,24 @@ void InteriorPoint::start(const PerKind<std::optional<RowBounds>>& bounds,
     rows.scale =
         kind == RowKind::position ? 1.0 : std::max(size_of(inner.lower), size_of(inner.upper));
     rows.scale = rows.scale > 0.0 ? std::min(rows.scale, 1.0) : 1.0;
+    const std::vector<Interval>& each = bounds[i]->each;
     const auto bounds_at = [&](std::size_t k) {
+      if (!each.empty()) {
+        return apart(each[k]);
+      }
       return k == 0 ? apart(bounds[i]->first) : (k + 1 == nodes ? apart(bounds[i]->last) : inner);
     };
     const Row value(values[i], static_cast<Eigen::Index>(rows.count));
-    const double beyond =
+    double beyond =
         std::max({(inner.lower - value).maxCoeff(), (value - inner.upper).maxCoeff(), 0.0});
-    const double least =
-        std::min(kLeastSlackShare * beyond + 1e-3 * rows.scale, 0.25 * (inner.upper - inner.lower));
+    double narrowest = inner.upper - inner.lower;
+    for (std::size_t k = 0; k < each.size(); ++k) {
+      const Interval at = bounds_at(k);
+      const double there = values[i][k];
+      beyond = std::max({beyond, at.lower - there, there - at.upper});
+      narrowest = std::min(narrowest, at.upper - at.lower);
+    }
+    const double least = std::min(kLeastSlackShare * beyond + 1e-3 * rows.scale, 0.25 * narrowest);
     for (Side* side : {&rows.lower, &rows.upper}) {
       for (Padded* array :
            {&side->bound, &side->slack, &side->multiplier, &side->inverse_slack, &side->residual,
@@ -74,6 +84,9 @@ void InteriorPoint::start(const PerKind<std::optional<RowBounds>>& bounds,
       side->sign = side == &rows.lower ? 1.0 : -1.0;
       const auto d = [&](const Interval& at) { return side->sign > 0.0 ? -at.lower : at.upper; };
       as_array(side->bound).setConstant(d(inner));
+      for (std::size_t k = 0; k < each.size(); ++k) {
+        side->bound[k] = d(bounds_at(k));
+      }
       side->bound[0] = d(bounds_at(0));
       side->bound[rows.count - 1] = d(bounds_at(rows.count - 1));
       as_array(side->slack) = (side->sign * value + as_array(side->bound)).max(least);

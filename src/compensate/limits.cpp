@@ -80,6 +80,19 @@ std::optional<double> resting_base_mm(const AxisWindow& window, std::size_t k) {
   return std::nullopt;
 }
 
+// V and A at a node.
+double max_velocity(const AxisWindow& window, std::size_t k) {
+  return window.max_velocity_at_mm_s.empty()
+             ? window.limits.max_velocity_mm_s
+             : std::min(window.max_velocity_at_mm_s[k], window.limits.max_velocity_mm_s);
+}
+
+double max_accel(const AxisWindow& window, std::size_t k) {
+  return window.max_accel_at_mm_s2.empty()
+             ? window.limits.max_accel_mm_s2
+             : std::min(window.max_accel_at_mm_s2[k], window.limits.max_accel_mm_s2);
+}
+
 BaseBounds base_bounds(const AxisWindow& window, ActiveLimits active, std::size_t k) {
   const BaseLimits& limits = window.limits;
   BaseBounds bounds;
@@ -88,11 +101,12 @@ BaseBounds base_bounds(const AxisWindow& window, ActiveLimits active, std::size_
     const double margin = std::isfinite(limits.max_accel_mm_s2)
                               ? limits.max_accel_mm_s2 * window.period_s / 4.0
                               : 0.0;
-    bounds.velocity.upper = std::max(limits.max_velocity_mm_s - margin, 0.0);
+    bounds.velocity.upper = std::max(max_velocity(window, k) - margin, 0.0);
     bounds.velocity.lower = -bounds.velocity.upper;
   }
   if (active.accel) {
-    bounds.accel = {-limits.max_accel_mm_s2, limits.max_accel_mm_s2};
+    bounds.accel.upper = max_accel(window, k);
+    bounds.accel.lower = -bounds.accel.upper;
   }
   if (active.position) {
     bound_position(window, active.position_between, resting_base_mm(window, k), bounds);
@@ -125,6 +139,21 @@ ActiveLimits broken(const dynamics::AxisTrajectory& base, const BaseLimits& limi
   return result;
 }
 
+ActiveLimits broken(const dynamics::AxisTrajectory& base, const AxisWindow& window) {
+  ActiveLimits result = broken(base, window.limits, window.period_s);
+  const auto beyond = [&](const std::vector<double>& values, const std::vector<double>& most) {
+    for (std::size_t k = 0; k < most.size(); ++k) {
+      if (std::abs(values[k]) > most[k] * (1.0 + kSlack)) {
+        return true;
+      }
+    }
+    return false;
+  };
+  result.velocity = result.velocity || beyond(base.velocity_mm_s, window.max_velocity_at_mm_s);
+  result.accel = result.accel || beyond(base.accel_mm_s2, window.max_accel_at_mm_s2);
+  return result;
+}
+
 ActiveLimits tightened(const ActiveLimits& active, const ActiveLimits& more) {
   return {active.velocity || more.velocity, active.accel || more.accel, active.jerk || more.jerk,
           active.position || more.position || more.position_between,
@@ -143,8 +172,7 @@ Result<AxisSolution> solve_within_limits(
     }
     iterations += solution->iterations;
     solution->iterations = iterations;
-    const ActiveLimits next =
-        tightened(active, broken(solution->base, window.limits, window.period_s));
+    const ActiveLimits next = tightened(active, broken(solution->base, window));
     if (next == active) {
       return solution;
     }

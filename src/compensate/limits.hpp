@@ -51,6 +51,9 @@ struct BaseBounds {
 [[nodiscard]] ActiveLimits broken(const dynamics::AxisTrajectory& base, const BaseLimits& limits,
                                   double period_s);
 
+// The same with the window's limits at the nodes.
+[[nodiscard]] ActiveLimits broken(const dynamics::AxisTrajectory& base, const AxisWindow& window);
+
 // The limits in force, and those broken in spite of them. The travel between nodes only counts
 // where the nodes keep it.
 [[nodiscard]] ActiveLimits tightened(const ActiveLimits& active, const ActiveLimits& more);

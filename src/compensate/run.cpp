@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "shared_motors.hpp"
+
 namespace unflex::compensate {
 namespace {
 
@@ -168,7 +170,11 @@ bool leaves_room(const planner::PlannedMove& move, const Setup& setup) {
     return std::abs(move.direction[axis]) * move.cruise_v_mm_s <=
            kRoomToSettle * limits.max_velocity_mm_s;
   };
-  return axis_fits(gcode::X, setup.x.limits) && axis_fits(gcode::Y, setup.y.limits);
+  const double both = std::abs(move.direction[gcode::X]) + std::abs(move.direction[gcode::Y]);
+  const bool motors_fit =
+      !setup.shares_motors ||
+      both * move.cruise_v_mm_s <= kRoomToSettle * setup.x.limits.max_velocity_mm_s;
+  return motors_fit && axis_fits(gcode::X, setup.x.limits) && axis_fits(gcode::Y, setup.y.limits);
 }
 
 // Where nothing needs solving, in the order of the course.
@@ -262,7 +268,8 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
           all.begin() + static_cast<std::ptrdiff_t>(2 * span.last + 1 - first_sample));
     };
     RunWindow window{make_axis(setup.x, setup, grid.period_s, slice(x), slice(weight)),
-                     make_axis(setup.y, setup, grid.period_s, slice(y), slice(weight))};
+                     make_axis(setup.y, setup, grid.period_s, slice(y), slice(weight)),
+                     setup.shares_motors};
     if (from_rest && span.first == 0) {
       window.x.start = AxisWindow::Start{nozzle.x, window.x.reference_mm.front()};
       window.y.start = AxisWindow::Start{nozzle.y, window.y.reference_mm.front()};
@@ -289,8 +296,12 @@ AxisSolution along(const AxisWindow& window) {
   return solution;
 }
 
-Result<AxisSolution> solve(const Engine& engine, const WindowSpan& span, const AxisWindow& window) {
-  return span.cruise ? along(window) : engine.solve(window);
+AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window) {
+  if (span.cruise) {
+    return {along(window.x), along(window.y)};
+  }
+  return window.shares_motors ? solve_with_shared_motors(engine, window)
+                              : AxisSolutions{engine.solve(window.x), engine.solve(window.y)};
 }
 
 dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,

@@ -275,8 +275,12 @@ class Compensator {
   }
 
   void solve_in_process(const std::shared_ptr<RunJob>& job, std::size_t first, std::size_t count) {
-    const std::vector<compensate::RunWindow> windows = windows_of(*job, first, count);
+    std::vector<compensate::RunWindow> windows = windows_of(*job, first, count);
     for (std::size_t i = 0; i < count; ++i) {
+      if (windows[i].shares_motors && !job->spans[first + i].cruise) {
+        // Divides the motors' limits; what the process finds counts.
+        static_cast<void>(compensate::solve(*divider_, job->spans[first + i], windows[i]));
+      }
       for (std::size_t axis = 0; axis < 2; ++axis) {
         tickets_.push_back({job, first + i, axis});
         const compensate::AxisWindow& window = axis == 0 ? windows[i].x : windows[i].y;
@@ -426,6 +430,7 @@ class Compensator {
   std::mutex mutex_;
   std::condition_variable news_;                // a piece has been read or a run been prepared
   std::unique_ptr<compensate::Engine> engine_;  // in threads; otherwise the processes solve
+  std::unique_ptr<compensate::Engine> divider_ = compensate::make_banded_engine();  // for those
   // Last, so that threads end before what they use.
   PieceThread pieces_;
   std::unique_ptr<record::Recorder> recorder_;  // none where nobody asks

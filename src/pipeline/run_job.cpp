@@ -52,12 +52,11 @@ std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
   setup.x.variants.clear();
   setup.y.variants.clear();
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
-  const auto windows = compensate::windows(job.course(), job.spans, job.nozzle, setup);
+  auto windows = compensate::windows(job.course(), job.spans, job.nozzle, setup);
   std::vector<dynamics::AxisTrajectory> x;
   std::vector<dynamics::AxisTrajectory> y;
   for (std::size_t i = 0; i < windows.size(); ++i) {
-    auto of_x = compensate::solve(*engine, job.spans[i], windows[i].x);
-    auto of_y = compensate::solve(*engine, job.spans[i], windows[i].y);
+    auto [of_x, of_y] = compensate::solve(*engine, job.spans[i], windows[i]);
     if (!of_x || !of_y) {
       return std::nullopt;
     }
@@ -125,9 +124,10 @@ void solve_windows(RunJob& job, std::size_t first, std::size_t count,
   std::vector<compensate::RunWindow> windows = windows_of(job, first, count);
   for (std::size_t i = 0; i < count; ++i) {
     compensate::AxisWindow* const problems[] = {&windows[i].x, &windows[i].y};
+    compensate::AxisSolutions solutions =
+        compensate::solve(engine, job.spans[first + i], windows[i]);
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      Result<compensate::AxisSolution> solution =
-          compensate::solve(engine, job.spans[first + i], *problems[axis]);
+      Result<compensate::AxisSolution>& solution = solutions[axis];
       for (Probe& probe : job.probes) {
         if (solution && probe.window == first + i && probe.axis == axis) {
           probe.problem = std::move(*problems[axis]);

@@ -44,6 +44,10 @@ dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
   return dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio);
 }
 
+bool shares_motors(const machine::Settings& settings) {
+  return Motors(settings.kinematics.type, settings.printer.firmware).shared_by_xy();
+}
+
 // What the base may be accelerated by so that the text stays within the limits: that of
 // acceleration and, where lines end on a fine grid, that of speed from line to line. Whole steps of
 // a motor are too coarse for the second.
@@ -55,8 +59,9 @@ double planned_base_accel(const machine::Settings& settings) {
         std::min(limit, std::max(kSpeedStepShare * settings.emit.max_speed_step_mm_s / shortest_s,
                                  kLeastHeadroom * settings.limits.max_accel_mm_s2));
   }
+  const double axes = shares_motors(settings) ? 2.0 : 1.0;  // that a motor gets the rounding of
   return kAccelShare * limit -
-         std::min(2.0 * grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);
+         std::min(2.0 * axes * grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);
 }
 
 // What the axis is in the middle of its band counts so much, the rest its edges.
@@ -96,7 +101,8 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
   setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
   setup.limits.max_accel_mm_s2 = planned_base_accel(settings);
   if (settings.base.max_jerk_mm_s3 > 0.0) {
-    setup.limits.max_jerk_mm_s3 = settings.base.max_jerk_mm_s3;
+    setup.limits.max_jerk_mm_s3 =
+        settings.base.max_jerk_mm_s3 / (shares_motors(settings) ? 2.0 : 1.0);
   }
   if (travel) {
     setup.limits.min_position_mm = travel->min;
@@ -218,6 +224,7 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
   compensate::Setup setup;
   setup.x = axis_setup(settings.dynamics_x, settings.printer.travel_x_mm, settings);
   setup.y = axis_setup(settings.dynamics_y, settings.printer.travel_y_mm, settings);
+  setup.shares_motors = shares_motors(settings);
   setup.period_s = settings.period_ms() * 1e-3;
   setup.lead_in_s = settings.solve.lead_in_ms * 1e-3;
   setup.tail_s = settings.tail_s();

@@ -94,6 +94,8 @@ std::string pack(const compensate::AxisWindow& window) {
   writer.values(window.weight);
   writer.value(window.jerk_weight);
   writer.value(window.limits);
+  writer.values(window.max_velocity_at_mm_s);
+  writer.values(window.max_accel_at_mm_s2);
   writer.value(window.start);
   writer.value(window.end_base_mm);
   return writer.take();
@@ -112,6 +114,8 @@ compensate::AxisWindow unpack_window(std::string_view bytes) {
   window.weight = reader.values();
   window.jerk_weight = reader.value<double>();
   window.limits = reader.value<compensate::BaseLimits>();
+  window.max_velocity_at_mm_s = reader.values();
+  window.max_accel_at_mm_s2 = reader.values();
   window.start = reader.value<std::optional<compensate::AxisWindow::Start>>();
   window.end_base_mm = reader.value<std::optional<double>>();
   return window;

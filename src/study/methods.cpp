@@ -81,10 +81,9 @@ Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSe
   std::vector<dynamics::AxisTrajectory> x;
   std::vector<dynamics::AxisTrajectory> y;
   BaseMotion result;
-  const auto windows = compensate::windows(plan, spans, nozzle, setup);
+  auto windows = compensate::windows(plan, spans, nozzle, setup);
   for (std::size_t i = 0; i < windows.size(); ++i) {
-    Result<compensate::AxisSolution> of_x = compensate::solve(engine, spans[i], windows[i].x);
-    Result<compensate::AxisSolution> of_y = compensate::solve(engine, spans[i], windows[i].y);
+    auto [of_x, of_y] = compensate::solve(engine, spans[i], windows[i]);
     if (!of_x || !of_y) {
       return tl::unexpected(of_x ? of_y.error() : of_x.error());
     }

@@ -100,10 +100,10 @@ double largest_difference_mm(const Moves& moves, const Setup& setup) {
   const auto engine = make_banded_engine();
   const NodeGrid grid = node_grid(moves, setup);
   const auto spans = mesh(moves, grid, setup);
-  const auto problems = windows(moves, spans, testing::at_rest(moves), setup);
+  auto problems = windows(moves, spans, testing::at_rest(moves), setup);
   std::vector<dynamics::AxisTrajectory> solutions;
   for (std::size_t i = 0; i < spans.size(); ++i) {
-    const auto solution = solve(*engine, spans[i], problems[i].x);
+    const auto solution = solve(*engine, spans[i], problems[i])[0];
     EXPECT_TRUE(solution.has_value());
     solutions.push_back(solution.value_or(AxisSolution{}).base);
   }

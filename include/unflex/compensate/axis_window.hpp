@@ -54,6 +54,10 @@ struct AxisWindow {
   // ρ/h⁶: without dimension, so that one value serves all periods.
   double jerk_weight = 1e-2;
   BaseLimits limits;
+  // V and A at the nodes, where they are less than in `limits`: what another axis leaves of a motor
+  // that moves both. Empty: nowhere.
+  std::vector<double> max_velocity_at_mm_s;
+  std::vector<double> max_accel_at_mm_s2;
   // At the first node: the nozzle as given, whatever the axis is, the base at rest there. Unset:
   // free.
   struct Start {

@@ -5,6 +5,7 @@
 //   b(t)  base, at rest at both ends of the run
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -26,6 +27,9 @@ struct AxisSetup {
 struct Setup {
   AxisSetup x;
   AxisSetup y;
+  // Whether limits of velocity and acceleration, the same for X and Y, are those of motors that
+  // move both: |ẋ| + |ẏ| ≤ V, |ẍ| + |ÿ| ≤ A.
+  bool shares_motors = false;
   double period_s = 1e-3;
   double lead_in_s = 0.0;      // rest of the reference before the first move
   double tail_s = 2e-3;        // rest of the reference after the last move, at least
@@ -86,6 +90,7 @@ struct WindowSpan {
 struct RunWindow {
   AxisWindow x;
   AxisWindow y;
+  bool shares_motors = false;  // as in Setup
 };
 
 // The problems of all windows, on the nodes of node_grid(). nozzle: where the nozzle is, and how
@@ -103,9 +108,10 @@ struct RunWindow {
 // One axis of a cruise: the reference.
 [[nodiscard]] AxisSolution along(const AxisWindow& window);
 
-// One axis of a window: what the engine says, or in a cruise the reference.
-[[nodiscard]] Result<AxisSolution> solve(const Engine& engine, const WindowSpan& span,
-                                         const AxisWindow& window);
+// X and Y of a window: what the engine says, or in a cruise the reference. Where they share motors
+// the window gets limits at the nodes, under which each axis by itself has this solution.
+using AxisSolutions = std::array<Result<AxisSolution>, 2>;
+[[nodiscard]] AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window);
 
 // Joins the solutions of the windows, in the order of `spans`, blending over the middle of each
 // overlap.
