@@ -307,7 +307,8 @@ class Search {
 
   [[nodiscard]] double too_quick(const Eigen::Vector2d& change_mm_s, double both_s) const {
     const double allowed = rules_->max_accel_mm_s2 * 0.5 * both_s;
-    const double excess = change_mm_s.cwiseAbs().maxCoeff() / allowed - 1.0;
+    const double excess =
+        rules_->motors.largest_of_xy(change_mm_s[0], change_mm_s[1], 0.0) / allowed - 1.0;
     return excess > 0.0 ? kTooQuick * (1.0 + excess) : 0.0;
   }
 

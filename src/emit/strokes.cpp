@@ -1,6 +1,7 @@
 #include "strokes.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -131,6 +132,38 @@ ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
   return {kAlong + kAcross * nx * nx, kAcross * nx * ny, kAlong + kAcross * ny * ny};
 }
 
+// What each axis may change its speed by. Of motors that move both, each has what the base itself
+// needs where lines join, and half of what is left.
+std::pair<SpeedSteps, SpeedSteps> speed_steps(const dynamics::BaseTrajectory& base,
+                                              const std::vector<double>& times, const Ends& ends,
+                                              const LineRules& rules) {
+  SpeedSteps x{kOfSpeedStep * rules.max_speed_step_mm_s, rules.max_accel_mm_s2};
+  SpeedSteps y = x;
+  if (!rules.motors.shared_by_xy()) {
+    return {x, y};
+  }
+  std::array<double, 2> before{};
+  if (!ends.from_rest) {
+    before = {base.x_at(0.0).velocity_mm_s, base.y_at(0.0).velocity_mm_s};
+  }
+  double before_s = 0.0;
+  for (std::size_t k = 0; k + 1 < times.size(); ++k) {
+    const double duration_s = times[k + 1] - times[k];
+    const std::array<double, 2> speed = {
+        (base.x_at(times[k + 1]).position_mm - base.x_at(times[k]).position_mm) / duration_s,
+        (base.y_at(times[k + 1]).position_mm - base.y_at(times[k]).position_mm) / duration_s};
+    const double middles_s = 0.5 * (before_s + duration_s);
+    const double of_x = std::abs(speed[0] - before[0]) / middles_s;
+    const double of_y = std::abs(speed[1] - before[1]) / middles_s;
+    const double left = std::max(rules.max_accel_mm_s2 - of_x - of_y, 0.0);
+    x.accel_at_mm_s2.push_back(of_x + 0.5 * left);
+    y.accel_at_mm_s2.push_back(of_y + 0.5 * left);
+    before = speed;
+    before_s = duration_s;
+  }
+  return {x, y};
+}
+
 Polygon polygon(const Run& run, const Timetable& table, const std::vector<double>& wanted,
                 const Grid& grid, const LineRules& rules) {
   const dynamics::BaseTrajectory& base = *run.base;
@@ -150,11 +183,11 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
   }
   const VertexChooser along_x(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x);
   const VertexChooser along_y(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y);
-  const SpeedSteps steps{kOfSpeedStep * rules.max_speed_step_mm_s, rules.max_accel_mm_s2};
   const auto choose = [&] {
     const Ends ends{!run.goes_on, !run.until_s};
-    return std::pair{along_x.choose(times, grid.x, rules.reach_x, steps, ends),
-                     along_y.choose(times, grid.y, rules.reach_y, steps, ends)};
+    const auto [of_x, of_y] = speed_steps(base, times, ends, rules);
+    return std::pair{along_x.choose(times, grid.x, rules.reach_x, of_x, ends),
+                     along_y.choose(times, grid.y, rules.reach_y, of_y, ends)};
   };
   auto vertices = choose();
   while (split_lines(base, vertices.first.nozzle_error_mm, vertices.second.nozzle_error_mm, rules,

@@ -217,8 +217,9 @@ void set_bounds(const SpeedSteps& most, double before_mm_s, const Ends& ends,
     const double middles_s =
         k > 0 ? 0.5 * (stages[k - 1].duration_s + line.duration_s) : 0.5 * line.duration_s;
     const double shared = k == 0 && !ends.from_rest ? 0.5 : 1.0;
+    const double accel = most.accel_at_mm_s2.empty() ? most.accel_mm_s2 : most.accel_at_mm_s2[k];
     const double step =
-        std::max(shared * std::min(most.step_mm_s, most.accel_mm_s2 * middles_s), std::abs(own));
+        std::max(shared * std::min(most.step_mm_s, accel * middles_s), std::abs(own));
     line.least = -step - own;
     line.most = step - own;
   }

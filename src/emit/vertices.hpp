@@ -30,6 +30,8 @@ struct Ends {
 struct SpeedSteps {
   double step_mm_s = std::numeric_limits<double>::infinity();
   double accel_mm_s2 = std::numeric_limits<double>::infinity();
+  // By line, where it begins; empty: accel_mm_s2 everywhere.
+  std::vector<double> accel_at_mm_s2 = {};
 };
 
 // One axis at the ends of the lines.

@@ -283,6 +283,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   }
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
   options.lines.max_accel_mm_s2 = planned_base_accel(settings);
+  options.lines.motors = options.fixed.motors();
   options.version = std::move(version);
   return options;
 }

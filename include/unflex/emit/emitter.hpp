@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "unflex/core/kinematics.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -48,7 +49,9 @@ struct LineRules {
   double burst_s = 0.1;
   // On either axis from line to line, where lines can be short enough.
   double max_speed_step_mm_s = 30.0;
-  double max_accel_mm_s2 = 20000.0;  // the same change by the time between the lines' middles
+  // What motors may do: their change of speed by the time between the lines' middles.
+  double max_accel_mm_s2 = 20000.0;
+  Motors motors;
 
   // The duration of lines as short as they can be without end.
   [[nodiscard]] double even_line_s() const {
