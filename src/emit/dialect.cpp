@@ -37,7 +37,8 @@ constexpr Limits kUnknownLimits = {.max_velocity_mm_s = kUnknown,
                                    .min_travel_velocity_mm_s = kUnknown,
                                    .min_segment_time_s = kUnknown,
                                    .min_movement_velocity_mm_s = kUnknown,
-                                   .jerk_policy = -1};
+                                   .jerk_policy = -1,
+                                   .axis_max_jerk_mm_s = kUnknownAxes};
 
 // One command with those of its words that have to be sent.
 class CommandLine {
@@ -113,7 +114,28 @@ void marlin(const Limits& wanted, const Limits& current, bool classic_jerk,
   advanced.finish(lines);
 }
 
-void rrf(const Limits& wanted, const Limits& current, std::vector<std::string>& lines) {
+// M566 sets the jerk of prints as well, where M205 sets it apart.
+void rrf_jerks(const Limits& wanted, const Limits& current, bool has_print_jerk,
+               std::vector<std::string>& lines) {
+  CommandLine jerk("M566");
+  jerk.axes(has_print_jerk ? wanted.axis_max_jerk_mm_s : wanted.axis_jerk_mm_s,
+            has_print_jerk ? current.axis_max_jerk_mm_s : current.axis_jerk_mm_s, kMinute_s);
+  jerk.word("P", wanted.jerk_policy, current.jerk_policy);
+  jerk.finish(lines);
+  if (has_print_jerk) {
+    std::array<double, 4> now = current.axis_jerk_mm_s;
+    for (std::size_t axis = 0; axis < now.size(); ++axis) {
+      const double max = wanted.axis_max_jerk_mm_s[axis];
+      now[axis] = max != current.axis_max_jerk_mm_s[axis] ? max : now[axis];
+    }
+    CommandLine print_jerk("M205");
+    print_jerk.axes(wanted.axis_jerk_mm_s, now);
+    print_jerk.finish(lines);
+  }
+}
+
+void rrf(const Limits& wanted, const Limits& current, bool has_print_jerk,
+         std::vector<std::string>& lines) {
   CommandLine accel("M201");
   accel.axes(wanted.axis_max_accel_mm_s2, current.axis_max_accel_mm_s2);
   accel.finish(lines);
@@ -126,10 +148,7 @@ void rrf(const Limits& wanted, const Limits& current, std::vector<std::string>& 
   used.word("P", wanted.print_accel_mm_s2, current.print_accel_mm_s2);
   used.word("T", wanted.travel_accel_mm_s2, current.travel_accel_mm_s2);
   used.finish(lines);
-  CommandLine jerk("M566");
-  jerk.axes(wanted.axis_jerk_mm_s, current.axis_jerk_mm_s, kMinute_s);
-  jerk.word("P", wanted.jerk_policy, current.jerk_policy);
-  jerk.finish(lines);
+  rrf_jerks(wanted, current, has_print_jerk, lines);
 }
 
 // Switched off it has no type; switched on again it has that which it is told, or another one.
@@ -178,6 +197,7 @@ Limits limits_in_run(Firmware firmware, const Limits& file, Limits raised) {
     raised.axis_max_velocity_mm_s[gcode::E] = file.axis_max_velocity_mm_s[gcode::E];
     raised.axis_max_accel_mm_s2[gcode::Z] = file.axis_max_accel_mm_s2[gcode::Z];
     raised.axis_jerk_mm_s[gcode::Z] = file.axis_jerk_mm_s[gcode::Z];
+    raised.axis_max_jerk_mm_s[gcode::Z] = file.axis_max_jerk_mm_s[gcode::Z];
     raised.retract_accel_mm_s2 = file.retract_accel_mm_s2;
   }
   return raised;
@@ -198,7 +218,7 @@ std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, cons
       marlin(wanted, current, config.classic_jerk, lines);
       break;
     case Firmware::rrf:
-      rrf(wanted, current, lines);
+      rrf(wanted, current, config.has_print_jerk, lines);
       break;
   }
   return lines;

@@ -171,6 +171,8 @@ void Interpreter::marlin_m_code(Event& event) {
       return marlin_flow_factor(event);
     case 486:
       return object_label(event);
+    case 493:
+      return marlin_fixed_time_motion(event);
     case 501:
     case 502:
       return limits_unknown(event);
@@ -334,6 +336,16 @@ void Interpreter::marlin_retraction_settings(Event& event) {
         state_.retracted = false;  // fwretract.h, refresh_autoretract
       }
       return;
+  }
+}
+
+// feature/ft_motion/M493.cpp. Without S1 the standard motion stays in force.
+void Interpreter::marlin_fixed_time_motion(Event& event) {
+  event.kind = EventKind::barrier;
+  if (command_.value('S').value_or(0.0) != 0.0) {
+    event.warnings.emplace_back(
+        "M493 S1 switches fixed-time motion on, which plans and shapes otherwise than unflex "
+        "reckons; take it out, or compensated motion behind it is drawn wrong");
   }
 }
 

@@ -56,10 +56,14 @@ void Interpreter::rrf_acceleration(Event& event) {
   raise(limits.travel_accel_mm_s2, kMinAccel_mm_s2);
 }
 
-// GCodes2.cpp, M205 in mm/s, M566 in mm/min and with the policy P.
+// GCodes2.cpp, M205 in mm/s, M566 in mm/min and with the policy P. From 3.6 on M205 sets the jerk
+// of prints, at most that of M566, which sets both (Movement/Move.cpp, SetInstantDv).
 void Interpreter::rrf_jerk(Event& event, double scale) {
   axis_limits(event, scale, 0.0, event.limits.edit().axis_jerk_mm_s);
   raise(event.limits.edit().axis_jerk_mm_s, kMinJerk_mm_s);
+  if (options_.has_print_jerk && command_.number == 566) {
+    event.limits.edit().axis_max_jerk_mm_s = event.limits.edit().axis_jerk_mm_s;
+  }
   const std::optional<double> policy = command_.value('P');
   if (command_.number == 566 && policy && *policy >= 0.0) {
     event.limits.edit().jerk_policy = to_int(*policy);

@@ -73,6 +73,15 @@ std::string store(const Value& value, const Key& key, Kinematics& target) {
 
 std::string store(const Value& value, const Key& key, std::string& target) {
   const auto* text = std::get_if<std::string>(&value.content);
+  if (key.words.empty()) {
+    // Free text stands in quotes as it is.
+    const auto is_plain = [](char c) { return c >= ' ' && c < 0x7f && c != '"' && c != '\\'; };
+    if (text == nullptr || !std::ranges::all_of(*text, is_plain)) {
+      return fmt::format("{} must be a text without quotes, not {}", key.name, value.kind);
+    }
+    target = *text;
+    return {};
+  }
   if (text == nullptr || std::ranges::find(key.words, *text) == key.words.end()) {
     return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), value.kind);
   }

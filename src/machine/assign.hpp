@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -44,6 +45,12 @@ struct Reading {
 
   void add(std::string key, Value value, SourcePlace place) {
     assignments.push_back({std::move(key), std::move(value), std::move(place)});
+  }
+  // As if the keys that begin so had not been given.
+  void forget(std::string_view beginning) {
+    std::erase_if(assignments, [&](const Assignment& assignment) {
+      return assignment.key.starts_with(beginning);
+    });
   }
   void note(SourcePlace place, std::string message, std::vector<std::string> keys = {}) {
     notes.push_back({{std::move(place), std::move(message)}, std::move(keys)});

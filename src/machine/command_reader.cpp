@@ -48,6 +48,8 @@ std::string firsts_of_lists(std::string_view line) {
 gcode::InterpreterOptions options_of(Firmware firmware) {
   gcode::InterpreterOptions options = gcode::default_options(firmware);
   options.firmware_retraction = true;
+  // Before 3.6 the two jerks are one, which Settings::print_jerk_mm_s() knows.
+  options.has_print_jerk = firmware == Firmware::rrf;
   return options;
 }
 
@@ -113,9 +115,16 @@ class CommandReader {
         reading.note(place, warning);
       }
     }
+    constexpr std::string_view kJerk = "limits.jerk_";
+    const bool is_print_jerk =
+        interpreter_.options().firmware == Firmware::rrf && command.number == 205;
     for (const LimitValue& limit : limit_values(*event.limits)) {
-      reading.add(limit.key, limit.value, place);
+      reading.add(is_print_jerk ? "limits.print_jerk_" + limit.key.substr(kJerk.size()) : limit.key,
+                  limit.value, place);
       remember(limit, place);
+      if (command.number == 566 && limit.key.starts_with(kJerk)) {
+        reading.forget("limits.print_jerk_" + limit.key.substr(kJerk.size()));
+      }
     }
     switch (command.number) {
       case 92:
@@ -262,7 +271,11 @@ Status read_marlin_line(CommandReader& reader, std::string_view line, std::size_
   if (is_g_unit || is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 208, 593})) {
     reader.take(text, command, place);
   }
-  if (command.number == 205) {
+  if (command.number == 493 && command.value('S')) {
+    reader.reading.add("printer.ft_motion", *command.value('S') != 0.0, place);
+  } else if (command.number == 900 && command.value('K')) {
+    reader.reading.add("printer.linear_advance_s", std::max(0.0, *command.value('K')), place);
+  } else if (command.number == 205) {
     marlin_junctions(reader, command, place);
   } else if (command.number == 593) {
     marlin_shaper(reader, command, place);

@@ -55,9 +55,34 @@ constexpr std::string_view kOtherForm = "not used";
 constexpr std::array<std::string_view, 11> kShaperTypes = {
     "auto", "zv", "mzv", "zvd", "zvdd", "zvddd", "ei", "2hump_ei", "3hump_ei", "ei2", "ei3"};
 
+// What field.cpp knows, and "auto" and "mainline".
+constexpr std::array<std::string_view, 7> kVariants = {
+    "auto", "mainline", "kalico", "kalico_limited", "kalico_smooth", "prusa_buddy", "snapmaker_j1"};
+constexpr std::array<std::string_view, 4> kTransports = {"auto", "card", "serial", "sbc"};
+
 constexpr std::array kKeys = {
     Key{"printer.firmware", &setting<&S::printer, &P::firmware>, kAny, "",
         "Firmware that runs the output"},
+    Key{"printer.variant",
+        &setting<&S::printer, &P::variant>,
+        kAny,
+        "",
+        "What of that firmware it is; auto: as recognised, mainline: its makers' own",
+        {},
+        nullptr,
+        kVariants},
+    Key{"printer.version", &setting<&S::printer, &P::version>, kAny, "",
+        "Its version as it tells it, such as \"v0.13.0-700-g0123abcd\" or \"3.6.0\"; \"\": not "
+        "known"},
+    Key{"printer.transport",
+        &setting<&S::printer, &P::transport>,
+        kAny,
+        "",
+        "How lines reach the firmware: from its card or Klipper's virtual_sdcard, by USB from a "
+        "host, by RRF's SBC; auto: card",
+        {},
+        nullptr,
+        kTransports},
     Key{"printer.travel_x_mm", &setting<&S::printer, &P::travel_x_mm>, kAny, "mm",
         "Where the base may be along X, [min, max]", kNotLimited},
     Key{"printer.travel_y_mm", &setting<&S::printer, &P::travel_y_mm>, kAny, "mm",
@@ -91,6 +116,10 @@ constexpr std::array kKeys = {
         Bounds{.min = 1.0, .max = 255.0}, "", "Marlin: N_ARC_CORRECTION"},
     Key{"printer.arc_p_circles", &setting<&S::printer, &P::arc_p_circles>, kAny, "",
         "Marlin: ARC_P_CIRCLES"},
+    Key{"printer.ft_motion", &setting<&S::printer, &P::ft_motion>, kAny, "",
+        "Marlin: fixed-time motion is on (M493 S1)"},
+    Key{"printer.linear_advance_s", &setting<&S::printer, &P::linear_advance_s>, kNotNegative, "s",
+        "Marlin: M900 K; 0 where LIN_ADVANCE is not built in"},
     Key{"printer.x_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 0>, kPositive, "1/mm",
         "Marlin, RRF: M92 X", "80", &derived_of_axis<&S::steps_per_mm, 0>},
     Key{"printer.y_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 1>, kPositive, "1/mm",
@@ -207,6 +236,14 @@ constexpr std::array kKeys = {
     Key{"limits.jerk_e_mm_s", &of_axis<&S::limits, &L::jerk_mm_s, 3>, kNotNegative, "mm/s",
         "Marlin with printer.classic_jerk: M205 E; RRF: M566 E", "5",
         &derived_of_axis<&S::jerk_mm_s, 3>},
+    Key{"limits.print_jerk_x_mm_s", &of_axis<&S::limits, &L::print_jerk_mm_s, 0>, kNotNegative,
+        "mm/s", "RRF: M205 X", "limits.jerk_x_mm_s", &derived_of_axis<&S::print_jerk_mm_s, 0>},
+    Key{"limits.print_jerk_y_mm_s", &of_axis<&S::limits, &L::print_jerk_mm_s, 1>, kNotNegative,
+        "mm/s", "RRF: M205 Y", "limits.jerk_y_mm_s", &derived_of_axis<&S::print_jerk_mm_s, 1>},
+    Key{"limits.print_jerk_z_mm_s", &of_axis<&S::limits, &L::print_jerk_mm_s, 2>, kNotNegative,
+        "mm/s", "RRF: M205 Z", "limits.jerk_z_mm_s", &derived_of_axis<&S::print_jerk_mm_s, 2>},
+    Key{"limits.print_jerk_e_mm_s", &of_axis<&S::limits, &L::print_jerk_mm_s, 3>, kNotNegative,
+        "mm/s", "RRF: M205 E", "limits.jerk_e_mm_s", &derived_of_axis<&S::print_jerk_mm_s, 3>},
     Key{"limits.jerk_policy", &setting<&S::limits, &L::jerk_policy>, Bounds{.min = 0.0, .max = 1.0},
         "", "RRF: M566 P"},
     Key{"limits.min_velocity_mm_s", &setting<&S::limits, &L::min_velocity_mm_s>, kNotNegative,
@@ -351,7 +388,8 @@ constexpr std::array kKeys = {
         "0.3 at 45 Hz, in proportion to the lower frequency", &derived<&S::tolerance_um>},
     Key{"emit.max_lines_per_s", &setting<&S::emit, &T::max_lines_per_s>, Bounds{.min = 1.0}, "1/s",
         "Lines the printer can take in a second of print; compensated ones never exceed it",
-        "Klipper 1000, Marlin 200, RRF 500", &derived<&S::max_lines_per_s>},
+        "Klipper 1000, Marlin 200, RRF 500, by serial 100, RRF by sbc 250",
+        &derived<&S::max_lines_per_s>},
     Key{"emit.max_speed_step_mm_s", &setting<&S::emit, &T::max_speed_step_mm_s>, kPositive, "mm/s",
         "How much an axis' speed may change from line to line, where lines can be short enough"},
     Key{"emit.accel_mm_s2", &setting<&S::emit, &T::accel_mm_s2>, kPositive, "mm/s²",

@@ -76,7 +76,7 @@ std::string range_text(const Key& key) {
     return "min < max";
   }
   if (std::holds_alternative<std::string& (*)(Draft&)>(key.member)) {
-    return fmt::format("\"{}\"", fmt::join(key.words, "\", \""));
+    return key.words.empty() ? "a text" : fmt::format("\"{}\"", fmt::join(key.words, "\", \""));
   }
   return bounds_text(key.bounds);
 }

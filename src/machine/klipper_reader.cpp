@@ -88,6 +88,7 @@ class Reader {
     }
     minimum_cruise_ratio();
     firmware_retraction();
+    kalico();
     travel("x");
     travel("y");
     input_shaper("x");
@@ -165,6 +166,29 @@ class Reader {
       }
     }
     return {};
+  }
+
+  // By sections, kinematics and shapers that Klipper does not have; what unflex cannot work with
+  // comes last and counts (field.cpp).
+  void kalico() {
+    const auto recognised = [&](const char* variant, const SourcePlace& at) {
+      reading_.add("printer.variant", variant, at);
+    };
+    for (const std::string section : {"danger_options", "kalico"}) {
+      if (const KlipperSection* const found = config_->find(section)) {
+        recognised("kalico", found->place);
+      }
+    }
+    for (const std::string name : {"shaper_type", "shaper_type_x", "shaper_type_y"}) {
+      const KlipperOption* const type = option("input_shaper", name);
+      if (type != nullptr && (type->text.starts_with("smooth_") || type->text == "smoother")) {
+        recognised("kalico_smooth", type->place);
+      }
+    }
+    const KlipperOption& kinematics = *option("printer", "kinematics");
+    if (kinematics.text.starts_with("limited_")) {
+      recognised("kalico_limited", kinematics.place);
+    }
   }
 
   // Before minimum_cruise_ratio Klipper had max_accel_to_decel.

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -39,7 +40,10 @@ std::vector<LimitValue> limit_values(const gcode::LimitChange& change) {
   c.add("limits.minimum_cruise_ratio", change.minimum_cruise_ratio);
   c.add("limits.max_{}_velocity_mm_s", change.axis_max_velocity_mm_s);
   c.add("limits.max_{}_accel_mm_s2", change.axis_max_accel_mm_s2);
-  c.add("limits.jerk_{}_mm_s", change.axis_jerk_mm_s);
+  // Of RepRapFirmware, M566's where there are two.
+  const bool is_max = std::ranges::any_of(change.axis_max_jerk_mm_s,
+                                          [](const auto& value) { return value.has_value(); });
+  c.add("limits.jerk_{}_mm_s", is_max ? change.axis_max_jerk_mm_s : change.axis_jerk_mm_s);
   c.add("limits.print_accel_mm_s2", change.print_accel_mm_s2);
   c.add("limits.travel_accel_mm_s2", change.travel_accel_mm_s2);
   c.add("limits.retract_accel_mm_s2", change.retract_accel_mm_s2);

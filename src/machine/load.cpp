@@ -8,6 +8,7 @@
 
 #include "command_reader.hpp"
 #include "draft.hpp"
+#include "field.hpp"
 #include "file_text.hpp"
 #include "key_table.hpp"
 #include "key_values.hpp"
@@ -51,8 +52,9 @@ Draft defaults() {
 
 // Stores what a printer file says, whatever kind it is of.
 Status read_printer(std::string_view text, const std::string& name, Draft& draft) {
-  const auto store = [&](const Reading& reading) {
+  const auto store = [&](Reading reading) {
     draft.foreign_file = name;
+    recognise_firmware(text, name, reading);
     return apply(reading, draft);
   };
   switch (source_kind(text)) {
@@ -164,6 +166,7 @@ Status read_print(const Sources& sources, Draft& draft) {
   Status applied = apply(reading, draft);
   if (applied) {
     bound_z(reading, draft);
+    read_start_code(*sources.print, draft);
   }
   return applied;
 }
@@ -190,6 +193,7 @@ Result<Settings> finish(Draft draft) {
   if (Status checked = check_consistency(draft); !checked) {
     return tl::unexpected(checked.error());
   }
+  judge_variant(draft);
   tell_notes(draft);
   note_unknown_resonances(draft);
   record_origins(draft);

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "field.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
 
@@ -99,6 +100,24 @@ std::array<double, 4> Settings::jerk_mm_s() const {
                                           : std::array{10.0, 10.0, 0.3, 5.0});
 }
 
+// Movement/Move.cpp, SetInstantDv: at most that of M566. Before 3.6 there is one jerk, which M205
+// sets as well as M566 does; unknown versions are taken for such.
+std::array<double, 4> Settings::print_jerk_mm_s() const {
+  if (printer.firmware != Firmware::rrf) {
+    return jerk_mm_s();
+  }
+  std::array<double, 4> values = or_default(limits.print_jerk_mm_s, jerk_mm_s());
+  if (has_print_jerk()) {
+    std::ranges::transform(values, jerk_mm_s(), values.begin(),
+                           [](double own, double most) { return std::min(own, most); });
+  }
+  return values;
+}
+
+bool Settings::has_print_jerk() const {
+  return printer.firmware == Firmware::rrf && is_at_least(printer.version, 3, 6);
+}
+
 std::array<double, 4> Settings::steps_per_mm() const {
   return or_default(printer.steps_per_mm, printer.firmware == Firmware::rrf
                                               ? std::array{80.0, 80.0, 800.0, 420.0}
@@ -138,8 +157,16 @@ double Settings::retract_accel_mm_s2() const {
   return limits.retract_accel_mm_s2.value_or(limits.max_accel_mm_s2);
 }
 
+// docs/firmware.md says where they are from.
 double Settings::max_lines_per_s() const {
-  return emit.max_lines_per_s.value_or(by_firmware(printer.firmware, 1000.0, 200.0, 500.0));
+  const auto by_transport = [this] {
+    if (printer.transport == "serial") {
+      return 100.0;
+    }
+    const bool is_sbc = printer.transport == "sbc" && printer.firmware == Firmware::rrf;
+    return is_sbc ? 250.0 : by_firmware(printer.firmware, 1000.0, 200.0, 500.0);
+  };
+  return emit.max_lines_per_s.value_or(by_transport());
 }
 
 double Settings::max_extrude_cross_section_mm2() const {

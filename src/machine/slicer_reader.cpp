@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 
+#include "field.hpp"
 #include "text_lines.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/command.hpp"
@@ -89,6 +90,10 @@ class Reader {
   Reading read(std::optional<Firmware> runs, bool by_default) {
     diameter("nozzle_diameter", "extruder.nozzle_diameter_mm");
     diameter("filament_diameter", "extruder.filament_diameter_mm");
+    const SlicerOption* const model = option("printer_model");
+    recognise_print(*print_, model == nullptr ? "" : model->text,
+                    model == nullptr ? SourcePlace{} : model->place,
+                    by_default ? std::nullopt : runs, reading_);
     const std::optional<Firmware> named = flavor(by_default);
     if (!named) {
       return std::move(reading_);

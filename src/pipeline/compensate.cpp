@@ -118,6 +118,9 @@ bool can_repeat(const Job& job) { return job.input_fd < 0 && job.output_fd < 0; 
 }  // namespace
 
 Result<report::Report> compensate(const Job& job, Progress& progress) {
+  if (const std::optional<Diagnostic>& refusal = job.settings.refusal) {
+    return fail(ErrorKind::usage, refusal->place, refusal->message);
+  }
   return compensate_with(job, engines_of(job.engine), progress);
 }
 

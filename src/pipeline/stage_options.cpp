@@ -135,6 +135,9 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
     case Firmware::rrf:
       limits.jerk_policy = 1;
       limits.min_movement_velocity_mm_s = 0.01;  // AbsoluteMinFeedrate
+      for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::E}) {
+        limits.axis_max_jerk_mm_s[axis] = settings.has_print_jerk() ? corner : planner::kNoLimit;
+      }
       break;
   }
   for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::E}) {
@@ -170,6 +173,7 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
   options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
   options.shaper_type = settings.shaper_type_x();
+  options.has_print_jerk = settings.has_print_jerk();
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
   options.steps_per_mm = settings.steps_per_mm();
   return options;
@@ -184,7 +188,10 @@ planner::Limits planner_limits(const machine::Settings& settings) {
   limits.accel_to_decel_mm_s2 = (1.0 - limits.minimum_cruise_ratio) * limits.max_accel_mm_s2;
   limits.axis_max_velocity_mm_s = settings.axis_max_velocity_mm_s();
   limits.axis_max_accel_mm_s2 = settings.axis_max_accel_mm_s2();
-  limits.axis_jerk_mm_s = settings.jerk_mm_s();
+  limits.axis_jerk_mm_s = settings.print_jerk_mm_s();
+  if (settings.has_print_jerk()) {
+    limits.axis_max_jerk_mm_s = settings.jerk_mm_s();
+  }
   limits.print_accel_mm_s2 = settings.print_accel_mm_s2();
   limits.travel_accel_mm_s2 = settings.travel_accel_mm_s2();
   limits.retract_accel_mm_s2 = settings.retract_accel_mm_s2();
@@ -217,6 +224,7 @@ planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
   config.minimum_planner_speed_mm_s = settings.printer.minimum_planner_speed_mm_s;
   config.block_buffer_size = config.ring_length = static_cast<int>(settings.queue_length());
   config.step_clock_hz = settings.printer.step_clock_hz;
+  config.has_print_jerk = settings.has_print_jerk();
   return config;
 }
 

@@ -1,5 +1,7 @@
 #include "unflex/planner/planner.hpp"
 
+#include <algorithm>
+
 #include "unflex/planner/klipper_planner.hpp"
 #include "unflex/planner/marlin_planner.hpp"
 #include "unflex/planner/rrf_planner.hpp"
@@ -30,7 +32,12 @@ void apply(const gcode::LimitChange& change, Limits& limits) {
   put(change.accel_to_decel_mm_s2, limits.accel_to_decel_mm_s2);
   put(change.axis_max_velocity_mm_s, limits.axis_max_velocity_mm_s);
   put(change.axis_max_accel_mm_s2, limits.axis_max_accel_mm_s2);
+  put(change.axis_max_jerk_mm_s, limits.axis_max_jerk_mm_s);
   put(change.axis_jerk_mm_s, limits.axis_jerk_mm_s);
+  for (std::size_t axis = 0; axis < limits.axis_jerk_mm_s.size(); ++axis) {
+    limits.axis_jerk_mm_s[axis] =
+        std::min(limits.axis_jerk_mm_s[axis], limits.axis_max_jerk_mm_s[axis]);
+  }
   put(change.print_accel_mm_s2, limits.print_accel_mm_s2);
   put(change.travel_accel_mm_s2, limits.travel_accel_mm_s2);
   put(change.retract_accel_mm_s2, limits.retract_accel_mm_s2);

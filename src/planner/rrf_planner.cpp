@@ -50,6 +50,7 @@ Limits rrf_raised(Limits limits) {
   for (const auto axis : {X, Y, Z, E}) {
     raise(limits.axis_max_velocity_mm_s[axis], limits.min_movement_velocity_mm_s);
     raise(limits.axis_max_accel_mm_s2[axis], kMinAccel_mm_s2);
+    raise(limits.axis_max_jerk_mm_s[axis], kMinJerk_mm_s);
     raise(limits.axis_jerk_mm_s[axis], kMinJerk_mm_s);
   }
   raise(limits.print_accel_mm_s2, kMinAccel_mm_s2);

@@ -90,6 +90,10 @@ std::string limits_difference(const planner::Limits& input, const planner::Limit
                                  output.axis_max_accel_mm_s2[axis]);
     differences.compare_relative(fmt::format("jerk of {}", kAxes[axis]), input.axis_jerk_mm_s[axis],
                                  output.axis_jerk_mm_s[axis]);
+    if (input.axis_max_jerk_mm_s[axis] != output.axis_max_jerk_mm_s[axis]) {
+      differences.compare_relative(fmt::format("most jerk of {}", kAxes[axis]),
+                                   input.axis_max_jerk_mm_s[axis], output.axis_max_jerk_mm_s[axis]);
+    }
   }
   differences.compare_relative("acceleration of prints", input.print_accel_mm_s2,
                                output.print_accel_mm_s2);

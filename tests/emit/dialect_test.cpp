@@ -60,6 +60,36 @@ TEST(LimitLines, TellMarlinWithClassicJerkTheJerks) {
             "M205 X8 Y7 E10 S0 T0 B20000");
 }
 
+// From 3.6 on: M566 sets the most and the jerk of prints, M205 the latter.
+TEST(LimitLines, SetBothJerksOfRepRapFirmware) {
+  planner::FirmwareConfig config = config_of(Firmware::rrf);
+  config.has_print_jerk = true;
+  planner::Limits file = some_limits();
+  file.axis_max_jerk_mm_s = {10.0, 7.0, 2.0, 10.0};
+  planner::Limits run = file;
+  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::E}) {
+    run.axis_jerk_mm_s[axis] = run.axis_max_jerk_mm_s[axis] = 1000.0;
+  }
+  EXPECT_THAT(limit_lines(config, run, file), ElementsAre("M566 X60000 Y60000 E60000"));
+  EXPECT_THAT(limit_lines(config, file, run), ElementsAre("M566 X600 Y420 E600", "M205 X8"));
+  EXPECT_THAT(limit_lines(config, file, file), IsEmpty());
+  planner::Limits lower = file;
+  lower.axis_jerk_mm_s[gcode::Y] = 5.0;
+  EXPECT_THAT(limit_lines(config, lower, file), ElementsAre("M205 Y5"));
+  EXPECT_EQ(limit_lines(config, file, unknown_to_run(Firmware::rrf, file)).back(), "M205 X8");
+  // Read by the firmware they put in force what was wanted.
+  gcode::InterpreterOptions options = gcode::default_options(Firmware::rrf);
+  options.has_print_jerk = true;
+  for (const planner::Limits& wanted : {file, lower}) {
+    gcode::Interpreter printer(options);
+    planner::Limits limits = run;
+    for (const std::string& line : limit_lines(config, wanted, run)) {
+      planner::apply(*printer.interpret({line, 1}).limits, limits);
+    }
+    EXPECT_EQ(limits, wanted);
+  }
+}
+
 TEST(LimitLines, AreOnlyWhatDiffers) {
   const planner::Limits current = some_limits();
   planner::Limits wanted = current;

@@ -103,6 +103,17 @@ TEST(MarlinTool, HasItsOwnPressureAdvance) {
   EXPECT_EQ(session.read("M900 K0.05").kind, EventKind::barrier) << "of the other one, maybe";
 }
 
+TEST(MarlinFixedTimeMotion, IsWarnedOfWhereItGoesOn) {
+  Session session(default_options(Firmware::marlin));
+  session.read("G28\nG1 X1 Y1 Z1");
+  const Event off = session.read("M493 S0");
+  EXPECT_EQ(off.kind, EventKind::barrier);
+  EXPECT_FALSE(off.position_lost);
+  EXPECT_THAT(off.warnings, IsEmpty());
+  EXPECT_EQ(session.read("M493 S1").warnings.size(), 1U);
+  EXPECT_TRUE(session.move("G1 X2").start_known);
+}
+
 TEST(MarlinModes, AreSetWhateverStandsInParentheses) {
   Session session(default_options(Firmware::marlin));
   session.read("M83");

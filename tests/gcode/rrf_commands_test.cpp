@@ -252,5 +252,19 @@ TEST(RrfShaper, ThatIsOffTakesAFrequencyForZvd) {
   EXPECT_EQ(session.state().shaper_freq_x_hz, 35.0);
 }
 
+TEST(RrfJerk, IsTwoFrom3_6On) {
+  InterpreterOptions options = default_options(Firmware::rrf);
+  Interpreter before(options);
+  EXPECT_FALSE(before.interpret({"M566 X600", 1}).limits->axis_max_jerk_mm_s[X]);
+  options.has_print_jerk = true;
+  Interpreter since(options);
+  const Event both = since.interpret({"M566 X600", 1});
+  EXPECT_EQ(both.limits->axis_max_jerk_mm_s[X], 10.0);
+  EXPECT_EQ(both.limits->axis_jerk_mm_s[X], 10.0);
+  const Event of_prints = since.interpret({"M205 X8", 1});
+  EXPECT_FALSE(of_prints.limits->axis_max_jerk_mm_s[X]);
+  EXPECT_EQ(of_prints.limits->axis_jerk_mm_s[X], 8.0);
+}
+
 }  // namespace
 }  // namespace unflex::gcode

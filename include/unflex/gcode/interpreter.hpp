@@ -58,6 +58,7 @@ struct LimitChange {
   AxisValues axis_max_velocity_mm_s;
   AxisValues axis_max_accel_mm_s2;
   AxisValues axis_jerk_mm_s;
+  AxisValues axis_max_jerk_mm_s;  // RepRapFirmware from 3.6: what axis_jerk_mm_s may be at most
   std::optional<double> print_accel_mm_s2;
   std::optional<double> travel_accel_mm_s2;
   std::optional<double> retract_accel_mm_s2;
@@ -150,6 +151,8 @@ struct InterpreterOptions {
   // RepRapFirmware's M593 P in config.g. Its off, P"none", replaces the type, so that switching the
   // shaper on again takes it.
   std::string shaper_type{};
+  // RepRapFirmware from 3.6: M205 sets the jerk of prints alone, M566 that and the most it may be.
+  bool has_print_jerk = false;
   // Of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
   double filament_diameter_mm = 1.75;
   // The configuration's, which an M92 has to agree with.
@@ -280,6 +283,7 @@ class Interpreter {
   void marlin_retraction_settings(Event& event);
   void marlin_shaper(Event& event);
   void marlin_pressure_advance(Event& event);
+  void marlin_fixed_time_motion(Event& event);
   void marlin_dwell(Event& event);
 
   void rrf(Event& event, std::string_view content);

@@ -27,6 +27,11 @@ using AxisOptions = std::array<std::optional<double>, 4>;
 
 struct PrinterSettings {
   Firmware firmware = Firmware::klipper;
+  // What of that firmware it is, where it is not its makers' own (docs/compatibility.md). "auto":
+  // as recognised; "mainline": nothing else, whatever was recognised.
+  std::string variant = "auto";
+  std::string version;             // as the firmware tells it; empty: not known
+  std::string transport = "auto";  // how lines reach the firmware: "card", "serial", "sbc"
   // Where the base may be. Unset: not limited, except that it stays above 0 where the path does.
   std::optional<Range> travel_x_mm;
   std::optional<Range> travel_y_mm;
@@ -51,6 +56,8 @@ struct PrinterSettings {
   double min_circle_segments = 72.0;         // MIN_CIRCLE_SEGMENTS, a whole number
   double arc_correction_interval = 25.0;     // N_ARC_CORRECTION, a whole number
   bool arc_p_circles = false;                // ARC_P_CIRCLES
+  bool ft_motion = false;                    // M493 S1: fixed-time motion is on
+  double linear_advance_s = 0.0;             // M900 K, 0 without LIN_ADVANCE
   std::optional<double>
       queue_length;                 // moves the firmware plans ahead; unset: the firmware's default
   double step_clock_hz = 750000.0;  // RepRapFirmware, StepClockRate
@@ -80,6 +87,7 @@ struct LimitSettings {
   AxisOptions axis_max_velocity_mm_s;
   AxisOptions axis_max_accel_mm_s2;
   AxisOptions jerk_mm_s;  // Marlin with classic jerk, RepRapFirmware; unset: the firmware's default
+  AxisOptions print_jerk_mm_s;                // RepRapFirmware, M205; unset: jerk_mm_s
   std::optional<double> print_accel_mm_s2;    // unset: Marlin max_accel_mm_s2, RRF no limit
   std::optional<double> travel_accel_mm_s2;   // likewise
   std::optional<double> retract_accel_mm_s2;  // Marlin; unset: max_accel_mm_s2
@@ -172,11 +180,16 @@ struct Settings {
   std::vector<std::pair<std::string, std::string>> origins;
   // What the user should know about what was read.
   std::vector<Diagnostic> notes;
+  // Why no print is compensated for this printer, and the way out (docs/compatibility.md).
+  std::optional<Diagnostic> refusal;
 
   // The values behind unset options, by the firmware's own formulas and defaults.
   [[nodiscard]] std::array<double, 4> axis_max_velocity_mm_s() const;
   [[nodiscard]] std::array<double, 4> axis_max_accel_mm_s2() const;
   [[nodiscard]] std::array<double, 4> jerk_mm_s() const;
+  // RepRapFirmware: the jerk of prints, and whether M205 sets it apart from M566's.
+  [[nodiscard]] std::array<double, 4> print_jerk_mm_s() const;
+  [[nodiscard]] bool has_print_jerk() const;
   [[nodiscard]] std::array<double, 4> steps_per_mm() const;
   [[nodiscard]] double queue_length() const;
   [[nodiscard]] double retract_length_mm() const;

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -17,6 +18,8 @@
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::planner {
+
+inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 // Limits a file may change in its middle. Arrays are per axis X Y Z E.
 struct Limits {
@@ -45,6 +48,8 @@ struct Limits {
   // RepRapFirmware.
   double min_movement_velocity_mm_s = 0.5;  // M203 I
   int jerk_policy = 0;                      // M566 P
+  // From 3.6, M566: the most that axis_jerk_mm_s, then M205's, may be.
+  std::array<double, 4> axis_max_jerk_mm_s{kNoLimit, kNoLimit, kNoLimit, kNoLimit};
 
   friend bool operator==(const Limits&, const Limits&) = default;
 };
@@ -85,7 +90,8 @@ struct FirmwareConfig {
   // RepRapFirmware 3.5.3 on a Duet 3 with a SAME70 (MB6HC, MB6XD). Others have 40 moves; a Duet 2
   // 937500 clocks per second (src/Movement/Move.h: InitialDdaRingLength, M595 P;
   // src/RepRapFirmware.h: StepClockRate).
-  int ring_length = 60;  // at least 4
+  int ring_length = 60;         // at least 4
+  bool has_print_jerk = false;  // from 3.6: Limits::axis_max_jerk_mm_s is a limit of its own
   double step_clock_hz = 750000.0;
 
   [[nodiscard]] Motors motors() const { return {kinematics, firmware}; }
