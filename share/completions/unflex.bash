@@ -15,6 +15,7 @@ _unflex_options() {
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
            '--report -q --quiet' ;;
     printer) echo '-h --help' ;;
+    'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer init') echo '-h --help --from -o --output --set -q --quiet' ;;
   esac
 }
@@ -22,7 +23,7 @@ _unflex_options() {
 _unflex_commands() {
   case $1 in
     '') echo 'compensate batch verify inspect study identify printer' ;;
-    printer) echo 'init' ;;
+    printer) echo 'init line-test' ;;
   esac
 }
 

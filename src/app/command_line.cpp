@@ -174,6 +174,14 @@ void add_printer(CLI::App& program, RunConfig& config) {
   add_overrides(*init, config);
   init->add_flag("-q,--quiet", config.quiet, "No summary");
   init->callback([&config] { config.command = Command::printer_init; });
+  CLI::App* const lines = printer->add_subcommand(
+      "line-test", "Write G-code that makes the printer show how many lines per second it takes");
+  lines->add_option("-o,--output", config.output, "Where to write, - for stdout")
+      ->type_name("OUT")
+      ->required();
+  add_settings(*lines, config);
+  lines->add_flag("-q,--quiet", config.quiet, "No summary");
+  lines->callback([&config] { config.command = Command::line_test; });
 }
 
 // A resonance in a print: spacing, speed and decay of its waves.

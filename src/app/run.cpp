@@ -13,6 +13,7 @@
 #include "hook.hpp"
 #include "identify.hpp"
 #include "inspection.hpp"
+#include "line_test.hpp"
 #include "log.hpp"
 #include "print_run.hpp"
 #include "printer_init.hpp"
@@ -131,6 +132,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return run_inspect(config, console);
     case Command::printer_init:
       return run_printer_init(config, console);
+    case Command::line_test:
+      return run_line_test(config, console);
     case Command::identify:
       return run_identify(config, console);
     case Command::study:

@@ -13,7 +13,7 @@
 
 namespace unflex::app {
 
-enum class Command { compensate, verify, inspect, printer_init, identify, study, batch };
+enum class Command { compensate, verify, inspect, printer_init, line_test, identify, study, batch };
 
 // The codes the program exits with, see docs/cli.md.
 enum class ExitCode : int {
@@ -41,7 +41,7 @@ struct RunConfig {
   // empty for the thesis' cases
   std::string input;
   // batch: the folder of the prints
-  // compensate, printer init, batch: -o, or the input with --in-place; verify: OUT
+  // compensate, printer init, printer line-test, batch: -o, or the input with --in-place; verify: OUT
   std::string output;
   bool in_place = false;
   std::optional<std::string> printer_file;
