@@ -225,6 +225,15 @@ void marlin_linear_advance(Draft& draft) {
   }
 }
 
+// Whatever else stands there is no version.
+void add_version(const std::string& version, const SourcePlace& place, Reading& reading) {
+  constexpr std::string_view kInVersions =
+      "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.+-_";
+  if (!version.empty() && version.find_first_not_of(kInVersions) == std::string::npos) {
+    reading.add("printer.version", version, place);
+  }
+}
+
 }  // namespace
 
 void recognise_firmware(std::string_view text, const std::string& file, Reading& reading) {
@@ -232,7 +241,7 @@ void recognise_firmware(std::string_view text, const std::string& file, Reading&
     const SourcePlace place{file, number};
     // klippy.log's.
     if (const auto version = behind(line, "Git version: '", '\'')) {
-      reading.add("printer.version", *version, place);
+      add_version(*version, place, reading);
     }
     const auto name = behind(line, "FIRMWARE_NAME:", '\0');
     if (!name) {
@@ -245,9 +254,9 @@ void recognise_firmware(std::string_view text, const std::string& file, Reading&
       reading.add("printer.variant", std::string(kSnapmakerJ1), place);
     }
     if (const auto version = behind(line, "FIRMWARE_VERSION:", ' ')) {
-      reading.add("printer.version", *version, place);
+      add_version(*version, place, reading);
     } else if (const auto marlin = behind(*name, "Marlin ", ' ')) {
-      reading.add("printer.version", *marlin, place);
+      add_version(*marlin, place, reading);
     }
   });
 }

@@ -67,6 +67,10 @@ INSTANTIATE_TEST_SUITE_P(Field, KlipperVersion,
                                            std::pair{"v0.14.0-635", false},
                                            std::pair{"v0.13.0", false}));
 
+TEST(Klipper, HasNoVersionThatIsNone) {
+  EXPECT_EQ(read(std::string("# Git version: 'a \"word\"'\n") + kPrinterCfg).printer.version, "");
+}
+
 TEST(Klipper, WithoutAShaperOrAsKalicoMayHaveAnyVersion) {
   const std::string version = "printer.version=\"v0.13.0-635\"";
   EXPECT_EQ(refusal(read(kPrinterCfg, {version, "printer.input_shaper_freq_x_hz=0",
