@@ -147,7 +147,8 @@ TEST_P(LongRunOn, IsCompensatedWithoutASeam) {
   const auto& after = report->compensated.extruding;
   EXPECT_LT(after.contour_rms_mm, 0.25 * before.contour_rms_mm);
   EXPECT_LT(after.contour_max_mm, before.contour_max_mm);
-  EXPECT_NEAR(report->emitted_time_s, report->reference_time_s, 0.02);
+  // Klipper stops for 10.5 ms where its shaper goes off, and again where it comes back.
+  EXPECT_NEAR(report->emitted_time_s, report->reference_time_s, 0.03);
   EXPECT_NEAR(report->output_extrusion_mm, report->input_extrusion_mm, 1e-5);
   // One run: its announcements, and nothing restored between its parts.
   const std::string output = folder.output();

@@ -128,6 +128,27 @@ class Reader {
 
 constexpr std::string_view kPoint = ";point ";
 
+// At these the machine does no more than stand still, so its shaper may stay off, as in a run: each
+// switch is a stop.
+bool stays_where_it_is(const std::string& point) {
+  return point.starts_with("EXCLUDE_OBJECT_") || point.starts_with("M486");
+}
+
+bool is_of_shaper(const std::string& word) {
+  return word.starts_with("SHAPER_") || word.starts_with("M593");
+}
+
+bool shaper_is_off(const Regime& regime) {
+  for (const char* word : {"SHAPER_FREQ_X", "SHAPER_FREQ_Y", "M593 XF", "M593 YF"}) {
+    const auto found = regime.find(word);
+    if (found != regime.end() && found->second != "0") {
+      return false;
+    }
+  }
+  const auto type = regime.find("M593 P");
+  return type == regime.end() || type->second == "\"none\"";
+}
+
 // The regime before each line that is marked as a point, and at the end.
 std::vector<std::pair<std::string, Regime>> regimes(const std::string& text, Reader reader) {
   std::vector<std::pair<std::string, Regime>> result;
@@ -194,7 +215,13 @@ class Restoration : public ::testing::TestWithParam<Printer> {
     ASSERT_EQ(found.size(), wanted.size());
     for (std::size_t i = 0; i < wanted.size(); ++i) {
       EXPECT_EQ(found[i].first, wanted[i].first);
-      EXPECT_EQ(found[i].second, wanted[i].second) << "before " << wanted[i].first;
+      Regime have = found[i].second;
+      Regime want = wanted[i].second;
+      if (stays_where_it_is(found[i].first) && shaper_is_off(have)) {
+        std::erase_if(have, [](const auto& word) { return is_of_shaper(word.first); });
+        std::erase_if(want, [](const auto& word) { return is_of_shaper(word.first); });
+      }
+      EXPECT_EQ(have, want) << "before " << wanted[i].first;
     }
     expect_no_point_in_a_run(output);
   }
