@@ -15,7 +15,8 @@
 // The change of speed v_k − v_{k−1} = u + c_k − c_{k−1} has bounds. Where the law above goes beyond
 // them, u is drawn to w, which is within them, by ρ/2 (u − w + λ)², and w to u in turn; the gains
 // stay what they are (O'Donoghue, Stathopoulos & Boyd, A splitting method for optimal control, IEEE
-// Trans. Control Syst. Technol. 21, 2013).
+// Trans. Control Syst. Technol. 21, 2013). Where the base itself needs all of the bounds, that may
+// end off the base's end; then the vertices stay on the curve.
 #include "vertices.hpp"
 
 #include <Eigen/Core>
@@ -42,6 +43,8 @@ constexpr double kAtEnd = 1e3;
 constexpr int kMostRounds = 60;
 constexpr double kSettled_mm_s = 0.02;
 constexpr double kPull = 0.03;
+// By how much of its bounds the last line, which ends where the base does, may exceed them.
+constexpr double kOfBounds = 0.02;
 
 // One line: where it takes (y, o), and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
 struct Stage {
@@ -267,24 +270,37 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
   at_end.topLeftCorner<2, 2>() = ring_down_square(nozzle_);
   at_end(2, 2) = kAtEnd;
   regulate(at_end, stages);
-  AxisVertices result = {{on_curve.front()}, {0.0}};
-  Eigen::Vector4d z = Eigen::Vector4d::Zero();
-  for (std::size_t k = 0; k < lines; ++k) {
-    const Stage& line = stages[k];
-    const auto end_of = [&](double change) {
-      return on_curve[k + 1] + z[2] + line.duration_s * (z[3] + change);
-    };
-    double vertex = on_curve[k + 1];
-    if (k + 1 < lines) {
-      const double wish = end_of(line.feedback * z + line.feed_forward);
-      vertex = place_within(grid, std::clamp(wish, within.min_mm, within.max_mm),
-                            end_of(line.least), end_of(line.most));
+  // Follows the laws, or keeps to the curve; the last line takes what is left. Whether it can.
+  const auto draw = [&](bool by_law, AxisVertices& result) {
+    result = {{on_curve.front()}, {0.0}};
+    Eigen::Vector4d z = Eigen::Vector4d::Zero();
+    bool within_bounds = true;
+    for (std::size_t k = 0; k < lines; ++k) {
+      const Stage& line = stages[k];
+      const auto end_of = [&](double change) {
+        return on_curve[k + 1] + z[2] + line.duration_s * (z[3] + change);
+      };
+      double vertex = on_curve[k + 1];
+      if (k + 1 < lines) {
+        vertex = by_law ? place_within(grid,
+                                       std::clamp(end_of(line.feedback * z + line.feed_forward),
+                                                  within.min_mm, within.max_mm),
+                                       end_of(line.least), end_of(line.most))
+                        : grid.nearest(std::clamp(vertex, within.min_mm, within.max_mm));
+      }
+      Vector5 w;
+      w << z, (vertex - on_curve[k + 1] - z[2]) / line.duration_s - z[3];
+      const double room = kOfBounds * (line.most - line.least) + grid.step_mm / line.duration_s;
+      within_bounds = w[4] >= line.least - room && w[4] <= line.most + room;
+      z = line.move * w + line.shift;
+      result.position_mm.push_back(vertex);
+      result.nozzle_error_mm.push_back(z[0]);
     }
-    Vector5 w;
-    w << z, (vertex - on_curve[k + 1] - z[2]) / line.duration_s - z[3];
-    z = line.move * w + line.shift;
-    result.position_mm.push_back(vertex);
-    result.nozzle_error_mm.push_back(z[0]);
+    return within_bounds;
+  };
+  AxisVertices result;
+  if (!draw(true, result)) {
+    draw(false, result);
   }
   return result;
 }

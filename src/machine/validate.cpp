@@ -225,7 +225,8 @@ double most_of_motor(const Settings& s) {
     return 1.0;
   }
   double most = 0.0;
-  for (const auto& row : Motors(s.kinematics.type, s.printer.firmware).rows()) {
+  const Motors motors(s.kinematics.type, s.printer.firmware);
+  for (const auto& row : motors.rows()) {
     most = std::max(most, std::hypot(row[0], row[1]));
   }
   return most;

@@ -68,6 +68,9 @@ double length_s(const ShaperPulses& pulses) {
 }
 
 bool same(const gcode::Shaper& a, const gcode::Shaper& b) {
+  if (!a.is_on() && !b.is_on()) {
+    return true;
+  }
   return a.freq_x_hz == b.freq_x_hz && a.freq_y_hz == b.freq_y_hz && a.settings == b.settings;
 }
 

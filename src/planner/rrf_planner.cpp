@@ -164,14 +164,16 @@ gcode::Position RrfPlanner::on_steps(const gcode::Position& position_mm) const {
   std::array<double, Motors::kCount> motors_mm{};
   for (std::size_t motor = 0; motor < motors_mm.size(); ++motor) {
     float at_mm = 0.0F;
+    double exactly_at_mm = 0.0;
     for (const auto axis : {X, Y, Z}) {
       at_mm +=
           static_cast<float>(motors_.rows()[motor][axis]) * static_cast<float>(position_mm[axis]);
+      exactly_at_mm += motors_.rows()[motor][axis] * position_mm[axis];
     }
     const double steps_per_mm = config_.steps_per_mm[motor];
     const float steps = at_mm * static_cast<float>(steps_per_mm);
     motors_mm[motor] =
-        steps_per_mm > 0.0 ? std::rint(static_cast<double>(steps)) / steps_per_mm : at_mm;
+        steps_per_mm > 0.0 ? std::rint(static_cast<double>(steps)) / steps_per_mm : exactly_at_mm;
   }
   gcode::Position result = position_mm;
   std::ranges::copy(motors_.axes(motors_mm), result.begin());

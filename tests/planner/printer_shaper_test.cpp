@@ -85,6 +85,17 @@ TEST(Switching, StopsKlipperForBothOfItsFilters) {
   EXPECT_DOUBLE_EQ(switching_s(config, kOff, kOff, {}), 0.0);
 }
 
+// What a shaper that is off would be is all the same.
+TEST(Switching, DoesNotStopWhereBothAreOff) {
+  gcode::Shaper typed = kOff;
+  typed.settings.type_x = "ei";
+  typed.settings.kept_freq_hz = 40.0;
+  for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
+    EXPECT_DOUBLE_EQ(switching_s(config_of(firmware), typed, kOff, {}), 0.0);
+    EXPECT_DOUBLE_EQ(switching_s(config_of(firmware), kOff, typed, {}), 0.0);
+  }
+}
+
 TEST(Switching, WaitsForTheFilterOfPressureAdvanceToo) {
   FirmwareConfig config = config_of(Firmware::klipper);
   EXPECT_NEAR(switching_s(config, kOn, kOff, 0.05), 0.040, 1e-12);
