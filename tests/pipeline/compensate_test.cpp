@@ -292,8 +292,8 @@ TEST_F(Texts, EndARunBeforeASteepMoveThatHardlyClimbs) {
 TEST_F(Texts, PassIntoAKeptMoveAtSpeed) {
   static_cast<void>(
       compensated("G28\nG90\nM83\nG1 Z0.2 F600\nG1 X100 Y100 F3000\nG1 F600\nG10\n"
-                  "G1 X100.007668 Y99.995436 E0.00029\nM205 X8 Y8\nG92 E0\n"
-                  "G1 X100.015841 Y99.988248 E0.00036\nG1 X101.980734 Y101.211794 E-0.3\n"));
+                  "G1 X107.668 Y95.436 E0.29\nM205 X8 Y8\nG92 E0\n"
+                  "G1 X115.841 Y88.248 E0.36\nG1 X117.980734 Y89.211794 E-0.3\n"));
 }
 
 TEST_F(Texts, CountFilamentInStepsOfE) {
@@ -374,8 +374,9 @@ TEST_F(Texts, RewriteDenseWipesWhereTheirLimitsCanBeRaised) {
       "G1 E-0.3 F2400\nG1 Z0.8\nG1 X50 F4800\n";
   for (const char* const firmware : {"marlin", "rrf"}) {
     const std::string output =
-        compensated(input, 1, {std::string("printer.firmware=") + firmware,
-                               "emit.max_lines_per_s=200", "limits.max_e_velocity_mm_s=50"});
+        compensated(input, 1,
+                    {std::string("printer.firmware=") + firmware, "emit.max_lines_per_s=200",
+                     "limits.max_e_velocity_mm_s=50"});
     EXPECT_LE(report_.max_lines_per_s, 200.0) << firmware;
     EXPECT_THAT(output, Not(HasSubstr(wipe.substr(0, wipe.find('\n'))))) << firmware;
     EXPECT_FALSE(report_.kept_moves.contains("retracting move")) << firmware;
