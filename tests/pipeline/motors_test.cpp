@@ -54,6 +54,7 @@ struct Case {
   std::size_t lines;
   std::vector<std::string> overrides;
   double room;  // above the limit that rounding explains, as a share of it
+  double cost;  // of the shared motors: how many times their own motors' RMS
 };
 
 void PrintTo(const Case& tested, std::ostream* out) { *out << tested.name; }
@@ -67,22 +68,25 @@ TEST_P(SharedMotorsOf, KeepTheirLimitsAtLittleCost) {
   const report::Report own = compensated(text, "cartesian", tested.overrides);
   EXPECT_LE(shared.base_max_accel_mm_s2, (1.001 + tested.room) * kMaxAccel_mm_s2);
   EXPECT_LE(shared.compensated.extruding.contour_rms_mm,
-            1.15 * own.compensated.extruding.contour_rms_mm);
+            tested.cost * own.compensated.extruding.contour_rms_mm);
   EXPECT_LT(shared.compensated.extruding.contour_rms_mm,
             0.2 * shared.uncompensated.extruding.contour_rms_mm);
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Machines, SharedMotorsOf,
-    ::testing::Values(Case{"KlipperCorexy", "corexy", "pipeline_star.gcode", 600, {}, 0.02},
-                      Case{"KlipperCorexyFast",
-                           "corexy",
-                           "pipeline_star.gcode",
-                           600,
-                           {"limits.max_accel_mm_s2=10000"},
-                           0.02},
-                      Case{"KlipperHybrid", "hybrid_corexy", "pipeline_star.gcode", 600, {}, 0.02},
-                      Case{"KlipperCorexz", "corexz", "pipeline_vase.gcode", 300, {}, 0.02}),
+    ::testing::Values(
+        Case{"KlipperCorexy", "corexy", "pipeline_star.gcode", 600, {}, 0.02, 1.15},
+        Case{"KlipperCorexyFast",
+             "corexy",
+             "pipeline_star.gcode",
+             600,
+             // The path alone asks a motor for 0.7 of its limit at 45 degrees.
+             {"limits.max_accel_mm_s2=10000"},
+             0.02,
+             1.5},
+        Case{"KlipperHybrid", "hybrid_corexy", "pipeline_star.gcode", 600, {}, 0.02, 1.15},
+        Case{"KlipperCorexz", "corexz", "pipeline_vase.gcode", 300, {}, 0.02, 1.15}),
     [](const auto& tested) { return tested.param.name; });
 
 }  // namespace
