@@ -16,6 +16,7 @@ _unflex_options() {
            '--report -q --quiet' ;;
     printer) echo '-h --help' ;;
     'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
+    'printer macros') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer init') echo '-h --help --from -o --output --set -q --quiet' ;;
   esac
 }
@@ -23,7 +24,7 @@ _unflex_options() {
 _unflex_commands() {
   case $1 in
     '') echo 'compensate batch verify inspect study identify printer' ;;
-    printer) echo 'init line-test' ;;
+    printer) echo 'init line-test macros' ;;
   esac
 }
 
@@ -32,6 +33,7 @@ _unflex_commands() {
 _unflex_value() {
   local print='*.@(gcode|gco|g|bgcode|gcode.gz)' printer='*.@(toml|cfg|g|txt)'
   case $1:$2 in
+    'printer macros:-o' | 'printer macros:--output') echo 'files *.cfg' ;;
     'printer init:-o' | 'printer init:--output') echo 'files *.toml' ;;
     batch: | batch:-o | batch:--output | batch:--report) echo 'folders' ;;
     batch:--summary) echo 'files *.@(json|xml)' ;;

@@ -7,7 +7,7 @@ function __unflex_command
     for word in $words[2..]
         if test -z "$command"; and contains -- $word $__unflex_commands
             set command $word
-        else if test "$command" = printer; and contains -- $word init line-test
+        else if test "$command" = printer; and contains -- $word init line-test macros
             set command "printer $word"
         end
     end
@@ -44,6 +44,7 @@ complete -c unflex -n '__unflex_in ""' -a identify -d 'Find the resonances in re
 complete -c unflex -n '__unflex_in ""' -a printer -d 'Printer files'
 complete -c unflex -n '__unflex_in printer' -a init -d 'Write a printer file from what already describes the printer'
 complete -c unflex -n '__unflex_in printer' -a line-test -d 'Write G-code that shows how many lines per second the printer takes'
+complete -c unflex -n '__unflex_in printer' -a macros -d 'Write macros by which a pause waits for the end of a compensated run'
 
 complete -c unflex -n "__unflex_in $prints" -a $gcode
 complete -c unflex -n '__unflex_in identify' -a '(__unflex_files .csv)'
@@ -73,9 +74,10 @@ complete -c unflex -n '__unflex_in "printer init"' -l from -x -a $printer -d 'Wh
 complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unflex_files .toml)' -d 'Where to write, - for stdout'
 
 complete -c unflex -n '__unflex_in "printer line-test"' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
+complete -c unflex -n '__unflex_in "printer macros"' -s o -l output -x -a '(__unflex_files .cfg)' -d 'Where to write, - for stdout'
 
-complete -c unflex -n "__unflex_in $prints batch 'printer line-test'" -l printer -x -a $printer -d 'The printer'
-complete -c unflex -n "__unflex_in $prints batch 'printer init' 'printer line-test'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n "__unflex_in $prints batch 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
+complete -c unflex -n "__unflex_in $prints batch 'printer init' 'printer line-test' 'printer macros'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
 complete -c unflex -n '__unflex_in inspect' -l report -x -a '(__unflex_files .json)' -d 'Write a report, - for stdout'
 complete -c unflex -n '__unflex_in compensate verify study identify' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
-complete -c unflex -n "__unflex_in $prints batch identify 'printer init' 'printer line-test'" -s q -l quiet -d 'No summary and no progress bar'
+complete -c unflex -n "__unflex_in $prints batch identify 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'

@@ -159,6 +159,19 @@ void add_study(CLI::App& program, RunConfig& config) {
   command->callback([&config] { config.command = Command::study; });
 }
 
+void add_printer_macros(CLI::App& printer, RunConfig& config) {
+  CLI::App* const macros = printer.add_subcommand(
+      "macros", "Write Klipper's macros by which a pause waits for the end of a compensated run");
+  macros
+      ->add_option("-o,--output", config.output,
+                   "Where to write, a file that printer.cfg includes, - for stdout")
+      ->type_name("OUT")
+      ->required();
+  add_settings(*macros, config);
+  macros->add_flag("-q,--quiet", config.quiet, "No summary");
+  macros->callback([&config] { config.command = Command::printer_macros; });
+}
+
 void add_printer(CLI::App& program, RunConfig& config) {
   CLI::App* const printer = program.add_subcommand("printer", "Printer files");
   printer->require_subcommand(1);
@@ -182,6 +195,7 @@ void add_printer(CLI::App& program, RunConfig& config) {
   add_settings(*lines, config);
   lines->add_flag("-q,--quiet", config.quiet, "No summary");
   lines->callback([&config] { config.command = Command::line_test; });
+  add_printer_macros(*printer, config);
 }
 
 // A resonance in a print: spacing, speed and decay of its waves.

@@ -17,6 +17,7 @@
 #include "log.hpp"
 #include "print_run.hpp"
 #include "printer_init.hpp"
+#include "printer_macros.hpp"
 #include "results.hpp"
 #include "signals.hpp"
 #include "unflex/core/caught.hpp"
@@ -134,6 +135,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return run_printer_init(config, console);
     case Command::line_test:
       return run_line_test(config, console);
+    case Command::printer_macros:
+      return run_printer_macros(config);
     case Command::identify:
       return run_identify(config, console);
     case Command::study:

@@ -127,6 +127,7 @@ void Emitter::line(const gcode::Event& event, std::string& out) {
     // RESTORE_GCODE_STATE brings back what was saved, which is not always what the input has now.
     restore_modes(out);
   }
+  tell_shaper(out);
 }
 
 void Emitter::keep(const std::vector<gcode::Event>& events, std::string& out) {
@@ -194,6 +195,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   set_unit(1.0, out);
   set_limits(input_limits_, out);
   restore_modes(out);
+  write_checkpoint("", out);
 }
 
 void Emitter::finish(std::string& out) { restore_shaper(out); }
@@ -211,6 +213,7 @@ void Emitter::enter_run(std::string& out) {
     // first line. G4 without a time has all three end their motion and goes on at once.
     write("G4 P0", out);
   }
+  write_checkpoint(" RUN=1", out);
   write(fmt::format("{} run", kComment), out);
 }
 
@@ -303,13 +306,42 @@ void Emitter::set_limits(const planner::Limits& limits, std::string& out) {
   limits_known_ = true;
 }
 
-void Emitter::restore_shaper(std::string& out) { set_shaper(input_.state().input_shaper(), out); }
+void Emitter::restore_shaper(std::string& out) {
+  set_shaper(input_.state().input_shaper(), out);
+  tell_shaper(out);
+}
 
 void Emitter::set_shaper(const gcode::Shaper& wanted, std::string& out) {
   for (const std::string& text :
        shaper_lines(options_.fixed.firmware, wanted, printer_.state().input_shaper())) {
     write(text, out);
   }
+}
+
+void Emitter::write_checkpoint(std::string_view words, std::string& out) {
+  if (options_.checkpoints) {
+    told_shaper_ = words_of_shaper();
+    write(fmt::format("UNFLEX_CHECKPOINT{}{}", words, told_shaper_), out);
+  }
+}
+
+// A pause from here on finds another shaper.
+void Emitter::tell_shaper(std::string& out) {
+  if (options_.checkpoints && words_of_shaper() != told_shaper_) {
+    write_checkpoint("", out);
+  }
+}
+
+// Those that put the printer's own shaper back while it is off.
+std::string Emitter::words_of_shaper() const {
+  constexpr std::string_view kCommand = "SET_INPUT_SHAPER";
+  std::string words;
+  for (const std::string& back :
+       shaper_lines(options_.fixed.firmware, input_.state().input_shaper(),
+                    printer_.state().input_shaper())) {
+    words += back.substr(kCommand.size());
+  }
+  return words;
 }
 
 }  // namespace unflex::emit

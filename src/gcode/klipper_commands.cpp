@@ -42,7 +42,9 @@ constexpr std::array kStoppingCodes = {17,  109, 116, 119, 126, 127, 150, 190,
 constexpr std::array kCodesWithPoint = {73,  201, 204, 205, 569, 572,  593,
                                         620, 622, 862, 900, 982, 1002, 1015};
 
-constexpr std::array<std::string_view, 22> kPassiveNames = {
+// UNFLEX_CHECKPOINT is the macro that unflex writes (docs/pausing.md). It does nothing unless a
+// pause is wanted, and after one position, limits and shaper are as before.
+constexpr std::array<std::string_view, 23> kPassiveNames = {
     "ECHO",
     "EXCLUDE_OBJECT_DEFINE",
     "GET_POSITION",
@@ -65,6 +67,7 @@ constexpr std::array<std::string_view, 22> kPassiveNames = {
     "SET_TEMPERATURE_FAN_TARGET",
     "STATUS",
     "TURN_OFF_HEATERS",
+    "UNFLEX_CHECKPOINT",
 };
 
 // Of SET_PRINT_STATS_INFO Mainsail's and Fluidd's macros make the pause that the user has asked for

@@ -397,6 +397,8 @@ constexpr std::array kKeys = {
         "1000000, RRF 5 × base.max_accel_mm_s2", &derived<&S::emit_accel_mm_s2>},
     Key{"emit.square_corner_velocity_mm_s", &setting<&S::emit, &T::square_corner_velocity_mm_s>,
         kPositive, "mm/s", "The printer's square_corner_velocity while it runs compensated motion"},
+    Key{"emit.checkpoints", &setting<&S::emit, &T::checkpoints>, kAny, "",
+        "Klipper: call UNFLEX_CHECKPOINT at the end of each run, where a pause then takes effect"},
 
     Key{"verify.step_ms", &setting<&S::verify, &V::step_ms>, Bounds{.min = 0.001, .max = 0.1}, "ms",
         "Step of the integration of the nozzle's motion"},

@@ -266,6 +266,13 @@ Status check_emission(const Draft& draft) {
         draft, {"emit.square_corner_velocity_mm_s", "limits.square_corner_velocity_mm_s"},
         "emit.square_corner_velocity_mm_s must not be below limits.square_corner_velocity_mm_s");
   }
+  if (s.emit.checkpoints && s.printer.firmware != Firmware::klipper) {
+    return conflict(draft, {"emit.checkpoints", "printer.firmware"},
+                    fmt::format("emit.checkpoints is true, but printer.firmware is {}, on which no "
+                                "pause can wait for a run's end; set it to false, docs/pausing.md "
+                                "says where to pause",
+                                to_string(s.printer.firmware)));
+  }
   return {};
 }
 

@@ -293,6 +293,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.max_accel_mm_s2 = planned_base_accel(settings);
   options.lines.motors = options.fixed.motors();
   options.version = std::move(version);
+  options.checkpoints = settings.emit.checkpoints;
   return options;
 }
 

@@ -48,7 +48,9 @@ bool is_known_addition(std::string_view content, Firmware firmware) {
       return true;
     }
   } else if (command.kind == gcode::CommandKind::extended) {
-    return command.name == "SET_VELOCITY_LIMIT" || command.name == "SET_INPUT_SHAPER";
+    constexpr std::array<std::string_view, 3> kNames = {"SET_VELOCITY_LIMIT", "SET_INPUT_SHAPER",
+                                                        "UNFLEX_CHECKPOINT"};
+    return std::ranges::find(kNames, command.name) != kNames.end();
   }
   if (command.is('G', 4)) {
     return only_word(command, 'P') && *command.words.front().value == 0.0;

@@ -64,6 +64,64 @@ TEST(Emitter, PutsLimitsSpeedAndShaperAroundARun) {
                           "M104 S0\n", kShaperOn));
 }
 
+EmitOptions with_checkpoints() {
+  EmitOptions how = options();
+  how.checkpoints = true;
+  return how;
+}
+
+const std::string kBack = " SHAPER_FREQ_X=45 SHAPER_FREQ_Y=45\n";
+const std::string kBegins = "UNFLEX_CHECKPOINT RUN=1" + kBack;
+const std::string kReached = "UNFLEX_CHECKPOINT" + kBack;
+const std::string kShaperIsBack = "UNFLEX_CHECKPOINT\n";
+
+TEST(Emitter, PutsCheckpointsWhereRunsBeginAndEnd) {
+  const std::string text =
+      emit(kHead + "G1 X10 E1 F3000\nG4 P1\nG1 X0 E1\nM104 S0\n", with_checkpoints()).text;
+  ASSERT_THAT(text, StartsWith(kHead));
+  EXPECT_THAT(
+      outline(text.substr(kHead.size())),
+      ElementsAre(";unflex test: compensated for Klipper, not to be compensated again\n",
+                  kShaperOff, kBegins, ";unflex run\n", kRaise, "~", kEnd, kRestore, "G1 F3000\n",
+                  kReached, "G4 P1\n", kBegins, ";unflex run\n", kRaise, "~", kEnd, kRestore,
+                  "G1 F3000\n", kReached, "M104 S0\n", kShaperOn, kShaperIsBack));
+}
+
+TEST(Emitter, TellsOfTheShaperBeforeTheMachineMovesByItself) {
+  EXPECT_THAT(
+      from_first_run(kHead + "G1 X10 E1\nPAUSE\nG1 X0 Y0 Z.2 F6000\nG1 X10 E1\nM84\n",
+                     with_checkpoints()),
+      ElementsAre(";unflex run\n", kRaise, "~", kEnd, kRestore, "G1 F6000\n", kReached, kShaperOn,
+                  kShaperIsBack, "PAUSE\n", "~", kShaperOff, kBegins, ";unflex run\n", kRaise, "~",
+                  kEnd, kRestore, "G1 F6000\n", kReached, kShaperOn, kShaperIsBack, "M84\n"));
+}
+
+// What the file has set there itself holds when a pause comes.
+TEST(Emitter, TellsOfAShaperThatTheFileSetsBetweenRuns) {
+  EXPECT_THAT(
+      from_first_run(kHead + "G1 X10 E1\nSET_INPUT_SHAPER SHAPER_FREQ_X=50\nG4 P1\nG1 X0 E1\n",
+                     with_checkpoints()),
+      ElementsAre(";unflex run\n", kRaise, "~", kEnd, kRestore, "G1 F6000\n", kReached,
+                  "SET_INPUT_SHAPER SHAPER_FREQ_X=50\n", "UNFLEX_CHECKPOINT SHAPER_FREQ_Y=45\n",
+                  "G4 P1\n", "SET_INPUT_SHAPER SHAPER_FREQ_X=0\n",
+                  "UNFLEX_CHECKPOINT RUN=1 SHAPER_FREQ_X=50 SHAPER_FREQ_Y=45\n", ";unflex run\n",
+                  kRaise, "~", kEnd, kRestore, "G1 F6000\n",
+                  "UNFLEX_CHECKPOINT SHAPER_FREQ_X=50 SHAPER_FREQ_Y=45\n",
+                  "SET_INPUT_SHAPER SHAPER_FREQ_X=50 SHAPER_FREQ_Y=45\n", kShaperIsBack));
+}
+
+// Nothing else is changed by them.
+TEST(Emitter, AddsNothingButCheckpoints) {
+  const std::string input = kHead +
+                            "G1 X10 E1\nM204 S700\nG1 Y10 E1\nG28 X\nG1 X20 Y10 F3000\n"
+                            "G1 X10 E1\nG1 Z2\nG1 Y0 E1\n";
+  std::string stripped;
+  for (const std::string& line : lines_of(emit(input, with_checkpoints()).text)) {
+    stripped += line.starts_with("UNFLEX_CHECKPOINT") ? "" : line;
+  }
+  EXPECT_EQ(stripped, emit(input, options()).text);
+}
+
 TEST(Emitter, MarksItsFirstRunOnly) {
   const std::string text =
       emit(kHead + "G1 X10 E1 F3000\nG4 P1\nG1 X0 E1\nG4 P1\nG1 X10 E1\n", options()).text;

@@ -33,25 +33,24 @@ TEST_P(Passive, LetsTheMotionGoOn) {
 
 INSTANTIATE_TEST_SUITE_P(
     Commands, Passive,
-    ::testing::Values("", "; comment", "(comment)", "N5", "M73 P10 R5", "M82", "M104 S210", "M105",
-                      "M106 S255", "M107", "M110 N0", "M115 U3.9.0", "M117 G28 now", "M118 A1 text",
-                      "M140 S60", "M141 S40", "M201 X1000 Y1000", "M203 X200", "M205 X8 Y8",
-                      "M204 P500", "M566 X300 P1", "M569 P0 S1", "M593 F0", "M862.3 P \"MK3S\"",
-                      "M862.1 P0.4", "M906 X800", "M907 E430", "M75", "M76", "M77", "M155 S2",
-                      "M250 C50", "M302 S0", "M355 S1", "SET_FAN_SPEED FAN=a SPEED=.5",
-                      "SET_PIN PIN=a VALUE=1", "SET_LED LED=a RED=1",
-                      "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210", "RESPOND MSG=\"G28\"",
-                      "EXCLUDE_OBJECT_DEFINE NAME=a", "SET_DISPLAY_TEXT MSG=hi",
-                      "set_filament_sensor SENSOR=a ENABLE=0", "SET_IDLE_TIMEOUT TIMEOUT=60",
-                      "SET_GCODE_VARIABLE MACRO=a VARIABLE=b VALUE=1", "TURN_OFF_HEATERS",
-                      "SET_SERVO SERVO=a ANGLE=1", "SET_RETRACTION", "M70 P5", "M73.2 R1.0", "M101",
-                      "M103", "M142 S36", "M201.2 K1.0", "M202 X1000 Y1000", "M205.1 X5",
-                      "M330 SYSLOG", "M567 P0 E1.0:0.0", "M569.1 P0", "M620.1 E F523 T240",
-                      "M620 S0A", "M621 S0A", "M622.1 S1", "M622 J1", "M623",
-                      "M624 AQAAAAAAAAA=", "M625", "M862.6 P\"Input shaper\"", "M900.1 K1",
-                      "M914 X50", "M960 S5 P1", "M971 S11 C11 O0", "M975 S1", "M981 S1 P20000",
-                      "M991 S0 P3", "M1002 gcode_claim_action : 0",
-                      "M1002 judge_flag timelapse_record_flag", "M1006 S1", "G392 S0"));
+    ::testing::Values(
+        "", "; comment", "(comment)", "N5", "M73 P10 R5", "M82", "M104 S210", "M105", "M106 S255",
+        "M107", "M110 N0", "M115 U3.9.0", "M117 G28 now", "M118 A1 text", "M140 S60", "M141 S40",
+        "M201 X1000 Y1000", "M203 X200", "M205 X8 Y8", "M204 P500", "M566 X300 P1", "M569 P0 S1",
+        "M593 F0", "M862.3 P \"MK3S\"", "M862.1 P0.4", "M906 X800", "M907 E430", "M75", "M76",
+        "M77", "M155 S2", "M250 C50", "M302 S0", "M355 S1", "SET_FAN_SPEED FAN=a SPEED=.5",
+        "SET_PIN PIN=a VALUE=1", "SET_LED LED=a RED=1",
+        "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210", "RESPOND MSG=\"G28\"",
+        "EXCLUDE_OBJECT_DEFINE NAME=a", "SET_DISPLAY_TEXT MSG=hi",
+        "set_filament_sensor SENSOR=a ENABLE=0", "SET_IDLE_TIMEOUT TIMEOUT=60",
+        "SET_GCODE_VARIABLE MACRO=a VARIABLE=b VALUE=1", "TURN_OFF_HEATERS",
+        "UNFLEX_CHECKPOINT RUN=1 SHAPER_FREQ_X=45", "SET_SERVO SERVO=a ANGLE=1", "SET_RETRACTION",
+        "M70 P5", "M73.2 R1.0", "M101", "M103", "M142 S36", "M201.2 K1.0", "M202 X1000 Y1000",
+        "M205.1 X5", "M330 SYSLOG", "M567 P0 E1.0:0.0", "M569.1 P0", "M620.1 E F523 T240",
+        "M620 S0A", "M621 S0A", "M622.1 S1", "M622 J1", "M623", "M624 AQAAAAAAAAA=", "M625",
+        "M862.6 P\"Input shaper\"", "M900.1 K1", "M914 X50", "M960 S5 P1", "M971 S11 C11 O0",
+        "M975 S1", "M981 S1 P20000", "M991 S0 P3", "M1002 gcode_claim_action : 0",
+        "M1002 judge_flag timelapse_record_flag", "M1006 S1", "G392 S0"));
 
 TEST_P(Stopping, FinishesAllMotionAndKeepsThePosition) {
   const Event event = session_.read(GetParam());

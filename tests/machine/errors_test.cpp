@@ -242,6 +242,18 @@ INSTANTIATE_TEST_SUITE_P(
                 {},
                 "printer.toml:2: emit.square_corner_velocity_mm_s must not be below "
                 "limits.square_corner_velocity_mm_s"},
+        Mistake{"CheckpointsOnMarlin",
+                "[emit]\ncheckpoints = true\n[printer]\nfirmware = \"marlin\"\n",
+                {},
+                "printer.toml:2: emit.checkpoints is true, but printer.firmware is marlin, on "
+                "which no pause can wait for a run's end; set it to false, docs/pausing.md says "
+                "where to pause"},
+        Mistake{"CheckpointsOnRepRapFirmware",
+                "[printer]\nfirmware = \"rrf\"\n",
+                {"emit.checkpoints=true"},
+                "--set emit.checkpoints=true: emit.checkpoints is true, but printer.firmware is "
+                "rrf, on which no pause can wait for a run's end; set it to false, "
+                "docs/pausing.md says where to pause"},
         Mistake{"OverlapLongerThanTheWindow",
                 "[solve]\nwindow_s = 1\noverlap_s = 2\n",
                 {},

@@ -181,7 +181,8 @@ TEST_F(Sections, WhatIsNotAskedForOfTheRestingPlanIsDropped) {
 TEST(KnownAddition, ComprisesTheFormsOfTheEmitterOnly) {
   for (const char* line :
        {";unflex run", ";unflex 0.1", "SET_VELOCITY_LIMIT ACCEL=1000000", "M83", "M82 ;unflex",
-        "G90", "G91", "G21", "G20", "G92 E1.25", "G1 F1200", "SET_INPUT_SHAPER SHAPER_FREQ_X=0"}) {
+        "G90", "G91", "G21", "G20", "G92 E1.25", "G1 F1200", "SET_INPUT_SHAPER SHAPER_FREQ_X=0",
+        "UNFLEX_CHECKPOINT", "UNFLEX_CHECKPOINT RUN=1 SHAPER_FREQ_X=45"}) {
     EXPECT_TRUE(is_known_addition(line, Firmware::klipper)) << line;
   }
   for (const char* line : {"; unflex run", "G92 X0", "G92", "G92 E0 X1", "G1 F1200 X1", "G1 X1",

@@ -13,7 +13,17 @@
 
 namespace unflex::app {
 
-enum class Command { compensate, verify, inspect, printer_init, line_test, identify, study, batch };
+enum class Command {
+  compensate,
+  verify,
+  inspect,
+  printer_init,
+  printer_macros,
+  line_test,
+  identify,
+  study,
+  batch
+};
 
 // The codes the program exits with, see docs/cli.md.
 enum class ExitCode : int {
@@ -41,7 +51,8 @@ struct RunConfig {
   // empty for the thesis' cases
   std::string input;
   // batch: the folder of the prints
-  // compensate, printer init, printer line-test, batch: -o, or the input with --in-place; verify: OUT
+  // compensate, printer init, printer macros, printer line-test, batch: -o, or the input with
+  // --in-place; verify: OUT
   std::string output;
   bool in_place = false;
   std::optional<std::string> printer_file;

@@ -67,6 +67,9 @@ struct EmitOptions {
   double line_accel_mm_s2 = 1e6;  // what the firmware then accelerates a line by
   LineRules lines;
   std::string version;  // for the comment at the first run
+  // Klipper: UNFLEX_CHECKPOINT is called where a run begins and ends and where the printer's own
+  // shaper is back, so that a pause inside the run takes effect at its end (docs/pausing.md).
+  bool checkpoints = false;
 };
 
 struct Stroke;  // a line to be, see src/emit/strokes.hpp
@@ -169,6 +172,9 @@ class Emitter {
   void restore_shaper(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out);
   void set_shaper(const gcode::Shaper& wanted, std::string& out);
+  void write_checkpoint(std::string_view words, std::string& out);
+  void tell_shaper(std::string& out);
+  [[nodiscard]] std::string words_of_shaper() const;
 
   EmitOptions options_;
   gcode::Interpreter input_;      // has read the input so far
@@ -178,6 +184,7 @@ class Emitter {
   bool limits_known_ = true;      // … unless a macro may have changed them
   bool started_ = false;          // a run has been written
   bool moving_ = false;           // the last line moves X or Y; what follows may pass on at speed
+  std::string told_shaper_;       // what the last checkpoint says that puts the shaper back
   std::string newline_ = "\n";    // as the input has it
   bool open_line_ = false;        // the last line written has no line ending
 };

@@ -156,6 +156,8 @@ struct EmitSettings {
   // base's.
   std::optional<double> accel_mm_s2;
   double square_corner_velocity_mm_s = 1000.0;
+  // Klipper: each run's end calls the macro at which a pause takes effect.
+  bool checkpoints = false;
 };
 
 struct VerifySettings {
