@@ -26,10 +26,14 @@ Step::Step(const dynamics::FlexibleAxis& axis, double dt) : dt_(dt) {
 
 Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
                    const dynamics::FlexibleAxis& nozzle)
+    : Followed(base, axis, nozzle,
+               {(base.*axis)(0.0).position_mm, (base.*axis)(0.0).velocity_mm_s}) {}
+
+Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
+                   const dynamics::FlexibleAxis& nozzle, const std::array<double, 2>& start)
     : period_s_(base.period_s) {
   const Step step(nozzle, base.period_s / kSubsteps);
-  const dynamics::AxisMotion start = (base.*axis)(0.0);
-  Eigen::Vector2d state(start.position_mm, start.velocity_mm_s);
+  Eigen::Vector2d state(start[0], start[1]);
   states_.push_back({state[0], state[1]});
   for (std::size_t k = 1; k < base.nodes(); ++k) {
     for (int i = 0; i < kSubsteps; ++i) {

@@ -29,10 +29,13 @@ class Step {
   Eigen::Matrix<double, 2, 5> columns_;
 };
 
-// (p, ṗ) of the nozzle that follows one axis of the base, from where that is and as fast.
+// (p, ṗ) of the nozzle that follows one axis of the base, from where that is and as fast, or from
+// another state.
 class Followed {
  public:
   Followed(const dynamics::BaseTrajectory& base, AxisAt axis, const dynamics::FlexibleAxis& nozzle);
+  Followed(const dynamics::BaseTrajectory& base, AxisAt axis, const dynamics::FlexibleAxis& nozzle,
+           const std::array<double, 2>& start);
 
   [[nodiscard]] Eigen::Vector2d at(double t) const;
 

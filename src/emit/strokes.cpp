@@ -5,7 +5,9 @@
 #include <cmath>
 #include <utility>
 
+#include "filament_flow.hpp"
 #include "line_ends.hpp"
+#include "nozzle_progress.hpp"
 #include "speeds.hpp"
 #include "step_path.hpp"
 #include "timetable.hpp"
@@ -76,7 +78,7 @@ gcode::Position end_of_lines(const Run& run, const Timetable& table, const Grid&
   if (run.until_s) {
     end[X] = grid.x.nearest(run.base->x_at(*run.until_s).position_mm);
     end[Y] = grid.y.nearest(run.base->y_at(*run.until_s).position_mm);
-    end[Z] = grid.z.nearest(table.along_path_mm(*run.until_s, Z));
+    end[Z] = grid.z.nearest(table.height_mm(*run.until_s));
   }
   return end;
 }
@@ -92,11 +94,12 @@ gcode::Position start_of(const Run& run) {
   return run.moves->front().segment.start_mm;
 }
 
-// What the run's lines have laid at time t. The filament that the firmware is behind by comes with
-// the run's first line, laid or drawn back, so that much of the first move's is none of theirs.
-double filament_of_lines(const Timetable& table, double behind_mm, double t) {
-  const double filament_mm = table.filament_mm(t);
-  if (t >= table.start_s(1)) {
+// What the run's lines have laid at time t: what belongs to the place where the nozzle is. The
+// filament that the firmware is behind by comes with the run's first line, laid or drawn back, so
+// that much of the first move's is none of theirs.
+double filament_of_lines(const NozzleProgress& nozzle, double behind_mm, double t) {
+  const double filament_mm = nozzle.filament_mm(t);
+  if (nozzle.past_first_move(t)) {
     return filament_mm - behind_mm;
   }
   return filament_mm - std::clamp(filament_mm, std::min(behind_mm, 0.0), std::max(behind_mm, 0.0));
@@ -265,6 +268,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     return {};
   }
 
+  const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle_x, rules.nozzle_y);
   const gcode::Position start = start_position(run, grid);
   const gcode::Position end = end_of_lines(run, table, grid);
   std::vector<Stroke> result;
@@ -279,8 +283,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     const bool is_end = i + 1 == times.size();
     stroke.x_mm = is_end ? end[X] : vertices.x_mm[i];
     stroke.y_mm = is_end ? end[Y] : vertices.y_mm[i];
-    stroke.z_mm = is_end ? end[Z] : grid.z.nearest(table.along_path_mm(times[i], Z));
-    stroke.e_mm = filament_of_lines(table, behind_mm, times[i]);
+    stroke.z_mm = is_end ? end[Z] : grid.z.nearest(table.height_mm(times[i]));
+    stroke.e_mm = filament_of_lines(nozzle, behind_mm, times[i]);
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_times_s.size() &&
            event_times_s[event] <= times[i] - 0.5 * rules.min_line_s) {
@@ -307,6 +311,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     final.x_mm = end[X];
     final.y_mm = end[Y];
     final.z_mm = end[Z];
+    level_flow(start, most_flow_step_mm_s(options.fixed), result);
     time_strokes(run, grid, options, result);
   }
   return result;

@@ -7,6 +7,7 @@ namespace unflex::emit {
 namespace {
 
 using gcode::E;
+using gcode::Z;
 using planner::PlannedMove;
 
 // A move boundary must be a vertex when a typical line (2 ms) laid across it would give either move
@@ -37,12 +38,12 @@ std::size_t Timetable::move_at(double t) const {
   return after == starts_s_.begin() ? 0 : static_cast<std::size_t>(after - starts_s_.begin()) - 1;
 }
 
-double Timetable::along_path_mm(double t, gcode::Axis axis) const {
+double Timetable::height_mm(double t) const {
   if (t >= starts_s_.back()) {
-    return run_->moves->back().segment.end_mm[axis];
+    return run_->moves->back().segment.end_mm[Z];
   }
   if (t <= starts_s_.front()) {
-    return run_->moves->front().segment.start_mm[axis];
+    return run_->moves->front().segment.start_mm[Z];
   }
   const std::size_t i = move_at(t);
   const PlannedMove& move = (*run_->moves)[i];
@@ -50,11 +51,7 @@ double Timetable::along_path_mm(double t, gcode::Axis axis) const {
   const double length = travelled_mm(starts_s_[i + 1]) - from;
   const double share =
       length > 0.0 ? (travelled_mm(t) - from) / length : (t - starts_s_[i]) / move.duration_s();
-  return move.segment.start_mm[axis] + share * move.segment.delta(axis);
-}
-
-double Timetable::filament_mm(double t) const {
-  return along_path_mm(t, E) - run_->moves->front().segment.start_mm[E];
+  return move.segment.start_mm[Z] + share * move.segment.delta(Z);
 }
 
 double Timetable::filament_per_mm(std::size_t i) const {

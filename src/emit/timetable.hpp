@@ -8,7 +8,7 @@
 
 namespace unflex::emit {
 
-// The run's moves in time, and the filament and height that belong to a moment.
+// The run's moves in time, and the height that belongs to a moment.
 class Timetable {
  public:
   explicit Timetable(const Run& run);
@@ -20,13 +20,9 @@ class Timetable {
   // The move at time t.
   [[nodiscard]] std::size_t move_at(double t) const;
 
-  // E or Z at time t: each move's share of it is spread along the base's path while the move lasts,
-  // which keeps filament per mm constant where the firmware looks for jumps in it, and the slope
-  // small where the base is slower than the plan.
-  [[nodiscard]] double along_path_mm(double t, gcode::Axis axis) const;
-
-  // Filament since the start of the run.
-  [[nodiscard]] double filament_mm(double t) const;
+  // Z at time t: each move's share of it is spread along the base's path while the move lasts,
+  // which keeps the slope small where the base is slower than the plan.
+  [[nodiscard]] double height_mm(double t) const;
 
   // Whether filament per mm changes so much at the boundary before move i that a line across it
   // would give either move too much or too little.
@@ -34,6 +30,7 @@ class Timetable {
 
   // For each event the time it stands at: the end of the moves before it.
   [[nodiscard]] std::vector<double> event_times_s() const;
+  [[nodiscard]] const std::vector<double>& starts_s() const { return starts_s_; }
 
  private:
   // Of move i, along the base's path.

@@ -127,6 +127,11 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder* re
   report.input_extrusion_mm = verified.input_extrusion_mm;
   report.output_extrusion_mm = verified.output_extrusion_mm;
   report.worst_move_extrusion_error_mm = verified.worst_move_extrusion_error_mm;
+  const auto lag = [](const verify::LagStats& stats) {
+    return report::Report::FilamentLag{stats.rms_mm, stats.max_mm, stats.max_line};
+  };
+  report.uncompensated_lag = lag(verified.uncompensated_lag);
+  report.compensated_lag = lag(verified.compensated_lag);
   report.runs_compensated = verified.runs;
   report.violation_count = verified.violation_count;
   for (const verify::Violation& violation : verified.violations) {

@@ -173,6 +173,11 @@ Json facts_json(const Report& r) {
                             static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s));
   add("Filament",
       fmt::format("{:.2f} mm in, {:.2f} mm out", r.input_extrusion_mm, r.output_extrusion_mm));
+  add("Filament off the nozzle", fmt::format("{} → {} µm RMS, {} → {} µm at most",
+                                             micrometres_text(r.uncompensated_lag.rms_mm),
+                                             micrometres_text(r.compensated_lag.rms_mm),
+                                             micrometres_text(r.uncompensated_lag.max_mm),
+                                             micrometres_text(r.compensated_lag.max_mm)));
   add("Written by", fmt::format("unflex {}", r.version));
   return facts;
 }

@@ -112,7 +112,13 @@ void add_output(const Report& r, Json& json) {
                           {"worst_run_drift_ms", r.worst_run_drift_ms}};
   json["extrusion"] = {{"input_mm", r.input_extrusion_mm},
                        {"output_mm", r.output_extrusion_mm},
-                       {"worst_move_error_mm", r.worst_move_extrusion_error_mm}};
+                       {"worst_move_error_mm", r.worst_move_extrusion_error_mm},
+                       {"lag_rms_mm", r.compensated_lag.rms_mm},
+                       {"lag_max_mm", r.compensated_lag.max_mm},
+                       {"lag_max_line", r.compensated_lag.max_line},
+                       {"uncompensated_lag_rms_mm", r.uncompensated_lag.rms_mm},
+                       {"uncompensated_lag_max_mm", r.uncompensated_lag.max_mm},
+                       {"uncompensated_lag_max_line", r.uncompensated_lag.max_line}};
   json["performance"] = {{"wall_s", r.wall_s},
                          {"cpu_s", r.cpu_s},
                          {"print_s_per_wall_s", r.print_s_per_wall_s},

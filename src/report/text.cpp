@@ -101,6 +101,10 @@ void write_output(Sink out, const Report& r) {
   }
   fmt::format_to(out, "filament      {:.2f} mm in, {:.2f} mm out\n", r.input_extrusion_mm,
                  r.output_extrusion_mm);
+  fmt::format_to(
+      out, "              off the nozzle by {} → {} µm RMS, {} → {} µm at most\n",
+      micrometres_text(r.uncompensated_lag.rms_mm), micrometres_text(r.compensated_lag.rms_mm),
+      micrometres_text(r.uncompensated_lag.max_mm), micrometres_text(r.compensated_lag.max_mm));
   fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",
                  r.print_s_per_wall_s, duration_text(r.wall_s), r.peak_rss_mb);
 }

@@ -68,6 +68,7 @@ void Meter::begin_section(ReferencePath& path) {
     current_ = path.first();
   }
   time_s_ = path.section_start_s();
+  laid_mm_ = path.filament_mm();
   section_error_ = {};
 }
 
@@ -115,11 +116,14 @@ void Meter::play(const planner::PlannedMove& move) {
   append_phases(move, phases_);
   const double start_s = time_s_;
   double elapsed_s = 0.0;
+  in_move_ = true;
   for (const BasePhase& phase : phases_) {
     play(phase);
     elapsed_s += phase.duration_s;
     time_s_ = start_s + elapsed_s;
   }
+  in_move_ = false;
+  laid_mm_ += move.segment.extruding() ? move.segment.delta(gcode::E) : 0.0;
   base_x_mm_ = move.segment.end_mm[gcode::X];
   base_y_mm_ = move.segment.end_mm[gcode::Y];
 }
@@ -203,12 +207,16 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured, c
     step();
     advance(phase.x, h);
     advance(phase.y, h);
+    advance(phase.e, h);
     Sample measurement;
     if (measured) {
       time_s_ = start_s + number * h;
       advance(reference.x, h);
       advance(reference.y, h);
       measurement = sample(reference, h);
+      if (follows_filament_ && in_move_ && reference.extruding) {
+        measure_filament(reference, laid_mm_ + phase.e.position, h);
+      }
     }
     if (observer_ != nullptr) {
       time_s_ = start_s + number * h;
@@ -263,6 +271,11 @@ Meter::Sample Meter::sample(const ReferencePhase& reference, double h) {
   return {contour2, line};
 }
 
+void Meter::measure_filament(const ReferencePhase& reference, double laid_mm, double h) {
+  filament_lag_.add(*path_, current_, reference.x.position, reference.y.position,
+                    nozzle_.x.position, nozzle_.y.position, laid_mm, h);
+}
+
 void Meter::tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
                  const Sample& sample) {
   Step step;
@@ -299,7 +312,7 @@ void Meter::wait_for_reference() {
   waiting_ = true;
   path_->extend_to(time_s_ + kSameTime_s);
   while (path_->end_s() - time_s_ > kSameTime_s) {
-    play(BasePhase{{base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, path_->end_s() - time_s_});
+    play(BasePhase{{base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, {}, path_->end_s() - time_s_});
     path_->extend_to(time_s_ + kSameTime_s);
   }
   waiting_ = false;

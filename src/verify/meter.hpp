@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "filament_lag.hpp"
 #include "shaped_base.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/near_path.hpp"
@@ -93,6 +94,10 @@ class Meter {
   // Puts the clock forward, within a section.
   void skip(double duration_s) { time_s_ += duration_s; }
 
+  // Measures the filament's lag, too, wherever motion is played move by move.
+  void follow_filament() { follows_filament_ = true; }
+  [[nodiscard]] LagStats filament_lag() const { return filament_lag_.stats(); }
+
   void follow_lag(bool on);
   [[nodiscard]] double worst_lag_s() const { return lag_.worst_s(); }
   [[nodiscard]] double lag_s() const { return lag_.present_s(); }
@@ -132,6 +137,7 @@ class Meter {
     std::size_t line = 0;
   };
   Sample sample(const ReferencePhase& reference, double h);
+  void measure_filament(const ReferencePhase& reference, double laid_mm, double h);
   void tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
             const Sample& sample);
 
@@ -147,6 +153,10 @@ class Meter {
   DeviationAccumulator extruding_;
   DeviationAccumulator all_;
   SectionError section_error_;
+  FilamentLag filament_lag_;
+  bool follows_filament_ = false;
+  bool in_move_ = false;  // the motion at hand is a move's, whose filament is known
+  double laid_mm_ = 0.0;  // before the move at hand, counted as the path's filament
   LagEstimate lag_;
   bool follow_lag_ = false;
   bool waiting_ = false;

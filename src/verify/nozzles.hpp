@@ -19,6 +19,7 @@ class Nozzles {
       // The same stretch of the path counts as near for all.
       detuned_.emplace_back(other, main_.reach_s());
     }
+    main_.follow_filament();
     if (observer_ != nullptr) {
       std::size_t number = 0;
       for_each([&](Meter& meter) { meter.watch(observer_, {emitted, number++}); });

@@ -58,6 +58,10 @@ void ReferencePath::append(planner::PlannedMove move, bool measured) {
     piece.direction_y = move.segment.delta(gcode::Y) / piece.length_xy_mm;
   }
   piece.extruding = move.segment.extruding();
+  piece.filament_mm = filament_mm_;
+  if (piece.extruding) {
+    filament_mm_ += move.segment.delta(gcode::E);
+  }
   piece.move = std::move(move);
   end_s_ = piece.end_s;
   pieces_.push_back(std::move(piece));

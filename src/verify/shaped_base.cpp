@@ -13,6 +13,16 @@ dynamics::BaseSegment later(const dynamics::BaseSegment& base, double h) {
           base.velocity + base.acceleration * h, base.acceleration};
 }
 
+// What a move lays as it goes, from 0 on; nothing where it pulls filament back.
+dynamics::BaseSegment along_filament(const planner::PlannedMove& move, double distance_mm,
+                                     double speed_mm_s, double accel_mm_s2) {
+  if (!move.segment.extruding()) {
+    return {};
+  }
+  const double per_mm = move.segment.delta(gcode::E) / move.length_mm;
+  return {per_mm * distance_mm, per_mm * speed_mm_s, per_mm * accel_mm_s2};
+}
+
 }  // namespace
 
 void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& phases) {
@@ -30,7 +40,8 @@ void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& pha
       return dynamics::BaseSegment{move.segment.start_mm[axis] + ratio * distance_mm,
                                    ratio * speeds[i], ratio * accels[i]};
     };
-    phases.push_back({along(gcode::X), along(gcode::Y), durations_s[i]});
+    phases.push_back({along(gcode::X), along(gcode::Y),
+                      along_filament(move, distance_mm, speeds[i], accels[i]), durations_s[i]});
     elapsed_s += durations_s[i];
   }
 }
@@ -49,7 +60,7 @@ ShapedBase::ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm
   set(y_, shaping.y);
   // It has rested for as long as the pulses look back.
   given_until_s_ = -memory_s_ - 1.0;
-  give({{x_mm, 0.0, 0.0}, {y_mm, 0.0, 0.0}, memory_s_ + 1.0});
+  give({{x_mm, 0.0, 0.0}, {y_mm, 0.0, 0.0}, {}, memory_s_ + 1.0});
 }
 
 void ShapedBase::give(const BasePhase& phase) {
@@ -69,7 +80,9 @@ void ShapedBase::add(const planner::PlannedMove& move, std::vector<BasePhase>& s
 void ShapedBase::finish(std::vector<BasePhase>& shaped) {
   const Timed& last = given_.back();
   BasePhase rest{later(last.phase.x, last.phase.duration_s),
-                 later(last.phase.y, last.phase.duration_s), memory_s_};
+                 later(last.phase.y, last.phase.duration_s),
+                 {},
+                 memory_s_};
   rest.x.velocity = rest.x.acceleration = 0.0;
   rest.y.velocity = rest.y.acceleration = 0.0;
   give(rest);
@@ -79,7 +92,7 @@ void ShapedBase::finish(std::vector<BasePhase>& shaped) {
 void ShapedBase::advance(std::vector<BasePhase>& shaped) {
   while (given_until_s_ - time_s_ > kSameTime_s) {
     const double until_s = std::min({given_until_s_, next_change(x_), next_change(y_)});
-    shaped.push_back({sum(x_, &BasePhase::x), sum(y_, &BasePhase::y), until_s - time_s_});
+    shaped.push_back({sum(x_, &BasePhase::x), sum(y_, &BasePhase::y), {}, until_s - time_s_});
     time_s_ = until_s;
   }
   while (given_.size() > 1 && given_[1].start_s <= time_s_ - memory_s_) {

@@ -22,6 +22,8 @@ namespace unflex::verify {
 struct BasePhase {
   dynamics::BaseSegment x;
   dynamics::BaseSegment y;
+  // Filament that comes out meanwhile. Zero for a shaped base, whose filament is not shaped.
+  dynamics::BaseSegment e = {};
   double duration_s = 0.0;
 };
 

@@ -367,6 +367,8 @@ VerifyReport Verifier::report() {
   for (std::size_t i = 0; i < original_.detuned().size(); ++i) {
     report.detuned.push_back({deviation(original_.detuned()[i]), deviation(emitted_.detuned()[i])});
   }
+  report.uncompensated_lag = original_.main().filament_lag();
+  report.compensated_lag = emitted_.main().filament_lag();
   report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
   report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
   report.worst_run_drift_s = emitted_.main().worst_lag_s();

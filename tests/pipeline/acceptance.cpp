@@ -22,6 +22,9 @@ using unflex::testing::TextMachine;
 
 // What one line of output may add: half a step of E in rounding, and noise of summing.
 constexpr double kFilamentStepMm = 1e-5 + 1e-8;
+// Filament follows the nozzle, which passes from move to move when the plan does but for some tens
+// of micrometres; and where Klipper would brake for a jump of the flow, it is spread over lines.
+constexpr double kFilamentOfNozzleMm = 5e-3;
 // A line between two moves may be put where the nearest line of output begins, half of the shortest
 // line away; the base is ahead of the path by what bends the machine.
 constexpr double kPlaceMm = 0.6;
@@ -128,13 +131,15 @@ void expect_kept(const report::Report& report, const machine::Settings& settings
   EXPECT_LE(report.base_max_velocity_mm_s, settings.base_max_velocity_mm_s());
   EXPECT_LE(report.max_lines_per_s, settings.max_lines_per_s());
   EXPECT_NEAR(report.output_extrusion_mm, report.input_extrusion_mm, kFilamentStepMm);
-  EXPECT_LE(report.worst_move_extrusion_error_mm, kFilamentStepMm);
+  EXPECT_LE(report.worst_move_extrusion_error_mm, kFilamentOfNozzleMm);
 }
 
 void expect_true_path(const report::Report& report, double improvement) {
   const report::DeviationRow& before = report.uncompensated.extruding;
   const report::DeviationRow& after = report.compensated.extruding;
   EXPECT_GT(after.duration_s, 0.0);
+  EXPECT_LE(report.compensated_lag.rms_mm, 10e-3);
+  EXPECT_LT(report.compensated_lag.rms_mm, report.uncompensated_lag.rms_mm);
   EXPECT_LE(after.contour_rms_mm, 0.8e-3);
   EXPECT_LE(after.contour_p99_mm, 4e-3);
   EXPECT_LE(after.contour_rms_mm, before.contour_rms_mm / improvement)

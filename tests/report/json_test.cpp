@@ -36,9 +36,15 @@ TEST(JsonReport, HasEveryValueUnderItsKey) {
                                                   {"max_lines_per_s", 890.0},
                                                   {"segment_ms_median", 2.5},
                                                   {"worst_run_drift_ms", 0.04}}));
-  EXPECT_EQ(json["extrusion"],
-            (nlohmann::json{
-                {"input_mm", 1234.5}, {"output_mm", 1234.75}, {"worst_move_error_mm", 0.00001}}));
+  EXPECT_EQ(json["extrusion"], (nlohmann::json{{"input_mm", 1234.5},
+                                               {"output_mm", 1234.75},
+                                               {"worst_move_error_mm", 0.00001},
+                                               {"lag_rms_mm", 0.0045},
+                                               {"lag_max_mm", 0.035},
+                                               {"lag_max_line", 801},
+                                               {"uncompensated_lag_rms_mm", 0.06},
+                                               {"uncompensated_lag_max_mm", 0.5},
+                                               {"uncompensated_lag_max_line", 700}}));
   EXPECT_EQ(json["performance"], (nlohmann::json{{"wall_s", 90.0},
                                                  {"cpu_s", 170.0},
                                                  {"print_s_per_wall_s", 40.0},

@@ -57,6 +57,8 @@ inline Report sample_report() {
   r.input_extrusion_mm = 1234.5;
   r.output_extrusion_mm = 1234.75;
   r.worst_move_extrusion_error_mm = 0.00001;
+  r.uncompensated_lag = {0.06, 0.5, 700};
+  r.compensated_lag = {0.0045, 0.035, 801};
   r.wall_s = 90.0;
   r.cpu_s = 170.0;
   r.print_s_per_wall_s = 40.0;

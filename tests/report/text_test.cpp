@@ -40,6 +40,7 @@ TEST(Summary, IsExactlyThis) {
       "lines         cost 0.50 µm RMS, 7.50 µm at most; more than 850 per second in 2 places, "
       "the first at line 70\n"
       "filament      1234.50 mm in, 1234.75 mm out\n"
+      "              off the nozzle by 60.0 → 4.50 µm RMS, 500 → 35.0 µm at most\n"
       "speed         40 s of print per second, 1m 30s in all, 64 MB\n"
       "violations    3\n");
 }

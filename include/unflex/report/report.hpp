@@ -146,6 +146,15 @@ struct Report {
   double input_extrusion_mm = 0.0;
   double output_extrusion_mm = 0.0;
   double worst_move_extrusion_error_mm = 0.0;
+  // How far along the path the nozzle and the filament that comes out are apart, as sliced and as
+  // emitted.
+  struct FilamentLag {
+    double rms_mm = 0.0;
+    double max_mm = 0.0;
+    std::size_t max_line = 0;  // of the input
+  };
+  FilamentLag uncompensated_lag;
+  FilamentLag compensated_lag;
 
   double wall_s = 0.0;
   double cpu_s = 0.0;

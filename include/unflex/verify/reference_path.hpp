@@ -28,6 +28,7 @@ struct PathPiece {
   double length_xy_mm = 0.0;
   bool measured = false;  // deviations count here
   bool extruding = false;
+  double filament_mm = 0.0;  // that extruding pieces lay before this one
   planner::PlannedMove move;
 
   // Length of the XY path the move has covered at time t, in [0, length_xy_mm].
@@ -49,6 +50,8 @@ class ReferencePath {
   [[nodiscard]] bool section_complete() const { return section_complete_; }
   // Where the known part ends, s.
   [[nodiscard]] double end_s() const { return end_s_; }
+  // That all extruding pieces so far lay.
+  [[nodiscard]] double filament_mm() const { return filament_mm_; }
 
   // The machine stands still for a while; only between sections. Nothing is measured …
   void rest(double duration_s) { end_s_ += duration_s; }
@@ -72,6 +75,7 @@ class ReferencePath {
   std::vector<PathPiece> pieces_;
   std::size_t dropped_ = 0;
   double end_s_ = 0.0;
+  double filament_mm_ = 0.0;
   double section_start_s_ = 0.0;
   bool section_complete_ = false;
 };

@@ -70,6 +70,14 @@ struct Detuned {
   Deviation compensated;
 };
 
+// By how much of the path the nozzle and the filament that comes out are apart, while the reference
+// lays filament: as if the filament of one place of the sliced path came out at another.
+struct LagStats {
+  double rms_mm = 0.0;  // by time
+  double max_mm = 0.0;
+  std::size_t max_line = 0;  // of the sliced file
+};
+
 struct VerifyReport {
   // Measured against the firmware's plan of the input.
   Deviation uncompensated;
@@ -91,6 +99,8 @@ struct VerifyReport {
   // Of one move or one run of the input; what the resolution of the output's lines in time may
   // explain is no error.
   double worst_move_extrusion_error_mm = 0.0;
+  LagStats uncompensated_lag;
+  LagStats compensated_lag;
   // Longest lag or lead of the nozzle behind the plan of its run, averaged over 0.1 s.
   double worst_run_drift_s = 0.0;
   double max_lines_per_s = 0.0;    // most lines begun in any 100 ms of the output, × 10

@@ -1,0 +1,122 @@
+#include "nozzle_progress.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "followed.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using gcode::E;
+using gcode::X;
+using gcode::Y;
+using planner::PlannedMove;
+
+// How far along the path the nozzle is looked for on both sides of the reference.
+constexpr double kWindow_mm = 1.0;
+// λ: where the path comes back to itself, the place that the reference is nearer to counts. So much
+// of the nozzle's lag is not seen.
+constexpr double kTowardsReference = 0.01;
+
+}  // namespace
+
+NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts_s,
+                               const dynamics::FlexibleAxis& nozzle_x,
+                               const dynamics::FlexibleAxis& nozzle_y)
+    : moves_(run.moves), period_s_(run.base->period_s) {
+  path_mm_.push_back(0.0);
+  filament_mm_.push_back(0.0);
+  for (const PlannedMove& move : *moves_) {
+    path_mm_.push_back(path_mm_.back() + move.segment.length_xy_mm());
+    filament_mm_.push_back(filament_mm_.back() + move.segment.delta(E));
+  }
+  std::size_t i = 0;
+  const auto reference_mm = [&](double t) {
+    while (i + 1 < moves_->size() && t >= starts_s[i + 1]) {
+      ++i;
+    }
+    const PlannedMove& move = (*moves_)[i];
+    const double length = path_mm_[i + 1] - path_mm_[i];
+    if (t >= starts_s[i + 1] || move.length_mm <= 0.0) {
+      return t >= starts_s[i] ? path_mm_[i + 1] : path_mm_[i];
+    }
+    return path_mm_[i] + length * move.distance_mm(std::max(t - starts_s[i], 0.0)) / move.length_mm;
+  };
+  // A run begins at rest. A part of one begins in motion, with the nozzle where it should be.
+  std::array<std::array<double, 2>, 2> state{};
+  const dynamics::AxisMotion x = run.base->x_at(0.0);
+  const dynamics::AxisMotion y = run.base->y_at(0.0);
+  state = {{{x.position_mm, x.velocity_mm_s}, {y.position_mm, y.velocity_mm_s}}};
+  if (run.goes_on) {
+    const std::size_t first = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(
+        std::upper_bound(starts_s.begin(), starts_s.end(), 0.0) - starts_s.begin() - 1, 0,
+        static_cast<std::ptrdiff_t>(moves_->size()) - 1));
+    const PlannedMove& move = (*moves_)[first];
+    const double local_s = std::clamp(-starts_s[first], 0.0, move.duration_s());
+    const gcode::Position at = move.position_mm(local_s);
+    const double v = move.velocity_mm_s(local_s);
+    state = {{{at[X], v * move.direction[X]}, {at[Y], v * move.direction[Y]}}};
+  }
+  const Followed along_x(*run.base, &dynamics::BaseTrajectory::x_at, nozzle_x, state[0]);
+  const Followed along_y(*run.base, &dynamics::BaseTrajectory::y_at, nozzle_y, state[1]);
+  double furthest = 0.0;
+  for (std::size_t k = 0; k < run.base->nodes(); ++k) {
+    const double t = period_s_ * static_cast<double>(k);
+    furthest = std::max(furthest, nearest_mm(along_x.at(t)[0], along_y.at(t)[0], reference_mm(t)));
+    progress_mm_.push_back(furthest);
+  }
+}
+
+double NozzleProgress::nearest_mm(double x_mm, double y_mm, double reference_mm) const {
+  const auto begins = path_mm_.begin();
+  const auto first = std::upper_bound(begins, path_mm_.end() - 1, reference_mm - kWindow_mm);
+  double best = std::numeric_limits<double>::infinity();
+  double nearest = reference_mm;
+  for (std::size_t i = first == begins ? 0 : static_cast<std::size_t>(first - begins) - 1;
+       i < moves_->size() && path_mm_[i] <= reference_mm + kWindow_mm; ++i) {
+    const gcode::Segment& segment = (*moves_)[i].segment;
+    const double length = path_mm_[i + 1] - path_mm_[i];
+    if (length <= 0.0) {
+      continue;
+    }
+    const double dx = segment.delta(X) / length;
+    const double dy = segment.delta(Y) / length;
+    const double px = x_mm - segment.start_mm[X];
+    const double py = y_mm - segment.start_mm[Y];
+    const double ahead = reference_mm - path_mm_[i];
+    const double along = std::clamp(
+        (px * dx + py * dy + kTowardsReference * ahead) / (1.0 + kTowardsReference), 0.0, length);
+    const double across_x = px - along * dx;
+    const double across_y = py - along * dy;
+    const double cost = across_x * across_x + across_y * across_y +
+                        kTowardsReference * (along - ahead) * (along - ahead);
+    if (cost < best) {
+      best = cost;
+      nearest = path_mm_[i] + along;
+    }
+  }
+  return nearest;
+}
+
+double NozzleProgress::progress_mm(double t) const {
+  const double at = std::clamp(t / period_s_, 0.0, static_cast<double>(progress_mm_.size() - 1));
+  const std::size_t k = std::min(static_cast<std::size_t>(at), progress_mm_.size() - 2);
+  return progress_mm_[k] + (at - static_cast<double>(k)) * (progress_mm_[k + 1] - progress_mm_[k]);
+}
+
+double NozzleProgress::filament_mm(double t) const {
+  const double at = progress_mm(t);
+  const auto after = std::upper_bound(path_mm_.begin(), path_mm_.end() - 1, at);
+  const std::size_t i =
+      after == path_mm_.begin() ? 0 : static_cast<std::size_t>(after - path_mm_.begin()) - 1;
+  const double length = path_mm_[i + 1] - path_mm_[i];
+  const double share = length > 0.0 ? std::min((at - path_mm_[i]) / length, 1.0) : 1.0;
+  return filament_mm_[i] + share * (filament_mm_[i + 1] - filament_mm_[i]);
+}
+
+bool NozzleProgress::past_first_move(double t) const { return progress_mm(t) >= path_mm_[1]; }
+
+}  // namespace unflex::emit

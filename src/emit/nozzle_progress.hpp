@@ -1,0 +1,39 @@
+// How far along the sliced path the nozzle is, which the filament of a run follows.
+//
+// Notation:
+//   r, p, b   reference, nozzle and base         s(t)   length of path that r has covered
+//   s_n(t)    where along the path p is: the u that minimises |p − path(u)|² + λ (u − s)²
+//   Q(u)      filament that the sliced file lays up to there
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/emit/emitter.hpp"
+
+namespace unflex::emit {
+
+class NozzleProgress {
+ public:
+  // Of the nozzle that hangs on the run's base; starts_s: of each move, and the end of the last.
+  NozzleProgress(const Run& run, const std::vector<double>& starts_s,
+                 const dynamics::FlexibleAxis& nozzle_x, const dynamics::FlexibleAxis& nozzle_y);
+
+  // Q(s_n(t)), mm, from 0 on. As the nozzle never goes back, it is monotone where Q is.
+  [[nodiscard]] double filament_mm(double t) const;
+  // Whether the nozzle has left the run's first move behind.
+  [[nodiscard]] bool past_first_move(double t) const;
+
+ private:
+  [[nodiscard]] double nearest_mm(double x_mm, double y_mm, double reference_mm) const;
+  [[nodiscard]] double progress_mm(double t) const;
+
+  const std::vector<planner::PlannedMove>* moves_;
+  double period_s_;
+  std::vector<double> path_mm_;      // where each move begins along the path, and the end
+  std::vector<double> filament_mm_;  // Q there
+  std::vector<double> progress_mm_;  // s_n at the base's nodes
+};
+
+}  // namespace unflex::emit

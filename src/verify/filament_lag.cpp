@@ -1,0 +1,96 @@
+#include "filament_lag.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace unflex::verify {
+namespace {
+
+// How far around the reference the nozzle's place is looked for, against their distance.
+constexpr double kSearch = 3.0;
+
+// Where on a piece of the path a point is nearest to it.
+struct Foot {
+  double along_mm = 0.0;
+  double distance2_mm2 = std::numeric_limits<double>::infinity();
+};
+
+Foot foot_on(const PathPiece& piece, double x_mm, double y_mm) {
+  const double x = x_mm - piece.x_mm;
+  const double y = y_mm - piece.y_mm;
+  const double along =
+      std::clamp(x * piece.direction_x + y * piece.direction_y, 0.0, piece.length_xy_mm);
+  return {along,
+          std::pow(x - along * piece.direction_x, 2) + std::pow(y - along * piece.direction_y, 2)};
+}
+
+double filament_per_mm(const PathPiece& piece) {
+  return piece.extruding ? piece.move.segment.delta(gcode::E) / piece.length_xy_mm : 0.0;
+}
+
+// Along what lays filament, from s_F with Q(s_F) = laid_mm to the place of the nozzle; below 0
+// where s_F is ahead.
+double laid_lag_mm(const ReferencePath& path, std::size_t number, double along_mm, double laid_mm) {
+  double lag_mm = 0.0;
+  while (laid_mm < path[number].filament_mm && number > path.first()) {
+    lag_mm += path[number].extruding ? along_mm : 0.0;
+    along_mm = path[--number].length_xy_mm;
+  }
+  const auto lays_mm = [&] { return filament_per_mm(path[number]) * path[number].length_xy_mm; };
+  while (laid_mm > path[number].filament_mm + lays_mm() && number + 1 < path.end()) {
+    lag_mm -= path[number].extruding ? path[number].length_xy_mm - along_mm : 0.0;
+    along_mm = 0.0;
+    ++number;
+  }
+  const double per_mm = filament_per_mm(path[number]);
+  if (per_mm <= 0.0) {
+    return lag_mm;
+  }
+  const double laid_along_mm = (laid_mm - path[number].filament_mm) / per_mm;
+  return lag_mm + along_mm - std::clamp(laid_along_mm, 0.0, path[number].length_xy_mm);
+}
+
+}  // namespace
+
+void FilamentLag::add(const ReferencePath& path, std::size_t current, double r_x_mm, double r_y_mm,
+                      double p_x_mm, double p_y_mm, double laid_mm, double h) {
+  const double reach_mm = kSearch * std::hypot(p_x_mm - r_x_mm, p_y_mm - r_y_mm);
+  const double reference_mm = foot_on(path[current], r_x_mm, r_y_mm).along_mm;
+  Foot best;
+  std::size_t nearest = current;
+  const auto look_at = [&](std::size_t number) {
+    const Foot foot = foot_on(path[number], p_x_mm, p_y_mm);
+    if (foot.distance2_mm2 < best.distance2_mm2) {
+      best = foot;
+      nearest = number;
+    }
+  };
+  look_at(current);
+  double back_mm = reference_mm;
+  for (std::size_t number = current; number > path.first() && back_mm <= reach_mm;) {
+    look_at(--number);
+    back_mm += path[number].length_xy_mm;
+  }
+  double ahead_mm = path[current].length_xy_mm - reference_mm;
+  for (std::size_t number = current + 1; number < path.end() && ahead_mm <= reach_mm; ++number) {
+    look_at(number);
+    ahead_mm += path[number].length_xy_mm;
+  }
+  if (!path[nearest].extruding) {
+    return;
+  }
+  const double lag_mm = laid_lag_mm(path, nearest, best.along_mm, laid_mm);
+  sum_lag2_ += h * lag_mm * lag_mm;
+  weight_s_ += h;
+  if (std::abs(lag_mm) > largest_mm_) {
+    largest_mm_ = std::abs(lag_mm);
+    line_ = path[nearest].move.segment.line;
+  }
+}
+
+LagStats FilamentLag::stats() const {
+  return {weight_s_ > 0.0 ? std::sqrt(sum_lag2_ / weight_s_) : 0.0, largest_mm_, line_};
+}
+
+}  // namespace unflex::verify

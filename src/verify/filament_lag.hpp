@@ -1,0 +1,35 @@
+// How far the filament that is laid lags behind the nozzle.
+//
+// Notation:
+//   r, p   reference and nozzle                F   filament that the file has laid, mm
+//   s_p    where along the sliced path the nozzle is nearest to it
+//   Q(s)   filament that the sliced file lays up to there
+//   s_F    the place whose filament comes out now: Q(s_F) = F
+//   lag    s_p − s_F, mm of path, moves without filament left out
+//
+// The path is searched around r only, no further than a few times |p − r|: it may come close to
+// itself.
+#pragma once
+
+#include <cstddef>
+
+#include "unflex/verify/reference_path.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::verify {
+
+class FilamentLag {
+ public:
+  // A moment h seconds long; the reference is on piece `current` of the path, which lays filament.
+  void add(const ReferencePath& path, std::size_t current, double r_x_mm, double r_y_mm,
+           double p_x_mm, double p_y_mm, double laid_mm, double h);
+  [[nodiscard]] LagStats stats() const;
+
+ private:
+  double sum_lag2_ = 0.0;
+  double weight_s_ = 0.0;
+  double largest_mm_ = 0.0;
+  std::size_t line_ = 0;
+};
+
+}  // namespace unflex::verify
