@@ -65,22 +65,21 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
   double furthest = 0.0;
   for (std::size_t k = 0; k < run.base->nodes(); ++k) {
     const double t = period_s_ * static_cast<double>(k);
-    furthest = std::max(furthest, nearest_mm(along_x.at(t)[0], along_y.at(t)[0], reference_mm(t)));
+    const double at_mm = reference_mm(t);
+    furthest = std::max(furthest, nearest_mm(along_x.at(t)[0], along_y.at(t)[0], i, at_mm));
     progress_mm_.push_back(furthest);
   }
 }
 
-double NozzleProgress::nearest_mm(double x_mm, double y_mm, double reference_mm) const {
-  const auto begins = path_mm_.begin();
-  const auto first = std::upper_bound(begins, path_mm_.end() - 1, reference_mm - kWindow_mm);
+double NozzleProgress::nearest_mm(double x_mm, double y_mm, std::size_t move,
+                                  double reference_mm) const {
   double best = std::numeric_limits<double>::infinity();
   double nearest = reference_mm;
-  for (std::size_t i = first == begins ? 0 : static_cast<std::size_t>(first - begins) - 1;
-       i < moves_->size() && path_mm_[i] <= reference_mm + kWindow_mm; ++i) {
+  const auto look_at = [&](std::size_t i) {
     const gcode::Segment& segment = (*moves_)[i].segment;
     const double length = path_mm_[i + 1] - path_mm_[i];
     if (length <= 0.0) {
-      continue;
+      return;
     }
     const double dx = segment.delta(X) / length;
     const double dy = segment.delta(Y) / length;
@@ -97,6 +96,16 @@ double NozzleProgress::nearest_mm(double x_mm, double y_mm, double reference_mm)
       best = cost;
       nearest = path_mm_[i] + along;
     }
+  };
+  // Further away than this, λ (u − s)² alone is more than what is found.
+  const auto reach_mm = [&] { return std::min(kWindow_mm, std::sqrt(best / kTowardsReference)); };
+  look_at(move);
+  for (std::size_t i = move; i > 0 && reference_mm - path_mm_[i] <= reach_mm();) {
+    look_at(--i);
+  }
+  for (std::size_t i = move + 1; i < moves_->size() && path_mm_[i] - reference_mm <= reach_mm();
+       ++i) {
+    look_at(i);
   }
   return nearest;
 }

@@ -26,7 +26,9 @@ class NozzleProgress {
   [[nodiscard]] bool past_first_move(double t) const;
 
  private:
-  [[nodiscard]] double nearest_mm(double x_mm, double y_mm, double reference_mm) const;
+  // s_n of a nozzle there, where the reference is on the move at s.
+  [[nodiscard]] double nearest_mm(double x_mm, double y_mm, std::size_t move,
+                                  double reference_mm) const;
   [[nodiscard]] double progress_mm(double t) const;
 
   const std::vector<planner::PlannedMove>* moves_;

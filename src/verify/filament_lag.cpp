@@ -21,8 +21,9 @@ Foot foot_on(const PathPiece& piece, double x_mm, double y_mm) {
   const double y = y_mm - piece.y_mm;
   const double along =
       std::clamp(x * piece.direction_x + y * piece.direction_y, 0.0, piece.length_xy_mm);
-  return {along,
-          std::pow(x - along * piece.direction_x, 2) + std::pow(y - along * piece.direction_y, 2)};
+  const double across_x = x - along * piece.direction_x;
+  const double across_y = y - along * piece.direction_y;
+  return {along, across_x * across_x + across_y * across_y};
 }
 
 double filament_per_mm(const PathPiece& piece) {
@@ -55,7 +56,9 @@ double laid_lag_mm(const ReferencePath& path, std::size_t number, double along_m
 
 void FilamentLag::add(const ReferencePath& path, std::size_t current, double r_x_mm, double r_y_mm,
                       double p_x_mm, double p_y_mm, double laid_mm, double h) {
-  const double reach_mm = kSearch * std::hypot(p_x_mm - r_x_mm, p_y_mm - r_y_mm);
+  const double off_x_mm = p_x_mm - r_x_mm;
+  const double off_y_mm = p_y_mm - r_y_mm;
+  const double reach_mm = kSearch * std::sqrt(off_x_mm * off_x_mm + off_y_mm * off_y_mm);
   const double reference_mm = foot_on(path[current], r_x_mm, r_y_mm).along_mm;
   Foot best;
   std::size_t nearest = current;

@@ -112,9 +112,9 @@ TEST(LevelFlow, IsAskedForByKlipperAlone) {
 
 // Moves with 0.03 mm of filament per mm but for one without, and what the nozzle has reached.
 struct Nozzle {
-  explicit Nozzle(const std::vector<gcode::Position>& points, double late_s = 0.0,
+  explicit Nozzle(const std::vector<gcode::Position>& points, double how_late_s = 0.0,
                   double freq_hz = 1000.0)
-      : late_s(late_s), axis(dynamics::from_frequency(freq_hz, 0.1)) {
+      : late_s(how_late_s), axis(dynamics::from_frequency(freq_hz, 0.1)) {
     planner::KlipperPlanner planner({}, {});
     for (std::size_t i = 1; i < points.size(); ++i) {
       planner.add({points[i - 1], points[i], 60.0, i, true});
