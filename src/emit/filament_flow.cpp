@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <vector>
 
 namespace unflex::emit {
 namespace {
@@ -33,7 +34,7 @@ double most_flow_step_mm_s(const planner::FirmwareConfig& firmware) {
   return std::numeric_limits<double>::infinity();
 }
 
-void level_flow(const gcode::Position& start_mm, double most_mm_s, std::vector<Stroke>& strokes) {
+void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Stroke> strokes) {
   if (!(most_mm_s > 0.0) || std::isinf(most_mm_s)) {
     return;
   }

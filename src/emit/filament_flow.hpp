@@ -5,7 +5,7 @@
 //   Δr        change of r where two lines join
 #pragma once
 
-#include <vector>
+#include <span>
 
 #include "strokes.hpp"
 
@@ -16,8 +16,8 @@ namespace unflex::emit {
 // (kinematics/extruder.py, calc_junction). The others' limits of E are raised in a run; infinity.
 [[nodiscard]] double most_flow_step_mm_s(const planner::FirmwareConfig& firmware);
 
-// Moves filament between neighbouring lines until |Δr| min(v, v') ≤ most_mm_s at every joint. All
-// of a run's filament stays what it was, and no line lays less than 0 if none did.
-void level_flow(const gcode::Position& start_mm, double most_mm_s, std::vector<Stroke>& strokes);
+// Moves filament between neighbouring lines until |Δr| min(v, v') ≤ most_mm_s at every joint. What
+// all of them lay stays what it was, and no line lays less than 0 if none did.
+void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Stroke> strokes);
 
 }  // namespace unflex::emit

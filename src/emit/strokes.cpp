@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "filament_flow.hpp"
@@ -94,10 +95,15 @@ gcode::Position start_of(const Run& run) {
   return run.moves->front().segment.start_mm;
 }
 
-// What the run's lines have laid at time t: what belongs to the place where the nozzle is. The
-// filament that the firmware is behind by comes with the run's first line, laid or drawn back, so
-// that much of the first move's is none of theirs.
-double filament_of_lines(const NozzleProgress& nozzle, double behind_mm, double t) {
+// What the run's lines have laid at time t: what belongs to the place where the nozzle is, and all
+// of it once the moves have ended, for a tail lays none. The filament that the firmware is behind
+// by comes with the run's first line, laid or drawn back, so that much of the first move's is none
+// of theirs.
+double filament_of_lines(const NozzleProgress& nozzle, const Timetable& table, double all_mm,
+                         double behind_mm, double t) {
+  if (table.tail_at(t)) {
+    return all_mm;
+  }
   const double filament_mm = nozzle.filament_mm(t);
   if (nozzle.past_first_move(t)) {
     return filament_mm - behind_mm;
@@ -274,6 +280,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   std::vector<Stroke> result;
   const double file_start_e_mm = start_of(run)[gcode::E];
   const double behind_mm = file_start_e_mm - start[gcode::E];
+  const double all_mm = end[gcode::E] - file_start_e_mm;
+  std::size_t laying = 0;  // lines that lay the run's filament; the tail's come after them
   Stroke last{0.0, start[X], start[Y], start[Z]};
   double dropped_s = times.front();
   std::size_t event = 0;
@@ -284,7 +292,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     stroke.x_mm = is_end ? end[X] : vertices.x_mm[i];
     stroke.y_mm = is_end ? end[Y] : vertices.y_mm[i];
     stroke.z_mm = is_end ? end[Z] : grid.z.nearest(table.height_mm(times[i]));
-    stroke.e_mm = filament_of_lines(nozzle, behind_mm, times[i]);
+    stroke.e_mm = filament_of_lines(nozzle, table, all_mm, behind_mm, times[i]);
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_times_s.size() &&
            event_times_s[event] <= times[i] - 0.5 * rules.min_line_s) {
@@ -299,6 +307,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
       stroke.z_mm = last.z_mm + change_of_z_mm(last, stroke, next_mm_s, grid, options);
     }
     if (goes_through(last, stroke, grid, rules)) {
+      laying += laying == result.size() && !table.tail_at(times[i - 1]) ? 1 : 0;
       result.push_back(stroke);
       last = stroke;
     } else if (result.empty()) {
@@ -307,11 +316,11 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   }
   if (!result.empty()) {
     Stroke& final = result.back();
-    final.e_mm = end[gcode::E] - file_start_e_mm;
+    final.e_mm = all_mm;
     final.x_mm = end[X];
     final.y_mm = end[Y];
     final.z_mm = end[Z];
-    level_flow(start, most_flow_step_mm_s(options.fixed), result);
+    level_flow(start, most_flow_step_mm_s(options.fixed), std::span(result).first(laying));
     time_strokes(run, grid, options, result);
   }
   return result;

@@ -38,6 +38,11 @@ std::size_t Timetable::move_at(double t) const {
   return after == starts_s_.begin() ? 0 : static_cast<std::size_t>(after - starts_s_.begin()) - 1;
 }
 
+bool Timetable::tail_at(double t) const {
+  constexpr double kRounding_s = 1e-9;
+  return t > starts_s_.back() - kRounding_s;
+}
+
 double Timetable::height_mm(double t) const {
   if (t >= starts_s_.back()) {
     return run_->moves->back().segment.end_mm[Z];

@@ -20,6 +20,9 @@ class Timetable {
   // The move at time t.
   [[nodiscard]] std::size_t move_at(double t) const;
 
+  // Whether the moves have ended at time t.
+  [[nodiscard]] bool tail_at(double t) const;
+
   // Z at time t: each move's share of it is spread along the base's path while the move lasts,
   // which keeps the slope small where the base is slower than the plan.
   [[nodiscard]] double height_mm(double t) const;

@@ -470,6 +470,26 @@ TEST(Strokes, LayFilamentMoveByMove) {
   }
 }
 
+// The nozzle may come to rest after the moves have ended, of a base that is meant for other
+// frequencies too. What its last micrometres would have does not belong there: a tail lays nothing.
+TEST(Strokes, HaveLaidAllFilamentWhenTheMovesHaveEnded) {
+  constexpr double kLate_s = 10e-3;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Path path = random_path(seed, 30);
+    const double end_s = planner::duration_s(path.moves);
+    const double all_mm =
+        path.moves.back().segment.end_mm[E] - path.moves.front().segment.start_mm[E];
+    std::size_t in_tail = 0;
+    for (const Stroke& stroke : path.draw(testing::plan_as_base(path.moves, kLate_s))) {
+      if (stroke.end_s > end_s - 1e-9) {
+        EXPECT_NEAR(stroke.e_mm, all_mm, 1e-12) << seed;
+        ++in_tail;
+      }
+    }
+    EXPECT_GT(in_tail, 2U) << seed;
+  }
+}
+
 TEST(Strokes, CarryTheHeightOfASpiral) {
   std::vector<gcode::Position> points;
   for (int i = 0; i <= 200; ++i) {

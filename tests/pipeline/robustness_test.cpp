@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -20,10 +21,12 @@ namespace {
 using testing::complaints;
 using testing::JobFolder;
 
-// The walls of a ring at 10 000 mm/s², whatever the slicer asked for.
-std::string fast_walls(std::istream& print) {
+// The walls of a ring at 10 000 mm/s², whatever the slicer asked for, as far as `most_lines`.
+std::string fast_walls(std::istream& print,
+                       std::size_t most_lines = std::numeric_limits<std::size_t>::max()) {
   std::string text;
-  for (std::string line; std::getline(print, line);) {
+  std::size_t lines = 0;
+  for (std::string line; lines < most_lines && std::getline(print, line); ++lines) {
     if (!line.starts_with("M204")) {
       text += line + "\n";
     }
@@ -89,7 +92,8 @@ TEST(SamplesRobustness, OfABandOfFrequenciesIsWorthAFifthAtItsEdges) {
   if (!print) {
     GTEST_SKIP() << "no shared samples beside the repository";
   }
-  expect_robust(fast_walls(print));
+  // Two fifths of the print; the rest is more of the same.
+  expect_robust(fast_walls(print, 20000));
 }
 
 TEST(Robustness, MayBeOfTheDampingToo) {
