@@ -92,6 +92,7 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
   state_.shaper_freq_x_hz = options_.shaper_freq_x_hz;
   state_.shaper_freq_y_hz = options_.shaper_freq_y_hz;
   state_.filament_diameter_mm = options_.filament_diameter_mm;
+  state_.absolute_e = !options_.relative_e;
   if (options_.firmware == Firmware::marlin) {
     state_.g91_covers_e = false;
     state_.feed_mm_s = 4000.0 / kSecondsPerMinute;  // DEFAULT_FEEDRATE_MM_M

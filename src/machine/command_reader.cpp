@@ -442,6 +442,11 @@ Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t n
     reader.take(text, command, place);
   }
   switch (command.number) {
+    case 82:
+    case 83:
+      // GCodes.cpp, CopyStateFrom after config.g: a print begins in that mode.
+      reader.reading.add("printer.relative_extrusion", command.number == 83, place);
+      break;
     case 98:
       reader.reading.note(place, "M98 runs another file, which unflex does not read");
       break;

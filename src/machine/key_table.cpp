@@ -87,6 +87,8 @@ constexpr std::array kKeys = {
         "Where the base may be along X, [min, max]", kNotLimited},
     Key{"printer.travel_y_mm", &setting<&S::printer, &P::travel_y_mm>, kAny, "mm",
         "Where the base may be along Y, [min, max]", kNotLimited},
+    Key{"printer.relative_extrusion", &setting<&S::printer, &P::relative_extrusion>, kAny, "",
+        "E is relative before the file's first M82 or M83: M83 in a start macro or in config.g"},
     Key{"printer.firmware_retraction", &setting<&S::printer, &P::firmware_retraction>, kAny, "",
         "G10 and G11 move filament. Klipper: [firmware_retraction]; Marlin: FWRETRACT"},
     Key{"printer.retract_length_mm", &setting<&S::printer, &P::retract_length_mm>, kNotNegative,

@@ -66,6 +66,7 @@ class Inspector {
       : result_(&result),
         firmware_(settings.printer.firmware),
         path_(firmware_),
+        absolute_e_(!settings.printer.relative_extrusion),
         planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))) {
     result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
     result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
@@ -197,7 +198,7 @@ class Inspector {
   std::vector<planner::PlannedMove> planned_;
   std::string slicers_;
   std::size_t linear_moves_ = 0;
-  bool absolute_e_ = true;
+  bool absolute_e_;
   long extruded_absolute_ = 0;  // extruding moves in M82 less those in M83
 };
 

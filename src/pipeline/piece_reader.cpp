@@ -211,6 +211,9 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
          "convert the file's line ends to LF");
   }
   interpreter_.interpret(event);
+  if (Status mode = extrusion_mode_.add(event, interpreter_.state(), lines_.name()); !mode) {
+    return tl::unexpected(mode.error());
+  }
   for (std::string& warning : event.warnings) {
     warn(event.line.number, std::move(warning));
   }

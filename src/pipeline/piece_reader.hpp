@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "extrusion_mode.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/emit/emitter.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -56,7 +57,7 @@ class PieceReader {
               verify::TravelLimits travel = {});
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
-  // read, was written by unflex, ends without a single G-code command in it, or has a move without
+  // read, was written by unflex, has E in another mode than it says, ends without a single G-code command in it, or has a move without
   // end. What the piece held before is gone; the storage of its lines is used again.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
@@ -103,6 +104,7 @@ class PieceReader {
   std::vector<Diagnostic> warnings_;
   std::size_t unlisted_warnings_ = 0;
   bool any_command_ = false;
+  ExtrusionModeCheck extrusion_mode_;
 };
 
 }  // namespace unflex::pipeline

@@ -156,6 +156,7 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
 
 gcode::InterpreterOptions interpreter_options(const machine::Settings& settings) {
   gcode::InterpreterOptions options = gcode::default_options(settings.printer.firmware);
+  options.relative_e = settings.printer.relative_extrusion;
   options.firmware_retraction = settings.printer.firmware_retraction;
   options.retract_length_mm = settings.retract_length_mm();
   options.retract_speed_mm_s = settings.retract_speed_mm_s();

@@ -175,6 +175,14 @@ TEST(RrfConfig, WithExpressionsAsksForTheirKeys) {
   EXPECT_THAT(parse(text, "config.g", given)->notes, IsEmpty());
 }
 
+TEST(RrfConfig, TellsInWhichModeOfFilamentAPrintBegins) {
+  const std::string text = "M550 P\"x\"\nM593 P\"zvd\" F40\n";
+  EXPECT_FALSE(read(text, "config.g").printer.relative_extrusion);
+  EXPECT_EQ(told(read(text + "G90\nM83\n", "config.g"), "printer.relative_extrusion"),
+            "true config.g:4");
+  EXPECT_FALSE(read(text + "M83\nM82\n", "config.g").printer.relative_extrusion);
+}
+
 TEST(RrfConfig, WithAWordTwiceSaysThatTheLineIsNotTaken) {
   const Settings s = read("M550 P\"x\"\nM204 P2000 P3000\nM593 P\"zvd\" F40\n", "config.g");
   ASSERT_THAT(s.notes, SizeIs(1));

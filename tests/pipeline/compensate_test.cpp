@@ -296,6 +296,15 @@ TEST_F(Texts, PassIntoAKeptMoveAtSpeed) {
                   "G1 X115.841 Y88.248 E0.36\nG1 X117.980734 Y89.211794 E-0.3\n"));
 }
 
+TEST_F(Texts, TakeFilamentAsTheStartMacroLeftItsMode) {
+  const std::string start = "G28\nG1 Z0.2 F600\nG1 X20 Y20 F6000\n";
+  const std::string walls = "G1 X60 E1.2\nG1 Y40 E0.6\nG1 X20 E1.2\nG1 Y20 E0.6\n";
+  std::string told = compensated(start + "M83\n" + walls);
+  const std::string known = compensated(start + walls, 1, {"printer.relative_extrusion=true"});
+  EXPECT_EQ(told.erase(told.find("M83\n"), 4), known);
+  EXPECT_THAT(known, Not(HasSubstr("M82")));
+}
+
 TEST_F(Texts, CountFilamentInStepsOfE) {
   static_cast<void>(
       compensated("G90\nM83\nM221 S300\nG1 X100 Y100 Z0.2 F6000\nG4 P500\nG1 X120 Y100 E.33333\n"

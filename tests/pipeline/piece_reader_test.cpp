@@ -1,9 +1,11 @@
 #include "piece_reader.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -13,6 +15,7 @@
 namespace unflex::pipeline {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -196,6 +199,49 @@ TEST(PieceReader, RefusesWhatHoldsNoCommand) {
         << text;
   }
   EXPECT_EQ(Reading("T0").error, "");
+}
+
+// Sixty walls of all lengths with 0.033 mm of filament per mm, in three strokes with a wipe each. E
+// is a difference, a reading, or a reading from the last stroke's end on.
+enum class WrittenE { relative, absolute, reset };
+
+std::string walls(WrittenE written) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> length(0.3, 8.0);
+  std::string text = "G28\nG1 Z0.2 F600\nG1 X20 Y20 F6000\n";
+  double laid_mm = 0.0;
+  double x = 20.0;
+  const auto e = [&](double mm) {
+    laid_mm = written == WrittenE::relative ? mm : laid_mm + mm;
+    return fmt::format(" E{:.5f}\n", laid_mm);
+  };
+  for (int i = 0; i < 60; ++i) {
+    const double mm = length(random);
+    x += i % 2 == 0 ? mm : -mm;
+    text += fmt::format("G1 X{:.3f}", x) + e(0.033 * mm);
+    if (i % 20 == 19) {
+      for (int wipe = 0; wipe < 4; ++wipe) {
+        x += 0.4;
+        text += fmt::format("G1 X{:.3f}", x) + e(-0.1);
+      }
+      text += "G1" + e(-0.4) + "G1 Y" + std::to_string(21 + i / 20) + "\n";
+      if (written == WrittenE::reset) {
+        text += "G92 E0\n";
+        laid_mm = 0.0;
+      }
+      text += "G1" + e(0.8);
+    }
+  }
+  return text;
+}
+
+TEST(PieceReader, RefusesRelativeFilamentThatNothingTellsOf) {
+  EXPECT_THAT(Reading(walls(WrittenE::relative)).error,
+              AllOf(HasSubstr("in.gcode:4"), HasSubstr("put M83 before its first move"),
+                    HasSubstr("printer.relative_extrusion = true")));
+  EXPECT_EQ(Reading("M83\n" + walls(WrittenE::relative)).error, "");
+  EXPECT_EQ(Reading(walls(WrittenE::absolute)).error, "");
+  EXPECT_EQ(Reading(walls(WrittenE::reset)).error, "");
 }
 
 TEST(PieceReader, LosesNoByteOfAnyFile) {

@@ -134,6 +134,8 @@ struct MarlinArcs {
 // What the firmware's configuration decides about the meaning of a line.
 struct InterpreterOptions {
   Firmware firmware = Firmware::klipper;
+  // The mode of E before the file's first M82 or M83.
+  bool relative_e = false;
   // Klipper's [firmware_retraction], Marlin's FWRETRACT: G10 and G11 move the filament (and so stop
   // the machine); otherwise they do nothing. RepRapFirmware always has it.
   bool firmware_retraction = true;

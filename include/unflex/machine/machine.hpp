@@ -35,6 +35,7 @@ struct PrinterSettings {
   // Where the base may be. Unset: not limited, except that it stays above 0 where the path does.
   std::optional<Range> travel_x_mm;
   std::optional<Range> travel_y_mm;
+  bool relative_extrusion = false;  // the printer is in M83 when a print begins
   // [firmware_retraction] is configured; lengths as in the printer's configuration.
   bool firmware_retraction = true;
   // Unset: the firmware's defaults.
