@@ -237,7 +237,7 @@ std::string walls(WrittenE written) {
 
 TEST(PieceReader, RefusesRelativeFilamentThatNothingTellsOf) {
   EXPECT_THAT(Reading(walls(WrittenE::relative)).error,
-              AllOf(HasSubstr("in.gcode:4"), HasSubstr("put M83 before its first move"),
+              AllOf(HasSubstr("in.gcode:50: "), HasSubstr("put M83 before its first move"),
                     HasSubstr("printer.relative_extrusion = true")));
   EXPECT_EQ(Reading("M83\n" + walls(WrittenE::relative)).error, "");
   EXPECT_EQ(Reading(walls(WrittenE::absolute)).error, "");
