@@ -92,8 +92,8 @@ TEST(SamplesRobustness, OfABandOfFrequenciesIsWorthAFifthAtItsEdges) {
   if (!print) {
     GTEST_SKIP() << "no shared samples beside the repository";
   }
-  // Two fifths of the print; the rest is more of the same.
-  expect_robust(fast_walls(print, 20000));
+  // A fifth of the print; the rest is more of the same.
+  expect_robust(fast_walls(print, 10000));
 }
 
 TEST(Robustness, MayBeOfTheDampingToo) {
