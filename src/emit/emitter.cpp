@@ -123,7 +123,7 @@ void Emitter::line(const gcode::Event& event, std::string& out) {
   }
   copy(event, out);
   follow_input(event);
-  if (event.kind == gcode::EventKind::barrier) {
+  if (event.kind == gcode::EventKind::border || event.kind == gcode::EventKind::barrier) {
     // RESTORE_GCODE_STATE brings back what was saved, which is not always what the input has now.
     restore_modes(out);
   }
@@ -180,9 +180,10 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
       }
     }
   };
+  bool joins_file = !run.goes_on;  // the first line, behind the file's own motion
   for (const Stroke& stroke : *plan.strokes) {
     write_events(stroke.events);
-    set_run_modes(out);
+    set_run_modes(std::exchange(joins_file, false), out);
     keep_reading_of_e_small(out);
     write_stroke(stroke, filament_origin, out);
   }
@@ -218,9 +219,17 @@ void Emitter::enter_run(std::string& out) {
 }
 
 // Whatever the input's lines have set inside the run.
-void Emitter::set_run_modes(std::string& out) {
+void Emitter::set_run_modes(bool joins_file, std::string& out) {
   set_unit(1.0, out);
-  set_limits(limits_in_run(options_.fixed.firmware, input_limits_, options_.run_limits), out);
+  planner::Limits limits =
+      limits_in_run(options_.fixed.firmware, input_limits_, options_.run_limits);
+  if (joins_file) {
+    // RepRapFirmware joins a move to the one before it by the policy that is in force when the move
+    // is added, and the one before can still change. By a run's policy filament that is moved alone
+    // before the run would end at the speed of the run's first line, and stop dead.
+    limits.jerk_policy = input_limits_.jerk_policy;
+  }
+  set_limits(limits, out);
   const gcode::ModalState& state = printer_.state();
   if (!state.absolute_xyz) {
     write("G90", out);

@@ -216,17 +216,39 @@ class SpeedSolver {
     return kRoom * std::min(accel_mm_s2 * kTenClocks_s, end_mm_s / 9.0);
   }
 
+  // The line before i is faster than v and so ends slower than it goes. If it began slower too, it
+  // has two ramps, and must gain enough over the faster of its ends. The speed nearest to v with
+  // which it does; where there is none, the line before is told the speed that it will have.
+  [[nodiscard]] double keeping_the_ramps_before(std::size_t i, double v) {
+    const double before = speed_mm_s_[i - 1];
+    const double began = i > 1 ? speed_mm_s_[i - 2] : magnitude(passing_.in_mm_s);
+    if (began >= before) {
+      return v;
+    }
+    const double faster_end = std::max(began, v);
+    const double gain = least_gain(faster_end, accel_mm_s2_[i - 1]);
+    if (before - faster_end >= gain) {
+      return v;
+    }
+    const double slower = before - gain;
+    if (slower >= began) {
+      return before - v < 0.5 * gain ? before : slower;
+    }
+    // However slow this line is, the one before gains too little over its beginning.
+    if (before - v < gain) {
+      return before;
+    }
+    if (i > 1) {
+      go_on_as_before(i - 1);
+    }
+    return v;
+  }
+
   // The speed nearest to v of which the firmware leaves out no ramp.
-  [[nodiscard]] double with_its_ramps(std::size_t i, double v) const {
+  [[nodiscard]] double with_its_ramps(std::size_t i, double v) {
     const double before = speed_mm_s_[i - 1];
     if (v < before) {
-      // The line before ends slower than it goes. If it also began slower, it has to be worth it.
-      const double gain = least_gain(v, accel_mm_s2_[i - 1]);
-      const bool rose = i < 2 || speed_mm_s_[i - 2] < before;
-      if (!rose || before - v >= gain) {
-        return v;
-      }
-      return before - v < 0.5 * gain ? before : before - gain;
+      return keeping_the_ramps_before(i, v);
     }
     const double after = i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : 0.0;
     const double faster_end = std::max(before, std::min(after, v));
@@ -237,14 +259,20 @@ class SpeedSolver {
     return v - faster_end < 0.5 * gain ? faster_end : faster_end + gain;
   }
 
+  // With the speed of the line before, to the last digit.
+  void go_on_as_before(std::size_t i) {
+    speed_mm_s_[i] = speed_mm_s_[i - 1];
+    (*strokes_)[i].speed_mm_s = (*strokes_)[i - 1].speed_mm_s;
+    (*strokes_)[i].feed_decimals = (*strokes_)[i - 1].feed_decimals;
+  }
+
   // The speed nearest to v that the firmware can be told and will take.
   void set_speed(std::size_t i, double v) {
     Stroke& stroke = (*strokes_)[i];
     if (i > 0 && options_->fixed.firmware == Firmware::rrf) {
       v = with_its_ramps(i, v);
       if (v == speed_mm_s_[i - 1]) {
-        stroke.speed_mm_s = speed_mm_s_[i] = v;
-        stroke.feed_decimals = (*strokes_)[i - 1].feed_decimals;
+        go_on_as_before(i);
         return;
       }
     }

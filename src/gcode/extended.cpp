@@ -72,10 +72,9 @@ void Interpreter::extended(Event& event) {
     return gcode_offset(event);
   }
   if (name == "SAVE_GCODE_STATE") {
-    // Klipper does not stop for it. But the modes it keeps must be those the file means, not those
-    // of rewritten motion, so nothing may be rewritten across it.
+    // The modes it keeps must be those the file means, not those of rewritten motion.
     saved_states_.insert_or_assign(state_name(command_), state_);
-    event.kind = EventKind::barrier;
+    event.kind = EventKind::border;
     return;
   }
   if (name == "RESTORE_GCODE_STATE") {
@@ -101,7 +100,7 @@ void Interpreter::extended(Event& event) {
       event.kind = EventKind::barrier;
       return;
     case Effect::unknown:
-      return lose_position(event);
+      return doubt_position(event);
   }
 }
 
@@ -165,13 +164,16 @@ void Interpreter::input_shaper(Event& event) {
   note_shaper(event);
 }
 
-// extras/exclude_object.py: Klipper does not stop for it. But when the user has cancelled the
+// Klipper's extras/exclude_object.py, Marlin's gcode/feature/cancel/M486.cpp, RepRapFirmware's
+// GCodes5.cpp, ChangeToObject: none of them stops for it. But when the user has cancelled the
 // object, all motion in between is left out, and the next goes in one line from wherever the
 // machine then is.
 void Interpreter::object_label(Event& event) {
-  event.kind = EventKind::barrier;
-  event.may_jump = true;
-  state_.known[X] = state_.known[Y] = false;
+  event.kind = EventKind::border;
+  for (const Axis axis : {X, Y}) {
+    assumed_[axis] = assumed_[axis] || state_.known[axis];
+    state_.known[axis] = false;
+  }
   z_left_out_ = options_.firmware == Firmware::marlin;
 }
 
@@ -241,7 +243,7 @@ void Interpreter::gcode_offset(Event& event) {
   }
   const Parameter move = number_of(command_, "MOVE");
   const bool moves = move.given && move.value != 0.0;
-  event.kind = EventKind::barrier;
+  event.kind = EventKind::border;
   for (const Axis axis : {X, Y, Z, E}) {
     state_.offset_mm[axis] += shift_mm[axis];
     state_.base_mm[axis] += shift_mm[axis];
@@ -268,14 +270,18 @@ void Interpreter::restore_state(Event& event) {
   state_.base_mm[E] += state_.position_mm[E] - state.position_mm[E];
   for (const Axis axis : {X, Y, Z}) {
     // A zero that was set at an unknown place lies nowhere on the bed that the other is told from.
-    state_.known[axis] = state_.known[axis] && state_.base_known[axis] && state.base_known[axis];
+    const bool zero_known = state_.base_known[axis] && state.base_known[axis];
+    state_.known[axis] = state_.known[axis] && zero_known;
+    if (axis != Z) {
+      assumed_[axis] = assumed_[axis] && zero_known;
+    }
   }
   state_.base_known = state.base_known;
   state_.offset_mm = state.offset_mm;
   state_.feed_mm_s = state.feed_mm_s;
   state_.speed_factor = state.speed_factor;
   state_.flow_factor = state.flow_factor;
-  event.kind = EventKind::barrier;
+  event.kind = EventKind::border;
   const Parameter move = number_of(command_, "MOVE");
   if (move.given && move.value != 0.0) {
     for (const Axis axis : {X, Y, Z}) {

@@ -117,9 +117,9 @@ void Event::reset() {
   shaper.reset();
   dwell_s = 0.0;
   position_lost = false;
-  may_jump = false;
   may_set_limits = false;
   warnings.clear();
+  added = false;
 }
 
 Event Interpreter::interpret(Line line) {
@@ -260,7 +260,7 @@ void Interpreter::other_m_code(Event& event) {
       event.kind = EventKind::barrier;
       return;
     case Effect::unknown:
-      return lose_position(event);
+      return doubt_position(event);
   }
 }
 
@@ -297,6 +297,7 @@ void Interpreter::home(Event& event) {
   event.kind = EventKind::barrier;
   event.position_lost = true;
   const bool some_named = command_.has_any("XYZ");
+  assumed_.fill(false);
   for (const Axis axis : {X, Y, Z}) {
     state_.known[axis] = false;
     if (!some_named || command_.has(kAxisLetters[axis])) {
@@ -511,12 +512,19 @@ void Interpreter::lose_position(Event& event) {
   event.kind = EventKind::barrier;
   event.position_lost = true;
   state_.known.fill(false);
+  assumed_.fill(false);
   // Of another extruder, maybe.
   pressure_advance_on_.reset();
   state_.pressure_advance_s.reset();
   if (options_.firmware == Firmware::rrf) {
     lose_tool();  // a macro may select one
   }
+}
+
+void Interpreter::doubt_position(Event& event) {
+  const std::array<bool, 4> before = known_or_assumed();
+  lose_position(event);
+  assumed_ = {before[X], before[Y]};
 }
 
 void Interpreter::not_understood(Event& event, std::string_view problem) {

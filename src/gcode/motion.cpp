@@ -119,10 +119,10 @@ Target read_target(const Command& command, const ModalState& state, Firmware fir
 
 // Whether the text says where a motion to the target starts. A plane may be at any height as long
 // as the line does not leave it.
-bool starts_known(const Target& target, const ModalState& state, bool in_xy_plane = true) {
-  const bool e_known = state.known[E] || !target.named[E] || !target.e_absolute;
-  const bool z_known = state.known[Z] || (in_xy_plane && !target.named[Z]);
-  return state.known[X] && state.known[Y] && z_known && e_known;
+bool starts_known(const Target& target, const std::array<bool, 4>& known, bool in_xy_plane = true) {
+  const bool e_known = known[E] || !target.named[E] || !target.e_absolute;
+  const bool z_known = known[Z] || (in_xy_plane && !target.named[Z]);
+  return known[X] && known[Y] && z_known && e_known;
 }
 
 // Once an axis has been sent to an absolute reading, its position is known. True if one was not
@@ -240,13 +240,15 @@ void Interpreter::linear_move(Event& event) {
   }
   const bool brings_z_back = z_left_out_ && target.named[Z] && state_.absolute_xyz;
   z_left_out_ = z_left_out_ && !brings_z_back;
-  const bool start_known = starts_known(target, state_) && modes_certain() && !brings_z_back;
+  Start start;
+  start.known = starts_known(target, state_.known) && modes_certain() && !brings_z_back;
+  start.assumed = !start.known && starts_known(target, known_or_assumed()) && modes_certain();
   const bool from_unknown = settle(target, state_) || brings_z_back;
   const double e_before_mm = state_.position_mm[E];
-  append_segment(event, target.position_mm, state_.feed_mm_s * state_.speed_factor, start_known);
+  append_segment(event, target.position_mm, state_.feed_mm_s * state_.speed_factor, start);
   keep_reading_of_e(target.e_absolute, e_before_mm);
   if (event.segments.empty() && from_unknown) {
-    event.kind = EventKind::barrier;
+    event.kind = start.assumed ? EventKind::border : EventKind::barrier;
   }
 }
 
@@ -297,7 +299,11 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
                     "check the line",
                     gap_mm));
   }
-  const bool start_known = starts_known(target, state_, plane.normal == Z) && modes_certain();
+  const bool in_xy_plane = plane.normal == Z;
+  Start start;
+  start.known = starts_known(target, state_.known, in_xy_plane) && modes_certain();
+  start.assumed =
+      !start.known && starts_known(target, known_or_assumed(), in_xy_plane) && modes_certain();
   settle(target, state_);
   const Position start_mm = state_.position_mm;
   const double radius_mm = std::hypot((*offset)[0], (*offset)[1]);
@@ -313,7 +319,7 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
       next[plane.alpha] = piece.end_mm[0];
       next[plane.beta] = piece.end_mm[1];
     }
-    append_segment(event, next, feed_mm_s, start_known, i == 0 || is_last ? 0.0 : radius_mm);
+    append_segment(event, next, feed_mm_s, start, i == 0 || is_last ? 0.0 : radius_mm);
   }
   keep_reading_of_e(target.e_absolute, start_mm[E]);
 }
@@ -325,10 +331,18 @@ void Interpreter::set_feed(std::optional<double> feed_word) {
   }
 }
 
+std::array<bool, 4> Interpreter::known_or_assumed() const {
+  std::array<bool, 4> known = state_.known;
+  for (const Axis axis : {X, Y}) {
+    known[axis] = known[axis] || assumed_[axis];
+  }
+  return known;
+}
+
 void Interpreter::append_segment(Event& event, const Position& target, double feed_mm_s,
-                                 bool start_known, double curve_radius_mm) {
-  Segment segment{state_.position_mm, target,      feed_mm_s,
-                  event.line.number,  start_known, curve_radius_mm};
+                                 const Start& start, double curve_radius_mm) {
+  Segment segment{state_.position_mm, target,        feed_mm_s,      event.line.number,
+                  start.known,        start.assumed, curve_radius_mm};
   if (segment.length_mm() < kShortestMove_mm) {
     for (const Axis axis : {X, Y, Z}) {
       segment.end_mm[axis] = segment.start_mm[axis];

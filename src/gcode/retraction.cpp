@@ -14,6 +14,14 @@ constexpr double kHopSpeed_mm_s = 10000.0;
 
 }  // namespace
 
+Interpreter::Start Interpreter::start_of_retraction() const {
+  const auto all = [](const std::array<bool, 4>& known) {
+    return known[X] && known[Y] && known[Z];
+  };
+  const bool known = all(state_.known);
+  return {known, !known && all(known_or_assumed())};
+}
+
 // firmware_retraction.py, cmd_G10 and cmd_G11: a relative E move between saving and restoring the
 // G-code state, so that E reads as before. The length is written with five decimals and the speed
 // in whole mm/min, and the flow and speed factors apply to both.
@@ -37,8 +45,7 @@ void Interpreter::firmware_retraction(Event& event, bool retract) {
   Position target = state_.position_mm;
   target[E] += travel_mm;
   state_.base_mm[E] += travel_mm;
-  append_segment(event, target, feed_mm_s * state_.speed_factor,
-                 state_.known[X] && state_.known[Y] && state_.known[Z]);
+  append_segment(event, target, feed_mm_s * state_.speed_factor, start_of_retraction());
   if (event.segments.empty()) {
     event.kind = EventKind::barrier;  // the length is not known here, but the machine stops
   }
@@ -54,14 +61,16 @@ void Interpreter::retraction_and_hop(Event& event, bool retract) {
     return;
   }
   state_.retracted = retract;
-  const bool known = state_.known[X] && state_.known[Y] && state_.known[Z] && modes_certain();
+  Start start = start_of_retraction();
+  start.known = start.known && modes_certain();
+  start.assumed = start.assumed && modes_certain();
   const auto shift = [&](Axis axis, double by_mm, double feed_mm_s) {
     Position target = state_.position_mm;
     target[axis] += by_mm;
     state_.base_mm[axis] += by_mm;
     // Without a speed (M207 F0) Marlin goes as fast as it went last (module/motion.cpp,
     // _internal_move_to_destination).
-    append_segment(event, target, feed_mm_s > 0.0 ? feed_mm_s : state_.feed_mm_s, known);
+    append_segment(event, target, feed_mm_s > 0.0 ? feed_mm_s : state_.feed_mm_s, start);
   };
   if (retract) {
     shift(E, -options_.retract_length_mm, options_.retract_speed_mm_s);

@@ -13,7 +13,6 @@
 namespace unflex::pipeline {
 namespace {
 
-constexpr std::string_view kStartUnknown = "start unknown";
 // Below this share the user hears of it, with so many reasons.
 constexpr double kEnough = 0.95;
 constexpr std::size_t kNamedReasons = 3;
@@ -43,6 +42,7 @@ void ExtrudedPath::keep(const Piece& piece) {
 }
 
 void ExtrudedPath::compensate(const Piece& piece) {
+  lost_by_.reset();
   for (const gcode::Event& event : piece.events) {
     for (const gcode::Segment& segment : event.segments) {
       const double length_mm = segment.extruding() ? segment.length_xy_mm() : 0.0;
@@ -61,7 +61,9 @@ void ExtrudedPath::keep_moves(const Piece& piece, const gcode::Event& event) {
       path_.total_mm += length_mm;
       path_.kept_mm[std::string(reason)] += length_mm;
     }
-    if (reason == kStartUnknown && lost_by_) {
+    if (segment.start_known) {
+      lost_by_.reset();
+    } else if (lost_by_) {
       ++unknown_[*lost_by_].moves_kept;
       unknown_[*lost_by_].kept_mm += length_mm;
     }

@@ -66,8 +66,8 @@ class Inspector {
       : result_(&result),
         firmware_(settings.printer.firmware),
         path_(firmware_),
-        absolute_e_(!settings.printer.relative_extrusion),
-        planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))) {
+        planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))),
+        absolute_e_(!settings.printer.relative_extrusion) {
     result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
     result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
     result_->lowest_accel_mm_s2 = std::numeric_limits<double>::infinity();
@@ -108,9 +108,16 @@ class Inspector {
 
  private:
   void add_event(const gcode::Event& event) {
+    if (event.added) {
+      count_kept_moves(event, firmware_, result_->kept_moves);
+      plan(event);
+      return;
+    }
     ++result_->lines;
     result_->bytes += event.line.text.size();
-    result_->passive_lines += event.kind == gcode::EventKind::passive ? 1 : 0;
+    const bool stops_nothing =
+        event.kind == gcode::EventKind::passive || event.kind == gcode::EventKind::border;
+    result_->passive_lines += stops_nothing ? 1 : 0;
     result_->limit_lines += event.kind == gcode::EventKind::limits ? 1 : 0;
     result_->barrier_lines += event.kind == gcode::EventKind::barrier ? 1 : 0;
     result_->reference_time_s += event.dwell_s;

@@ -98,7 +98,7 @@ double NozzleFollower::follow(const Piece& piece) {
     }
     for (std::size_t k = 0; k < piece.move_counts[i]; ++k, ++next) {
       const planner::PlannedMove& move = piece.moves[next];
-      if (!move.segment.start_known) {
+      if (!move.segment.start_known && !move.segment.start_assumed) {
         // From wherever the machine was: nothing is known but that it starts at rest.
         set(at_rest(move.segment.start_mm), move.segment.start_mm);
       }

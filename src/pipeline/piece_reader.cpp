@@ -194,8 +194,25 @@ void PieceReader::take_spare(gcode::Event& event) {
   }
 }
 
+void PieceReader::read_line(gcode::Event& event) {
+  interpreter_.interpret(event);
+  for (std::string& warning : event.warnings) {
+    warn(event.line.number, std::move(warning));
+  }
+  warn_of_travel(event);
+  if (event.kind != gcode::EventKind::move) {
+    planner_->apply(*event.limits);
+  }
+}
+
 Result<bool> PieceReader::read_event(gcode::Event& event) {
   gcode::Line& line = event.line;
+  if (approached_) {
+    line = std::move(*approached_);
+    approached_.reset();
+    read_line(event);
+    return true;
+  }
   const Result<bool> more = lines_.next(line);
   if (!more || !*more) {
     return more;
@@ -210,16 +227,15 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
          "a carriage return without a line feed ends no line, neither here nor in the printer: "
          "convert the file's line ends to LF");
   }
-  interpreter_.interpret(event);
+  if (std::optional<std::string> approach = interpreter_.approach(line)) {
+    approached_ = std::exchange(line, {std::move(*approach), line.number});
+    read_line(event);
+    event.added = true;
+    return true;
+  }
+  read_line(event);
   if (Status mode = extrusion_mode_.add(event, interpreter_.state(), lines_.name()); !mode) {
     return tl::unexpected(mode.error());
-  }
-  for (std::string& warning : event.warnings) {
-    warn(event.line.number, std::move(warning));
-  }
-  warn_of_travel(event);
-  if (event.kind != gcode::EventKind::move) {
-    planner_->apply(*event.limits);
   }
   return true;
 }

@@ -57,8 +57,9 @@ class PieceReader {
               verify::TravelLimits travel = {});
 
   // The next piece; false at the end of the input. An error of kind input when the text cannot be
-  // read, was written by unflex, has E in another mode than it says, ends without a single G-code command in it, or has a move without
-  // end. What the piece held before is gone; the storage of its lines is used again.
+  // read, was written by unflex, has E in another mode than it says, ends without a single G-code
+  // command in it, or has a move without end. What the piece held before is gone; the storage of
+  // its lines is used again.
   [[nodiscard]] Result<bool> next(Piece& piece);
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
@@ -70,6 +71,7 @@ class PieceReader {
   void take_spare(gcode::Event& event);
   Result<bool> cut(Piece& piece);
   Result<bool> read_event(gcode::Event& event);
+  void read_line(gcode::Event& event);
   void warn(std::size_t line, std::string message);
   void warn_of_travel(const gcode::Event& event);
   void append(gcode::Event&& event);
@@ -81,6 +83,7 @@ class PieceReader {
 
   gcode::LineReader lines_;
   gcode::Interpreter interpreter_;
+  std::optional<gcode::Line> approached_;  // read, and to come after gcode::Interpreter::approach
   std::unique_ptr<planner::Planner> planner_;
   Firmware firmware_;
   verify::TravelLimits travel_;

@@ -225,7 +225,7 @@ planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
   config.minimum_planner_speed_mm_s = settings.printer.minimum_planner_speed_mm_s;
   config.block_buffer_size = config.ring_length = static_cast<int>(settings.queue_length());
   config.step_clock_hz = settings.printer.step_clock_hz;
-  config.has_print_jerk = settings.has_print_jerk();
+  config.has_print_jerk = config.rounds_phases = settings.has_print_jerk();
   return config;
 }
 

@@ -46,7 +46,10 @@ bool MarlinPlanner::add(const gcode::Segment& segment) {
   }
   follow_jumps(segment);
   asked_mm_ = segment.end_mm;
-  start_known_ = start_known_ && segment.start_known;
+  if (!segment.start_known) {
+    start_assumed_ = segment.start_assumed && (start_known_ || start_assumed_);
+    start_known_ = false;
+  }
 
   // One entry always stays empty.
   if (end_ - first_ == ring_.size() - 1) {
@@ -69,6 +72,7 @@ bool MarlinPlanner::add(const gcode::Segment& segment) {
   position_ = target;
   filament_mm_ = segment.end_mm[E];
   start_known_ = true;
+  start_assumed_ = false;
   ++end_;
   if (end_ - 1 != planned_) {
     reverse_pass();
@@ -123,6 +127,7 @@ void MarlinPlanner::set_move(const gcode::Segment& segment, const marlin::Steps&
   move = PlannedMove{};
   move.segment = segment;
   move.segment.start_known = start_known_;
+  move.segment.start_assumed = start_assumed_;
   std::array<double, 4> delta{};
   for (std::size_t axis = 0; axis < delta.size(); ++axis) {
     const double steps_per_mm = config_.steps_per_mm[axis];

@@ -127,6 +127,7 @@ Settings make_settings(const Limits& asked, const FirmwareConfig& config) {
   result.print_accel = static_cast<float>(limits.print_accel_mm_s2) * per_clock2;
   result.travel_accel = static_cast<float>(limits.travel_accel_mm_s2) * per_clock2;
   result.join_all = limits.jerk_policy != 0;
+  result.rounds_phases = config.rounds_phases;
   return result;
 }
 
@@ -193,9 +194,15 @@ void set_trapezoid(Dda& dda) {
 void finish(const Settings& settings, Dda& dda) {
   const float decel_start_mm = dda.length_mm - dda.decel_distance_mm;
   const float steady_mm = decel_start_mm - std::min(dda.accel_distance_mm, decel_start_mm);
-  const float accel_clocks = ramp_clocks(dda.top_speed, dda.start_speed, dda.accel);
-  const float decel_clocks = ramp_clocks(dda.top_speed, dda.end_speed, dda.decel);
-  const float steady_clocks = steady_mm <= 0.0F ? 0.0F : steady_mm / dda.top_speed;
+  float accel_clocks = ramp_clocks(dda.top_speed, dda.start_speed, dda.accel);
+  float decel_clocks = ramp_clocks(dda.top_speed, dda.end_speed, dda.decel);
+  float steady_clocks = steady_mm <= 0.0F ? 0.0F : steady_mm / dda.top_speed;
+  if (settings.rounds_phases) {
+    // PrepParams::SetFromDDA, lrintf: ties to even, as std::nearbyint here.
+    accel_clocks = std::nearbyint(accel_clocks);
+    decel_clocks = std::nearbyint(decel_clocks);
+    steady_clocks = std::nearbyint(steady_clocks);
+  }
   // Of less than one clock each phase would have to give more than it has.
   dda.clocks = std::max<std::int64_t>(1, whole_clocks(accel_clocks + steady_clocks + decel_clocks));
 

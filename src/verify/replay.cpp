@@ -136,12 +136,17 @@ void Replay::read_line() {
   if (!more) {
     error_ = more.error();
   }
-  const Regime before{interpreter_.state(), plan_.limits()};
   if (more && *more) {
     ++lines_read_;
     if (listener_) {
       listener_(line);
     }
+    if (!in_output_) {
+      read_approach(line);
+    }
+  }
+  const Regime before{interpreter_.state(), plan_.limits()};
+  if (more && *more) {
     read_event(interpreter_.interpret(std::move(line)), before);
   } else {
     for_each_plan([](PlanQueue& plan) { plan.stop(); });
@@ -151,6 +156,14 @@ void Replay::read_line() {
     end.line.number = lines_read_;
     end.regime = before;
     push_section(std::move(end));
+  }
+}
+
+// The emitted file has it as a line.
+void Replay::read_approach(const gcode::Line& line) {
+  if (std::optional<std::string> text = interpreter_.approach(line)) {
+    const Regime before{interpreter_.state(), plan_.limits()};
+    read_event(interpreter_.interpret({std::move(*text), line.number}), before);
   }
 }
 
@@ -171,7 +184,9 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
         if (event.segments.front().start_known) {
           place(std::move(event.line), before, true);
         } else {
-          for_each_plan([](PlanQueue& plan) { plan.stop(); });
+          if (!event.segments.front().start_assumed) {
+            for_each_plan([](PlanQueue& plan) { plan.stop(); });
+          }
           event.segments.clear();
           read_section(SectionKind::barrier, std::move(event), before);
         }
@@ -180,6 +195,9 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
       } else {
         read_section(SectionKind::move, std::move(event), before);
       }
+      break;
+    case gcode::EventKind::border:
+      read_section(SectionKind::border, std::move(event), before);
       break;
     case gcode::EventKind::barrier:
       for_each_plan([](PlanQueue& plan) { plan.stop(); });
@@ -215,7 +233,6 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
                                                before.modal.pressure_advance_s);
   }
   section.moves_by_itself = event.position_lost;
-  section.may_be_left = event.position_lost || event.may_jump;
   section.may_be_added =
       kind == SectionKind::barrier && is_known_addition(event.line.content(), fixed_.firmware);
   section.line = std::move(event.line);

@@ -31,6 +31,7 @@ struct Regime {
 enum class SectionKind {
   run,
   move,     // a move that is kept as it is
+  border,   // a line without motion that no run reaches across: the label of an object …
   barrier,  // the machine stops: homing, tool change, macro, pause …
   end,      // of the file
 };
@@ -44,8 +45,7 @@ struct Section {
   double dwell_s = 0.0;
   // barrier: for how long the machine stands still to switch its input shaper.
   double switching_s = 0.0;
-  bool may_be_left = false;  // barrier: the machine moves by itself, or may go elsewhere next
-  bool moves_by_itself = false;
+  bool moves_by_itself = false;  // barrier
   // barrier: of a form unflex adds, so that it may be no section at all of the sliced file.
   bool may_be_added = false;
   // run: announced as compensated.
@@ -109,6 +109,7 @@ class Replay {
  private:
   [[nodiscard]] bool find_move(const PlanQueue& plan);
   void read_line();
+  void read_approach(const gcode::Line& line);
   void read_event(gcode::Event event, const Regime& before);
   void read_run_moves(gcode::Event event, const Regime& before);
   void read_section(SectionKind kind, gcode::Event event, const Regime& before);

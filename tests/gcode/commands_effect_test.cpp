@@ -61,15 +61,16 @@ TEST_P(Stopping, FinishesAllMotionAndKeepsThePosition) {
   EXPECT_TRUE(session_.move("G1 X2").start_known);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Commands, Stopping,
-    ::testing::Values("M900 K0.05", "M572 D0 S0.05", "SET_PRINT_STATS_INFO CURRENT_LAYER=3", "G4",
-                      "M400", "M109 S210", "M190 S60", "M191 S40", "M116", "M17", "M119",
-                      "M300 S440 P50", "M150 R255", "M280 P0 S90", "M412 S1", "M420 S1", "G92 X0",
-                      "G92", "G10 P0 S210", "SET_INPUT_SHAPER TYPE=mzv",
-                      "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=.04", "SET_GCODE_OFFSET Z=0",
-                      "TEMPERATURE_WAIT SENSOR=a MINIMUM=50",
-                      "SET_TMC_CURRENT STEPPER=stepper_x CURRENT=1"));
+INSTANTIATE_TEST_SUITE_P(Commands, Stopping,
+                         ::testing::Values("M900 K0.05", "M572 D0 S0.05",
+                                           "SET_PRINT_STATS_INFO CURRENT_LAYER=3", "G4", "M400",
+                                           "M109 S210", "M190 S60", "M191 S40", "M116", "M17",
+                                           "M119", "M300 S440 P50", "M150 R255", "M280 P0 S90",
+                                           "M412 S1", "M420 S1", "G92 X0", "G92", "G10 P0 S210",
+                                           "SET_INPUT_SHAPER TYPE=mzv",
+                                           "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=.04",
+                                           "TEMPERATURE_WAIT SENSOR=a MINIMUM=50",
+                                           "SET_TMC_CURRENT STEPPER=stepper_x CURRENT=1"));
 
 TEST_P(Losing, LeavesTheMachineAnywhere) {
   const Event event = session_.read(GetParam());
@@ -109,8 +110,34 @@ TEST(ForeignLimits, MayBeSetByAMacro) {
 TEST(ExcludeObject, MayLeaveOutWhatFollows) {
   Session session;
   session.read("G1 X1 Y1 Z1");
-  EXPECT_TRUE(session.read("EXCLUDE_OBJECT NAME=a").may_jump);
-  EXPECT_FALSE(session.move("G1 X2").start_known);
+  EXPECT_EQ(session.read("EXCLUDE_OBJECT NAME=a").kind, EventKind::border);
+  const Segment next = session.move("G1 X2");
+  EXPECT_FALSE(next.start_known);
+  EXPECT_TRUE(next.start_assumed);
+  session.read("G1 X2 Y2");
+  EXPECT_TRUE(session.move("G1 X3").start_known);
+}
+
+TEST(ExcludeObject, MakesNoUnknownPlaceKnown) {
+  for (const char* lost : {"G28\nEXCLUDE_OBJECT_END", "EXCLUDE_OBJECT_END\nG28"}) {
+    Session session;
+    session.read("G1 X1 Y1 Z1");
+    session.read(lost);
+    const Segment next = session.move("G1 X2 Y2");
+    EXPECT_FALSE(next.start_known) << lost;
+    EXPECT_FALSE(next.start_assumed) << lost;
+  }
+}
+
+TEST(UnknownCommand, IsTakenToMoveNothing) {
+  for (const char* command : {"MY_MACRO A=1", "M7001"}) {
+    Session session;
+    session.read("G1 X1 Y1 Z1");
+    EXPECT_TRUE(session.read(command).position_lost);
+    const Segment next = session.move("G1 X2 Y2");
+    EXPECT_FALSE(next.start_known) << command;
+    EXPECT_TRUE(next.start_assumed) << command;
+  }
 }
 
 // kinematics/extruder.py, _set_pressure_advance: from none to some is another smoothing time.

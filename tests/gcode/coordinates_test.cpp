@@ -210,11 +210,11 @@ TEST(Coordinates, FlowFactorScalesExtrusionAndKeepsItsReading) {
   }
 }
 
-TEST(Coordinates, OffsetsShiftTheZeroAndStop) {
+TEST(Coordinates, OffsetsShiftTheZeroAndStopNothing) {
   Session session;
   session.read("G1 X1 Y1 Z1");
   Event event = session.read("SET_GCODE_OFFSET Z=0.2 x=-1");
-  EXPECT_EQ(event.kind, EventKind::barrier);
+  EXPECT_EQ(event.kind, EventKind::border);
   EXPECT_FALSE(event.position_lost);
   EXPECT_THAT(session.state().position_mm, ElementsAre(1, 1, 1, 0));
   EXPECT_THAT(session.move("G1 X1 Z1").end_mm, ElementsAre(0, 1, 1.2, 0));
@@ -242,10 +242,10 @@ TEST(Coordinates, OffsetsThatMoveLoseThePosition) {
 TEST(Coordinates, SavedStatesComeBack) {
   Session session;
   session.read("G1 X1 Y1 Z1 E4 F600\nM83\nG92 X0");
-  EXPECT_EQ(session.read("SAVE_GCODE_STATE NAME=a").kind, EventKind::barrier);
+  EXPECT_EQ(session.read("SAVE_GCODE_STATE NAME=a").kind, EventKind::border);
   session.read("G91\nM82\nM221 S50\nM220 S50\nG1 X5 E2 F1200\nG92 X3");
   Event event = session.read("RESTORE_GCODE_STATE NAME=a");
-  EXPECT_EQ(event.kind, EventKind::barrier);
+  EXPECT_EQ(event.kind, EventKind::border);
   EXPECT_FALSE(event.position_lost);
   EXPECT_TRUE(session.state().absolute_xyz);
   EXPECT_FALSE(session.state().absolute_e);

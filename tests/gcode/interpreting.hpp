@@ -41,6 +41,9 @@ class Session {
     return event.segments.empty() ? Segment{} : event.segments.front();
   }
 
+  [[nodiscard]] std::optional<std::string> approach(const std::string& line) const {
+    return interpreter_.approach({line + "\n", number_ + 1});
+  }
   [[nodiscard]] const ModalState& state() const { return interpreter_.state(); }
 
  private:

@@ -135,7 +135,7 @@ TEST(MarlinObjects, AreFollowedByAMoveThatBringsZBack) {
   Session session(default_options(Firmware::marlin));
   session.read("G1 X1 Y1 Z0.3\nM486 S1\nG1 X2 Y2");
   EXPECT_TRUE(session.move("G1 X3").start_known);
-  EXPECT_EQ(session.read("G1 Z0.3").kind, EventKind::barrier);
+  EXPECT_EQ(session.read("G1 Z0.3").kind, EventKind::border);
   EXPECT_EQ(session.read("G1 Z0.3").kind, EventKind::passive);
   session.read("M486 S0\nG1 X2 Y2");
   EXPECT_FALSE(session.move("G1 X3 Z0.3").start_known);

@@ -156,7 +156,7 @@ TEST(RrfObjects, AreLabelledByComments) {
                            ";MESH:cube.stl", "; process Process1", "M486 S0"}) {
     Session session(default_options(Firmware::rrf));
     session.read("G1 X1 Y1 Z1");
-    EXPECT_EQ(session.read(line).kind, EventKind::barrier) << line;
+    EXPECT_EQ(session.read(line).kind, EventKind::border) << line;
     EXPECT_FALSE(session.move("G1 X2").start_known) << line;
   }
   for (const char* line : {"; processing", ";MESHES", "G1 X1 ; printing object",

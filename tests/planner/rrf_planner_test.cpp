@@ -96,6 +96,18 @@ TEST(RrfPlanner, MovesLastWholeStepClocksRoundedDown) {
   }
 }
 
+// Ramps of 22 500 clocks each, and 25 000 clocks per mm of steady motion between them.
+TEST(RrfPlanner, From36EachPhaseIsRoundedToWholeStepClocks) {
+  FirmwareConfig config = rrf_config();
+  config.steps_per_mm = {};
+  config.rounds_phases = true;
+  for (const double part : {0.3, 0.7}) {
+    const auto moves =
+        rrf_plan(polyline({{7.0 + part / 25000.0, 0, 0, 0}}, 30.0), rrf_default_limits(), config);
+    EXPECT_NEAR(config.step_clock_hz * moves.at(0).duration_s(), 197500.0 + std::round(part), 1e-6);
+  }
+}
+
 // A tenth of a micrometre in the middle of a fast straight line, whether steady or on a ramp.
 TEST(RrfPlanner, MovesOfLessThanAStepClockLastOne) {
   for (const double end_mm : {15.0, 60.0}) {

@@ -164,7 +164,7 @@ class Emitter {
   void note_motion(const gcode::Event& event);
   void follow_input(const gcode::Event& event);
   void enter_run(std::string& out);
-  void set_run_modes(std::string& out);
+  void set_run_modes(bool joins_file, std::string& out);
   void keep_reading_of_e_small(std::string& out);
   void set_unit(double unit_mm, std::string& out);
   void write_stroke(const Stroke& stroke, double filament_origin, std::string& out);

@@ -31,6 +31,9 @@ struct Segment {
   // after homing, a macro or a tool change), its Z where the line names Z, or the filament that the
   // line takes (absolute E after a macro): such a motion must not be rewritten.
   bool start_known = true;
+  // Not known, but taken to be start_mm: only the label of an object stands between, which may have
+  // been cancelled, or a command that is not known and may have moved the machine.
+  bool start_assumed = false;
   // Radius of the arc this piece continues; 0 for a straight move and an arc's first and last
   // piece. Marlin hands it to its planner, which then limits the junction by centripetal
   // acceleration (PlannerHints::curve_radius).
@@ -96,6 +99,9 @@ struct Shaper {
 enum class EventKind {
   passive,  // neither moves nor stops the machine: comments, modes, fans, M73, G1 with F alone …
   limits,   // changes the planner's limits from here on; does not stop
+  // Does not stop either, but no rewritten motion may reach across: labels of objects, which may
+  // have what follows left out, and what saves or restores the file's modes.
+  border,
   barrier,  // all motion is finished first: G4, G28, M400, T, unknown commands and macros
   move,     // one or more segments
 };
@@ -111,11 +117,10 @@ struct Event {
   double dwell_s = 0.0;           // barrier: G4's pause
   // barrier: the machine may be anywhere afterwards, in any mode (homing, macro, tool change).
   bool position_lost = false;
-  // barrier: the label of an object; if that was cancelled, the next motion starts elsewhere.
-  bool may_jump = false;
   // Klipper's macros may make limits of it (M205), others than those known.
   bool may_set_limits = false;
   std::vector<std::string> warnings;  // remarks for the user about this line
+  bool added = false;                 // the line is none of the file: Interpreter::approach
 
   // As before it was interpreted; keeps the line and the storage.
   void reset();
@@ -226,6 +231,12 @@ class Interpreter {
   // The same of event.line, into an event whose storage is used again.
   void interpret(Event& event);
 
+  // A travel whose start is only assumed (Segment::start_assumed) cannot be rewritten, and leaves
+  // the nozzle swinging where extrusion begins. For such a line the text of another that can stand
+  // before it and makes all of its way but the end, which then starts at a known place. It leads
+  // nowhere the line does not. Nothing for any other line.
+  [[nodiscard]] std::optional<std::string> approach(const Line& line) const;
+
   [[nodiscard]] const ModalState& state() const { return state_; }
   // With what M207 and the like have changed.
   [[nodiscard]] const InterpreterOptions& options() const { return options_; }
@@ -322,10 +333,20 @@ class Interpreter {
                      std::string_view problem);
   void keep_reading_of_e(bool e_absolute, double before_mm);
   void set_feed(std::optional<double> feed_word);
+  // What is known of where a motion starts: Segment::start_known, Segment::start_assumed.
+  struct Start {
+    bool known = true;
+    bool assumed = false;
+  };
+  // ModalState::known, as if no object had been cancelled and no unknown command moved anything.
+  [[nodiscard]] std::array<bool, 4> known_or_assumed() const;
+  [[nodiscard]] Start start_of_retraction() const;
   // Adds the straight piece to `target`, unless it has no length, and moves the state there.
-  void append_segment(Event& event, const Position& target, double feed_mm_s, bool start_known,
+  void append_segment(Event& event, const Position& target, double feed_mm_s, const Start& start,
                       double curve_radius_mm = 0.0);
   void lose_position(Event& event);
+  // The same of a command that is not known: where the machine was is where it is taken to be.
+  void doubt_position(Event& event);
   void not_understood(Event& event, std::string_view problem);
 
   InterpreterOptions options_;
@@ -342,6 +363,8 @@ class Interpreter {
   // Marlin: behind the label of an object, until Z is named. Motion of a cancelled object is left
   // out along Z too (gcode.cpp, get_destination_from_command), and not made up for.
   bool z_left_out_ = false;
+  // X and Y: unknown for no other reason.
+  std::array<bool, 2> assumed_{};
   bool modes_uncertain_ = false;  // a line that may not run has set a mode or a limit
   bool feed_uncertain_ = false;   // the same for F alone
   Command command_;               // of the line being read; kept for its storage

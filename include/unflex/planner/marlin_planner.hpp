@@ -129,6 +129,7 @@ class MarlinPlanner final : public Planner {
   gcode::Position asked_mm_{};  // end of the last segment given, queued or not
   bool has_position_ = false;   // a segment has been given
   bool start_known_ = true;     // of all segments since the last queued block
+  bool start_assumed_ = false;  // of those of them whose start is not known
   std::vector<marlin::Block> ring_;
   // Blocks first_ … end_ − 1 are in the buffer, counted since the beginning.
   std::size_t first_ = 0;

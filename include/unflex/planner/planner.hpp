@@ -92,6 +92,7 @@ struct FirmwareConfig {
   // src/RepRapFirmware.h: StepClockRate).
   int ring_length = 60;         // at least 4
   bool has_print_jerk = false;  // from 3.6: Limits::axis_max_jerk_mm_s is a limit of its own
+  bool rounds_phases = false;   // from 3.6: each phase of a move lasts whole step clocks, rounded
   double step_clock_hz = 750000.0;
 
   [[nodiscard]] Motors motors() const { return {kinematics, firmware}; }

@@ -58,8 +58,9 @@ struct Settings {
   Vector allowed_jerk{};  // M566
   float print_accel = 0.0F;
   float travel_accel = 0.0F;
-  float min_speed = 0.0F;  // M203 I
-  bool join_all = false;   // jerk policy other than 0
+  float min_speed = 0.0F;      // M203 I
+  bool join_all = false;       // jerk policy other than 0
+  bool rounds_phases = false;  // FirmwareConfig::rounds_phases
 };
 
 // One move of the ring.

@@ -1,0 +1,74 @@
+// Of a travel whose start is not certain: most of its way as a line of its own.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "unflex/gcode/interpreter.hpp"
+
+namespace unflex::gcode {
+namespace {
+
+// What is left of the way: at 5000 mm/s² it takes 50 ms from rest to rest, two periods of a slow
+// printer, in which a base can take a nozzle's swing away.
+constexpr double kLeft_mm = 3.0;
+// … and the least part of a way that is made ahead.
+constexpr double kLeastShare = 0.1;
+// A way shorter than this is drawn as it stands.
+constexpr double kShortest_mm = 0.1;
+constexpr int kDecimals = 4;
+constexpr int kDecimalsOfInches = 6;
+
+// G0 or G1 with X and Y, maybe F, each once, and nothing else that counts.
+bool is_plain_travel(const Command& command) {
+  if (command.kind != CommandKind::traditional || command.letter != 'G' ||
+      (command.number != 0 && command.number != 1) || command.subnumber != -1 ||
+      command.line_number || command.checksum) {
+    return false;
+  }
+  std::array<int, 2> seen{};
+  return std::ranges::all_of(command.words,
+                             [&](const Word& word) {
+                               if (word.letter == 'X' || word.letter == 'Y') {
+                                 return word.value && ++seen[word.letter == 'Y'] == 1;
+                               }
+                               return word.letter == 'F' && word.value && *word.value > 0.0;
+                             }) &&
+         seen[0] == 1 && seen[1] == 1;
+}
+
+}  // namespace
+
+std::optional<std::string> Interpreter::approach(const Line& line) const {
+  const std::array<bool, 4> taken = known_or_assumed();
+  if ((state_.known[X] && state_.known[Y]) || !taken[X] || !taken[Y]) {
+    return std::nullopt;
+  }
+  const Command command = parse(line.content());
+  if (!is_plain_travel(command) || !state_.absolute_xyz || !modes_certain()) {
+    return std::nullopt;
+  }
+  const auto target_mm = [&](Axis axis, char letter) {
+    return state_.base_mm[axis] + *command.value(letter) * state_.unit_mm;
+  };
+  const double x_mm = target_mm(X, 'X');
+  const double y_mm = target_mm(Y, 'Y');
+  const double way_mm = std::hypot(x_mm - state_.position_mm[X], y_mm - state_.position_mm[Y]);
+  if (!(way_mm >= kShortest_mm)) {
+    return std::nullopt;
+  }
+  const double share = std::max(kLeastShare, 1.0 - kLeft_mm / way_mm);
+  const auto reading = [&](Axis axis, double to_mm) {
+    const double from_mm = state_.position_mm[axis];
+    return (from_mm + share * (to_mm - from_mm) - state_.base_mm[axis]) / state_.unit_mm;
+  };
+  const int decimals = state_.unit_mm == 1.0 ? kDecimals : kDecimalsOfInches;
+  std::string text = fmt::format("G{} X{:.{}f} Y{:.{}f}", command.number, reading(X, x_mm),
+                                 decimals, reading(Y, y_mm), decimals);
+  if (const std::optional<double> feed = command.value('F')) {
+    text += fmt::format(" F{}", *feed);
+  }
+  return text + (line.text.ends_with("\r\n") ? "\r\n" : "\n");
+}
+
+}  // namespace unflex::gcode

@@ -1,0 +1,118 @@
+// What RepRapFirmware makes of a run's lines, by its own planner.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "plain_emission.hpp"
+#include "unflex/emit/emitter.hpp"
+#include "unflex/planner/rrf_planner.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using ::testing::ElementsAre;
+using testing::lines_of;
+
+EmitOptions rrf_options() {
+  EmitOptions how = testing::options();
+  how.interpreter = gcode::default_options(Firmware::rrf);
+  how.fixed.firmware = Firmware::rrf;
+  how.fixed.steps_per_mm = {80.0, 80.0, 400.0, 420.0};
+  how.printer_limits = planner::rrf_default_limits();
+  how.run_limits = planner::rrf_default_limits();
+  how.run_limits.axis_max_velocity_mm_s = {1200.0, 1200.0, 20.0, 1200.0};
+  how.run_limits.axis_max_accel_mm_s2 = {1e5, 1e5, 200.0, 1e5};
+  how.run_limits.axis_jerk_mm_s = {1000.0, 1000.0, 10.0, 1000.0};
+  how.run_limits.print_accel_mm_s2 = how.run_limits.travel_accel_mm_s2 = 1e5;
+  how.run_limits.jerk_policy = 1;
+  how.line_accel_mm_s2 = 1e5;
+  return how;
+}
+
+// The plan of an emitted text; by number of line.
+std::vector<planner::PlannedMove> plan_of(const std::string& text, const EmitOptions& how) {
+  gcode::Interpreter interpreter(how.interpreter);
+  planner::RrfPlanner planner(how.printer_limits, how.fixed);
+  std::size_t number = 0;
+  for (const std::string& line : lines_of(text)) {
+    const gcode::Event event = interpreter.interpret({line, ++number});
+    planner.apply(*event.limits);
+    if (event.kind == gcode::EventKind::barrier) {
+      planner.stop();
+    }
+    for (const gcode::Segment& segment : event.segments) {
+      planner.add(segment);
+    }
+  }
+  planner.stop();
+  std::vector<planner::PlannedMove> moves;
+  planner.take(moves);
+  return moves;
+}
+
+// Joining moves of every kind is what lets a run's lines pass. The move before the first of them is
+// still to be planned when that comes, and would end at its speed.
+TEST(RrfRun, LetsFilamentBeforeItEndAtRest) {
+  const EmitOptions how = rrf_options();
+  const std::string text =
+      testing::emit("G28\nG90\nM83\nG1 X0 Y0 Z0.2 F6000\nG1 E1 F2400\nG1 X10 E1 F3000\nG4 P1\n",
+                    how)
+          .text;
+  std::vector<std::string> jerks;
+  for (const std::string& line : lines_of(text)) {
+    if (line.starts_with("M566") || line.starts_with("G1 X10 ")) {
+      jerks.push_back(line.substr(0, 6) + (line.find(" P1") != std::string::npos ? "P1" : ""));
+    } else if (line.starts_with("G1 X") && !jerks.empty() && jerks.back() != "~") {
+      jerks.emplace_back("~");
+    }
+  }
+  EXPECT_THAT(jerks, ElementsAre("M566 X", "~", "M566 PP1", "~", "G1 X10", "M566 X"));
+  const std::vector<planner::PlannedMove> moves = plan_of(text, how);
+  const auto alone = std::ranges::find_if(moves, [](const planner::PlannedMove& move) {
+    return !move.segment.moves_xy() && move.segment.delta(gcode::E) > 0.0;
+  });
+  ASSERT_NE(alone, moves.end());
+  EXPECT_EQ(alone->end_v_mm_s, 0.0);
+  EXPECT_GT(alone->cruise_v_mm_s, 20.0);
+}
+
+// A line takes as long as its length, its feed and its ramps say: none of the latter is left out.
+TEST(RrfRun, HasNoLineSlowerThanItSays) {
+  const EmitOptions how = rrf_options();
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> place(0.0, 20.0);
+  std::uniform_int_distribution<int> feed(600, 9000);
+  std::string input = "G28\nG90\nM83\nG1 X0 Y0 Z0.2 F6000\nM204 P3000 T3000\nM201 X3000 Y3000\n";
+  for (int i = 0; i < 120; ++i) {
+    input += "G1 X" + std::to_string(place(random)) + " Y" + std::to_string(place(random)) +
+             " E.1 F" + std::to_string(feed(random)) + "\n";
+  }
+  const std::string text = testing::emit(input + "G4 P1\n", how).text;
+  const std::vector<std::string> lines = lines_of(text);
+  const std::vector<planner::PlannedMove> moves = plan_of(text, how);
+  std::size_t looked_at = 0;
+  for (std::size_t i = 1; i + 1 < moves.size(); ++i) {
+    const auto in_run = [&](std::size_t k) {
+      return std::string_view(lines[moves[k].segment.line - 1]).find(" E") !=
+             std::string_view::npos;
+    };
+    if (!in_run(i - 1) || !in_run(i) || !in_run(i + 1)) {
+      continue;
+    }
+    const double v = moves[i].segment.feed_mm_s;
+    const double up = std::max(0.0, v - std::min(v, moves[i - 1].segment.feed_mm_s));
+    const double down = std::max(0.0, v - std::min(v, moves[i + 1].segment.feed_mm_s));
+    const double says_s = (moves[i].length_mm + (up * up + down * down) / 2e5) / v;
+    EXPECT_LT(moves[i].duration_s(), 1.001 * says_s + 2e-6) << lines[moves[i].segment.line - 1];
+    ++looked_at;
+  }
+  EXPECT_GT(looked_at, 1000U);
+}
+
+}  // namespace
+}  // namespace unflex::emit
