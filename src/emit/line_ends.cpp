@@ -117,6 +117,26 @@ class Candidate {
   const LineRules* rules_;
 };
 
+// Halves the lines that `which` names by their ends' places in `times`, as far as the halves are
+// long enough. Whether there were any.
+template <typename Which>
+bool halve(const BaseTrajectory& base, const LineRules& rules, std::vector<double>& times,
+           Which which) {
+  std::vector<double> result = {times.front()};
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    const double from = times[i - 1];
+    const double middle = 0.5 * (from + times[i]);
+    if (which(i) && long_enough(base, from, middle, rules) &&
+        long_enough(base, middle, times[i], rules)) {
+      result.push_back(middle);
+    }
+    result.push_back(times[i]);
+  }
+  const bool halved = result.size() > times.size();
+  times.swap(result);
+  return halved;
+}
+
 }  // namespace
 
 bool long_enough(const BaseTrajectory& base, double from, double to, const LineRules& rules) {
@@ -178,19 +198,22 @@ bool split_lines(const BaseTrajectory& base, const std::vector<double>& x_error_
   constexpr double kAddedUp = 4.0;
   const double most = kAddedUp * rules.tolerance_mm;
   const auto off = [&](std::size_t i) { return std::hypot(x_error_mm[i], y_error_mm[i]) > most; };
-  std::vector<double> result = {times.front()};
-  for (std::size_t i = 1; i < times.size(); ++i) {
-    const double from = times[i - 1];
-    const double middle = 0.5 * (from + times[i]);
-    if ((off(i) || (i + 1 < times.size() && off(i + 1))) &&
-        long_enough(base, from, middle, rules) && long_enough(base, middle, times[i], rules)) {
-      result.push_back(middle);
-    }
-    result.push_back(times[i]);
-  }
-  const bool split = result.size() > times.size();
-  times.swap(result);
-  return split;
+  return halve(base, rules, times,
+               [&](std::size_t i) { return off(i) || (i + 1 < times.size() && off(i + 1)); });
+}
+
+bool split_quick_joins(const BaseTrajectory& base, const std::vector<double>& x_mm,
+                       const std::vector<double>& y_mm, const LineRules& rules,
+                       std::vector<double>& times) {
+  const auto quick = [&](std::size_t i, const std::vector<double>& at_mm) {
+    const auto speed = [&](std::size_t line) {
+      return (at_mm[line] - at_mm[line - 1]) / (times[line] - times[line - 1]);
+    };
+    return i > 0 && i + 1 < times.size() &&
+           std::abs(speed(i + 1) - speed(i)) > rules.max_speed_step_mm_s;
+  };
+  const auto join = [&](std::size_t i) { return quick(i, x_mm) || quick(i, y_mm); };
+  return halve(base, rules, times, [&](std::size_t i) { return join(i) || join(i - 1); });
 }
 
 }  // namespace unflex::emit

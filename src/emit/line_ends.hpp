@@ -25,4 +25,11 @@ bool split_lines(const dynamics::BaseTrajectory& base, const std::vector<double>
                  const std::vector<double>& y_error_mm, const LineRules& rules,
                  std::vector<double>& times);
 
+// Halves both lines of each join at which the speed of an axis, with the vertices x_mm and y_mm at
+// `times`, changes by more than it may, as far as the halves are long enough. Whether there were
+// any.
+bool split_quick_joins(const dynamics::BaseTrajectory& base, const std::vector<double>& x_mm,
+                       const std::vector<double>& y_mm, const LineRules& rules,
+                       std::vector<double>& times);
+
 }  // namespace unflex::emit

@@ -200,7 +200,9 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
   };
   auto vertices = choose();
   while (split_lines(base, vertices.first.nozzle_error_mm, vertices.second.nozzle_error_mm, rules,
-                     times)) {
+                     times) ||
+         split_quick_joins(base, vertices.first.position_mm, vertices.second.position_mm, rules,
+                           times)) {
     vertices = choose();
   }
   return {std::move(times), std::move(vertices.first.position_mm),

@@ -56,7 +56,9 @@ double largest_motor_accel(const std::vector<planner::PlannedMove>& moves, const
 std::string text_of(const Piece& piece) {
   std::string text;
   for (const gcode::Event& event : piece.events) {
-    text += event.line.text;
+    if (!event.added) {
+      text += event.line.text;
+    }
   }
   return text;
 }
