@@ -1,6 +1,6 @@
 // What the firmwares share, and Klipper's modes and coordinates. Motion is in motion.cpp and
 // retraction.cpp, Klipper's extended commands are in extended.cpp, what is Marlin's and
-// RepRapFirmware's own in marlin.cpp and rrf.cpp.
+// RepRapFirmware's own in marlin.cpp and rrf.cpp, what becomes uncertain in uncertainty.cpp.
 #include "unflex/gcode/interpreter.hpp"
 
 #include <fmt/core.h>
@@ -22,16 +22,6 @@ constexpr double kMmPerInch = 25.4;
 constexpr double kSecondsPerMinute = 60.0;
 // Room for so many is kept from line to line.
 constexpr std::size_t kKeptSegments = 4;
-
-// What a line that may not run must leave alone, or what follows is uncertain. F and places are not
-// among it: they are known again with the next word that gives them.
-bool same_modes(const ModalState& a, const ModalState& b) {
-  return a.absolute_xyz == b.absolute_xyz && a.absolute_e == b.absolute_e &&
-         a.unit_mm == b.unit_mm && a.speed_factor == b.speed_factor &&
-         a.filament_factor() == b.filament_factor() && a.plane == b.plane &&
-         a.retracted == b.retracted && a.inverse_time == b.inverse_time &&
-         a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper == b.shaper;
-}
 
 // gcode.py, _process_commands: the line is split at runs of letters, and all that stands between
 // them, blanks, zeros and parentheses, belongs to the command's number or to a value.
@@ -470,66 +460,6 @@ void Interpreter::steps_per_mm(Event& event) {
 void Interpreter::note_shaper(Event& event) {
   event.sets_shaper = true;
   event.shaper.edit() = state_.input_shaper();
-}
-
-void Interpreter::limits_unknown(Event& event) {
-  lose_position(event);
-  event.warnings.push_back(fmt::format(
-      "{}{} may change the limits to ones not in this file; those known so far are kept",
-      command_.letter, command_.number));
-}
-
-void Interpreter::uncertain_modes(Event& event, std::string_view cause) {
-  lose_position(event);
-  if (!modes_uncertain_) {
-    modes_uncertain_ = true;
-    event.warnings.push_back(fmt::format("{}: what follows is passed through unchanged", cause));
-  }
-}
-
-void Interpreter::maybe(Event& event, void (Interpreter::*carry_out)(Event&),
-                        std::string_view cause) {
-  Interpreter trial = *this;
-  Event tried;
-  (trial.*carry_out)(tried);
-  if (!same_modes(state_, trial.state_) || tried.kind == EventKind::limits ||
-      trial.modes_uncertain_ != modes_uncertain_) {
-    return uncertain_modes(event, cause);
-  }
-  feed_uncertain_ = feed_uncertain_ || trial.state_.feed_mm_s != state_.feed_mm_s;
-  lose_position(event);
-}
-
-void Interpreter::doubtful_line(Event& event, void (Interpreter::*carry_out)(Event&),
-                                std::string_view problem) {
-  maybe(event, carry_out, problem);
-  if (event.warnings.empty()) {
-    not_understood(event, problem);
-  }
-}
-
-void Interpreter::lose_position(Event& event) {
-  event.kind = EventKind::barrier;
-  event.position_lost = true;
-  state_.known.fill(false);
-  assumed_.fill(false);
-  // Of another extruder, maybe.
-  pressure_advance_on_.reset();
-  state_.pressure_advance_s.reset();
-  if (options_.firmware == Firmware::rrf) {
-    lose_tool();  // a macro may select one
-  }
-}
-
-void Interpreter::doubt_position(Event& event) {
-  const std::array<bool, 4> before = known_or_assumed();
-  lose_position(event);
-  assumed_ = {before[X], before[Y]};
-}
-
-void Interpreter::not_understood(Event& event, std::string_view problem) {
-  lose_position(event);
-  event.warnings.push_back(fmt::format("{}: passed through unchanged; check the line", problem));
 }
 
 }  // namespace unflex::gcode
