@@ -76,12 +76,31 @@ double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double t
   return largest;
 }
 
-// When the shortest line from `start` ends. Where no more than two lines go, they share the time,
-// as speed changes most between long ones.
+// How long the shortest lines are when as many as possible share the time evenly.
+double even_share_s(double from, double to, const LineRules& rules) {
+  constexpr double kRounding = 1e-9;
+  return (to - from) / std::max(1.0, std::floor((to - from) / rules.even_line_s() + kRounding));
+}
+
+// When the shortest line from `start` ends. None of those that may follow has to be longer, as
+// speed changes most between long ones.
 double first_end(double start, double to, const LineRules& rules) {
-  return to - start < 3.0 * rules.even_line_s()
-             ? std::max(0.5 * (start + to), start + rules.min_line_s)
-             : start + rules.min_line_s;
+  return start + std::max(even_share_s(start, to, rules), rules.min_line_s);
+}
+
+// What the base changes the speed of an axis by, at most, between two moments line_s apart, the
+// later one of which lies in [from, to]. Lines of that length change it by no more where they join.
+double change_over(const BaseTrajectory& base, double from, double to, double line_s) {
+  double most = 0.0;
+  for (double t = std::max(from, line_s); t < to + base.period_s; t += base.period_s) {
+    for (const AxisAt axis : {&BaseTrajectory::x_at, &BaseTrajectory::y_at}) {
+      const auto speed = [&](double at) {
+        return (base.*axis)(std::min(at, base.duration_s())).velocity_mm_s;
+      };
+      most = std::max(most, std::abs(speed(t) - speed(t - line_s)));
+    }
+  }
+  return most;
 }
 
 // How a line would do.
@@ -151,6 +170,18 @@ bool long_enough(const BaseTrajectory& base, double from, double to, const LineR
   return std::max(std::abs(dx), std::abs(dy)) >= rules.min_line_mm;
 }
 
+bool cuts_well(const BaseTrajectory& base, double from, double to, const LineRules& rules) {
+  // So many that each is hardly longer than the shortest.
+  constexpr double kMany = 20.0;
+  if (to - from > kMany * rules.even_line_s()) {
+    return true;
+  }
+  const double most = kOfSpeedStep * rules.max_speed_step_mm_s;
+  // Where not even the shortest lines bear it, there is nothing to gain.
+  return change_over(base, from, to, even_share_s(from, to, rules)) <= most ||
+         change_over(base, from, to, rules.even_line_s()) > most;
+}
+
 void append_line_ends(const BaseTrajectory& base, double from, double to, const LineRules& rules,
                       std::vector<double>& times) {
   const double h = base.period_s;
@@ -178,7 +209,8 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     for (double step = 1.0; step >= 1.0;) {
       const double t = end + step * h;
       if (t - start <= rules.max_line_s && long_enough(base, start, t, rules) &&
-          long_enough(base, t, to, rules) && line.good(before, start, t)) {
+          long_enough(base, t, to, rules) && cuts_well(base, t, to, rules) &&
+          line.good(before, start, t)) {
         end = t;
       } else {
         growing = false;

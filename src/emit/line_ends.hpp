@@ -8,9 +8,17 @@
 
 namespace unflex::emit {
 
+// What the places of lines may take of the largest change of speed; the rest is for their times.
+inline constexpr double kOfSpeedStep = 0.95;
+
 // Whether the firmware takes a line over this time: min_line_s, and min_line_mm along X or Y.
 [[nodiscard]] bool long_enough(const dynamics::BaseTrajectory& base, double from, double to,
                                const LineRules& rules);
+
+// Whether as many lines as possible between these times, all alike, can each bear what the base
+// changes its speed by meanwhile.
+[[nodiscard]] bool cuts_well(const dynamics::BaseTrajectory& base, double from, double to,
+                             const LineRules& rules);
 
 // Appends to `times` the ends of the lines between `from` (its last entry) and `to`, `to` included.
 // Lines grow as long as what they leave out moves the nozzle by no more than the tolerance. None is

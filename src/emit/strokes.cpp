@@ -25,9 +25,6 @@ using gcode::Z;
 // Rounding to a grid as coarse as this is what limits accuracy.
 constexpr double kCoarse_mm = 1e-3;
 
-// What a place may take of the largest change of speed; the rest is for the lines' times.
-constexpr double kOfSpeedStep = 0.95;
-
 // Moments at which a line should end: lines that stand between moves, changes of filament per mm,
 // the ends of motion. In order.
 std::vector<double> wanted_times(const Run& run, const Timetable& table,
@@ -49,13 +46,17 @@ std::vector<double> wanted_times(const Run& run, const Timetable& table,
   return wanted;
 }
 
-// Those of them that have lines between them, and the ends of the run.
+// Those of them that have lines between them, none of which must be so long that speed changes too
+// much from it to the next, and the ends of the run.
 std::vector<double> required_times(const Run& run, const std::vector<double>& wanted,
                                    const LineRules& rules) {
   const double end = run.end_s();
+  const auto has_lines = [&](double from, double to) {
+    return long_enough(*run.base, from, to, rules) && cuts_well(*run.base, from, to, rules);
+  };
   std::vector<double> times = {0.0};
   for (const double t : wanted) {
-    if (long_enough(*run.base, times.back(), t, rules) && long_enough(*run.base, t, end, rules)) {
+    if (has_lines(times.back(), t) && has_lines(t, end)) {
       times.push_back(t);
     }
   }
@@ -123,6 +124,21 @@ bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const 
   const double steps = std::max(std::abs(to.x_mm - from.x_mm) / grid.x.step_mm,
                                 std::abs(to.y_mm - from.y_mm) / grid.y.step_mm);
   return steps > rules.min_steps - 0.5;
+}
+
+using VelocityXY = std::array<double, 2>;
+
+VelocityXY velocity_mm_s(const Stroke& from, const Stroke& to) {
+  const double duration_s = to.end_s - from.end_s;
+  return {(to.x_mm - from.x_mm) / duration_s, (to.y_mm - from.y_mm) / duration_s};
+}
+
+// Whether speed would change by more than it may. So it does where the base rests for a line's time
+// while it turns round and that line, without a length, becomes part of the next: it then gets the
+// shortest length that the firmware moves for.
+bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const LineRules& rules) {
+  return std::max(std::abs(after[0] - before[0]), std::abs(after[1] - before[1])) >
+         rules.max_speed_step_mm_s;
 }
 
 // Across a path that is drawn errors count most, along it they only shift time; where nothing is
@@ -209,29 +225,57 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
           std::move(vertices.second.position_mm)};
 }
 
+// As fast as a line may change Z without a ramp of its own.
+double most_z_speed_mm_s(const EmitOptions& options) {
+  constexpr double kOfJerk = 0.5;
+  return options.fixed.firmware == Firmware::klipper
+             ? options.fixed.max_z_velocity_mm_s
+             : kOfJerk * options.run_limits.axis_jerk_mm_s[Z];
+}
+
 // How much of its change of Z a line bears: it must not be steep by it, nor slow, as Z has limits
 // of its own that a run leaves as they are. The rest waits for other lines, as long as nobody sees
-// that.
-double change_of_z_mm(const Stroke& from, const Stroke& to, double next_mm_s, const Grid& grid,
-                      const EmitOptions& options) {
+// that. `before` and `after` are what the lines there go at.
+double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& before,
+                      const VelocityXY& after, const Grid& grid, const EmitOptions& options) {
   constexpr double kUnseen_mm = 0.01;
-  // Of the line's time, for ramps.
-  constexpr double kRamps = 0.25;
-  constexpr double kOfJerk = 0.5;
+  // Of the line's time, for ramps: F makes up for them, and so changes more than speed does.
+  constexpr double kRamps = 0.03;
   const double length = std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
   const double dz = to.z_mm - from.z_mm;
   double most = 2.0 * gcode::kMaxSlope * length;
-  if (options.fixed.firmware != Firmware::klipper && std::abs(dz) < kUnseen_mm) {
+  if (std::abs(dz) < kUnseen_mm) {
     const double duration_s = to.end_s - from.end_s;
-    const double change_mm_s = std::abs(length / duration_s - next_mm_s);
-    const planner::Limits& limits = options.run_limits;
-    most = std::min({most, kOfJerk * limits.axis_jerk_mm_s[Z] * duration_s,
-                     kRamps * limits.axis_max_accel_mm_s2[Z] * length * duration_s / change_mm_s});
+    const VelocityXY own = velocity_mm_s(from, to);
+    // Where the path bends a line has to slow down as if it had a ramp.
+    const auto change_mm_s = [&](const VelocityXY& other) {
+      return std::hypot(own[0] - other[0], own[1] - other[1]);
+    };
+    most = std::min({most, most_z_speed_mm_s(options) * duration_s,
+                     kRamps * z_accel_mm_s2(options) * length * duration_s /
+                         std::max(change_mm_s(before), change_mm_s(after))});
   }
   if (std::abs(dz) <= most) {
     return dz;
   }
   return std::copysign(std::floor(most / grid.z.step_mm) * grid.z.step_mm, dz);
+}
+
+// The run ends at its height: what its last line cannot bear of the change, those before it take.
+void climb_in_time(const Stroke& start, const Grid& grid, const EmitOptions& options,
+                   std::vector<Stroke>& strokes) {
+  VelocityXY after{};
+  for (std::size_t i = strokes.size(); i-- > 1;) {
+    const VelocityXY before = velocity_mm_s(i > 1 ? strokes[i - 2] : start, strokes[i - 1]);
+    const double change_mm =
+        change_of_z_mm(strokes[i - 1], strokes[i], before, after, grid, options);
+    const double left_mm = strokes[i].z_mm - strokes[i - 1].z_mm - change_mm;
+    if (left_mm == 0.0) {
+      return;
+    }
+    strokes[i - 1].z_mm += left_mm;
+    after = velocity_mm_s(strokes[i - 1], strokes[i]);
+  }
 }
 
 // How fast, and in which direction, a part of a run begins and ends.
@@ -287,6 +331,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   Stroke last{0.0, start[X], start[Y], start[Z]};
   double dropped_s = times.front();
   std::size_t event = 0;
+  const Passing ends = passing(run);
+  VelocityXY before = ends.in_mm_s.value_or(VelocityXY{});
   for (std::size_t i = 1; i < times.size(); ++i) {
     Stroke stroke;
     stroke.end_s = times[i] - dropped_s;
@@ -301,14 +347,18 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
       ++event;
     }
     stroke.events = event;
-    const double next_mm_s = is_end ? 0.0
-                                    : std::hypot(vertices.x_mm[i + 1] - stroke.x_mm,
-                                                 vertices.y_mm[i + 1] - stroke.y_mm) /
-                                          (times[i + 1] - times[i]);
     if (!is_end) {
-      stroke.z_mm = last.z_mm + change_of_z_mm(last, stroke, next_mm_s, grid, options);
+      const Stroke next{times[i + 1] - dropped_s, vertices.x_mm[i + 1], vertices.y_mm[i + 1]};
+      if (grid.x.step_mm <= kCoarse_mm && !result.empty() &&
+          !goes_through(last, stroke, grid, rules) &&
+          turns_quickly(before, velocity_mm_s(last, next), rules)) {
+        stroke.x_mm += std::copysign(rules.min_steps * grid.x.step_mm, next.x_mm - last.x_mm);
+      }
+      stroke.z_mm = last.z_mm + change_of_z_mm(last, stroke, before, velocity_mm_s(stroke, next),
+                                               grid, options);
     }
     if (goes_through(last, stroke, grid, rules)) {
+      before = velocity_mm_s(last, stroke);
       laying += laying == result.size() && !table.tail_at(times[i - 1]) ? 1 : 0;
       result.push_back(stroke);
       last = stroke;
@@ -322,6 +372,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     final.x_mm = end[X];
     final.y_mm = end[Y];
     final.z_mm = end[Z];
+    climb_in_time({0.0, start[X], start[Y], start[Z]}, grid, options, result);
     level_flow(start, most_flow_step_mm_s(options.fixed), std::span(result).first(laying));
     time_strokes(run, grid, options, result);
   }

@@ -12,9 +12,10 @@
 // from the beginning on. Each is put on the grid before the next one is chosen, so that those to
 // come make up for its rounding.
 //
-// The change of speed v_k − v_{k−1} = u + c_k − c_{k−1} has bounds. Where the law above goes beyond
-// them, u is drawn to w, which is within them, by ρ/2 (u − w + λ)², and w to u in turn; the gains
-// stay what they are (O'Donoghue, Stathopoulos & Boyd, A splitting method for optimal control, IEEE
+// The change of speed v_k − v_{k−1} = u + c_k − c_{k−1} has bounds, and so has the one behind the
+// last line, which g there decides. Where the law above goes beyond them, u is drawn to w, which is
+// within them, by ρ/2 (u − w + λ)², and w to u in turn, the last g in the same way; the gains stay
+// what they are (O'Donoghue, Stathopoulos & Boyd, A splitting method for optimal control, IEEE
 // Trans. Control Syst. Technol. 21, 2013). Where the base itself needs all of the bounds, that may
 // end off the base's end; then the vertices stay on the curve.
 #include "vertices.hpp"
@@ -40,11 +41,23 @@ using Matrix5 = Eigen::Matrix<double, 5, 5>;
 constexpr double kAtEnd = 1e3;
 // Of the splitting: its rounds at most, the change at which it ends, and ρ against what u costs
 // without.
-constexpr int kMostRounds = 60;
+constexpr int kMostRounds = 200;
 constexpr double kSettled_mm_s = 0.02;
-constexpr double kPull = 0.03;
+constexpr double kPull = 0.3;
 // By how much of its bounds the last line, which ends where the base does, may exceed them.
 constexpr double kOfBounds = 0.02;
+
+struct Bounds {
+  double least = 0.0;
+  double most = 0.0;
+
+  [[nodiscard]] double nearest(double value) const { return std::clamp(value, least, most); }
+  // Nearly, as far as anyone can tell within the rounding.
+  [[nodiscard]] bool hold(double value, double rounding) const {
+    const double room = kOfBounds * (most - least) + rounding;
+    return value >= least - room && value <= most + room;
+  }
+};
 
 // One line: where it takes (y, o), and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
 struct Stage {
@@ -54,15 +67,20 @@ struct Stage {
   Vector5 slope = Vector5::Zero();
   double duration_s = 0.0;
   double chord_mm_s = 0.0;
-  // Bounds of u.
-  double least = 0.0;
-  double most = 0.0;
+  Bounds bounds;  // of u
   // The law u = feedback · z + feed_forward, and what it is found by.
   Eigen::RowVector4d feedback = Eigen::RowVector4d::Zero();
   double feed_forward = 0.0;
   double curvature = 0.0;          // of the cost along u
   Vector5 pull = Vector5::Zero();  // the cost's slope but for that of the cost to go and of w
   double target = 0.0;             // w − λ
+};
+
+// What is behind the last line.
+struct Ending {
+  Eigen::Matrix4d cost = Eigen::Matrix4d::Zero();
+  Bounds bounds;        // of the last g
+  double target = 0.0;  // w − λ
 };
 
 Stage stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed, const Step& step,
@@ -112,10 +130,10 @@ Stage stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed, c
   return result;
 }
 
-// Sets the feedback of all laws for a pull of ρ towards the targets; at_end: P behind the last
-// line.
-void set_feedback(Eigen::Matrix4d at_end, double rho, std::vector<Stage>& stages) {
-  Eigen::Matrix4d& to_go = at_end;
+// Sets the feedback of all laws for a pull of ρ towards the targets.
+void set_feedback(const Ending& ending, double rho, std::vector<Stage>& stages) {
+  Eigen::Matrix4d to_go = ending.cost;
+  to_go(3, 3) += rho;
   for (std::size_t k = stages.size(); k-- > 0;) {
     Stage& line = stages[k];
     Matrix5 cost = line.cost + line.move.transpose() * to_go * line.move;
@@ -128,8 +146,8 @@ void set_feedback(Eigen::Matrix4d at_end, double rho, std::vector<Stage>& stages
 }
 
 // … and their feed-forward, once the feedback is set.
-void set_feed_forward(double rho, std::vector<Stage>& stages) {
-  Eigen::Vector4d to_go = Eigen::Vector4d::Zero();
+void set_feed_forward(const Ending& ending, double rho, std::vector<Stage>& stages) {
+  Eigen::Vector4d to_go{0.0, 0.0, 0.0, -rho * ending.target};
   for (std::size_t k = stages.size(); k-- > 0;) {
     Stage& line = stages[k];
     Vector5 slope = line.pull + line.move.transpose() * to_go;
@@ -139,9 +157,9 @@ void set_feed_forward(double rho, std::vector<Stage>& stages) {
   }
 }
 
-// Calls use(k, u) for each line with what its law says, off the grid.
+// Calls use(k, u) for each line with what its law says, off the grid. The last g.
 template <typename Use>
-void follow(const std::vector<Stage>& stages, Use use) {
+double follow(const std::vector<Stage>& stages, Use use) {
   Eigen::Vector4d z = Eigen::Vector4d::Zero();
   for (std::size_t k = 0; k < stages.size(); ++k) {
     const Stage& line = stages[k];
@@ -151,6 +169,7 @@ void follow(const std::vector<Stage>& stages, Use use) {
     w << z, u;
     z = line.move * w + line.shift;
   }
+  return z[3];
 }
 
 // The median.
@@ -164,35 +183,53 @@ double middle_curvature(const std::vector<Stage>& stages) {
   return *middle;
 }
 
+// w of one bounded quantity, and its λ.
+struct Drawn {
+  double w = 0.0;
+  double lambda = 0.0;
+
+  [[nodiscard]] double target() const { return w - lambda; }
+
+  // One round for what it has become; by how much that changes it.
+  double draw(double value, const Bounds& bounds) {
+    const double before = w;
+    w = bounds.nearest(value + lambda);
+    lambda += value - w;
+    return std::max(std::abs(value - w), std::abs(w - before));
+  }
+};
+
 // Sets the laws of all lines so that what they say lies within the bounds, nearly.
-void regulate(const Eigen::Matrix4d& at_end, std::vector<Stage>& stages) {
-  set_feedback(at_end, 0.0, stages);
-  set_feed_forward(0.0, stages);
+void regulate(Ending& ending, std::vector<Stage>& stages) {
+  set_feedback(ending, 0.0, stages);
+  set_feed_forward(ending, 0.0, stages);
   bool within = true;
-  std::vector<double> w(stages.size());
-  follow(stages, [&](std::size_t k, double u) {
-    w[k] = std::clamp(u, stages[k].least, stages[k].most);
-    within = within && w[k] == u;
-  });
+  const auto begin = [&](double value, const Bounds& bounds) {
+    const Drawn drawn{bounds.nearest(value), 0.0};
+    within = within && drawn.w == value;
+    return drawn;
+  };
+  std::vector<Drawn> changes(stages.size());
+  const double last =
+      follow(stages, [&](std::size_t k, double u) { changes[k] = begin(u, stages[k].bounds); });
+  Drawn at_end = begin(last, ending.bounds);
   if (within) {
     return;
   }
   const double rho = kPull * middle_curvature(stages);
-  set_feedback(at_end, rho, stages);
-  std::vector<double> lambda(stages.size());
+  set_feedback(ending, rho, stages);
   double change = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kMostRounds && change > kSettled_mm_s; ++round) {
     for (std::size_t k = 0; k < stages.size(); ++k) {
-      stages[k].target = w[k] - lambda[k];
+      stages[k].target = changes[k].target();
     }
-    set_feed_forward(rho, stages);
+    ending.target = at_end.target();
+    set_feed_forward(ending, rho, stages);
     change = 0.0;
-    follow(stages, [&](std::size_t k, double u) {
-      const double before = w[k];
-      w[k] = std::clamp(u + lambda[k], stages[k].least, stages[k].most);
-      lambda[k] += u - w[k];
-      change = std::max({change, std::abs(u - w[k]), std::abs(w[k] - before)});
+    const double g = follow(stages, [&](std::size_t k, double u) {
+      change = std::max(change, changes[k].draw(u, stages[k].bounds));
     });
+    change = std::max(change, at_end.draw(g, ending.bounds));
   }
 }
 
@@ -206,35 +243,40 @@ Reach with_base(Reach reach, const BaseTrajectory& base, AxisAt axis) {
   return reach;
 }
 
-// How fast the base is where the lines begin, if it does not rest there.
-double speed_before(const BaseTrajectory& base, AxisAt axis, const Ends& ends) {
-  return ends.from_rest ? 0.0 : (base.*axis)(0.0).velocity_mm_s;
+// How fast the base is at a time at which it may rest.
+double speed_at(const BaseTrajectory& base, AxisAt axis, double t, bool rests) {
+  return rests ? 0.0 : (base.*axis)(t).velocity_mm_s;
 }
 
-// What u may be. Where other lines go on, half of a change is theirs.
-void set_bounds(const SpeedSteps& most, double before_mm_s, const Ends& ends,
-                std::vector<Stage>& stages) {
+// Of a change of speed over middles_s, where the base's own is `own`. Where other lines are beyond
+// the join, half of the change is theirs.
+double most_change(double step_mm_s, double accel_mm_s2, double middles_s, bool shared,
+                   double own) {
+  const double both = std::min(step_mm_s, accel_mm_s2 * middles_s);
+  return std::max(shared ? 0.5 * both : both, std::abs(own));
+}
+
+// What u may be, and the last g.
+void set_bounds(const SpeedSteps& most, double before_mm_s, double after_mm_s, const Ends& ends,
+                std::vector<Stage>& stages, Ending& ending) {
+  const auto accel = [&](std::size_t k) {
+    return most.accel_at_mm_s2.empty() ? most.accel_mm_s2 : most.accel_at_mm_s2[k];
+  };
   for (std::size_t k = 0; k < stages.size(); ++k) {
     Stage& line = stages[k];
     const double own = line.chord_mm_s - (k > 0 ? stages[k - 1].chord_mm_s : before_mm_s);
     const double middles_s =
         k > 0 ? 0.5 * (stages[k - 1].duration_s + line.duration_s) : 0.5 * line.duration_s;
-    const double shared = k == 0 && !ends.from_rest ? 0.5 : 1.0;
-    const double accel = most.accel_at_mm_s2.empty() ? most.accel_mm_s2 : most.accel_at_mm_s2[k];
     const double step =
-        std::max(shared * std::min(most.step_mm_s, accel * middles_s), std::abs(own));
-    line.least = -step - own;
-    line.most = step - own;
+        most_change(most.step_mm_s, accel(k), middles_s, k == 0 && !ends.from_rest, own);
+    line.bounds = {-step - own, step - own};
   }
-}
-
-// The place on the grid that is nearest to `wish` within the bounds, as far as any is.
-double place_within(const AxisGrid& grid, double wish, double least, double most) {
-  const double at = grid.nearest(std::clamp(wish, least, std::max(least, most)));
-  if (at > most && at - grid.step_mm >= least) {
-    return at - grid.step_mm;
-  }
-  return at < least && at + grid.step_mm <= most ? at + grid.step_mm : at;
+  // g = v − c, and v may be off the speed after it by a step.
+  const Stage& last = stages.back();
+  const double own = last.chord_mm_s - after_mm_s;
+  const double step = most_change(most.step_mm_s, accel(stages.size() - 1), 0.5 * last.duration_s,
+                                  !ends.to_rest, own);
+  ending.bounds = {-step - own, step - own};
 }
 
 }  // namespace
@@ -262,37 +304,38 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
     stages.push_back(stage(base, axis, followed_, step, times[k], times[k + 1]));
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
-  const double before_mm_s = speed_before(base, axis, ends);
-  set_bounds(most, before_mm_s, ends, stages);
+  Ending ending;
+  set_bounds(most, speed_at(base, axis, times.front(), ends.from_rest),
+             speed_at(base, axis, times.back(), ends.to_rest), ends, stages, ending);
   const Reach within = with_base(reach, base, axis);
   // After the run e rings down.
-  Eigen::Matrix4d at_end = Eigen::Matrix4d::Zero();
-  at_end.topLeftCorner<2, 2>() = ring_down_square(nozzle_);
-  at_end(2, 2) = kAtEnd;
-  regulate(at_end, stages);
-  // Follows the laws, or keeps to the curve; the last line takes what is left. Whether it can.
+  ending.cost.topLeftCorner<2, 2>() = ring_down_square(nozzle_);
+  ending.cost(2, 2) = kAtEnd;
+  regulate(ending, stages);
+  // Follows the laws, or keeps to the curve; the last line takes what is left. Whether it can, and
+  // all others keep their bounds.
   const auto draw = [&](bool by_law, AxisVertices& result) {
     result = {{on_curve.front()}, {0.0}};
     Eigen::Vector4d z = Eigen::Vector4d::Zero();
     bool within_bounds = true;
     for (std::size_t k = 0; k < lines; ++k) {
       const Stage& line = stages[k];
-      const auto end_of = [&](double change) {
-        return on_curve[k + 1] + z[2] + line.duration_s * (z[3] + change);
-      };
       double vertex = on_curve[k + 1];
       if (k + 1 < lines) {
-        vertex = by_law ? place_within(grid,
-                                       std::clamp(end_of(line.feedback * z + line.feed_forward),
-                                                  within.min_mm, within.max_mm),
-                                       end_of(line.least), end_of(line.most))
-                        : grid.nearest(std::clamp(vertex, within.min_mm, within.max_mm));
+        if (by_law) {
+          // Not held to the bounds one by one: the regulator knows nothing of that, and what it
+          // misses on one line would grow on the next ones.
+          const double change = line.feedback * z + line.feed_forward;
+          vertex += z[2] + line.duration_s * (z[3] + change);
+        }
+        vertex = grid.nearest(std::clamp(vertex, within.min_mm, within.max_mm));
       }
       Vector5 w;
       w << z, (vertex - on_curve[k + 1] - z[2]) / line.duration_s - z[3];
-      const double room = kOfBounds * (line.most - line.least) + grid.step_mm / line.duration_s;
-      within_bounds = w[4] >= line.least - room && w[4] <= line.most + room;
       z = line.move * w + line.shift;
+      const double rounding = grid.step_mm / line.duration_s;
+      within_bounds = within_bounds && line.bounds.hold(w[4], rounding) &&
+                      (k + 1 < lines || ending.bounds.hold(z[3], rounding));
       result.position_mm.push_back(vertex);
       result.nozzle_error_mm.push_back(z[0]);
     }

@@ -387,7 +387,7 @@ constexpr std::array kKeys = {
     Key{"emit.tolerance_um", &setting<&S::emit, &T::tolerance_um>,
         Bounds{.min = 0.0, .max = 1000.0}, "µm",
         "How far what a line leaves out of the base's motion may move the nozzle",
-        "0.3 at 45 Hz, in proportion to the lower frequency", &derived<&S::tolerance_um>},
+        "0.25 at 45 Hz, in proportion to the lower frequency", &derived<&S::tolerance_um>},
     Key{"emit.max_lines_per_s", &setting<&S::emit, &T::max_lines_per_s>, Bounds{.min = 1.0}, "1/s",
         "Lines the printer can take in a second of print; compensated ones never exceed it",
         "Klipper 1000, Marlin 200, RRF 500, by serial 100, RRF by sbc 250",

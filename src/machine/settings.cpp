@@ -214,7 +214,7 @@ double Settings::period_ms() const {
 }
 
 double Settings::tolerance_um() const {
-  constexpr double kPerHz = 0.3 / 45.0;
+  constexpr double kPerHz = 0.25 / 45.0;
   return emit.tolerance_um.value_or(kPerHz * std::min(dynamics_x.freq_hz, dynamics_y.freq_hz));
 }
 

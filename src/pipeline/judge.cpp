@@ -131,17 +131,26 @@ verify::RunError error_of(const verify::DeviationStats& stats, double swing_mm,
                            stats.contour_max_mm, stats.duration_s, swing_mm, model);
 }
 
+// A nozzle that is where the plan is when the move ends, and as fast.
+dynamics::NozzleXY on_plan(const planner::PlannedMove& move) {
+  const auto along = [&](gcode::Axis axis) -> dynamics::NozzleState {
+    return {move.segment.end_mm[axis], move.end_v_mm_s * move.direction[axis]};
+  };
+  return {along(gcode::X), along(gcode::Y)};
+}
+
 // Why the deviation `after` is worse than the one before. Each counts with the swing that it leaves
-// to what follows.
+// to what follows the plan's last move.
 std::optional<std::string> worse(const verify::RunDeviation& before,
-                                 const verify::RunDeviation& after, const gcode::Position& end,
-                                 const verify::Rules& rules) {
+                                 const verify::RunDeviation& after,
+                                 const planner::PlannedMove& last, const verify::Rules& rules) {
   const auto no_worse = [](double a, double b, double nothing) {
     return a <= std::max((1.0 + kSampling) * b, nothing);
   };
   const double chance = chance_mm(rules.fixed);
-  const double swing_before_mm = verify::swing_mm(before.end, end, rules.nozzle);
-  const double swing_after_mm = verify::swing_mm(after.end, end, rules.nozzle);
+  const dynamics::NozzleXY still = on_plan(last);
+  const double swing_before_mm = verify::apart_mm(before.end, still, rules.nozzle);
+  const double swing_after_mm = verify::apart_mm(after.end, still, rules.nozzle);
   if (before.extruding.stats().duration_s > 0.0) {
     const verify::RunError b = error_of(before.extruding.stats(), swing_before_mm, rules.nozzle);
     const verify::RunError a = error_of(after.extruding.stats(), swing_after_mm, rules.nozzle);
@@ -212,8 +221,7 @@ Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_
   const verify::RunDeviation after = deviation_of(run, verdict.replayed, nozzle, rules, lead_in_s);
   verdict.nozzle = after.end;
   verdict.rate = std::move(rate);
-  std::optional<std::string> objection =
-      worse(before, after, run.moves.back().segment.end_mm, rules);
+  std::optional<std::string> objection = worse(before, after, run.moves.back(), rules);
   verdict.worse = objection.has_value();
   if (!(in_motion.may_be_worse && is_bearable(before, after))) {
     verdict.objection = std::move(objection);

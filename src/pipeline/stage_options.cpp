@@ -19,7 +19,7 @@ constexpr double kGridMm = 1e-4;
 constexpr double kAccelShare = 0.98;
 // What the base may take of the largest change of speed from line to line; the rest lets the lines
 // make up for each other. But never less acceleration than this times the plan's.
-constexpr double kSpeedStepShare = 0.8;
+constexpr double kSpeedStepShare = 0.93;
 constexpr double kLeastHeadroom = 1.2;
 // The firmware's clock differs a little from line to line; no more than the budget of lines may
 // begin within any 100 ms all the same.

@@ -78,6 +78,28 @@ TEST(Judge, RejectsTheSamePathAtTheWrongTimeWhereNothingIsPrinted) {
       << *reason;
 }
 
+// In the middle of a run the nozzle goes on with the path, which is no swing: half a percent of
+// speed more at the part's end is nothing against the swing that it came with.
+TEST(Judge, TakesOnlyWhatIsOffThePlanAsSwingWhereAPartEnds) {
+  Piece part = pieces_of("G90\nM83\nG1 X0 Y0 Z0.2 F6000\nG1 X10 E0.5\nG1 X20 E0.5\n")[1];
+  part.after = {part.moves.back()};
+  part.moves.pop_back();
+  part.events.pop_back();
+  part.move_counts.pop_back();
+  ASSERT_GT(part.moves.back().end_v_mm_s, 99.0);
+  gcode::Interpreter printer;
+  for (const char* line : {"G90\n", "M83\n", "G1 X0 Y0 Z0.2 F6000\n"}) {
+    static_cast<void>(printer.interpret({line, 0}));
+  }
+  const dynamics::NozzleXY still = at_rest({0.0, 0.0, 0.2, 0.0});
+  dynamics::NozzleXY swinging = still;
+  swinging.y.position = 0.02;
+  const Verdict verdict =
+      judge(part, deviation_of(part, part.moves, swinging, rules(), 0.0), "G1 X10 E0.5 F6030\n",
+            printer, {}, still, rules(), 0.0, {}, 1000.0, {.lines_before = {}, .goes_on = true});
+  EXPECT_EQ(verdict.objection, std::nullopt);
+}
+
 TEST(Judge, RejectsMoreLinesPerSecondThanAllowed) {
   std::string text = "G1 F6000\n";
   for (int i = 1; i <= 40; ++i) {
