@@ -262,9 +262,9 @@ double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& be
 }
 
 // The run ends at its height: what its last line cannot bear of the change, those before it take.
-void climb_in_time(const Stroke& start, const Grid& grid, const EmitOptions& options,
-                   std::vector<Stroke>& strokes) {
-  VelocityXY after{};
+// `after`: what comes behind.
+void climb_in_time(const Stroke& start, VelocityXY after, const Grid& grid,
+                   const EmitOptions& options, std::vector<Stroke>& strokes) {
   for (std::size_t i = strokes.size(); i-- > 1;) {
     const VelocityXY before = velocity_mm_s(i > 1 ? strokes[i - 2] : start, strokes[i - 1]);
     const double change_mm =
@@ -372,7 +372,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     final.x_mm = end[X];
     final.y_mm = end[Y];
     final.z_mm = end[Z];
-    climb_in_time({0.0, start[X], start[Y], start[Z]}, grid, options, result);
+    climb_in_time({0.0, start[X], start[Y], start[Z]}, ends.out_mm_s.value_or(VelocityXY{}), grid,
+                  options, result);
     level_flow(start, most_flow_step_mm_s(options.fixed), std::span(result).first(laying));
     time_strokes(run, grid, options, result);
   }
