@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <random>
 #include <vector>
 
 #include "unflex/dynamics/base_trajectory.hpp"
@@ -54,6 +55,39 @@ inline dynamics::BaseTrajectory plan_as_base(const std::vector<planner::PlannedM
                                              double lead_in_s = 0.0) {
   const double nodes = std::ceil((lead_in_s + duration_s(moves) + 2e-3) / kPeriod_s);
   return sampled([&](double t) { return plan_at(moves, t - lead_in_s); }, nodes * kPeriod_s);
+}
+
+// From rest to rest, accelerating by the whole of what is allowed nearly all the time: for a few
+// nodes this way, for a few that way, each axis at its own moments. Reversed in time and sign from
+// the middle on.
+inline dynamics::BaseTrajectory bang_bang(unsigned seed, double accel_mm_s2, std::size_t half) {
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<std::size_t> nodes(2, 7);
+  dynamics::BaseTrajectory base;
+  base.period_s = kPeriod_s;
+  for (dynamics::AxisTrajectory* axis : {&base.x, &base.y}) {
+    std::vector<double> accel;
+    double sign = 1.0;
+    while (accel.size() < half) {
+      accel.insert(accel.end(), nodes(random), sign * accel_mm_s2);
+      sign = -sign;
+    }
+    accel.resize(half);
+    for (std::size_t k = half; k-- > 0;) {
+      accel.push_back(-accel[k]);
+    }
+    double position = 50.0;
+    double velocity = 0.0;
+    for (std::size_t k = 0; k < accel.size(); ++k) {
+      axis->position_mm.push_back(position);
+      axis->velocity_mm_s.push_back(velocity);
+      axis->accel_mm_s2.push_back(accel[k]);
+      const double next = k + 1 < accel.size() ? accel[k + 1] : 0.0;
+      position += kPeriod_s * (velocity + kPeriod_s * (2.0 * accel[k] + next) / 6.0);
+      velocity += kPeriod_s * 0.5 * (accel[k] + next);
+    }
+  }
+  return base;
 }
 
 inline EmitOptions options() {

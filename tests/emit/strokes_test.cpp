@@ -518,7 +518,7 @@ TEST(Strokes, CarryTheHeightOfASpiral) {
 TEST(Strokes, ClimbWhereThatCostsNoTime) {
   std::vector<gcode::Position> points;
   for (int i = 0; i <= 60; ++i) {
-    points.push_back({100.0 + 0.5 * i, 100.0 + (i % 2), 0.2 + 0.0005 * i, 0.05 * i});
+    points.push_back({100.0 + 0.5 * i, 100.0 + (i % 2), 0.2 + 0.004 * i, 0.05 * i});
   }
   const Path path(points, 20.0);
   EmitOptions how = options();
@@ -540,7 +540,7 @@ TEST(Strokes, ClimbWhereThatCostsNoTime) {
     } else {
       ++level;
     }
-    EXPECT_NEAR(to.z_mm, 0.2 + 0.0005 * (to.x_mm - 100.0) / 0.5, 0.01);
+    EXPECT_NEAR(to.z_mm, 0.2 + 0.004 * (to.x_mm - 100.0) / 0.5, 0.02);
     before = v;
     from = to;
   }
@@ -548,23 +548,27 @@ TEST(Strokes, ClimbWhereThatCostsNoTime) {
   EXPECT_GT(level, 0) << "the case shows nothing";
 }
 
-// While a base turns round it may rest for as long as a line takes; what comes behind is not spread
-// over both.
-TEST(Strokes, TurnRoundInSmallSteps) {
-  const Path path({{0.0, 0.0, 0.2, 0.0}, {10.0, 0.0, 0.2, 1.0}});
-  const auto to_and_fro = [](double t) {
-    const double out = 0.08 * smooth((t - 0.10) / 0.005);
-    const double back = 0.08 * smooth((t - 0.1065) / 0.005);
-    return std::array<double, 2>{10.0 * smooth(t / 0.1) + out - back, 0.0};
-  };
-  const std::vector<Stroke> drawn = path.draw(testing::sampled(to_and_fro, 0.12));
-  Stroke from{0.0, 0.0, 0.0};
-  double before = 0.0;
-  for (const Stroke& to : drawn) {
-    const double v = (to.x_mm - from.x_mm) / (to.end_s - from.end_s);
-    EXPECT_LE(std::abs(v - before), 30.0) << to.end_s;
-    before = v;
-    from = to;
+// However hard the base works and wherever filament per millimetre changes.
+TEST(Strokes, ChangeSpeedByNoMoreThanIsAllowedAnywhere) {
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    const Path path = random_path(seed, 12);
+    const auto nodes = static_cast<std::size_t>(planner::duration_s(path.moves) / kPeriod_s);
+    const dynamics::BaseTrajectory base = testing::bang_bang(seed, 26000.0, nodes / 2 + 2);
+    std::array<double, 2> before{};
+    Stroke from{0.0, base.x.position_mm.front(), base.y.position_mm.front()};
+    for (const Stroke& to : path.draw(base)) {
+      const double duration_s = to.end_s - from.end_s;
+      const std::array<double, 2> v = {(to.x_mm - from.x_mm) / duration_s,
+                                       (to.y_mm - from.y_mm) / duration_s};
+      // The run of this test begins and ends elsewhere than its base.
+      if (from.end_s > 0.0 && before != std::array<double, 2>{} &&
+          to.end_s < base.duration_s() - 2e-3) {
+        EXPECT_LE(std::abs(v[0] - before[0]), 30.5) << seed << ' ' << to.end_s;
+        EXPECT_LE(std::abs(v[1] - before[1]), 30.5) << seed << ' ' << to.end_s;
+      }
+      before = from.end_s > 0.0 ? v : std::array<double, 2>{};
+      from = to;
+    }
   }
 }
 
