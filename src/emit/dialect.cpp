@@ -203,6 +203,14 @@ Limits limits_in_run(Firmware firmware, const Limits& file, Limits raised) {
   return raised;
 }
 
+ZLimits z_limits(const planner::FirmwareConfig& config, const Limits& in_run) {
+  if (config.firmware == Firmware::klipper) {
+    return {config.max_z_velocity_mm_s, config.max_z_accel_mm_s2};
+  }
+  constexpr double kOfJerk = 0.5;
+  return {kOfJerk * in_run.axis_jerk_mm_s[gcode::Z], in_run.axis_max_accel_mm_s2[gcode::Z]};
+}
+
 Limits unknown_to_run(Firmware firmware, const Limits& file) {
   return limits_in_run(firmware, file, kUnknownLimits);
 }

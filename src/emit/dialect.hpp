@@ -18,6 +18,14 @@ namespace unflex::emit {
 [[nodiscard]] planner::Limits limits_in_run(Firmware firmware, const planner::Limits& file,
                                             planner::Limits raised);
 
+// What Z may do inside a run, whose limits these are: change without a ramp, and accelerate.
+struct ZLimits {
+  double speed_mm_s;
+  double accel_mm_s2;
+};
+[[nodiscard]] ZLimits z_limits(const planner::FirmwareConfig& config,
+                               const planner::Limits& in_run);
+
 // Where a macro may have set limits: what a run sets is unlike any limits, what it leaves to the
 // file is as the file has it, so as not to be set to what nobody has said.
 [[nodiscard]] planner::Limits unknown_to_run(Firmware firmware, const planner::Limits& file);

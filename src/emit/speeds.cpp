@@ -14,6 +14,7 @@
 #include <limits>
 #include <memory>
 
+#include "dialect.hpp"
 #include "unflex/core/number.hpp"
 
 namespace unflex::emit {
@@ -132,7 +133,7 @@ class SpeedSolver {
         step_events_(strokes.size(), 0.0),
         correction_(strokes.size(), 1.0),
         speed_mm_s_(strokes.size()) {
-    const double of_z_mm_s2 = z_accel_mm_s2(options);
+    const double z_accel_mm_s2 = z_limits(options.fixed, options.run_limits).accel_mm_s2;
     gcode::Position at = start_mm;
     at[E] = 0.0;
     for (std::size_t i = 0; i < strokes.size(); ++i) {
@@ -140,7 +141,7 @@ class SpeedSolver {
       const double dz = stroke.z_mm - at[Z];
       distance_mm_[i] = std::hypot(stroke.x_mm - at[X], stroke.y_mm - at[Y], dz);
       if (dz != 0.0) {
-        accel_mm_s2_[i] = std::min(accel_mm_s2_[i], of_z_mm_s2 * distance_mm_[i] / std::abs(dz));
+        accel_mm_s2_[i] = std::min(accel_mm_s2_[i], z_accel_mm_s2 * distance_mm_[i] / std::abs(dz));
       }
       const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm, stroke.e_mm};
       for (std::size_t axis = 0; options.fixed.firmware == Firmware::marlin && axis < to.size();
@@ -322,11 +323,6 @@ class SpeedSolver {
 };
 
 }  // namespace
-
-double z_accel_mm_s2(const EmitOptions& options) {
-  return options.fixed.firmware == Firmware::klipper ? options.fixed.max_z_accel_mm_s2
-                                                     : options.run_limits.axis_max_accel_mm_s2[Z];
-}
 
 void set_speeds(const gcode::Position& start_mm, const Passing& passing, const EmitOptions& options,
                 double mm_s_per_feed, double late_s, std::vector<Stroke>& strokes) {

@@ -9,9 +9,6 @@
 
 namespace unflex::emit {
 
-// What Z may be accelerated by inside a run.
-[[nodiscard]] double z_accel_mm_s2(const EmitOptions& options);
-
 // The base's velocity where the lines begin and end; unset: it rests.
 struct Passing {
   std::optional<std::array<double, 2>> in_mm_s;

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "dialect.hpp"
 #include "filament_flow.hpp"
 #include "line_ends.hpp"
 #include "nozzle_progress.hpp"
@@ -133,9 +134,7 @@ VelocityXY velocity_mm_s(const Stroke& from, const Stroke& to) {
   return {(to.x_mm - from.x_mm) / duration_s, (to.y_mm - from.y_mm) / duration_s};
 }
 
-// Whether speed would change by more than it may. So it does where the base rests for a line's time
-// while it turns round and that line, without a length, becomes part of the next: it then gets the
-// shortest length that the firmware moves for.
+// Whether an axis would change its speed by more than it may.
 bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const LineRules& rules) {
   return std::max(std::abs(after[0] - before[0]), std::abs(after[1] - before[1])) >
          rules.max_speed_step_mm_s;
@@ -225,14 +224,6 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
           std::move(vertices.second.position_mm)};
 }
 
-// As fast as a line may change Z without a ramp of its own.
-double most_z_speed_mm_s(const EmitOptions& options) {
-  constexpr double kOfJerk = 0.5;
-  return options.fixed.firmware == Firmware::klipper
-             ? options.fixed.max_z_velocity_mm_s
-             : kOfJerk * options.run_limits.axis_jerk_mm_s[Z];
-}
-
 // How much of its change of Z a line bears: it must not be steep by it, nor slow, as Z has limits
 // of its own that a run leaves as they are. The rest waits for other lines, as long as nobody sees
 // that. `before` and `after` are what the lines there go at.
@@ -251,8 +242,9 @@ double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& be
     const auto change_mm_s = [&](const VelocityXY& other) {
       return std::hypot(own[0] - other[0], own[1] - other[1]);
     };
-    most = std::min({most, most_z_speed_mm_s(options) * duration_s,
-                     kRamps * z_accel_mm_s2(options) * length * duration_s /
+    const ZLimits limits = z_limits(options.fixed, options.run_limits);
+    most = std::min({most, limits.speed_mm_s * duration_s,
+                     kRamps * limits.accel_mm_s2 * length * duration_s /
                          std::max(change_mm_s(before), change_mm_s(after))});
   }
   if (std::abs(dz) <= most) {
@@ -352,6 +344,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
       if (grid.x.step_mm <= kCoarse_mm && !result.empty() &&
           !goes_through(last, stroke, grid, rules) &&
           turns_quickly(before, velocity_mm_s(last, next), rules)) {
+        // The base rests here while it turns round. A line without a length would become part of
+        // the next one, so it gets the shortest that the firmware moves for.
         stroke.x_mm += std::copysign(rules.min_steps * grid.x.step_mm, next.x_mm - last.x_mm);
       }
       stroke.z_mm = last.z_mm + change_of_z_mm(last, stroke, before, velocity_mm_s(stroke, next),

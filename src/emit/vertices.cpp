@@ -16,8 +16,8 @@
 // last line, which g there decides. Where the law above goes beyond them, u is drawn to w, which is
 // within them, by ρ/2 (u − w + λ)², and w to u in turn, the last g in the same way; the gains stay
 // what they are (O'Donoghue, Stathopoulos & Boyd, A splitting method for optimal control, IEEE
-// Trans. Control Syst. Technol. 21, 2013). Where the base itself needs all of the bounds, that may
-// end off the base's end; then the vertices stay on the curve.
+// Trans. Control Syst. Technol. 21, 2013). Where a bound is still broken by more than a
+// little, the vertices stay on the curve.
 #include "vertices.hpp"
 
 #include <Eigen/Core>
@@ -44,7 +44,8 @@ constexpr double kAtEnd = 1e3;
 constexpr int kMostRounds = 200;
 constexpr double kSettled_mm_s = 0.02;
 constexpr double kPull = 0.3;
-// By how much of its bounds the last line, which ends where the base does, may exceed them.
+// By how much of its bounds a change of speed may exceed them: the splitting ends a little outside,
+// and the last line, which ends where the base does, takes what is left.
 constexpr double kOfBounds = 0.02;
 
 struct Bounds {

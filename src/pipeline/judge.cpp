@@ -148,9 +148,9 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
     return a <= std::max((1.0 + kSampling) * b, nothing);
   };
   const double chance = chance_mm(rules.fixed);
-  const dynamics::NozzleXY still = on_plan(last);
-  const double swing_before_mm = verify::apart_mm(before.end, still, rules.nozzle);
-  const double swing_after_mm = verify::apart_mm(after.end, still, rules.nozzle);
+  const dynamics::NozzleXY as_planned = on_plan(last);
+  const double swing_before_mm = verify::apart_mm(before.end, as_planned, rules.nozzle);
+  const double swing_after_mm = verify::apart_mm(after.end, as_planned, rules.nozzle);
   if (before.extruding.stats().duration_s > 0.0) {
     const verify::RunError b = error_of(before.extruding.stats(), swing_before_mm, rules.nozzle);
     const verify::RunError a = error_of(after.extruding.stats(), swing_after_mm, rules.nozzle);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <functional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "unflex/dynamics/base_trajectory.hpp"
@@ -57,6 +58,24 @@ inline dynamics::BaseTrajectory plan_as_base(const std::vector<planner::PlannedM
   return sampled([&](double t) { return plan_at(moves, t - lead_in_s); }, nodes * kPeriod_s);
 }
 
+// An axis that sets off from rest at 50 mm with these accelerations at its nodes, linear in
+// between.
+inline dynamics::AxisTrajectory accelerated(std::vector<double> accel_mm_s2) {
+  dynamics::AxisTrajectory axis;
+  double position = 50.0;
+  double velocity = 0.0;
+  for (std::size_t k = 0; k < accel_mm_s2.size(); ++k) {
+    axis.position_mm.push_back(position);
+    axis.velocity_mm_s.push_back(velocity);
+    const double a = accel_mm_s2[k];
+    const double next = k + 1 < accel_mm_s2.size() ? accel_mm_s2[k + 1] : 0.0;
+    position += kPeriod_s * (velocity + kPeriod_s * (2.0 * a + next) / 6.0);
+    velocity += kPeriod_s * 0.5 * (a + next);
+  }
+  axis.accel_mm_s2 = std::move(accel_mm_s2);
+  return axis;
+}
+
 // From rest to rest, accelerating by the whole of what is allowed nearly all the time: for a few
 // nodes this way, for a few that way, each axis at its own moments. Reversed in time and sign from
 // the middle on.
@@ -76,16 +95,7 @@ inline dynamics::BaseTrajectory bang_bang(unsigned seed, double accel_mm_s2, std
     for (std::size_t k = half; k-- > 0;) {
       accel.push_back(-accel[k]);
     }
-    double position = 50.0;
-    double velocity = 0.0;
-    for (std::size_t k = 0; k < accel.size(); ++k) {
-      axis->position_mm.push_back(position);
-      axis->velocity_mm_s.push_back(velocity);
-      axis->accel_mm_s2.push_back(accel[k]);
-      const double next = k + 1 < accel.size() ? accel[k + 1] : 0.0;
-      position += kPeriod_s * (velocity + kPeriod_s * (2.0 * accel[k] + next) / 6.0);
-      velocity += kPeriod_s * 0.5 * (accel[k] + next);
-    }
+    *axis = accelerated(std::move(accel));
   }
   return base;
 }

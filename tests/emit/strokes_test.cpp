@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
+#include "drawn_path.hpp"
 #include "line_ends.hpp"
 #include "plain_base.hpp"
-#include "unflex/planner/klipper_planner.hpp"
 #include "vertices.hpp"
 
 namespace unflex::emit {
@@ -21,61 +21,13 @@ using gcode::Y;
 using gcode::Z;
 using testing::kPeriod_s;
 using testing::options;
-
-// Moves with their plan, and lines to go with them.
-struct Path {
-  explicit Path(const std::vector<gcode::Position>& points, double feed_mm_s = 60.0) {
-    planner::KlipperPlanner planner({}, {});
-    for (std::size_t i = 1; i < points.size(); ++i) {
-      planner.add({points[i - 1], points[i], feed_mm_s, i, true});
-      gcode::Event event;
-      event.kind = gcode::EventKind::move;
-      events.push_back(event);
-      move_counts.push_back(1);
-    }
-    planner.stop();
-    planner.take(moves);
-  }
-
-  // A line that does not move, before event i.
-  void insert(std::size_t i, gcode::EventKind kind) {
-    gcode::Event event;
-    event.kind = kind;
-    events.insert(events.begin() + static_cast<std::ptrdiff_t>(i), event);
-    move_counts.insert(move_counts.begin() + static_cast<std::ptrdiff_t>(i), 0);
-  }
-
-  [[nodiscard]] std::vector<Stroke> draw(const dynamics::BaseTrajectory& base,
-                                         const EmitOptions& how = options(),
-                                         double lead_in_s = 0.0) const {
-    return strokes({&events, &move_counts, &moves, &base, lead_in_s}, {}, how);
-  }
-
-  std::vector<gcode::Event> events;
-  std::vector<std::size_t> move_counts;
-  std::vector<planner::PlannedMove> moves;
-};
+using testing::Path;
+using testing::random_path;
 
 // Rising from rest to rest: 0 to 1 with the first two derivatives zero at both ends.
 double smooth(double s) {
   s = std::clamp(s, 0.0, 1.0);
   return s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
-}
-
-Path random_path(unsigned seed, std::size_t count) {
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> step(-4.0, 4.0);
-  std::uniform_real_distribution<double> filament(0.0, 0.2);
-  std::vector<gcode::Position> points = {{100.0, 100.0, 0.2, 3.0}};
-  while (points.size() <= count) {
-    gcode::Position next = points.back();
-    // Written to 10⁻³ mm, as slicers do.
-    next[X] = std::round((next[X] + step(random)) * 1e3) / 1e3;
-    next[Y] = std::round((next[Y] + step(random)) * 1e3) / 1e3;
-    next[E] += std::round(filament(random) * 1e5) / 1e5;
-    points.push_back(next);
-  }
-  return Path(points);
 }
 
 TEST(Strokes, EndExactlyWhereAndWithWhatTheMovesEnd) {
@@ -488,87 +440,6 @@ TEST(Strokes, HaveLaidAllFilamentWhenTheMovesHaveEnded) {
       }
     }
     EXPECT_GT(in_tail, 2U) << seed;
-  }
-}
-
-TEST(Strokes, CarryTheHeightOfASpiral) {
-  std::vector<gcode::Position> points;
-  for (int i = 0; i <= 200; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / 100.0;
-    points.push_back({100.0 + 20.0 * std::cos(angle), 100.0 + 20.0 * std::sin(angle),
-                      0.2 + 0.003 * i, 0.05 * i});
-  }
-  const Path path(points);
-  const std::vector<Stroke> drawn = path.draw(testing::plan_as_base(path.moves));
-  double start = 0.0;
-  std::size_t i = 0;
-  for (const Stroke& stroke : drawn) {
-    while (i + 1 < path.moves.size() && stroke.end_s > start + path.moves[i].duration_s()) {
-      start += path.moves[i++].duration_s();
-    }
-    EXPECT_NEAR(stroke.z_mm, path.moves[i].position_mm(stroke.end_s - start)[Z], 0.51e-4);
-  }
-  EXPECT_EQ(drawn.back().z_mm, points.back()[Z]);
-  EXPECT_GT(drawn.size(), 200U);
-}
-
-// Klipper gives a line with a change of Z an acceleration of its own, which may be so low that a
-// short line at a sharp bend takes longer than it was given. Such a line has none; the next ones
-// do.
-TEST(Strokes, ClimbWhereThatCostsNoTime) {
-  std::vector<gcode::Position> points;
-  for (int i = 0; i <= 60; ++i) {
-    points.push_back({100.0 + 0.5 * i, 100.0 + (i % 2), 0.2 + 0.004 * i, 0.05 * i});
-  }
-  const Path path(points, 20.0);
-  EmitOptions how = options();
-  how.fixed.max_z_accel_mm_s2 = 100.0;
-  how.fixed.max_z_velocity_mm_s = 15.0;
-  const std::vector<Stroke> drawn = path.draw(testing::plan_as_base(path.moves), how);
-  Stroke from{0.0, 100.0, 100.0, 0.2};
-  std::array<double, 2> before{};
-  int level = 0;
-  for (const Stroke& to : drawn) {
-    const double duration_s = to.end_s - from.end_s;
-    const std::array<double, 2> v = {(to.x_mm - from.x_mm) / duration_s,
-                                     (to.y_mm - from.y_mm) / duration_s};
-    const double dz = std::abs(to.z_mm - from.z_mm);
-    if (dz > 1e-9) {
-      const double accel = 100.0 * std::hypot(v[0], v[1]) * duration_s / dz;
-      EXPECT_LE(std::hypot(v[0] - before[0], v[1] - before[1]) / accel, 0.05 * duration_s)
-          << to.end_s;
-    } else {
-      ++level;
-    }
-    EXPECT_NEAR(to.z_mm, 0.2 + 0.004 * (to.x_mm - 100.0) / 0.5, 0.02);
-    before = v;
-    from = to;
-  }
-  EXPECT_EQ(drawn.back().z_mm, points.back()[Z]);
-  EXPECT_GT(level, 0) << "the case shows nothing";
-}
-
-// However hard the base works and wherever filament per millimetre changes.
-TEST(Strokes, ChangeSpeedByNoMoreThanIsAllowedAnywhere) {
-  for (unsigned seed = 1; seed <= 12; ++seed) {
-    const Path path = random_path(seed, 12);
-    const auto nodes = static_cast<std::size_t>(planner::duration_s(path.moves) / kPeriod_s);
-    const dynamics::BaseTrajectory base = testing::bang_bang(seed, 26000.0, nodes / 2 + 2);
-    std::array<double, 2> before{};
-    Stroke from{0.0, base.x.position_mm.front(), base.y.position_mm.front()};
-    for (const Stroke& to : path.draw(base)) {
-      const double duration_s = to.end_s - from.end_s;
-      const std::array<double, 2> v = {(to.x_mm - from.x_mm) / duration_s,
-                                       (to.y_mm - from.y_mm) / duration_s};
-      // The run of this test begins and ends elsewhere than its base.
-      if (from.end_s > 0.0 && before != std::array<double, 2>{} &&
-          to.end_s < base.duration_s() - 2e-3) {
-        EXPECT_LE(std::abs(v[0] - before[0]), 30.5) << seed << ' ' << to.end_s;
-        EXPECT_LE(std::abs(v[1] - before[1]), 30.5) << seed << ' ' << to.end_s;
-      }
-      before = from.end_s > 0.0 ? v : std::array<double, 2>{};
-      from = to;
-    }
   }
 }
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <numbers>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "plain_base.hpp"
@@ -14,11 +15,11 @@
 namespace unflex::emit {
 namespace {
 
-constexpr double kNode_s = 1e-3;
+constexpr double kNode_s = testing::kPeriod_s;
 constexpr double kGrid_mm = 1e-4;
 
-// Of the bounds, as far as the splitting method and the grid tell: see kOfBounds in vertices.cpp.
-double nearly(double bound_mm_s) { return 1.04 * bound_mm_s + kGrid_mm / kNode_s; }
+// What the splitting method and the rounding to the grid leave of a bound.
+double nearly(double bound_mm_s) { return bound_mm_s + 0.7; }
 
 // From rest to rest: the acceleration is a sum of sines under a window, drawn at random, with the
 // largest value given.
@@ -49,19 +50,12 @@ dynamics::BaseTrajectory random_base(unsigned seed, double max_accel_mm_s2) {
     accel[k] -= sum / windows * std::sin(std::numbers::pi * static_cast<double>(k) / (kNodes - 1));
     largest = std::max(largest, std::abs(accel[k]));
   }
+  for (double& a : accel) {
+    a *= max_accel_mm_s2 / largest;
+  }
   dynamics::BaseTrajectory base;
   base.period_s = kNode_s;
-  double position = 50.0;
-  double velocity = 0.0;
-  for (std::size_t k = 0; k < kNodes; ++k) {
-    const double a = accel[k] * max_accel_mm_s2 / largest;
-    base.x.position_mm.push_back(position);
-    base.x.velocity_mm_s.push_back(velocity);
-    base.x.accel_mm_s2.push_back(a);
-    const double next = (k + 1 < kNodes ? accel[k + 1] : 0.0) * max_accel_mm_s2 / largest;
-    position += kNode_s * (velocity + kNode_s * (2.0 * a + next) / 6.0);
-    velocity += kNode_s * 0.5 * (a + next);
-  }
+  base.x = testing::accelerated(std::move(accel));
   base.y = base.x;
   return base;
 }
