@@ -13,8 +13,8 @@ namespace unflex::app {
 namespace {
 
 // What the results say about success: broken rules before deviation.
-ExitCode judge(const RunConfig& config, bool passed_on, const report::Report& report,
-               Console& console) {
+ExitCode exit_code_of(const RunConfig& config, bool passed_on, const report::Report& report,
+                      Console& console) {
   const std::string_view consequence = consequence_of(passed_on);
 
   console.lines(
@@ -74,7 +74,7 @@ Status deliver(Workspace& space, ExitCode verdict, bool passed_on, const report:
 }  // namespace
 
 Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
-  Result<Workspace> space = prepare(config);
+  Result<Workspace> space = open_workspace(config);
   if (!space) {
     return tl::unexpected(space.error());
   }
@@ -102,7 +102,7 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   }
   add_setting_warnings(space->settings, report->warnings);
   console.warnings(report->warnings);
-  const ExitCode verdict = judge(config, passed_on, *report, console);
+  const ExitCode verdict = exit_code_of(config, passed_on, *report, console);
   return deliver(*space, verdict, passed_on, *report).map([&] {
     return PrintOutcome{verdict, std::move(*report)};
   });

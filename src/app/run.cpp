@@ -13,10 +13,10 @@
 #include "hook.hpp"
 #include "identify.hpp"
 #include "inspection.hpp"
-#include "line_test.hpp"
 #include "log.hpp"
 #include "print_run.hpp"
 #include "printer_init.hpp"
+#include "printer_line_test.hpp"
 #include "printer_macros.hpp"
 #include "results.hpp"
 #include "signals.hpp"
@@ -31,7 +31,7 @@ namespace unflex::app {
 namespace {
 
 Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
-  Result<Workspace> space = prepare(config);
+  Result<Workspace> space = open_workspace(config);
   if (!space) {
     return tl::unexpected(space.error());
   }
@@ -91,7 +91,7 @@ Result<ExitCode> run_study(const RunConfig& config, Console& console) {
   std::optional<Workspace> print;
   std::optional<Output> report;
   if (!config.input.empty()) {
-    Result<Workspace> space = prepare(config);
+    Result<Workspace> space = open_workspace(config);
     if (!space) {
       return tl::unexpected(space.error());
     }

@@ -99,7 +99,7 @@ Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
       {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
 }
 
-Result<Workspace> prepare(const RunConfig& config) {
+Result<Workspace> open_workspace(const RunConfig& config) {
   Result<Input> input = Input::open(config.input);
   if (!input) {
     return tl::unexpected(input.error());

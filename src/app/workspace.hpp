@@ -24,7 +24,7 @@ struct Workspace {
 [[nodiscard]] Result<machine::Settings> load_settings(const RunConfig& config, Input& input);
 
 // Opens the prints, the output and the report, and reads the settings.
-[[nodiscard]] Result<Workspace> prepare(const RunConfig& config);
+[[nodiscard]] Result<Workspace> open_workspace(const RunConfig& config);
 
 // A print that was changed meanwhile explains whatever else went wrong.
 [[nodiscard]] Status check_inputs(const Workspace& space);

@@ -1,12 +1,12 @@
 #include "unflex/collocation/hargraves_paris.hpp"
 
+#include <fmt/core.h>
+
 #include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <string>
 #include <utility>
-
-#include <fmt/core.h>
 
 namespace unflex::collocation {
 namespace {
@@ -123,8 +123,7 @@ class HargravesParis final : public nlp::Problem {
       problem_->dynamics(i.tc, i.zc, fc);
       const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(rows_);
       for (int s = 0; s < nx_; ++s) {
-        const double xc_dot =
-            -1.5 * (i.z1(s) - i.z2(s)) / i.h - 0.25 * (i.f1(s) + i.f2(s));
+        const double xc_dot = -1.5 * (i.z1(s) - i.z2(s)) / i.h - 0.25 * (i.f1(s) + i.f2(s));
         g[row + static_cast<std::size_t>(s)] = xc_dot - fc(s);
       }
       for (std::size_t j = 0; j < limited_slopes_.size(); ++j) {
@@ -175,10 +174,10 @@ class HargravesParis final : public nlp::Problem {
     const int row = index % rows_;
     return row < nx_
                ? fmt::format("defect of {}, interval {}", problem_->name(row), index / rows_)
-               : fmt::format("slope of {}, interval {}",
-                             problem_->name(nx_ + limited_slopes_[static_cast<std::size_t>(
-                                                      row - nx_)]),
-                             index / rows_);
+               : fmt::format(
+                     "slope of {}, interval {}",
+                     problem_->name(nx_ + limited_slopes_[static_cast<std::size_t>(row - nx_)]),
+                     index / rows_);
   }
 
  private:
@@ -191,10 +190,10 @@ class HargravesParis final : public nlp::Problem {
       variable_bounds_.upper.insert(variable_bounds_.upper.end(), upper.begin(), upper.end());
     }
     for (int k = 0; k + 1 < nodes_; ++k) {
-      constraint_bounds_.lower.insert(constraint_bounds_.lower.end(),
-                                      static_cast<std::size_t>(nx_), 0.0);
-      constraint_bounds_.upper.insert(constraint_bounds_.upper.end(),
-                                      static_cast<std::size_t>(nx_), 0.0);
+      constraint_bounds_.lower.insert(constraint_bounds_.lower.end(), static_cast<std::size_t>(nx_),
+                                      0.0);
+      constraint_bounds_.upper.insert(constraint_bounds_.upper.end(), static_cast<std::size_t>(nx_),
+                                      0.0);
       for (const int j : limited_slopes_) {
         constraint_bounds_.lower.push_back(-slope_limit(j));
         constraint_bounds_.upper.push_back(slope_limit(j));

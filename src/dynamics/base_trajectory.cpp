@@ -7,8 +7,7 @@ namespace unflex::dynamics {
 AxisMotion between(const AxisTrajectory& axis, std::size_t k, double s, double h) {
   const double a0 = axis.accel_mm_s2[k];
   const double jerk = (axis.accel_mm_s2[k + 1] - a0) / h;
-  return {axis.position_mm[k] +
-              s * (axis.velocity_mm_s[k] + s * (0.5 * a0 + s * jerk / 6.0)),
+  return {axis.position_mm[k] + s * (axis.velocity_mm_s[k] + s * (0.5 * a0 + s * jerk / 6.0)),
           axis.velocity_mm_s[k] + s * (a0 + 0.5 * s * jerk), a0 + s * jerk};
 }
 

@@ -74,7 +74,7 @@ NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state, const BaseSegm
       state.velocity + h / 6.0 * (k1.velocity + 2.0 * (k2.velocity + k3.velocity) + k4.velocity)};
 }
 
-StepMap::StepMap(Step one_step, const FlexibleAxis& axis, double h)
+StepMap::StepMap(OneStep one_step, const FlexibleAxis& axis, double h)
     : of_position_(one_step(axis, {1.0, 0.0}, {}, h)),
       of_velocity_(one_step(axis, {0.0, 1.0}, {}, h)),
       of_base_velocity_(one_step(axis, {}, {0.0, 1.0, 0.0}, h)),

@@ -38,12 +38,12 @@ void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Str
   if (!(most_mm_s > 0.0) || std::isinf(most_mm_s)) {
     return;
   }
-  struct Line {
+  struct LineFlow {
     double length_mm;
     double speed_mm_s;
     double filament_mm;
   };
-  std::vector<Line> lines;
+  std::vector<LineFlow> lines;
   Stroke before{0.0, start_mm[X], start_mm[Y], start_mm[Z]};
   for (const Stroke& stroke : strokes) {
     const double length =
@@ -57,8 +57,8 @@ void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Str
     for (std::size_t number = 1; number < lines.size(); ++number) {
       // There and back in turn.
       const std::size_t i = sweep % 2 == 0 ? number : lines.size() - number;
-      Line& a = lines[i - 1];
-      Line& b = lines[i];
+      LineFlow& a = lines[i - 1];
+      LineFlow& b = lines[i];
       if (!(a.length_mm > 0.0 && b.length_mm > 0.0)) {
         continue;
       }

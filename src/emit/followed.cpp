@@ -12,7 +12,7 @@ constexpr int kSubsteps = 4;
 
 }  // namespace
 
-Step::Step(const dynamics::FlexibleAxis& axis, double dt) : dt_(dt) {
+StepMatrix::StepMatrix(const dynamics::FlexibleAxis& axis, double dt) : dt_(dt) {
   const auto column = [&](int i, dynamics::NozzleState from, dynamics::BaseSegment base) {
     const dynamics::NozzleState to = dynamics::exact_step(axis, from, base, dt);
     columns_.col(i) << to.position, to.velocity;
@@ -32,7 +32,7 @@ Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
 Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
                    const dynamics::FlexibleAxis& nozzle, const std::array<double, 2>& start)
     : period_s_(base.period_s) {
-  const Step step(nozzle, base.period_s / kSubsteps);
+  const StepMatrix step(nozzle, base.period_s / kSubsteps);
   Eigen::Vector2d state(start[0], start[1]);
   states_.push_back({state[0], state[1]});
   for (std::size_t k = 1; k < base.nodes(); ++k) {

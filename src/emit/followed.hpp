@@ -14,9 +14,9 @@ namespace unflex::emit {
 using AxisAt = dynamics::AxisMotion (dynamics::BaseTrajectory::*)(double) const;
 
 // exact_step of one length, which is linear in everything, as a matrix. States are (p, ṗ).
-class Step {
+class StepMatrix {
  public:
-  Step(const dynamics::FlexibleAxis& axis, double dt);
+  StepMatrix(const dynamics::FlexibleAxis& axis, double dt);
 
   [[nodiscard]] double dt() const { return dt_; }
   [[nodiscard]] Eigen::Matrix2d free() const { return columns_.leftCols<2>(); }

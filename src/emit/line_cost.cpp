@@ -20,7 +20,7 @@ constexpr std::size_t kLooks = 16;
 constexpr std::array<std::array<int, 4>, 2> kPlace = {{{0, 1, 2, 6}, {3, 4, 5, 7}}};
 
 NozzleAnswers nozzle_answers(const FlexibleAxis& axis, double dt, std::size_t count) {
-  const Step step(axis, dt);
+  const StepMatrix step(axis, dt);
   NozzleAnswers result;
   result.free.emplace_back(Eigen::Matrix2d::Identity());
   result.step.emplace_back(Eigen::Vector2d::Zero());

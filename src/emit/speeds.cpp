@@ -37,7 +37,7 @@ constexpr double kCatchUpAccel = 0.05;
 constexpr double kMostCorrection = 2.0;
 
 // How long the straight line lasts that the firmware is on before and after the lines of a part.
-constexpr double kApproach_s = 0.05;
+constexpr double kPassing_s = 0.05;
 constexpr std::size_t kNoStroke = std::numeric_limits<std::size_t>::max();
 
 double magnitude(const std::optional<std::array<double, 2>>& velocity_mm_s) {
@@ -46,18 +46,18 @@ double magnitude(const std::optional<std::array<double, 2>>& velocity_mm_s) {
 
 // The line to (side = −1) or from (side = 1) `next`, at that velocity, and laying as much filament
 // per mm.
-gcode::Segment approach(const gcode::Segment& next, const std::array<double, 2>& velocity_mm_s,
-                        double side) {
+gcode::Segment passing_line(const gcode::Segment& next, const std::array<double, 2>& velocity_mm_s,
+                            double side) {
   gcode::Segment line;
   gcode::Position& near = side < 0.0 ? line.end_mm : line.start_mm;
   gcode::Position& far = side < 0.0 ? line.start_mm : line.end_mm;
   near = side < 0.0 ? next.start_mm : next.end_mm;
   far = near;
-  far[X] += side * kApproach_s * velocity_mm_s[0];
-  far[Y] += side * kApproach_s * velocity_mm_s[1];
+  far[X] += side * kPassing_s * velocity_mm_s[0];
+  far[Y] += side * kPassing_s * velocity_mm_s[1];
   line.feed_mm_s = std::hypot(velocity_mm_s[0], velocity_mm_s[1]);
   if (next.length_xy_mm() > 0.0) {
-    far[E] += side * kApproach_s * line.feed_mm_s * next.delta(E) / next.length_xy_mm();
+    far[E] += side * kPassing_s * line.feed_mm_s * next.delta(E) / next.length_xy_mm();
   }
   line.line = kNoStroke;
   line.start_known = true;
@@ -191,12 +191,12 @@ class SpeedSolver {
                                   start_mm_[gcode::E] + stroke.e_mm};
       line = {line.end_mm, to, stroke.speed_mm_s, i, true};
       if (i == 0 && passing_.in_mm_s) {
-        clock.pass(approach(line, *passing_.in_mm_s, -1.0));
+        clock.pass(passing_line(line, *passing_.in_mm_s, -1.0));
       }
       clock.add(line, way_mm / speed_mm_s_[i]);
     }
     if (passing_.out_mm_s) {
-      clock.pass(approach(line, *passing_.out_mm_s, 1.0));
+      clock.pass(passing_line(line, *passing_.out_mm_s, 1.0));
     }
     clock.finish();
     for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {

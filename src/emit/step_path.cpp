@@ -77,7 +77,7 @@ struct Option {
 };
 
 // One of them.
-struct Line {
+struct Choice {
   double total = 0.0;
   Place to{};
   const Lines* lines = nullptr;
@@ -399,7 +399,7 @@ class Search {
         extend(option, places);
       }
     }
-    for (const Line& line : kept_) {
+    for (const Choice& line : kept_) {
       arena_.push_back(after_line(*line.lines, line.lane, k, line.to, line.total));
     }
   }
@@ -422,18 +422,18 @@ class Search {
   }
 
   // Keeps the best kKept lines, one to each place, in order.
-  void keep(const Line& line) {
+  void keep(const Choice& line) {
     if (line.total >= most_to_keep()) {
       return;
     }
-    const auto same = std::ranges::find(kept_, line.to, &Line::to);
+    const auto same = std::ranges::find(kept_, line.to, &Choice::to);
     if (same != kept_.end()) {
       if (same->total <= line.total) {
         return;
       }
       kept_.erase(same);
     }
-    const auto place = std::ranges::upper_bound(kept_, line.total, {}, &Line::total);
+    const auto place = std::ranges::upper_bound(kept_, line.total, {}, &Choice::total);
     kept_.insert(place, line);
     if (kept_.size() > kKept) {
       kept_.pop_back();
@@ -462,7 +462,7 @@ class Search {
   // Of the candidate that is being searched.
   std::vector<std::size_t> tried_;
   std::vector<Option> options_;
-  std::vector<Line> kept_;
+  std::vector<Choice> kept_;
 };
 
 }  // namespace

@@ -84,8 +84,8 @@ struct Ending {
   double target = 0.0;  // w − λ
 };
 
-Stage stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed, const Step& step,
-            double from, double to) {
+Stage stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed,
+            const StepMatrix& step, double from, double to) {
   const double duration = to - from;
   const int steps = static_cast<int>(std::lround(duration / step.dt()));
   const double b0 = (base.*axis)(from).position_mm;
@@ -160,7 +160,7 @@ void set_feed_forward(const Ending& ending, double rho, std::vector<Stage>& stag
 
 // Calls use(k, u) for each line with what its law says, off the grid. The last g.
 template <typename Use>
-double follow(const std::vector<Stage>& stages, Use use) {
+double apply_laws(const std::vector<Stage>& stages, Use use) {
   Eigen::Vector4d z = Eigen::Vector4d::Zero();
   for (std::size_t k = 0; k < stages.size(); ++k) {
     const Stage& line = stages[k];
@@ -212,7 +212,7 @@ void regulate(Ending& ending, std::vector<Stage>& stages) {
   };
   std::vector<Drawn> changes(stages.size());
   const double last =
-      follow(stages, [&](std::size_t k, double u) { changes[k] = begin(u, stages[k].bounds); });
+      apply_laws(stages, [&](std::size_t k, double u) { changes[k] = begin(u, stages[k].bounds); });
   Drawn at_end = begin(last, ending.bounds);
   if (within) {
     return;
@@ -227,7 +227,7 @@ void regulate(Ending& ending, std::vector<Stage>& stages) {
     ending.target = at_end.target();
     set_feed_forward(ending, rho, stages);
     change = 0.0;
-    const double g = follow(stages, [&](std::size_t k, double u) {
+    const double g = apply_laws(stages, [&](std::size_t k, double u) {
       change = std::max(change, changes[k].draw(u, stages[k].bounds));
     });
     change = std::max(change, at_end.draw(g, ending.bounds));
@@ -294,14 +294,15 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
   const BaseTrajectory& base = *base_;
   const AxisAt axis = axis_;
   const std::size_t lines = times.size() - 1;
-  std::map<std::int64_t, Step> steps;  // by length; few lengths are different
+  std::map<std::int64_t, StepMatrix> steps;  // by length; few lengths are different
   std::vector<Stage> stages;
   std::vector<double> on_curve = {(base.*axis)(0.0).position_mm};
   for (std::size_t k = 0; k < lines; ++k) {
     const double duration = times[k + 1] - times[k];
     const double dt = duration / std::ceil(duration / base.period_s - 1e-9);
     constexpr double kSame_s = 1e-12;
-    const Step& step = steps.try_emplace(std::llround(dt / kSame_s), nozzle_, dt).first->second;
+    const StepMatrix& step =
+        steps.try_emplace(std::llround(dt / kSame_s), nozzle_, dt).first->second;
     stages.push_back(stage(base, axis, followed_, step, times[k], times[k + 1]));
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }

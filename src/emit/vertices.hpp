@@ -51,8 +51,8 @@ class VertexChooser {
 
   // For lines that end at times[1], times[2] …; the first vertex and the last are the base's own,
   // the others on the grid. None goes further out than `reach` or the base itself, and no change of
-  // speed, from line to line or to rest, exceeds `most` by more than a little, unless the base's own
-  // does.
+  // speed, from line to line or to rest, exceeds `most` by more than a little, unless the base's
+  // own does.
   [[nodiscard]] AxisVertices choose(const std::vector<double>& times, const AxisGrid& grid,
                                     const Reach& reach, const SpeedSteps& most,
                                     Ends ends = {}) const;

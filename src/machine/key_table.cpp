@@ -55,7 +55,7 @@ constexpr std::string_view kOtherForm = "not used";
 constexpr std::array<std::string_view, 11> kShaperTypes = {
     "auto", "zv", "mzv", "zvd", "zvdd", "zvddd", "ei", "2hump_ei", "3hump_ei", "ei2", "ei3"};
 
-// What field.cpp knows, and "auto" and "mainline".
+// What variants.cpp knows, and "auto" and "mainline".
 constexpr std::array<std::string_view, 7> kVariants = {
     "auto", "mainline", "kalico", "kalico_limited", "kalico_smooth", "prusa_buddy", "snapmaker_j1"};
 constexpr std::array<std::string_view, 4> kTransports = {"auto", "card", "serial", "sbc"};

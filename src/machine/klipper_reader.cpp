@@ -169,7 +169,7 @@ class Reader {
   }
 
   // By sections, kinematics and shapers that Klipper does not have; what unflex cannot work with
-  // comes last and counts (field.cpp).
+  // comes last and counts (variants.cpp).
   void kalico() {
     const auto recognised = [&](const char* variant, const SourcePlace& at) {
       reading_.add("printer.variant", variant, at);

@@ -8,7 +8,6 @@
 
 #include "command_reader.hpp"
 #include "draft.hpp"
-#include "field.hpp"
 #include "file_text.hpp"
 #include "key_table.hpp"
 #include "key_values.hpp"
@@ -19,6 +18,7 @@
 #include "unflex/core/utf8.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
+#include "variants.hpp"
 
 namespace unflex::machine {
 namespace {

@@ -9,9 +9,9 @@
 #include <algorithm>
 #include <numbers>
 
-#include "field.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
+#include "variants.hpp"
 
 namespace unflex::machine {
 namespace {

@@ -8,10 +8,10 @@
 #include <map>
 #include <optional>
 
-#include "field.hpp"
 #include "text_lines.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/command.hpp"
+#include "variants.hpp"
 
 namespace unflex::machine {
 namespace {

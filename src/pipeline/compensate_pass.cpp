@@ -270,7 +270,7 @@ class Compensator {
     pool_.submit([this, job, first, count] {
       solve_windows(*job, first, count, *engine_);
       if (job->missing.fetch_sub(2 * count) == 2 * count) {
-        prepare(*job, rules_);
+        make_lines(*job, rules_);
         wake();
       }
     });
@@ -326,7 +326,7 @@ class Compensator {
     job.results[ticket.window][ticket.axis] = axis_result(std::move(done.solution));
     if (--job.missing == 0) {
       pool_.submit([this, job = ticket.job] {
-        prepare(*job, rules_);
+        make_lines(*job, rules_);
         wake();
       });
     }

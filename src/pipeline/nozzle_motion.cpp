@@ -12,8 +12,8 @@ namespace {
 
 // Over one node period. Acceleration is linear between nodes; for the nozzle each half's mean does
 // as well.
-dynamics::NozzleState follow(const dynamics::AxisTrajectory& base, std::size_t k, double h,
-                             const dynamics::FlexibleAxis& axis, dynamics::NozzleState state) {
+dynamics::NozzleState after_node(const dynamics::AxisTrajectory& base, std::size_t k, double h,
+                                 const dynamics::FlexibleAxis& axis, dynamics::NozzleState state) {
   const double change = base.accel_mm_s2[k + 1] - base.accel_mm_s2[k];
   const dynamics::AxisMotion middle = dynamics::between(base, k, 0.5 * h, h);
   state = dynamics::exact_step(
@@ -71,8 +71,8 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
 
 void advance(const dynamics::BaseTrajectory& base, std::size_t k, const verify::NozzleModel& model,
              dynamics::NozzleXY& nozzle) {
-  nozzle = {follow(base.x, k, base.period_s, model.x, nozzle.x),
-            follow(base.y, k, base.period_s, model.y, nozzle.y)};
+  nozzle = {after_node(base.x, k, base.period_s, model.x, nozzle.x),
+            after_node(base.y, k, base.period_s, model.y, nozzle.y)};
 }
 
 double across_mm(const gcode::Segment& segment, double x_mm, double y_mm) {

@@ -142,7 +142,7 @@ void solve_windows(RunJob& job, std::size_t first, std::size_t count,
   job.results[first][0].failure = exception.what();
 }
 
-void prepare(RunJob& job, const RunRules& rules) noexcept {
+void make_lines(RunJob& job, const RunRules& rules) noexcept {
   try {
     job.failure = failure_of(job);
     if (job.failure.empty()) {

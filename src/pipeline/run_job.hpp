@@ -49,7 +49,7 @@ struct RunJob {
   int lines_after = 0;                   // of Run, by the sliced lines that follow
   std::atomic<std::size_t> missing = 0;  // axes of windows not yet solved
 
-  // From prepare(): the base and its lines, or the reason why the run's own moves must stand.
+  // From make_lines(): the base and its lines, or the reason why the run's own moves must stand.
   dynamics::BaseTrajectory base;
   emit::RunPlan plan;
   verify::RunDeviation before;  // of its own moves
@@ -90,6 +90,6 @@ void solve_windows(RunJob& job, std::size_t first, std::size_t count,
                    const compensate::Engine& engine) noexcept;
 
 // Once all windows are solved. Throws nothing.
-void prepare(RunJob& job, const RunRules& rules) noexcept;
+void make_lines(RunJob& job, const RunRules& rules) noexcept;
 
 }  // namespace unflex::pipeline

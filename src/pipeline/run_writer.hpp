@@ -23,7 +23,7 @@ class RunWriter {
   RunWriter(const RunRules& rules, std::string input_name, double max_lines_per_s,
             report::Report& report);
 
-  // The piece as text. Of a run, prepare() has been called. An error where a run of which parts
+  // The piece as text. Of a run, make_lines() has been called. An error where a run of which parts
   // have been written cannot go on.
   [[nodiscard]] Result<std::string> write(const RunJob& job);
   // What follows the last piece.

@@ -180,9 +180,9 @@ bool populate_block(const Settings& settings, const Request& request, std::size_
   const Vector speed_mm_s = limit_speeds(settings, motion, per_second, block);
   limit_accel(settings, motion, inverse_length, block);
 
-  const Approach approach{motion.distance_mm, speed_mm_s,       inverse_length,
-                          with_filament,      moves_queued > 0, request.curve_radius_mm};
-  block.max_entry_v2 = max_entry_v2(settings, block, approach, previous);
+  const BlockEntry entry{motion.distance_mm, speed_mm_s,       inverse_length,
+                         with_filament,      moves_queued > 0, request.curve_radius_mm};
+  block.max_entry_v2 = max_entry_v2(settings, block, entry, previous);
   block.entry_v2 = settings.minimum_speed_mm_s * settings.minimum_speed_mm_s;
   block.nominal_length =
       block.nominal_speed_mm_s * block.nominal_speed_mm_s <= reachable_v2(block, block.entry_v2);

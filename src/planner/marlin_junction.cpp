@@ -104,18 +104,18 @@ float deviation_v2(const Settings& settings, const Block& block, float curve_rad
   return std::min(v2, arc_v2(block.length_mm, accel, cos_theta));
 }
 
-float junction_deviation_v2(const Settings& settings, const Block& block, const Approach& approach,
+float junction_deviation_v2(const Settings& settings, const Block& block, const BlockEntry& entry,
                             bool joined, Previous& previous) {
-  Vector unit = approach.distance_mm;
+  Vector unit = entry.distance_mm;
   // That of motors is longer than that of the head.
-  if (approach.with_filament || settings.shares_motors) {
+  if (entry.with_filament || settings.shares_motors) {
     normalise(unit);
   } else {
-    for (float& x : unit) x *= approach.inverse_length;
+    for (float& x : unit) x *= entry.inverse_length;
   }
   float v2 = 0.0F;
   if (joined) {
-    v2 = std::min({deviation_v2(settings, block, approach.curve_radius_mm, previous.unit, unit),
+    v2 = std::min({deviation_v2(settings, block, entry.curve_radius_mm, previous.unit, unit),
                    square(block.nominal_speed_mm_s), square(previous.nominal_speed_mm_s)});
   }
   previous.unit = unit;
@@ -165,12 +165,12 @@ float shared_speed(const Settings& settings, const Block& block, const Vector& s
   return v * factor;
 }
 
-float classic_jerk_v2(const Settings& settings, const Block& block, const Approach& approach,
+float classic_jerk_v2(const Settings& settings, const Block& block, const BlockEntry& entry,
                       bool joined, Previous& previous) {
-  const float safe = safe_speed(settings, block, approach.speed_mm_s);
+  const float safe = safe_speed(settings, block, entry.speed_mm_s);
   float v = safe;
   if (joined) {
-    v = shared_speed(settings, block, approach.speed_mm_s, previous);
+    v = shared_speed(settings, block, entry.speed_mm_s, previous);
     const float threshold = v * 0.99F;
     if (previous.safe_speed_mm_s > threshold && safe > threshold) v = safe;
   }
@@ -180,11 +180,11 @@ float classic_jerk_v2(const Settings& settings, const Block& block, const Approa
 
 }  // namespace
 
-float max_entry_v2(const Settings& settings, const Block& block, const Approach& approach,
+float max_entry_v2(const Settings& settings, const Block& block, const BlockEntry& entry,
                    Previous& previous) {
-  const bool joined = approach.moving && previous.nominal_speed_mm_s >= kNoSpeed_mm_s;
-  return settings.classic_jerk ? classic_jerk_v2(settings, block, approach, joined, previous)
-                               : junction_deviation_v2(settings, block, approach, joined, previous);
+  const bool joined = entry.moving && previous.nominal_speed_mm_s >= kNoSpeed_mm_s;
+  return settings.classic_jerk ? classic_jerk_v2(settings, block, entry, joined, previous)
+                               : junction_deviation_v2(settings, block, entry, joined, previous);
 }
 
 }  // namespace unflex::planner::marlin

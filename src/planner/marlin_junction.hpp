@@ -5,8 +5,8 @@
 
 namespace unflex::planner::marlin {
 
-// How a block is approached.
-struct Approach {
+// How the queue enters a block.
+struct BlockEntry {
   Vector distance_mm{};
   Vector speed_mm_s{};  // nominal, per axis
   float inverse_length = 0.0F;
@@ -18,6 +18,6 @@ struct Approach {
 // Highest squared speed at the start of the block, by junction deviation or classic jerk. Keeps in
 // `previous` what these two need at the next junction.
 [[nodiscard]] float max_entry_v2(const Settings& settings, const Block& block,
-                                 const Approach& approach, Previous& previous);
+                                 const BlockEntry& entry, Previous& previous);
 
 }  // namespace unflex::planner::marlin

@@ -70,7 +70,7 @@ void Recorder::Gatherer::section(const verify::ReferencePath& sliced,
   }
 }
 
-void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::Step& step) {
+void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::NozzleStep& step) {
   if (!nozzle.emitted) {
     bench_.add(nozzle.model, step.time_s, step.nozzle);
   }
@@ -93,13 +93,13 @@ void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::Step& step)
   }
 }
 
-void Recorder::Gatherer::move_along(Version& version, const verify::Step& step) const {
+void Recorder::Gatherer::move_along(Version& version, const verify::NozzleStep& step) const {
   const double along_mm =
       cells_[version.where.move].along_mm(step.reference_x_mm, step.reference_y_mm);
   version.where.along_mm = std::max(version.where.along_mm, along_mm);
 }
 
-void Recorder::Gatherer::measured_step(int number, const verify::Step& step) {
+void Recorder::Gatherer::measured_step(int number, const verify::NozzleStep& step) {
   Version& version = versions_[number];
   if (step.piece != version.piece) {
     close_chunk(number, std::numeric_limits<double>::infinity());

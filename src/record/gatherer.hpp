@@ -25,7 +25,7 @@ class Recorder::Gatherer final : public verify::Observer {
 
   void line(const gcode::Line& line) override;
   void section(const verify::ReferencePath& sliced, const verify::ReferencePath& emitted) override;
-  void step(verify::NozzleId nozzle, const verify::Step& step) override;
+  void step(verify::NozzleId nozzle, const verify::NozzleStep& step) override;
   void hold(double duration_s) override;
   void advanced(const verify::ReferencePath& sliced, double time_s) override;
   [[nodiscard]] double memory_s() const override { return bench_.memory_s(); }
@@ -76,8 +76,8 @@ class Recorder::Gatherer final : public verify::Observer {
     std::array<std::vector<report::Moment>, 2> moments;
   };
 
-  void measured_step(int number, const verify::Step& step);
-  void move_along(Version& version, const verify::Step& step) const;
+  void measured_step(int number, const verify::NozzleStep& step);
+  void move_along(Version& version, const verify::NozzleStep& step) const;
   void enter(int number, std::size_t piece);
   void close_chunk(int number, double to_mm);
   void append_moves(const Version& version, std::size_t until);

@@ -15,7 +15,7 @@ constexpr std::size_t kHalf = 75;
 MomentRing::MomentRing(double half_width_s)
     : interval_s_(half_width_s / static_cast<double>(kHalf)), entries_(kEntries) {}
 
-void MomentRing::add(const verify::Step& step, const PathPoint& where) {
+void MomentRing::add(const verify::NozzleStep& step, const PathPoint& where) {
   last_s_ = clock_s_;
   Entry& entry = entries_[count_++ % entries_.size()];
   entry.where = where;

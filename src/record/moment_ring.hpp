@@ -30,7 +30,7 @@ class MomentRing {
     return clock_s_ - last_s_ >= interval_s_;
   }
   // That step; the reference is at `where`, which never decreases.
-  void add(const verify::Step& step, const PathPoint& where);
+  void add(const verify::NozzleStep& step, const PathPoint& where);
   // The base rests.
   void pass(double duration_s) { clock_s_ += duration_s; }
 

@@ -129,18 +129,18 @@ report::Plot sensitivity_plot(const CaseResult& result) {
                     .y_label = "contour error max, µm",
                     .width_px = 560,
                     .height_px = 300};
-  struct Line {
+  struct Shown {
     Method method;
     const char* colour;
     report::Stroke stroke;
   };
   using report::Stroke;
-  for (const Line& line : {Line{Method::uncompensated, "--before", Stroke::dashed},
-                           Line{Method::zv, "--series-3", Stroke::solid},
-                           Line{Method::mzv, "--series-4", Stroke::dashed},
-                           Line{Method::zvd, "--series-5", Stroke::dotted},
-                           Line{Method::thesis_least_squares, "--series-6", Stroke::dashed},
-                           Line{Method::unflex_4x, "--after", Stroke::solid}}) {
+  for (const Shown& line : {Shown{Method::uncompensated, "--before", Stroke::dashed},
+                            Shown{Method::zv, "--series-3", Stroke::solid},
+                            Shown{Method::mzv, "--series-4", Stroke::dashed},
+                            Shown{Method::zvd, "--series-5", Stroke::dotted},
+                            Shown{Method::thesis_least_squares, "--series-6", Stroke::dashed},
+                            Shown{Method::unflex_4x, "--after", Stroke::solid}}) {
     const MethodResult& method = by(result, line.method);
     if (!method.used) {
       continue;

@@ -195,8 +195,9 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   });
 }
 
-template <typename Step>
-void Meter::integrate(BasePhase& phase, double steps, double h, bool measured, const Step& step) {
+template <typename OneStep>
+void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
+                      const OneStep& step) {
   const double start_s = time_s_;
   ReferencePhase reference;
   if (measured) {
@@ -278,7 +279,7 @@ void Meter::measure_filament(const ReferencePhase& reference, double laid_mm, do
 
 void Meter::tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
                  const Sample& sample) {
-  Step step;
+  NozzleStep step;
   step.time_s = time_s_;
   step.h_s = h;
   step.nozzle = nozzle_;

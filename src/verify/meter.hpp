@@ -127,8 +127,8 @@ class Meter {
   };
 
   void integrate(BasePhase& phase, double duration_s, bool measured);
-  template <typename Step>
-  void integrate(BasePhase& phase, double steps, double h, bool measured, const Step& step);
+  template <typename OneStep>
+  void integrate(BasePhase& phase, double steps, double h, bool measured, const OneStep& step);
   [[nodiscard]] double next_reference_change();
   [[nodiscard]] ReferencePhase reference_phase(double duration_s) const;
   // What was measured of the nozzle.

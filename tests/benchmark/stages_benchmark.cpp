@@ -118,7 +118,7 @@ void CutIntoLines(benchmark::State& state, const std::string& firmware) {
   const RunRules rules = rules_of(s);
   const auto job = job_of(s, rules);
   solve_windows(*job, 0, job->spans.size(), *compensate::make_banded_engine());
-  prepare(*job, rules);
+  make_lines(*job, rules);
   for (auto _ : state) {
     benchmark::DoNotOptimize(emit::plan_run(job->run(), job->piece.start, rules.emit));
   }

@@ -16,7 +16,7 @@ void play(MomentRing& ring, double& t, double until_s) {
     if (!ring.advance(kStep_s)) {
       continue;
     }
-    verify::Step step;
+    verify::NozzleStep step;
     step.measured = true;
     step.reference_x_mm = step.base_x.position = 100.0 * t;
     step.nozzle.x.position = 100.0 * t + 1.0;

@@ -24,7 +24,7 @@ class Sums final : public Observer {
     ++sections;
     paths = {&sliced, &emitted};
   }
-  void step(NozzleId nozzle, const Step& step) override {
+  void step(NozzleId nozzle, const NozzleStep& step) override {
     Nozzle& sum = nozzles[{nozzle.emitted, nozzle.model}];
     if (step.extruding) {
       sum.extruding_s += step.h_s;

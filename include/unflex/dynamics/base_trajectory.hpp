@@ -29,9 +29,7 @@ struct BaseTrajectory {
   AxisTrajectory y;
 
   [[nodiscard]] std::size_t nodes() const { return x.position_mm.size(); }
-  [[nodiscard]] double duration_s() const {
-    return static_cast<double>(nodes() - 1) * period_s;
-  }
+  [[nodiscard]] double duration_s() const { return static_cast<double>(nodes() - 1) * period_s; }
   // t in [0, duration_s()], clamped.
   [[nodiscard]] AxisMotion x_at(double t) const { return at(x, t); }
   [[nodiscard]] AxisMotion y_at(double t) const { return at(y, t); }

@@ -64,8 +64,8 @@ class StepMap {
   }
 
  protected:
-  using Step = NozzleState (*)(const FlexibleAxis&, NozzleState, const BaseSegment&, double);
-  StepMap(Step one_step, const FlexibleAxis& axis, double h);
+  using OneStep = NozzleState (*)(const FlexibleAxis&, NozzleState, const BaseSegment&, double);
+  StepMap(OneStep one_step, const FlexibleAxis& axis, double h);
 
  private:
   // What one unit of each makes after the step.

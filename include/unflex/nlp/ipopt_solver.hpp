@@ -28,7 +28,7 @@ enum class Outcome {
 
 struct Solution {
   Outcome outcome = Outcome::not_converged;
-  std::string message;         // not_converged: Ipopt's status and the worst violated constraint
+  std::string message;  // not_converged: Ipopt's status and the worst violated constraint
   std::vector<double> x;
   std::vector<double> lambda;  // multipliers of g
   double objective = 0.0;

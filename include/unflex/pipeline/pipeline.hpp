@@ -36,8 +36,8 @@ struct Job {
   std::string output_name;
   machine::Settings settings;
   EngineChoice engine = EngineChoice::automatic;
-  bool record = false;  // gather what an HTML report shows
-  unsigned workers = 1;          // threads or solver processes that compute at once
+  bool record = false;   // gather what an HTML report shows
+  unsigned workers = 1;  // threads or solver processes that compute at once
 };
 
 // Reads the input, compensates it, writes the output and verifies what was written.
@@ -56,31 +56,31 @@ struct LimitInPrint {
 
 // What was understood of a file.
 struct Inspection {
-  std::string dialect;            // "PrusaSlicer 2.5.0 …" from the file's first or last comments
+  std::string dialect;  // "PrusaSlicer 2.5.0 …" from the file's first or last comments
   std::size_t lines = 0;
   std::size_t bytes = 0;
-  std::size_t moves = 0;          // segments that move X, Y or Z
+  std::size_t moves = 0;  // segments that move X, Y or Z
   std::size_t extruding_moves = 0;
   std::size_t extrude_only_moves = 0;
-  std::size_t arcs = 0;           // G2 and G3 lines
+  std::size_t arcs = 0;  // G2 and G3 lines
   std::size_t passive_lines = 0;
   std::size_t limit_lines = 0;
   std::size_t barrier_lines = 0;
   std::map<std::string, std::size_t> commands;  // "G1", "M204", "PRINT_START" → lines
-  std::size_t runs = 0;           // stretches that can be compensated
+  std::size_t runs = 0;                         // stretches that can be compensated
   std::size_t windows = 0;
-  double run_time_s = 0.0;        // in those runs
-  std::map<std::string, std::size_t> kept_moves;  // reason → moves outside runs
-  report::ExtrudedPath extruded_path;  // compensated: what can be
+  double run_time_s = 0.0;                               // in those runs
+  std::map<std::string, std::size_t> kept_moves;         // reason → moves outside runs
+  report::ExtrudedPath extruded_path;                    // compensated: what can be
   std::vector<report::UnknownCommand> unknown_commands;  // by their first lines
   double reference_time_s = 0.0;
   double moving_time_s = 0.0;
   double filament_mm = 0.0;
   double path_length_mm = 0.0;
   double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0, z_max_mm = 0.0;
-  bool absolute_e = false;        // M82 in force for most extrusions
+  bool absolute_e = false;                                     // M82 in force for most extrusions
   double lowest_accel_mm_s2 = 0.0, highest_accel_mm_s2 = 0.0;  // in force during moves
-  std::map<std::string, LimitInPrint> limits;  // by key: "limits.max_accel_mm_s2"
+  std::map<std::string, LimitInPrint> limits;                  // by key: "limits.max_accel_mm_s2"
   std::vector<std::string> warnings;
 };
 

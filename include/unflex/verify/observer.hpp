@@ -19,7 +19,7 @@ struct NozzleId {
 };
 
 // One step of the integration, at its end.
-struct Step {
+struct NozzleStep {
   double time_s = 0.0;  // on the clock of the nozzle's reference
   double h_s = 0.0;
   dynamics::NozzleXY nozzle;
@@ -49,7 +49,7 @@ class Observer {
   // A section (a run, or a single move) begins: its pieces come at the ends of these, which are two
   // where the run is measured against its own plan. The n-th piece of both is the same move.
   virtual void section(const ReferencePath& sliced, const ReferencePath& emitted) = 0;
-  virtual void step(NozzleId nozzle, const Step& step) = 0;
+  virtual void step(NozzleId nozzle, const NozzleStep& step) = 0;
   // The base stands still for so long, between sections.
   virtual void hold(double duration_s) = 0;
   // All nozzles on the sliced file's plan have been moved to this time of `sliced`.

@@ -1,5 +1,5 @@
 // Sources of each row: docs/compatibility.md.
-#include "field.hpp"
+#include "variants.hpp"
 
 #include <fmt/core.h>
 

@@ -1,4 +1,4 @@
-#include "line_test.hpp"
+#include "printer_line_test.hpp"
 
 #include <fmt/core.h>
 
