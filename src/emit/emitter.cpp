@@ -9,6 +9,7 @@
 #include "dialect.hpp"
 #include "strokes.hpp"
 #include "unflex/core/number.hpp"
+#include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/compensable.hpp"
 
 namespace unflex::emit {
@@ -192,7 +193,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   if (run.until_s) {
     return;
   }
-  write(fmt::format("{} end", kComment), out);
+  write(kRunEndMark, out);
   set_unit(1.0, out);
   set_limits(input_limits_, out);
   restore_modes(out);
@@ -204,7 +205,7 @@ void Emitter::finish(std::string& out) { restore_shaper(out); }
 void Emitter::enter_run(std::string& out) {
   if (!started_) {
     started_ = true;
-    write(fmt::format("{} {}: compensated for {}, not to be compensated again", kComment,
+    write(fmt::format("{} {}: compensated for {}, not to be compensated again", kOwnMark,
                       options_.version, brand(options_.fixed.firmware)),
           out);
   }
@@ -215,7 +216,7 @@ void Emitter::enter_run(std::string& out) {
     write("G4 P0", out);
   }
   write_checkpoint(" RUN=1", out);
-  write(fmt::format("{} run", kComment), out);
+  write(kRunMark, out);
 }
 
 // Whatever the input's lines have set inside the run.

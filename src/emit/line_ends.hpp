@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "unflex/dynamics/base_trajectory.hpp"
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/line_rules.hpp"
 
 namespace unflex::emit {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "unflex/dynamics/flexible_axis.hpp"
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/run.hpp"
 
 namespace unflex::emit {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "unflex/dynamics/base_trajectory.hpp"
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/line_rules.hpp"
 #include "vertices.hpp"
 
 namespace unflex::emit {

@@ -5,7 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/emit_options.hpp"
+#include "unflex/emit/run.hpp"
 #include "vertices.hpp"
 
 namespace unflex::emit {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/run.hpp"
 
 namespace unflex::emit {
 

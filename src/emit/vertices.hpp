@@ -7,7 +7,7 @@
 #include "followed.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/line_rules.hpp"
 
 namespace unflex::emit {
 

@@ -2,19 +2,21 @@
 
 #include <string_view>
 
-#include "unflex/emit/emitter.hpp"
+#include "unflex/core/own_marks.hpp"
 
 namespace unflex::pipeline {
 namespace {
 
-// ";unflex run" or ";unflex 1.2.3: …".
+// One of the marks, or the line that names the version: ";unflex 1.2.3: …".
 bool is_own_comment(std::string_view content) {
-  if (!content.starts_with(emit::kComment)) {
+  if (content == kRunMark || content == kRunEndMark) {
+    return true;
+  }
+  if (!content.starts_with(kOwnMark)) {
     return false;
   }
-  content.remove_prefix(emit::kComment.size());
-  return content == " run" || content == " end" ||
-         (content.size() > 1 && content[0] == ' ' && content[1] >= '0' && content[1] <= '9');
+  content.remove_prefix(kOwnMark.size());
+  return content.size() > 1 && content[0] == ' ' && content[1] >= '0' && content[1] <= '9';
 }
 
 }  // namespace

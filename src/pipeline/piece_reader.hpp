@@ -12,7 +12,7 @@
 
 #include "extrusion_mode.hpp"
 #include "unflex/core/error.hpp"
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/run.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/planner/planner.hpp"

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "judge.hpp"
+#include "unflex/emit/emitter.hpp"
 
 namespace unflex::pipeline {
 namespace {

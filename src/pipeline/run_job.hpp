@@ -15,7 +15,8 @@
 #include "unflex/compensate/axis_window.hpp"
 #include "unflex/compensate/run.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/emit_options.hpp"
+#include "unflex/emit/run.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {

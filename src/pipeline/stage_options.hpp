@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "unflex/compensate/run.hpp"
-#include "unflex/emit/emitter.hpp"
+#include "unflex/emit/emit_options.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/machine/machine.hpp"
 #include "unflex/planner/planner.hpp"

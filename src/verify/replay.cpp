@@ -6,16 +6,13 @@
 #include <string_view>
 #include <utility>
 
+#include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
 #include "unflex/planner/printer_shaper.hpp"
 
 namespace unflex::verify {
 namespace {
-
-constexpr std::string_view kOwnComment = ";unflex";
-constexpr std::string_view kRunComment = ";unflex run";
-constexpr std::string_view kRunEndComment = ";unflex end";
 
 // Of filament alone, and no more than rounding to five digits may leave until E is next told to be
 // somewhere.
@@ -36,7 +33,7 @@ bool only_word(const gcode::Command& command, char letter) {
 }  // namespace
 
 bool is_known_addition(std::string_view content, Firmware firmware) {
-  if (content.starts_with(kOwnComment)) {
+  if (content.starts_with(kOwnMark)) {
     return true;
   }
   const gcode::Command command = gcode::parse(content);
@@ -249,10 +246,10 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
 }
 
 void Replay::place(gcode::Line line, const Regime& before, bool motion) {
-  if (in_output_ && line.content().starts_with(kRunComment)) {
+  if (in_output_ && line.content().starts_with(kRunMark)) {
     sections_.back().compensated = true;
     in_compensated_run_ = true;
-  } else if (line.content().starts_with(kRunEndComment)) {
+  } else if (line.content().starts_with(kRunEndMark)) {
     in_compensated_run_ = false;
   }
   PlacedLine placed;

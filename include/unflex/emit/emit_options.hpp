@@ -1,0 +1,25 @@
+// What the emitter has to know of the printer, and how it is to write.
+#pragma once
+
+#include <string>
+
+#include "unflex/emit/line_rules.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::emit {
+
+struct EmitOptions {
+  gcode::InterpreterOptions interpreter;
+  planner::Limits printer_limits;  // in force when the file starts
+  planner::FirmwareConfig fixed;
+  planner::Limits run_limits;     // inside a compensated run
+  double line_accel_mm_s2 = 1e6;  // what the firmware then accelerates a line by
+  LineRules lines;
+  std::string version;  // for the comment at the first run
+  // Klipper: UNFLEX_CHECKPOINT is called where a run begins and ends and where the printer's own
+  // shaper is back, so that a pause inside the run takes effect at its end (docs/pausing.md).
+  bool checkpoints = false;
+};
+
+}  // namespace unflex::emit

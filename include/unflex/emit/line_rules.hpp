@@ -1,0 +1,44 @@
+// How the base's motion is cut into lines.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+#include "unflex/core/kinematics.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+
+namespace unflex::emit {
+
+// How far an axis may go.
+struct Reach {
+  double min_mm = -std::numeric_limits<double>::infinity();
+  double max_mm = std::numeric_limits<double>::infinity();
+};
+
+struct LineRules {
+  dynamics::FlexibleAxis nozzle_x;  // what hangs on the base
+  dynamics::FlexibleAxis nozzle_y;
+  Reach reach_x;
+  Reach reach_y;
+  double tolerance_mm = 3e-4;  // of what a line may move the nozzle by
+  double min_line_s = 1e-3;    // none is shorter than this …
+  double min_line_mm = 0.0;    // … or than this along both X and Y
+  int min_steps = 1;           // of the grid; the firmware joins shorter lines to the next
+  double max_line_s = 0.05;
+  // Between whole steps lines may be as short as min_line_s, but no more than burst_lines begin
+  // within any burst_s, those before and after the run counted; 0: no limit.
+  int burst_lines = 0;
+  double burst_s = 0.1;
+  // On either axis from line to line, where lines can be short enough.
+  double max_speed_step_mm_s = 30.0;
+  // What motors may do: their change of speed by the time between the lines' middles.
+  double max_accel_mm_s2 = 20000.0;
+  Motors motors;
+
+  // The duration of lines as short as they can be without end.
+  [[nodiscard]] double even_line_s() const {
+    return burst_lines > 0 ? std::max(min_line_s, burst_s / burst_lines) : min_line_s;
+  }
+};
+
+}  // namespace unflex::emit
