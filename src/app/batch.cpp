@@ -21,6 +21,7 @@
 #include "outputs.hpp"
 #include "results.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/report/format.hpp"
 
 namespace unflex::app {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "unflex/app/run_config.hpp"
-#include "unflex/report/format.hpp"
+#include "unflex/report/json_parts.hpp"
 
 namespace unflex::app {
 

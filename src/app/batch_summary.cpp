@@ -8,6 +8,7 @@
 
 #include "console.hpp"
 #include "unflex/core/utf8.hpp"
+#include "unflex/report/format.hpp"
 
 namespace unflex::app {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "unflex/app/run_config.hpp"
-#include "unflex/report/format.hpp"
+#include "unflex/report/json_parts.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/svg_plot.hpp"
 

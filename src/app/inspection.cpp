@@ -9,6 +9,7 @@
 #include "unflex/app/run_config.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/report/format.hpp"
+#include "unflex/report/json_parts.hpp"
 
 namespace unflex::app {
 namespace {

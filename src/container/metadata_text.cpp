@@ -6,8 +6,8 @@
 #include <charconv>
 #include <utility>
 
-#include "base64.hpp"
 #include "bgcode_format.hpp"
+#include "unflex/core/base64.hpp"
 
 namespace unflex::container {
 namespace {

@@ -298,6 +298,19 @@ std::array<double, 2> start_of_lines(const Run& run, const Grid& grid) {
                                          grid.y.nearest(run.base->y_at(0.0).position_mm)});
 }
 
+void give_length(const Stroke& next, const Grid& grid, const LineRules& rules, Stroke& stroke) {
+  const double along_x = next.x_mm - stroke.x_mm;
+  const double along_y = next.y_mm - stroke.y_mm;
+  const bool along_its_y = std::abs(along_y) > std::abs(along_x);
+  const Reach& reach = along_its_y ? rules.reach_y : rules.reach_x;
+  double& at_mm = along_its_y ? stroke.y_mm : stroke.x_mm;
+  const double shift_mm = std::copysign(rules.min_steps * (along_its_y ? grid.y : grid.x).step_mm,
+                                        along_its_y ? along_y : along_x);
+  const double ahead_mm = at_mm + shift_mm;
+  const bool within = ahead_mm >= reach.min_mm && ahead_mm <= reach.max_mm;
+  at_mm = within ? ahead_mm : at_mm - shift_mm;
+}
+
 std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions& options) {
   const Timetable table(run);
   const std::vector<double> event_times_s = table.event_times_s();
@@ -345,8 +358,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
           !goes_through(last, stroke, grid, rules) &&
           turns_quickly(before, velocity_mm_s(last, next), rules)) {
         // The base rests here while it turns round. A line without a length would become part of
-        // the next one, so it gets the shortest that the firmware moves for.
-        stroke.x_mm += std::copysign(rules.min_steps * grid.x.step_mm, next.x_mm - last.x_mm);
+        // the next one.
+        give_length(next, grid, rules, stroke);
       }
       stroke.z_mm = last.z_mm + change_of_z_mm(last, stroke, before, velocity_mm_s(stroke, next),
                                                grid, options);

@@ -40,6 +40,11 @@ struct Grid {
 [[nodiscard]] std::vector<Stroke> strokes(const Run& run, const Grid& grid,
                                           const EmitOptions& options);
 
+// Moves the end of a stroke that has no length by as much as the firmware needs to move for it:
+// along the axis that the next stroke turns to, towards that one's end, or away from it where the
+// axis' travel ends.
+void give_length(const Stroke& next, const Grid& grid, const LineRules& rules, Stroke& stroke);
+
 // Gives them new speeds, for another Run::late_s.
 void time_strokes(const Run& run, const Grid& grid, const EmitOptions& options,
                   std::vector<Stroke>& strokes);

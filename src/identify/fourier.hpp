@@ -1,7 +1,7 @@
 // Energy spectra by FFT (Eigen's, kissfft inside).
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 namespace unflex::identify {

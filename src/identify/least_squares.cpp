@@ -1,5 +1,6 @@
 #include "least_squares.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 

@@ -1,7 +1,7 @@
 // Weighted nonlinear least squares with few unknowns.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <functional>
 
 namespace unflex::identify {

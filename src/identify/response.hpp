@@ -1,7 +1,7 @@
 // What a sweep with a given excitation looks like behind a mode.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "unflex/identify/mode.hpp"
 

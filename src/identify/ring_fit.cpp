@@ -4,6 +4,7 @@
 // which on this fits about as well as from any later one.
 #include "ring_fit.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -3,6 +3,7 @@
 // β = 6, whose energy at x bins from the centre is (Kaiser and Schafer, On the Use of the I0-sinh
 // Window for Spectrum Analysis, 1980)
 //   ( sinh √(β² − π²x²) / √(β² − π²x²) )².
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "nozzle_motion.hpp"
+
 namespace unflex::pipeline {
 namespace {
 
@@ -131,14 +133,6 @@ verify::RunError error_of(const verify::DeviationStats& stats, double swing_mm,
                            stats.contour_max_mm, stats.duration_s, swing_mm, model);
 }
 
-// A nozzle that is where the plan is when the move ends, and as fast.
-dynamics::NozzleXY on_plan(const planner::PlannedMove& move) {
-  const auto along = [&](gcode::Axis axis) -> dynamics::NozzleState {
-    return {move.segment.end_mm[axis], move.end_v_mm_s * move.direction[axis]};
-  };
-  return {along(gcode::X), along(gcode::Y)};
-}
-
 // Why the deviation `after` is worse than the one before. Each counts with the swing that it leaves
 // to what follows the plan's last move.
 std::optional<std::string> worse(const verify::RunDeviation& before,
@@ -148,7 +142,7 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
     return a <= std::max((1.0 + kSampling) * b, nothing);
   };
   const double chance = chance_mm(rules.fixed);
-  const dynamics::NozzleXY as_planned = on_plan(last);
+  const dynamics::NozzleXY as_planned = at_end_of(last);
   const double swing_before_mm = verify::apart_mm(before.end, as_planned, rules.nozzle);
   const double swing_after_mm = verify::apart_mm(after.end, as_planned, rules.nozzle);
   if (before.extruding.stats().duration_s > 0.0) {

@@ -8,7 +8,8 @@
 #include <cstdint>
 
 #include "assets.hpp"
-#include "base64.hpp"
+#include "unflex/core/base64.hpp"
+#include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/report.hpp"
 
@@ -71,7 +72,7 @@ std::string packed(const std::vector<Moment>& moments) {
       append_float(value, bytes);
     }
   }
-  return base64(bytes);
+  return to_base64(bytes);
 }
 
 Json places_json(const std::vector<Place>& places) {
@@ -300,7 +301,7 @@ std::string to_html(const Report& report) {
   page.body += assets::report_html;
   page.body += embedded_json("data", data_json(report));
   page.body += fmt::format("<script type=\"application/octet-stream\" id=\"paths\">{}</script>\n",
-                           base64(report.recording->paths.bytes));
+                           to_base64(report.recording->paths.bytes));
   for (const std::string_view script : {assets::plot_js, assets::paths_js, assets::layers_js,
                                         assets::moment_js, assets::report_js}) {
     page.script += script;

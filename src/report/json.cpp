@@ -1,6 +1,6 @@
 // The keys are documented in docs/report.md; a test holds the two together.
 
-#include "unflex/report/format.hpp"
+#include "unflex/report/json_parts.hpp"
 
 namespace unflex::report {
 namespace {

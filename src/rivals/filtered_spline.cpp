@@ -1,6 +1,6 @@
 #include "unflex/rivals/filtered_spline.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>

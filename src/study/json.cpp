@@ -1,6 +1,6 @@
 // The keys are documented in docs/study.md; a test holds the two together.
 
-#include "unflex/report/format.hpp"
+#include "unflex/report/json_parts.hpp"
 #include "unflex/study/study.hpp"
 
 namespace unflex::study {

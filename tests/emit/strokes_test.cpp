@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -71,6 +72,32 @@ TEST(Strokes, LayWhatTheFileHasThoughTheFirmwareIsBehindIt) {
       }
     }
   }
+}
+
+// A line that turns round where it stands.
+TEST(GiveLength, GoesAlongTheAxisThatTurnsAndStaysWithinItsTravel) {
+  const Grid grid{{0.0, 1e-4}, {0.0, 2e-4}, {0.0, 1e-4}};
+  LineRules rules;
+  rules.reach_x = {0.0, 250.0};
+  rules.reach_y = {-1.0, 210.0};
+  const auto end_of = [&](double x_mm, double y_mm, double next_x_mm, double next_y_mm) {
+    Stroke stroke{0.0, x_mm, y_mm};
+    give_length({1.0, next_x_mm, next_y_mm}, grid, rules, stroke);
+    return std::array{stroke.x_mm, stroke.y_mm};
+  };
+  const auto expect_end = [](std::array<double, 2> end_mm, double x_mm, double y_mm) {
+    EXPECT_NEAR(end_mm[0], x_mm, 1e-9);
+    EXPECT_NEAR(end_mm[1], y_mm, 1e-9);
+  };
+  expect_end(end_of(100.0, 100.0, 101.0, 100.5), 100.0001, 100.0);
+  expect_end(end_of(100.0, 100.0, 99.0, 100.5), 99.9999, 100.0);
+  expect_end(end_of(100.0, 100.0, 100.5, 99.0), 100.0, 99.9998);
+  expect_end(end_of(250.0, 210.0, 250.0, 209.0), 250.0, 209.9998);
+  // Both ends of the travel.
+  expect_end(end_of(250.0, 100.0, 250.0, 100.0), 249.9999, 100.0);
+  expect_end(end_of(0.0, 100.0, -1e-5, 100.0), 0.0001, 100.0);
+  expect_end(end_of(100.0, 210.0, 100.0, 210.00001), 100.0, 209.9998);
+  expect_end(end_of(100.0, -1.0, 100.0, -1.00001), 100.0, -0.9998);
 }
 
 // Most strokes that begin within any 100 ms.

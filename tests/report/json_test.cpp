@@ -6,7 +6,6 @@
 
 #include "report/documented_keys.hpp"
 #include "report/sample_report.hpp"
-#include "unflex/report/format.hpp"
 
 namespace unflex::report {
 namespace {

@@ -1,7 +1,6 @@
-// The parts that every report of the program shares.
+// Figures and lists as every summary of the program writes them.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -9,28 +8,13 @@
 
 namespace unflex::report {
 
-using Json = nlohmann::ordered_json;
-
-inline constexpr int kSchemaVersion = 1;
-
-// {"limits.max_accel_mm_s2": {"value": 5000, "origin": "printer.toml:7"}, …}
-[[nodiscard]] Json settings_json(const std::vector<Setting>& settings);
-
-// Two spaces of indentation, final newline. What is not UTF-8 (file names are bytes) is replaced.
-[[nodiscard]] std::string dump(const Json& json);
-
 // Three figures, so that 1234 µm and 0.05 µm fit the same column; without the unit.
 [[nodiscard]] std::string micrometres_text(double mm);
 
-// 0.9876 → "98.7 %", and "100.0 %" only of all there is.
+// 0.9876 → "98.7 %". Only a share of 1 is "100.0 %".
 [[nodiscard]] std::string share_text(double share);
 
-// {"total_mm": …, "compensated_share": …, …}
-[[nodiscard]] Json path_json(const ExtrudedPath& path);
-
-// [{"command": "M1234", "count": 3, …}, …]
-[[nodiscard]] Json unknown_json(const std::vector<UnknownCommand>& commands);
-// … and as lines of a summary, the first few.
+// The first few commands, as lines of a summary.
 [[nodiscard]] std::string unknown_text(const std::vector<UnknownCommand>& commands);
 
 // 3725.4 → "1h 02m 05s"; below a minute with tenths, "5.3s".

@@ -14,7 +14,7 @@
 #include <string>
 #include <string_view>
 
-#include "unflex/report/format.hpp"
+#include "unflex/report/json_parts.hpp"
 
 namespace unflex::report {
 

@@ -1,9 +1,9 @@
-#include "base64.hpp"
+#include "unflex/core/base64.hpp"
 
 #include <cstddef>
 #include <cstdint>
 
-namespace unflex::container {
+namespace unflex {
 namespace {
 
 constexpr std::string_view kDigits =
@@ -56,4 +56,4 @@ std::optional<std::string> from_base64(std::string_view text) {
   return bytes;
 }
 
-}  // namespace unflex::container
+}  // namespace unflex

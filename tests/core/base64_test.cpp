@@ -1,12 +1,10 @@
-// Base64.
-
-#include "base64.hpp"
+#include "unflex/core/base64.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-namespace unflex::container {
+namespace unflex {
 namespace {
 
 // RFC 4648, section 10.
@@ -15,7 +13,10 @@ TEST(Base64, IsThatOfTheRfc) {
   EXPECT_EQ(to_base64("f"), "Zg==");
   EXPECT_EQ(to_base64("fo"), "Zm8=");
   EXPECT_EQ(to_base64("foo"), "Zm9v");
+  EXPECT_EQ(to_base64("foob"), "Zm9vYg==");
+  EXPECT_EQ(to_base64("fooba"), "Zm9vYmE=");
   EXPECT_EQ(to_base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(to_base64("\xff\xfe\xfd\x80"), "//79gA==");
 }
 
 TEST(Base64, ComesBack) {
@@ -36,4 +37,4 @@ TEST(Base64, IsRefusedWhenItIsNone) {
 }
 
 }  // namespace
-}  // namespace unflex::container
+}  // namespace unflex

@@ -1,0 +1,29 @@
+// The parts of JSON that every report of the program shares.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "unflex/report/report.hpp"
+
+namespace unflex::report {
+
+using Json = nlohmann::ordered_json;
+
+inline constexpr int kSchemaVersion = 1;
+
+// {"limits.max_accel_mm_s2": {"value": 5000, "origin": "printer.toml:7"}, …}
+[[nodiscard]] Json settings_json(const std::vector<Setting>& settings);
+
+// Two spaces of indentation, final newline. Bytes that are not UTF-8, which file names may have, are
+// replaced.
+[[nodiscard]] std::string dump(const Json& json);
+
+// {"total_mm": …, "compensated_share": …, …}
+[[nodiscard]] Json path_json(const ExtrudedPath& path);
+
+// [{"command": "M1234", "count": 3, …}, …]
+[[nodiscard]] Json unknown_json(const std::vector<UnknownCommand>& commands);
+
+}  // namespace unflex::report
