@@ -30,7 +30,7 @@ constexpr int kStateColumns = 9;
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kBetweenSweeps{2};
 
-// What is wrong with the settings themselves is said once, not of every print.
+// Checks the settings, so that what is wrong with them is said once and not for every print.
 Status check_settings(const RunConfig& config) {
   std::error_code failed;
   if (config.printer_file && std::filesystem::exists(*config.printer_file, failed) &&
@@ -41,8 +41,8 @@ Status check_settings(const RunConfig& config) {
   return machine::load(config.printer_file, config.overrides).map([](const machine::Settings&) {});
 }
 
-// The folders on the way to the output that are not there yet. Until they are kept, what a refusal
-// leaves of them empty goes again.
+// The folders on the way to the output that do not exist yet. Unless they are kept, the empty ones
+// are removed in the end, so that a refusal leaves none behind.
 class NewFolders {
  public:
   explicit NewFolders(const std::filesystem::path& folder) {
@@ -67,7 +67,7 @@ class NewFolders {
   std::vector<std::filesystem::path> missing_;  // the innermost first
 };
 
-// The summary must not take the place of what is read or made.
+// Checks that the summary does not take the place of a file that is read or made.
 Status check_summary(const RunConfig& config, const BatchFiles& files) {
   if (!config.summary) {
     return {};
@@ -114,7 +114,7 @@ bool sweep(const std::vector<BatchPrint>& prints) {
   return all_gone;
 }
 
-// The same where the prints' own workers may still be ending.
+// Sweeps for a while until nothing is left, since the prints' own workers may still be ending.
 void sweep_patiently(const std::vector<BatchPrint>& prints) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!sweep(prints) && std::chrono::steady_clock::now() < end) {
@@ -151,7 +151,7 @@ class Batch {
     for (const Error& error : files_.unreadable) {
       add_unreadable(error);
     }
-    // The longest first: what is left at the end is short.
+    // The longest prints come first, so that only short ones are left at the end.
     std::vector<std::size_t> waiting(files_.prints.size());
     std::iota(waiting.begin(), waiting.end(), std::size_t{0});
     std::ranges::stable_sort(waiting,
@@ -172,7 +172,7 @@ class Batch {
  private:
   [[nodiscard]] std::uintmax_t bytes(std::size_t print) const { return files_.prints[print].bytes; }
 
-  // waiting: the next at the end.
+  // waiting: the next print is at the end.
   Status work_on(std::vector<std::size_t> waiting) {
     BatchProcesses processes(config_->workers);
     while (!waiting.empty() || processes.any()) {
@@ -210,7 +210,7 @@ class Batch {
         fail_by(remembered.error(), answer);
       }
     }
-    // A print that a signal ended is told of by the message of the whole.
+    // If a signal ended the print, the message about the whole batch tells that.
     if (ending_signal() == 0 || answer.state != BatchState::failed) {
       add({print.name, print.input, print.output, std::move(answer), done.wall_s});
     }
@@ -281,7 +281,7 @@ Result<ExitCode> run_batch(const RunConfig& config, Console& console) {
   if (!manifest) {
     return tl::unexpected(manifest.error());
   }
-  // In the output's folder, maybe, which is there only now.
+  // Only now, since the summary may go into the output's folder, which exists only now.
   Result<std::optional<Output>> summary_file = open_summary(config);
   if (!summary_file) {
     return tl::unexpected(summary_file.error());

@@ -26,7 +26,7 @@ bool ends_with(std::string_view name, std::string_view suffix) {
                     [](char a, char b) { return a == small(b); });
 }
 
-// Of a file that may not exist yet.
+// Where a file is, or would be if it does not exist yet.
 fs::path place_of(const fs::path& file) {
   std::error_code failed;
   fs::path place = fs::weakly_canonical(file, failed);
@@ -101,7 +101,7 @@ class Finder {
                      .report = {},
                      .bytes = failed ? 0 : bytes};
     if (reports_) {
-      // The whole name, as a.gcode and a.g may stand side by side.
+      // The page's name holds the print's whole name, as a.gcode and a.g may stand side by side.
       print.report = (*reports_ / name).string() + ".html";
     }
     files.prints.push_back(std::move(print));
@@ -124,7 +124,7 @@ Status check_folders(const RunConfig& config) {
     return fail(ErrorKind::input, {config.input, 0},
                 "is not a folder; for one print there is unflex compensate");
   }
-  // Not by their names, of which a folder may have several where capitals do not count.
+  // We do not compare names: a folder may have several of them where capitals do not count.
   if (fs::equivalent(config.input, config.output, failed)) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the folder of the prints too; give -o another");
@@ -137,8 +137,8 @@ std::string in_small_letters(std::string text) {
   return text;
 }
 
-// Links can lead two names to one file, and so can folders and printers' cards to which capitals
-// are small letters.
+// Checks that no two names lead to one file. Links can do that, and so can folders and printers'
+// cards that take capitals for small letters.
 Status check_distinct(const std::vector<BatchPrint>& prints) {
   std::map<fs::path, const BatchPrint*> inputs;
   std::map<fs::path, const BatchPrint*> outputs;

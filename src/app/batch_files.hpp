@@ -1,4 +1,4 @@
-// The prints of a folder, and where what is made of them goes.
+// The prints of a folder, and where their outputs and reports go.
 #pragma once
 
 #include <cstdint>

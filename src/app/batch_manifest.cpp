@@ -26,7 +26,7 @@ constexpr std::chrono::milliseconds kBetweenClaims{100};
 Status claim(int folder, const std::string& name) {
   for (int i = 0; ::flock(folder, LOCK_EX | LOCK_NB) != 0; ++i) {
     if (errno != EWOULDBLOCK && errno != EINTR) {
-      // Network file systems may not know such claims; the manifest itself is safe without.
+      // Network file systems may not know such claims; the manifest itself is safe without them.
       return {};
     }
     if (i == kClaims) {
@@ -65,7 +65,7 @@ Result<BatchManifest> BatchManifest::open(const std::filesystem::path& folder) {
     return tl::unexpected(free.error());
   }
   BatchManifest manifest(folder / kManifestName, std::move(claimed));
-  // That it can be written is known before the work begins.
+  // Checks before the work begins that the manifest can be written.
   if (const Result<Output> probe = Output::open(manifest.file_.string()); !probe) {
     return tl::unexpected(probe.error());
   }

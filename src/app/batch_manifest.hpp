@@ -18,14 +18,14 @@ inline constexpr std::string_view kManifestName = ".unflex-batch.json";
 class BatchManifest {
  public:
   // Makes the folder if there is none, claims it for this process and those it forks, and reads the
-  // manifest. What is damaged or of a later version counts for nothing. Errors are of kind usage:
-  // the folder cannot be written, or another batch works in it.
+  // manifest. A manifest that is damaged or of another version counts for nothing. Errors are of
+  // kind usage: the folder cannot be written, or another batch works in it.
   [[nodiscard]] static Result<BatchManifest> open(const std::filesystem::path& folder);
 
   // What is known of the print's output.
   [[nodiscard]] std::optional<BatchRecord> find(const std::string& name) const;
 
-  // Remembers it, on the disk too before it returns. Errors are of kind internal.
+  // Remembers the record, on the disk too before it returns. Errors are of kind internal.
   [[nodiscard]] Status put(const std::string& name, const BatchRecord& record);
 
  private:

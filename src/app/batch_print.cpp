@@ -53,7 +53,7 @@ std::string_view name_of(pipeline::EngineChoice engine) {
   return "auto";
 }
 
-// Of the settings as they hold for this print, wherever they are from.
+// The hash of the settings in force for this print, wherever they are from.
 Result<std::string> hash_of_settings(const RunConfig& config) {
   Result<Input> input = Input::open(config.input);
   if (!input) {
@@ -71,7 +71,7 @@ Result<std::string> hash_of_settings(const RunConfig& config) {
   return sha256(text);
 }
 
-// What an output made now would be made from; without the output itself.
+// What an output made now would be made from. The hashes of output and report stay empty.
 Result<BatchOrigin> origin_now(const RunConfig& config) {
   Result<std::string> input = hash_of_file(config.input);
   if (!input) {
@@ -88,7 +88,7 @@ Result<BatchOrigin> origin_now(const RunConfig& config) {
                      .report_sha256 = {}};
 }
 
-// The same with what is there of output and report.
+// Adds the hashes of the output and of the report that are there.
 Result<BatchOrigin> with_outputs(const RunConfig& config, BatchOrigin origin) {
   Result<std::string> output = hash_of_file(config.output);
   if (!output) {
@@ -115,7 +115,7 @@ bool is_up_to_date(const RunConfig& config, const BatchOrigin& now,
   if (config.max_deviation_mm && !(known->figures.max_after_mm <= *config.max_deviation_mm)) {
     return false;
   }
-  // A report from another time does no harm where none is asked for.
+  // If no report is asked for, an old one does no harm.
   Result<BatchOrigin> there = with_outputs(config, now);
   return there && there->output_sha256 == known->origin.output_sha256 &&
          (!config.report || there->report_sha256 == known->origin.report_sha256);
@@ -139,7 +139,7 @@ BatchFigures figures_of(const report::Report& report) {
           .print_time_s = report.emitted_time_s};
 }
 
-// Compensates and remembers. Errors are those of compensating.
+// Compensates the print and fills the answer. Errors are those of compensating.
 Status compensate(const RunConfig& config, const BatchOrigin& now, Console& console,
                   BatchAnswer& answer) {
   if (Status made = make_folder_of(config.output); !made) {

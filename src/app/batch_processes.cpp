@@ -21,7 +21,7 @@ namespace unflex::app {
 namespace {
 
 constexpr int kPatienceMs = 100;
-// Of prints that are asked to end, before they are made to.
+// The time that prints get to end by themselves before they are killed.
 constexpr std::chrono::milliseconds kGrace{200};
 constexpr std::chrono::milliseconds kBetweenLooks{5};
 
@@ -33,12 +33,12 @@ int wait_for(pid_t pid, int options, int& status) {
   return got;
 }
 
-// Leaves by _exit so that nothing the parent has open is flushed or removed twice, and lets no
-// exception out, which would go through the parent's code and end the other prints.
+// Leaves by _exit, so that nothing the parent has open is flushed or removed twice. Lets no
+// exception out, since it would pass through the parent's code and end the other prints.
 [[noreturn]] void answer_and_exit(pid_t parent, int pipe,
                                   const BatchProcesses::Work& work) noexcept {
   // Should the parent be killed, its prints go with it at once: they hold its claim on the folder.
-  // Their temporary files go when the batch is started again.
+  // Their temporary files are removed when the batch is started again.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) {
     ::_exit(0);
@@ -46,7 +46,7 @@ int wait_for(pid_t pid, int options, int& status) {
   try {
     static_cast<void>(write_all(pipe, pack(work())));
   } catch (const std::exception&) {
-    // Not even the answer fits into memory. The parent sees a print without one.
+    // Not even the answer fits into memory. The parent sees a print without an answer.
     ::_exit(1);
   }
   ::_exit(0);

@@ -1,6 +1,6 @@
-// Prints side by side, each in a process of its own. Compensating forks workers, which must be
-// before a process has any thread, so that two prints in one process would not do; and a print that
-// takes its process down, or is shot for want of memory, leaves the others alone.
+// Works on prints side by side, each in a process of its own. Compensating forks workers before its
+// process has any thread, so two prints cannot share a process. And a print whose process crashes,
+// or is killed for want of memory, leaves the others alone.
 #pragma once
 
 #include <sys/types.h>
@@ -23,28 +23,28 @@ class BatchProcesses {
 
   struct Done {
     std::size_t ticket = 0;
-    bool answered = false;  // otherwise the error says how the process ended, without a place
+    bool answered = false;  // if not, the error says how the process ended, without a place
     BatchAnswer answer;
     double wall_s = 0.0;
   };
 
-  // At most `workers` of all of them compute at once.
+  // workers: how many compute at once, over all prints.
   explicit BatchProcesses(unsigned workers) : free_workers_(workers) {}
   BatchProcesses(const BatchProcesses&) = delete;
   BatchProcesses& operator=(const BatchProcesses&) = delete;
-  // Ends what is under way: asks first, so that temporary files go.
+  // Ends the prints under way. Asks them first, so that they remove their temporary files.
   ~BatchProcesses();
 
-  // How many workers the next of `waiting` prints gets, 0 while none is free: all of them share
-  // what is free.
+  // How many workers the next of `waiting` prints gets, 0 while none is free. All waiting prints
+  // share the free workers.
   [[nodiscard]] unsigned workers_for_next(std::size_t waiting) const;
 
-  // Forks. The work is called in the new process, its answer comes back with the ticket.
+  // Forks a process, which calls the work. Its answer comes back with the ticket.
   [[nodiscard]] Status start(std::size_t ticket, unsigned workers, const Work& work);
 
   [[nodiscard]] bool any() const { return !running_.empty(); }
 
-  // Those that have ended; waits a moment for one, or until a signal comes.
+  // The prints that have ended. Waits a moment for one, or until a signal comes.
   [[nodiscard]] std::vector<Done> take();
 
  private:
@@ -53,7 +53,7 @@ class BatchProcesses {
     std::size_t ticket = 0;
     unsigned workers = 0;
     FileDescriptor answer;  // a pipe
-    std::string text;       // of the answer, as far as it has come
+    std::string text;       // packed answer, as far as it has come
     std::chrono::steady_clock::time_point start;
   };
 

@@ -23,7 +23,7 @@ struct BatchFigures {
 struct BatchOrigin {
   std::string version;
   std::string input_sha256;
-  std::string settings_sha256;  // all that decides about the bytes beside the input
+  std::string settings_sha256;  // hash of all that decides about the output, beside the input
   std::string output_sha256;
   std::string report_sha256;  // empty without a report
 
@@ -42,7 +42,7 @@ struct BatchAnswer {
   BatchState state = BatchState::failed;
   int exit_code = static_cast<int>(ExitCode::internal);
   bool measured = false;              // the figures are there
-  BatchRecord record;                 // the origin where the state is not failed
+  BatchRecord record;                 // its origin is set unless the state is failed
   std::vector<std::string> messages;  // warnings and errors, one line each
   std::string error;                  // why it failed, one line
 };
@@ -51,12 +51,12 @@ struct BatchAnswer {
 
 [[nodiscard]] report::Json to_json(const BatchFigures& figures);
 [[nodiscard]] report::Json to_json(const BatchRecord& record);
-// Throws what the JSON library throws where something is missing.
+// Throws what the JSON library throws if something is missing.
 [[nodiscard]] BatchRecord record_from(const report::Json& json);
 
-// Between processes.
+// The answer as a text, for the way between processes.
 [[nodiscard]] std::string pack(const BatchAnswer& answer);
-// An answer that is cut off is one that failed.
+// An answer that is cut off counts as failed.
 [[nodiscard]] BatchAnswer unpack(const std::string& text);
 
 }  // namespace unflex::app

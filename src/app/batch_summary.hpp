@@ -24,7 +24,7 @@ struct BatchSummary {
   double wall_s = 0.0;
 
   [[nodiscard]] std::size_t count(BatchState state) const;
-  // The highest of all.
+  // The highest exit code of all prints.
   [[nodiscard]] int exit_code() const;
 };
 

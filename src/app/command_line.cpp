@@ -198,9 +198,9 @@ void add_printer(CLI::App& program, RunConfig& config) {
   add_printer_macros(*printer, config);
 }
 
-// A resonance in a print: spacing, speed and decay of its waves.
+// Options for a resonance that shows in a print: spacing, speed and decay of its waves.
 void add_tower(CLI::App& command, RunConfig& config) {
-  // Half the width of what a ruler tells.
+  // How exactly a ruler tells them: half the width of the interval, as a share.
   constexpr double kShareOfSpacing = 0.05;
   constexpr double kShareOfDecay = 0.2;
   const auto tower = [&config]() -> identify::Tower& {
@@ -280,7 +280,7 @@ Status check_output(const RunConfig& config) {
   return {};
 }
 
-// An ending alone would make a hidden file.
+// Refuses a name that is only an ending, since it would make a hidden file.
 Status check_has_name(std::string_view option, const std::string& file,
                       std::initializer_list<std::string_view> endings) {
   if (std::ranges::find(endings, file) == endings.end()) {
@@ -302,7 +302,7 @@ Status check_report(const RunConfig& config) {
   if (!name.ends_with(".json") && !is_html(name)) {
     return usage(fmt::format("--report {}: the name must end in .json or .html", name));
   }
-  // Of compensate it stands for the output's name.
+  // With compensate, an ending alone stands for the output's name with that ending.
   return config.command == Command::compensate
              ? Status{}
              : check_has_name("--report", name, {".json", ".html"});

@@ -10,11 +10,11 @@
 namespace unflex::app {
 namespace {
 
-// So many lines of a kind, and so many kinds.
+// At most so many lines of a kind are shown, and so many kinds.
 constexpr std::size_t kMaxAlike = 3;
 constexpr std::size_t kMaxKinds = 10;
 
-// What is left of the line without its place, numbers, and what is quoted.
+// What is left of the line without its place, numbers and quoted text.
 std::string kind_of(std::string_view line) {
   line.remove_prefix(std::min(line.find(": "), line.size()));
   std::string kind;
@@ -66,7 +66,7 @@ std::vector<std::string> summarised(const std::vector<std::string>& lines, std::
   for (std::size_t i = 0; i < std::min(kinds.size(), kMaxKinds); ++i) {
     const std::vector<const std::string*>& alike = of_kind[kinds[i]];
     left -= alike.size();
-    // Of two too many, the second is shorter than the remark.
+    // If only one line is too many, showing it takes no more room than the remark.
     const std::size_t shown = alike.size() <= kMaxAlike + 1 ? alike.size() : kMaxAlike;
     for (std::size_t n = 0; n < shown; ++n) {
       result.push_back(*alike[n]);

@@ -18,9 +18,9 @@ namespace unflex::app {
 // "file:line: message", or "unflex: message" for an error without a place.
 [[nodiscard]] std::string error_text(const Error& error);
 
-// The first few lines of each kind, which differ in place, numbers and quoted text alone, and how
-// many more there are; then how many of `total` are left. `what` names them, and may say where
-// they are.
+// Lines of one kind differ only in place, numbers and quoted text. Gives the first few lines of
+// each kind and how many more there are, then how many of `total` are left. `what` names the lines,
+// and may say where all of them are.
 [[nodiscard]] std::vector<std::string> summarised(const std::vector<std::string>& lines,
                                                   std::size_t total, std::string_view what);
 
@@ -33,13 +33,13 @@ class Console {
 
   void line(std::string_view text);
   void error(const Error& error) { line(error_text(error)); }
-  // The lines, summarised.
+  // Shows the lines, summarised.
   void lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what);
   void warnings(const std::vector<std::string>& all) {
     lines(all, all.size(), "warnings; --report lists them");
   }
 
-  // Keeps what goes elsewhere, line by line.
+  // Keeps a text that is shown elsewhere, line by line.
   void note(std::string_view text);
 
   [[nodiscard]] const std::vector<std::string>& kept() const { return kept_; }

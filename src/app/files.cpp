@@ -19,7 +19,7 @@
 namespace unflex::app {
 namespace {
 
-// Its ending keeps it apart from names that people choose, such as .unflex-backup.
+// The ending keeps temporary files apart from names that people choose, such as .unflex-backup.
 constexpr std::string_view kTemporaryName = ".unflex-XXXXXX.tmp";
 constexpr std::string_view kTemporaryEnding = ".tmp";
 constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
@@ -27,9 +27,9 @@ constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
 // How often a wait is interrupted to see whether a signal has come just before it.
 constexpr int kPatience_ms = 50;
 
-// Whether what has failed is to be tried again. A signal that does not end the program (a resized
-// window) must not end a read either; a stream that does not block, as whoever shares it may want,
-// is waited for.
+// Whether to try again what has failed. A signal that does not end the program (a resized window)
+// must not end a read either. A stream may be set not to block, for the sake of someone who shares
+// it; then we wait for it.
 bool try_again(int fd, short events) {
   if (errno == EAGAIN) {
     pollfd what{fd, events, 0};
@@ -44,7 +44,8 @@ bool exists(const std::string& name) {
   return ::lstat(name.c_str(), &status) == 0;
 }
 
-// What unflex makes: neither a pipe that somebody gave such a name, nor another's file.
+// Whether it may be a file that unflex made: neither a pipe that somebody gave such a name, nor
+// another user's file.
 bool is_ours(int fd) {
   struct stat status {};
   return ::fstat(fd, &status) == 0 && S_ISREG(status.st_mode) && status.st_nlink == 1 &&
@@ -75,8 +76,8 @@ tl::expected<TemporaryFile, int> TemporaryFile::create(const std::filesystem::pa
     if (!file.valid()) {
       return tl::unexpected(errno);
     }
-    // Tells remove_abandoned() that someone is at it, where the file system can. Another process
-    // may have found and removed the file before.
+    // The lock tells remove_abandoned() that the file is in use, if the file system has locks.
+    // Another process may have found and removed the file before.
     static_cast<void>(::flock(file.get(), LOCK_EX));
     if (exists(name)) {
       return TemporaryFile(std::move(name), std::move(file), ::getpid());
@@ -218,7 +219,7 @@ std::string name_of_file(const std::string& name, int fd) {
 bool is_descriptor(const std::filesystem::path& name) {
   std::error_code failed;
   std::filesystem::path at = std::filesystem::absolute(name, failed);
-  // As many links as Linux follows.
+  // Linux follows at most 40 links.
   for (int links = 0; !failed && links < 40 && std::filesystem::is_symlink(at, failed); ++links) {
     const std::filesystem::path folder = std::filesystem::canonical(at.parent_path(), failed);
     if (folder.string().starts_with("/proc/") && folder.filename() == "fd") {

@@ -42,12 +42,12 @@ class TemporaryFile {
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] int fd() const { return fd_.get(); }
-  // Removes such files whose process was killed. False if some are left: they are in use, or by
-  // processes that are about to end.
+  // Removes temporary files whose process was killed. False if some are left: they are in use,
+  // perhaps by processes that are about to end.
   static bool remove_abandoned(const std::filesystem::path& directory);
   // Removes the name now; the contents live on behind fd().
   void unlink();
-  // The name is someone else's from here on.
+  // From here on the file is someone else's, and is not removed.
   void release();
 
  private:
@@ -58,14 +58,16 @@ class TemporaryFile {
   pid_t owner_ = 0;
 };
 
-// What can be read next, empty at the end, or the errno; EINTR as below.
+// What can be read next, empty at the end, or the errno of what went wrong; EINTR only if a signal
+// asked the program to end.
 [[nodiscard]] tl::expected<std::string, int> read_some(int fd);
 
-// Both return 0 or the errno of what went wrong; EINTR only if a signal asked the program to end.
+// write_all() and copy_all() return 0 or the errno of what went wrong; EINTR only if a signal asked
+// the program to end.
 [[nodiscard]] int write_all(int fd, std::string_view data);
 [[nodiscard]] int copy_all(int from, int to);
 
-// What stands in the way of a file there.
+// Why a temporary file cannot be made or written, for messages.
 [[nodiscard]] std::string temporary_error_text(int error);
 
 // $TMPDIR or /tmp.
@@ -74,7 +76,8 @@ class TemporaryFile {
 // Whether both names lead to one file, existing or not. An empty name leads to none.
 [[nodiscard]] bool same_file(const std::string& a, const std::string& b);
 
-// The name, or of "-" one of the file that descriptor `fd` was redirected to; "" for other streams.
+// The name itself; for "-" a name of the file that descriptor `fd` was redirected to; "" for other
+// streams.
 [[nodiscard]] std::string name_of_file(const std::string& name, int fd);
 
 // Whether the name leads to a file by an open descriptor, as /dev/stdout does.

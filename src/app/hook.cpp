@@ -12,7 +12,7 @@ namespace unflex::app {
 namespace {
 
 constexpr std::string_view kPrefix = "SLIC3R_";
-// Variables that are no settings.
+// The beginning of variables that are no settings.
 constexpr std::string_view kScriptPrefix = "SLIC3R_PP_";
 constexpr std::string_view kFileHost = "File";
 

@@ -21,13 +21,13 @@ struct Slicer {
   machine::SlicerVariables settings;
 };
 
-// From the environment of the process.
+// Reads the environment of the process.
 [[nodiscard]] Slicer read_slicer();
 
-// What was asked for, as it is meant when a slicer has started the program: `compensate --in-place`
-// takes the slicer's settings, calls the print by its final name, and a report that is only a
-// suffix (".html") stands beside the final file. Other commands do not look at the slicer. An error
-// of kind usage where there is no such place.
+// What was asked for, completed by what a slicer that has started the program says: `compensate
+// --in-place` takes the slicer's settings, calls the print by its final name, and a report that is
+// only a suffix (".html") stands beside the final file. Other commands do not look at the slicer.
+// An error of kind usage if there is no such place.
 [[nodiscard]] Result<RunConfig> with_slicer(RunConfig config, const Slicer& slicer);
 
 }  // namespace unflex::app

@@ -23,7 +23,8 @@ Result<std::string> read_record(const std::string& name) {
   return input ? input->read_all() : Result<std::string>(tl::unexpected(input.error()));
 }
 
-// Which axis a record is of: as its name says, as told, or along which it moved the more.
+// The axis of a record: the one that its name tells, the one that the user gives, or the one along
+// which it moved more.
 Result<identify::Axis> axis_of(const IdentifyConfig& config, const identify::DataSet& set,
                                Identification& all) {
   if (set.axis) {
@@ -139,7 +140,7 @@ Result<ExitCode> run_identify(const RunConfig& config, Console& console) {
       return tl::unexpected(written.error());
     }
   }
-  // Without figures and drawings what is left is the lines to paste.
+  // If quiet, only the lines to paste are left, without figures and drawings.
   const Status written = config.report == kStandardStream
                              ? Status{}
                              : write_last(config.quiet ? snippet(*all) : identification_text(*all));

@@ -16,7 +16,7 @@
 namespace unflex::app {
 namespace {
 
-// Text piece by piece, unpacked where it is packed.
+// Gives the text block by block, unpacked if it is packed.
 class TextReader {
  public:
   using ReadBlock = std::function<Result<std::string>()>;
@@ -30,7 +30,7 @@ class TextReader {
     }
   }
 
-  // Empty at the end.
+  // The next text; empty at the end.
   Result<std::string> next() {
     if (unpacker_ == nullptr) {
       return head_.empty() ? read_() : std::exchange(head_, {});
@@ -80,7 +80,7 @@ Result<Input> Input::open(const std::string& name) {
     return fail(ErrorKind::input, place, "is a directory, not a G-code file");
   }
   Input input(name, std::move(fd), version_of(status));
-  // Even a file on stdin may stand anywhere but at its start, so it is copied too.
+  // Even a file on stdin need not stand at its start, so it is copied too.
   input.is_stream_ = is_stdin || !S_ISREG(status.st_mode);
   return input;
 }
@@ -184,7 +184,7 @@ Status Input::copy_text() {
     return fail(ErrorKind::internal, {directory.string(), 0},
                 fmt::format("cannot keep {} here: {}", name_, temporary_error_text(copy.error())));
   }
-  // Whatever happens, nothing is left.
+  // Without a name, nothing is left of the copy, whatever happens.
   copy->unlink();
   const std::unique_ptr<container::Unpacker> unpacker = container::make_unpacker(kind_, name_);
   TextReader reader(unpacker.get(), std::exchange(head_, {}), [this] { return read_block(); });

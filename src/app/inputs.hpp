@@ -15,7 +15,7 @@
 
 namespace unflex::app {
 
-// A file that is written to or replaced gets another one.
+// The version of a file: a file that is written to or replaced gets another one.
 struct InputVersion {
   dev_t device = 0;
   ino_t number = 0;
@@ -36,33 +36,34 @@ class Input {
   // file without a name.
   [[nodiscard]] Status make_seekable();
 
-  // The same but for text and gzip in a stream, which can be read once as they come.
+  // Copies like make_seekable(), except text and gzip in a stream, which can be read once as they
+  // come.
   [[nodiscard]] Status make_readable();
 
-  // What it is packed in, known once it was made readable or seekable, and what a binary file says
-  // beside its G-code.
+  // What the input is packed in, and what a binary file says beside its G-code. Both are known once
+  // the input was made readable or seekable.
   [[nodiscard]] container::Kind kind() const { return kind_; }
   [[nodiscard]] const std::optional<container::Metadata>& metadata() const { return metadata_; }
 
-  // What of the print can be seen now. Of a stream its head is taken; it is to be had back, as
-  // packed as it was, from head(), before what stream_fd() still gives.
+  // What can be seen now of the print. From a stream its head is taken; head() gives it back, as
+  // packed as it was. What stream_fd() still gives comes after it.
   [[nodiscard]] Result<machine::PrintText> look();
   [[nodiscard]] const std::string& head() const { return head_; }
 
-  // Whether the file is still what it was when it was opened. If not, what was read may be of two
-  // files, and is no base for a result: an error of kind input.
+  // Checks that the file is still what it was when it was opened. If not, what was read may be of
+  // two files and is no base for a result: an error of kind input.
   [[nodiscard]] Status check_unchanged() const;
 
-  // All of it, of what is small enough to be held.
+  // Reads all of an input that is small enough to be held.
   [[nodiscard]] Result<std::string> read_all();
 
-  // Of what cannot be read twice, to read it once; otherwise −1.
+  // The descriptor of an input that cannot be read twice, to read it once; −1 for other inputs.
   [[nodiscard]] int stream_fd() const { return is_stream_ && !is_copied_ ? fd_.get() : -1; }
 
-  // Where to read it, and what the user calls it.
+  // Where to read the input, and what the user calls it.
   [[nodiscard]] std::filesystem::path path() const;
   [[nodiscard]] const std::string& name() const { return name_; }
-  // Messages call it so from here on.
+  // Messages call the input so from here on.
   void call(std::string name) { name_ = std::move(name); }
 
  private:
@@ -73,7 +74,7 @@ class Input {
   [[nodiscard]] Status look_at_kind();
   // What can be read next, empty at the end.
   [[nodiscard]] Result<std::string> read_block() const;
-  // All of it as text to a temporary file, which takes the input's place.
+  // Copies all of it as text to a temporary file, which takes the input's place.
   [[nodiscard]] Status copy_text();
   [[nodiscard]] tl::unexpected<Error> cannot_read(int error) const;
 
@@ -85,7 +86,7 @@ class Input {
   bool is_copied_ = false;  // its text is in a temporary file
   container::Kind kind_ = container::Kind::text;
   std::optional<container::Metadata> metadata_;
-  std::string head_;  // read already
+  std::string head_;  // first bytes, if they were read already
 };
 
 }  // namespace unflex::app

@@ -37,7 +37,7 @@ Json moves_json(const Inspection& i) {
           {"absolute_extrusion", i.absolute_e}};
 }
 
-// Of the table of settings.
+// Widths in the table of settings.
 constexpr int kKeyColumns = 44;
 constexpr int kValueColumns = 14;
 
@@ -79,13 +79,13 @@ void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
                  s.dynamics_y.damping_ratio);
 }
 
-// The report has all digits of what follows from other keys.
+// Fewer digits for values that follow from other keys. The report has all digits.
 std::string short_value(const std::string& value) {
   const std::optional<double> number = parse_number(value);
   return value.empty() ? "-" : number ? fmt::format("{:.6g}", *number) : value;
 }
 
-// Every key, its value in force when the print starts, and where that is from.
+// Every key, its value in force when the print starts, and where the value is from.
 void write_settings(Sink out, const machine::Settings& settings) {
   fmt::format_to(out, "settings\n");
   for (const machine::SettingRow& row : machine::rows(settings)) {

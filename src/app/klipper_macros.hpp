@@ -5,7 +5,7 @@
 
 namespace unflex::app {
 
-// What printer.cfg includes.
+// The text of the file that printer.cfg is to include.
 [[nodiscard]] std::string klipper_macros();
 
 }  // namespace unflex::app

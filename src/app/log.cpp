@@ -16,7 +16,7 @@ namespace {
 
 constexpr mode_t kMode = 0666;
 
-// What a log must not be: it would be read or replaced.
+// Checks that the log is not a file that is read or replaced.
 Status check_distinct(const RunConfig& config) {
   for (const std::string& other : {config.input, config.output, config.report.value_or(""),
                                    config.printer_file.value_or("")}) {

@@ -1,4 +1,4 @@
-// A file in which runs of the program add up what they said: slicers show little of it.
+// A file to which the program adds what it has said each time, since slicers show little of it.
 #pragma once
 
 #include <string>
@@ -12,12 +12,12 @@ namespace unflex::app {
 
 class Log {
  public:
-  // Checks that the log, if there is to be one, can be written before the work begins: an error of
-  // kind usage.
+  // Checks before the work begins that the log, if there is to be one, can be written. If not, that
+  // is an error of kind usage.
   [[nodiscard]] static Result<Log> open(const RunConfig& config);
 
   // One entry: time (UTC), version and print, then the lines and the exit code. It is written at
-  // once, so that entries of several runs at a time do not mix. Errors are of kind internal.
+  // once, so that the entries of several processes do not mix. Errors are of kind internal.
   [[nodiscard]] Status append(const std::vector<std::string>& lines, int exit_code);
 
  private:
@@ -26,7 +26,7 @@ class Log {
 
   std::string name_;
   std::string print_;
-  FileDescriptor file_;  // none where no log is asked for
+  FileDescriptor file_;  // invalid if no log is asked for
 };
 
 }  // namespace unflex::app

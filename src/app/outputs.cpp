@@ -74,7 +74,7 @@ mode_t mode_of_new_files() {
   return 0666U & ~mask;
 }
 
-// Gives the temporary file the owner (where that is allowed) and permissions of what it replaces.
+// Gives the temporary file the owner (if that is allowed) and permissions of the file it replaces.
 int take_over_permissions(int fd, const std::filesystem::path& target) {
   struct stat status {};
   if (::stat(target.c_str(), &status) != 0) {
@@ -82,7 +82,8 @@ int take_over_permissions(int fd, const std::filesystem::path& target) {
   }
   const bool same_owner = ::fchown(fd, status.st_uid, status.st_gid) == 0;
   if (!same_owner) {
-    // Of a folder that is shared by a group; otherwise its rights would pass to another.
+    // At least the group is kept, for folders that a group shares. Otherwise the rights of the
+    // group would pass to another group.
     static_cast<void>(::fchown(fd, static_cast<uid_t>(-1), status.st_gid));
   }
   // Rights to run as someone must not pass to another owner.
@@ -102,7 +103,7 @@ Result<Output> Output::open(const std::string& name) {
   if (!directory) {
     return tl::unexpected(directory.error());
   }
-  // What a killed run may have left there.
+  // Removes what a killed process may have left there.
   static_cast<void>(TemporaryFile::remove_abandoned(*directory));
   tl::expected<TemporaryFile, int> temporary = TemporaryFile::create(*directory);
   if (!temporary) {
@@ -189,7 +190,8 @@ Status Output::for_each_block(const std::function<Status(std::string_view)>& use
   }
 }
 
-// What is renamed must be on the disk before: after a power cut the name may be there without it.
+// Puts the result on the disk before it is renamed. Otherwise, after a power cut, the name may be
+// there without the contents.
 Status Output::settle() const {
   const int fd = result().fd();
   if (const int error = take_over_permissions(fd, target_); error != 0) {
@@ -207,7 +209,8 @@ Status Output::replace_target() {
   note_result();
   const std::filesystem::path directory = made.path().parent_path();
   (packed_ ? *packed_ : temporary_).release();
-  // The rename itself must survive a power cut; where directories cannot be synced it is done.
+  // The rename itself must survive a power cut. If the directory cannot be synced, it is done all
+  // the same.
   const FileDescriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.valid()) {
     ::fsync(folder.get());
@@ -237,7 +240,7 @@ Status Output::copy_to_stream() {
     return opened;
   }
   const int error = copy_all(source.get(), stream_.get());
-  stream_ = FileDescriptor();  // whoever reads it learns that this was all
+  stream_ = FileDescriptor();  // closed, so that the reader learns that this was all
   if (error != 0) {
     return cannot_write(error);
   }

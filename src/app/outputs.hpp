@@ -18,11 +18,11 @@ namespace unflex::app {
 // gets a copy.
 class Output {
  public:
-  // Checks that the result can be written, before the work. What cannot is an error of kind usage.
+  // Checks before the work that the result can be written. If not, that is an error of kind usage.
   [[nodiscard]] static Result<Output> open(const std::string& name);
 
-  // Makes commit() pack the text that was written. origin: of the binary file it was made from, or
-  // null; it must outlive this.
+  // Makes commit() pack the text that was written. origin: metadata of the binary file that the
+  // text was made from, or null; must outlive this object.
   void pack_as(container::Kind kind, const container::Metadata* origin) {
     kind_ = kind;
     origin_ = origin;
@@ -30,19 +30,20 @@ class Output {
   [[nodiscard]] container::Kind kind() const { return kind_; }
   [[nodiscard]] bool is_stream() const { return target_.empty(); }
 
-  // Where to write meanwhile, always text.
+  // Where to write until then, always text.
   [[nodiscard]] const std::filesystem::path& path() const { return temporary_.path(); }
   [[nodiscard]] Status write(std::string_view text);
 
-  // Of a stream, to write to it at once, packed as it is to be, and not commit(); otherwise −1, as
-  // for a binary file, which begins with what is known last. Errors as of commit().
+  // The descriptor of a stream: the caller writes to it at once, packed as asked, and does not
+  // commit(). −1 for a file, and for binary G-code, which begins with what is known last. Errors
+  // are those of commit().
   [[nodiscard]] Result<int> stream_fd();
 
-  // Does all of commit() that takes room on the disk, which is what fails mostly. Nothing is
-  // written after it.
+  // Does the part of commit() that takes room on the disk, since that part fails most often.
+  // Nothing may be written after it.
   [[nodiscard]] Status seal();
 
-  // Errors are of kind internal; the old file is then as it was.
+  // Puts the result in place. Errors are of kind internal; the old file is then as it was.
   [[nodiscard]] Status commit();
 
  private:
@@ -51,7 +52,7 @@ class Output {
 
   [[nodiscard]] Status pack();
   [[nodiscard]] Status pack_into(int to);
-  // Goes through the text.
+  // Calls `use` for each block of the text.
   [[nodiscard]] Status for_each_block(const std::function<Status(std::string_view)>& use) const;
   [[nodiscard]] const TemporaryFile& result() const { return packed_ ? *packed_ : temporary_; }
   [[nodiscard]] Status settle() const;

@@ -12,7 +12,7 @@
 namespace unflex::app {
 namespace {
 
-// What the results say about success: broken rules before deviation.
+// The exit code that follows from the results: broken rules count before deviation.
 ExitCode exit_code_of(const RunConfig& config, bool passed_on, const report::Report& report,
                       Console& console) {
   const std::string_view consequence = consequence_of(passed_on);
@@ -42,8 +42,9 @@ ExitCode exit_code_of(const RunConfig& config, bool passed_on, const report::Rep
   return ExitCode::done;
 }
 
-// Both or none: where there is no room for the report, the output must not be there either. The
-// last moment to see that a print to be replaced is still the one that was read.
+// Delivers both output and report, or none: if there is no room for the report, the output must not
+// be there either. The inputs are checked as late as possible, since a print that is replaced must
+// still be the one that was read.
 Status deliver_output(Workspace& space, std::string_view report) {
   const auto commit_report = [&](bool to_stream) {
     return space.report && space.report->is_stream() == to_stream ? space.report->commit()
@@ -53,13 +54,13 @@ Status deliver_output(Workspace& space, std::string_view report) {
       .and_then([&] { return space.report ? space.report->write(report) : Status{}; })
       .and_then([&] { return space.report ? space.report->seal() : Status{}; })
       .and_then([&] { return check_inputs(space); })
-      // What a stream does not take is known when it has it.
+      // Only writing tells whether a stream takes the report, so this comes before the output.
       .and_then([&] { return commit_report(true); })
       .and_then([&] { return space.output->commit(); })
       .and_then([&] { return commit_report(false); });
 }
 
-// An output that failed is not handed on, but what is known about it is.
+// An output that failed is not delivered, but the report on it is.
 Status deliver(Workspace& space, ExitCode verdict, bool passed_on, const report::Report& report) {
   const std::string text = !space.report      ? std::string()
                            : report.recording ? report::to_html(report)

@@ -13,10 +13,10 @@ struct PrintOutcome {
   report::Report report;
 };
 
-// All but the summary: output and report are in place when it returns, or as they were.
+// Does all but the summary. When it returns, output and report are in place, or as they were.
 [[nodiscard]] Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console);
 
-// The same with its summary.
+// Works on the print and prints the summary.
 [[nodiscard]] Result<ExitCode> run_on_print(const RunConfig& config, Console& console);
 
 }  // namespace unflex::app

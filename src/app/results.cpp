@@ -87,7 +87,8 @@ Status print_summary(const RunConfig& config, std::string_view text, Console& co
 
 Status write_last(std::string_view text) {
   const int error = write_all(STDOUT_FILENO, text);
-  // Whoever ends the program here has the files already: it must not say that there are none.
+  // If a signal ends the program here, the files are in place already, so no message must say that
+  // there are none.
   const bool is_done = error == EINTR && has_result();
   return error == 0 || is_done
              ? Status{}

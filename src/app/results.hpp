@@ -18,12 +18,12 @@
 
 namespace unflex::app {
 
-// Of a process that a signal ended: 128 + signal.
+// The exit code of a process that a signal ended: 128 + signal.
 inline constexpr int kSignalExitBase = 128;
 
 [[nodiscard]] ExitCode exit_code(ErrorKind kind);
 
-// What a command returns that a signal ended. with_result: one of its results is in place.
+// The error of a command that a signal ended. with_result: one of its results is in place.
 [[nodiscard]] tl::unexpected<Error> interrupted(Command command, bool with_result = false);
 
 // Runs one of the pipeline's commands with a progress bar that is gone when it returns.
@@ -40,21 +40,22 @@ auto with_progress(const RunConfig& config, Work work)
 
 [[nodiscard]] std::vector<std::string> setting_warnings(const machine::Settings& settings);
 
-// What an error leaves. passed_on: the output has gone to a stream as it came.
+// What becomes of the output after an error, for messages. passed_on: the output has gone to a
+// stream as it came.
 [[nodiscard]] std::string_view consequence_of(bool passed_on);
 
-// With --strict, an error where there are warnings, which are shown as the errors they then are.
+// With --strict, an error if there are warnings. They are then shown as errors.
 [[nodiscard]] Status accept(const RunConfig& config, std::vector<std::string> warnings,
                             bool passed_on, Console& console);
 
-// Remarks about the settings come before those about the print.
+// Puts remarks about the settings before those about the print.
 void add_setting_warnings(const machine::Settings& settings, std::vector<std::string>& warnings);
 
 // The summary goes to stdout, unless a result is there; then to stderr if someone is looking.
 [[nodiscard]] Status print_summary(const RunConfig& config, std::string_view text,
                                    Console& console);
 
-// To stdout, as the last thing a command does.
+// Writes to stdout, as the last thing a command does.
 [[nodiscard]] Status write_last(std::string_view text);
 
 [[nodiscard]] Status write_report(std::optional<Output>& report, std::string_view text);

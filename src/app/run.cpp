@@ -150,12 +150,13 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
   return run_on_print(config, console);
 }
 
-// The exit code of the command; what went wrong has been said.
+// Runs the command and says what went wrong. Returns the exit code.
 int run_said(const RunConfig& config, Console& console) {
   const Result<ExitCode> result = run_command(config, console);
   if (!result) {
     say_last_words_yourself();
-    // What fails once a result is in place is told as it is, or it would be taken for missing.
+    // If a result is in place, the failure itself is told. Otherwise the result would be taken for
+    // missing.
     const bool ended = ending_signal() != 0 && (!has_result() || config.command == Command::batch);
     console.error(ended ? interrupted(config.command).value() : result.error());
     return ended ? kSignalExitBase + ending_signal()

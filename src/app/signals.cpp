@@ -16,7 +16,7 @@ namespace unflex::app {
 namespace {
 
 constexpr int kSignalExitBase = 128;
-// For what is under way to end by itself, µs.
+// The time in which the work under way can end by itself, µs.
 constexpr suseconds_t kPatience_us = 400'000;
 
 volatile std::sig_atomic_t received = 0;
@@ -36,7 +36,7 @@ pid_t main_process = 0;
 volatile std::sig_atomic_t expected = 0;
 volatile std::sig_atomic_t in_place = 0;
 
-// Nothing here but what a signal handler may call.
+// Calls nothing but what a signal handler may call.
 extern "C" void give_up(int /*signal*/) {
   bool removed = false;
   for (const Slot& slot : unfinished) {
@@ -44,7 +44,8 @@ extern "C" void give_up(int /*signal*/) {
       removed = ::unlink(slot.file.data()) == 0 || removed;
     }
   }
-  // Between the two nobody knows.
+  // Between expect_a_result() and note_result() nobody knows whether the result is in place, unless
+  // a temporary file could still be removed. Then nothing is said.
   if (main_process == ::getpid() && (in_place != 0 || removed || expected == 0)) {
     const Words& words = in_place != 0 ? last_words_with_result : last_words;
     static_cast<void>(::write(STDERR_FILENO, words.data(), std::strlen(words.data())));

@@ -15,8 +15,8 @@ namespace unflex::app {
 struct Workspace {
   machine::Settings settings;
   Input input;
-  std::optional<Input> compensated;  // verify
-  std::optional<Output> output;      // compensate
+  std::optional<Input> compensated;  // only for verify
+  std::optional<Output> output;      // only for compensate
   std::optional<Output> report;
 };
 
@@ -26,10 +26,10 @@ struct Workspace {
 // Opens the prints, the output and the report, and reads the settings.
 [[nodiscard]] Result<Workspace> open_workspace(const RunConfig& config);
 
-// A print that was changed meanwhile explains whatever else went wrong.
+// An error if a print was changed meanwhile, since that explains whatever else went wrong.
 [[nodiscard]] Status check_inputs(const Workspace& space);
 
-// The same as the pipeline wants it.
+// The job for the pipeline.
 [[nodiscard]] Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space);
 
 }  // namespace unflex::app

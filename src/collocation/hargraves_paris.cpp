@@ -292,7 +292,7 @@ class HargravesParis final : public nlp::Problem {
     }
   }
 
-  // Fills everything that depends on the two nodes, and z_c.
+  // Fills in everything that depends on the two nodes, and z_c.
   void load(std::span<const double> x, int k, Interval& i) const {
     const auto at = static_cast<std::size_t>(k);
     i.t1 = times_[at];
@@ -372,8 +372,8 @@ class HargravesParis final : public nlp::Problem {
     }
   }
 
-  // f₁ and f₂ stand in x_c (with ± h/8) and in ẋ_c (with −1/4): their own curvature counts with
-  // the multiplier that reaches them.
+  // f₁ and f₂ appear in x_c (with ± h/8) and in ẋ_c (with −1/4). So their own curvature counts too,
+  // with the multipliers that reach it there.
   void add_curvature_of_slopes(const Interval& i, double weight, const StateVector& mu,
                                PairByPair& h) const {
     PointVector lc(nz_);
@@ -417,9 +417,9 @@ class HargravesParis final : public nlp::Problem {
   std::vector<double> start_;
   nlp::Sparsity jacobian_sparsity_;
   nlp::Sparsity hessian_sparsity_;
-  std::vector<Entry> defect_entries_;    // of Δ over (z₁, z₂)
-  std::vector<Entry> diagonal_entries_;  // of a node's own Hessian block, lower triangle
-  std::vector<Entry> coupling_entries_;  // of the block (node k+1, node k)
+  std::vector<Entry> defect_entries_;    // entries of Δ over (z₁, z₂)
+  std::vector<Entry> diagonal_entries_;  // entries of a node's own Hessian block, lower triangle
+  std::vector<Entry> coupling_entries_;  // entries of the block (node k+1, node k)
 };
 
 }  // namespace

@@ -40,12 +40,12 @@ struct AxisChain {
   AxisChain(double omega_h, double zeta);
 };
 
-// What a limit holds down. Each has one row per node, or per interval for jerk.
+// The quantities that limits bound. Each has one row per node; jerk has one per interval.
 enum class RowKind : int { position = 0, velocity, accel, jerk };
 inline constexpr std::array<RowKind, 4> kRowKinds = {RowKind::position, RowKind::velocity,
                                                      RowKind::accel, RowKind::jerk};
 
-// One of them per row kind.
+// One value per row kind.
 template <class T>
 using PerKind = std::array<T, kRowKinds.size()>;
 
@@ -53,9 +53,9 @@ using PerKind = std::array<T, kRowKinds.size()>;
   return static_cast<std::size_t>(kind);
 }
 
-// Pulls the nozzle everywhere, by nothing that could be noticed: where the reference rests, steps
-// would otherwise ring out into denormal numbers, which take ten times as long. Forms turn it round
-// with every step, or steps would settle to it and be as small again.
+// A pull on the nozzle at every node, too weak to be noticed. Where the reference rests, steps
+// would otherwise ring out into denormal numbers, which take ten times as long. The forms reverse
+// the pull with every step. Otherwise steps would settle to it and become as small again.
 inline constexpr double kFaintPull = 1e-60;
 
 // The window's numbers, scaled.
@@ -71,19 +71,21 @@ struct ScaledWindow {
 
   void assign(const AxisWindow& window);
   [[nodiscard]] double to_scaled_position(double mm) const;
-  // Sets what the window gives of the base at its ends, so that it does not hang on rounding.
+  // Sets the base at its ends to exactly what the window gives, so that rounding has no effect
+  // there.
   void keep_ends(dynamics::AxisTrajectory& base) const;
 };
 
-// Lower and upper bounds of the rows of one kind: the same at all nodes but the first and the last.
+// Lower and upper bounds of the rows of one kind. Usually they are equal at all nodes but the first
+// and the last.
 struct RowBounds {
   Interval first;
-  Interval inner;  // the widest of them, if they differ
+  Interval inner;  // if they differ from node to node: the widest
   Interval last;
-  std::vector<Interval> each = {};  // of all nodes, if they differ
+  std::vector<Interval> each = {};  // of every node, if they differ from node to node
 };
 
-// Of the kinds that the active limits bound.
+// The bounds of those kinds that the active limits bound.
 [[nodiscard]] PerKind<std::optional<RowBounds>> row_bounds(const ScaledWindow& scaled,
                                                            const ActiveLimits& active);
 

@@ -13,16 +13,16 @@ namespace unflex::compensate {
 
 inline constexpr double kLengthUnitMm = 0.01;
 
-// States p, ṗ, b, ḃ and the p_i, ṗ_i of what the axis may be beside; control b̈.
+// States p, ṗ, b, ḃ, then p_i, ṗ_i of the other models of the axis; control b̈.
 class AxisProblem final : public collocation::OptimalControlProblem {
  public:
-  // The numbers are places in z where the axis is one thing only.
+  // The numbers are places in z if the axis has one model only.
   enum Component : int { kNozzle = 0, kNozzleRate, kBase, kBaseRate, kBaseAccel };
 
   // The window must outlive the problem.
   AxisProblem(const AxisWindow& window, ActiveLimits active);
 
-  // The place of a component in z, a nozzle's for what the axis may be.
+  // The place of a component in z. A component of the nozzle has one place for each model.
   [[nodiscard]] int place(Component component, std::size_t model = 0) const;
 
   int states() const override { return 2 + 2 * static_cast<int>(window_->models()); }
@@ -53,12 +53,12 @@ class AxisProblem final : public collocation::OptimalControlProblem {
   void guess(int k, double t, collocation::PointVector& z) const override;
   std::string name(int component) const override;
 
-  // Between scaled and physical values of a component, mm and s.
+  // Convert a component between scaled and physical values, mm and s.
   [[nodiscard]] double to_physical(Component component, double scaled) const;
   [[nodiscard]] double to_scaled(Component component, double physical) const;
 
  private:
-  // r and w at time t, which is a node or a middle.
+  // The place in r and w that belongs to time t, which is a node or a middle.
   [[nodiscard]] std::size_t sample(double t) const;
 
   const AxisWindow* window_;

@@ -32,7 +32,7 @@ const char* name_of(RowKind kind) {
   }
 }
 
-// Steps the form to the optimum without limits: by one step, but for rounding.
+// Steps the form to the optimum without limits. Without rounding one step would do.
 template <class Form>
 bool solve_without_limits(Form& form, std::size_t nodes) {
   if (!form.factor({})) {
@@ -84,8 +84,8 @@ Result<AxisSolution> solve_by(Form& form, InteriorPoint& interior_point, const S
   });
 }
 
-// What one window is solved in. Kept from window to window, as allocating would take longer than
-// solving.
+// The memory that one window is solved in. It is kept from window to window, as allocating would
+// take longer than solving.
 struct Workspace {
   ScaledWindow scaled;
   InteriorPoint interior_point;
@@ -95,8 +95,9 @@ struct Workspace {
   StageForm<5> stages_of_five;
 };
 
-// As many as windows were ever solved at once. They belong to no thread: a thread's own ones end by
-// a destructor that the C library aborts the process over if it has no memory to remember it.
+// There are as many workspaces as windows were ever solved at once. They do not belong to threads:
+// the C library must remember to destroy what belongs to a thread, and aborts the process if it has
+// no memory for that.
 class Workspaces {
  public:
   std::unique_ptr<Workspace> take() {
@@ -145,7 +146,7 @@ class BandedEngine final : public Engine {
       return solve_by(work.stages_of_three, work.interior_point, scaled, false);
     }
     if (form_ == BandedForm::flat || (form_ == BandedForm::fitting && FlatForm::suits(scaled))) {
-      // Where it runs out of digits, stages have some left.
+      // If the flat form runs out of digits, the stage form has some left.
       Result<AxisSolution> solution =
           solve_by(work.flat, work.interior_point, scaled, form_ == BandedForm::fitting);
       if (solution || form_ == BandedForm::flat) {

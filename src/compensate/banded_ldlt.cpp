@@ -14,7 +14,8 @@ bool BandedLdlt::factor(const Band& h, std::size_t first, std::size_t last) {
     from_first[d] = h[d].data() + first;
     from_last[d] = h[d].data() + last - d;
   }
-  // Rows and columns r … r + 5 after r steps, upper triangle; column j as the matrix has it.
+  // Rows and columns r … r + 5 after r steps, upper triangle. load() takes column j from the
+  // matrix.
   Pair w[kHalfBand + 1][kHalfBand + 1];
   const auto load = [&](std::size_t r, std::size_t j) {
     for (std::size_t i = 0; i <= j; ++i) {
@@ -49,7 +50,7 @@ bool BandedLdlt::factor(const Band& h, std::size_t first, std::size_t last) {
   if (!(smallest.minCoeff() > 0.0)) {
     return false;
   }
-  // What both sides have left: their updates, on top of the matrix itself.
+  // The middle block: the matrix itself and the updates of both sides.
   middle_.setZero();
   const double* const* diagonal = from_first.data();
   for (std::size_t i = 0; i < middle_size_; ++i) {
@@ -97,7 +98,7 @@ void BandedLdlt::solve(double* x) const {
     from_first[r] = value(0);
     *(from_last - r) = value(1);
   };
-  // Rows that both sides reach get both their updates; so updates are summed apart.
+  // Rows that both sides reach get the updates of both, so updates are summed apart.
   Pair update[kHalfBand + 1] = {Pair::Zero(), Pair::Zero(), Pair::Zero(),
                                 Pair::Zero(), Pair::Zero(), Pair::Zero()};
   for (std::size_t r = 0; r < steps; ++r) {
@@ -131,7 +132,7 @@ void BandedLdlt::solve(double* x) const {
   }
   for (std::size_t r = steps; r-- > 0;) {
     const Column& column = columns_[r];
-    // The farthest first: the nearest has only just been found.
+    // The farthest value first, since the nearest has only just been found.
     Pair value = load(r) * column.inverse_pivot;
     for (std::size_t i = kHalfBand; i-- > 0;) {
       value -= column.below[i] * next[i];

@@ -1,7 +1,7 @@
 // L D Lᵀ of a symmetric positive definite matrix of half-bandwidth 5, and solving with it.
 //
-// A step of the factorisation waits for the pivot of the step before, and that wait is most of its
-// time. So both ends are eliminated at once, in the two lanes of one register, towards a middle
+// Each step of the factorisation waits for the pivot of the step before, and this wait is most of
+// its time. So both ends are eliminated at once, in the two lanes of one register, towards a middle
 // block of five or six rows ("twisted" factorisation; Meurant, "A review on the inverse of
 // symmetric tridiagonal and block tridiagonal matrices", SIAM J. Matrix Anal. Appl. 13 (1992)).
 #pragma once
@@ -22,15 +22,15 @@ using Band = std::array<Padded, kHalfBand + 1>;
 
 class BandedLdlt {
  public:
-  // Of the rows and columns first … last of h, five at least. False when a pivot is not positive;
-  // then the factor is of no use.
+  // Factorises the rows and columns first … last of h, at least five. Returns false if a pivot is
+  // not positive; then the factor is of no use.
   [[nodiscard]] bool factor(const Band& h, std::size_t first, std::size_t last);
 
   // x ← H⁻¹ x on first … last. Entries beside them are not touched.
   void solve(double* x) const;
 
  private:
-  using Pair = Eigen::Array2d;  // of the same step from the first row and from the last
+  using Pair = Eigen::Array2d;  // one step's values, from the first row and from the last
   using Middle = Eigen::Matrix<double, kHalfBand + 1, kHalfBand + 1>;
 
   struct Column {
@@ -38,7 +38,8 @@ class BandedLdlt {
     std::array<Pair, kHalfBand> below;  // L at the next five rows
   };
 
-  // False when a pivot of the middle block (its lower triangle is given) is not positive.
+  // Factorises the middle block, whose lower triangle is given. Returns false if a pivot is not
+  // positive.
   [[nodiscard]] bool factor_middle();
 
   std::size_t first_ = 0;

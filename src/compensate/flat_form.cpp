@@ -135,7 +135,7 @@ void FlatForm::assign(const ScaledWindow& scaled) {
   find_ends();
 }
 
-// What keeps the fixed ends, and the first guess there.
+// Finds what keeps the fixed ends, and sets the first guess there.
 void FlatForm::find_ends() {
   const Stencil& position = stencils_[index_of(RowKind::position)];
   const Stencil& velocity = stencils_[index_of(RowKind::velocity)];
@@ -171,8 +171,8 @@ void FlatForm::find_ends() {
 }
 
 void FlatForm::add_up_cost() {
-  // The jerk's weight is the same everywhere, so its part is one number per diagonal, but for the
-  // first and last rows, which not all of its stencils reach.
+  // The jerk's weight is equal everywhere, so its part is one number per diagonal. The first and
+  // last rows differ, because not all of its stencils reach them.
   const Stencil& jerk = stencils_[index_of(RowKind::jerk)];
   const std::size_t unknowns = nodes_ + 4;
   for (std::size_t d = 0; d <= kHalfBand; ++d) {
@@ -249,7 +249,7 @@ bool FlatForm::factor(const PerKind<const double*>& weights) {
   return ldlt_.factor(hessian_, first_, last_);
 }
 
-// From all of c to the unknowns.
+// Goes from the Hessian of all of c to that of the unknowns.
 void FlatForm::tie_ends_of_hessian() {
   const auto at = [&](std::size_t i, std::size_t j) {
     const std::size_t d = i < j ? j - i : i - j;
@@ -277,7 +277,7 @@ void FlatForm::tie_ends_of_hessian() {
     const std::size_t t = nodes_ - 1;
     Eigen::Matrix<double, 5, 3> tie;
     tie << Eigen::Matrix3d::Identity(), end_from_;
-    Eigen::Matrix<double, 2, 5> coupling;  // of c_{t−2}, c_{t−1} with c_t …
+    Eigen::Matrix<double, 2, 5> coupling;  // between c_{t−2}, c_{t−1} and c_t … c_{t+4}
     Eigen::Matrix<double, 5, 5> block;
     for (Eigen::Index j = 0; j < 5; ++j) {
       const std::size_t column = t + static_cast<std::size_t>(j);

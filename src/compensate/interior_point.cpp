@@ -7,18 +7,18 @@
 namespace unflex::compensate {
 namespace {
 
-// Stands for a bound that is not there: 10 m, and as far for the others.
+// Stands for a missing bound: 10 m for positions, and the same number for the other kinds.
 constexpr double kFar = 1e6;
-// Bounds closer to each other leave no interior; they are moved apart to this.
+// Bounds closer to each other than this leave no interior. They are moved apart to this.
 constexpr double kNarrowest = 2e-7;
-// The first sλ, in mean half costs of a node, and how it grows with the excess of the start.
-// Small where the start is nearly there, large where it is far off: otherwise the first steps run
-// into the bounds and 200 iterations are not enough.
+// The first sλ, in mean half costs of a node, and the power by which it grows with the excess of
+// the start. It is small if the start nearly keeps its bounds, and large if it is far off.
+// Otherwise the first steps would run into the bounds and 200 iterations would not be enough.
 constexpr double kBarrierShare = 30.0;
 constexpr double kBarrierPower = 2.0;
-// Of how far the start is beyond its bounds: no slack begins smaller.
+// No slack begins smaller than this share of how far the start is beyond its bounds.
 constexpr double kLeastSlackShare = 0.3;
-// The share of the way to the nearest bound that a step goes.
+// A step goes this share of the way to the nearest bound.
 constexpr double kShareOfWay = 0.995;
 
 using Row = Eigen::Map<const Eigen::ArrayXd>;
@@ -42,7 +42,7 @@ void InteriorPoint::start(const PerKind<std::optional<RowBounds>>& bounds,
                           const PerKind<const double*>& values, std::size_t nodes,
                           double half_cost_per_node) {
   sides_ = 0;
-  double excess = 0.0;  // of all kinds, by their scales
+  double excess = 0.0;  // the largest of all kinds, divided by their scales
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     Rows& rows = rows_[i];
     if (!rows.active) {
@@ -172,7 +172,7 @@ void InteriorPoint::correct(double target) {
   }
 }
 
-// The longest step that leaves all slacks and multipliers positive, but for a little.
+// The longest step that leaves all slacks and multipliers positive, shortened by kShareOfWay.
 double InteriorPoint::longest(const PerKind<const double*>& steps) {
   double steepest = kShareOfWay;
   for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -205,7 +205,7 @@ void InteriorPoint::advance(double length) {
   }
 }
 
-// Forces of the multipliers as they are.
+// Sets the forces of the present multipliers.
 void InteriorPoint::pull() {
   for (Rows& rows : rows_) {
     if (rows.active) {

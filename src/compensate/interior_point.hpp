@@ -27,14 +27,14 @@ class InteriorPoint {
   struct Outcome {
     bool converged = false;
     int iterations = 0;
-    // Otherwise: the row that is farthest beyond its bound.
+    // If not converged: the row that is farthest beyond its bound.
     RowKind worst_kind = RowKind::position;
     std::size_t worst_row = 0;
     double worst_excess = 0.0;  // scaled
   };
 
-  // Steps the form, which is at the optimum without limits, to that within the bounds. strict: not
-  // to reach the narrower of the two tolerances counts as not converged.
+  // Steps the form from the optimum without limits to the optimum within the bounds. strict: a
+  // solution that misses the narrower of the two tolerances counts as not converged.
   template <class Form>
   [[nodiscard]] Outcome solve(Form& form, std::size_t nodes,
                               const PerKind<std::optional<RowBounds>>& bounds, bool strict);
@@ -81,19 +81,19 @@ class InteriorPoint {
 
   PerKind<Rows> rows_;
   double gap_ = 0.0;       // Σ s λ
-  double residual_ = 0.0;  // largest |r|, by the kind's scale
+  double residual_ = 0.0;  // largest |r|, divided by the kind's scale
   std::size_t sides_ = 0;  // number of s
 };
 
 // The largest sλ summed over all sides, and the largest decrement left, as shares of the cost.
 inline constexpr double kGapShare = 1e-8;
-// The same, scaled, where rounding allows within a few more iterations: where the cost is large, a
-// small share of it is still enough to move a base that hardly moves the nozzle.
+// A narrower limit of both, scaled, if rounding allows it within kMostPolish more iterations: where
+// the cost is large, even a small share of it can move a base that hardly moves the nozzle.
 inline constexpr double kGap = 1e-7;
 inline constexpr int kMostPolish = 2;
-// Of the kind's scale.
+// The largest residual, as a share of the kind's scale.
 inline constexpr double kFeasibility = 1e-8;
-// Per node: below this the cost is of no interest.
+// A half cost per node below this is of no interest.
 inline constexpr double kIdleHalfCost = 1e-8;
 inline constexpr int kMaxIterations = 200;
 

@@ -6,9 +6,10 @@
 namespace unflex::compensate {
 namespace {
 
-// Relative excess that is rounding, not a broken limit.
+// A relative excess up to this is rounding, not a broken limit.
 constexpr double kSlack = 1e-6;
-// The same for positions: a tenth of the grid that they are written on.
+// An excess of a position up to this is rounding: a tenth of the grid that positions are written
+// on.
 constexpr double kPositionSlackMm = 1e-5;
 
 // How far the base is beyond its travel; negative inside.
@@ -17,14 +18,15 @@ double beyond_travel(const dynamics::AxisMotion& motion, const BaseLimits& limit
                   motion.position_mm - limits.max_position_mm);
 }
 
-// Whether b leaves its travel between nodes k and k+1: at a turning point, where
+// Whether b leaves its travel between nodes k and k+1. It can do so only at a turning point, where
 // ḃ = v + a s + j s²/2 is zero.
 bool leaves_travel_between(const dynamics::AxisTrajectory& base, std::size_t k,
                            const BaseLimits& limits, double h) {
   const double v = base.velocity_mm_s[k];
   const double a = base.accel_mm_s2[k];
   const double step = base.accel_mm_s2[k + 1] - a;
-  // No further than this from node k: nearly always far from either end.
+  // b goes no further than this from node k. Nearly always that is far from both ends of the
+  // travel.
   const double reach = (std::abs(v) + (0.5 * std::abs(a) + std::abs(step) / 6.0) * h) * h;
   if (beyond_travel({base.position_mm[k], v, a}, limits) + reach < 0.0) {
     return false;
@@ -45,8 +47,8 @@ bool leaves_travel_between(const dynamics::AxisTrajectory& base, std::size_t k,
   return false;
 }
 
-// Bounds of b and b̈ that keep the base within its travel at a node where it may rest at
-// resting_mm.
+// Sets bounds of b and b̈ that keep the base within its travel. resting_mm is set if the base rests
+// at this node.
 void bound_position(const AxisWindow& window, bool between, std::optional<double> resting_mm,
                     BaseBounds& bounds) {
   const BaseLimits& limits = window.limits;
@@ -55,7 +57,8 @@ void bound_position(const AxisWindow& window, bool between, std::optional<double
     // Between nodes b departs from the chord by at most A h²/8.
     margin = std::min(limits.max_accel_mm_s2 * std::pow(window.period_s, 2) / 8.0,
                       0.5 * (limits.max_position_mm - limits.min_position_mm));
-    // Where it rests closer to the end of the travel than that, it can only set off inwards.
+    // If the base rests closer to the end of the travel than the margin, it can only set off
+    // inwards.
     if (resting_mm && *resting_mm < limits.min_position_mm + margin) {
       bounds.accel.lower = 0.0;
     }
@@ -97,7 +100,8 @@ BaseBounds base_bounds(const AxisWindow& window, ActiveLimits active, std::size_
   const BaseLimits& limits = window.limits;
   BaseBounds bounds;
   if (active.velocity) {
-    // ḃ is a parabola between nodes and may pass them by up to A h/4 (b̈ from A to −A).
+    // ḃ is a parabola between nodes and may exceed its values there by up to A h/4 (b̈ from A to
+    // −A).
     const double margin = std::isfinite(limits.max_accel_mm_s2)
                               ? limits.max_accel_mm_s2 * window.period_s / 4.0
                               : 0.0;
@@ -128,7 +132,7 @@ ActiveLimits broken(const dynamics::AxisTrajectory& base, const BaseLimits& limi
       const double step = base.accel_mm_s2[k + 1] - a;
       result.jerk = result.jerk || std::abs(step) > limits.max_jerk_mm_s3 * h * (1.0 + kSlack);
       if (a * base.accel_mm_s2[k + 1] < 0.0) {
-        // b̈ crosses zero inside the interval: ḃ has its extremum there.
+        // b̈ crosses zero inside the interval, and ḃ has its extremum there.
         fastest = std::max(fastest, std::abs(v - 0.5 * a * a * h / step));
       }
       result.position_between =

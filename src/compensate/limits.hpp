@@ -1,9 +1,10 @@
-// Which limits of a window its program carries, the bounds that they are at the nodes, and the rule
-// by which they are put in: the same for every engine.
+// Which limits the program of a window has, their bounds at the nodes, and the rule by which limits
+// are added. All engines share this.
 //
 // Most windows keep all limits by themselves, and bounds that the solution keeps anyway only cost
-// iterations. So a window is solved without them, and the kinds that its solution breaks are put
-// in until none is broken. The problem being convex, the result is the optimum under all of them.
+// iterations. So a window is first solved without limits. Then the kinds that its solution breaks
+// are added, until none is broken. As the problem is convex, the result is the optimum under all
+// limits.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +22,7 @@ struct ActiveLimits {
   bool accel = false;
   bool jerk = false;
   bool position = false;
-  // Also keeps b within its travel between nodes, by a margin at the nodes.
+  // Keeps b within its travel between nodes too, by a margin at the nodes.
   bool position_between = false;
 
   bool operator==(const ActiveLimits&) const = default;
@@ -34,14 +35,15 @@ struct Interval {
   [[nodiscard]] bool bounded() const;
 };
 
-// Of b, ḃ and b̈ at a node, in mm and s.
+// Bounds of b, ḃ and b̈ at a node, in mm and s.
 struct BaseBounds {
   Interval position;
   Interval velocity;
   Interval accel;
 };
 
-// At node k of the window. b and ḃ at a resting end are given, so bounds on them say nothing there.
+// The bounds at node k of the window. At a resting end b and ḃ are given, so bounds on them have no
+// effect there.
 [[nodiscard]] BaseBounds base_bounds(const AxisWindow& window, ActiveLimits active, std::size_t k);
 
 // Where the base rests at node k, if it does.
@@ -51,14 +53,14 @@ struct BaseBounds {
 [[nodiscard]] ActiveLimits broken(const dynamics::AxisTrajectory& base, const BaseLimits& limits,
                                   double period_s);
 
-// The same with the window's limits at the nodes.
+// Which limits the trajectory breaks, the window's own limits at the nodes included.
 [[nodiscard]] ActiveLimits broken(const dynamics::AxisTrajectory& base, const AxisWindow& window);
 
-// The limits in force, and those broken in spite of them. The travel between nodes only counts
-// where the nodes keep it.
+// The limits in `active`, and those in `more`, which are broken in spite of them. Travel between
+// nodes counts only where the nodes themselves keep the travel.
 [[nodiscard]] ActiveLimits tightened(const ActiveLimits& active, const ActiveLimits& more);
 
-// Solves by the rule above; iterations are those of all solves together.
+// Solves by the rule above. `iterations` of the result is the sum over all solves.
 [[nodiscard]] Result<AxisSolution> solve_within_limits(
     const AxisWindow& window,
     const std::function<Result<AxisSolution>(const ActiveLimits&)>& solve_with);

@@ -12,7 +12,7 @@ class Padded {
  public:
   static constexpr std::size_t kPad = 8;
 
-  // Contents are lost; memory is kept when it suffices.
+  // Contents are lost. Memory is kept if it suffices.
   void resize(std::size_t size) {
     size_ = size;
     values_.resize(size + 2 * kPad);

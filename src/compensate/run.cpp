@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kBlendNodes = 10;
 // Shorter cruises are left to the solver.
 constexpr std::size_t kShortestCruise = 100;
-// A cruise as fast as the base may be leaves it no room to settle.
+// A cruise faster than this share of the largest speed leaves the base no room to settle.
 constexpr double kRoomToSettle = 0.99;
 
 // Walks along the plan; times must not decrease from call to call.
@@ -53,7 +53,7 @@ class Reference {
   [[nodiscard]] bool is_last() const {
     return part_ == last_part_ && index_ + 1 == parts_[part_].size();
   }
-  // To the next part's first move after the last of one.
+  // Goes on to the first move of the next part after the last move of one.
   void settle() {
     if (part_ < last_part_ && index_ == parts_[part_].size()) {
       ++part_;
@@ -73,24 +73,24 @@ std::size_t to_nodes(double time_s, double period_s) {
   return static_cast<std::size_t>(std::ceil(time_s / period_s - 1e-9));
 }
 
-// Nodes that are solved beyond the end of a part.
+// The number of nodes that are solved beyond the end of a part.
 std::size_t around(const Course::Moves& moves, double period_s, const Setup& setup) {
   return static_cast<std::size_t>(std::min(planner::duration_s(moves), 2.0 * setup.overlap_s) /
                                   period_s);
 }
 
-// The axis' part of a window without its ends.
+// One axis of a window, without what is given at the window's ends.
 AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
                      std::vector<double> reference, std::vector<double> weight) {
   AxisWindow window;
   window.axis = axis.axis;
   window.variants = axis.variants;
   window.period_s = period_s;
-  // What the base's jerk does to the nozzle's motion goes with (ωh)²: so weighted, one value serves
-  // all resonances.
+  // The effect of the base's jerk on the nozzle's motion goes with (ωh)². With this weight one
+  // value serves all resonances.
   window.jerk_weight = setup.jerk_weight * std::pow(axis.axis.omega_rad_s * period_s, 4);
   window.limits = axis.limits;
-  // Where the sliced path itself leaves the travel, the base may go as far but no further.
+  // If the sliced path itself leaves the travel, the base may go as far but no further.
   const auto [low, high] = std::ranges::minmax(reference);
   window.limits.min_position_mm = std::min(window.limits.min_position_mm, low);
   window.limits.max_position_mm = std::max(window.limits.max_position_mm, high);
@@ -154,11 +154,12 @@ std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup) {
 
 namespace {
 
-// Until the base, and the nozzle with it, goes along with an even motion after an uneven one.
+// How long base and nozzle need after an uneven motion until they go along with an even one.
 double settling_s(const Setup& setup, double period_s) {
   double longest_s = 0.0;
   for (const BaseLimits& limits : {setup.x.limits, setup.y.limits}) {
-    // Zero where the one is not limited; what neither is takes no time.
+    // Zero if jerk is not limited. If acceleration is not limited, the ratio is not finite and
+    // counts as no time.
     const double ramp_s = limits.max_accel_mm_s2 / limits.max_jerk_mm_s3;
     longest_s = std::max(longest_s, std::isfinite(ramp_s) ? 2.0 * ramp_s : 0.0);
   }
@@ -177,7 +178,7 @@ bool leaves_room(const planner::PlannedMove& move, const Setup& setup) {
   return motors_fit && axis_fits(gcode::X, setup.x.limits) && axis_fits(gcode::Y, setup.y.limits);
 }
 
-// Where nothing needs solving, in the order of the course.
+// The cruises, where nothing needs solving, in the order of the course.
 std::vector<WindowSpan> cruises(const Course& course, const NodeGrid& grid, const Setup& setup) {
   const double settling = settling_s(setup, grid.period_s);
   const double end_s = static_cast<double>(grid.count - 1) * grid.period_s;
@@ -221,7 +222,7 @@ std::vector<WindowSpan> mesh(const Course& course, const NodeGrid& grid, const S
     spans.push_back(cruise);
   }
   solve_to(grid.count - 1);
-  // Where windows and cruises meet, either is used up to the same node.
+  // Where a window and a cruise meet, both are used up to the same node.
   for (std::size_t i = 0; i < spans.size(); ++i) {
     if (spans[i].cruise) {
       spans[i - 1].core_last = spans[i].core_first;

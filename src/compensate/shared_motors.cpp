@@ -1,6 +1,6 @@
-// Where both axes together want more than there is, each gets in proportion to what it wants. What
-// neither uses is divided evenly and tried again: the solution before stays within reach, so that
-// each round is no worse.
+// Where both axes together want more than a motor has, each gets in proportion to what it wants.
+// What neither axis uses is divided evenly, and both are solved again. The solution before keeps
+// the new limits too, so no round is worse.
 #include "shared_motors.hpp"
 
 #include <algorithm>
@@ -13,9 +13,9 @@ namespace unflex::compensate {
 namespace {
 
 constexpr int kMostRounds = 6;
-// A round that gains less than this share of the cost is the last.
+// If a round gains less than this share of the cost, it is the last.
 constexpr double kGain = 0.01;
-// Relative excess that is rounding.
+// A relative excess up to this is rounding.
 constexpr double kSlack = 1e-6;
 
 bool is_solved(const AxisSolutions& solutions) {
@@ -35,7 +35,7 @@ bool exceeds(const std::vector<double>& x, const std::vector<double>& y, double 
   return false;
 }
 
-// Divides a limit at all nodes by what each axis does there.
+// Divides a limit between the axes at all nodes, by what each axis does there.
 void divide(const std::vector<double>& x, const std::vector<double>& y, double limit,
             std::vector<double>& limit_of_x, std::vector<double>& limit_of_y) {
   limit_of_x.resize(x.size());

@@ -1,8 +1,8 @@
 // The window stage by stage: states z_k and inputs j_k of axis_chain.hpp, stepped by a Riccati
-// recursion. Several times the work of the flat form (flat_form.hpp), but it takes any window: the
-// recursion never expresses the nozzle by differences of what the base does, so a small ωh costs no
-// digits, and any two nodes will do. It also takes what an axis may be beside
-// (AxisWindow::variants): z then is
+// recursion. It is several times the work of the flat form (flat_form.hpp), but takes any window.
+// The recursion never expresses the nozzle by differences of the base's motion, so a small ωh costs
+// no digits, and two nodes are enough. It also takes several models of the axis
+// (AxisWindow::variants); then
 //
 //   z_k = (p_1, ṗ_1, …, p_m, ṗ_m, b, ḃ, b̈)
 //
@@ -63,7 +63,7 @@ class StageForm {
     double inverse_curvature;  // 1/R; 0 where K is prescribed
   };
 
-  // Whether the input of interval k keeps the end.
+  // Whether the input of interval k is prescribed, so as to keep the end.
   [[nodiscard]] bool prescribed(std::size_t k) const;
   [[nodiscard]] State prescribed_feedback(std::size_t k) const;
   [[nodiscard]] bool factor_start(const Square& to_come);
@@ -88,14 +88,14 @@ class StageForm {
 
   using Middles = Eigen::Matrix<double, kStates, kModels>;
   using PerModel = Eigen::Matrix<double, kModels, 1>;
-  // p_c − r of the interval after node k, and p − r there.
+  // p_c − r in the interval after node k, and p − r at node k.
   [[nodiscard]] PerModel middle_errors(std::size_t k) const;
   [[nodiscard]] PerModel errors(std::size_t k) const;
 
   Square transition_;      // Φ
   State input_;            // B
-  Middles middle_;         // p_c by z_k …
-  PerModel middle_input_;  // … and j_k
+  Middles middle_;         // coefficients of z_k in p_c
+  PerModel middle_input_;  // coefficient of j_k in p_c
   PerModel share_;         // α
   // δz_0 = start_basis_ y with y free, found by start_inverse_.
   Eigen::Matrix<double, kStates, Eigen::Dynamic, 0, kStates, kStates> start_basis_;

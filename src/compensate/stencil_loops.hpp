@@ -33,7 +33,7 @@ inline void add_transposed(const std::array<double, kHalfBand + 1>& s, const dou
   }
 }
 
-// One diagonal of the next: products s_i s_{i+D}.
+// One diagonal of add_squares(): products s_i s_{i+D}.
 template <std::size_t L, std::size_t D>
 inline void add_diagonal(const std::array<double, kHalfBand + 1>& s, const double* __restrict w,
                          double* __restrict to, std::size_t count) {

@@ -22,18 +22,18 @@ inline constexpr std::string_view kBgcodeMagic = "GCDE";
 inline constexpr std::size_t kFileHeaderBytes = 10;
 inline constexpr std::uint32_t kVersion = 1;
 
-// In the order of their numbers, which is not that of the file.
+// The types in the order of their numbers. In a file they stand in another order.
 enum class BlockType : std::uint16_t { file, gcode, slicer, printer, print, thumbnail };
 inline constexpr std::size_t kBlockTypes = 6;
 inline constexpr std::size_t kCompressions = 4;
 inline constexpr std::size_t kEncodings = 3;
 inline constexpr std::size_t kThumbnailFormats = 3;
 
-// Of thumbnails, as their comments name them, by format.
+// How comments name thumbnails, by format.
 inline constexpr std::array<std::string_view, kThumbnailFormats> kThumbnailNames = {
     "thumbnail", "thumbnail_JPG", "thumbnail_QOI"};
 
-// What metadata are written in.
+// Encodings of metadata.
 inline constexpr std::uint16_t kIni = 0;
 inline constexpr std::uint16_t kJson = 1;
 
@@ -44,7 +44,7 @@ inline constexpr std::string_view kJsonConfigKey = "prusaslicer_json_config";
 // Prusa's G-code blocks are made of at most this much text, so that a printer can hold one.
 inline constexpr std::size_t kGcodeBlockBytes = 65536;
 
-// What a block's data are before they are packed, or nothing if they are damaged.
+// The data of a block before they were packed. nullopt if they are damaged.
 [[nodiscard]] std::optional<std::string> decompress(std::string_view packed,
                                                     Compression compression, std::size_t size);
 [[nodiscard]] std::string compress(std::string_view bytes, Compression compression);

@@ -21,7 +21,7 @@ constexpr std::array<std::string_view, kBlockTypes> kTypeNames = {
     "file metadata",    "G-code",         "slicer metadata",
     "printer metadata", "print metadata", "thumbnail"};
 
-// Where a type stands in the file.
+// The rank of each type in the order of the file.
 constexpr std::array<int, kBlockTypes> kRanks = {0, 5, 4, 1, 3, 2};
 
 std::size_t index(BlockType type) { return static_cast<std::size_t>(type); }

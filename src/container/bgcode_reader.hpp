@@ -26,8 +26,8 @@ class BgcodeUnpacker final : public Unpacker {
   struct Block {
     BlockType type = BlockType::file;
     Compression compression = Compression::none;
-    std::size_t size = 0;         // of the data, unpacked
-    std::size_t packed_size = 0;  // as they stand in the file
+    std::size_t size = 0;         // size of the unpacked data
+    std::size_t packed_size = 0;  // size of the data in the file
     std::size_t header_bytes = 0;
     std::size_t parameter_bytes = 0;
     [[nodiscard]] std::size_t bytes_before_checksum() const {
@@ -35,7 +35,7 @@ class BgcodeUnpacker final : public Unpacker {
     }
   };
 
-  // Each does one step: what it has taken from the packed bytes has been dealt with.
+  // Each function does one step. When it returns, the packed bytes that it took are dealt with.
   Result<bool> take_file_header();
   Result<std::optional<Block>> block_header() const;
   Status check_order(BlockType type) const;
@@ -52,13 +52,13 @@ class BgcodeUnpacker final : public Unpacker {
 
   std::string name_;
   std::string packed_;
-  std::size_t next_ = 0;   // in packed_, the first byte not dealt with
+  std::size_t next_ = 0;   // first byte of packed_ that is not dealt with
   std::size_t taken_ = 0;  // bytes before packed_
   bool ended_ = false;
   bool has_header_ = false;
   bool has_checksums_ = false;
   bool is_done_ = false;
-  bool ends_line_ = true;  // the text so far
+  bool ends_line_ = true;  // whether the text so far ends with a line end
   std::size_t metadata_bytes_ = 0;
   std::optional<BlockType> last_;
   Metadata metadata_;

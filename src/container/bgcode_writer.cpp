@@ -10,7 +10,7 @@
 namespace unflex::container {
 namespace {
 
-// As unflex reads them, docs/gcode.md.
+// The longest line that unflex reads (docs/gcode.md).
 constexpr std::size_t kLongestLineBytes = std::size_t{1} << 20U;
 
 void put(std::string& bytes, std::uint32_t value, std::size_t count) {
@@ -19,7 +19,7 @@ void put(std::string& bytes, std::uint32_t value, std::size_t count) {
   }
 }
 
-// Without any of the carriage returns that some tools leave several of.
+// The line without the carriage returns at its end; some tools leave several.
 std::string_view without_end(std::string_view line) {
   return line.substr(0, line.find_last_not_of('\r') + 1);
 }
@@ -96,7 +96,7 @@ class BgcodePacker final : public Packer {
     return surveyed_.is_gcode(line).map([](bool) {});
   }
 
-  // The end of the survey; all metadata come before the G-code.
+  // Ends the survey and writes all metadata, which come before the G-code.
   Status begin() {
     if (has_begun_) {
       return {};
@@ -137,7 +137,7 @@ class BgcodePacker final : public Packer {
 
   void put_block(BlockType type, Compression compression,
                  std::initializer_list<std::uint16_t> parameters, std::string_view data) {
-    // Nothing is left as it is: some readers fail to unpack it.
+    // Empty data are not packed: some readers fail to unpack them.
     compression = data.empty() ? Compression::none : compression;
     std::string block;
     put(block, static_cast<std::uint32_t>(type), 2);
@@ -175,7 +175,8 @@ class BgcodePacker final : public Packer {
   }
 
   void end_gcode_block() {
-    // Every file has one; in MeatPack, two such bytes would be a command.
+    // Every file has at least one block of G-code. A block with a byte 0xFF stays unencoded,
+    // because two such bytes are a command in MeatPack.
     if (gcode_.empty() && has_gcode_) {
       return;
     }
@@ -203,7 +204,7 @@ class BgcodePacker final : public Packer {
   BgcodeOptions options_;
   const Metadata* origin_;
   MetadataLines surveyed_;
-  std::optional<MetadataLines> sorted_;  // says again which lines are metadata
+  std::optional<MetadataLines> sorted_;  // says a second time which lines are metadata
   Lines lines_;
   bool has_begun_ = false;
   bool has_gcode_ = false;

@@ -10,7 +10,7 @@ constexpr unsigned kSmallWindowBits = 11;
 constexpr unsigned kLargeWindowBits = 12;
 
 std::optional<std::string> inflate_all(std::string_view packed, std::size_t size) {
-  // One byte more than there should be, so that more of them do not pass for the right number.
+  // One byte more than there should be, so that too much data is noticed.
   std::string bytes(size + 1, '\0');
   uLongf got = bytes.size();
   uLong taken = packed.size();

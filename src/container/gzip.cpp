@@ -10,7 +10,7 @@ namespace unflex::container {
 namespace {
 
 constexpr std::size_t kPieceBytes = std::size_t{1} << 16U;
-// zlib: a window of 2^15 bytes, in gzip's wrapping instead of its own.
+// zlib: a window of 2^15 bytes; the 16 asks for gzip's wrapping instead of zlib's own.
 constexpr int kWindowBits = 15 + 16;
 constexpr int kMemoryLevel = 8;
 
@@ -53,7 +53,8 @@ class GzipUnpacker final : public Unpacker {
   }
 
  private:
-  // Between members: another one may follow, zeros that fill up a block of a tape, or the end.
+  // Between members: another member may follow, or zeros that fill up a block of a tape, or the
+  // end.
   Status begin_member() {
     while (!in_member_ && next_ < packed_.size()) {
       const std::string_view rest = std::string_view(packed_).substr(next_);
@@ -115,7 +116,7 @@ class GzipUnpacker final : public Unpacker {
   std::string name_;
   z_stream stream_{};
   std::string packed_;
-  std::size_t next_ = 0;   // in packed_, what zlib has not taken yet
+  std::size_t next_ = 0;   // first byte of packed_ that zlib has not taken yet
   std::size_t taken_ = 0;  // bytes before packed_
   std::size_t members_ = 0;
   bool in_member_ = false;
@@ -139,7 +140,8 @@ class GzipPacker final : public Packer {
   Result<std::string> push(std::string_view text) override {
     std::string packed;
     while (!text.empty()) {
-      // Who reads a pipe gets every piece of text when it is complete, wherever pushes were cut.
+      // The reader of a pipe gets every 64 KiB of text as soon as they are complete, wherever the
+      // pushes were cut.
       const std::string_view piece = text.substr(0, kPieceBytes - since_flush_);
       text.remove_prefix(piece.size());
       since_flush_ += piece.size();

@@ -17,7 +17,7 @@ constexpr unsigned kLiteralBits = 1 + 8;
 constexpr std::size_t kShortestMatch = 3;
 constexpr unsigned kHashBits = 14;
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
-// Bounds the time on text that repeats itself; beyond it matches hardly get longer.
+// Bounds the time on text that repeats itself. With more tries matches hardly get longer.
 constexpr int kMaxTries = 256;
 
 class BitWriter {
@@ -134,8 +134,8 @@ std::vector<Match> all_matches(std::string_view bytes, std::size_t window) {
   return matches;
 }
 
-// The lengths to take so that the fewest bits are written, from the end backwards: a match costs
-// the same at any length up to its longest, 1 stands for a literal.
+// The lengths with which the fewest bits are written, found from the end backwards. A match costs
+// the same at any length up to its longest. Length 1 stands for a literal.
 std::vector<std::uint8_t> cheapest_lengths(const std::vector<Match>& matches, unsigned match_bits) {
   std::vector<std::uint8_t> lengths(matches.size(), 1);
   std::vector<std::uint64_t> bits(matches.size() + 1, 0);
@@ -196,7 +196,7 @@ std::optional<std::string> unheatshrink(std::string_view packed, unsigned window
       bytes += distance <= bytes.size() ? bytes[bytes.size() - distance] : '\0';
     }
   }
-  // The last byte is filled up; the original's encoder may add another one.
+  // The last byte is filled up; the original's encoder may add another byte.
   return in.left() < 16 ? std::optional(std::move(bytes)) : std::nullopt;
 }
 

@@ -7,7 +7,7 @@
 namespace unflex::container {
 namespace {
 
-// Two signal bytes and one of these.
+// A command is two signal bytes and one of these.
 constexpr unsigned char kSignal = 0xFF;
 constexpr unsigned char kEnablePacking = 251;
 constexpr unsigned char kDisablePacking = 250;
@@ -15,8 +15,8 @@ constexpr unsigned char kResetAll = 249;
 constexpr unsigned char kEnableNoSpaces = 247;
 constexpr unsigned char kDisableNoSpaces = 246;
 
-// What the sixteen codes stand for; without spaces E takes the place of one. The last says that the
-// character follows in a byte of its own.
+// What the sixteen codes stand for. Without spaces, E takes the place of the space. The last code
+// says that the character follows in a byte of its own.
 constexpr std::string_view kCharacters = "0123456789. \nGX";
 constexpr unsigned kSpaceCode = 11;
 constexpr unsigned kLineEndCode = 12;
@@ -36,8 +36,8 @@ std::array<std::uint8_t, 256> make_codes() {
   return codes;
 }
 
-// G and a number, then words of a capital and perhaps a number, each after exactly one space: the
-// only form that comes back as it was when its spaces are dropped.
+// Whether the command is G and a number, then words of a capital and perhaps a number, each after
+// exactly one space. Only this form comes back as it was when its spaces are dropped.
 bool is_canonical(std::string_view command) {
   if (command.size() < 2 || command[0] != 'G' || !is_digit(command[1])) {
     return false;
@@ -65,7 +65,7 @@ class MeatPacker {
     command(kEnableNoSpaces);
   }
 
-  // The line without its end.
+  // Packs a line, given without its end.
   void line(std::string_view text) {
     if (text.starts_with(';')) {
       if (comments_) {
@@ -114,7 +114,8 @@ class MeatPacker {
     }
   }
 
-  // A line ends with a byte: after a line end in the lower half the upper half means nothing.
+  // Packs line_ two characters at a time. A line ends with a whole byte: after a line end in the
+  // lower half, the upper half means nothing.
   void pairs() {
     static const std::array<std::uint8_t, 256> codes = make_codes();
     set_packing(true);
@@ -132,8 +133,8 @@ class MeatPacker {
         packed_ += second;
       }
     }
-    // libbgcode's reader (1.0) makes room for twice the packed bytes and loses characters beyond;
-    // empty lines, which its own writer adds too, are room without a meaning.
+    // libbgcode's reader (1.0) makes room for twice the packed bytes and loses characters beyond
+    // that. So we add empty lines, as its own writer does: they give room and have no meaning.
     while (2 * (packed_.size() - begin) < most_text()) {
       packed_ += static_cast<char>(kLineEndCode << 4U | kLineEndCode);
     }
@@ -269,7 +270,7 @@ class MeatUnpacker {
   bool no_spaces_ = false;
   unsigned signals_ = 0;
   unsigned whole_ = 0;     // characters to come in bytes of their own
-  bool has_held_ = false;  // one to be put after the first of them
+  bool has_held_ = false;  // held_ is put after the first of these characters
   char held_ = '\0';
 };
 

@@ -7,12 +7,12 @@
 
 namespace unflex::container {
 
-// Lines, each with its end, of which none may be empty or contain a byte 0xFF. Spaces go only where
-// unmeatpack() puts them back. comments: lines that are comments stay, as they are; otherwise all
-// comments are dropped.
+// Packs lines, each with its end. No line may be empty or contain a byte 0xFF. Spaces are left out
+// only where unmeatpack() puts them back. comments: whether comments are kept or dropped; lines
+// that are comments are kept as they are.
 [[nodiscard]] std::string meatpack(std::string_view lines, bool comments);
 
-// Any bytes give a text.
+// Unpacks; any bytes give a text.
 [[nodiscard]] std::string unmeatpack(std::string_view packed);
 
 }  // namespace unflex::container

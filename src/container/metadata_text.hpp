@@ -1,4 +1,4 @@
-// Metadata of binary G-code as comments of a text, and found again among them.
+// Writes metadata of binary G-code as comments of a text, and finds them there again.
 #pragma once
 
 #include <cstddef>
@@ -13,27 +13,27 @@
 
 namespace unflex::container {
 
-// Nothing if a line is not key=value.
+// nullopt if a line is not key=value.
 [[nodiscard]] std::optional<KeyValues> key_values(std::string_view lines);
 [[nodiscard]] std::string lines_of(const KeyValues& values);
 
-// What stands before the G-code and after it: the layout of PrusaSlicer's own conversion to text.
+// The text before the G-code and the text after it, in the layout of PrusaSlicer's own conversion.
 [[nodiscard]] std::string head_text(const Metadata& metadata);
 [[nodiscard]] std::string tail_text(const Metadata& metadata);
 
 // Goes through the lines of a text and tells which are metadata and which G-code.
 class MetadataLines {
  public:
-  // origin: as of make_bgcode_packer().
+  // origin: as in make_bgcode_packer().
   explicit MetadataLines(const Metadata* origin);
-  // For a second time through the same text, when it is known which comment is a key's last.
+  // For a second pass through the text: `surveyed` knows which comment is the last of its key.
   MetadataLines(const Metadata* origin, const MetadataLines& surveyed);
 
   // Whether the line (without its end) belongs into a G-code block: not blank, and not metadata.
-  // Errors have a message alone.
+  // Errors have only a message.
   [[nodiscard]] Result<bool> is_gcode(std::string_view line);
 
-  // What there was, to be called once, after the last line.
+  // The metadata that were found. Call it once, after the last line.
   [[nodiscard]] Result<Metadata> take();
 
  private:
@@ -50,19 +50,18 @@ class MetadataLines {
   [[nodiscard]] Metadata sorted() const;
 
   const Metadata* origin_;
-  std::set<std::string, std::less<>>
-      head_keys_;  // those that are metadata before the first command
-  std::set<std::string, std::less<>> tail_keys_;  // and after it
+  std::set<std::string, std::less<>> head_keys_;  // keys that are metadata before the first command
+  std::set<std::string, std::less<>> tail_keys_;  // keys that are metadata after it
   bool in_head_ = true;
   Section section_ = Section::none;
   bool had_config_ = false;
   bool had_json_config_ = false;
-  std::size_t expected_digits_ = 0;  // of the thumbnail being read
+  std::size_t expected_digits_ = 0;  // base64 digits of the thumbnail being read
   Values head_;
   Values tail_;
   using Counts = std::map<std::string, std::size_t, std::less<>>;
   Counts tail_counts_;               // how often a key came after the first command
-  std::optional<Counts> tail_ends_;  // and will have come at the end
+  std::optional<Counts> tail_ends_;  // how often it will have come at the end
   Metadata found_;
 };
 

@@ -7,7 +7,7 @@
 namespace unflex {
 namespace {
 
-// What can be done about a file that cannot be written, if that can be told.
+// What can be done about a file that cannot be written; empty if that is unknown.
 std::string_view remedy(int error) {
   switch (error) {
     case ENOSPC:

@@ -51,7 +51,7 @@ Motors::Motors(Kinematics kinematics, Firmware firmware) {
 }
 
 std::array<double, Motors::kCount> Motors::axes(const std::array<double, kCount>& q) const {
-  // Cramer's rule: column j of the inverse's adjugate is the cross product of the other two rows.
+  // Cramer's rule: column i of the adjugate is the cross product of the other two rows.
   std::array<double, kCount> result{};
   double determinant = 0.0;
   for (std::size_t i = 0; i < kCount; ++i) {

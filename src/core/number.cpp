@@ -13,9 +13,9 @@ namespace {
 constexpr std::array<std::int64_t, 10> kPowersOfTen = {
     1, 10, 100, 1'000, 10'000, 100'000, 1'000'000, 10'000'000, 100'000'000, 1'000'000'000};
 
-// Plain decimals: a double holds their digits as an integer and the power of ten that divides it,
-// so one division rounds correctly (Clinger, How to Read Floating Point Numbers Accurately, 1990).
-// Others are left to from_chars.
+// Plain decimals of few digits: a double holds both their digits as an integer and the power of ten
+// that divides it, so one division rounds correctly (Clinger, How to Read Floating Point Numbers
+// Accurately, 1990). All other texts are left to from_chars.
 constexpr int kExactDigits = 15;
 constexpr std::array<double, kExactDigits + 1> kExactPowersOfTen = {
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};

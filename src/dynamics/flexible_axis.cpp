@@ -39,7 +39,8 @@ FreeResponse underdamped(double omega, double zeta, double h) {
 }
 
 // With κ for ω_d the circular functions become hyperbolic ones. These would overflow for large κh,
-// so both are written with the two decaying exponentials; the slow rate ζω − κ by its conjugate.
+// so we write both with the two decaying exponentials. The slow rate ζω − κ comes from its
+// conjugate.
 FreeResponse overdamped(double omega, double zeta, double h) {
   const double root = std::sqrt((zeta - 1.0) * (zeta + 1.0));
   const double slow = std::exp(-omega / (zeta + root) * h);
@@ -57,7 +58,7 @@ FlexibleAxis from_frequency(double freq_hz, double damping_ratio) {
 
 NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state, const BaseSegment& base,
                      double h) {
-  // The slope of (p, ṗ) at `at`, moved from the start by `slope` over dt.
+  // moved(): the start moved along `slope` over dt. slope_at(): the slope of (p, ṗ) at `at`.
   const auto moved = [&](const NozzleState& slope, double dt) {
     return NozzleState{state.position + dt * slope.position, state.velocity + dt * slope.velocity};
   };

@@ -88,7 +88,7 @@ ShaperPulses fitted(const std::array<FittedPulse, N>& fits, double freq_hz, doub
   return pulses;
 }
 
-// Weights need not sum up to 1 yet, times begin at 0.
+// The weights need not add up to 1 yet. The times begin at 0.
 ShaperPulses raw_pulses(ShaperKind kind, double freq_hz, double zeta) {
   switch (kind) {
     case ShaperKind::zv:

@@ -6,15 +6,15 @@
 namespace unflex::emit {
 namespace {
 
-// How long before the base's end the last line may end, in candidates.
+// The last line ends at most this many candidates before the base does.
 constexpr std::size_t kEarliest = 512;
-// How much longer than an even pace a line is reckoned to take at most.
+// The cost to go assumes that a line takes at most this many times LineRules::even_line_s().
 constexpr double kPatience = 2.5;
 
 }  // namespace
 
-// The duration of a line from k on that the cost to go reckons with: the shortest that covers
-// enough steps at an even pace.
+// The duration that the cost to go assumes for a line from k on: the shortest that covers enough
+// steps at an even pace or slower.
 std::size_t CostToGo::usual(std::size_t k) const {
   const std::size_t left = costs_->size() - 1 - k;
   std::size_t m = costs_->candidates(rules_->even_line_s());
@@ -25,7 +25,7 @@ std::size_t CostToGo::usual(std::size_t k) const {
     const Eigen::Vector2d way = costs_->base_mm(k + candidates) - costs_->base_mm(k);
     return way.cwiseQuotient(step_mm_).cwiseAbs().maxCoeff() >= rules_->min_steps;
   };
-  // Where the base turns round, that may be never.
+  // Where the base turns round, no line may ever cover enough steps.
   const std::size_t patience = costs_->candidates(kPatience * rules_->even_line_s());
   while (m < std::min(patience, left - m) && !covers(m)) {
     ++m;
@@ -33,8 +33,8 @@ std::size_t CostToGo::usual(std::size_t k) const {
   return m;
 }
 
-// After the last line: the machine rests at the run's end while the base still moves. Of e alone,
-// that is of z with o as it must be.
+// The cost after the last line: the machine rests at the run's end while the base still moves. Then
+// o is given, so the cost is a quadratic of e alone.
 void CostToGo::compute_resting(std::size_t until) {
   rest_.assign(until - rest_from_ + 1, {});
   rest_.back() = costs_->ring_down();

@@ -1,4 +1,4 @@
-// What all lines that are still to come will cost: the value function that the search goes by.
+// The cost of all lines that are still to come. This is the value function that guides the search.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,8 +9,8 @@
 
 namespace unflex::emit {
 
-// The cost of the best lines to come if places were no whole numbers and times fixed, which is a
-// linear-quadratic regulator's (Anderson & Moore, Optimal Control: Linear Quadratic Methods, § 2.4
+// The cost of the best lines to come if places were real numbers and times fixed. It is that of a
+// linear-quadratic regulator (Anderson & Moore, Optimal Control: Linear Quadratic Methods, § 2.4
 // and 4.1).
 class CostToGo {
  public:
@@ -19,11 +19,12 @@ class CostToGo {
            const Eigen::Vector2d& end_mm)
       : costs_(&costs), rules_(&rules), step_mm_(step_mm), end_mm_(end_mm) {}
 
-  // For the candidates from `from` to `until`; is_last: the last line ends there.
+  // Computes the costs for the candidates from `from` to `until`. is_last: the last line ends
+  // there.
   void compute(std::size_t from, std::size_t until, bool is_last);
 
   [[nodiscard]] const Quadratic& at(std::size_t k) const { return to_go_[k - from_]; }
-  // Of the machine that rests from candidate k on, if there is need to know.
+  // Whether the last line may end at candidate k, and the cost if the machine rests from there on.
   [[nodiscard]] bool may_rest(std::size_t k) const { return k >= rest_from_; }
   [[nodiscard]] const Quadratic& resting(std::size_t k) const { return rest_[k - rest_from_]; }
 

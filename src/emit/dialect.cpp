@@ -18,7 +18,7 @@ using planner::Limits;
 constexpr double kMinute_s = 60.0;
 constexpr double kMicroseconds = 1e6;
 
-// Unlike any limit that is wanted.
+// NaN is unequal to any wanted limit, so the limit is written.
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr std::array kUnknownAxes = {kUnknown, kUnknown, kUnknown, kUnknown};
 constexpr Limits kUnknownLimits = {.max_velocity_mm_s = kUnknown,
@@ -40,12 +40,13 @@ constexpr Limits kUnknownLimits = {.max_velocity_mm_s = kUnknown,
                                    .jerk_policy = -1,
                                    .axis_max_jerk_mm_s = kUnknownAxes};
 
-// One command with those of its words that have to be sent.
+// One command, with only those of its words that have to be sent.
 class CommandLine {
  public:
   explicit CommandLine(std::string_view command) : text_(command) {}
 
-  // Word and value without anything between, as in X1000; or with it, as in ACCEL=1000.
+  // The value follows the name without anything between, as in X1000; the name may end in "=", as
+  // in ACCEL=1000.
   void word(std::string_view name, double wanted, double current, double factor = 1.0) {
     if (wanted != current) {
       // Twelve digits: 0.1 · 60 is 6, not 6.000000000000001.
@@ -79,9 +80,10 @@ void klipper(const Limits& wanted, const Limits& current, std::vector<std::strin
   line.word("ACCEL=", wanted.max_accel_mm_s2, current.max_accel_mm_s2);
   line.word("SQUARE_CORNER_VELOCITY=", wanted.square_corner_velocity_mm_s,
             current.square_corner_velocity_mm_s);
-  // ACCEL_TO_DECEL is heeded before March 2024, when MINIMUM_CRUISE_RATIO is not, and ignored from
-  // August 2025 on. Between these it stands for a ratio where none is given (toolhead.py,
-  // cmd_SET_VELOCITY_LIMIT, commits 0105aa3 and 3ef760c), so one is.
+  // Before March 2024 Klipper heeds ACCEL_TO_DECEL and does not know MINIMUM_CRUISE_RATIO. From
+  // August 2025 on it ignores ACCEL_TO_DECEL. Between these dates ACCEL_TO_DECEL stands for a ratio
+  // if no ratio is given (toolhead.py, cmd_SET_VELOCITY_LIMIT, commits 0105aa3 and 3ef760c), so we
+  // always give a ratio with it.
   const bool to_decel = wanted.accel_to_decel_mm_s2 != current.accel_to_decel_mm_s2;
   line.word("MINIMUM_CRUISE_RATIO=", wanted.minimum_cruise_ratio,
             to_decel ? kUnknown : current.minimum_cruise_ratio);
@@ -114,7 +116,7 @@ void marlin(const Limits& wanted, const Limits& current, bool classic_jerk,
   advanced.finish(lines);
 }
 
-// M566 sets the jerk of prints as well, where M205 sets it apart.
+// Where M205 sets a separate jerk for prints, M566 sets that one as well.
 void rrf_jerks(const Limits& wanted, const Limits& current, bool has_print_jerk,
                std::vector<std::string>& lines) {
   CommandLine jerk("M566");
@@ -151,7 +153,8 @@ void rrf(const Limits& wanted, const Limits& current, bool has_print_jerk,
   rrf_jerks(wanted, current, has_print_jerk, lines);
 }
 
-// Switched off it has no type; switched on again it has that which it is told, or another one.
+// RepRapFirmware forgets the settings when it switches the shaper off, so they count only while it
+// is on.
 bool same_rrf_shaper(const gcode::Shaper& one, const gcode::Shaper& other) {
   return one.freq_x_hz == other.freq_x_hz &&
          (one.freq_x_hz == 0.0 || (one.settings.type_x == other.settings.type_x &&
@@ -159,7 +162,7 @@ bool same_rrf_shaper(const gcode::Shaper& one, const gcode::Shaper& other) {
                                    one.settings.custom_words == other.settings.custom_words));
 }
 
-// One shaper for both axes.
+// RepRapFirmware has one shaper for both axes.
 std::string rrf_shaper(const gcode::Shaper& wanted) {
   if (wanted.freq_x_hz == 0.0) {
     return "M593 P\"none\"";

@@ -1,4 +1,4 @@
-// What a firmware is told in its own words.
+// Limits and shapers in each firmware's own commands.
 #pragma once
 
 #include <string>
@@ -11,14 +11,15 @@
 
 namespace unflex::emit {
 
-// As its makers write it.
+// The firmware's name as its makers write it.
 [[nodiscard]] std::string_view brand(Firmware firmware);
 
 // `raised` limits for X, Y and filament; what concerns Z and retraction stays as the file has it.
 [[nodiscard]] planner::Limits limits_in_run(Firmware firmware, const planner::Limits& file,
                                             planner::Limits raised);
 
-// What Z may do inside a run, whose limits these are: change without a ramp, and accelerate.
+// What Z may do inside a run with the limits in_run: how far its speed may jump, and how fast it
+// may accelerate.
 struct ZLimits {
   double speed_mm_s;
   double accel_mm_s2;
@@ -26,17 +27,19 @@ struct ZLimits {
 [[nodiscard]] ZLimits z_limits(const planner::FirmwareConfig& config,
                                const planner::Limits& in_run);
 
-// Where a macro may have set limits: what a run sets is unlike any limits, what it leaves to the
-// file is as the file has it, so as not to be set to what nobody has said.
+// What a run assumes to be in force after a macro that may have changed the limits. Limits that a
+// run sets are unknown, so they are always written. Limits that a run leaves to the file are as the
+// file has them, so that no value is written which nobody has said.
 [[nodiscard]] planner::Limits unknown_to_run(Firmware firmware, const planner::Limits& file);
 
-// The lines, without their endings, that put `wanted` in force: what differs from `current`.
+// The lines, without their endings, that put `wanted` in force. They contain only what differs from
+// `current`.
 [[nodiscard]] std::vector<std::string> limit_lines(const planner::FirmwareConfig& config,
                                                    const planner::Limits& wanted,
                                                    const planner::Limits& current);
 
-// The lines that put `wanted` in place of `current`. A default Shaper is none. RepRapFirmware is
-// told all of its settings, since it forgets its type while the shaper is off.
+// The lines that put `wanted` in place of `current`. A default Shaper means no shaper.
+// RepRapFirmware is told all settings, since it forgets its type while the shaper is off.
 [[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                     const gcode::Shaper& current);
 

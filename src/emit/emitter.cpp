@@ -23,7 +23,7 @@ using gcode::Z;
 constexpr int kPositionDecimals = 4;
 constexpr int kExactDecimals = 9;  // where a run ends on a finer place than the grid
 constexpr int kFilamentDecimals = 5;
-constexpr double kFeedToleranceMmS = 1e-6;  // what restoring F with its decimals may leave
+constexpr double kFeedToleranceMmS = 1e-6;  // F restored with its decimals may be off by this
 
 // Marlin adds what a relative line extrudes to the reading of E in single precision (gcode.cpp,
 // get_destination_from_command). Below this reading a line loses less than 4 nm.
@@ -37,14 +37,14 @@ void append_word(std::string& text, char letter, double value, int decimals) {
   append_scaled(text, to_scaled(value, decimals), decimals);
 }
 
-// A coordinate on the grid, or as fine as it takes.
+// With the grid's decimals if the value lies on the grid, else with kExactDecimals.
 void append_coordinate(std::string& text, char letter, double value) {
   const double on_grid =
       static_cast<double>(to_scaled(value, kPositionDecimals)) / power_of_ten(kPositionDecimals);
   append_word(text, letter, value, same(on_grid, value) ? kPositionDecimals : kExactDecimals);
 }
 
-// Without the zero before the point, as slicers write it: most lines carry less than a millimetre.
+// Leaves out the zero before the point, as slicers do: most lines lay less than a millimetre.
 void append_filament(std::string& text, double value) {
   append_word(text, 'E', value, kFilamentDecimals);
   const std::size_t point = text.find('.', text.rfind('E'));
@@ -53,7 +53,8 @@ void append_filament(std::string& text, double value) {
   }
 }
 
-// Places that can be written, or, where the firmware rounds to steps, that it goes to.
+// The places that an axis can have: those that can be written, or whole steps if the firmware
+// rounds to steps.
 AxisGrid axis_grid(const planner::FirmwareConfig& config, gcode::Axis axis, double zero_mm) {
   if (config.firmware != Firmware::klipper) {
     return {0.0, 1.0 / config.steps_per_mm[axis]};
@@ -181,14 +182,14 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
       }
     }
   };
-  bool joins_file = !run.goes_on;  // the first line, behind the file's own motion
+  bool joins_file = !run.goes_on;  // the first line follows the file's own motion
   for (const Stroke& stroke : *plan.strokes) {
     write_events(stroke.events);
     set_run_modes(std::exchange(joins_file, false), out);
     keep_reading_of_e_small(out);
     write_stroke(stroke, filament_origin, out);
   }
-  // What stands between moves belongs to the run, though its motion may be over.
+  // The remaining lines belong to the run too, even if its motion is over.
   write_events(run.events->size());
   if (run.until_s) {
     return;
@@ -212,22 +213,22 @@ void Emitter::enter_run(std::string& out) {
   set_shaper({}, out);
   if (moving_) {
     // A run begins at rest, but no firmware stops by itself between the move before it and its
-    // first line. G4 without a time has all three end their motion and goes on at once.
+    // first line. G4 without a time makes all three firmwares end their motion and go on at once.
     write("G4 P0", out);
   }
   write_checkpoint(" RUN=1", out);
   write(kRunMark, out);
 }
 
-// Whatever the input's lines have set inside the run.
+// Sets a run's modes and limits, since the input's lines inside the run may have set others.
 void Emitter::set_run_modes(bool joins_file, std::string& out) {
   set_unit(1.0, out);
   planner::Limits limits =
       limits_in_run(options_.fixed.firmware, input_limits_, options_.run_limits);
   if (joins_file) {
-    // RepRapFirmware joins a move to the one before it by the policy that is in force when the move
-    // is added, and the one before can still change. By a run's policy filament that is moved alone
-    // before the run would end at the speed of the run's first line, and stop dead.
+    // When a move is added, RepRapFirmware joins it to the move before by the jerk policy in force
+    // at that time, and may still change the move before. With the policy of a run, filament moved
+    // alone before the run would end at the speed of the run's first line, and stop dead.
     limits.jerk_policy = input_limits_.jerk_policy;
   }
   set_limits(limits, out);
@@ -240,7 +241,7 @@ void Emitter::set_run_modes(bool joins_file, std::string& out) {
   }
 }
 
-// Where the file's own reading is known, and so put back after the run.
+// Only if the file's own reading of E is known: then it is put back after the run.
 void Emitter::keep_reading_of_e_small(std::string& out) {
   const gcode::ModalState& state = printer_.state();
   if (options_.fixed.firmware == Firmware::marlin && input_.state().known[E] && state.known[E] &&
@@ -249,7 +250,7 @@ void Emitter::keep_reading_of_e_small(std::string& out) {
   }
 }
 
-// Of moves; Marlin reads limits, M200 and M207 in it as well.
+// Sets the unit of moves. Marlin reads limits, M200 and M207 in this unit as well.
 void Emitter::set_unit(double unit_mm, std::string& out) {
   if (printer_.state().unit_mm != unit_mm) {
     write(unit_mm == 1.0 ? "G21" : "G20", out);
@@ -267,10 +268,10 @@ void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::st
   axis(X, 'X', stroke.x_mm);
   axis(Y, 'Y', stroke.y_mm);
   if (state.known[Z]) {
-    // Where nobody has told the height, the run's moves do not leave it.
+    // If the height is unknown, the run's moves do not change it.
     axis(Z, 'Z', stroke.z_mm);
   }
-  // What rounding left over so far is part of the difference.
+  // The difference includes what rounding has left over so far.
   const double filament =
       (filament_origin + stroke.e_mm - state.position_mm[E]) / state.filament_per_e_mm();
   if (to_scaled(filament, kFilamentDecimals) != 0) {
@@ -283,9 +284,9 @@ void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::st
 void Emitter::restore_modes(std::string& out) {
   const gcode::ModalState& wanted = input_.state();
   const gcode::ModalState& state = printer_.state();
-  // A G92 E of the input fell between two lines that split its moment: put the zero right. Not
-  // where a macro has left a reading that nobody knows, since the next E would be taken from
-  // another.
+  // If a G92 E of the input stood at a moment inside one of our lines, put its zero right. Not if a
+  // macro has left an unknown reading of E, since the next E would then be measured from a wrong
+  // zero.
   if (wanted.known[E] && !same(wanted.base_mm[E], state.base_mm[E])) {
     std::string text = "G92";
     append_word(text, 'E', (state.position_mm[E] - wanted.base_mm[E]) / state.filament_per_e_mm(),
@@ -335,14 +336,14 @@ void Emitter::write_checkpoint(std::string_view words, std::string& out) {
   }
 }
 
-// A pause from here on finds another shaper.
+// Writes a checkpoint if a pause from here on would find another shaper than the last one told.
 void Emitter::tell_shaper(std::string& out) {
   if (options_.checkpoints && words_of_shaper() != told_shaper_) {
     write_checkpoint("", out);
   }
 }
 
-// Those that put the printer's own shaper back while it is off.
+// The words of SET_INPUT_SHAPER that put the printer's own shaper back while it is off.
 std::string Emitter::words_of_shaper() const {
   constexpr std::string_view kCommand = "SET_INPUT_SHAPER";
   std::string words;

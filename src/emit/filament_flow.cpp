@@ -13,12 +13,12 @@ using gcode::X;
 using gcode::Y;
 using gcode::Z;
 
-// What may be used of the firmware's limit: E is rounded to five digits, and lines are a little
+// Share of the firmware's limit that we use: E is rounded to five digits, and lines are a little
 // faster than their length and time say.
 constexpr double kOfLimit = 0.9;
-// Sweeps over the lines; each moves what is too much one line further.
+// The most sweeps over the lines. Each sweep moves an excess one line further.
 constexpr int kMostSweeps = 200;
-// Of the limit, where sweeping ends.
+// Sweeping ends when no jump exceeds this share of the limit.
 constexpr double kSettled = 1.01;
 
 }  // namespace
@@ -55,7 +55,7 @@ void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Str
   for (int sweep = 0; sweep < kMostSweeps && !settled; ++sweep) {
     settled = true;
     for (std::size_t number = 1; number < lines.size(); ++number) {
-      // There and back in turn.
+      // Sweeps go forwards and backwards in turn.
       const std::size_t i = sweep % 2 == 0 ? number : lines.size() - number;
       LineFlow& a = lines[i - 1];
       LineFlow& b = lines[i];

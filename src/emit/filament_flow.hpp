@@ -1,7 +1,7 @@
-// The flow of filament from line to line, where the firmware slows down for a jump of it.
+// The flow of filament from line to line. The firmware slows down where it jumps.
 //
 // Notation:
-//   q, d, T   of a line: filament, length, time      r = q/d, v = d/T
+//   q, d, T   filament, length and time of a line      r = q/d, v = d/T
 //   Δr        change of r where two lines join
 #pragma once
 
@@ -11,13 +11,14 @@
 
 namespace unflex::emit {
 
-// By how much the flow, mm of filament per s, may jump where lines join without the firmware
-// slowing down there: Klipper passes a joint at no more than instantaneous_corner_velocity / |Δr|
-// (kinematics/extruder.py, calc_junction). The others' limits of E are raised in a run; infinity.
+// The largest jump of the flow, mm of filament per s, at which the firmware does not slow down:
+// Klipper passes a joint at no more than instantaneous_corner_velocity / |Δr|
+// (kinematics/extruder.py, calc_junction). For the other firmwares it is infinite, as their limits
+// of E are raised in a run.
 [[nodiscard]] double most_flow_step_mm_s(const planner::FirmwareConfig& firmware);
 
-// Moves filament between neighbouring lines until |Δr| min(v, v') ≤ most_mm_s at every joint. What
-// all of them lay stays what it was, and no line lays less than 0 if none did.
+// Moves filament between neighbouring lines until |Δr| min(v, v') ≤ most_mm_s at every joint. The
+// sum over all lines stays, and no line lays less than 0 if none did before.
 void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Stroke> strokes);
 
 }  // namespace unflex::emit

@@ -7,7 +7,7 @@
 namespace unflex::emit {
 namespace {
 
-// Steps per node period.
+// Integration steps per node period.
 constexpr int kSubsteps = 4;
 
 }  // namespace
@@ -47,7 +47,7 @@ Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
   }
 }
 
-// By cubic interpolation between the nodes.
+// Interpolates by cubics between the nodes.
 Eigen::Vector2d Followed::at(double t) const {
   const double scaled = t / period_s_;
   const auto k = std::min(static_cast<std::size_t>(std::max(scaled, 0.0)), states_.size() - 2);

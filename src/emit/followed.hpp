@@ -1,4 +1,4 @@
-// The nozzle that follows the base exactly, which the one that follows lines is compared with.
+// The nozzle that follows the base exactly. We compare the nozzle that follows the lines with it.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,8 @@ namespace unflex::emit {
 // BaseTrajectory::x_at or y_at.
 using AxisAt = dynamics::AxisMotion (dynamics::BaseTrajectory::*)(double) const;
 
-// exact_step of one length, which is linear in everything, as a matrix. States are (p, ṗ).
+// dynamics::exact_step() for one step length, as a matrix: the step is linear in the state and in
+// the base. States are (p, ṗ).
 class StepMatrix {
  public:
   StepMatrix(const dynamics::FlexibleAxis& axis, double dt);
@@ -29,8 +30,8 @@ class StepMatrix {
   Eigen::Matrix<double, 2, 5> columns_;
 };
 
-// (p, ṗ) of the nozzle that follows one axis of the base, from where that is and as fast, or from
-// another state.
+// (p, ṗ) of the nozzle that follows one axis of the base. It starts with the base's position and
+// velocity, or with a given state.
 class Followed {
  public:
   Followed(const dynamics::BaseTrajectory& base, AxisAt axis, const dynamics::FlexibleAxis& nozzle);
@@ -44,12 +45,13 @@ class Followed {
   double period_s_;
 };
 
-// What the polygon's own distance from the base counts, against the nozzle's: content above about
-// six times the resonance is left to follow the base rather than the nozzle.
+// Weight of the polygon's own distance from the base, against the nozzle's error. So motion above
+// about six times the resonance follows the base rather than the nozzle.
 inline constexpr double kBaseWeight = 1e-3;
 
 // ∫ e² = (e, ė) P (e, ė)ᵀ of a nozzle that rings down around a base at rest, from the closed form
-// (Lyapunov's equation). Damping ratios below 0.01 are taken as 0.01, so that it is finite.
+// (Lyapunov's equation). Damping ratios below 0.01 are taken as 0.01, so that the integral is
+// finite.
 [[nodiscard]] Eigen::Matrix2d ring_down_square(const dynamics::FlexibleAxis& axis);
 
 }  // namespace unflex::emit

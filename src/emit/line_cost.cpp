@@ -13,7 +13,7 @@ using dynamics::FlexibleAxis;
 
 // Candidate times per node of the base.
 constexpr std::size_t kPerNode = 2;
-// Moments at most at which the error during a line is looked at.
+// During a line the error is sampled at no more than this many moments.
 constexpr std::size_t kLooks = 16;
 
 // Where (e, ė, o, u) of an axis stand in w.
@@ -124,7 +124,7 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
   LineCost result;
   const std::array<const NozzleAnswers*, 2> answers = {&x_, &y_};
   const std::array<const std::vector<Eigen::Vector2d>*, 2> nozzle = {&nozzle_x_at_, &nozzle_y_at_};
-  // What the chord from b_k to b_{k+m} alone would do.
+  // The motion that the chord from b_k to b_{k+m} alone would make.
   std::array<Eigen::Vector2d, 2> begin;
   std::array<double, 2> speed{};
   for (std::size_t axis = 0; axis < 2; ++axis) {

@@ -1,4 +1,5 @@
-// What a line of given duration does to the nozzle, as a quadratic of where it begins and ends.
+// The effect of a line of given duration on the nozzle, as a quadratic of where the line begins and
+// ends.
 //
 // Notation:
 //   τ_k        candidate times of line ends; b_k, f_k  base and nozzle state (p, ṗ) there
@@ -44,7 +45,7 @@ struct LineCost {
   Vector6d shift = Vector6d::Zero();
 };
 
-// A line and all that comes after it, as it depends on z and u:
+// The cost of a line and all that comes after it, by z and u:
 // value(z) + ½ (u − u*)ᵀ S (u − u*), u* = feedback z + feed_forward.
 struct LineChoice {
   Quadratic value;
@@ -53,7 +54,7 @@ struct LineChoice {
   Eigen::Vector2d feed_forward = Eigen::Vector2d::Zero();
 };
 
-// A line and all that comes after it: ½ wᵀHw + hᵀw + c.
+// The cost of a line and all that comes after it: ½ wᵀHw + hᵀw + c.
 struct WholeCost {
   Matrix8d matrix;
   Vector8d slope;
@@ -62,11 +63,11 @@ struct WholeCost {
 
 [[nodiscard]] WholeCost whole_cost(const LineCost& line, const Quadratic& to_go);
 [[nodiscard]] LineChoice best_end(const LineCost& line, const Quadratic& to_go);
-// The same for u = 0: the line ends on the base.
+// The cost by z of a line that ends on the base (u = 0), and all that comes after it.
 [[nodiscard]] Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go);
 
-// Answers of the nozzle on one axis after j candidates' time: to its own state, to a step and to a
-// ramp of the base.
+// Responses of the nozzle on one axis after j candidate intervals: to its own state, and to a step
+// and a ramp of the base.
 struct NozzleAnswers {
   std::vector<Eigen::Matrix2d> free;
   std::vector<Eigen::Vector2d> step;
@@ -82,32 +83,33 @@ class LineCosts {
   // Number of candidate times.
   [[nodiscard]] std::size_t size() const { return base_.size(); }
   [[nodiscard]] double time_s(std::size_t k) const { return static_cast<double>(k) * dt_s_; }
-  // Between two of them.
+  // Time between two candidates.
   [[nodiscard]] double dt_s() const { return dt_s_; }
-  // The number of them that take at least this long.
+  // The fewest candidate intervals that last at least this long.
   [[nodiscard]] std::size_t candidates(double duration_s) const;
   [[nodiscard]] const Eigen::Vector2d& base_mm(std::size_t k) const { return base_[k]; }
-  // f of one axis.
+  // f of one axis at candidate k.
   [[nodiscard]] const Eigen::Vector2d& nozzle(std::size_t axis, std::size_t k) const {
     return axis == 0 ? nozzle_x_at_[k] : nozzle_y_at_[k];
   }
   [[nodiscard]] const ErrorWeight& weight(std::size_t k) const { return weights_[k]; }
   [[nodiscard]] const NozzleAnswers& answers(std::size_t axis) const { return axis == 0 ? x_ : y_; }
 
-  // k + m < size(), and no longer than rules.max_line_s.
+  // The line from candidate k to k + m. k + m < size(), and the line lasts no longer than
+  // rules.max_line_s.
   [[nodiscard]] LineCost line(std::size_t k, std::size_t m) const;
 
-  // After the last candidate the base rests and e rings down.
+  // The cost after the last candidate: the base rests and e rings down.
   [[nodiscard]] Quadratic ring_down() const;
 
  private:
   using Row = Eigen::RowVector4d;
-  // What is the same for all lines over m candidates: e of an axis by (e, ė, o, u), at some
-  // moments, and the sums of its squares.
+  // What all lines over m candidates share: e of an axis by (e, ė, o, u) at some moments, and the
+  // sums of its squares.
   struct Shape {
     struct Look {
       std::size_t j = 0;  // candidates since the line's begin
-      double s = 0.0;     // the same as a share of the line
+      double s = 0.0;     // j as a share of the line
       Row x;
       Row y;
     };

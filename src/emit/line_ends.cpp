@@ -20,11 +20,11 @@ using dynamics::BaseTrajectory;
 using dynamics::FlexibleAxis;
 
 constexpr int kMaxSamples = 128;
-// What the base itself may take of the largest change of speed. The rest is for its lines' places,
+// Share of the largest change of speed that the base itself may use. The rest is for the vertices,
 // which are not on its curve.
 constexpr double kOwnShare = 0.8;
 
-// e at kMaxSamples points at most, `steps` + 1 of them equally spaced over the line.
+// e at `steps` + 1 points, equally spaced over the line. steps is no more than kMaxSamples.
 std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, AxisAt at,
                                                  const BaseTrajectory& base, double from,
                                                  double duration, int steps) {
@@ -76,20 +76,20 @@ double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double t
   return largest;
 }
 
-// How long the shortest lines are when as many as possible share the time evenly.
+// How long each line is if as many as possible share the time evenly.
 double even_share_s(double from, double to, const LineRules& rules) {
   constexpr double kRounding = 1e-9;
   return (to - from) / std::max(1.0, std::floor((to - from) / rules.even_line_s() + kRounding));
 }
 
-// When the shortest line from `start` ends. None of those that may follow has to be longer, as
-// speed changes most between long ones.
+// When the shortest line from `start` ends. It is an even share of the time, so that none of the
+// lines after it has to be longer: speed changes most between long lines.
 double first_end(double start, double to, const LineRules& rules) {
   return start + std::max(even_share_s(start, to, rules), rules.min_line_s);
 }
 
-// What the base changes the speed of an axis by, at most, between two moments line_s apart, the
-// later one of which lies in [from, to]. Lines of that length change it by no more where they join.
+// The largest change of either axis' speed between two moments line_s apart, the later of which
+// lies in [from, to]. Where lines of that length join, their speed changes by no more than this.
 double change_over(const BaseTrajectory& base, double from, double to, double line_s) {
   double most = 0.0;
   for (double t = std::max(from, line_s); t < to + base.period_s; t += base.period_s) {
@@ -103,13 +103,13 @@ double change_over(const BaseTrajectory& base, double from, double to, double li
   return most;
 }
 
-// How a line would do.
+// Tells whether a line would be good.
 class Candidate {
  public:
   Candidate(const BaseTrajectory& base, const LineRules& rules) : base_(&base), rules_(&rules) {}
 
-  // Moves the nozzle little, and speed changes little from the line before, which began at
-  // `before`, and to the shortest line that may come behind.
+  // Whether the line moves the nozzle little, and speed changes little at both its ends: from the
+  // line before, which began at `before`, and to the shortest line that may come behind.
   [[nodiscard]] bool good(double before, double from, double to) const {
     const double after = to + rules_->min_line_s;
     return std::max(change(before, from, to), change(from, to, after)) <=
@@ -118,8 +118,8 @@ class Candidate {
   }
 
  private:
-  // Of either axis' speed where lines from a to b and from b to c join. A line without time stands
-  // for rest.
+  // The larger change of the two axes' speeds where lines from a to b and from b to c join. A line
+  // without time stands for rest.
   [[nodiscard]] double change(double a, double b, double c) const {
     const auto along = [&](AxisAt axis) {
       const auto speed = [&](double from, double to) {
@@ -136,8 +136,8 @@ class Candidate {
   const LineRules* rules_;
 };
 
-// Halves the lines that `which` names by their ends' places in `times`, as far as the halves are
-// long enough. Whether there were any.
+// Halves the lines that `which` names by the places of their ends in `times`. A line stays whole if
+// its halves would be too short. Returns whether any line was halved.
 template <typename Which>
 bool halve(const BaseTrajectory& base, const LineRules& rules, std::vector<double>& times,
            Which which) {
@@ -171,13 +171,13 @@ bool long_enough(const BaseTrajectory& base, double from, double to, const LineR
 }
 
 bool cuts_well(const BaseTrajectory& base, double from, double to, const LineRules& rules) {
-  // So many that each is hardly longer than the shortest.
+  // Among this many lines each is hardly longer than the shortest.
   constexpr double kMany = 20.0;
   if (to - from > kMany * rules.even_line_s()) {
     return true;
   }
   const double most = kOfSpeedStep * rules.max_speed_step_mm_s;
-  // Where not even the shortest lines bear it, there is nothing to gain.
+  // If not even the shortest lines keep to it, there is nothing to gain.
   return change_over(base, from, to, even_share_s(from, to, rules)) <= most ||
          change_over(base, from, to, rules.even_line_s()) > most;
 }
@@ -192,8 +192,8 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     if (to - start <= rules.max_line_s && line.good(before, start, to)) {
       break;
     }
-    // What is left must be long enough for a line too. The shortest line goes in any case, longer
-    // ones as long as they are good.
+    // The rest must be long enough for a line too. We take the shortest line in any case, and a
+    // longer one as long as it is good.
     double end = 0.0;
     for (double t = first_end(start, to, rules); t < to; t += h) {
       if (long_enough(base, start, t, rules) && long_enough(base, t, to, rules)) {
@@ -204,7 +204,7 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     if (end == 0.0) {
       break;
     }
-    // Doubled steps as long as that goes, then halved ones.
+    // The end moves on in doubled steps while the line stays good, then in halved ones.
     bool growing = true;
     for (double step = 1.0; step >= 1.0;) {
       const double t = end + step * h;

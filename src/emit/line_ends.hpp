@@ -1,4 +1,4 @@
-// Which moments the lines of a run end at.
+// When the lines of a run end.
 #pragma once
 
 #include <vector>
@@ -8,34 +8,35 @@
 
 namespace unflex::emit {
 
-// What the places of lines may take of the largest change of speed; the rest is for their times.
+// Share of the largest change of speed that the vertices may use. The rest is for the lines' times.
 inline constexpr double kOfSpeedStep = 0.95;
 
-// Whether the firmware takes a line over this time: min_line_s, and min_line_mm along X or Y.
+// Whether a line over this time is long enough: rules.even_line_s(), and min_line_mm along X or Y.
 [[nodiscard]] bool long_enough(const dynamics::BaseTrajectory& base, double from, double to,
                                const LineRules& rules);
 
-// Whether as many lines as possible between these times, all alike, can each bear what the base
-// changes its speed by meanwhile.
+// Whether speed changes by no more than it may from line to line, if as many lines as possible
+// share this time evenly. Also true if not even the shortest lines could do that.
 [[nodiscard]] bool cuts_well(const dynamics::BaseTrajectory& base, double from, double to,
                              const LineRules& rules);
 
 // Appends to `times` the ends of the lines between `from` (its last entry) and `to`, `to` included.
-// Lines grow as long as what they leave out moves the nozzle by no more than the tolerance. None is
-// too short, if [from, to] allows.
+// Lines grow as long as what they leave out moves the nozzle by no more than the tolerance. No line
+// is too short, if [from, to] allows.
 void append_line_ends(const dynamics::BaseTrajectory& base, double from, double to,
                       const LineRules& rules, std::vector<double>& times);
 
-// Halves the lines before whose ends the nozzle, by errors at `times`, is off by more than is to be
-// expected of lines within the tolerance, and the lines before those, as far as the halves are long
-// enough. Whether there were any.
+// If the nozzle is further off at the end of a line than lines within the tolerance should cause,
+// halves that line and the line before it. x_error_mm and y_error_mm are the nozzle's errors at
+// `times`. A line stays whole if its halves would be too short. Returns whether any line was
+// halved.
 bool split_lines(const dynamics::BaseTrajectory& base, const std::vector<double>& x_error_mm,
                  const std::vector<double>& y_error_mm, const LineRules& rules,
                  std::vector<double>& times);
 
-// Halves both lines of each join at which the speed of an axis, with the vertices x_mm and y_mm at
-// `times`, changes by more than it may, as far as the halves are long enough. Whether there were
-// any.
+// Halves both lines of each join at which the speed of an axis changes by more than it may. x_mm
+// and y_mm are the vertices at `times`. A line stays whole if its halves would be too short.
+// Returns whether any line was halved.
 bool split_quick_joins(const dynamics::BaseTrajectory& base, const std::vector<double>& x_mm,
                        const std::vector<double>& y_mm, const LineRules& rules,
                        std::vector<double>& times);

@@ -1,8 +1,8 @@
 // All lines that begin with one of a few states, by their duration.
 //
-// A line at speed v: e at j candidates after its begin is what it would be if the machine stayed
-// where it is, plus v times the answer to a ramp. So J is a quadratic of v, and its coefficients
-// are sums over j that go on from one duration to the next.
+// Take a line at speed v. At j candidates after its begin, e is what it would be if the machine
+// stayed where it is, plus v times the answer to a ramp. So J is a quadratic of v, and its
+// coefficients are sums over j. The sums of one duration continue those of a shorter one.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,11 +15,11 @@ namespace unflex::emit {
 
 class LineFan {
  public:
-  // States at once.
+  // Number of states that are handled at once.
   static constexpr std::size_t kLanes = 4;
   using Lanes = Eigen::Array<double, kLanes, 1>;
 
-  // A line and all that comes after it, for each state:
+  // The cost of a line and all that comes after it, for each state:
   // least + ½ (v − best)ᵀ S (v − best).
   struct Choice {
     Lanes least = Lanes::Zero();
@@ -42,12 +42,12 @@ class LineFan {
 
   explicit LineFan(const LineCosts& costs) : costs_(&costs) {}
 
-  // Lines from τ_k on, and from these z, no more than kLanes.
+  // Begins lines at τ_k, one from each of these z, no more than kLanes.
   void begin(std::size_t k, std::span<const Vector6d> states);
-  // Lines over m candidates, no fewer than before.
+  // Extends the lines to m candidates. m must not decrease from call to call.
   void reach(std::size_t m);
 
-  // Of the lines reached: with what follows, J alone, and z at the end.
+  // For the lines reached: the duration, the cost with what follows, J alone, and z at the end.
   [[nodiscard]] double duration_s() const { return duration_s_; }
   [[nodiscard]] Choice choice(const Quadratic& to_go) const;
   [[nodiscard]] double cost(std::size_t lane, const Eigen::Vector2d& v) const;
@@ -58,13 +58,13 @@ class LineFan {
   struct Axis {
     const NozzleAnswers* answers = nullptr;
     Lanes place = Lanes::Zero();   // o
-    Lanes behind = Lanes::Zero();  // p of the nozzle minus where the line begins
+    Lanes behind = Lanes::Zero();  // p of the nozzle minus the place where the line begins
     Lanes speed = Lanes::Zero();   // ṗ
     Lanes pull = Lanes::Zero();    // Σ ramp (W e)
     double ramps = 0.0;            // Σ W ramp²
-    double base = 0.0;             // Σ of the base's way, b_{k+j} − b_k
-    double time_base = 0.0;        // Σ j dt of the same
-    // Of the lines reached.
+    double base = 0.0;             // Σ (b_{k+j} − b_k)
+    double time_base = 0.0;        // Σ j dt (b_{k+j} − b_k)
+    // For the lines reached:
     Lanes slope = Lanes::Zero();  // ∂J/∂v at v = 0
     Lanes error = Lanes::Zero();  // e, ė, o at the end for v = 0
     Lanes error_speed = Lanes::Zero();
@@ -82,10 +82,10 @@ class LineFan {
   Axis y_;
   Lanes square_ = Lanes::Zero();  // Σ eᵀWe for v = 0
   double ramps_xy_ = 0.0;
-  double base_square_ = 0.0;  // Σ |b_{k+j} − b_k|²
-  double times_s_ = 0.0;      // Σ j dt, and of its square
-  double times_squared_ = 0.0;
-  // Of the lines reached.
+  double base_square_ = 0.0;    // Σ |b_{k+j} − b_k|²
+  double times_s_ = 0.0;        // Σ j dt
+  double times_squared_ = 0.0;  // Σ (j dt)²
+  // For the lines reached:
   double duration_s_ = 0.0;
   Lanes held_ = Lanes::Zero();  // J for v = 0
   double stiffness_xy_ = 0.0;

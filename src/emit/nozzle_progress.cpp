@@ -15,10 +15,10 @@ using gcode::X;
 using gcode::Y;
 using planner::PlannedMove;
 
-// How far along the path the nozzle is looked for on both sides of the reference.
+// The nozzle is looked for this far along the path on both sides of the reference.
 constexpr double kWindow_mm = 1.0;
-// λ: where the path comes back to itself, the place that the reference is nearer to counts. So much
-// of the nozzle's lag is not seen.
+// λ: where the path comes back to itself, the place that is nearer to the reference counts. This
+// share of the nozzle's lag is not seen.
 constexpr double kTowardsReference = 0.01;
 
 }  // namespace
@@ -45,7 +45,8 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
     }
     return path_mm_[i] + length * move.distance_mm(std::max(t - starts_s[i], 0.0)) / move.length_mm;
   };
-  // A run begins at rest. A part of one begins in motion, with the nozzle where it should be.
+  // A run begins at rest. A part of a run begins in motion, and we take the nozzle to be on the
+  // reference then.
   std::array<std::array<double, 2>, 2> state{};
   const dynamics::AxisMotion x = run.base->x_at(0.0);
   const dynamics::AxisMotion y = run.base->y_at(0.0);
@@ -97,7 +98,7 @@ double NozzleProgress::nearest_mm(double x_mm, double y_mm, std::size_t move,
       nearest = path_mm_[i] + along;
     }
   };
-  // Further away than this, λ (u − s)² alone is more than what is found.
+  // Further away than this, λ (u − s)² alone is more than the least cost so far.
   const auto reach_mm = [&] { return std::min(kWindow_mm, std::sqrt(best / kTowardsReference)); };
   look_at(move);
   for (std::size_t i = move; i > 0 && reference_mm - path_mm_[i] <= reach_mm();) {

@@ -16,7 +16,8 @@ namespace unflex::emit {
 
 class NozzleProgress {
  public:
-  // Of the nozzle that hangs on the run's base; starts_s: of each move, and the end of the last.
+  // The nozzle hangs on the run's base. starts_s: when each move starts, and when the last one
+  // ends.
   NozzleProgress(const Run& run, const std::vector<double>& starts_s,
                  const dynamics::FlexibleAxis& nozzle_x, const dynamics::FlexibleAxis& nozzle_y);
 
@@ -26,7 +27,7 @@ class NozzleProgress {
   [[nodiscard]] bool past_first_move(double t) const;
 
  private:
-  // s_n of a nozzle there, where the reference is on the move at s.
+  // s_n of a nozzle at (x_mm, y_mm), while the reference is on `move` and s = reference_mm.
   [[nodiscard]] double nearest_mm(double x_mm, double y_mm, std::size_t move,
                                   double reference_mm) const;
   [[nodiscard]] double progress_mm(double t) const;

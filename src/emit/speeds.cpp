@@ -1,10 +1,10 @@
 // Notation:
 //   d, T  a line's length after rounding, and its time      A  the firmware's acceleration
-//   c     what the firmware's own plan takes, over what the formula says
+//   c     time in the firmware's own plan, over the time by the formula
 //
 //   v = c (d + ((v − v_prev)₊² + (v − v_next)₊²) / 2A) / T
 //
-// A line as fast as or slower than its neighbours has no ramp. c is 1 but for what only the
+// A line as fast as or slower than its neighbours has no ramp. c is 1 except for what only the
 // firmware's planner knows: junctions it slows down for, speeds it rounds to whole steps.
 #include "speeds.hpp"
 
@@ -27,16 +27,17 @@ using gcode::Z;
 
 // The ramps are short against the lines, so a few rounds over the neighbours settle them.
 constexpr int kRampRounds = 6;
-// Plans by the firmware's own rules, each with what the one before has taught.
+// Plans by the firmware's own rules. Each uses the corrections c of the plan before.
 constexpr int kRounds = 3;
-// How much of its time a line may be shortened or lengthened by, to make up for those before it.
+// Share of its time by which a line may be shortened or lengthened, to make up for lines before it.
 constexpr double kMostCatchUp = 0.2;
-// … and what of the acceleration limit may go into it.
+// Share of the acceleration limit that this may use.
 constexpr double kCatchUpAccel = 0.05;
-// What one plan may change a speed by: the reason may have been a neighbour.
+// One plan may change a speed by this factor at most, since the reason may have been a neighbour.
 constexpr double kMostCorrection = 2.0;
 
-// How long the straight line lasts that the firmware is on before and after the lines of a part.
+// Before and after the lines of a part, the firmware is taken to be on a straight line that lasts
+// this long.
 constexpr double kPassing_s = 0.05;
 constexpr std::size_t kNoStroke = std::numeric_limits<std::size_t>::max();
 
@@ -44,8 +45,8 @@ double magnitude(const std::optional<std::array<double, 2>>& velocity_mm_s) {
   return velocity_mm_s ? std::hypot((*velocity_mm_s)[0], (*velocity_mm_s)[1]) : 0.0;
 }
 
-// The line to (side = −1) or from (side = 1) `next`, at that velocity, and laying as much filament
-// per mm.
+// The line that leads to `next` (side = −1) or away from it (side = 1), with that velocity and as
+// much filament per mm as `next`.
 gcode::Segment passing_line(const gcode::Segment& next, const std::array<double, 2>& velocity_mm_s,
                             double side) {
   gcode::Segment line;
@@ -75,20 +76,21 @@ int feed_decimals(double feed_mm_min) {
   return feed_mm_min >= 1.0 ? 3 : 8;
 }
 
-// When the firmware, by its own plan, is through with the lines it has been given.
+// Tells when the firmware, by its own plan, will have done the lines it has been given.
 class FirmwareClock {
  public:
   FirmwareClock(std::unique_ptr<planner::Planner> firmware, double start_s)
       : firmware_(std::move(firmware)), final_s_(start_s) {}
 
-  // Lines are numbered from 0. expected_s: what the line takes until the plan has it.
+  // Lines are numbered from 0. expected_s: duration that is assumed for the line until the plan has
+  // it.
   void add(const gcode::Segment& line, double expected_s) {
     firmware_->add(line);
     durations_s_.push_back(expected_s);
     expected_s_ += expected_s;
     take();
   }
-  // A line that is none of the run's.
+  // A line that does not belong to the run.
   void pass(const gcode::Segment& line) { firmware_->add(line); }
   void finish() {
     firmware_->stop();
@@ -114,7 +116,7 @@ class FirmwareClock {
 
   std::unique_ptr<planner::Planner> firmware_;
   std::vector<planner::PlannedMove> moves_;
-  std::vector<double> durations_s_;  // planned ones, and expected ones after them
+  std::vector<double> durations_s_;  // of the planned lines, then of the expected ones
   double final_s_;
   double expected_s_ = 0.0;
 };
@@ -173,7 +175,7 @@ class SpeedSolver {
     }
   }
 
-  // What rounding and the firmware do to the clock the next lines make up for.
+  // Rounding and the firmware change the time that lines take. The next lines make up for that.
   void round_to_feeds(double late_s) {
     FirmwareClock clock(planner::make_planner(options_->run_limits, options_->fixed), late_s);
     gcode::Segment line;
@@ -207,8 +209,8 @@ class SpeedSolver {
   }
 
   // RepRapFirmware leaves out a line's ramp up from the faster of its two ends, and so goes no
-  // faster than that, if it would take less than ten step clocks and gain less than 10 %
-  // (DDA.cpp, RecalculateMove). The least gain over `end` that it does not leave out.
+  // faster than that end, if the ramp would take less than ten step clocks and gain less than 10 %
+  // (DDA.cpp, RecalculateMove). Returns the least gain over `end_mm_s` with which the ramp stays.
   [[nodiscard]] static double least_gain(double end_mm_s, double accel_mm_s2) {
     constexpr double kTenClocks_s = 10.0 / 750000.0;
     constexpr double kRoom = 1.05;
@@ -216,8 +218,9 @@ class SpeedSolver {
   }
 
   // The line before i is faster than v and so ends slower than it goes. If it began slower too, it
-  // has two ramps, and must gain enough over the faster of its ends. The speed nearest to v with
-  // which it does; where there is none, the line before is told the speed that it will have.
+  // has two ramps, and must gain enough over the faster of its ends. Returns the speed nearest to v
+  // with which it does. If there is none, the line before is given the speed that it will really
+  // have.
   [[nodiscard]] double keeping_the_ramps_before(std::size_t i, double v) {
     const double before = speed_mm_s_[i - 1];
     const double began = i > 1 ? speed_mm_s_[i - 2] : magnitude(passing_.in_mm_s);
@@ -233,7 +236,7 @@ class SpeedSolver {
     if (slower >= began) {
       return before - v < 0.5 * gain ? before : slower;
     }
-    // However slow this line is, the one before gains too little over its beginning.
+    // However slow this line is, the line before gains too little over its own beginning.
     if (before - v < gain) {
       return before;
     }
@@ -243,7 +246,7 @@ class SpeedSolver {
     return v;
   }
 
-  // The speed nearest to v of which the firmware leaves out no ramp.
+  // The speed nearest to v at which the firmware leaves out no ramp.
   [[nodiscard]] double with_its_ramps(std::size_t i, double v) {
     const double before = speed_mm_s_[i - 1];
     if (v < before) {
@@ -258,7 +261,7 @@ class SpeedSolver {
     return v - faster_end < 0.5 * gain ? faster_end : faster_end + gain;
   }
 
-  // With the speed of the line before, to the last digit.
+  // Gives line i the speed of the line before it, to the last digit.
   void go_on_as_before(std::size_t i) {
     speed_mm_s_[i] = speed_mm_s_[i - 1];
     (*strokes_)[i].speed_mm_s = (*strokes_)[i - 1].speed_mm_s;
@@ -302,8 +305,8 @@ class SpeedSolver {
     const double before = i > 0 ? speed_mm_s_[i - 1] : magnitude(passing_.in_mm_s);
     const double after =
         i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : magnitude(passing_.out_mm_s);
-    // No ramp lasts longer than the line. Where one would have to, the line takes longer, and those
-    // after it make up for that.
+    // No ramp lasts longer than the line. Where a ramp would have to, the line takes longer, and
+    // the lines after it make up for that.
     const double most = accel_mm_s2_[i] * given_s(i);
     const double up = std::clamp(v - before, 0.0, most);
     const double down = std::clamp(v - after, 0.0, most);
@@ -317,7 +320,7 @@ class SpeedSolver {
   double mm_s_per_feed_;
   std::vector<double> distance_mm_;
   std::vector<double> accel_mm_s2_;
-  std::vector<double> step_events_;  // Marlin: of the axis with most steps
+  std::vector<double> step_events_;  // Marlin: steps of the axis that has most of them
   std::vector<double> correction_;   // c
   std::vector<double> speed_mm_s_;
 };

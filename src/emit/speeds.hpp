@@ -16,8 +16,8 @@ struct Passing {
 };
 
 // Sets the speeds of the strokes, and the digits of F they need, so that the firmware takes the
-// time each of them was given. mm_s_per_feed: what F1 means. late_s: by how much the first begins
-// late, which they make up for.
+// time that each of them was given. mm_s_per_feed: the speed that F1 means. late_s: how late the
+// first line begins; the lines make up for it.
 void set_speeds(const gcode::Position& start_mm, const Passing& passing, const EmitOptions& options,
                 double mm_s_per_feed, double late_s, std::vector<Stroke>& strokes);
 

@@ -7,10 +7,10 @@
 namespace unflex::emit {
 namespace {
 
-// How many places off the best one, along the path, an end may lie.
+// An end may lie this many places off the best one, along the path.
 constexpr int kAlong = 3;
 
-// Whole numbers are held as doubles here: conversions would take most of the time.
+// Whole numbers are held as doubles here, since conversions would take most of the time.
 class Chooser {
  public:
   Chooser(const Bowl& bowl, const Eigen::Vector2d& best, const Places& places, double room)
@@ -20,7 +20,7 @@ class Chooser {
         places_(&places),
         room_(room) {}
 
-  // The best place among those with this many steps on one axis.
+  // Considers the best place among those with this many steps on one axis.
   void consider(std::size_t axis, double steps_there) {
     const double off = steps_there - best_[axis];
     const double other = best_[1 - axis] + bowl_->slant[axis] * off;
@@ -34,7 +34,7 @@ class Chooser {
       add(to, extra);
     }
   }
-  // And those with so many around the best one.
+  // Considers those with up to `reach` steps more or less on one axis than the best place has.
   void consider_around(std::size_t axis, int reach) {
     const double middle = nearest_whole(best_[axis]);
     for (int d = -reach; d <= reach; ++d) {

@@ -14,8 +14,8 @@ namespace unflex::emit {
 
 using Place = std::array<std::int64_t, 2>;  // in steps
 
-// The nearest whole number, of less than 2^51: where a double has no places after the point, adding
-// rounds.
+// The nearest whole number, for |x| < 2^51. At the size of kNoFraction a double has no digits after
+// the point, so adding it rounds x.
 [[nodiscard]] inline double nearest_whole(double x) {
   constexpr double kNoFraction = 0x1.8p52;
   return (x + kNoFraction) - kNoFraction;
@@ -45,20 +45,21 @@ class StepGrid {
   Eigen::Vector2d offset_mm_;
 };
 
-// Whatever a place costs more than the best one: ½ (x, y) S (x, y)ᵀ of its distance, in steps.
+// What a place costs more than the best one: ½ (x, y) S (x, y)ᵀ of its distance from it, in steps.
 struct Bowl {
   Bowl() = default;
   Bowl(double xx, double xy, double yy);
 
-  std::size_t flat = 0;  // the axis along which S is less
-  // By the axis that is given: how far the cheapest place on the other one moves with it, and what
-  // the square of a step costs along that way, and beside it.
+  std::size_t flat = 0;  // the axis along which S is smaller
+  // Indexed by the axis whose place is given. slant: how far the cheapest place on the other axis
+  // moves per step on this one. along: the cost of a squared step on this axis if the other
+  // follows. beside: the cost of a squared step of the other axis off its cheapest place.
   std::array<double, 2> slant{};
   std::array<double, 2> along{};
   std::array<double, 2> beside{};
 };
 
-// Which places there are: at least min_steps from `from` on one axis, and from least to most.
+// The places allowed: at least min_steps from `from` on one axis, and from least to most.
 struct Places {
   Place from{};
   int min_steps = 1;
@@ -75,7 +76,8 @@ struct StepEnd {
   double extra = 0.0;
 };
 
-// The cheapest ones around the best place, in steps; in order, all of them below `room`.
+// The cheapest places around the best one, in steps. They are in order of cost, and all cost less
+// than `room` extra.
 struct StepEnds {
   static constexpr std::size_t kMost = 3;
   std::array<StepEnd, kMost> ends;

@@ -1,8 +1,8 @@
-// A firmware that counts motor steps takes a line's end to the nearest of them, and may refuse
-// lines of less than a few. Where a line ends, and when, are then whole numbers, and the best are
-// searched for: of all lines that begin where a kept state is, those that cost least are kept for
-// each candidate time, kKept of them (the M-algorithm; Anderson & Mohan, IEEE Trans. Comm. 32
-// (1984), 169). A state's cost is that of its lines so far and of those to come (cost_to_go.hpp).
+// A firmware that counts motor steps moves a line's end to the nearest step, and may refuse lines
+// of less than a few steps. So the ends of lines, and their times, are whole numbers, and we search
+// for the best ones. For each candidate time we keep the kKept cheapest lines that end there, among
+// all that begin at a kept state (the M-algorithm; Anderson & Mohan, IEEE Trans. Comm. 32 (1984),
+// 169). A state's cost is that of its lines so far and of those to come (cost_to_go.hpp).
 // line_cost.hpp has the notation.
 #include "step_path.hpp"
 
@@ -24,31 +24,32 @@ namespace {
 
 // States kept for each candidate time.
 constexpr std::size_t kKept = LineFan::kLanes;
-// Lines to one candidate, by what they promise, that set the bar for the others.
+// This many lines to a candidate, the most promising ones, are tried first. They set the bar for
+// the others.
 constexpr std::ptrdiff_t kFirst = 8;
-// Candidates that are searched at once, and how far beyond them.
+// Candidates of one block, and how many beyond the block are searched with it.
 constexpr std::size_t kBlock = 4096;
 constexpr std::size_t kBeyond = 512;
 // Lines up to this long may lie across a wanted time.
 constexpr double kAcross_mm = 0.25;
-// A line is worth this much time of an error as large as the tolerance.
+// One more line costs as much as an error as large as the tolerance does in this time.
 constexpr double kLineWorth_s = 0.01;
-// What lines faster than an even pace cost beyond their worth, per (pace² − 1).
+// Lines faster than an even pace cost this many line worths more, per (pace² − 1).
 constexpr double kHaste = 20.0;
-// However many lines follow a run, it gets this many within the time that lines are counted over.
+// However many lines follow a run, this many of its own may begin within burst_s before its end.
 constexpr int kFewest = 4;
-// What too quick a change of speed costs, mm²·s.
+// Cost of a change of speed that the motors cannot make, mm²·s.
 constexpr double kTooQuick = 1e-4;
-// What a line too many costs.
+// Cost of a line more than a burst may have, mm²·s.
 constexpr double kTooMany = 1e-4;
 
 struct State {
-  double total = 0.0;  // what it has cost and will cost
+  double total = 0.0;  // what the state has cost and will cost
   double spent = 0.0;
   Vector6d z = Vector6d::Zero();
   Place at{};
   Eigen::Vector2d speed_mm_s = Eigen::Vector2d::Zero();  // of the line that ends here
-  double line_s = 0.0;                                   // its duration
+  double line_s = 0.0;                                   // duration of that line
   std::size_t k = 0;
   std::int32_t parent = -1;
 };
@@ -58,25 +59,25 @@ struct Lines {
   explicit Lines(const LineCosts& costs) : fan(costs) {}
 
   LineFan fan;
-  // Of lines to the candidate that is being searched.
+  // For the lines that end at the candidate being searched:
   double duration_s = 0.0;
   double price = 0.0;  // see Search::price()
   LineFan::Choice choice;
   Bowl bowl;
   std::size_t k = 0;
-  std::size_t first = 0;  // of the states, in the arena
+  std::size_t first = 0;  // place in the arena of the first state
   std::size_t count = 0;
-  std::array<double, kKept> earliest_s{};  // that a line may end
+  std::array<double, kKept> earliest_s{};  // when a line from each state may end
 };
 
-// Lines of one duration from one state.
+// All lines of one duration from one state.
 struct Option {
   double least = 0.0;  // total
   const Lines* lines = nullptr;
   std::size_t lane = 0;
 };
 
-// One of them.
+// One line of an Option.
 struct Choice {
   double total = 0.0;
   Place to{};
@@ -147,7 +148,7 @@ class Search {
         return std::move(polygon_);
       }
       if (taken < 2) {
-        return {};  // a line longer than a block
+        return {};  // one line is longer than a block
       }
       State next = *way[taken - 1];
       next.parent = -1;
@@ -186,7 +187,7 @@ class Search {
     if (until >= shortest_ && result.back() != until) {
       result.push_back(until);
     }
-    // Across the wanted time.
+    // Lines across the next wanted time have to be short.
     const std::size_t any_length =
         too_many_wanted(k) ? costs_->candidates(rules_->even_line_s()) : 0;
     for (m = std::max(shortest_, until + 1); m <= most; ++m) {
@@ -198,7 +199,7 @@ class Search {
     }
   }
 
-  // Whether lines from k on that end at every wanted time would be more than the budget has.
+  // Whether lines from k on that end at every wanted time would be more than a burst may have.
   [[nodiscard]] bool too_many_wanted(std::size_t k) const {
     constexpr std::ptrdiff_t kSome = 4;
     const auto next = std::ranges::upper_bound(wanted_, k);
@@ -206,7 +207,8 @@ class Search {
            *(next + kSome - 1) < k + kSome * costs_->candidates(rules_->even_line_s());
   }
 
-  // Searches candidates from `from` to `until`; the best state at the end, in arena_.
+  // Searches the candidates from `from` to `until`. Returns the place in arena_ of the best state
+  // at the end.
   std::optional<std::size_t> block(State begin, std::size_t from, std::size_t until, bool is_last) {
     if (is_last && ends_.until_s) {
       to_go_.compute(from, std::min(until + kBeyond, costs_->size() - 1), false);
@@ -245,7 +247,7 @@ class Search {
       arena_.push_back(*finished_);
       return arena_.size() - 1;
     }
-    // Of the states at the end of the block.
+    // The best of the states near the end of the block.
     std::optional<std::size_t> best;
     for (std::size_t i = 0; i < arena_.size(); ++i) {
       if (arena_[i].k + kBeyond / 2 > until && (!best || arena_[i].total < arena_[*best].total)) {
@@ -255,7 +257,7 @@ class Search {
     return best;
   }
 
-  // Lines from all states of the arena from `first` on, which are of one candidate time.
+  // Begins lines from all states in the arena from `first` on. They have the same candidate time.
   void spread(std::size_t first, std::size_t until) {
     const std::size_t k = arena_[first].k;
     Lines& lines = lines_[k % lines_.size()];
@@ -276,8 +278,8 @@ class Search {
     }
   }
 
-  // From when on a line that begins with state i may end, for no more than burst_lines to begin
-  // within any burst_s.
+  // When a line that begins with state i may end at the earliest, so that no more than burst_lines
+  // begin within any burst_s.
   [[nodiscard]] double earliest_end_s(std::size_t i) const {
     if (rules_->burst_lines <= 0) {
       return 0.0;
@@ -292,14 +294,14 @@ class Search {
     if (lines == allowed) {
       return rules_->burst_s + costs_->time_s(arena_[static_cast<std::size_t>(ancestor)].k);
     }
-    // The youngest in begins_s_ is the oldest of the block.
+    // The last entry of begins_s_ is the oldest state of the block, which is counted already.
     const auto before = static_cast<std::size_t>(allowed - lines);
     return before < begins_s_.size() ? rules_->burst_s + begins_s_[begins_s_.size() - 1 - before]
                                      : 0.0;
   }
 
-  // What a line over m candidates costs for being one. The shorter, the more: it takes from the
-  // lines that may follow within the time they are counted over.
+  // What a line over m candidates costs for being a line. Shorter lines cost more, since fewer
+  // lines can then follow within burst_s.
   [[nodiscard]] double price(std::size_t m) const {
     const double pace = rules_->even_line_s() / (static_cast<double>(m) * costs_->dt_s());
     return line_worth_ * (1.0 + kHaste * std::max(pace * pace - 1.0, 0.0));
@@ -312,12 +314,12 @@ class Search {
     return excess > 0.0 ? kTooQuick * (1.0 + excess) : 0.0;
   }
 
-  // What a line that ends at candidate k costs beyond J, wherever that is.
+  // What a line that ends at candidate k costs beyond J, at whatever place it ends.
   [[nodiscard]] double fixed_cost(const Lines& lines, std::size_t lane, std::size_t k) const {
     return lines.price + (costs_->time_s(k) < lines.earliest_s[lane] ? kTooMany : 0.0);
   }
 
-  // A state with a line to another place.
+  // The state after a line from another state to the place `to`.
   [[nodiscard]] State after_line(const Lines& lines, std::size_t lane, std::size_t k,
                                  const Place& to, double total) const {
     const State& state = arena_[lines.first + lane];
@@ -334,7 +336,7 @@ class Search {
     return next;
   }
 
-  // Where it is; the run's begin may lie between whole steps.
+  // Where the state is. The run's begin may lie between whole steps.
   [[nodiscard]] Eigen::Vector2d start_mm(const State& state) const {
     return costs_->base_mm(state.k) + Eigen::Vector2d(state.z[2], state.z[5]);
   }
@@ -343,7 +345,7 @@ class Search {
     return (grid_.mm(to) - start_mm(state)) / duration_s;
   }
 
-  // The last line, after which the machine rests or goes on.
+  // Tries the last line, after which the machine rests or goes on with the next part.
   void finish(const std::vector<Lines*>& all, std::size_t k) {
     for (const Lines* lines : all) {
       const LineFan::Choice choice =
@@ -363,8 +365,8 @@ class Search {
     }
   }
 
-  // Lines that end at candidate k, those that promise most first, to the places nearest to the best
-  // ones, as the cost has it.
+  // Tries lines that end at candidate k, the most promising ones first. Each goes to the places
+  // that cost least around its best end.
   void extend(const std::vector<Lines*>& all, std::size_t k) {
     options_.clear();
     for (Lines* lines : all) {
@@ -380,7 +382,8 @@ class Search {
         options_.push_back({least, lines, lane});
       }
     }
-    // Neither beyond the travel nor further out than the base.
+    // Places stay within the travel, or where the base itself leaves it, no further out than the
+    // base.
     const Eigen::Vector2d& base = costs_->base_mm(k);
     const Eigen::Vector2d& slack = grid_.step_mm();
     const Eigen::Vector2d least_mm(rules_->reach_x.min_mm, rules_->reach_y.min_mm);
@@ -388,7 +391,7 @@ class Search {
     Places places{.min_steps = rules_->min_steps,
                   .least = grid_.steps(least_mm.cwiseMin(base - slack)),
                   .most = grid_.steps(most_mm.cwiseMax(base + slack))};
-    // With the best few the bar is set; the order of the others does not matter.
+    // The best few set the bar; the order of the others does not matter.
     if (std::ssize(options_) > kFirst) {
       std::ranges::nth_element(options_, options_.begin() + kFirst, {}, &Option::least);
     }
@@ -416,7 +419,7 @@ class Search {
     }
   }
 
-  // What a line to the candidate that is being searched may cost to be kept.
+  // To be kept, a line to the candidate being searched must cost less than this.
   [[nodiscard]] double most_to_keep() const {
     return kept_.size() < kKept ? std::numeric_limits<double>::infinity() : kept_.back().total;
   }
@@ -444,22 +447,22 @@ class Search {
   RunEnds ends_;
   StepGrid grid_;
   const LineRules* rules_;
-  std::size_t last_;      // candidate
-  std::size_t shortest_;  // candidates that a line takes
+  std::size_t last_;      // the last candidate
+  std::size_t shortest_;  // fewest candidates that a line takes
   std::size_t longest_;
   std::vector<std::size_t> wanted_;
   Place end_;
   double line_worth_ = 0.0;
-  Polygon polygon_;               // of the blocks before
-  std::vector<double> begins_s_;  // of their lines, and of those before the run
-  // Of the block that is being searched.
+  Polygon polygon_;               // from the blocks before
+  std::vector<double> begins_s_;  // when its lines began, and those before the run
+  // For the block being searched:
   CostToGo to_go_;
   std::vector<State> arena_;
   std::optional<State> finished_;
-  // By candidate, the last of them: the lines that begin there, and those that end there.
+  // Rings by candidate: the lines that begin there, and those that end there.
   std::vector<Lines> lines_;
   std::vector<std::vector<Lines*>> ending_;
-  // Of the candidate that is being searched.
+  // For the candidate being searched:
   std::vector<std::size_t> tried_;
   std::vector<Option> options_;
   std::vector<Choice> kept_;

@@ -11,14 +11,14 @@
 
 namespace unflex::emit {
 
-// Where the lines of a run end, and when; the first entry is where and when the first one begins.
+// Where and when the lines of a run end. The first entry is where and when the first line begins.
 struct Polygon {
   std::vector<double> times_s;
   std::vector<double> x_mm;
   std::vector<double> y_mm;
 };
 
-// What a nozzle that is off by e counts at one moment: eᵀWe.
+// The weight W of an error e of the nozzle at one moment: eᵀWe.
 struct ErrorWeight {
   double xx = 1.0;
   double xy = 0.0;
@@ -27,23 +27,23 @@ struct ErrorWeight {
   bool operator==(const ErrorWeight&) const = default;
 };
 
-// What a run begins and ends with.
+// The two ends of a run.
 struct RunEnds {
   double start_x_mm = 0.0;
   double start_y_mm = 0.0;
   double end_x_mm = 0.0;
   double end_y_mm = 0.0;
   std::vector<double> lines_before_s = {};  // when the lines before it began, in order, before 0
-  int lines_after = 0;                      // how many begin within rules.burst_s after it
-  bool goes_on = false;                     // it begins in motion
-  // When it ends in motion; the base is given further.
+  int lines_after = 0;   // how many lines begin within rules.burst_s after the run
+  bool goes_on = false;  // the run begins in motion
+  // Set if the run ends in motion: when it ends. The base is given beyond that.
   std::optional<double> until_s = {};
 };
 
-// The lines of at least rules.min_steps of `x` or `y` that make the nozzle follow the base best: a
-// line may be longer or end a few steps further along the path if that brings its end closer to
-// whole steps across it. Only short lines lie across one of the `wanted` times; the last line may
-// end before the base does. Empty if there is no such line.
+// The lines of at least rules.min_steps of `x` or `y` that make the nozzle follow the base best. A
+// line may be longer or end a few steps further along the path, if that brings its end closer to
+// whole steps across it. Only short lines lie across one of the `wanted` times. The last line may
+// end before the base does. Returns an empty polygon if there are no such lines.
 [[nodiscard]] Polygon step_path(const dynamics::BaseTrajectory& base,
                                 const std::vector<double>& wanted,
                                 const std::function<ErrorWeight(double)>& weight,

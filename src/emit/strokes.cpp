@@ -23,11 +23,11 @@ using gcode::X;
 using gcode::Y;
 using gcode::Z;
 
-// Rounding to a grid as coarse as this is what limits accuracy.
+// On a grid this coarse, rounding is what limits accuracy.
 constexpr double kCoarse_mm = 1e-3;
 
-// Moments at which a line should end: lines that stand between moves, changes of filament per mm,
-// the ends of motion. In order.
+// Moments at which a line should end, in order: where other lines stand between moves, where
+// filament per mm changes, and where the motion begins and ends.
 std::vector<double> wanted_times(const Run& run, const Timetable& table,
                                  const std::vector<double>& event_times_s) {
   std::vector<double> wanted;
@@ -47,8 +47,9 @@ std::vector<double> wanted_times(const Run& run, const Timetable& table,
   return wanted;
 }
 
-// Those of them that have lines between them, none of which must be so long that speed changes too
-// much from it to the next, and the ends of the run.
+// The wanted times at which a line can end, and the ends of the run. A wanted time is left out if
+// the lines before or behind it would be too short, or so long that speed changes too much from one
+// to the next.
 std::vector<double> required_times(const Run& run, const std::vector<double>& wanted,
                                    const LineRules& rules) {
   const double end = run.end_s();
@@ -65,7 +66,7 @@ std::vector<double> required_times(const Run& run, const std::vector<double>& wa
   return times;
 }
 
-// Where the file's own moves take the machine, which the firmware may round.
+// Where the file's own moves take the machine. The firmware may round that place.
 gcode::Position end_of_moves(const Run& run) {
   for (auto event = run.events->rbegin(); event != run.events->rend(); ++event) {
     if (!event->segments.empty()) {
@@ -97,10 +98,10 @@ gcode::Position start_of(const Run& run) {
   return run.moves->front().segment.start_mm;
 }
 
-// What the run's lines have laid at time t: what belongs to the place where the nozzle is, and all
-// of it once the moves have ended, for a tail lays none. The filament that the firmware is behind
-// by comes with the run's first line, laid or drawn back, so that much of the first move's is none
-// of theirs.
+// The filament that the run's lines have laid at time t: what belongs to the place where the nozzle
+// is. Once the moves have ended it is all of their filament, since a tail lays none. Marlin may
+// still owe filament of a move it skipped (`behind_mm`). The first line lays it, or draws it back,
+// so we subtract it from the first move.
 double filament_of_lines(const NozzleProgress& nozzle, const Timetable& table, double all_mm,
                          double behind_mm, double t) {
   if (table.tail_at(t)) {
@@ -120,7 +121,8 @@ gcode::Position start_position(const Run& run, const Grid& grid) {
   return start;
 }
 
-// Whether the firmware moves for such a line, and not only with the next one.
+// Whether the line is long enough for the firmware to move at once, and not only with the next
+// line.
 bool goes_through(const Stroke& from, const Stroke& to, const Grid& grid, const LineRules& rules) {
   const double steps = std::max(std::abs(to.x_mm - from.x_mm) / grid.x.step_mm,
                                 std::abs(to.y_mm - from.y_mm) / grid.y.step_mm);
@@ -140,8 +142,8 @@ bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const Line
          rules.max_speed_step_mm_s;
 }
 
-// Across a path that is drawn errors count most, along it they only shift time; where nothing is
-// drawn they count as what they leave behind.
+// Across a drawn path errors count most; along it they only shift time. Where nothing is drawn,
+// errors matter only by what they leave behind for later.
 ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
   constexpr double kAlong = 0.001;
   constexpr double kTravel = 0.02;
@@ -156,8 +158,8 @@ ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
   return {kAlong + kAcross * nx * nx, kAcross * nx * ny, kAlong + kAcross * ny * ny};
 }
 
-// What each axis may change its speed by. Of motors that move both, each has what the base itself
-// needs where lines join, and half of what is left.
+// The largest changes of speed of each axis. If motors move both axes, each axis gets what the base
+// itself needs where lines join, and half of what is left.
 std::pair<SpeedSteps, SpeedSteps> speed_steps(const dynamics::BaseTrajectory& base,
                                               const std::vector<double>& times, const Ends& ends,
                                               const LineRules& rules) {
@@ -224,13 +226,14 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
           std::move(vertices.second.position_mm)};
 }
 
-// How much of its change of Z a line bears: it must not be steep by it, nor slow, as Z has limits
-// of its own that a run leaves as they are. The rest waits for other lines, as long as nobody sees
-// that. `before` and `after` are what the lines there go at.
+// How much of its change of Z a line can take. The line must not become steep, nor slow: Z has
+// limits of its own, which a run leaves as they are. The rest waits for other lines, as long as it
+// is too small to be seen. `before` and `after` are the velocities of the neighbouring lines.
 double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& before,
                       const VelocityXY& after, const Grid& grid, const EmitOptions& options) {
   constexpr double kUnseen_mm = 0.01;
-  // Of the line's time, for ramps: F makes up for them, and so changes more than speed does.
+  // Share of the line's time that ramps may take. F makes up for them, so F changes more than the
+  // speed does.
   constexpr double kRamps = 0.03;
   const double length = std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
   const double dz = to.z_mm - from.z_mm;
@@ -238,7 +241,7 @@ double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& be
   if (std::abs(dz) < kUnseen_mm) {
     const double duration_s = to.end_s - from.end_s;
     const VelocityXY own = velocity_mm_s(from, to);
-    // Where the path bends a line has to slow down as if it had a ramp.
+    // Where the path bends, a line has to slow down as if it had a ramp.
     const auto change_mm_s = [&](const VelocityXY& other) {
       return std::hypot(own[0] - other[0], own[1] - other[1]);
     };
@@ -253,8 +256,8 @@ double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& be
   return std::copysign(std::floor(most / grid.z.step_mm) * grid.z.step_mm, dz);
 }
 
-// The run ends at its height: what its last line cannot bear of the change, those before it take.
-// `after`: what comes behind.
+// The run must end at its height. What the last line cannot take of the change of Z, the lines
+// before it take. `after`: the velocity behind the last line.
 void climb_in_time(const Stroke& start, VelocityXY after, const Grid& grid,
                    const EmitOptions& options, std::vector<Stroke>& strokes) {
   for (std::size_t i = strokes.size(); i-- > 1;) {
@@ -270,7 +273,7 @@ void climb_in_time(const Stroke& start, VelocityXY after, const Grid& grid,
   }
 }
 
-// How fast, and in which direction, a part of a run begins and ends.
+// The velocity with which a part of a run begins and ends.
 Passing passing(const Run& run) {
   const auto velocity = [&](double t) -> std::optional<std::array<double, 2>> {
     constexpr double kMoves_mm_s = 0.1;
@@ -332,7 +335,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const double file_start_e_mm = start_of(run)[gcode::E];
   const double behind_mm = file_start_e_mm - start[gcode::E];
   const double all_mm = end[gcode::E] - file_start_e_mm;
-  std::size_t laying = 0;  // lines that lay the run's filament; the tail's come after them
+  std::size_t laying = 0;  // lines that lay the run's filament; lines of the tail come after them
   Stroke last{0.0, start[X], start[Y], start[Z]};
   double dropped_s = times.front();
   std::size_t event = 0;

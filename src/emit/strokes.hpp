@@ -31,18 +31,19 @@ struct Grid {
   double speed_factor = 1.0;  // M220 when the run begins
 };
 
-// Where in X and Y the first line of the run begins.
+// The X and Y where the first line of the run begins.
 [[nodiscard]] std::array<double, 2> start_of_lines(const Run& run, const Grid& grid);
 
 // The strokes of a run. Positions lie on the grid, but a run's last one is exactly where the last
-// move ends. Strokes that would have no length after rounding are merged into their successor, at
-// the ends of the run dropped. Empty when nothing is left.
+// move ends. A stroke that would have no length after rounding is merged into its successor; at the
+// ends of the run it is dropped. Empty when nothing is left.
 [[nodiscard]] std::vector<Stroke> strokes(const Run& run, const Grid& grid,
                                           const EmitOptions& options);
 
-// Moves the end of a stroke that has no length by as much as the firmware needs to move for it:
-// along the axis that the next stroke turns to, towards that one's end, or away from it where the
-// axis' travel ends.
+// Gives a length to a stroke that has none: moves its end by the least distance that the firmware
+// takes for a move (rules.min_steps). It moves along X or Y, whichever changes more on the way to
+// the end of `next`, and towards that end. If that leaves the axis's travel, it moves the opposite
+// way.
 void give_length(const Stroke& next, const Grid& grid, const LineRules& rules, Stroke& stroke);
 
 // Gives them new speeds, for another Run::late_s.

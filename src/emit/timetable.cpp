@@ -69,7 +69,7 @@ bool Timetable::filament_changes(std::size_t i) const {
     return (*run_->moves)[move].segment.delta(E) < 0.0;
   };
   if (pulls_back(i - 1) && pulls_back(i)) {
-    return false;  // nothing is drawn: where along a wipe it happens does not matter
+    return false;  // nothing is drawn, so it does not matter where along a wipe it happens
   }
   const double t = starts_s_[i];
   const double speed =

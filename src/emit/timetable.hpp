@@ -23,25 +23,25 @@ class Timetable {
   // Whether the moves have ended at time t.
   [[nodiscard]] bool tail_at(double t) const;
 
-  // Z at time t: each move's share of it is spread along the base's path while the move lasts,
-  // which keeps the slope small where the base is slower than the plan.
+  // Z at time t. Each move's change of Z is spread along the base's path while the move lasts. This
+  // keeps the slope small where the base is slower than the plan.
   [[nodiscard]] double height_mm(double t) const;
 
   // Whether filament per mm changes so much at the boundary before move i that a line across it
   // would give either move too much or too little.
   [[nodiscard]] bool filament_changes(std::size_t i) const;
 
-  // For each event the time it stands at: the end of the moves before it.
+  // The time at which each event stands: the end of the moves before it.
   [[nodiscard]] std::vector<double> event_times_s() const;
   [[nodiscard]] const std::vector<double>& starts_s() const { return starts_s_; }
 
  private:
-  // Of move i, along the base's path.
+  // Filament of move i per mm of the base's path.
   [[nodiscard]] double filament_per_mm(std::size_t i) const;
   [[nodiscard]] double travelled_mm(double t) const;
 
   const Run* run_;
-  std::vector<double> starts_s_;      // of each move, and the end of the last
+  std::vector<double> starts_s_;      // when each move starts, and when the last one ends
   std::vector<double> travelled_mm_;  // length of the base's path at the nodes
 };
 

@@ -12,12 +12,12 @@
 // from the beginning on. Each is put on the grid before the next one is chosen, so that those to
 // come make up for its rounding.
 //
-// The change of speed v_k − v_{k−1} = u + c_k − c_{k−1} has bounds, and so has the one behind the
-// last line, which g there decides. Where the law above goes beyond them, u is drawn to w, which is
-// within them, by ρ/2 (u − w + λ)², and w to u in turn, the last g in the same way; the gains stay
-// what they are (O'Donoghue, Stathopoulos & Boyd, A splitting method for optimal control, IEEE
-// Trans. Control Syst. Technol. 21, 2013). Where a bound is still broken by more than a
-// little, the vertices stay on the curve.
+// The change of speed v_k − v_{k−1} = u + c_k − c_{k−1} has bounds. So has the change behind the
+// last line, which depends on the last g. Where the law above breaks them, bounds are kept by ADMM:
+// w is the nearest value within the bounds, λ the scaled dual, and ρ/2 (u − w + λ)² is added to the
+// cost. The last g is treated like a u. The gains stay what they are (O'Donoghue, Stathopoulos &
+// Boyd, A splitting method for optimal control, IEEE Trans. Control Syst. Technol. 21, 2013). Where
+// a bound is still broken by more than a little, the vertices stay on the curve.
 #include "vertices.hpp"
 
 #include <Eigen/Core>
@@ -37,14 +37,14 @@ using dynamics::FlexibleAxis;
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 
-// What the last vertex is away from the base costs against e² over a second: it is the base's own.
+// Weight of the last vertex's distance from the base, against e² over a second: that vertex is to
+// be the base's own.
 constexpr double kAtEnd = 1e3;
-// Of the splitting: its rounds at most, the change at which it ends, and ρ against what u costs
-// without.
+// ADMM: the most rounds, the change at which it ends, and ρ as a share of what u costs without it.
 constexpr int kMostRounds = 200;
 constexpr double kSettled_mm_s = 0.02;
 constexpr double kPull = 0.3;
-// By how much of its bounds a change of speed may exceed them: the splitting ends a little outside,
+// A change of speed may exceed its bounds by this share of their width: ADMM ends a little outside,
 // and the last line, which ends where the base does, takes what is left.
 constexpr double kOfBounds = 0.02;
 
@@ -53,7 +53,7 @@ struct Bounds {
   double most = 0.0;
 
   [[nodiscard]] double nearest(double value) const { return std::clamp(value, least, most); }
-  // Nearly, as far as anyone can tell within the rounding.
+  // Whether the value keeps the bounds, but for kOfBounds of their width and the rounding.
   [[nodiscard]] bool hold(double value, double rounding) const {
     const double room = kOfBounds * (most - least) + rounding;
     return value >= least - room && value <= most + room;
@@ -69,15 +69,15 @@ struct Stage {
   double duration_s = 0.0;
   double chord_mm_s = 0.0;
   Bounds bounds;  // of u
-  // The law u = feedback · z + feed_forward, and what it is found by.
+  // The law u = feedback · z + feed_forward, and what is needed to find it.
   Eigen::RowVector4d feedback = Eigen::RowVector4d::Zero();
   double feed_forward = 0.0;
   double curvature = 0.0;          // of the cost along u
-  Vector5 pull = Vector5::Zero();  // the cost's slope but for that of the cost to go and of w
+  Vector5 pull = Vector5::Zero();  // the cost's slope without the cost to go and w
   double target = 0.0;             // w − λ
 };
 
-// What is behind the last line.
+// The cost and the bounds at the end of the last line.
 struct Ending {
   Eigen::Matrix4d cost = Eigen::Matrix4d::Zero();
   Bounds bounds;        // of the last g
@@ -90,14 +90,14 @@ Stage stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed,
   const int steps = static_cast<int>(std::lround(duration / step.dt()));
   const double b0 = (base.*axis)(from).position_mm;
   const double slope = ((base.*axis)(to).position_mm - b0) / duration;
-  // First in terms of where the line begins and ends, (y, o_k, o_{k+1}).
+  // First by where the line begins and ends, (y, o_k, o_{k+1}).
   Eigen::Matrix4d cost = Eigen::Matrix4d::Zero();
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
   const auto add_square = [&](const Eigen::RowVector4d& row, double value, double weight) {
     cost += weight * row.transpose() * row;
     gradient += weight * value * row.transpose();
   };
-  // The nozzle's answer to them, and to the chord alone.
+  // The nozzle's answer to these, and to the chord alone.
   Eigen::Matrix<double, 2, 4> answer = Eigen::Matrix<double, 2, 4>::Zero();
   answer.leftCols<2>().setIdentity();
   Eigen::Vector2d chord = followed.at(from) - Eigen::Vector2d(b0, 0.0);
@@ -146,7 +146,7 @@ void set_feedback(const Ending& ending, double rho, std::vector<Stage>& stages) 
   }
 }
 
-// … and their feed-forward, once the feedback is set.
+// Sets the feed-forward of all laws, once the feedback is set.
 void set_feed_forward(const Ending& ending, double rho, std::vector<Stage>& stages) {
   Eigen::Vector4d to_go{0.0, 0.0, 0.0, -rho * ending.target};
   for (std::size_t k = stages.size(); k-- > 0;) {
@@ -158,7 +158,7 @@ void set_feed_forward(const Ending& ending, double rho, std::vector<Stage>& stag
   }
 }
 
-// Calls use(k, u) for each line with what its law says, off the grid. The last g.
+// Calls use(k, u) for each line with the u of its law, off the grid. Returns the last g.
 template <typename Use>
 double apply_laws(const std::vector<Stage>& stages, Use use) {
   Eigen::Vector4d z = Eigen::Vector4d::Zero();
@@ -173,7 +173,7 @@ double apply_laws(const std::vector<Stage>& stages, Use use) {
   return z[3];
 }
 
-// The median.
+// The median of the lines' curvatures.
 double middle_curvature(const std::vector<Stage>& stages) {
   std::vector<double> curvatures;
   for (const Stage& line : stages) {
@@ -184,14 +184,15 @@ double middle_curvature(const std::vector<Stage>& stages) {
   return *middle;
 }
 
-// w of one bounded quantity, and its λ.
+// w and λ of one bounded quantity, which is a u or the last g.
 struct Drawn {
   double w = 0.0;
   double lambda = 0.0;
 
   [[nodiscard]] double target() const { return w - lambda; }
 
-  // One round for what it has become; by how much that changes it.
+  // One round of ADMM, for the new value of the quantity. Returns the larger of the change of w and
+  // the distance between value and w.
   double draw(double value, const Bounds& bounds) {
     const double before = w;
     w = bounds.nearest(value + lambda);
@@ -200,7 +201,7 @@ struct Drawn {
   }
 };
 
-// Sets the laws of all lines so that what they say lies within the bounds, nearly.
+// Sets the laws of all lines so that each u lies within its bounds, nearly.
 void regulate(Ending& ending, std::vector<Stage>& stages) {
   set_feedback(ending, 0.0, stages);
   set_feed_forward(ending, 0.0, stages);
@@ -234,7 +235,7 @@ void regulate(Ending& ending, std::vector<Stage>& stages) {
   }
 }
 
-// `reach`, and as far as the base itself goes.
+// `reach`, widened to where the base itself goes.
 Reach with_base(Reach reach, const BaseTrajectory& base, AxisAt axis) {
   for (std::size_t k = 0; k < base.nodes(); ++k) {
     const double at = (base.*axis)(static_cast<double>(k) * base.period_s).position_mm;
@@ -244,20 +245,20 @@ Reach with_base(Reach reach, const BaseTrajectory& base, AxisAt axis) {
   return reach;
 }
 
-// How fast the base is at a time at which it may rest.
+// The speed of the base at time t, or 0 where it rests.
 double speed_at(const BaseTrajectory& base, AxisAt axis, double t, bool rests) {
   return rests ? 0.0 : (base.*axis)(t).velocity_mm_s;
 }
 
-// Of a change of speed over middles_s, where the base's own is `own`. Where other lines are beyond
-// the join, half of the change is theirs.
+// The largest change of speed allowed at a join, over middles_s between the lines' middles. It is
+// at least the base's own change, `own`. If another part continues there, each side gets half.
 double most_change(double step_mm_s, double accel_mm_s2, double middles_s, bool shared,
                    double own) {
   const double both = std::min(step_mm_s, accel_mm_s2 * middles_s);
   return std::max(shared ? 0.5 * both : both, std::abs(own));
 }
 
-// What u may be, and the last g.
+// Sets the bounds of each u and of the last g.
 void set_bounds(const SpeedSteps& most, double before_mm_s, double after_mm_s, const Ends& ends,
                 std::vector<Stage>& stages, Ending& ending) {
   const auto accel = [&](std::size_t k) {
@@ -272,7 +273,7 @@ void set_bounds(const SpeedSteps& most, double before_mm_s, double after_mm_s, c
         most_change(most.step_mm_s, accel(k), middles_s, k == 0 && !ends.from_rest, own);
     line.bounds = {-step - own, step - own};
   }
-  // g = v − c, and v may be off the speed after it by a step.
+  // g = v − c, and v may differ from the speed behind it by one step.
   const Stage& last = stages.back();
   const double own = last.chord_mm_s - after_mm_s;
   const double step = most_change(most.step_mm_s, accel(stages.size() - 1), 0.5 * last.duration_s,
@@ -294,7 +295,7 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
   const BaseTrajectory& base = *base_;
   const AxisAt axis = axis_;
   const std::size_t lines = times.size() - 1;
-  std::map<std::int64_t, StepMatrix> steps;  // by length; few lengths are different
+  std::map<std::int64_t, StepMatrix> steps;  // by length; there are only a few lengths
   std::vector<Stage> stages;
   std::vector<double> on_curve = {(base.*axis)(0.0).position_mm};
   for (std::size_t k = 0; k < lines; ++k) {
@@ -314,8 +315,8 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
   ending.cost.topLeftCorner<2, 2>() = ring_down_square(nozzle_);
   ending.cost(2, 2) = kAtEnd;
   regulate(ending, stages);
-  // Follows the laws, or keeps to the curve; the last line takes what is left. Whether it can, and
-  // all others keep their bounds.
+  // Chooses the vertices by the laws, or on the curve. The last line takes what is left. Returns
+  // whether it and all other lines keep their bounds.
   const auto draw = [&](bool by_law, AxisVertices& result) {
     result = {{on_curve.front()}, {0.0}};
     Eigen::Vector4d z = Eigen::Vector4d::Zero();
@@ -325,8 +326,8 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
       double vertex = on_curve[k + 1];
       if (k + 1 < lines) {
         if (by_law) {
-          // Not held to the bounds one by one: the regulator knows nothing of that, and what it
-          // misses on one line would grow on the next ones.
+          // We do not clamp each change to its bounds. The regulator would not know of that, and
+          // what it misses on one line would grow on the next ones.
           const double change = line.feedback * z + line.feed_forward;
           vertex += z[2] + line.duration_s * (z[3] + change);
         }

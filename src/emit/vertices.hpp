@@ -11,7 +11,7 @@
 
 namespace unflex::emit {
 
-// Places that a vertex of one axis can have: offset + integer · step.
+// The places that a vertex of one axis can have: offset + integer · step.
 struct AxisGrid {
   double offset_mm = 0.0;
   double step_mm = 1e-4;
@@ -25,34 +25,35 @@ struct Ends {
   bool to_rest = true;
 };
 
-// How much an axis' speed may change where two lines join: by step_mm_s, and by accel_mm_s2 times
+// The most that an axis' speed may change where two lines join: step_mm_s, and accel_mm_s2 times
 // the time between the lines' middles.
 struct SpeedSteps {
   double step_mm_s = std::numeric_limits<double>::infinity();
   double accel_mm_s2 = std::numeric_limits<double>::infinity();
-  // By line, where it begins; empty: accel_mm_s2 everywhere.
+  // accel_mm_s2 for each line, at its begin. Empty: accel_mm_s2 everywhere.
   std::vector<double> accel_at_mm_s2 = {};
 };
 
 // One axis at the ends of the lines.
 struct AxisVertices {
   std::vector<double> position_mm;
-  // Where a nozzle that follows the polygon is then, minus where one that follows the base is.
+  // At each vertex: the nozzle that follows the polygon, minus the nozzle that follows the base.
   std::vector<double> nozzle_error_mm;
 };
 
-// Chooses the vertices of one axis of a run. On the base's curve they would not do: a chord lies
-// inside a curve, off by b̈T²/12 on average, and the nozzle follows that. So they are where they
-// make the nozzle follow the polygon as it would follow the base, rounding to the grid included.
+// Chooses the vertices of one axis of a run. Vertices on the base's curve would not do: a chord
+// lies inside the curve, off by b̈T²/12 on average, and the nozzle follows the chord. So we choose
+// them such that the nozzle follows the polygon as it would follow the base, rounding to the grid
+// included.
 class VertexChooser {
  public:
   VertexChooser(const dynamics::BaseTrajectory& base, AxisAt axis,
                 const dynamics::FlexibleAxis& nozzle);
 
-  // For lines that end at times[1], times[2] …; the first vertex and the last are the base's own,
-  // the others on the grid. None goes further out than `reach` or the base itself, and no change of
-  // speed, from line to line or to rest, exceeds `most` by more than a little, unless the base's
-  // own does.
+  // For lines that end at times[1], times[2] …. The first and the last vertex are the base's own,
+  // the others lie on the grid. No vertex goes further out than `reach` or the base itself. No
+  // change of speed, from line to line or to rest, exceeds `most` by more than a little, unless the
+  // base's own does.
   [[nodiscard]] AxisVertices choose(const std::vector<double>& times, const AxisGrid& grid,
                                     const Reach& reach, const SpeedSteps& most,
                                     Ends ends = {}) const;

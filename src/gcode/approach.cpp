@@ -1,4 +1,4 @@
-// Of a travel whose start is not certain: most of its way as a line of its own.
+// The approach: most of the way of a travel whose start is only assumed, as a line of its own.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,12 +9,12 @@
 namespace unflex::gcode {
 namespace {
 
-// What is left of the way: at 5000 mm/s² it takes 50 ms from rest to rest, two periods of a slow
-// printer, in which a base can take a nozzle's swing away.
+// The approach leaves this end of the way to the travel. At 5000 mm/s² this end takes 50 ms from
+// rest to rest: two periods of a slow printer, in which a base can take a nozzle's swing away.
 constexpr double kLeft_mm = 3.0;
-// … and the least part of a way that is made ahead.
+// The approach makes at least this share of the way.
 constexpr double kLeastShare = 0.1;
-// A way shorter than this is drawn as it stands.
+// A shorter travel gets no approach.
 constexpr double kShortest_mm = 0.1;
 constexpr int kDecimals = 4;
 constexpr int kDecimalsOfInches = 6;

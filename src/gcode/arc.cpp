@@ -8,8 +8,9 @@
 namespace unflex::gcode {
 namespace {
 
-// Klipper compares start and end exactly, after the angle has suffered from round-off, and so loses
-// some full circles; what the file asks for is the circle.
+// Within this distance start and end coincide, and the arc is a full circle. Klipper compares them
+// exactly, after round-off in the angle, and so loses some full circles. But the file asks for the
+// circle.
 constexpr double kClosedWithin_mm = 1e-9;
 
 double angle_travelled(const Arc& arc) {

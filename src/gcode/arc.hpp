@@ -17,17 +17,18 @@ struct Arc {
   bool clockwise = false;
 };
 
-// Where a piece ends.
+// The end of a piece.
 struct ArcPiece {
   std::array<double, 2> end_mm{};  // alpha, beta
-  double share = 1.0;              // of the travel along the normal and of the filament
+  // Share so far of the travel along the normal and of the filament.
+  double share = 1.0;
 };
 
-// A file of one line may not take the memory of millions.
+// Limits memory: one line must not fall into millions of pieces.
 inline constexpr double kMostArcPieces = 1e5;
 
-// The pieces in order; the last ends exactly at the arc's end. nullopt if the arc would fall into
-// more than kMostArcPieces, or than the firmware counts.
+// The pieces in order; the last ends exactly at the arc's end. nullopt if there would be more than
+// kMostArcPieces, or more than the firmware can count.
 using ArcPieces = std::optional<std::vector<ArcPiece>>;
 
 // Source: Klipper, klippy/extras/gcode_arcs.py, ArcSupport.planArc (after Marlin's plan_arc).
@@ -38,12 +39,12 @@ using ArcPieces = std::optional<std::vector<ArcPiece>>;
 
 // Source: Marlin 2.1.2, src/gcode/motion/G2_G3.cpp, plan_arc.
 //   ℓ  = ρ|φ|, length without the normal;  s = MAX_ARC_SEGMENT_MM, or v / ARC_SEGMENTS_PER_SEC
-//        within MIN_ARC_SEGMENT_MM and it
+//        clamped to [MIN_ARC_SEGMENT_MM, MAX_ARC_SEGMENT_MM]
 //   n₀ = max(⌊ℓ/s⌋, ⌈MIN_CIRCLE_SEGMENTS · |φ|/2π⌉)
 //   n  = ⌈ℓ/max⌉ if ℓ/n₀ > max, max(1, ⌊ℓ/min⌋) if ℓ/n₀ < min, else n₀
 // The radius vector is turned by sin θ ≈ θ − θ³/6, cos θ ≈ 1 − θ²/2, and computed afresh at every
 // N_ARC_CORRECTION-th piece. `circles` full turns come first, each an arc of its own.
-// Empty where Marlin leaves the arc out, as its angle is zero.
+// Empty if the angle is zero, since Marlin leaves such an arc out.
 [[nodiscard]] ArcPieces plan_marlin_arc(const Arc& arc, int circles, double feed_mm_s,
                                         const MarlinArcs& rules);
 
@@ -54,7 +55,7 @@ using ArcPieces = std::optional<std::vector<ArcPiece>>;
 
 // The centre of an arc of a given radius, as an offset from its start: the short way round for a
 // positive radius, the long way for a negative. A radius too small to reach the end becomes half
-// the chord. nullopt where start and end coincide, as they leave the centre open.
+// the chord. nullopt where start and end coincide, since any centre would then do.
 //
 // Source: Marlin, src/gcode/motion/G2_G3.cpp, GcodeSuite::G2_G3; RepRapFirmware's DoArcMove gives
 // the same, and refuses a radius that is too small by more than 1 %.

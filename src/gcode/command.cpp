@@ -62,7 +62,7 @@ class Parser {
   // The next character that is no blank, '\0' at the end.
   [[nodiscard]] char peek_past_blanks(std::size_t from) const;
   [[nodiscard]] bool checksum_follows(std::size_t star) const;
-  // T-1, no tool.
+  // Whether the line is T-1, which deselects the tool.
   [[nodiscard]] bool deselects_tool() const {
     return to_upper(peek()) == 'T' && line_.substr(cursor_ + 1, 1) == "-" &&
            is_digit(peek_past_blanks(cursor_ + 2));
@@ -178,7 +178,8 @@ void Parser::read_word() {
   command_.spelling.joined_letters |= is_letter(before) || before == '_';
   command_.spelling.exponent |= to_upper(line_[from]) == 'E' &&
                                 (is_digit(before) || before == '.') && !command_.words.empty();
-  // Filled in where it stays: copying what was written in parts just before stalls the processor.
+  // We fill the word where it stays. Copying it right after it was written in parts stalls the
+  // processor.
   Word& word = command_.words.emplace_back();
   word.letter = to_upper(line_[cursor_++]);
   skip_blanks();
@@ -281,8 +282,8 @@ bool Parser::checksum_follows(std::size_t star) const {
   return !rest.empty() && std::all_of(rest.begin(), rest.end(), is_digit);
 }
 
-// Free text and extended commands may hold a '*' of their own: there only a numbered line has a
-// checksum. Its place, npos without one.
+// Place of the checksum's '*', npos without one. Free text and extended commands may hold a '*' of
+// their own, so there only a numbered line has a checksum.
 std::size_t Parser::numbered_checksum() const {
   const std::size_t star = command_.line_number ? line_.rfind('*') : std::string_view::npos;
   const bool found = star != std::string_view::npos && star >= cursor_ && checksum_follows(star);
@@ -317,8 +318,8 @@ std::string_view Parser::take_digits() {
   return line_.substr(from, cursor_ - from);
 }
 
-// In an M-code that is text or an expression, and what comes next may be a word again; anything
-// else makes no sense.
+// Deals with characters that form no word. In an M-code they are text or an expression, and a word
+// may follow. In any other command they make the line malformed.
 void Parser::unreadable(std::size_t from) {
   if (command_.letter == 'M' && command_.number >= 0) {
     command_.spelling.other_text = true;

@@ -8,8 +8,9 @@
 namespace unflex::gcode {
 namespace {
 
-// An absolute E word that repeats the last one leaves a difference where that was approached in
-// five decimals. It pulls nothing back: a step of an extruder is fifty times as long.
+// An absolute E word that repeats the last one can leave a difference, if E was brought there in
+// five decimals. Such a difference pulls nothing back: a step of an extruder is fifty times as
+// long.
 constexpr double kFilamentRoundoff_mm = 2e-5;
 
 bool has_axis_word(const Command& command) {
@@ -50,7 +51,7 @@ bool compensable(const Event& event, Firmware firmware) {
 }
 
 bool names_position(std::string_view content) {
-  // Most lines without effect are comments: look before parsing.
+  // Most lines without effect are comments, so we look before we parse.
   const std::size_t first = content.find_first_not_of(" \t");
   return first != std::string_view::npos &&
          std::string_view("GgNn").find(content[first]) != std::string_view::npos &&

@@ -16,7 +16,8 @@
 namespace unflex::gcode {
 namespace {
 
-// A parameter's number; unlike a word's it may have an exponent ("ACCEL=1e5").
+// Reads the number of a parameter. Unlike the number of a word it may have an exponent
+// ("ACCEL=1e5").
 std::optional<double> parse_parameter_number(std::string_view text) {
   const std::size_t exponent = text.find_first_of("eE");
   if (exponent == std::string_view::npos || !parse_number(text.substr(0, exponent))) {
@@ -72,7 +73,7 @@ void Interpreter::extended(Event& event) {
     return gcode_offset(event);
   }
   if (name == "SAVE_GCODE_STATE") {
-    // The modes it keeps must be those the file means, not those of rewritten motion.
+    // The saved modes must be those of the file, not those of rewritten motion.
     saved_states_.insert_or_assign(state_name(command_), state_);
     event.kind = EventKind::border;
     return;
@@ -83,7 +84,7 @@ void Interpreter::extended(Event& event) {
   if (name == "SET_INPUT_SHAPER") {
     return input_shaper(event);
   }
-  // EXCLUDE_OBJECT may leave out all that follows of the object.
+  // EXCLUDE_OBJECT can cancel an object, so that the rest of it is left out.
   if (name == "EXCLUDE_OBJECT_START" || name == "EXCLUDE_OBJECT_END" || name == "EXCLUDE_OBJECT") {
     return object_label(event);
   }
@@ -104,7 +105,7 @@ void Interpreter::extended(Event& event) {
   }
 }
 
-// toolhead.py, cmd_SET_VELOCITY_LIMIT: one invalid value and nothing is set.
+// toolhead.py, cmd_SET_VELOCITY_LIMIT: if one value is invalid, nothing is set.
 void Interpreter::velocity_limit(Event& event) {
   const Parameter velocity = number_of(command_, "VELOCITY");
   const Parameter accel = number_of(command_, "ACCEL");
@@ -120,7 +121,8 @@ void Interpreter::velocity_limit(Event& event) {
     event.warnings.emplace_back("SET_VELOCITY_LIMIT with an invalid value is ignored");
     return;
   }
-  // From March 2024 to August 2025 it sets the ratio, unless that is given.
+  // From March 2024 to August 2025 ACCEL_TO_DECEL sets the cruise ratio, unless the line gives
+  // that.
   event.may_set_limits = to_decel.given && !cruise.given;
   if (velocity.given || accel.given || corner.given || cruise.given || to_decel.given) {
     event.kind = EventKind::limits;
@@ -165,9 +167,9 @@ void Interpreter::input_shaper(Event& event) {
 }
 
 // Klipper's extras/exclude_object.py, Marlin's gcode/feature/cancel/M486.cpp, RepRapFirmware's
-// GCodes5.cpp, ChangeToObject: none of them stops for it. But when the user has cancelled the
-// object, all motion in between is left out, and the next goes in one line from wherever the
-// machine then is.
+// GCodes5.cpp, ChangeToObject: no firmware stops at a label. But if the user has cancelled the
+// object, all its motion is left out, and the next move goes straight from where the machine then
+// is.
 void Interpreter::object_label(Event& event) {
   event.kind = EventKind::border;
   for (const Axis axis : {X, Y}) {
@@ -226,7 +228,7 @@ void Interpreter::retraction_settings(Event& event) {
   state_.retracted = false;
 }
 
-// gcode_move.py, cmd_SET_GCODE_OFFSET: the zero moves, the machine only with MOVE=1.
+// gcode_move.py, cmd_SET_GCODE_OFFSET: the zero moves; the machine moves only with MOVE=1.
 void Interpreter::gcode_offset(Event& event) {
   constexpr std::array<std::string_view, 4> kKeys = {"X", "Y", "Z", "E"};
   constexpr std::array<std::string_view, 4> kAdjustKeys = {"X_ADJUST", "Y_ADJUST", "Z_ADJUST",
@@ -269,7 +271,7 @@ void Interpreter::restore_state(Event& event) {
   state_.base_mm = state.base_mm;
   state_.base_mm[E] += state_.position_mm[E] - state.position_mm[E];
   for (const Axis axis : {X, Y, Z}) {
-    // A zero that was set at an unknown place lies nowhere on the bed that the other is told from.
+    // If one of the two zeros was set at an unknown place, their distance on the bed is unknown.
     const bool zero_known = state_.base_known[axis] && state.base_known[axis];
     state_.known[axis] = state_.known[axis] && zero_known;
     if (axis != Z) {

@@ -1,6 +1,5 @@
-// Which commands stop the machine: each firmware's rule. The lists are in klipper_commands.cpp,
-// marlin_commands.cpp and rrf_commands.cpp, that of codes unknown to all three in
-// foreign_commands.cpp.
+// Which commands stop the machine, for each firmware. The lists are in klipper_commands.cpp,
+// marlin_commands.cpp and rrf_commands.cpp. Codes unknown to all three are in foreign_commands.cpp.
 #pragma once
 
 #include <algorithm>
@@ -12,13 +11,13 @@
 namespace unflex::gcode {
 
 enum class Effect {
-  passive,  // takes effect at its place in the motion, or none; the motion goes on
+  passive,  // takes effect at its place in the motion or has none; the motion goes on
   stop,     // all motion is finished first; position and modes stay
   unknown,  // may move the machine or change its modes: homing, macros, tool changes
 };
 
-// "M118 A1 action:pause", "RESPOND TYPE=command MSG=action:pause": the host may move the machine,
-// and by the file's limits.
+// Whether the line asks the host to act ("M118 A1 action:pause", "RESPOND TYPE=command
+// MSG=action:pause"). The host may then move the machine, which must obey the file's limits.
 [[nodiscard]] inline bool asks_host_to_act(const Command& command) {
   return command.arguments.find("action:") != std::string_view::npos;
 }
@@ -26,13 +25,13 @@ enum class Effect {
 // What an M-code without a handler of its own does.
 [[nodiscard]] Effect m_code_effect(Firmware firmware, int number);
 
-// The same for an extended command of Klipper's; the name in upper case.
+// What an extended command of Klipper does. `name` is in upper case.
 [[nodiscard]] Effect extended_effect(std::string_view name);
 
 [[nodiscard]] Effect klipper_m_code_effect(int number);
 [[nodiscard]] Effect marlin_m_code_effect(int number);
 [[nodiscard]] Effect rrf_m_code_effect(int number);
-// What the firmwares answer "Unknown command" to.
+// What an M-code does that all three firmwares answer with "Unknown command".
 [[nodiscard]] Effect foreign_m_code_effect(int number);
 
 // What a code with a part behind the point (M201.2) does to Klipper.

@@ -1,6 +1,6 @@
-// What the firmwares share, and Klipper's modes and coordinates. Motion is in motion.cpp and
-// retraction.cpp, Klipper's extended commands are in extended.cpp, what is Marlin's and
-// RepRapFirmware's own in marlin.cpp and rrf.cpp, what becomes uncertain in uncertainty.cpp.
+// What the firmwares share, and Klipper's modes and coordinates. In other files are motion
+// (motion.cpp, retraction.cpp), Klipper's extended commands (extended.cpp), the commands of Marlin
+// and RepRapFirmware (marlin.cpp, rrf.cpp), and what becomes uncertain (uncertainty.cpp).
 #include "unflex/gcode/interpreter.hpp"
 
 #include <fmt/core.h>
@@ -20,11 +20,11 @@ namespace {
 constexpr std::array<char, 4> kAxisLetters = {'X', 'Y', 'Z', 'E'};
 constexpr double kMmPerInch = 25.4;
 constexpr double kSecondsPerMinute = 60.0;
-// Room for so many is kept from line to line.
+// An event keeps room for so many segments from line to line.
 constexpr std::size_t kKeptSegments = 4;
 
-// gcode.py, _process_commands: the line is split at runs of letters, and all that stands between
-// them, blanks, zeros and parentheses, belongs to the command's number or to a value.
+// gcode.py, _process_commands: Klipper splits the line at runs of letters. All that stands between
+// two runs (blanks, zeros, parentheses) belongs to the command's number or to a value.
 std::string_view klipper_misspelling(const Command& command) {
   const Spelling& spelling = command.spelling;
   const auto is_one_of = [&](char letter, std::initializer_list<int> numbers) {
@@ -44,7 +44,7 @@ std::string_view klipper_misspelling(const Command& command) {
   return may_matter ? "letters without a number between them, which are one word to Klipper" : "";
 }
 
-// "Xnan" names none.
+// Whether a word with a number names an axis beside X, Y, Z and E. ("Xnan" does not name A.)
 bool names_further_axis(const Command& command) {
   return std::ranges::any_of(command.words, [](const Word& word) {
     return word.value && std::string_view("ABCUVW").find(word.letter) != std::string_view::npos;
@@ -57,7 +57,7 @@ InterpreterOptions default_options(Firmware firmware) {
   InterpreterOptions options;
   options.firmware = firmware;
   if (firmware == Firmware::marlin) {
-    // Configuration_adv.h: FWRETRACT is off; the rest are its values where it is on.
+    // Configuration_adv.h: FWRETRACT is off. The other values apply where it is switched on.
     options.firmware_retraction = false;
     options.retract_length_mm = 3.0;
     options.retract_speed_mm_s = 45.0;
@@ -99,7 +99,7 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
 void Event::reset() {
   kind = EventKind::passive;
   if (segments.capacity() > kKeptSegments) {
-    segments = {};  // of an arc
+    segments = {};  // frees the storage of an arc
   }
   segments.clear();
   limits.reset();
@@ -174,7 +174,7 @@ void Interpreter::klipper_g_code(Event& event) {
     case 0:
     case 1:
       if (names_further_axis(command_)) {
-        return lose_position(event);  // steppers that MANUAL_STEPPER has made axes of
+        return lose_position(event);  // may be a stepper that MANUAL_STEPPER has made an axis
       }
       return linear_move(event);
     case 2:
@@ -259,7 +259,7 @@ void Interpreter::set_units(bool inches) {
   update_e_unit();
 }
 
-// Marlin's parser.h, axis_unit_factor: a volume is in cubic inches.
+// Marlin's parser.h, axis_unit_factor: after G20 a volume is in cubic inches.
 void Interpreter::update_e_unit() {
   const bool is_cube = options_.firmware == Firmware::marlin && state_.volumetric;
   state_.e_unit = is_cube ? state_.unit_mm * state_.unit_mm * state_.unit_mm : state_.unit_mm;
@@ -277,12 +277,12 @@ void Interpreter::dwell(Event& event) {
   event.dwell_s = pause_ms * kSecondsPerMs;
 }
 
-// Position values stay: what the axes read afterwards is the printer's configuration, not in the
-// text. Nor is where the axes are that a line does not name: Z is probed above some place of the
-// bed (Klipper's safe_z_home.py, Marlin's G28.cpp, home_z_safely, RepRapFirmware's homez.g), and X
-// and Y are homed with Z lifted. Homing takes the effect of G92 off an axis (Klipper's
-// gcode_move.py, _handle_home_rails_end; Marlin's motion.cpp, set_axis_is_at_home; RepRapFirmware's
-// G92 sets the very position that homing sets).
+// The position values stay, but count as unknown: the printer's configuration decides what the axes
+// read afterwards. Axes that the line does not name become unknown too: Z is probed above some
+// place of the bed (Klipper's safe_z_home.py, Marlin's G28.cpp, home_z_safely, RepRapFirmware's
+// homez.g), and X and Y are homed with Z lifted. Homing undoes the effect of G92 on an axis
+// (Klipper's gcode_move.py, _handle_home_rails_end; Marlin's motion.cpp, set_axis_is_at_home;
+// RepRapFirmware's G92 sets the very position that homing sets).
 void Interpreter::home(Event& event) {
   event.kind = EventKind::barrier;
   event.position_lost = true;
@@ -314,20 +314,20 @@ void Interpreter::set_position(Event& event) {
       const double scale = axis == E ? state_.filament_per_e_mm() : state_.unit_mm;
       const double reading = bare ? 0.0 : *command_.value(kAxisLetters[axis]);
       state_.base_mm[axis] = state_.position_mm[axis] - reading * scale;
-      // Of an unknown place, all that follows is told from here: it is counted as if the machine
-      // were where it was last.
+      // If the place is unknown, all that follows is relative to it. We count as if the machine
+      // were still at its last known position.
       state_.base_known[axis] = state_.base_known[axis] && (axis == E || state_.known[axis]);
       state_.known[axis] = true;
     }
   }
-  // Of the firmwares only RepRapFirmware stops for it; but rewritten motion must not reach across a
-  // change of the zero.
+  // Only RepRapFirmware stops at G92. But rewritten motion must not reach across a change of the
+  // zero.
   if (bare || named[X] || named[Y] || named[Z]) {
     event.kind = EventKind::barrier;
   }
 }
 
-// toolhead.py, cmd_M204: S, or the smaller of P and T; one of them alone is refused.
+// toolhead.py, cmd_M204: S, or the smaller of P and T. P or T alone is refused.
 void Interpreter::acceleration(Event& event) {
   for (const char letter : {'S', 'P', 'T'}) {
     if (command_.has(letter) && !(command_.value(letter).value_or(0.0) > 0.0)) {
@@ -363,15 +363,16 @@ void Interpreter::flow_factor(Event& event) {
   }
 }
 
-// The zero of E moves so that its reading stays (Klipper: gcode_move.py, cmd_M221).
+// Moves the zero of E so that the reading of E stays (Klipper: gcode_move.py, cmd_M221).
 void Interpreter::set_flow_factor(double factor) {
   const double reading = state_.e_reading();
   state_.flow_factor = factor;
   state_.base_mm[E] = state_.position_mm[E] - reading * state_.filament_factor();
 }
 
-// The tool in use keeps its place; another is reached by macros or moves of the firmware's own, and
-// has its own M221 (Marlin: flow_percentage; RepRapFirmware: extrusionFactors).
+// Selecting the tool in use changes nothing. Another tool is reached by macros or by moves of the
+// firmware itself, and has its own M221 (Marlin: flow_percentage; RepRapFirmware:
+// extrusionFactors).
 void Interpreter::select_tool(Event& event, int tool) {
   event.kind = EventKind::barrier;
   if (tool_ == tool) {
@@ -390,7 +391,7 @@ void Interpreter::select_tool(Event& event, int tool) {
   tool_ = tool;
 }
 
-// Another may be in use from here on.
+// From here on another tool may be in use.
 void Interpreter::lose_tool() {
   if (tool_) {
     flow_factors_[*tool_] = state_.flow_factor;
@@ -398,7 +399,7 @@ void Interpreter::lose_tool() {
   }
 }
 
-// Without a tool, of the one in use.
+// Sets M221 of a tool. Without `tool` it is the one in use.
 void Interpreter::set_flow_of(std::optional<double> tool, double factor) {
   const int in_use = tool_.value_or(0);
   const int number = tool ? to_int(*tool) : in_use;
@@ -409,7 +410,7 @@ void Interpreter::set_flow_of(std::optional<double> tool, double factor) {
   }
 }
 
-// The same for M200.
+// M200: moves the zero of E so that the reading of E stays.
 void Interpreter::set_volumetric(bool on, double filament_diameter_mm) {
   const double reading = state_.e_reading();
   state_.volumetric = on;
@@ -439,7 +440,7 @@ void Interpreter::axis_limits(Event& event, double scale, double least, AxisValu
   }
 }
 
-// M92. What the planner knows of steps stays its configuration's.
+// M92. The planner keeps the steps of its configuration, so a different value is warned of.
 void Interpreter::steps_per_mm(Event& event) {
   for (const Axis axis : {X, Y, Z, E}) {
     const char letter = kAxisLetters[axis];

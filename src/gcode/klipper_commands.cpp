@@ -12,17 +12,17 @@ namespace {
 // Handled without a stop:
 //   73 117 display_status.py; 104 140 heaters.py set_temperature; 105 report; 106 107 fan.py;
 //   110 115 118 gcode.py and respond.py; 114 gcode_move.py.
-// Not known to Klipper, which ignores them, and not usually taken over by macros. Beside those of
-// foreign_commands.cpp:
+// Not known to Klipper, which ignores them, and not usually defined as macros. More are in
+// foreign_commands.cpp.
 //   74 75 76 77 78 (job records), 92 (steps), 101 103 (extruder on and off, of Skeinforge's time),
 //   108, 113, 141 (chamber), 155 (reports), 200, 201 203 205 566 (limits), 207 208 209
 //   (retraction), 211 (end stops), 250 (contrast), 301 304 305 (PID), 302 (cold extrusion), 350
 //   (microsteps), 355 (light), 403 (MMU), 404 405 406 407 (filament width), 413 (power loss), 503,
 //   540, 555 (print area), 563 567 568 (tools of RepRapFirmware), 569 (drivers), 575 (serial), 591
 //   (filament sensor), 592 593 (extrusion, shaping), 620 621 (Bambu: filament change), 622 623
-//   (Bambu: a condition, so that what stands between always happens here), 624 625 (Bambu: labels),
+//   (Bambu: a condition; Klipper always runs the lines between), 624 625 (Bambu: labels),
 //   906 to 914 919 920 (drivers), 960 (Bambu: lights), 993 1015 (Bambu: detectors).
-// For those of limits Event::may_set_limits is set.
+// 201 203 205 566 also set Event::may_set_limits.
 constexpr std::array kPassiveCodes = {
     73,  74,  75,  76,  77,  78,  92,  101, 103, 104, 105, 106, 107, 108, 110, 113, 114, 115, 117,
     118, 140, 141, 155, 200, 201, 203, 205, 207, 208, 209, 211, 250, 301, 302, 304, 305, 350, 355,
@@ -30,20 +30,21 @@ constexpr std::array kPassiveCodes = {
     621, 622, 623, 624, 625, 906, 907, 908, 909, 910, 911, 912, 913, 914, 919, 920, 960, 993, 1015};
 
 // 17 motors on; 109 116 190 191 wait for temperatures; 119 end stops; 300 beep (a macro with a
-// pause in Klipper's own examples); 400 wait. Macros make of 126 127 (valves), 150 (light), 280
-// (servo), 412 (filament sensor), 420 (BED_MESH_PROFILE LOAD) and of 572 900 (SET_PRESSURE_ADVANCE)
-// what may stop.
+// pause in Klipper's own examples); 400 wait. The others are usually macros that may stop: 126 127
+// (valves), 150 (light), 280 (servo), 412 (filament sensor), 420 (BED_MESH_PROFILE LOAD), 572 900
+// (SET_PRESSURE_ADVANCE).
 constexpr std::array kStoppingCodes = {17,  109, 116, 119, 126, 127, 150, 190,
                                        191, 280, 300, 400, 412, 420, 572, 900};
 
-// With a part behind the point Klipper knows none of them (gcode.py takes M201.2 for a name), and
-// the codes themselves move nothing: 73 201 204 205 (Bambu: scales), 569 572 593 (drivers and
-// shaping of RepRapFirmware), 620 622 982 1002 1015 (Bambu), 862 (Prusa: printer check), 900.
+// Codes with a part behind the point. Klipper knows none of them (gcode.py takes M201.2 for a
+// name), and the codes themselves move nothing: 73 201 204 205 (Bambu: scales), 569 572 593
+// (drivers and shaping of RepRapFirmware), 620 622 982 1002 1015 (Bambu), 862 (Prusa: printer
+// check), 900.
 constexpr std::array kCodesWithPoint = {73,  201, 204, 205, 569, 572,  593,
                                         620, 622, 862, 900, 982, 1002, 1015};
 
 // UNFLEX_CHECKPOINT is the macro that unflex writes (docs/pausing.md). It does nothing unless a
-// pause is wanted, and after one position, limits and shaper are as before.
+// pause is wanted. After a pause, position, limits and shaper are as before.
 constexpr std::array<std::string_view, 23> kPassiveNames = {
     "ECHO",
     "EXCLUDE_OBJECT_DEFINE",
@@ -70,8 +71,8 @@ constexpr std::array<std::string_view, 23> kPassiveNames = {
     "UNFLEX_CHECKPOINT",
 };
 
-// Of SET_PRINT_STATS_INFO Mainsail's and Fluidd's macros make the pause that the user has asked for
-// at a layer.
+// Mainsail's and Fluidd's macros turn SET_PRINT_STATS_INFO into the pause that the user has asked
+// for at a layer.
 constexpr std::array<std::string_view, 9> kStoppingNames = {
     "DUMP_TMC",
     "INIT_TMC",

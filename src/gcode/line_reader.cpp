@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kBlockBytes = 256 * 1024;
 constexpr std::size_t kLongestLineBytes = 1024 * 1024;
 
-// By its byte order mark.
+// Recognises UTF-16 by its byte order mark.
 bool is_utf16(std::string_view text) {
   return text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff");
 }
@@ -40,7 +40,8 @@ bool Line::has_bare_return() const {
 LineReader::LineReader(std::istream& stream, std::string name)
     : stream_(&stream), name_(std::move(name)), block_(kBlockBytes) {}
 
-// With what the stream has: one that is still being written may long have no more.
+// Takes what the stream has now and does not wait for a full block: a stream that is still being
+// written may bring no more for a long time.
 void LineReader::fill_block() {
   cursor_ = 0;
   filled_ = 0;
@@ -48,7 +49,7 @@ void LineReader::fill_block() {
     filled_ = static_cast<std::size_t>(
         stream_->readsome(block_.data(), static_cast<std::streamsize>(block_.size())));
   }
-  // Looked for once instead of line by line.
+  // One search per block is faster than one per line.
   const std::string_view block(block_.data(), filled_);
   block_has_return_ = block.find('\r') != std::string_view::npos;
   block_has_nul_ = block.find('\0') != std::string_view::npos;

@@ -20,10 +20,11 @@ std::optional<double> whole(std::optional<double> value) {
   return value ? std::optional<double>(std::trunc(*value)) : std::nullopt;
 }
 
-// By a word of its own, not one of a second command that counts for nothing.
+// Whether an S word sets the power of a laser. Behind a second command, which counts for nothing, S
+// belongs to that command.
 bool sets_laser(const Command& command) { return command.has('S') && !command.has_any("GMT"); }
 
-// Why a line may mean something else to a Marlin as it is usually built; empty if not.
+// Why a Marlin as it is usually built may read the line differently; empty if it does not.
 std::string_view doubt(std::string_view content, const Command& command) {
   std::string_view code = content.substr(0, content.find(';'));
   const std::size_t parenthesis = code.find('(');
@@ -35,7 +36,7 @@ std::string_view doubt(std::string_view content, const Command& command) {
   if (command.letter == 'G') {
     code = code.substr(0, parenthesis);
   }
-  // Texts and names stand behind M and its number.
+  // In an M-code lower case matters only in M itself: texts and names may stand behind its number.
   const std::size_t first = code.find_first_not_of(" \t");
   const bool lower = command.letter == 'G' ? std::any_of(code.begin(), code.end(), is_lower)
                                            : first < code.size() && is_lower(code[first]);
@@ -102,7 +103,7 @@ void Interpreter::marlin_g_code(Event& event) {
       return marlin_dwell(event);
     case 10:
     case 11:
-      // G10 has no other meaning here; S1 is the long retraction of a tool change.
+      // In Marlin G10 has no other meaning; S1 is the long retraction of a tool change.
       return options_.firmware_retraction ? retraction_and_hop(event, command_.number == 10)
                                           : void();
     case 17:
@@ -123,7 +124,7 @@ void Interpreter::marlin_g_code(Event& event) {
       return;
     case 90:
     case 91:
-      // gcode.h, set_relative_mode: E too, until M82 or M83 says otherwise.
+      // gcode.h, set_relative_mode: sets the mode of E too, until M82 or M83 changes it.
       state_.absolute_xyz = state_.absolute_e = command_.number == 90;
       return;
     case 92:
@@ -185,8 +186,8 @@ void Interpreter::marlin_m_code(Event& event) {
   }
 }
 
-// motion/G0_G1.cpp. Under M209 a short move of E alone is the firmware's own retraction, and its
-// length is hidden from the planner.
+// motion/G0_G1.cpp. Under M209 a short move of E alone is replaced by firmware retraction. The
+// length in the line never reaches the planner.
 void Interpreter::marlin_linear_move(Event& event) {
   constexpr double kShortest_mm = 0.1;  // MIN_AUTORETRACT
   constexpr double kLongest_mm = 10.0;  // MAX_AUTORETRACT
@@ -211,7 +212,7 @@ void Interpreter::marlin_linear_move(Event& event) {
   retraction_and_hop(event, change < 0.0);
 }
 
-// motion/G4.cpp: S in seconds comes after P in milliseconds.
+// motion/G4.cpp: S in seconds is read after P in milliseconds, so S wins.
 void Interpreter::marlin_dwell(Event& event) {
   event.kind = EventKind::barrier;
   constexpr double kSecondsPerMs = 1e-3;
@@ -224,7 +225,7 @@ void Interpreter::marlin_dwell(Event& event) {
   event.dwell_s = pause_s;
 }
 
-// config/M200-M205.cpp, M204: S is P and T in one.
+// config/M200-M205.cpp, M204: S sets both P and T.
 void Interpreter::marlin_acceleration(Event& event) {
   const double unit = state_.unit_mm;
   LimitChange& limits = event.limits.edit();
@@ -235,7 +236,7 @@ void Interpreter::marlin_acceleration(Event& event) {
   limit(event, 'T', unit, kAboveZero, limits.travel_accel_mm_s2);
 }
 
-// config/M200-M205.cpp, M205. Whether J or the jerks count is a matter of how Marlin was built.
+// config/M200-M205.cpp, M205. The build of Marlin decides whether J or the jerks count.
 void Interpreter::marlin_advanced_settings(Event& event) {
   constexpr double kSecondsPerMicrosecond = 1e-6;
   constexpr double kLeastDeviation_mm = 0.01;
@@ -256,7 +257,8 @@ void Interpreter::marlin_advanced_settings(Event& event) {
   }
 }
 
-// config/M220.cpp: R, then B keeps what was before, then S.
+// config/M220.cpp: R restores the kept factor, then B keeps the factor from before the line, then S
+// sets a new one.
 void Interpreter::marlin_speed_factor(Event& event) {
   const double before = state_.speed_factor;
   if (command_.has('R')) {
@@ -284,7 +286,7 @@ void Interpreter::marlin_flow_factor(Event& event) {
   }
 }
 
-// config/M200-M205.cpp, M200: a diameter switches volumes on, D0 and S0 switch them off.
+// config/M200-M205.cpp, M200: a diameter makes E a volume, D0 and S0 make it a length.
 void Interpreter::marlin_volumetric(Event& event) {
   if (!command_.has_any("DS")) {
     return;
@@ -353,7 +355,7 @@ void Interpreter::marlin_fixed_time_motion(Event& event) {
 void Interpreter::marlin_pressure_advance(Event& event) {
   constexpr double kMost = 10.0;
   const std::optional<double> k = command_.value('K');
-  if (command_.has_any("LST")) {  // another extruder, or another of its two values
+  if (command_.has_any("LST")) {  // for another extruder, or for another of its two values
     event.kind = EventKind::barrier;
     state_.pressure_advance_s.reset();
     return;

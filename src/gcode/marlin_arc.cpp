@@ -1,5 +1,5 @@
-// Marlin computes with 32 bit floats; how many pieces an arc has can hang on their rounding, so the
-// count is computed in them. Places are computed in double.
+// Marlin computes with 32 bit floats. The number of an arc's pieces can depend on their rounding,
+// so it is computed in 32 bits here too. Places are computed in double.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -14,7 +14,7 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kMostPieces = 65535.0;  // uint16_t
 // NEAR_ZERO of Marlin's core/macros.h.
 constexpr double kSame_mm = 1e-6;
-// The angle of an arc that goes straight back to where it came from, seen in 32 bits.
+// A smaller angle counts as zero, as it would in 32 bits.
 constexpr double kNoAngle = 1e-7;
 
 bool is_closed(const Arc& arc) {
@@ -22,7 +22,7 @@ bool is_closed(const Arc& arc) {
          std::abs(arc.end_mm[1] - arc.start_mm[1]) < kSame_mm;
 }
 
-// With its sign: positive anticlockwise. 0: nothing to do.
+// Angle travelled, positive anticlockwise. 0: Marlin leaves the arc out.
 double angle_of(const Arc& arc) {
   if (is_closed(arc)) {
     return arc.clockwise ? -kTurn : kTurn;

@@ -1,7 +1,8 @@
 // Marlin 2.1.2, src/gcode/gcode.cpp, process_parsed_command, and each command's own file. Marlin
 // stops where a handler calls planner.synchronize(), or where it waits so long that the buffer runs
-// empty. A code no configuration knows is echoed as unknown and does nothing; but derived
-// firmwares give many of them a meaning, so only those are passive of which none moves anything.
+// empty. It echoes a code that no configuration knows as unknown and does nothing. But derived
+// firmwares give many of these codes a meaning, so a code is passive only if no such meaning moves
+// anything.
 #include <algorithm>
 #include <array>
 
@@ -18,8 +19,8 @@ namespace {
 //   way; 300 beep, from a queue; 301 302 304 305 309 heaters; 355 light; 380 381 solenoids; 403 404
 //   407; 412 413 414; 430; 503 504 settings are listed or checked; 510 511; 540 552 553 554 569
 //   575 603 672 710 851 871; 906 to 914 and 919 drivers; 7219.
-// Unknown to Marlin: 74, 555 (print area), 566 572 591 592 (RepRapFirmware's), 563
-// 567 568 (tools of RepRapFirmware); those of foreign_commands.cpp.
+// Unknown to Marlin: 74, 555 (print area), 566 572 591 592 (RepRapFirmware's), 563 567 568 (tools
+// of RepRapFirmware). More are in foreign_commands.cpp.
 constexpr std::array kPassiveCodes = {
     10,  11,  16,  20,  27,  31,  42,  73,  74,  75,  76,  77,  78,  85,  100, 102, 104, 105, 106,
     107, 108, 110, 111, 113, 114, 115, 117, 118, 119, 120, 121, 122, 123, 126, 127, 128, 129, 140,
@@ -29,9 +30,9 @@ constexpr std::array kPassiveCodes = {
     603, 672, 710, 851, 871, 906, 907, 908, 909, 910, 911, 912, 913, 914, 919, 7219};
 
 //   3 4 5 spindle or laser; 7 8 9 coolant; 12 closed loop; 17 motors on; 80 power on, waits; 109
-//   190 191 192 193 wait for temperatures; 303 tunes; 400 waits. Not 500, which keeps limits and
-//   shaper as they are, so that they must be the file's and no run's; nor 226, which waits for a
-//   pin: meanwhile the user may do anything.
+//   190 191 192 193 wait for temperatures; 303 tunes; 400 waits.
+// 500 is left out: it stores limits and shaper, which must be those of the file, not of a run. 226
+// is left out too: it waits for a pin, and meanwhile the user may do anything.
 constexpr std::array kStoppingCodes = {3,  4,   5,   7,   8,   9,   12,  17,
                                        80, 109, 190, 191, 192, 193, 303, 400};
 

@@ -13,19 +13,20 @@
 namespace unflex::gcode {
 namespace {
 
-// Below this Klipper takes a move for one that does not leave its place (toolhead.py, Move).
+// Klipper takes a shorter move for one that does not leave its place (toolhead.py, Move).
 constexpr double kShortestMove_mm = 1e-9;
 // No machine is a thousand kilometres long; beyond that a number is a mistake.
 constexpr double kLargestCoordinate_mm = 1e9;
 constexpr double kSecondsPerMinute = 60.0;
-// More than rounding to three digits does to an arc of any size.
+// Largest gap between an arc's end and its circle without a warning. Rounding to three digits
+// leaves a smaller gap on an arc of any size.
 constexpr double kLargestGap_mm = 0.1;
 
 // Where a motion line wants the machine to be.
 struct Target {
   Position position_mm{};
-  std::array<bool, 4> named{};  // axes the line names …
-  bool e_absolute = false;      // … E by its absolute reading
+  std::array<bool, 4> named{};  // axes that the line names
+  bool e_absolute = false;      // E words are absolute readings
   std::optional<double> feed;   // F word
   bool feed_is_none = false;
   const char* problem = nullptr;
@@ -48,8 +49,8 @@ std::optional<Axis> axis_of(char letter) {
   }
 }
 
-// What the firmware makes of a speed that is none: Klipper refuses the line (gcode_move.py,
-// cmd_G1), RepRapFirmware goes on at its minimum speed; Marlin does not mind.
+// What is wrong with a speed that is not above zero. Klipper refuses the line (gcode_move.py,
+// cmd_G1), RepRapFirmware goes on at its minimum speed. Marlin does not mind.
 const char* problem_of_feed(double feed, Firmware firmware) {
   if (feed > 0.0 || firmware == Firmware::marlin) {
     return nullptr;
@@ -58,9 +59,9 @@ const char* problem_of_feed(double feed, Firmware firmware) {
                                        : "F must be above zero, or the printer creeps";
 }
 
-// A line of several commands, or of one word twice, was hardly meant so. Klipper and Marlin take
-// the last of equal words and a second command for words without meaning; RepRapFirmware's reader
-// knows better.
+// A line with several commands, or with one word twice, was hardly meant so. Klipper and Marlin
+// take the last of equal words and ignore a second command. RepRapFirmware's lines of this kind are
+// dealt with in rrf.cpp.
 std::string_view oddity(const Command& command) {
   unsigned seen = 0;
   for (const Word& word : command.words) {
@@ -117,16 +118,16 @@ Target read_target(const Command& command, const ModalState& state, Firmware fir
   return target;
 }
 
-// Whether the text says where a motion to the target starts. A plane may be at any height as long
-// as the line does not leave it.
+// Whether the text says where a motion to the target starts. Z may be unknown if the motion is in
+// the XY plane and the line does not name Z.
 bool starts_known(const Target& target, const std::array<bool, 4>& known, bool in_xy_plane = true) {
   const bool e_known = known[E] || !target.named[E] || !target.e_absolute;
   const bool z_known = known[Z] || (in_xy_plane && !target.named[Z]);
   return known[X] && known[Y] && z_known && e_known;
 }
 
-// Once an axis has been sent to an absolute reading, its position is known. True if one was not
-// known before, so that the machine may have moved where the numbers show no motion.
+// Once an axis has been sent to an absolute reading, its position is known. True if it was unknown
+// for some axis. Then the machine may have moved although the numbers show no motion.
 bool settle(const Target& target, ModalState& state) {
   bool was_unknown = false;
   for (const Axis axis : {X, Y, Z, E}) {
@@ -150,7 +151,7 @@ struct ArcPlane {
   char beta_offset;
 };
 
-// Klipper takes X before Z; the others Z before X, as the right-hand rule has it.
+// In G18 Klipper takes X before Z. The other firmwares take Z before X, by the right-hand rule.
 ArcPlane arc_plane(int plane, Firmware firmware) {
   switch (plane) {
     case 18:
@@ -189,7 +190,7 @@ std::optional<std::array<double, 2>> centre_offset(const Command& command, const
   return offset;
 }
 
-// RepRapFirmware abandons the print where a radius misses the end by more than 1 %.
+// RepRapFirmware abandons the print if the radius is too small by more than 1 %.
 bool radius_reaches(const Command& command, double unit_mm, const Arc& arc) {
   const double radius_mm = command.value('R').value_or(0.0) * unit_mm;
   const double half_chord_mm =
@@ -219,7 +220,7 @@ double Segment::length_xy_mm() const { return length(delta(X), delta(Y), 0.0); }
 
 double Segment::length_mm() const { return length(delta(X), delta(Y), delta(Z)); }
 
-// RepRapFirmware: a relative E is no part of the reading that an absolute one is taken from
+// RepRapFirmware: relative E words do not change the reading that absolute ones refer to
 // (GCodes.cpp, LoadExtrusionAndFeedrateFromGCode, latestVirtualExtruderPosition).
 void Interpreter::keep_reading_of_e(bool e_absolute, double before_mm) {
   if (options_.firmware == Firmware::rrf && !e_absolute) {
@@ -347,8 +348,8 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
     for (const Axis axis : {X, Y, Z}) {
       segment.end_mm[axis] = segment.start_mm[axis];
     }
-    // Less is round-off between two ways to the same reading, not a move. (Klipper would stop for
-    // it.)
+    // A smaller change of E is round-off between two ways to the same reading, not a move. (Klipper
+    // would stop for it.)
     if (std::abs(segment.delta(E)) < kShortestMove_mm) {
       return;
     }

@@ -5,8 +5,8 @@
 
 namespace unflex::gcode {
 
-// Firmwares keep numbers in 32 bits. What is beyond them is a mistake and no number here, so that
-// nothing reckoned from it, however often, is infinite; what is next to nothing is nothing.
+// Firmwares keep numbers in 32 bits. A number beyond their range is a mistake and is refused, so
+// that nothing computed from it becomes infinite. A number next to zero counts as zero.
 [[nodiscard]] inline bool fits_printers(double value) {
   constexpr double kLargest = 1e10;
   return std::abs(value) <= kLargest;

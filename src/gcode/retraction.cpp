@@ -8,8 +8,8 @@ namespace unflex::gcode {
 namespace {
 
 constexpr double kSecondsPerMinute = 60.0;
-// The hop goes as fast as the planner lets Z: RepRapFirmware's ImpossiblyHighFeedRate, in Marlin
-// the limit of M203 itself.
+// The hop goes as fast as the planner lets Z. RepRapFirmware asks for ImpossiblyHighFeedRate,
+// Marlin for the limit of M203 itself.
 constexpr double kHopSpeed_mm_s = 10000.0;
 
 }  // namespace
@@ -30,7 +30,7 @@ void Interpreter::firmware_retraction(Event& event, bool retract) {
     return;
   }
   if (state_.retracted == retract) {
-    event.kind = EventKind::barrier;  // unless a macro has done what was there to be done
+    event.kind = EventKind::barrier;  // a macro may have changed the state, and then the line moves
     return;
   }
   state_.retracted = retract;
@@ -56,7 +56,7 @@ void Interpreter::firmware_retraction(Event& event, bool retract) {
 // lifted after the filament is drawn back and lowered before it is pushed on.
 void Interpreter::retraction_and_hop(Event& event, bool retract) {
   if (state_.retracted == retract) {
-    // Unless a macro has done what was there to be done, or the tool is another.
+    // A macro may have changed the state, or the tool may be another: then the line moves.
     event.kind = EventKind::barrier;
     return;
   }

@@ -13,7 +13,7 @@
 namespace unflex::gcode {
 namespace {
 
-// Of words that come twice RepRapFirmware takes the first.
+// Whether a word comes twice. RepRapFirmware takes the first one.
 bool repeats_a_word(const Command& command) {
   for (auto word = command.words.begin(); word != command.words.end(); ++word) {
     if (std::any_of(command.words.begin(), word,
@@ -41,7 +41,7 @@ bool sets_mode(const Code& code) {
                             : code.letter == 'M' && (code.number == 82 || code.number == 83);
 }
 
-// Commands that leave all modes but F as they are. G53 is for its line alone.
+// Commands that leave all modes but F as they are. G53 acts on its line alone.
 bool leaves_modes(const Code& code) {
   constexpr std::array kCodes = {0, 1, 2, 3, 4, 28, 53};
   return code.letter == 'G'
@@ -81,7 +81,8 @@ void Interpreter::rrf(Event& event, std::string_view content) {
   rrf_command(event);
 }
 
-// True if the line needs no more reading: a meta command, or part of a block that may not run.
+// True if the line needs no more reading: a meta command, or part of a block that may or may not
+// run.
 bool Interpreter::rrf_meta_line(Event& event, std::string_view content) {
   const MetaCommand meta = meta_command(content);
   if (command_.kind == CommandKind::none && meta == MetaCommand::none) {
@@ -100,7 +101,7 @@ bool Interpreter::rrf_meta_line(Event& event, std::string_view content) {
       lose_position(event);
       return true;
     case MetaCommand::harmless:
-      // What it reads must be what the file has set, not what a run has.
+      // The values it reads must be those that the file has set, not those of a run.
       if (reads_machine(content)) {
         lose_position(event);
       }
@@ -116,7 +117,7 @@ bool Interpreter::rrf_meta_line(Event& event, std::string_view content) {
 }
 
 void Interpreter::rrf_conditional_line(Event& event, std::string_view content) {
-  lose_tool();  // it may have been changed, or not
+  lose_tool();  // the line may or may not change the tool
   if (has_expression(content)) {
     rrf_expression(event);
     return lose_position(event);
@@ -124,7 +125,7 @@ void Interpreter::rrf_conditional_line(Event& event, std::string_view content) {
   maybe(event, &Interpreter::rrf_command, "a mode or a limit set under a condition");
 }
 
-// What is not evaluated here: harmless where the command is.
+// unflex does not evaluate expressions. The line is harmless if its command is harmless.
 void Interpreter::rrf_expression(Event& event) {
   const bool is_m = command_.kind == CommandKind::traditional && command_.letter == 'M';
   const bool is_g = command_.letter == 'G' && command_.number >= 0;
@@ -193,7 +194,7 @@ void Interpreter::rrf_as_meant(Event& event) {
 }
 
 // StringParser.cpp, FindParameters and FinishedCommand: a command ends where the next begins, and
-// each is carried out. Followed where all of them do no more than set modes.
+// each is carried out. unflex follows this only if all of them do no more than set modes.
 void Interpreter::rrf_several_commands(Event& event) {
   std::vector<Code> codes = {{command_.letter, command_.number}};
   for (const Word& word : command_.words) {
@@ -289,8 +290,8 @@ void Interpreter::rrf_m_code(Event& event) {
     case 109:
       return rrf_wait_for_heater(event);
     case 120:
-      // GCodeMachineState.cpp: what is pushed is kept, and E is a length from here on.
-      // As with Klipper's SAVE_GCODE_STATE, these must be the file's modes, not those of a run.
+      // GCodeMachineState.cpp: M120 saves the modes, and E is a length from here on. As with
+      // Klipper's SAVE_GCODE_STATE, the saved modes must be those of the file, not those of a run.
       event.kind = EventKind::barrier;
       pushed_states_.push_back(state_);
       return set_volumetric(false, state_.filament_diameter_mm);
@@ -371,7 +372,7 @@ void Interpreter::rrf_plane(Event& event) {
   }
 }
 
-// GCodes.cpp, DoDwell: S in seconds comes before P in milliseconds.
+// GCodes.cpp, DoDwell: S in seconds takes precedence over P in milliseconds.
 void Interpreter::rrf_dwell(Event& event) {
   event.kind = EventKind::barrier;
   constexpr double kSecondsPerMs = 1e-3;
@@ -380,8 +381,8 @@ void Interpreter::rrf_dwell(Event& event) {
   event.dwell_s = std::max(0.0, pause_s);
 }
 
-// GCodes2.cpp, M109: without a target nothing but the wait; where no tool is in use it selects one,
-// and that runs macros.
+// GCodes2.cpp, M109: without a target it only waits. With a target and no tool in use it selects a
+// tool, which runs macros.
 void Interpreter::rrf_wait_for_heater(Event& event) {
   event.kind = EventKind::barrier;
   if (command_.has_any("RS") && tool_.value_or(-1) < 0) {

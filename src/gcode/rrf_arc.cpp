@@ -15,7 +15,8 @@ constexpr double kMinSegment_mm = 0.02;
 constexpr double kMaxSegment_mm = 1.0;
 constexpr double kMaxSegmentsPerSecond = 200.0;
 
-// Positive whichever way round. A whole circle where start and end are the same 32 bit numbers.
+// Angle travelled, positive in either direction. A full circle if start and end are equal as 32 bit
+// numbers.
 double angle_of(const Arc& arc) {
   const auto same = [](double one, double other) {
     return static_cast<float>(one) == static_cast<float>(other);
@@ -31,7 +32,7 @@ double angle_of(const Arc& arc) {
   return angle < 0.0 ? angle + kTurn : angle;
 }
 
-// In 32 bits as in the firmware, for the sake of its rounding.
+// Computed in 32 bits as in the firmware, because the count can depend on rounding.
 double segment_count(double radius_mm, double angle, double feed_mm_s) {
   const auto radius = static_cast<float>(radius_mm);
   const float by_deviation = std::sqrt(8.0F * radius * static_cast<float>(kMaxDeviation_mm));

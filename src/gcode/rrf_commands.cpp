@@ -1,7 +1,8 @@
 // RepRapFirmware 3.5, src/GCodes/GCodes2.cpp, HandleMcode. It stops where a handler calls
-// LockCurrentMovementSystemAndWaitForStandstill or LockAllMovementSystemsAndWaitForStandstill; what
-// GCodeQueue.cpp, ShouldQueueMCode, names is tied to its place in the motion instead. A code it
-// does not know is looked for as a macro file of that name (TryMacroFile), which may do anything.
+// LockCurrentMovementSystemAndWaitForStandstill or LockAllMovementSystemsAndWaitForStandstill.
+// Codes that GCodeQueue.cpp, ShouldQueueMCode, names are tied to their place in the motion instead.
+// For a code it does not know, it looks for a macro file of that name (TryMacroFile), which may do
+// anything.
 #include <algorithm>
 #include <array>
 
@@ -23,8 +24,8 @@ constexpr std::array kPassiveCodes = {
     503, 540, 550, 551, 552, 553, 554, 555, 557, 558, 562, 564, 567, 568, 570, 571, 575, 576, 581,
     586, 587, 588, 589, 591, 592, 905, 911, 912, 929, 950, 951, 953, 955, 956, 957};
 
-//   17 motors on; 81 power off at the end; 116 waits for temperatures, as 109 190 191 do; 150 LEDs
-//   of some kinds; 302 cold extrusion; 350 microsteps; 400 waits; 505; 569 drivers (GCodes3.cpp);
+//   17 motors on; 81 power off at the end; 116 109 190 191 wait for temperatures; 150 LEDs of some
+//   kinds; 302 cold extrusion; 350 microsteps; 400 waits; 505; 569 drivers (GCodes3.cpp);
 //   572 pressure advance (Move.cpp); 574 end stops; 577 waits for an input; 595 the queue; 906 913
 //   917 currents; 915 stall detection; 918.
 constexpr std::array kStoppingCodes = {17,  81,  116, 150, 190, 191, 302, 350, 400, 505,

@@ -11,7 +11,7 @@ namespace {
 constexpr std::array<std::string_view, 5> kHarmless = {"echo", "global", "set", "skip", "var"};
 constexpr std::array<std::string_view, 4> kBlocks = {"elif", "else", "if", "while"};
 constexpr std::array<std::string_view, 3> kJumps = {"abort", "break", "continue"};
-// Of Slic3r's family, Cura, Simplify3D and IdeaMaker.
+// Labels of Slic3r's family, Cura, Simplify3D and IdeaMaker.
 constexpr std::array<std::string_view, 5> kObjectLabels = {"MESH", "PRINTING", "printing object",
                                                            "process", "stop printing object"};
 

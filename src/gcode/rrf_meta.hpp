@@ -8,7 +8,7 @@ namespace unflex::gcode {
 
 enum class MetaCommand {
   none,
-  harmless,  // var, global, set, echo, skip: neither motion nor modes
+  harmless,  // var, global, set, echo, skip: change neither motion nor modes
   block,     // if, elif, else, while: the lines indented below may run or not, or many times
   jump,      // break, continue, abort
 };
@@ -26,8 +26,8 @@ enum class MetaCommand {
 // state and tools.
 [[nodiscard]] bool reads_machine(std::string_view content);
 
-// GCodes3.cpp, ProcessWholeLineComment: a comment that begins or ends an object, so that motion up
-// to the next such comment is left out when the object has been cancelled.
+// GCodes3.cpp, ProcessWholeLineComment: a comment that begins or ends an object. If the object has
+// been cancelled, motion up to the next such comment is left out.
 [[nodiscard]] bool labels_object(std::string_view comment);
 
 }  // namespace unflex::gcode

@@ -9,7 +9,7 @@
 namespace unflex::gcode {
 namespace {
 
-// What the firmware does to a value that is too small.
+// The firmware raises a value that is too small to `least`.
 void raise(std::optional<double>& value, double least) {
   if (value) {
     value = std::max(least, *value);
@@ -34,8 +34,8 @@ void Interpreter::rrf_axis_acceleration(Event& event) {
   raise(event.limits.edit().axis_max_accel_mm_s2, kMinAccel_mm_s2);
 }
 
-// GCodes2.cpp, M203: mm/min, or mm/s with S1. That no axis is slower than I, be it set here or
-// before, is the planner's to know.
+// GCodes2.cpp, M203: mm/min, or mm/s with S1. No axis is slower than I, whether the line sets I or
+// an earlier one did. The planner sees to that.
 void Interpreter::rrf_max_velocity(Event& event) {
   const double scale = command_.value('S') == 1.0 ? 1.0 : 1.0 / 60.0;
   std::optional<double>& least = event.limits.edit().min_movement_velocity_mm_s;
@@ -57,7 +57,7 @@ void Interpreter::rrf_acceleration(Event& event) {
 }
 
 // GCodes2.cpp, M205 in mm/s, M566 in mm/min and with the policy P. From 3.6 on M205 sets the jerk
-// of prints, at most that of M566, which sets both (Movement/Move.cpp, SetInstantDv).
+// of prints, which is at most that of M566. M566 sets both (Movement/Move.cpp, SetInstantDv).
 void Interpreter::rrf_jerk(Event& event, double scale) {
   axis_limits(event, scale, 0.0, event.limits.edit().axis_jerk_mm_s);
   raise(event.limits.edit().axis_jerk_mm_s, kMinJerk_mm_s);
@@ -71,7 +71,7 @@ void Interpreter::rrf_jerk(Event& event, double scale) {
   }
 }
 
-// GCodes2.cpp, M220 and M221: one percent at least.
+// GCodes2.cpp, M220 and M221: a factor is at least one percent.
 void Interpreter::rrf_speed_factor(Event& event) {
   if (command_.value('S').value_or(0.0) >= 1.0) {
     state_.speed_factor = *command_.value('S') / 100.0;
@@ -99,7 +99,7 @@ void Interpreter::rrf_volumetric() {
   set_volumetric(is_volume, diameter_mm > 0.0 ? diameter_mm : state_.filament_diameter_mm);
 }
 
-// Tools/Tool.cpp, SetFirmwareRetraction. T comes after F, R after S.
+// Tools/Tool.cpp, SetFirmwareRetraction. T is read after F, and R after S.
 void Interpreter::rrf_retraction_settings(Event& event) {
   if (command_.value('P').value_or(tool_.value_or(0)) != tool_.value_or(0)) {
     return;

@@ -10,8 +10,8 @@
 namespace unflex::gcode {
 namespace {
 
-// The text of P, in quotes or not, without the characters RepRapFirmware leaves out of a name and
-// in lower case (StringParser::GetReducedString).
+// The text of P, in quotes or not, in lower case. Characters that RepRapFirmware ignores in a name
+// are left out (StringParser::GetReducedString).
 std::string shaper_name(std::string_view arguments) {
   std::string name;
   const std::size_t at = arguments.find_first_of("Pp");
@@ -54,9 +54,9 @@ void Interpreter::marlin_shaper(Event& event) {
   note_shaper(event);
 }
 
-// Movement/AxisShaper.cpp, AxisShaper::Configure. One shaper for both axes; all but L waits for the
-// end of all motion; without a type, a shaper that is off becomes "zvd", L or not. So L must not
-// stand in a run, where the shaper is off.
+// Movement/AxisShaper.cpp, AxisShaper::Configure. There is one shaper for both axes. All words but
+// L wait for the end of all motion. Without a type, a shaper that is off becomes "zvd", even if L
+// stands alone. So L must not stand in a run, where the shaper is off.
 void Interpreter::rrf_shaper(Event& event) {
   const bool has_type = command_.has('P');
   const bool sets = has_type || command_.value('F') || command_.value('S') || command_.value('L');

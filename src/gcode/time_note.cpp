@@ -17,10 +17,11 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-// Writes the duration that begins at text[i], scaled, and moves i behind it; false where none does.
+// Writes the duration that begins at text[i], scaled, and moves i behind it. False if none begins
+// there.
 using Duration = bool (*)(std::string_view text, std::size_t& i, double factor, std::string& out);
 
-// 2789 or 376.225026, with as many digits.
+// A number like 2789 or 376.225026. It keeps its count of decimals.
 bool number(std::string_view text, std::size_t& i, double factor, std::string& out) {
   std::size_t end = i;
   std::size_t decimals = 0;
@@ -46,7 +47,7 @@ bool number(std::string_view text, std::size_t& i, double factor, std::string& o
   return true;
 }
 
-// 1d 2h 3m 4s, from any unit on.
+// A duration like 1d 2h 3m 4s, which may begin with any unit.
 bool units(std::string_view text, std::size_t& i, double factor, std::string& out) {
   struct Unit {
     char name;
@@ -100,7 +101,7 @@ bool units(std::string_view text, std::size_t& i, double factor, std::string& ou
   return true;
 }
 
-// The text with what follows each of the places that `begins` finds scaled.
+// The text with a scaled duration at each place where `begins` is true.
 template <typename Begins>
 std::string scaled(std::string_view text, double factor, Duration duration, Begins begins) {
   std::string out;

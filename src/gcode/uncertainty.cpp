@@ -1,4 +1,4 @@
-// Lines that may do anything, or that may not be carried out: what is no longer known behind them.
+// What is no longer known behind lines that may do anything, or that may or may not be carried out.
 #include <fmt/core.h>
 #include <fmt/format.h>
 
@@ -9,8 +9,8 @@
 namespace unflex::gcode {
 namespace {
 
-// What a line that may not run must leave alone, or what follows is uncertain. F and places are not
-// among it: they are known again with the next word that gives them.
+// Whether the modes are equal. If a line that may or may not run changes one, what follows is
+// uncertain. F and places are not compared: the next word that gives them makes them known again.
 bool same_modes(const ModalState& a, const ModalState& b) {
   return a.absolute_xyz == b.absolute_xyz && a.absolute_e == b.absolute_e &&
          a.unit_mm == b.unit_mm && a.speed_factor == b.speed_factor &&
@@ -62,7 +62,7 @@ void Interpreter::lose_position(Event& event) {
   event.position_lost = true;
   state_.known.fill(false);
   assumed_.fill(false);
-  // Of another extruder, maybe.
+  // another extruder may be in use
   pressure_advance_on_.reset();
   state_.pressure_advance_s.reset();
   if (options_.firmware == Firmware::rrf) {

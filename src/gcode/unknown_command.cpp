@@ -12,12 +12,12 @@
 namespace unflex::gcode {
 namespace {
 
-// What the interpreters have handlers for, and what moves the machine or waits for the user by its
-// meaning, in every firmware that has it:
+// Codes that the interpreters handle, and codes that by their meaning move the machine or wait for
+// the user in every firmware that has them:
 //   G: 27 parks, 28 homes, 29 30 32 34 38 probe and level.
 constexpr std::array kKnownGCodes = {0,  1,  2,  3,  4,  10, 11, 17, 18, 19, 20, 21, 27, 28,
                                      29, 30, 32, 34, 38, 53, 60, 90, 91, 92, 93, 94, 392};
-//   M: 0 1 25 125 226 600 601 602 pauses, 2 24 32 112 524 of the print, 18 84 motors off, 48
+//   M: 0 1 25 125 226 600 601 602 pauses, 2 24 32 112 524 control the print, 18 84 motors off, 48
 //   probes, 500 501 502 settings, 701 702 filament.
 constexpr std::array kKnownMCodes = {0,   1,   2,   18,  24,  25,  32,  48,  82,  83,  84,  92,
                                      109, 112, 116, 120, 121, 125, 200, 201, 203, 204, 205, 207,

@@ -12,9 +12,9 @@ namespace {
 
 constexpr double kQuantile = 1.959964;
 
-// Mean of logarithms by their intervals; where they scatter more than those tell, the mean's
-// interval grows by as much (Birge, The Calculation of Errors by the Method of Least Squares,
-// 1932).
+// Mean of logarithms, weighted by their intervals. If the values scatter more than their intervals
+// tell, the interval of the mean grows by as much (Birge, The Calculation of Errors by the Method
+// of Least Squares, 1932).
 Estimate mean_of(const std::vector<Mode>& modes, Estimate Mode::*which) {
   double weights = 0.0;
   double sum = 0.0;
@@ -35,7 +35,7 @@ Estimate mean_of(const std::vector<Mode>& modes, Estimate Mode::*which) {
   return estimate_of(std::exp(mean), std::max(1.0, excess) / weights);
 }
 
-// Energy in the band in which resonances are.
+// How much an axis moved. Differences of neighbours favour the band in which resonances are.
 double motion(const std::vector<double>& samples) {
   double sum = 0.0;
   for (std::size_t i = 1; i < samples.size(); ++i) {
@@ -55,7 +55,7 @@ double motion(const DataSet& set, std::size_t axis) {
   return sum;
 }
 
-// Whether something is known of it.
+// Whether the value lies in a finite interval above 0.
 bool is_known(const Estimate& estimate) {
   return estimate.low > 0.0 && estimate.low <= estimate.value && estimate.value <= estimate.high &&
          std::isfinite(estimate.high);
@@ -87,7 +87,7 @@ Result<Mode> fit(const DataSet& set, Axis axis, const Sweep& sweep) {
   if (!mode) {
     return fail(mode.error().kind, {set.name, 0}, mode.error().message);
   }
-  // Not what a resonance looks like, whatever the numbers.
+  // Such numbers do not describe a resonance.
   if (!is_known(mode->freq_hz) || !is_known(mode->damping_ratio) ||
       !(mode->damping_ratio.value < 1.0)) {
     return fail(ErrorKind::input, {set.name, 0}, "no resonance can be made out in it");

@@ -44,7 +44,7 @@ std::optional<double> number_of(std::string_view text) {
 struct Table {
   std::vector<std::string> header;
   std::vector<Row> rows;
-  std::string last_line;  // of M956: "Rate 1344, overflows 0"
+  std::string last_line;  // last line of M956: "Rate 1344, overflows 0"
 };
 
 // Reads the first `columns` cells of each row.
@@ -203,7 +203,7 @@ class Parser {
     return std::vector{std::move(set)};
   }
 
-  // Klipper rounds frequencies to 0.1 Hz, so that the step has to come from all of them.
+  // Klipper rounds frequencies to 0.1 Hz, so the step has to come from all rows together.
   static double step_of(const std::vector<Row>& rows) {
     return (rows.back()[0] - rows.front()[0]) / static_cast<double>(rows.size() - 1);
   }
@@ -213,8 +213,8 @@ class Parser {
     if (!(step_hz > 0.0)) {
       return fail(ErrorKind::input, {file_, 0}, "its frequencies do not grow");
     }
-    // Klipper samples at no more than 4.5 kHz (icm20948.py), so its spectra end below 2.5 kHz. The
-    // grid begins at 0 Hz wherever the rows do, and must fit into memory.
+    // Klipper samples at no more than 4.5 kHz (icm20948.py), so its spectra end below 2.5 kHz. Our
+    // grid begins at 0 Hz wherever the rows begin, and must fit into memory.
     constexpr double kHighest_hz = 10e3;
     if (const double last_hz = table.rows.back()[0]; last_hz > kHighest_hz) {
       return fail(ErrorKind::input, {file_, 0},
@@ -229,7 +229,7 @@ class Parser {
       set.data = spectrum(table, step_hz, is_normalized, {1, 2, 3});
       return std::vector{std::move(set)};
     }
-    // The sum over all three axes, at each of several points.
+    // Each column is the sum over all three axes at one of several points.
     std::vector<DataSet> sets;
     for (std::size_t column = 1; column < columns; ++column) {
       DataSet set = set_of(fmt::format("{} ({})", file_, header_[column]));
@@ -241,8 +241,8 @@ class Parser {
 
   static Spectrum spectrum(const Table& table, double step_hz, bool is_normalized,
                            const std::array<std::size_t, 3>& columns) {
-    // Files of several points are interpolated to steps of 0.2 Hz from those of 2048 samples at
-    // 3200 Hz.
+    // Files of several points are interpolated to steps of 0.2 Hz. Their spectra were computed in
+    // the steps of 2048 samples at 3200 Hz, so we go back to these.
     constexpr double kWelchStep_hz = 3200.0 / 2048.0;
     const double first_hz = table.rows.front()[0];
     const double kept_hz = step_hz < 0.5 ? kWelchStep_hz : step_hz;

@@ -18,12 +18,12 @@ struct LeastSquares {
 };
 
 // Minimises Σ w (data − model(θ))² from a start by Levenberg's and Marquardt's method (Marquardt,
-// An Algorithm for Least-Squares Estimation of Nonlinear Parameters, 1963), derivatives by central
-// differences of 1e-5: parameters must be of the order of 1.
+// An Algorithm for Least-Squares Estimation of Nonlinear Parameters, 1963). Derivatives are central
+// differences of 1e-5, so parameters must be of the order of 1.
 [[nodiscard]] LeastSquares minimise(const Model& model, const Eigen::ArrayXd& data,
                                     const Eigen::ArrayXd& weights, Eigen::VectorXd start);
 
-// Covariance of the parameters that holds whatever the residuals' variances are, and where
+// Covariance of the parameters. It holds whatever the variances of the residuals are, also if
 // neighbours in blocks of `block` data go together (White, A Heteroskedasticity-Consistent
 // Covariance Matrix Estimator, Econometrica 1980, with clusters):
 //   (JᵀWJ)⁻¹ Σ_blocks g gᵀ (JᵀWJ)⁻¹,   g = Σ_block w r J.

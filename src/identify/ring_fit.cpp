@@ -1,7 +1,7 @@
 // Once the base is at rest the nozzle's acceleration is
 //   y(t) = e^(−ζωt) (a cos ω_d t + b sin ω_d t) + c,   ω_d = ω√(1−ζ²),
-// c being gravity. When that begins is not recorded: it is the earliest moment after the peak from
-// which on this fits about as well as from any later one.
+// c being gravity. The record does not say when the base comes to rest. We take the earliest moment
+// after the peak from which on this fits about as well as from any later one.
 #include "ring_fit.hpp"
 
 #include <Eigen/QR>
@@ -20,10 +20,10 @@ namespace {
 constexpr Eigen::Index kFewestSamples = 48;
 constexpr double kLowest_hz = 5.0;
 constexpr double kHighest_hz = 250.0;
-// What decays faster is over before it has swung to and fro.
+// A faster decay is over before the nozzle has swung to and fro.
 constexpr double kMostDamping = 0.4;
 
-// ln f, ln ζ, a, b, c.
+// The model; p is ln f, ln ζ, a, b, c.
 Eigen::ArrayXd ringing(const Eigen::ArrayXd& time_s, const Eigen::VectorXd& p) {
   const double damping_ratio = std::min(std::exp(p[1]), 0.95);
   const double omega = 2.0 * std::numbers::pi * std::exp(p[0]);
@@ -48,7 +48,7 @@ Eigen::VectorXd with_amplitudes(const Eigen::ArrayXd& time_s, const Eigen::Array
 }
 
 std::optional<double> strongest_hz(const Eigen::ArrayXd& data, double rate_hz) {
-  // A few oscillations are a broad peak: zeros behind them show where its top is.
+  // A few oscillations make a broad peak. Zeros behind them show where its top is.
   const auto length = static_cast<std::size_t>(std::max<Eigen::Index>(4096, data.size()));
   std::vector<double> padded(length, 0.0);
   const double mean = data.tail(data.size() / 4).mean();
@@ -106,8 +106,8 @@ std::optional<Ringing> fit_from(const Eigen::ArrayXd& all, Eigen::Index start, d
   return usable ? std::optional(std::move(result)) : std::nullopt;
 }
 
-// Fits from places between the peak and two thirds of what follows; the first that is as good as
-// the best.
+// Fits from places between the peak and two thirds of what follows. Returns the first fit that is
+// as good as the best.
 std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, double rate_hz) {
   constexpr Eigen::Index kStarts = 24;
   constexpr double kAboveNoise = 3.0;
@@ -127,7 +127,7 @@ std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, double rate_hz) 
     }
   }
   const auto best = std::ranges::min_element(found, {}, &Ringing::spread);
-  // Within what chance makes of the best one's spread.
+  // A spread counts as good as the best one if chance alone explains the difference.
   const auto first = std::ranges::find_if(found, [&](const Ringing& r) {
     const double chance = 2.5 / std::sqrt(2.0 * static_cast<double>(r.data.size()));
     return r.spread <= (1.0 + chance) * best->spread;
@@ -161,7 +161,7 @@ Result<Mode> fit_ringing(const std::vector<double>& samples, double rate_hz) {
       estimate_of(std::exp(ring->fit.parameters[0]), std::max(alone(0, 0), together(0, 0)));
   mode.damping_ratio =
       estimate_of(std::exp(ring->fit.parameters[1]), std::max(alone(1, 1), together(1, 1)));
-  // Of the stretch in which it rings, not of the noise behind it.
+  // The unexplained share is that of the stretch that rings, not of the noise behind it.
   const double time_constant_s =
       1.0 / (2.0 * std::numbers::pi * mode.freq_hz.value * mode.damping_ratio.value);
   const auto shown =

@@ -1,7 +1,7 @@
-// A spectrum by Welch's method is, but for which moments its windows weigh the more, the sweep's
-// energy behind the mode, smeared by the window's own spectrum. Klipper's window is Kaiser's with
-// β = 6, whose energy at x bins from the centre is (Kaiser and Schafer, On the Use of the I0-sinh
-// Window for Spectrum Analysis, 1980)
+// A spectrum by Welch's method is the sweep's energy behind the mode, smeared by the window's own
+// spectrum. We neglect that its windows weigh some moments more than others. Klipper's window is
+// Kaiser's with β = 6, whose energy at x bins from the centre is (Kaiser and Schafer, On the Use of
+// the I0-sinh Window for Spectrum Analysis, 1980)
 //   ( sinh √(β² − π²x²) / √(β² − π²x²) )².
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -103,8 +103,8 @@ struct Candidate {
   double cost = 0.0;
 };
 
-// How far a bin is off goes with its height; nothing is better known than to a hundredth of the
-// root mean square.
+// The error of a bin is proportional to its height, but no smaller than a hundredth of the root
+// mean square.
 Candidate refine(const Bins& bins, const WelchModel& welch, SpectrumParameters start) {
   constexpr int kRounds = 6;
   constexpr double kLeastVariance = 1e-4;
@@ -137,8 +137,9 @@ Candidate best_of(const Bins& bins, const WelchModel& welch) {
   return best;
 }
 
-// Of the parameters: the greater of what the residual's size tells and what its pattern does,
-// since the window makes neighbours alike. Twice, as a few bins are all there is of a resonance.
+// Variances of the parameters: the greater of what the residual's size tells and what its pattern
+// tells, since the window makes neighbours alike. They are doubled, because a resonance has only a
+// few bins.
 Eigen::VectorXd variances(const Candidate& candidate) {
   constexpr double kCaution = 2.0;
   const LeastSquares& fit = candidate.fit;

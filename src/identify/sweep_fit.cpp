@@ -1,10 +1,11 @@
-// The energy spectrum |Y(ν)|² of the whole recording, without regard to phase, so that neither the
-// moment the sweep began nor the clocks matter. Y is what the mode makes of the sweep, s, plus
-// white noise of mean energy S, independent from bin to bin; then (Rice, Mathematical Analysis of
-// Random Noise, 1945)
+// The fit uses the energy spectrum |Y(ν)|² of the whole recording without its phase. So neither the
+// moment at which the sweep began nor the clocks matter. Y is the mode's answer to the sweep, with
+// energy s, plus white noise of mean energy S, independent from bin to bin; then (Rice,
+// Mathematical Analysis of Random Noise, 1945)
 //   E|Y|² = s + S,   var|Y|² = 2 s S + S².
-// s is c·E(ν)·|H(ν)|² (response.hpp) but for a ripple of some percent where the third harmonic of
-// what was before meets the fundamental; it changes fast enough with ν to count as noise.
+// s is c·E(ν)·|H(ν)|² (response.hpp) but for a ripple of some percent. The ripple arises where the
+// third harmonic of an earlier moment meets the fundamental. It changes fast enough with ν to count
+// as noise.
 #include "sweep_fit.hpp"
 
 #include <fmt/core.h>
@@ -19,7 +20,7 @@
 namespace unflex::identify {
 namespace {
 
-// Values that are averaged to one, and values that lie in the band of the sweep.
+// The spectrum in the band of the sweep; each value is the mean of `values_each` bins.
 struct Band {
   Eigen::ArrayXd freq_hz;
   Eigen::ArrayXd energy;
@@ -29,10 +30,11 @@ struct Band {
 
 constexpr double kSamplesPerPeriod = 2.5;
 constexpr double kGroup_hz = 0.04;
-// Lower, the slow to and fro that newer Klippers add to the sweep is the stronger.
+// At lower frequencies the slow to and fro that newer Klippers add to the sweep is stronger.
 constexpr double kLowest_hz = 12.0;
 
-// Lines of that to and fro: far above what noise or ripple could be.
+// So many standard deviations above the model, a value is a line of this to and fro: noise and
+// ripple do not get there.
 constexpr double kOutlier = 8.0;
 
 Eigen::ArrayXd variance(const Eigen::ArrayXd& signal, double noise, double values_each) {
@@ -72,7 +74,7 @@ Eigen::ArrayXd weights_at(const Band& band, const Eigen::ArrayXd& model, double 
   return (band.energy - model > kOutlier * spread.sqrt()).select(0.0, spread.inverse()).eval();
 }
 
-// Where the response is highest against the excitation, on a spectrum of 1 Hz.
+// The frequency at which the response is highest against the excitation, in means over 1 Hz.
 double first_guess_hz(const Band& band) {
   const auto width = static_cast<Eigen::Index>(1.0 / band.step_hz);
   double best = 0.0;
@@ -95,8 +97,8 @@ struct Candidate {
   double cost = 0.0;
 };
 
-// Weights follow from the fit and the fit from the weights. A cost that can be compared is the
-// likelihood of the residuals.
+// The weights follow from the fit and the fit from the weights, so we repeat both. The cost
+// compares candidates by the likelihood of their residuals.
 Candidate refine(const Band& band, const Eigen::ArrayXd& excitation, SpectrumParameters start) {
   constexpr int kRounds = 6;
   const Model model = [&](const Eigen::VectorXd& logarithms) {
@@ -166,12 +168,12 @@ Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const
   const Candidate best = best_of(band, excitation);
   const SpectrumParameters p = SpectrumParameters::from(best.fit.parameters);
   const Eigen::ArrayXd fitted = model_of(band, excitation, p);
-  // White noise looks like a mode far below that is nearly all damper.
+  // White noise looks like a mode far below the band that is nearly all damper.
   constexpr double kFlat = 3.0;
   if (fitted.maxCoeff() < kFlat * fitted.minCoeff()) {
     return fail(ErrorKind::input, "no resonance stands out of the noise in it");
   }
-  // What is no noise goes together over some tenths of a Hz.
+  // Deviations that are not noise go together over some tenths of a Hz.
   const auto block = static_cast<Eigen::Index>(0.5 / band.step_hz);
   const Eigen::MatrixXd alone = sandwich(best.fit, best.weights, 1);
   const Eigen::MatrixXd together = sandwich(best.fit, best.weights, block);

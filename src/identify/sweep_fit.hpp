@@ -7,7 +7,7 @@
 
 namespace unflex::identify {
 
-// Whether the samples hold a sweep: ringing is over within seconds.
+// Whether the samples last long enough to hold a sweep; ringing is over within seconds.
 [[nodiscard]] bool holds_sweep(const std::vector<double>& samples, double rate_hz);
 
 [[nodiscard]] Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz,

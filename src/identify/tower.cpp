@@ -28,7 +28,7 @@ Result<Mode> fit_tower(const Tower& tower) {
     return fail(ErrorKind::usage,
                 "the decay is how many times lower a wave is than the one before, above 1");
   }
-  // Those that dynamics.x.freq_hz may have.
+  // The frequencies that dynamics.x.freq_hz may have.
   constexpr double kLeast_hz = 1.0;
   constexpr double kMost_hz = 1000.0;
   const double freq_hz = tower.speed_mm_s / tower.spacing_mm;

@@ -74,7 +74,7 @@ std::string store(const Value& value, const Key& key, Kinematics& target) {
 std::string store(const Value& value, const Key& key, std::string& target) {
   const auto* text = std::get_if<std::string>(&value.content);
   if (key.words.empty()) {
-    // Free text stands in quotes as it is.
+    // Free text is written in quotes as it is, without escapes.
     const auto is_plain = [](char c) { return c >= ' ' && c < 0x7f && c != '"' && c != '\\'; };
     if (text == nullptr || !std::ranges::all_of(*text, is_plain)) {
       return fmt::format("{} must be a text without quotes, not {}", key.name, value.kind);

@@ -11,7 +11,7 @@
 
 namespace unflex::machine {
 
-// What a source may hold for a key. monostate is what no key takes.
+// What a source may hold for a key. monostate stands for a value that no key takes.
 struct Value {
   Value(double number) : content(number), kind("a number") {}
   Value(bool flag) : content(flag), kind("true or false") {}
@@ -40,13 +40,13 @@ struct Assignment {
 
 // What a reader understood of a printer's or a slicer's own settings.
 struct Reading {
-  std::vector<Assignment> assignments;  // a later one of a key wins
+  std::vector<Assignment> assignments;  // if a key occurs twice, the later wins
   std::vector<Note> notes;
 
   void add(std::string key, Value value, SourcePlace place) {
     assignments.push_back({std::move(key), std::move(value), std::move(place)});
   }
-  // As if the keys that begin so had not been given.
+  // Drops the assignments of all keys that begin so.
   void forget(std::string_view beginning) {
     std::erase_if(assignments, [&](const Assignment& assignment) {
       return assignment.key.starts_with(beginning);
@@ -57,12 +57,12 @@ struct Reading {
   }
 };
 
-// Stores the value of a key and its place. Returns what is wrong: unknown key, type, bounds; or
-// nothing.
+// Stores the value of a key and its place. Returns what is wrong (unknown key, type, bounds), or an
+// empty text.
 [[nodiscard]] std::string assign(const std::string& name, const Value& value,
                                  const SourcePlace& place, Draft& draft);
 
-// Stores them all. What is wrong is an error of kind usage at its place.
+// Stores all assignments. What is wrong is an error of kind usage at its place.
 [[nodiscard]] Status apply(const Reading& reading, Draft& draft);
 
 }  // namespace unflex::machine

@@ -48,12 +48,12 @@ std::string firsts_of_lists(std::string_view line) {
 gcode::InterpreterOptions options_of(Firmware firmware) {
   gcode::InterpreterOptions options = gcode::default_options(firmware);
   options.firmware_retraction = true;
-  // Before 3.6 the two jerks are one, which Settings::print_jerk_mm_s() knows.
+  // Before 3.6 there is only one jerk. Settings::print_jerk_mm_s() takes care of that.
   options.has_print_jerk = firmware == Firmware::rrf;
   return options;
 }
 
-// The keys of what a line says.
+// The keys that a line would set.
 std::vector<std::string> keys_of(const gcode::Command& command) {
   std::vector<std::string> keys;
   const auto add_axes = [&](std::string_view pattern) {
@@ -103,13 +103,14 @@ class CommandReader {
     reading.add("printer.firmware", std::string(to_string(firmware)), {file_, 0});
   }
 
-  // Has the interpreter read a line, the command, and takes what it sets, or says that it can't.
+  // Has the interpreter read a line with its command. Takes what the line sets, or notes that it is
+  // not taken.
   void take(const std::string& text, const gcode::Command& command, const SourcePlace& place) {
     const gcode::Event event = interpreter_.interpret({text, place.line});
     if (event.position_lost) {
       return not_taken(text, command, place);
     }
-    // In a print steps and inches are a reason to warn.
+    // Steps and inches are a reason to warn only in a print.
     if (command.number != 92 && command.letter != 'G') {
       for (const std::string& warning : event.warnings) {
         reading.note(place, warning);
@@ -144,8 +145,8 @@ class CommandReader {
     }
   }
 
-  // Of what both axes can do; the motors' limits follow from it: enough for the faster axis, not
-  // too much for the weaker.
+  // Adds the tool's limits from those of X and Y. The motors' limits follow from them: velocity
+  // enough for the faster axis, acceleration not too much for the weaker.
   void finish() {
     const auto& [x_velocity, y_velocity] = velocity_;
     const bool y_is_faster = y_velocity && (!x_velocity || y_velocity->first > x_velocity->first);
@@ -223,17 +224,17 @@ class CommandReader {
 
   std::string file_;
   gcode::Interpreter interpreter_;
-  // The latest of X and of Y.
+  // The latest limits of X and of Y.
   std::array<Found, 2> velocity_;
   std::array<Found, 2> accel_;
 };
 
 void marlin_junctions(CommandReader& reader, const gcode::Command& command,
                       const SourcePlace& place) {
-  // Which of the two Marlin was built with shows in which it lists.
+  // Marlin lists the one it was built with: junction deviation (J) or classic jerk (X).
   if (command.has('J')) {
     reader.reading.add("printer.classic_jerk", false, place);
-    // M503 shows two decimals of it.
+    // M503 shows only two decimals of J.
     if (command.value('J') == 0.01 && reader.state().unit_mm == 1.0) {
       reader.reading.note(place,
                           "M503 rounds J, and Marlin's default of 0.013 shows as 0.01; if it was "
@@ -256,7 +257,8 @@ void marlin_shaper(CommandReader& reader, const gcode::Command& command, const S
   }
 }
 
-// M503 lists M665 for deltas and SCARAs alone; of cores it does not tell.
+// M503 lists M665 only for deltas and SCARAs. It does not tell whether the machine is a CoreXY or
+// the like.
 Status read_marlin_line(CommandReader& reader, std::string_view line, std::size_t number) {
   constexpr std::string_view kEcho = "echo:";
   const std::size_t echo = line.rfind(kEcho);
@@ -286,8 +288,8 @@ Status read_marlin_line(CommandReader& reader, std::string_view line, std::size_
   return {};
 }
 
-// How long the value is that the text begins with: a number, an expression in braces, or a text in
-// quotes.
+// The length of the value that the text begins with: a number, an expression in braces, or a text
+// in quotes.
 std::size_t value_length(std::string_view text) {
   int depth = 0;
   bool in_quotes = false;
@@ -304,7 +306,7 @@ std::size_t value_length(std::string_view text) {
   return text.size();
 }
 
-// Each letter, in upper case, with its value or the values between its colons, as they stand.
+// Each letter, in upper case, with the text of its value, or of its values if colons part them.
 std::map<char, std::vector<std::string_view>> values_of(std::string_view arguments) {
   std::map<char, std::vector<std::string_view>> values;
   while (!arguments.empty()) {
@@ -326,7 +328,7 @@ std::map<char, std::vector<std::string_view>> values_of(std::string_view argumen
 struct TravelEnd {
   std::optional<double> mm;
   SourcePlace place;
-  bool is_outdated = false;  // by a later line that gave no number
+  bool is_outdated = false;  // a later line gave no number
 };
 
 struct Travel {
@@ -334,7 +336,7 @@ struct Travel {
   TravelEnd max;
 };
 
-// X0:220, or X0 with S1 for the least and X220 for the most.
+// Reads X0:220, or X0 with S1 for the minimum and X220 for the maximum.
 void read_travel(CommandReader& reader, std::string_view arguments, std::array<Travel, 2>& travel,
                  const SourcePlace& place) {
   const std::map<char, std::vector<std::string_view>> values = values_of(arguments);
@@ -368,7 +370,8 @@ void read_travel(CommandReader& reader, std::string_view arguments, std::array<T
   }
 }
 
-// The place is that of an outdated end, if there is one: before the note that says so.
+// Adds the travel of an axis. If one end is outdated, its place is taken. It is before the place of
+// the note on that end, so the note is still told (load.cpp, is_known).
 void add_travel(CommandReader& reader, const Travel& travel, std::string_view axis) {
   const auto& [min, max] = travel;
   if (!max.mm || (min.is_outdated && !min.mm)) {

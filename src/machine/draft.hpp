@@ -18,8 +18,8 @@ struct MassSpringDamper {
   std::optional<double> damping_n_s_mm;
 };
 
-// What the user should know, and the keys that speak of the same: once others have given all of
-// them it is known.
+// A remark for the user, and the keys that it is about. If other places give all of these keys, it
+// is not told.
 struct Note {
   Diagnostic diagnostic;
   std::vector<std::string> keys;

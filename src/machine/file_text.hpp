@@ -8,7 +8,7 @@
 
 namespace unflex::machine {
 
-// The whole file; errors, of kind usage, also where it is too large for a printer file.
+// The whole file. Errors are of kind usage; a file that is too large for a printer file is one.
 [[nodiscard]] Result<std::string> read_printer_file(const std::filesystem::path& file);
 
 }  // namespace unflex::machine

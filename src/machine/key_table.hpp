@@ -31,15 +31,15 @@ using Member = std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draf
 struct Key {
   std::string_view name;
   Member member;
-  Bounds bounds;  // of numbers
+  Bounds bounds;  // only for numbers
   std::string_view unit;
   std::string_view meaning;
-  // For optional members: what holds while unset, in words, and as a number where there is one.
+  // For optional members: what holds while unset, in words, and as a number if there is one.
   std::string_view if_unset = {};
   double (*in_force)(const Settings&) = nullptr;
-  // Of a text: what it may be.
+  // The words that a text may be; empty: any text.
   std::span<const std::string_view> words = {};
-  // Another form of other keys: read, turned into those, and not kept.
+  // The key is another form of other keys: its value is converted into theirs and not kept.
   bool converted = false;
 };
 

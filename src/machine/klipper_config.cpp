@@ -19,13 +19,13 @@ constexpr std::string_view kSavedHeader =
     "#*# <---------------------- SAVE_CONFIG ---------------------->";
 constexpr std::string_view kInclude = "include ";
 
-// An indented line goes on with the value of the option before it.
+// An indented line continues the value of the option before it.
 struct Parser {
   std::string file;
   KlipperConfig* config = nullptr;
   KlipperSection* section = nullptr;
   KlipperOption* option = nullptr;
-  std::size_t indent = 0;  // of the line the option began in
+  std::size_t indent = 0;  // indent of the line in which the option began
 };
 
 std::string_view without_comment(std::string_view line) {
@@ -38,7 +38,7 @@ std::string_view without_comment(std::string_view line) {
   return line;
 }
 
-// "[stepper_x]" → "stepper_x", and "" where the line is no header.
+// "[stepper_x]" → "stepper_x", and "" if the line is no header.
 std::string_view header_of(std::string_view content) {
   const std::size_t end = content.rfind(']');
   return content.starts_with('[') && end != std::string_view::npos && end > 1
@@ -64,8 +64,8 @@ Status parse_line(Parser& parser, std::string_view line, std::size_t number) {
   }
   const std::size_t indent = text.find(content);
   if (parser.option != nullptr && indent > parser.indent) {
-    // Klipper joins the lines by their ends. No value that is read here has several, and a message
-    // that quotes it is to have one.
+    // Klipper joins such lines with line ends. We join with spaces: no value that is read here has
+    // several lines, and a message that quotes a value should have one line.
     parser.option->text += fmt::format("{}{}", parser.option->text.empty() ? "" : " ", content);
     return {};
   }
@@ -87,7 +87,7 @@ Status parse_line(Parser& parser, std::string_view line, std::size_t number) {
   return {};
 }
 
-// The files a pattern names, sorted; an error where it names one that does not exist.
+// The files that a pattern names, sorted. An error if a name without wildcards leads to no file.
 Result<std::vector<std::string>> included_files(std::string_view pattern,
                                                 const SourcePlace& place) {
   const std::string path = (fs::path(place.file).parent_path() / pattern).string();
@@ -96,7 +96,7 @@ Result<std::vector<std::string>> included_files(std::string_view pattern,
   std::vector<std::string> files(found.gl_pathv, found.gl_pathv + found.gl_pathc);
   ::globfree(&found);
   std::sort(files.begin(), files.end());
-  // A pattern may match nothing, a name may not.
+  // Only a pattern with wildcards may match nothing.
   if (files.empty() && (error != GLOB_NOMATCH || path.find_first_of("*?[") == std::string::npos)) {
     return fail(ErrorKind::usage, place,
                 fmt::format("the included file {} does not exist or cannot be read", path));
@@ -152,8 +152,8 @@ Status parse_file(std::string_view text, const std::string& file, KlipperConfig&
   return status;
 }
 
-// SAVE_CONFIG writes what it saves as comments. What stands elsewhere as well is not taken from
-// here, and nothing is once someone has written below.
+// Adds the options that SAVE_CONFIG has saved as comments. An option that stands elsewhere too is
+// not taken from here. If someone has written below the saved lines, none of them is taken.
 Status add_saved(std::string_view text, std::size_t first_line, const std::string& file,
                  KlipperConfig& config) {
   KlipperConfig saved;
@@ -205,7 +205,7 @@ Result<KlipperConfig> parse_klipper_config(std::string_view text, const std::str
   if (saved == std::string_view::npos) {
     return config;
   }
-  // The header's two lines say who writes there.
+  // Skip the header's two lines, which say who writes there.
   std::string_view rest = text.substr(saved);
   std::size_t line = 1 + static_cast<std::size_t>(std::ranges::count(written, '\n'));
   for (int skipped = 0; skipped < 2; ++skipped, ++line) {

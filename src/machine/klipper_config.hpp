@@ -16,7 +16,7 @@ struct KlipperOption {
 };
 
 struct KlipperSection {
-  SourcePlace place;                             // of its first header
+  SourcePlace place;                             // place of its first header
   std::map<std::string, KlipperOption> options;  // by name in lower case; the last of a name counts
 
   [[nodiscard]] const KlipperOption* find(const std::string& option) const;

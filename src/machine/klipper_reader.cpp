@@ -47,7 +47,7 @@ struct KnownKinematics {
   Kinematics type;
 };
 
-// Kalico's limited_ ones move as those without that word (klippy/kinematics).
+// Kalico's limited_ kinematics move like those without that word (klippy/kinematics).
 constexpr std::array kKinematics = {
     KnownKinematics{"cartesian", Kinematics::cartesian},
     KnownKinematics{"corexy", Kinematics::corexy},
@@ -110,7 +110,8 @@ class Reader {
     return found == nullptr ? SourcePlace{file_, 0} : found->place;
   }
 
-  // The number of an option that is there; what is no number becomes the failure.
+  // The number of an option; nullopt if there is no such option. Text that is no number becomes
+  // failure_.
   std::optional<double> number(std::string_view section, std::string_view name) {
     const KlipperOption* const found = option(section, name);
     if (found == nullptr) {
@@ -168,8 +169,8 @@ class Reader {
     return {};
   }
 
-  // By sections, kinematics and shapers that Klipper does not have; what unflex cannot work with
-  // comes last and counts (variants.cpp).
+  // Recognises Kalico by sections, kinematics and shapers that Klipper does not have. The last
+  // variant found counts, so the ones that unflex cannot work with come last (variants.cpp).
   void kalico() {
     const auto recognised = [&](const char* variant, const SourcePlace& at) {
       reading_.add("printer.variant", variant, at);

@@ -40,7 +40,7 @@ std::vector<LimitValue> limit_values(const gcode::LimitChange& change) {
   c.add("limits.minimum_cruise_ratio", change.minimum_cruise_ratio);
   c.add("limits.max_{}_velocity_mm_s", change.axis_max_velocity_mm_s);
   c.add("limits.max_{}_accel_mm_s2", change.axis_max_accel_mm_s2);
-  // Of RepRapFirmware, M566's where there are two.
+  // RepRapFirmware may have two jerks; these keys then take M566's.
   const bool is_max = std::ranges::any_of(change.axis_max_jerk_mm_s,
                                           [](const auto& value) { return value.has_value(); });
   c.add("limits.jerk_{}_mm_s", is_max ? change.axis_max_jerk_mm_s : change.axis_jerk_mm_s);

@@ -21,10 +21,11 @@ constexpr double kPause_ms = 500.0;
 constexpr double kHeight_mm = 10.0;
 constexpr double kLayer_mm = 0.2;
 constexpr double kRow_mm = 2.0;
-// Where nobody has said how large the bed is, it is larger than this.
+// If the size of the bed is not known, we assume that it is at least this large.
 constexpr double kSmallBed_mm = 100.0;
 
-// Marlin joins lines of fewer steps than this to the next (MIN_STEPS_PER_SEGMENT).
+// The shortest line of the test. Marlin joins lines of too few steps to the next
+// (MIN_STEPS_PER_SEGMENT).
 double least_line_mm(const Settings& settings) {
   switch (settings.printer.firmware) {
     case Firmware::marlin:
@@ -70,13 +71,14 @@ std::optional<LineTestStage> stage_of(double lines_per_s, const Settings& settin
       2.0 * braking_mm > kStroke_mm) {
     return std::nullopt;
   }
-  // From rest to rest: the ramps cost what the cruise would take along as much way again.
+  // Each stroke goes from rest to rest. Its ramps take twice as long as cruising over their length
+  // v²/a would, so they add v/a.
   stage.duration_s =
       2.0 * rounds(stage) * (kStroke_mm / stage.speed_mm_s + stage.speed_mm_s / accel_mm_s2);
   return stage;
 }
 
-// Where the test is made along an axis: the middle, `length_mm` long.
+// Where the test begins along an axis, if it is `length_mm` long and in the middle.
 Result<double> begin_of(const std::optional<Range>& travel, double length_mm,
                         std::string_view key) {
   const Range range = travel.value_or(Range{0.0, kSmallBed_mm});
@@ -92,7 +94,7 @@ void write_stroke(const LineTestStage& stage, double from_mm, double to_mm, doub
                   std::string& text) {
   const double lines = std::round(kStroke_mm * stage.lines_per_s / stage.speed_mm_s);
   for (double line = 1.0; line <= lines; line += 1.0) {
-    // As long as a compensated line is.
+    // This line of text is as long as a compensated one.
     text += fmt::format("G1 X{:.4f} Y{:.4f} F{:.1f}\n", from_mm + (to_mm - from_mm) * line / lines,
                         y_mm, 60.0 * stage.speed_mm_s);
   }

@@ -74,7 +74,8 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
   return read_toml(text, name, draft);
 }
 
-// A firmware's own configuration says all but the resonances where no input shaper is set up.
+// A firmware's own configuration says everything, except the resonances if no input shaper is set
+// up.
 void note_unknown_resonances(Draft& draft) {
   std::vector<std::string_view> axes;
   for (const std::string_view axis : {"x", "y"}) {
@@ -98,7 +99,7 @@ bool is_known(const Note& note, const Draft& draft) {
   const auto given_by_others = [&](const std::string& key) {
     const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
     const SourcePlace& noted = note.diagnostic.place;
-    // What stands before it in the same file is what the note says is outdated.
+    // A value before the note in the same file is the one that the note calls outdated.
     return place && (place->file != noted.file || place->line > noted.line);
   };
   return !note.keys.empty() && std::ranges::all_of(note.keys, given_by_others);
@@ -112,7 +113,8 @@ void tell_notes(Draft& draft) {
   }
 }
 
-// To Klipper a Z faster than the tool may be is a mistake, but slicers say what the axis can do.
+// Lowers what the slicer says about Z. To Klipper a Z that is faster than the tool may be is a
+// mistake, but slicers say what the axis can do.
 void bound_z(const Reading& slicer, Draft& draft) {
   const Settings& s = draft.settings;
   if (s.printer.firmware != Firmware::klipper) {
@@ -150,7 +152,7 @@ Status apply_overrides(const std::vector<std::string>& overrides, Draft& draft) 
   return {};
 }
 
-// What a print's slicer says of the printer holds where nobody else says anything.
+// Takes what a print's slicer says of the printer, for keys that no other source gives.
 Status read_print(const Sources& sources, Draft& draft) {
   const bool by_default = !draft.places[*find_key("printer.firmware")];
   const std::optional<Firmware> runs =
@@ -231,7 +233,8 @@ namespace {
 
 std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
 
-// A file's name is bytes, but must neither end the comment it stands in nor be what TOML refuses.
+// A file's name may be any bytes. In a comment it must neither end the comment nor hold what TOML
+// refuses.
 std::string printable(std::string_view text) {
   std::string shown;
   while (!text.empty()) {
@@ -243,8 +246,8 @@ std::string printable(std::string_view text) {
   return shown;
 }
 
-// Keys left at their default are comments: they stay so when the text is read again, and what
-// holds is still seen.
+// Keys left at their default are written as comments. So they stay at their default when the text
+// is read again, and the value in force is still seen.
 std::string toml_line(const Key& key, std::string_view name, const std::string& origin,
                       Draft& draft) {
   const std::optional<std::string> own = own_value(key, draft);

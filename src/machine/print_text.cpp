@@ -9,7 +9,7 @@
 namespace unflex::machine {
 namespace {
 
-// OrcaSlicer's settings with long start and end codes stay far below.
+// OrcaSlicer's settings with long start and end codes stay far below this.
 constexpr std::size_t kTailBytes = std::size_t{1} << 19U;
 constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
 
@@ -27,7 +27,7 @@ bool is_move(std::string_view line) {
 
 std::size_t head_end(std::string_view text) {
   const bool is_full = text.size() >= kMaxHeadBytes;
-  // However much of the text has come, the same is looked at.
+  // No more than these bytes are looked at, however much of the text has come.
   text = text.substr(0, kMaxHeadBytes);
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = text.find('\n', at);
@@ -48,7 +48,7 @@ Result<PrintText> read_print_text(const std::filesystem::path& file, const std::
   std::string block(kBlockBytes, '\0');
   std::size_t lines = 0;
   bool in_head = true;
-  // One pass, since the number of a line is how many are before it.
+  // One pass through all of the file, since a line's number needs the count of the lines before it.
   while (stream.read(block.data(), static_cast<std::streamsize>(block.size())) ||
          stream.gcount() > 0) {
     const std::string_view read(block.data(), static_cast<std::size_t>(stream.gcount()));

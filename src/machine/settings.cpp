@@ -42,7 +42,7 @@ double default_shaper_hz(const PrinterSettings& printer, const AxisDynamics& dyn
   return printer.firmware == Firmware::klipper ? dynamics.freq_hz : 0.0;
 }
 
-// M204 P and T.
+// The default of M204 P and T.
 double default_command_accel(const Settings& settings) {
   // RepRapFirmware's DefaultPrintingAcceleration, above whatever M201 allows.
   constexpr double kRrfNoLimit_mm_s2 = 50000.0;
@@ -54,8 +54,9 @@ double by_firmware(Firmware firmware, double klipper, double marlin, double rrf)
   return firmware == Firmware::klipper ? klipper : firmware == Firmware::marlin ? marlin : rrf;
 }
 
-// Of a shaper that nobody describes: Klipper's shaper_defs.py, DEFAULT_DAMPING_RATIO; Marlin's
-// Configuration_adv.h, SHAPING_ZETA_X; RepRapFirmware's AxisShaper.h, DefaultDamping.
+// The damping ratio of a shaper for which none is given: Klipper's shaper_defs.py,
+// DEFAULT_DAMPING_RATIO; Marlin's Configuration_adv.h, SHAPING_ZETA_X; RepRapFirmware's
+// AxisShaper.h, DefaultDamping.
 constexpr double kKlipperDampingRatio = 0.1;
 constexpr double kMarlinDampingRatio = 0.15;
 constexpr double kRrfDampingRatio = 0.1;
@@ -100,8 +101,8 @@ std::array<double, 4> Settings::jerk_mm_s() const {
                                           : std::array{10.0, 10.0, 0.3, 5.0});
 }
 
-// Movement/Move.cpp, SetInstantDv: at most that of M566. Before 3.6 there is one jerk, which M205
-// sets as well as M566 does; unknown versions are taken for such.
+// Movement/Move.cpp, SetInstantDv: the jerk of prints is at most that of M566. Before 3.6 there is
+// one jerk, which both M205 and M566 set; unknown versions are taken to be that old.
 std::array<double, 4> Settings::print_jerk_mm_s() const {
   if (printer.firmware != Firmware::rrf) {
     return jerk_mm_s();
@@ -157,7 +158,7 @@ double Settings::retract_accel_mm_s2() const {
   return limits.retract_accel_mm_s2.value_or(limits.max_accel_mm_s2);
 }
 
-// docs/firmware.md says where they are from.
+// docs/firmware.md says where these numbers are from.
 double Settings::max_lines_per_s() const {
   const auto by_transport = [this] {
     if (printer.transport == "serial") {
@@ -201,7 +202,7 @@ double Settings::tail_s() const {
 }
 
 double Settings::emit_accel_mm_s2() const {
-  // RepRapFirmware leaves out short ramps: the lower its acceleration, the fewer.
+  // RepRapFirmware leaves out short ramps. The lower its acceleration, the fewer it leaves out.
   constexpr double kTimesBase = 5.0;
   return emit.accel_mm_s2.value_or(
       printer.firmware == Firmware::rrf ? kTimesBase * base_max_accel_mm_s2() : 1e6);

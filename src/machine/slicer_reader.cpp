@@ -168,7 +168,7 @@ class Reader {
     return option(speed) != nullptr ? speed : fmt::format("machine_max_feedrate_{}", axis);
   }
 
-  // The least of some options, or the greatest, from where it is.
+  // Adds the least or the greatest value of some options, with its place.
   template <class Better>
   void add_extreme(const std::string& key, const std::vector<std::string>& names, Better better) {
     std::string best;
@@ -215,8 +215,8 @@ class Reader {
       add("limits.max_" + axis + "_accel_mm_s2", number(accel), accel);
       add("limits.jerk_" + axis + "_mm_s", number(jerk), jerk);
     }
-    // What the motors can do follows from these: enough for the faster axis, not too much for the
-    // weaker.
+    // The motors' limits follow from these: velocity enough for the faster axis, acceleration not
+    // too much for the weaker.
     add_extreme("limits.max_velocity_mm_s", {velocity_option("x"), velocity_option("y")},
                 std::greater<>());
     add_least("limits.max_accel_mm_s2",
@@ -232,7 +232,7 @@ class Reader {
     }
   }
 
-  // The flavor "marlin" means Marlin 1, which knew jerk alone for long.
+  // The flavor "marlin" means Marlin 1, which for a long time knew only jerk.
   void junctions() {
     const std::string deviation = "machine_max_junction_deviation";
     if (number(deviation)) {

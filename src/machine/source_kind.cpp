@@ -10,11 +10,11 @@
 namespace unflex::machine {
 namespace {
 
-// Commands of RepRapFirmware's that make a machine and that no print and no dump of Marlin's has:
-// drives, axes, end stops, heaters, kinematics, board's name, jerk, other files.
+// Commands with which RepRapFirmware describes a machine, and which no print and no dump of
+// Marlin's has: drives, axes, end stops, heaters, kinematics, board's name, jerk, other files.
 constexpr std::array kRrfCodes = {98, 550, 558, 563, 566, 574, 584, 667, 669, 950};
-// What Marlin's M503 lists and RepRapFirmware does not know: temperatures' presets and units,
-// automatic retraction, bed levelling, the probe's offset, linear advance, filament change.
+// Commands that Marlin's M503 lists and RepRapFirmware does not know: temperatures' presets and
+// units, automatic retraction, bed levelling, the probe's offset, linear advance, filament change.
 constexpr std::array kMarlinCodes = {145, 149, 209, 420, 603, 851, 900};
 
 struct Traces {
@@ -31,7 +31,8 @@ bool is_one_of(int number, const auto& codes) {
   return std::ranges::find(codes, number) != codes.end();
 }
 
-// What both know is told apart by its words. M203 is in mm/min, and in Marlin in mm/s.
+// Commands that both firmwares know are told apart by their words. M203 is in mm/min, but in Marlin
+// in mm/s.
 bool is_rrf_setting(const gcode::Command& command) {
   constexpr double kFasterThanAnyMarlin = 1500.0;
   switch (command.number) {
@@ -96,7 +97,7 @@ void look_at(std::string_view line, Traces& traces) {
   if (delimiter != std::string_view::npos && delimiter > 0 && content.front() != '#' &&
       content.front() != ';') {
     const std::string_view name = trimmed(content.substr(0, delimiter));
-    // No key of ours is called so, and TOML knows no colon.
+    // No key of our TOML is called "kinematics", and TOML has no colons there.
     traces.klipper += name == "kinematics" ? 2 : 0;
     traces.klipper += traces.headers > 0 && content[delimiter] == ':' && content.front() != '"';
   }

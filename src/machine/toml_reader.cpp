@@ -57,7 +57,7 @@ std::string store(const toml::node& node, const std::string& name, const SourceP
   return assign(name, value_of(node), place, draft);
 }
 
-// A value or an empty table of the file with its dotted name.
+// A value or a table of the file with its dotted name.
 struct Entry {
   std::string name;
   const toml::node* node = nullptr;

@@ -18,7 +18,7 @@ namespace {
 
 // A firmware needs some room above the base's acceleration to follow dense lines.
 constexpr double kEmitAccelFactor = 5.0;
-// Fewer nodes per period of resonance than this and the optimum is worse than a ZV shaper's.
+// With fewer nodes per period of resonance, the optimum is worse than a ZV shaper's.
 constexpr double kLeastNodesPerPeriod = 10.0;
 
 std::optional<SourcePlace> place_of(const Draft& draft, std::string_view key) {
@@ -26,7 +26,7 @@ std::optional<SourcePlace> place_of(const Draft& draft, std::string_view key) {
   return index ? draft.places[*index] : std::nullopt;
 }
 
-// Rounded to three digits that a user may type: not above a bound, or not below.
+// Rounds a bound to three digits that a user may type, so that the result keeps the bound.
 double typed(double value, double (*round)(double)) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
   return round(value / unit) * unit;
@@ -34,7 +34,7 @@ double typed(double value, double (*round)(double)) {
 std::string at_most(double value) { return fmt::format("{:.3g}", typed(value, std::floor)); }
 std::string at_least(double value) { return fmt::format("{:.3g}", typed(value, std::ceil)); }
 
-// An error at the first of the keys that was given anywhere; with defaults alone it has no place.
+// An error at the first of the keys that was given anywhere. If all are defaults, it has no place.
 tl::unexpected<Error> conflict(const Draft& draft, std::initializer_list<std::string_view> keys,
                                std::string message) {
   SourcePlace first;
@@ -65,7 +65,8 @@ bool is_overridden(const Draft& draft, std::string_view key) {
   return place && place->file.starts_with(kOverrideMark);
 }
 
-// One form overrides the other.
+// Checks that an axis is given in one form, and that form completely. A form given by --set
+// overrides the other form in a file.
 Status check_mass_keys(const Draft& draft, const std::string& section) {
   std::optional<std::string> given;
   std::optional<std::string> missing;
@@ -164,7 +165,7 @@ Status check_printer(const Draft& draft) {
   return {};
 }
 
-// What M593 of RepRapFirmware takes (AxisShaper::Configure).
+// Checks that M593 of RepRapFirmware takes the shaper (AxisShaper::Configure).
 Status check_shaper(const Draft& draft) {
   const Settings& s = draft.settings;
   if (s.printer.firmware != Firmware::rrf) {
@@ -190,7 +191,7 @@ Status check_shaper(const Draft& draft) {
   return {};
 }
 
-// What a firmware can plan for.
+// Checks that the firmware can plan for the kinematics.
 Status check_kinematics(const Draft& draft) {
   const Settings& s = draft.settings;
   const auto refuse = [&](std::string_view why) {
@@ -218,8 +219,8 @@ Status check_kinematics(const Draft& draft) {
   return {};
 }
 
-// How much more a motor may be asked for than the limits say that the plan keeps: Klipper limits
-// what the tool does, the others what motors do.
+// The most that the plan may ask of a motor, relative to the limits. Klipper limits what the tool
+// does, the other firmwares what the motors do.
 double most_of_motor(const Settings& s) {
   if (s.printer.firmware != Firmware::klipper) {
     return 1.0;
@@ -235,7 +236,7 @@ double most_of_motor(const Settings& s) {
 Status check_base(const Draft& draft) {
   const Settings& s = draft.settings;
   const double most = most_of_motor(s);
-  // 1 or √2.
+  // `most` is 1 or √2.
   const std::string_view times = most > 1.0 ? "√2 × " : "";
   if (s.base_max_velocity_mm_s() < most * s.limits.max_velocity_mm_s) {
     return conflict(draft, {"base.max_velocity_mm_s", "limits.max_velocity_mm_s"},

@@ -1,11 +1,11 @@
-// What no single key can be checked for.
+// Checks that concern more than one key.
 #pragma once
 
 #include "draft.hpp"
 
 namespace unflex::machine {
 
-// Nodes per period of resonance that leave little to be gained by more.
+// With so many nodes per period of resonance, more would gain little.
 inline constexpr double kGoodNodesPerPeriod = 20.0;
 
 // Turns mass, stiffness and damping into frequency and damping ratio.

@@ -113,7 +113,8 @@ void refuse(Draft& draft, SourcePlace place, std::string message) {
   }
 }
 
-// Klipper db10e92e9 to 77d5d942e, 631 and 642 commits after v0.13.0.
+// Klipper from db10e92e9 to 77d5d942e, 631 to 642 commits after v0.13.0, does not switch its shaper
+// off.
 void klipper_ignores_shaper_off(Draft& draft) {
   const Settings& s = draft.settings;
   constexpr std::array kTag = {0, 13, 0};
@@ -132,8 +133,8 @@ void klipper_ignores_shaper_off(Draft& draft) {
   }
 }
 
-// kinematics/limited_*.py: check_move caps by max_x_accel and max_y_accel, or scales by them, what
-// SET_VELOCITY_LIMIT ACCEL allows; extras/input_shaper.py of the branch bleeding-edge-v2.
+// kinematics/limited_*.py: check_move caps what SET_VELOCITY_LIMIT ACCEL allows by max_x_accel and
+// max_y_accel, or scales it by them; extras/input_shaper.py of the branch bleeding-edge-v2.
 void kalico(Draft& draft) {
   const std::string& variant = draft.settings.printer.variant;
   if (variant == kKalicoLimited) {
@@ -193,7 +194,7 @@ void marlin_ft_motion(Draft& draft) {
 
 // module/planner.cpp: a line with filament is accelerated by at most jerk_E / (K · e), with e the
 // filament per mm, and with junction deviation jerk_E² = √½ · deviation · a_E / (1 − √½). Inside a
-// run both are raised, so that it is far above what a run needs.
+// run the values behind this limit are raised, so that it is far above what a run needs.
 void marlin_linear_advance(Draft& draft) {
   const Settings& s = draft.settings;
   if (s.printer.firmware != Firmware::marlin || s.printer.linear_advance_s <= 0.0) {
@@ -225,7 +226,7 @@ void marlin_linear_advance(Draft& draft) {
   }
 }
 
-// Whatever else stands there is no version.
+// Adds the version, if the text can be one.
 void add_version(const std::string& version, const SourcePlace& place, Reading& reading) {
   constexpr std::string_view kInVersions =
       "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.+-_";
@@ -239,7 +240,7 @@ void add_version(const std::string& version, const SourcePlace& place, Reading& 
 void recognise_firmware(std::string_view text, const std::string& file, Reading& reading) {
   for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
     const SourcePlace place{file, number};
-    // klippy.log's.
+    // This line is from klippy.log.
     if (const auto version = behind(line, "Git version: '", '\'')) {
       add_version(*version, place, reading);
     }
@@ -270,7 +271,7 @@ void recognise_print(const PrintText& print, std::string_view printer_model,
   std::string_view variant = variant_of_model(printer_model);
   SourcePlace place = model_place;
   for_each_line(print.head, 1, [&](std::string_view line, std::size_t number) {
-    // M862.3 P "MK4": the printer refuses the print if it is another.
+    // M862.3 P "MK4": the printer refuses the print if it is another model.
     const gcode::Command command = gcode::parse(line);
     const bool is_check = command.kind == gcode::CommandKind::traditional &&
                           command.letter == 'M' && command.number == 862 && command.subnumber == 3;
@@ -296,7 +297,7 @@ void read_start_code(const PrintText& print, Draft& draft) {
       return;
     }
     const auto set = [&](std::string_view key, const Value& value) {
-      // Below its bounds it is nothing that Marlin takes.
+      // A value out of its bounds is ignored, since Marlin does not take it either.
       static_cast<void>(assign(std::string(key), value, {print.name, number}, draft));
     };
     if (command.number == 493 && command.value('S')) {

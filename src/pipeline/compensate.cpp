@@ -18,7 +18,7 @@
 namespace unflex::pipeline {
 namespace {
 
-// Over a print of which runs turn out to break rules; each leaves those as they were sliced.
+// Most passes over one print. Each pass keeps the runs that broke rules in the passes before.
 constexpr int kMostPasses = 5;
 
 Engines engines_of(EngineChoice choice) {
@@ -46,7 +46,7 @@ PassOutcome failed(tl::unexpected<Error> error) { return {std::move(error), {}};
 // Opens what the job names and goes over it once.
 PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verify::BlamedRun>& kept,
                  bool last, Progress& progress, report::Report& report) {
-  // Before there is any thread.
+  // This forks, so it comes before any thread exists.
   Result<WorkerPool> processes =
       WorkerPool::start(engines.threaded ? (engines.second ? 1 : 0) : job.workers, engines.second);
   if (!processes) {
@@ -96,8 +96,7 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
   return outcome;
 }
 
-// Of single runs the report tells. Where it is all of them, the print is as good as not
-// compensated.
+// The report lists single runs that were kept. If all were kept, warn the user.
 bool warn_of_no_run(const Job& job, report::Report& report) {
   if (report.runs_total == 0 || report.runs_compensated > 0 || report.fallbacks.empty()) {
     return false;

@@ -26,16 +26,16 @@
 namespace unflex::pipeline {
 namespace {
 
-// Nodes of runs that have been read and not yet been written, per worker, and windows that solver
-// processes are given ahead.
+// Per worker: nodes of runs that may be read and not yet written, and windows that solver processes
+// are given ahead.
 constexpr std::size_t kNodesAhead = 20'000;
 constexpr std::size_t kWindowsAhead = 24;
-// Lines of them and of what stands between; no print has so many to so few nodes.
+// At most so many lines may wait in the queue. It bounds memory where moves are tiny.
 constexpr std::size_t kLinesAhead = 200'000;
 // Windows built at once.
 constexpr std::size_t kWindowsAtOnce = 8;
-// The trajectory of a run or part is held as a whole, 48 bytes per node; longer ones are left as
-// they are. Only a single move makes a part so long.
+// The trajectory of a run or part is held as a whole, 48 bytes per node. A run or part with more
+// nodes is kept. Only a single move can make a part so long.
 constexpr std::size_t kMaxRunNodes = 8'000'000;
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kShortPatience{2};
@@ -63,7 +63,8 @@ std::string text_of(const Piece& piece) {
   return text;
 }
 
-// What has been passed on cannot be written once more with a run left as it was.
+// A stream cannot be written again with a run kept, and no pass follows the last one. There a run
+// may be worse by more before it counts as a violation.
 verify::Rules rules_of_pass(const Job& job, bool last) {
   verify::Rules rules = verify_rules(job.settings);
   if (job.output_fd >= 0 || last) {
@@ -72,8 +73,8 @@ verify::Rules rules_of_pass(const Job& job, bool last) {
   return rules;
 }
 
-// Reads pieces, has runs worked on, and writes them in order. All of it in the calling thread but
-// for what is in the pools.
+// Reads pieces, has runs worked on, and writes them in order. All happens in the calling thread,
+// except what the pools and the other threads do.
 class Compensator {
  public:
   Compensator(const Job& job, const Engines& engines, const std::vector<verify::BlamedRun>& kept,
@@ -134,7 +135,7 @@ class Compensator {
       }
     }
     if (progress_->cancelled()) {
-      // A stream that is cancelled ends wherever it is.
+      // A cancelled stream ends early, so perhaps not all of the print was read.
       return fail(ErrorKind::internal, "cancelled");
     }
     if (pieces_.error()) {
@@ -155,14 +156,15 @@ class Compensator {
 
   [[nodiscard]] bool is_done() const { return all_read_ && queue_.empty(); }
 
-  // Whether more should be read. However long the only run is, what follows it must be known.
+  // Whether more should be read. If only one run waits, there is always room: what follows it must
+  // be known, however long the run is.
   [[nodiscard]] bool has_room() {
     const bool is_little =
         nodes_queued_ <= kNodesAhead * std::max(job_.workers, 1U) && lines_queued_ <= kLinesAhead;
     return (is_little || queue_.size() <= 1) && !verifier_.is_behind();
   }
 
-  // Takes what has been read; false when nothing has.
+  // Takes the next piece, or notes the end of the input. False if neither has come.
   bool take_piece() {
     if (std::unique_ptr<Piece> piece = pieces_.take()) {
       auto job = std::make_shared<RunJob>();
@@ -177,7 +179,7 @@ class Compensator {
     return false;
   }
 
-  // Queues the piece.
+  // Prepares the work on the piece and queues it.
   void admit(std::shared_ptr<RunJob> job) {
     const Piece& piece = job->piece;
     if (piece.is_run) {
@@ -222,15 +224,15 @@ class Compensator {
       job->prepared = true;
     }
     if (!queue_.empty() && rules_.emit.lines.burst_lines > 0) {
-      // The lines of a run where they are counted have to fit those after it. Where they are not,
-      // it is being worked on already.
+      // If lines are counted, those of a run must leave room for the lines that follow. If they are
+      // not counted, the run is being worked on already and must not be changed.
       queue_.back()->lines_after = verify::LineRate::first_lines(piece.moves);
     }
     lines_queued_ += job->piece.events.size();
     queue_.push_back(std::move(job));
   }
 
-  // What an earlier pass found of the run.
+  // What an earlier pass blamed the run for; nullptr: nothing.
   [[nodiscard]] const verify::BlamedRun* blamed_before(const Piece& piece) const {
     const std::size_t first = piece.moves.front().segment.line;
     const std::size_t last = piece.moves.back().segment.line;
@@ -247,7 +249,7 @@ class Compensator {
   // Gives the solvers what they can take, in the order of the file.
   void feed() {
     for (std::size_t piece = 0; piece < queue_.size(); ++piece) {
-      // A run is known in full when it is known what follows.
+      // If lines are counted, the last run in the queue waits until what follows is known.
       if (!all_read_ && piece + 1 == queue_.size() && rules_.emit.lines.burst_lines > 0) {
         return;
       }
@@ -280,14 +282,15 @@ class Compensator {
     std::vector<compensate::RunWindow> windows = windows_of(*job, first, count);
     for (std::size_t i = 0; i < count; ++i) {
       if (windows[i].shares_motors && !job->spans[first + i].cruise) {
-        // Divides the motors' limits; what the process finds counts.
+        // This only divides the motors' limits between the axes. The process finds the solution.
         static_cast<void>(compensate::solve(*divider_, job->spans[first + i], windows[i]));
       }
       for (std::size_t axis = 0; axis < 2; ++axis) {
         tickets_.push_back({job, first + i, axis});
         const compensate::AxisWindow& window = axis == 0 ? windows[i].x : windows[i].y;
         if (job->spans[first + i].cruise) {
-          // Never the last of a run, so that it will be prepared when that one is.
+          // A cruise is never a run's last window. So `missing` gets to 0 only in place(), which
+          // then prepares the run.
           job->results[first + i][axis] = axis_result(compensate::along(window));
           --job->missing;
         } else {
@@ -297,7 +300,7 @@ class Compensator {
     }
   }
 
-  // For something to do.
+  // Waits for something to do.
   void wait() {
     if (processes_->under_way() > 0) {
       const CpuSlot::Without without(*slots_);
@@ -308,13 +311,13 @@ class Compensator {
     }
     const CpuSlot::Without without(*slots_);
     std::unique_lock lock(mutex_);
-    // The verifier does not say when it has caught up.
+    // The verifier does not tell when it has caught up, so look again soon.
     news_.wait_for(lock, verifier_.is_behind() ? kShortPatience : kPatience, [this] {
       return can_write() || (has_room() && !all_read_ && pieces_.has_news());
     });
   }
 
-  // Where lines are counted, it must be known what follows a run.
+  // Whether the first piece can be written. If lines are counted, what follows must be known.
   [[nodiscard]] bool can_write() const {
     return !queue_.empty() && queue_.front()->prepared &&
            (queue_.size() > 1 || all_read_ || rules_.emit.lines.burst_lines == 0);
@@ -355,7 +358,7 @@ class Compensator {
   void put(std::string input, std::string output) {
     bytes_written_ += input.size();
     if (job_.output_fd >= 0) {
-      // How long the print takes is not known yet.
+      // A stream cannot be corrected at its end, so its durations are scaled by the factor so far.
       output = scaled_lines(output, writer_.time_factor());
     }
     *output_ << output;
@@ -365,7 +368,7 @@ class Compensator {
   // Has the probes solved by the second engine.
   Status check_engine() {
     for (std::size_t i = 0; i < gaps_.probes().size(); ++i) {
-      // Windows of runs that failed have none.
+      // Probes of runs that failed have no solution.
       if (!gaps_.probes()[i].solution.base.position_mm.empty()) {
         processes_->submit(i, gaps_.probes()[i].problem);
       }
@@ -399,7 +402,7 @@ class Compensator {
     return {};
   }
 
-  // Which solution a number given to the processes stands for.
+  // The solution that a number given to the processes stands for.
   struct Ticket {
     std::shared_ptr<RunJob> job;
     std::size_t window;
@@ -418,24 +421,25 @@ class Compensator {
   report::Report* report_;
   RunWriter writer_;
   GapCheck gaps_;
-  // The nozzle where the reader is, if every run before was compensated: what motion left as it is
-  // has set ringing, the next run starts with.
+  // The nozzle after the last piece read, as if every run so far were compensated. Kept motion
+  // leaves a swing, with which the next run starts.
   NozzleFollower nozzle_;
   std::deque<std::shared_ptr<RunJob>> queue_;
   std::size_t nodes_queued_ = 0;
   std::size_t lines_queued_ = 0;
-  std::deque<Ticket> tickets_;    // of the windows of queue_
-  std::size_t first_ticket_ = 0;  // number of tickets_' front
+  std::deque<Ticket> tickets_;    // for the windows in queue_
+  std::size_t first_ticket_ = 0;  // number of the first ticket in tickets_
   double input_bytes_;            // 0: not known
   std::size_t bytes_written_ = 0;
   bool all_read_ = false;
   std::mutex mutex_;
   std::condition_variable news_;                // a piece has been read or a run been prepared
-  std::unique_ptr<compensate::Engine> engine_;  // in threads; otherwise the processes solve
-  std::unique_ptr<compensate::Engine> divider_ = compensate::make_banded_engine();  // for those
+  std::unique_ptr<compensate::Engine> engine_;  // used in threads; null: the processes solve
+  std::unique_ptr<compensate::Engine> divider_ =
+      compensate::make_banded_engine();  // for solve_in_process()
   // Last, so that threads end before what they use.
   PieceThread pieces_;
-  std::unique_ptr<record::Recorder> recorder_;  // none where nobody asks
+  std::unique_ptr<record::Recorder> recorder_;  // null if the job asks for no recording
   VerifyThread verifier_;
   TaskPool pool_;
 };

@@ -24,16 +24,16 @@ struct PassStreams {
   WorkerPool& processes;
   CpuSlots& slots;
   std::function<void()> stop_input;  // see PieceThread
-  bool last = false;                 // nothing is written once more after this pass
+  bool last = false;                 // no other pass follows
 };
 
 struct PassOutcome {
   Status status;
-  // Runs with which the result breaks rules, and one whose parts could not be gone on with.
+  // Runs that break rules in the output, and a run in which a part could not be written.
   std::vector<verify::BlamedRun> blamed;
 };
 
-// kept: runs that are left as they were sliced.
+// kept: runs to be left as sliced.
 [[nodiscard]] PassOutcome compensate_pass(const Job& job, const Engines& engines,
                                           const std::vector<verify::BlamedRun>& kept,
                                           const PassStreams& streams, Progress& progress,

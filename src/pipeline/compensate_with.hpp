@@ -9,9 +9,9 @@
 
 namespace unflex::pipeline {
 
-// Solves in threads, where there is an engine that allows it; then the second one, if any, checks
-// a sample of the windows in a process of its own. Otherwise the second one solves everything, in
-// as many processes as there are workers, each with its own engine.
+// If `threaded` is set, it solves in threads, and `second`, if set, checks a sample of the windows
+// in a process of its own. If `threaded` is not set, `second` solves everything, in as many
+// processes as there are workers, each with its own engine.
 struct Engines {
   WorkerPool::EngineFactory threaded;
   WorkerPool::EngineFactory second;

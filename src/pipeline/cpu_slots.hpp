@@ -1,4 +1,4 @@
-// As many threads may compute at once as the user allows; the others wait for a slot.
+// No more threads compute at once than the user allows; the others wait for a slot.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace unflex::pipeline {
 
-// Not a std::counting_semaphore: that of libstdc++ 12.2 may sleep for ever though a slot is free
+// Not a std::counting_semaphore: the one in libstdc++ 12.2 may sleep for ever though a slot is free
 // (GCC bug 104928).
 class CpuSlots {
  public:
@@ -32,7 +32,7 @@ class CpuSlots {
   unsigned free_;
 };
 
-// Holds a slot, or, as `Without`, gives the holder's back for a while.
+// Holds a slot. `Without` gives the holder's slot back for a while.
 class CpuSlot {
  public:
   explicit CpuSlot(CpuSlots& slots) : slots_(&slots) { slots_->take(); }

@@ -15,8 +15,8 @@ namespace unflex::pipeline {
 
 class EmissionCost {
  public:
-  // A run. original: its sliced moves, which begin lead_in_s after the base; replayed: the
-  // printer's plan of its lines; start: the nozzle when it begins.
+  // Adds a run. original: its sliced moves, which begin lead_in_s after the base; replayed: the
+  // printer's plan of the written lines; start: the nozzle when the base begins.
   void add(const std::vector<planner::PlannedMove>& original, double lead_in_s,
            const dynamics::BaseTrajectory& base, const std::vector<planner::PlannedMove>& replayed,
            const dynamics::NozzleXY& start, const verify::NozzleModel& model);

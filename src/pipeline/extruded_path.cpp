@@ -13,12 +13,12 @@
 namespace unflex::pipeline {
 namespace {
 
-// Below this share the user hears of it, with so many reasons.
+// If a smaller share of the path is compensated, a warning names so many reasons.
 constexpr double kEnough = 0.95;
 constexpr std::size_t kNamedReasons = 3;
-// Of path; less is not worth a warning.
+// A command that costs less path than this is not worth a warning.
 constexpr double kLeast_mm = 0.1;
-// Of a whole file; a share of less says nothing.
+// If a file has less extruded path than this, the share says nothing.
 constexpr double kLeastFile_mm = 100.0;
 
 std::vector<std::pair<double, std::string>> largest(const std::map<std::string, double>& kept_mm) {

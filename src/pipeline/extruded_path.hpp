@@ -18,13 +18,13 @@ class ExtrudedPath {
  public:
   explicit ExtrudedPath(Firmware firmware) : firmware_(firmware) {}
 
-  // Of the pieces in the order of the file, one that stands as it was sliced …
+  // Adds a piece that is kept. Pieces come in the order of the file.
   void keep(const Piece& piece);
-  // … and a run that does not.
+  // Adds a run that is compensated.
   void compensate(const Piece& piece);
 
   [[nodiscard]] const report::ExtrudedPath& path() const { return path_; }
-  // By their first lines.
+  // In the order of their first lines.
   [[nodiscard]] const std::vector<report::UnknownCommand>& unknown_commands() const {
     return unknown_;
   }
@@ -37,10 +37,10 @@ class ExtrudedPath {
   report::ExtrudedPath path_;
   std::vector<report::UnknownCommand> unknown_;
   std::map<std::string, std::size_t> places_;  // in unknown_, by command
-  std::optional<std::size_t> lost_by_;         // the last to leave the machine nobody knows where
+  std::optional<std::size_t> lost_by_;  // index in unknown_ of the command that lost the position
 };
 
-// What the user should hear of them: commands that cost extruded path, and a share that is low.
+// Warnings for the user: commands that cost extruded path, and a low compensated share.
 [[nodiscard]] std::vector<std::string> remarks(const report::ExtrudedPath& path,
                                                const std::vector<report::UnknownCommand>& unknown,
                                                const std::string& input_name);

@@ -5,11 +5,12 @@
 namespace unflex::pipeline {
 namespace {
 
-// The most filament that is laid per mm: a line 1.2 mm wide and 0.6 high of 1.75 mm filament.
+// The most filament laid per mm of path: a line 1.2 mm wide and 0.6 mm high, 1.75 mm filament.
 constexpr double kDensest = 0.3;
 constexpr std::size_t kEnoughPairs = 40;
-// Of differences half are smaller than the one before. Of readings no more than a wipe draws back,
-// and few of those are as small as what a single move lays.
+// If E words are differences, about half are smaller than the previous one. If they are readings, E
+// falls only in wipes, and rarely to less than a single move lays. So a larger share of falls means
+// differences.
 constexpr double kShare = 0.2;
 
 }  // namespace

@@ -14,15 +14,15 @@ namespace unflex::pipeline {
 // back, and the rest would lay far too much.
 class ExtrusionModeCheck {
  public:
-  // Lines in the order of the file, each with the state after it. An error once the mode is surely
-  // another.
+  // Takes the lines in the order of the file, each with the state after it. An error once E is
+  // surely relative although the state says absolute.
   [[nodiscard]] Status add(const gcode::Event& event, const gcode::ModalState& after,
                            const std::string& file);
 
  private:
-  std::optional<double> last_mm_;  // what E read after the move before
-  std::size_t pairs_ = 0;          // of moves in X and Y that follow each other
-  std::size_t falls_ = 0;          // pairs as only differences can be
+  std::optional<double> last_mm_;  // what E read after the previous move
+  std::size_t pairs_ = 0;          // pairs of moves in X and Y that follow each other
+  std::size_t falls_ = 0;          // pairs in which E falls to less than a move lays
 };
 
 }  // namespace unflex::pipeline

@@ -16,7 +16,7 @@ constexpr std::size_t kBlockBytes = 256 * 1024;
 // How often a wait is interrupted to see whether it is still wanted.
 constexpr int kPatience_ms = 50;
 
-// Whether the descriptor is ready; false once it is unwanted.
+// Waits until the descriptor is ready; false once it is unwanted.
 bool ready(int fd, short events, CpuSlots& slots, const std::function<bool()>& is_unwanted) {
   pollfd what{fd, events, 0};
   if (poll(&what, 1, 0) > 0) {
@@ -55,7 +55,7 @@ bool FdSource::read_block() {
       return count > 0;
     }
     if (errno != EINTR && errno != EAGAIN) {
-      // Makes the stream bad.
+      // The stream catches this and becomes bad.
       throw std::ios_base::failure("cannot read");
     }
   }

@@ -15,7 +15,7 @@
 
 namespace unflex::pipeline {
 
-// The reader gives its slot back while it waits. Ends early when cancelled or stopped.
+// The reader gives its slot back while it waits. The text ends early when cancelled or stopped.
 class FdSource final : public std::streambuf {
  public:
   FdSource(const Job& job, const Progress& progress, CpuSlots& slots);
@@ -23,14 +23,14 @@ class FdSource final : public std::streambuf {
   // Nothing more is wanted: ends a read that is under way in another thread.
   void stop() { stopped_ = true; }
 
-  // What was wrong with packed text, where the stream is bad for that.
+  // Why the text could not be unpacked, if the stream is bad because of that.
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
  protected:
   int_type underflow() override;
 
  private:
-  // The next bytes into block_; false at the end.
+  // Reads the next bytes into block_; false at the end.
   bool read_block();
   bool unpack_block();
   [[nodiscard]] bool is_unwanted() const { return stopped_ || progress_->cancelled(); }
@@ -41,7 +41,7 @@ class FdSource final : public std::streambuf {
   CpuSlots* slots_;
   std::string block_;
   std::unique_ptr<container::Unpacker> unpacker_;
-  std::string text_;  // unpacked
+  std::string text_;  // unpacked text
   std::optional<Error> error_;
 };
 
@@ -49,8 +49,8 @@ class FdSink final : public std::streambuf {
  public:
   FdSink(const Job& job, const Progress& progress, CpuSlots& slots);
 
-  // To be called once after all of the text; what is packed is incomplete without. False when not
-  // all of it was written: cancelled, or for the error below.
+  // Call it once after all of the text; packed output is incomplete without it. False if not all
+  // was written: the work was cancelled, or error() tells why.
   [[nodiscard]] bool finish();
 
   // The errno of what has gone wrong, or 0.
@@ -65,7 +65,7 @@ class FdSink final : public std::streambuf {
 
   int fd_;
   int error_ = 0;
-  bool is_whole_ = true;  // what was to be written has been
+  bool is_whole_ = true;  // all that came has been written
   const Progress* progress_;
   CpuSlots* slots_;
   std::unique_ptr<container::Packer> packer_;

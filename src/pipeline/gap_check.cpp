@@ -7,8 +7,8 @@
 namespace unflex::pipeline {
 namespace {
 
-// A window in which nothing moves has an objective of rounding errors: an error of a nanometre
-// throughout does not count.
+// If nothing moves in a window, its objective is made of rounding errors. So the gap is taken
+// relative to at least the objective of an error of 1 nm throughout.
 constexpr double kNothing_mm = 1e-6;
 
 }  // namespace
@@ -17,7 +17,7 @@ void GapCheck::choose(RunJob& job) {
   for (std::size_t window = 0; window < job.spans.size(); ++window) {
     for (std::size_t axis = 0; axis < 2 && !job.spans[window].cruise; ++axis) {
       const std::uint64_t number = seen_++;
-      // Not std::uniform_int_distribution, whose numbers are each library's own.
+      // Not std::uniform_int_distribution: its numbers differ between libraries.
       const std::uint64_t slot = number < kProbes ? number : random_() % (number + 1);
       if (slot < kProbes) {
         job.probes.push_back({static_cast<std::size_t>(slot), window, axis, {}, {}});

@@ -1,5 +1,7 @@
 // A fixed sample of the windows is solved by a second engine as well, which shares no code with the
-// first.
+// first. If motors move both axes, it gets each axis with that axis' share of the motors' limits.
+// The shares are always the first engine's, so it checks how each axis uses its share, not how the
+// limits are divided.
 #pragma once
 
 #include <cstddef>
@@ -16,13 +18,14 @@ class GapCheck {
  public:
   static constexpr std::size_t kProbes = 8;
 
-  // Chooses among the job's windows, which come in the order of the file (Vitter's algorithm R,
-  // ACM Trans. Math. Softw. 11 (1985) 37). Always the same for the same file.
+  // Chooses among the job's windows, which come in the order of the file (Vitter's algorithm R, ACM
+  // Trans. Math. Softw. 11 (1985) 37). The choice is always the same for the same file.
   void choose(RunJob& job);
-  // Takes what the job's windows have become.
+  // Takes the job's probes once they are solved.
   void take(RunJob& job);
 
-  // The problems, and what the second engine makes of each.
+  // The chosen problems with the first engine's solutions. compare() adds to `check` how far the
+  // second engine's solution of one is away.
   [[nodiscard]] const std::vector<Probe>& probes() const { return probes_; }
   static void compare(const Probe& probe, const compensate::AxisSolution& second,
                       report::SolverCheck& check);

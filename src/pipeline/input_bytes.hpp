@@ -9,7 +9,7 @@
 
 namespace unflex::pipeline {
 
-// 0 where it is not known: of a stream, or a file whose name is gone since it was opened.
+// 0 if the size is not known: for a stream, or a file whose name is gone since it was opened.
 [[nodiscard]] inline double input_bytes(const Job& job) {
   std::error_code unknown;
   const std::uintmax_t bytes =
@@ -17,7 +17,7 @@ namespace unflex::pipeline {
   return unknown ? 0.0 : static_cast<double>(bytes);
 }
 
-// Progress is unknown where the size is.
+// −1, unknown progress, if the size is not known.
 [[nodiscard]] inline double share_of_input(double done_bytes, double input_bytes) {
   return input_bytes > 0.0 ? done_bytes / input_bytes : -1.0;
 }

@@ -122,7 +122,7 @@ class Inspector {
     result_->barrier_lines += event.kind == gcode::EventKind::barrier ? 1 : 0;
     result_->reference_time_s += event.dwell_s;
     if (event.line.content().starts_with("G1 ")) {
-      ++linear_moves_;  // most lines; what they say is in the event
+      ++linear_moves_;  // most lines are such; the event has their content
     } else {
       add_command(gcode::parse(event.line.content()));
     }
@@ -157,7 +157,8 @@ class Inspector {
     absolute_e_ = command.is('M', 82) || (absolute_e_ && !command.is('M', 83));
   }
 
-  // By the firmware's own plan, which unlike that of the pieces goes through lifts without a stop.
+  // Plans the whole file as the firmware does. Unlike the plan of the pieces, this plan goes
+  // through lifts without a stop.
   void plan(const gcode::Event& event) {
     if (event.kind != gcode::EventKind::move) {
       planner_->apply(*event.limits);
@@ -206,7 +207,7 @@ class Inspector {
   std::string slicers_;
   std::size_t linear_moves_ = 0;
   bool absolute_e_;
-  long extruded_absolute_ = 0;  // extruding moves in M82 less those in M83
+  long extruded_absolute_ = 0;  // extruding moves in M82 minus those in M83
 };
 
 }  // namespace

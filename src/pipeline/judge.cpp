@@ -11,12 +11,12 @@
 namespace unflex::pipeline {
 namespace {
 
-// Below these no print shows a difference.
+// No print shows a difference below these.
 constexpr double kNothingRms_mm = 0.5e-3;
 constexpr double kNothing_mm = 3e-3;
-// Where the firmware rounds to steps, a single place may be off by part of one by chance.
+// If the firmware rounds to steps, a single place may by chance be off by this share of a step.
 constexpr double kShareOfStep = 0.1;
-// What coarse steps may leave unseen of an error.
+// The share of an error that coarse time steps may miss.
 constexpr double kSampling = 2e-4;
 
 double chance_mm(const planner::FirmwareConfig& config) {
@@ -35,7 +35,8 @@ verify::RunDeviation deviation_of(const Piece& run, const std::vector<planner::P
   if (run.begins_run() && run.ends_run()) {
     return verify::measure(run.moves, base, nozzle, model, lead_in_s);
   }
-  // Where the base is a little ahead of the plan, or behind, the path must be there already.
+  // The base may be a little ahead of the plan or behind it, so the reference includes the moves
+  // around the part.
   std::vector<planner::PlannedMove> reference = run.before;
   reference.insert(reference.end(), run.moves.begin(), run.moves.end());
   reference.insert(reference.end(), run.after.begin(), run.after.end());
@@ -47,7 +48,7 @@ namespace {
 
 constexpr std::size_t kNoLine = std::numeric_limits<std::size_t>::max();
 
-// As if the printer went on for a while as on its last line.
+// A line that continues the last one for a while, since the printer goes on after it.
 gcode::Segment continued(const gcode::Segment& last) {
   constexpr double kAWhile_s = 0.05;
   gcode::Segment line = last;
@@ -62,11 +63,13 @@ gcode::Segment continued(const gcode::Segment& last) {
 
 // What the printer makes of the text.
 struct Replayed {
-  std::optional<planner::PlannedMove> before;  // of a part, the last move before it
+  std::optional<planner::PlannedMove>
+      before;  // the last move before the text, if it is a later part
   std::vector<planner::PlannedMove> moves;
 };
 
-// Marlin leaves a move of a few steps to the next one: it is not where the text says.
+// Marlin skips a move of a few steps and makes it with the next one, so it is not where the text
+// says. Returns the skipped move, if there is one.
 std::optional<gcode::Segment> left_to_next(const gcode::Position& machine_mm,
                                            const gcode::Position& at_mm) {
   constexpr double kFewSteps_mm = 0.5;
@@ -133,8 +136,8 @@ verify::RunError error_of(const verify::DeviationStats& stats, double swing_mm,
                            stats.contour_max_mm, stats.duration_s, swing_mm, model);
 }
 
-// Why the deviation `after` is worse than the one before. Each counts with the swing that it leaves
-// to what follows the plan's last move.
+// Why the deviation `after` is worse than `before`; nullopt if it is not. Each counts with the
+// swing that is left after the plan's last move, `last`.
 std::optional<std::string> worse(const verify::RunDeviation& before,
                                  const verify::RunDeviation& after,
                                  const planner::PlannedMove& last, const verify::Rules& rules) {
@@ -158,9 +161,9 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
         "largest {:.3f} to {:.3f} µm",
         b.rms_mm * 1e3, a.rms_mm * 1e3, b.max_mm * 1e3, a.max_mm * 1e3);
   }
-  // Travel draws nothing, and a straight one has no contour error whatever it does: what counts is
-  // how well the nozzle keeps to where it should be, and so what it leaves to the next run. Where
-  // the firmware rounds the clock of each line, only the latter.
+  // Travel draws nothing, and straight travel has no contour error whatever happens. So its
+  // tracking error counts, since it tells what swing is left to the next run. If the firmware
+  // rounds the clock of each line, it is enough that this swing is no larger.
   const verify::DeviationStats b = before.all.stats();
   const verify::DeviationStats a = after.all.stats();
   if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm, kNothingRms_mm) ||
@@ -172,7 +175,7 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
                      b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
 }
 
-// Whether a print could bear it although it is worse.
+// Whether the print can bear the deviation `after` although it is worse.
 bool is_bearable(const verify::RunDeviation& before, const verify::RunDeviation& after) {
   constexpr double kBearableRms_mm = 5e-3;
   constexpr double kBearable_mm = 25e-3;
@@ -206,7 +209,7 @@ Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_
   for (const planner::PlannedMove& move : verdict.replayed) {
     rate.add(move);
   }
-  // Where the sliced lines themselves are too many, fewer are better.
+  // If the sliced lines themselves exceed the budget, the run may have as many as they.
   if (rate.max_per_s() > std::max(max_lines_per_s, original_rate.max_per_s())) {
     verdict.objection = fmt::format("{:.0f} lines per second are more than {:.0f}",
                                     rate.max_per_s(), max_lines_per_s);

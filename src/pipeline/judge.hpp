@@ -15,34 +15,35 @@
 
 namespace unflex::pipeline {
 
-// How the nozzle strays from the run while the base makes the moves `base`; of the run's own moves,
-// how it would without compensation. Sampled as finely as its ringing asks for, not as a
-// verification is.
+// How the nozzle strays from the run while the base makes the moves `base`. With the run's own
+// moves as `base`, this is the deviation without compensation. It is sampled as finely as the
+// nozzle's ringing needs, more coarsely than in a verification.
 [[nodiscard]] verify::RunDeviation deviation_of(const Piece& run,
                                                 const std::vector<planner::PlannedMove>& base,
                                                 const dynamics::NozzleXY& nozzle,
                                                 const verify::Rules& rules, double lead_in_s);
 
-// Where the text is a part of a run, or the printer passes into it from lines that are kept.
+// What is around the text, if it is a part of a run or the printer passes into it from kept lines.
 struct InMotion {
-  std::vector<gcode::Segment> lines_before;  // the last ones of what is before; none: from rest
-  bool goes_on = false;                      // another part follows
-  bool may_be_worse = false;                 // by little: there is no other way left
-  // Where the last move led that the firmware has made.
+  std::vector<gcode::Segment>
+      lines_before;           // the last lines before the text; none: it begins at rest
+  bool goes_on = false;       // another part follows
+  bool may_be_worse = false;  // by a little, since the part must be written
+  // Where the last move ended that the firmware has made.
   std::optional<gcode::Position> machine_mm = std::nullopt;
 };
 
 struct Verdict {
-  std::optional<std::string> objection;        // why the original moves must stand
-  bool worse = false;                          // than they, which was allowed
-  dynamics::NozzleXY nozzle;                   // without objection: after the run …
-  verify::LineRate rate;                       // … its lines counted …
-  std::vector<planner::PlannedMove> replayed;  // … and what the printer makes of them
+  std::optional<std::string> objection;  // why the original moves must stand
+  bool worse = false;                    // deviates more than the original moves
+  dynamics::NozzleXY nozzle;             // at the end of the run, if there is no objection
+  verify::LineRate rate;                 // with the run's lines counted, if there is no objection
+  std::vector<planner::PlannedMove> replayed;  // the printer's plan of the text
 };
 
 // Replays the text of a compensated run as the printer would, in the state the printer is in before
-// it. Objects where it breaks a hard rule, asks for more lines per second than allowed, or where
-// its deviation is larger than that of the original moves, `before`. rate: of the lines before it.
+// the run. Objects if the run breaks a hard rule, has more lines per second than allowed, or
+// deviates more than its original moves (`before`). rate: has counted the lines before the run.
 [[nodiscard]] Verdict judge(const Piece& run, const verify::RunDeviation& before,
                             std::string_view text, gcode::Interpreter printer,
                             const planner::Limits& printer_limits, const dynamics::NozzleXY& nozzle,

@@ -10,8 +10,8 @@
 namespace unflex::pipeline {
 namespace {
 
-// Over one node period. Acceleration is linear between nodes; for the nozzle each half's mean does
-// as well.
+// Advances the nozzle by one node period. The base's acceleration is linear between nodes; for the
+// nozzle, the mean of each half is accurate enough.
 dynamics::NozzleState after_node(const dynamics::AxisTrajectory& base, std::size_t k, double h,
                                  const dynamics::FlexibleAxis& axis, dynamics::NozzleState state) {
   const double change = base.accel_mm_s2[k + 1] - base.accel_mm_s2[k];
@@ -24,7 +24,7 @@ dynamics::NozzleState after_node(const dynamics::AxisTrajectory& base, std::size
       0.5 * h);
 }
 
-// Of a nozzle whose base stands still: its deviation some time later.
+// How the deviation of a nozzle develops while its base stands still.
 dynamics::NozzleState swing(const dynamics::FlexibleAxis& axis,
                             const dynamics::NozzleState& deviation, double duration_s) {
   return dynamics::exact_step(axis, deviation, {}, duration_s);
@@ -43,7 +43,7 @@ dynamics::NozzleXY at_end_of(const planner::PlannedMove& move) {
           {end[gcode::Y], v * move.direction[gcode::Y]}};
 }
 
-// Phase by phase: the acceleration changes where one ends.
+// Goes phase by phase, since the acceleration changes between phases.
 void advance(const planner::PlannedMove& move, double from_s, double to_s,
              const verify::NozzleModel& model, dynamics::NozzleXY& nozzle) {
   const std::array<double, 3> ends_s = {move.accel_s, move.accel_s + move.cruise_s,
@@ -99,7 +99,7 @@ double NozzleFollower::follow(const Piece& piece) {
     for (std::size_t k = 0; k < piece.move_counts[i]; ++k, ++next) {
       const planner::PlannedMove& move = piece.moves[next];
       if (!move.segment.start_known && !move.segment.start_assumed) {
-        // From wherever the machine was: nothing is known but that it starts at rest.
+        // The start is not known. All that is known is that the machine starts at rest.
         set(at_rest(move.segment.start_mm), move.segment.start_mm);
       }
       advance(move, 0.0, move.duration_s(), model_, driven_);
@@ -114,7 +114,7 @@ double NozzleFollower::follow(const Piece& piece) {
       pause(event.dwell_s);
     }
     if (event.sets_shaper) {
-      // The sliced file has this stop too.
+      // The sliced file has this stop too, so it does not count as added.
       printer_ = *event.shaper;
       static_cast<void>(change(printer_, std::nullopt));
     }
@@ -136,7 +136,8 @@ void NozzleFollower::pause(double duration_s) {
   ringing_ = {swing(model_.x, ringing_.x, duration_s), swing(model_.y, ringing_.y, duration_s)};
 }
 
-// The machine stands still, all that the shaper before has delayed is over, and the nozzle rings.
+// Switches the shaper. Meanwhile the machine stands still: the motion that the old shaper has
+// delayed ends, and the nozzle rings.
 double NozzleFollower::change(const gcode::Shaper& next, std::optional<double> pressure_advance_s) {
   const double stop_s = planner::switching_s(config_, present_, next, pressure_advance_s);
   if (stop_s == 0.0) {

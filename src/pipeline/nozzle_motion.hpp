@@ -15,14 +15,14 @@ namespace unflex::pipeline {
 
 [[nodiscard]] dynamics::NozzleXY at_rest(const gcode::Position& position);
 
-// On the plan, where the move ends and as fast as it then is.
+// A nozzle that follows the plan exactly, at the end of the move.
 [[nodiscard]] dynamics::NozzleXY at_end_of(const planner::PlannedMove& move);
 
 // Takes the nozzle from one moment of the move to a later one, seconds after its start.
 void advance(const planner::PlannedMove& move, double from_s, double to_s,
              const verify::NozzleModel& model, dynamics::NozzleXY& nozzle);
 
-// Takes it from node k of the base's motion to the next.
+// Takes the nozzle from node k of the base's motion to the next.
 void advance(const dynamics::BaseTrajectory& base, std::size_t k, const verify::NozzleModel& model,
              dynamics::NozzleXY& nozzle);
 
@@ -32,8 +32,8 @@ void advance(const dynamics::BaseTrajectory& base, std::size_t k, const verify::
 // The nozzle from piece to piece, the printer's own shaper included.
 //
 // A shaper's base is a weighted sum of shifted motions, b_s(t) = Σ A_i b(t − t_i), and the nozzle's
-// response is linear. So the shaped nozzle is the same sum of a nozzle that hangs on the unshaped
-// base, and only that one is followed, from rest:
+// response is linear. So the shaped nozzle is such a sum of a nozzle u that hangs on the unshaped
+// base. Only u is followed, from rest:
 //
 //   p(t) = Σ A_i u(t − t_i) + e^{-ζωt}(…)
 //
@@ -48,12 +48,13 @@ class NozzleFollower {
   NozzleFollower(const verify::NozzleModel& model, const planner::FirmwareConfig& config,
                  const gcode::Shaper& shaper);
 
-  // The piece's own moves and pauses, with the shaper as the emitter leaves it there. Returns for
-  // how long the machine stands still while the emitter switches it, s.
+  // Follows the piece's own moves and pauses, with the shaper as the emitter leaves it there.
+  // Returns how long the machine stands still because the emitter switches the shaper, s.
   double follow(const Piece& piece);
-  // The emitter switches the shaper off, for a run that begins. Returns the same.
+  // The emitter switches the shaper off for a run that begins. Returns how long the machine stands
+  // still for it, s.
   double begin_run(const Piece& run);
-  // The nozzle is known to be so, the base at rest at this place.
+  // Sets the nozzle and the place of the base, where they are known.
   void set(const dynamics::NozzleXY& nozzle, const gcode::Position& base);
 
   // Meaningful where no shaper acts, as in and after runs.
@@ -65,12 +66,12 @@ class NozzleFollower {
 
   verify::NozzleModel model_;
   planner::FirmwareConfig config_;
-  gcode::Shaper printer_;     // as the input has it
-  gcode::Shaper present_;     // as the output has it
-  planner::Shaping shaping_;  // of the latter
+  gcode::Shaper printer_;     // shaper that the input has set
+  gcode::Shaper present_;     // shaper that acts in the output
+  planner::Shaping shaping_;  // how present_ acts
   std::array<double, 2> base_mm_{};
   dynamics::NozzleXY driven_;   // u; without a shaper the nozzle itself
-  dynamics::NozzleXY ringing_;  // the rest, as a deviation
+  dynamics::NozzleXY ringing_;  // the second term of p, as a deviation from the base
 };
 
 }  // namespace unflex::pipeline

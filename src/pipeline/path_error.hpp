@@ -12,7 +12,7 @@
 
 namespace unflex::pipeline {
 
-// Of what is across the path, while filament is laid.
+// The error across the path while filament is laid, as a sum of squares over samples.
 struct PathError {
   double sum_mm2 = 0.0;
   std::size_t samples = 0;
@@ -21,8 +21,8 @@ struct PathError {
   [[nodiscard]] double rms_mm() const;
 };
 
-// Of a run: at the nodes of the base's motion, which begins lead_in_s before the plan. start: the
-// nozzle when it begins.
+// The error in a run, sampled at the nodes of the base's motion. The base begins lead_in_s before
+// the plan. start: the nozzle when the base begins.
 [[nodiscard]] PathError path_error(const std::vector<planner::PlannedMove>& plan, double lead_in_s,
                                    const dynamics::BaseTrajectory& base,
                                    const dynamics::NozzleXY& start,

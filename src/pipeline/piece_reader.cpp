@@ -18,30 +18,32 @@ namespace {
 
 // Lines between runs are handed on in portions, so that a long file without motion stays small.
 constexpr std::size_t kMaxEventsOutsideRuns = 4096;
-// In a run they are held until it is known what follows. So many in a row, or in what is held of
-// the run, no print has; the run ends there as if the machine stopped.
+// In a run, lines without motion are held until it is known what follows. No print has so many in a
+// row, or so many in the part of a run that is held. If there are more, the run ends there as if
+// the machine stopped.
 constexpr std::size_t kMostInARow = 20'000;
 constexpr std::size_t kMostInARun = 400'000;
 constexpr std::size_t kMaxWarnings = 1000;
 constexpr std::size_t kMostSpareEvents = 10'000;
 constexpr std::size_t kUsualEvents = 8;
-// Runs up to this long are handled as a whole, so that they can be left as they are …
+// Runs up to this long are handled as a whole, so that they can be kept.
 constexpr double kWhole_s = 60.0;
-// … of longer ones parts, which end near borders this far apart, …
+// Longer runs are split into parts of at least kPart_s. A part ends at a `Border`; these are about
+// kBorder_s apart.
 constexpr double kPart_s = 20.0;
 constexpr double kBorder_s = 0.5;
-// … if there is one where velocity changes by no more than this. Otherwise they become longer, up
-// to about this long or of so many moves, …
+// A part ends where velocity changes by no more than kSmooth_mm_s. If there is no such border, the
+// part grows up to about kMost_s or kMostMoves.
 constexpr double kSmooth_mm_s = 3.0;
 constexpr double kMost_s = 1800.0;
 constexpr std::size_t kMostMoves = 100'000;
-// … and are given so much of what is around them.
+// A part gets the moves around it that take this long.
 constexpr double kAround_s = 0.3;
-// After how many borders it is looked whether a run is that long.
+// After so many new borders, the reader looks whether the run is long enough to be split.
 constexpr std::size_t kBordersPerLook = 8;
 constexpr double kOnTheEdge_mm = 1e-3;
 
-// How much velocity changes from the move before to this one.
+// The change of velocity from the previous move to this one.
 double turn_before(const std::vector<planner::PlannedMove>& moves, std::size_t move) {
   const planner::PlannedMove& from = moves[move - 1];
   const planner::PlannedMove& to = moves[move];
@@ -60,7 +62,7 @@ std::vector<planner::PlannedMove> first_of(const std::vector<planner::PlannedMov
   return {moves.begin(), last};
 }
 
-// What is from `first` on.
+// Removes the values from `first` on and returns them.
 template <class Value>
 std::vector<Value> split_off(std::vector<Value>& values, std::size_t first) {
   const auto begin = values.begin() + static_cast<std::ptrdiff_t>(first);
@@ -172,8 +174,8 @@ Result<bool> PieceReader::cut(Piece& piece) {
   return true;
 }
 
-// Empties the piece. Lines are what there is most of; pieces that kept their storage would all grow
-// to the size of the largest.
+// Empties the piece and collects the storage of its lines for reuse. If pieces kept their storage,
+// all would grow to the size of the largest.
 void PieceReader::recycle(Piece& piece) {
   if (!piece.events.empty() && spare_events_ + piece.events.size() <= kMostSpareEvents) {
     spare_events_ += piece.events.size();
@@ -221,7 +223,7 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
     return tl::unexpected(sliced.error());
   }
   any_command_ = any_command_ || looks_like_command(line.content());
-  // Of Marlin's, which it ends, the interpreter tells.
+  // For Marlin a carriage return ends the line, and the interpreter warns.
   if (firmware_ != Firmware::marlin && line.has_bare_return()) {
     warn(line.number,
          "a carriage return without a line feed ends no line, neither here nor in the printer: "
@@ -251,7 +253,8 @@ void PieceReader::warn(std::size_t line, std::string message) {
   warnings_.back().message = fmt::format("{} more warnings are not listed", unlisted_warnings_);
 }
 
-// The printer refuses the move, or cuts it off; unflex leaves the way there as it is.
+// Warns of a move out of the travel. The printer refuses it or cuts it off; unflex does not correct
+// it.
 void PieceReader::warn_of_travel(const gcode::Event& event) {
   const auto outside = [](double at, double min, double max, bool min_assumed) {
     return at > max + kOnTheEdge_mm || (at < min - kOnTheEdge_mm && !min_assumed);
@@ -268,7 +271,7 @@ void PieceReader::warn_of_travel(const gcode::Event& event) {
   }
 }
 
-// Puts the event into the open piece, after the lines that turned out to stand between.
+// Puts the event into the open piece, after the lines held in between_.
 void PieceReader::append(gcode::Event&& event) {
   if (open_.events.empty()) {
     open_.from_mm = machine_mm_;
@@ -277,7 +280,7 @@ void PieceReader::append(gcode::Event&& event) {
   }
   append_between();
   if (open_.is_run && open_.events.empty()) {
-    // The move itself changes nothing of it.
+    // The event is a move, so it has changed nothing of this state.
     open_.start = emit::run_start(interpreter_.state(), planner_->limits());
     open_.pressure_advance_s = interpreter_.state().pressure_advance_s;
     open_.cut_off = after_cut_;
@@ -308,7 +311,7 @@ void PieceReader::append_between() {
   between_.clear();
 }
 
-// Of the move that is about to be added.
+// Notes a border before the move that is about to be added, if the last border is long ago.
 void PieceReader::mark_border(const gcode::Event& event) {
   if (since_border_s_ >= kBorder_s) {
     since_border_s_ = 0.0;
@@ -321,8 +324,9 @@ void PieceReader::mark_border(const gcode::Event& event) {
   }
 }
 
-// The border at which a part is to end, once it is long enough and the plan final until some time
-// after it: the first that is no corner. Where all are, the least sharp, but only of very many.
+// The border at which the open part is to end; nullopt: none yet. The part must be long enough, and
+// the plan final until kAround_s after the border. The first border that is no corner is taken. If
+// all are corners, the least sharp is taken once the part is very long.
 std::optional<std::size_t> PieceReader::border_to_split_at() const {
   const std::vector<planner::PlannedMove>& moves = open_.moves;
   const double total_s = planner::duration_s(moves);
@@ -355,7 +359,7 @@ std::optional<std::size_t> PieceReader::border_to_split_at() const {
   return total_s > kMost_s || moves.size() > kMostMoves ? best : std::nullopt;
 }
 
-// Hands out a part of the open run, if that is long by now.
+// Hands out a part of the open run if the run is long by now.
 bool PieceReader::split(Piece& piece) {
   if (borders_since_look_ < kBordersPerLook) {
     return false;
@@ -387,14 +391,14 @@ bool PieceReader::split(Piece& piece) {
   return true;
 }
 
-// Hands out the open piece; the lines after a run's last move go to the next one.
+// Hands out the open piece; the lines after a run's last move go to the next piece.
 void PieceReader::close(Piece& piece) {
   if (open_.events.empty()) {
     append_between();
   }
   planner_->stop();
   planner_->take(open_.moves);
-  // Marlin leaves moves of a few steps to the next one.
+  // Marlin leaves a move of a few steps to the next one, so a run may have no planned move.
   open_.is_run = open_.is_run && !open_.moves.empty();
   piece = std::exchange(open_, Piece{});
   still_lines_ = 0;

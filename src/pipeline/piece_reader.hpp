@@ -1,4 +1,4 @@
-// The input cut into what is handled as one: runs, and the lines between them.
+// Cuts the input into pieces: runs, parts of long runs, and the lines between runs.
 #pragma once
 
 #include <cstddef>
@@ -21,32 +21,32 @@
 namespace unflex::pipeline {
 
 struct Piece {
-  // A run: compensable moves and the lines between them that do not stop the machine. Its plan goes
-  // from rest to rest, since the base has to stand still where it meets motion left as it is. Has
-  // at least one planned move. A long one comes in parts.
+  // Whether this is a run: compensable moves and the lines between them that do not stop the
+  // machine. Its plan goes from rest to rest, since the base has to stand still where it meets kept
+  // motion. It has at least one planned move. A long run comes in parts.
   bool is_run = false;
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
   std::vector<planner::PlannedMove> moves;
-  emit::RunStart start;  // of a run
-  // Where a run begins: what the file has set, if it has.
+  emit::RunStart start;  // only for runs and parts
+  // Pressure advance that the file has set when a run begins; nullopt: not set.
   std::optional<double> pressure_advance_s;
   gcode::Position from_mm{};  // where the piece's first move finds the machine
-  // Of a part of a run, some of its moves around: none before the first part and after the last.
+  // Some moves of the run around this part: none before the first part and after the last.
   std::vector<planner::PlannedMove> before;
   std::vector<planner::PlannedMove> after;
-  // Of a run: it meets another one where the machine does not stop, but for the lines without
-  // motion there, which are too many to be held. Its own moves have to stand.
+  // The run was ended early, or begins, where too many lines without motion stand in a row. The
+  // printer does not stop there, so the run keeps its sliced moves.
   bool cut_off = false;
 
   [[nodiscard]] bool begins_run() const { return is_run && before.empty(); }
   [[nodiscard]] bool ends_run() const { return is_run && after.empty(); }
 };
 
-// Why a move of a line that is no part of a run stays as it is.
+// Why a move is kept whose line is not in a run.
 [[nodiscard]] std::string_view kept_move_reason(const gcode::Segment& segment, Firmware firmware);
 
-// Counts the event's moves that unflex leaves as they are, by reason.
+// Counts the event's moves by the reason why they are kept, if they are.
 void count_kept_moves(const gcode::Event& event, Firmware firmware,
                       std::map<std::string, std::size_t>& kept);
 
@@ -83,27 +83,28 @@ class PieceReader {
 
   gcode::LineReader lines_;
   gcode::Interpreter interpreter_;
-  std::optional<gcode::Line> approached_;  // read, and to come after gcode::Interpreter::approach
+  std::optional<gcode::Line> approached_;  // line that comes after its approach
   std::unique_ptr<planner::Planner> planner_;
   Firmware firmware_;
   verify::TravelLimits travel_;
-  // Where a run that turns out to be long may be parted: before a move of it.
+  // A place before a move where a run that turns out to be long may be split.
   struct Border {
     std::size_t event = 0;
     std::size_t move = 0;
     emit::RunStart start;
   };
 
-  Piece open_;                    // being filled
-  std::deque<Border> borders_;    // of it
-  double since_border_s_ = 0.0;   // roughly
-  gcode::Position machine_mm_{};  // after the last planned move
+  Piece open_;                    // piece being filled
+  std::deque<Border> borders_;    // borders in open_
+  double since_border_s_ = 0.0;   // rough time since the last border
+  gcode::Position machine_mm_{};  // end of the last planned move
   std::size_t borders_since_look_ = 0;
-  std::vector<std::vector<gcode::Event>> spare_;  // storage for the next ones
-  std::size_t spare_events_ = 0;                  // in it
-  std::vector<gcode::Event> between_;  // after the open run's last move; its own or not, who knows
-  bool after_cut_ = false;             // and nothing but lines without motion since
-  std::size_t still_lines_ = 0;        // without motion, of the open run and after it
+  std::vector<std::vector<gcode::Event>> spare_;  // storage for the next events
+  std::size_t spare_events_ = 0;                  // number of events in spare_
+  std::vector<gcode::Event>
+      between_;                  // lines after the open run's last move, perhaps not in the run
+  bool after_cut_ = false;       // only lines without motion since a run was cut off
+  std::size_t still_lines_ = 0;  // lines without motion in the open run and after it
   std::vector<Diagnostic> warnings_;
   std::size_t unlisted_warnings_ = 0;
   bool any_command_ = false;

@@ -22,7 +22,7 @@ namespace unflex::pipeline {
 class PieceThread {
  public:
   // The stream is read in the thread; wake: called there whenever something has come. stop_input:
-  // ends a read of a stream that need not end soon.
+  // ends a read of a stream, which might wait for ever.
   PieceThread(
       std::istream& input, std::string name, const verify::Rules& rules, CpuSlots& slots,
       std::function<void()> wake, std::function<void()> stop_input = [] {});
@@ -33,21 +33,21 @@ class PieceThread {
 
   // The next piece, if it has been read.
   [[nodiscard]] std::unique_ptr<Piece> take();
-  // Gives back pieces that have been dealt with, whose storage the next ones use, and waits for all
-  // that have been read meanwhile; none at the end.
+  // Gives back pieces that have been dealt with, so that their storage is used again. Then waits
+  // for pieces and takes all that have been read; none at the end.
   void exchange(std::deque<std::unique_ptr<Piece>>& pieces);
   // Whether take() would give one or at_end() has come.
   [[nodiscard]] bool has_news();
   // Whether the last piece has been taken: the input has ended, or could not be read on.
   [[nodiscard]] bool at_end();
-  // At the end. Throws what the thread could not handle, such as memory that ran out: where there
-  // is none left, no error could be made of it.
+  // To be called at the end. Throws what the thread could not handle, such as std::bad_alloc:
+  // without memory it could not make an Error of it.
   [[nodiscard]] const std::optional<Error>& error() const;
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return reader_.warnings(); }
 
  private:
   void read(const std::function<void()>& wake);
-  // The thread ends with the exception that is being handled.
+  // Ends the thread with the exception that is being handled; error() throws it again.
   void give_up();
 
   CpuSlots* slots_;

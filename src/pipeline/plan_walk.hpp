@@ -14,10 +14,11 @@ class PlanWalk {
 
   [[nodiscard]] bool at_end() const { return index_ == moves_->size(); }
   [[nodiscard]] const planner::PlannedMove& move() const { return (*moves_)[index_]; }
-  // Where it is.
+  // Where the walk is.
   [[nodiscard]] gcode::Position position_mm() const { return move().position_mm(done_s_); }
 
-  // To `t`; visit(move, from, to) for each stretch on the way, in seconds since the move's start.
+  // Walks on to the time `t`. Calls visit(move, from, to) for each stretch on the way; from and to
+  // are in seconds since the move's start.
   template <typename Visit>
   void to(double t, const Visit& visit) {
     for (; !at_end() && start_s_ + move().duration_s() <= t; ++index_, done_s_ = 0.0) {
@@ -33,8 +34,8 @@ class PlanWalk {
  private:
   const std::vector<planner::PlannedMove>* moves_;
   std::size_t index_ = 0;
-  double start_s_ = 0.0;  // of the move
-  double done_s_ = 0.0;   // of it
+  double start_s_ = 0.0;  // when the move starts
+  double done_s_ = 0.0;   // how far into the move the walk is
 };
 
 }  // namespace unflex::pipeline

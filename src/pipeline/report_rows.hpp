@@ -20,10 +20,10 @@ namespace unflex::pipeline {
 // What the work since `begin` has cost this process and its children.
 void add_performance(std::chrono::steady_clock::time_point begin, report::Report& report);
 
-// What gathers for an HTML report, if the job asks for one.
+// Gathers data for an HTML report; null if the job does not ask for one.
 [[nodiscard]] std::unique_ptr<record::Recorder> recorder_for(const Job& job,
                                                              const verify::Rules& rules);
-// What a verification is to measure beside, for the report and for the recorder, if there is one.
+// What else a verification is to measure: for the report, and for the recorder if there is one.
 [[nodiscard]] verify::Observation observation_of(record::Recorder* recorder,
                                                  const verify::Rules& rules);
 

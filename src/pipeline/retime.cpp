@@ -40,7 +40,7 @@ Status retime(const std::string& path, const std::string& name, double factor) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
   std::string chunk(kChunk, '\0');
   std::string unread;   // read, not yet a whole line
-  std::string pending;  // to be written, where it was not read yet
+  std::string pending;  // to be written once its place has been read
   std::streamoff read_at = 0;
   std::streamoff written_to = 0;
   for (bool more = true; more && file;) {
@@ -57,7 +57,7 @@ Status retime(const std::string& path, const std::string& name, double factor) {
     const std::size_t whole = more ? unread.rfind('\n') + 1 : unread.size();
     pending += scaled_lines(std::string_view(unread).substr(0, whole), factor);
     unread.erase(0, whole);
-    // Not over what is still to be read.
+    // Do not write over what is still to be read.
     const auto room = static_cast<std::size_t>(read_at - written_to);
     const std::size_t ready = more ? std::min(pending.size(), room) : pending.size();
     file.seekp(written_to);

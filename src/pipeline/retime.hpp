@@ -1,4 +1,4 @@
-// What a file says of its duration, made true again.
+// Corrects what a file says about its duration.
 #pragma once
 
 #include <string>
@@ -8,15 +8,15 @@
 
 namespace unflex::pipeline {
 
-// The lines of a text, the last perhaps without its end, with the durations in M73 and in the
-// slicer's comments multiplied by `factor`.
+// The text with the durations in M73 and in the slicer's comments multiplied by `factor`. The last
+// line may be without its line ending.
 [[nodiscard]] std::string scaled_lines(std::string_view text, double factor);
 
-// The same for a file, in place. Fails if the file cannot be read or written; `name` is what the
-// error calls it.
+// Corrects a file in place like scaled_lines(). Fails if the file cannot be read or written; `name`
+// is what the error calls it.
 [[nodiscard]] Status retime(const std::string& path, const std::string& name, double factor);
 
-// What writing comes to where a file takes no more.
+// The error if a file cannot be written any further.
 [[nodiscard]] tl::unexpected<Error> output_failed(const std::string& name);
 
 }  // namespace unflex::pipeline

@@ -26,7 +26,8 @@ std::string failure_of(const RunJob& job) {
   return {};
 }
 
-// From the course's first node on; of a part also what comes after its last.
+// Joins the solutions of the windows, from the course's first node on. For a part this includes the
+// nodes after its last one.
 dynamics::AxisTrajectory joined(const RunJob& job,
                                 const std::vector<dynamics::AxisTrajectory>& solutions) {
   dynamics::AxisTrajectory base = compensate::join(job.spans, solutions);
@@ -37,7 +38,7 @@ dynamics::AxisTrajectory joined(const RunJob& job,
   return base;
 }
 
-// Of what the solvers have found.
+// Joins what the solvers have found for the axis.
 dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
   std::vector<dynamics::AxisTrajectory> solutions;
   for (std::array<AxisResult, 2>& result : job.results) {
@@ -47,7 +48,7 @@ dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
   return joined(job, solutions);
 }
 
-// The base that would be best if the axes were as given and nothing else.
+// The base optimised for the nominal axes alone.
 std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
   compensate::Setup setup = job.setup;
   setup.x.variants.clear();
@@ -78,8 +79,8 @@ void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
   }
 }
 
-// Where the firmware counts steps, how lines are cut depends on those before the run. What these
-// will be is not known yet: as many as there may be, at an even pace.
+// If the firmware counts steps, the cut of a run depends on the lines before it. These are not
+// known yet, so we assume as many as allowed, at an even pace.
 std::vector<double> even_lines_before_s(const emit::LineRules& rules) {
   std::vector<double> begins_s;
   for (int i = rules.burst_lines; i > 0; --i) {

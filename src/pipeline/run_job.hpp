@@ -39,23 +39,23 @@ struct Probe {
 
 struct RunJob {
   Piece piece;
-  // From here on of runs, or parts of runs, only.
-  dynamics::NozzleXY nozzle;  // when it begins, if every run before is compensated
+  // What follows is only used for runs and parts of runs.
+  dynamics::NozzleXY nozzle;  // at its begin, if every run before is compensated
   compensate::Setup setup;
   compensate::NodeGrid grid;
   std::vector<compensate::WindowSpan> spans;
   std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
   std::vector<Probe> probes;
   std::size_t submitted = 0;             // windows given to the solvers
-  int lines_after = 0;                   // of Run, by the sliced lines that follow
+  int lines_after = 0;                   // Run::lines_after, counted in the sliced lines
   std::atomic<std::size_t> missing = 0;  // axes of windows not yet solved
 
-  // From make_lines(): the base and its lines, or the reason why the run's own moves must stand.
+  // Results of make_lines(): the base and its lines, or the reason why the run is kept.
   dynamics::BaseTrajectory base;
   emit::RunPlan plan;
-  verify::RunDeviation before;  // of its own moves
-  // Where the axes may be several things, of the axes as given: on this base, and on the one that
-  // would be best for them.
+  verify::RunDeviation before;  // deviation of the run's sliced moves
+  // Contour error of the nominal axes; set only with dynamics.*_error. `robust`: on the emitted
+  // base. `nominal`: on the base optimised for them alone.
   PathError robust;
   PathError nominal;
   std::size_t iterations = 0;
@@ -66,7 +66,7 @@ struct RunJob {
   [[nodiscard]] compensate::Course course() const {
     return {piece.before, piece.moves, piece.after};
   }
-  // How long before its plan the base begins.
+  // How long before the plan the base begins.
   [[nodiscard]] double lead_in_s() const { return piece.begins_run() ? setup.lead_in_s : 0.0; }
   // What the emitter is to write; the arguments are Run's.
   [[nodiscard]] emit::Run run(double tolerance_share = 1.0, double limits_share = 1.0,
@@ -86,11 +86,12 @@ struct RunRules {
 [[nodiscard]] std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
                                                             std::size_t count);
 
-// Solves these windows. Calls for others may run at the same time.
+// Solves these windows. Calls for other windows may run at the same time.
 void solve_windows(RunJob& job, std::size_t first, std::size_t count,
                    const compensate::Engine& engine) noexcept;
 
-// Once all windows are solved. Throws nothing.
+// Joins the windows and cuts the base into lines. To be called once all windows are solved. Throws
+// nothing.
 void make_lines(RunJob& job, const RunRules& rules) noexcept;
 
 }  // namespace unflex::pipeline

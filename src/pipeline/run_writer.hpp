@@ -1,5 +1,5 @@
-// Writes runs and the lines between them in the order of the input, and watches that no run gets
-// worse by it.
+// Writes runs and the lines between them in the order of the input, and makes sure that
+// compensation makes no run worse.
 #pragma once
 
 #include <optional>
@@ -19,20 +19,21 @@ namespace unflex::pipeline {
 
 class RunWriter {
  public:
-  // Rules and report must outlive the writer. input_name: in errors. max_lines_per_s: the budget.
+  // Rules and report must outlive the writer. input_name: for messages. max_lines_per_s: the
+  // budget.
   RunWriter(const RunRules& rules, std::string input_name, double max_lines_per_s,
             report::Report& report);
 
-  // The piece as text. Of a run, make_lines() has been called. An error where a run of which parts
-  // have been written cannot go on.
+  // The piece as text. For a run, make_lines() must have been called. An error if parts of a run
+  // have been written and the next one cannot be.
   [[nodiscard]] Result<std::string> write(const RunJob& job);
   // What follows the last piece.
   [[nodiscard]] std::string finish();
 
-  // The run whose parts could not be gone on with, so far.
+  // The run in which a part could not be written, if there is one so far.
   [[nodiscard]] const std::optional<verify::BlamedRun>& blocked() const { return blocked_; }
 
-  // How much longer what has been written takes than it would have.
+  // The duration of what has been written, relative to its duration as sliced.
   [[nodiscard]] double time_factor() const {
     return sliced_s_ > 0.0 ? written_s_ / sliced_s_ : 1.0;
   }
@@ -55,25 +56,25 @@ class RunWriter {
   double max_lines_per_s_;
   report::Report* report_;
   emit::Emitter emitter_;
-  // The last lines that were kept, where the printer passes from them into what follows.
+  // The last lines that were kept, if the printer passes from them into what follows.
   std::vector<gcode::Segment> kept_lines_;
-  std::optional<gcode::Position> machine_mm_;  // where the last move led that the firmware made
-  NozzleFollower nozzle_;                      // as it really swings after what has been written
-  dynamics::NozzleXY run_nozzle_;              // … and where the run or part at hand begins
-  double switching_s_ = 0.0;                   // how long that run waits for the shaper to be off
-  verify::RunDeviation before_;                // of the run at hand, if it were left as it is
-  verify::LineRate line_rate_;                 // of what has been written
-  std::vector<gcode::Segment> last_lines_;     // of the part before, of a run in parts
-  double late_s_ = 0.0;                        // by how much it ended late
-  bool run_stands_ = false;                    // the first part of the run at hand stands as it is
-  std::size_t run_line_ = 0;                   // where it begins
+  std::optional<gcode::Position> machine_mm_;  // end of the last move that the firmware made
+  NozzleFollower nozzle_;                      // true nozzle after what has been written
+  dynamics::NozzleXY run_nozzle_;              // true nozzle where the run or part at hand begins
+  double switching_s_ = 0.0;                   // how long the run waits for the shaper to be off
+  verify::RunDeviation before_;                // deviation of the run at hand if it were kept
+  verify::LineRate line_rate_;                 // rate of the lines that have been written
+  std::vector<gcode::Segment> last_lines_;     // last lines of the previous part of the run
+  double late_s_ = 0.0;                        // how late the previous part ended
+  bool run_stands_ = false;                    // the first part of the run at hand was kept
+  std::size_t run_line_ = 0;                   // first line of the run at hand
   std::optional<verify::BlamedRun> blocked_;
   ExtrudedPath path_;
   EmissionCost cost_;
   PathError robust_;
   PathError nominal_;
-  double sliced_s_ = 0.0;   // time that what has been written took …
-  double written_s_ = 0.0;  // … and takes
+  double sliced_s_ = 0.0;   // sliced duration of what has been written
+  double written_s_ = 0.0;  // true duration of what has been written
 };
 
 }  // namespace unflex::pipeline

@@ -13,19 +13,20 @@ namespace unflex::pipeline {
 namespace {
 
 // Rounding a line's ends to the grid changes the acceleration from line to line by up to 4 · ½ ·
-// grid / T², rounding F and the firmware's ramps by a little more; the optimiser stays that far
-// below the limit so that the text keeps it.
+// grid / T². Rounding F and the firmware's ramps change it by a little more. The optimiser stays
+// that far below the limit, so that the text keeps it.
 constexpr double kGridMm = 1e-4;
 constexpr double kAccelShare = 0.98;
-// What the base may take of the largest change of speed from line to line; the rest lets the lines
-// make up for each other. But never less acceleration than this times the plan's.
+// The share that the base may use of the largest change of speed from line to line. The rest lets
+// the lines make up for each other. But the base may always accelerate kLeastHeadroom times as much
+// as the plan.
 constexpr double kSpeedStepShare = 0.93;
 constexpr double kLeastHeadroom = 1.2;
-// The firmware's clock differs a little from line to line; no more than the budget of lines may
-// begin within any 100 ms all the same.
+// The firmware's clock differs a little from line to line. With this room no more lines than the
+// budget begin within any 100 ms all the same.
 constexpr double kClockRoom = 1.002;
 
-// The time over which lines are counted, and how short a single one may be against the even pace.
+// The time over which lines are counted, and the shortest line relative to the even pace.
 constexpr double kBurst_s = 0.1;
 constexpr double kShortest = 0.4;
 
@@ -48,9 +49,9 @@ bool shares_motors(const machine::Settings& settings) {
   return Motors(settings.kinematics.type, settings.printer.firmware).shared_by_xy();
 }
 
-// What the base may be accelerated by so that the text stays within the limits: that of
-// acceleration and, where lines end on a fine grid, that of speed from line to line. Whole steps of
-// a motor are too coarse for the second.
+// The acceleration that the base may have so that the text stays within the limits. There is a
+// limit of acceleration and, if lines end on a fine grid, one of the change of speed from line to
+// line. Whole steps of a motor are too coarse for the second.
 double planned_base_accel(const machine::Settings& settings) {
   const double shortest_s = min_line_s(settings);
   double limit = settings.base_max_accel_mm_s2();
@@ -59,15 +60,16 @@ double planned_base_accel(const machine::Settings& settings) {
         std::min(limit, std::max(kSpeedStepShare * settings.emit.max_speed_step_mm_s / shortest_s,
                                  kLeastHeadroom * settings.limits.max_accel_mm_s2));
   }
-  const double axes = shares_motors(settings) ? 2.0 : 1.0;  // that a motor gets the rounding of
+  const double axes =
+      shares_motors(settings) ? 2.0 : 1.0;  // number of axes whose rounding a motor gets
   return kAccelShare * limit -
          std::min(2.0 * axes * grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);
 }
 
-// What the axis is in the middle of its band counts so much, the rest its edges.
+// The weight of the middle of the band of an axis; its edges have the rest.
 constexpr double kMiddleShare = 0.25;
 
-// The edges of the band that the axis may be in, if it is one.
+// The edges of the band that the axis may be in; empty if there is no such band.
 std::vector<compensate::AxisVariant> variants(const machine::AxisDynamics& dynamics,
                                               const machine::DynamicsError& error) {
   std::vector<compensate::AxisVariant> edges;
@@ -111,8 +113,8 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
   return setup;
 }
 
-// Inside a compensated run: room above the base's own limits, so that the firmware never slows a
-// line down for them. Z is left as it is.
+// The printer's limits inside a compensated run. They leave room above the base's own limits, so
+// that the firmware never slows a line down. Z keeps its limits.
 planner::Limits run_limits(planner::Limits limits, const machine::Settings& settings) {
   const double velocity = 2.0 * settings.base_max_velocity_mm_s();
   const double accel = settings.emit_accel_mm_s2();

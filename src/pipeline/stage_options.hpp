@@ -17,7 +17,7 @@ namespace unflex::pipeline {
 [[nodiscard]] planner::Limits planner_limits(const machine::Settings& settings);
 [[nodiscard]] planner::FirmwareConfig firmware_config(const machine::Settings& settings);
 [[nodiscard]] compensate::Setup compensate_setup(const machine::Settings& settings);
-// The same for one run: where the travel of an axis is not known, the base stays above 0 if the run
+// The setup for one run. If the travel of an axis is not known, the base stays above 0 if the run
 // does, since many machines end there.
 [[nodiscard]] compensate::Setup setup_for(const compensate::Setup& setup,
                                           const std::vector<planner::PlannedMove>& run,

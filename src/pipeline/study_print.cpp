@@ -13,7 +13,7 @@
 namespace unflex::pipeline {
 namespace {
 
-// Runs are taken together until they last so long: enough for all threads, little to hold.
+// Runs are taken together until they last this long: enough for all threads, little memory.
 constexpr double kBatch_s = 20.0;
 constexpr double kSampleStep_s = 2e-4;
 constexpr int kParts = 5;
@@ -73,7 +73,7 @@ Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progre
     const bool inside = piece.is_run && !piece.ends_run();
     if (!batch.empty() && !inside && (!more || batch_s >= kBatch_s)) {
       const std::size_t number = study::study_runs(batch, setup, options, result);
-      // Of all runs so far, the largest error is now known.
+      // The largest error of all runs so far is now known.
       const double max_mm = result.methods.front().straying[0].max_mm;
       if (max_mm > worst_mm) {
         worst_mm = max_mm;

@@ -12,7 +12,7 @@ TaskPool::TaskPool(unsigned threads, CpuSlots& slots) : slots_(&slots) {
       threads_.emplace_back([this] { work(); });
     }
   } catch (const std::exception&) {
-    // The system gives no more of them, or no memory for them; fewer, or none, do the same.
+    // The system gives no more threads, or no memory for them. Fewer threads, or none, do as well.
   }
 }
 

@@ -16,8 +16,8 @@ class TaskPool {
  public:
   using Task = std::function<void()>;  // throws nothing
 
-  // As many threads as the system gives. Without any, tasks are carried out where they are
-  // submitted.
+  // Starts `threads` threads, or as many as the system gives. Without any, tasks are carried out
+  // where they are submitted.
   TaskPool(unsigned threads, CpuSlots& slots);
   // Finishes the tasks that are under way and drops the others.
   ~TaskPool();

@@ -31,7 +31,8 @@ report::DeviationRows rows(const verify::Deviation& deviation) {
   return {row(deviation.extruding), row(deviation.all)};
 }
 
-// What was compensated already is no measure: it would be found to be as good as itself.
+// Refuses an input that unflex has compensated: compared with it, the output would look as good as
+// sliced.
 Status check_measure(std::istream& input, const std::string& name) {
   gcode::LineReader lines(input, name);
   gcode::Line line;

@@ -90,7 +90,7 @@ VerifyThread::VerifyThread(const verify::Rules& rules, const verify::Observation
         } catch (...) {
           failure_ = std::current_exception();
         }
-        // It may have ended early, and a print is long.
+        // The verification may have ended early, and the rest of a print must not pile up here.
         input_.drop();
         output_.drop();
       }) {}

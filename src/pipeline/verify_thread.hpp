@@ -44,25 +44,25 @@ class TextQueue final : public std::streambuf {
   bool reader_waits_ = false;
   bool ended_ = false;
   bool dropped_ = false;
-  std::string current_;  // the reader's
+  std::string current_;  // text that is being read
 };
 
 class VerifyThread {
  public:
-  // What the observation refers to must outlive this.
+  // What the observation refers to must outlive this object.
   VerifyThread(const verify::Rules& rules, const verify::Observation& observation,
                std::string input_name, std::string output_name, CpuSlots& slots);
-  // Stops it, where finish() was not called.
+  // Stops the verification if it is still under way.
   ~VerifyThread();
   VerifyThread(const VerifyThread&) = delete;
   VerifyThread& operator=(const VerifyThread&) = delete;
 
-  // The next piece of both texts. Does not wait.
+  // Appends to both texts. Does not wait.
   void push(std::string input, std::string output);
-  // Whether it is so far behind that it should be waited for. Never while it waits itself: a run
-  // of many MB is read to its end only when what follows is there.
+  // Whether the verification is so far behind that the caller should wait for it. Never true while
+  // it waits for text itself: a run of many MB is read to its end only when what follows is there.
   [[nodiscard]] bool is_behind();
-  // Both texts have ended.
+  // Tells that both texts have ended.
   void end();
   // After end(): waits for the result. Throws what the thread could not handle, such as memory that
   // ran out.

@@ -65,7 +65,7 @@ class Reader {
 
 bool transfer(int socket, char* data, std::size_t size, bool sending) {
   while (size > 0) {
-    // MSG_NOSIGNAL: a dead peer shall be an answer, not SIGPIPE.
+    // MSG_NOSIGNAL: a dead peer shall give an error, not SIGPIPE.
     const ssize_t count =
         sending ? send(socket, data, size, MSG_NOSIGNAL) : recv(socket, data, size, 0);
     if (count < 0 && errno == EINTR) {

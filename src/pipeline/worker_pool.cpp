@@ -19,9 +19,9 @@
 namespace unflex::pipeline {
 namespace {
 
-// The life of a worker: read a window, solve it, answer, until the parent hangs up. Leaves by _exit
-// so that nothing the parent has open is flushed twice, and lets no exception out, which would go
-// through the parent's code and clean up after the parent.
+// The life of a worker: read a window, solve it, answer, until the parent hangs up. Leaves by
+// _exit, so that nothing the parent has open is flushed twice. Lets no exception out, since it
+// would pass through the parent's code and clean up what is the parent's.
 [[noreturn]] void work(int socket, const WorkerPool::EngineFactory& factory) noexcept {
   // Ctrl-C reaches the whole group; the parent decides when its workers end.
   std::signal(SIGINT, SIG_IGN);
@@ -53,7 +53,7 @@ std::string answer(const compensate::Engine& engine, std::string_view window) {
 
 Result<WorkerPool> WorkerPool::start(unsigned workers, const EngineFactory& factory) {
   WorkerPool pool(factory);
-  // All at once: a worker closes the sockets of those before it.
+  // The vector gets its size before any fork: a worker closes the sockets of all earlier workers.
   pool.workers_.resize(workers);
   for (Worker& worker : pool.workers_) {
     if (Status status = pool.spawn(worker); !status) {
@@ -126,7 +126,7 @@ void WorkerPool::submit(std::size_t ticket, const compensate::AxisWindow& window
 // Gives every idle worker a window.
 void WorkerPool::feed() {
   for (Worker& worker : workers_) {
-    // A worker may die of what it is given, and its successor of that again.
+    // A worker may die of its window, and its successor of the same window again.
     while (!queue_.empty() && !worker.task && worker.socket >= 0) {
       worker.task = std::move(queue_.front());
       queue_.pop_front();
@@ -138,7 +138,7 @@ void WorkerPool::feed() {
   }
 }
 
-// Of a worker that died.
+// Replaces a worker that died. Its window is tried once more.
 void WorkerPool::replace(Worker& worker) {
   close(worker.socket);
   kill(worker.pid, SIGKILL);

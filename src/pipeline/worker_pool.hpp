@@ -17,8 +17,8 @@
 
 namespace unflex::pipeline {
 
-// What a worker answers to a packed window: its solution, or what the solver threw, such as memory
-// that ran out; packed.
+// A worker's packed answer to a packed window: the solution, or an error with what the solver
+// threw, such as std::bad_alloc.
 [[nodiscard]] std::string answer(const compensate::Engine& engine, std::string_view window);
 
 class WorkerPool {

@@ -10,9 +10,9 @@
 //
 // Backward pass, from a standstill after the last move n:
 //   s_i = min(S_i, s_{i+1} + Δ_i)            speed at the start of move i, squared
-//   m_i = min(M_i, m_{i+1} + (1 − r)Δ_i)     the same with smooth ramps
+//   m_i = min(M_i, m_{i+1} + (1 − r)Δ_i)     s_i with smooth ramps
 // where S and M already hold the forward reach from the start of the stretch. Once m_i is bound by
-// M_i no later move can change it, nor anything before i.
+// M_i, no later move can change m_i or anything before i.
 #include "unflex/planner/klipper_planner.hpp"
 
 #include <algorithm>
@@ -34,7 +34,7 @@ constexpr double kFirstPlanInterval_s = 1.0;
 
 double square(double x) { return x * x; }
 
-// Direction and length; whether there is any.
+// Sets direction and length. False if the move has no length.
 bool set_geometry(PlannedMove& move) {
   using enum gcode::Axis;
   std::array<double, 4> delta{};
@@ -107,7 +107,7 @@ std::size_t KlipperPlanner::take(std::vector<PlannedMove>& out) {
 
 std::size_t KlipperPlanner::pending() const { return moves_.size(); }
 
-// Lowers the limits of the last move, given along its path.
+// Lowers the limits of the last move. The new limits are along its path.
 void KlipperPlanner::limit_speed(double velocity_mm_s, double accel_mm_s2) {
   PlannedMove& move = moves_.back();
   Junction& junction = lookahead_.back();
@@ -168,8 +168,9 @@ void KlipperPlanner::join_to_previous() {
 }
 
 // Fills in start, end and cruise speeds as if the machine stood still after the last move, and
-// returns how many moves are final: all, or, when planning lazily, those before the last but one
-// peak of the smooth profile. The last peak still moves as the queue grows.
+// returns how many moves are final. When planning lazily these are the moves before the last but
+// one peak of the smooth profile, because the last peak still moves as the queue grows. Otherwise
+// these are all moves.
 std::size_t KlipperPlanner::backward_pass(bool lazy) {
   std::size_t final_count = lazy ? 0 : lookahead_.size();
   bool searching = lazy;

@@ -26,7 +26,7 @@ std::uint32_t magnitude(std::int64_t steps) {
   return to_unsigned(std::abs(static_cast<double>(steps)));
 }
 
-// The motion of a block per motor, and that of the head.
+// The motion of a block: of each motor, and of the head.
 struct Travel {
   std::array<std::uint32_t, 4> steps{};
   Vector distance_mm{};
@@ -54,7 +54,7 @@ Travel travel(const Settings& settings, const Steps& delta) {
   return result;
 }
 
-// A motion in X, Y and Z too short to be one counts as a move of filament.
+// A motion of too few steps in X, Y and Z counts as a move of filament.
 float length_mm(const Settings& settings, const Travel& travel) {
   const Vector& d = travel.head_mm;
   if (std::max({travel.steps[X], travel.steps[Y], travel.steps[Z]}) <
@@ -97,7 +97,7 @@ Vector limit_speeds(const Settings& settings, const Travel& travel, float per_se
         to_unsigned(static_cast<float>(block.nominal_rate_steps_s) * factor);
     block.nominal_speed_mm_s *= factor;
   }
-  // The firmware divides by it, and nothing comes of a rate of none.
+  // The firmware divides by the rate, so it must not be 0.
   block.nominal_rate_steps_s = std::max(block.nominal_rate_steps_s, 1U);
   return speed_mm_s;
 }

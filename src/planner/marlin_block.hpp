@@ -14,15 +14,15 @@ namespace unflex::planner::marlin {
   return v2 + 2.0F * block.accel_mm_s2 * block.length_mm;
 }
 
-// What is asked of a block.
+// What the file asks of a block.
 struct Request {
   Steps delta{};
   float feed_mm_s = 0.0F;
   float curve_radius_mm = 0.0F;
 };
 
-// Fills everything in but the move. False, and `previous` untouched, if the block is too short to
-// be queued. `moves_queued`: blocks in the buffer that do not run yet.
+// Fills in all of the block but its move. False, and `previous` untouched, if the block is too
+// short to be queued. `moves_queued`: blocks in the buffer that do not run yet.
 [[nodiscard]] bool populate_block(const Settings& settings, const Request& request,
                                   std::size_t moves_queued, Previous& previous, Block& block);
 

@@ -7,7 +7,8 @@
 
 namespace unflex::planner::marlin {
 
-// Towards zero; the nearest there is where the type cannot hold it, and 0 for what is no number.
+// Rounds towards zero. A value that the type cannot hold becomes the nearest that it can, and NaN
+// becomes 0.
 template <class Integer>
 [[nodiscard]] Integer saturated(double value) {
   using Range = std::numeric_limits<Integer>;

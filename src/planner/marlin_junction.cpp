@@ -3,8 +3,8 @@
 // Source: Marlin 2.1.2, src/module/planner.cpp, Planner::_populate_block; planner.h,
 // limit_value_by_axis_maximum.
 //
-//   u, w   unit vectors of the motors' motion in the block before and in this one; with E, if the
-//          latter takes filament
+//   u, w   unit vectors of the motors' motion in the block before and in this one; with E, if this
+//          block takes filament
 //   θ      angle at the junction, 0 for a reversal: cos θ = −u·w
 //   δ      junction deviation
 //   a_j    acceleration along w − u within the limits of the axes
@@ -28,7 +28,7 @@ constexpr float kStraight = 0.999999F;
 // (JD_HANDLE_SMALL_SEGMENTS).
 constexpr float kShort_mm = 1.0F;
 constexpr float kCosOctagon = -0.7071067812F;
-// Speeds below count as none.
+// A lower speed counts as none.
 constexpr float kNoSpeed_mm_s = 0.000001F;
 
 float square(float x) { return x * x; }
@@ -50,8 +50,8 @@ float junction_accel(const Settings& settings, float accel, const Vector& along)
 
 // arccos(t) for t in (0, 1) by chords of the curve, as the firmware has it by default
 // (JD_USE_LOOKUP_TABLE): chord i spans 1 − 2⁻ⁱ to 1 − 2⁻⁽ⁱ⁺¹⁾, inner points raised so that the
-// error is the same to both sides, ±0.01 rad at most. Made in floats: near t = 1 slope and offset
-// cancel, and what rounding leaves of them is up to 1 % of the angle.
+// error is the same to both sides, ±0.01 rad at most. The chords are made in floats, because near t
+// = 1 slope and offset cancel, and what rounding leaves of them is up to 1 % of the angle.
 class ChordArccos {
  public:
   ChordArccos() {
@@ -107,7 +107,7 @@ float deviation_v2(const Settings& settings, const Block& block, float curve_rad
 float junction_deviation_v2(const Settings& settings, const Block& block, const BlockEntry& entry,
                             bool joined, Previous& previous) {
   Vector unit = entry.distance_mm;
-  // That of motors is longer than that of the head.
+  // With E, or on shared motors, the vector is not as long as the head's travel.
   if (entry.with_filament || settings.shares_motors) {
     normalise(unit);
   } else {
@@ -122,7 +122,7 @@ float junction_deviation_v2(const Settings& settings, const Block& block, const 
   return v2;
 }
 
-// Speed from which every axis can halt at once.
+// The speed from which every axis can halt at once.
 float safe_speed(const Settings& settings, const Block& block, const Vector& speed_mm_s) {
   float safe = block.nominal_speed_mm_s;
   bool limited = false;

@@ -1,8 +1,8 @@
 // The buffer of blocks and the speeds at their junctions.
 //
 // Source: Marlin 2.1.2, src/module/planner.cpp: buffer_segment, _buffer_steps, get_current_block,
-// recalculate and its passes. Trapezoids are made once, when a block begins to run: the firmware
-// makes them anew whenever a speed changes, from the same two speeds.
+// recalculate and its passes. Trapezoids are made once, when a block begins to run. The firmware
+// makes them anew whenever a speed changes, in the end from the same two speeds.
 #include "unflex/planner/marlin_planner.hpp"
 
 #include <algorithm>
@@ -21,8 +21,8 @@ using enum gcode::Axis;
 // The next segment begins elsewhere if it begins further away than this: homing, an offset, a jump.
 constexpr double kSamePlace_mm = 1e-6;
 
-// X, Y and Z fit the firmware's floats, and its products decide ties. E, counted from the beginning
-// of the file, does not.
+// X, Y and Z fit the firmware's floats, and its products in floats decide ties. E is counted from
+// the beginning of the file and does not fit.
 std::int64_t to_steps(std::size_t axis, double mm, double steps_per_mm) {
   constexpr double kMost = 0x1p53;
   const double steps =
@@ -108,7 +108,7 @@ marlin::Steps MarlinPlanner::rounded(const gcode::Position& position_mm) const {
   return result;
 }
 
-// An axis that does not begin where the segment before ended has been set elsewhere
+// An axis that does not begin where the segment before ended has been set to another place
 // (set_machine_position_mm).
 void MarlinPlanner::follow_jumps(const gcode::Segment& segment) {
   const marlin::Steps start = rounded(segment.start_mm);
@@ -121,7 +121,7 @@ void MarlinPlanner::follow_jumps(const gcode::Segment& segment) {
   has_position_ = true;
 }
 
-// From the position to the target, both in whole steps.
+// Makes the move from position_ to the target, both in whole steps.
 void MarlinPlanner::set_move(const gcode::Segment& segment, const marlin::Steps& target,
                              PlannedMove& move) {
   move = PlannedMove{};
@@ -164,9 +164,9 @@ void MarlinPlanner::drop_first() {
   running_ = false;
 }
 
-// From the last block back to the one after planned_: highest speeds from which the machine can
-// still slow down. The firmware skips blocks that begin at their limit already, which is the same:
-// speeds only rise here.
+// From the last block back to the one after planned_: sets the highest entry speeds from which the
+// machine can still slow down. The firmware skips blocks that begin at their limit already. The
+// result is the same, because speeds only rise here.
 void MarlinPlanner::reverse_pass() {
   float next_v2 = settings_.minimum_speed_mm_s * settings_.minimum_speed_mm_s;
   for (std::size_t i = end_ - 1; i != planned_; --i) {

@@ -1,5 +1,5 @@
-// Source: Marlin 2.1.2, src/module/planner.cpp, Planner::calculate_trapezoid_for_block; what
-// becomes of its numbers: stepper.cpp, Stepper::block_phase_isr.
+// Source: Marlin 2.1.2, src/module/planner.cpp, Planner::calculate_trapezoid_for_block, and
+// stepper.cpp, Stepper::block_phase_isr, which uses its numbers.
 //
 //   r_i, r_n, r_f   initial, nominal and final rate, steps/s     a   acceleration, steps/s²
 //   N_a, N_d        steps of the ramps up and down               N   steps of the block
@@ -50,9 +50,9 @@ Trapezoid make_trapezoid(const Block& block, float entry, float exit) {
   return result;
 }
 
-// The interrupt accelerates from r_i for N_a steps, though not above r_n, keeps that rate, and
-// decelerates for the last N_d steps from it. Where r_n is below the minimum of r_i, all but the
-// first step is at r_n.
+// The interrupt accelerates from r_i for N_a steps, though not above r_n, keeps the rate it
+// reached, and decelerates from there for the last N_d steps. If r_n is below the minimum of r_i,
+// all but the first step is at r_n.
 void set_profile(const Trapezoid& trapezoid, Block& block) {
   PlannedMove& move = block.move;
   const double mm_per_step = move.length_mm / block.step_events;

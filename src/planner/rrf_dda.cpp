@@ -38,8 +38,8 @@ float travel_mm(const Vector& delta) {
   return xyz > 0.0F ? xyz : std::abs(delta[E]);
 }
 
-// Removes a ramp too short to matter: the top speed becomes that of the move's faster end. Both
-// ramps are known to fit.
+// Removes a ramp that is too short to matter: the top speed becomes that of the move's faster end.
+// The caller has checked that both ramps fit.
 void set_top_speed(Dda& dda) {
   const float u = dda.start_speed;
   const float w = dda.end_speed;
@@ -59,8 +59,8 @@ void set_top_speed(Dda& dda) {
   }
 }
 
-// The whole move is one ramp. Rounding may have made it a little steeper than the limit, or its
-// neighbours' new limits much steeper: the ramp is then what it must be.
+// The whole move is one ramp. Rounding may have made it a little steeper than the limit, or new
+// limits of its neighbours much steeper. Its acceleration is then what the ramp needs.
 void set_single_ramp(Dda& dda) {
   const float u2 = squared(dda.start_speed);
   const float w2 = squared(dda.end_speed);
@@ -69,21 +69,22 @@ void set_single_ramp(Dda& dda) {
   dda.decel_distance_mm = up ? 0.0F : dda.length_mm;
   dda.top_speed = std::max(dda.start_speed, dda.end_speed);
   const float needed = std::abs(w2 - u2) / (2.0F * dda.length_mm);
-  // Nothing is needed where a·s vanishes beside u² in a float. The firmware then has 0/0 for the
-  // ramp's duration, and its conversion to 0 clocks.
+  // `needed` is 0 if a·s vanishes beside u² in a float. The firmware then gets 0/0 for the ramp's
+  // duration, and converts it to 0 clocks.
   if (needed > 0.0F) (up ? dda.accel : dda.decel) = needed;
 }
 
 float ramp_clocks(float high, float low, float accel) { return (high - low) / accel; }
 
-// Rounded down. The firmware's 32 bits are full after 95 minutes; a move that takes longer counts
-// for as long as it takes, up to eleven years.
+// Rounded down. The firmware's 32 bits overflow after 95 minutes. Here a longer move keeps its
+// duration, up to eleven years.
 std::int64_t whole_clocks(float clocks) {
   constexpr float kMost = 0x1p48F;
   return clocks > 0.0F ? static_cast<std::int64_t>(std::min(clocks, kMost)) : 0;
 }
 
-// Whether an axis is moved by others' motors too, or its motor moves others (HasSharedMotor).
+// Whether the motor of another axis moves this one too, or the motor of this axis moves another
+// (HasSharedMotor).
 bool shares_motor(const Motors::Rows& rows, std::size_t axis) {
   for (std::size_t other = 0; other < rows.size(); ++other) {
     if (other != axis && (rows[axis][other] != 0.0 || rows[other][axis] != 0.0)) return true;
@@ -91,7 +92,7 @@ bool shares_motor(const Motors::Rows& rows, std::size_t axis) {
   return false;
 }
 
-// CoreKinematics::LimitSpeedAndAcceleration. What it is told of the direction has lost its signs.
+// CoreKinematics::LimitSpeedAndAcceleration. The firmware passes it the direction without signs.
 void limit_by_motors(const Settings& settings, Dda& dda) {
   const Motors::Rows& rows = settings.motors.rows();
   for (std::size_t motor = 0; motor < rows.size(); ++motor) {
@@ -132,7 +133,8 @@ Settings make_settings(const Limits& asked, const FirmwareConfig& config) {
 }
 
 bool start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda) {
-  // The firmware knows positions of X, Y and Z as floats, and filament as what a move takes.
+  // The firmware holds positions of X, Y and Z as floats, and filament as the amount that a move
+  // takes.
   Vector delta{};
   for (const auto axis : {X, Y, Z}) {
     delta[axis] =
@@ -203,7 +205,7 @@ void finish(const Settings& settings, Dda& dda) {
     decel_clocks = std::nearbyint(decel_clocks);
     steady_clocks = std::nearbyint(steady_clocks);
   }
-  // Of less than one clock each phase would have to give more than it has.
+  // With less than one clock in all, the longest phase would have to give more than it has.
   dda.clocks = std::max<std::int64_t>(1, whole_clocks(accel_clocks + steady_clocks + decel_clocks));
 
   const double clock_hz = settings.clock_hz;

@@ -17,8 +17,9 @@ bool may_join(const Settings& settings, const Dda& previous, const Dda& next) {
           next.extruder_not_print == previous.extruder_not_print);
 }
 
-// The same question asked again when a joint further on has changed. A printing move may also be
-// followed by one that does not extrude, at the same speed: slicers' "coast to end".
+// Whether the joint between these moves may change when a joint further on has changed. A printing
+// move may also be followed, at the same speed, by one that does not extrude: slicers' "coast to
+// end".
 bool may_change_previous(const Settings& settings, const Dda& previous, const Dda& dda) {
   if (settings.join_all) return true;
   if (previous.moves_xy != dda.moves_xy) return false;
@@ -42,8 +43,8 @@ void limit_jerk(const Settings& settings, const Dda& next, Dda& dda) {
   }
 }
 
-// One joint of the way back: decides at which speed the move can end. True if the move before it
-// must end faster as well for that; its target is then set.
+// One joint of the way back: decides at which speed moves[i] can end. True if for this the move
+// before it must end faster too. The target of the move before is then set.
 bool look_back(const Settings& settings, std::deque<Dda>& moves, std::size_t i,
                bool frozen_extrudes) {
   Dda& dda = moves[i];

@@ -7,12 +7,12 @@
 
 namespace unflex::planner::rrf {
 
-// Joins the last move, which stands still at both ends, to the one before it, and raises the speeds
-// at earlier joints as far as that now allows. All trapezoids are set afterwards.
+// Joins the last move, which stands still at both ends, to the one before it. Then raises the
+// speeds at earlier joints as far as this allows. All trapezoids are set afterwards.
 // frozen_extrudes: whether the last frozen move lays filament. The firmware asks whether the move
-// before slows down, and where that move is frozen, finds its extrusion rate in the same memory
-// (DDA.h: beforePrepare and afterPrepare). It matters only where a lowered limit has made a move
-// decelerate harder than it may.
+// before slows down. If that move is frozen, the firmware finds its extrusion rate in the same
+// memory instead (DDA.h: beforePrepare and afterPrepare). This matters only where a lowered limit
+// has made a move decelerate harder than it may.
 void join_last(const Settings& settings, std::deque<Dda>& provisional, bool frozen_extrudes);
 
 }  // namespace unflex::planner::rrf

@@ -118,15 +118,15 @@ void RrfPlanner::wait_for_space() {
       if (can_add()) return;
     }
     while (can_freeze()) freeze();
-    // The firmware lets 50 ms pass before the first move begins. Until then nothing happens, so the
-    // plan is the same without.
+    // The firmware lets 50 ms pass before the first move begins. Nothing happens until then, so the
+    // plan is the same without this pause.
     moving_ = true;
   }
 }
 
 bool RrfPlanner::can_add() const {
-  // One entry stays empty until the oldest move is frozen: that one's start is the end of the entry
-  // before it.
+  // One entry stays empty until the oldest move is frozen, because that move starts where the entry
+  // before it ends.
   const std::size_t used = provisional_.size() + finish_.size();
   if (used >= ring_length_ || (used + 1 == ring_length_ && finish_.empty())) return false;
   std::int64_t total = 0;

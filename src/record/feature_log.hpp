@@ -22,10 +22,12 @@ class FeatureLog {
     std::size_t feature = 0;
     std::size_t layers_begun = 0;  // comments that begin a layer so far
   };
-  // In which a line is that has been read. Lines must not decrease from call to call.
+  // The feature and layer that a line belongs to. The line must have been read. Lines must not
+  // decrease from call to call.
   [[nodiscard]] At at(std::size_t number);
 
-  // Names by number; 0 is what no comment names. At most 48 are told apart, the rest is the last.
+  // Names by feature number. 0 stands for lines before any comment. At most 48 are told apart; all
+  // further names share the last number.
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
 
  private:

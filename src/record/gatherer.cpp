@@ -9,21 +9,21 @@ namespace {
 
 // Deviations are kept for bits of the path of about this long.
 constexpr double kChunk_s = 3e-3;
-// Within this time there is one candidate for the worst places.
+// One candidate for the worst places is taken per so much time.
 constexpr double kBlock_s = 0.1;
-// Around a place so many periods of the slower axis are shown, on either side.
+// So many periods of the slower axis are shown before and after a place.
 constexpr double kPeriods = 3.0;
 constexpr double kShortest_s = 0.06;
 constexpr double kLongest_s = 0.2;
 constexpr std::size_t kMostLayers = 8192;
-// Without comments a layer begins where filament is laid at another height, or while Z rises
-// steadily, after so much.
+// If the slicer writes no comments, a layer begins when filament is laid at another height. While Z
+// rises steadily, it begins after kSpiralLayer_mm.
 constexpr double kSameZ_mm = 0.005;
 constexpr double kSpiralLayer_mm = 0.2;
 constexpr double kFinestCell_mm = 1e-5;
 constexpr int kHistogramCells = 72;
 constexpr double kCellsPerOctave = 4.0;
-// Around the centre of a scene that counts as being at the place.
+// Share of a scene, around its centre, that counts as being at the place.
 constexpr double kAtPlace = 0.05;
 
 double half_width_s(const verify::NozzleModel& model) {
@@ -60,7 +60,7 @@ void Recorder::Gatherer::section(const verify::ReferencePath& sliced,
   }
   complete_moves(cells_.end());
   section_first_ = sliced.end();
-  // Moves of filament alone have not been entered.
+  // Moves of filament alone were never entered, so cells_ may end too early.
   cells_.continue_at(section_first_);
   versions_[0].path = &sliced;
   versions_[1].path = &emitted;
@@ -191,7 +191,7 @@ void Recorder::Gatherer::close_chunk(int number, double to_mm) {
   }
 }
 
-// Puts the worst of the last tenth of a second forward for the worst places.
+// Proposes the worst of the last kBlock_s for the worst places.
 void Recorder::Gatherer::propose(int number) {
   Version& version = versions_[number];
   const PlaceCandidate candidate = std::exchange(version.block, {});
@@ -225,7 +225,7 @@ void Recorder::Gatherer::collect_moments(int number, bool over) {
   }
 }
 
-// Moves before this one have been left by both nozzles.
+// Stores the moves before `until`, which both nozzles have left.
 void Recorder::Gatherer::complete_moves(std::size_t until) {
   while (cells_.first() < until) {
     const PathMove& move = cells_[cells_.first()];

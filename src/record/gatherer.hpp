@@ -1,7 +1,7 @@
-// What a Recorder is made of.
+// The inside of a Recorder.
 //
-// Two nozzles go along the same moves, one after the other: a move's cells are complete, and go to
-// the layers, when both have left it.
+// Two nozzles (before and after) go along the same moves, one ahead of the other. When both have
+// left a move, its cells are complete and go to the layers.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ namespace unflex::record {
 
 class Recorder::Gatherer final : public verify::Observer {
  public:
-  // machines: true ones that shapers are measured on.
+  // machines: number of machines, with different true frequencies, that shapers are measured on.
   Gatherer(const Options& options, std::size_t machines);
 
   void line(const gcode::Line& line) override;
@@ -33,13 +33,13 @@ class Recorder::Gatherer final : public verify::Observer {
   [[nodiscard]] report::Recording finish();
 
  private:
-  // The deviation on a bit of a move.
+  // The deviation on a short bit of a move.
   struct Chunk {
     double from_mm = 0.0;
     double weight_s = 0.0;
     double sum_contour2 = 0.0;
     double contour2_max_mm2 = -1.0;
-    double max_x_mm = 0.0, max_y_mm = 0.0;  // the reference when it was largest
+    double max_x_mm = 0.0, max_y_mm = 0.0;  // where the reference was at the largest deviation
     std::size_t max_line = 0;
   };
   // One of the two nozzles.
@@ -47,8 +47,8 @@ class Recorder::Gatherer final : public verify::Observer {
     explicit Version(double half_width_s, std::size_t places) : ring(half_width_s), worst(places) {}
 
     const verify::ReferencePath* path = nullptr;
-    std::size_t first_piece = 0;  // of the section, on that path
-    std::size_t piece = 0;        // the nozzle's, on that path
+    std::size_t first_piece = 0;  // first piece of the section on `path`
+    std::size_t piece = 0;        // the nozzle's piece on `path`
     PathPoint where;
     Chunk chunk;
     double block_s = 0.0;
@@ -70,7 +70,7 @@ class Recorder::Gatherer final : public verify::Observer {
     std::size_t first_line = 0;
     std::array<Sums, 2> sums;
   };
-  // A place, and what both nozzles do there.
+  // What both nozzles do around a place.
   struct Scene {
     std::size_t id = 0;
     std::array<std::vector<report::Moment>, 2> moments;

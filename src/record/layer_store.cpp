@@ -8,22 +8,22 @@ namespace unflex::record {
 namespace {
 
 constexpr double kUnitsPerMm = 100.0;
-// What a point and the head of a path take, about.
+// About how many bytes a point and the head of a path take.
 constexpr std::size_t kPointBytes = 4;
 constexpr std::size_t kPathBytes = 9;
-// Coarser than this layers are left out instead, 0.01 mm.
+// Beyond this tolerance layers are left out instead, 0.01 mm.
 constexpr double kCoarsest = 8.0;
 constexpr std::size_t kMostLeftOut = 64;
-// Shortest stretches when it has to be coarser, over the tolerance.
+// Length of the shortest stretches per tolerance, once the store is coarser.
 constexpr double kLeastPerTolerance = 30.0;
-// Deviations this much apart are drawn as one, in codes, and more when it has to be coarser;
-// below the second they all look alike.
+// Deviation codes up to kAlike apart are drawn as one, and kAlikePerLevel more per coarser level.
+// Codes below kSmall all look alike.
 constexpr int kAlike = 3;
 constexpr int kAlikePerLevel = 2;
 constexpr unsigned char kSmall = 40;
-// What of the whole length may be outside of where the print is, on each side.
+// Share of the whole length that may lie outside of the print's rectangle, on each side.
 constexpr double kOutside = 0.003;
-// By how much too much is drawn together.
+// When the store is too large, it is made coarser until it fills this share of the budget.
 constexpr double kFill = 0.75;
 
 std::int32_t units(double mm) {
@@ -141,7 +141,7 @@ std::size_t LayerStore::size_bytes() const {
   return kPointBytes * points_.size() + kPathBytes * paths_.size();
 }
 
-// Whether nobody would miss the path.
+// Whether the path is so small that nobody would miss it.
 bool LayerStore::too_small(std::span<const Point> path) const {
   return tolerance_ > kCoarsest && std::all_of(path.begin(), path.end(), [&](const Point& point) {
            return std::hypot(point.x - path[0].x, point.y - path[0].y) <= tolerance_;
@@ -174,7 +174,7 @@ void LayerStore::coarsen() {
 }
 
 std::array<double, 2> LayerStore::extent(std::int32_t Point::*coordinate) const {
-  // Lengths at a coordinate; half a stretch at each of its ends.
+  // Coordinates with path lengths: half of each stretch at each of its ends.
   std::vector<std::pair<std::int32_t, double>> lengths;
   double whole = 0.0;
   for (std::size_t path = 0; path < paths_.size(); ++path) {

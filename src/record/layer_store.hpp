@@ -1,8 +1,8 @@
 // The print's paths with their deviations, in bounded memory.
 //
-// While they fit, every point of the sliced file is kept. When they do not, what is there is drawn
-// more coarsely, and what follows as well: first neighbouring stretches become one that has the
-// largest deviation of both, then every other layer is left out.
+// While the paths fit, every point of the sliced file is kept. When they do not, the paths so far
+// and all later ones are drawn more coarsely. First neighbouring stretches are joined to one that
+// has the largest deviation of both. Then every other layer is left out.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ class LayerStore {
   // Layers must not decrease.
   void add(const Stretch& stretch);
 
-  // Everything; ends[i] is where layer i ends. Afterwards the store is as before or coarser.
+  // Encodes all paths; layer i ends at byte ends[i]. This may make the store coarser.
   [[nodiscard]] report::LayerPaths encode(std::size_t layers, std::vector<std::size_t>& ends);
 
   [[nodiscard]] std::size_t size_bytes() const;
@@ -60,18 +60,18 @@ class LayerStore {
   [[nodiscard]] std::size_t end_of(std::size_t path) const;
   [[nodiscard]] bool too_small(std::span<const Point> path) const;
   void coarsen();
-  // Where all but a few thousandths of the paths' length lies, 0.01 mm.
+  // Range of the coordinate in which all but a few thousandths of the paths' length lies, 0.01 mm.
   [[nodiscard]] std::array<double, 2> extent(std::int32_t Point::*coordinate) const;
   void encode_into(std::size_t layers, std::vector<std::size_t>& ends, std::string& bytes) const;
 
   std::size_t budget_bytes_;
   int level_ = 0;
-  double tolerance_ = 0.5;  // of points left out, 0.01 mm
-  double least_ = 0.0;      // stretches shorter than this are merged whatever their deviations
+  double tolerance_ = 0.5;  // how far left-out points may lie from what is drawn, 0.01 mm
+  double least_ = 0.0;      // shorter stretches are merged whatever their deviations, 0.01 mm
   std::size_t layer_step_ = 1;
   std::vector<Point> points_;
   std::vector<Path> paths_;
-  // Of the last stretch: points left out on it, and the deviations of all that it consists of.
+  // Points left out on the last stretch, and the range of deviations on it.
   std::vector<Point> left_out_;
   std::array<Range, 2> codes_{};
   bool may_merge_ = false;

@@ -7,7 +7,7 @@ namespace unflex::record {
 namespace {
 
 constexpr std::size_t kEntries = 8192;
-// Moments before, and after, a place.
+// Number of moments before a place, and as many after it.
 constexpr std::size_t kHalf = 75;
 
 }  // namespace

@@ -1,5 +1,5 @@
-// The last seconds of a nozzle's motion, at intervals, from which what happened around a place can
-// be taken, before and after.
+// Keeps samples of the last seconds of a nozzle's motion. From them the motion just before and
+// after a place can be taken.
 #pragma once
 
 #include <compare>
@@ -21,15 +21,15 @@ struct PathPoint {
 
 class MomentRing {
  public:
-  // Taken are the moments up to half_width_s before and after the reference is at a place.
+  // Moments are taken up to half_width_s before and after the reference is at a place.
   explicit MomentRing(double half_width_s);
 
-  // The nozzle takes a step. Whether it is to be added.
+  // The nozzle takes a step of duration_s. Returns whether the step is to be added.
   [[nodiscard]] bool advance(double duration_s) {
     clock_s_ += duration_s;
     return clock_s_ - last_s_ >= interval_s_;
   }
-  // That step; the reference is at `where`, which never decreases.
+  // Adds the step. The reference is at `where`, which must never decrease.
   void add(const verify::NozzleStep& step, const PathPoint& where);
   // The base rests.
   void pass(double duration_s) { clock_s_ += duration_s; }
@@ -42,14 +42,14 @@ class MomentRing {
     std::size_t id = 0;
     std::vector<report::Moment> moments;
   };
-  // Those requests that have been fulfilled since the last call; all, with what there is, if it is
-  // over. Nothing if the place has left the ring already.
+  // The requests fulfilled since the last call. over: no more steps follow, so all requests are
+  // answered with the moments there are. A place that has left the ring gets no moments.
   [[nodiscard]] std::vector<Taken> take(bool over);
   [[nodiscard]] bool has_requests() const { return !requests_.empty(); }
 
  private:
   struct Entry {
-    report::Moment moment;  // absolute
+    report::Moment moment;  // absolute time and places
     PathPoint where;
   };
   struct Request {
@@ -69,7 +69,7 @@ class MomentRing {
   double interval_s_;
   double clock_s_ = 0.0;
   double last_s_ = -1.0;
-  std::size_t count_ = 0;  // of all entries there have been
+  std::size_t count_ = 0;  // number of all entries ever added
   std::vector<Entry> entries_;
   std::vector<Request> requests_;
 };

@@ -1,5 +1,5 @@
-// The sliced file's moves between the time one of the two nozzles is there and the time both have
-// been: each cut into cells, of which the largest deviation before and after is kept.
+// Moves of the sliced file that one of the two nozzles has reached and not both have left. Each
+// move is cut into cells, and each cell keeps its largest deviations before and after.
 #pragma once
 
 #include <array>
@@ -37,13 +37,13 @@ class PathCells {
   }
 
   void append(const verify::PathPiece& piece, std::size_t layer, std::size_t feature);
-  // Version 0 is before, 1 after. Between the two distances along the move.
+  // Notes a deviation between two distances along the move. Version 0 is before, 1 after.
   void deviate(std::size_t number, int version, double from_mm, double to_mm, unsigned char code);
   [[nodiscard]] std::array<unsigned char, 2> cell(const PathMove& move, std::size_t i) const {
     return cells_[move.first_cell - first_cell_ + i];
   }
   void drop_front();
-  // There are none; the next to be appended gets this number.
+  // Only while there are no moves: the next one appended gets this number.
   void continue_at(std::size_t number) { first_ = number; }
 
  private:

@@ -7,14 +7,14 @@
 namespace unflex::record {
 namespace {
 
-// Errors below zero come before those above.
+// Number of negative frequency errors, which come first.
 constexpr std::size_t kBelow = 2;
 
 report::Spread spread(const verify::Deviation& deviation) {
   return {deviation.extruding.contour_max_mm, deviation.extruding.contour_rms_mm};
 }
 
-// The main value, which comes first, goes between those below and those above.
+// All values by rising frequency error: `main` goes after the kBelow first ones.
 template <class Value>
 std::vector<Value> in_order(const Value& main, const std::vector<Value>& others) {
   std::vector<Value> result = others;

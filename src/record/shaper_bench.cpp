@@ -12,17 +12,18 @@ namespace {
 // Moments per period of the faster axis.
 constexpr double kPerPeriod = 16.0;
 constexpr double kBlock_s = 1.0;
-// Measured before every second block is left out, and again before every second of the others.
+// After so much measured time every second block is left out, after as much again every second of
+// the rest, and so on.
 constexpr double kStrideLasts_s = 60.0;
-// Nozzles that nobody asks for must be let to forget now and then.
+// After so many skipped moments the nozzles are asked once, so that they forget the past.
 constexpr std::size_t kSkipped = 128;
-// A nozzle that is not heard of for so many intervals has stood still.
+// A nozzle without a new state for so many intervals has stood still.
 constexpr double kGap = 4.0;
-// A corner's largest deviation is a kink, so what comes near the largest so far (as a square) is
-// looked at so many times in an interval.
+// At a corner the deviation peaks in a kink. So if its square exceeds kNearPeak times the largest
+// so far, it is measured kFine times in the interval.
 constexpr double kNearPeak = 0.16;
 constexpr int kFine = 8;
-// Intervals between the last a machine is heard of and the last moment that is measured.
+// So many intervals lie between the last state of a machine and the last moment measured.
 constexpr double kMargin = 2.0;
 
 double frequency_hz(const dynamics::FlexibleAxis& axis) {
@@ -62,7 +63,7 @@ void ShaperBench::add(std::size_t machine, double time_s, const dynamics::Nozzle
     }
   };
   if (last_s >= 0.0 && time_s - last_s > kGap * interval_s_) {
-    // No cubic from before to after the rest.
+    // Two states at rest, so that no cubic spans the whole rest.
     const dynamics::NozzleXY& last = last_[machine];
     add(last_s + interval_s_, {{last.x.position, 0.0}, {last.y.position, 0.0}});
     add(time_s - interval_s_, {{unshaped.x.position, 0.0}, {unshaped.y.position, 0.0}});
@@ -93,7 +94,7 @@ void ShaperBench::advance(const verify::ReferencePath& path, double time_s) {
       return;
     }
     const verify::PathPiece& piece = path[piece_];
-    // Whole intervals, so that the moments are the same however the path comes.
+    // Skip whole intervals, so that the moments do not depend on how the path is handed over.
     if (piece.start_s > next_s_ + interval_s_) {
       const double rest_s = std::min(piece.start_s, until_s) - next_s_;
       next_s_ += interval_s_ * std::max(0.0, std::ceil(rest_s / interval_s_) - 1.0);

@@ -1,8 +1,9 @@
-// How the firmware's input shapers would have done on the same print: each built for the printer's
-// frequencies as the settings have them, on a machine whose true ones are as set or somewhat off.
+// How the firmware's input shapers would have done on the same print. Each is built for the
+// frequencies of the settings and measured on machines whose true frequencies are as set or
+// somewhat off.
 //
-// A whole print has more moments than can be looked at, so from some length on only every second,
-// fourth, … of its seconds is measured, and counts as often.
+// A whole print has too many moments to measure all. So after some time only every second, then
+// every fourth second is measured (and so on), and counts 2, 4, … times.
 #pragma once
 
 #include <cstddef>
@@ -17,14 +18,14 @@ namespace unflex::record {
 
 class ShaperBench {
  public:
-  // `model` is the printer of the settings; there are `machines` true ones.
+  // `model` is the printer of the settings; `machines` is the number of machines.
   ShaperBench(const verify::NozzleModel& model, std::size_t machines);
 
-  // A machine's nozzle without a shaper. Times must increase.
+  // The state of a machine's nozzle without a shaper. Times must increase.
   void add(std::size_t machine, double time_s, const dynamics::NozzleXY& unshaped);
   // All machines have come to this time of the path.
   void advance(const verify::ReferencePath& path, double time_s);
-  // For how long after its time the path is needed.
+  // For how long a piece of the path is needed after its time, s.
   [[nodiscard]] double memory_s() const;
 
   [[nodiscard]] std::vector<report::Contender> contenders() const;
@@ -53,7 +54,7 @@ class ShaperBench {
   std::vector<dynamics::NozzleXY> last_;
   verify::NearPath near_;
   bool begun_ = false;
-  std::size_t piece_ = 0;  // of the path, at next_s_
+  std::size_t piece_ = 0;  // piece of the path at next_s_
   double next_s_ = 0.0;
   std::vector<Nozzle*> peaking_;
   std::size_t skipped_ = 0;

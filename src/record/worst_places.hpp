@@ -1,5 +1,5 @@
-// The places where the nozzle strays most, each of them once: what is near one of them, on
-// whatever layer, counts as the same.
+// The places where the nozzle strays most, each listed once. Candidates near each other count as
+// one place, even on different layers.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ class WorstPlaces {
     bool added = false;
     std::vector<std::size_t> removed;
   };
-  // Puts the candidate, under a number, in its place, if it has one.
+  // Adds the candidate under the number id, if it is among the worst.
   Change add(const PlaceCandidate& candidate, std::size_t id);
 
   struct Kept {
@@ -36,7 +36,7 @@ class WorstPlaces {
   };
   // The worst first.
   [[nodiscard]] const std::vector<Kept>& places() const { return places_; }
-  // Whether a candidate with this deviation might have a place.
+  // Whether a candidate with this deviation might be among the worst.
   [[nodiscard]] bool may_have(double contour2_mm2) const {
     return places_.size() < most_ || contour2_mm2 > places_.back().candidate.contour2_mm2;
   }

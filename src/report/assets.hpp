@@ -8,7 +8,7 @@ namespace unflex::report::assets {
 extern const std::string_view page_css;
 extern const std::string_view page_js;
 
-// Of the report of a print.
+// For the report of a print.
 extern const std::string_view report_css;
 extern const std::string_view report_html;
 extern const std::string_view plot_js;

@@ -7,7 +7,7 @@
 namespace unflex::report {
 namespace {
 
-// Only what the file itself contains is ever loaded or run.
+// The page never loads or runs anything but what the file itself contains.
 constexpr std::string_view kPolicy =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
@@ -27,7 +27,7 @@ std::size_t sequence_length(std::string_view text) {
   if (lead >= 0xC2U && lead <= 0xDFU && continues(1)) {
     return 2;
   }
-  // Neither longer than needed nor a surrogate nor above U+10FFFF.
+  // Reject overlong forms, surrogates and code points above U+10FFFF.
   if ((lead & 0xF0U) == 0xE0U && continues(1) && continues(2)) {
     return (lead == 0xE0U && second < 0xA0U) || (lead == 0xEDU && second >= 0xA0U) ? 0 : 3;
   }

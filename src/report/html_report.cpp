@@ -1,5 +1,5 @@
-// The page is complete without its script but for the pictures; what the script shows it reads from
-// one JSON object and the bytes of the paths.
+// Without its script the page lacks only the pictures. The script reads what it shows from one JSON
+// object and the bytes of the paths.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 namespace unflex::report {
 namespace {
 
-// Of lists that may be of any length.
+// Limits for lists and texts that may be of any length.
 constexpr std::size_t kMostListed = 100;
 constexpr std::size_t kLongestText = 500;
 
@@ -63,7 +63,7 @@ void append_float(double value, std::string& bytes) {
   }
 }
 
-// Little-endian floats, eight to a moment, in the order of its fields.
+// The moments as little-endian floats: eight per moment, in the order of its fields.
 std::string packed(const std::vector<Moment>& moments) {
   std::string bytes;
   for (const Moment& m : moments) {
@@ -213,7 +213,7 @@ constexpr std::string_view kTypical =
     "sliced path. It is computed: the file is replayed as the firmware would, with the nozzle "
     "hanging on springs and dampers of the frequencies given in the settings.";
 
-// Three figures.
+// A length with three figures, in µm.
 std::string um_text(double mm) {
   const double value = mm * 1e3;
   const int digits = value >= 99.95 ? 0 : value >= 9.995 ? 1 : 2;

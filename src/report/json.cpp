@@ -80,7 +80,7 @@ void add_motion(const Report& r, Json& json) {
 
 void add_work(const Report& r, Json& json) {
   if (r.solver_engine.empty()) {
-    // Nothing was solved, a file was verified: what was tried for it is not known.
+    // Nothing was solved: an existing file was verified. How it was made is not known.
     for (const char* const key : {"windows", "fallbacks", "kept_moves", "extruded_path",
                                   "unknown_commands", "line_budget", "solver"}) {
       json[key] = nullptr;

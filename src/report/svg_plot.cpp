@@ -22,7 +22,7 @@ constexpr double kTop = 8.0;
 constexpr double kBottom = 36.0;
 constexpr double kTolerancePx = 0.2;
 constexpr double kRoom = 0.05;
-// Of the plot's size: how far outside points may lie before they are moved nearer.
+// Points further outside than this multiple of the plot's size are moved nearer.
 constexpr double kBeyond = 4.0;
 
 PlotRange range_of(const Plot& plot, double PlotPoint::*coordinate) {
@@ -47,7 +47,7 @@ void widen(PlotRange& range, double size) {
   range = {middle - 0.5 * size, middle + 0.5 * size};
 }
 
-// From the plot's units to pixels.
+// Converts from the plot's units to pixels.
 class Frame {
  public:
   explicit Frame(const Plot& plot)
@@ -135,7 +135,7 @@ double tick_step(const PlotRange& range, double wanted) {
   const double power = std::pow(10.0, std::floor(std::log10(rough)));
   double nearest = power;
   for (const double multiple : {2.0, 5.0, 10.0}) {
-    // By ratio: the border between two steps is their geometric mean.
+    // Compare ratios: the border between two steps is their geometric mean.
     if (rough * rough > nearest * multiple * power) {
       nearest = multiple * power;
     }
@@ -153,7 +153,7 @@ std::vector<double> ticks(const PlotRange& range, double wanted) {
   return result;
 }
 
-// As many decimals as the step between ticks needs.
+// The value with as many decimals as the step between ticks needs.
 std::string tick_text(double value, const PlotRange& range, double wanted) {
   const int decimals =
       std::max(0, -static_cast<int>(std::floor(std::log10(tick_step(range, wanted)) + 1e-9)));
@@ -225,8 +225,8 @@ std::string svg_plot(const Plot& plot) {
   const Frame frame(plot);
   std::string svg;
   const Sink out = std::back_inserter(svg);
-  // An inner viewport clips the curves, so that no identifier is needed that would have to be
-  // unique.
+  // An inner viewport clips the curves. A clip path would need an identifier that is unique in the
+  // page.
   fmt::format_to(out, R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">)",
                  plot.width_px, plot.height_px, escape_html(plot.title));
   write_axes(out, plot, frame);

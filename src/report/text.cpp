@@ -27,7 +27,7 @@ void write_deviation(Sink out, std::string_view moves, const DeviationRow& befor
                  cell(before.contour_rms_mm, after.contour_rms_mm));
 }
 
-// What the frequency being off would do.
+// The error if the true frequencies are off.
 void write_sensitivity(Sink out, const std::vector<Sensitivity>& sensitivity) {
   if (sensitivity.empty()) {
     return;
@@ -146,7 +146,7 @@ std::string share_text(double share) {
 }
 
 std::string duration_text(double seconds) {
-  // Just below a minute tenths would round to 60.0.
+  // From 59.95 s on, tenths would round to 60.0.
   if (!(seconds >= 59.95)) {
     return fmt::format("{:.1f}s", seconds);
   }

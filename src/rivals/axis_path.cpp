@@ -6,7 +6,7 @@
 namespace unflex::rivals {
 namespace {
 
-// Beginnings closer together than this are the same.
+// Times closer together than this are equal.
 constexpr double kSameTime_s = 1e-12;
 
 dynamics::BaseSegment advanced(const dynamics::BaseSegment& motion, double dt) {
@@ -14,7 +14,8 @@ dynamics::BaseSegment advanced(const dynamics::BaseSegment& motion, double dt) {
           motion.velocity + dt * motion.acceleration, motion.acceleration};
 }
 
-// The motion `t` into the path, with the acceleration that holds from then on.
+// The motion at time t of the path, with the acceleration that holds from then on. `index` is where
+// the search begins; it only grows.
 dynamics::BaseSegment motion_at(const AxisPath& path, std::size_t& index, double t) {
   while (index + 1 < path.size() && path[index + 1].start_s <= t + kSameTime_s) {
     ++index;
@@ -138,7 +139,8 @@ const dynamics::NozzleState& NozzleWalk::at(double t) {
   const AxisPath& path = *path_;
   while (t - now_s_ > kSameTime_s) {
     const dynamics::BaseSegment base = motion_at(path, index_, now_s_);
-    // Before the first parabola the next change is its beginning, later that of the next one.
+    // The next change is the beginning of the first parabola while that is still to come, later
+    // that of the next one.
     const bool waiting = now_s_ + kSameTime_s < path[index_].start_s;
     const std::size_t next = waiting ? index_ : index_ + 1;
     const double change_s = next < path.size() ? path[next].start_s : t;

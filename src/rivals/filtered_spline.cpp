@@ -16,10 +16,10 @@ constexpr int kSamples = 5;            // per knot
 constexpr int kParts = 16;             // parabolas per knot that stand for the quintic
 constexpr std::size_t kWindow = 60;
 constexpr std::size_t kKept = 30;
-// What is left of a basis function's response, as a share, when it is given up.
+// A basis function's response is cut off when only this share of it is left.
 constexpr double kForgotten = 1e-8;
 
-// Σ_i (−1)^i C(n+1, i) (u − i)₊^m / m!: the cardinal spline for m = n, its derivatives for less.
+// Σ_i (−1)^i C(n+1, i) (u − i)₊^m / m!: the cardinal spline for m = n, its derivatives for m < n.
 double cardinal(double u, int m) {
   constexpr std::array<double, kSupport + 1> kBinomial = {1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0};
   if (u <= 0.0 || u >= kSupport) {
@@ -36,7 +36,7 @@ double cardinal(double u, int m) {
   return sum;
 }
 
-// N, N′ and N″ at every part of a knot: at the i-th of them i / kParts after the first knot.
+// N, N′ and N″ at every part of a knot. Entry i is for i / kParts knots after the first one.
 using BasisTable = std::vector<std::array<double, 3>>;
 
 BasisTable basis_table() {
@@ -62,7 +62,7 @@ AxisPath basis_path(const BasisTable& table, double knot_s) {
   return through_nodes(nodes, 0.0, knot_s / kParts, 1);
 }
 
-// φ at the samples, as far as it matters and no further than `longest` of them.
+// φ at the samples, as far as it matters, and at most `longest` of them.
 std::vector<double> filtered_basis(const BasisTable& table, const dynamics::FlexibleAxis& axis,
                                    double knot_s, std::size_t longest) {
   const double rate =
@@ -80,7 +80,8 @@ std::vector<double> filtered_basis(const BasisTable& table, const dynamics::Flex
   return result;
 }
 
-// The coefficients one after the other, and what of the reference is still to be made.
+// Finds the coefficients one after the other, and keeps what is left of the reference for the next
+// ones.
 class Preview {
  public:
   Preview(const std::vector<double>& basis, std::vector<double> wanted)
@@ -120,7 +121,7 @@ class Preview {
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors_;
 };
 
-// b at the knots' parts.
+// The spline b as parabolas between the parts of the knots.
 AxisPath spline_path(const BasisTable& table, const std::vector<double>& coefficients, double first,
                      double start_s, double knot_s) {
   dynamics::AxisTrajectory nodes;
@@ -145,12 +146,13 @@ AxisPath filtered_spline(const AxisPath& reference, const dynamics::FlexibleAxis
                          const SplineOptions& options) {
   const double knot_s = options.knot_s;
   const double length_s = options.lead_in_s + end_s(reference) + options.tail_s;
-  // The last of them ends with the tail.
+  // The last knot is at the end of the tail.
   const auto knots = static_cast<std::size_t>(std::ceil(length_s / knot_s));
   const std::size_t free = knots > kDegree ? knots - kDegree : 1;
   const double first = reference.front().motion.position;
   const double last = reference.back().motion.position;
-  // The coefficients after the free ones stand at the end; as many as reach into the samples.
+  // The coefficients after the free ones stay at the end position. We take as many of them as reach
+  // into the samples.
   const std::size_t total = free + kSupport;
   std::vector<double> wanted(total * kSamples);
   PathCursor cursor(reference);

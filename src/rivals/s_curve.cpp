@@ -3,10 +3,10 @@
 namespace unflex::rivals {
 namespace {
 
-// Parabolas per ramp: at 64 they are off by less than 1e-8 of the ramp's length.
+// Parabolas per ramp. At 64 they are off by less than 1e-8 of the ramp's length.
 constexpr int kParts = 64;
 
-// The share of the change of speed that is done, and its integral, at fraction u of the ramp.
+// At fraction u of the ramp: the share of the change of speed that is done, and its integral.
 double share(double u) { return u < 0.5 ? 2.0 * u * u : 1.0 - 2.0 * (1.0 - u) * (1.0 - u); }
 double covered(double u) {
   return u < 0.5 ? 2.0 / 3.0 * u * u * u : u - 0.5 + 2.0 / 3.0 * (1.0 - u) * (1.0 - u) * (1.0 - u);

@@ -1,7 +1,8 @@
-// The equations are a chain: those of interval k hold the base's position b_k and three velocities.
-// So least squares need no large matrix: from the end of the plan on, v_{k+1} is eliminated by an
-// orthogonal transformation of the rows that hold it (G. H. Golub & C. F. Van Loan, "Matrix
-// Computations", 4th ed., section 5.3), which leaves rows in (b_k, v_{k−1}, v_k) alone.
+// The equations form a chain: those of interval k contain the base's position b_k and three
+// velocities. So least squares need no large matrix. From the end of the plan on, v_{k+1} is
+// eliminated by an orthogonal transformation of the rows that contain it (G. H. Golub & C. F. Van
+// Loan, "Matrix Computations", 4th ed., section 5.3). This leaves rows in (b_k, v_{k−1}, v_k)
+// alone.
 #include "unflex/rivals/thesis_method.hpp"
 
 #include <Eigen/QR>
@@ -40,7 +41,7 @@ struct Defects {
   Form velocity;
 };
 
-// Of the interval that begins at node k.
+// The defects of the interval that begins at node k.
 Defects defects(const Nodes& nodes, const dynamics::FlexibleAxis& axis, std::size_t k) {
   const dynamics::NozzleState& p1 = nodes.nozzle[k];
   const dynamics::NozzleState& p2 = nodes.nozzle[k + 1];
@@ -67,7 +68,8 @@ Defects defects(const Nodes& nodes, const dynamics::FlexibleAxis& axis, std::siz
           slope_rate * one - 0.25 * (f1 + f2) - f_middle};
 }
 
-// The velocity at every node and the base's position at the first one, as a path of parabolas.
+// The path of parabolas with these velocities at the nodes, from the base's position at the first
+// node on.
 AxisPath path_of(const Nodes& nodes, const std::vector<double>& velocity) {
   AxisPath path;
   double position = nodes.nozzle.front().position;
@@ -80,7 +82,8 @@ AxisPath path_of(const Nodes& nodes, const std::vector<double>& velocity) {
   return path;
 }
 
-// Solves each form, which is to vanish, for v_{k+1}, from v_0 and the base's position on.
+// Solves each form, which is to be zero, for v_{k+1}, starting from v_0 and the base's first
+// position.
 std::vector<double> substitute(const Nodes& nodes, const std::vector<Form>& forms,
                                double first_velocity) {
   std::vector<double> velocity = {first_velocity};
@@ -103,7 +106,7 @@ AxisPath thesis_least_squares(const AxisPath& reference, const dynamics::Flexibl
   using Rows = Eigen::Matrix<double, 6, 5>;
   const Nodes nodes = sample(reference, period_s);
   std::vector<Form> forms(nodes.count() - 1);
-  // What later intervals ask of (b_{k+1}, v_k, v_{k+1}).
+  // The rows that later intervals leave for (b_{k+1}, v_k, v_{k+1}).
   Eigen::Matrix<double, 3, 5> later = Eigen::Matrix<double, 3, 5>::Zero();
   for (std::size_t k = nodes.count() - 1; k-- > 0;) {
     Rows rows = Rows::Zero();
@@ -125,7 +128,7 @@ AxisPath thesis_least_squares(const AxisPath& reference, const dynamics::Flexibl
     forms[k] = triangle.row(0);
     later = triangle.middleRows<3>(1);
   }
-  // v_0 alone is left: the start's row and those of the whole plan.
+  // Only v_0 is left: in the row of the start, and in the rows that are left of the whole plan.
   double square = kStartWeight * kStartWeight;
   double product = 0.0;
   for (int i = 0; i < 3; ++i) {

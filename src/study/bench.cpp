@@ -10,7 +10,7 @@
 namespace unflex::study {
 namespace {
 
-// As the verifier's reach: half a period of the slower axis, and some room.
+// The reach is that of the verifier: half a period of the slower axis, and this much room.
 constexpr double kReachRoom_s = 0.02;
 
 double reach_s(const compensate::Setup& setup) {
@@ -58,7 +58,7 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
   result.method = method;
   Result<BaseMotion> base = base_by(method, run, setup, engine);
   if (!base && base.error().kind == ErrorKind::internal) {
-    // No solution, as for a run that `compensate` would keep as it is.
+    // No solution: `compensate` would keep such a run as it is.
     result.failed_runs = 1;
     base = base_by(Method::uncompensated, run, setup, engine);
   }

@@ -13,7 +13,7 @@ namespace unflex::study {
 namespace {
 
 constexpr int kRepeats = 5;
-// Longer solves need no repetition to be timed.
+// A solve is repeated for its timing until this much time is spent.
 constexpr double kEnough_s = 0.02;
 constexpr int kParts = 8;
 
@@ -25,7 +25,7 @@ struct Solved {
   [[nodiscard]] int iterations() const { return x.iterations + y.iterations; }
 };
 
-// Several times, for the least time; all give the same.
+// Solves several times to find the least time. Each solve gives the same result.
 Result<Solved> solve(const compensate::RunWindow& window, const compensate::Engine& engine) {
   Solved solved;
   solved.wall_s = std::numeric_limits<double>::infinity();

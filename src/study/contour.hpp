@@ -8,8 +8,8 @@
 
 namespace unflex::study {
 
-// Measures against the part of the path that the plan passes within ±reach of the time given (a
-// part passes close to itself elsewhere), to whole moves.
+// Measures against the part of the path that the plan passes within ±reach of the given time, since
+// the path may pass close to itself elsewhere. The part consists of whole moves.
 class ContourGauge {
  public:
   ContourGauge(const std::vector<planner::PlannedMove>& moves, double reach_s);

@@ -1,4 +1,4 @@
-// A base's motion measured by the nozzle that hangs on it.
+// Measures a base's motion by the nozzle that hangs on it.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace unflex::study {
 
-// frequency_error: of the true axes against those of the setup.
+// frequency_error: relative error of the true frequencies against those of the setup.
 [[nodiscard]] Straying straying(const BaseMotion& base,
                                 const std::vector<planner::PlannedMove>& plan,
                                 const BenchSetup& setup, double frequency_error);

@@ -19,7 +19,7 @@ using report::escape_html;
 using report::micrometres_text;
 using Sink = std::back_insert_iterator<std::string>;
 
-// Bars are as long as the logarithm of the error above this.
+// Bar lengths are proportional to the logarithm of the error over this.
 constexpr double kBarFrom_mm = 1e-5;
 
 const MethodResult& by(const CaseResult& result, Method method) {
@@ -122,7 +122,7 @@ void write_gaps(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "</tbody></table></div></section>\n");
 }
 
-// Contour error against the error of the frequency.
+// Contour error plotted over the error of the frequency.
 report::Plot sensitivity_plot(const CaseResult& result) {
   report::Plot plot{.title = "Contour error against the error of the natural frequency",
                     .x_label = "true frequency against the one assumed, %",

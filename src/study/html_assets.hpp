@@ -25,7 +25,7 @@ table.data td.none { color: var(--muted); }
 )css";
 
 // Shows the figures of the chosen case by the chosen method. Cases 5A and 5B differ from the
-// reference in the thesis' own methods alone; the rest has no figures there.
+// reference only in the thesis' own methods. Other methods have no figures there.
 inline constexpr std::string_view kScript = R"js(
 (() => {
   const of = document.getElementById("case"), by = document.getElementById("method");

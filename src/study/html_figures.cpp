@@ -15,7 +15,7 @@ using report::PlotCurve;
 using report::PlotPoint;
 using report::Stroke;
 
-// Half the width of the zoom, in the error without compensation.
+// Half the width of the zoom, as a multiple of the error without compensation.
 constexpr double kZoom = 1.3;
 constexpr double kLeastZoom_mm = 1e-3;
 
@@ -60,7 +60,7 @@ Plot in_the_plane(const std::vector<Track>& list, std::string title) {
   return plot;
 }
 
-// Both axes of every track over time, from the values given on.
+// A quantity of both axes of every track over time, minus its value in `from`.
 Plot over_time(const std::vector<Track>& list, double dynamics::NozzleState::*quantity,
                const dynamics::NozzleXY& from, std::string title, std::string label) {
   Plot plot{.title = std::move(title), .x_label = "t, ms", .y_label = std::move(label)};
@@ -101,7 +101,7 @@ std::string figures(const CaseResult& result, const MethodResult& method) {
       kZoom * result.methods[static_cast<std::size_t>(Method::uncompensated)].straying[0].max_mm,
       kLeastZoom_mm);
 
-  // Displacements are from where the plan is first.
+  // Displacements are relative to the start of the plan.
   const dynamics::NozzleXY& start = list.front().states->front();
 
   const Plot plane = in_the_plane(list, fmt::format("Path in the plane, {}", of));

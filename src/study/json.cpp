@@ -61,7 +61,7 @@ Json chain_json(const ChainResult& chain) {
   return {{"case", chain.case_name}, {"engine", chain.engine}, {"steps", steps}};
 }
 
-// Whatever differs from one time to the next.
+// All that differs from one run of the program to the next.
 Json performance_json(const Outcome& outcome) {
   Json chains = Json::array();
   for (const ChainResult& chain : outcome.chains) {

@@ -1,4 +1,4 @@
-// What each method makes of a run.
+// Makes the base of a run by each method.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -17,12 +17,13 @@ namespace {
 
 using Moves = std::vector<planner::PlannedMove>;
 
-// Knots of a filtered spline per period of the nozzle, and how many it is given to begin and end
-// in.
+// Knots of a filtered spline per period of the nozzle, and the length of its lead-in and of its
+// tail in knots.
 constexpr double kKnotsPerPeriod = 10.0;
 constexpr double kSplineEndKnots = 5.0;
 
-// The shaper of an axis, built for its damping or the most that the shaper is defined for.
+// The shaper of an axis, built for the axis's damping, or for the largest one that the shaper is
+// defined for.
 struct BuiltShaper {
   dynamics::ShaperPulses pulses;
   std::string remark;
@@ -54,7 +55,7 @@ Result<BaseMotion> shaped_base(dynamics::ShaperKind kind, const Moves& plan,
                     x->remark.empty() ? y->remark : x->remark};
 }
 
-// Both axes by a function of the axis' reference and dynamics.
+// Makes the base of both axes by a function of an axis's reference and dynamics.
 template <class Make>
 BaseMotion both_axes(const Moves& plan, const compensate::Setup& setup, const Make& make) {
   return {make(rivals::reference_path(plan, gcode::X), setup.x.axis),

@@ -16,15 +16,17 @@ namespace {
 constexpr double kLeadIn_s = 0.01;
 constexpr double kLeastTail_s = 0.02;
 constexpr double kJerkWeight = 0.1;
-// More than two periods of the softest case: whatever rings has shown its largest swing.
+// More than two periods of the softest case, so that any ringing has shown its largest swing.
 constexpr double kHold_s = 0.25;
 constexpr double kTraceStep_s = 5e-4;
 constexpr double kTraceTail_s = 0.06;
-// Around the worst place of a print.
+// Time traced before and after the worst place of a print.
 constexpr double kTraceAround_s = 0.06;
-// Fine steps from coarse ones are measured with what unflex is allowed by default …
+// Coarse-to-fine is measured with the acceleration that unflex may use by default, in multiples of
+// the plan's.
 constexpr double kChainMultiple = 4.0;
-// … on the reference, the softest and the least damped case, if all are run.
+// If all cases are run, coarse-to-fine is measured on the reference, the softest and the least
+// damped case.
 constexpr std::array<std::string_view, 3> kChainCases = {"ref", "1A", "2A"};
 
 // Calls work(i) for i = 0 … count − 1 in several threads, in any order.
@@ -59,7 +61,8 @@ std::string describe(const Case& of) {
                      of.axis.zeta, of.accel_mm_s2, of.velocity_mm_s, of.period_s * 1e3);
 }
 
-// With other nodes, the thesis' own methods alone move differently from the reference.
+// Cases 5A and 5B change only the thesis' nodes. So all methods but the thesis' own move as in the
+// reference.
 void drop_repeated_traces(const Case& of, BenchResult& methods) {
   if (of.name != "5A" && of.name != "5B") {
     return;

@@ -42,7 +42,7 @@ void write_maxima(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "\n");
 }
 
-// The thesis' failure at the end of motion.
+// How far from its target the base comes to rest: there the thesis' methods fail.
 void write_gaps(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "\n{:<28}", "base rests short by, µm");
   for (const CaseResult& result : outcome.cases) {

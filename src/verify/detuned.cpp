@@ -5,8 +5,7 @@
 namespace unflex::verify {
 namespace {
 
-// The nozzle is a smooth function of time: for a tenth of the steps the maxima are the same within
-// one percent.
+// The nozzle moves smoothly, so a tenth of the steps gives the same maxima within 1 %.
 constexpr double kCoarseStep_s = 1e-3;
 
 }  // namespace

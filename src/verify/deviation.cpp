@@ -47,7 +47,7 @@ RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration
   if (duration_s <= 0.0) {
     return {};
   }
-  // So as not to count for ever where nothing damps.
+  // A lower limit, because an undamped swing would count for ever.
   static constexpr double kLeastDamping = 0.01;
   const auto ringing_s = [](const dynamics::FlexibleAxis& axis) {
     return 1.0 / (4.0 * std::max(axis.zeta, kLeastDamping) * axis.omega_rad_s);

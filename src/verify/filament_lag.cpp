@@ -7,10 +7,10 @@
 namespace unflex::verify {
 namespace {
 
-// How far around the reference the nozzle's place is looked for, against their distance.
+// The nozzle's place is searched up to this multiple of |p − r| around the reference.
 constexpr double kSearch = 3.0;
 
-// Where on a piece of the path a point is nearest to it.
+// The place on a piece of the path that is nearest to a point.
 struct Foot {
   double along_mm = 0.0;
   double distance2_mm2 = std::numeric_limits<double>::infinity();
@@ -30,8 +30,8 @@ double filament_per_mm(const PathPiece& piece) {
   return piece.extruding ? piece.move.segment.delta(gcode::E) / piece.length_xy_mm : 0.0;
 }
 
-// Along what lays filament, from s_F with Q(s_F) = laid_mm to the place of the nozzle; below 0
-// where s_F is ahead.
+// The lag s_p − s_F along the moves that lay filament, with Q(s_F) = laid_mm. It is below 0 if s_F
+// is ahead. s_p is given by the piece's number and along_mm.
 double laid_lag_mm(const ReferencePath& path, std::size_t number, double along_mm, double laid_mm) {
   double lag_mm = 0.0;
   while (laid_mm < path[number].filament_mm && number > path.first()) {

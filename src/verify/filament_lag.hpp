@@ -7,8 +7,8 @@
 //   s_F    the place whose filament comes out now: Q(s_F) = F
 //   lag    s_p − s_F, mm of path, moves without filament left out
 //
-// The path is searched around r only, no further than a few times |p − r|: it may come close to
-// itself.
+// The path may come close to itself. So it is searched only around r, no further than a few times
+// |p − r|.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace unflex::verify {
 
 class FilamentLag {
  public:
-  // A moment h seconds long; the reference is on piece `current` of the path, which lays filament.
+  // Adds a step of h seconds. The reference is on piece `current` of the path, which lays filament.
   void add(const ReferencePath& path, std::size_t current, double r_x_mm, double r_y_mm,
            double p_x_mm, double p_y_mm, double laid_mm, double h);
   [[nodiscard]] LagStats stats() const;

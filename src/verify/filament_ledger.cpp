@@ -47,7 +47,7 @@ void FilamentLedger::play(const planner::PlannedMove& move, double start_s) {
       border.from_f_mm = line_ends_here && from_s > start_s ? laid_until(from_s) : before_mm;
     }
   }
-  // The last border known may be the run's last, which is closed when all has been laid.
+  // The last known border may be the end of the run. end_run() closes that one.
   for (; borders_.size() > 1 && borders_.front().time_s + kClockTolerance_s <= end_s;
        borders_.pop_front()) {
     const Border& border = borders_.front();
@@ -63,12 +63,12 @@ void FilamentLedger::end_run() {
     const Border& border = borders_.front();
     close(border.q_mm, border.reached ? border.from_f_mm : f_mm_, f_mm_);
   }
-  // Whatever comes late still belongs to the last move.
+  // Filament that comes late still belongs to the last move.
   close(q_mm_, f_mm_, f_mm_);
   borders_.clear();
 }
 
-// The bounds change places where filament is pulled back.
+// If filament is pulled back, from_f_mm is the larger bound.
 void FilamentLedger::close(double q_mm, double from_f_mm, double to_f_mm) {
   const double distance_mm =
       q_mm - std::clamp(q_mm, std::min(from_f_mm, to_f_mm), std::max(from_f_mm, to_f_mm));

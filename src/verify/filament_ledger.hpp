@@ -4,10 +4,10 @@
 //   Q(t), F(t)   filament the sliced and the emitted file have laid since the run's start, mm
 //   t_i          end of the i-th move of the sliced file
 //
-// Where a line of the emitted file spans the end of a move, it cannot be said how much of it
+// If a line of the emitted file spans the end of a move, nobody can say how much of the line
 // belongs to which move. So Q(t_i) is compared with the interval from F at the start to F at the
-// end of the line; outside of it, the distance counts. Where a line ends at t_i, to the tolerance δ
-// of the clock, the interval is that from F(t_i − δ) to F(t_i + δ). The error of a move is the
+// end of the line. Only the distance outside of it counts. If a line ends at t_i, to the tolerance
+// δ of the clock, the interval goes from F(t_i − δ) to F(t_i + δ). The error of a move is the
 // difference of the distances at its two ends. At the end of the run the interval has no width.
 #pragma once
 
@@ -20,15 +20,15 @@ namespace unflex::verify {
 
 class FilamentLedger {
  public:
-  // The path, at the beginning of a section, must outlive the run.
+  // The path must be at the beginning of a section and must outlive the run.
   void begin_run(const ReferencePath& path);
-  // A move of the emitted file that starts at time start_s of the path, which is known beyond the
-  // move's end.
+  // A move of the emitted file, starting at time start_s of the path. The path must be known beyond
+  // the move's end.
   void play(const planner::PlannedMove& move, double start_s);
-  // The whole run is known, in both files.
+  // Ends the run: all its moves are known, in both files.
   void end_run();
 
-  // Of the last run, mm.
+  // Filament of the last run, mm.
   [[nodiscard]] double input_mm() const { return q_mm_; }
   [[nodiscard]] double output_mm() const { return f_mm_; }
   // The largest error of one move so far, mm.
@@ -39,7 +39,7 @@ class FilamentLedger {
   struct Border {
     double time_s = 0.0;
     double q_mm = 0.0;
-    bool reached = false;  // the line at time_s − δ has come
+    bool reached = false;  // the line at time_s − δ has been played
     double from_f_mm = 0.0;
   };
 

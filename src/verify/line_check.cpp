@@ -11,10 +11,10 @@
 namespace unflex::verify {
 namespace {
 
-// The base rests at the rounded end of the path before it.
+// Outside compensated runs the base rests at the rounded end of its path.
 constexpr double kRestTolerance_mm = 1e-4 + 1e-9;
 
-// Nothing to any firmware, and not in what unflex writes of binary G-code.
+// Firmware ignores blank lines, and unflex drops them from binary G-code.
 bool is_blank(const gcode::Line& line) {
   return line.content().find_first_not_of(" \t\r") == std::string_view::npos;
 }
@@ -97,8 +97,8 @@ void LineCheck::match(const PlacedLine& input, const PlacedLine& output) {
   }
 }
 
-// The output's line is not the one expected: either that one and perhaps more are lost, or this one
-// does not belong here.
+// The output's line is not the expected one. Either the expected line and perhaps more are lost, or
+// the output's line does not belong here.
 void LineCheck::resynchronise(const PlacedLine& output) {
   std::deque<PlacedLine>& lines = input_->lines();
   const auto found = std::find_if(lines.begin(), lines.end(), [&](const PlacedLine& input) {

@@ -1,6 +1,6 @@
 // Checks that the lines of the sliced file stand in the emitted one: all, unchanged, in their
 // order, where they stood along the path, and none but lines of known forms between them. Blank
-// lines mean nothing.
+// lines are ignored.
 #pragma once
 
 #include "replay.hpp"
@@ -8,8 +8,8 @@
 
 namespace unflex::verify {
 
-// Equal byte for byte but for durations in M73 and comments; an input that ends without a line
-// ending may have got one, and one that ends as in Windows the short one, as in binary G-code.
+// Equal byte for byte, except for durations in M73 and comments, and for the line ending: a missing
+// one may have been added, and that of Windows may have become the short one, as in binary G-code.
 [[nodiscard]] bool same_line(const gcode::Line& input, const gcode::Line& output);
 
 class LineCheck {

@@ -77,7 +77,8 @@ double Meter::base_offset_mm() {
   if (path_->first() == path_->end()) {
     return 0.0;
   }
-  // Before the reference starts and after it has ended, of what is near then.
+  // Before the reference starts, the path near its start counts; after it has ended, that near its
+  // end.
   near_.slide(*path_, std::clamp(time_s_, (*path_)[path_->first()].start_s, path_->end_s()));
   std::size_t nearest = 0;
   return std::sqrt(near_.squared_contour_error(*path_, base_x_mm_, base_y_mm_, nearest));
@@ -226,7 +227,8 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
   }
 }
 
-// From now on for a time in which it neither changes its acceleration nor its move.
+// The reference's motion for the next duration_s. In that time it must change neither its
+// acceleration nor its move.
 Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
   const PathPiece& piece = (*path_)[current_];
   const planner::PlannedMove& move = piece.move;
@@ -309,7 +311,7 @@ void Meter::look() {
 void Meter::wait_for_reference() {
   const NozzleXY nozzle = nozzle_;
   const double time_s = time_s_;
-  // Bounded stretches, so that a reference far ahead need not be known to its end at once.
+  // Waits in bounded stretches, so that a reference far ahead need not be known to its end at once.
   waiting_ = true;
   path_->extend_to(time_s_ + kSameTime_s);
   while (path_->end_s() - time_s_ > kSameTime_s) {

@@ -23,7 +23,7 @@ class LagEstimate {
   // Starts afresh, keeping the largest lag found.
   void restart();
   [[nodiscard]] double worst_s() const { return worst_s_; }
-  // As it is now; 0 where the reference rests.
+  // The present lag; 0 while the reference rests.
   [[nodiscard]] double present_s() const {
     return velocity2_ > 0.0 ? std::abs(error_dot_velocity_) / velocity2_ : 0.0;
   }
@@ -33,8 +33,8 @@ class LagEstimate {
   double velocity2_ = 0.0;
   double weight_s_ = 0.0;
   double worst_s_ = 0.0;
-  double last_h_ = 0.0;  // h of the last sample, for which …
-  double keep_ = 1.0;    // … so much of the memory stays
+  double last_h_ = 0.0;  // h of the last sample
+  double keep_ = 1.0;    // share of the memory that stays after last_h_
 };
 
 // The contour error of a nozzle in one section.
@@ -53,7 +53,7 @@ class SectionError {
     return weight_s_ > 0.0 ? std::sqrt(sum_contour2_ / weight_s_) : 0.0;
   }
   [[nodiscard]] double duration_s() const { return weight_s_; }
-  [[nodiscard]] std::size_t line() const { return line_; }  // of the largest
+  [[nodiscard]] std::size_t line() const { return line_; }  // line of the largest error
 
  private:
   double sum_contour2_ = 0.0;
@@ -68,33 +68,33 @@ class Meter {
   Meter(const NozzleModel& model, double near_s);
   explicit Meter(const NozzleModel& model) : Meter(model, verify::reach_s(model)) {}
 
-  // Tells of every step.
+  // Tells the observer of every step.
   void watch(Observer* observer, NozzleId id);
 
   // The nozzle and base at the very start.
   void set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm);
-  // From now on measures against this path, which must outlive that; the clock is put to the start
-  // of its current section.
+  // Measures against this path from now on. The path must live as long. The clock is set to the
+  // start of the path's current section.
   void begin_section(ReferencePath& path);
   // Moves the base. If it does not start where the base stands, base and nozzle are shifted there.
   void play(const planner::PlannedMove& move);
-  // The same of motion that goes on from where the base stands.
+  // Moves the base by a phase that begins where the base stands.
   void play(BasePhase phase);
-  // The base moves so while nothing is measured and the clock stands.
+  // Moves the base by a phase while nothing is measured and the clock stands.
   void settle(const BasePhase& phase);
-  // Takes base and nozzle to another place, as they are.
+  // Shifts base and nozzle, so that the base is at this place.
   void shift_to(double x_mm, double y_mm);
-  // Lets the present count among the largest errors.
+  // Measures the present moment with weight zero, so that it counts for the largest errors.
   void look();
-  // The base stands still until the reference has ended, and the nozzle is measured meanwhile;
-  // the nozzle's state afterwards is the one from before, since the machine does not wait.
+  // The base stands still until the reference has ended, and the nozzle is measured meanwhile. Then
+  // the nozzle's state and the clock are reset, since the machine does not wait.
   void wait_for_reference();
   // The base stands still; nothing is measured.
   void hold(double duration_s);
   // Puts the clock forward, within a section.
   void skip(double duration_s) { time_s_ += duration_s; }
 
-  // Measures the filament's lag, too, wherever motion is played move by move.
+  // Also measures the filament's lag while motion is played move by move.
   void follow_filament() { follows_filament_ = true; }
   [[nodiscard]] LagStats filament_lag() const { return filament_lag_.stats(); }
 
@@ -109,11 +109,11 @@ class Meter {
   [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
   [[nodiscard]] const DeviationAccumulator& all() const { return all_; }
   [[nodiscard]] double reach_s() const { return near_.reach_s(); }
-  // While the reference lays filament, in the section that began last.
+  // Contour error while the reference lays filament, in the section that began last.
   [[nodiscard]] const SectionError& section_error() const { return section_error_; }
-  // How far the base is now from the path the reference passes about now.
+  // Distance of the base from the path that the reference passes within ±reach_s() of now.
   [[nodiscard]] double base_offset_mm();
-  // From a place to the end of the path known so far.
+  // Distance from a place to the end of the path known so far.
   [[nodiscard]] double to_path_end_mm(const gcode::Position& from) const;
   // How far the nozzle will swing from the end of the path known so far.
   [[nodiscard]] double swing_mm() const;
@@ -142,7 +142,7 @@ class Meter {
             const Sample& sample);
 
   NozzleModel model_;
-  std::vector<BasePhase> phases_;  // of the move at hand
+  std::vector<BasePhase> phases_;  // phases of the move at hand
   ReferencePath* path_ = nullptr;
   double time_s_ = 0.0;
   NozzleXY nozzle_;
@@ -155,8 +155,9 @@ class Meter {
   SectionError section_error_;
   FilamentLag filament_lag_;
   bool follows_filament_ = false;
-  bool in_move_ = false;  // the motion at hand is a move's, whose filament is known
-  double laid_mm_ = 0.0;  // before the move at hand, counted as the path's filament
+  bool in_move_ = false;  // a whole move is played, so its filament is known
+  double laid_mm_ =
+      0.0;  // filament laid before the move at hand, counted as in ReferencePath::filament_mm()
   LagEstimate lag_;
   bool follow_lag_ = false;
   bool waiting_ = false;

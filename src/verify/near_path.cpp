@@ -6,8 +6,8 @@
 namespace unflex::verify {
 namespace {
 
-// The nozzle lags by less than half a period of its slower axis; the constant covers a base whose
-// clock runs off.
+// The nozzle lags by less than half a period of its slower axis. This constant is added for a base
+// whose clock is off.
 constexpr double kClockReach_s = 0.02;
 
 }  // namespace

@@ -10,13 +10,13 @@
 
 namespace unflex::verify {
 
-// The nozzle of the rules, and those of the observation, which follow it.
+// The nozzle of the rules (main) and those of the observation (detuned).
 class Nozzles {
  public:
   Nozzles(const NozzleModel& model, const Observation& observation, bool emitted)
       : main_(model), observer_(observation.observer) {
     for (const NozzleModel& other : observation.detuned) {
-      // The same stretch of the path counts as near for all.
+      // One reach for all, so that one stretch of the path counts as near for all.
       detuned_.emplace_back(other, main_.reach_s());
     }
     main_.follow_filament();
@@ -33,7 +33,7 @@ class Nozzles {
   void begin_section(ReferencePath& path) {
     for_each([&](Meter& meter) { meter.begin_section(path); });
   }
-  // From now on the printer's own shaper does this to the motion.
+  // Sets how the printer's own shaper changes the motion from now on.
   void shape(const planner::Shaping& shaping) {
     finish_shaped();
     shaping_ = shaping;
@@ -59,7 +59,7 @@ class Nozzles {
   void wait_for_reference() {
     for_each([](Meter& meter) { meter.wait_for_reference(); });
   }
-  // The machine stands still so long; what a shaper has delayed comes first.
+  // The machine stands still for duration_s. Motion that the shaper has delayed is played first.
   void hold(double duration_s) {
     const double rest_s = std::max(0.0, duration_s - finish_shaped());
     for_each([&](Meter& meter) { meter.hold(rest_s); });
@@ -91,8 +91,8 @@ class Nozzles {
   }
 
   planner::Shaping shaping_;
-  std::optional<ShapedBase> shaped_;  // while motion is shaped
-  gcode::Position to_mm_{};           // where that leads
+  std::optional<ShapedBase> shaped_;  // set while motion is shaped
+  gcode::Position to_mm_{};           // end of the last move given to shaped_
   std::vector<BasePhase> phases_;
   Meter main_;
   std::vector<Meter> detuned_;

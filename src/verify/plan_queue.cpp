@@ -5,7 +5,8 @@
 namespace unflex::verify {
 namespace {
 
-// Asking the planner for finished moves costs a little; so many moves are queued before.
+// Asking the planner for finished moves costs a little. So it is asked only once for this many
+// moves.
 constexpr std::size_t kTakeEvery = 32;
 
 }  // namespace

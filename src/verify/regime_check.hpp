@@ -8,8 +8,8 @@
 namespace unflex::verify {
 
 // What differs between the sliced and the emitted file's state at the same place, in words; empty
-// when nothing does. Where the machine stands is compared to one rounding step of coordinates; the
-// filament coordinate only where the next E word depends on it.
+// when nothing does. Positions may differ by one rounding step of coordinates. E is compared only
+// if the next E word depends on it.
 [[nodiscard]] std::string modal_difference(const gcode::ModalState& input,
                                            const gcode::ModalState& output);
 

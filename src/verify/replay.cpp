@@ -14,8 +14,8 @@
 namespace unflex::verify {
 namespace {
 
-// Of filament alone, and no more than rounding to five digits may leave until E is next told to be
-// somewhere.
+// Whether a move is only a rounding remainder: it moves filament alone, and no more than rounding
+// to five digits may leave until the next absolute E.
 bool is_nothing(const gcode::Event& event, const gcode::ModalState& modal) {
   constexpr double kRounding_mm = 3.5e-5;
   if (event.segments.size() != 1 || event.segments.front().length_mm() > 0.0) {
@@ -156,7 +156,7 @@ void Replay::read_line() {
   }
 }
 
-// The emitted file has it as a line.
+// The emitted file has the approach as a line. So it is read as a line here, too.
 void Replay::read_approach(const gcode::Line& line) {
   if (std::optional<std::string> text = interpreter_.approach(line)) {
     const Regime before{interpreter_.state(), plan_.limits()};
@@ -177,7 +177,8 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
       break;
     case gcode::EventKind::move:
       if (is_nothing(event, before.modal)) {
-        // Which it is in the other file, where nothing was rounded before.
+        // In the other file, where nothing was rounded before, this line does not move. So it is
+        // treated as no move here, too.
         if (event.segments.front().start_known) {
           place(std::move(event.line), before, true);
         } else {
@@ -204,8 +205,8 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
 }
 
 bool Replay::stays_in_run(const gcode::Event& event) const {
-  // What a line of emitted text may replace is known from the sliced file; by itself one of a few
-  // µm may well look steep.
+  // The sliced file tells what may be compensated. An emitted line of a few µm may look too steep
+  // by itself, so every move of an announced run belongs to the run.
   return in_compensated_run_ || gcode::compensable(event, fixed_.firmware);
 }
 
@@ -234,7 +235,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
       kind == SectionKind::barrier && is_known_addition(event.line.content(), fixed_.firmware);
   section.line = std::move(event.line);
 
-  // An announcement holds although unflex stops the machine before the first move.
+  // The announcement of a run also holds if unflex stops the machine before the first move.
   const Section& ended = sections_.back();
   Section run;
   run.compensated = section.may_be_added && ended.compensated && !ended.regime.has_value();

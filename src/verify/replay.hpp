@@ -1,5 +1,5 @@
-// A file as the firmware sees it: planned moves, cut into sections, and the other lines between
-// them with the place where they stand.
+// A file as the firmware sees it: planned moves, cut into sections, and the other lines, each with
+// the place where it stands.
 //
 // A run section is a stretch of motion that may be rewritten; sections of the other kinds are
 // single lines that end it. Runs (possibly empty) and other sections alternate, beginning with a
@@ -33,20 +33,20 @@ enum class SectionKind {
   move,     // a move that is kept as it is
   border,   // a line without motion that no run reaches across: the label of an object …
   barrier,  // the machine stops: homing, tool change, macro, pause …
-  end,      // of the file
+  end,      // end of the file
 };
 
 struct Section {
   SectionKind kind = SectionKind::run;
   std::size_t id = 0;
-  // Not for runs: the line, and the regime it is read in (at the end: the final one).
+  // The section's line; runs have none.
   gcode::Line line;
-  std::optional<Regime> regime;  // runs: at the first move
+  std::optional<Regime> regime;  // before the line; run: before its first move; end: the final one
   double dwell_s = 0.0;
   // barrier: for how long the machine stands still to switch its input shaper.
   double switching_s = 0.0;
-  bool moves_by_itself = false;  // barrier
-  // barrier: of a form unflex adds, so that it may be no section at all of the sliced file.
+  bool moves_by_itself = false;  // barrier: the machine moves by itself
+  // barrier: its form is one that unflex adds, so the sliced file may not have this barrier.
   bool may_be_added = false;
   // run: announced as compensated.
   bool compensated = false;
@@ -71,34 +71,34 @@ class Replay {
   Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
          const planner::Limits& limits, const planner::FirmwareConfig& fixed, bool in_output);
 
-  // Calls `listener` with every line, before what it means is known.
+  // Calls `listener` with every line, before the line is interpreted.
   void on_line(std::function<void(const gcode::Line&)> listener) {
     listener_ = std::move(listener);
   }
 
   // The next move of the current section; false at its end.
   [[nodiscard]] bool next(planner::PlannedMove& move);
-  // Whether next() would give one. Every line before it has then been read.
+  // Whether next() would give a move. Every line before that move has then been read.
   [[nodiscard]] bool has_move();
   [[nodiscard]] Firmware firmware() const { return fixed_.firmware; }
-  // The moves of the sliced file by another plan, in which the machine rests at both ends of every
-  // section. The two plans are independent of each other; what is not asked for of this one is
-  // dropped at the section's end, or by skip_resting().
+  // The next move of the sliced file by the resting plan, in which the machine rests at both ends
+  // of every section; false at the section's end. The two plans are independent. Moves of the
+  // resting plan that nobody takes are dropped at the section's end or by skip_resting().
   [[nodiscard]] bool next_resting(planner::PlannedMove& move);
   void skip_resting() { resting_plan_.skip(); }
 
   // The current section. `compensated` and `regime` of a run are known once has_move() was asked.
   [[nodiscard]] const Section& section() const { return sections_.front(); }
-  // The largest that M221 and M200 make of a mm of E where the current section began and where
-  // reading has come to.
+  // Filament per mm of E, by M221 and M200: the larger value of where the current section began and
+  // of the last line read.
   [[nodiscard]] double filament_factor() const;
-  // The section after the current one, all of whose moves must have been taken.
+  // The section after the current one. All moves of the current one must have been taken.
   [[nodiscard]] const Section& following() const { return sections_[1]; }
   void next_section();
-  // Makes one run of the current one, the barrier that follows it, and the run after that.
+  // Joins the current run, the barrier after it and the run after that barrier to one run.
   void join_over_barrier();
 
-  // Lines read so far, oldest first; the user removes those it has dealt with.
+  // Lines read so far, oldest first. The caller removes the lines it has dealt with.
   [[nodiscard]] std::deque<PlacedLine>& lines() { return lines_; }
 
   [[nodiscard]] const gcode::LineReader& reader() const { return reader_; }

@@ -101,7 +101,7 @@ void BaseCheck::add(const planner::PlannedMove& move) {
     velocity_excess_.offer(v - motors_.uncertainty(motor) * kRounding_mm / duration,
                            rules_->base_max_velocity_mm_s, segment.line);
   }
-  // The firmware may pass from motion left as it is into the run, and out of it, at some speed.
+  // The firmware may pass from kept motion into the run, and out of the run, at some speed.
   if (last_duration_s_ == 0.0) {
     last_velocity_ = velocity_at(move, move.start_v_mm_s);
   }

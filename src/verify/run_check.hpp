@@ -25,14 +25,15 @@ class Excursion {
   void add(const gcode::Segment& segment);
   void clear() { sides_ = {}; }
 
-  // A line of the emitted file that goes out of the travel, and further than the sliced file does
-  // in this section; nullptr if there is none.
+  // The point furthest beyond one side of the travel.
   struct Side {
     double beyond_mm = 0.0;
     std::size_t line = 0;
     double x_mm = 0.0;
     double y_mm = 0.0;
   };
+  // A side on which this file, the emitted one, goes out of the travel, and further than the
+  // sliced file (`input`) does in this section; nullptr if there is none.
   [[nodiscard]] const Side* worse_than(const Excursion& input) const;
 
  private:
@@ -49,7 +50,7 @@ class BaseCheck {
       : rules_(&rules), violations_(&violations), motors_(rules.fixed.motors()) {}
 
   void begin_run();
-  // In the middle of a run, after this move.
+  // Begins in the middle of a run, after the move `before`.
   void go_on(const planner::PlannedMove& before);
   void add(const planner::PlannedMove& move);
   void end_run();
@@ -59,7 +60,7 @@ class BaseCheck {
   [[nodiscard]] double median_duration_s() const;
 
  private:
-  // What is over the limit by most in the current run.
+  // The largest excess over a limit in the current run.
   struct Excess {
     double value = 0.0;
     double ratio = 1.0;
@@ -67,10 +68,10 @@ class BaseCheck {
     void offer(double a_value, double limit, std::size_t a_line);
   };
   using PerMotor = std::array<double, Motors::kCount>;
-  // Of a motion per axis; 0 for motors that move neither X nor Y.
+  // Motion of each motor for a motion of the axes; 0 for motors that move neither X nor Y.
   [[nodiscard]] PerMotor of_motors(double x, double y, double z) const;
   [[nodiscard]] PerMotor mean_velocity(const planner::PlannedMove& move) const;
-  // Where a move goes at this speed along its way.
+  // Velocity of each motor where the move has this speed along its path.
   [[nodiscard]] PerMotor velocity_at(const planner::PlannedMove& move, double v_mm_s) const;
   void keep(const planner::PlannedMove& move);
   void change_of_velocity(const PerMotor& velocity, double duration_s, std::size_t line);
@@ -79,15 +80,15 @@ class BaseCheck {
   const Rules* rules_;
   Violations* violations_;
   Motors motors_;
-  PerMotor last_velocity_{};      // on the mean over the last move
-  PerMotor end_velocity_{};       // at its end
-  double last_duration_s_ = 0.0;  // 0: at rest
+  PerMotor last_velocity_{};      // mean over the last move
+  PerMotor end_velocity_{};       // at the end of the last move
+  double last_duration_s_ = 0.0;  // duration of the last move; 0: at rest
   std::size_t last_line_ = 0;
   Excess velocity_excess_;
   Excess accel_excess_;
   double max_velocity_ = 0.0;
   double max_accel_ = 0.0;
-  LogHistogram durations_s_;  // by number
+  LogHistogram durations_s_;  // every move counts as one
 };
 
 // Whether the firmware refuses the move because it lays too much filament (Klipper:

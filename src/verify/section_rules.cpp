@@ -8,17 +8,18 @@
 namespace unflex::verify {
 namespace {
 
-// A line more within 100 ms is a matter of the clock's last digits.
+// One more line within 100 ms is allowed: the clock's last digits may decide that.
 constexpr double kOneLine_per_s = 10.0;
-// Rounding to steps, and what the nozzle strays.
+// Allowance for rounding to steps and for how far the nozzle strays.
 constexpr double kRounding_mm = 0.05;
 // Filament of a line that this makes late.
 constexpr double kLate_mm = 5e-4;
-// Lines that tell how much filament there is on a way are longer.
+// Shorter lines do not tell how much filament is laid per path.
 constexpr double kShort_mm = 0.2;
-// Lines may lay more than on the densest way, by what their lengths are rounded to.
+// A line may lay this much more per path than the densest one, since lengths are rounded.
 constexpr double kDenser = 1.25;
-// How it swings in a tail, where it lays nothing, is another matter.
+// In a tail the nozzle lays nothing. So it may swing more there than if the run had been kept: by
+// this factor, or up to this much.
 constexpr double kTimesInTail = 2.2;
 constexpr double kLittleSwing_mm = 80e-3;
 
@@ -63,13 +64,13 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
   first_line_ = first_line_ == 0 ? line : first_line_;
   last_line_ = line;
   offset_.offer(meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), line);
-  // Where along its way a wipe pulls filament back does not matter.
+  // Filament that a wipe pulls back does not matter.
   const double filament_mm = std::max(0.0, move.segment.delta(gcode::E));
   if (!late && move.segment.length_xy_mm() > kShort_mm) {
     densest_ = std::max(densest_, filament_mm / move.segment.length_xy_mm());
   }
   if (late) {
-    // A run whose clock is late has some of its way still to go.
+    // If the run's clock is late, some of its path is still to go.
     const double to_go_mm = meter.to_path_end_mm(move.segment.start_mm);
     filament_in_tail_.offer(filament_mm,
                             kLate_mm + filament_tolerance_mm + kDenser * densest_ * to_go_mm, line);
@@ -84,8 +85,8 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
 void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emitted) {
   check_rate(rate);
   check_nozzle(kept, emitted);
-  // The firmware may pass from motion that was kept into the run without a stop. When the run was
-  // written it was taken to begin at rest, so that how it rings is not known as exactly.
+  // The firmware may pass from kept motion into the run without a stop, but the run was written to
+  // begin at rest. So its ringing is not known exactly, and its swing is not checked.
   if (!ringing_) {
     check_swing(kept, emitted);
   }

@@ -3,7 +3,7 @@
 // than if the run had been kept as it was sliced, the tail included.
 //
 // Notation:
-//   ω, ζ   of the softer axis              A, v   largest acceleration of a base, its speed
+//   ω, ζ   of an axis                      A, v   largest acceleration of a base, its speed
 //   A/ω² + 2ζv/ω   how far a base is from the nozzle that follows it, and so from the path
 #pragma once
 
@@ -21,13 +21,13 @@ class SectionRules {
   SectionRules(const Rules& rules, Violations& violations)
       : rules_(&rules), violations_(&violations) {}
 
-  // ringing: motion that was kept has just set the nozzle swinging.
+  // ringing: kept motion just before the run has set the nozzle swinging.
   void begin(const LineRate& rate_before, bool ringing);
-  // A move of the sliced file's run by itself, as it would come here.
+  // A sliced move of the run, planned by itself from rest to rest.
   void add_sliced(const planner::PlannedMove& move) { sliced_rate_.add(move); }
   // A move of the emitted run, after it has been played. late: the plan had ended when it began.
   void add(const planner::PlannedMove& move, Meter& meter, bool late, double filament_tolerance_mm);
-  // The whole run has been played: emitted, and kept as it was sliced.
+  // The whole run has been played: as emitted, and as if its sliced moves had been kept.
   void end(const LineRate& rate, const Meter& kept, const Meter& emitted);
 
  private:
@@ -46,12 +46,12 @@ class SectionRules {
   Violations* violations_;
   LineRate sliced_rate_;
   bool ringing_ = false;
-  double densest_ = 0.0;  // most filament on a way, mm/mm
+  double densest_ = 0.0;  // most filament per path, mm/mm
   std::size_t first_line_ = 0;
   std::size_t last_line_ = 0;
   Breach offset_;
   Breach filament_in_tail_;
-  double swing_in_tail_mm_ = 0.0;  // the largest
+  double swing_in_tail_mm_ = 0.0;  // largest swing in the tail
   std::size_t swing_line_ = 0;
 };
 

@@ -13,7 +13,7 @@ dynamics::BaseSegment later(const dynamics::BaseSegment& base, double h) {
           base.velocity + base.acceleration * h, base.acceleration};
 }
 
-// What a move lays as it goes, from 0 on; nothing where it pulls filament back.
+// Filament that a move lays, counted from its start; zero if it pulls filament back.
 dynamics::BaseSegment along_filament(const planner::PlannedMove& move, double distance_mm,
                                      double speed_mm_s, double accel_mm_s2) {
   if (!move.segment.extruding()) {
@@ -58,7 +58,7 @@ ShapedBase::ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm
   };
   set(x_, shaping.x);
   set(y_, shaping.y);
-  // It has rested for as long as the pulses look back.
+  // The base has rested for as long as the pulses look back.
   given_until_s_ = -memory_s_ - 1.0;
   give({{x_mm, 0.0, 0.0}, {y_mm, 0.0, 0.0}, {}, memory_s_ + 1.0});
 }
@@ -101,7 +101,8 @@ void ShapedBase::advance(std::vector<BasePhase>& shaped) {
   }
 }
 
-// The first time after now at which a tap comes to another phase. Puts the taps to those of now.
+// The first time after now at which a tap comes to another phase. Moves the taps to their phases of
+// now.
 double ShapedBase::next_change(std::vector<Tap>& taps) {
   double change_s = std::numeric_limits<double>::infinity();
   for (Tap& tap : taps) {

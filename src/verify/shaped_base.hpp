@@ -1,10 +1,10 @@
-// The base that the motors make of planned motion where the printer's own input shaper is on.
+// The base's motion while the printer's own input shaper is on.
 //
 //   b_s(t) = Σ A_i b(t − d_i)     per axis; the pulses' delays counted from the first of them
 //
-// Of motion in phases of constant acceleration that is again motion in such phases, with an end
-// wherever a delayed phase ends. It comes later than the firmware's by the time from the first
-// pulse to their mean, some ms, which a distance from the path does not notice.
+// Planned motion has phases of constant acceleration, and so has shaped motion: a phase ends
+// wherever a delayed phase ends. The firmware shifts the pulses by their mean delay, so this motion
+// comes some ms later than the firmware's. Distances from the path do not depend on that.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ struct BasePhase {
   double duration_s = 0.0;
 };
 
-// The phases of one move, those without duration left out.
+// Appends the phases of one move, except those without duration.
 void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& phases);
 
 class ShapedBase {
@@ -35,17 +35,17 @@ class ShapedBase {
   // The base rests at x, y.
   ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm);
 
-  // Takes motion that goes on from what it was given before and appends as much as is known of the
-  // shaped motion by then: as long as what was given.
+  // Takes the next move and appends the shaped motion that is known by then. It lasts as long as
+  // the motion given so far.
   void add(const planner::PlannedMove& move, std::vector<BasePhase>& shaped);
-  // The machine stands still: what is left of the shaped motion.
+  // The machine stands still. Appends what is left of the shaped motion.
   void finish(std::vector<BasePhase>& shaped);
 
  private:
   struct Tap {
     double delay_s = 0.0;
     double weight = 0.0;
-    std::size_t index = 0;  // of the phase that it has come to, counted from the very first
+    std::size_t index = 0;  // phase that the tap has reached, counted from the very first
   };
   struct Timed {
     double start_s = 0.0;
@@ -64,7 +64,7 @@ class ShapedBase {
   std::deque<Timed> given_;
   std::size_t forgotten_ = 0;
   double given_until_s_ = 0.0;
-  double time_s_ = 0.0;  // of the shaped motion
+  double time_s_ = 0.0;  // end of the shaped motion so far
 };
 
 }  // namespace unflex::verify

@@ -1,4 +1,4 @@
-// Both files side by side.
+// Reads both files side by side.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ namespace unflex::verify {
 // next at speed, that plan takes some ms longer.
 class Verifier {
  public:
-  // What is given must outlive it.
+  // The streams, the progress and the observer must outlive the Verifier.
   Verifier(std::istream& input, const std::string& input_name, std::istream& output,
            const std::string& output_name, const Rules& rules, Progress& progress,
            const Observation& observation);
@@ -74,24 +74,25 @@ class Verifier {
   ReferencePath run_path_;
   ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
   Nozzles original_;
-  // Were the sliced moves of a compensated run kept, from where emitted_ is, against run_path_.
+  // The nozzle if the sliced moves of a compensated run were kept. It starts from the state of
+  // emitted_ and is measured against run_path_.
   Meter kept_;
   Nozzles emitted_;
-  gcode::Shaper emitted_shaper_;  // what emitted_ is shaped by
+  gcode::Shaper emitted_shaper_;  // shaper that acts on emitted_
   FilamentLedger filament_;
   BaseCheck base_;
   SectionRules rules_of_run_;
   Excursion input_excursion_;
   Excursion output_excursion_;
-  bool input_refused_ = false;    // a move of the section is refused by the firmware
-  std::size_t refused_line_ = 0;  // the same in the output; 0: none
+  bool input_refused_ = false;    // the firmware refuses a sliced move of the section
+  std::size_t refused_line_ = 0;  // first line of the output that the firmware refuses; 0: none
   LineRate rate_;
   double max_lines_per_s_ = 0.0;
   double since_kept_motion_s_ = 0.0;
-  std::optional<Error> failure_;   // a move without end
+  std::optional<Error> failure_;   // an endless move
   std::size_t section_first_ = 0;  // first piece of the path in this section
-  std::size_t original_next_ = 0;  // the one the original plays next
-  std::size_t kept_next_ = 0;      // of run_path_, the one that kept_ plays next
+  std::size_t original_next_ = 0;  // piece that original_ plays next
+  std::size_t kept_next_ = 0;      // piece of run_path_ that kept_ plays next
   std::size_t moves_ = 0;
   VerifyReport totals_;
 };

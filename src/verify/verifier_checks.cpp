@@ -29,9 +29,9 @@ bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
 
 }  // namespace
 
-// A step of E is as much filament as M221 makes of it.
+// M221 scales the filament of a rounding step of E.
 double Verifier::filament_tolerance_mm() const {
-  // Marlin lays the filament of a move that is too short for it with the next one, which may be
+  // Marlin lays the filament of a move that is too short for it with the next move, which may be
   // after the run.
   const planner::FirmwareConfig& firmware = rules_.fixed;
   const double too_short_mm = firmware.firmware == Firmware::marlin
@@ -101,8 +101,8 @@ void Verifier::check_regime(const Section& input, const Section& output) {
       !difference.empty()) {
     violations_.in_output(line, fmt::format("limits not restored: {}", difference));
   }
-  // Motion that the file has between compensated runs passes without the shaper: each switch is a
-  // stop. What the machine does by itself is its owner's.
+  // Kept motion between compensated runs may pass without the shaper, because each switch is a
+  // stop. The shaper must be restored at the end and before the machine moves by itself.
   const bool shaper_matters = input.kind == SectionKind::end || input.moves_by_itself;
   if (shaper_matters && !same_shaper(before.modal, after.modal)) {
     violations_.in_output(line, "the printer's input shaper is not restored");

@@ -10,12 +10,12 @@
 namespace unflex::verify {
 namespace {
 
-// A line inside a compensated run stands this near to its place: the base leads the nozzle, by up
-// to a/ω² when it accelerates, and lines of motion, between which it stands, have a length.
+// How far a line inside a compensated run may stand from its place, at least. The base leads the
+// nozzle by up to a/ω² when it accelerates, and a line can only stand between two lines of motion.
 constexpr double kLeastPlaceTolerance_mm = 0.5;
 constexpr std::size_t kMovesPerUpdate = 1024;
 constexpr double kApart_s = 10.0;
-// By which the clock of a run may lag behind its plan where that ends, besides what is known of it.
+// How far the clock of a run may lag at the end of its plan, besides the lag that is measured.
 constexpr double kLate_s = 5e-4;
 constexpr double kRingsFor_s = 1.0;
 
@@ -115,7 +115,7 @@ bool Verifier::next_resting_move(planner::PlannedMove& move) {
   return true;
 }
 
-// Whether the work does, since the move has no end.
+// Whether the verification ends here because the move is endless.
 bool Verifier::ends_here(const planner::PlannedMove& move, const Replay& file) {
   if (is_endless(move)) {
     failure_ = endless_move(move, file.reader().name());
@@ -131,7 +131,7 @@ void Verifier::begin_section(bool compensated) {
   original_.begin_section(path_);
   if (compensated) {
     violations_.begin_run();
-    // Far from the run before, which is not the path that leads here.
+    // A long rest, so that the path of the previous run does not count as near.
     run_path_.rest(kApart_s);
     run_path_.begin_section(rules_.lead_in_s);
   }
@@ -144,7 +144,7 @@ void Verifier::begin_section(bool compensated) {
     const Meter& emitted = emitted_.main();
     kept_.begin_section(run_path_);
     kept_.set_state(emitted.nozzle(), emitted.base_x_mm(), emitted.base_y_mm());
-    // It would begin at once.
+    // The kept moves would begin at once, without a lead-in.
     kept_.skip(rules_.lead_in_s);
     kept_next_ = run_path_.end();
   }
@@ -159,7 +159,7 @@ void Verifier::begin_section(bool compensated) {
   input_refused_ = false;
   refused_line_ = 0;
   if (compensated) {
-    // How it swings to begin with is the same for both. Sampled later it may seem less.
+    // Both nozzles begin with the same swing. If it were sampled only later, it might seem smaller.
     kept_.look();
   }
 }
@@ -271,7 +271,7 @@ void Verifier::play(const planner::PlannedMove& move) {
   if (refused_line_ == 0 && refused(move, rules_)) {
     refused_line_ = move.segment.line;
   }
-  // The original is as far in its section as the emitted one is in its own.
+  // The original advances in its section as far as the emitted nozzle has in its own.
   const double elapsed_s = emitted_.main().time_s() - emitted_path_->section_start_s();
   path_.extend_to(path_.section_start_s() + elapsed_s);
   let_original_follow(path_.section_start_s() + elapsed_s);
@@ -279,7 +279,7 @@ void Verifier::play(const planner::PlannedMove& move) {
 
 void Verifier::let_original_follow(double until_s) {
   while (original_next_ < path_.end() && path_[original_next_].end_s <= until_s) {
-    // Playing makes the path grow, which moves its pieces.
+    // A copy, because playing makes the path grow, which moves its pieces.
     const planner::PlannedMove move = path_[original_next_++].move;
     original_.play(move);
   }

@@ -1,4 +1,4 @@
-// Broken rules, collected: all are counted, the first ones kept.
+// Collects broken rules. All are counted, only the first ones kept.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ class Violations {
   Violations(std::string input_name, std::string output_name)
       : input_name_(std::move(input_name)), output_name_(std::move(output_name)) {}
 
-  // A compensated run begins; until the next one does, what is broken is blamed on it.
+  // A compensated run begins. Broken rules are blamed on it until the next one begins.
   void begin_run() {
     settle();
     run_ = {};
@@ -29,7 +29,7 @@ class Violations {
   void in_output(std::size_t line, std::string message) {
     add({output_name_, line}, std::move(message));
   }
-  // For what the sliced file has and the emitted one has not.
+  // For lines that the sliced file has and the emitted one lacks.
   void in_input(std::size_t line, std::string message) {
     add({input_name_, line}, std::move(message));
   }
@@ -64,7 +64,7 @@ class Violations {
   std::string output_name_;
   std::vector<Violation> kept_;
   std::size_t count_ = 0;
-  BlamedRun run_;  // the present one
+  BlamedRun run_;  // the present run
   std::vector<BlamedRun> blamed_;
 };
 

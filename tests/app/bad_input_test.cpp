@@ -1,5 +1,5 @@
-// What people and programs hand over instead of a sliced print: each either passes through with its
-// meaning kept, or is told of in one line with its place and what to do. docs/cli.md has the table.
+// Inputs other than a proper sliced print. Each either passes through with its meaning kept, or
+// causes a message of one line with its place and what to do. docs/cli.md has the table.
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ const std::string kGood =
     "G1 X104 E.2 F3600\nG1 Y104 E.2\nG1 E-1 F1800\nG1 X100 F9000\nG1 E1 F1800\n"
     "G1 Y100 E.2 F3600\n";
 
-// In the middle of a print, at line 11.
+// Puts the lines into the middle of a print, from line 11 on.
 std::string among(const std::string& lines) { return kStart + kGood + lines + "\n" + kGood; }
 
 std::string utf16(const std::string& text) {
@@ -49,16 +49,16 @@ std::string repeated(const std::string& line, int times) {
   return text;
 }
 
-// What is said of a file: nothing, a warning, or an error, after which there is no output.
+// unflex's answer to a file: nothing, a warning, or an error, after which there is no output.
 struct Answer {
   enum Kind { passes, warns, fails } kind = passes;
-  std::string text;        // the line, but for the file's name
-  bool unchanged = false;  // what is warned of stands in the output as it was
+  std::string text;        // the message without the file's name
+  bool unchanged = false;  // the lines warned of are in the output, unchanged
 };
 
 Answer passes() { return {}; }
 Answer warns(std::string text) { return {Answer::warns, std::move(text), true}; }
-// The printer knows what it means, and so does unflex.
+// A warning about lines whose meaning both the printer and unflex know.
 Answer remarks(std::string text) { return {Answer::warns, std::move(text), false}; }
 Answer fails(std::string text) { return {Answer::fails, std::move(text)}; }
 
@@ -68,8 +68,8 @@ struct Bad {
   Answer klipper;
   Answer marlin;
   Answer rrf;
-  std::vector<std::string> lines_kept;  // stand in the output as they do here
-  bool travel = false;                  // of the printer is known
+  std::vector<std::string> lines_kept;  // the output has these lines unchanged
+  bool travel = false;                  // the settings give the printer's travel
 };
 
 void PrintTo(const Bad& bad, std::ostream* out) { *out << bad.name; }
@@ -79,7 +79,7 @@ Bad all(std::string name, std::string text, const Answer& answer,
   return {std::move(name), std::move(text), answer, answer, answer, std::move(lines_kept), false};
 }
 
-// A line among good ones.
+// A bad line among good ones.
 Bad line(std::string name, const std::string& text, const Answer& klipper, const Answer& marlin,
          const Answer& rrf) {
   return {std::move(name), among(text), klipper, marlin, rrf, {text + "\n"}, false};
@@ -93,7 +93,7 @@ class BadInput : public ProgramTest, public ::testing::WithParamInterface<Bad> {
   static std::vector<std::string> with_options(std::vector<std::string> arguments,
                                                const std::string& firmware) {
     std::vector<std::string> options = {"--quiet", "--set", "printer.firmware=" + firmware};
-    // What is known of the printer is not warned of.
+    // A known travel prevents the warning about an unknown one.
     if (GetParam().travel) {
       options.insert(options.end(), {"--set", "printer.travel_x_mm=[0, 250]", "--set",
                                      "printer.travel_y_mm=[0, 210]"});
@@ -113,12 +113,13 @@ class BadInput : public ProgramTest, public ::testing::WithParamInterface<Bad> {
     return result;
   }
 
-  // Of warnings, those about the file.
+  // The warnings about the file.
   static std::string about_file(const std::string& err) {
     return lines_of(err, [](const std::string& text) { return text.starts_with("in.gcode"); });
   }
 
-  // Of these, the ones that reading the file gives; inspect compensates nothing.
+  // The warnings that come from reading the file. inspect gives only these, because it compensates
+  // nothing.
   static std::string from_reading(const std::string& about_file) {
     return lines_of(about_file, [](const std::string& text) {
       return text.find("of the extruded path is compensated") == std::string::npos;
@@ -160,7 +161,7 @@ class BadInput : public ProgramTest, public ::testing::WithParamInterface<Bad> {
     expect_strict(firmware, answer);
   }
 
-  // With --strict what is warned of is an error, and nothing is written.
+  // With --strict a warning becomes an error, and nothing is written.
   void expect_strict(const std::string& firmware, const Answer& answer) {
     if (answer.kind != Answer::warns) {
       return;
@@ -246,7 +247,7 @@ INSTANTIATE_TEST_SUITE_P(
         line("NaN", "G1 Xnan", kJoined, kLowerCase, kTwice),
         line("Infinity", "G1 Xinf E.2", kJoined, kLowerCase, kNoNumber),
         line("MinusInfinity", "G1 X-inf", cannot_read("X-inf")),
-        // To Klipper that is X1 E400.
+        // Klipper reads this as X1 E400.
         line("OfFourHundredDigits", "G1 X1e400", passes(), kLowerCase, kExponent),
         line("OfCommandTooLarge", "G99999999999 X1", cannot_read("G99999999999")),
         line("BeyondAnyMachine", "G1 X9999999999 E.2",

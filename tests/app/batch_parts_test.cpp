@@ -42,7 +42,7 @@ TEST(XmlText, HoldsNothingThatIsMarkupOrNoCharacter) {
   EXPECT_EQ(xml_text("µ → 𝄞"), "µ → 𝄞");
   EXPECT_EQ(xml_text(std::string_view("\0\x1b", 2)), "\uFFFD\uFFFD");
   EXPECT_EQ(xml_text("\xff\xc3"), "\uFFFD\uFFFD");            // no UTF-8, cut off
-  EXPECT_EQ(xml_text("\xc0\xaf"), "\uFFFD\uFFFD");            // longer than need be
+  EXPECT_EQ(xml_text("\xc0\xaf"), "\uFFFD\uFFFD");            // longer than necessary
   EXPECT_EQ(xml_text("\xed\xa0\x80"), "\uFFFD\uFFFD\uFFFD");  // a surrogate
   EXPECT_EQ(xml_text("\xef\xbf\xbf"), "\uFFFD");              // U+FFFF
 }

@@ -54,7 +54,7 @@ class BatchTest : public ProgramTest {
 
   [[nodiscard]] const Outcome& last() const { return last_; }
 
-  // All files below, but for those of the batch itself.
+  // All files below the folder, except those of the batch itself.
   [[nodiscard]] std::vector<std::string> files_in(const std::string& folder) const {
     std::vector<std::string> found;
     for (const auto& entry : fs::recursive_directory_iterator(path(folder))) {
@@ -66,7 +66,7 @@ class BatchTest : public ProgramTest {
     return found;
   }
 
-  // Which file it is; a file that is written again is another.
+  // Identifies the file on disk; writing it again gives a new identity.
   [[nodiscard]] ino_t identity(const std::string& name) const {
     struct stat status {};
     EXPECT_EQ(::stat(path(name).c_str(), &status), 0) << name;
@@ -110,8 +110,8 @@ TEST_F(BatchTest, DoesAgainOnlyWhatChanged) {
                               {"e.g", "unchanged"}}));
   EXPECT_GT(summary()["prints"][0]["deviation"]["contour_max_mm"]["uncompensated"], 0.01);
 
-  // Another input of the same size and time, a newer one with the same content, an output that is
-  // gone, one that was changed.
+  // b: another input with the same size and time. c: a newer input with the same content. d: the
+  // output is missing. e: the output was changed.
   const auto time = fs::last_write_time(path("in/b.g"));
   std::string text = small_print();
   text.replace(text.find("Y26"), 3, "Y27");
@@ -132,7 +132,7 @@ TEST_F(BatchTest, DoesAllAgainForOtherSettings) {
   add("in/a.g");
   add("printer.toml", "[limits]\nmax_accel_mm_s2 = 3000\n");
   EXPECT_EQ(states({"--printer", "printer.toml"}).at("a.g"), "done");
-  // The same settings from elsewhere.
+  // Equal settings from another source.
   EXPECT_EQ(states({"--set", "limits.max_accel_mm_s2=3000"}).at("a.g"), "unchanged");
   EXPECT_EQ(states({"--set", "limits.max_accel_mm_s2=3001"}).at("a.g"), "done");
   EXPECT_EQ(states({"--set", "limits.max_accel_mm_s2=3001", "--report", "pages"}).at("a.g"),
@@ -353,7 +353,7 @@ TEST_F(BatchTest, RefusesToReplaceAPrintThroughALink) {
   EXPECT_THAT(twice.err, StartsWith("out/b/x.g: would come from in/a/x.g and from in/b/x.g"));
 }
 
-// Waits until the output is there.
+// Waits until the output exists.
 bool wait_for(const fs::path& file) {
   const auto deadline = steady_clock::now() + std::chrono::seconds(30);
   while (!fs::exists(file) && steady_clock::now() < deadline) {
@@ -395,19 +395,19 @@ TEST_F(BatchTest, EndsSoonWhenAskedAndLeavesNothingHalfDone) {
 }
 
 TEST_F(BatchTest, KilledAndStartedAgainDoesOnlyWhatIsMissing) {
-  // The longest comes first, the short ones meanwhile.
+  // The longest print starts first; the short ones are done meanwhile.
   add("in/long.g", squares(1200));
   add("in/short.g", squares(20));
   add("in/shorter.g", squares(10));
   {
     Program program(directory(), batch({"-j", "2"}), "", leave_uncounted);
-    // It was begun when the one before had been remembered.
+    // The batch remembers a print before it begins the next one.
     ASSERT_TRUE(wait_for(path("out/shorter.g")));
     program.signal(SIGKILL);
     EXPECT_EQ(program.wait().exit_code, 128 + SIGKILL);
   }
   ASSERT_FALSE(fs::exists(path("out/long.g"))) << "too fast to be killed half-way";
-  // What the print that was killed leaves behind.
+  // A temporary file as a killed print leaves it.
   write_file(path("out/.unflex-AbCdEf.tmp"), "half a print");
   const ino_t kept = identity("out/short.g");
   const States states_now = states();

@@ -1,4 +1,4 @@
-// Words to a configuration.
+// From the words of the command line to a configuration.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -76,7 +76,7 @@ TEST(CommandLine, HelpAndVersionAreTexts) {
   EXPECT_THAT(parse_command_line({"verify", "--help"})->text, ::testing::HasSubstr("--against"));
 }
 
-// What the command line is refused with.
+// The message with which the command line is refused.
 std::string refusal(const std::vector<std::string>& arguments) {
   const Result<CommandLine> line = parse_command_line(arguments);
   return line ? "no error" : line.error().message;

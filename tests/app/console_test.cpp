@@ -42,7 +42,7 @@ TEST(Bar, IsTheStageAloneWhileTheFractionIsUnknown) {
   EXPECT_EQ(bar_text("reading", -1.0, 60), "reading");
 }
 
-// What a bar has written to the pipe that stands for its terminal.
+// A progress bar that writes to a pipe instead of a terminal.
 class BarOnAPipe : public ::testing::Test {
  protected:
   BarOnAPipe() { EXPECT_EQ(::pipe(ends_.data()), 0); }
@@ -74,7 +74,7 @@ TEST_F(BarOnAPipe, IsRedrawnAtMostTenTimesASecond) {
       bar.update("solving", millisecond / 1000.0);
     }
   }
-  EXPECT_EQ(redraws(written()), 10 + 1);  // and cleared once
+  EXPECT_EQ(redraws(written()), 10 + 1);  // 10 times drawn, once cleared
 }
 
 TEST_F(BarOnAPipe, IsClearedAtTheEnd) {

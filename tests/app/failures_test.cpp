@@ -1,4 +1,4 @@
-// Whatever goes wrong: one clear line on stderr, the right exit code, nothing written.
+// Every failure gives one clear line on stderr and the right exit code, and nothing is written.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ struct Failure {
   std::string name;
   std::vector<std::string> arguments;
   int exit_code = 0;
-  std::string message;  // how the line begins
+  std::string message;  // the beginning of the line
 };
 
 void PrintTo(const Failure& failure, std::ostream* out) { *out << failure.name; }

@@ -1,11 +1,11 @@
-// Loaded before the C library (LD_PRELOAD): calls that matter to files, processes and clocks are
-// listed, fail or kill the program, as its environment says.
+// Loaded before the C library (LD_PRELOAD). Lists calls that matter to files, processes and clocks,
+// makes them fail or kills the program, as the environment says.
 //
 //   FAULT_LIST=FILE        a line there for each fsync and rename
 //   FAULT_KILL=CALL        die of SIGKILL before the first such call: fsync, rename, fsync-folder
 //   FAULT_FAIL=CALL        the call fails with EIO instead; also fork, pipe2 and socketpair,
 //                          and inflate for want of memory
-//   FAULT_SIGNAL=CALL      SIGINT comes before each such call, of the same
+//   FAULT_SIGNAL=CALL      SIGINT comes before each such call (the calls of FAULT_KILL)
 //   FAULT_CHANGE=FILE      somebody else adds a line to FILE before each rename
 //   FAULT_UNREADABLE=NAME  reads of files whose name ends so fail with EIO behind 64 KiB
 //   FAULT_CLOCK=1          each look at the calendar's clock finds it an hour earlier
@@ -70,7 +70,7 @@ int failure() {
   return -1;
 }
 
-// Seconds by which the clock has gone back.
+// Seconds by which the clock has been set back.
 time_t lateness_s() {
   static time_t late_s = 0;
   return std::getenv("FAULT_CLOCK") != nullptr ? late_s += kHour_s : 0;
@@ -117,7 +117,7 @@ int socketpair(int domain, int type, int protocol, int* pair) noexcept {
              : original<int(int, int, int, int*)>("socketpair")(domain, type, protocol, pair);
 }
 
-// zlib's.
+// Replaces zlib's function.
 int inflate(void* stream, int flush) {
   constexpr int kOutOfMemory = -4;
   return asks("FAULT_FAIL", "inflate") ? kOutOfMemory
@@ -129,7 +129,7 @@ ssize_t read(int fd, void* block, size_t bytes) {
                            : original<ssize_t(int, void*, size_t)>("read")(fd, block, bytes);
 }
 
-// Asked of the kernel: sanitizers look at the clock where there is no memory yet to look up a name.
+// Calls the kernel, because sanitizers read the clock before there is memory to look up a name.
 int clock_gettime(clockid_t clock, timespec* now) noexcept {
   const auto result = static_cast<int>(::syscall(SYS_clock_gettime, clock, now));
   if (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE) {

@@ -1,5 +1,5 @@
-// unflex as a slicer's post-processing script: the path comes last, the slicer speaks through its
-// environment and shows little of what a script says.
+// unflex as a slicer's post-processing script: the path comes last, the slicer passes settings in
+// its environment and shows little of a script's messages.
 
 #include "hook.hpp"
 
@@ -21,7 +21,7 @@ using ::testing::IsEmpty;
 using ::testing::MatchesRegex;
 using ::testing::StartsWith;
 
-// Set as long as it lives.
+// An environment variable that is set for the lifetime of the object.
 class Variable {
  public:
   Variable(std::string name, const std::string& value) : name_(std::move(name)) {

@@ -1,5 +1,5 @@
-// What lets a pause wait for the end of a compensated run: Klipper's macros, and the lines that
-// call them.
+// Klipper's macros that let a pause wait for the end of a compensated run, and the lines that call
+// them.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ std::size_t count(const std::string& text, const std::string& what) {
   return found;
 }
 
-// Klipper's names of variables, macros and commands.
+// The names in the text that follow the mark.
 std::set<std::string> words_after(const std::string& text, const std::string& mark) {
   std::set<std::string> words;
   for (std::size_t at = text.find(mark); at != std::string::npos;
@@ -66,7 +66,7 @@ TEST_F(Macros, AreOnesThatKlipperCanRead) {
   const std::string text = written();
   EXPECT_THAT(text, StartsWith("# Written by unflex "));
   EXPECT_THAT(text, HasSubstr("\n[pause_resume]\n"));
-  // Each section's name without regard to case is a command, and none comes twice.
+  // The name of each section, without regard to case, is a command, and no name occurs twice.
   EXPECT_EQ(words_after(text, "\n[gcode_macro "),
             (std::set<std::string>{"UNFLEX_CHECKPOINT", "pAUSE", "cANCEL_PRINT", "rESUME",
                                    "_UNFLEX_LEAVE", "_UNFLEX_RETURN", "_UNFLEX_SHAPER"}));
@@ -92,14 +92,14 @@ TEST_F(Macros, SetOnlyVariablesThatTheCheckpointHas) {
     EXPECT_EQ(known.count(name), 1U) << name;
   }
   std::set<std::string> read = words_after(text, " own.");
-  read.erase("");  // where a sentence ends
+  read.erase("");  // from the end of a sentence in a comment
   for (const std::string& name : read) {
     EXPECT_EQ(known.count(name), 1U) << name;
   }
 }
 
-// What stops the machine or ends its look-ahead stands behind the question whether a pause waits,
-// in a macro of its own.
+// Commands that stop the machine or end its look-ahead are in macros of their own, which the
+// checkpoint calls only if a pause waits.
 TEST_F(Macros, StopNothingAtACheckpoint) {
   const std::string checkpoint = section(written(), kCheckpoint);
   for (const char* stops :
@@ -174,7 +174,7 @@ TEST_F(Macros, AreCalledByLinesThatChangeNothingElse) {
   EXPECT_EQ(reached, runs);
   EXPECT_EQ(stripped, read_file(path("plain.gcode")));
 
-  // The lines are known to whom verifies without the key.
+  // verify knows these lines even without the key.
   const Outcome verified =
       run(with({"verify", "out.gcode", "--against", "in.gcode", "--report", "v.json"}));
   EXPECT_EQ(verified.exit_code, 0) << verified.err;

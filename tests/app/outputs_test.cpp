@@ -1,4 +1,4 @@
-// Files that appear whole or not at all.
+// Files that appear complete or not at all.
 
 #include "outputs.hpp"
 
@@ -108,12 +108,12 @@ TEST_F(Outputs, AreTheSameFileByEveryName) {
   EXPECT_FALSE(same_file(path("a").string(), path("new").string()));
 }
 
-// The program's stream `to` is a file of the folder.
+// Redirects the program's stream `to` to this file.
 std::function<void()> redirected(const std::string& file, int flags, int to) {
   return [=] { ::dup2(::open(file.c_str(), flags | O_CLOEXEC), to); };
 }
 
-// A shell gives a file to a stream without its name.
+// When a shell redirects a stream, the program does not learn the file's name.
 TEST_F(Outputs, AreNotTheInputByAStreamEither) {
   write_file(path("in.gcode"), small_print());
   const auto expect_refusal = [&](const Outcome& outcome, const std::string& message) {
@@ -152,7 +152,7 @@ TEST_F(Outputs, DoNotReplaceALinkThatLeadsNowhere) {
             "is a link that leads nowhere; make what it leads to, or remove it");
 }
 
-// Whoever may write to the folder could stop all others with it.
+// Otherwise anyone who may write to the folder could block all other users with such a pipe.
 TEST_F(Outputs, DoNotWaitForAPipeWithTheNameOfATemporaryFile) {
   ASSERT_EQ(::mkfifo(path(".unflex-ffffff.tmp").c_str(), 0600), 0);
   Result<Output> output = Output::open(path("new").string());

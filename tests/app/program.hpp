@@ -12,7 +12,7 @@
 namespace unflex::app {
 
 struct Outcome {
-  int exit_code = -1;  // 128 + signal if one killed it
+  int exit_code = -1;  // 128 + signal if a signal killed it
   std::string out;
   std::string err;
 };
@@ -21,7 +21,7 @@ struct Outcome {
 class Program {
  public:
   // `input` becomes stdin; the program runs in `directory`. prepare: called in the new process just
-  // before it becomes the program, to limit it, say.
+  // before the program starts, for example to limit its memory.
   Program(const std::filesystem::path& directory, const std::vector<std::string>& arguments,
           const std::string& input = "", const std::function<void()>& prepare = {});
   void signal(int number) const;
@@ -33,11 +33,11 @@ class Program {
   pid_t child_ = -1;
 };
 
-// Called before a program that may be stopped while it writes: where lines are counted
-// (coverage.sh) its counts would spoil those of all others.
+// For `prepare`, if the program may be stopped while it writes. When coverage.sh counts lines, the
+// incomplete counts of such a program would spoil those of all others.
 void leave_uncounted();
 
-// Called before a program whose stdout is to be full.
+// For `prepare`: makes stdout full.
 void fill_stdout();
 
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
@@ -67,7 +67,7 @@ class ProgramTest : public ::testing::Test {
 // A print of two small squares, with everything a slicer does between moves.
 [[nodiscard]] std::string small_print();
 
-// A print of as many larger squares, one run each.
+// A print of `count` larger squares, one run each.
 [[nodiscard]] std::string squares(int count);
 
 }  // namespace unflex::app

@@ -1,4 +1,4 @@
-// Others at work on the same files, and standard streams that are not there.
+// Other processes at work on the same files, and closed standard streams.
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -32,7 +32,7 @@ class Sharing : public ProgramTest {
     write_file(path("out.gcode"), kPrecious);
   }
 
-  // What becomes of the print when it is worked on by two at once.
+  // The outcomes of two programs that work on the print at once.
   [[nodiscard]] std::pair<Outcome, Outcome> twice(const Words& words) const {
     Program first(directory(), words);
     Program second(directory(), words);
@@ -99,7 +99,8 @@ void PrintTo(const Change& change, std::ostream* out) { *out << change.name; }
 
 class WhileItIsRead : public Sharing, public ::testing::WithParamInterface<Change> {
  protected:
-  // Stops the program as soon as its temporary file shows that it has begun.
+  // Stops the program as soon as its temporary file shows that it has begun, changes the print, and
+  // lets the program continue.
   Outcome run_with_change(const Words& words) const {
     Program program(directory(), words);
     const auto deadline = steady_clock::now() + std::chrono::seconds(10);
@@ -124,7 +125,7 @@ TEST_P(WhileItIsRead, AChangedPrintIsNotCompensated) {
     EXPECT_EQ(outcome.err, GetParam().message);
     EXPECT_EQ(outcome.out, "");
     EXPECT_EQ(read_file(path("out.gcode")), kPrecious);
-    // What the other has made of it stands.
+    // The change by the other process must persist.
     const std::string found = read_file(path("in.gcode"));
     write_file(path("in.gcode"), squares(400));
     GetParam().make(path("in.gcode"));
@@ -177,7 +178,7 @@ TEST_F(Sharing, NeedsNoStandardStreams) {
     });
     const bool no_stdout = (closed >> STDOUT_FILENO & 1) != 0;
     const bool no_stderr = (closed >> STDERR_FILENO & 1) != 0;
-    // The summary cannot be told, which is told where that can be.
+    // The summary cannot be written to a closed stdout; stderr says so unless it is closed too.
     EXPECT_EQ(outcome.exit_code, no_stdout ? 4 : 0) << closed;
     EXPECT_EQ(outcome.err,
               no_stdout && !no_stderr ? "stdout: cannot write: Bad file descriptor\n" : "");

@@ -71,7 +71,7 @@ TEST_F(SmallPrint, IsShownOnAPageThatIsTheSameForAnyNumberOfWorkers) {
   EXPECT_THAT(first, StartsWith("<!DOCTYPE html>"));
   EXPECT_THAT(first, HasSubstr("<title>in.gcode</title>"));
   EXPECT_EQ(page("4"), first);
-  // The report changes nothing of the output.
+  // Writing a report does not change the output.
   EXPECT_EQ(read_file(path("out.gcode")), compensated());
 }
 

@@ -1,4 +1,4 @@
-// What each stage costs, on a piece of a real print, in ns per move, per node of the base, or per
+// The cost of each stage on a piece of a real print, in ns per move, per node of the base, or per
 // ms of print. docs/performance.md has the figures.
 #include <benchmark/benchmark.h>
 
@@ -83,7 +83,7 @@ void ReadAndPlan(benchmark::State& state) {
 }
 BENCHMARK(ReadAndPlan)->Unit(benchmark::kMillisecond);
 
-// accel: the base's limit in mm/s², 0 for the default, which hardly any window touches.
+// accel: the base's limit in mm/s²; 0 for the default, which hardly any window reaches.
 void Solve(benchmark::State& state, compensate::Engine& engine, double accel) {
   const machine::Settings s = settings("klipper");
   RunRules rules = rules_of(s);
@@ -139,7 +139,7 @@ void Measure(benchmark::State& state) {
 }
 BENCHMARK(Measure)->Unit(benchmark::kMillisecond);
 
-// What repeats itself has the most places to look at.
+// Repeating text is the worst case: it has the most places to search.
 void PackRepeats(benchmark::State& state) {
   const std::string bytes(static_cast<std::size_t>(state.range(0)), 'a');
   for (auto _ : state) {

@@ -33,7 +33,7 @@ nlp::Solution solve(const OptimalControlProblem& problem, const std::vector<doub
   return solution.value_or(nlp::Solution{});
 }
 
-// Largest error over the nodes of one component against its known course.
+// Largest error of one component against its known course, over the nodes.
 template <class Course>
 double worst_error(const OptimalControlProblem& problem, const std::vector<double>& times,
                    const nlp::Solution& solution, int component, const Course& course) {

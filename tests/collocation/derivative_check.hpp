@@ -34,7 +34,7 @@ inline Dense jacobian_at(const Problem& problem, const std::vector<double>& x) {
   return dense(sparsity, values, problem.constraint_bounds().lower.size(), x.size());
 }
 
-// Of σ f + λᵀ g, both triangles.
+// The Hessian of σ f + λᵀ g, both triangles.
 inline Dense hessian_at(const Problem& problem, const std::vector<double>& x, double sigma,
                         const std::vector<double>& lambda) {
   const Sparsity& sparsity = problem.hessian_sparsity();
@@ -66,7 +66,7 @@ inline std::vector<double> random_vector(std::mt19937_64& random, std::size_t n,
   return result;
 }
 
-// Column by column of ∂F/∂x for F from x to a vector; error O(step²) plus rounding.
+// ∂F/∂x by central differences, column by column; error O(step²) plus rounding.
 template <class Function>
 Dense central_differences(const Function& function, std::vector<double> x, double step) {
   Dense result(function(x).size(), static_cast<Eigen::Index>(x.size()));
@@ -102,8 +102,9 @@ inline void expect_sound_patterns(const Problem& problem) {
   check(problem.hessian_sparsity(), n, true);
 }
 
-// Gradient, Jacobian and Hessian at x, dense: an entry that the pattern lacks shows as a zero where
-// the differences have none. The tolerance is relative to the largest entry.
+// Checks gradient, Jacobian and Hessian at x as dense matrices. An entry that the pattern lacks
+// shows as a zero where the differences are not zero. The tolerance is relative to the largest
+// entry.
 inline void expect_exact_derivatives(const Problem& problem, const std::vector<double>& x,
                                      double sigma, const std::vector<double>& lambda,
                                      double tolerance = 1e-8, double step = 1e-5) {

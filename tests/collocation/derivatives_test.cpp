@@ -15,7 +15,7 @@ using nlp::testing::random_vector;
 using testing::DrivenPendulum;
 using testing::LinearPendulum;
 
-// From 0.4 on, steps between 0.05 and 0.4.
+// A mesh from 0.4 on with steps between 0.05 and 0.4.
 std::vector<double> uneven_mesh(std::mt19937_64& random, int nodes) {
   std::uniform_real_distribution<double> step(0.05, 0.4);
   std::vector<double> times = {0.4};
@@ -58,7 +58,7 @@ TEST(HargravesParis, HasPatternsWithoutRepetition) {
 }
 
 TEST(HargravesParis, LeavesOutWhatIsZeroByStructure) {
-  // θ, v and u know nothing of w and q in the linear pendulum's dynamics.
+  // In the linear pendulum's dynamics θ, v and u do not depend on w and q.
   const LinearPendulum problem;
   const auto program = transcribe(problem, {0.0, 0.1, 0.2});
   const nlp::Sparsity& sparsity = program->jacobian_sparsity();

@@ -40,7 +40,7 @@ class LinearQuadratic : public OptimalControlProblem {
   }
   void dynamics_hessian(double /*t*/, const PointVector& /*z*/, const StateVector& /*mu*/,
                         PointByPoint& h) const override {
-    h.setConstant(std::nan(""));  // asking for it is a mistake
+    h.setConstant(std::nan(""));  // nobody may ask for it
   }
   StateByPointPattern dynamics_pattern() const override {
     StateByPoint fz(states(), points());
@@ -93,8 +93,8 @@ class LinearQuadratic : public OptimalControlProblem {
   }
 };
 
-// Everything that a derivative could get wrong: nonlinear, coupled, explicit in time, two controls,
-// a cost that is not quadratic, one slope limited and weighted, and structural zeros.
+// A problem with all that a derivative could get wrong: nonlinear, coupled, explicit in time, two
+// controls, a cost that is not quadratic, one slope limited and weighted, and structural zeros.
 //
 //   θ̇ = v
 //   v̇ = −(1 + 0.3 sin t) sin θ − 0.2 v³ + u cos θ
@@ -196,8 +196,8 @@ class DrivenPendulum : public OptimalControlProblem {
   static double swell(double t) { return 1.0 + 0.5 * std::cos(2.0 * t); }
 };
 
-// The same with linear dynamics declared as such but a cost that is not quadratic, so that the
-// Hessian goes by the pattern instead of being full.
+// The driven pendulum with linear dynamics, declared as linear. Its cost is not quadratic, so the
+// Hessian has the pattern's entries instead of being full.
 class LinearPendulum final : public DrivenPendulum {
  public:
   void dynamics(double t, const PointVector& z, StateVector& f) const override {

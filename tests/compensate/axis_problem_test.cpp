@@ -181,7 +181,7 @@ TEST(AxisProblem, LetsABaseAtTheEndOfItsTravelSetOffInwardsOnly) {
 }
 
 TEST(AxisProblem, ItsSolutionIsWhatTheNozzleDoes) {
-  // The nozzle's states of the program against those that the base's motion makes, exactly.
+  // Compares the nozzle's states in the program with the exact response to the base's motion.
   const auto moves = testing::plan({{0.0, 0.0}, {10.0, 0.0}, {4.0, 3.0}, {4.0, 9.0}},
                                    testing::planner_limits(100.0, 5000.0, 5.0));
   for (const dynamics::FlexibleAxis axis :

@@ -1,4 +1,4 @@
-// The banded engine's two forms against each other and against Ipopt on the same program.
+// Compares the banded engine's two forms with each other and with Ipopt on the same program.
 #include "banded_engine.hpp"
 
 #include <gmock/gmock.h>
@@ -23,12 +23,12 @@ using testing::random_path;
 using testing::solve_by_ipopt;
 using testing::WindowKind;
 
-// The agreement asked for: 0.05 µm and a millionth of the objective. Without a tight tolerance it
-// would be Ipopt's error that is measured.
+// The required agreement: 0.05 µm, and a millionth of the objective. Ipopt needs a tight tolerance,
+// or its own error would be measured.
 constexpr double kSameBaseMm = 5e-5;
 constexpr double kSameObjective = 1e-6;
 constexpr double kIpoptTolerance = 1e-12;
-// Below this objective, mm²·s, a window is tracked to less than rounding on the output's grid.
+// Below this objective, mm²·s, a window is tracked more exactly than the output's grid.
 constexpr double kIdle = 1e-16;
 
 AxisSolution solve(const AxisWindow& window, BandedForm form = BandedForm::fitting) {
@@ -54,7 +54,7 @@ void expect_same(const AxisSolution& a, const AxisSolution& b, double base_mm, d
   EXPECT_NEAR(a.objective, b.objective, objective * b.objective + kIdle);
 }
 
-// A limit, and windows that it holds.
+// A limit, set on windows that it constrains.
 struct Limit {
   const char* name;
   std::function<void(AxisWindow&)> set;
@@ -162,7 +162,7 @@ TEST_P(BandedEngineUnder, FindsTheSameOptimumByBothForms) {
     const Result<AxisSolution> by_stages = make_banded_engine(BandedForm::stages)->solve(window);
     const Result<AxisSolution> flat = make_banded_engine(BandedForm::flat)->solve(window);
     if (!by_stages || !flat) {
-      // The flat form may run out of digits, but never finds what is not there.
+      // The flat form may lack precision, but it must not find a solution that does not exist.
       EXPECT_FALSE(flat.has_value());
       ++without;
       continue;
@@ -215,7 +215,7 @@ TEST(BandedEngine, TakesVariantsThatAreTheAxisItselfForOneThing) {
 TEST(BandedEngine, TakesTheShortestWindows) {
   std::mt19937_64 random(10);
   for (std::size_t nodes = 2; nodes <= 10; ++nodes) {
-    // Two nodes free at both ends have more unknowns than terms in the cost.
+    // Leave out two nodes free at both ends: they have more unknowns than terms in the cost.
     for (int ends = nodes == 2 ? 1 : 0; ends < 4; ++ends) {
       AxisWindow window = random_path(random, nodes, {.start = ends % 2 == 1, .end = ends >= 2});
       SCOPED_TRACE(std::to_string(nodes) + " nodes, ends " + std::to_string(ends));
@@ -306,7 +306,7 @@ TEST(BandedEngine, SaysWhichLimitMakesAWindowImpossible) {
     EXPECT_EQ(solution.error().kind, ErrorKind::internal);
     EXPECT_THAT(solution.error().message, ::testing::HasSubstr("worst violation"));
   }
-  // The same with time enough.
+  // With more time the move is possible.
   window.reference_mm.assign(501, 0.0);
   window.weight.assign(501, 1.0);
   EXPECT_TRUE(make_banded_engine()->solve(window).has_value());
@@ -331,7 +331,8 @@ TEST(BandedEngine, GivesTheSameBytesInEveryThread) {
     threads.emplace_back([&, t] {
       found[t].resize(windows.size());
       for (std::size_t i = 0; i < windows.size(); ++i) {
-        // Each thread in another order: nothing may be left over from the window before.
+        // Each thread solves in another order, so that anything left over from the previous window
+        // would show.
         const std::size_t at = (i * 7 + t * 11) % windows.size();
         found[t][at] = engine->solve(windows[at]).value_or(AxisSolution{});
       }

@@ -1,4 +1,4 @@
-// The Ipopt engine on single windows: is it the optimum, and the same every time.
+// The Ipopt engine on single windows: whether it finds the optimum, and the same one every time.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ AxisSolution solve(const AxisWindow& window) {
   return solution.value_or(AxisSolution{});
 }
 
-// Out and back with corners of all sorts, some of it travel.
+// A path out and back with various corners, partly travel.
 AxisWindow zigzag(const dynamics::FlexibleAxis& axis, double base_accel) {
   const auto moves = testing::plan(
       {{20.0, 20.0}, {26.0, 20.0}, {25.0, 24.0}, {21.0, 22.0, false}, {20.5, 22.0}, {30.0, 22.5}},
@@ -32,8 +32,8 @@ AxisWindow zigzag(const dynamics::FlexibleAxis& axis, double base_accel) {
   return x_window(moves, setup_for(axis, base_accel));
 }
 
-// The base's motion moved by ε times a cubic B-spline at every node where `shape` is not zero: its
-// acceleration stays linear between nodes.
+// The base's motion, changed by ε times a cubic B-spline at every node where `shape` is not zero:
+// its acceleration stays linear between nodes.
 dynamics::AxisTrajectory perturbed(const dynamics::AxisTrajectory& base,
                                    const std::vector<double>& shape, double h) {
   dynamics::AxisTrajectory result = base;
@@ -52,8 +52,8 @@ double largest(const std::vector<double>& values) {
 }
 
 TEST(IpoptEngine, FollowsAReferenceThatTheBaseCanMake) {
-  // r = 5 mm + 1 mm · sin² over 0.2 s: smooth, so the nozzle is on it throughout, and the base is
-  // where the inverse of the model has it.
+  // r = 5 mm + 1 mm · sin² over 0.2 s is smooth, so the nozzle is on it throughout, and the base is
+  // where the inverse model puts it.
   const dynamics::FlexibleAxis axis{100.0, 0.0};
   AxisWindow window;
   window.axis = axis;
@@ -92,7 +92,8 @@ TEST(IpoptEngine, ReportsTheObjectiveThatTheReplayedNozzleHas) {
 TEST(IpoptEngine, LeavesNothingToGainWithinTheLimits) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  // One window that keeps its limit by itself, and one that is held by it.
+  // With the first limit the optimum keeps the limit by itself, with the second the limit is
+  // active.
   for (const double limit : {1e6, 1.2e4}) {
     const AxisWindow window = zigzag({}, limit);
     const double h = window.period_s;
@@ -173,7 +174,7 @@ TEST(IpoptEngine, StartsAndEndsTheBaseAtRest) {
 }
 
 TEST(IpoptEngine, QuietensANozzleThatStillSwings) {
-  // What motion before has left: 50 µm and 10 mm/s. The reference rests for 60 ms.
+  // An earlier motion has left a swing of 50 µm and 10 mm/s. The reference rests for 60 ms.
   AxisWindow window;
   window.period_s = 1e-3;
   window.reference_mm.assign(121, 50.0);
@@ -186,7 +187,7 @@ TEST(IpoptEngine, QuietensANozzleThatStillSwings) {
       testing::play(window.axis, solution.base, window.period_s, window.start->nozzle);
   EXPECT_NEAR(nozzle.back().position, 50.0, 1e-5);
   EXPECT_NEAR(nozzle.back().velocity, 0.0, 1e-2);
-  // Left alone it would swing on for long.
+  // Without the base's motion the nozzle would swing on for long.
   dynamics::NozzleState alone =
       dynamics::exact_step(window.axis, window.start->nozzle, {50.0, 0.0, 0.0}, 0.06);
   EXPECT_GT(std::hypot(alone.position - 50.0, alone.velocity / window.axis.omega_rad_s), 5e-3);

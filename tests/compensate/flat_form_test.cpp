@@ -1,4 +1,5 @@
-// The chain and the flat form are the transcribed program: what they make keeps its defects.
+// The chain and the flat form are equivalent to the transcribed program: their results satisfy its
+// defect equations.
 #include "flat_form.hpp"
 
 #include <gtest/gtest.h>

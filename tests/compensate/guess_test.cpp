@@ -1,4 +1,4 @@
-// Windows that bring a first guess.
+// Windows that have a first guess.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -9,7 +9,7 @@
 namespace unflex::compensate {
 namespace {
 
-// A window whose base would like to accelerate more than it may, without a guess.
+// A window without a guess, whose base is held by its limit of acceleration.
 AxisWindow limited_window() {
   std::mt19937_64 random(7);
   AxisWindow window = testing::random_path(random, 150, {});
@@ -18,7 +18,7 @@ AxisWindow limited_window() {
   return window;
 }
 
-// The window's own solution, with the nozzle that it makes.
+// The window's own solution as a guess, with the nozzle's response to it.
 AxisWindow::Guess guess_from(const AxisWindow& window, const AxisSolution& solution) {
   AxisWindow::Guess guess{{window.start->nozzle}, solution.base};
   for (std::size_t k = 0; k + 1 < window.nodes(); ++k) {

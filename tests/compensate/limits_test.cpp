@@ -45,7 +45,7 @@ Extremes solve(const AxisWindow& window) {
   return solution ? extremes(solution->base, window.period_s) : Extremes{};
 }
 
-// Full stops at 5000 mm/s², which ask the base for more than any of the limits below.
+// Full stops at 5000 mm/s², for which the base would need more than any limit below.
 AxisWindow stops(double base_accel) {
   const auto moves = testing::plan({{50.0, 0.0}, {60.0, 0.0}, {52.0, 0.0}, {58.0, 0.0}},
                                    planner_limits(100.0, 5000.0, 0.0));

@@ -1,4 +1,4 @@
-// Where nodes are solved and where the base just goes along.
+// Which nodes are solved, and where the base just moves along with the plan.
 
 #include <gtest/gtest.h>
 

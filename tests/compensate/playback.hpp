@@ -1,5 +1,4 @@
-// Plans of short paths, windows made of them, and what the nozzle does when the base makes a
-// trajectory.
+// Plans of short paths, windows made of them, and the nozzle's response to a base trajectory.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +21,7 @@ struct Point {
   bool extrude = true;
 };
 
-// From rest at the first point to rest at the last.
+// The plan from rest at the first point to rest at the last.
 inline std::vector<planner::PlannedMove> plan(const std::vector<Point>& points,
                                               const planner::Limits& limits,
                                               double filament_mm = 0.3) {
@@ -47,7 +46,7 @@ inline planner::Limits planner_limits(double velocity, double accel, double corn
   return {velocity, accel, corner_velocity, 0.0};
 }
 
-// Where the plan is t seconds after its beginning; it rests before and after.
+// The plan's position t seconds after its start; it rests before and after.
 inline gcode::Position plan_at(const std::vector<planner::PlannedMove>& moves, double t) {
   for (const planner::PlannedMove& move : moves) {
     if (t <= move.duration_s()) {
@@ -79,8 +78,8 @@ inline AxisWindow x_window(const std::vector<planner::PlannedMove>& moves, const
 
 inline constexpr int kSubsteps = 20;
 
-// The nozzle at every 20th of each interval, 20 (n − 1) + 1 states, exactly but for the base's
-// acceleration, which is taken constant, at its mean, over each 20th.
+// The nozzle at every 20th of each interval, 20 (n − 1) + 1 states. The response is exact for a
+// base whose acceleration is constant, at its mean, over each 20th.
 inline std::vector<dynamics::NozzleState> play(const dynamics::FlexibleAxis& axis,
                                                const dynamics::AxisTrajectory& base,
                                                double period_s, dynamics::NozzleState nozzle) {

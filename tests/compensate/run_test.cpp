@@ -99,8 +99,8 @@ TEST(Cut, LaysCoresEndToEndWithRoomForTheBlends) {
       EXPECT_LE(span.core_last, span.last);
       EXPECT_LT(span.last, nodes);
       if (i > 0) {
-        // Nodes are used once: a core begins where the one before ends, and both windows reach
-        // over the whole blend, which the cores hold.
+        // Each node is in one core: a core begins where the one before ends. Both windows cover the
+        // whole blend between them, and the blend lies within the cores.
         EXPECT_EQ(span.core_first, spans[i - 1].core_last);
         ASSERT_GE(span.core_first, kHalfBlend);
         EXPECT_LE(span.first, span.core_first - kHalfBlend);
@@ -138,7 +138,7 @@ TEST(Windows, TakeReferenceAndWeightFromThePlan) {
   }
 }
 
-// Solves all windows of a course and takes what lies between its ends.
+// Solves all windows of a course and returns x of the base between the course's ends.
 std::vector<double> base_x_mm(const Course& course, const compensate::Setup& setup) {
   const NodeGrid grid = node_grid(course, setup);
   const auto spans = cut(grid.count, setup);
@@ -156,7 +156,7 @@ std::vector<double> base_x_mm(const Course& course, const compensate::Setup& set
 
 TEST(Windows, OfPartsOfARunGiveTheSameBaseAsThoseOfTheWhole) {
   const auto moves = long_run(60);
-  // It matters a little where the nodes lie, at corners most.
+  // The places of the nodes matter a little, mostly at corners.
   const compensate::Setup setup = setup_for({}, 2e4);
   const std::vector<double> whole = base_x_mm(moves, setup);
   const std::span<const planner::PlannedMove> all(moves);
@@ -170,7 +170,7 @@ TEST(Windows, OfPartsOfARunGiveTheSameBaseAsThoseOfTheWhole) {
     const std::vector<double> before = base_x_mm(first, setup);
     const std::vector<double> after = base_x_mm(second, setup);
     ASSERT_EQ(before.size(), grid.last + 1);
-    // They meet, and end where the whole does.
+    // The two parts meet, and they begin and end where the whole does.
     EXPECT_NEAR(before.back(), after.front(), 1e-3) << border;
     EXPECT_NEAR(before.front(), whole.front(), 1e-9);
     EXPECT_NEAR(after.back(), whole.back(), 1e-9);
@@ -286,7 +286,7 @@ TEST(Join, TakesEachWindowAloneOutsideTheBlends) {
   setup.overlap_s = 0.02;
   const auto spans = cut(200, setup);
   ASSERT_GT(spans.size(), 2U);
-  // Window i is i everywhere.
+  // The solution of window i has the value i everywhere.
   std::vector<dynamics::AxisTrajectory> solutions;
   for (std::size_t i = 0; i < spans.size(); ++i) {
     const std::vector<double> values(spans[i].last - spans[i].first + 1, static_cast<double>(i));

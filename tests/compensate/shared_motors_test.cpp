@@ -1,4 +1,4 @@
-// Motors that move both axes keep their limits, at little cost.
+// Motors that move both axes keep their limits, and that costs little accuracy.
 #include "shared_motors.hpp"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ double largest_sum(const std::vector<double>& x, const std::vector<double>& y) {
   return largest;
 }
 
-// Each axis with half of the limits all the time.
+// Solves with half of the limits for each axis all the time.
 AxisSolutions halved(const Engine& engine, RunWindow window) {
   for (AxisWindow* const axis : {&window.x, &window.y}) {
     axis->limits.max_accel_mm_s2 /= 2.0;
@@ -69,7 +69,7 @@ TEST(SharedMotors, KeepTheirLimitsAndCostLessThanHalvedOnes) {
     EXPECT_GE(cost(solutions), (1.0 - 1e-6) * cost(alone));
     EXPECT_LE(cost(solutions), (1.0 + 1e-6) * cost(half));
     divided += window.x.max_accel_at_mm_s2.empty() ? 0 : 1;
-    // The limits that the window has got are what each axis has to know.
+    // The limits that the window got are all that each axis has to know.
     EXPECT_LT(testing::largest_difference(engine->solve(window.x)->base.position_mm, x.position_mm),
               1e-9);
   }

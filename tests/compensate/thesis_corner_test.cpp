@@ -13,7 +13,7 @@
 namespace unflex::compensate {
 namespace {
 
-// The limits on what is left are a tenth above what was measured.
+// The limits on the remaining error are a tenth above the measured values.
 struct CornerCase {
   std::string name;
   double omega = 100.0;
@@ -59,7 +59,7 @@ Contour contour(const std::vector<planner::PlannedMove>& moves,
   return {1e3 * worst, 1e3 * std::sqrt(sum / static_cast<double>(count))};
 }
 
-// The nozzle while the base makes the plan itself, by chords of `step_s`.
+// The nozzle while the base follows the plan itself, in chords of `step_s`.
 std::vector<dynamics::NozzleState> play_plan(const dynamics::FlexibleAxis& axis,
                                              const std::vector<planner::PlannedMove>& moves,
                                              gcode::Axis which, double step_s) {

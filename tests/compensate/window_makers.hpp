@@ -1,4 +1,4 @@
-// Windows to solve: seeded random ones, and their solution by other means.
+// Windows to solve: seeded random windows, and their solution by Ipopt.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ struct WindowKind {
   bool end = true;
 };
 
-// A path of trapezoidal speed from corner to corner, up to 100 mm/s and 5000 mm/s², somewhere on
+// A path with trapezoidal speed from corner to corner, up to 100 mm/s and 5000 mm/s², somewhere on
 // the bed; part of it is travel.
 inline AxisWindow random_path(std::mt19937_64& random, std::size_t nodes, const WindowKind& kind) {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
@@ -64,8 +64,8 @@ inline AxisWindow random_path(std::mt19937_64& random, std::size_t nodes, const 
   return window;
 }
 
-// Ipopt moves every bound outwards by 10⁻⁸ of its scaled size, at least by 10⁻⁸, before it begins.
-// These limits are what it has to be given to keep those of the window.
+// Before it begins, Ipopt moves every bound outwards by 10⁻⁸ of its scaled size, at least by 10⁻⁸.
+// With these limits it keeps those of the window.
 inline BaseLimits before_ipopt_relaxes(const AxisWindow& window) {
   const double h = window.period_s;
   const double origin_mm = window.reference_mm.front();
@@ -81,7 +81,7 @@ inline BaseLimits before_ipopt_relaxes(const AxisWindow& window) {
   return limits;
 }
 
-// The window's optimum under the limits of `active` by Ipopt, to a tolerance of one's choice.
+// The window's optimum by Ipopt, under the limits of `active` and to this tolerance.
 inline Result<AxisSolution> solve_by_ipopt(AxisWindow window, const ActiveLimits& active,
                                            double tolerance) {
   const BaseLimits given = before_ipopt_relaxes(window);

@@ -71,7 +71,7 @@ TEST_P(LibbgcodeFiles, KeepAllThatIsNotGcodeByteForByte) {
   const std::vector<Block> after = blocks(again);
   ASSERT_EQ(after.size(), before.size());
   for (std::size_t i = 0; i + 1 < before.size(); ++i) {
-    // Heatshrink leaves a choice: only what it unpacks to is the same.
+    // Heatshrink may pack one text in several ways. Only the unpacked text is the same.
     if (metadata != Compression::heatshrink_12_4 || before[i].compression == 0) {
       EXPECT_EQ(after[i].bytes, before[i].bytes) << "block " << i;
     }
@@ -101,7 +101,7 @@ TEST(Bgcode, IsTheSamePrintAsLibbgcodeMakesOfTheText) {
   EXPECT_EQ(ours.metadata.file, theirs.metadata.file);
   EXPECT_EQ(ours.metadata.slicer, theirs.metadata.slicer);
   EXPECT_EQ(ours.metadata.print, theirs.metadata.print);
-  // In another order: that of PrusaSlicer 2.8 itself.
+  // Our order differs: it is that of PrusaSlicer 2.8 itself.
   EXPECT_THAT(ours.metadata.printer, ::testing::UnorderedElementsAreArray(theirs.metadata.printer));
   ASSERT_EQ(ours.metadata.thumbnails.size(), 1U);
   EXPECT_EQ(ours.metadata.thumbnails[0].data, theirs.metadata.thumbnails[0].data);
@@ -126,7 +126,7 @@ TEST(Bgcode, ComesBackInEveryCompressionAndEncoding) {
         const BgcodeOptions options{compression, compression, encoding, checksum};
         const Result<Unpacked> unpacked = unpack(*to_bgcode(text, nullptr, options));
         ASSERT_TRUE(unpacked) << to_string(unpacked.error());
-        // Without metadata, blank lines are around it.
+        // Without metadata there are blank lines around the text.
         EXPECT_EQ(unpacked->text, "\n" + text + "\n");
       }
     }

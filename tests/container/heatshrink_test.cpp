@@ -48,7 +48,7 @@ TEST(Heatshrink, FindsWhatIsAWindowAwayAndNotFurther) {
     }
     const std::size_t alone = heatshrink(bytes, window_bits).size();
     const std::string repeated = bytes + bytes.substr(0, 16);
-    // One bit, the window's and four: 16 or 17.
+    // A reference takes one bit, the window's bits and four: 16 or 17.
     EXPECT_LE(heatshrink(repeated, window_bits).size(), alone + 3);
     EXPECT_GE(heatshrink(bytes + "?" + bytes.substr(0, 16), window_bits).size(), alone + 5);
   }

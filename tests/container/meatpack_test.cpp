@@ -18,7 +18,7 @@ TEST(Meatpack, PacksAVectorMadeByHand) {
   EXPECT_EQ(meatpack("G1 X1 Y\n", true), std::string(kStart) + "\x1d\x1e\xcfY\xcc");
   // (E 8) with E for a space; M: (whole M, 8).
   EXPECT_EQ(meatpack("M8E8\n", true), std::string(kStart) + "\x8fM\x8b\xcc");
-  // Both whole.
+  // Both characters whole.
   EXPECT_EQ(meatpack("MM\n", true), std::string(kStart) + "\xffMM\xcc");
 }
 
@@ -61,7 +61,7 @@ TEST(Meatpack, ComesBack) {
   }
 }
 
-// libbgcode's reader loses characters otherwise.
+// If the text were packed smaller, libbgcode's reader would lose characters.
 TEST(Meatpack, PacksToNoLessThanHalfTheText) {
   std::mt19937 random(3);
   for (int draw = 0; draw < 50; ++draw) {

@@ -1,4 +1,4 @@
-// What slicers say beside the G-code, as comments and as blocks.
+// What slicers write beside the G-code, as comments and as blocks.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -132,7 +132,7 @@ TEST(PrintMetadata, ThatAreDamagedAreNotPacked) {
   EXPECT_THAT(message("; thumbnail begin 1x1 4\n; Zm9v\n; Zm9v\n"), HasSubstr("damaged thumbnail"));
   EXPECT_THAT(message("; thumbnail begin 1x1 4\n; Zm9v\n"), HasSubstr("damaged thumbnail"));
   EXPECT_THAT(message("G28\n; prusaslicer_config = begin\n; a = 1\n"), HasSubstr("cut off"));
-  // Not a thumbnail's beginning at all.
+  // This line does not begin a thumbnail.
   EXPECT_EQ(message("; thumbnail begin here\nG28\n"), "no error");
 }
 

@@ -7,7 +7,7 @@
 namespace unflex {
 namespace {
 
-// RFC 4648, section 10.
+// The examples of RFC 4648, section 10.
 TEST(Base64, IsThatOfTheRfc) {
   EXPECT_EQ(to_base64(""), "");
   EXPECT_EQ(to_base64("f"), "Zg==");

@@ -1,4 +1,4 @@
-// Whoever listens wants the work to end at once.
+// A progress that is cancelled from the beginning.
 #pragma once
 
 #include "unflex/core/progress.hpp"

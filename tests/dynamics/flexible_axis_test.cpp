@@ -91,7 +91,7 @@ TEST(ExactStep, FollowsAConstantVelocityAndLagsUnderConstantAcceleration) {
   const NozzleState cruising = exact_step(axis, {2.0, 50.0}, {2.0, 50.0, 0.0}, 0.3);
   EXPECT_NEAR(cruising.position, 17.0, 1e-12);
   EXPECT_NEAR(cruising.velocity, 50.0, 1e-12);
-  // The lag a/ω² = 5000/10⁴ mm is kept once it is there.
+  // The steady lag a/ω² = 5000/10⁴ mm stays as it is.
   const NozzleState accelerating = exact_step(axis, {-0.5, 0.0}, {0.0, 0.0, 5000.0}, 0.1);
   EXPECT_NEAR(accelerating.position, 24.5, 1e-11);
   EXPECT_NEAR(accelerating.velocity, 500.0, 1e-10);

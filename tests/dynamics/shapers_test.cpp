@@ -22,7 +22,7 @@ void PrintTo(const Recorded& r, std::ostream* out) { *out << name(r.kind) << " �
 
 class KlippersPulses : public ::testing::TestWithParam<Recorded> {};
 
-// What klippy/extras/shaper_defs.py returns, normalised and shifted to their mean.
+// The pulses that klippy/extras/shaper_defs.py returns, normalised and shifted to their mean.
 TEST_P(KlippersPulses, AreReproduced) {
   const Recorded& recorded = GetParam();
   const auto pulses = shaper_pulses(recorded.kind, recorded.freq_hz, recorded.zeta);
@@ -114,8 +114,8 @@ TEST(Shaper, IsRefusedAboveTheDampingItIsDefinedFor) {
   }
 }
 
-// What is left of a vibration after the last pulse, as a share of that after one pulse:
-// |Σ weight · e^{ζωt} e^{iω_d t}| e^{−ζω t_last} (Singer & Seering, eq. 7).
+// The vibration left after the last pulse, as a share of that after a single pulse: |Σ weight ·
+// e^{ζωt} e^{iω_d t}| e^{−ζω t_last} (Singer & Seering, eq. 7).
 double residual(const ShaperPulses& pulses, double freq_hz, double zeta) {
   const double omega = 2.0 * std::numbers::pi * freq_hz;
   const std::complex<double> pole(zeta * omega, omega * std::sqrt(1.0 - zeta * zeta));

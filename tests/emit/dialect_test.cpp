@@ -1,4 +1,4 @@
-// What each firmware is told, word by word.
+// The lines that set limits on each firmware, word by word.
 #include "dialect.hpp"
 
 #include <gmock/gmock.h>
@@ -60,7 +60,8 @@ TEST(LimitLines, TellMarlinWithClassicJerkTheJerks) {
             "M205 X8 Y7 E10 S0 T0 B20000");
 }
 
-// From 3.6 on: M566 sets the most and the jerk of prints, M205 the latter.
+// From RepRapFirmware 3.6 on, M566 sets the largest jerk and the jerk of prints, M205 only the
+// latter.
 TEST(LimitLines, SetBothJerksOfRepRapFirmware) {
   planner::FirmwareConfig config = config_of(Firmware::rrf);
   config.has_print_jerk = true;
@@ -77,7 +78,7 @@ TEST(LimitLines, SetBothJerksOfRepRapFirmware) {
   lower.axis_jerk_mm_s[gcode::Y] = 5.0;
   EXPECT_THAT(limit_lines(config, lower, file), ElementsAre("M205 Y5"));
   EXPECT_EQ(limit_lines(config, file, unknown_to_run(Firmware::rrf, file)).back(), "M205 X8");
-  // Read by the firmware they put in force what was wanted.
+  // When the firmware reads these lines, the wanted limits are in force.
   gcode::InterpreterOptions options = gcode::default_options(Firmware::rrf);
   options.has_print_jerk = true;
   for (const planner::Limits& wanted : {file, lower}) {
@@ -103,7 +104,7 @@ TEST(LimitLines, AreOnlyWhatDiffers) {
   EXPECT_THAT(limit_lines(config_of(Firmware::marlin), wanted, current), ElementsAre("M201 Y1100"));
 }
 
-// Whatever is told is understood, by the same firmware's interpreter, as what was meant.
+// An interpreter of the same firmware must understand the lines as they are meant.
 TEST(LimitLines, AreReadBackAsTheyWereMeant) {
   for (const Firmware firmware : {Firmware::marlin, Firmware::rrf}) {
     const planner::Limits wanted = some_limits();

@@ -1,4 +1,4 @@
-// Planned moves, and the lines that a base makes of them.
+// Planned moves, and the output lines for a base that follows them.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,7 @@
 
 namespace unflex::emit::testing {
 
-// Moves with their plan, and lines to go with them.
+// Moves with their plan, and the events that belong to them.
 struct Path {
   explicit Path(const std::vector<gcode::Position>& points, double feed_mm_s = 60.0) {
     planner::KlipperPlanner planner({}, {});
@@ -27,7 +27,7 @@ struct Path {
     planner.take(moves);
   }
 
-  // A line that does not move, before event i.
+  // Inserts a line without motion before event i.
   void insert(std::size_t i, gcode::EventKind kind) {
     gcode::Event event;
     event.kind = kind;
@@ -53,7 +53,7 @@ inline Path random_path(unsigned seed, std::size_t count) {
   std::vector<gcode::Position> points = {{100.0, 100.0, 0.2, 3.0}};
   while (points.size() <= count) {
     gcode::Position next = points.back();
-    // Written to 10⁻³ mm, as slicers do.
+    // Rounded to 10⁻³ mm, as slicers do.
     next[gcode::X] = std::round((next[gcode::X] + step(random)) * 1e3) / 1e3;
     next[gcode::Y] = std::round((next[gcode::Y] + step(random)) * 1e3) / 1e3;
     next[gcode::E] += std::round(filament(random) * 1e5) / 1e5;

@@ -33,7 +33,7 @@ const std::string kEnd = ";unflex end\n";
 const std::string kShaperOff = "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\n";
 const std::string kShaperOn = "SET_INPUT_SHAPER SHAPER_FREQ_X=45 SHAPER_FREQ_Y=45\n";
 
-// The emitted lines but for strokes, which stand as one "~".
+// The emitted lines, where each group of strokes is replaced by one "~".
 std::vector<std::string> outline(const std::string& text) {
   std::vector<std::string> result;
   for (const std::string& line : lines_of(text)) {
@@ -46,7 +46,7 @@ std::vector<std::string> outline(const std::string& text) {
   return result;
 }
 
-// The outline of what comes after the first mark of a run.
+// The outline from the first mark of a run on.
 std::vector<std::string> from_first_run(const std::string& input,
                                         const EmitOptions& how = options()) {
   const std::string text = emit(input, how).text;
@@ -96,7 +96,7 @@ TEST(Emitter, TellsOfTheShaperBeforeTheMachineMovesByItself) {
                   kEnd, kRestore, "G1 F6000\n", kReached, kShaperOn, kShaperIsBack, "M84\n"));
 }
 
-// What the file has set there itself holds when a pause comes.
+// A pause must restore the shaper that the file itself has set there.
 TEST(Emitter, TellsOfAShaperThatTheFileSetsBetweenRuns) {
   EXPECT_THAT(
       from_first_run(kHead + "G1 X10 E1\nSET_INPUT_SHAPER SHAPER_FREQ_X=50\nG4 P1\nG1 X0 E1\n",
@@ -110,7 +110,7 @@ TEST(Emitter, TellsOfAShaperThatTheFileSetsBetweenRuns) {
                   "SET_INPUT_SHAPER SHAPER_FREQ_X=50 SHAPER_FREQ_Y=45\n", kShaperIsBack));
 }
 
-// Nothing else is changed by them.
+// Checkpoints change nothing else in the output.
 TEST(Emitter, AddsNothingButCheckpoints) {
   const std::string input = kHead +
                             "G1 X10 E1\nM204 S700\nG1 Y10 E1\nG28 X\nG1 X20 Y10 F3000\n"
@@ -153,7 +153,8 @@ TEST(Emitter, KeepsAnAccelerationInsideARunAndRaisesItAgainAtOnce) {
                           "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
-// Though the motion behind it is too short for a line of its own.
+// The run ends after the motion that follows the passive line, although that motion is too short
+// for a line of its own.
 TEST(Emitter, EndsARunBehindAllThatTheInputHasInIt) {
   EmitOptions how = options();
   how.lines.min_line_s = 0.03;
@@ -177,14 +178,14 @@ TEST(Emitter, KeepsVelocityLimitsInsideARunAndRaisesThemAgainAtOnce) {
                   "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
-// M205 is a macro that sets the square corner velocity on many a printer.
+// On many printers M205 is a macro that sets the square corner velocity.
 TEST(Emitter, SetsAllLimitsOfARunAgainAfterWhatMayBeAMacroOfLimits) {
   EXPECT_THAT(from_first_run(kHead + "G1 X10 E1\nM205 X8 Y8\nG1 Y10 E1\nG4 P1\n"),
               ElementsAre(";unflex run\n", kRaise, "~", "M205 X8 Y8\n", kRaise, "~", kEnd, kRestore,
                           "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
-// Klipper of 2024 takes it for a ratio, which must not hold in the run.
+// Klipper of 2024 converts ACCEL_TO_DECEL to a ratio, which must not hold in the run.
 TEST(Emitter, SetsAllLimitsOfARunAgainAfterAccelToDecel) {
   EXPECT_THAT(
       from_first_run(kHead + "G1 X10 E1\nSET_VELOCITY_LIMIT ACCEL=5000 ACCEL_TO_DECEL=2000\n"
@@ -196,7 +197,7 @@ TEST(Emitter, SetsAllLimitsOfARunAgainAfterAccelToDecel) {
                   "G1 F6000\n", "G4 P1\n", kShaperOn));
 }
 
-// Where the ratio has not changed, it is given all the same.
+// ACCEL_TO_DECEL is given even if the ratio has not changed.
 TEST(Emitter, SetsNoAccelToDecelWithoutARatio) {
   EXPECT_THAT(
       from_first_run("SET_VELOCITY_LIMIT MINIMUM_CRUISE_RATIO=0\n" + kHead + "G1 X10 E1\nG4 P1\n"),
@@ -248,7 +249,7 @@ TEST(Emitter, WritesRelativeFilamentAndReturnsToAbsolute) {
 }
 
 TEST(Emitter, PutsTheZeroOfFilamentRightThatARunHasSplit) {
-  // A new zero in the middle of a run: what follows counts from there, exactly.
+  // G92 E0 in the middle of a run: E after the run must count exactly from there.
   const std::string input =
       "G90\nM82\nG92 E0\nG1 X0 Y0 Z0.2 F6000\nG1 X10 E0.123456\nG92 E0\nG1 Y10 E0.5\nG4 P1\n"
       "G1 X3 E0.7\n";
@@ -264,7 +265,8 @@ TEST(Emitter, PutsTheZeroOfFilamentRightThatARunHasSplit) {
               0.7, 1e-5);
 }
 
-// Whatever the macro did to E: the file's next absolute E is meant from there.
+// A macro may have changed E. The file's next absolute E counts from there, so the emitter must not
+// set E.
 TEST(Emitter, SaysNothingOfAReadingOfFilamentThatAMacroHasLeft) {
   const std::string beginning = "G90\nM83\nG92 E0\nG1 X0 Y0 Z0.2 F6000\n";
   const std::string run = "G1 X10 E0.333333\nG1 X20 E0.333333\nM221 S90\nG1 Y10 E0.333333\n";

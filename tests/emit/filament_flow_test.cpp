@@ -15,7 +15,7 @@
 namespace unflex::emit {
 namespace {
 
-// Lines along X from 0 on; the flow is mm of filament per mm.
+// Lines along X from 0 on; `flows` is mm of filament per mm.
 std::vector<Stroke> lines(const std::vector<double>& lengths_mm, const std::vector<double>& flows,
                           double speed_mm_s) {
   std::vector<Stroke> result;
@@ -54,13 +54,13 @@ TEST(LevelFlow, MakesAStepOfFlowAStair) {
   const double all_mm = strokes.back().e_mm;
   level_flow({}, 1.0, strokes);
   const std::vector<double> levelled = flows_of(strokes);
-  // 1 mm/s at 100 mm/s.
+  // A jump of the flow by 0.01 is 1 mm/s of filament at 100 mm/s.
   EXPECT_LE(largest_jump(levelled), 1.02e-2);
   for (std::size_t i = 1; i < levelled.size(); ++i) {
     EXPECT_GE(levelled[i], levelled[i - 1] - 1e-12);
   }
   EXPECT_NEAR(strokes.back().e_mm, all_mm, 1e-12);
-  // No further than the stair needs.
+  // The ramp is no longer than the jump requires.
   EXPECT_NEAR(levelled[16], 0.0, 1e-12);
   EXPECT_NEAR(levelled[23], 0.033, 1e-12);
 }
@@ -110,7 +110,8 @@ TEST(LevelFlow, IsAskedForByKlipperAlone) {
   EXPECT_EQ(most_flow_step_mm_s(firmware), std::numeric_limits<double>::infinity());
 }
 
-// Moves with 0.03 mm of filament per mm but for one without, and what the nozzle has reached.
+// Moves with 0.03 mm of filament per mm, except one without, and the progress of the nozzle along
+// them.
 struct Nozzle {
   explicit Nozzle(const std::vector<gcode::Position>& points, double how_late_s = 0.0,
                   double freq_hz = 1000.0)
@@ -134,7 +135,7 @@ struct Nozzle {
     return {run, starts_s, axis, axis};
   }
 
-  // Of the sliced path, at time t of the plan.
+  // Filament of the sliced path at time t of the plan.
   [[nodiscard]] double filament_mm(double t) const {
     std::size_t i = 0;
     while (i + 1 < moves.size() && t > starts_s[i + 1]) {
@@ -157,11 +158,11 @@ TEST(NozzleProgress, GivesThePlaceOfANozzleThatIsLateItsOwnFilament) {
   const NozzleProgress progress = nozzle.progress();
   double largest_mm = 0.0;
   for (double t = 0.0; t < nozzle.starts_s.back(); t += 1e-3) {
-    // Of a lag, 1 % is not seen.
+    // The progress misses about 1 % of the lag.
     EXPECT_NEAR(progress.filament_mm(t), nozzle.filament_mm(t - nozzle.late_s), 2e-4) << t;
     largest_mm = std::max(largest_mm, std::abs(progress.filament_mm(t) - nozzle.filament_mm(t)));
   }
-  // As long as 3 ms at 60 mm/s.
+  // A lag of 3 ms at 60 mm/s is 0.18 mm.
   EXPECT_NEAR(largest_mm, 0.03 * 0.18, 3e-4);
 }
 

@@ -1,4 +1,4 @@
-// What lines do to the height, and how much they change speed.
+// The height of lines, and their changes of speed.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -45,9 +45,8 @@ TEST(Strokes, CarryTheHeightOfASpiral) {
   EXPECT_GT(drawn.size(), 200U);
 }
 
-// Klipper gives a line with a change of Z an acceleration of its own, which may be so low that a
-// short line at a sharp bend takes longer than it was given. Such a line has none; the next ones
-// do.
+// Klipper gives a line with a change of Z its own acceleration. This may be so low that a short
+// line at a sharp bend takes longer than planned. Such a line must not change Z; the next ones do.
 TEST(Strokes, ClimbWhereThatCostsNoTime) {
   std::vector<gcode::Position> points;
   for (int i = 0; i <= 60; ++i) {
@@ -80,7 +79,7 @@ TEST(Strokes, ClimbWhereThatCostsNoTime) {
   EXPECT_GT(level, 0) << "the case shows nothing";
 }
 
-// However hard the base works and wherever filament per millimetre changes.
+// The limit holds however hard the base works, and wherever filament per millimetre changes.
 TEST(Strokes, ChangeSpeedByNoMoreThanIsAllowedAnywhere) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
     const Path path = random_path(seed, 12);
@@ -90,7 +89,7 @@ TEST(Strokes, ChangeSpeedByNoMoreThanIsAllowedAnywhere) {
     Stroke from{0.0, base.x.position_mm.front(), base.y.position_mm.front()};
     for (const Stroke& to : path.draw(base)) {
       const std::array<double, 2> v = velocity_mm_s(from, to);
-      // The run of this test begins and ends elsewhere than its base.
+      // Skip both ends: the run of this test begins and ends elsewhere than its base.
       if (from.end_s > 0.0 && before != std::array<double, 2>{} &&
           to.end_s < base.duration_s() - 2e-3) {
         EXPECT_LE(std::abs(v[0] - before[0]), 30.5) << seed << ' ' << to.end_s;

@@ -41,7 +41,7 @@ inline dynamics::BaseTrajectory sampled(const std::function<std::array<double, 2
   return base;
 }
 
-// X and Y of the plan at a time after its start, before and after it at rest.
+// X and Y of the plan at a time after its start. It rests before its start and after its end.
 inline std::array<double, 2> plan_at(const std::vector<planner::PlannedMove>& moves, double t) {
   std::size_t i = 0;
   while (i + 1 < moves.size() && t > moves[i].duration_s()) {
@@ -51,15 +51,14 @@ inline std::array<double, 2> plan_at(const std::vector<planner::PlannedMove>& mo
   return {p[gcode::X], p[gcode::Y]};
 }
 
-// The base goes where the plan goes, with a lead-in and a tail of rest.
+// A base that follows the plan, with a lead-in and a tail of rest.
 inline dynamics::BaseTrajectory plan_as_base(const std::vector<planner::PlannedMove>& moves,
                                              double lead_in_s = 0.0) {
   const double nodes = std::ceil((lead_in_s + duration_s(moves) + 2e-3) / kPeriod_s);
   return sampled([&](double t) { return plan_at(moves, t - lead_in_s); }, nodes * kPeriod_s);
 }
 
-// An axis that sets off from rest at 50 mm with these accelerations at its nodes, linear in
-// between.
+// An axis that starts at rest at 50 mm, with these accelerations at its nodes, linear in between.
 inline dynamics::AxisTrajectory accelerated(std::vector<double> accel_mm_s2) {
   dynamics::AxisTrajectory axis;
   double position = 50.0;
@@ -76,9 +75,9 @@ inline dynamics::AxisTrajectory accelerated(std::vector<double> accel_mm_s2) {
   return axis;
 }
 
-// From rest to rest, accelerating by the whole of what is allowed nearly all the time: for a few
-// nodes this way, for a few that way, each axis at its own moments. Reversed in time and sign from
-// the middle on.
+// A base from rest to rest that accelerates by the largest allowed value nearly all the time: for a
+// few nodes one way, for a few nodes the other way, each axis at its own times. From the middle on,
+// the motion is reversed in time and sign.
 inline dynamics::BaseTrajectory bang_bang(unsigned seed, double accel_mm_s2, std::size_t half) {
   std::mt19937 random(seed);
   std::uniform_int_distribution<std::size_t> nodes(2, 7);

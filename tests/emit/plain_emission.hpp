@@ -12,7 +12,7 @@
 
 namespace unflex::emit::testing {
 
-// Looks on before every line outside of runs: the printer's state and the input's.
+// Observes the printer's and the input's state before every line outside of runs.
 struct Boundary {
   const Emitter* emitter = nullptr;
   const gcode::ModalState* input = nullptr;

@@ -1,5 +1,5 @@
-// Random programs with every mode a file can change: whatever stands outside of runs must find the
-// printer as the input would have it.
+// Random programs with every mode a file can change: every line outside of runs must find the
+// printer in the state that the input would have.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ using gcode::X;
 using gcode::Y;
 using gcode::Z;
 
-// Writes a program of moves within 20 to 80 mm in whatever mode is in force.
+// Writes a program of moves between 20 and 80 mm in whatever mode is in force.
 class Writer {
  public:
   explicit Writer(unsigned seed) : random_(seed) { add("G28\nG90\nM83\nG1 X50 Y50 Z0.3 F3000\n"); }
@@ -172,7 +172,7 @@ TEST(RandomProgram, FindsThePrinterOutsideRunsAsItWouldWithoutThem) {
   }
 }
 
-// The emitter's own idea of the printer is what a printer makes of the text.
+// The emitter's model of the printer must equal the state of a printer that reads the text.
 TEST(RandomProgram, EndsAsItWouldWithoutRunsWhenTheTextIsRead) {
   for (unsigned seed = 101; seed <= 140; ++seed) {
     const std::string program = Writer(seed).program(300);

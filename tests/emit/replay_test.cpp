@@ -1,4 +1,4 @@
-// What the printer makes of the text: it plans the lines anew.
+// The printer plans the emitted lines anew; these tests check its plan.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -69,7 +69,7 @@ std::vector<planner::PlannedMove> planned(const std::string& text, const EmitOpt
   return moves;
 }
 
-// One run, as it was meant and as the printer plans it.
+// One run as the emitter meant it, and as the printer plans it.
 struct Replay {
   Replay(const std::string& text, const EmitOptions& how) {
     std::istringstream stream(text);
@@ -154,7 +154,7 @@ TEST(Replay, LaysTheFilamentOfEveryRunWithinOneStep) {
       double laid = 0.0;
       for (std::size_t i = 0; i < replay.meant.size(); ++i) {
         laid += replay.moves[i].segment.delta(E);
-        // Nothing accumulates on the way either.
+        // No error accumulates during the run either.
         ASSERT_NEAR(laid, replay.meant[i].e_mm, 0.7e-5) << flow << "line " << i;
       }
       const double sliced =
@@ -164,7 +164,8 @@ TEST(Replay, LaysTheFilamentOfEveryRunWithinOneStep) {
   }
 }
 
-// Klipper reduces speed at junctions where filament per mm jumps; lines of one stretch must not.
+// Klipper reduces speed at junctions where filament per mm jumps. The lines of one move must not
+// have such jumps.
 TEST(Replay, LosesNoTimeToTheExtruder) {
   EmitOptions how = options();
   const Replay replay(drawing(6, 20.0), how);

@@ -1,4 +1,4 @@
-// What RepRapFirmware makes of a run's lines, by its own planner.
+// RepRapFirmware's own plan of a run's lines.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ EmitOptions rrf_options() {
   return how;
 }
 
-// The plan of an emitted text; by number of line.
+// The plan of an emitted text, by number of line.
 std::vector<planner::PlannedMove> plan_of(const std::string& text, const EmitOptions& how) {
   gcode::Interpreter interpreter(how.interpreter);
   planner::RrfPlanner planner(how.printer_limits, how.fixed);
@@ -55,8 +55,8 @@ std::vector<planner::PlannedMove> plan_of(const std::string& text, const EmitOpt
   return moves;
 }
 
-// Joining moves of every kind is what lets a run's lines pass. The move before the first of them is
-// still to be planned when that comes, and would end at its speed.
+// A run's lines pass only if moves of every kind are joined (M566 P1). The move before the first
+// line is planned after that line comes, and would then end at that line's speed.
 TEST(RrfRun, LetsFilamentBeforeItEndAtRest) {
   const EmitOptions how = rrf_options();
   const std::string text =
@@ -81,7 +81,8 @@ TEST(RrfRun, LetsFilamentBeforeItEndAtRest) {
   EXPECT_GT(alone->cruise_v_mm_s, 20.0);
 }
 
-// A line takes as long as its length, its feed and its ramps say: none of the latter is left out.
+// A line takes as long as its length, its feed and its ramps say, because the firmware leaves no
+// ramp out.
 TEST(RrfRun, HasNoLineSlowerThanItSays) {
   const EmitOptions how = rrf_options();
   std::mt19937 random(11);

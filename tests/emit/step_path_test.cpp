@@ -25,7 +25,7 @@ using dynamics::NozzleState;
 
 using PathFunction = std::function<std::array<double, 2>(double)>;
 
-// 0 to 1 over the duration, with the first two derivatives zero at both ends.
+// Rises from 0 to 1 over the duration, with the first two derivatives zero at both ends.
 double rise(double t, double duration_s) {
   const double s = std::clamp(t / duration_s, 0.0, 1.0);
   return s * s * s * (10.0 + s * (6.0 * s - 15.0));
@@ -33,8 +33,8 @@ double rise(double t, double duration_s) {
 
 ErrorWeight all_alike(double) { return {}; }
 
-// The nozzle that follows straight lines between the polygon's vertices, as exact_step has it, in
-// steps of at most 0.1 ms; `look` gets the time and both axes.
+// Moves a nozzle by exact_step, in steps of at most 0.1 ms, while the base follows straight lines
+// between the polygon's vertices. `look` gets the time and both axes.
 void follow(const Polygon& polygon, const LineRules& rules, double until_s,
             const std::function<void(double, NozzleState, NozzleState)>& look) {
   NozzleState x{polygon.x_mm.front(), 0.0};
@@ -61,7 +61,8 @@ void follow(const Polygon& polygon, const LineRules& rules, double until_s,
   }
 }
 
-// RMS distance in µm between that nozzle and the one that follows the base, across `normal`.
+// RMS distance in µm, across `normal`, between this nozzle and the one that follows the base
+// itself.
 double error_um(const Polygon& polygon, const BaseTrajectory& base, const LineRules& rules,
                 std::array<double, 2> normal) {
   const Followed fx(base, &BaseTrajectory::x_at, rules.nozzle_x);
@@ -221,7 +222,7 @@ TEST(CheapestEnds, AreTheCheapestOfAll) {
       }
     }
     if (std::abs(best[0]) > 44.0 || std::abs(best[1]) > 44.0) {
-      continue;  // at the edge only some are tried
+      continue;  // near the edge only some candidates are tried
     }
     ASSERT_GT(found.count, 0U);
     EXPECT_NEAR(found.ends[0].extra, cheapest, 1e-9);
@@ -278,7 +279,7 @@ TEST(LineCosts, BestEndIsTheMinimum) {
               on_base.dot(line.slope) + line.constant + to_go.at(line.shift), 1e-15);
 }
 
-// Random ways from rest to rest, as a base might go.
+// Random motion from rest to rest, like that of a base.
 struct RandomWay {
   explicit RandomWay(unsigned seed) {
     std::mt19937 random(seed);
@@ -338,15 +339,15 @@ TEST(StepPath, IsNoFurtherOffThanStepsAre) {
     const RandomWay way(seed);
     const BaseTrajectory base = testing::sampled(way.path, std::ceil(way.duration_s * 1e3) * 1e-3);
     const Polygon polygon = step_path(base, {}, all_alike, way.ends, kSteps, kSteps, rules);
-    // On each axis a place is off by 3.6 µm RMS if it is rounded to the nearest step, and the
-    // nozzle by more, by what that sets ringing.
+    // Rounding to the nearest step gives an error of 3.6 µm RMS on each axis. The nozzle's error is
+    // larger, because the rounding makes it ring.
     EXPECT_LE(error_um(polygon, base, rules, {1.0, 0.0}), 4.5) << seed;
     EXPECT_LE(error_um(polygon, base, rules, {0.0, 1.0}), 4.5) << seed;
   }
 }
 
 TEST(StepPath, DrawsASlantedLineToAFractionOfAStep) {
-  // 17.3 and 5.1 mm: steps on both axes meet the line nowhere.
+  // The slant is 17.3 by 5.1 mm, so that nowhere whole steps on both axes lie on the line.
   const double slant = std::hypot(17.3, 5.1);
   const std::array<double, 2> normal = {-5.1 / slant, 17.3 / slant};
   const BaseTrajectory base = testing::sampled(
@@ -378,7 +379,7 @@ TEST(StepPath, CountsTheLinesBeforeTheRun) {
   const LineRules rules = marlin_rules();
   const Polygon polygon = step_path(base, {}, all_alike, ends, kSteps, kSteps, rules);
   ASSERT_GE(polygon.times_s.size(), 2U);
-  // 18 lines in the last 2 ms: the next one has to wait as long as a line may take.
+  // There were 18 lines in the last 2 ms, so the next line must take as long as a line may.
   EXPECT_GE(polygon.times_s[1], 0.5 * rules.max_line_s);
 }
 
@@ -411,7 +412,7 @@ TEST(StepPath, IsEmptyWhereNoLineIsLongEnough) {
 }
 
 TEST(StepPath, IsTheSameWayAcrossBlocks) {
-  // Some seconds, so that the search goes on from what it has decided.
+  // The path lasts some seconds, so the search continues from what it has decided.
   const BaseTrajectory base = testing::sampled(
       [](double t) {
         return std::array{20.0 * std::sin(0.8 * t) * rise(t, 1.0), 15.0 * rise(t, 6.0)};

@@ -25,7 +25,7 @@ using testing::options;
 using testing::Path;
 using testing::random_path;
 
-// Rising from rest to rest: 0 to 1 with the first two derivatives zero at both ends.
+// Rises from 0 to 1 with the first two derivatives zero at both ends.
 double smooth(double s) {
   s = std::clamp(s, 0.0, 1.0);
   return s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
@@ -45,8 +45,8 @@ TEST(Strokes, EndExactlyWhereAndWithWhatTheMovesEnd) {
   }
 }
 
-// Which is filament that the file has told of before and Marlin lays or draws back with the run's
-// first line.
+// Marlin may owe filament of earlier moves. It lays or draws back that filament with the first line
+// of the run.
 TEST(Strokes, LayWhatTheFileHasThoughTheFirmwareIsBehindIt) {
   constexpr double kFirst_mm = 0.5;
   constexpr double kAlong_mm = 0.015;  // filament follows the nozzle, which swings by 0.15 mm
@@ -61,7 +61,7 @@ TEST(Strokes, LayWhatTheFileHasThoughTheFirmwareIsBehindIt) {
       path.moves.front().segment.start_mm[E] -= behind_mm;
       for (const Stroke& stroke : path.draw(testing::plan_as_base(path.moves))) {
         const double share = (stroke.x_mm - 100.0) / 10.0;
-        // Lines turn the corner a little beside it.
+        // The lines pass the corner at a small distance.
         if (share < 1.0 && stroke.y_mm < 100.01) {
           EXPECT_NEAR(stroke.e_mm, share * first_mm, std::abs(behind_mm) + kAlong_mm);
           EXPECT_GE(stroke.e_mm, std::min(0.0, first_mm));
@@ -74,7 +74,7 @@ TEST(Strokes, LayWhatTheFileHasThoughTheFirmwareIsBehindIt) {
   }
 }
 
-// A line that turns round where it stands.
+// A line that returns to its start.
 TEST(GiveLength, GoesAlongTheAxisThatTurnsAndStaysWithinItsTravel) {
   const Grid grid{{0.0, 1e-4}, {0.0, 2e-4}, {0.0, 1e-4}};
   LineRules rules;
@@ -93,14 +93,14 @@ TEST(GiveLength, GoesAlongTheAxisThatTurnsAndStaysWithinItsTravel) {
   expect_end(end_of(100.0, 100.0, 99.0, 100.5), 99.9999, 100.0);
   expect_end(end_of(100.0, 100.0, 100.5, 99.0), 100.0, 99.9998);
   expect_end(end_of(250.0, 210.0, 250.0, 209.0), 250.0, 209.9998);
-  // Both ends of the travel.
+  // At both ends of the travel.
   expect_end(end_of(250.0, 100.0, 250.0, 100.0), 249.9999, 100.0);
   expect_end(end_of(0.0, 100.0, -1e-5, 100.0), 0.0001, 100.0);
   expect_end(end_of(100.0, 210.0, 100.0, 210.00001), 100.0, 209.9998);
   expect_end(end_of(100.0, -1.0, 100.0, -1.00001), 100.0, -0.9998);
 }
 
-// Most strokes that begin within any 100 ms.
+// The largest number of strokes that begin within any 100 ms.
 std::size_t most_at_once(const std::vector<Stroke>& drawn) {
   std::size_t most = 0;
   for (std::size_t first = 0; first < drawn.size(); ++first) {
@@ -161,7 +161,7 @@ TEST(Strokes, LieOnAGridThatBeginsAtTheZeroOfTheFile) {
   }
 }
 
-// Position of a polyline of strokes at a moment.
+// Position on a polyline of strokes at time t.
 std::array<double, 2> at(const std::vector<Stroke>& drawn, const gcode::Position& start, double t) {
   Stroke from{0.0, start[X], start[Y]};
   for (const Stroke& to : drawn) {
@@ -185,12 +185,12 @@ class Turn : public ::testing::Test {
     return {100.0 + kRadius_mm * std::sin(angle), 100.0 - kRadius_mm * std::cos(angle)};
   }
 
-  // There and back, so that the path ends where it begins; its plan plays no role here.
+  // The path goes there and back, so that it ends at its start; its plan does not matter here.
   Turn()
       : path_({{100.0, 95.0, 0.2, 0.0}, {110.0, 95.0, 0.2, 1.0}, {100.0, 95.0, 0.2, 2.0}}, 50.0) {}
 
-  // How far the nozzle on these strokes is from the nozzle on the circle, at most; its RMS if
-  // `rms`.
+  // The largest distance between the nozzle on these strokes and the nozzle on the circle; the RMS
+  // distance if `rms`.
   [[nodiscard]] double nozzle_error_mm(const std::vector<Stroke>& drawn,
                                        const dynamics::FlexibleAxis& axis, bool rms = false) const {
     constexpr double kStep_s = 2e-5;
@@ -231,7 +231,7 @@ TEST_F(Turn, MovesTheNozzleByNoMoreThanTheTolerance) {
     how.lines.max_speed_step_mm_s = 1e6;
     const std::vector<Stroke> drawn = path_.draw(base_, how);
     const double worst = nozzle_error_mm(drawn, how.lines.nozzle_x);
-    // Each line is within the tolerance by itself; neighbours add to it.
+    // Each line alone is within the tolerance, but its neighbours add to the error.
     EXPECT_LE(worst, 3.0 * tolerance_mm + 0.5e-4);
     EXPECT_GE(worst, 0.3 * tolerance_mm) << "lines could be longer";
     EXPECT_LT(drawn.size(), last_lines);
@@ -313,11 +313,12 @@ TEST_F(Turn, IsAsWideAsTheBaseOnAverage) {
   }
   inscribed /= kDuration_s - 0.2;
   EXPECT_GT(inscribed, 0.5e-3) << "the case shows nothing";
-  // At the four outermost points vertices stay within the base's extent.
+  // At the four outermost points the vertices stay within the base's extent.
   EXPECT_LT(std::abs(mean), 0.1 * inscribed);
 }
 
-// A limit that the base itself does not keep leaves its lines no more than the base needs.
+// If the base itself exceeds the limit, its lines may use as much acceleration as the base needs,
+// but no more.
 TEST_F(Turn, DrivesTheLinesNoHarderThanTheBaseWhereThatIsAboveTheLimit) {
   EmitOptions how = options();
   how.lines.max_accel_mm_s2 = 1.0;
@@ -338,7 +339,7 @@ TEST_F(Turn, DrivesTheLinesNoHarderThanTheBaseWhereThatIsAboveTheLimit) {
 }
 
 TEST_F(Turn, GoesNoFurtherOutThanTheBase) {
-  // Which may touch the end of its travel there.
+  // The base may touch the end of its travel at the outermost points.
   EmitOptions how = options();
   how.lines.reach_x = how.lines.reach_y = {98.0, 102.0};
   for (const Stroke& stroke : path_.draw(base_, how)) {
@@ -348,7 +349,7 @@ TEST_F(Turn, GoesNoFurtherOutThanTheBase) {
 }
 
 TEST(Strokes, KeepTheAccelerationFromLineToLine) {
-  // Swinging as hard as allowed: b̈ = A sin(ωt).
+  // The base swings as hard as allowed: b̈ = A sin(ωt).
   constexpr double kAccel = 20000.0;
   constexpr double kOmega = 2.0 * std::numbers::pi * 80.0;
   const Path path({{0.0, 0.0, 0.2, 0.0}, {1.0, 0.0, 0.2, 0.0}, {0.0, 0.0, 0.2, 0.0}});
@@ -365,7 +366,7 @@ TEST(Strokes, KeepTheAccelerationFromLineToLine) {
     const double t = to.end_s - from.end_s;
     const double v = (to.x_mm - from.x_mm) / t;
     if (last_t > 0.0) {
-      // The grid adds up to 2·10⁻⁴ mm over the square of the shorter time.
+      // Rounding to the grid adds up to 2·10⁻⁴ mm over the square of the shorter time.
       EXPECT_LE(std::abs(v - last_v) / (0.5 * (t + last_t)),
                 kAccel + 2e-4 / std::pow(std::min(t, last_t), 2));
     }
@@ -377,7 +378,7 @@ TEST(Strokes, KeepTheAccelerationFromLineToLine) {
 
 TEST(Strokes, MergeWhatWouldHaveNoLength) {
   const Path path({{0.0, 0.0, 0.2, 0.0}, {10.0, 0.0, 0.2, 1.0}});
-  // Rest, motion, rest, motion, rest; rests longer than any line.
+  // The base rests, moves, rests, moves and rests. Each rest is longer than any line.
   const auto halting = [](double t) {
     return std::array<double, 2>{5.0 * smooth((t - 0.13) / 0.05) + 5.0 * smooth((t - 0.35) / 0.05),
                                  0.0};
@@ -389,8 +390,8 @@ TEST(Strokes, MergeWhatWouldHaveNoLength) {
     EXPECT_GT(to.speed_mm_s, 0.0);
     from = to;
   }
-  // What is dropped before the motion and after it is missing from the clock; the rest between is
-  // not. Each end may lie within a line of up to 50 ms.
+  // The rests before and after the motion are dropped, so the clock lacks them; the rest between
+  // the motions stays. Each end may lie within a line of up to 50 ms.
   EXPECT_GE(drawn.back().end_s, 0.27);
   EXPECT_LE(drawn.back().end_s, 0.27 + 0.1);
   EXPECT_EQ(drawn.back().e_mm, 1.0);
@@ -419,15 +420,15 @@ TEST(Strokes, EndWhereALineStandsOrFilamentPerMillimetreChanges) {
   EXPECT_TRUE(ends_at(first));
   EXPECT_TRUE(ends_at(second));
   EXPECT_FALSE(ends_at(second + path.moves[2].duration_s()));
-  // The passive line comes after what is drawn before its moment and before all else.
+  // The passive line comes after the strokes that end before its time, and before all others.
   for (std::size_t i = 0; i < drawn.size(); ++i) {
     EXPECT_EQ(drawn[i].events >= 2, i > 0 && drawn[i - 1].end_s > first - 0.6e-3) << i;
   }
 }
 
 TEST(Strokes, LayFilamentMoveByMove) {
-  // A nozzle that stays with the base passes from move to move when the plan does. Klipper would
-  // have jumps of the flow levelled.
+  // This nozzle stays with the base, so it passes from move to move when the plan does. The limit
+  // is raised because Klipper would otherwise require jumps of the flow to be levelled.
   EmitOptions how = options();
   how.lines.nozzle_x = how.lines.nozzle_y = dynamics::from_frequency(2000.0, 0.5);
   how.fixed.instantaneous_corner_velocity_mm_s = 1e6;
@@ -450,8 +451,8 @@ TEST(Strokes, LayFilamentMoveByMove) {
   }
 }
 
-// The nozzle may come to rest after the moves have ended, of a base that is meant for other
-// frequencies too. What its last micrometres would have does not belong there: a tail lays nothing.
+// A base that is meant for several frequencies may bring the nozzle to rest only after the moves
+// have ended. The filament of these last micrometres must be laid before: a tail lays nothing.
 TEST(Strokes, HaveLaidAllFilamentWhenTheMovesHaveEnded) {
   constexpr double kLate_s = 10e-3;
   for (unsigned seed = 1; seed <= 10; ++seed) {

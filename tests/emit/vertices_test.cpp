@@ -18,11 +18,11 @@ namespace {
 constexpr double kNode_s = testing::kPeriod_s;
 constexpr double kGrid_mm = 1e-4;
 
-// What the splitting method and the rounding to the grid leave of a bound.
+// The bound with a margin for the splitting method and the rounding to the grid.
 double nearly(double bound_mm_s) { return bound_mm_s + 0.7; }
 
-// From rest to rest: the acceleration is a sum of sines under a window, drawn at random, with the
-// largest value given.
+// A base from rest to rest. Its acceleration is a random sum of sines under a window, scaled to the
+// given largest value.
 dynamics::BaseTrajectory random_base(unsigned seed, double max_accel_mm_s2) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
@@ -38,7 +38,7 @@ dynamics::BaseTrajectory random_base(unsigned seed, double max_accel_mm_s2) {
       accel[k] += size * window * window * std::sin(2.0 * std::numbers::pi * wave * s + phase);
     }
   }
-  // Without what would leave it in motion.
+  // Subtract the part that would leave the base in motion.
   double sum = 0.0;
   double windows = 0.0;
   for (std::size_t k = 0; k < kNodes; ++k) {
@@ -85,7 +85,7 @@ class Vertices : public ::testing::TestWithParam<unsigned> {
       }
     }
     if (ends.to_rest) {
-      // The last line takes half of its own time to come to rest, as to any join.
+      // The last line comes to rest within half of its own time, as at any join.
       result.largest_step_mm_s = std::max(result.largest_step_mm_s, std::abs(last));
     }
     result.rms_um = 1e3 * std::sqrt(square / static_cast<double>(times.size() - 1));
@@ -108,19 +108,20 @@ class Vertices : public ::testing::TestWithParam<unsigned> {
   dynamics::BaseTrajectory base_ = random_base(GetParam(), 18000.0);
 };
 
-// A bound of 28.5 is what a base of 18000 mm/s² needs nearly all of: lines of 1.5 ms take 27.
+// A base of 18000 mm/s² needs 27 mm/s with lines of 1.5 ms, so the bound of 28.5 hardly exceeds its
+// need.
 TEST_P(Vertices, ChangeSpeedByNoMoreThanIsAllowed) {
   const std::vector<double> times = short_lines();
   const Measured free = measure(times, {});
   const Measured bound = measure(times, {28.5, 1e9});
   EXPECT_LE(bound.largest_step_mm_s, nearly(28.5));
-  // It costs something only where there is something to cut.
+  // The bound costs accuracy only where it cuts something.
   EXPECT_LE(bound.rms_um, 1.5 * free.rms_um + 0.02);
 }
 
-// Where the base needs all of the bound nearly everywhere, little is left to make up for rounding
-// with, and what is missed at one place must not grow at the next. The last line comes to rest
-// within the bound as well.
+// This base needs the whole bound nearly everywhere, so little is left to correct rounding errors.
+// An error at one place must not grow at the next. The last line must come to rest within the bound
+// as well.
 TEST_P(Vertices, FollowABaseThatNeedsAllThatIsAllowed) {
   base_ = testing::bang_bang(GetParam(), 28400.0, 150);
   std::vector<double> times;
@@ -146,7 +147,7 @@ TEST_P(Vertices, KeepTheAccelerationBetweenTheMiddlesOfLines) {
   }
 }
 
-// Where a part goes on from another, the two share the change of speed.
+// Where a part continues another one, each of the two gets half of the change of speed.
 TEST_P(Vertices, TakeHalfOfTheChangeWhereOthersGoOn) {
   dynamics::BaseTrajectory moving = base_;
   constexpr std::size_t kFirst = 120;

@@ -1,4 +1,4 @@
-// Decisions taken from the bytes that fuzzing mutates; zeros where they end.
+// Decisions taken from the bytes that fuzzing mutates. After their end, all bytes are zero.
 #pragma once
 
 #include <cstddef>
@@ -23,16 +23,16 @@ class Bytes {
     rest_.remove_prefix(1);
     return value;
   }
-  // Of `count` variants, '0' the first.
+  // One of `count` variants; '0' gives the first.
   std::size_t variant(std::size_t count) {
     return static_cast<unsigned char>(byte() - '0') % count;
   }
-  // From a grid of 65 536 values.
+  // A number from a grid of 65 536 values.
   double number(double from, double to) {
     const std::size_t high = byte();
     return from + (to - from) * static_cast<double>(256 * high + byte()) / 65535.0;
   }
-  // Up to the next line feed, which is left out.
+  // The text up to the next line feed, which is left out.
   std::string_view line() { return testing::take_line(rest_); }
 
  private:

@@ -1,6 +1,6 @@
 // Whole prints, from their bytes to the bytes that the printer gets.
 //
-// What the output must be is told by the text alone, read as the printer reads it.
+// The checks judge the output by its text alone, read as the printer reads it.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 #include <sys/mman.h>
@@ -27,11 +27,11 @@
 namespace unflex::fuzz {
 namespace {
 
-// More motion says no more and takes long; where whole steps are reckoned with, the sooner.
+// Longer prints find nothing more and are slow, above all on firmwares with whole steps.
 constexpr std::size_t kMostSegments = 3000;
 double most_s(Firmware firmware) { return firmware == Firmware::klipper ? 2.0 : 0.3; }
 
-// Of the motion that may be rewritten, and of all that is printed.
+// Whether there is little enough motion: in what may be rewritten, and in all.
 bool is_short(const Playback& print, Firmware firmware) {
   constexpr double kMost_s = 100.0;
   double rewritten_s = 0.0;
@@ -42,8 +42,9 @@ bool is_short(const Playback& print, Firmware firmware) {
          planner::duration_s(print.moves) < kMost_s;
 }
 
-// '0' to '2': the bytes are a print for Klipper, Marlin, RepRapFirmware; '3' to '5': the bytes are
-// turned into one. Behind '6' to ';', 'B' to 'G' and so on they are given with other settings.
+// '0' to '2': the bytes are a print for Klipper, Marlin, RepRapFirmware. '3' to '5': the bytes are
+// turned into such a print. The bytes '6' to ';', 'B' to 'G' and so on select these again, with
+// other settings.
 struct CompensateVariant {
   Firmware firmware;
   bool written;
@@ -73,7 +74,7 @@ machine::Settings settings_of(const CompensateVariant& variant) {
   return *settings;
 }
 
-// A file that is nowhere but in memory.
+// A file that exists only in memory.
 class MemoryFile {
  public:
   explicit MemoryFile(std::string_view text) : fd_(memfd_create("unflex", MFD_CLOEXEC)) {
@@ -117,7 +118,7 @@ Result<Compensated> run(const std::string& text, const machine::Settings& settin
   });
 }
 
-// Lines that must come through: all that do not move the machine.
+// Lines that must be in the output: all that do not move the machine.
 std::vector<std::string> standing_lines(const Playback& playback) {
   std::vector<std::string> lines;
   for (const gcode::Event& event : playback.events) {
@@ -174,7 +175,7 @@ void check_end(const Playback& input, const Playback& output, const machine::Set
     require(std::abs(output.end.position_mm[axis] - expected) <= tolerance,
             fmt::format("{} ends at {} mm instead of {} mm", "XYZE"[axis],
                         output.end.position_mm[axis], expected));
-    // A reading that nobody knows is not put right.
+    // An unknown reading is not corrected.
     require(std::abs(output.end.base_mm[axis] - input.end.base_mm[axis]) <= tolerance ||
                 !input.end.known[axis],
             fmt::format("the zero of {} is {} mm instead of {} mm", "XYZE"[axis],
@@ -196,7 +197,7 @@ void check_end(const Playback& input, const Playback& output, const machine::Set
 void check_report(const report::Report& report) {
   require(report.violation_count == 0, fmt::format("{} violations: {}", report.violation_count,
                                                    fmt::join(report.violations, "; ")));
-  // Two with nothing between them but a rounding of filament are verified as one.
+  // Two runs with only a rounding of filament between them are verified as one run.
   require(report.runs_compensated + report.runs_fallback <= report.runs_total,
           "more runs than there are");
   for (const std::string& warning : report.warnings) {

@@ -1,4 +1,4 @@
-// What G-code comes packed in.
+// Containers of G-code: gzip and binary G-code.
 #include <algorithm>
 #include <array>
 #include <string>
@@ -12,15 +12,15 @@ namespace {
 
 using container::Kind;
 
-// A few bytes can stand for any amount of text; what follows this says no more.
+// A few packed bytes can stand for any amount of text; more than this finds nothing new.
 constexpr std::size_t kMostText = 1U << 20U;
 
 struct Unpacked {
   std::string text;
-  bool whole = true;  // read to its end, without an error
+  bool whole = true;  // read to its end without an error
 };
 
-// Pulls what there is; false at an error or where it is enough.
+// Pulls all available text; false at an error or if there is enough.
 bool pull_all(container::Unpacker& unpacker, Unpacked& unpacked) {
   for (;;) {
     const Result<std::string> piece = unpacker.pull();

@@ -1,4 +1,4 @@
-// libFuzzer's way in.
+// Entry point for libFuzzer.
 #include <cstddef>
 #include <cstdint>
 

@@ -1,4 +1,4 @@
-// Lines, what they mean to each firmware, and its plan of them.
+// Lines, their meaning to each firmware, and its plan of them.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::size_t kMostSegments = 20'000;
 
-// '0' Klipper, '1' Marlin, '2' RepRapFirmware; '3' to '5' the same configured otherwise.
+// '0' Klipper, '1' Marlin, '2' RepRapFirmware; '3' to '5': these firmwares in another
+// configuration.
 PrinterSetup printer_setup(std::size_t variant) {
   const Firmware firmware =
       std::array{Firmware::klipper, Firmware::marlin, Firmware::rrf}[variant % 3];
@@ -43,12 +44,12 @@ PrinterSetup printer_setup(std::size_t variant) {
   return setup;
 }
 
-// What rounding to whole steps may add to the speed of an axis, and in Marlin a speed that no move
-// is slower than.
+// How much rounding to whole steps may add to the speed of an axis; for Marlin also its minimum
+// speed.
 double allowance_mm_s(const planner::PlannedMove& move, const planner::FirmwareConfig& fixed,
                       std::size_t axis) {
   if (fixed.firmware == Firmware::rrf) {
-    // The direction is that between whole steps and coordinates in floats.
+    // The direction is computed from whole steps, and from coordinates in single precision.
     const double coordinate_mm =
         2e-7 * (std::abs(move.segment.start_mm[axis]) + std::abs(move.segment.end_mm[axis]));
     return move.cruise_v_mm_s * (1.0 / fixed.steps_per_mm[axis] + coordinate_mm) / move.length_mm;
@@ -118,8 +119,8 @@ void gcode(std::string_view bytes) {
     require(gcode::same_but_for_times(content, gcode::with_times_scaled(content, 1.5)),
             "a line with its times scaled is another line");
   }
-  // Segments too small to be queued have no move; a line's number tells which is whose, and of an
-  // arc's pieces all have the same limits and speed.
+  // Segments that are too small to be queued have no move. The line number tells which segment a
+  // move comes from; all pieces of an arc have equal limits and speeds.
   std::size_t next = 0;
   for (const planner::PlannedMove& move : playback.moves) {
     check_move(move);

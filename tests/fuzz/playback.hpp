@@ -1,4 +1,4 @@
-// A text as a printer plays it.
+// What a printer makes of a text.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace unflex::fuzz {
 
-// What held when a segment was given to the planner.
+// A segment and the limits in force when it was given to the planner.
 struct Given {
   gcode::Segment segment;
   planner::Limits limits;
@@ -35,7 +35,8 @@ struct PrinterSetup {
   planner::FirmwareConfig fixed;
 };
 
-// Plays the text until there are `most_segments` of motion. Checks what must hold of every line.
+// Plays the text until there are `most_segments` of motion. Checks conditions that every line must
+// meet.
 [[nodiscard]] Playback play(const std::string& text, const PrinterSetup& setup,
                             std::size_t most_segments);
 

@@ -18,9 +18,9 @@ using gcode::Z;
 constexpr double kLow_mm = 20.0;
 constexpr double kHigh_mm = 80.0;
 constexpr std::size_t kMostLines = 60;
-// What gaining speed and losing it takes, about.
+// Approximate time for gaining speed and losing it.
 constexpr double kRamps_s = 0.02;
-// Filament of 1.75 mm in a line of 0.4 by 0.2 mm.
+// For 1.75 mm filament and a line of 0.4 by 0.2 mm.
 constexpr double kFilamentPerMm = 0.033;
 
 }  // namespace
@@ -71,7 +71,7 @@ std::string ProgramWriter::next(Bytes& source) {
     case 8:
       return "G1" + speed(source) + "\n";
     case 9:
-      // Whatever it is; it stands between lines that are known.
+      // An arbitrary line; it stands between known ones.
       return std::string(source.line()) + "\n";
     case 10:
     case 11:
@@ -86,7 +86,7 @@ std::string ProgramWriter::next(Bytes& source) {
   }
 }
 
-// A straight move that turns by what is usual.
+// A straight move that turns by a usual angle.
 std::string ProgramWriter::draw(Bytes& source, double least_mm, double most_mm) {
   const gcode::Position& at = interpreter_.state().position_mm;
   const double length = source.number(least_mm, most_mm);
@@ -99,7 +99,7 @@ std::string ProgramWriter::draw(Bytes& source, double least_mm, double most_mm) 
          filament(source, std::hypot(to_x - at[X], to_y - at[Y])) + speed(source) + "\n";
 }
 
-// Around a centre to the left or right.
+// An arc around a centre to the left or right.
 std::string ProgramWriter::arc(Bytes& source) {
   const gcode::ModalState& state = interpreter_.state();
   const gcode::Position& at = state.position_mm;
@@ -162,7 +162,7 @@ std::string ProgramWriter::stop(Bytes& source) {
   return kStops[source.byte() % kStops.size()];
 }
 
-// The word that brings the axis to a place.
+// The word that moves the axis to a place.
 std::string ProgramWriter::word(gcode::Axis axis, double to_mm) const {
   const gcode::ModalState& state = interpreter_.state();
   const bool absolute = axis == E ? state.e_is_absolute() : state.absolute_xyz;

@@ -1,4 +1,4 @@
-// Prints as slicers write them, made of any bytes.
+// Turns any bytes into prints as slicers write them.
 #pragma once
 
 #include <string>
@@ -9,9 +9,9 @@
 
 namespace unflex::fuzz {
 
-// Writes lines that the firmware takes: moves, arcs, retractions, wipes, hops, modes, limits,
+// Writes lines that the firmware accepts: moves, arcs, retractions, wipes, hops, modes, limits,
 // pauses, macros and comments, in whatever mode is in force, between 20 and 80 mm. The first byte
-// of each line says what it is.
+// for each line selects its kind.
 class ProgramWriter {
  public:
   ProgramWriter(const gcode::InterpreterOptions& options, double duration_s);

@@ -1,4 +1,4 @@
-// What describes a printer, in all the ways people have it.
+// Descriptions of a printer in all forms.
 #include <string>
 #include <vector>
 
@@ -40,7 +40,7 @@ Result<machine::Settings> read(Bytes source, As as) {
       .print = &print, .printer_file = {}, .overrides = {}, .firmware_as_sliced = true});
 }
 
-// Each stage takes its part without a number that its types cannot hold.
+// Each stage must accept its part of the settings without a number that its types cannot hold.
 void turn_into_options(const machine::Settings& settings) {
   static_cast<void>(pipeline::compensate_setup(settings));
   static_cast<void>(pipeline::emit_options(settings, "fuzz"));

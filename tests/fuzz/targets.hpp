@@ -1,8 +1,8 @@
-// What fuzzing calls: each function takes any bytes and throws Broken where something that must
+// The targets of fuzzing: each function takes any bytes and throws Broken if something that must
 // hold of every input does not.
 //
-// Bytes that choose among variants come first and are told by their value alone, so that a file of
-// the corpus can be written by hand: '0' is the first variant, '1' the second, and so on.
+// Bytes that choose a variant come first. Only their value counts, so that a file of the corpus can
+// be written by hand: '0' is the first variant, '1' the second, and so on.
 #pragma once
 
 #include <stdexcept>
@@ -22,15 +22,15 @@ inline void require(bool holds, const std::string& otherwise) {
   }
 }
 
-// Lines, their meaning to a firmware, and its plan of them. First byte: see GcodeVariant.
+// Lines of G-code, their meaning to a firmware, and its plan of them. First byte: see GcodeVariant.
 void gcode(std::string_view bytes);
 // A whole print. First byte: see CompensateVariant.
 void compensate(std::string_view bytes);
-// What describes a printer. First byte: as a file, at the head of a print, in a stream, as --set.
+// Descriptions of a printer. First byte: as a file, at the head of a print, in a stream, as --set.
 void settings(std::string_view bytes);
-// What G-code comes packed in. First byte: unpacked from gzip, from binary G-code, packed so.
+// Containers of G-code. First byte: unpacked from gzip, from binary G-code, packed in either.
 void container(std::string_view bytes);
-// What people record of a printer. First byte: what the file is called.
+// Records of accelerometers. First byte: the name of the file.
 void records(std::string_view bytes);
 
 }  // namespace unflex::fuzz

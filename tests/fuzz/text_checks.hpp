@@ -1,4 +1,4 @@
-// What must hold of texts that users are shown. The program itself takes control characters out.
+// Checks of texts that users see. The program itself removes control characters.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ inline void require_one_line(std::string_view text) {
           "a message of several lines: " + std::string(text));
 }
 
-// That the input is to blame.
+// Requires that the error blames the input.
 inline void require_fault_of_input(const Error& error) {
   require(error.kind != ErrorKind::internal, "internal error: " + to_string(error));
   require_one_line(to_string(error));

@@ -64,8 +64,8 @@ TEST(Approach, IsOfPlainTravelOnly) {
   EXPECT_EQ(approach_behind("G1 X10 Y20 Z1\n" + kLabel + "G91\n", "G1 X40 Y60"), std::nullopt);
 }
 
-// Whatever way: the line before and the line itself end where the line alone does, on its way, and
-// the second starts at a known place.
+// In every direction the approach and the line together end where the line alone does, along its
+// path, and the line starts at a known place.
 TEST(Approach, LiesOnTheWay) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(-200.0, 200.0);

@@ -1,4 +1,4 @@
-// What an arc must look like, whoever cut it.
+// What every arc must look like, whichever firmware cuts it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,10 +16,10 @@ struct ExpectedArc {
   double radius_mm;
   double angle_rad;  // with its sign: positive anticlockwise
   std::size_t pieces;
-  double tolerance_mm = 1e-9;  // of the radius
+  double tolerance_mm = 1e-9;  // tolerance of the radius
 };
 
-// Equal angles about the centre, filament and Z in equal shares.
+// Expects equal angles about the centre, and filament and Z in equal shares.
 inline void expect_arc(const Event& event, const ExpectedArc& arc) {
   ASSERT_EQ(event.kind, EventKind::move);
   ASSERT_EQ(event.segments.size(), arc.pieces);

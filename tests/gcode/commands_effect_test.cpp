@@ -1,4 +1,4 @@
-// Which commands stop the machine, and which lose it.
+// Which commands stop the machine, and which lose its position.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(
                       "PRINT_START BED=60", "print_end", "PAUSE", "MY_LAYER_MACRO A=1",
                       "BED_MESH_PROFILE LOAD=default", "SET_GCODE_OFFSET Z=1 MOVE=1"));
 
-// Bambu's firmware decides about them; Klipper does not know M622 and carries them out.
+// Bambu's firmware may skip these lines. Klipper does not know M622 and carries them out.
 TEST(LinesUnderBambusCondition, AreCarriedOut) {
   Session session;
   session.read("G1 X1 Y1 Z1\nM1002 judge_flag timelapse_record_flag\nM622 J1\nG1 X5\nG91\nM623");
@@ -140,7 +140,8 @@ TEST(UnknownCommand, IsTakenToMoveNothing) {
   }
 }
 
-// kinematics/extruder.py, _set_pressure_advance: from none to some is another smoothing time.
+// kinematics/extruder.py, _set_pressure_advance: a change from none to some changes the smoothing
+// time.
 TEST(PressureAdvance, OfAnotherExtruderMayStop) {
   Session session;
   EXPECT_EQ(session.read("SET_PRESSURE_ADVANCE ADVANCE=.05").kind, EventKind::barrier);

@@ -106,7 +106,7 @@ TEST(Coordinates, StayUnknownThroughRelativeMoves) {
   EXPECT_THAT(session.state().known, ElementsAre(false, false, false, true));
 }
 
-// Kiri:Moto begins so. Where on the bed that is does not matter.
+// Kiri:Moto's prints begin so. The place on the bed does not matter.
 TEST(Coordinates, AreToldFromAZeroThatIsSetAtAnUnknownPlace) {
   Session session;
   EXPECT_EQ(session.read("G28\nG92 X0 Y0 Z0").kind, EventKind::barrier);
@@ -140,7 +140,7 @@ TEST(Coordinates, MoveFromAnUnknownPlaceToTheSameReadingStops) {
   EXPECT_EQ(event.kind, EventKind::passive);
 }
 
-// Z is probed somewhere else, and X and Y are homed with Z lifted.
+// Homing one axis moves others: Z is probed at another place, and X and Y are homed with Z lifted.
 TEST(Coordinates, HomingAnyAxisForgetsAllAndKeepsTheirReadings) {
   Session session;
   Event event = session.read("G1 X1 Y2 Z3\nG28 X0");

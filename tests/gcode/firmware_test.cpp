@@ -120,7 +120,8 @@ TEST(FirmwareRetraction, MovesFilamentAndKeepsItsReading) {
   EXPECT_DOUBLE_EQ(next.feed_mm_s, 100.0) << "the modal speed stays";
 }
 
-// Where there is nothing to do a macro may have seen to it that there is.
+// G10 or G11 may seem to have nothing to do, but an earlier macro may have changed that. So the
+// machine counts as stopped.
 TEST(FirmwareRetraction, HappensOnceAndStopsAnyhow) {
   Session session(retracting());
   EXPECT_EQ(session.read("G11").kind, EventKind::barrier) << "nothing to undo";

@@ -18,7 +18,7 @@ class Session {
  public:
   explicit Session(InterpreterOptions options = {}) : interpreter_(options) {}
 
-  // The event of the last of the lines.
+  // Reads the lines and returns the event of the last one.
   Event read(const std::string& lines) {
     std::istringstream text(lines);
     Event event;
@@ -33,7 +33,7 @@ class Session {
     return event;
   }
 
-  // The only segment of the last of the lines.
+  // Reads the lines and returns the only segment of the last one.
   Segment move(const std::string& lines) {
     const Event event = read(lines);
     EXPECT_EQ(event.kind, EventKind::move) << lines;
@@ -59,7 +59,7 @@ inline std::string file_text(const std::string& path) {
   return text.str();
 }
 
-// Rows of numbers, the heading left out.
+// The rows of numbers of a table, without the heading.
 inline std::vector<std::vector<double>> csv_rows(const std::string& path) {
   std::istringstream text(file_text(path));
   std::vector<std::vector<double>> rows;

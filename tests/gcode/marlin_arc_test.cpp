@@ -20,7 +20,8 @@ InterpreterOptions marlin() { return default_options(Firmware::marlin); }
 
 TEST(MarlinArc, HasPiecesOfAtMostOneMillimetre) {
   Session session(marlin());
-  // A quarter of 20 mm: 31.4 mm; 31 pieces would be longer than 1 mm, so 32. The least were 18.
+  // A quarter of 20 mm: 31.4 mm; 31 pieces would be longer than 1 mm, so 32. At least 18 are
+  // needed.
   const Event event = session.read("G90\nM83\nG1 X20 Y0 Z1 F1200\nG3 X0 Y20 I-20 J0 E3.1 Z2");
   expect_arc(event, {0.0, 0.0, 20.0, pi / 2.0, 32, 2e-4});
   EXPECT_DOUBLE_EQ(event.segments[7].feed_mm_s, 20.0);
@@ -74,11 +75,11 @@ TEST(MarlinArc, TakesSegmentsPerSecondWhereConfigured) {
   InterpreterOptions options = marlin();
   options.marlin_arcs.segments_per_s = 50.0;
   Session session(options);
-  // 20 mm/s at 50 per second: 0.4 mm. Half of 20 mm: 62.83 mm, 157 pieces.
+  // 20 mm/s at 50 per second: 0.4 mm. A half circle of 20 mm: 62.83 mm, 157 pieces.
   EXPECT_THAT(session.read("G1 X20 Y0 Z0 F1200\nG3 X-20 Y0 I-20").segments, SizeIs(157));
   // M220 counts: 40 mm/s, 0.8 mm, 78 pieces.
   EXPECT_THAT(session.read("M220 S200\nG3 X20 Y0 I20").segments, SizeIs(78));
-  // 200 mm/s would be 4 mm: no more than the longest.
+  // 200 mm/s would be 4 mm, which is cut to the longest length.
   EXPECT_THAT(session.read("G3 X-20 Y0 I-20 F6000").segments, SizeIs(63));
 }
 
@@ -100,7 +101,7 @@ TEST(MarlinArc, MakesFullCirclesFirstWhereItReadsThem) {
   Session session(options);
   const Event event = session.read("M83\nG1 X10 Y0 Z0\nG3 X0 Y10 I-10 P2 Z4.5 E9");
   ASSERT_THAT(event.segments, SizeIs(2 * 72 + 18));
-  // 900° in all, a circle is 2/5 of it.
+  // The arc has 900°, of which a circle is 2/5.
   const Position& once = event.segments[71].end_mm;
   EXPECT_NEAR(once[X], 10.0, 1e-9);
   EXPECT_NEAR(once[Y], 0.0, 1e-9);
@@ -135,8 +136,8 @@ TEST(MarlinArc, ThatMarlinMayReadOtherwiseIsNotRewritten) {
   }
 }
 
-// With the default lengths ⌊ℓ⌋ pieces are always too long, so that n = ⌈ℓ / 1 mm⌉ unless the least
-// number per circle is more; and ⌊ℓ / 0.1 mm⌋ where those are too short.
+// With the default lengths ⌊ℓ⌋ pieces are always too long, so n = ⌈ℓ / 1 mm⌉, or the least number
+// per circle if that is more. If these pieces are too short, n = ⌊ℓ / 0.1 mm⌋.
 double pieces(double radius, double angle) {
   const double flat = radius * angle;
   const double least = std::ceil(72.0 * angle / (2.0 * pi));

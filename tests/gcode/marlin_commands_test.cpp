@@ -1,4 +1,4 @@
-// Which commands stop a Marlin, which lose it, and which it does not mind.
+// Which commands stop a machine with Marlin, which lose its position, and which do neither.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -148,7 +148,7 @@ TEST(MarlinRetraction, IsUnknownToMostMarlins) {
   EXPECT_FALSE(session.state().retracted);
 }
 
-// Found by fuzzing.
+// Fuzzing found this case.
 TEST(MarlinRetraction, WithoutASpeedGoesAsFastAsTheMoveBefore) {
   Session session = retracting();
   session.read("G1 X1 Y1 Z1 E10 F1200\nM220 S200\nM207 S2 F0");

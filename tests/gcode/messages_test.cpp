@@ -1,5 +1,5 @@
-// What the user is told of lines that are wrong, or mean what a printer may not do: every message
-// of the interpreter, by the line that brings it.
+// Every message of the interpreter about lines that are wrong or that a printer may not follow,
+// with a line that causes it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,8 +15,8 @@ using ::testing::ElementsAre;
 
 struct Told {
   Firmware firmware;
-  std::string lines;    // the message is of the last
-  std::string message;  // the whole
+  std::string lines;    // the last one causes the message
+  std::string message;  // the whole message
 };
 
 const std::string kPassed = ": passed through unchanged; check the line";

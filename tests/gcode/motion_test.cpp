@@ -1,4 +1,4 @@
-// G0 to G3, and what stands in a motion line beside its coordinates.
+// G0 to G3, and the other words of a motion line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -100,7 +100,8 @@ TEST(Moves, IgnoreWordsOfOtherAxes) {
   EXPECT_THAT(session.move("G1 X1 H5 D S2 P").end_mm, ElementsAre(1, 0, 0, 0));
 }
 
-// Every piece starts where the one before ended, on the circle, and the last ends at the target.
+// Expects every piece to start on the circle where the previous one ended, and the last one to end
+// at the target.
 void expect_on_circle(const Event& event, double centre_x, double centre_y, double radius) {
   for (std::size_t i = 0; i < event.segments.size(); ++i) {
     const Position& end = event.segments[i].end_mm;

@@ -24,14 +24,14 @@ struct DialectModel {
   double feed = 0.0;  // mm/s
   double speed = 1.0;
   double flow = 1.0;
-  double area = 1.0;  // of the filament where E is a volume
+  double area = 1.0;  // cross section of the filament, if E is a volume
   bool retracted = false;
   double hop = 0.0;
 
   [[nodiscard]] bool is_marlin() const { return firmware == Firmware::marlin; }
 };
 
-// Writes one line after the other; the model follows.
+// Writes line by line; the model follows.
 class DialectWriter {
  public:
   static constexpr double kLength_mm = 1.5;
@@ -80,7 +80,7 @@ class DialectWriter {
     return static_cast<double>(std::uniform_int_distribution<int>(-99999, 99999)(random_)) / 1000.0;
   }
 
-  // In Marlin the later of G90/G91 and M82/M83 counts for E, in RepRapFirmware only the latter.
+  // For E, Marlin uses the later one of G90/G91 and M82/M83. RepRapFirmware uses only M82/M83.
   std::string distance_mode() {
     model_.relative = pick(2) == 0;
     if (model_.is_marlin()) {
@@ -136,7 +136,7 @@ class DialectWriter {
         const double value = number();
         const bool relative = axis == E ? model_.e_relative : model_.relative;
         delta[axis] = relative ? value : value - model_.reading[axis];
-        // RepRapFirmware leaves the reading of E out of it.
+        // In RepRapFirmware relative moves do not change the reading of E.
         model_.reading[axis] += relative && axis == E && !model_.is_marlin() ? 0.0 : delta[axis];
         axes = axes || axis != E;
         line += fmt::format(" {}{}", "XYZE"[axis], value);
@@ -147,7 +147,7 @@ class DialectWriter {
       line += fmt::format(" F{}", feed);
       model_.feed = feed / 60.0;
     }
-    // RepRapFirmware leaves moves of E alone as they are.
+    // RepRapFirmware does not scale moves of E alone.
     scaled_ = model_.is_marlin() || axes;
     for (const Axis axis : {X, Y, Z}) {
       model_.machine[axis] += delta[axis];

@@ -1,4 +1,4 @@
-// Random programs against a model that thinks the other way round: it tracks the readings of the
+// Random programs against a model that works the other way round: it tracks the readings of the
 // axes and the machine side by side, and never a base position.
 #include <fmt/core.h>
 #include <gtest/gtest.h>

@@ -29,11 +29,11 @@ TEST(RrfArc, HasPiecesThatStrayFiveMicrometres) {
 
 TEST(RrfArc, HasTwoHundredPiecesASecondWhereItIsSlow) {
   Session session(rrf());
-  // 20 mm/s: 0.1 mm; a half of 10 mm is 31.416 mm: ⌊314.16 + 0.8⌋ = 314.
+  // 20 mm/s: 0.1 mm; a half circle of 10 mm is 31.416 mm: ⌊314.16 + 0.8⌋ = 314.
   expect_arc(session.read("G1 X10 Y0 Z0 F1200\nG2 X-10 Y0 I-10"), {0.0, 0.0, 10.0, -pi, 314});
   // M220 makes it 40 mm/s: 0.2 mm, ⌊157.08 + 0.8⌋.
   EXPECT_THAT(session.read("M220 S200\nG2 X10 Y0 I10").segments, SizeIs(157));
-  // 1 mm/s would be 5 µm: no less than 0.02 mm. ⌊1570.8 + 0.8⌋.
+  // 1 mm/s would be 5 µm, but a piece is at least 0.02 mm: ⌊1570.8 + 0.8⌋.
   EXPECT_THAT(session.read("M220 S100\nG2 X-10 Y0 I-10 F60").segments, SizeIs(1571));
 }
 

@@ -1,4 +1,4 @@
-// Which commands stop a RepRapFirmware, which lose it, and which it does not mind.
+// Which commands stop a machine with RepRapFirmware, which lose its position, and which do neither.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

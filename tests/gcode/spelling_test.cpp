@@ -1,4 +1,4 @@
-// Lines that are written so that printers do not take them alike.
+// Lines whose spelling makes printers read them differently.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -61,7 +61,8 @@ TEST(Spelling, IsNoMatterWhereThePrinterReadsItAsItIsMeant) {
   }
 }
 
-// A Marlin with PAREN_COMMENTS reads it, and a RepRapFirmware that runs a CNC machine.
+// A Marlin with PAREN_COMMENTS takes parentheses as comments, and so does a RepRapFirmware that
+// runs a CNC machine.
 TEST(Spelling, LeavesModesUncertainThatMayHaveBeenSet) {
   for (const auto& [firmware, line] :
        {std::pair{Firmware::marlin, "(a) G91"}, std::pair{Firmware::rrf, "(a) G91"},

@@ -1,4 +1,4 @@
-// Which lines are told of as unknown.
+// Which lines are reported as unknown.
 #include "unflex/gcode/unknown_command.hpp"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ TEST(UnknownCommands, AreNotThoseThatMoveTheMachineInAKnownWay) {
   EXPECT_EQ(unknown(Firmware::rrf, "if state.upTime > 3"), "");
 }
 
-// Their warning says more.
+// These lines have a warning of their own, which says more.
 TEST(UnknownCommands, AreNotLinesThatAreWarnedOf) {
   EXPECT_EQ(unknown(Firmware::klipper, "Hello, world"), "");
   EXPECT_EQ(unknown(Firmware::klipper, "G1 X3 ?"), "");

@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::SizeIs;
 
-// What an accelerometer sees of a move that ends after 0.4 s.
+// The record of an accelerometer for a move that ends after 0.4 s.
 Recording stop_of_a_move(double mode_hz, double damping_ratio, double noise) {
   const SimulatedTest test{.mode_hz = mode_hz, .damping_ratio = damping_ratio, .rate_hz = 1344.0};
   const std::vector<Pulse> move = {{0.05, 3000.0}, {0.35, 0.0}, {0.4, -3000.0}, {0.9, 0.0}};

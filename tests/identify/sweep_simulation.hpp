@@ -19,7 +19,7 @@ struct SimulatedTest {
   double hz_per_s = 1.0;
   double sweeping_accel = 400.0;  // the slow to and fro of newer Klippers; 0 for older
   double sweeping_period_s = 1.2;
-  double noise_share = 0.1;  // standard deviation, of the response's peak
+  double noise_share = 0.1;  // standard deviation, as a share of the response's peak
   double offset = 250.0;     // gravity on a chip that is not level
   std::uint32_t seed = 1;
 };
@@ -45,7 +45,7 @@ inline std::vector<Pulse> vibration(const SimulatedTest& test) {
   return pulses;
 }
 
-// With the slow square wave added, whose first two stretches are shorter.
+// The pulses with the slow square wave added, whose first two stretches are shorter.
 inline std::vector<Pulse> with_sweeping(const SimulatedTest& test,
                                         const std::vector<Pulse>& pulses) {
   if (test.sweeping_accel == 0.0) {
@@ -68,8 +68,8 @@ inline std::vector<Pulse> with_sweeping(const SimulatedTest& test,
   return result;
 }
 
-// The stretch q = b − p of the belt under the base's acceleration u: q̈ = u − 2ζω q̇ − ω² q; what
-// the nozzle is accelerated by is 2ζω q̇ + ω² q. Exact while u is constant.
+// The stretch q = b − p of the belt under the base's acceleration u: q̈ = u − 2ζω q̇ − ω² q; the
+// nozzle's acceleration is 2ζω q̇ + ω² q. Exact while u is constant.
 class Belt {
  public:
   Belt(double mode_hz, double damping_ratio)
@@ -97,7 +97,7 @@ class Belt {
   double v_ = 0.0;
 };
 
-// The nozzle's acceleration at the samples' times, half a second of rest on either side.
+// The nozzle's acceleration at the samples' times, with half a second of rest before and after.
 inline std::vector<double> response(const SimulatedTest& test, const std::vector<Pulse>& pulses,
                                     double shift_s) {
   constexpr double kRest_s = 0.5;

@@ -1,4 +1,4 @@
-// Modes come back from sweeps as Klipper makes them, with intervals that mean what they say.
+// Modes are found again in simulated sweeps of Klipper, and their confidence intervals are right.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// UNFLEX_IDENTIFY_DRAWS=200 is what docs/identify.md tells of.
+// docs/identify.md reports UNFLEX_IDENTIFY_DRAWS=200.
 int number_of_draws() {
   constexpr int kDefault = 40;
   const char* const wanted = std::getenv("UNFLEX_IDENTIFY_DRAWS");
@@ -62,7 +62,7 @@ TEST(RecordedSweep, TellsFrequencyAndDampingWithHonestIntervals) {
   EXPECT_GE(close_damping, 0.95 * draws);
   EXPECT_GE(held_freq, 0.9 * draws);
   EXPECT_GE(held_damping, 0.9 * draws);
-  if (draws >= 200) {  // of fewer, all may well hold
+  if (draws >= 200) {  // with fewer draws all intervals may well hold
     EXPECT_LE(held_freq, 0.99 * draws);
     EXPECT_LE(held_damping, 0.99 * draws);
   }

@@ -1,4 +1,4 @@
-// Power spectral density as klippy/extras/shaper_calibrate.py has it: Welch's method, Kaiser
+// Power spectral density as klippy/extras/shaper_calibrate.py computes it: Welch's method, Kaiser
 // windows of half a second and more, half overlapping.
 #pragma once
 

@@ -16,7 +16,7 @@ struct Mistake {
   std::string name;
   std::string text;
   std::vector<std::string> overrides;
-  std::string message;  // the whole of it
+  std::string message;  // the whole message
 };
 
 void PrintTo(const Mistake& mistake, std::ostream* out) { *out << mistake.name; }
@@ -300,7 +300,7 @@ TEST(DirectoryAsFile, IsAUsageError) {
   EXPECT_THAT(to_string(settings.error()), HasSubstr("is a directory"));
 }
 
-// Opens, and fails to be read.
+// The file can be opened, but not read.
 TEST(UnreadableFile, IsAUsageError) {
   const Result<Settings> settings = load("/proc/self/mem", {});
   ASSERT_FALSE(settings.has_value());

@@ -1,4 +1,4 @@
-// A printer.cfg says all that is needed, as Klipper reads it.
+// A printer.cfg, read as Klipper reads it, gives all that is needed.
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-// The line test asks for the rates it says, within what the firmware can plan.
+// The line test has the line rates that it states, within what the firmware can plan.
 
 #include "unflex/machine/line_test.hpp"
 
@@ -30,7 +30,7 @@ std::string text_for(const std::string& printer) {
   return text.value_or("");
 }
 
-// What a stage's moves are, as they are written.
+// The moves of a stage as written.
 struct Stage {
   double label_lines_per_s = 0.0;
   double label_s = 0.0;
@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(
                       "[printer]\nfirmware = \"marlin\"\n[limits]\nmax_accel_mm_s2 = 3000\n",
                       "[printer]\nfirmware = \"rrf\"\ntransport = \"sbc\"\n"));
 
-// Marlin joins shorter ones to the next, and plans 16 ahead.
+// Marlin joins shorter lines to the next one, and plans 16 ahead.
 TEST(LineTest, KeepsMarlinsLinesLongEnough) {
   const Settings settings =
       read("[printer]\nfirmware = \"marlin\"\n[limits]\nmax_accel_mm_s2 = 500\n");

@@ -1,4 +1,4 @@
-// What a printer file says arrives, and what it does not say follows from the rest.
+// The settings have what the printer file says, and the rest follows from that.
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ Settings read(std::string_view text, const std::vector<std::string>& overrides =
   return settings.value_or(Settings{});
 }
 
-// Found by fuzzing: it was written as -0 and read again as 0.
+// Fuzzing found this: −0 was written as -0 and read again as 0.
 TEST(Settings, HoldNoZeroWithASign) {
   const Result<Settings> settings =
       parse("[printer]\nunretract_extra_length_mm = -0.0\n", "printer.toml", {});
@@ -156,7 +156,7 @@ TEST(Overrides, MayNameTheSchema) {
   EXPECT_FALSE(parse("", "printer.toml", {"schema_version=2"}));
 }
 
-// Whoever types the bound a message names is not refused again.
+// A user who types the bound that a message names must not be refused again.
 TEST(Bounds, ThatMessagesNameAreAccepted) {
   for (double freq_hz = 20.0; freq_hz < 300.0; freq_hz *= 1.003) {
     const std::string dynamics =
@@ -242,7 +242,7 @@ TEST(ShaperFrequency, IsOneForBothAxesOfRepRapFirmware) {
   EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 41.0);
 }
 
-// Each firmware's own, which is what its switch means where no type is named.
+// The default is the firmware's own type, which it uses if a command names none.
 TEST(ShaperType, IsTheFirmwaresDefaultUnlessNamed) {
   EXPECT_EQ(read("").shaper_type_x(), "mzv");
   EXPECT_EQ(read("", {"printer.firmware=marlin"}).shaper_type_x(), "zv");

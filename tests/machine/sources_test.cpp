@@ -1,4 +1,4 @@
-// Marlin's M503, RepRapFirmware's config.g and slicers say what they know, in their order.
+// Settings from Marlin's M503, RepRapFirmware's config.g and slicers, and which of them wins.
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -82,7 +82,7 @@ TEST(MarlinDump, IsRead) {
   EXPECT_THAT(s.notes, IsEmpty());
 }
 
-// M503 S0 writes no echo; M906 and M569 are both firmwares'.
+// M503 S0 writes no echo. M906 and M569 exist in both firmwares.
 TEST(MarlinDump, WithoutEchoesIsKnownByItsWords) {
   const Settings s = read(
       "M149 C\nM92 X80 Y80 Z400 E93\nM203 X500 Y500 Z12 E120\nM201 X1000 Y900\n"
@@ -146,7 +146,7 @@ TEST(RrfConfig, IsRead) {
   EXPECT_THAT(s.notes, IsEmpty());
 }
 
-// Speeds are in mm/min, sixty times what they would be to Marlin.
+// RepRapFirmware's speeds are in mm/min, so the numbers are sixty times those of Marlin.
 TEST(RrfConfig, OfSpeedsAloneIsKnownByItsWords) {
   for (const std::string text :
        {"M566 X900 Y900\nM203 X12000 Y12000\nM201 X1000 Y1000\n",
@@ -158,7 +158,7 @@ TEST(RrfConfig, OfSpeedsAloneIsKnownByItsWords) {
   }
 }
 
-// What cannot be evaluated is for the user to say.
+// Expressions cannot be evaluated, so the user has to give the values.
 TEST(RrfConfig, WithExpressionsAsksForTheirKeys) {
   const std::string text =
       "M550 P\"x\"\nM566 X{global.jerk} Y900\nM201 X3000 Y3000\nM593 P\"zvd\" F40\n";
@@ -338,7 +338,7 @@ TEST(Slicers, TellAKlippersLimitsAtTheHead) {
   EXPECT_DOUBLE_EQ(s.axis_max_accel_mm_s2()[2], 12000.0);
 }
 
-// A tool slower than the slicer thinks takes Z along.
+// If the tool is slower than the slicer believes, Z is slower as well.
 TEST(Slicers, TellAZThatIsNotFasterThanTheTool) {
   const PrintText print =
       print_of("",
@@ -405,7 +405,7 @@ TEST(Slicers, NameTheFlavorAloneInCura) {
   EXPECT_EQ(to_string(odd.notes[0]),
             "print.gcode:1: warning: unflex does not know G-code of the flavor 'Makerbot'; say "
             "what runs it with --set printer.firmware=...");
-  // Whoever does as told is not told again.
+  // A user who follows the advice does not get it again.
   const std::vector<std::string> said = {"printer.firmware=marlin"};
   EXPECT_THAT(sliced(print, said).notes, IsEmpty());
   const Result<Settings> to_run = load({.print = &print, .printer_file = {}, .overrides = said});
@@ -491,7 +491,7 @@ TEST(ToToml, OfEverySourceReadsBackAsTheSameSettings) {
 
 TEST(ToToml, ReadsBackWhateverTheFileIsCalled) {
   const std::string text = "[limits]\nmax_accel_mm_s2 = 1234\n";
-  // Bytes that are no UTF-8: stray, cut off, longer than need be, a surrogate, too large.
+  // Invalid UTF-8: a stray byte, cut off, overlong, a surrogate, too large.
   for (const auto& [name, shown] :
        {std::pair{"a\xff.toml", "a?.toml"}, std::pair{"a\xc3", "a?"}, std::pair{"\xe2\x82", "??"},
         std::pair{"\xc0\xaf.toml", "??.toml"}, std::pair{"\xe0\x80\x80", "???"},

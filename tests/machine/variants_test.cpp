@@ -1,4 +1,4 @@
-// Firmware in the field: each is recognised, and supported or refused with the way out.
+// Variants of firmware: each is recognised, and either supported or refused with advice.
 
 #include <gmock/gmock.h>
 
@@ -94,7 +94,7 @@ TEST(Kalico, IsRefusedWithLimitedKinematics) {
   EXPECT_THAT(refusal(s), HasSubstr("printer:2: warning: Kalico's limited_* kinematics"));
   EXPECT_THAT(refusal(s), HasSubstr("set kinematics in printer.cfg without limited_"));
   EXPECT_THAT(notes(s), Not(HasSubstr("does not know kinematics")));
-  // What is written of it says the same.
+  // The settings stay the same when written and read again.
   const Settings again = read(to_toml(s));
   EXPECT_THAT(refusal(again), HasSubstr("Kalico's limited_* kinematics"));
 }
@@ -164,7 +164,7 @@ TEST(FixedTimeMotion, IsRefusedUntilItIsOff) {
   EXPECT_THAT(refusal(s), HasSubstr("write M493 S0 into the start code"));
 }
 
-// What the print says comes after what the printer has stored.
+// The print's start code wins over what the printer has stored.
 TEST(FixedTimeMotion, GoesByTheStartCode) {
   const std::vector<std::string> is_on = {"printer.firmware=\"marlin\"", "printer.ft_motion=true"};
   const std::vector<std::string> is_off = {"printer.firmware=\"marlin\""};

@@ -17,7 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-// A small program with dense derivatives, written down in place.
+// A small program with dense derivatives, given by functions.
 struct Functions {
   std::function<double(std::span<const double>)> f;
   std::function<void(std::span<const double>, std::span<double>)> gradient;
@@ -50,7 +50,7 @@ class SmallProblem : public Problem {
     }
   }
 
-  // Says that the constraints are linear and the objective quadratic.
+  // Declares that the constraints are linear and the objective is quadratic.
   void declare_constant() { constant_ = true; }
   int jacobian_calls() const { return jacobian_calls_; }
   int hessian_calls() const { return hessian_calls_; }
@@ -220,7 +220,7 @@ TEST(Ipopt, SolvesHockAndSchittkowskis71) {
 }
 
 TEST(Ipopt, KeepsAFixedVariableExactly) {
-  // x₁ = 1 is where the free optimum has it; x₁ = 1.2 costs more.
+  // The free optimum has x₁ = 1; x₁ = 1.2 costs more.
   for (const double fixed : {1.0, 1.2}) {
     const SmallProblem problem({{fixed, 1.0, 1.0, 1.0}, {fixed, 5.0, 5.0, 5.0}}, kHs071Constraints,
                                {3.0, 4.0, 4.0, 2.0}, hs071_functions());

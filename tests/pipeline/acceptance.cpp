@@ -20,17 +20,18 @@ namespace {
 using unflex::testing::Printer;
 using unflex::testing::TextMachine;
 
-// What one line of output may add: half a step of E in rounding, and noise of summing.
+// Filament error that one output line may add: half a step of E in rounding, and noise of summing.
 constexpr double kFilamentStepMm = 1e-5 + 1e-8;
-// Filament follows the nozzle, which passes from move to move when the plan does but for some tens
-// of micrometres; and where Klipper would brake for a jump of the flow, it is spread over lines.
+// Filament follows the nozzle. The nozzle passes from move to move when the plan does, within some
+// tens of micrometres. Where Klipper would brake for a jump of the flow, the jump is spread over
+// lines.
 constexpr double kFilamentOfNozzleMm = 5e-3;
-// A line between two moves may be put where the nearest line of output begins, half of the shortest
-// line away; the base is ahead of the path by what bends the machine.
+// A line between two moves may be put where the nearest output line begins, which is up to half of
+// the shortest line away. Besides, the base is ahead of the path by what bends the machine.
 constexpr double kPlaceMm = 0.6;
 constexpr double kPlaceFilamentMm = 0.02;
 
-// G0 to G3 with a word for X, Y, Z or E, told by the letters alone.
+// Whether the line is G0 to G3 with a word for X, Y, Z or E, by its letters alone.
 bool is_motion(std::string_view line) {
   std::string code;
   bool in_parentheses = false;
@@ -53,7 +54,7 @@ bool is_motion(std::string_view line) {
          code.find_first_of("XYZE", number_end) != std::string::npos;
 }
 
-// A line that unflex adds to raise, restore and put right.
+// A line that unflex adds to raise and restore limits and to correct modes and coordinates.
 bool is_own(std::string_view line) {
   constexpr std::array<std::string_view, 10> kBeginnings = {";unflex",
                                                             "SET_VELOCITY_LIMIT ",
@@ -69,7 +70,7 @@ bool is_own(std::string_view line) {
                              [&](std::string_view start) { return line.starts_with(start); });
 }
 
-// A line that is no motion, and where the machine was when it came.
+// A line without motion, and where the machine was when it came.
 struct Standing {
   std::string text;
   std::array<double, 3> at_mm{};
@@ -98,7 +99,7 @@ void expect_same_place(const Standing& in, const Standing& out) {
   EXPECT_NEAR(out.filament_mm, in.filament_mm, kPlaceFilamentMm) << in.text;
 }
 
-// The line without what it says of durations, which follow the emitted print time.
+// The line without its duration, which follows the emitted print time.
 std::string but_for_durations(const std::string& line) {
   if (line.starts_with(";TIME")) {
     return line.substr(0, line.find(':'));
@@ -146,9 +147,8 @@ void expect_true_path(const report::Report& report, double improvement) {
       << "from " << before.contour_rms_mm;
 }
 
-// Every line of the input that is no motion stands in the output, byte for byte, in order, and at
-// the same place along the path; whatever else the output holds is motion or a line of unflex's
-// own.
+// Every line of the input without motion stands in the output, byte for byte, in order, and at its
+// place along the path. Any other output line is motion or a line of unflex's own.
 void expect_lines_kept(const std::string& input, const std::string& output,
                        const Printer& printer) {
   const std::vector<Standing> in = standing_lines(input, printer);

@@ -1,4 +1,4 @@
-// What must hold of a compensated print.
+// Checks that every compensated print must pass.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@ namespace unflex::pipeline::testing {
 
 struct Expectation {
   unsigned workers = 1;
-  // At least this many times less contour error (RMS while extruding) than before.
+  // The contour error (RMS while extruding) must shrink at least by this factor.
   double improvement = 1.0;
 };
 

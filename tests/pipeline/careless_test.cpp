@@ -1,4 +1,4 @@
-// Files as people write them, for the firmwares whose own rules decide what such files mean.
+// Carelessly written files, whose meaning the rules of each firmware decide.
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ constexpr const char* kStart = "G28\nG90\nM83\nG1 X100 Y100 Z0.2 F6000\n";
 struct File {
   std::string name;
   std::string text;
-  // Filament of the whole file, reckoned by hand, mm: Marlin's and RepRapFirmware's.
+  // Filament of the whole file in Marlin and in RepRapFirmware, computed by hand, mm.
   double marlin_mm = 0.0;
   double rrf_mm = 0.0;
 };
@@ -91,7 +91,7 @@ INSTANTIATE_TEST_SUITE_P(
         File{"NumbersAndChecksums", numbered(kCorner), 0.6, 0.6},
         File{"Comments", kCorner + "(wall)\nG1 X104 E.2 ;(a) *5\nG1 Y104 E.2\n", 1.0, 1.0},
         File{"NoSpaces", std::string(kStart) + "G1E.2X104F3600\nG1 X 100 Y 104 E .2\n", 0.4, 0.4},
-        // In Marlin G90 and G91 are E's modes too.
+        // In Marlin G90 and G91 also set the mode of E.
         File{"RelativeMoves",
              std::string(kStart) + "G91\nG1 X4 E.2 F3600\nG1 Y4 E.2\nG90\nM83\nG1 X100 E.2\n", 0.6,
              0.6},
@@ -137,8 +137,8 @@ INSTANTIATE_TEST_SUITE_P(
              0.4, 0.4}),
     [](const auto& tested) { return tested.param.name; });
 
-// Marlin leaves a move of fewer than six steps to the next one. Alone between two of filament it is
-// no run.
+// Marlin adds a move of fewer than six steps to the next move. Such a move, alone between two moves
+// of filament, is therefore no run.
 TEST(MarlinRun, NeedsAMoveThatMarlinTakes) {
   const report::Report report =
       compensated(kCorner + "G1 E-1 F1800\nG1 X100.057\nG1 E1 F1800\nG1 X104 E.2\n",

@@ -58,12 +58,12 @@ bool is_bad(const compensate::AxisWindow& window) {
   return window.reference_mm.front() > kFirstBad;
 }
 
-// Solves as usual where the island is good.
+// The solver for good islands.
 Result<compensate::AxisSolution> solve_properly(const compensate::AxisWindow& window) {
   return compensate::make_ipopt_engine()->solve(window);
 }
 
-// As planned, and shaken by 50 µm with this period.
+// The plan as solution, shaken by 50 µm with this period.
 compensate::AxisSolution shaken(const compensate::AxisWindow& window, double period_nodes) {
   compensate::AxisSolution solution = testing::plain_solution(window);
   const auto last = static_cast<double>(window.nodes() - 1);
@@ -89,7 +89,7 @@ TEST_P(Fallback, KeepsTheMovesOfTheRunsThatFailedAndSaysWhich) {
   const Result<report::Report> report = run(folder, GetParam().solve);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-  // Islands at 165 and 160, and the travel from either.
+  // The islands at 165 and 160, and one travel from each.
   EXPECT_EQ(report->runs_fallback, 4U) << testing::complaints(*report);
   EXPECT_EQ(report->runs_total, report->runs_compensated + report->runs_fallback);
   EXPECT_EQ(report->windows_total, report->windows_solved + report->windows_fallback);
@@ -106,7 +106,7 @@ TEST_P(Fallback, KeepsTheMovesOfTheRunsThatFailedAndSaysWhich) {
   }
 }
 
-// The places that the lines of the report's fallbacks have in the input.
+// The report gives the lines of the input that make the run that was kept.
 TEST_P(Fallback, NamesTheLinesOfTheRun) {
   const std::string input = print_of({140, 165});
   const JobFolder folder(input);
@@ -178,7 +178,7 @@ TEST(Compensate, LeavesAFileAloneWhereNothingCanBeSolved) {
 
 class Texts : public ::testing::Test {
  protected:
-  // The text compensated as the program does it.
+  // The output of compensate() for this text.
   std::string compensated(const std::string& input, unsigned workers = 1,
                           const std::vector<std::string>& overrides = {}) {
     const JobFolder folder(input, overrides);
@@ -195,7 +195,7 @@ class Texts : public ::testing::Test {
     return folder.output();
   }
 
-  std::size_t fallbacks_ = 0;  // expected
+  std::size_t fallbacks_ = 0;  // expected number
   report::Report report_;
 };
 
@@ -241,12 +241,12 @@ TEST_F(Texts, EndProperlyWhereTheInputHasNoLastLineEnding) {
   const std::string warm = "G90\nM83\nG1 X0 Y0 Z0.2 F6000\nG1 X10 Y0 E1\nG4 P1\nM104 S0";
   EXPECT_THAT(compensated(warm),
               EndsWith("\nM104 S0\nSET_INPUT_SHAPER SHAPER_FREQ_X=45 SHAPER_FREQ_Y=45\n"));
-  // The last line as part of a run.
+  // Here the last line is part of a run.
   const std::string moving = "G90\nM83\nG1 X0 Y0 Z0.2 F6000\nG1 X10 Y0 E1\nG1 X10 Y10 E1";
   EXPECT_THAT(compensated(moving), EndsWith("\n"));
 }
 
-// Inside a run the base is not where such a line says, and E may be in the other mode.
+// Inside a run the base is not at the place such a line names, and E may be in the other mode.
 TEST_F(Texts, LeaveOutMovesWithoutLengthInsideARun) {
   const std::string output = compensated(
       "G90\nM82\nG92 E0\nG1 X100 Y100 Z0.4 F6000\nG4 P500\nG1 X120 Y100 E1\nG1 X120 Y120 E2\n"
@@ -267,7 +267,7 @@ TEST_F(Texts, EndARunExactlyWhereTheInputIs) {
   EXPECT_THAT(output, HasSubstr(" X134.590811296 Y119.150893041 "));
 }
 
-// Corners where the base all but stops while the plan goes on climbing.
+// The base almost stops at the corners while the plan goes on climbing.
 TEST_F(Texts, DrawASpiralOfSteepSmallTurns) {
   std::string input = "G90\nM83\nG1 X100 Y100 Z0.2 F6000\nG4 P500\nG1 F3600\n";
   for (int i = 1; i <= 24; ++i) {
@@ -339,7 +339,7 @@ TEST_F(Texts, StopForObjectLabelsAndSavedStates) {
                   "\nG1 X120 Y120 E2\nG1 X100 Y120 E3\nSAVE_GCODE_STATE NAME=a\nG1 X100 Y100 E4\n"
                   "G1 X110 Y100 E5\nRESTORE_GCODE_STATE NAME=a\nG1 X100 Y110 E6\n");
   EXPECT_EQ(report_.violation_count, 0U);
-  // Limits are back before the label, and the first move after it goes as it was sliced.
+  // The limits are restored before the label, and the first move after it is as sliced.
   EXPECT_THAT(output, HasSubstr(label + "\nG1 X120 Y120 E2\n"));
   EXPECT_LT(output.rfind("ACCEL=5000", output.find(label)), output.find(label));
   EXPECT_GT(output.rfind("ACCEL=5000", output.find(label)),
@@ -422,7 +422,7 @@ TEST_F(Texts, AreVerifiedWithTheSameFiguresAgain) {
   EXPECT_EQ(verified->violation_count, 0U);
 }
 
-// Remembers what it was told, and asks for the end once that is more than allowed.
+// Remembers the reported progress, and cancels once it exceeds `until`.
 class Listener final : public Progress {
  public:
   explicit Listener(double until = 2.0) : until_(until) {}
@@ -451,7 +451,7 @@ TEST(Compensate, TellsItsProgressFromNothingToAll) {
   EXPECT_LE(progress.fractions.back(), 1.0);
 }
 
-// However little there is to do: what is waited for has a patience of 0.1 s.
+// Compensating a tiny print must be quick: every wait for a thread may last up to 0.1 s.
 TEST(Compensate, WaitsForNothingOnceAllIsWritten) {
   const JobFolder folder("G28\nG1 X10 Y10 F3000\n");
   Job job = folder.job();

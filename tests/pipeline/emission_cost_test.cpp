@@ -14,7 +14,7 @@ verify::NozzleModel model() {
   return {dynamics::from_frequency(45.0, 0.06), dynamics::from_frequency(30.0, 0.1), 1e-4, 0.5};
 }
 
-// From 0 at one speed, for longer than the base.
+// A move from 0 at constant speed, longer than the base.
 std::vector<planner::PlannedMove> move_at(double speed_mm_s, bool extruding,
                                           gcode::Axis axis = gcode::X) {
   planner::PlannedMove move;
@@ -55,7 +55,8 @@ TEST(EmissionCost, IsNothingAlongThePath) {
 TEST(EmissionCost, IsWhatTheDifferenceOfTheBasesMakesOfTheNozzleAcrossThePath) {
   EmissionCost cost;
   cost.add(move_at(50.0, true, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), {}, model());
-  // The model is linear: the nozzle is off by what a base at 1 mm/s makes of it.
+  // The bases differ by 1 mm/s. The model is linear, so the nozzle's error is the response to a
+  // base at 1 mm/s.
   double sum = 0.0;
   double largest = 0.0;
   for (std::size_t k = 1; k < kNodes; ++k) {
@@ -73,12 +74,12 @@ TEST(EmissionCost, CountsWhereFilamentIsLaid) {
   EmissionCost cost;
   cost.add(move_at(50.0, false, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), {}, model());
   EXPECT_EQ(cost.rms_mm(), 0.0);
-  // The first of two runs' samples and none of the second's.
+  // Only the samples of the first of two runs count.
   cost.add(move_at(50.0, true, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), {}, model());
   const double alone = cost.rms_mm();
   cost.add(move_at(50.0, false, gcode::Y), 0.0, base_at(50.0), move_at(55.0, true), {}, model());
   EXPECT_EQ(cost.rms_mm(), alone);
-  // A lead-in, in which nothing is laid yet, leaves out the first samples.
+  // Nothing is laid during a lead-in, so its samples, the first ones, do not count.
   EmissionCost late;
   late.add(move_at(50.0, true, gcode::Y), 0.1, base_at(50.0), move_at(51.0, true), {}, model());
   EXPECT_GT(late.rms_mm(), alone);

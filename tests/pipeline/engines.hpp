@@ -1,4 +1,4 @@
-// Solvers whose behaviour the window decides, for tests of what stands around them.
+// Engines for tests of the code around them; the window decides how they behave.
 #pragma once
 
 #include <sys/types.h>
@@ -36,7 +36,7 @@ inline std::function<std::unique_ptr<compensate::Engine>()> factory(Solve solve)
   return [solve = std::move(solve)] { return std::make_unique<TestEngine>(solve); };
 }
 
-// The base does what the plan says: a solution that is no improvement.
+// A solution that improves nothing: the base follows the plan.
 inline compensate::AxisSolution plain_solution(const compensate::AxisWindow& window) {
   const std::size_t n = window.nodes();
   const double h = window.period_s;

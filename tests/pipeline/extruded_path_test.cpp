@@ -1,4 +1,4 @@
-// How much of a print is compensated although it has commands that nobody knows.
+// How much of a print is compensated although it has unknown commands.
 #include "extruded_path.hpp"
 
 #include <fmt/core.h>
@@ -22,8 +22,8 @@ using testing::JobFolder;
 
 constexpr double kSide_mm = 30.0;
 
-// Squares, each behind a macro, with a code of another printer before two of its sides. Z is not
-// on any grid and is named once.
+// Squares, each after a macro, with a code of another printer before two of its sides. Z is named
+// only once and lies on no grid.
 std::string squares(int count) {
   std::string text = "G28\nG90\nM83\nG1 Z0.30004 F600\nG1 X40 Y40 F6000\n";
   for (int i = 0; i < count; ++i) {
@@ -64,7 +64,7 @@ TEST_P(OfAnyFirmware, AMacroCostsTheMoveBehindItAlone) {
   EXPECT_EQ(verified->violation_count, 0U) << testing::complaints(*verified);
 }
 
-// A macro may have gone to another height, which a Z from before it would undo.
+// A macro may have moved to another height. Writing a Z from before the macro would undo that.
 TEST_P(OfAnyFirmware, NoHeightIsWrittenThatNobodyKnows) {
   const JobFolder folder(squares(2), overrides());
   SilentProgress progress;

@@ -1,4 +1,4 @@
-// What a firmware's configuration decides is a key, and each key changes the plan.
+// Everything that a firmware's configuration decides is a key, and each key changes the plan.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 using testing::JobFolder;
 
-// A bit of everything that takes its time from a limit or a setting.
+// A program in which every limit and setting affects the duration of something.
 std::string everything() {
   std::string text =
       "G90\nM83\nG1 X100 Y100 Z0.2 F3000\n"
@@ -45,7 +45,7 @@ Inspection plan(const std::vector<std::string>& overrides) {
 struct Case {
   std::string firmware;
   std::string setting;
-  std::vector<std::string> others = {};  // in force with and without it
+  std::vector<std::string> others = {};  // in force both with and without `setting`
 };
 
 void PrintTo(const Case& tested, std::ostream* out) {
@@ -177,7 +177,7 @@ TEST(FirmwareKeys, BelowWhatRepRapFirmwareTakesAreWhatItMakesOfThem) {
   EXPECT_THAT(printed.text, ::testing::HasSubstr("M566 X900 Y900 E6 P0\n"));
 }
 
-// Klipper refuses the line; the result is checked by it, the plan does not know it.
+// Klipper refuses such a line. The plan does not know this limit, so verify checks it.
 TEST(FirmwareKeys, NameTheCrossSectionThatKlipperRefuses) {
   const auto bead = [](const char* filament) {
     return std::string("G90\nM83\nG1 X100 Y100 Z0.2 F600\nG4 P500\nG1 X101 Y100 E") + filament;

@@ -13,10 +13,10 @@ namespace unflex::pipeline::testing {
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
 void write_file(const std::filesystem::path& file, std::string_view text);
 
-// Settings with defaults but for the overrides "key=value".
+// Default settings with these overrides, "key=value".
 [[nodiscard]] machine::Settings settings(const std::vector<std::string>& overrides = {});
 
-// A directory that is gone with the object, holding one input and one output.
+// A directory with one input and one output, deleted with the object.
 class JobFolder {
  public:
   explicit JobFolder(std::string_view input, const std::vector<std::string>& overrides = {});
@@ -33,7 +33,7 @@ class JobFolder {
   machine::Settings settings_;
 };
 
-// What a report says of broken rules and of runs that kept their moves, one per line, for messages.
+// The violations and kept runs of a report, one per line, for messages.
 [[nodiscard]] std::string complaints(const report::Report& report);
 
 }  // namespace unflex::pipeline::testing

@@ -78,8 +78,8 @@ TEST(Judge, RejectsTheSamePathAtTheWrongTimeWhereNothingIsPrinted) {
       << *reason;
 }
 
-// In the middle of a run the nozzle goes on with the path, which is no swing: half a percent of
-// speed more at the part's end is nothing against the swing that it came with.
+// In the middle of a run the nozzle moves on with the path, and that motion is no swing. Here the
+// part ends half a percent too fast, which is little beside the swing at its start.
 TEST(Judge, TakesOnlyWhatIsOffThePlanAsSwingWhereAPartEnds) {
   Piece part = pieces_of("G90\nM83\nG1 X0 Y0 Z0.2 F6000\nG1 X10 E0.5\nG1 X20 E0.5\n")[1];
   part.after = {part.moves.back()};
@@ -110,18 +110,18 @@ TEST(Judge, RejectsMoreLinesPerSecondThanAllowed) {
   const std::optional<std::string> reason = Corner(false).objection_to(text, 100.0);
   ASSERT_TRUE(reason.has_value());
   EXPECT_TRUE(reason->ends_with(" lines per second are more than 100")) << *reason;
-  // The two sliced lines are more than this as well, and no others could be fewer.
+  // The two sliced lines exceed this limit as well, and no output could have fewer lines.
   EXPECT_EQ(Corner(false).objection_to("G1 X10\nG1 Y10\n", 1.0), std::nullopt);
 }
 
 TEST(Judge, ReplaysByTheLimitsInTheText) {
-  // The same lines, but the base creeps: the corner is late by far, and so is the nozzle.
+  // With such a low acceleration the base is far too late at the corner, and so is the nozzle.
   EXPECT_TRUE(
       Corner(false).objection_to("SET_VELOCITY_LIMIT ACCEL=100\nG1 X10\nG1 Y10\n").has_value());
 }
 
-// x of the nozzle after the base went from 0 to 10 mm by the plan of the moves, by quadrature of
-// the oscillator's impulse response g: p(T) = ∫ g(T − t) (2ζω ḃ + ω² b) dt.
+// x of the nozzle after the base went from 0 to 10 mm by the plan of the moves. Uses quadrature
+// with the oscillator's impulse response g: p(T) = ∫ g(T − t) (2ζω ḃ + ω² b) dt.
 double nozzle_by_convolution(const std::vector<planner::PlannedMove>& moves) {
   const dynamics::FlexibleAxis axis = rules().nozzle.x;
   const double damped = axis.omega_rad_s * std::sqrt(1.0 - axis.zeta * axis.zeta);
@@ -133,7 +133,7 @@ double nozzle_by_convolution(const std::vector<planner::PlannedMove>& moves) {
   for (const planner::PlannedMove& move : moves) {
     end += move.duration_s();
   }
-  const double start = 10.0;  // the nozzle hangs still at x = 10 before
+  const double start = 10.0;  // before, the nozzle rests at x = 10
   double origin = 0.0;
   constexpr int kSteps = 100000;
   for (const planner::PlannedMove& move : moves) {
@@ -203,7 +203,7 @@ TEST(NozzleFollower, HomingLetsTheNozzleComeToRest) {
   EXPECT_EQ(after.y.velocity, 0.0);
 }
 
-// A shaper that is tuned exactly leaves no swing, which is what it is for.
+// An exactly tuned shaper leaves no swing.
 TEST(NozzleFollower, AnExactShaperLeavesTheRunAfterItAtRest) {
   const std::string text =
       "G90\nM83\nG1 X10 Y10 Z1 F6000\nM400\nG1 X17.5 Y12 Z1.5\nM400\nG1 X20 E1\nG1 Y15 E1\n";
@@ -233,8 +233,8 @@ TEST(NozzleFollower, AnExactShaperLeavesTheRunAfterItAtRest) {
   EXPECT_GT(std::abs(before_run({}).x.velocity), 0.1) << "the case shows nothing";
 }
 
-// Ahead of what may move the machine by itself the shaper is on again, and the wipe behind it is
-// shaped; ahead of other lines it stays off.
+// Before a line that may move the machine by itself, the shaper is switched on again, and the wipe
+// after it is shaped. Before other lines the shaper stays off.
 TEST(NozzleFollower, TheShaperComesBackBeforeWhatMovesByItself) {
   gcode::Shaper shaper;
   shaper.freq_x_hz = shaper.freq_y_hz = 40.0;

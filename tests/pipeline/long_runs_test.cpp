@@ -1,4 +1,4 @@
-// Runs that are too long to be handled as a whole: spiral vases, mostly.
+// Runs that are too long to be handled as a whole, mostly spiral vases.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@ using testing::factory;
 using ::testing::HasSubstr;
 using testing::JobFolder;
 
-// Which the printer goes through without a stop, so that they cannot be compensated apart.
+// The printer does not stop between these runs, so neither can be compensated without the other.
 TEST(LongRuns, AreLeftWhereTheyMeetAtTooManyLinesWithoutMotion) {
   std::string text = "G28\nG90\nM83\nG1 X20 Y20 Z0.4 F6000\nG4 P0\nG1 X60 Y20 E1\n";
   for (int i = 0; i < 30'000; ++i) {
@@ -50,7 +50,7 @@ TEST(LongRuns, AreLeftWhereTheyMeetAtTooManyLinesWithoutMotion) {
   EXPECT_THAT(first, HasSubstr("; nothing\nG1 X90 Y25 E1\n"));
 }
 
-// A lobed spiral that rises and widens, without a stop, with lines that do not move in between.
+// A lobed spiral that rises and widens without a stop, with lines without motion in it.
 std::string spiral(double duration_s) {
   constexpr double kSpeed_mm_s = 40.0;
   constexpr double kStep_mm = 1.5;
@@ -147,10 +147,10 @@ TEST_P(LongRunOn, IsCompensatedWithoutASeam) {
   const auto& after = report->compensated.extruding;
   EXPECT_LT(after.contour_rms_mm, 0.25 * before.contour_rms_mm);
   EXPECT_LT(after.contour_max_mm, before.contour_max_mm);
-  // Klipper stops for 10.5 ms where its shaper goes off, and again where it comes back.
+  // Klipper stops for 10.5 ms when its shaper is switched off, and again when it is switched on.
   EXPECT_NEAR(report->emitted_time_s, report->reference_time_s, 0.03);
   EXPECT_NEAR(report->output_extrusion_mm, report->input_extrusion_mm, 1e-5);
-  // One run: its announcements, and nothing restored between its parts.
+  // One run: its marks come once, and nothing is restored between its parts.
   const std::string output = folder.output();
   const auto count = [&](std::string_view what) {
     std::size_t found = 0;
@@ -176,7 +176,7 @@ TEST(LongRun, IsTheSameForAnyNumberOfWorkers) {
   EXPECT_EQ(folder.output(), output);
 }
 
-// Solves what does not go further out than this.
+// Solves windows that stay within this position, and fails for others.
 testing::Solve up_to(double most_mm) {
   return [most_mm](const compensate::AxisWindow& window) -> Result<compensate::AxisSolution> {
     if (*std::ranges::max_element(window.reference_mm) > most_mm) {

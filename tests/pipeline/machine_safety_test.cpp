@@ -1,5 +1,5 @@
-// What the judge finds in an emitted file that someone, or a fault of unflex, has spoilt: every
-// rule broken once for every firmware, and edits by chance.
+// Violations that verify finds in an emitted file spoilt by someone, or by a fault of unflex: every
+// rule broken once for every firmware, and random edits.
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using testing::JobFolder;
 
-// A fast wall, and a slow one whose nozzle hardly strays in the first place.
+// A fast wall, and a slow one where the nozzle hardly strays even without compensation.
 constexpr const char* kPrint =
     "G28\nG90\nM83\nG1 X60 Y60 Z0.2 F6000\nG4 P500\nM106 S128\n"
     "G1 X100 E1.6 F7200\nM104 S210\nG1 Y100 E1.6\nM106 S200\nG1 X60 E1.6\nG1 Y60 E1.6\n"
@@ -64,7 +64,7 @@ std::string text_of(const Lines& lines) {
   return text;
 }
 
-// The number behind a letter of the line, and the line with another.
+// The number after a letter of the line, and the line with another number there.
 double value(const std::string& line, char letter) {
   return std::stod(line.substr(line.find(letter) + 1));
 }
@@ -82,7 +82,7 @@ class Emitted : public ::testing::TestWithParam<Firmware> {
  protected:
   Emitted() : folder_(kPrint, overrides(GetParam())), good_(good(GetParam())) {}
 
-  // Compensated once for each firmware.
+  // The compensated print, made once for each firmware.
   static const Lines& good(Firmware firmware) {
     static std::map<Firmware, Lines> made;
     Lines& lines = made[firmware];
@@ -172,7 +172,7 @@ TEST_P(Emitted, WithoutTheShaperRestored) {
       bad.push_back(line);
     }
   }
-  // Whatever stood behind it is there, but for the shaper.
+  // Everything that stood after it is there, except the shaper.
   EXPECT_THAT(found_in(bad), HasSubstr("the printer's input shaper is not restored"));
 }
 
@@ -235,7 +235,7 @@ TEST_P(Emitted, WithALineTooFast) {
 }
 
 TEST_P(Emitted, WithLinesAboveTheBudget) {
-  // Every line of half a wall in parts.
+  // Splits every line of half a wall.
   const int count = GetParam() == Firmware::klipper ? 30 : 6;
   const std::vector<std::size_t> moves = run(0);
   Lines bad = good_;
@@ -258,7 +258,7 @@ TEST_P(Emitted, WithLinesAboveTheBudget) {
 }
 
 TEST_P(Emitted, WithANozzleThatStrays) {
-  // A bump of a tenth, too smooth for any limit.
+  // A bump of 0.15 mm, too smooth to break any limit.
   const std::vector<std::size_t> moves = run(2);
   Lines bad = good_;
   const std::size_t first = moves.size() / 8;
@@ -314,7 +314,7 @@ std::vector<At> nozzle_path(const Lines& lines, const machine::Settings& setting
   return path;
 }
 
-// How far the one path goes away from the other.
+// The largest distance of a point of `path` from the path `from`.
 double distance_mm(const std::vector<At>& path, const std::vector<At>& from) {
   constexpr std::size_t kNear = 80;
   double largest = 0.0;
@@ -329,8 +329,9 @@ double distance_mm(const std::vector<At>& path, const std::vector<At>& from) {
 }
 
 TEST_P(Emitted, WithVerticesMovedByChance) {
-  // Of the slow wall, where the nozzle strays little; but for the last lines, after whose plan has
-  // ended no path is left to measure from, and a swing below kBearableSwing_mm passes.
+  // Edits the slow wall, where the nozzle strays little. The last lines are left out: there the
+  // plan has ended, so there is no path to measure from, and a swing below kBearableSwing_mm
+  // passes.
   const std::vector<std::size_t> moves = run(2);
   const machine::Settings settings = testing::settings(overrides(GetParam()));
   const std::vector<At> good_path = nozzle_path(good_, settings);

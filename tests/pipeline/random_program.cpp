@@ -21,7 +21,7 @@ constexpr double kMargin_mm = 10.0;
 constexpr double kFilamentPerMm = 0.04;
 constexpr double kLongestMove_s = 0.25;
 
-// The lines follow an interpreter, which knows what a word means where it stands.
+// An interpreter follows the lines, so that the writer knows what a word means at its place.
 class Writer {
  public:
   Writer(Firmware firmware, unsigned seed) : firmware_(firmware), random_(seed) {
@@ -48,7 +48,7 @@ class Writer {
   double number(double from, double to) {
     return std::uniform_real_distribution<double>(from, to)(random_);
   }
-  // As likely between 1 and 10 as between 10 and 100.
+  // A logarithmic distribution: values from 1 to 10 are as likely as from 10 to 100.
   double magnitude(double from, double to) {
     return std::exp(number(std::log(from), std::log(to)));
   }
@@ -120,7 +120,7 @@ class Writer {
     double x_mm;
     double y_mm;
   };
-  // Somewhere on the bed, at a distance that takes no longer than a slow line may.
+  // A place on the bed, near enough for a slow line not to take too long.
   Place place(double distance_mm) {
     const double angle = number(0.0, 2.0 * std::numbers::pi);
     const auto inside = [](double at) { return std::clamp(at, kMargin_mm, kBed_mm - kMargin_mm); };
@@ -143,7 +143,7 @@ class Writer {
            (filament != 0.0 ? word(E, state().position_mm[E] + filament) : "") + speed + "\n";
   }
 
-  // Short lines along a curve, as of a slicer that resolves finely.
+  // Short lines along a curve, as a slicer with a fine resolution writes.
   std::string curve() {
     std::string text;
     const std::size_t lines = 4 + pick(20);
@@ -161,7 +161,7 @@ class Writer {
     return text;
   }
 
-  // A wall with corners, back to where it began.
+  // A wall with corners that returns to its start.
   std::string wall() {
     const double side = std::min(distance(), 20.0);
     const double x = std::min(state().position_mm[X], kBed_mm - kMargin_mm - side);

@@ -1,5 +1,5 @@
-// Valid programs by chance: what slicers, their users and their scripts put between moves, in any
-// order and at any speed.
+// Random valid programs: what slicers, users and scripts write between moves, in any order and at
+// any speed.
 #pragma once
 
 #include <random>
@@ -11,11 +11,11 @@
 namespace unflex::pipeline::testing {
 
 struct RandomProgram {
-  std::vector<std::string> overrides;  // "key=value", of the printer
+  std::vector<std::string> overrides;  // "key=value" settings of the printer
   std::string text;
 };
 
-// The same for the same seed.
+// The seed determines the program.
 [[nodiscard]] RandomProgram random_program(Firmware firmware, unsigned seed);
 
 }  // namespace unflex::pipeline::testing

@@ -1,5 +1,5 @@
-// Programs by chance, compensated and verified. UNFLEX_RANDOM_PROGRAMS says how many for each
-// firmware, UNFLEX_RANDOM_SEED which the first is.
+// Random programs, compensated and verified. UNFLEX_RANDOM_PROGRAMS is their number per firmware,
+// UNFLEX_RANDOM_SEED the first seed.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ using testing::JobFolder;
 using testing::RandomProgram;
 
 constexpr unsigned kPrograms = 35;
-// Coordinates come in four decimals, filament in five and with a remainder.
+// Coordinates are written with four decimals, filament with five and a remainder.
 constexpr double kPosition_mm = 0.6e-4;
 constexpr double kFilament_mm = 2e-5;
 
@@ -51,12 +51,12 @@ bool is_motion(const std::string& line) {
          command.number <= 3;
 }
 
-// Of durations alone M73 may differ.
+// The line; for M73, whose duration may differ, only the command.
 std::string but_for_durations(const std::string& line) {
   return line.starts_with("M73 ") ? "M73" : line;
 }
 
-// The input's lines without motion are all there, in their order.
+// All lines of the input without motion are in the output, in their order.
 void expect_commands_kept(const std::string& input, const std::string& output) {
   const std::vector<std::string> out = lines_of(output);
   auto next = out.begin();
@@ -100,7 +100,7 @@ void expect_same_end(const std::string& input, const std::string& output, Firmwa
 struct Counts {
   std::size_t runs = 0;
   std::size_t kept = 0;
-  std::size_t blamed = 0;  // of these, for what only verification has found
+  std::size_t blamed = 0;  // kept runs whose fault only verification found
 };
 
 void expect_faultless(Firmware firmware, unsigned seed, Counts& counts) {
@@ -145,11 +145,11 @@ TEST_P(RandomPrograms, AreCompensatedWithoutFault) {
   RecordProperty("kept", static_cast<int>(counts.kept));
   RecordProperty("blamed", static_cast<int>(counts.blamed));
   EXPECT_LE(static_cast<double>(counts.blamed), 0.03 * static_cast<double>(counts.runs) + 1.0);
-  // Most is compensated: keeping all of it would be no fault either.
+  // Most runs must be compensated, because a file with all runs kept would be faultless too.
   EXPECT_LT(static_cast<double>(counts.kept), 0.2 * static_cast<double>(counts.runs));
 }
 
-// Programs that once were not.
+// Programs that once failed this test.
 
 TEST(RandomProgramsFoundFaulty, WhereARunIsEnteredFromKeptMotionAtSpeed) {
   Counts counts;

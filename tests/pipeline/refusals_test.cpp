@@ -1,4 +1,4 @@
-// What every command of the pipeline refuses, in the same words.
+// Inputs that every command of the pipeline refuses, with equal messages.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,7 +65,7 @@ TEST_P(EveryTask, StopsWhenItIsTold) {
   EXPECT_EQ(refusal(folder.job(), progress), "cancelled");
 }
 
-// A print that would never end is a slip in the file.
+// A print that would hardly ever end is a slip in the file.
 TEST_P(EveryTask, RefusesAMoveOfHours) {
   const std::string text = kPrint + "G1 X10 F0.001\nG1 X20 F6000\n";
   const JobFolder folder(text);
@@ -97,7 +97,7 @@ TEST(Verify, NeedsAnOutputThatIsThere) {
   EXPECT_EQ(to_string(report.error()), "made: cannot read the file");
 }
 
-// It would be found to be as good as itself.
+// A compensated file measured against itself would look perfect.
 TEST(Verify, RefusesWhatWasCompensatedAsTheMeasure) {
   const JobFolder folder(kPrint);
   SilentProgress progress;

@@ -1,7 +1,7 @@
 // Wherever the printer can leave a compensated run, its own limits and its input shaper hold again.
 //
-// The texts are read here by a reader of its own, which knows no more than which word of which
-// command sets what: nothing that unflex reads its output with decides whether that is right.
+// These tests have their own reader, which knows only which word of which command sets what. It
+// shares nothing with unflex's own reading of its output.
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ namespace {
 
 using testing::JobFolder;
 
-// What is in force, by the command and word that sets it.
+// The values in force; the key is the command and word that sets each.
 using Regime = std::map<std::string, std::string>;
 
 // The regime of a printer while it reads a text.
@@ -66,7 +66,7 @@ class Reader {
     }
   }
 
-  // What counts of it: nobody knows the frequency of a shaper that is off.
+  // The regime without the frequency of a shaper that is off, which does not matter.
   [[nodiscard]] Regime regime() const {
     Regime result = regime_;
     if (result["M593 P"] == "\"none\"") {
@@ -128,8 +128,8 @@ class Reader {
 
 constexpr std::string_view kPoint = ";point ";
 
-// At these the machine does no more than stand still, so its shaper may stay off, as in a run: each
-// switch is a stop.
+// At these points the machine only stands still. Its shaper may stay off, as in a run, because each
+// switch of the shaper is a stop.
 bool stays_where_it_is(const std::string& point) {
   return point.starts_with("EXCLUDE_OBJECT_") || point.starts_with("M486") ||
          point.starts_with(";printing object") || point.starts_with(";stop printing object");
@@ -150,7 +150,7 @@ bool shaper_is_off(const Regime& regime) {
   return type == regime.end() || type->second.empty() || type->second == "\"none\"";
 }
 
-// The regime before each line that is marked as a point, and at the end.
+// The regime before each marked point, and at the end.
 std::vector<std::pair<std::string, Regime>> regimes(const std::string& text, Reader reader) {
   std::vector<std::pair<std::string, Regime>> result;
   std::istringstream stream(text);
@@ -167,17 +167,17 @@ std::vector<std::pair<std::string, Regime>> regimes(const std::string& text, Rea
 struct Printer {
   std::string name;
   Firmware firmware = Firmware::klipper;
-  Regime own;  // what the printer has when the print begins
+  Regime own;  // the regime when the print begins
   std::vector<std::string> settings;
   std::vector<std::string> points;   // lines at which the print may leave its run
-  std::vector<std::string> changes;  // of limits and shaper, as slicers write them
+  std::vector<std::string> changes;  // changes of limits and shaper, as slicers write them
 };
 
 void PrintTo(const Printer& printer, std::ostream* out) { *out << printer.name; }
 
-// Blocks of moves with a point between two that extrude, and changes before the run, in it, before
-// and after the point. Every second block goes on without naming Z, so that nothing of it can be
-// rewritten after a point that lost the place.
+// Blocks of moves, each with a point between two extruding moves, and changes before the run, in
+// it, and before and after the point. Every second block does not name Z, so after a point that
+// lost the position, nothing of the block can be rewritten.
 std::string print_of(const Printer& printer) {
   std::string text = "G28\nG90\nM83\nM220 S100\n";
   std::size_t next = 0;
@@ -206,7 +206,7 @@ class Restoration : public ::testing::TestWithParam<Printer> {
     const Result<report::Report> report = compensate(folder.job(), progress);
     ASSERT_TRUE(report) << to_string(report.error());
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
-    // Of runs as short as these, some are no better than what they replace.
+    // Some of such short runs are no better compensated, and are kept.
     EXPECT_GE(2 * report->runs_compensated, report->runs_total) << testing::complaints(*report);
     EXPECT_NEAR(report->output_extrusion_mm, report->input_extrusion_mm, 1e-3);
     const Reader reader(printer.firmware, printer.own);
@@ -233,8 +233,8 @@ class Restoration : public ::testing::TestWithParam<Printer> {
     for (std::string line; std::getline(stream, line);) {
       in_run = line == ";unflex run" || (in_run && line != ";unflex end");
       EXPECT_FALSE(in_run && line.find(kPoint) != std::string::npos) << line;
-      // Filament alone would be read otherwise than filament that is laid (RepRapFirmware's M220
-      // and M221), and stop the machine.
+      // RepRapFirmware's M220 and M221 treat filament alone differently from filament that is laid,
+      // and a line of filament alone would stop the machine.
       EXPECT_FALSE(in_run && line.starts_with("G1 E")) << line;
     }
     EXPECT_FALSE(in_run);
@@ -245,7 +245,7 @@ TEST_P(Restoration, HoldsAtEachPointAtWhichThePrinterMayLeaveTheRun) {
   expect_restored(GetParam(), print_of(GetParam()));
 }
 
-// No limit in the file: it is the configured ones that come back.
+// The file sets no limits, so the configured ones are restored.
 TEST_P(Restoration, HoldsWhereTheFileSetsNothing) {
   Printer printer = GetParam();
   printer.changes = {"M117 nothing"};
@@ -267,7 +267,7 @@ TEST_P(Restoration, HoldsAtTheEndOfAFileThatEndsInARun) {
   expect_restored(printer, input + "G1 Y103 E.1\n" + printer.changes.front());
 }
 
-// One at a time, as each may hide what another one does.
+// One change at a time, because each may hide what another does.
 TEST_P(Restoration, HoldsAfterEachChangeAlone) {
   const Printer& printer = GetParam();
   for (const std::string& change : printer.changes) {

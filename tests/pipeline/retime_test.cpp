@@ -12,7 +12,7 @@ namespace {
 
 class Retime : public ::testing::Test {
  protected:
-  // What retime() makes of a file of this content.
+  // The result of retime() for this content.
   static std::string retimed(const std::string& content, double factor) {
     const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / "retime.gcode";
     {

@@ -10,7 +10,7 @@
 namespace unflex::pipeline::testing {
 namespace {
 
-// Known start, then the corner.
+// A known start position, then the corner.
 constexpr const char* kCorner =
     "G90\nM83\nG1 X5 Y0 Z0.2 F1200\nG1 X0\nM400\n"
     "G1 X10 Y0 E0.4 F6000\nG1 X10 Y10 E0.4\n";
@@ -25,7 +25,7 @@ std::vector<std::string> thesis_machine() {
           "printer.travel_y_mm=[-50,50]"};
 }
 
-// Of the corner compensated.
+// The report on the compensated corner.
 report::Report report_of(const std::vector<std::string>& more = {}) {
   std::vector<std::string> overrides = thesis_machine();
   overrides.insert(overrides.end(), more.begin(), more.end());
@@ -49,7 +49,7 @@ TEST(ThesisCorner, IsMissedBy464MicrometresWithoutCompensation) {
   EXPECT_NEAR(before.duration_s, 0.24, 1e-9);
 }
 
-// What is left is the grid of 0.1 µm that positions are written on.
+// The remaining error comes from the grid of 0.1 µm on which positions are written.
 TEST(ThesisCorner, IsDrawnWithin50NanometresByTheEmittedText) {
   const report::DeviationRow after = report_of().compensated.extruding;
   EXPECT_LE(after.contour_rms_mm, 0.05e-3);

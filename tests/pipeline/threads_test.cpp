@@ -1,4 +1,4 @@
-// What runs beside the main thread.
+// The threads beside the main thread.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -96,7 +96,7 @@ constexpr const char* kPrint =
 TEST(VerifyThread, FindsWhatVerifyingAfterwardsFinds) {
   CpuSlots slots(1);
   VerifyThread thread(verify_rules(testing::settings()), {}, "in", "out", slots);
-  // Texts come in pieces that are no whole lines, and one long before the other.
+  // Texts come in pieces that are no whole lines, and one text comes long before the other.
   const std::string text = kPrint;
   thread.push("", text.substr(0, 20));
   thread.push(text.substr(0, 33), text.substr(20));
@@ -117,7 +117,7 @@ TEST(VerifyThread, IsBehindUntilItHasReadWhatItWasGiven) {
     long_text += "; nothing that would take the machine anywhere\n";
   }
   {
-    const CpuSlot slot(slots);  // it cannot work
+    const CpuSlot slot(slots);  // the thread cannot work meanwhile
     thread.push(long_text, long_text);
     EXPECT_TRUE(thread.is_behind());
   }
@@ -135,7 +135,7 @@ TEST(VerifyThread, IsNotWaitedForWhileItWaitsForOneOfTheTexts) {
   }
 }
 
-// What is held on the heap.
+// Bytes allocated on the heap.
 std::size_t held_bytes() {
   const struct mallinfo2 info = mallinfo2();
   return info.uordblks + info.hblkhd;
@@ -144,7 +144,7 @@ std::size_t held_bytes() {
 TEST(VerifyThread, DropsTheTextsOnceItHasEndedEarly) {
   CpuSlots slots(1);
   VerifyThread thread(verify_rules(testing::settings()), {}, "in", "out", slots);
-  // A move that takes for ever.
+  // A move that takes practically for ever.
   const std::string endless = std::string(kPrint) + "G1 X0 F0.001\nM400\n";
   thread.push(endless, endless);
   const std::string text(6U << 20U, ';');
@@ -198,8 +198,8 @@ TEST(FdSink, SaysWhereItWasCancelledBeforeAllWasWritten) {
   ::close(pipe[1]);
 }
 
-// Cancelled for the reading thread, and for the other one when it asks the second time after its
-// piece was written.
+// Cancelled at once for the reading thread. For the main thread, cancelled when it asks a second
+// time after its piece was written.
 class CancelledInTheReader final : public Progress {
  public:
   void update(std::string_view /*stage*/, double /*fraction*/) override { is_written_ = true; }
@@ -217,7 +217,7 @@ TEST(Compensate, IsNotDoneWhereItsInputEndedForBeingCancelled) {
   const testing::JobFolder folder("");
   std::array<int, 2> pipe{};
   ASSERT_EQ(::pipe(pipe.data()), 0);
-  // There is more to come.
+  // The pipe stays open: more could come.
   constexpr std::string_view kBegun = "G28\nM106 S9\n";
   ASSERT_EQ(::write(pipe[1], kBegun.data(), kBegun.size()), std::ssize(kBegun));
   Job job = folder.job();
@@ -236,7 +236,7 @@ TEST(VerifyThread, EndsUnaskedWhenItIsNoLongerWanted) {
   thread.push(kPrint, kPrint);
 }
 
-// Jobs with these numbers of windows, as the reader would have them.
+// Jobs with these numbers of windows, like those the reader makes.
 std::vector<std::unique_ptr<RunJob>> jobs(const std::vector<std::size_t>& windows) {
   std::vector<std::unique_ptr<RunJob>> result;
   for (const std::size_t count : windows) {
@@ -246,7 +246,8 @@ std::vector<std::unique_ptr<RunJob>> jobs(const std::vector<std::size_t>& window
   return result;
 }
 
-// Which axes of windows a file of that many windows has for probes, in the order of the slots.
+// Which axes of windows are chosen as probes in a file of so many windows, in the order of the
+// slots.
 std::vector<std::size_t> chosen(const std::vector<std::size_t>& windows) {
   GapCheck check;
   std::size_t before = 0;
@@ -291,7 +292,7 @@ TEST(GapCheck, GivesTheLargestDifferences) {
   EXPECT_NEAR(check.largest_gap, 0.02, 1e-9);
   EXPECT_EQ(check.largest_difference_mm, 0.25);
   EXPECT_EQ(check.windows, 1U);
-  // Nothing moves: what is left is rounding.
+  // Nothing moves, so the objectives are rounding errors.
   probe.solution.objective = 3e-22;
   probe.solution.base = second.base;
   second.objective = 1e-22;

@@ -20,7 +20,7 @@ namespace {
 
 using testing::factory;
 
-// What the windows of these tests ask of their engine, carried as the only reference position.
+// What a window of these tests asks of its engine, stored as its first reference position.
 enum Task : int { kSolve, kRefuse, kDie, kThrow, kSleep, kAbort };
 
 compensate::AxisWindow window(Task task, double mark = 0.0) {
@@ -45,7 +45,7 @@ Result<compensate::AxisSolution> obey(const compensate::AxisWindow& window) {
       std::this_thread::sleep_for(std::chrono::hours(1));
       break;
     case kSolve:
-      // Marks above one come out later than those below.
+      // Windows with a mark above one take longer.
       std::this_thread::sleep_for(std::chrono::milliseconds(window.reference_mm[1] > 1.0 ? 60 : 0));
       break;
   }
@@ -60,7 +60,7 @@ WorkerPool pool_of(unsigned workers) {
   return std::move(*pool);
 }
 
-// Waits until nothing is under way.
+// Waits until no window is under way.
 std::map<std::size_t, Result<compensate::AxisSolution>> take_all(WorkerPool& pool) {
   std::map<std::size_t, Result<compensate::AxisSolution>> taken;
   while (pool.under_way() > 0) {
@@ -129,7 +129,7 @@ TEST(WorkerPool, FailsWhatIsLeftWhereNoProcessCanBeStarted) {
   WorkerPool pool = pool_of(1);
   rlimit descriptors{};
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &descriptors), 0);
-  // poll() wants as many as it waits for.
+  // poll() needs as many descriptors as it waits for.
   const rlimit none{1, descriptors.rlim_max};
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
   pool.submit(7, window(kDie));
@@ -221,7 +221,7 @@ TEST(WorkerPool, HasAWindowUnderWayUntilTheDeathsOfItAreTold) {
   Result<WorkerPool> pool =
       WorkerPool::start(1, []() -> std::unique_ptr<compensate::Engine> { throw std::bad_alloc(); });
   ASSERT_TRUE(pool.has_value());
-  // More than a socket takes: both deaths are noticed while it is sent.
+  // Larger than a socket's buffer, so both deaths are noticed during sending.
   compensate::AxisWindow large = window(kSolve);
   large.reference_mm.resize(1'000'000);
   pool->submit(7, large);
@@ -232,7 +232,7 @@ TEST(WorkerPool, HasAWindowUnderWayUntilTheDeathsOfItAreTold) {
   EXPECT_EQ(taken.at(7).error().message, "two solver processes died of it");
 }
 
-// As when the system runs out of memory: the window itself is all right.
+// The system may kill a worker when memory runs out. That is no fault of the window.
 TEST(WorkerPool, SolvesAWindowAgainWhoseWorkerWasKilled) {
   WorkerPool pool = pool_of(1);
   std::ifstream children(fmt::format("/proc/self/task/{}/children", getpid()));

@@ -18,7 +18,7 @@ inline FirmwareConfig marlin_config() {
   return config;
 }
 
-// No stretching after a stop, and axes that allow all.
+// Limits without stretching after a stop, and with axes that allow everything.
 inline Limits marlin_limits() {
   Limits limits;
   limits.min_segment_time_s = 0.0;

@@ -30,7 +30,7 @@ using testing::number;
 using testing::Row;
 using testing::rows;
 
-// What the numbers of a block describe: rates at the start, the peak and the end, and the time.
+// The motion that a block describes: rates at the start, the peak and the end, and the time.
 struct Profile {
   double initial = 0.0;
   double peak = 0.0;
@@ -170,7 +170,7 @@ TEST(MarlinOracle, SameMovesAreQueuedWithTheSameSteps) {
       for (std::size_t axis = 0; axis < 4; ++axis) {
         const double steps =
             (segment.end_mm[axis] - segment.start_mm[axis]) * plan.steps_per_mm[axis];
-        // Filament is the file's own; the firmware rounds it at both ends.
+        // The plan has the file's own filament. The firmware rounds it at both ends.
         const double rounding = axis == gcode::E ? 1.0 : 1e-9;
         ASSERT_NEAR(std::abs(steps), number(of_marlin[i], 2 + axis), rounding)
             << name << " move " << segment.line << " axis " << axis;

@@ -18,7 +18,7 @@ using testing::marlin_plan;
 using testing::polyline;
 using testing::segment;
 
-// One step of X or Y, and what a rate rounded up to whole steps per second is off by at most.
+// One step of X or Y, and the largest error of a rate that is rounded up to whole steps per second.
 constexpr double kStep_mm = 1.0 / 80.0;
 constexpr double kRounding_mm_s = 2.0 * kStep_mm;
 // MINIMAL_STEP_RATE along X or Y.
@@ -69,7 +69,7 @@ TEST(MarlinPlanner, FewerThanSixStepsWaitForTheNextMove) {
 }
 
 TEST(MarlinPlanner, StepsOfFilamentCountAsWellAndSetTheLengthOfTheFeed) {
-  // 4 steps of X with 10 of E: the feed is that of the filament.
+  // 4 steps of X with 10 of E: the feed applies to the filament.
   const double e_mm = 10.0 / 93.0;
   const auto moves = marlin_plan({segment({0, 0, 0, 0}, {0.05, 0, 0, e_mm}, 2.0)});
   ASSERT_EQ(moves.size(), 1U);
@@ -110,7 +110,7 @@ TEST(MarlinPlanner, SingleMoveIsTheTrapezoidUpToOneStep) {
   EXPECT_DOUBLE_EQ(moves[0].start_v_mm_s, kSlowest_mm_s);
   EXPECT_DOUBLE_EQ(moves[0].cruise_v_mm_s, v);
   EXPECT_DOUBLE_EQ(moves[0].accel_s, (v - kSlowest_mm_s) / a);
-  // The way down takes 133.3 steps, of which 133 are done.
+  // Braking needs 133.3 steps, of which 133 are done.
   EXPECT_NEAR(moves[0].end_v_mm_s, std::sqrt(v * v - 2.0 * a * 133.0 * kStep_mm), 1e-9);
   EXPECT_NEAR(moves[0].decel_s, (v - moves[0].end_v_mm_s) / a, 1e-12);
 }
@@ -131,7 +131,7 @@ TEST(MarlinPlanner, AccelerationAtTheCornerKeepsTheAxesLimits) {
   const auto moves = marlin_plan(polyline({{20, 0, 0, 0}, {20, 20, 0, 0}}, 50.0), limits);
   ASSERT_EQ(moves.size(), 2U);
   const double sin_half = std::numbers::sqrt2 / 2.0;
-  // The block itself has 300 along Y; at 45° this is less than Y's limit.
+  // The second block has 300 along Y, which at 45° gives less than Y's limit.
   const double v = std::sqrt(300.0 * 0.013 * sin_half / (1.0 - sin_half));
   EXPECT_NEAR(moves[1].start_v_mm_s, v, kRounding_mm_s);
   EXPECT_NEAR(moves[1].accel_mm_s2, 300.0, 1e-9);
@@ -309,7 +309,8 @@ TEST(MarlinPlanner, RatesBelowTheSlowestHaveNoRamps) {
   EXPECT_DOUBLE_EQ(moves[0].duration_s(), 5.0);
 }
 
-// Slower than 32 bits of microseconds can say, and the queue is filled with stretching.
+// The moves take longer than 32 bits of microseconds can hold, while the queue is still filling and
+// moves are stretched.
 TEST(MarlinPlanner, MovesOfHoursAreNotStretched) {
   Limits limits = marlin_limits();
   limits.min_segment_time_s = 0.02;

@@ -111,10 +111,10 @@ TEST_P(MarlinProgram, MovesFollowOneAnotherInWholeSteps) {
     const gcode::Position& asked = steps_[moves_[i].segment.line].segment.end_mm;
     for (std::size_t axis = 0; axis < 4; ++axis) {
       const double off = moves_[i].segment.end_mm[axis] - asked[axis];
-      // Half a step, and what the firmware's floats resolve of some 10 000 steps.
+      // Half a step, and the resolution of the firmware's floats at some 10 000 steps.
       ASSERT_LE(std::abs(off) * config_.steps_per_mm[axis], 0.51);
     }
-    // Filament is the file's own, so that its steps are known to within one.
+    // The plan has the file's own filament, so its steps are known to within one.
     std::array<double, 4> steps = axis_steps(moves_[i], config_);
     steps[gcode::E] += 1.0;
     ASSERT_GE(std::ranges::max(steps), config_.min_steps_per_segment);
@@ -133,13 +133,14 @@ TEST_P(MarlinProgram, RampsAddUpToTheLength) {
   }
 }
 
-// The end is faster by what the ramps' whole steps leave, 4a steps at most, and rates rounded up.
+// A move's end may be faster because ramps have whole steps (4a steps at most) and rates are
+// rounded up.
 TEST_P(MarlinProgram, SpeedsAtJunctionsAgreeUpToTheRoundingToSteps) {
   for (std::size_t i = 1; i < moves_.size(); ++i) {
     if (steps_[moves_[i].segment.line].stop_before) continue;
     const PlannedMove& before = moves_[i - 1];
     const PlannedMove& after = moves_[i];
-    if (before.kinematic != after.kinematic) continue;  // speeds of different things
+    if (before.kinematic != after.kinematic) continue;  // speeds of the tool and of filament
     const double rounding = 3.0 * (step_mm(before, config_) + step_mm(after, config_));
     const double slowest = 120.0 * step_mm(before, config_);
     const double shared = std::max(after.start_v_mm_s + rounding, slowest);
@@ -149,7 +150,7 @@ TEST_P(MarlinProgram, SpeedsAtJunctionsAgreeUpToTheRoundingToSteps) {
     const bool filament_length =
         std::max({steps[X], steps[Y], steps[Z]}) < config_.min_steps_per_segment ||
         std::max({steps_after[X], steps_after[Y], steps_after[Z]}) < config_.min_steps_per_segment;
-    if (filament_length) continue;  // the firmware compares unlike speeds there
+    if (filament_length) continue;  // the firmware compares speeds of different kinds there
     ASSERT_LE(before.end_v_mm_s, std::sqrt(shared * shared + ramp) + rounding) << i;
   }
 }

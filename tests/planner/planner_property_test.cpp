@@ -168,7 +168,7 @@ TEST(PlannerProperty, ThePlanDoesNotDependOnWhenMovesAreTaken) {
 TEST(PlannerProperty, PlanningLazilyEqualsPlanningAWholeStretchAtOnce) {
   constexpr double kFactor = 1048576.0;
   Style style;
-  style.extruder_alone = false;  // their acceleration has a bound that does not scale
+  style.extruder_alone = false;  // the bound of their acceleration does not scale
   for (unsigned seed = 100; seed < 130; ++seed) {
     const auto program = ProgramMaker(seed, style).make(4000);
     const auto lazy = run(program, Taking::always);

@@ -85,7 +85,7 @@ TEST(Switching, StopsKlipperForBothOfItsFilters) {
   EXPECT_DOUBLE_EQ(switching_s(config, kOff, kOff, {}), 0.0);
 }
 
-// What a shaper that is off would be is all the same.
+// The type and damping of a shaper that is off do not matter.
 TEST(Switching, DoesNotStopWhereBothAreOff) {
   gcode::Shaper typed = kOff;
   typed.settings.type_x = "ei";

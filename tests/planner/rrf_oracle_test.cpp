@@ -148,7 +148,7 @@ TEST_F(RrfOracle, EveryMoveTakesTheSameTime) {
   });
 }
 
-// To the eight digits of the table.
+// The plan agrees to the eight digits of the table.
 TEST_F(RrfOracle, EveryMoveHasTheSameSpeedsAndAcceleration) {
   for_each_move([](const auto& name, const Plan&, const PlannedMove& move, const Row& row) {
     const std::array<double, 4> planned = {move.start_v_mm_s, move.cruise_v_mm_s, move.end_v_mm_s,

@@ -17,7 +17,7 @@ using testing::polyline;
 using testing::segment;
 
 constexpr double kClock_s = 1.0 / 750000.0;
-// The firmware's floats: speeds agree to this part.
+// Relative accuracy of speeds, given the firmware's floats.
 constexpr double kFloat = 1e-6;
 
 FirmwareConfig rrf_config() {
@@ -291,8 +291,8 @@ TEST(RrfPlanner, HalfTheRingBoundsTheSpeedOfADenseLine) {
   }
 }
 
-// The second move is so short that its end, not the jerk, limits the first joint; the third one
-// lifts that, and the jerk of that moment decides.
+// The second move is so short that its end, not the jerk, limits the first joint. The third move
+// lifts this limit. Then the jerk in force at that moment decides.
 TEST(RrfPlanner, NewJerkCountsForJointsThatAreStillProvisional) {
   const auto path = polyline({{50, 0, 0, 0}, {50, 0.005, 0, 0}, {50, 50, 0, 0}}, 100.0);
   for (const double jerk : {8.0, 20.0}) {
@@ -324,7 +324,7 @@ TEST(RrfPlanner, AMoveAfterAStopBeginsAtAStandstill) {
   EXPECT_EQ(moves.at(1).start_v_mm_s, 0.0);
 }
 
-// Its 32 bits of step clocks are full after 95 minutes.
+// 32 bits of step clocks overflow after 95 minutes.
 TEST(RrfPlanner, MovesOfHoursTakeAsLongAsTheirSpeedSays) {
   const auto moves = rrf_plan(polyline({{5000, 0, 0, 0}, {5001, 0, 0, 0}}, 0.5), fast_limits(0));
   ASSERT_EQ(moves.size(), 2U);

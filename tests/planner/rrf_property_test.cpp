@@ -15,7 +15,7 @@ namespace {
 using enum gcode::Axis;
 
 constexpr double kClock_hz = 750000.0;
-// A difference of two coordinates below 256 that are floats.
+// Rounding of the difference of two coordinates below 256 that are floats.
 constexpr double kCoordinate_mm = 3.2e-5;
 
 Limits some_limits(std::mt19937_64& random, int policy) {
@@ -103,7 +103,7 @@ TEST(RrfProperties, TrapezoidsCoverTheirLengthToWithinElevenClocks) {
       const double covered = 0.5 * (move.start_v_mm_s + move.cruise_v_mm_s) * move.accel_s +
                              move.cruise_v_mm_s * move.cruise_s +
                              0.5 * (move.cruise_v_mm_s + move.end_v_mm_s) * move.decel_s;
-      // One clock is rounded off; a ramp that set_top_speed removes is worth ten.
+      // Rounding takes up to one clock. A ramp that set_top_speed removes takes up to ten.
       const double clock_mm = move.cruise_v_mm_s / kClock_hz;
       ASSERT_NEAR(covered, move.length_mm, 11.5 * clock_mm + 1e-6 * move.length_mm)
           << move.segment.line;

@@ -41,7 +41,7 @@ std::vector<PlannedMove> rrf_plan(const std::vector<gcode::Segment>& segments, c
   return moves;
 }
 
-// At 45° one motor of a CoreXY does all the way, times √2, and the other stands.
+// At 45° one motor of a CoreXY moves √2 times the length, and the other stands.
 TEST(MarlinOnACoreXy, LimitsMotors) {
   FirmwareConfig core = marlin_config();
   core.kinematics = Kinematics::corexy;
@@ -59,7 +59,7 @@ TEST(MarlinOnACoreXy, LimitsMotors) {
   EXPECT_NEAR(line(1.0, 0.0, core).accel_mm_s2, 5000.0, 1.0);
   EXPECT_NEAR(line(0.8, 0.6, core).accel_mm_s2, 5000.0 / 1.4, 1.0);
   EXPECT_NEAR(line(half, half, marlin_config()).accel_mm_s2, 7071.0, 1.0);
-  // Places are those of X and Y on their own.
+  // The positions are those of X and Y, as without shared motors.
   const PlannedMove move = line(0.8, 0.6, core);
   EXPECT_NEAR(move.length_mm, 80.0, 1e-9);
   EXPECT_NEAR(move.segment.end_mm[X], 64.0, 1e-9);
@@ -77,8 +77,8 @@ TEST(MarlinOnACoreXy, JoinsLinesByTheirMotorsDirections) {
         .end_v_mm_s;
   };
   EXPECT_NEAR(corner(core), corner(marlin_config()), 0.01);
-  // Along X and Z: the motors' way along X is √2 times as long, so they turn by less where X
-  // is more; tan of the angle between is 1/√2 instead of 1.
+  // A line along X and Z: the motors' motion along X is √2 times as long, so the direction turns
+  // less. The tangent of the angle is 1/√2 instead of 1.
   const auto ramp = [&](const FirmwareConfig& config) {
     return marlin_plan(polyline({{40, 0, 0, 0}, {80, 0, 40, 0}}, 100.0), limits, config)
         .at(1)
@@ -144,7 +144,7 @@ TEST(RrfOnACoreXy, IsWhereItsMotorsStepsAre) {
   EXPECT_NEAR(move.segment.end_mm[Y], 400.5 / 80.0, 1e-9);
 }
 
-// Klipper limits the tool alone (klippy/toolhead.py).
+// Klipper limits only the tool, not the motors (klippy/toolhead.py).
 TEST(KlipperOnACoreXy, PlansAsOnAnyMachine) {
   FirmwareConfig core;
   core.kinematics = Kinematics::corexy;

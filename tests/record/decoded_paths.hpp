@@ -10,7 +10,7 @@ namespace unflex::record::testing {
 
 struct DecodedPoint {
   double x_mm = 0.0, y_mm = 0.0;
-  unsigned before = 0, after = 0;  // not of the first point
+  unsigned before = 0, after = 0;  // unset for the first point
 
   friend bool operator==(const DecodedPoint&, const DecodedPoint&) = default;
 };

@@ -36,7 +36,7 @@ std::vector<DecodedPath> layer(const report::LayerPaths& paths,
   return decoded(paths.bytes, number == 0 ? 0 : ends[number - 1], ends[number]);
 }
 
-// Rings of noise: nothing of it can be merged while it is to be exact.
+// Rings with random deviations. None of their stretches can be merged while the store is exact.
 void add_rings(LayerStore& store, std::size_t layers, std::size_t rings, std::size_t points,
                unsigned seed) {
   std::mt19937 random(seed);
@@ -82,7 +82,7 @@ TEST(LayerStore, KeepsEveryPointOfWhatIsSmall) {
 TEST(LayerStore, DrawsCellsOfAStraightLineThatLookAlikeAsOne) {
   LayerStore store(10'000);
   for (int i = 0; i < 40; ++i) {
-    // From the 30th on the deviation is another one.
+    // The deviation changes at the 30th stretch.
     store.add(stretch(0.5 * i, 0.0, 0.5 * (i + 1), 0.0, i < 30 ? 100 : 140, 10));
   }
   std::vector<std::size_t> ends;
@@ -132,7 +132,7 @@ TEST(LayerStore, StaysWithinItsBudgetAndLosesNoMaximum) {
         most = std::max(most, point.before);
       }
     }
-    // 1600 numbers up to 150.
+    // Among 1600 numbers up to 150 the largest is hardly below 150.
     EXPECT_GE(most, 149U) << layers;
   }
 }
@@ -165,7 +165,8 @@ TEST(LayerStore, MovesNoPointFurtherThanItSays) {
     }
     farthest = std::max(farthest, best);
   }
-  // Each coarser drawing adds to what the one before has left out: at most as much as all of them.
+  // Each time the store gets coarser, the errors add up. Their sum is at most twice the last
+  // tolerance.
   EXPECT_LE(farthest, 2.0 * paths.tolerance_mm + 0.01);
 }
 

@@ -9,7 +9,7 @@ namespace {
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// One move of 1 mm per 10 ms; the reference goes 1 mm per 10 ms too, and so does everything else.
+// Moves of 1 mm, 10 ms each. Reference, base and nozzle all go along with them.
 void play(MomentRing& ring, double& t, double until_s) {
   constexpr double kStep_s = 1e-4;
   for (; t < until_s; t += kStep_s) {

@@ -17,7 +17,7 @@ using report::Recording;
 using ::testing::ElementsAre;
 using ::testing::SizeIs;
 
-// Squares and a long wall, layer upon layer.
+// A print of squares and a long wall on every layer.
 std::string print(int layers, bool comments = true) {
   std::string text = "G28\nG90\nM83\nM204 S4000\nG1 Z0.3 F600\nG1 X20 Y20 F6000\n";
   for (int layer = 0; layer < layers; ++layer) {

@@ -27,7 +27,7 @@ verify::NozzleModel model(double error = 0.0) {
   return {axis, axis};
 }
 
-// Has the bench look at the corner on machines with these errors.
+// Runs the bench on the corner, on machines with these errors.
 struct Benched {
   explicit Benched(const std::vector<double>& errors) : bench(model(), errors.size()) {
     const std::vector<planner::PlannedMove> moves = corner();
@@ -97,7 +97,7 @@ TEST(ShaperBench, FindsWhatTheClosedFormFinds) {
     for (std::size_t k = 0; k < errors.size(); ++k) {
       const report::Spread wanted = exactly(dynamics::kShaperKinds[i], errors[k]);
       EXPECT_NEAR(found[i].spreads[k].max_mm, wanted.max_mm, 0.02 * wanted.max_mm) << found[i].name;
-      // Of a single corner, with sixteen moments in a period.
+      // The tolerance is wide: there is a single corner, with sixteen moments per period.
       EXPECT_NEAR(found[i].spreads[k].rms_mm, wanted.rms_mm, 0.08 * wanted.rms_mm) << found[i].name;
     }
   }
@@ -132,7 +132,7 @@ TEST(ShaperBench, MeasuresALongPrintOnlyNowAndThen) {
     bench.add(0, t, {{t, 1.0}, {1e-3, 0.0}});
     bench.advance(path, t);
   }
-  // All of 60 s, half of 120 s, a quarter of what is left.
+  // All of the first 60 s are measured, half of the next 120 s, and a quarter of the rest.
   EXPECT_NEAR(bench.measured_s(), 175.0, 5.0);
   for (const report::Contender& contender : bench.contenders()) {
     EXPECT_NEAR(contender.spreads[0].rms_mm, 1e-3, 1e-9);

@@ -9,7 +9,7 @@
 
 namespace unflex::report {
 
-// "deviation.*.*.contour_max_mm": a `*` for names that are not fixed or that repeat.
+// "deviation.*.*.contour_max_mm": `*` stands for names that are not fixed or that repeat.
 inline void collect_keys(const nlohmann::json& node, const std::string& path,
                          std::set<std::string>& keys) {
   if (node.is_array() && !node.empty() && node.front().is_object()) {

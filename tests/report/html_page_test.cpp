@@ -30,7 +30,7 @@ TEST(HtmlEscape, ReplacesWhatIsNoText) {
   EXPECT_EQ(escape_html(std::string("a\0b\x1b\x7f", 5)),
             "a\xef\xbf\xbd"
             "b\xef\xbf\xbd\xef\xbf\xbd");
-  // Longer than needed, a surrogate, above U+10FFFF, cut short.
+  // Overlong, a surrogate, above U+10FFFF, cut short.
   for (const char* const text : {"\xc0\xbc", "\xe0\x80\xbc", "\xed\xa0\x80", "\xf4\x90\x80\x80",
                                  "\xf0\x9f\x98", "\xe2\x82"}) {
     EXPECT_THAT(escape_html(text), ::testing::MatchesRegex("(\xef\xbf\xbd)+")) << text;

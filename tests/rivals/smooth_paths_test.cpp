@@ -92,8 +92,8 @@ TEST(FilteredSpline, BringsTheNozzleMuchCloserToTheReference) {
   EXPECT_LT(tracking_error(path, reference, kAxis), 0.002);
 }
 
-// 200 knots in windows of 60 against one sweep over a plan that fits into one window: the same
-// plan, once alone and once amid a long rest, gives the same motion.
+// A plan gives the same motion alone, where it fits into one window, and amid a long rest of 200
+// knots in windows of 60.
 TEST(FilteredSpline, LosesNothingByItsLimitedPreview) {
   AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
   const AxisPath alone = filtered_spline(reference, kAxis, options(kAxis.omega_rad_s));

@@ -109,8 +109,8 @@ TEST(ThesisMethod, MeetsTheVelocityDefectsWhereTheyStandAlone) {
   EXPECT_LT(residuals(sampled(reference, 5e-3), axis, v, true).cwiseAbs().maxCoeff(), 1e-7);
 }
 
-// Where the plan's acceleration jumps, the nozzle's in the equations, f, alternates around the new
-// one with the pole −(3 − ζωh)/(3 + ζωh).
+// After a jump of the plan's acceleration, the nozzle's acceleration f in the equations alternates
+// around the new value with the pole −(3 − ζωh)/(3 + ζωh).
 TEST(ThesisMethod, RingsFromNodeToNodeWithThePoleOfItsDefect) {
   constexpr double kOmega = 100.0;
   constexpr double kZeta = 0.2;

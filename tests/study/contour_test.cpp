@@ -20,7 +20,7 @@ TEST(ContourGauge, MeasuresToTheNearestPointOfTheEdges) {
   EXPECT_NEAR(gauge.measure(0.3, 10.0, 10.7).distance_mm, 0.7, 1e-14);
 }
 
-// Near the end of the path the beginning is close by in place but not in time.
+// At the end of the path its beginning is close in place, but not in time.
 TEST(ContourGauge, SeesOnlyWhatThePlanPassesAroundThatTime) {
   ContourGauge gauge(reference_corner(), 0.03);
   EXPECT_NEAR(gauge.measure(0.01, 9.9, 5.0).distance_mm, 5.0, 1e-14);

@@ -1,4 +1,4 @@
-// The figures that the study is held to, case by case. docs/study.md has the whole table.
+// The figures that the study must reproduce, case by case. docs/study.md has the whole table.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -110,7 +110,7 @@ TEST_F(ThesisCases, StrayLessWithAFilteredSplineThanWithAnyShaper) {
   }
 }
 
-// A wrong model costs all who invert it the same, however well they do.
+// All methods that invert the model lose about the same if the model is wrong.
 TEST_F(ThesisCases, StrayAlikeWithAllInversesWhereTheFrequencyIsWrong) {
   constexpr std::size_t kTenPercentMore = 4;
   ASSERT_EQ(kFrequencyErrors[kTenPercentMore], 0.10);

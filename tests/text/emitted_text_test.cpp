@@ -1,4 +1,4 @@
-// Filament in the emitted text, read by a machine of the tests' own.
+// Filament in the emitted text, read by the tests' own machine.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -60,7 +60,7 @@ std::string walls_from(double reading_mm) {
   return text + fmt::format("G1 E{:.5f}\nM84\n", e - 3.0);
 }
 
-// Where single precision tells: Marlin adds relative filament up in it.
+// Far from zero, single precision matters: Marlin adds up relative filament in it.
 TEST(EmittedText, LaysTheFilamentOfAnAbsoluteReadingFarFromZero) {
   for (const Firmware firmware : kFirmwares) {
     for (const double reading_mm : {0.0, 9000.0}) {
@@ -71,7 +71,7 @@ TEST(EmittedText, LaysTheFilamentOfAnAbsoluteReadingFarFromZero) {
   }
 }
 
-// Many runs, each of which might leave its share of an error.
+// Errors of single runs would add up over many runs.
 TEST(EmittedText, LaysTheFilamentOfManyRuns) {
   for (const char* const modes : {"G90\nM82\n", "G90\nM83\n", "G91\nM83\n"}) {
     SCOPED_TRACE(modes);

@@ -1,5 +1,5 @@
-// The reader of the program and the text machine, line by line: two readings of the firmwares'
-// sources that know nothing of each other.
+// Compares unflex's interpreter with the text machine, line by line. Both are written from the
+// firmwares' sources, independently of each other.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -20,10 +20,10 @@ namespace {
 constexpr unsigned kPrograms = 2000;
 constexpr unsigned kLines = 20000;
 constexpr double kRetraction_mm = 0.8;
-// Single precision, of places that lie some 1000 mm away in the file's own coordinates.
+// Tolerance for single precision, for places some 1000 mm away in the file's own coordinates.
 constexpr double kSingle_mm = 2e-3;
 
-// Lines as careless hands and programs write them, and worse.
+// Writes lines like those of careless people and programs, and worse.
 class Scribbler {
  public:
   explicit Scribbler(unsigned seed) : random_(seed) {}
@@ -76,7 +76,8 @@ class Interpreters : public ::testing::TestWithParam<Firmware> {
     }
   }
 
-  // Forgets the line again. False if nothing is claimed of it: it is warned of, or may be a macro.
+  // Reads a line with copies of both readers. False if nothing can be compared: the line causes a
+  // warning, or may be a macro.
   bool read_alone(const std::string& line) {
     SCOPED_TRACE(line);
     gcode::Interpreter interpreter = interpreter_;

@@ -23,7 +23,7 @@ std::map<std::string, double> klipper(const machine::Settings& settings) {
           {"accel to decel", (1.0 - own.minimum_cruise_ratio) * own.max_accel_mm_s2}};
 }
 
-// Marlin's and RepRapFirmware's.
+// The limits of Marlin and RepRapFirmware.
 std::map<std::string, double> others(const machine::Settings& settings) {
   const bool is_marlin = settings.printer.firmware == Firmware::marlin;
   std::map<std::string, double> limits;

@@ -1,4 +1,4 @@
-// The printer of a machine's settings, as a text machine takes it.
+// The printer that the settings describe, in the form that a text machine takes.
 #pragma once
 
 #include "same_print.hpp"

@@ -15,45 +15,46 @@ constexpr std::string_view kMark = ";line ";
 constexpr std::string_view kOwn = ";unflex ";
 constexpr std::array<const char*, 3> kAxes = {"X", "Y", "Z"};
 
-// Coordinates are written in four decimals.
+// Coordinates are written with four decimals.
 constexpr double kPosition_mm = 0.6e-4;
 constexpr double kOffset_mm = 1e-9;
-// Filament comes in five decimals, with what is left over of each line.
+// Filament is written with five decimals; the remainder goes to the next line.
 constexpr double kFilament_mm = 2e-5;
-// What Marlin and RepRapFirmware count in single precision, far from zero or many times.
+// Error of Marlin and RepRapFirmware, which count in single precision, far from zero or after many
+// lines.
 constexpr double kSingle_mm = 5e-3;
 constexpr double kSingle = std::numeric_limits<float>::epsilon();
-// Of a reading behind a macro: nobody knows it to put it right where M221 falls between two lines
-// of a run that split its moment.
+// Tolerance for the reading of E after a macro, where unflex cannot correct it because it is
+// unknown. M221 may fall between two lines of a run and split its effect.
 constexpr double kMoment_mm = 5e-2;
 constexpr double kFeed = 1e-6;
-// Of a limit, which these two keep in single precision as well.
+// Relative tolerance for a limit, which Marlin and RepRapFirmware keep in single precision too.
 constexpr double kLimit = 2e-7;
-// How far a base may swing out.
+// How far a base may leave the path.
 constexpr double kSwing_mm = 2.0;
-// What a run may pull back or push that its lines do not.
+// How much filament a run may pull back or push beyond what its lines do.
 constexpr double kPulled_mm = 5e-3;
-// Half a step of Z, at whole ones of which Marlin and RepRapFirmware are sent.
+// Half a step of Z: Marlin and RepRapFirmware get whole steps.
 constexpr double kStep_mm = 1.3e-3;
-// Marlin leaves motion of less than six steps to the next line (MIN_STEPS_PER_SEGMENT), so a run
-// may begin that much lower than its lines.
+// Marlin adds motion of less than six steps to the next line (MIN_STEPS_PER_SEGMENT), so a run may
+// begin that much lower than its lines.
 constexpr double kUnqueued_mm = 6.0 / 400.0;
 
-// Such lines are written anew.
+// Whether the line tells a duration; unflex rewrites such lines.
 bool tells_duration(std::string_view line) {
   return line.starts_with("M73") || line.starts_with(";TIME") ||
          line.find("estimated printing time") != std::string_view::npos;
 }
 
-// The first of the lines that put the file's own limits in force.
+// Whether the line is the first of those that restore the file's own limits.
 bool sets_limits(std::string_view line) {
   return line.starts_with("SET_VELOCITY_LIMIT ") || line.starts_with("M201 ");
 }
 
-// Behind a run nothing moves before its limits are taken back.
+// end_of_run: after a run, nothing may move until the limits are restored.
 enum class Part { kept, run, end_of_run };
 
-// What space a stretch of lines takes, and between what the filament is.
+// The range of places and of filament that a stretch of lines covers.
 struct Extent {
   static constexpr double kNone = std::numeric_limits<double>::infinity();
   std::array<double, 4> least_mm{kNone, kNone, kNone, kNone};
@@ -75,7 +76,8 @@ struct Extent {
   [[nodiscard]] bool empty() const { return least_mm[0] > most_mm[0]; }
 };
 
-// Reads both texts side by side: a mark of the emitted one has the sliced one read up to there.
+// Reads both texts side by side: at each mark of the emitted text, reads the sliced text up to that
+// mark.
 class Comparison {
  public:
   Comparison(std::string_view sliced, const Printer& printer)
@@ -89,7 +91,7 @@ class Comparison {
       const std::string_view line = take_line(emitted);
       emitted_.read(line);
       follow(line);
-      // Klipper ends the print there.
+      // Klipper ends the print at a refused line.
       if (printer_.firmware == Firmware::klipper && sliced_.refused() > 0) {
         expect(emitted_.refused() > 0, "what is refused is not");
         return difference_;
@@ -99,7 +101,7 @@ class Comparison {
     expect(rest_.empty(), "lines are lost");
     expect(part_ == Part::kept, "a run does not end");
     compare();
-    // Off from the first run on, but for what moves by itself.
+    // From the first run on the shaper is off, except for what moves by itself.
     compare_limits(true);
     expect(emitted_.refused() == sliced_.refused(), "a line is refused");
     return difference_;
@@ -149,14 +151,14 @@ class Comparison {
     return line;
   }
 
-  // The first difference is told.
+  // Keeps the first difference.
   void expect(bool holds, std::string_view otherwise) {
     if (!holds && difference_.empty()) {
       difference_ = fmt::format("{}: {}", place_, otherwise);
     }
   }
   void expect_near(std::string_view what, double emitted, double sliced, double leeway) {
-    expect(emitted == sliced || std::abs(emitted - sliced) <= leeway,  // infinity, too
+    expect(emitted == sliced || std::abs(emitted - sliced) <= leeway,  // == for infinity
            fmt::format("{} is {:.9g} instead of {:.9g}", what, emitted, sliced));
   }
 
@@ -218,15 +220,15 @@ class Comparison {
   }
 
   const Printer& printer_;
-  std::string_view rest_;  // of the sliced text
+  std::string_view rest_;  // unread rest of the sliced text
   TextMachine sliced_;
   TextMachine emitted_;
   Part part_ = Part::kept;
   std::string place_;
   std::string difference_;
-  // Since the last mark.
+  // Lines since the last mark.
   std::set<std::string_view> since_mark_;
-  // Since the last mark outside of a run.
+  // Extents since the last mark outside of a run.
   Extent lines_;
   Extent run_;
   bool run_seen_ = false;

@@ -1,5 +1,5 @@
-// Two texts of one print, the sliced and the emitted one, held against each other by a machine that
-// shares nothing with what reads and writes them.
+// Compares the sliced and the emitted text of one print by a machine that shares nothing with the
+// code that reads and writes them.
 #pragma once
 
 #include <map>
@@ -14,19 +14,19 @@ namespace unflex::testing {
 struct Printer {
   Firmware firmware = Firmware::klipper;
   TextMachine::Retraction retraction;
-  std::map<std::string, double> limits;  // its own, by the names of Reading::limits
+  std::map<std::string, double> limits;  // its own limits, named as in Reading::limits
 };
 
-// True of a print with comments like those that difference() goes by.
+// Whether a print already has comments like those that difference() looks for.
 [[nodiscard]] bool has_marks(std::string_view gcode);
 
-// The print with a comment behind each line that says which it was. A comment stays where it is, so
-// the lines of the emitted text outside of runs can be told.
+// The print with a comment after each line that gives the line's number. A comment stays in place,
+// so the lines of the emitted text outside of runs can be identified.
 [[nodiscard]] std::string numbered(std::string_view gcode);
 
-// What is not the same; nothing if the emitted text, outside of its runs, has the lines of the
-// sliced one, with the machine in the same place, modes and limits and the same filament laid, and
-// each run stays near the lines it stands for. Both texts are numbered.
+// The first difference, or an empty text. Outside of its runs the emitted text must have the lines
+// of the sliced text, with the machine at equal places, in equal modes and limits, and with as much
+// filament laid. Each run must stay near the lines it replaces. Both texts are numbered.
 [[nodiscard]] std::string difference(std::string_view sliced, std::string_view emitted,
                                      const Printer& printer);
 

@@ -48,11 +48,12 @@ void TextMachine::set_klipper_limits() {
   }
 }
 
-// M200-M205.cpp: in the line's units, but for the time of B; an acceleration of M201 becomes a
-// whole number (planner.h, max_acceleration_mm_per_s2), and a J out of range changes nothing.
-// GCodes2.cpp, HandleMcode(), and GCodes5.cpp, ConfigureAccelerations(): always in mm; M203 and
-// M566 by the minute, M203 S1 and M205 by the second; M205 sets what M566 sets; no less than what
-// Configuration.h has.
+// Marlin, M200-M205.cpp: values are in the line's units, except the time of B. An acceleration of
+// M201 becomes a whole number (planner.h, max_acceleration_mm_per_s2). A J out of range changes
+// nothing.
+// RepRapFirmware, GCodes2.cpp, HandleMcode(), and GCodes5.cpp, ConfigureAccelerations(): values are
+// always in mm. M203 and M566 are per minute, M203 S1 and M205 per second. M205 sets the values of
+// M566. No value is below its minimum in Configuration.h.
 void TextMachine::set_limits() {
   const bool marlin = is(Firmware::marlin);
   const bool minutes = !marlin && (is("M566") || (is("M203") && number("S") != 1.0));
@@ -83,7 +84,7 @@ void TextMachine::set_limits() {
   }
 }
 
-// M593.cpp: for both axes if none is named.
+// M593.cpp: sets both axes if none is named.
 void TextMachine::set_marlin_shaper() {
   for (const std::string axis : {"X", "Y"}) {
     const bool meant = has(axis) || !has_any_of("XY");
@@ -96,8 +97,8 @@ void TextMachine::set_marlin_shaper() {
   }
 }
 
-// AxisShaper.cpp, Configure(): one for both axes. Too low a frequency is refused, 0 too; any other
-// makes ZVD of none.
+// AxisShaper.cpp, Configure(): one shaper for both axes. It refuses too low a frequency, 0
+// included. Any other frequency turns "none" into ZVD.
 void TextMachine::set_rrf_shaper() {
   constexpr double kLeast_hz = 750000.0 / (2.0 * 65535.0);
   std::map<std::string, double>& limits = reading_.limits;

@@ -83,10 +83,11 @@ void TextLine::parse_klipper(const std::string& line) {
   }
 }
 
-// Marlin: parser.cpp, parse(), by default without GCODE_CASE_INSENSITIVE, so that small letters are
-// no words; of a word that is there twice the last counts. RepRapFirmware: StringParser.cpp, Put(),
-// DecodeCommand(), FindParameters() and Seen(): an asterisk ends only what has a line number, an E
-// right after a digit is an exponent, nothing in quotes is a word, and the first of two counts.
+// Marlin: parser.cpp, parse(), without GCODE_CASE_INSENSITIVE, the default. Small letters are
+// therefore no words. If a word is there twice, the last one counts.
+// RepRapFirmware: StringParser.cpp, Put(), DecodeCommand(), FindParameters() and Seen(). An
+// asterisk ends only a line with a line number, an E right after a digit is an exponent, nothing in
+// quotes is a word, and the first of two equal words counts.
 void TextLine::parse_others(std::string line) {
   const bool marlin = firmware_ == Firmware::marlin;
   if (!marlin) {
@@ -139,9 +140,9 @@ std::string TextLine::text(std::string_view word) const {
   return text.starts_with('"') ? text.substr(1, text.find('"', 1) - 1) : text;
 }
 
-// Klipper wants the whole word to be a number (gcode.py, get), RepRapFirmware its beginning
-// (StringParser.cpp, ReadFloatValue()); Marlin takes other words as not there (parser.h,
-// seenval()).
+// Klipper requires that the whole word is a number (gcode.py, get), RepRapFirmware only its
+// beginning (StringParser.cpp, ReadFloatValue()). Marlin ignores words that are no numbers
+// (parser.h, seenval()).
 std::optional<double> TextLine::number(std::string_view word) const {
   if (!has(word)) {
     return std::nullopt;

@@ -1,4 +1,4 @@
-// A line of G-code taken apart as a firmware does it.
+// A line of G-code, parsed as a firmware does.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace unflex::testing {
 
-// What is thrown where the firmware answers with an error.
+// Thrown if the firmware answers with an error.
 struct Refused {};
 
 // Klipper computes in double precision, Marlin and RepRapFirmware in single.
@@ -25,14 +25,14 @@ class TextLine {
  public:
   TextLine(Firmware firmware, std::string_view text);
 
-  // Such as "G1", "M201.1" or "SET_VELOCITY_LIMIT"; none in an empty line.
+  // The command, such as "G1", "M201.1" or "SET_VELOCITY_LIMIT"; empty for an empty line.
   [[nodiscard]] const std::string& command() const { return command_; }
-  // RepRapFirmware would carry it out as well.
+  // Whether the line has a second command, which RepRapFirmware would carry out too.
   [[nodiscard]] bool has_second_command() const { return has_second_command_; }
 
   [[nodiscard]] bool has(std::string_view word) const { return words_.contains(word); }
   [[nodiscard]] bool has_any_of(std::string_view letters) const;
-  // Without quotes.
+  // The text of a word, without quotes.
   [[nodiscard]] std::string text(std::string_view word) const;
   [[nodiscard]] std::optional<double> number(std::string_view word) const;
 

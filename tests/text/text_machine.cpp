@@ -75,7 +75,7 @@ void TextMachine::carry_out() {
       {" SAVE_GCODE_STATE ", kKlipper, [](M& m) { m.save_state(); }},
       {" RESTORE_GCODE_STATE ", kKlipper, [](M& m) { m.restore_state(); }},
       {" SET_GCODE_OFFSET ", kKlipper, [](M& m) { m.set_gcode_offset(); }},
-      // Nothing that is in a reading.
+      // Commands that change nothing in a reading.
       {"  G4 G17 M73 M104 M105 M106 M107 M109 M110 M115 M117 M118 M140 M190 M400 M486 T0 ", kAll,
        [](M& /*m*/) {}},
       {" EXCLUDE_OBJECT_DEFINE EXCLUDE_OBJECT_START EXCLUDE_OBJECT_END ", kKlipper,
@@ -93,7 +93,8 @@ void TextMachine::carry_out() {
   }
 }
 
-// A cancelled object, a factor put by, offsets of a tool, a move to an endstop or restore point.
+// A cancelled object, a stored or restored factor, offsets of a tool, or a move to an endstop or
+// restore point.
 bool TextMachine::is_special() const {
   return (is("M486") && has_any_of("CPU")) || (is("M220") && has_any_of("BR")) ||
          (is(Firmware::rrf) &&
@@ -110,7 +111,7 @@ std::optional<double> TextMachine::length_mm(std::string_view word) const {
   return value ? std::optional(in_mm(*value)) : std::nullopt;
 }
 
-// gcode_move.py, cmd_G1: to Klipper E is relative in G91 too.
+// gcode_move.py, cmd_G1: in Klipper, G91 makes E relative too.
 void TextMachine::update() {
   const bool klipper = is(Firmware::klipper);
   reading_.absolute_e = absolute_e_words_ && (reading_.absolute_xyz || !klipper);
@@ -124,9 +125,9 @@ void TextMachine::update() {
 // gcode_move.py, cmd_G1; gcode.cpp, get_destination_from_command(); GCodes.cpp, DoStraightMove()
 // and LoadExtrusionAndFeedrateFromGCode().
 //
-// Klipper's coordinate of E is after the flow factor. Marlin applies it to all moves of E
-// (planner.cpp, _populate_block()), RepRapFirmware to arcs and lines that name an axis, moved or
-// not; there a relative E is not counted.
+// Klipper's coordinate of E includes the flow factor. Marlin applies the factor to all moves of E
+// (planner.cpp, _populate_block()). RepRapFirmware applies it to arcs and to lines that name an
+// axis, whether it moves or not. RepRapFirmware does not count a relative E in its coordinate.
 TextMachine::Goal TextMachine::goal() const {
   Goal goal{at_, 0.0};
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
@@ -149,7 +150,7 @@ TextMachine::Goal TextMachine::goal() const {
   return goal;
 }
 
-// Klipper refuses an F of 0 or less, Marlin goes on without it.
+// Klipper refuses an F of 0 or less; Marlin ignores it.
 void TextMachine::take_feed() {
   const std::optional<double> feed = length_mm("F");
   if (!feed || (is(Firmware::marlin) && *feed <= 0.0)) {
@@ -192,7 +193,7 @@ void TextMachine::arc() {
   }
   std::array<double, 2> from{};
   std::array<double, 2> to{};
-  for (std::size_t axis = 0; axis < 2; ++axis) {  // to Klipper in the coordinates of the words
+  for (std::size_t axis = 0; axis < 2; ++axis) {  // Klipper: the words' coordinates
     from[axis] = klipper ? at_[axis] - base_[axis] : at_[axis];
     to[axis] = klipper ? number(kAxes[axis]).value_or(from[axis]) : target.at[axis];
   }
@@ -220,7 +221,7 @@ void TextMachine::arc() {
   const double near_mm = marlin ? 1e-6 : 0.0;
   const bool closed = std::abs(dx) <= near_mm && std::abs(dy) <= near_mm;
   if (closed) {
-    // Rounding makes Klipper leave out some full circles.
+    // Because of rounding, Klipper leaves out some full circles.
     angle = clockwise ? -kTurn : kTurn;
   } else if (klipper) {
     angle += (angle < 0.0 ? kTurn : 0.0) - (clockwise ? kTurn : 0.0);
@@ -242,9 +243,9 @@ void TextMachine::arc() {
 }
 
 // firmware_retraction.py, cmd_G10: a relative G1 between SAVE_GCODE_STATE and RESTORE_GCODE_STATE,
-// so that the flow factor counts and the reading stays. It does not count in fwretract.cpp,
-// retract(), for motion.cpp, _internal_move_to_destination(), puts it by, nor in GCodes.cpp,
-// RetractFilament().
+// so the flow factor counts and the reading stays. In Marlin (fwretract.cpp, retract()) the factor
+// does not count, because motion.cpp, _internal_move_to_destination(), suspends it. It does not
+// count in RepRapFirmware either (GCodes.cpp, RetractFilament()).
 void TextMachine::retract(bool back, double length_mm) {
   if (std::exchange(reading_.retracted, back) == back) {
     return;
@@ -268,8 +269,8 @@ void TextMachine::home() {
   }
 }
 
-// stepper_enable.py, cmd_M18, looks at no word. M17_M18_M84.cpp and GCodes2.cpp, HandleMcode(): S
-// is a time for later, and what is named stops alone.
+// stepper_enable.py, cmd_M18, ignores all words. M17_M18_M84.cpp and GCodes2.cpp, HandleMcode(): S
+// sets a timeout, and only the named axes stop.
 void TextMachine::motors_off() {
   const bool all = is(Firmware::klipper) || !has_any_of("XYZES");
   for (std::size_t axis = 0; axis < E; ++axis) {
@@ -278,8 +279,8 @@ void TextMachine::motors_off() {
   }
 }
 
-// gcode.h, set_relative_mode(): Marlin forgets M82 and M83. Others do not (gcode_move.py, cmd_G90;
-// GCodes2.cpp, HandleGcode()).
+// gcode.h, set_relative_mode(): Marlin forgets M82 and M83. The others do not (gcode_move.py,
+// cmd_G90; GCodes2.cpp, HandleGcode()).
 void TextMachine::set_relative(bool relative) {
   reading_.absolute_xyz = !relative;
   if (is(Firmware::marlin)) {
@@ -287,7 +288,7 @@ void TextMachine::set_relative(bool relative) {
   }
 }
 
-// gcode_move.py, cmd_G20, refuses.
+// gcode_move.py, cmd_G20: Klipper refuses inches.
 void TextMachine::use_inches() {
   if (is(Firmware::klipper)) {
     throw Refused{};
@@ -295,7 +296,7 @@ void TextMachine::use_inches() {
   reading_.inches = true;
 }
 
-// gcode_move.py, cmd_G92: the base moves, that of E too, and all of it if nothing is named.
+// gcode_move.py, cmd_G92: moves the base, that of E too, and the base of all axes if none is named.
 void TextMachine::klipper_g92() {
   Coordinates base = has_any_of("XYZE") ? base_ : at_;
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
@@ -306,7 +307,7 @@ void TextMachine::klipper_g92() {
   base_ = base;
 }
 
-// G92.cpp: the workspace moves, E is set.
+// G92.cpp: moves the workspace, and sets E.
 void TextMachine::marlin_g92() {
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
     const double native = kept(length_mm(kAxes[axis]).value_or(0.0) + base_[axis]);
@@ -317,7 +318,7 @@ void TextMachine::marlin_g92() {
   }
 }
 
-// GCodes3.cpp, SetPositions(): the position is set, and the axis counts as homed.
+// GCodes3.cpp, SetPositions(): sets the position, and the axis counts as homed.
 void TextMachine::rrf_g92() {
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
     const double value = length_mm(kAxes[axis]).value_or(at_[axis]);
@@ -329,7 +330,7 @@ void TextMachine::rrf_g92() {
   }
 }
 
-// S of M220 and M221. Klipper takes 100 if there is none (gcode_move.py), Marlin whole numbers
+// S of M220 and M221. Without S, Klipper takes 100 (gcode_move.py). Marlin takes whole numbers
 // (M220.cpp, M221.cpp), RepRapFirmware nothing below 1 (GCodes2.cpp, HandleMcode()).
 double TextMachine::percentage(double current) const {
   const std::optional<double> word = number("S");
@@ -356,7 +357,8 @@ void TextMachine::save_state() {
                                                           homing_};
 }
 
-// gcode_move.py, cmd_RESTORE_GCODE_STATE: filament that was moved since then is not in the reading.
+// gcode_move.py, cmd_RESTORE_GCODE_STATE: filament moved since the state was saved is not in the
+// reading.
 void TextMachine::restore_state() {
   const auto found = saved_.find(has("NAME") ? line_.text("NAME") : "default");
   if (found == saved_.end()) {

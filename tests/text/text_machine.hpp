@@ -1,11 +1,11 @@
-// What a printer does with G-code, read from the text alone: an interpreter written from the
-// firmwares' own sources (Klipper, Marlin 2.1.2, RepRapFirmware 3.5) that shares nothing with
-// unflex's. Tests hold a sliced print against what has become of it.
+// What a printer does with G-code, read from the text alone. This interpreter is written from the
+// firmwares' own sources (Klipper, Marlin 2.1.2, RepRapFirmware 3.5) and shares nothing with
+// unflex's. Tests compare a sliced print with its emitted text by it.
 //
-// Assumed of the printer: it homes at 0, has one tool, which is selected and hot, no limits of
-// travel, and all commands compiled in (Marlin: INCH_MODE_SUPPORT, ARC_SUPPORT, FWRETRACT, input
-// shaping, CLASSIC_JERK beside junction deviation). A move before homing, which Klipper and
-// RepRapFirmware refuse, is carried out from 0, since a macro that is not followed may have homed.
+// Assumptions: the printer homes at 0; it has one tool, which is selected and hot; it has no limits
+// of travel; all commands are compiled in (Marlin: INCH_MODE_SUPPORT, ARC_SUPPORT, FWRETRACT, input
+// shaping, CLASSIC_JERK beside junction deviation). Klipper and RepRapFirmware refuse a move before
+// homing. Here it is carried out from 0, because a macro that is not followed may have homed.
 #pragma once
 
 #include <array>
@@ -21,21 +21,21 @@
 
 namespace unflex::testing {
 
-// What a printer would have done after some lines.
+// The state of a printer after some lines.
 struct Reading {
-  std::array<double, 3> position_mm{};  // in the machine's coordinates: what G92 moves is not in it
-  std::array<bool, 3> known{};          // homed, and motors never off since
+  std::array<double, 3> position_mm{};  // machine coordinates, which G92 does not change
+  std::array<bool, 3> known{};          // homed, and motors not off since
   std::array<double, 3> offset_mm{};    // where X0 Y0 Z0 is in the machine's coordinates
   double filament_mm = 0.0;   // pushed less pulled back, after flow factors, with G10 and G11
   double e_reading_mm = 0.0;  // what an absolute E word is counted from, in mm
-  double feed_mm_s = 0.0;     // of the next line without F, before the speed factor
+  double feed_mm_s = 0.0;     // for the next line without F, before the speed factor
   double speed_factor = 1.0;
   double flow_factor = 1.0;
   bool absolute_xyz = true;
-  bool absolute_e = true;  // as the next E word is taken
+  bool absolute_e = true;  // how the next E word is read
   bool inches = false;
   bool retracted = false;  // by G10
-  // What lines have set, in mm and s whatever the lines' units.
+  // The limits and shapers that lines have set, in mm and s whatever the units of the lines.
   // Klipper: "velocity", "accel", "square corner velocity", "minimum cruise ratio",
   //   "shaper X freq", "shaper X damping", "shaper X type".
   // Marlin: "M201 X", "M203 X", "M204 P" R T, "M205 X" J S T B, "shaper X freq" damping.
@@ -50,22 +50,22 @@ struct Reading {
 class TextMachine {
  public:
   struct Retraction {
-    double length_mm = 0.0;  // of G10
-    double extra_mm = 0.0;   // that G11 pushes beyond it
+    double length_mm = 0.0;  // pulled back by G10
+    double extra_mm = 0.0;   // pushed by G11 beyond length_mm
   };
 
   TextMachine(Firmware firmware, Retraction retraction);
 
-  // A line without its ending.
+  // Reads a line, given without its ending.
   void read(std::string_view text);
 
   [[nodiscard]] const Reading& reading() const { return reading_; }
-  // Ends of the last line's moves in the machine's coordinates: one of a straight line, many along
+  // The ends of the last line's moves in machine coordinates: one for a straight line, many along
   // an arc, none if X, Y and Z rest. Homing is no move.
   [[nodiscard]] const std::vector<std::array<double, 3>>& path() const { return path_; }
-  // Commands that nothing is known of here, so that the reading may be wrong after them.
+  // Commands that this machine does not know. The reading may be wrong after them.
   [[nodiscard]] const std::set<std::string>& not_followed() const { return not_followed_; }
-  // Lines that the firmware answers with an error.
+  // The number of lines that the firmware answers with an error.
   [[nodiscard]] std::size_t refused() const { return refused_; }
 
  private:
@@ -127,15 +127,15 @@ class TextMachine {
   std::set<std::string> not_followed_;
   std::size_t refused_ = 0;
 
-  TextLine line_;  // the last
+  TextLine line_;  // the last line
 
-  // As the firmware counts: Klipper's last_position, Marlin's current_position, RepRapFirmware's
-  // currentUserPosition and latestVirtualExtruderPosition.
+  // The firmware's own coordinates: Klipper's last_position, Marlin's current_position,
+  // RepRapFirmware's currentUserPosition and latestVirtualExtruderPosition.
   Coordinates at_{};
-  // Added to an absolute word: Klipper's base_position, Marlin's workspace_offset negated.
+  // Added to an absolute word: Klipper's base_position, or Marlin's workspace_offset negated.
   Coordinates base_{};
   Coordinates homing_{};  // Klipper's homing_position
-  // From the firmware's coordinates to the machine's: RepRapFirmware's G92 moves the former.
+  // Offset from the firmware's coordinates to the machine's. RepRapFirmware's G92 moves the former.
   std::array<double, 3> shift_mm_{};
   bool absolute_e_words_ = true;  // M82 or M83
   std::map<std::string, Saved> saved_;

@@ -20,7 +20,7 @@ TextMachine after(Firmware firmware, std::initializer_list<std::string_view> lin
   return machine;
 }
 
-// The same of every firmware, so that the tests below are about what differs.
+// All firmwares agree on this print; the tests below are about their differences.
 TEST(TextMachine, FollowsAPlainPrint) {
   for (const Firmware firmware : kFirmwares) {
     const TextMachine machine =
@@ -86,7 +86,7 @@ TEST(TextMachine, SplitsALineAsTheFirmwareDoes) {
   EXPECT_EQ(x_after(Firmware::klipper, "G1 X5 X6"), 6.0);
   EXPECT_EQ(x_after(Firmware::marlin, "G1 X5 X6"), 6.0);
   EXPECT_EQ(x_after(Firmware::rrf, "G1 X5 X6"), 5.0);
-  // To RepRapFirmware an E that follows a digit is an exponent.
+  // RepRapFirmware reads an E that follows a digit as an exponent.
   EXPECT_EQ(after(Firmware::marlin, {"G1 X5E1"}).reading().filament_mm, 1.0);
   EXPECT_EQ(x_after(Firmware::rrf, "G1 X5E1"), 50.0);
   EXPECT_EQ(after(Firmware::rrf, {"G1 X5 E1"}).reading().filament_mm, 1.0);
@@ -197,7 +197,7 @@ TEST(TextMachine, RelativeEInTheReading) {
   }
 }
 
-// types.h: xyze_pos_t is of floats. At 100 m a step of 0.0078 mm is the least there is.
+// types.h: xyze_pos_t consists of floats. At 100 m the smallest step is 0.0078 mm.
 TEST(TextMachine, MarlinCountsEInSinglePrecision) {
   const auto pushed = [](Firmware firmware) {
     TextMachine machine = after(firmware, {"G92 E100000", "M83"});
@@ -225,7 +225,7 @@ TEST(TextMachine, G92MovesCoordinatesAndNotTheTool) {
     EXPECT_DOUBLE_EQ(machine.reading().position_mm[0], 25.0);
     EXPECT_DOUBLE_EQ(machine.reading().position_mm[1], 50.0);
   }
-  // Without words Klipper takes all, the others nothing.
+  // G92 without words resets all axes in Klipper, none in the others.
   EXPECT_EQ(after(Firmware::klipper, {"G1 X9 E3", "G92"}).reading().offset_mm[0], 9.0);
   EXPECT_EQ(after(Firmware::klipper, {"G1 X9 E3", "G92"}).reading().e_reading_mm, 0.0);
   EXPECT_EQ(after(Firmware::marlin, {"G1 X9 E3", "G92"}).reading().offset_mm[0], 0.0);
@@ -258,9 +258,9 @@ TEST(TextMachine, FlowFactor) {
     EXPECT_DOUBLE_EQ(machine.reading().e_reading_mm, 12.0);
     machine.read("G92 E3");
     EXPECT_DOUBLE_EQ(machine.reading().e_reading_mm, 3.0);
-    machine.read("G1 E4");  // RepRapFirmware has no factor where no axis is named
+    machine.read("G1 E4");  // RepRapFirmware applies no factor if no axis is named
     EXPECT_NEAR(machine.reading().filament_mm, firmware == Firmware::rrf ? 12.0 : 11.5, 1e-6);
-    machine.read("G1 X20 E5");  // it is enough that one is named
+    machine.read("G1 X20 E5");  // naming an axis is enough
     EXPECT_NEAR(machine.reading().filament_mm, firmware == Firmware::rrf ? 12.5 : 12.0, 1e-6);
   }
   EXPECT_DOUBLE_EQ(after(Firmware::klipper, {"M221 S95.5", "M221"}).reading().flow_factor, 1.0);
@@ -268,7 +268,7 @@ TEST(TextMachine, FlowFactor) {
   EXPECT_NEAR(after(Firmware::rrf, {"M221 S95.5", "M221"}).reading().flow_factor, 0.955, 1e-6);
 }
 
-// gcode_move.py, cmd_M220: the speed follows, so that the feed of later lines stays.
+// gcode_move.py, cmd_M220: changes the speed too, so that the feed of later lines stays.
 TEST(TextMachine, SpeedFactorLeavesTheFeed) {
   for (const Firmware firmware : kFirmwares) {
     const Reading reading = after(firmware, {"G1 F1200", "M220 S150", "G1 X1"}).reading();

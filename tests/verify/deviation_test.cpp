@@ -134,7 +134,7 @@ TEST(Measure, OnAStraightLineTheNozzleIsLateOrEarlyButOnThePath) {
                 limits_with(1e4, 5.0));
   const DeviationStats stats = measure(moves, moves, at_rest(moves), {}).extruding.stats();
   const double omega = NozzleModel{}.x.omega_rad_s;
-  // Braking from 100 to 50 mm/s throws it forward by a/ω², and it swings on from there.
+  // Braking from 100 to 50 mm/s throws the nozzle forward by a/ω², and it swings on from there.
   EXPECT_GT(stats.tracking_max_mm, 0.5 * 1e4 / (omega * omega));
   EXPECT_LT(stats.contour_max_mm, 1e-12);
 }
@@ -229,7 +229,7 @@ TEST(Measure, ABaseThatEndsEarlyRestsWhileTheReferenceGoesOn) {
   const DeviationStats stats = run.all.stats();
   EXPECT_NEAR(stats.duration_s, duration_s(moves), 1e-9);
   EXPECT_NEAR(stats.tracking_max_mm, 10.0, 0.01);
-  // What is handed on is the nozzle at the end of the base's own motion, still swinging.
+  // run.end is the nozzle at the end of the base's own motion, still swinging.
   EXPECT_GT(std::abs(run.end.x.velocity), 0.1);
 }
 
@@ -250,8 +250,8 @@ TEST(Measure, CarriesTheNozzleFromOneRunToTheNext) {
 
 TEST(Measure, OnACircleTheNozzleRunsOutside) {
   // Many more pieces than are kept at a time, so that old ones are dropped on the way. Filament is
-  // laid where the swinging of the start has died down and that of the end has not begun, and so
-  // little of it that the extruder does not slow the junctions down.
+  // laid after the swing of the start has died down and before that of the end begins. It is so
+  // little that the extruder does not slow the junctions down.
   std::vector<testing::Point> points = {{0.0, 0.0, 0.0}};
   for (int i = 1; i <= 20000; ++i) {
     const double angle = 0.005 * i;
@@ -260,7 +260,7 @@ TEST(Measure, OnACircleTheNozzleRunsOutside) {
   }
   const auto moves = plan_path(points, limits_with(5000.0, 5.0));
   const DeviationStats stats = measure(moves, moves, at_rest(moves), {}).extruding.stats();
-  // Radius R, speed v: outside by v²/(Rω²), to first order in v/(Rω).
+  // At radius R and speed v the nozzle is outside by v²/(Rω²), to first order in v/(Rω).
   const double omega = NozzleModel{}.x.omega_rad_s;
   const double outside_mm = 60.0 * 60.0 / (20.0 * omega * omega);
   EXPECT_NEAR(stats.contour_rms_mm, outside_mm, 0.03 * outside_mm);

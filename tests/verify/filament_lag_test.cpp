@@ -26,7 +26,7 @@ class Lag : public ::testing::Test {
     path_.extend_to(10.0);
   }
 
-  // Of one moment.
+  // The lag of one moment.
   double lag_mm(std::size_t piece, double reference_mm, double nozzle_x_mm, double nozzle_y_mm,
                 double laid_mm) {
     const PathPiece& on = path_[piece];
@@ -49,7 +49,7 @@ class Lag : public ::testing::Test {
 
 TEST_F(Lag, IsNoneWhereTheNozzleHasItsFilament) {
   EXPECT_NEAR(lag_mm(0, 5.0, 5.0, 0.0, 0.5), 0.0, 1e-12);
-  // Beside the path, and behind the reference, with its own place's filament.
+  // The nozzle is beside the path and behind the reference, but with the filament of its own place.
   EXPECT_NEAR(lag_mm(0, 5.0, 4.9, 0.05, 0.49), 0.0, 1e-12);
   EXPECT_NEAR(lag_mm(3, 5.0, 25.0, 1.0, 2.25), 0.0, 1e-12);
 }
@@ -66,9 +66,9 @@ TEST_F(Lag, IsTheDistanceFromTheNozzleToThePlaceWhoseFilamentComesOut) {
 TEST_F(Lag, LeavesOutMovesWithoutFilament) {
   // 0.1 mm on the last move, with the filament of a place 0.2 mm before the end of the first.
   EXPECT_NEAR(lag_mm(3, 0.1, 29.9, 1.0, 1.98), 0.3, 1e-12);
-  // The other way round.
+  // The nozzle is before the end of the first move, with the filament of a place on the last.
   EXPECT_NEAR(lag_mm(0, 19.8, 19.8, 0.0, 2.01), 0.4, 1e-12);
-  // Where the nozzle is on a move without filament, nothing is measured.
+  // If the nozzle is on a move without filament, nothing is measured.
   EXPECT_EQ(lag_mm(1, 5.0, 25.0, 0.0, 1.0), 0.0);
 }
 

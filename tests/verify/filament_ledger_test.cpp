@@ -65,7 +65,7 @@ TEST_F(Ledger, FindsFilamentLaidInTheWrongMove) {
   play({even_move(1.0, 0.4), even_move(1.0, 0.8)},
        {even_move(0.5, 0.3), even_move(0.5, 0.3), even_move(0.5, 0.3), even_move(0.5, 0.3)});
   EXPECT_DOUBLE_EQ(output_mm_, 1.2);
-  // Less by what the tolerance of the clock may explain, 0.2 ms at 0.6 mm/s.
+  // The error is less by what the tolerance of the clock explains, 0.2 ms at 0.6 mm/s.
   EXPECT_NEAR(worst_mm_, 0.2, 1.3e-4);
 }
 

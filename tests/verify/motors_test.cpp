@@ -1,4 +1,4 @@
-// The base's limits are those of motors.
+// The base's limits apply to its motors.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ std::string broken(Kinematics kinematics, const planner::PlannedMove& move, doub
 
 TEST(BaseLimits, AreThoseOfMotors) {
   const auto move = even_move(100.0, 80.0, 0.0);
-  // From rest in half of the move's time.
+  // The move's speed is reached from rest in half of the move's time.
   EXPECT_EQ(broken(Kinematics::cartesian, move, 101.0, 10100.0), "");
   EXPECT_THAT(broken(Kinematics::corexy, move, 101.0, 1e6), HasSubstr("base velocity 180 mm/s"));
   EXPECT_THAT(broken(Kinematics::corexy, move, 181.0, 17000.0),

@@ -9,7 +9,7 @@
 namespace unflex::verify {
 namespace {
 
-// There and back, 1 mm beside: a path that passes close to itself.
+// A path that passes close to itself: it goes there, and back 1 mm beside.
 ReferencePath hairpin(std::vector<planner::PlannedMove>& moves, std::size_t& taken) {
   planner::Limits limits;
   limits.max_accel_mm_s2 = 1e6;
@@ -36,11 +36,11 @@ TEST(NearPath, MeasuresTheDistanceToThePathNearTheTime) {
   NearPath near(0.03);
   near.begin(path);
   std::size_t nearest = 99;
-  // Half way along the first move; the way back would be nearer.
+  // Half way along the first move. The way back would be nearer, but is out of reach in time.
   near.slide(path, 0.25);
   EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, 25.0, 0.8, nearest)), 0.8, 1e-9);
   EXPECT_EQ(nearest, 0U);
-  // Not further along the path than the reach: 3 mm.
+  // The path counts no further than its reach in time, 3 mm ahead.
   EXPECT_NEAR(std::sqrt(near.squared_contour_error(path, 35.0, 0.0, nearest)), 7.0, 0.1);
   // At the turn all three pieces are near.
   near.slide(path, 0.505);

@@ -110,7 +110,7 @@ TEST(Observation, OfTheSameNozzleIsTheSame) {
   };
   expect_near(report.detuned[0].uncompensated, report.uncompensated, 0.0);
   expect_near(report.detuned[0].compensated, report.compensated, 0.0);
-  // A tenth of the steps; a corner's largest deviation is a kink.
+  // Only a tenth of the steps are made, and a corner's largest deviation is a kink.
   expect_near(report.detuned[1].uncompensated, report.uncompensated, 0.05);
   expect_near(report.detuned[1].compensated, report.compensated, 0.05);
 }

@@ -24,7 +24,7 @@ inline std::string set_limits(const planner::Limits& limits) {
       limits.minimum_cruise_ratio);
 }
 
-// For programs in G90, M83 and mm, with known positions. period_s: of the short lines.
+// For programs in G90, M83 and mm, with known positions. period_s: duration of the short lines.
 class PlainEmitter {
  public:
   explicit PlainEmitter(double period_s = 2e-3) : period_s_(period_s) {}

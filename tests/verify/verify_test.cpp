@@ -56,7 +56,7 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return text.replace(at, what.size(), with);
 }
 
-// The n-th of the short lines the plain emitter wrote, counted from 0.
+// The n-th of the short lines that the plain emitter wrote, counted from 0.
 std::pair<std::size_t, std::size_t> short_line(const std::string& text, int n) {
   std::size_t at = text.find(";unflex run\n");
   for (int i = -1; i < n; ++i) {
@@ -124,7 +124,7 @@ TEST(Verify, TheDeviationOfAFileIsThatOfItsPlan) {
       {{1.0, 1.0, 0.0}, {40.0, 1.0, 100.0, 1.0}, {40.0, 40.0, 100.0, 1.0}}, planner::Limits{});
   const DeviationStats alone = measure(moves, moves, testing::at_rest(moves), {}).extruding.stats();
   const DeviationStats in_file = verify_text(text, text).uncompensated.extruding;
-  // What the positioning left of swinging has died down by e^{-51} in three seconds.
+  // The swing after the positioning has died down by e^{-51} in three seconds.
   EXPECT_NEAR(in_file.contour_max_mm, alone.contour_max_mm, 1e-9);
   EXPECT_NEAR(in_file.contour_rms_mm, alone.contour_rms_mm, 1e-9);
   EXPECT_NEAR(in_file.tracking_rms_mm, alone.tracking_rms_mm, 1e-9);
@@ -163,11 +163,11 @@ TEST_F(Emitted, AFaithfulCopyInShortLinesIsFaultless) {
   EXPECT_GT(report.base_max_accel_mm_s2, 1900.0);
   EXPECT_LT(report.base_max_accel_mm_s2, 8000.0);
   EXPECT_LT(report.worst_run_drift_s, 5e-4);
-  // Compensated by nothing, it deviates as before.
+  // The copy does not compensate, so it deviates as before.
   EXPECT_NEAR(report.compensated.extruding.contour_rms_mm,
               report.uncompensated.extruding.contour_rms_mm,
               0.05 * report.uncompensated.extruding.contour_rms_mm);
-  // The sliced file passes through a corner into its wipe, the other one rests there.
+  // The sliced file passes through a corner into its wipe. The emitted file rests there.
   EXPECT_GT(report.compensated.extruding.duration_s, report.uncompensated.extruding.duration_s);
   EXPECT_LT(report.compensated.extruding.duration_s,
             report.uncompensated.extruding.duration_s + 0.01);
@@ -346,7 +346,7 @@ TEST_F(Emitted, AMoveTheFirmwareRefusesIsFound) {
 }
 
 TEST_F(Emitted, ALateClockIsDrift) {
-  // Every line one percent slower: the run of about three seconds ends 30 ms late.
+  // Every line is one percent slower, so the run of about three seconds ends 30 ms late.
   Rules rules = on_a_bed();
   const std::string input =
       "G90\nM83\nG1 Z0.3 F600\nG1 X0 Y0.1 F6000\nG4 P2000\nG1 X90 Y0.1 E3 F1800\nM400\n";
@@ -379,7 +379,8 @@ class Shaped : public Emitted {
     rules.interpreter.shaper_freq_x_hz = 45.0;
     return verify_text(kPrint, output, rules);
   }
-  // Switched off before the first run, and `restored` before the macro at the end.
+  // The good text with the shaper switched off before the first run, and with the line `restored`
+  // before the macro at the end.
   [[nodiscard]] std::string shaped(const std::string& restored) const {
     std::string text = good_;
     text.insert(text.find(";unflex run\n"), "SET_INPUT_SHAPER SHAPER_FREQ_X=0\n");
@@ -424,7 +425,8 @@ TEST(Verify, AnInputWithoutFinalLineEndingMayGetOne) {
   EXPECT_NE(violations_of(verify_text("G90\n; end\n", "G90\n; end")), "");
 }
 
-// Where filament was rounded to five digits, a line that repeats the last E moves it by that.
+// If filament was rounded to five digits, a line that repeats the last E moves filament by the
+// rounding error.
 TEST(Verify, ALineThatMovesByRoundingAloneIsNoSectionOfItsOwn) {
   const std::string start = "G90\nM82\nG92 E0\nG1 Z0.3 F600\nG1 X20 Y20 F6000\n";
   const std::string input = start + "G1 E1.00000 F1800\nG1 Z0.5\nG1 X20 Y20 E1.00001\nG1 Z0.7\n";

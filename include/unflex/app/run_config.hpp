@@ -40,7 +40,7 @@ inline constexpr std::string_view kStandardStream = "-";
 // What `identify` works on.
 struct IdentifyConfig {
   std::vector<std::string> records;
-  std::optional<identify::Axis> axis;  // of all of them; unset: as each tells
+  std::optional<identify::Axis> axis;  // axis of all records; unset: as each record tells
   identify::Sweep sweep;
   std::optional<identify::Tower> tower;
 };
@@ -48,9 +48,8 @@ struct IdentifyConfig {
 struct RunConfig {
   Command command = Command::compensate;
   // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
-  // empty for the thesis' cases
+  // empty for the thesis' cases; batch: the folder of the prints
   std::string input;
-  // batch: the folder of the prints
   // compensate, printer init, printer macros, printer line-test, batch: -o, or the input with
   // --in-place; verify: OUT
   std::string output;
@@ -59,7 +58,7 @@ struct RunConfig {
   std::vector<std::string> overrides;  // "key=value"
   std::optional<std::string> report;   // a file ending in .json or .html, or "-"; batch: a folder
   std::optional<std::string> summary;  // batch: a file ending in .json or .xml
-  std::optional<std::string> log;      // compensate: what was said is added to it
+  std::optional<std::string> log;      // compensate: file to which all that was said is added
   // compensate: what messages call the print, and what the slicer that started the program says of
   // the printer (hook.hpp)
   std::string print_name;

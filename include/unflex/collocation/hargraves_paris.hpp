@@ -25,8 +25,8 @@
 
 namespace unflex::collocation {
 
-// The nonlinear program of the problem on the mesh. times: the nodes, increasing, at least two.
-// The problem must outlive the program. Derivatives are exact.
+// The nonlinear program of the problem on the mesh. times: the nodes, increasing, at least two. The
+// problem must outlive the program. Derivatives are exact.
 [[nodiscard]] std::unique_ptr<nlp::Problem> transcribe(const OptimalControlProblem& problem,
                                                        std::vector<double> times);
 
@@ -34,7 +34,8 @@ namespace unflex::collocation {
 [[nodiscard]] PointVector node(const OptimalControlProblem& problem, std::span<const double> x,
                                int k);
 
-// The state between nodes 1 and 2 at fraction s in [0, 1] of the interval: the cubic of the method.
+// The state between nodes 1 and 2 at fraction s in [0, 1] of the interval, on the cubic of the
+// method.
 [[nodiscard]] StateVector interpolate(const OptimalControlProblem& problem, double t1,
                                       const PointVector& z1, double t2, const PointVector& z2,
                                       double s);

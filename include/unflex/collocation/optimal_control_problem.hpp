@@ -1,4 +1,4 @@
-// An optimal-control problem on a given time span, apart from how it is discretised:
+// An optimal-control problem on a given time span, independent of how it is discretised:
 //
 //   min ∫ L(t, x, u) dt + ∫ u̇ᵀ R u̇ dt    subject to    ẋ = f(t, x, u)
 //
@@ -56,8 +56,8 @@ class OptimalControlProblem {
   [[nodiscard]] virtual PointByPointPattern cost_pattern() const = 0;
   [[nodiscard]] virtual bool quadratic_cost() const = 0;
 
-  // Weight of the squared slope, the diagonal of R, and the largest absolute slope (kNoBound:
-  // free).
+  // The weight of the squared slope, which is the diagonal of R, and the largest absolute slope
+  // (kNoBound: free).
   [[nodiscard]] virtual ControlVector slope_weight() const = 0;
   [[nodiscard]] virtual ControlVector slope_limit() const = 0;
 

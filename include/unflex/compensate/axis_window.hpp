@@ -6,8 +6,8 @@
 //         |ḃ| ≤ V,  |b̈| ≤ A,  |d b̈/dt| ≤ J,  b_min ≤ b ≤ b_max
 //
 //   r  reference, mm       p  nozzle, mm       b  base, mm       w  weight       h  node period, s
-//   i  what the axis may be: one thing where it is known, several that share the base where it is
-//      not; α_i, its share, adds up to 1
+//   i  models of the axis: one if it is known, several on the same base if it is not; their shares
+//      α_i add up to 1
 //
 // Nozzle and base are both unknown: with the nozzle fixed to the plan the problem is
 // overdetermined (docs/theory.md).
@@ -26,8 +26,8 @@
 
 namespace unflex::compensate {
 
-// Kept between nodes too; those of position and velocity as far as acceleration is limited, and
-// position within 10⁻⁵ mm.
+// These limits hold between nodes too: those of position and velocity if acceleration is limited,
+// and position within 10⁻⁵ mm.
 struct BaseLimits {
   double max_velocity_mm_s = std::numeric_limits<double>::infinity();  // V
   double max_accel_mm_s2 = std::numeric_limits<double>::infinity();    // A
@@ -36,12 +36,12 @@ struct BaseLimits {
   double max_position_mm = std::numeric_limits<double>::infinity();
 };
 
-// Something else an axis may be.
+// Another model that the axis may have.
 struct AxisVariant {
   dynamics::FlexibleAxis axis;
   double share = 0.0;  // α
 };
-// An axis is one of 1, 3 or 5 things.
+// An axis has 1, 3 or 5 models.
 inline constexpr std::size_t kMostVariants = 4;
 
 struct AxisWindow {
@@ -54,21 +54,21 @@ struct AxisWindow {
   // ρ/h⁶: without dimension, so that one value serves all periods.
   double jerk_weight = 1e-2;
   BaseLimits limits;
-  // V and A at the nodes, where they are less than in `limits`: what another axis leaves of a motor
-  // that moves both. Empty: nowhere.
+  // V and A at the nodes, where another axis on the same motors leaves less than `limits`. Empty:
+  // `limits` alone holds.
   std::vector<double> max_velocity_at_mm_s;
   std::vector<double> max_accel_at_mm_s2;
-  // At the first node: the nozzle as given, whatever the axis is, the base at rest there. Unset:
-  // free.
+  // The state at the first node: the nozzle as given, in all models, and the base at rest at
+  // base_mm. Unset: free.
   struct Start {
     dynamics::NozzleState nozzle;
     double base_mm = 0.0;
   };
   std::optional<Start> start;
-  // At the last node: the base at rest there. Unset: free.
+  // Where the base rests at the last node. Unset: free.
   std::optional<double> end_base_mm;
-  // A motion not far from the solution, at the nodes: where an engine that iterates from a point
-  // may begin. It has no influence on the solution, and is not passed on to worker processes.
+  // A motion near the solution, at the nodes, from which an iterating engine may begin. It does not
+  // change the solution, and is not passed on to worker processes.
   struct Guess {
     std::vector<dynamics::NozzleState> nozzle;
     dynamics::AxisTrajectory base;
@@ -76,7 +76,7 @@ struct AxisWindow {
   std::optional<Guess> guess;
 
   [[nodiscard]] std::size_t nodes() const { return (reference_mm.size() + 1) / 2; }
-  // Variant i, `axis` being the first.
+  // Model i: `axis` is model 0, variants[i − 1] is model i.
   [[nodiscard]] std::size_t models() const { return variants.size() + 1; }
   [[nodiscard]] AxisVariant model(std::size_t i) const;
 };
@@ -95,7 +95,7 @@ class Engine {
   Engine& operator=(const Engine&) = delete;
   virtual ~Engine() = default;
 
-  // An error when the window has no solution or the solver does not find it.
+  // Returns an error if the window has no solution or the solver does not find it.
   [[nodiscard]] virtual Result<AxisSolution> solve(const AxisWindow& window) const = 0;
   [[nodiscard]] virtual std::string name() const = 0;
 };
@@ -103,8 +103,8 @@ class Engine {
 // Hargraves–Paris transcription solved by Ipopt. Not thread-safe (see nlp/ipopt_solver.hpp).
 [[nodiscard]] std::unique_ptr<Engine> make_ipopt_engine();
 
-// The same program without its equality constraints, solved by interior points of its own. Any
-// number of threads may solve at once, with one engine or several.
+// Solves the program of make_ipopt_engine() without its equality constraints, by interior points of
+// unflex's own. Any number of threads may solve at once, with one engine or several.
 [[nodiscard]] std::unique_ptr<Engine> make_banded_engine();
 
 }  // namespace unflex::compensate

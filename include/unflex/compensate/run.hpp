@@ -46,7 +46,7 @@ struct Course {
   Course(const std::vector<planner::PlannedMove>& run) : moves(run) {}
   Course(Moves ahead, Moves part, Moves behind) : before(ahead), moves(part), after(behind) {}
 
-  // The moves around a part, at least 2 Setup::overlap_s of them or all there are; none: rest.
+  // The moves around a part: at least 2 Setup::overlap_s of them, or all there are. Empty: rest.
   Moves before;
   Moves moves;  // not empty
   Moves after;
@@ -54,9 +54,10 @@ struct Course {
 
 // The nodes of a course.
 struct NodeGrid {
-  double period_s = 0.0;  // so that a part ends at a node
+  double period_s = 0.0;  // chosen so that a part ends at a node
   std::size_t count = 0;
-  // The course itself is between these; the others are there for its ends' sake.
+  // The moves of the course itself lie between these nodes. The nodes outside are solved for the
+  // sake of its ends.
   std::size_t first = 0;
   std::size_t last = 0;
 };
@@ -69,21 +70,22 @@ struct WindowSpan {
   std::size_t last = 0;
   std::size_t core_first = 0;
   std::size_t core_last = 0;
-  // The reference moves evenly and has done so for long: the base goes with it, as any solution
-  // would, and there is nothing to solve.
+  // The reference has moved evenly for long, and still does. Any solution would have the base go
+  // with it, so there is nothing to solve.
   bool cruise = false;
 };
 
-// All of so many nodes if they are few enough, otherwise cores of equal length with overlap.
-// Depends on nothing but the numbers given, so that the result is the same for any number of
-// workers.
+// One window over all nodes if they are few enough, otherwise windows with cores of equal length
+// and with overlap. Depends on nothing but the numbers given, so that the result is the same for
+// any number of workers.
 [[nodiscard]] std::vector<WindowSpan> cut(std::size_t nodes, const Setup& setup);
 
-// Windows where the plan accelerates, and cruises between them. The first and the last are windows.
+// Windows where the plan accelerates, and cruises between them. The first and the last span are
+// windows.
 [[nodiscard]] std::vector<WindowSpan> mesh(const Course& course, const NodeGrid& grid,
                                            const Setup& setup);
 
-// Those that are no cruises.
+// The number of spans that are not cruises.
 [[nodiscard]] std::size_t windows_to_solve(const std::vector<WindowSpan>& spans);
 
 // Both axes of one window.
@@ -93,23 +95,24 @@ struct RunWindow {
   bool shares_motors = false;  // as in Setup
 };
 
-// The problems of all windows, on the nodes of node_grid(). nozzle: where the nozzle is, and how
-// fast, when the run begins (rest but for what earlier motion left behind).
+// The problems of all windows, on the nodes of node_grid(). nozzle: its position and velocity when
+// the run begins (at rest, apart from what earlier motion left behind).
 [[nodiscard]] std::vector<RunWindow> windows(const Course& course,
                                              const std::vector<WindowSpan>& spans,
                                              const dynamics::NozzleXY& nozzle, const Setup& setup);
 
-// The same for `count` windows from number `first` on.
+// The problems of `count` windows from number `first` on.
 [[nodiscard]] std::vector<RunWindow> windows(const Course& course,
                                              const std::vector<WindowSpan>& spans,
                                              std::size_t first, std::size_t count,
                                              const dynamics::NozzleXY& nozzle, const Setup& setup);
 
-// One axis of a cruise: the reference.
+// The solution for one axis of a cruise: the reference.
 [[nodiscard]] AxisSolution along(const AxisWindow& window);
 
-// X and Y of a window: what the engine says, or in a cruise the reference. Where they share motors
-// the window gets limits at the nodes, under which each axis by itself has this solution.
+// Solves X and Y of a window by the engine; in a cruise the solution is the reference. If the axes
+// share motors, the window gets limits at the nodes under which each axis by itself has this
+// solution.
 using AxisSolutions = std::array<Result<AxisSolution>, 2>;
 [[nodiscard]] AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window);
 

@@ -23,7 +23,7 @@ struct Metadata {
   std::vector<Thumbnail> thumbnails;
   KeyValues print;          // times, filament
   std::string slicer;       // lines key=value: all settings
-  std::string slicer_json;  // the same as JSON; empty: no such block
+  std::string slicer_json;  // all settings as JSON; empty: no such block
 };
 
 }  // namespace unflex::container

@@ -9,7 +9,7 @@ namespace unflex {
 
 [[nodiscard]] std::string to_base64(std::string_view bytes);
 
-// Nothing if the text is no base64 of whole groups of four.
+// nullopt if the text is no base64 of whole groups of four.
 [[nodiscard]] std::optional<std::string> from_base64(std::string_view text);
 
 }  // namespace unflex

@@ -7,7 +7,8 @@
 
 namespace unflex {
 
-// Of kind internal. Memory or threads that ran out come with a remedy.
+// The exception as an error of kind internal. If memory or threads ran out, the error names a
+// remedy.
 [[nodiscard]] Error error_of(const std::exception& exception);
 
 }  // namespace unflex

@@ -5,10 +5,10 @@
 
 namespace unflex {
 
-// "No such file or directory".
+// The text of an error, such as "No such file or directory".
 [[nodiscard]] std::string errno_text(int error);
 
-// The same of what could not be written, with what can be done about it.
+// The text of an error in writing, with what can be done about it.
 [[nodiscard]] std::string write_error_text(int error);
 
 }  // namespace unflex

@@ -19,7 +19,7 @@ enum class Kinematics { cartesian, corexy, corexz, hybrid_corexy, hybrid_corexz 
 // "hybrid_corexy", "hybrid_corexz".
 [[nodiscard]] std::string_view to_string(Kinematics kinematics);
 
-// All of them, in the order above.
+// All kinematics, in the order above.
 [[nodiscard]] std::span<const Kinematics> all_kinematics();
 
 // The linear map from axes to motors: 3 × 3, motors by axes, without unit.
@@ -44,16 +44,16 @@ class Motors {
   // Whether there is a motor that moves both X and Y.
   [[nodiscard]] bool shared_by_xy() const;
 
-  // What motor i does where the axes do x, y, z: travel, velocity or acceleration.
+  // What motor i does when the axes do x, y, z: travel, velocity or acceleration.
   [[nodiscard]] double of(std::size_t i, double x, double y, double z) const {
     return rows_[i][0] * x + rows_[i][1] * y + rows_[i][2] * z;
   }
   // Where the axes are when the motors are at q.
   [[nodiscard]] std::array<double, kCount> axes(const std::array<double, kCount>& q) const;
 
-  // The most that a motor of X or Y does at it, either way.
+  // The largest magnitude of what a motor of X or Y does when the axes do x, y, z.
   [[nodiscard]] double largest_of_xy(double x, double y, double z) const;
-  // How much of an uncertainty, the same in all axes, motor i has.
+  // The uncertainty of motor i if that of every axis is 1.
   [[nodiscard]] double uncertainty(std::size_t i) const {
     return std::abs(rows_[i][0]) + std::abs(rows_[i][1]) + std::abs(rows_[i][2]);
   }

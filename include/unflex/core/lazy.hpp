@@ -1,11 +1,12 @@
-// A value most of whose instances are never set.
+// A value that is seldom set.
 #pragma once
 
 #include <memory>
 
 namespace unflex {
 
-// Value{} until it is edited; takes the place of a pointer only. Copies are independent.
+// Value{} until it is edited; until then it takes only the room of a pointer. Copies are
+// independent.
 template <class Value>
 class Lazy {
  public:

@@ -12,7 +12,7 @@ namespace unflex {
 // "-.8", "3.". Exponents, "inf", "nan", hexadecimal, and anything left over give nullopt.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text);
 
-// Towards zero, and what no int can hold to the nearest that can. value is a number.
+// Rounds towards zero. A value that no int can hold becomes the nearest int. value must not be NaN.
 [[nodiscard]] int to_int(double value);
 
 // Appends `scaled / 10^decimals` without trailing zeros or a needless point: (12500, 4) is "1.25",

@@ -1,4 +1,4 @@
-// SHA-256 (FIPS 180-4): tells whether two contents are the same.
+// SHA-256 (FIPS 180-4), by which we tell whether two contents are the same.
 #pragma once
 
 #include <array>
@@ -12,7 +12,8 @@ namespace unflex {
 class Sha256 {
  public:
   void add(std::string_view bytes);
-  // Of all that was added, 64 lower-case hexadecimal digits. Nothing can be added afterwards.
+  // The hash of all that was added, as 64 lower-case hexadecimal digits. Nothing can be added
+  // afterwards.
   [[nodiscard]] std::string finish();
 
  private:

@@ -1,4 +1,4 @@
-// UTF-8, which the names of files and what prints say need not be.
+// UTF-8. The names of files and the texts in prints need not be valid UTF-8.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@ struct Utf8Character {
   char32_t value = 0;
 };
 
-// The character that a text begins with, which is not empty. Sequences longer than need be,
-// surrogates and what is above U+10FFFF are none.
+// The first character of a text, which must not be empty. Overlong sequences, surrogates and values
+// above U+10FFFF are no characters.
 [[nodiscard]] Utf8Character first_utf8(std::string_view text);
 
 }  // namespace unflex

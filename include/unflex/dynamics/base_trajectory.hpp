@@ -6,7 +6,7 @@
 
 namespace unflex::dynamics {
 
-// One axis at the nodes. b̈ is linear between nodes, so b is the cubic that it makes.
+// One axis at the nodes. b̈ is linear between nodes, so b is a cubic there.
 struct AxisTrajectory {
   std::vector<double> position_mm;
   std::vector<double> velocity_mm_s;
@@ -20,7 +20,8 @@ struct AxisMotion {
   double accel_mm_s2 = 0.0;
 };
 
-// Between nodes k and k+1 at `s` seconds after k, h seconds apart; k + 1 < number of nodes.
+// The motion `s` seconds after node k, between nodes k and k+1, which are h seconds apart; k + 1 <
+// number of nodes.
 [[nodiscard]] AxisMotion between(const AxisTrajectory& axis, std::size_t k, double s, double h);
 
 struct BaseTrajectory {
@@ -30,7 +31,7 @@ struct BaseTrajectory {
 
   [[nodiscard]] std::size_t nodes() const { return x.position_mm.size(); }
   [[nodiscard]] double duration_s() const { return static_cast<double>(nodes() - 1) * period_s; }
-  // t in [0, duration_s()], clamped.
+  // t is clamped to [0, duration_s()].
   [[nodiscard]] AxisMotion x_at(double t) const { return at(x, t); }
   [[nodiscard]] AxisMotion y_at(double t) const { return at(y, t); }
 

@@ -44,12 +44,12 @@ struct BaseSegment {
 [[nodiscard]] NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state,
                                    const BaseSegment& base, double h);
 
-// The exact state h seconds later for the same input, from the closed form of the damped
-// oscillator (any ζ ≥ 0).
+// The exact state h seconds later under the same motion of the base, from the closed form of the
+// damped oscillator (any ζ ≥ 0).
 [[nodiscard]] NozzleState exact_step(const FlexibleAxis& axis, NozzleState state,
                                      const BaseSegment& base, double h);
 
-// A step of one length as the linear map it is, for many steps of that length.
+// A step of a fixed length as a linear map, for many steps of that length.
 class StepMap {
  public:
   // The base's position is carried along so that numbers stay small.
@@ -68,20 +68,20 @@ class StepMap {
   StepMap(OneStep one_step, const FlexibleAxis& axis, double h);
 
  private:
-  // What one unit of each makes after the step.
+  // The state after the step that one unit of each makes.
   NozzleState of_position_;
   NozzleState of_velocity_;
   NozzleState of_base_velocity_;
   NozzleState of_base_acceleration_;
 };
 
-// rk4_step().
+// rk4_step() as a map.
 class Rk4Map : public StepMap {
  public:
   Rk4Map(const FlexibleAxis& axis, double h);
 };
 
-// exact_step().
+// exact_step() as a map.
 class ExactMap : public StepMap {
  public:
   ExactMap(const FlexibleAxis& axis, double h);

@@ -4,7 +4,7 @@
 //   f     natural frequency, undamped, Hz      ζ     damping ratio
 //   K     e^{−πζ/√(1−ζ²)}: what a half period of damping leaves      T_d   1/(f √(1−ζ²))
 //
-// Pulses as in Klipper, klippy/extras/shaper_defs.py; its sources, where a name is not its own:
+// Pulses as in Klipper, klippy/extras/shaper_defs.py. The shapers come from:
 //   ZV, ZVD     Singer & Seering, "Preshaping command inputs to reduce system vibration",
 //               J. Dyn. Syst. Meas. Control 112 (1990) 76–82
 //   EI          Singhose, Seering & Singer, "Residual vibration reduction using vector diagrams to
@@ -12,7 +12,7 @@
 //   2HUMP_EI, 3HUMP_EI    Singhose, Porter, Tuttle & Singer, "Vibration reduction using multi-hump
 //               input shapers", J. Dyn. Syst. Meas. Control 119 (1997) 320–326
 //   MZV         Klipper's own
-//   ZVDD, ZVDDD the same as ZV and ZVD with one and two pulses more (binomial weights), as in
+//   ZVDD, ZVDDD ZVD with one and two pulses more (binomial weights), as in
 //               RepRapFirmware, Movement/AxisShaper.cpp
 #pragma once
 
@@ -25,7 +25,7 @@ namespace unflex::dynamics {
 
 enum class ShaperKind { zv, mzv, zvd, ei, two_hump_ei, three_hump_ei, zvdd, zvddd };
 
-// Those that Klipper has; the last two are RepRapFirmware's alone.
+// The kinds that Klipper has. zvdd and zvddd are RepRapFirmware's alone.
 inline constexpr std::array<ShaperKind, 6> kShaperKinds = {
     ShaperKind::zv, ShaperKind::mzv,         ShaperKind::zvd,
     ShaperKind::ei, ShaperKind::two_hump_ei, ShaperKind::three_hump_ei};
@@ -33,11 +33,11 @@ inline constexpr std::array<ShaperKind, 6> kShaperKinds = {
 // As Klipper spells it in capitals: "ZV", "2HUMP_EI".
 [[nodiscard]] std::string_view name(ShaperKind kind);
 
-// Above this the pulses are not defined: 0.99 for those in closed form, 0.4, 0.3 and 0.2 for EI,
-// 2HUMP_EI and 3HUMP_EI, which are fits. Klipper refuses them there.
+// Above this damping ratio the pulses are not defined: 0.99 for pulses in closed form, 0.4, 0.3 and
+// 0.2 for EI, 2HUMP_EI and 3HUMP_EI, which are fits. Klipper refuses them there.
 [[nodiscard]] double max_damping_ratio(ShaperKind kind);
 
-// The reference delayed by time_s counts with this weight.
+// The reference, delayed by time_s, counts with this weight.
 struct Pulse {
   double time_s = 0.0;
   double weight = 0.0;
@@ -48,7 +48,8 @@ struct Pulse {
 // pulses therefore lie before 0.
 using ShaperPulses = std::vector<Pulse>;
 
-// Built for the given axis. nullopt above max_damping_ratio(); freq_hz must be above zero.
+// The pulses for an axis with this frequency and damping. nullopt above max_damping_ratio();
+// freq_hz must be above zero.
 [[nodiscard]] std::optional<ShaperPulses> shaper_pulses(ShaperKind kind, double freq_hz,
                                                         double damping_ratio);
 

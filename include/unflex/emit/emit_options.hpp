@@ -14,7 +14,7 @@ struct EmitOptions {
   planner::Limits printer_limits;  // in force when the file starts
   planner::FirmwareConfig fixed;
   planner::Limits run_limits;     // inside a compensated run
-  double line_accel_mm_s2 = 1e6;  // what the firmware then accelerates a line by
+  double line_accel_mm_s2 = 1e6;  // acceleration of a line inside a run
   LineRules lines;
   std::string version;  // for the comment at the first run
   // Klipper: UNFLEX_CHECKPOINT is called where a run begins and ends and where the printer's own

@@ -1,5 +1,5 @@
-// The base's motion as G-code that a printer, whose firmware plans everything it reads anew,
-// executes as it was meant (docs/firmware.md says why each rule is there).
+// The base's motion as G-code. Firmware plans everything it reads anew; this text is such that the
+// printer still executes the motion as it was meant (docs/firmware.md says why each rule is there).
 #pragma once
 
 #include <string>
@@ -16,11 +16,12 @@ namespace unflex::emit {
 // The costly part of writing a run; it does not depend on what is written before.
 [[nodiscard]] RunPlan plan_run(const Run& run, const RunStart& start, const EmitOptions& options);
 
-// The same lines for a run that begins later or less late.
+// The lines of `plan` with new speeds, for a run whose Run::late_s has changed.
 [[nodiscard]] RunPlan retimed(const RunPlan& plan, const Run& run, const EmitOptions& options);
 
-// Homing, macros and tool changes, which move the machine by themselves and may leave other limits.
-// Before them the printer gets its own shaper back, which is off from the first run on.
+// Whether the line is homing, a macro or a tool change. These move the machine by themselves and
+// may leave other limits. Before them the printer gets its own shaper back, which is off from the
+// first run on.
 [[nodiscard]] bool moves_by_itself(const gcode::Event& event);
 
 // Writes the output in the order of the input. Follows both texts with an interpreter of its own,
@@ -30,25 +31,25 @@ class Emitter {
  public:
   explicit Emitter(EmitOptions options);
 
-  // An input line outside of compensated runs, byte for byte, with whatever has to be restored
-  // before it.
+  // Writes an input line outside of compensated runs, byte for byte, after whatever has to be
+  // restored before it.
   void line(const gcode::Event& event, std::string& out);
 
-  // Lines that were to be a compensated run but stand as they are. The printer's own shaper stays
-  // as it is, on before the first run and off after it: each switch is a stop.
+  // Writes the lines of a run that is kept. The printer's own shaper stays as it is, on before the
+  // first run and off after it, because each switch is a stop.
   void keep(const std::vector<gcode::Event>& events, std::string& out);
 
-  // What a run that follows now would start from.
+  // The state that a run which follows now would start from.
   [[nodiscard]] RunStart run_start() const;
 
-  // A compensated run in place of its events. The plan is not empty and made for run_start(). Of a
-  // run in parts, all have to follow each other.
+  // Writes a compensated run in place of its events. The plan must not be empty and must be made
+  // for run_start(). The parts of a run must follow each other directly.
   void run(const Run& run, const RunPlan& plan, std::string& out);
 
-  // After the last line.
+  // To be called after the last line.
   void finish(std::string& out);
 
-  // The output's state so far, as the printer has it.
+  // The printer's state after the output so far.
   [[nodiscard]] const gcode::Interpreter& printer() const { return printer_; }
   [[nodiscard]] const planner::Limits& printer_limits() const { return limits_; }
 
@@ -74,11 +75,11 @@ class Emitter {
   gcode::Interpreter input_;      // has read the input so far
   gcode::Interpreter printer_;    // has read the output so far
   planner::Limits input_limits_;  // as the input has them
-  planner::Limits limits_;        // as the output has them …
-  bool limits_known_ = true;      // … unless a macro may have changed them
+  planner::Limits limits_;        // as the output has them
+  bool limits_known_ = true;      // false if a macro may have changed limits_
   bool started_ = false;          // a run has been written
-  bool moving_ = false;           // the last line moves X or Y; what follows may pass on at speed
-  std::string told_shaper_;       // what the last checkpoint says that puts the shaper back
+  bool moving_ = false;           // the last line moves X or Y, so the next may begin at speed
+  std::string told_shaper_;       // the words of the last checkpoint that put the shaper back
   std::string newline_ = "\n";    // as the input has it
   bool open_line_ = false;        // the last line written has no line ending
 };

@@ -20,22 +20,22 @@ struct LineRules {
   dynamics::FlexibleAxis nozzle_y;
   Reach reach_x;
   Reach reach_y;
-  double tolerance_mm = 3e-4;  // of what a line may move the nozzle by
-  double min_line_s = 1e-3;    // none is shorter than this …
-  double min_line_mm = 0.0;    // … or than this along both X and Y
-  int min_steps = 1;           // of the grid; the firmware joins shorter lines to the next
+  double tolerance_mm = 3e-4;  // largest nozzle error by what one line leaves out
+  double min_line_s = 1e-3;    // shortest duration of a line
+  double min_line_mm = 0.0;    // shortest length of a line along X or Y
+  int min_steps = 1;  // fewest grid steps of a line; the firmware joins shorter lines to the next
   double max_line_s = 0.05;
-  // Between whole steps lines may be as short as min_line_s, but no more than burst_lines begin
-  // within any burst_s, those before and after the run counted; 0: no limit.
+  // If the firmware rounds to whole steps, single lines may be as short as min_line_s. But no more
+  // than burst_lines begin within any burst_s, lines before and after the run counted. 0: no limit.
   int burst_lines = 0;
   double burst_s = 0.1;
-  // On either axis from line to line, where lines can be short enough.
+  // Largest change of speed of either axis from line to line, where lines can be short enough.
   double max_speed_step_mm_s = 30.0;
-  // What motors may do: their change of speed by the time between the lines' middles.
+  // Limit of the motors: change of speed divided by the time between the middles of two lines.
   double max_accel_mm_s2 = 20000.0;
   Motors motors;
 
-  // The duration of lines as short as they can be without end.
+  // The shortest duration that the lines of an endless row of equal lines may have.
   [[nodiscard]] double even_line_s() const {
     return burst_lines > 0 ? std::max(min_line_s, burst_s / burst_lines) : min_line_s;
   }

@@ -1,4 +1,4 @@
-// A compensated run as the emitter gets it, and as the lines that it is cut into.
+// A compensated run as the emitter gets it, and the lines that it is cut into.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace unflex::emit {
 
 struct Stroke;  // a line to be, see src/emit/strokes.hpp
 
-// What a run finds when it begins and has to fit into.
+// The state of the printer in which a run begins.
 struct RunStart {
   std::array<double, 3> zero_mm{};  // machine position of X0 Y0 Z0 (G92)
   double speed_factor = 1.0;        // M220
@@ -35,23 +35,23 @@ struct Run {
   const std::vector<planner::PlannedMove>* moves = nullptr;
   const dynamics::BaseTrajectory* base = nullptr;
   double lead_in_s = 0.0;        // the first move starts this long after the base
-  double tolerance_share = 1.0;  // of LineRules::tolerance_mm that its lines may use
-  double limits_share = 1.0;     // of LineRules' burst_lines and max_accel_mm_s2 that they may use
-  std::vector<double> lines_before_s =
-      {};               // begins of the lines just before it, in order, before 0
-  int lines_after = 0;  // how many lines begin within LineRules::burst_s after it
-  // It goes on from another part: there the last line's end is in X and Y, the nearest to the base
-  // that can be written unless known better.
+  double tolerance_share = 1.0;  // share of LineRules::tolerance_mm that its lines may use
+  double limits_share = 1.0;     // share of LineRules' burst_lines and max_accel_mm_s2 to use
+  // When the lines just before the run began, in order. The run begins at 0.
+  std::vector<double> lines_before_s = {};
+  int lines_after = 0;  // how many lines begin within LineRules::burst_s after the run
+  // This part continues the previous one. `from_mm` is where that ended; unset: the grid point
+  // nearest to the base.
   bool goes_on = false;
   std::optional<std::array<double, 2>> from_mm = {};
-  double late_s = 0.0;  // by how much its first line begins late
-  // When the next part goes on from it. The base, which moves then, is given some time further.
+  double late_s = 0.0;  // how late its first line begins
+  // When the next part takes over. The base still moves then, and is given for some time beyond it.
   std::optional<double> until_s = {};
 
   [[nodiscard]] double end_s() const { return until_s.value_or(base->duration_s()); }
 };
 
-// A run cut into lines, for a certain start. Without lines when its motion is too small for one.
+// A run cut into lines, for a certain start. It has no lines if its motion is too small for one.
 struct RunPlan {
   RunStart start;
   std::array<double, 2> from_mm{};  // where the first line begins

@@ -25,14 +25,14 @@ using Position = std::array<double, 4>;
 struct Segment {
   Position start_mm{};
   Position end_mm{};
-  double feed_mm_s = 0.0;  // what the file asks for, after M220
+  double feed_mm_s = 0.0;  // speed that the file asks for, after M220
   std::size_t line = 0;    // line number in the input
-  // False when the machine's X or Y at the start is not known from the text (beginning of the file,
-  // after homing, a macro or a tool change), its Z where the line names Z, or the filament that the
-  // line takes (absolute E after a macro): such a motion must not be rewritten.
+  // False: the text does not say where the motion starts, so the motion must not be rewritten.
+  // Unknown may be X or Y (at the beginning of the file, after homing, a macro or a tool change), Z
+  // where the line names Z, or the filament that the line takes (absolute E after a macro).
   bool start_known = true;
-  // Not known, but taken to be start_mm: only the label of an object stands between, which may have
-  // been cancelled, or a command that is not known and may have moved the machine.
+  // The start is not known, but taken to be start_mm. The reason is the label of an object, which
+  // may have been cancelled, or an unknown command, which may have moved the machine.
   bool start_assumed = false;
   // Radius of the arc this piece continues; 0 for a straight move and an arc's first and last
   // piece. Marlin hands it to its planner, which then limits the junction by centripetal
@@ -51,7 +51,8 @@ struct Segment {
 // Per axis X Y Z E, where a line gives one.
 using AxisValues = std::array<std::optional<double>, 4>;
 
-// New planner limits; those not set stay as they are. planner::Limits says which are whose.
+// New planner limits; those not set stay as they are. planner::Limits says which firmware has
+// which.
 struct LimitChange {
   std::optional<double> max_velocity_mm_s;
   std::optional<double> max_accel_mm_s2;
@@ -61,7 +62,7 @@ struct LimitChange {
   AxisValues axis_max_velocity_mm_s;
   AxisValues axis_max_accel_mm_s2;
   AxisValues axis_jerk_mm_s;
-  AxisValues axis_max_jerk_mm_s;  // RepRapFirmware from 3.6: what axis_jerk_mm_s may be at most
+  AxisValues axis_max_jerk_mm_s;  // RepRapFirmware from 3.6: largest axis_jerk_mm_s
   std::optional<double> print_accel_mm_s2;
   std::optional<double> travel_accel_mm_s2;
   std::optional<double> retract_accel_mm_s2;
@@ -73,8 +74,8 @@ struct LimitChange {
   std::optional<int> jerk_policy;
 };
 
-// What a line that sets the input shaper again must say besides the frequencies. Empty: nothing in
-// the file has changed what the configuration says.
+// What a line that sets the input shaper again must say besides the frequencies. A setting is empty
+// if the file has not changed the configured one.
 struct ShaperSettings {
   std::string type_x;  // Klipper SHAPER_TYPE, RepRapFirmware P (one type for both axes)
   std::string type_y;
@@ -99,8 +100,9 @@ struct Shaper {
 enum class EventKind {
   passive,  // neither moves nor stops the machine: comments, modes, fans, M73, G1 with F alone …
   limits,   // changes the planner's limits from here on; does not stop
-  // Does not stop either, but no rewritten motion may reach across: labels of objects, which may
-  // have what follows left out, and what saves or restores the file's modes.
+  // Does not stop the machine, but no rewritten motion may reach across. Labels of objects are
+  // borders, since the printer may leave out what follows. So are lines that save or restore the
+  // file's modes.
   border,
   barrier,  // all motion is finished first: G4, G28, M400, T, unknown commands and macros
   move,     // one or more segments
@@ -112,17 +114,18 @@ struct Event {
   Line line;
   std::vector<Segment> segments;  // move
   Lazy<LimitChange> limits;       // limits
-  bool sets_shaper = false;       // barrier: from here on the input shaper is …
-  Lazy<Shaper> shaper;            // … this one
+  bool sets_shaper = false;       // barrier: the line sets the input shaper
+  Lazy<Shaper> shaper;            // barrier: the input shaper from here on
   double dwell_s = 0.0;           // barrier: G4's pause
   // barrier: the machine may be anywhere afterwards, in any mode (homing, macro, tool change).
   bool position_lost = false;
-  // Klipper's macros may make limits of it (M205), others than those known.
+  // The line may set limits that are not known here: with Klipper a macro may do so (M205), or
+  // ACCEL_TO_DECEL in some of its versions.
   bool may_set_limits = false;
   std::vector<std::string> warnings;  // remarks for the user about this line
-  bool added = false;                 // the line is none of the file: Interpreter::approach
+  bool added = false;                 // not a line of the file, but an Interpreter::approach
 
-  // As before it was interpreted; keeps the line and the storage.
+  // Undoes the interpretation; keeps the line and the storage.
   void reset();
 };
 
@@ -155,23 +158,23 @@ struct InterpreterOptions {
   double shaper_freq_y_hz = 0.0;
   double retract_z_hop_mm = 0.0;  // Marlin and RepRapFirmware, M207 Z
   MarlinArcs marlin_arcs{};
-  // RepRapFirmware's M593 P in config.g. Its off, P"none", replaces the type, so that switching the
-  // shaper on again takes it.
+  // RepRapFirmware's M593 P in config.g. P"none", which switches the shaper off, replaces the type,
+  // so a line that switches it on again must give this type.
   std::string shaper_type{};
-  // RepRapFirmware from 3.6: M205 sets the jerk of prints alone, M566 that and the most it may be.
+  // RepRapFirmware from 3.6: M205 sets the jerk of prints alone; M566 sets it and its upper bound.
   bool has_print_jerk = false;
-  // Of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
+  // Filament diameter of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
   double filament_diameter_mm = 1.75;
-  // The configuration's, which an M92 has to agree with.
+  // Steps per mm of the configuration; an M92 must agree with them.
   std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 500.0};
 };
 
-// The options with the values the firmware's own source has before anyone configures it.
+// The options with the default values of the firmware's source.
 [[nodiscard]] InterpreterOptions default_options(Firmware firmware);
 
 // The state a line is read in.
 struct ModalState {
-  Position position_mm{};  // machine
+  Position position_mm{};  // machine position
   // Whether the axis' machine position is known from the text. E counts from the file's beginning.
   std::array<bool, 4> known{false, false, false, true};
   Position base_mm{};  // machine position of the G-code zero (G92, offsets, hop of G10)
@@ -187,7 +190,7 @@ struct ModalState {
   double flow_factor = 1.0;            // M221
   bool volumetric = false;             // M200: E is in mm³
   double filament_diameter_mm = 1.75;  // M200 D
-  double e_unit = 1.0;                 // of an E word: unit_mm, or its cube where Marlin reads mm³
+  double e_unit = 1.0;                 // unit of E words: unit_mm, or its cube if Marlin reads mm³
   int plane = 17;                      // G17, G18, G19
   bool retracted = false;              // firmware retraction
   double hop_mm = 0.0;                 // how far G10 has lifted Z
@@ -228,17 +231,17 @@ class Interpreter {
 
   // Never fails: a line that cannot be understood passes as a barrier with a warning.
   [[nodiscard]] Event interpret(Line line);
-  // The same of event.line, into an event whose storage is used again.
+  // Interprets event.line and fills the event, whose storage is used again.
   void interpret(Event& event);
 
-  // A travel whose start is only assumed (Segment::start_assumed) cannot be rewritten, and leaves
-  // the nozzle swinging where extrusion begins. For such a line the text of another that can stand
-  // before it and makes all of its way but the end, which then starts at a known place. It leads
-  // nowhere the line does not. Nothing for any other line.
+  // A travel whose start is only assumed (Segment::start_assumed) cannot be rewritten, and so the
+  // nozzle would swing where extrusion begins. For such a travel this gives an approach: a line to
+  // put before it that makes all of the way but the end. The end then starts at a known place. The
+  // approach leads nowhere that the travel does not lead. nullopt for any other line.
   [[nodiscard]] std::optional<std::string> approach(const Line& line) const;
 
   [[nodiscard]] const ModalState& state() const { return state_; }
-  // With what M207 and the like have changed.
+  // The options, with the changes that M207 and similar commands have made.
   [[nodiscard]] const InterpreterOptions& options() const { return options_; }
 
  private:
@@ -326,9 +329,9 @@ class Interpreter {
 
   // False behind a line that may or may not have set a mode or F.
   [[nodiscard]] bool modes_certain() const { return !modes_uncertain_ && !feed_uncertain_; }
-  // The line may be carried out or not: what it would do is tried on a copy.
+  // For a line that the printer may or may not carry out. Its effect is tried on a copy.
   void maybe(Event& event, void (Interpreter::*carry_out)(Event&), std::string_view cause);
-  // The same with a warning, whatever it would do.
+  // Like maybe(), but there is always a warning.
   void doubtful_line(Event& event, void (Interpreter::*carry_out)(Event&),
                      std::string_view problem);
   void keep_reading_of_e(bool e_absolute, double before_mm);
@@ -341,33 +344,34 @@ class Interpreter {
   // ModalState::known, as if no object had been cancelled and no unknown command moved anything.
   [[nodiscard]] std::array<bool, 4> known_or_assumed() const;
   [[nodiscard]] Start start_of_retraction() const;
-  // Adds the straight piece to `target`, unless it has no length, and moves the state there.
+  // Adds a straight segment to `target`, unless it has no length, and moves the state there.
   void append_segment(Event& event, const Position& target, double feed_mm_s, const Start& start,
                       double curve_radius_mm = 0.0);
   void lose_position(Event& event);
-  // The same of a command that is not known: where the machine was is where it is taken to be.
+  // Loses the position after an unknown command. X and Y are assumed to be where they were.
   void doubt_position(Event& event);
   void not_understood(Event& event, std::string_view problem);
 
   InterpreterOptions options_;
   ModalState state_;
   std::map<std::string, ModalState, std::less<>> saved_states_;  // SAVE_GCODE_STATE, by name
-  // Whether the last SET_PRESSURE_ADVANCE switched it on, and on which extruder.
+  // Whether the last SET_PRESSURE_ADVANCE switched pressure advance on, and for which extruder.
   std::optional<bool> pressure_advance_on_;
   std::string pressure_advance_extruder_;
   std::vector<ModalState> pushed_states_;  // RepRapFirmware, M120
   std::optional<int> tool_;                // the tool in use, where the file selects it
-  std::map<int, double> flow_factors_;     // M221, of the tools not in use
+  std::map<int, double> flow_factors_;     // M221 of the tools not in use
   // RepRapFirmware: the indentation of the outermost `if`, `while` or `else` whose block is open.
   std::optional<std::size_t> block_indent_;
-  // Marlin: behind the label of an object, until Z is named. Motion of a cancelled object is left
-  // out along Z too (gcode.cpp, get_destination_from_command), and not made up for.
+  // Marlin: true behind the label of an object, until a line names Z. Marlin leaves out the motion
+  // of a cancelled object along Z too and does not make up for it (gcode.cpp,
+  // get_destination_from_command).
   bool z_left_out_ = false;
-  // X and Y: unknown for no other reason.
+  // X and Y: if the position is unknown, only labels and unknown commands are the reason.
   std::array<bool, 2> assumed_{};
-  bool modes_uncertain_ = false;  // a line that may not run has set a mode or a limit
-  bool feed_uncertain_ = false;   // the same for F alone
-  Command command_;               // of the line being read; kept for its storage
+  bool modes_uncertain_ = false;  // a line that may or may not run has set a mode or a limit
+  bool feed_uncertain_ = false;   // a line that may or may not run has set F
+  Command command_;               // command of the line being read; kept for its storage
 };
 
 }  // namespace unflex::gcode

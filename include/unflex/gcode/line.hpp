@@ -13,13 +13,13 @@ namespace unflex::gcode {
 
 // One line of the input, byte for byte.
 struct Line {
-  std::string text;  // with its line ending ("\n", "\r\n"), without one at the end of the file
+  std::string text;             // with its line ending ("\n", "\r\n"); the last line may have none
   std::size_t number = 0;       // 1-based
   bool may_hold_return = true;  // false: there is no carriage return in it
 
   // The text without its line ending.
   [[nodiscard]] std::string_view content() const;
-  // Whether something follows a '\r': other programs take that for the end of a line.
+  // Whether text follows a '\r' within the line. Other programs would end the line there.
   [[nodiscard]] bool has_bare_return() const;
 };
 

@@ -1,4 +1,4 @@
-// Commands that no table here knows.
+// Commands that are in none of unflex's tables.
 #pragma once
 
 #include <string>
@@ -8,9 +8,9 @@
 
 namespace unflex::gcode {
 
-// The command of a line that may do anything, since nothing here knows what it does: a macro, or a
-// code of another firmware ("MY_MACRO", "M1234.5"). Empty for all other lines, those among them
-// that move the machine in a known way (G28, tool changes) or have been warned of.
+// The command of a line whose effect unflex does not know: a macro, or a code of another firmware
+// ("MY_MACRO", "M1234.5"). Empty for all other lines. Among these are lines that move the machine
+// in a known way (G28, tool changes) and lines with a warning.
 [[nodiscard]] std::string unknown_command(const Event& event, Firmware firmware);
 
 }  // namespace unflex::gcode

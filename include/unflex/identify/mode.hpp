@@ -14,11 +14,11 @@ namespace unflex::identify {
 
 struct Estimate {
   double value = 0.0;
-  double low = 0.0;  // of the 95 % interval
+  double low = 0.0;  // lower end of the 95 % interval
   double high = 0.0;
 };
 
-// What was measured and what the mode makes of it, to be drawn: energy over frequency in Hz, or
+// What was measured and what the fitted mode gives, for a drawing: energy over frequency in Hz, or
 // acceleration over time in s.
 struct Curve {
   bool is_spectrum = true;
@@ -32,7 +32,7 @@ enum class Method {
   spectrum,  // a spectrum by Welch's method
   ringing,   // the decay after a move
   tower,     // measured by hand
-  combined,  // several of them
+  combined,  // several records
 };
 
 [[nodiscard]] std::string_view to_string(Method method);
@@ -41,37 +41,37 @@ struct Mode {
   Method method = Method::sweep;
   Estimate freq_hz;
   Estimate damping_ratio;
-  double unexplained = 0.0;  // share of what was measured that the mode is not, 0 to 1
+  double unexplained = 0.0;  // share of the measurement that the mode does not explain, 0 to 1
   Curve curve;
   std::vector<std::string> warnings;
 };
 
 // The sweep that excited the printer. Klipper: FREQ_START and FREQ_END of TEST_RESONANCES; the
-// default is where the sweeps of all its versions agree.
+// default is the band that the sweeps of all its versions share.
 struct Sweep {
   double start_hz = 5.0;
   double end_hz = 133.0;
 };
 
-// Fits a mode to the samples of one axis, of a sweep where they hold one, otherwise of ringing.
+// Fits a mode to the samples of one axis: to a sweep if they hold one, otherwise to ringing.
 [[nodiscard]] Result<Mode> fit_recording(const Recording& recording, Axis axis, const Sweep& sweep);
 [[nodiscard]] Result<Mode> fit_spectrum(const Spectrum& spectrum, Axis axis, const Sweep& sweep);
 [[nodiscard]] Result<Mode> fit(const DataSet& set, Axis axis, const Sweep& sweep);
 
-// Which of X and Y moved the more.
+// The one of X and Y that moved more.
 [[nodiscard]] Axis dominant_axis(const DataSet& set);
 
-// One mode from several records of it. Where they differ by more than their intervals, the
-// interval grows.
+// One mode from several records of it. If the records differ by more than their intervals, the
+// interval of the mode grows.
 [[nodiscard]] Mode combine(const std::vector<Mode>& modes);
 
 // A ringing tower: waves `spacing_mm` apart on a wall printed at `speed_mm_s`, and how many times
-// lower each is than the one before. Spreads are half the range it might be.
+// lower each wave is than the one before. A spread is half of the range in which the value may lie.
 struct Tower {
   double spacing_mm = 0.0;
   double spacing_spread_mm = 0.0;
   double speed_mm_s = 0.0;
-  double decay = 0.0;  // height of a wave over that of the next, above 1; 0: not measured
+  double decay = 0.0;  // height of a wave over the height of the next, above 1; 0: not measured
   double decay_spread = 0.0;
 };
 

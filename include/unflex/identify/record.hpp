@@ -1,4 +1,4 @@
-// What people record of a printer's resonances, as they have it in files.
+// Records of a printer's resonances, as people have them in files.
 #pragma once
 
 #include <array>
@@ -27,23 +27,22 @@ struct Recording {
 struct Spectrum {
   double step_hz = 0.0;                        // density k is at k · step_hz
   std::array<std::vector<double>, 3> density;  // X, Y, Z, in any unit
-  // SHAPER_CALIBRATE divides by the frequency before it writes.
+  // SHAPER_CALIBRATE divides the density by the frequency before it writes.
   bool is_normalized = false;
 };
 
 struct DataSet {
-  std::string name;  // the file's, and for one of several in a file its own
+  std::string name;  // name of the file; with several data sets in it, also of the column
   std::variant<Recording, Spectrum> data;
-  std::optional<Axis> axis;  // that the name tells
+  std::optional<Axis> axis;  // axis that the name tells
   bool is_diagonal = false;  // a test of a belt, neither along X nor along Y
   std::vector<std::string> notes;
 };
 
 // Reads the text of a file:
 //   Klipper's raw recording, also Shake&Tune's   #time,accel_x,accel_y,accel_z
-//   Klipper's spectrum                           freq,psd_x,psd_y,psd_z,psd_xyz[,shapers:,…], or
-//   with
-//                                                one column for each of several points
+//   Klipper's spectrum                           freq,psd_x,psd_y,psd_z,psd_xyz[,shapers:,…],
+//                                                or one column for each of several points
 //   RepRapFirmware's M956                        Sample,X,Y,Z … Rate 1344, overflows 0
 // Errors are of kind input: another header, a line that is no row of numbers, too few rows.
 [[nodiscard]] Result<std::vector<DataSet>> parse_csv(std::string_view text,

@@ -10,7 +10,7 @@ namespace unflex::machine {
 struct KeyDescription {
   std::string name;           // "limits.max_accel_mm_s2"
   std::string unit;           // "mm/s²"; empty for a pure number, a switch or a word
-  std::string range;          // "> 0", "0 to 1", "true, false"
+  std::string range;          // "> 0", "≥ 0, ≤ 1", "true, false"
   std::string default_value;  // "5000", or in words what holds while the key is unset
   std::string meaning;        // one line
 };

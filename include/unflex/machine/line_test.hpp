@@ -16,12 +16,13 @@ struct LineTestStage {
   double duration_s = 0.0;  // as the firmware plans it, ramps included
 };
 
-// The stages that the firmware can be asked for: its lines are long enough for it not to join them,
-// and as many as it plans ahead are long enough to brake in.
+// The stages that the firmware can be asked for: the lines are long enough that it does not join
+// them, and the lines that it plans ahead are together long enough to brake in.
 [[nodiscard]] std::vector<LineTestStage> line_test_stages(const Settings& settings);
 
 // The file: homing, then one stage after the other, each a layer of its own, higher and further
-// along Y, without heat or filament. An error of kind usage where the travel is too small.
+// along Y, without heat or filament. An error of kind usage if the travel or the limits are too
+// small.
 [[nodiscard]] Result<std::string> line_test(const Settings& settings);
 
 }  // namespace unflex::machine

@@ -22,13 +22,13 @@ struct Range {
   double max = 0.0;
 };
 
-// Per axis X Y Z E, where set.
+// One value for each of X Y Z E; unset where none is given.
 using AxisOptions = std::array<std::optional<double>, 4>;
 
 struct PrinterSettings {
   Firmware firmware = Firmware::klipper;
-  // What of that firmware it is, where it is not its makers' own (docs/compatibility.md). "auto":
-  // as recognised; "mainline": nothing else, whatever was recognised.
+  // Which variant of the firmware runs, if not its makers' own (docs/compatibility.md). "auto": as
+  // recognised; "mainline": its makers' own, whatever was recognised.
   std::string variant = "auto";
   std::string version;             // as the firmware tells it; empty: not known
   std::string transport = "auto";  // how lines reach the firmware: "card", "serial", "sbc"
@@ -66,9 +66,9 @@ struct PrinterSettings {
   // 0: the printer has none. Unset: the frequency of the axis' dynamics.
   std::optional<double> input_shaper_freq_x_hz;
   std::optional<double> input_shaper_freq_y_hz;
-  // As the firmware spells it, or "auto": what it takes when it is told none. RepRapFirmware
-  // forgets its type when its shaper is switched off (M593 P). Klipper may have another one along
-  // Y.
+  // The type of the shaper as the firmware spells it; "auto": what the firmware takes if it is told
+  // none. RepRapFirmware forgets the type when its shaper is switched off (M593 P). Klipper may
+  // have another type along Y.
   std::string input_shaper_type = "auto";
   std::string input_shaper_type_y = "auto";  // "auto": as along X
   // Unset: the firmware's default.
@@ -83,14 +83,15 @@ struct LimitSettings {
   double max_accel_mm_s2 = 5000.0;
   double square_corner_velocity_mm_s = 5.0;
   double minimum_cruise_ratio = 0.5;
-  // Klipper knows Z's alone, unset: max_velocity_mm_s and max_accel_mm_s2. For the others X and Y
-  // are those when unset, Z and E the firmware's default.
+  // Klipper has these for Z alone; unset: max_velocity_mm_s and max_accel_mm_s2. With other
+  // firmwares unset X and Y are max_velocity_mm_s and max_accel_mm_s2, unset Z and E the firmware's
+  // default.
   AxisOptions axis_max_velocity_mm_s;
   AxisOptions axis_max_accel_mm_s2;
   AxisOptions jerk_mm_s;  // Marlin with classic jerk, RepRapFirmware; unset: the firmware's default
   AxisOptions print_jerk_mm_s;                // RepRapFirmware, M205; unset: jerk_mm_s
   std::optional<double> print_accel_mm_s2;    // unset: Marlin max_accel_mm_s2, RRF no limit
-  std::optional<double> travel_accel_mm_s2;   // likewise
+  std::optional<double> travel_accel_mm_s2;   // unset: like print_accel_mm_s2
   std::optional<double> retract_accel_mm_s2;  // Marlin; unset: max_accel_mm_s2
   double junction_deviation_mm = 0.013;       // Marlin
   double min_velocity_mm_s = 0.0;             // Marlin
@@ -107,13 +108,14 @@ struct ExtruderSettings {
   std::optional<double> max_extrude_only_velocity_mm_s;  // unset: Klipper's formula
   std::optional<double> max_extrude_only_accel_mm_s2;    // unset: Klipper's formula
   double instantaneous_corner_velocity_mm_s = 1.0;
-  // Klipper's [extruder], where the file does not set it: how long a switch of the shaper takes.
+  // Klipper's [extruder], if the print does not set it. It decides how long a switch of the shaper
+  // takes.
   double pressure_advance_s = 0.0;
   double pressure_advance_smooth_s = 0.04;
 };
 
-// Either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and damping_n_s_mm; the latter are
-// turned into the former when read.
+// A printer file gives either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and
+// damping_n_s_mm, which are converted when read.
 struct AxisDynamics {
   double freq_hz = 45.0;
   double damping_ratio = 0.06;
@@ -141,20 +143,20 @@ struct SolveSettings {
   double overlap_s = 0.06;        // pre-roll and post-roll of such a window
   double lead_in_ms = 0.0;        // the base may start this much before the plan does
   std::optional<double> tail_ms;  // the base may settle this much longer; unset: max(8ζ/ω, 2 ms)
-  double travel_weight = 0.1;     // of the tracking error where nothing is extruded
+  double travel_weight = 0.1;     // weight of the tracking error where nothing is extruded
   double jerk_weight = 1.5;       // regularisation (docs/theory.md)
 };
 
 struct EmitSettings {
   // Node period; unset: 1 ms, or a twentieth of the faster resonance's period if that is shorter.
   std::optional<double> period_ms;
-  // Of what a line's shape may move the nozzle by. Unset: 0.3 µm at 45 Hz, in proportion to the
+  // How far the shape of a line may move the nozzle. Unset: 0.25 µm at 45 Hz, in proportion to the
   // lower frequency, so that lines per second hardly depend on it.
   std::optional<double> tolerance_um;
   std::optional<double> max_lines_per_s;  // hard limit; unset: by firmware
   double max_speed_step_mm_s = 30.0;      // from line to line, per axis
-  // The firmware's acceleration inside a compensated run; unset: 1e6, RepRapFirmware 5 times the
-  // base's.
+  // The firmware's acceleration inside a compensated run; unset: 1e6, with RepRapFirmware 5 times
+  // the base's.
   std::optional<double> accel_mm_s2;
   double square_corner_velocity_mm_s = 1000.0;
   // Klipper: each run's end calls the macro at which a pause takes effect.
@@ -224,8 +226,8 @@ struct Sources {
   const PrintText* print = nullptr;                   // the print they are for, if it is at hand
   std::optional<std::filesystem::path> printer_file;  // --printer
   std::vector<std::string> overrides;                 // --set, "key=value"
-  // The firmware is the one the print was sliced for, if no other source names one. Otherwise the
-  // default: many printers are sliced for as if they had another.
+  // If no source names a firmware, take the one that the print was sliced for. If this is false,
+  // take the default: many printers are sliced for as if they had another firmware.
   bool firmware_as_sliced = false;
 };
 
@@ -239,11 +241,11 @@ struct Sources {
 // Whether a file that was looked at describes a printer itself, and is no print.
 [[nodiscard]] bool describes_printer(const PrintText& text);
 
-// The same without a print.
+// Reads the settings without a print.
 [[nodiscard]] Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
                                     const std::vector<std::string>& overrides);
 
-// The same for the text of a printer file; name stands for the file in messages.
+// Reads the settings from the text of a printer file; `name` stands for the file in messages.
 [[nodiscard]] Result<Settings> parse(std::string_view text, const std::string& name,
                                      const std::vector<std::string>& overrides);
 

@@ -1,4 +1,4 @@
-// What of a print can be seen before it is read: where slicers write what they know of the printer.
+// The beginning and end of a print, where slicers write what they know of the printer.
 #pragma once
 
 #include <cstddef>
@@ -18,10 +18,10 @@ using SlicerVariables = std::vector<std::pair<std::string, std::string>>;
 struct PrintText {
   std::string name;           // for messages
   std::string head;           // whole lines from the first to the first move
-  std::string tail;           // whole lines to the last; empty where it is not to be had
+  std::string tail;           // whole lines up to the last; empty if it cannot be had
   std::size_t tail_line = 0;  // number of the tail's first line
-  bool is_stream = false;     // the tail comes too late
-  // What the slicer says besides. Where the text says it as well, the text holds.
+  bool is_stream = false;     // a pipe, whose tail comes too late
+  // What the slicer says outside the text. If the text says it too, the text counts.
   SlicerVariables variables = {};
 };
 
@@ -29,9 +29,10 @@ struct PrintText {
 [[nodiscard]] Result<PrintText> read_print_text(const std::filesystem::path& file,
                                                 const std::string& name);
 
-// Where the head of a print ends that begins like `text`: behind the line of the first move
-// (G0 to G3), or where none comes within kMaxHeadBytes, behind the last whole line in these; npos
-// while neither has come. It is the same in whatever pieces the text comes.
+// Where the head of a print ends that begins like `text`: behind the line of the first move (G0 to
+// G3). If no move comes within kMaxHeadBytes, the head ends behind the last whole line in these
+// bytes. npos if more text is needed to tell. The result does not depend on the pieces in which the
+// text comes.
 inline constexpr std::size_t kMaxHeadBytes = std::size_t{1} << 20U;
 [[nodiscard]] std::size_t head_end(std::string_view text);
 

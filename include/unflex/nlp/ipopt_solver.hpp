@@ -14,10 +14,10 @@
 namespace unflex::nlp {
 
 struct SolverOptions {
-  double tolerance = 1e-7;  // of the scaled optimality error
+  double tolerance = 1e-7;  // largest scaled optimality error
   int max_iterations = 200;
-  // The start is near the solution of a program whose unknowns are about 1: stay close to it, also
-  // where it is close to bounds.
+  // The start is near the solution, and the unknowns are about 1. Ipopt then stays close to the
+  // start, even where that is close to bounds.
   bool warm = false;
 };
 
@@ -35,7 +35,7 @@ struct Solution {
   int iterations = 0;
 };
 
-// Errors (kind internal): Ipopt refuses an option or cannot be set up. Not to converge is no error.
+// Errors (kind internal): Ipopt refuses an option or cannot be set up. Not converging is no error.
 [[nodiscard]] Result<Solution> solve(const Problem& problem, const SolverOptions& options);
 
 // "ipopt 3.11.9"

@@ -1,4 +1,4 @@
-// A nonlinear program, apart from any solver:
+// A nonlinear program, independent of any solver:
 //
 //   min f(x)   subject to   g_L ≤ g(x) ≤ g_U,   x_L ≤ x ≤ x_U
 //
@@ -12,7 +12,8 @@
 
 namespace unflex::nlp {
 
-// Where a sparse matrix may be non-zero; entry i stands at (row[i], column[i]), 0-based, once each.
+// Where a sparse matrix may be non-zero. Entry i stands at (row[i], column[i]), 0-based; no place
+// occurs twice.
 struct Sparsity {
   std::vector<int> row;
   std::vector<int> column;
@@ -36,7 +37,8 @@ class Problem {
   [[nodiscard]] virtual const Bounds& variable_bounds() const = 0;    // sizes give n
   [[nodiscard]] virtual const Bounds& constraint_bounds() const = 0;  // sizes give m
   [[nodiscard]] virtual const std::vector<double>& start() const = 0;
-  // True when g is linear, and when f is quadratic: J, and H if both hold, are then evaluated once.
+  // Whether g is linear, and whether f is quadratic. If g is linear, J is evaluated only once; if
+  // both hold, H too.
   [[nodiscard]] virtual bool linear_constraints() const = 0;
   [[nodiscard]] virtual bool quadratic_objective() const = 0;
 

@@ -26,11 +26,12 @@ struct Job {
   std::filesystem::path input;   // a seekable file
   std::string input_name;        // as the user calls it, for messages ("-" for stdin)
   std::filesystem::path output;  // compensate: written here, not atomically
-  // compensate: read and written as the text comes, instead of the files, where not negative.
+  // compensate: streams that are read and written as the text comes, instead of the files.
+  // Negative: not used.
   int input_fd = -1;
-  std::string input_head = {};  // of input_fd, read already
+  std::string input_head = {};  // first bytes of input_fd, read already
   int output_fd = -1;
-  // What passes through these two: text or gzip. Files are of text.
+  // What the two descriptors carry: text or gzip. Files hold text.
   container::Kind input_fd_kind = container::Kind::text;
   container::Kind output_fd_kind = container::Kind::text;
   std::string output_name;
@@ -69,10 +70,10 @@ struct Inspection {
   std::map<std::string, std::size_t> commands;  // "G1", "M204", "PRINT_START" → lines
   std::size_t runs = 0;                         // stretches that can be compensated
   std::size_t windows = 0;
-  double run_time_s = 0.0;                               // in those runs
-  std::map<std::string, std::size_t> kept_moves;         // reason → moves outside runs
-  report::ExtrudedPath extruded_path;                    // compensated: what can be
-  std::vector<report::UnknownCommand> unknown_commands;  // by their first lines
+  double run_time_s = 0.0;                        // duration of all runs
+  std::map<std::string, std::size_t> kept_moves;  // reason → moves outside runs
+  report::ExtrudedPath extruded_path;  // its `compensated_mm` is what could be compensated
+  std::vector<report::UnknownCommand> unknown_commands;  // in the order of their first lines
   double reference_time_s = 0.0;
   double moving_time_s = 0.0;
   double filament_mm = 0.0;

@@ -9,9 +9,9 @@
 namespace unflex::pipeline {
 
 // Tries all methods on every run of `job.input`, planned as `compensate` plans it, with the job's
-// settings; unflex' multiples are of limits.max_accel_mm_s2. Every run begins with the nozzle at
-// rest, and nothing is written as G-code: bases move exactly as their method has them. traces: also
-// of the worst place, for the figures.
+// settings; unflex' acceleration limits are multiples of limits.max_accel_mm_s2. Every run begins
+// with the nozzle at rest. Nothing is written as G-code: bases move exactly as each method has
+// them. traces: also record the worst place, for the figures.
 [[nodiscard]] Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progress);
 
 }  // namespace unflex::pipeline

@@ -28,12 +28,13 @@ class KlipperPlanner final : public Planner {
   // minimum_cruise_ratio leaves, (1 − ratio)·a.
   struct Junction {
     double max_start_v2 = 0.0;         // at the start: the junction's limit, or what is reachable
-    double max_smooth_start_v2 = 0.0;  // the same with smooth acceleration
+    double max_smooth_start_v2 = 0.0;  // max_start_v2 with smooth acceleration
     double max_cruise_v2 = 0.0;
     double delta_v2 = 0.0;  // 2aL: the most by which v² can change within the move
     double smooth_delta_v2 = 0.0;
     double junction_deviation_mm = 0.0;
-    // Written by the backward pass. No cruise speed: that of the move before is carried over.
+    // Written by the backward pass. Without cruise_v2 the cruise speed of the move before is
+    // carried over.
     double start_v2 = 0.0;
     double end_v2 = 0.0;
     std::optional<double> cruise_v2;
@@ -48,7 +49,7 @@ class KlipperPlanner final : public Planner {
 
   FirmwareConfig config_;
   std::vector<PlannedMove> moves_;   // final ones first, then those in lookahead_
-  std::vector<Junction> lookahead_;  // of the last lookahead_.size() entries of moves_
+  std::vector<Junction> lookahead_;  // one for each of the last entries of moves_
   double until_plan_s_;  // shortest time of moves still to be queued before the next lazy planning
 };
 

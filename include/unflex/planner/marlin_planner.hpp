@@ -1,27 +1,29 @@
 // Marlin's planner.
 //
 // Notation: Marlin 2.1.2, src/module/planner.cpp. The arithmetic is the firmware's own: 32-bit
-// floats and integers in the same order, because rates are rounded up to whole steps per second and
-// one more or less of them is 100 µs on a move of a second.
+// floats and integers in the same order. Rates are rounded up to whole steps per second, and one
+// step per second more or less is 100 µs on a move of a second.
 //
 // Rounding. Targets are rounded to whole steps, and the rounding is carried: the start_mm and
 // end_mm of a planned move are where the motors are, not what the file says. A move of fewer than
-// min_steps_per_segment steps on every axis is not queued; its motion belongs to the next move that
-// is. The same goes for E in the planning; but the E of a planned move is the file's, so that
-// filament can be accounted for. The firmware rounds E anew at each G92 E0, which moves the
+// min_steps_per_segment steps on every axis is not queued; its motion is added to the next queued
+// move. E is rounded in this way for the planning. But the E of a planned move is the file's, so
+// that filament can be accounted for. The firmware rounds E anew at each G92 E0, which moves the
 // filament by less than one step (and drops what was too short to be queued).
 //
 // Lookahead. The file is taken to be read faster than it is printed. The buffer of N blocks then
-// holds N − 1, the running one among them; when a block begins to run, the N − 3 after it are known
-// and the last of these ends at MINIMUM_PLANNER_SPEED. From then on its end speed is fixed. After a
-// stop the buffer is filled before the first block runs, which therefore knows N − 2; meanwhile the
-// third to (N/2)-th block are stretched to min_segment_time (SLOWDOWN), as they would be in the
-// firmware. A real printer's first block runs as soon as three are queued.
+// holds N − 1, including the running one. When a block begins to run, the N − 3 blocks after it are
+// known, and the last of these ends at MINIMUM_PLANNER_SPEED. From then on the end speed of the
+// running block is fixed. After a stop the buffer is filled before the first block runs, so this
+// block has N − 2 known blocks after it. Meanwhile the third to (N/2)-th block are stretched to
+// min_segment_time (SLOWDOWN), as they would be in the firmware. A real printer's first block runs
+// as soon as three are queued.
 //
-// Trapezoid. A block's ramps take whole steps: the one up is rounded up, the one down is rounded
-// down (calculate_trapezoid_for_block). Both have the block's acceleration a, and the last ends
-// where the steps end. So a move ends faster than the next one begins: v² by up to 4a times the
-// length of a step, and what rounding rates up, at least to 120 steps/s, adds.
+// Trapezoid. A block's ramps take whole steps: the ramp up is rounded up, the ramp down is rounded
+// down (calculate_trapezoid_for_block). Both have the block's acceleration a, and the ramp down
+// ends where the steps end. So a move ends faster than the next one begins: v² is higher by up to
+// 4a times the length of a step, plus what rounding adds to the rates. (They are rounded up, and to
+// 120 steps/s at least.)
 //
 // Left out: the timing of single steps in the stepper interrupt (block_phase_isr), where each step
 // takes a period of the rate at its beginning. Simulated for 3 200 blocks, this moves a block's end
@@ -43,14 +45,15 @@
 namespace unflex::planner {
 namespace marlin {
 
-// Of the axes X Y Z E, or of the motors. The firmware's 32 bits are full after 4 km of filament.
+// Steps of the axes X Y Z E, or of the motors. The firmware's 32 bits overflow after 4 km of
+// filament.
 using Steps = std::array<std::int64_t, 4>;
 using Vector = std::array<float, 4>;
 
 // Limits and configuration in the firmware's own types (planner_settings_t). Limits are of motors,
 // which on a core are not the axes.
 struct Settings {
-  std::array<std::array<int, 3>, 3> motors{};  // by axes, as in unflex::Motors
+  std::array<std::array<int, 3>, 3> motors{};  // motors by axes, as in unflex::Motors
   bool shares_motors = false;                  // IS_CORE
   Vector steps_per_mm{};
   Vector mm_per_step{};
@@ -75,7 +78,7 @@ struct Settings {
 
 // One entry of the buffer (block_t). v2 are squared speeds.
 struct Block {
-  std::uint32_t step_events = 0;  // of the axis with most steps
+  std::uint32_t step_events = 0;  // steps of the axis that has most
   std::uint32_t nominal_rate_steps_s = 0;
   std::uint32_t accel_steps_s2 = 0;
   float nominal_speed_mm_s = 0.0F;
@@ -104,7 +107,7 @@ class MarlinPlanner final : public Planner {
   // config.block_buffer_size must be at least 4.
   MarlinPlanner(const Limits& limits, const FirmwareConfig& config);
 
-  // False as well for a move that is too short to be queued.
+  // Also false for a move that is too short to be queued.
   bool add(const gcode::Segment& segment) override;
   void stop() override;
   std::size_t take(std::vector<PlannedMove>& out) override;
@@ -121,15 +124,15 @@ class MarlinPlanner final : public Planner {
   void forward_pass();
 
   FirmwareConfig config_;
-  Limits settings_limits_;  // those that settings_ were made from
+  Limits settings_limits_;  // the limits that settings_ were made from
   marlin::Settings settings_;
   marlin::Previous previous_;
-  marlin::Steps position_{};    // after the last queued block
+  marlin::Steps position_{};    // steps after the last queued block
   double filament_mm_ = 0.0;    // E of the file after the last queued block
   gcode::Position asked_mm_{};  // end of the last segment given, queued or not
   bool has_position_ = false;   // a segment has been given
-  bool start_known_ = true;     // of all segments since the last queued block
-  bool start_assumed_ = false;  // of those of them whose start is not known
+  bool start_known_ = true;     // all starts since the last queued block are known
+  bool start_assumed_ = false;  // the unknown ones among these starts are all assumed
   std::vector<marlin::Block> ring_;
   // Blocks first_ … end_ − 1 are in the buffer, counted since the beginning.
   std::size_t first_ = 0;

@@ -21,16 +21,17 @@ namespace unflex::planner {
 
 inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
-// Limits a file may change in its middle. Arrays are per axis X Y Z E.
+// Limits that a file may change. Arrays are per axis X Y Z E.
 struct Limits {
   // Klipper.
   double max_velocity_mm_s = 300.0;
   double max_accel_mm_s2 = 5000.0;
   double square_corner_velocity_mm_s = 5.0;
   double minimum_cruise_ratio = 0.5;
-  // What Klipper had in its place before March 2024. Later ones are planned for, which do without.
+  // Before March 2024 Klipper had this in place of minimum_cruise_ratio. The planner follows later
+  // versions, which do without it.
   double accel_to_decel_mm_s2 = 2500.0;
-  // Marlin and RepRapFirmware. The defaults, and those for Marlin alone, are of Marlin 2.1.2:
+  // Marlin and RepRapFirmware. These defaults, and those for Marlin alone, are from Marlin 2.1.2:
   // Configuration.h (DEFAULT_MAX_FEEDRATE, DEFAULT_MAX_ACCELERATION, DEFAULT_ACCELERATION,
   // DEFAULT_XJERK, JUNCTION_DEVIATION_MM) and Configuration_adv.h (DEFAULT_MINIMUMFEEDRATE,
   // DEFAULT_MINSEGMENTTIME).
@@ -40,15 +41,15 @@ struct Limits {
   double print_accel_mm_s2 = 3000.0;                                           // M204 P
   double travel_accel_mm_s2 = 3000.0;                                          // M204 T
   // Marlin.
-  double retract_accel_mm_s2 = 3000.0;    // M204 R: of filament alone
+  double retract_accel_mm_s2 = 3000.0;    // M204 R: moves of filament alone
   double junction_deviation_mm = 0.013;   // M205 J
-  double min_velocity_mm_s = 0.0;         // M205 S: of moves with filament
+  double min_velocity_mm_s = 0.0;         // M205 S: moves with filament
   double min_travel_velocity_mm_s = 0.0;  // M205 T
   double min_segment_time_s = 0.02;       // M205 B
   // RepRapFirmware.
   double min_movement_velocity_mm_s = 0.5;  // M203 I
   int jerk_policy = 0;                      // M566 P
-  // From 3.6, M566: the most that axis_jerk_mm_s, then M205's, may be.
+  // M566 from 3.6: upper bound of axis_jerk_mm_s, which M205 sets there.
   std::array<double, 4> axis_max_jerk_mm_s{kNoLimit, kNoLimit, kNoLimit, kNoLimit};
 
   friend bool operator==(const Limits&, const Limits&) = default;
@@ -57,7 +58,7 @@ struct Limits {
 // Puts the limits that the change sets in place of those in force.
 void apply(const gcode::LimitChange& change, Limits& limits);
 
-// The printer's own input shaper as its configuration has it, where a file says nothing else. The
+// The printer's own input shaper as its configuration has it, unless a file sets another. The
 // defaults are Klipper's (klippy/extras/shaper_defs.py).
 struct InstalledShaper {
   std::string type_x = "mzv";  // as the firmware spells it, in lower case
@@ -87,8 +88,8 @@ struct FirmwareConfig {
   int block_buffer_size = 16;                // BLOCK_BUFFER_SIZE; at least 4
   bool jd_handle_small_segments = true;      // JD_HANDLE_SMALL_SEGMENTS
   double minimum_planner_speed_mm_s = 0.05;  // MINIMUM_PLANNER_SPEED, above 0
-  // RepRapFirmware 3.5.3 on a Duet 3 with a SAME70 (MB6HC, MB6XD). Others have 40 moves; a Duet 2
-  // 937500 clocks per second (src/Movement/Move.h: InitialDdaRingLength, M595 P;
+  // RepRapFirmware 3.5.3 on a Duet 3 with a SAME70 (MB6HC, MB6XD). Other boards have 40 moves, and
+  // a Duet 2 has 937500 clocks per second (src/Movement/Move.h: InitialDdaRingLength, M595 P;
   // src/RepRapFirmware.h: StepClockRate).
   int ring_length = 60;         // at least 4
   bool has_print_jerk = false;  // from 3.6: Limits::axis_max_jerk_mm_s is a limit of its own
@@ -122,10 +123,10 @@ struct PlannedMove {
   [[nodiscard]] double time_s(double distance_mm) const;
 };
 
-// Of all of them, one after the other.
+// How long the moves take, one after the other.
 [[nodiscard]] double duration_s(std::span<const PlannedMove> moves);
 
-// The last of them that take so long together, or all there are.
+// The last moves that take at least `duration_s` together, or all moves.
 [[nodiscard]] std::span<const PlannedMove> last_moves(std::span<const PlannedMove> moves,
                                                       double duration_s);
 
@@ -148,8 +149,8 @@ class Planner {
   // The machine comes to rest after the last queued move.
   virtual void stop() = 0;
 
-  // Moves the moves that are final to the end of `out` and returns how many. After stop() these
-  // are all moves queued before it.
+  // Takes the final moves out, appends them to `out` and returns how many. After stop() these are
+  // all moves queued before it.
   virtual std::size_t take(std::vector<PlannedMove>& out) = 0;
 
   // Moves queued and not yet taken.

@@ -1,5 +1,5 @@
-// The printer's own input shaper: what it makes of the motion that unflex leaves to it, and for how
-// long the machine stands still when it is switched.
+// The printer's own input shaper: how it changes the motion that unflex leaves to it, and how long
+// the machine stands still when a line switches the shaper.
 //
 // Sources: Klipper (August 2026) klippy/extras/input_shaper.py, klippy/toolhead.py,
 // klippy/extras/motion_queuing.py, klippy/chelper/kin_shaper.c; Marlin 2.1.2 src/module/stepper.cpp
@@ -21,27 +21,27 @@ struct Shaping {
   dynamics::ShaperPulses y;
 
   [[nodiscard]] bool acts() const { return !x.empty() || !y.empty(); }
-  // For how long after the end of a motion the machine still moves, and before its begin already.
+  // The longest time by which the machine moves before a motion begins or after it ends.
   [[nodiscard]] double reach_s() const;
-  // From the first pulse to the last.
+  // Time from the first pulse to the last.
   [[nodiscard]] double length_s() const;
 };
 
-// The pulses of this shaper. Of types and damping ratios that the file has not set, those
-// of the configuration hold. A type that is not known counts as the firmware's default.
+// The pulses of the shaper. Types and damping ratios that the file has not set are those of the
+// configuration. An unknown type counts as the firmware's default.
 [[nodiscard]] Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper);
 
-// How long the machine stands still, at least, where a line turns the first of these shapers into
-// the second. 0 where they are the same.
+// The shortest time that the machine stands still when a line changes the shaper from `before` to
+// `after`. 0 if they are the same.
 //
-// Klipper generates all steps of what is queued, which takes as long as its filters look ahead and
-// back, once by the old settings and once by the new (flush_all_steps, calc_step_gen_restart):
+// Klipper generates all steps of what is queued. This takes as long as its filters look ahead and
+// back, once with the old settings and once with the new ones (flush_all_steps,
+// calc_step_gen_restart):
 //   stop = d(before) + d(after),   d = max(1 ms, reach of the shaper, half of the smooth time of
 //   pressure advance)
-// Marlin waits until the delayed part of the motion is over. RepRapFirmware does as well, and
-// starts from standstill when it has waited 10 ms for further lines (Configuration.h,
-// DefaultGracePeriod). pressure_advance_s: the one in force, where the file says so; otherwise the
-// configuration's is.
+// Marlin waits until the delayed part of the motion is over. RepRapFirmware does so too, and starts
+// from standstill when it has waited 10 ms for further lines (Configuration.h, DefaultGracePeriod).
+// pressure_advance_s: the value in force, where the file sets it; nullopt: the configuration's.
 [[nodiscard]] double switching_s(const FirmwareConfig& config, const gcode::Shaper& before,
                                  const gcode::Shaper& after,
                                  std::optional<double> pressure_advance_s);

@@ -3,31 +3,32 @@
 // Notation: RepRapFirmware 3.5.3, src/Movement/DDA.cpp and DDARing.cpp. A queued move is a DDA; it
 // is provisional until it is prepared, and frozen from then on. Speeds are in mm per step clock and
 // in 32-bit floats, as in the firmware: its decisions ("does this move reach its requested speed",
-// "is it nothing but a deceleration") hang on the last bits. They agree with the firmware's up to
+// "is it nothing but a deceleration") depend on the last bits. They agree with the firmware's up to
 // the fused multiply-adds that its compiler may have chosen.
 //
-// Rounding. A motor ends each move on a whole step, X, Y and Z each at the one nearest to what the
-// file says; start_mm and end_mm of a planned move are there. Lengths and speeds are those of the
-// file's path, so the direction of a planned move is a unit vector only up to a step over the
-// length. The extruder's remainders are carried: it follows the file's E to within a step and is
-// not rounded. An axis with 0 steps per mm is not rounded either.
+// Rounding. A motor ends each move on a whole step: X, Y and Z each end on the step nearest to what
+// the file says. start_mm and end_mm of a planned move are these places. Lengths and speeds are
+// those of the file's path, so the direction of a planned move is a unit vector only up to a step
+// over the length. The extruder's remainders are carried: it follows the file's E to within a step
+// and is not rounded. An axis with 0 steps per mm is not rounded either.
 //
 // Duration. A move lasts a whole number of step clocks, rounded down (DDA::Prepare). What is cut
 // off (less than one clock) is taken from its longest phase. Where RecalculateMove drops a ramp of
 // less than ten clocks, the other ramp's distance stays that of the requested speed, and the move
 // falls short of its length by as much as ten clocks of motion (2.7 µm at 200 mm/s). The firmware's
-// motors make up for both at once when the next move begins; a planned move does where it starts to
-// slow down.
+// motors make up for both at once when the next move begins. A planned move makes up for them where
+// it starts to slow down.
 //
 // Lookahead. A move can change while it is provisional. The file is taken to be read faster than it
-// is printed, and the task that fills the ring (Move::MoveLoop) to run at every clock; a real one
-// runs every 2 ms. So before each instant the ring holds what CanAddMove allows: ring_length moves,
-// of which at most about two seconds are provisional. Moves are frozen 50 ms before they begin, or
-// 100 ms if they do not slow down, but never more than half the ring (PrepareMoves). Moves that
-// precede a stop, too few to fill the ring, begin when the stop is read.
+// is printed, and the task that fills the ring (Move::MoveLoop) to run at every clock; in a real
+// printer it runs every 2 ms. So before each instant the ring holds what CanAddMove allows:
+// ring_length moves, of which at most about two seconds are provisional. Moves are frozen 50 ms
+// before they begin, or 100 ms if they do not slow down, but never more than half the ring
+// (PrepareMoves). If the moves before a stop are too few to fill the ring, they begin when the stop
+// is read.
 //
-// Limits. M201, M203 and M204 count for moves added later. M566 counts from where it stands for all
-// junctions that are reckoned from then on, which includes those of provisional moves.
+// Limits. M201, M203 and M204 count for moves added later. M566 counts for all junctions that are
+// computed after it, and these include junctions of provisional moves.
 //
 // Left out: pressure advance (its default of 0 leaves acceleration alone; M572), input shaping, the
 // reduced accelerations of M201.1, kinematics other than Cartesian and cores, tools with several X
@@ -75,8 +76,8 @@ struct Dda {
   float end_speed = 0.0F;
   float accel_distance_mm = 0.0F;
   float decel_distance_mm = 0.0F;
-  float target_end_speed = 0.0F;    // what the next move asks for
-  std::int64_t clocks = 0;          // whole duration
+  float target_end_speed = 0.0F;    // end speed that the next move asks for
+  std::int64_t clocks = 0;          // duration of the whole move
   bool moves_xy = false;            // xyMoving
   bool prints = false;              // isPrintingMove
   bool extruder_not_print = false;  // isNonPrintingExtruderMove
@@ -90,7 +91,7 @@ struct Dda {
 //   M566 X15 Y15 Z10 E5 mm/s, P0    M204 P50000 T50000 mm/s²
 [[nodiscard]] Limits rrf_default_limits();
 
-// The limits that the firmware really has when it is told these: none is below a floor
+// The limits that the firmware really uses when given `limits`: it raises each to a floor
 // (src/Platform/Platform.h: SetMaxFeedrate, SetInstantDv and so on).
 [[nodiscard]] Limits rrf_raised(Limits limits);
 
@@ -113,12 +114,12 @@ class RrfPlanner final : public Planner {
   void freeze();
   [[nodiscard]] std::int64_t next_event() const;
   [[nodiscard]] std::int64_t last_finish() const;
-  // Where the motors' whole steps put it.
+  // The place to which the motors' whole steps round the position.
   [[nodiscard]] gcode::Position on_steps(const gcode::Position& position_mm) const;
 
   FirmwareConfig config_;
   Motors motors_;
-  Limits settings_limits_;  // those that settings_ were made from
+  Limits settings_limits_;  // the limits that settings_ were made from
   rrf::Settings settings_;
   std::size_t ring_length_;
   std::int64_t clock_hz_;
@@ -127,7 +128,7 @@ class RrfPlanner final : public Planner {
   std::vector<PlannedMove> final_;
   // Step clocks since the machine last stood still.
   std::int64_t now_ = 0;
-  std::deque<std::int64_t> finish_;  // of frozen moves that have not ended yet; the first one runs
+  std::deque<std::int64_t> finish_;  // ends of frozen moves that have not ended yet; the first runs
   bool moving_ = false;
 };
 

@@ -11,9 +11,9 @@
 namespace unflex::record {
 
 struct Options {
-  verify::NozzleModel nozzle;  // of the verification's rules
+  verify::NozzleModel nozzle;  // Rules::nozzle of the verification
   std::size_t paths_bytes = 1'500'000;
-  std::size_t places = 12;  // worst ones, before and after each
+  std::size_t places = 12;  // number of worst places, for each of before and after
 };
 
 class Recorder {
@@ -23,10 +23,10 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // Watches a verification that also measures verify::detuned(); once, and before the recorder
-  // ends.
+  // To watch one verification, which must also measure verify::detuned(). The recorder must outlive
+  // the verification.
   [[nodiscard]] verify::Observer& observer();
-  // Of the verification that came out so.
+  // The recording of the verification, whose result is `verified`. Call it once.
   [[nodiscard]] report::Recording finish(const verify::VerifyReport& verified);
 
  private:

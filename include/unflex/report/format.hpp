@@ -14,7 +14,7 @@ namespace unflex::report {
 // 0.9876 → "98.7 %". Only a share of 1 is "100.0 %".
 [[nodiscard]] std::string share_text(double share);
 
-// The first few commands, as lines of a summary.
+// The first few unknown commands, as lines of a summary.
 [[nodiscard]] std::string unknown_text(const std::vector<UnknownCommand>& commands);
 
 // 3725.4 → "1h 02m 05s"; below a minute with tenths, "5.3s".

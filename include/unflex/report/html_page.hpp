@@ -18,7 +18,7 @@
 
 namespace unflex::report {
 
-// For text and attributes: & < > " ' become entities, control characters and what is not UTF-8
+// For text and attributes: & < > " ' become entities; control characters and invalid UTF-8 become
 // U+FFFD. Whatever comes from outside the program must pass through this or embedded_json().
 [[nodiscard]] std::string escape_html(std::string_view text);
 

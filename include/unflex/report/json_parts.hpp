@@ -16,8 +16,8 @@ inline constexpr int kSchemaVersion = 1;
 // {"limits.max_accel_mm_s2": {"value": 5000, "origin": "printer.toml:7"}, …}
 [[nodiscard]] Json settings_json(const std::vector<Setting>& settings);
 
-// Two spaces of indentation, final newline. Bytes that are not UTF-8, which file names may have, are
-// replaced.
+// Two spaces of indentation, final newline. Bytes that are not UTF-8, which file names may have,
+// are replaced.
 [[nodiscard]] std::string dump(const Json& json);
 
 // {"total_mm": …, "compensated_share": …, …}

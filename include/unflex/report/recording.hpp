@@ -1,5 +1,5 @@
-// What a page shows of a print besides its figures: the paths with their deviation, the worst
-// places, and how others would have done. Its size is bounded whatever the print.
+// What a page shows of a print besides its figures: the paths with their deviations, the worst
+// places, and how input shapers would have done. Its size is bounded, whatever the print.
 //
 //   before, after   the sliced file as the firmware plays it, and the compensated one
 #pragma once
@@ -10,7 +10,7 @@
 
 namespace unflex::report {
 
-// Contour error over time, of moves that lay filament.
+// Contour error over the time in which filament is laid.
 struct Spread {
   double max_mm = 0.0;
   double rms_mm = 0.0;
@@ -21,12 +21,12 @@ struct BeforeAfter {
   Spread after;
 };
 
-// In the order of the print.
+// A layer; layers are in the order of the print.
 struct LayerRow {
   double z_mm = 0.0;
   std::size_t first_line = 0;
   BeforeAfter spread;
-  std::size_t paths_end = 0;  // its paths are the bytes of LayerPaths::bytes up to here
+  std::size_t paths_end = 0;  // end of its paths in LayerPaths::bytes
 };
 
 // The paths of all layers, one layer after the other, each a sequence of paths without a gap:
@@ -40,24 +40,24 @@ struct LayerRow {
 // "before" is zero.
 struct LayerPaths {
   std::string bytes;
-  std::size_t layer_step = 1;  // each n-th layer is there
-  // Where the print is: a rectangle that hardly any of the paths' length is outside of.
+  std::size_t layer_step = 1;  // only every n-th layer is stored
+  // The print's rectangle: nearly all of the paths' length lies inside.
   double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0;
-  double tolerance_mm = 0.0;  // points that are left out lie this near to what is drawn
+  double tolerance_mm = 0.0;  // left-out points lie at most so far from what is drawn
 };
 
 // Logarithmic, 15 steps to the double: code c stands for 0.05 µm · 2^(c/15); 0 for all below.
 [[nodiscard]] unsigned char deviation_code(double squared_mm2);
 
 struct FeatureRow {
-  std::string name;  // as the slicer calls it; empty where it does not
+  std::string name;  // the slicer's name for it; empty if it gives none
   double duration_s = 0.0;
   BeforeAfter spread;
 };
 
-// Around a place, in the XY plane, relative to it.
+// A moment around a place. Coordinates are relative to the place.
 struct Moment {
-  double time_s = 0.0;  // from when the reference is there
+  double time_s = 0.0;  // since the reference was at the place
   double contour_mm = 0.0;
   double reference_x_mm = 0.0, reference_y_mm = 0.0;
   double base_x_mm = 0.0, base_y_mm = 0.0;
@@ -80,7 +80,8 @@ struct HistogramCell {
   double after_s = 0.0;
 };
 
-// What the nozzle would have done if the true frequencies were others than those of the settings.
+// How one method (none, unflex, an input shaper) would have done if the true frequencies were
+// others than those of the settings.
 struct Contender {
   std::string name;
   std::vector<Spread> spreads;  // one for each of Recording::frequency_errors, or none
@@ -93,8 +94,9 @@ struct Recording {
   std::vector<Place> worst_before, worst_after;  // the worst first
   std::vector<HistogramCell> histogram;
   std::vector<double> frequency_errors;  // 0.05: the true ones are 5 % above
-  std::vector<Contender> contenders;     // first the sliced file, then the compensated one
-  double shapers_measured_s = 0.0;       // print time for which the others were measured
+  std::vector<Contender>
+      contenders;  // first the sliced file, then the compensated one, then the shapers
+  double shapers_measured_s = 0.0;  // print time for which the shapers were measured
 };
 
 }  // namespace unflex::report

@@ -22,11 +22,11 @@ struct DeviationRow {
   std::size_t contour_max_line = 0;
 };
 
-// What it costs that the base is to suit a band of frequencies: the error across the path, of
-// extruding moves and before lines are made of it, where the axes are as given.
+// Contour error of the nominal axes while extruding, before lines are made of the base. It shows
+// what it costs that the base suits a band of frequencies.
 struct Robustness {
   double rms_mm = 0.0;
-  double nominal_rms_mm = 0.0;  // of the base that would be best for them
+  double nominal_rms_mm = 0.0;  // on the base optimised for the nominal axes alone
 };
 
 struct DeviationRows {
@@ -34,7 +34,8 @@ struct DeviationRows {
   DeviationRow all;
 };
 
-// Of extruding moves, if the true frequencies are above those assumed by the share frequency_error.
+// Contour error of extruding moves if the true frequencies are the assumed ones times 1 +
+// frequency_error.
 struct Sensitivity {
   double frequency_error = 0.0;
   Spread uncompensated;
@@ -55,13 +56,13 @@ struct AboveBudget {
   double lines_per_s = 0.0;
 };
 
-// The way in X and Y on which filament is laid.
+// Length of the path in X and Y on which filament is laid.
 struct ExtrudedPath {
   double total_mm = 0.0;
   double compensated_mm = 0.0;
-  std::map<std::string, double> kept_mm;  // of the rest, by reason
+  std::map<std::string, double> kept_mm;  // length that was kept, by reason
 
-  // 1 where there is none.
+  // 1 if there is no extruded path.
   [[nodiscard]] double compensated_share() const {
     return total_mm > 0.0 ? compensated_mm / total_mm : 1.0;
   }
@@ -72,16 +73,16 @@ struct UnknownCommand {
   std::string command;  // "MY_MACRO", "M1234"
   std::size_t count = 0;
   std::size_t first_line = 0;
-  std::size_t moves_kept = 0;  // behind it, because it is not known where they start …
-  double kept_mm = 0.0;        // … and their extruded path
+  std::size_t moves_kept = 0;  // moves after it that were kept, because their start is not known
+  double kept_mm = 0.0;        // extruded path of moves_kept
 };
 
 struct LineBudget {
   double max_lines_per_s = 0.0;
   std::size_t places_above = 0;
   std::vector<AboveBudget> above;  // at most 1000 are listed
-  // How far the nozzle is, across the path, from where it would be if the base moved exactly as
-  // optimised, while filament is laid: what few lines and the printer's grid cost.
+  // Distance of the nozzle, across the path, from its place if the base moved exactly as optimised,
+  // while filament is laid. It shows what few lines and the printer's grid cost.
   double cost_rms_mm = 0.0;
   double cost_max_mm = 0.0;
 };
@@ -89,8 +90,8 @@ struct LineBudget {
 // Windows that a second engine has solved as well.
 struct SolverCheck {
   std::size_t windows = 0;
-  double largest_gap = 0.0;            // of the objectives, relative
-  double largest_difference_mm = 0.0;  // of the base's positions
+  double largest_gap = 0.0;            // relative gap of the objectives
+  double largest_difference_mm = 0.0;  // difference of the base's positions
 };
 
 struct Setting {
@@ -113,7 +114,7 @@ struct Report {
   DeviationRows uncompensated;
   DeviationRows compensated;
   std::vector<Sensitivity> sensitivity;  // by rising error
-  std::optional<Robustness> robustness;  // where a band was asked for
+  std::optional<Robustness> robustness;  // set if a band of frequencies was asked for
 
   double base_max_velocity_mm_s = 0.0;
   double base_max_accel_mm_s2 = 0.0;
@@ -146,8 +147,8 @@ struct Report {
   double input_extrusion_mm = 0.0;
   double output_extrusion_mm = 0.0;
   double worst_move_extrusion_error_mm = 0.0;
-  // How far along the path the nozzle and the filament that comes out are apart, as sliced and as
-  // emitted.
+  // Distance along the path between the nozzle and the place whose filament comes out, as sliced
+  // and as emitted.
   struct FilamentLag {
     double rms_mm = 0.0;
     double max_mm = 0.0;
@@ -165,13 +166,13 @@ struct Report {
   std::size_t violation_count = 0;
   std::vector<std::string> warnings;
 
-  std::optional<Recording> recording;  // where it was asked for; only in HTML
+  std::optional<Recording> recording;  // set if it was asked for; only in HTML
 };
 
 // The report as JSON with the keys of docs/report.md, two spaces of indentation, final newline.
 [[nodiscard]] std::string to_json(const Report& report);
 
-// The report as a page for people, complete in itself. It needs the recording.
+// The report as a self-contained page for people. `recording` must be set.
 [[nodiscard]] std::string to_html(const Report& report);
 
 // A summary for people, a dozen lines.

@@ -1,5 +1,5 @@
-// The motion of one axis as parabolas one after the other: what a base is told by any method, and
-// what the nozzle does that hangs on it.
+// The motion of one axis as a row of parabolas: the base's motion by any method, and what the
+// nozzle that hangs on it does.
 //
 //   b, p   base and nozzle       r   reference, the plan's own motion
 #pragma once
@@ -15,14 +15,14 @@
 
 namespace unflex::rivals {
 
-// Holds until the next parabola begins.
+// A motion that holds until the next parabola begins.
 struct Parabola {
   double start_s = 0.0;
   dynamics::BaseSegment motion;
 };
 
-// In order of time and not empty. Before the first one the axis rests where that begins; the last
-// one lasts for ever.
+// In order of time and not empty. Before the first parabola the axis rests where that one begins.
+// The last parabola lasts for ever.
 using AxisPath = std::vector<Parabola>;
 
 // r(t) of a plan that starts at rest at time 0 and ends at rest.
@@ -32,12 +32,12 @@ using AxisPath = std::vector<Parabola>;
 // Σ weight · b(t − time_s), exactly.
 [[nodiscard]] AxisPath shaped(const AxisPath& path, const dynamics::ShaperPulses& pulses);
 
-// Motion given at nodes, the first at start_s, with b̈ linear between them: each interval becomes
-// `parts` parabolas whose ends are exact and whose acceleration is the mean.
+// The motion given at nodes, the first at start_s, with b̈ linear between them. Each interval
+// becomes `parts` parabolas whose ends are exact and whose acceleration is the mean.
 [[nodiscard]] AxisPath through_nodes(const dynamics::AxisTrajectory& nodes, double start_s,
                                      double period_s, int parts);
 
-// b and ḃ at time t; walks along for times that do not decrease.
+// Gives b and ḃ at time t. Times must not decrease from call to call.
 class PathCursor {
  public:
   explicit PathCursor(const AxisPath& path) : path_(&path) {}
@@ -48,7 +48,7 @@ class PathCursor {
   std::size_t index_ = 0;
 };
 
-// When the last parabola begins, that is when the path comes to rest if it does.
+// When the last parabola begins. If the path comes to rest, it does so then.
 [[nodiscard]] double end_s(const AxisPath& path);
 
 struct PeakMotion {
@@ -57,8 +57,9 @@ struct PeakMotion {
 };
 [[nodiscard]] PeakMotion peak(const AxisPath& path);
 
-// The nozzle on a path, in closed form from one parabola's beginning to the next; times must not
-// decrease. It rests at the path's beginning until start_s, which must not be later than that.
+// The nozzle on a path, in closed form from one parabola's beginning to the next. Times must not
+// decrease from call to call. Until start_s the nozzle rests at the path's beginning; start_s must
+// not be later than the first parabola.
 class NozzleWalk {
  public:
   NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path, double start_s);
@@ -73,7 +74,7 @@ class NozzleWalk {
   double now_s_;
   dynamics::NozzleState nozzle_;
   double last_step_s_ = 0.0;
-  // For steps of the length that last came twice running.
+  // For steps of this length, which came twice in a row.
   double map_step_s_ = 0.0;
   dynamics::ExactMap map_;
 };
@@ -87,7 +88,7 @@ struct TimeGrid {
   [[nodiscard]] double at(std::size_t k) const { return start_s + static_cast<double>(k) * step_s; }
 };
 
-// A walk over the grid's times, beginning with the first.
+// The nozzle at the times of the grid, by a NozzleWalk that begins at the first one.
 [[nodiscard]] std::vector<dynamics::NozzleState> nozzle_on(const dynamics::FlexibleAxis& axis,
                                                            const AxisPath& path,
                                                            const TimeGrid& grid);

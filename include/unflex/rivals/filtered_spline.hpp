@@ -23,8 +23,8 @@ namespace unflex::rivals {
 
 struct SplineOptions {
   double knot_s = 0.005;   // Δ
-  double lead_in_s = 0.0;  // how long before the reference the base may begin to move
-  double tail_s = 0.0;     // how long after it the base may still move
+  double lead_in_s = 0.0;  // the base may begin to move this long before the reference
+  double tail_s = 0.0;     // the base may still move for this long after the reference
 };
 
 [[nodiscard]] AxisPath filtered_spline(const AxisPath& reference,

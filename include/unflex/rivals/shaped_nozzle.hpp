@@ -1,12 +1,12 @@
-// The nozzle of a shaped machine from that of the same machine without a shaper.
+// The nozzle of a machine with a shaper, from the nozzle of the same machine without one.
 //
 // A shaper's base is a weighted sum of delayed references, and the nozzle's response is linear. So
 // the shaped nozzle is the same sum of the unshaped nozzle's own motion, delayed,
 //
 //   p_shaped(t) = Σ weight · p(t − time_s)
 //
-// exactly, whatever axis the nozzle really hangs on; nothing has to be integrated again. It costs a
-// cubic per pulse, axis and moment, so that a whole print can be compared with any number of
+// exactly, whatever axis the nozzle really hangs on. Nothing has to be integrated again. The cost
+// is one cubic per pulse, axis and moment. So a whole print can be compared with any number of
 // shapers while it is replayed.
 #pragma once
 
@@ -21,21 +21,23 @@ namespace unflex::rivals {
 
 class ShapedNozzle {
  public:
-  // Either train may be that of another shaper; an empty one leaves its axis as it is.
+  // The trains of the two axes may belong to different shapers. An empty train leaves its axis as
+  // it is.
   ShapedNozzle(const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y);
 
-  // The unshaped nozzle, at times that increase; in between it is the cubic through position and
-  // velocity (off by less than 1e-6 mm for samples 0.5 ms apart at 100 Hz and 10 000 mm/s²). Before
-  // the first sample it rests there.
+  // Adds a sample of the unshaped nozzle; times must increase. Between samples the nozzle is on the
+  // cubic through position and velocity (off by less than 1e-6 mm for samples 0.5 ms apart at 100
+  // Hz and 10 000 mm/s²). Before the first sample it rests at that sample.
   void add(double time_s, const dynamics::NozzleXY& unshaped);
 
-  // Up to when the samples given so far determine the shaped nozzle: lookahead_s() before the last.
+  // The samples given so far determine the shaped nozzle up to this time, which is lookahead_s()
+  // before the last sample.
   [[nodiscard]] double known_until_s() const;
   [[nodiscard]] double lookahead_s() const { return lookahead_s_; }
 
-  // The shaped nozzle's state at a time up to known_until_s(); later it takes the last sample for
-  // the unshaped nozzle's rest. Times must not decrease from call to call: what no later one needs
-  // is forgotten.
+  // The shaped nozzle's state at a time up to known_until_s(). For a later time the unshaped nozzle
+  // is taken to rest at the last sample. Times must not decrease from call to call, because samples
+  // that no later time needs are forgotten.
   [[nodiscard]] dynamics::NozzleXY at(double time_s);
 
  private:
@@ -45,7 +47,7 @@ class ShapedNozzle {
   };
   struct Tap {
     dynamics::Pulse pulse;
-    std::size_t index = 0;  // of the sample at or before the delayed time, never forgotten ones
+    std::size_t index = 0;  // number of the sample at or before the delayed time
   };
 
   [[nodiscard]] dynamics::NozzleState sum(std::vector<Tap>& taps,

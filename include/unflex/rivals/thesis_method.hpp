@@ -4,8 +4,8 @@
 //   p, ṗ   nozzle, given at the nodes by the plan      b, v   base and its velocity at the nodes
 //   h      node period                                 f      ω²(b − p) + 2ζω(v − ṗ)
 //
-// Unknown is v; b follows from it by the trapezoidal rule, b₂ = b₁ + h (v₁ + v₂)/2. Equations, per
-// interval with the ends 1 and 2 and the middle c, in mm and s:
+// The unknown is v; b follows from it by the trapezoidal rule, b₂ = b₁ + h (v₁ + v₂)/2. Equations,
+// per interval with the ends 1 and 2 and the middle c, in mm and s:
 //
 //   position defect   −3(p₁ − p₂)/2h − (ṗ₁ + ṗ₂)/4 − ṗ_c = 0,      ṗ_c = (ṗ₁ + ṗ₂)/2 + h(f₁ − f₂)/8
 //   velocity defect   −3(ṗ₁ − ṗ₂)/2h − (f₁ + f₂)/4 − f_c = 0,
@@ -25,13 +25,13 @@ namespace unflex::rivals {
 inline constexpr double kJerkWeight = 1e-4;
 inline constexpr double kStartWeight = 1e3;
 
-// The least-squares point of all equations, at which an interior-point code stops because they have
-// no solution. Linear in the length of the plan.
+// The least-squares point of all equations. An interior-point code stops there, because the
+// equations have no solution. The effort is linear in the length of the plan.
 [[nodiscard]] AxisPath thesis_least_squares(const AxisPath& reference,
                                             const dynamics::FlexibleAxis& axis, double period_s);
 
-// The consistent half of the equations: the velocity defects alone, which determine v one after the
-// other from v = 0 on.
+// The consistent half of the equations, which are the velocity defects alone. They determine v node
+// by node, from v = 0 on.
 [[nodiscard]] AxisPath thesis_velocity_defects(const AxisPath& reference,
                                                const dynamics::FlexibleAxis& axis, double period_s);
 

@@ -1,5 +1,5 @@
-// One bench for everything that can be done with a planned motion: each method moves the base in
-// its own way, the same nozzle hangs on it, and the same gauge measures how far it strays.
+// A bench that compares methods on one planned motion. Each method moves the base in its own way.
+// One nozzle model hangs on every base, and one gauge measures how far the nozzle strays.
 #pragma once
 
 #include <array>
@@ -36,25 +36,25 @@ inline constexpr std::size_t kMethodCount = 15;
 // "uncompensated", "ZV", "unflex 4×" …
 [[nodiscard]] std::string_view name(Method method);
 
-// By how much the true natural frequency differs from the one that the base was made for.
+// Relative errors of the true natural frequency against the one that the base was made for.
 inline constexpr std::array<double, 5> kFrequencyErrors = {0.0, -0.10, -0.05, 0.05, 0.10};
 
 struct BenchSetup {
   compensate::Setup unflex;          // its acceleration limits are set per method
-  double plan_accel_mm_s2 = 5000.0;  // that unflex' multiples are of
+  double plan_accel_mm_s2 = 5000.0;  // unflex_2x, 4x, 10x allow multiples of it
   double thesis_period_s = 5e-3;
-  int parts = 10;             // parabolas that stand for an interval of unflex' base
-  double step_s = 5e-5;       // of the samples the nozzle is measured at
-  double hold_s = 0.0;        // how long it is looked at after the base has come to rest
-  double trace_step_s = 0.0;  // of the traces; 0: none
-  double trace_from_s = 0.0;  // where in the plan they begin
-  double trace_to_s = 0.0;    // … and end
+  int parts = 10;             // parabolas per node interval of unflex' base
+  double step_s = 5e-5;       // between the samples at which the nozzle is measured
+  double hold_s = 0.0;        // how long the nozzle is watched after the base has come to rest
+  double trace_step_s = 0.0;  // between samples of the traces; 0: no traces
+  double trace_from_s = 0.0;  // begin of the traces in the plan
+  double trace_to_s = 0.0;    // end of the traces in the plan
 };
 
 // A stretch of motion from rest to rest.
 struct Run {
   std::vector<planner::PlannedMove> plan;
-  // The same path planned with half the acceleration, for the slow S-curve; empty: not tried.
+  // A plan of the same path with half the acceleration, for the slow S-curve; empty: not tried.
   std::vector<planner::PlannedMove> slow_plan;
 };
 
@@ -62,7 +62,7 @@ struct Run {
 struct BaseMotion {
   rivals::AxisPath x;
   rivals::AxisPath y;
-  int iterations = 0;  // of unflex' engine
+  int iterations = 0;  // iterations of unflex' engine
   std::string remark;
 };
 
@@ -71,8 +71,8 @@ struct Straying {
   double max_mm = 0.0;           // while filament is laid
   double square_sum_mm2s = 0.0;  // ∫ distance² dt over the same time
   double time_s = 0.0;
-  double max_at_s = 0.0;      // when that is, in the plan of the run
-  double after_max_mm = 0.0;  // from the plan's end on
+  double max_at_s = 0.0;      // time of max_mm in the plan of the run
+  double after_max_mm = 0.0;  // largest distance from the plan's end on
 
   [[nodiscard]] double rms_mm() const;
   void merge(const Straying& other);
@@ -88,14 +88,14 @@ struct Trace {
 
 struct MethodResult {
   Method method = Method::uncompensated;
-  bool used = false;   // in every run; otherwise …
-  std::string remark;  // … why not; or else what is to be said about how it was used
+  bool used = false;   // the method could be used in every run
+  std::string remark;  // why the method was not used, or a note on how it was used
   std::array<Straying, kFrequencyErrors.size()> straying;
-  rivals::PeakMotion base_peak;  // larger axis
-  double end_gap_mm = 0.0;       // how far from its target the base comes to rest, larger axis
-  double longer_s = 0.0;         // plan and base come to rest that much later than the plan
+  rivals::PeakMotion base_peak;  // of the axis with the larger one
+  double end_gap_mm = 0.0;  // distance from the target at which the base comes to rest, larger axis
+  double longer_s = 0.0;    // how much later than the plan the base comes to rest
   int iterations = 0;
-  std::size_t failed_runs = 0;  // without a solution: measured as the plan has them
+  std::size_t failed_runs = 0;  // runs without a solution; measured uncompensated
   Trace trace;                  // at the exact frequency; empty unless asked for
 };
 
@@ -105,7 +105,7 @@ using BenchResult = std::vector<MethodResult>;  // one per method, in their orde
 [[nodiscard]] BenchResult try_all(const Run& run, const BenchSetup& setup,
                                   const compensate::Engine& engine);
 
-// The base by one method. An error, with the reason, where it cannot be used.
+// The base as one method moves it. An error with the reason if the method cannot be used.
 [[nodiscard]] Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setup,
                                          const compensate::Engine& engine);
 

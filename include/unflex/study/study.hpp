@@ -1,4 +1,4 @@
-// The whole study: cases on the bench, and what there is to tell of them.
+// The whole study: cases on the bench, and its reports.
 #pragma once
 
 #include <string>
@@ -21,8 +21,7 @@ struct CaseResult {
   double plan_s = 0.0;      // duration of the plan
   std::size_t runs = 1;
   BenchResult methods;
-  // What the figures zoom in on; of a print, they show the surroundings of its worst place as it
-  // is.
+  // The place that the figures zoom in on. For a print it is the worst uncompensated place.
   double focus_x_mm = 0.0;
   double focus_y_mm = 0.0;
 };
@@ -36,8 +35,8 @@ struct ChainResult {
 struct Outcome {
   std::string version;
   std::string input;                     // the print's name; empty for the thesis' cases
-  std::string engine;                    // of unflex' bases
-  std::vector<report::Setting> printer;  // of a print
+  std::string engine;                    // engine that made unflex' bases
+  std::vector<report::Setting> printer;  // settings of a print
   std::vector<CaseResult> cases;
   std::vector<ChainResult> chains;
   std::vector<std::string> warnings;
@@ -48,25 +47,25 @@ struct Options {
   bool ipopt = false;                   // unflex' bases by Ipopt instead of the banded engine
   unsigned workers = 1;                 // threads; the result does not depend on them
   std::vector<std::string> cases = {};  // names of those to run; none: all
-  bool traces = false;                  // for the figures
+  bool traces = false;                  // record traces for the figures
 };
 
 // The bench of a thesis case: nodes at 1 ms, 10 ms of lead-in, a tail of 8ζ/ω but at least 20 ms,
 // and little weight on the jerk (docs/study.md).
 [[nodiscard]] BenchSetup corner_setup(const Case& of);
 
-// The thesis' cases. An error of kind usage for the name of a case that there is not.
+// Studies the thesis' cases. An error of kind usage if options name an unknown case.
 [[nodiscard]] Result<Outcome> study_corner(const Options& options, Progress& progress);
 
-// Of the engine that makes unflex' bases.
+// Name of the engine that makes unflex' bases.
 [[nodiscard]] std::string engine_name(const Options& options);
 
-// The runs of a print by all methods, added to `result` in their order. Returns which of them is
-// the one whose nozzle strays most uncompensated.
+// Tries all methods on the runs of a print and adds the results to `result`, in the order of the
+// runs. Returns the index of the run whose nozzle strays most uncompensated.
 std::size_t study_runs(const std::vector<Run>& runs, const BenchSetup& setup,
                        const Options& options, CaseResult& result);
 
-// Traces for `result` of the run's surroundings of its worst place as it is.
+// Adds traces to `result`: the run around its worst uncompensated place.
 void trace_worst_place(const Run& run, BenchSetup setup, const Options& options,
                        CaseResult& result);
 

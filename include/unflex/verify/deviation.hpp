@@ -24,13 +24,14 @@ struct DeviationStats {
   double contour_rms_mm = 0.0;
   double tracking_max_mm = 0.0;
   double tracking_rms_mm = 0.0;
-  double duration_s = 0.0;           // time the statistics are over
+  double duration_s = 0.0;           // time that the statistics cover
   std::size_t contour_max_line = 0;  // line of the sliced file nearest to the largest contour error
 };
 
 struct Deviation {
   DeviationStats extruding;  // while the reference lays filament
-  // While the reference moves in X or Y; of a file also while the base is held after its end.
+  // While the reference moves in X or Y. For a whole file, also while the base is held after its
+  // end.
   DeviationStats all;
 };
 
@@ -68,24 +69,24 @@ struct NozzleModel {
   double hold_s = 0.5;   // how long the base is held after the end of the file
 };
 
-// The same, integrated as coarsely as comparing two motions bears: 40 steps to a period of the
-// faster axis.
+// The model with a step just fine enough to compare two motions: 40 steps per period of the faster
+// axis.
 [[nodiscard]] NozzleModel coarse(NozzleModel model);
 
 using dynamics::NozzleXY;
 
-// How differently two nozzles swing.
+// Distance between two nozzle states, in mm. Velocities count divided by ω.
 [[nodiscard]] double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model);
 
 // How far the nozzle will swing around a base that rests at `at`.
 [[nodiscard]] double swing_mm(const NozzleXY& nozzle, const gcode::Position& at,
                               const NozzleModel& model);
 
-// What a run does to the print: how far the nozzle strays while it draws, and how it swings
-// afterwards, as if what follows drew with that swing.
+// The error that a run causes: how far the nozzle strays while the run draws, and the swing that it
+// leaves. The swing counts as if the moves that follow drew with it. c is the contour error.
 struct RunError {
   double rms_mm = 0.0;  // √((∫ c² dt + A²/(4ζω)) / T); A, the swing, rings out as e^{−ζωt}
-  double max_mm = 0.0;  // of c and A
+  double max_mm = 0.0;  // the larger of max c and A
 };
 
 // contour2_mm2_s: ∫ c² dt over duration_s, T.
@@ -100,11 +101,11 @@ struct RunDeviation {
   double base_end_y_mm = 0.0;
 };
 
-// Integrates the nozzle while the base makes `base`, and measures it against the path and plan of
-// `reference`; the base starts lead_in_s before the reference, and `start` is the nozzle then.
-// Where the base takes longer than the reference, the reference rests at its end; where it ends
-// sooner, it rests until the reference ends, too. A negative lead_in_s: the reference starts before
-// the base. goes_on: nothing is measured after the base's last move.
+// Integrates the nozzle while the base makes the moves `base`, and measures it against the path and
+// plan of `reference`. The base starts lead_in_s before the reference (negative: after it), and
+// `start` is the nozzle's state then. If the base takes longer, nothing is measured after the end
+// of the reference. If the base ends first, it rests until the reference ends. goes_on: nothing is
+// measured after the base's last move.
 [[nodiscard]] RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                                    const std::vector<planner::PlannedMove>& base, NozzleXY start,
                                    const NozzleModel& model, double lead_in_s = 0.0,

@@ -1,4 +1,4 @@
-// Moves that no one will see the end of.
+// Moves that take so long that the file must be wrong.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ namespace unflex::verify {
 
 [[nodiscard]] bool is_endless(const planner::PlannedMove& move);
 
-// Of kind input, at the move's line.
+// An error of kind input at the move's line.
 [[nodiscard]] Error endless_move(const planner::PlannedMove& move, const std::string& file);
 
 }  // namespace unflex::verify

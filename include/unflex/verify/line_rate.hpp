@@ -10,8 +10,7 @@
 
 namespace unflex::verify {
 
-// Counts lines that move the machine, one after the other. What a line becomes in the firmware, the
-// segments of an arc, counts as one.
+// Counts the lines that move the machine. All segments of an arc count as one line.
 class LineRate {
  public:
   void add(const planner::PlannedMove& move) {
@@ -29,9 +28,9 @@ class LineRate {
     time_s_ += move.duration_s();
   }
 
-  // Lines of another text follow, numbered anew.
+  // The next lines come from another text, with line numbers of its own.
   void change_text() { line_ = 0; }
-  // Of these, coming next, how many lines begin within 100 ms.
+  // How many lines of these moves begin within 100 ms of the first one.
   [[nodiscard]] static int first_lines(const std::vector<planner::PlannedMove>& moves) {
     int count = 0;
     double time_s = 0.0;
@@ -48,10 +47,10 @@ class LineRate {
   }
   // Most lines begun within any 100 ms, per second, since the beginning or forget().
   [[nodiscard]] double max_per_s() const { return static_cast<double>(most_) / kSpan_s; }
-  // The line with which there were so many; 0: none.
+  // The line at which max_per_s() was reached; 0: none.
   [[nodiscard]] std::size_t densest_line() const { return most_line_; }
   void forget() { most_ = most_line_ = 0; }
-  // When the lines of the last 100 ms began, against the end of the last one.
+  // When the lines of the last 100 ms began, relative to the end of the last move (so below 0).
   [[nodiscard]] std::vector<double> last_begins_s() const {
     std::vector<double> result;
     for (const double start : starts_s_) {

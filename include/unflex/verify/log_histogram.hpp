@@ -1,6 +1,6 @@
 // Histogram over cells whose borders are less than 1 % apart, from 2⁻³⁰ to 2⁷; what lies outside
-// falls into the first or last cell. Values are given by their squares, which is what distances are
-// computed as.
+// falls into the first or last cell. Values are given by their squares, because distances are
+// computed as squares.
 #pragma once
 
 #include <algorithm>
@@ -25,12 +25,12 @@ class LogHistogram {
   // The middle of the cell in which the given fraction of the whole weight is reached, within
   // 0.5 %; 0 for an empty histogram.
   [[nodiscard]] double quantile(double fraction) const;
-  // Of the cells that begin below the value.
+  // Total weight of the cells that begin below the value.
   [[nodiscard]] double weight_below(double value) const;
 
  private:
-  // A double's bits are its exponent above its mantissa: those down to the mantissa's sixth divide
-  // every octave of squares into 64 equal cells, and numbers in order have cells in order.
+  // The bits of a double are its exponent and then its mantissa. The exponent and the first six
+  // bits of the mantissa number the cells: 64 equal ones per octave of squares, in ascending order.
   static constexpr int kDropped = 52 - 6;
   static constexpr double kSmallest = 0x1p-60;
   static constexpr double kLargest = 0x1p14;

@@ -17,25 +17,27 @@ namespace unflex::verify {
 // The reach τ for a nozzle.
 [[nodiscard]] double reach_s(const NozzleModel& model);
 
-// Asked for one time after the other. Times may go back a little, as far as the path still reaches.
+// Asked at increasing times. A time may go back a little, as far as the path still holds its
+// pieces.
 class NearPath {
  public:
   explicit NearPath(double reach_s) : reach_s_(reach_s) {}
 
   // From now on looks at this path.
   void begin(const ReferencePath& path);
-  // To time t, of which the path must hold the piece.
+  // Moves on to time t. The path must hold the piece at t.
   void slide(const ReferencePath& path, double t);
-  // Of a nozzle at p at that time; `nearest` becomes the number of the nearest piece.
+  // Squared contour error of a nozzle at p at the time of the last slide(). `nearest` becomes the
+  // number of the nearest piece.
   [[nodiscard]] double squared_contour_error(const ReferencePath& path, double p_x_mm,
                                              double p_y_mm, std::size_t& nearest);
   [[nodiscard]] double reach_s() const { return reach_s_; }
 
  private:
-  // Where a piece of the path is cut at some time, kept for a while.
+  // Remembers for a while where a piece of the path is cut at t − τ or t + τ.
   class Cut {
    public:
-    // How much of the piece is covered at t + ahead_s, or was shortly before.
+    // Length of the piece covered at t + ahead_s, or up to kCutKept_s earlier.
     double at(const PathPiece& piece, std::size_t number, double t, double ahead_s);
 
    private:
@@ -44,7 +46,7 @@ class NearPath {
     double covered_mm_ = 0.0;
   };
 
-  // How long a cut of the path serves.
+  // How long a remembered cut is used.
   static constexpr double kCutKept_s = 1e-3;
 
   double reach_s_;
@@ -55,7 +57,7 @@ class NearPath {
   Cut last_cut_;
 };
 
-// Here for speed: these are most of what a verification takes.
+// Inline for speed: a verification spends most of its time here.
 
 inline double NearPath::Cut::at(const PathPiece& piece, std::size_t number, double t,
                                 double ahead_s) {
@@ -80,8 +82,8 @@ inline void NearPath::slide(const ReferencePath& path, double t) {
   }
 }
 
-// Whole pieces, the first and the last one cut. Where the nearest point is well inside, where
-// exactly they are cut does not matter.
+// Pieces count whole, except that the first and the last are cut at t ± τ. The exact cut is
+// computed only if the nearest point is close to it.
 inline double NearPath::squared_contour_error(const ReferencePath& path, double p_x_mm,
                                               double p_y_mm, std::size_t& nearest) {
   const double from_s = time_s_ - reach_s_;

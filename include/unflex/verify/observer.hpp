@@ -1,4 +1,4 @@
-// Watches a verification. Nothing of it costs anything when nobody does.
+// Interface for watching a verification. It costs nothing if there is no observer.
 #pragma once
 
 #include <array>
@@ -12,10 +12,10 @@
 
 namespace unflex::verify {
 
-// Which of the nozzles is meant.
+// Tells the nozzles of a verification apart.
 struct NozzleId {
   bool emitted = false;   // hangs on the emitted file's base, not on the sliced file's plan
-  std::size_t model = 0;  // 0: of the rules; i + 1: Observation::detuned[i]
+  std::size_t model = 0;  // 0: Rules::nozzle; i + 1: Observation::detuned[i]
 };
 
 // One step of the integration, at its end.
@@ -25,17 +25,17 @@ struct NozzleStep {
   dynamics::NozzleXY nozzle;
   dynamics::BaseSegment base_x;
   dynamics::BaseSegment base_y;
-  // Whether the reference moves. Only then the following are set.
+  // Whether the reference moves. Only then `extruding` and the fields after it are set.
   bool measured = false;
-  // The base has ended before the reference: it stands still, and what follows goes on from where
-  // the nozzle was when that began.
+  // The base has ended early and rests while the reference runs on. The nozzle state is reset
+  // afterwards.
   bool waiting = false;
   bool extruding = false;
   double reference_x_mm = 0.0;
   double reference_y_mm = 0.0;
-  std::size_t piece = 0;  // of the reference
+  std::size_t piece = 0;  // piece of the reference's path
   double contour2_mm2 = 0.0;
-  std::size_t line = 0;  // of the sliced file, nearest to the nozzle
+  std::size_t line = 0;  // line of the sliced file that is nearest to the nozzle
 };
 
 class Observer {
@@ -44,32 +44,33 @@ class Observer {
   Observer(const Observer&) = delete;
   Observer& operator=(const Observer&) = delete;
 
-  // Lines of the sliced file, each before the moves that it makes.
+  // A line of the sliced file has been read. It comes before the moves that it makes.
   virtual void line(const gcode::Line& line) = 0;
-  // A section (a run, or a single move) begins: its pieces come at the ends of these, which are two
-  // where the run is measured against its own plan. The n-th piece of both is the same move.
+  // A section (a run or a single move) begins. Its pieces will be appended to both paths. They are
+  // different paths if the run is measured against its own plan. Then the n-th piece of the section
+  // is the same move in both.
   virtual void section(const ReferencePath& sliced, const ReferencePath& emitted) = 0;
   virtual void step(NozzleId nozzle, const NozzleStep& step) = 0;
-  // The base stands still for so long, between sections.
+  // The base stands still for duration_s, between sections.
   virtual void hold(double duration_s) = 0;
   // All nozzles on the sliced file's plan have been moved to this time of `sliced`.
   virtual void advanced(const ReferencePath& sliced, double time_s) = 0;
-  // For how long after its time the sliced file's path is still needed.
+  // For how long a piece of the sliced path is still needed after its time, s.
   [[nodiscard]] virtual double memory_s() const = 0;
 
  protected:
   Observer() = default;
 };
 
-// By how much true frequencies may be off, for what that would do.
+// Relative errors of the frequencies, for which detuned nozzles are measured.
 inline constexpr std::array<double, 4> kFrequencyErrors = {-0.10, -0.05, 0.05, 0.10};
 
-// The nozzle with each of these errors.
+// `model` with each of kFrequencyErrors.
 [[nodiscard]] std::vector<NozzleModel> detuned(const NozzleModel& model);
 
-// What else to measure, and for whom.
+// What to measure besides the rules' nozzle, and who watches.
 struct Observation {
-  // Other nozzles, on the same two bases.
+  // Further nozzles that hang on the same two bases.
   std::vector<NozzleModel> detuned;
   Observer* observer = nullptr;
 };

@@ -1,4 +1,4 @@
-// The planned moves of the sliced file on one time axis, as much of them as is needed at a time.
+// The planned moves of the sliced file on one time axis. Only the moves needed now are held.
 //
 // Time starts at 0 with the first move of the file and runs through all moves and rests. Sections
 // (runs and single moves that are kept as they are) follow each other without a gap.
@@ -12,7 +12,7 @@
 
 namespace unflex::verify {
 
-// A move that stays where it is.
+// A move of this duration that stands still.
 [[nodiscard]] planner::PlannedMove resting(double x_mm, double y_mm, double duration_s);
 
 // Hands out the next planned move of a section; false at the section's end.
@@ -28,7 +28,7 @@ struct PathPiece {
   double length_xy_mm = 0.0;
   bool measured = false;  // deviations count here
   bool extruding = false;
-  double filament_mm = 0.0;  // that extruding pieces lay before this one
+  double filament_mm = 0.0;  // filament that extruding pieces have laid before this one
   planner::PlannedMove move;
 
   // Length of the XY path the move has covered at time t, in [0, length_xy_mm].
@@ -48,14 +48,14 @@ class ReferencePath {
   void extend_to(double t);
   // Whether all moves of the section are known.
   [[nodiscard]] bool section_complete() const { return section_complete_; }
-  // Where the known part ends, s.
+  // Time at which the known part ends, s.
   [[nodiscard]] double end_s() const { return end_s_; }
-  // That all extruding pieces so far lay.
+  // Filament that all extruding pieces so far lay.
   [[nodiscard]] double filament_mm() const { return filament_mm_; }
 
-  // The machine stands still for a while; only between sections. Nothing is measured …
+  // The machine stands still between two sections. Nothing is measured.
   void rest(double duration_s) { end_s_ += duration_s; }
-  // … or deviations count although nothing moves, as after the end of the file.
+  // The machine stands still, but deviations count, as after the end of the file.
   void hold(double x_mm, double y_mm, double duration_s);
 
   // Pieces have numbers that stay the same when old ones are dropped.

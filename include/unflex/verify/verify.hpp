@@ -22,13 +22,15 @@ struct TravelLimits {
   double x_max_mm = 1e9;
   double y_min_mm = -1e9;
   double y_max_mm = 1e9;
-  // The minimum of an axis is not known but taken to be 0 wherever the sliced path stays above it.
+  // The minimum of the axis is not known. It is taken to be 0 in sections whose sliced path stays
+  // above 0.
   bool x_min_assumed = false;
   bool y_min_assumed = false;
 };
 
-// By how much the nozzle may stray more in a compensated run than if that had been kept, by
-// whichever is more. There is a little for the steps in which the two are sampled.
+// How far the nozzle may stray in a compensated run: `times` as far as if the run had been kept, or
+// as far as the absolute limit, whichever is more. The small margins cover the different sampling
+// of the two.
 struct Leeway {
   double times = 1.02;
   double rms_mm = 0.5e-3;
@@ -47,7 +49,7 @@ struct Rules {
   double base_max_accel_mm_s2 = 20000.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
   Leeway leeway;
-  double lead_in_s = 0.0;  // by which compensated runs start before their plan
+  double lead_in_s = 0.0;  // how long before their plan compensated runs start
 };
 
 // One broken rule of the emitted file.
@@ -56,67 +58,66 @@ struct Violation {
   std::string message;
 };
 
-// A compensated run that broke a rule, or after which one was found broken, by its lines in the
-// sliced file.
+// A compensated run that is blamed for a broken rule: the rule broke in the run, or after it and
+// before the next one. The lines are those of the sliced file.
 struct BlamedRun {
   std::size_t first_line = 0;
   std::size_t last_line = 0;
-  std::string reason;  // the first
+  std::string reason;  // message of the first violation
 };
 
-// What another nozzle on the same two bases does.
+// Deviations of a further nozzle (Observation::detuned) on the two bases.
 struct Detuned {
   Deviation uncompensated;
   Deviation compensated;
 };
 
-// By how much of the path the nozzle and the filament that comes out are apart, while the reference
-// lays filament: as if the filament of one place of the sliced path came out at another.
+// Distance along the sliced path between the nozzle and the place whose filament comes out, while
+// the reference lays filament.
 struct LagStats {
-  double rms_mm = 0.0;  // by time
+  double rms_mm = 0.0;  // weighted by time
   double max_mm = 0.0;
-  std::size_t max_line = 0;  // of the sliced file
+  std::size_t max_line = 0;  // line of the sliced file with the largest lag
 };
 
 struct VerifyReport {
   // Measured against the firmware's plan of the input.
   Deviation uncompensated;
-  // In compensated runs, which begin and end at rest, measured against the plan of the run by
-  // itself; where the input passes from one stretch into the next at speed, that takes some ms
-  // longer.
+  // Compensated runs begin and end at rest, so each is measured against its own plan from rest to
+  // rest. If the input passes into or out of the run at speed, that plan takes some ms longer.
   Deviation compensated;
   std::vector<Detuned> detuned;   // one for each of Observation::detuned
   double reference_time_s = 0.0;  // duration of the input by the firmware's plan, dwells included
-  double emitted_time_s = 0.0;    // of the output
-  // Of the replayed base, largest motor of X and Y, compensated runs only: mean velocity of one
-  // move.
+  double emitted_time_s = 0.0;    // duration of the output
+  // Largest mean velocity of one move of the replayed base, over the motors of X and Y. Compensated
+  // runs only.
   double base_max_velocity_mm_s = 0.0;
-  // Of the replayed base, the same motors, compensated runs only: change of mean velocity between
-  // neighbouring moves over the time between their middles.
+  // Largest change of mean velocity between neighbouring moves, divided by the time between their
+  // middles. Motors and runs as for base_max_velocity_mm_s.
   double base_max_accel_mm_s2 = 0.0;
   double input_extrusion_mm = 0.0;  // net filament
   double output_extrusion_mm = 0.0;
-  // Of one move or one run of the input; what the resolution of the output's lines in time may
-  // explain is no error.
+  // Largest filament error of one move or one run of the input. What the output's lines cannot
+  // resolve in time is no error.
   double worst_move_extrusion_error_mm = 0.0;
   LagStats uncompensated_lag;
   LagStats compensated_lag;
-  // Longest lag or lead of the nozzle behind the plan of its run, averaged over 0.1 s.
+  // Longest lag or lead of the nozzle against the plan of its run, averaged over 0.1 s.
   double worst_run_drift_s = 0.0;
   double max_lines_per_s = 0.0;    // most lines begun in any 100 ms of the output, × 10
-  double segment_ms_median = 0.0;  // of the output's moves inside compensated runs
-  std::size_t runs = 0;            // compensated ones
+  double segment_ms_median = 0.0;  // median duration of the output's moves inside compensated runs
+  std::size_t runs = 0;            // number of compensated runs
   std::size_t output_lines = 0;
   std::size_t output_bytes = 0;
-  std::vector<Violation> violations;   // at most 100 are kept …
-  std::size_t violation_count = 0;     // … all are counted
-  std::vector<BlamedRun> blamed_runs;  // in order; empty where nothing was compensated before
+  std::vector<Violation> violations;   // the first 100 at most
+  std::size_t violation_count = 0;     // number of all violations
+  std::vector<BlamedRun> blamed_runs;  // in the order of the file
 };
 
-// The first hard rule that `base`, the replayed moves of one compensated run, breaks: the base's
-// velocity and acceleration, the travel (where `reference`, the run's own plan, does not go as far
-// itself), filament that the firmware refuses. nullopt when it keeps them all. before: of a part of
-// a run, the last replayed move before it.
+// The first hard rule that is broken by `base`, the replayed moves of one compensated run; nullopt
+// if none is. The rules: velocity and acceleration of the base; the travel, unless `reference` (the
+// run's own plan) goes as far; no filament that the firmware refuses. before: the last replayed
+// move before `base`, if `base` is a part of a run.
 [[nodiscard]] std::optional<std::string> broken_rule(
     const std::vector<planner::PlannedMove>& reference,
     const std::vector<planner::PlannedMove>& base, const Rules& rules,
@@ -129,8 +130,8 @@ struct VerifyReport {
 // more lines per second than the budget and than the sliced file has there; a base further from
 // the path than the machine bends; filament laid after the plan of a run has ended; a nozzle that
 // strays more than in the sliced file; a move the firmware refuses (extrusion ratio); limits, modes
-// or shaper not restored. Where the sequence of stops differs, nothing can be compared any further;
-// the figures are then of what came before. Nothing but VerifyReport::detuned depends on the
+// or shaper not restored. If the sequence of stops differs, nothing can be compared any further.
+// The figures then cover what came before. Nothing but VerifyReport::detuned depends on the
 // observation.
 [[nodiscard]] Result<VerifyReport> verify(std::istream& input, const std::string& input_name,
                                           std::istream& output, const std::string& output_name,
