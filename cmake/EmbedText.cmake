@@ -1,9 +1,9 @@
-# Text files as constants of the program.
+# Makes text files constants of the program.
 #
 # unflex_embed_text(target FILE... ) makes a source of `target` in which each file is a
 # std::string_view: assets/page.css of unflex_report becomes unflex::report::assets::page_css. The
-# module declares its constants in a header of its own, assets.hpp. The files are read anew whenever
-# they change.
+# module declares its constants in its header assets.hpp. The source is made anew whenever a file
+# changes.
 #
 # Run as a script, with OUTPUT, MODULE and FILES (separated by |), this writes that source.
 if(CMAKE_SCRIPT_MODE_FILE)

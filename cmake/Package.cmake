@@ -7,7 +7,7 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_VERBATIM_VARIABLES ON)
 set(CPACK_PACKAGE_NAME unflex)
 set(CPACK_PACKAGE_VENDOR "unflex contributors")
-# CPack would put it before each package's own.
+# CPack would put this summary before each package's own.
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
@@ -34,7 +34,7 @@ before and after.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libunflex-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SOURCE unflex)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-# What unflexDependencies.cmake looks for.
+# The packages that unflexDependencies.cmake looks for.
 string(JOIN ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   pkg-config coinor-libipopt-dev libblas-dev liblapack-dev libeigen3-dev libexpected-dev libfmt-dev
   libtomlplusplus-dev nlohmann-json3-dev zlib1g-dev)
@@ -44,7 +44,7 @@ unflex rewrites sliced G-code so that the nozzle of a 3D printer draws the
 sliced path in spite of swinging. This package has its stages as a static
 C++20 library, with headers and the files by which CMake finds it.")
 
-# Debian wants to know where each package comes from.
+# Debian requires a changelog in each package.
 configure_file(share/debian/changelog.in ${PROJECT_BINARY_DIR}/package/changelog @ONLY)
 unflex_gzip(${PROJECT_BINARY_DIR}/package/changelog ${PROJECT_BINARY_DIR}/package/changelog.gz)
 target_sources(unflex_manual PRIVATE ${PROJECT_BINARY_DIR}/package/changelog.gz)

@@ -15,6 +15,7 @@ packages=(
 )
 test_packages=(
   libgmock-dev libgtest-dev
+  ccache clang-format
   # HTML reports are looked at in a real browser.
   chromium python3
   # Packages are made, the manual page is formatted, shells complete command lines.

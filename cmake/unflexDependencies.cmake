@@ -1,10 +1,11 @@
-# What the library is built from, looked for by the build and, installed beside unflexConfig.cmake,
-# by every project that links the library. Sets unflex_NOT_FOUND_MESSAGE where something is missing.
+# Looks for the libraries that unflex is built from. The build uses this file, and so does every
+# project that links the library: it is installed beside unflexConfig.cmake. Sets
+# unflex_NOT_FOUND_MESSAGE if something is missing.
 set(unflex_NOT_FOUND_MESSAGE)
 set(unflex_missing)
 
-# unflex_need(found NAME DEBIAN...): unless found, what is called NAME and comes in Debian's
-# packages DEBIAN is missing.
+# unflex_need(found NAME DEBIAN...): notes that NAME, which comes in Debian's packages DEBIAN, is
+# missing, unless it was found.
 macro(unflex_need found name)
   if(NOT ${found})
     list(APPEND unflex_missing "${name} (in Debian ${ARGN})")

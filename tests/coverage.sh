@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # coverage.sh [CTEST OPTION]...
 #
-# Builds unflex and its tests into build-coverage/ so that they count which lines run, runs the tests but
-# for whole sample prints, of which cuts run the same code, and lists how much of each file of src/ and
-# include/ they reached. Fails where that is less than 90 % of all lines, or where no test reaches a
-# place that makes an error.
+# Builds unflex and its tests into build-coverage/ so that they count which lines run. Runs all
+# tests except whole sample prints, since pieces of these run the same code. Lists how much of each
+# file of src/ and include/ was reached. Fails if that is less than 90 % of all lines, or if no test
+# reaches a place that makes an error.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
@@ -21,8 +21,9 @@ fi
 cmake --build "$build" --parallel "$(nproc)"
 
 find "$build" -name '*.gcda' -delete
-# Programs that tests keep from writing cannot write their counts, and may not say so where the tests
-# read; nobody has no right to the counts of all others.
+# Tests keep some programs from writing, so these cannot write their counts. Their messages about
+# that must not get into the output that tests read. The AsNobody tests are left out: the user
+# nobody may not write the counts of others.
 export GCOV_ERROR_FILE=/dev/null UNFLEX_UNCOUNTED=$build/uncounted
 ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" \
   --exclude-regex "$whole_prints|^AsNobody" "$@"

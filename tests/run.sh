@@ -1,11 +1,17 @@
 #!/usr/bin/env bash
 # run.sh [CTEST OPTION]...
 #
-# Installs what is missing on Debian 12, builds unflex and its tests into build/ and runs them all,
-# or those that the options choose. Then, unless there are options, fuzzes for a minute.
+# Installs what is missing on Debian 12, builds unflex and its tests into build/, with warnings as
+# errors, and runs them all, or those that the options choose. `run.sh -L quick` builds and runs what
+# belongs to every change and no more.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
+
+target=all
+if [[ " $* " == *" -L quick "* ]]; then
+  target=quick_tests
+fi
 
 "$root/cmake/install_packages.sh" --tests
 
@@ -13,10 +19,8 @@ generator=()
 if [[ ! -e $root/build/CMakeCache.txt ]]; then
   generator=(-G Ninja)
 fi
-cmake "${generator[@]}" -S "$root" -B "$root/build" -DCMAKE_BUILD_TYPE=Release -DUNFLEX_TESTS=ON
-cmake --build "$root/build" --parallel "$(nproc)"
+cmake "${generator[@]}" -S "$root" -B "$root/build" -DCMAKE_BUILD_TYPE=Release -DUNFLEX_TESTS=ON \
+  -DUNFLEX_WERROR=ON
+cmake --build "$root/build" --parallel "$(nproc)" --target "$target"
 
 ctest --test-dir "$root/build" --output-on-failure --parallel "$(nproc)" "$@"
-if (($# == 0)); then
-  "$root/tests/fuzz/run.sh" 12
-fi

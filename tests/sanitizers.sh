@@ -2,9 +2,9 @@
 # sanitizers.sh [address | thread] [CTEST OPTION]...
 #
 # Builds unflex and its tests with sanitizers and runs them: with those for addresses and undefined
-# behaviour (clang) in build-fuzz/, with the one for threads (GCC) in build-thread/, or with the
-# named alone. Whole sample prints are left out, and with the thread sanitizer the browser, which
-# knows nothing of threads.
+# behaviour (clang) in build-fuzz/, and with the one for threads (GCC) in build-thread/, or only
+# with the named one. Whole sample prints are left out. With the thread sanitizer the browser tests
+# are left out, too, since they have nothing to do with threads.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
@@ -32,9 +32,9 @@ for kind in "${kinds[@]}"; do
     cmake -G Ninja -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=RelWithDebInfo "${options[@]}"
   fi
   cmake --build "$build" --parallel "$(nproc)"
-  # The thread sanitizer has its memory at fixed places, which random ones get in the way of. It calls
-  # threads leaked that an interrupted program ends without waiting for; any other that is never
-  # joined ends the program by itself.
+  # The thread sanitizer has its memory at fixed addresses, so addresses must not be random. Its
+  # report of leaked threads is off: an interrupted program ends without waiting for its threads.
+  # Any other thread that is never joined ends the program anyway.
   TSAN_OPTIONS=halt_on_error=1:report_thread_leaks=0 setarch --addr-no-randomize \
     ctest --test-dir "$build" --output-on-failure --parallel "$(nproc)" \
     --exclude-regex "$left_out" "$@"

@@ -1,3 +1,3 @@
 # Sourced: the tests of whole prints, of which cuts run the same code, for builds that are slow.
 # shellcheck shell=bash disable=SC2034
-whole_prints='SamplesRobustness|RealPrint|WholePrint|DialectPrint|All/Sample\.|FirstTwentyLayers|OtherFirmware'
+whole_prints='TenLayers|OtherFirmware'

@@ -88,7 +88,8 @@ class UnflexCompensate(Script):
             raise RuntimeError(said or "unflex ended with exit code {}".format(done.returncode))
 
 
-# Cura's strings have "\n" alone, and what is no UTF-8 in them must come back as it was.
+# Cura's strings have only "\n" as line ends. Bytes in them that are no UTF-8 must come back as they
+# were.
 def _write(path, text):
     with open(path, "w", encoding="utf-8", errors="surrogateescape", newline="") as file:
         file.write(text)
@@ -109,7 +110,7 @@ def _show(message):
 
 
 def _is_mark(line):
-    # unflex keeps all lines but moves as they are, save for those that tell the time.
+    # unflex keeps all lines except moves and lines that tell the time.
     return line.startswith((";", "M"))
 
 

@@ -1,6 +1,6 @@
 # Completion of unflex' command line for bash. It needs nothing but bash itself.
 
-# What a command takes besides files. `unflex COMMAND --help` has the same options.
+# Commands and options. `unflex COMMAND --help` has the same options.
 _unflex_options() {
   local print='--printer --set --report -q --quiet'
   case $1 in
@@ -28,8 +28,9 @@ _unflex_commands() {
   esac
 }
 
-# What may follow a word: `files PATTERN`, `folders`, `words WORD...`, `any` for what cannot be guessed, or
-# nothing where the word takes no value. Files of another name are offered where none matches.
+# Prints what may follow a word: `files PATTERN`, `folders`, `words WORD...`, `any` for values that
+# cannot be guessed, or nothing if the word takes no value. If no file matches, all files are
+# offered.
 _unflex_value() {
   local print='*.@(gcode|gco|g|bgcode|gcode.gz)' printer='*.@(toml|cfg|g|txt)'
   case $1:$2 in
@@ -52,7 +53,7 @@ _unflex_value() {
   esac
 }
 
-# Files that match the pattern and folders; all files where none matches.
+# Folders, and files that match the pattern; all files if none matches.
 _unflex_files() {
   local word=$1 pattern=$2 file extglob
   extglob=$(shopt -p extglob)
@@ -67,7 +68,7 @@ _unflex_files() {
 
 _unflex() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command= word kind
-  # --engine=ipopt comes as three words.
+  # Bash splits --engine=ipopt into three words.
   if [[ $current == = ]]; then
     current=
   elif [[ $previous == = ]]; then

@@ -1,6 +1,6 @@
 # Completion of unflex' command line for fish. `unflex COMMAND --help` has the same options.
 
-# Of the words before the cursor those that are commands: "printer init".
+# The words before the cursor that are commands: "printer init".
 function __unflex_command
     set -l words (commandline -opc)
     set -l command
@@ -19,7 +19,7 @@ function __unflex_in
     contains -- (__unflex_command) $argv
 end
 
-# Folders and files whose names end in one of these; all files where there are none.
+# Folders, and files whose names end in one of these; all files if there are no such files.
 function __unflex_files
     set -l ends (string escape --style=regex -- $argv | string join '|')
     set -l all (__fish_complete_path (commandline -ct))

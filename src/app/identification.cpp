@@ -8,8 +8,8 @@
 #include <string_view>
 
 #include "unflex/app/run_config.hpp"
-#include "unflex/report/json_parts.hpp"
 #include "unflex/report/html_page.hpp"
+#include "unflex/report/json_parts.hpp"
 #include "unflex/report/svg_plot.hpp"
 
 namespace unflex::app {
@@ -20,7 +20,7 @@ using identify::Estimate;
 using identify::Mode;
 using report::Json;
 
-// As many digits as tell something: a tenth of the interval.
+// The value with digits down to a tenth of its interval; more would tell nothing.
 std::string number_text(double value, const Estimate& estimate) {
   const double width = std::max(estimate.high - estimate.low, 1e-9 * std::abs(value));
   const int decimals = std::clamp(static_cast<int>(std::ceil(1.0 - std::log10(width))), 0, 5);
@@ -33,7 +33,8 @@ std::string interval_text(const Estimate& e) {
   return fmt::format("{} to {}", number_text(e.low, e), number_text(e.high, e));
 }
 
-// Energies span decades; their roots are amplitudes. What swings about nothing is drawn as it is.
+// The heights at which a curve is drawn. A spectrum holds energies, which span decades, so we draw
+// their roots, the amplitudes. A curve that swings about 0 is drawn as it is.
 std::vector<double> heights(const Curve& curve, const std::vector<double>& values) {
   std::vector<double> result;
   for (const double value : values) {
@@ -125,7 +126,8 @@ std::string record_card(const IdentifiedRecord& record) {
   }
   return fmt::format(
       "<section class=\"card\"><h2>{} along {}</h2>\n"
-      "<p>{} Hz ({}), damping ratio {} ({}), by {}; {:.0f} % of it is something else.</p>\n{}{}"
+      "<p>{} Hz ({}), damping ratio {} ({}), by {}; {:.0f} % of the record is not explained by "
+      "this mode.</p>\n{}{}"
       "</section>\n",
       report::escape_html(record.name), letter(record.axis), estimate_text(record.mode.freq_hz),
       interval_text(record.mode.freq_hz), estimate_text(record.mode.damping_ratio),

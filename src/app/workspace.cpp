@@ -12,8 +12,8 @@
 namespace unflex::app {
 namespace {
 
-// Two names for one file would have the result destroy what it was made from. So would a stream
-// that is redirected to it.
+// Checks that no two names lead to one file: the result would destroy what it was made from. So
+// would a stream that is redirected to such a file.
 Status check_distinct(const RunConfig& config) {
   const bool compensates = config.command == Command::compensate;
   const std::string input = name_of_file(config.input, STDIN_FILENO);
@@ -57,7 +57,7 @@ Status open_outputs(const RunConfig& config, Workspace& space) {
   return {};
 }
 
-// What is read more than once.
+// Copies what is read more than once.
 Status spool(const RunConfig& config, Workspace& space) {
   if (config.command == Command::compensate) {
     return space.input.make_readable();
@@ -68,20 +68,21 @@ Status spool(const RunConfig& config, Workspace& space) {
   return space.compensated ? space.compensated->make_seekable() : Status{};
 }
 
-// Of a binary print and a text the metadata stand in different places.
+// Refuses a binary output of a text, since their metadata stand in different places.
 Status check_kinds(const RunConfig& config, const Workspace& space) {
   if (space.compensated && space.compensated->kind() == container::Kind::bgcode &&
       space.input.kind() != container::Kind::bgcode) {
     return fail(
         ErrorKind::usage, {config.output, 0},
-        fmt::format("is binary G-code and {} is not, so that metadata stand in other places; "
-                    "have the output written as plain G-code and verify that",
+        fmt::format("is binary G-code and {} is plain text, so their lines cannot be compared; "
+                    "write the output as plain G-code and verify that",
                     config.input));
   }
   return {};
 }
 
-// What the output is to be packed in: in place and in a stream as the input is.
+// How the output is to be packed: like the input if it is a stream or in place of the input,
+// otherwise as its name says.
 container::Kind output_kind(const RunConfig& config, const Workspace& space) {
   return config.in_place || space.output->is_stream() ? space.input.kind()
                                                       : container::kind_of_name(config.output);
@@ -123,7 +124,7 @@ Result<Workspace> open_workspace(const RunConfig& config) {
           .and_then([&] { return load_settings(config, space.input); })
           .map([&](machine::Settings settings) { space.settings = std::move(settings); });
   if (!ready) {
-    // A print that is gone already explains what went wrong.
+    // If the print has changed meanwhile, that explains what went wrong.
     const Status unchanged = space.input.check_unchanged();
     return tl::unexpected(unchanged ? ready.error() : unchanged.error());
   }

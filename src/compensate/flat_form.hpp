@@ -43,22 +43,24 @@ struct FlatStencils {
 class FlatForm {
  public:
   // Whether the window is long enough for its two ends not to meet, and ωh large enough for the
-  // numbers: from p to b̈ and back they grow by (ωh)⁻².
+  // numbers, which grow by (ωh)⁻² from p to b̈ and back.
   [[nodiscard]] static bool suits(const ScaledWindow& window);
 
-  // Takes the window, which must stay, and goes to a first guess that keeps its ends.
+  // Takes the window, which must outlive the form, and goes to a first guess that keeps its ends.
   void assign(const ScaledWindow& window);
 
-  // Half the gradient of the cost where the form now is, and the values of the rows of these kinds.
+  // Computes half the cost and half its gradient at the present c, and the values of the rows of
+  // these kinds.
   void evaluate(const PerKind<bool>& kinds);
   [[nodiscard]] double half_cost() const;
   [[nodiscard]] const double* rows(RowKind kind) const { return rows_[index_of(kind)].data(); }
 
-  // Prepares for steps: Hessian plus Gᵀ W G, the rows weighted by W (null: not at all).
+  // Prepares for steps: factorises the Hessian plus Gᵀ W G, where W weights the rows (null: no
+  // weight). Returns false if it is not positive definite.
   [[nodiscard]] bool factor(const PerKind<const double*>& weights);
 
-  // The step to the minimum of the quadratic model less its work against the forces on the rows
-  // (null: none), and what it changes the rows by.
+  // Finds the step to the minimum of the quadratic model less the work of the forces on the rows
+  // (null: no forces), and the change of the rows by that step.
   void solve(const PerKind<const double*>& forces);
   [[nodiscard]] const double* row_steps(RowKind kind) const {
     return row_steps_[index_of(kind)].data();
@@ -91,16 +93,14 @@ class FlatForm {
   PerKind<Stencil> stencils_{};
   Stencil nozzle_{};
   Stencil middle_{};
-  Eigen::Matrix<double, 5, 1> start_offset_;     // c*
   Eigen::Matrix<double, 5, 1> start_direction_;  // m
-  Eigen::Matrix<double, 2, 3> end_from_;         // last two c from the three before …
-  Eigen::Vector2d end_offset_;                   // … plus this
+  Eigen::Matrix<double, 2, 3> end_from_;         // the last two c by the three before them
 
   Padded c_;
   Padded saved_;
   Padded step_;
   Padded gradient_;
-  // Weights of the squares of p − r at nodes and middles, and these times p − r.
+  // Weights of (p − r)² at nodes and middles. A pull is the weight times p − r.
   Padded node_reference_;
   Padded middle_reference_;
   Padded node_weight_;

@@ -52,7 +52,7 @@ std::optional<std::string> from_base64(std::string_view text) {
     bytes += static_cast<char>(group >> 8U & 255U);
     bytes += static_cast<char>(group & 255U);
   }
-  bytes.resize(bytes.size() - padding);
+  bytes.erase(bytes.size() - padding);
   return bytes;
 }
 

@@ -9,7 +9,7 @@ constexpr Bounds kAny{};
 constexpr Bounds kNotNegative{.min = 0.0};
 constexpr Bounds kPositive{.min = 0.0, .min_open = true};
 
-// The member of a section of the settings, and of an axis' alternative dynamics.
+// Members of the settings' sections, and of the form of an axis as mass, spring and damper.
 template <auto Section, auto Field>
 auto& setting(Draft& draft) {
   return draft.settings.*Section.*Field;
@@ -55,7 +55,7 @@ constexpr std::string_view kOtherForm = "not used";
 constexpr std::array<std::string_view, 11> kShaperTypes = {
     "auto", "zv", "mzv", "zvd", "zvdd", "zvddd", "ei", "2hump_ei", "3hump_ei", "ei2", "ei3"};
 
-// What variants.cpp knows, and "auto" and "mainline".
+// The variants that variants.cpp knows, besides "auto" and "mainline".
 constexpr std::array<std::string_view, 7> kVariants = {
     "auto", "mainline", "kalico", "kalico_limited", "kalico_smooth", "prusa_buddy", "snapmaker_j1"};
 constexpr std::array<std::string_view, 4> kTransports = {"auto", "card", "serial", "sbc"};
@@ -67,12 +67,13 @@ constexpr std::array kKeys = {
         &setting<&S::printer, &P::variant>,
         kAny,
         "",
-        "What of that firmware it is; auto: as recognised, mainline: its makers' own",
+        "The firmware's variant; auto: as unflex recognises it, mainline: the makers' own",
         {},
         nullptr,
         kVariants},
     Key{"printer.version", &setting<&S::printer, &P::version>, kAny, "",
-        "Its version as it tells it, such as \"v0.13.0-700-g0123abcd\" or \"3.6.0\"; \"\": not "
+        "The firmware's version as it tells it, such as \"v0.13.0-700-g0123abcd\" or \"3.6.0\"; "
+        "\"\": not "
         "known"},
     Key{"printer.transport",
         &setting<&S::printer, &P::transport>,
@@ -84,11 +85,12 @@ constexpr std::array kKeys = {
         nullptr,
         kTransports},
     Key{"printer.travel_x_mm", &setting<&S::printer, &P::travel_x_mm>, kAny, "mm",
-        "Where the base may be along X, [min, max]", kNotLimited},
+        "The base's travel along X, [min, max]", kNotLimited},
     Key{"printer.travel_y_mm", &setting<&S::printer, &P::travel_y_mm>, kAny, "mm",
-        "Where the base may be along Y, [min, max]", kNotLimited},
+        "The base's travel along Y, [min, max]", kNotLimited},
     Key{"printer.relative_extrusion", &setting<&S::printer, &P::relative_extrusion>, kAny, "",
-        "E is relative before the file's first M82 or M83: M83 in a start macro or in config.g"},
+        "E words are differences before the file's first M82 or M83, since a start macro or "
+        "config.g has M83"},
     Key{"printer.firmware_retraction", &setting<&S::printer, &P::firmware_retraction>, kAny, "",
         "G10 and G11 move filament. Klipper: [firmware_retraction]; Marlin: FWRETRACT"},
     Key{"printer.retract_length_mm", &setting<&S::printer, &P::retract_length_mm>, kNotNegative,
@@ -158,7 +160,8 @@ constexpr std::array kKeys = {
         &setting<&S::printer, &P::input_shaper_type>,
         kAny,
         "",
-        "Its type as the firmware spells it; auto: Klipper mzv, Marlin zv, RRF zvd",
+        "Type of the printer's own shaper as the firmware spells it; auto: Klipper mzv, Marlin zv, "
+        "RRF zvd",
         {},
         nullptr,
         kShaperTypes},
@@ -166,7 +169,7 @@ constexpr std::array kKeys = {
         &setting<&S::printer, &P::input_shaper_type_y>,
         kAny,
         "",
-        "Klipper: its type along Y; auto: as along X",
+        "Klipper: type of the printer's own shaper along Y; auto: as along X",
         {},
         nullptr,
         kShaperTypes},
@@ -182,9 +185,9 @@ constexpr std::array kKeys = {
         &derived<&S::shaper_damping_ratio_y>},
 
     Key{"limits.max_velocity_mm_s", &setting<&S::limits, &L::max_velocity_mm_s>, kPositive, "mm/s",
-        "Klipper: [printer] max_velocity; the others: of X and Y"},
+        "Klipper: [printer] max_velocity; the others: the larger of X and Y"},
     Key{"limits.max_accel_mm_s2", &setting<&S::limits, &L::max_accel_mm_s2>, kPositive, "mm/s²",
-        "Klipper: [printer] max_accel; the others: of X and Y"},
+        "Klipper: [printer] max_accel; the others: the larger of X and Y"},
     Key{"limits.square_corner_velocity_mm_s", &setting<&S::limits, &L::square_corner_velocity_mm_s>,
         kNotNegative, "mm/s", "Klipper: [printer] square_corner_velocity"},
     Key{"limits.minimum_cruise_ratio", &setting<&S::limits, &L::minimum_cruise_ratio>,
@@ -349,9 +352,11 @@ constexpr std::array kKeys = {
 
     Key{"dynamics.freq_error", &setting<&S::dynamics_error, &R::freq>,
         Bounds{.min = 0.0, .max = 0.5}, "",
-        "Share by which both frequencies may be off, either way: the base is to suit them all"},
+        "How far both frequencies may be off, either way, as a share; the base then suits them "
+        "all"},
     Key{"dynamics.damping_error", &setting<&S::dynamics_error, &R::damping>,
-        Bounds{.min = 0.0, .max = 0.9}, "", "The same for both damping ratios"},
+        Bounds{.min = 0.0, .max = 0.9}, "",
+        "How far both damping ratios may be off, either way, as a share"},
 
     Key{"kinematics.type", &setting<&S::kinematics, &K::type>, kAny, "",
         "Which motors move which axes. base.* limits are those of motors"},
@@ -368,7 +373,7 @@ constexpr std::array kKeys = {
     Key{"solve.window_s", &setting<&S::solve, &O::window_s>, Bounds{.min = 0.05, .max = 60.0}, "s",
         "Part of a long run that is solved at once"},
     Key{"solve.overlap_s", &setting<&S::solve, &O::overlap_s>, Bounds{.min = 0.0, .max = 10.0}, "s",
-        "What such a part sees of its neighbours on either side"},
+        "How much of its neighbours on either side such a part takes into account"},
     Key{"solve.lead_in_ms", &setting<&S::solve, &O::lead_in_ms>, Bounds{.min = 0.0, .max = 1000.0},
         "ms", "How long before the plan the base may start"},
     Key{"solve.tail_ms", &setting<&S::solve, &O::tail_ms>, Bounds{.min = 0.0, .max = 1000.0}, "ms",
@@ -386,7 +391,7 @@ constexpr std::array kKeys = {
         "1, or a twentieth of the shorter resonance's period", &derived<&S::period_ms>},
     Key{"emit.tolerance_um", &setting<&S::emit, &T::tolerance_um>,
         Bounds{.min = 0.0, .max = 1000.0}, "µm",
-        "How far what a line leaves out of the base's motion may move the nozzle",
+        "How far a straight line may move the nozzle from where the base's own curve would have it",
         "0.25 at 45 Hz, in proportion to the lower frequency", &derived<&S::tolerance_um>},
     Key{"emit.max_lines_per_s", &setting<&S::emit, &T::max_lines_per_s>, Bounds{.min = 1.0}, "1/s",
         "Lines the printer can take in a second of print; compensated ones never exceed it",

@@ -13,17 +13,17 @@ namespace unflex::pipeline {
 namespace {
 
 constexpr std::size_t kMostListed = 1000;
-// Of the tolerance, for a run that the whole of it spoils.
+// Share of the tolerance, for a run that fails with all of it.
 constexpr double kFineTolerance = 0.05;
-// Of the limits, for a run that exceeds them …
+// Share of the limits to aim at, for a run that exceeds them.
 constexpr double kLower = 0.85;
-// … and for one that must be written.
+// Shares of the limits to aim at, for a part that must be written.
 constexpr double kLowest[] = {0.7, 0.5};
-// What of a part's last lines tells the printer how it arrives at the next part.
+// The lines of this last stretch of a part decide how the printer arrives at the next part.
 constexpr double kLastLines_s = 0.05;
 constexpr double kApart_mm = 1e-3;
 constexpr std::ptrdiff_t kKeptLines = 16;
-// Parts that begin less late are written as they were planned.
+// A part that begins less late than this is written as planned.
 constexpr double kLate_s = 2e-5;
 constexpr double kSamePlace_mm = 1e-7;
 
@@ -35,7 +35,7 @@ std::vector<gcode::Segment> last_lines(const std::vector<planner::PlannedMove>& 
   return lines;
 }
 
-// Of kept lines and those of the piece, the last since the machine has stopped.
+// Adds the piece's lines to the kept lines; only the last ones since a stop are held.
 void follow_motion(const Piece& piece, std::vector<gcode::Segment>& lines) {
   for (const gcode::Event& event : piece.events) {
     if (event.kind == gcode::EventKind::barrier) {
@@ -89,11 +89,12 @@ Result<std::string> RunWriter::write(const RunJob& job) {
       const std::size_t line = piece.events.front().line.number;
       blocked_ = {run_line_, piece.moves.back().segment.line,
                   fmt::format("at line {}: {}", line, *failure)};
-      return fail(ErrorKind::input, {input_name_, line},
-                  fmt::format("up to line {} the print cannot be compensated, and it does not stop "
-                              "before: {}; write to a file, where all of it can be left as it was "
-                              "sliced",
-                              piece.events.back().line.number, *failure));
+      return fail(
+          ErrorKind::input, {input_name_, line},
+          fmt::format("the lines up to {} cannot be compensated, and the print does not stop "
+                      "before them: {}; write to a file instead of a stream, then unflex "
+                      "can leave the whole motion as it was sliced",
+                      piece.events.back().line.number, *failure));
     }
   }
   if (failure) {
@@ -123,7 +124,7 @@ std::string RunWriter::finish() {
   return text;
 }
 
-// The printer moves as the input has it.
+// Accounts for a kept piece: the printer moves as sliced.
 void RunWriter::keep_motion(const Piece& piece) {
   written_s_ += nozzle_.follow(piece);
   follow_motion(piece, kept_lines_);
@@ -162,7 +163,7 @@ emit::RunPlan RunWriter::plan(const RunJob& job, double tolerance_share,
   return emit::plan_run(run, emitter_.run_start(), rules_->emit);
 }
 
-// The lines that were prepared, in time.
+// The lines that were prepared, retimed if the part begins late.
 emit::RunPlan RunWriter::in_time(const RunJob& job) const {
   if (std::abs(late_s_) < kLate_s || job.plan.empty()) {
     return job.plan;
@@ -172,7 +173,7 @@ emit::RunPlan RunWriter::in_time(const RunJob& job) const {
   return emit::retimed(job.plan, run, rules_->emit);
 }
 
-// Whether the run was planned for where the printer is.
+// Whether the run was planned for the place and state in which the printer is.
 bool RunWriter::fits(const RunJob& job) const {
   const gcode::Position& at = emitter_.printer().state().position_mm;
   const bool same_place =
@@ -181,13 +182,13 @@ bool RunWriter::fits(const RunJob& job) const {
   return same_place && job.plan.start == emitter_.run_start();
 }
 
-// The run as compensated text, or why its original lines must stand.
+// Writes the run as compensated text, or returns why its original lines must stand.
 std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& text) {
   if (!job.failure.empty()) {
     return job.failure;
   }
-  // Its own moves would find the nozzle as it is, which after motion that was kept is not as
-  // reckoned with.
+  // The sliced moves would start with the true nozzle. If an earlier run was kept, that nozzle is
+  // not the expected one, and the deviation has to be measured again.
   before_ = verify::apart_mm(run_nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
                 ? deviation_of(job.piece, job.piece.moves, run_nozzle_, rules_->verify, 0.0)
                 : job.before;
@@ -196,19 +197,20 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   if (fits(job)) {
     objection = try_run(job, in_time(job), false, text);
   }
-  // What was not known beforehand: how it starts, and the lines before.
+  // Plans again with what was not known before: how the run starts, and the lines before it.
   if (objection && (counts_steps || !fits(job))) {
     objection = try_run(job, plan(job, 1.0, 1.0), false, text);
   }
-  // Where whole steps make a line too quick or the lines a few too many, aiming lower helps.
+  // Whole steps may make a line too quick, or the lines a few too many. Aiming lower helps.
   if (objection && counts_steps) {
     objection = try_run(job, plan(job, 1.0, kLower), false, text);
   }
-  // Where long lines break a limit or cost too much, short ones may do.
+  // If long lines break a limit or cost too much, short ones may do.
   return objection ? try_run(job, plan(job, kFineTolerance, 1.0), false, text) : objection;
 }
 
-// The same for a part that must be written: what keeps the limits will do.
+// Writes a part that must be written: it may be a little worse, but must keep the limits. Returns
+// why it cannot be written, if so.
 std::optional<std::string> RunWriter::insist(const RunJob& job, std::string& text) {
   if (!job.failure.empty()) {
     return job.failure;

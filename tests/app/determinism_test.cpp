@@ -1,4 +1,4 @@
-// The same print becomes the same bytes, wherever, whenever and however the program is run.
+// A print gives equal bytes, wherever, whenever and however the program is run.
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/program.hpp"
+#include "paths.hpp"
 
 namespace unflex::app {
 namespace {
@@ -21,17 +22,18 @@ using Words = std::vector<std::string>;
 
 struct Made {
   std::string output;
-  nlohmann::json report;  // without what it took
+  nlohmann::json report;  // without the performance figures
 
   bool operator==(const Made&) const = default;
 };
 
 class Bytes : public ProgramTest {
  protected:
-  // Only Klipper gets the cut of a real print; for the others every line's end is searched for.
+  // Klipper gets a piece of a real print. The other firmwares get a small one, because the search
+  // for the end of each line is slow.
   void choose(const std::string& firmware) {
     firmware_ = firmware;
-    write_file(path("in.gcode"), firmware == "klipper" ? read_file(fs::path(UNFLEX_TEST_DATA) /
+    write_file(path("in.gcode"), firmware == "klipper" ? read_file(fs::path(test_paths::kData) /
                                                                    "pipeline_washer_arcs.gcode")
                                                        : small_print());
   }
@@ -43,7 +45,7 @@ class Bytes : public ProgramTest {
     return all;
   }
 
-  // What lies there now, and takes it away.
+  // The output and the report, which are then deleted.
   [[nodiscard]] Made take() const {
     Made made{read_file(path("out.gcode")),
               nlohmann::json::parse(read_file(path("r.json")), nullptr, false)};
@@ -103,7 +105,7 @@ TEST_P(Determinism, HoldsInAnyEnvironment) {
               }) == first);
 }
 
-// Decimal commas, grouped digits, an i whose capital is no I.
+// Locales with decimal commas, grouped digits, or an i whose capital is not I.
 TEST_F(Bytes, AreTheSameUnderAnyLocale) {
   const std::string folder = path("locales");
   fs::create_directory(folder);
@@ -143,7 +145,7 @@ TEST_P(Determinism, HoldsFromAnyFolderAndByAnyName) {
   }
   EXPECT_EQ(run(there, "", moved).exit_code, 0);
   Made absolute = take();
-  // Names are told as they were given.
+  // The report has names as they were given.
   absolute.report["input"] = "in.gcode";
   absolute.report["output"] = "out.gcode";
   EXPECT_TRUE(absolute == first);
@@ -166,7 +168,7 @@ TEST_P(Determinism, HoldsOnATerminal) {
     argv.push_back(nullptr);
     ::setenv("TERM", "xterm", 1);
     if (::chdir(directory().c_str()) == 0) {
-      ::execv(UNFLEX_PROGRAM, argv.data());
+      ::execv(test_paths::kProgram, argv.data());
     }
     ::_exit(127);
   }

@@ -1,4 +1,4 @@
-// Records become lines for the printer file.
+// From records to lines for the printer file.
 
 #include <gmock/gmock.h>
 
@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "app/program.hpp"
+#include "paths.hpp"
 #include "report/documented_keys.hpp"
 
 namespace unflex::app {
@@ -82,8 +83,9 @@ TEST_F(Identify, WritesAReportWhoseKeysAreDocumented) {
   EXPECT_LE(json["dynamics"]["x"]["freq_hz"]["low"], json["dynamics"]["x"]["freq_hz"]["high"]);
   std::set<std::string> keys;
   report::collect_keys(json, "", keys);
-  keys.insert("records[].curve.freq_hz");  // in place of time_s, of spectra
-  EXPECT_EQ(report::documented_keys(UNFLEX_DOCS "/identify.md", "Report"), keys);
+  keys.insert("records[].curve.freq_hz");  // spectra have it instead of time_s
+  EXPECT_EQ(report::documented_keys(std::string(test_paths::kDocs) + "/identify.md", "Report"),
+            keys);
 }
 
 TEST_F(Identify, WritesAPageOfItsOwn) {
@@ -101,7 +103,7 @@ TEST_F(Identify, TakesARingingTower) {
                                "--decay", "1.5", "--axis", "y", "-q"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, StartsWith("[dynamics.y]\nfreq_hz = 50"));
-  // --axis is the tower's; a record's name tells its own.
+  // --axis applies to the tower. A record's name gives its own axis.
   const Outcome both = run({"identify", "a_x.csv", "--wave-spacing-mm", "2", "--speed-mm-s", "100",
                             "--decay", "1.5", "--axis", "y", "-q"});
   EXPECT_THAT(both.out, AllOf(HasSubstr("[dynamics.x]"), HasSubstr("[dynamics.y]")));

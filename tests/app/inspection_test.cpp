@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "paths.hpp"
 #include "report/documented_keys.hpp"
 
 namespace unflex::app {
@@ -89,7 +90,8 @@ TEST(ReportPage, DocumentsExactlyTheKeysOfAnInspection) {
       nlohmann::json::parse(inspection_json(sample(), "in.gcode", *machine::load({}, {})));
   std::set<std::string> keys;
   report::collect_keys(json, "", keys);
-  EXPECT_EQ(report::documented_keys(UNFLEX_DOCS "/report.md", "inspect"), keys);
+  EXPECT_EQ(report::documented_keys(std::string(test_paths::kDocs) + "/report.md", "inspect"),
+            keys);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// However the printer is described, the print comes out the same.
+// The output does not depend on how the printer is described.
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "app/program.hpp"
+#include "paths.hpp"
 
 namespace unflex::app {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-const std::string kConfig = std::string(UNFLEX_TEST_DATA) + "/printer/printer.cfg";
+const std::string kConfig = std::string(test_paths::kData) + "/printer/printer.cfg";
 
 class PrinterFile : public ProgramTest {
  protected:

@@ -10,13 +10,15 @@
 #include <fstream>
 #include <iterator>
 
+#include "paths.hpp"
+
 namespace unflex::app {
 namespace {
 
 constexpr int kCannotStart = 127;
 
 std::filesystem::path make_directory() {
-  // Not $TMPDIR, which some tests set for the program.
+  // Do not use $TMPDIR, which some tests set for the program.
   std::string name = "/tmp/unflex_test_XXXXXX";
   EXPECT_NE(::mkdtemp(name.data()), nullptr);
   return name;
@@ -35,7 +37,7 @@ std::filesystem::path make_directory() {
   if (prepare) {
     prepare();
   }
-  ::execv(UNFLEX_PROGRAM, argv.data());
+  ::execv(test_paths::kProgram, argv.data());
   ::_exit(kCannotStart);
 }
 

@@ -1,4 +1,4 @@
-// A program that is asked to end leaves nothing behind.
+// A program that a signal asks to end leaves nothing behind.
 
 #include <fcntl.h>
 #include <fmt/core.h>
@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "app/program.hpp"
+#include "paths.hpp"
 
 namespace unflex::app {
 namespace {
@@ -53,7 +54,7 @@ TEST_P(EndingSignal, RemovesTheTemporaryFileAndKeepsTheTarget) {
 
 INSTANTIATE_TEST_SUITE_P(OfEveryKind, EndingSignal, ::testing::Values(SIGINT, SIGTERM, SIGHUP));
 
-// stdout is a pipe that is full and that nobody reads.
+// Makes stdout a full pipe that nobody reads.
 void stop_stdout() {
   std::array<int, 2> pipe{};
   if (::pipe(pipe.data()) == 0) {
@@ -65,7 +66,7 @@ void stop_stdout() {
   }
 }
 
-// Its summary is all that is missing.
+// Only the summary is missing when the signal comes.
 TEST_F(ProgramTest, DoesNotSayThatNothingWasWrittenOnceItWas) {
   write_file(path("in.gcode"), small_print());
   Program program(directory(), {"compensate", "in.gcode", "--in-place"}, "", stop_stdout);
@@ -103,7 +104,7 @@ TEST_F(ProgramTest, DoesNotSayThatNoReportWasWrittenOnceItWas) {
   }
 }
 
-// stdout does not block and nobody reads it.
+// stdout is non-blocking and nobody reads it.
 TEST_F(ProgramTest, EndsWhileItWaitsForAStreamThatDoesNotBlock) {
   write_file(path("in.gcode"), small_print());
   Program program(directory(), {"compensate", "in.gcode", "-o", "out.gcode", "--report", "-"}, "",
@@ -121,7 +122,7 @@ TEST_F(ProgramTest, EndsWhileItWaitsForAStreamThatDoesNotBlock) {
 }
 
 TEST_F(ProgramTest, EndsSoonEvenWhereARunTakesLong) {
-  // Marlin's whole steps make a run of a minute a matter of many seconds.
+  // With Marlin's whole steps a run of a minute takes many seconds to compensate.
   std::string text = "G28\nG90\nM83\nG1 X20 Y20 F6000\n";
   for (int i = 0; i < 4000; ++i) {
     text += fmt::format("G1 X{} Y{} E0.05\n", i % 2 == 0 ? 40 : 20, 20.0 + 0.01 * i);
@@ -137,7 +138,7 @@ TEST_F(ProgramTest, EndsSoonEvenWhereARunTakesLong) {
   EXPECT_EQ(outcome.exit_code, 128 + SIGINT);
   EXPECT_EQ(outcome.err, "unflex: interrupted, no file was written\n");
   EXPECT_THAT(names(), ElementsAre("in.gcode"));
-  // Half a second, and room for a busy machine; the work takes far longer.
+  // Half a second is expected; the rest is for a busy machine. The work itself takes far longer.
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
 }
 
@@ -164,7 +165,8 @@ TEST_F(ProgramTest, EndsWithoutASignalWhenNobodyReadsItsOutput) {
     ::close(ends[1]);
     const int null = ::open(path("err").c_str(), O_WRONLY | O_CREAT, 0600);
     ::dup2(null, STDERR_FILENO);
-    ::execl(UNFLEX_PROGRAM, "unflex", "compensate", path("in.gcode").c_str(), "-o", "-", nullptr);
+    ::execl(test_paths::kProgram, "unflex", "compensate", path("in.gcode").c_str(), "-o", "-",
+            nullptr);
     ::_exit(127);
   }
   ::close(ends[0]);

@@ -1,4 +1,4 @@
-// Text goes through the program as it comes.
+// Text passes through the program as it arrives.
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "app/program.hpp"
+#include "paths.hpp"
 
 namespace unflex::app {
 namespace {
@@ -28,7 +29,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-// The program with pipes at both ends that stay open.
+// Runs the program with pipes at both ends, which stay open.
 class Filter {
  public:
   explicit Filter(const std::filesystem::path& errors) {
@@ -44,7 +45,7 @@ class Filter {
         ::close(fd);
       }
       static_cast<void>(std::freopen(errors.c_str(), "w", stderr));
-      ::execl(UNFLEX_PROGRAM, "unflex", "compensate", "-", "-o", "-", nullptr);
+      ::execl(test_paths::kProgram, "unflex", "compensate", "-", "-o", "-", nullptr);
       ::_exit(127);
     }
     ::close(in[0]);
@@ -75,7 +76,7 @@ class Filter {
       out_ = -1;
     }
   }
-  // The exit code, or −1 if it has not ended within ten seconds; it is ended then.
+  // The exit code, or −1 if the program has not ended within ten seconds and is killed.
   [[nodiscard]] int wait() const {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
     int status = 0;
@@ -90,7 +91,7 @@ class Filter {
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
-  // Reads until `what` has come; all that has come. Not longer than half a minute.
+  // Reads until `what` has come, for half a minute at most. Returns everything that has come.
   const std::string& read_until(std::string_view what) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     while (text_.find(what) == std::string::npos && std::chrono::steady_clock::now() < deadline &&
@@ -98,7 +99,7 @@ class Filter {
     }
     return text_;
   }
-  // Reads to the end; the exit code.
+  // Reads to the end and returns the exit code.
   int finish() {
     while (read_some()) {
     }
@@ -142,7 +143,7 @@ TEST_F(ProgramTest, PassesARunOnAsSoonAsItHasEnded) {
   filter.close_input();
   EXPECT_EQ(filter.finish(), 0);
   EXPECT_THAT(filter.text(), HasSubstr("\nM84\n"));
-  // The same bytes as in a file; what M73 says is too small to change.
+  // A file gets equal bytes; the durations in M73 are too short to change.
   write_file(path("in.gcode"), std::string(kFirstRun) + std::string(kSecondRun));
   EXPECT_EQ(run({"compensate", "in.gcode", "-o", "out.gcode"}).exit_code, 0);
   EXPECT_EQ(filter.text(), read_file(path("out.gcode")));
@@ -155,7 +156,7 @@ TEST_F(ProgramTest, EndsWhenItsInputEndsBeforeAnything) {
   EXPECT_EQ(filter.text(), "");
 }
 
-// Whoever writes has nothing to say for now.
+// The input stays open, but nothing more comes.
 TEST_F(ProgramTest, EndsWhenNobodyReadsItThoughItsInputGoesOn) {
   Filter filter(path("err"));
   filter.close_output();
@@ -164,12 +165,12 @@ TEST_F(ProgramTest, EndsWhenNobodyReadsItThoughItsInputGoesOn) {
   EXPECT_EQ(read_file(path("err")), "stdout: cannot write: Broken pipe\n");
 }
 
-// A pipe whose ends do not block, as event loops make them.
+// A pipe with non-blocking ends, as event loops make them.
 class LoosePipe {
  public:
   LoosePipe() {
     EXPECT_EQ(::pipe2(ends_.data(), O_NONBLOCK | O_CLOEXEC), 0);
-    // A page.
+    // One page, the smallest size.
     EXPECT_GT(::fcntl(ends_[1], F_SETPIPE_SZ, 4096), 0);
   }
   ~LoosePipe() {
@@ -183,7 +184,7 @@ class LoosePipe {
   [[nodiscard]] int writer() const { return ends_[1]; }
   void close_writer() { ::close(std::exchange(ends_[1], -1)); }
 
-  // Some bytes at a time, late, until the other end is closed.
+  // Reads a few bytes at a time, slowly, until the other end is closed.
   [[nodiscard]] std::string read_slowly() const {
     std::string text;
     std::array<char, 4096> block{};

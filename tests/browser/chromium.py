@@ -26,8 +26,8 @@ class Chromium:
         self.read_fd, from_browser = os.pipe()
 
         def connect():
-            # The browser reads commands from descriptor 3 and answers on 4; what has these numbers
-            # now must be out of the way first.
+            # The browser reads commands from descriptor 3 and answers on 4. Descriptors that have
+            # these numbers now must be moved first.
             here, there = os.dup(to_browser), os.dup(from_browser)
             while here < 5:
                 here = os.dup(here)

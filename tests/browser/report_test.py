@@ -207,7 +207,7 @@ class Report(unittest.TestCase):
             self.assertEqual(shades, sorted(shades))
             backgrounds.add(found["background"])
         self.assertEqual(len(backgrounds), 2)
-        # By the button too: auto, light, dark.
+        # The button changes the theme, too: auto, light, dark.
         self.open(1366, 820)
         first = self.picture()
         self.browser.click_on("#theme")

@@ -1,9 +1,13 @@
 #include "packed.hpp"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <array>
 #include <fstream>
 #include <iterator>
+
+#include "paths.hpp"
 
 namespace unflex::container {
 
@@ -64,8 +68,15 @@ Result<std::string> to_bgcode(std::string_view text, const Metadata* origin,
 
 std::string to_gzip(std::string_view text) { return *pack(*make_gzip_packer(), text); }
 
+std::string ten_layers(std::string_view print) {
+  const Result<Unpacked> unpacked =
+      unpack(test_data("prints/" + std::string(print) + "_ten_layers.gcode.gz"));
+  EXPECT_TRUE(unpacked.has_value()) << print;
+  return unpacked ? unpacked->text : std::string();
+}
+
 std::string test_data(std::string_view name) {
-  std::ifstream stream(std::string(UNFLEX_TEST_DATA "/").append(name), std::ios::binary);
+  std::ifstream stream((std::string(test_paths::kData) + "/").append(name), std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 

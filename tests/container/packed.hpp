@@ -1,4 +1,4 @@
-// Whole texts packed and unpacked, and texts to do it with.
+// Packs and unpacks whole texts, and makes texts for that.
 #pragma once
 
 #include <cstddef>
@@ -26,6 +26,9 @@ struct Unpacked {
 
 // A file of tests/data.
 [[nodiscard]] std::string test_data(std::string_view name);
+
+// The first ten layers of a real print: bracket, cube, star, textplate or wallring.
+[[nodiscard]] std::string ten_layers(std::string_view print);
 
 // Commands and comments of all sorts, with nothing that MeatPack would change; every command in a
 // line of its own and no comments but in lines of their own where `comments` is not set.

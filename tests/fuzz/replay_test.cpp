@@ -1,4 +1,4 @@
-// What fuzzing has kept, and what it has found, replayed.
+// Replays the stored corpus of fuzzing, including inputs that once broke something.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,13 +9,14 @@
 #include <string_view>
 #include <vector>
 
+#include "paths.hpp"
 #include "targets.hpp"
 
 namespace unflex::fuzz {
 namespace {
 
 std::vector<std::filesystem::path> corpus(const std::string& target) {
-  const auto folder = std::filesystem::path(UNFLEX_TEST_DATA).parent_path() / "fuzz" / "corpus";
+  const auto folder = std::filesystem::path(test_paths::kData).parent_path() / "fuzz" / "corpus";
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder / target)) {
     files.push_back(entry.path());

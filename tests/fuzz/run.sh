@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # run.sh [SECONDS [TARGET]...]
 #
-# Builds the fuzzing programs into build-fuzz/ with clang, and has each of them, or those named, look
-# for what breaks for so many seconds (12) on all cores, beginning with the stored corpus. What it
-# finds is left in build-fuzz/finds/, what reached new code in build-fuzz/corpus/.
+# Builds the fuzzing programs into build-fuzz/ with clang. Runs each of them, or the named ones, for
+# so many seconds (12) on all cores, beginning with the stored corpus. Inputs that break something
+# are left in build-fuzz/finds/, inputs that reached new code in build-fuzz/corpus/.
 set -euo pipefail
 
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -27,12 +27,12 @@ cmake --build "$build" --parallel "$(nproc)" --target fuzz
 for target in "${targets[@]}"; do
   echo "Fuzzing $target for $seconds s"
   mkdir -p "$build/corpus/$target" "$build/finds/$target"
-  # Prints are made of the same words as lines.
+  # Prints consist of the same words as lines.
   dictionary=$here/${target/compensate/gcode}.dict
-  # Half a second and half a gigabyte are more than any such small input may take; with sanitizers
-  # and its branches counted, sixty times (the fit of a record: 0.09 s and 4.5 s) and twice as much.
-  # What is freed stays in quarantine: at the default of 256 MB a few hundred records, one after
-  # another, come to 1.3 GB, with this to 0.6 GB, whichever they are.
+  # Normally such a small input takes at most half a second and half a gigabyte. Sanitizers and
+  # counted branches need sixty times as long (the fit of a record: 4.5 s instead of 0.09 s) and
+  # twice the memory. Freed memory stays in quarantine: with the default of 256 MB a few hundred
+  # records add up to 1.3 GB, with this value to 0.6 GB, whichever records they are.
   ASAN_OPTIONS=quarantine_size_mb=64 "$build/tests/fuzz/fuzz_$target" -fork="$(nproc)" \
     -max_total_time="$seconds" -timeout=30 -rss_limit_mb=1024 -max_len=4096 -dict="$dictionary" \
     -artifact_prefix="$build/finds/$target/" "$build/corpus/$target" "$here/corpus/$target"

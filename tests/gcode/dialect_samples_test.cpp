@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
+#include <sstream>
 #include <string>
 
+#include "container/packed.hpp"
 #include "interpreting.hpp"
 #include "unflex/gcode/compensable.hpp"
+#include "whole_prints.hpp"
 
 namespace unflex::gcode {
 namespace {
@@ -16,23 +18,16 @@ struct Print {
   const char* name;
   Firmware firmware;
   std::size_t moves;        // lines that move something
-  std::size_t compensable;  // of these, lines that may be rewritten
+  std::size_t compensable;  // moves that may be rewritten
   std::size_t limits;       // lines that change limits
   double filament_mm;
 };
 
 void PrintTo(const Print& print, std::ostream* out) { *out << print.name; }
 
-class DialectPrint : public ::testing::TestWithParam<Print> {};
-
-TEST_P(DialectPrint, IsReadWithoutRemarks) {
-  const Print& print = GetParam();
-  const std::string path = std::string(UNFLEX_SHARED) + "/samples/" + print.name + ".gcode";
-  if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "the sample prints are not there: " << path;
-  }
-  std::ifstream stream(path, std::ios::binary);
-  LineReader reader(stream, path);
+void expect_read(const std::string& bytes, const Print& print) {
+  std::istringstream stream(bytes);
+  LineReader reader(stream, print.name);
   Interpreter interpreter(default_options(print.firmware));
   std::size_t moves = 0;
   std::size_t rewritable = 0;
@@ -56,6 +51,30 @@ TEST_P(DialectPrint, IsReadWithoutRemarks) {
   EXPECT_EQ(rewritable, print.compensable);
   EXPECT_EQ(limits, print.limits);
   EXPECT_NEAR(filament_mm, print.filament_mm, 0.01);
+}
+
+class CutDialectPrint : public ::testing::TestWithParam<Print> {};
+
+TEST_P(CutDialectPrint, IsReadWithoutRemarks) {
+  expect_read(container::ten_layers(GetParam().name), GetParam());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Samples, CutDialectPrint,
+    ::testing::Values(Print{"bracket", Firmware::marlin, 16149, 15542, 259, 1112.692},
+                      Print{"cube", Firmware::marlin, 1618, 1525, 1, 228.7026},
+                      Print{"textplate", Firmware::marlin, 21363, 20782, 12014, 1941.849},
+                      Print{"wallring", Firmware::marlin, 3602, 3173, 173, 1581.619}),
+    [](const auto& parameter) { return std::string(parameter.param.name); });
+
+class DialectPrint : public ::testing::TestWithParam<Print> {};
+
+TEST_P(DialectPrint, IsReadWithoutRemarks) {
+  const std::filesystem::path path = unflex::testing::whole_print(GetParam().name);
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "UNFLEX_SAMPLES names no folder with it: " << path;
+  }
+  expect_read(file_text(path), GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(

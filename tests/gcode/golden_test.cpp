@@ -1,4 +1,4 @@
-// What the firmware itself made of a program of moves and arcs in all modes.
+// Compares with the firmware's own moves for a program of moves and arcs in all modes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "interpreting.hpp"
+#include "paths.hpp"
 
 namespace unflex::gcode {
 namespace {
 
-const std::string kData = UNFLEX_TEST_DATA;
+const std::string kData = test_paths::kData;
 
 // The program draws G0 to G3 in all planes, G10 G11, G90 to G92, M82 M83, M220 M221, offsets and
 // saved states. The table is what Klipper's gcode_move.py, gcode_arcs.py and firmware_retraction.py
@@ -26,7 +27,7 @@ TEST(Interpreter, MovesAsKlipperDoes) {
   while (std::getline(program, line.text)) {
     ++line.number;
     const Event event = interpreter.interpret(line);
-    // Arcs by chance end anywhere.
+    // Random arcs end anywhere.
     EXPECT_THAT(event.warnings, ::testing::Each(::testing::HasSubstr("off its circle")))
         << line.number << ": " << line.text;
     EXPECT_FALSE(event.position_lost) << line.number << ": " << line.text;

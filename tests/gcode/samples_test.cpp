@@ -1,12 +1,15 @@
-// Ten whole prints of five slicers, against the counts Klipper reports for them.
+// Cuts of five prints of three slicers against counts of another program, and ten whole prints
+// against those that Klipper reports.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
+#include <sstream>
 #include <string>
 
+#include "container/packed.hpp"
 #include "interpreting.hpp"
+#include "whole_prints.hpp"
 
 namespace unflex::gcode {
 namespace {
@@ -21,17 +24,9 @@ struct Sample {
 
 void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
 
-class WholePrint : public ::testing::TestWithParam<Sample> {};
-
-TEST_P(WholePrint, IsReadAsKlipperReadsIt) {
-  const Sample& sample = GetParam();
-  const std::string path = std::string(UNFLEX_SHARED) + "/samples/" + sample.name + ".gcode";
-  if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "the sample prints are not there: " << path;
-  }
-  const std::string bytes = file_text(path);
-  std::ifstream stream(path, std::ios::binary);
-  LineReader reader(stream, path);
+void expect_read(const std::string& bytes, const Sample& sample) {
+  std::istringstream stream(bytes);
+  LineReader reader(stream, sample.name);
   // Klipper without a [firmware_retraction] section, as where the counts were taken.
   Interpreter interpreter(InterpreterOptions{.firmware_retraction = false});
   std::string joined;
@@ -62,6 +57,32 @@ TEST_P(WholePrint, IsReadAsKlipperReadsIt) {
   EXPECT_EQ(moves_xyz, sample.moves_xyz);
   EXPECT_EQ(moves_e, sample.moves_e);
   EXPECT_EQ(arcs, sample.arcs);
+}
+
+class CutPrint : public ::testing::TestWithParam<Sample> {};
+
+TEST_P(CutPrint, IsReadAsKlipperReadsIt) {
+  expect_read(container::ten_layers(GetParam().name), GetParam());
+}
+
+// Counted by another program.
+INSTANTIATE_TEST_SUITE_P(Samples, CutPrint,
+                         ::testing::Values(Sample{"bracket", 17502, 15847, 15569, 0},
+                                           Sample{"cube", 1920, 1538, 1541, 0},
+                                           Sample{"star", 7129, 4994, 4688, 0},
+                                           Sample{"textplate", 33595, 20796, 15370, 0},
+                                           Sample{"wallring", 4879, 3357, 3322, 0}),
+                         [](const auto& parameter) { return std::string(parameter.param.name); });
+
+class WholePrint : public ::testing::TestWithParam<Sample> {};
+
+TEST_P(WholePrint, IsReadAsKlipperReadsIt) {
+  const Sample& sample = GetParam();
+  const std::filesystem::path path = unflex::testing::whole_print(sample.name);
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "UNFLEX_SAMPLES names no folder with it: " << path;
+  }
+  expect_read(file_text(path), sample);
 }
 
 INSTANTIATE_TEST_SUITE_P(Samples, WholePrint,

@@ -1,4 +1,4 @@
-// The page docs/configuration.md says what the program does.
+// The page docs/configuration.md agrees with the program.
 
 #include "unflex/machine/keys.hpp"
 
@@ -10,6 +10,7 @@
 #include <iterator>
 #include <set>
 
+#include "paths.hpp"
 #include "unflex/machine/machine.hpp"
 
 namespace unflex::machine {
@@ -18,11 +19,11 @@ namespace {
 using ::testing::HasSubstr;
 
 std::string documentation() {
-  std::ifstream page(UNFLEX_DOCS "/configuration.md");
+  std::ifstream page(std::string(test_paths::kDocs) + "/configuration.md");
   return {std::istreambuf_iterator<char>(page), {}};
 }
 
-// The row of the page's table.
+// The key's row in the page's table.
 std::string row_of(const KeyDescription& key) {
   return fmt::format("| `{}` | {} | {} | {} | {} |\n", key.name, key.default_value, key.unit,
                      key.range, key.meaning);

@@ -8,12 +8,13 @@
 #include <map>
 #include <string>
 
+#include "paths.hpp"
 #include "unflex/machine/machine.hpp"
 
 namespace unflex::machine {
 
 inline std::string fixture(const std::string& name) {
-  return std::string(UNFLEX_TEST_DATA) + "/printer/" + name;
+  return std::string(test_paths::kData) + "/printer/" + name;
 }
 
 inline std::map<std::string, SettingRow> by_key(const Settings& settings) {
@@ -30,7 +31,7 @@ inline std::string told(const Settings& settings, const std::string& key) {
   return row.value + " " + std::filesystem::path(row.origin).filename().string();
 }
 
-// A directory that goes with the test.
+// A directory that is deleted after the test.
 class PrinterFiles : public ::testing::Test {
  protected:
   PrinterFiles()

@@ -38,7 +38,7 @@ examples=/usr/share/doc/unflex/examples
 "${in_root[@]}" unflex verify /tmp/out.gcode --against $examples/washer.gcode \
   --printer $examples/printer.toml --quiet
 
-# The same bytes as the program writes where it was built.
+# The program in the build directory must write equal bytes.
 "$build/unflex" compensate "$root$examples/washer.gcode" -o "$scratch/out.gcode" \
   --printer "$root$examples/printer.toml" --quiet
 cmp -- "$root/tmp/out.gcode" "$scratch/out.gcode"

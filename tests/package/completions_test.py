@@ -1,6 +1,6 @@
-"""What shells complete against the program's help: completions_test.py UNFLEX COMPLETIONS
+"""Compares what shells complete with the program's help: completions_test.py UNFLEX COMPLETIONS
 
-Each test is skipped where its shell is missing.
+Each test is skipped if its shell is missing.
 """
 
 import os
@@ -43,7 +43,7 @@ class Completion:
         os.mkdir(os.path.join(self.folder, "prints"))
 
     def files(self, line):
-        """What is offered at the end of the line; folders end in a slash."""
+        """The candidates at the end of the line; folders end in a slash."""
         return {name + "/" if os.path.isdir(os.path.join(self.folder, name)) and name[-1:] != "/"
                 else name for name in self.candidates(line)}
 
@@ -144,14 +144,14 @@ class Fish(Completion, unittest.TestCase):
 
     def candidates(self, line):
         script = 'source $argv[1]/unflex.fish; complete -C $argv[2]'
-        # Without a home of its own fish would write into the user's.
+        # fish needs a home of its own, or it would write into the user's.
         found = lines_of(["fish", "--no-config", "-c", script, COMPLETIONS, line], self.folder,
                          HOME=self.folder, XDG_CONFIG_HOME=os.path.join(self.folder, ".config"),
                          XDG_DATA_HOME=os.path.join(self.folder, ".local"))
         return [candidate.split("\t")[0] for candidate in found]
 
     def options(self, line):
-        # Long options are offered behind two dashes.
+        # fish offers long options only after two dashes.
         return set(self.candidates(line)) | set(self.candidates(line + "-"))
 
 

@@ -1,7 +1,7 @@
 """The Debian packages: deb_test.py BUILD VERSION BUILD_TYPE
 
-Makes them from the build directory BUILD and looks at what is in them; bare_root.sh installs and
-runs them. Exits with 77, which skips the test, where this is not Debian.
+Makes the packages from the build directory BUILD and checks their contents; bare_root.sh installs
+and runs them. Exits with 77, which skips the test, if this is not Debian.
 """
 
 import glob
@@ -56,7 +56,7 @@ class Packages(unittest.TestCase):
         return found[0]
 
     def names(self, package):
-        """Of the files in a package; their owner and mode are checked on the way."""
+        """The names of the files in a package; also checks their owner and mode."""
         found = []
         for line in output("dpkg-deb", "--contents", self.package(package)).splitlines():
             mode, owner, _, _, _, name = line.split(maxsplit=5)
@@ -107,7 +107,7 @@ class Packages(unittest.TestCase):
             listed = re.search(r"^packages=\((.*?)^\)", file.read(), re.MULTILINE | re.DOTALL)
         needed = {word for line in listed.group(1).splitlines() if "#" not in line
                   for word in line.split()}
-        # Tools for building and what the program alone is made of.
+        # Leave out the tools for building, and what only the program needs.
         self.assertEqual(depends, needed - {"g++", "cmake", "ninja-build", "libcli11-dev"})
 
     def test_links_of_the_documentation_lead_somewhere(self):
@@ -118,7 +118,7 @@ class Packages(unittest.TestCase):
         for document in glob.glob(os.path.join(there, "**", "*.md"), recursive=True):
             with open(document, encoding="utf-8") as file:
                 found = re.findall(r"\]\(([^)#]+)[^)]*\)", file.read())
-            # What LICENSE says, packages say in `copyright`.
+            # Packages have the text of LICENSE in `copyright`.
             for link in found:
                 if link != "LICENSE" and not link.startswith("https://"):
                     links += 1

@@ -1,7 +1,7 @@
-"""The library as other projects meet it: library_test.py BUILD UNFLEX CXX DATA EXAMPLES
+"""The library as other projects use it: library_test.py BUILD UNFLEX CXX DATA EXAMPLES
 
 Installs from the build directory BUILD into a temporary folder, builds EXAMPLES/library there with
-the compiler CXX and compares what it writes of a print of DATA with what the program UNFLEX writes.
+the compiler CXX, and compares its output for a print of DATA with that of the program UNFLEX.
 """
 
 import os
@@ -24,7 +24,8 @@ class Library(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory()
         cls.addClassCleanup(scratch.cleanup)
         cls.folder = scratch.name
-        # The build may lie in one place and what it installs be moved to another.
+        # Install into one folder and move the result to another, because users may move an
+        # installation.
         first = os.path.join(cls.folder, "first")
         cls.prefix = os.path.join(cls.folder, "prefix")
         subprocess.run(["cmake", "--install", BUILD, "--prefix", first], check=True,

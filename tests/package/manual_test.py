@@ -1,4 +1,4 @@
-"""The manual page against the program's help: manual_test.py UNFLEX MANUAL"""
+"""Compares the manual page with the program's help: manual_test.py UNFLEX MANUAL"""
 
 import re
 import shutil
@@ -44,7 +44,7 @@ class Manual(unittest.TestCase):
         short = {name: names for names in self.described() for name in names}
         shown = {command: set().union(*(short.get(name, {name}) for name in options))
                  for command, options in self.synopses().items()}
-        # A command that only has commands of its own has no synopsis.
+        # A command that has only subcommands has no synopsis.
         expected = {command: options - HELP for command, options in self.commands.items()
                     if options - HELP}
         expected[()] = HELP

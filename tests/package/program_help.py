@@ -1,4 +1,4 @@
-"""What a program's own help says of its command line."""
+"""Reads a program's commands and options from its own help."""
 
 import re
 import subprocess

@@ -1,12 +1,12 @@
-# zsh_candidates.zsh FOLDER DUMP LINE: what zsh, with the completions in FOLDER, offers at the end
-# of LINE, one candidate on a line. DUMP is where zsh keeps what it found of completions, to be quicker
-# the next time.
+# zsh_candidates.zsh FOLDER DUMP LINE: prints what zsh, with the completions in FOLDER, offers at
+# the end of LINE, one candidate per line. zsh stores the completions it found in DUMP, to be
+# quicker the next time.
 zmodload zsh/zpty
 found=$(mktemp)
 zpty shell zsh -f -i
 zpty -w shell "found=${(q)found}; fpath=(${(q)1} \$fpath); PROMPT= "
 zpty -w shell "autoload -U compinit; compinit -u -d ${(q)2}"
-# Candidates are handed to compadd, which for -O, -A and -D only computes.
+# zsh hands candidates to compadd. With -O, -A or -D compadd only computes.
 zpty -w shell 'compadd() {
   if [[ ${@[1,(i)(-|--)]} == *-(O|A|D)* ]]; then builtin compadd "$@"; return; fi
   local -a hits; builtin compadd -A hits "$@"; print -rl -- $hits >>$found; builtin compadd "$@"

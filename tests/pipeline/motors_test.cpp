@@ -1,4 +1,4 @@
-// Motors that move two axes: within their limits, at little cost.
+// Motors that move two axes stay within their limits, and that costs little accuracy.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "jobs.hpp"
+#include "paths.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 
@@ -20,9 +21,9 @@ using testing::JobFolder;
 
 constexpr double kMaxAccel_mm_s2 = 20000.0;
 
-// The first lines of a print, without what sets accelerations.
+// The first lines of a print, without the commands that set accelerations.
 std::string beginning(const std::string& name, std::size_t lines) {
-  std::ifstream file(std::filesystem::path(UNFLEX_TEST_DATA) / name);
+  std::ifstream file(std::filesystem::path(test_paths::kData) / name);
   EXPECT_TRUE(file.is_open()) << name;
   std::string text;
   std::size_t count = 0;
@@ -53,8 +54,8 @@ struct Case {
   std::string print;
   std::size_t lines;
   std::vector<std::string> overrides;
-  double room;  // above the limit that rounding explains, as a share of it
-  double cost;  // of the shared motors: how many times their own motors' RMS
+  double room;  // rounding may exceed the limit by this share
+  double cost;  // ratio of the RMS to that with a motor per axis
 };
 
 void PrintTo(const Case& tested, std::ostream* out) { *out << tested.name; }
@@ -81,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(
              "corexy",
              "pipeline_star.gcode",
              600,
-             // The path alone asks a motor for 0.7 of its limit at 45 degrees.
+             // At 45 degrees the path alone takes 0.7 of a motor's limit.
              {"limits.max_accel_mm_s2=10000"},
              0.02,
              1.5},

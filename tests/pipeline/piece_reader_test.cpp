@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "jobs.hpp"
+#include "paths.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -171,7 +172,7 @@ TEST(PieceReader, EndsARunWhereTooManyLinesWithoutMotionStand) {
       EXPECT_NEAR(piece.moves.back().end_v_mm_s, 0.0, 1e-9);
     }
   }
-  // The last one begins where the machine has stopped.
+  // The last run begins where the machine has stopped.
   EXPECT_THAT(cut_off, ElementsAre(true, true, false));
 }
 
@@ -201,8 +202,8 @@ TEST(PieceReader, RefusesWhatHoldsNoCommand) {
   EXPECT_EQ(Reading("T0").error, "");
 }
 
-// Sixty walls of all lengths with 0.033 mm of filament per mm, in three strokes with a wipe each. E
-// is a difference, a reading, or a reading from the last stroke's end on.
+// Sixty walls of random lengths with 0.033 mm of filament per mm, in three strokes with a wipe
+// each. E is a difference; or a reading; or a reading that starts anew after each stroke.
 enum class WrittenE { relative, absolute, reset };
 
 std::string walls(WrittenE written) {
@@ -246,7 +247,7 @@ TEST(PieceReader, RefusesRelativeFilamentThatNothingTellsOf) {
 
 TEST(PieceReader, LosesNoByteOfAnyFile) {
   std::size_t files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(UNFLEX_TEST_DATA)) {
+  for (const auto& entry : std::filesystem::directory_iterator(test_paths::kData)) {
     if (entry.path().extension() == ".gcode") {
       const std::string text = testing::read_file(entry.path());
       const Reading reading(text);

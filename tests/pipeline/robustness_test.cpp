@@ -1,4 +1,4 @@
-// What a frequency that is not quite the assumed one does to a print.
+// How a wrong frequency affects a print.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,8 +12,10 @@
 #include <vector>
 
 #include "jobs.hpp"
+#include "paths.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "whole_prints.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -21,7 +23,8 @@ namespace {
 using testing::complaints;
 using testing::JobFolder;
 
-// The walls of a ring at 10 000 mm/s², whatever the slicer asked for, as far as `most_lines`.
+// The first `most_lines` lines of the walls of a ring, at 10 000 mm/s² whatever the slicer asked
+// for.
 std::string fast_walls(std::istream& print,
                        std::size_t most_lines = std::numeric_limits<std::size_t>::max()) {
   std::string text;
@@ -60,7 +63,7 @@ double worst_rms_mm(const report::Report& report, const std::string& name) {
   return 0.0;
 }
 
-// What the band of ±10 % gains at its edges and costs in its middle.
+// A band of ±10 % improves the edges of the band and costs accuracy in its middle.
 void expect_robust(const std::string& text) {
   const report::Report nominal = compensated(text, {});
   const report::Report robust = compensated(text, {"dynamics.freq_error=0.1"});
@@ -71,7 +74,7 @@ void expect_robust(const std::string& text) {
       << "nothing is for nothing";
   EXPECT_FALSE(nominal.robustness.has_value());
   ASSERT_TRUE(robust.robustness.has_value());
-  // What lines cost is small beside it.
+  // The cost of writing lines is small in comparison.
   EXPECT_NEAR(robust.robustness->rms_mm, robust.compensated.extruding.contour_rms_mm,
               0.15 * robust.robustness->rms_mm);
   EXPECT_LT(robust.robustness->nominal_rms_mm, nominal.compensated.extruding.contour_rms_mm);
@@ -81,23 +84,21 @@ void expect_robust(const std::string& text) {
 }
 
 TEST(Robustness, OfABandOfFrequenciesIsWorthAFifthAtItsEdges) {
-  std::ifstream print(std::filesystem::path(UNFLEX_TEST_DATA) / "pipeline_wallring.gcode");
+  std::ifstream print(std::filesystem::path(test_paths::kData) / "pipeline_wallring.gcode");
   expect_robust(fast_walls(print));
 }
 
 TEST(SamplesRobustness, OfABandOfFrequenciesIsWorthAFifthAtItsEdges) {
-  const auto path =
-      std::filesystem::path(UNFLEX_SHARED) / "samples" / "wallring_mini_marlin2.gcode";
-  std::ifstream print(path);
+  std::ifstream print(unflex::testing::whole_print("wallring_mini_marlin2"));
   if (!print) {
-    GTEST_SKIP() << "no shared samples beside the repository";
+    GTEST_SKIP() << "UNFLEX_SAMPLES names no folder with wallring_mini_marlin2";
   }
-  // A fifth of the print; the rest is more of the same.
+  // A fifth of the print is enough; the rest is similar.
   expect_robust(fast_walls(print, 10000));
 }
 
 TEST(Robustness, MayBeOfTheDampingToo) {
-  std::ifstream print(std::filesystem::path(UNFLEX_TEST_DATA) / "pipeline_wallring.gcode");
+  std::ifstream print(std::filesystem::path(test_paths::kData) / "pipeline_wallring.gcode");
   const std::string text = fast_walls(print);
   const auto worst_mm = [&](const report::Report& report) {
     return report.compensated.extruding.contour_rms_mm;
@@ -109,7 +110,7 @@ TEST(Robustness, MayBeOfTheDampingToo) {
 }
 
 TEST(Robustness, IsReportedForEveryPrint) {
-  std::ifstream print(std::filesystem::path(UNFLEX_TEST_DATA) / "pipeline_wallring.gcode");
+  std::ifstream print(std::filesystem::path(test_paths::kData) / "pipeline_wallring.gcode");
   const std::string text = fast_walls(print);
   const report::Report report = compensated(text, {});
   ASSERT_EQ(report.sensitivity.size(), 4U);
@@ -119,7 +120,7 @@ TEST(Robustness, IsReportedForEveryPrint) {
     EXPECT_GT(report.sensitivity[i].compensated.rms_mm,
               report.compensated.extruding.contour_rms_mm);
   }
-  // As if that were the frequency the file is measured with.
+  // Verifying with the wrong frequency must give the reported value.
   const JobFolder folder(text, {"limits.max_accel_mm_s2=10000"});
   SilentProgress progress;
   ASSERT_TRUE(compensate(folder.job(), progress).has_value());

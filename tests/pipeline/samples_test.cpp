@@ -1,105 +1,131 @@
-// Real prints through the whole pipeline: pieces that come with the tests, and, where the shared
-// samples are at hand, longer stretches of all ten.
+// Real prints through the whole pipeline: pieces and ten layers of prints, and whole ones where
+// UNFLEX_SAMPLES names them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
+#include <array>
+#include <cctype>
 #include <filesystem>
+#include <iterator>
+#include <optional>
 #include <ostream>
+#include <sstream>
 #include <string>
-#include <string_view>
+#include <vector>
 
 #include "acceptance.hpp"
+#include "container/packed.hpp"
 #include "jobs.hpp"
 #include "own_limits.hpp"
+#include "paths.hpp"
 #include "same_print.hpp"
+#include "whole_prints.hpp"
 
 namespace unflex::pipeline::testing {
 namespace {
 
-struct Sample {
-  std::string name;
-  std::string_view layer_mark;  // the line that begins a layer
-  std::size_t layers;           // as many of them; 0: all
-  std::size_t lines;            // no more than this; 0: all
-  double improvement;
+// A print of the README's table, and how its row begins.
+struct Row {
+  std::string print;
+  std::string begins;
 };
 
 // For the name ctest shows.
+void PrintTo(const Row& row, std::ostream* out) { *out << row.print; }
+
+// The figures of a row of README.md: RMS and the 99th percentile, before and after, in µm.
+std::vector<double> figures_of(const Row& row) {
+  const std::string page = read_file(std::filesystem::path(test_paths::kDocs) / "../README.md");
+  const std::size_t begin = page.find("| " + row.begins);
+  EXPECT_NE(begin, std::string::npos) << row.begins;
+  const std::size_t cells = page.find(" |", begin);
+  std::string text = page.substr(cells, page.find('\n', begin) - cells);
+  std::ranges::replace_if(
+      text, [](char c) { return c != '.' && std::isdigit(static_cast<unsigned char>(c)) == 0; },
+      ' ');
+  std::istringstream stream(text);
+  return {std::istream_iterator<double>(stream), {}};
+}
+
+class TenLayers : public ::testing::TestWithParam<Row> {};
+
+TEST_P(TenLayers, AreDrawnAsTheReadmeSays) {
+  const JobFolder folder(container::ten_layers(GetParam().print));
+  SilentProgress progress;
+  const Result<report::Report> report = compensate(folder.job(2), progress);
+  ASSERT_TRUE(report.has_value()) << to_string(report.error());
+  EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
+  EXPECT_EQ(report->runs_fallback, 0U) << complaints(*report);
+  const report::DeviationRow& before = report->uncompensated.extruding;
+  const report::DeviationRow& after = report->compensated.extruding;
+  const std::array<double, 4> measured_mm = {before.contour_rms_mm, after.contour_rms_mm,
+                                             before.contour_p99_mm, after.contour_p99_mm};
+  const std::vector<double> told_um = figures_of(GetParam());
+  ASSERT_EQ(told_um.size(), measured_mm.size());
+  for (std::size_t i = 0; i < told_um.size(); ++i) {
+    // As told with two or three digits, and as other compilers may differ in the last bits.
+    EXPECT_NEAR(1e3 * measured_mm[i], told_um[i], 0.006 + 0.005 * told_um[i]);
+  }
+  // "Print time grows by 0.05 to 0.26 %."
+  EXPECT_GT(report->emitted_time_s, 1.0004 * report->reference_time_s);
+  EXPECT_LT(report->emitted_time_s, 1.00265 * report->reference_time_s);
+}
+
+INSTANTIATE_TEST_SUITE_P(Readme, TenLayers,
+                         ::testing::Values(Row{"wallring", "ring of walls"}, Row{"star", "star"},
+                                           Row{"cube", "cube"}, Row{"textplate", "plate with text"},
+                                           Row{"bracket", "bracket"}),
+                         [](const auto& tested) { return tested.param.print; });
+
+struct Sample {
+  std::string name;
+  double improvement = 1.0;
+};
+
 void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
 
-std::size_t line_end(const std::string& text, std::size_t begin) {
-  return std::min(text.find('\n', begin), text.size() - 1) + 1;
-}
-
-std::string cut(const std::string& text, const Sample& sample) {
-  std::size_t layers = 0;
-  std::size_t lines = 0;
-  for (std::size_t begin = 0; begin < text.size(); begin = line_end(text, begin)) {
-    const bool new_layer =
-        sample.layers > 0 && std::string_view(text).substr(begin).starts_with(sample.layer_mark);
-    if ((new_layer && layers++ == sample.layers) || (sample.lines > 0 && lines++ == sample.lines)) {
-      return text.substr(0, begin);
-    }
-  }
-  return text;
-}
-
-bool whole_samples() { return std::getenv("UNFLEX_WHOLE_SAMPLES") != nullptr; }
-
-// Names the test after the sample.
 std::string name_of(const ::testing::TestParamInfo<Sample>& tested) { return tested.param.name; }
 
 class RealPrint : public ::testing::TestWithParam<Sample> {};
 
 TEST_P(RealPrint, IsDrawnAsSliced) {
-  const Sample& sample = GetParam();
-  const std::filesystem::path path =
-      std::filesystem::path(UNFLEX_SHARED) / "samples" / (sample.name + ".gcode");
+  const std::filesystem::path path = unflex::testing::whole_print(GetParam().name);
   if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "no shared samples beside the repository";
+    GTEST_SKIP() << "UNFLEX_SAMPLES names no folder with it: " << path;
   }
-  const std::string text = read_file(path);
-  expect_compensated(whole_samples() ? text : cut(text, sample), {2, sample.improvement});
+  expect_compensated(read_file(path), {.workers = 2, .improvement = GetParam().improvement});
 }
 
-// The first ten layers of five prints; of the others as much as takes about as long.
 INSTANTIATE_TEST_SUITE_P(
-    Shared, RealPrint,
-    ::testing::Values(Sample{"bracket_mk3s_whole", ";LAYER_CHANGE", 10, 0, 15.0},
-                      Sample{"cube20_ender3_absE", ";LAYER_CHANGE", 10, 0, 15.0},
-                      Sample{"star_voron_klipper_fwretract", ";LAYER_CHANGE", 10, 0, 15.0},
-                      Sample{"textplate_cura", ";LAYER:", 10, 0, 15.0},
-                      Sample{"wallring_mini_marlin2", ";LAYER_CHANGE", 10, 0, 15.0},
-                      Sample{"dome_snap_dense", "", 0, 8000, 1.0},
-                      Sample{"pins_slic3r_zhop", "", 0, 0, 1.0},
-                      Sample{"vase_rrf_spiral", "", 0, 8000, 1.0},
-                      Sample{"washer_ratrig_arcs", "", 0, 0, 1.0},
-                      Sample{"washer_ratrig_lines", "", 0, 0, 1.0}),
+    Whole, RealPrint,
+    ::testing::Values(Sample{"bracket_mk3s_whole", 15.0}, Sample{"cube20_ender3_absE", 15.0},
+                      Sample{"star_voron_klipper_fwretract", 15.0}, Sample{"textplate_cura", 15.0},
+                      Sample{"wallring_mini_marlin2", 15.0}, Sample{"dome_snap_dense"},
+                      Sample{"pins_slic3r_zhop"}, Sample{"vase_rrf_spiral"},
+                      Sample{"washer_ratrig_arcs"}, Sample{"washer_ratrig_lines"}),
     name_of);
 
 class PieceOfPrint : public ::testing::TestWithParam<Sample> {};
 
 TEST_P(PieceOfPrint, IsDrawnAsSliced) {
   const std::filesystem::path path =
-      std::filesystem::path(UNFLEX_TEST_DATA) / ("pipeline_" + GetParam().name + ".gcode");
-  expect_compensated(read_file(path), {2, GetParam().improvement});
+      std::filesystem::path(test_paths::kData) / ("pipeline_" + GetParam().name + ".gcode");
+  expect_compensated(read_file(path), {.workers = 2, .improvement = GetParam().improvement});
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Small, PieceOfPrint,
-    ::testing::Values(Sample{"bracket", "", 0, 0, 15.0}, Sample{"cube20", "", 0, 0, 15.0},
-                      Sample{"star", "", 0, 0, 15.0}, Sample{"textplate", "", 0, 0, 10.0},
-                      Sample{"wallring", "", 0, 0, 15.0}, Sample{"vase", "", 0, 0, 1.0},
-                      Sample{"washer_arcs", "", 0, 0, 1.0}),
-    name_of);
+INSTANTIATE_TEST_SUITE_P(Small, PieceOfPrint,
+                         ::testing::Values(Sample{"bracket", 15.0}, Sample{"cube20", 15.0},
+                                           Sample{"star", 15.0}, Sample{"textplate", 10.0},
+                                           Sample{"wallring", 15.0}, Sample{"vase"},
+                                           Sample{"washer_arcs"}),
+                         name_of);
 
 struct OnFirmware {
   std::string firmware;
   std::string piece;
   double rms_mm;           // at most this while extruding
   double improvement;      // RMS at least this many times less than before
-  double max_lines_per_s;  // that firmware's default budget
+  double max_lines_per_s;  // default line budget of the firmware
 };
 
 void PrintTo(const OnFirmware& tested, std::ostream* out) {
@@ -108,10 +134,10 @@ void PrintTo(const OnFirmware& tested, std::ostream* out) {
 
 class OtherFirmware : public ::testing::TestWithParam<OnFirmware> {};
 
-// What the firmware's whole steps leave of it; docs/firmware.md says how much that is.
+// The improvement that is left with the firmware's whole steps; docs/firmware.md gives the numbers.
 TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
   const std::filesystem::path path =
-      std::filesystem::path(UNFLEX_TEST_DATA) / ("pipeline_" + GetParam().piece + ".gcode");
+      std::filesystem::path(test_paths::kData) / ("pipeline_" + GetParam().piece + ".gcode");
   const std::string sliced = unflex::testing::numbered(read_file(path));
   const JobFolder folder(sliced, {"printer.firmware=" + GetParam().firmware});
   const Job job = folder.job(2);
@@ -125,7 +151,8 @@ TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
   EXPECT_GT(report->runs_compensated, 0U);
   EXPECT_LE(report->max_lines_per_s, GetParam().max_lines_per_s);
   EXPECT_LE(report->emitted_time_s, 1.01 * report->reference_time_s);
-  // A run's last line may end before the base would have come to rest.
+  // The emitted print may be a little shorter: a run's last line may end before the base would have
+  // come to rest.
   EXPECT_GE(report->emitted_time_s, 0.97 * report->reference_time_s);
   const double before = report->uncompensated.extruding.contour_rms_mm;
   const double after = report->compensated.extruding.contour_rms_mm;

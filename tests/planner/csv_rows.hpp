@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "paths.hpp"
 #include "unflex/core/number.hpp"
 
 namespace unflex::planner::testing {
@@ -15,7 +16,7 @@ namespace unflex::planner::testing {
 using Row = std::vector<std::string>;
 
 inline std::vector<Row> rows(const std::string& name) {
-  std::ifstream file(std::string(UNFLEX_TEST_DATA) + "/" + name);
+  std::ifstream file(std::string(test_paths::kData) + "/" + name);
   std::vector<Row> result;
   for (std::string line; std::getline(file, line);) {
     Row& row = result.emplace_back();

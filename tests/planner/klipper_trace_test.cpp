@@ -23,9 +23,11 @@
 #include <tuple>
 #include <vector>
 
+#include "paths.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/planner/klipper_planner.hpp"
+#include "whole_prints.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -179,7 +181,7 @@ Mismatch compare(const Plan& plan, const std::vector<Row>& rows) {
 class CutTrace : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(CutTrace, HasKlippersPhases) {
-  const fs::path data = UNFLEX_TEST_DATA;
+  const fs::path data = test_paths::kData;
   const std::string name = std::string("planner_") + GetParam();
   const auto rows = parse_trace(read_text(data / (name + ".csv")));
   ASSERT_EQ(rows.size(), 800U);
@@ -193,13 +195,12 @@ INSTANTIATE_TEST_SUITE_P(Klipper, CutTrace, ::testing::Values("wallring", "arcs"
 class WholeTrace : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(WholeTrace, HasKlippersPhases) {
-  const fs::path shared = UNFLEX_SHARED;
   const std::string name = GetParam();
-  const fs::path trace = shared / "traces" / (name + ".moves.csv.gz");
-  if (!fs::exists(trace)) GTEST_SKIP() << "no traces beside this repository (" << trace << ")";
-  const auto rows = parse_trace(read_gz(trace));
+  const fs::path path = unflex::testing::whole_print_folder("traces") / (name + ".moves.csv.gz");
+  if (!fs::exists(path)) GTEST_SKIP() << "UNFLEX_SAMPLES names no folder with it: " << path;
+  const auto rows = parse_trace(read_gz(path));
   ASSERT_GT(rows.size(), 10000U);
-  const Plan plan = plan_file(shared / "samples" / (name + ".gcode"));
+  const Plan plan = plan_file(unflex::testing::whole_print(name));
   EXPECT_EQ(plan.xyz_moves, rows.size());
   const Mismatch mismatch = compare(plan, rows);
   EXPECT_EQ(mismatch.phases_off, 0U);
@@ -213,17 +214,16 @@ INSTANTIATE_TEST_SUITE_P(Klipper, WholeTrace,
 class WholeSample : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(WholeSample, TakesAsLongAsKlipperSays) {
-  const fs::path shared = UNFLEX_SHARED;
-  const fs::path totals = shared / "traces" / "totals.csv";
-  if (!fs::exists(totals)) GTEST_SKIP() << "no traces beside this repository (" << totals << ")";
+  const fs::path path = unflex::testing::whole_print_folder("traces") / "totals.csv";
+  if (!fs::exists(path)) GTEST_SKIP() << "UNFLEX_SAMPLES names no folder with it: " << path;
   std::map<std::string, std::vector<std::string>> rows;
-  std::stringstream stream(read_text(totals));
+  std::stringstream stream(read_text(path));
   for (std::string row; std::getline(stream, row);) {
     const auto cells = split(row);
     rows[cells.at(0)] = cells;
   }
   const auto& row = rows.at(GetParam());
-  const Plan plan = plan_file(shared / "samples" / (std::string(GetParam()) + ".gcode"));
+  const Plan plan = plan_file(unflex::testing::whole_print(GetParam()));
   EXPECT_NEAR(plan.duration_s, number(row[1]), 2e-6);
   EXPECT_EQ(plan.xyz_moves, std::stoul(row[2]));
   EXPECT_EQ(plan.e_moves, std::stoul(row[3]));

@@ -4,6 +4,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "paths.hpp"
 #include "report/documented_keys.hpp"
 #include "report/sample_report.hpp"
 
@@ -164,7 +165,8 @@ TEST(JsonReport, IsIndentedAndEndsWithANewline) {
 TEST(ReportPage, DocumentsExactlyTheKeysOfAReport) {
   std::set<std::string> keys;
   collect_keys(parsed(sample_report()), "", keys);
-  EXPECT_EQ(documented_keys(UNFLEX_DOCS "/report.md", "compensate and verify"), keys);
+  EXPECT_EQ(documented_keys(std::string(test_paths::kDocs) + "/report.md", "compensate and verify"),
+            keys);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ import unittest
 UNFLEX = os.path.abspath(sys.argv[1])
 SLICER = shutil.which("prusa-slicer")
 
-# As PrusaSlicer writes a picture that stands in the head; its command line makes none.
+# A picture in the head as PrusaSlicer writes it. Its command line makes none.
 THUMBNAIL = """
 ;
 ; thumbnail begin 16x16 72
@@ -62,7 +62,7 @@ class Hook(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = folder.name
-        # What shells and slicers trip over.
+        # A path with characters that shells and slicers trip over.
         self.prints = os.path.join(self.folder, "it's \"my\" prints")
         os.mkdir(self.prints)
         self.output = os.path.join(self.prints, "a box.gcode")
@@ -126,7 +126,7 @@ class Hook(unittest.TestCase):
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
                                   text=True)
         self.assertEqual(verified.returncode, 0, verified.stdout)
-        # The path's odd characters are the log's own.
+        # The log writes the path's odd characters in its own way.
         self.assertRegex(read(self.log), r"Z unflex [0-9.]+ " + re.escape(self.output) + "\n")
         self.assertRegex(read(self.log), r"\n  exit code 0\n$")
 

@@ -1,10 +1,11 @@
-// What the study writes.
+// The study's reports.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <iterator>
 
+#include "paths.hpp"
 #include "report/documented_keys.hpp"
 #include "unflex/study/study.hpp"
 
@@ -51,7 +52,7 @@ TEST(StudyJson, IsDocumentedKeyByKey) {
   full.printer.push_back({"limits.max_accel_mm_s2", "5000", "default"});
   std::set<std::string> keys;
   report::collect_keys(nlohmann::json::parse(to_json(full)), "", keys);
-  EXPECT_EQ(report::documented_keys(UNFLEX_DOCS "/report.md", "study"), keys);
+  EXPECT_EQ(report::documented_keys(std::string(test_paths::kDocs) + "/report.md", "study"), keys);
 }
 
 TEST(StudyJson, SaysWhyAMethodIsNotUsed) {
@@ -88,7 +89,7 @@ TEST(StudyHtml, EscapesWhatComesFromOutside) {
   EXPECT_THAT(html, HasSubstr("<li>line &lt;i&gt;7&lt;/i&gt;</li>"));
 }
 
-// Nothing but travel, or a plan that the nozzle follows exactly.
+// The error is zero if there is only travel, or if the nozzle follows the plan exactly.
 TEST(StudyHtml, OfNoErrorAtAllIsStillAPage) {
   Outcome still = outcome();
   for (MethodResult& method : still.cases.front().methods) {
@@ -106,9 +107,9 @@ TEST(StudyHtml, OfAllCasesIsSmall) {
   EXPECT_LT(to_html(*all).size(), 3'000'000U);
 }
 
-// The errors of the thesis that the design lists, by where they stand.
+// The errors of the thesis that the design lists, with their places.
 TEST(Theory, NamesEveryErrorOfTheThesis) {
-  std::ifstream page(UNFLEX_DOCS "/theory.md");
+  std::ifstream page(std::string(test_paths::kDocs) + "/theory.md");
   const std::string text{std::istreambuf_iterator<char>(page), {}};
   const std::string table = text.substr(text.find("## Where the thesis' text differs"));
   for (const char* place :

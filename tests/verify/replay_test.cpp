@@ -40,6 +40,9 @@ class Sections : public ::testing::Test {
         case SectionKind::barrier:
           words.push_back("barrier");
           break;
+        case SectionKind::border:
+          words.push_back("border");
+          break;
         case SectionKind::end:
           words.push_back("end");
           lines_ = replay.lines().size();

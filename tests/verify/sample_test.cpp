@@ -1,33 +1,30 @@
-// Whole prints against themselves, where the shared samples are at hand.
+// Prints against themselves.
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <string>
 
+#include "container/packed.hpp"
 #include "replaying.hpp"
 #include "unflex/verify/verify.hpp"
+#include "whole_prints.hpp"
 
 namespace unflex::verify {
 namespace {
 
-class Sample : public ::testing::TestWithParam<std::string> {};
-
-TEST_P(Sample, IsItsOwnFaultlessOutput) {
-  const std::filesystem::path path =
-      std::filesystem::path(UNFLEX_SHARED) / "samples" / (GetParam() + ".gcode");
-  if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "no shared samples beside the repository";
-  }
-  std::ifstream input(path, std::ios::binary);
-  std::ifstream output(path, std::ios::binary);
+void expect_faultless(const std::string& text) {
+  std::istringstream input(text);
+  std::istringstream output(text);
   Rules rules;
   rules.nozzle.step_s = 1e-3;
   SilentProgress progress;
   const auto report = verify(input, "in.gcode", output, "out.gcode", rules, progress);
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(testing::violations_of(*report), "");
-  EXPECT_EQ(report->output_bytes, std::filesystem::file_size(path));
+  EXPECT_EQ(report->output_bytes, text.size());
   EXPECT_NEAR(report->reference_time_s, report->emitted_time_s, 1e-9);
   EXPECT_LT(report->worst_move_extrusion_error_mm, 1e-9);
   EXPECT_GT(report->uncompensated.extruding.contour_rms_mm, 1e-3);
@@ -35,6 +32,24 @@ TEST_P(Sample, IsItsOwnFaultlessOutput) {
   EXPECT_NEAR(report->compensated.extruding.contour_rms_mm, rms, 1e-9 * rms);
   EXPECT_NEAR(report->compensated.all.contour_max_mm, report->uncompensated.all.contour_max_mm,
               1e-9);
+}
+
+class Cut : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Cut, IsItsOwnFaultlessOutput) { expect_faultless(container::ten_layers(GetParam())); }
+
+INSTANTIATE_TEST_SUITE_P(All, Cut, ::testing::Values("cube", "star", "wallring"),
+                         [](const auto& tested) { return tested.param; });
+
+class Sample : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Sample, IsItsOwnFaultlessOutput) {
+  const std::filesystem::path path = unflex::testing::whole_print(GetParam());
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "UNFLEX_SAMPLES names no folder with it: " << path;
+  }
+  std::ifstream file(path, std::ios::binary);
+  expect_faultless({std::istreambuf_iterator<char>(file), {}});
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Sample,

@@ -4,13 +4,14 @@ const layerView = (data, onLayer) => {
   const reader = layerReader(bytesOf(document.getElementById("paths").textContent), data.layers);
   const step = data.layer_step;
   const drawn = index => Math.min(index - (index % step), data.layers.length - 1);
-  // What is shown: a layer, the point in the middle, pixels per mm; chosen: a place.
+  // What is shown: the layer, the point in the middle, pixels per mm, and the chosen place.
   const state = {layer: 0, x: 0, y: 0, scale: 1, chosen: null};
   let places = [];
   let asked = false;
 
-  // Colours on a logarithmic scale; in the light from pale to dark, in the dark the other way round,
-  // so that their order shows in any kind of sight. Lines grow a little with the deviation too.
+  // Colours on a logarithmic scale. They go from pale to dark in the light theme, and from dark to
+  // pale in the dark one, so that the colour-blind see their order, too. Lines also grow a little
+  // with the deviation.
   const stops = {
     light: [
       [196, 208, 220],
@@ -113,7 +114,7 @@ const layerView = (data, onLayer) => {
     }
     context.lineCap = "round";
     context.lineJoin = "round";
-    // An extrusion is some 0.4 mm wide.
+    // An extrusion is about 0.4 mm wide.
     const line = Math.min(Math.max(0.34 * s, 1), 14);
     for (let shade = 0; shade < shades; ++shade) {
       if (!used[shade]) continue;
@@ -227,7 +228,7 @@ const layerView = (data, onLayer) => {
     redraw();
   };
 
-  // What is nearest to a point of the picture, within some pixels.
+  // The stretch nearest to a point of the picture, within some pixels.
   const nearest = (canvas, px, py) => {
     if (!data.layers.length) return null;
     const layer = reader(drawn(state.layer)),
@@ -305,7 +306,7 @@ const layerView = (data, onLayer) => {
       }
       pointers.set(event.pointerId, now);
     });
-    // The page scrolls over a picture that nobody has chosen.
+    // Over a picture without focus the wheel scrolls the page.
     canvas.addEventListener(
       "wheel",
       event => {
@@ -370,7 +371,7 @@ const layerView = (data, onLayer) => {
       places = list;
       redraw();
     },
-    // Brings a place into the middle, some mm of its surroundings with it.
+    // Shows a place in the middle, with some mm around it.
     show: place => {
       const {width, height} = size(canvases[0]);
       state.chosen = place;

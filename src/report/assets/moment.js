@@ -13,8 +13,8 @@ const momentView = () => {
     return columns;
   };
 
-  // Curves are smoothed over this long, since a base that is told lines of a few ms has no
-  // acceleration to speak of in between.
+  // Curves are smoothed over this time, since a base that follows lines of a few ms hardly
+  // accelerates within a line.
   const window_s = 0.004;
   const interpolated = (times, values, t) => {
     if (t < times[0] || t > times[times.length - 1]) return NaN;
@@ -46,7 +46,7 @@ const momentView = () => {
         window_s ** 2,
     );
 
-  // Deviation from the path, magnified: the nearest point of the path, and so many times as far.
+  // The nozzle with its deviation from the nearest point of the path magnified by `factor`.
   const magnified = (moments, factor) => {
     const x = [],
       y = [];

@@ -1,5 +1,5 @@
 "use strict";
-// What all pages share: light and dark.
+// All pages share this: the choice between light and dark.
 const unflex = (() => {
   const root = document.documentElement;
   const button = document.getElementById("theme");

@@ -1,4 +1,4 @@
-// The print's paths as the report holds them.
+// Decodes the print's paths from the report's bytes.
 const codeToUm = code => (code === 0 ? 0 : 0.05 * 2 ** (code / 15));
 
 const bytesOf = text => {
@@ -8,8 +8,8 @@ const bytesOf = text => {
   return bytes;
 };
 
-// Layers of `paths`, decoded when they are first asked for: {x0, y0, x1, y1 (mm), before, after
-// (codes), path (number in `heads`), heads [{feature, first, last}]}.
+// Decodes a layer when it is first asked for: {x0, y0, x1, y1 (mm), before, after (codes), path
+// (number in `heads`), heads [{feature, first, last}]}.
 const layerReader = (bytes, rows) => {
   const read = new Array(rows.length);
   const decode = (from, to) => {

@@ -15,7 +15,7 @@ const make = (() => {
   };
 })();
 
-// Three figures; micrometres.
+// Micrometres with three figures.
 const figures = value =>
   value >= 99.95 ? value.toFixed(0) : value >= 9.995 ? value.toFixed(1) : value.toFixed(2);
 const micrometres = value => figures(value) + "\u00a0µm";
@@ -236,7 +236,7 @@ const plot = (() => {
     return draw;
   };
 
-  // Names where the curves end, moved apart.
+  // Names at the ends of the curves, moved apart.
   function endLabels(series, x, y, inner) {
     const labels = series
       .filter(one => one.y.length)
@@ -264,7 +264,7 @@ const plot = (() => {
     return group;
   }
 
-  // Values of all curves where the pointer is.
+  // Shows the values of all curves at the pointer.
   function hover(svg, cursor, spec, x, y, inner, width) {
     if (spec.equal) return;
     const value = spec.value || (v => String(parseFloat(v.toPrecision(3))));

@@ -1,4 +1,4 @@
-// Puts the report of a print together.
+// Builds the report of a print.
 const unflexReport = (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const byId = id => document.getElementById(id);
@@ -50,7 +50,7 @@ const unflexReport = (() => {
     byId("coarse").hidden = false;
   }
 
-  // The largest deviation of every layer, above the slider.
+  // Draws the largest deviation of every layer above the slider.
   function drawStrip() {
     const strip = byId("strip");
     if (rows.length < 2) {
@@ -144,7 +144,7 @@ const unflexReport = (() => {
   const places = [...data.worst[0], ...data.worst[1]];
   view.setPlaces(places);
 
-  // How far, for how long.
+  // For how long the nozzle deviates how far.
   const histogram = () => {
     const cells = data.histogram,
       total = Math.max(data.extruding_s, 1e-9),
@@ -336,7 +336,7 @@ const unflexReport = (() => {
     );
   };
 
-  // The picture first, of the layer that gives most to see; the rest when it is on screen.
+  // First the picture of the most telling layer. The rest is built when that is on screen.
   const weight = (row, i) => (row[2] - (i ? rows[i - 1][2] : 0)) * row[4] ** 2;
   const telling = rows.reduce(
     (best, row, i) => (weight(row, i) > weight(rows[best], best) ? i : best),

@@ -1,17 +1,19 @@
-#include "stage_form.hpp"
+// How StageForm does what stage_form.hpp says. Each number of models is compiled in a source of its
+// own (stage_form_one.cpp …), because it takes the compiler long.
+#pragma once
 
 #include <Eigen/Cholesky>
+#include <array>
+
+#include "stage_form.hpp"
 
 namespace unflex::compensate {
-namespace {
 
-// Rows that a weight at a node acts on, and the component of z that each is.
-constexpr std::array<RowKind, 3> kNodeKinds = {RowKind::position, RowKind::velocity,
-                                               RowKind::accel};
+// The kinds with a row at every node. Each row is a component of z.
+inline constexpr std::array<RowKind, 3> kNodeKinds = {RowKind::position, RowKind::velocity,
+                                                      RowKind::accel};
 
-}  // namespace
-
-// Of b, ḃ and b̈ one interval before the base rests at b.
+// From b, ḃ and b̈ one interval before the base rests: the place where it will rest.
 template <int kModels>
 typename StageForm<kModels>::State StageForm<kModels>::resting_soon() {
   State row = State::Zero();
@@ -36,7 +38,7 @@ void StageForm<kModels>::assign(const ScaledWindow& scaled) {
     growth.template block<2, 2>(p, p) = chain.growth.topLeftCorner<2, 2>();
     growth.template block<2, 3>(p, kBase) = chain.growth.topRightCorner<2, 3>();
     input_.template segment<2>(p) = chain.input.head<2>();
-    // The base is the same for all.
+    // All models have the base in common.
     growth.template block<3, 3>(kBase, kBase) = chain.growth.bottomRightCorner<3, 3>();
     input_.template segment<3>(kBase) = chain.input.tail<3>();
   }
@@ -89,7 +91,8 @@ typename StageForm<kModels>::State StageForm<kModels>::prescribed_feedback(std::
   return feedback;
 }
 
-// From the given start, or from rest at the reference, without any jerk until the end asks for it.
+// Goes from the given start, or from rest at the first reference point, without any jerk until the
+// end asks for it.
 template <int kModels>
 void StageForm<kModels>::first_guess() {
   const bool two_nodes_to_rest = window_->end_base && nodes_ == 2;
@@ -104,7 +107,8 @@ void StageForm<kModels>::first_guess() {
     start_basis_ = Square::Identity();
   }
   if (two_nodes_to_rest) {
-    // The only input cannot keep both b and ḃ: b̈ at the first node is tied to the rest of it.
+    // The only input cannot keep both b and ḃ. So b̈ at the first node is tied to the rest of that
+    // state.
     const auto tie = [&](auto&& state, double target) {
       state(kBaseAccel) = 6.0 * (target - state(kBase)) - 4.0 * state(kBaseRate);
     };
@@ -270,7 +274,7 @@ void StageForm<kModels>::solve(const PerKind<const double*>& forces) {
     }
   };
   const double* const jerk_force = forces[index_of(RowKind::jerk)];
-  // The model's decrease is ½ Σ r²/R over the inputs, and the same for the start.
+  // The model's decrease is ½ Σ r²/R over the inputs, plus such a term for the start.
   decrement_ = 0.0;
   State g = State::Zero();
   add_node(nodes_ - 1, g);
@@ -329,9 +333,5 @@ void StageForm<kModels>::write(dynamics::AxisTrajectory& base) const {
   put(RowKind::accel, 0.0, base.accel_mm_s2);
   window_->keep_ends(base);
 }
-
-template class StageForm<1>;
-template class StageForm<3>;
-template class StageForm<5>;
 
 }  // namespace unflex::compensate

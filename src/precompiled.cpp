@@ -1,0 +1,1 @@
+// Brings the headers that cmake/PrecompiledHeaders.cmake compiles once for all modules.
