@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # install_packages.sh [--tests | --fuzz | --coverage]
 #
-# Installs what unflex is built from, on Debian 12, and with --tests what its tests need as well,
-# with --fuzz what sanitizers and fuzzing need besides, with --coverage what counting lines does.
-# Does nothing where all is installed; otherwise it needs root or sudo.
+# Installs the packages that unflex is built from on Debian 12. --tests adds those of its tests,
+# --fuzz those of sanitizers and fuzzing, --coverage those of counting lines. Does nothing if all is
+# installed; otherwise it needs root or sudo.
 set -euo pipefail
 
 packages=(
@@ -15,12 +15,13 @@ packages=(
 )
 test_packages=(
   libgmock-dev libgtest-dev
-  ccache clang-format
-  # HTML reports are looked at in a real browser.
+  # Builds are cached, the format of sources is checked, the picture of modules is drawn.
+  ccache clang-format graphviz
+  # Tests look at HTML reports in a real browser.
   chromium python3
-  # Packages are made, the manual page is formatted, shells complete command lines.
+  # Tests make packages, format the manual page and let shells complete command lines.
   dpkg-dev file fish groff man-db mandoc zsh
-  # The hook is tried in a real slicer, the examples for continuous integration are read as YAML.
+  # Tests run the hook in a real slicer and read the examples for continuous integration as YAML.
   prusa-slicer python3-yaml
 )
 # Debian's default clang, 14, does not understand the ranges of libstdc++ 12.

@@ -8,7 +8,10 @@ modules has the arrows of the build.
 
 import pathlib
 import re
+import shutil
+import subprocess
 import sys
+import tempfile
 import unittest
 
 ROOT = pathlib.Path(sys.argv.pop(1))
@@ -56,6 +59,12 @@ def matches(name):
         return [file for file in FILES if re.search(f"(^|/){pattern}(/|$)", file)]
     return [file for file in FILES
             if file == name or file.endswith("/" + name) or file.startswith(name + "/")]
+
+
+def arrows(svg):
+    """The arrows of a picture, as pairs of modules."""
+    titles = re.findall(r"<title>(.*?)</title>", svg.replace("&#45;", "-"))
+    return {tuple(title.split("-&gt;")) for title in titles if "-&gt;" in title}
 
 
 class Names(unittest.TestCase):
@@ -111,12 +120,19 @@ class Modules(unittest.TestCase):
                 self.assertEqual(int(layer), layers[module])
 
     def test_the_picture_has_the_arrows_of_the_build(self):
-        svg = page("docs/modules.svg")
-        arrows = {tuple(title.split("-&gt;"))
-                  for title in re.findall(r"<title>(.*?)</title>", svg.replace("&#45;", "-"))
-                  if "-&gt;" in title}
-        self.assertEqual(arrows, draw_modules.reduced(draw_modules.read(MODULES)),
+        self.assertEqual(arrows(page("docs/modules.svg")),
+                         draw_modules.reduced(draw_modules.read(MODULES)),
                          "run docs/draw_modules.py build/modules.txt")
+
+    def test_the_picture_is_what_the_script_draws(self):
+        if not shutil.which("dot"):
+            self.skipTest("there is no Graphviz")
+        with tempfile.TemporaryDirectory() as folder:
+            drawn = pathlib.Path(folder) / "modules.svg"
+            subprocess.run([ROOT / "docs/draw_modules.py", MODULES, drawn], check=True)
+            # Places depend on the fonts that are installed.
+            self.assertEqual(arrows(drawn.read_text(encoding="utf-8")),
+                             arrows(page("docs/modules.svg")))
 
 
 if __name__ == "__main__":
