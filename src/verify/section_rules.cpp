@@ -12,7 +12,7 @@ namespace {
 constexpr double kOneLine_per_s = 10.0;
 // Allowance for rounding to steps and for how far the nozzle strays.
 constexpr double kRounding_mm = 0.05;
-// Filament of a line that this makes late.
+// Filament that a line in the tail may lay in any case.
 constexpr double kLate_mm = 5e-4;
 // Shorter lines do not tell how much filament is laid per path.
 constexpr double kShort_mm = 0.2;
