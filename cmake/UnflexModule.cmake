@@ -1,6 +1,7 @@
 # unflex_module(name [NUMERICAL] SOURCES file... [LINKS target...])
 #
-# NUMERICAL: its loops are worth -O3. The others are compiled with -O2, which takes a quarter less.
+# NUMERICAL: its loops are worth -O3. The others are compiled with -O2, which takes the compiler less
+# time.
 #
 # Declares the static library unflex_<name> (alias unflex::<name>) from the sources of
 # src/<name>, with its public headers in include/unflex/<name>.

@@ -7,7 +7,6 @@
 #include <cctype>
 #include <filesystem>
 #include <iterator>
-#include <optional>
 #include <ostream>
 #include <sstream>
 #include <string>
