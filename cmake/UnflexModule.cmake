@@ -62,9 +62,11 @@ function(unflex_test_library name)
   target_precompile_headers(${name} REUSE_FROM unflex_test_headers)
 endfunction()
 
-# unflex_test(name [QUICK] [SLOW pattern...] SOURCES file... LINKS target...): one GoogleTest binary,
-# discovered by ctest. QUICK: its tests have the label `quick`, but for those that match a pattern of
-# SLOW, and the target quick_tests builds it. Tests find what they read and run by paths.hpp.
+# unflex_test(name [QUICK] [SLOW pattern...] SOURCES file... LINKS target...): one GoogleTest binary.
+# ctest has each of its tests. QUICK: the target quick_tests builds it, and its tests are one test of
+# ctest, with the label `quick`, since starting a process takes longer than most of them; those that
+# match a pattern of SLOW are tests by themselves, without the label. Tests find what they read and
+# run by paths.hpp.
 function(unflex_test name)
   cmake_parse_arguments(ARG "QUICK" "" "SLOW;SOURCES;LINKS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -73,16 +75,15 @@ function(unflex_test name)
   unflex_flags(${name})
   unflex_build_soon(${name})
   target_precompile_headers(${name} REUSE_FROM unflex_test_headers)
+  set(by_themselves "*")
   if(ARG_QUICK)
+    list(JOIN ARG_SLOW ":" by_themselves)
     add_dependencies(quick_tests ${name})
-    list(JOIN ARG_SLOW ":" slow)
-    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "-${slow}"
-      PROPERTIES TIMEOUT 600 LABELS quick)
-    if(slow)
-      gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "${slow}"
-        PROPERTIES TIMEOUT 600)
-    endif()
-  else()
-    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+    add_test(NAME ${name} COMMAND ${name} --gtest_brief=1 "--gtest_filter=-${by_themselves}")
+    set_tests_properties(${name} PROPERTIES TIMEOUT 600 LABELS quick)
+  endif()
+  if(by_themselves)
+    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "${by_themselves}"
+      PROPERTIES TIMEOUT 600)
   endif()
 endfunction()
