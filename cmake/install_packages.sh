@@ -21,8 +21,9 @@ test_packages=(
   chromium python3
   # Tests make packages, format the manual page and let shells complete command lines.
   dpkg-dev file fish groff man-db mandoc zsh
-  # Tests run the hook in a real slicer and read the examples for continuous integration as YAML.
-  prusa-slicer python3-yaml
+  # Tests run the hook in a real slicer, read the examples for continuous integration as YAML, and
+  # run Klipper's macros.
+  prusa-slicer python3-jinja2 python3-yaml
 )
 # Debian's default clang, 14, does not understand the ranges of libstdc++ 12.
 fuzz_packages=(clang-16 libclang-rt-16-dev llvm-16)

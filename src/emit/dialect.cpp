@@ -10,11 +10,14 @@
 #include <limits>
 #include <utility>
 
+#include "unflex/core/own_marks.hpp"
+
 namespace unflex::emit {
 namespace {
 
 using planner::Limits;
 
+constexpr std::string_view kKlipperLimits = "SET_VELOCITY_LIMIT";
 constexpr double kMinute_s = 60.0;
 constexpr double kMicroseconds = 1e6;
 
@@ -75,7 +78,7 @@ class CommandLine {
 };
 
 void klipper(const Limits& wanted, const Limits& current, std::vector<std::string>& lines) {
-  CommandLine line("SET_VELOCITY_LIMIT");
+  CommandLine line(kKlipperLimits);
   line.word("VELOCITY=", wanted.max_velocity_mm_s, current.max_velocity_mm_s);
   line.word("ACCEL=", wanted.max_accel_mm_s2, current.max_accel_mm_s2);
   line.word("SQUARE_CORNER_VELOCITY=", wanted.square_corner_velocity_mm_s,
@@ -218,6 +221,8 @@ Limits unknown_to_run(Firmware firmware, const Limits& file) {
   return limits_in_run(firmware, file, kUnknownLimits);
 }
 
+bool limits_act_early(Firmware firmware) { return firmware == Firmware::rrf; }
+
 std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, const Limits& wanted,
                                      const Limits& current) {
   std::vector<std::string> lines;
@@ -233,6 +238,10 @@ std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, cons
       break;
   }
   return lines;
+}
+
+std::string unless_interrupted(std::string line) {
+  return line.replace(0, kKlipperLimits.size(), kLimitsMacro);
 }
 
 std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,

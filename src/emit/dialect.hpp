@@ -32,11 +32,20 @@ struct ZLimits {
 // file has them, so that no value is written which nobody has said.
 [[nodiscard]] planner::Limits unknown_to_run(Firmware firmware, const planner::Limits& file);
 
+// Whether limits also hold for the move in the line before. RepRapFirmware keeps the last move in a
+// buffer of its own until its queue of moves has room, reads on meanwhile, and obeys limits at once
+// (GCodes/GCodes.cpp, ReadMove; GCodes2.cpp, M201, M203, M566; GCodes5.cpp, M204).
+[[nodiscard]] bool limits_act_early(Firmware firmware);
+
 // The lines, without their endings, that put `wanted` in force. They contain only what differs from
 // `current`.
 [[nodiscard]] std::vector<std::string> limit_lines(const planner::FirmwareConfig& config,
                                                    const planner::Limits& wanted,
                                                    const planner::Limits& current);
+
+// The line, one of limit_lines(), that has no effect once the run has been interrupted. Klipper
+// with checkpoints: the rest of such a run goes on from standstill by the printer's own limits.
+[[nodiscard]] std::string unless_interrupted(std::string line);
 
 // The lines that put `wanted` in place of `current`. A default Shaper means no shaper.
 // RepRapFirmware is told all settings, since it forgets its type while the shaper is off.

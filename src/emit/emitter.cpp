@@ -67,6 +67,12 @@ Grid grid_of(const RunStart& start, const planner::FirmwareConfig& config) {
           axis_grid(config, Z, start.zero_mm[Z]), start.speed_factor};
 }
 
+bool changes(const gcode::Event& event, const planner::Limits& limits) {
+  planner::Limits changed = limits;
+  planner::apply(*event.limits, changed);
+  return changed != limits;
+}
+
 EmitOptions in_run(const RunStart& start, EmitOptions options) {
   options.run_limits = limits_in_run(options.fixed.firmware, start.limits, options.run_limits);
   return options;
@@ -98,8 +104,10 @@ void Emitter::write(std::string_view text, std::string& out) {
 void Emitter::note_motion(const gcode::Event& event) {
   if (!event.segments.empty()) {
     moving_ = event.segments.back().length_xy_mm() > 0.0;
+    move_waits_ = true;
   } else if (event.kind == gcode::EventKind::barrier) {
     moving_ = false;
+    move_waits_ = moves_by_itself(event);
   }
 }
 
@@ -176,6 +184,9 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
       if (stays && options_.fixed.firmware == Firmware::marlin) {
         set_unit(input_.state().unit_mm, out);
       }
+      if (stays && changes(event, limits_)) {
+        wait_for_move(out);
+      }
       follow_input(event);
       if (stays) {
         copy(event, out);
@@ -231,7 +242,8 @@ void Emitter::set_run_modes(bool joins_file, std::string& out) {
     // alone before the run would end at the speed of the run's first line, and stop dead.
     limits.jerk_policy = input_limits_.jerk_policy;
   }
-  set_limits(limits, out);
+  // A run that is interrupted before its first line still begins at rest.
+  set_limits(limits, out, options_.checkpoints && !joins_file);
   const gcode::ModalState& state = printer_.state();
   if (!state.absolute_xyz) {
     write("G90", out);
@@ -302,17 +314,33 @@ void Emitter::restore_modes(std::string& out) {
   }
   set_unit(wanted.unit_mm, out);
   if (std::abs(wanted.feed_mm_s - state.feed_mm_s) > kFeedToleranceMmS) {
-    std::string text = "G1";
-    append_word(text, 'F', wanted.feed_mm_s * 60.0 / state.unit_mm, kExactDecimals);
-    write(text, out);
+    write_feed(wanted.feed_mm_s, out);
   }
 }
 
-void Emitter::set_limits(const planner::Limits& limits, std::string& out) {
+void Emitter::write_feed(double feed_mm_s, std::string& out) {
+  std::string text = "G1";
+  append_word(text, 'F', feed_mm_s * 60.0 / printer_.state().unit_mm, kExactDecimals);
+  write(text, out);
+}
+
+// A line without motion is read only when the move before it has left the buffer.
+void Emitter::wait_for_move(std::string& out) {
+  if (move_waits_ && limits_act_early(options_.fixed.firmware)) {
+    write_feed(printer_.state().feed_mm_s, out);
+    move_waits_ = false;
+  }
+}
+
+void Emitter::set_limits(const planner::Limits& limits, std::string& out, bool may_be_interrupted) {
   const planner::Limits current =
       limits_known_ ? limits_ : unknown_to_run(options_.fixed.firmware, limits_);
-  for (const std::string& text : limit_lines(options_.fixed, limits, current)) {
-    write(text, out);
+  const std::vector<std::string> lines = limit_lines(options_.fixed, limits, current);
+  if (!lines.empty()) {
+    wait_for_move(out);
+  }
+  for (const std::string& text : lines) {
+    write(may_be_interrupted ? unless_interrupted(text) : text, out);
   }
   limits_known_ = true;
 }
@@ -332,7 +360,7 @@ void Emitter::set_shaper(const gcode::Shaper& wanted, std::string& out) {
 void Emitter::write_checkpoint(std::string_view words, std::string& out) {
   if (options_.checkpoints) {
     told_shaper_ = words_of_shaper();
-    write(fmt::format("UNFLEX_CHECKPOINT{}{}", words, told_shaper_), out);
+    write(fmt::format("{}{}{}", kCheckpointMacro, words, told_shaper_), out);
   }
 }
 

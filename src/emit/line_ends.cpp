@@ -88,17 +88,20 @@ double first_end(double start, double to, const LineRules& rules) {
   return start + std::max(even_share_s(start, to, rules), rules.min_line_s);
 }
 
-// The largest change of either axis' speed between two moments line_s apart, the later of which
-// lies in [from, to]. Where lines of that length join, their speed changes by no more than this.
-double change_over(const BaseTrajectory& base, double from, double to, double line_s) {
+// The largest change of a motor's speed between two moments line_s apart, the later of which lies
+// in [from, to]. Where lines of that length join, motors' speeds change by no more than this.
+double change_over(const BaseTrajectory& base, double from, double to, double line_s,
+                   const Motors& motors) {
   double most = 0.0;
   for (double t = std::max(from, line_s); t < to + base.period_s; t += base.period_s) {
-    for (const AxisAt axis : {&BaseTrajectory::x_at, &BaseTrajectory::y_at}) {
+    const auto change = [&](AxisAt axis) {
       const auto speed = [&](double at) {
         return (base.*axis)(std::min(at, base.duration_s())).velocity_mm_s;
       };
-      most = std::max(most, std::abs(speed(t) - speed(t - line_s)));
-    }
+      return speed(t) - speed(t - line_s);
+    };
+    most = std::max(most, motors.largest_of_xy(change(&BaseTrajectory::x_at),
+                                               change(&BaseTrajectory::y_at), 0.0));
   }
   return most;
 }
@@ -118,7 +121,7 @@ class Candidate {
   }
 
  private:
-  // The larger change of the two axes' speeds where lines from a to b and from b to c join. A line
+  // The largest change of a motor's speed where lines from a to b and from b to c join. A line
   // without time stands for rest.
   [[nodiscard]] double change(double a, double b, double c) const {
     const auto along = [&](AxisAt axis) {
@@ -127,9 +130,10 @@ class Candidate {
                                (to - from)
                          : 0.0;
       };
-      return std::abs(speed(b, c) - speed(a, b));
+      return speed(b, c) - speed(a, b);
     };
-    return std::max(along(&BaseTrajectory::x_at), along(&BaseTrajectory::y_at));
+    return rules_->motors.largest_of_xy(along(&BaseTrajectory::x_at), along(&BaseTrajectory::y_at),
+                                        0.0);
   }
 
   const BaseTrajectory* base_;
@@ -178,8 +182,8 @@ bool cuts_well(const BaseTrajectory& base, double from, double to, const LineRul
   }
   const double most = kOfSpeedStep * rules.max_speed_step_mm_s;
   // If not even the shortest lines keep to it, there is nothing to gain.
-  return change_over(base, from, to, even_share_s(from, to, rules)) <= most ||
-         change_over(base, from, to, rules.even_line_s()) > most;
+  return change_over(base, from, to, even_share_s(from, to, rules), rules.motors) <= most ||
+         change_over(base, from, to, rules.even_line_s(), rules.motors) > most;
 }
 
 void append_line_ends(const BaseTrajectory& base, double from, double to, const LineRules& rules,
@@ -237,14 +241,17 @@ bool split_lines(const BaseTrajectory& base, const std::vector<double>& x_error_
 bool split_quick_joins(const BaseTrajectory& base, const std::vector<double>& x_mm,
                        const std::vector<double>& y_mm, const LineRules& rules,
                        std::vector<double>& times) {
-  const auto quick = [&](std::size_t i, const std::vector<double>& at_mm) {
+  const auto change = [&](std::size_t i, const std::vector<double>& at_mm) {
     const auto speed = [&](std::size_t line) {
       return (at_mm[line] - at_mm[line - 1]) / (times[line] - times[line - 1]);
     };
-    return i > 0 && i + 1 < times.size() &&
-           std::abs(speed(i + 1) - speed(i)) > rules.max_speed_step_mm_s;
+    return speed(i + 1) - speed(i);
   };
-  const auto join = [&](std::size_t i) { return quick(i, x_mm) || quick(i, y_mm); };
+  const auto join = [&](std::size_t i) {
+    return i > 0 && i + 1 < times.size() &&
+           rules.motors.largest_of_xy(change(i, x_mm), change(i, y_mm), 0.0) >
+               rules.max_speed_step_mm_s;
+  };
   return halve(base, rules, times, [&](std::size_t i) { return join(i) || join(i - 1); });
 }
 

@@ -136,9 +136,9 @@ VelocityXY velocity_mm_s(const Stroke& from, const Stroke& to) {
   return {(to.x_mm - from.x_mm) / duration_s, (to.y_mm - from.y_mm) / duration_s};
 }
 
-// Whether an axis would change its speed by more than it may.
+// Whether a motor would change its speed by more than it may.
 bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const LineRules& rules) {
-  return std::max(std::abs(after[0] - before[0]), std::abs(after[1] - before[1])) >
+  return rules.motors.largest_of_xy(after[0] - before[0], after[1] - before[1], 0.0) >
          rules.max_speed_step_mm_s;
 }
 
@@ -159,34 +159,39 @@ ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
 }
 
 // The largest changes of speed of each axis. If motors move both axes, each axis gets what the base
-// itself needs where lines join, and half of what is left.
+// itself needs where lines join, and half of what is left to the motors.
 std::pair<SpeedSteps, SpeedSteps> speed_steps(const dynamics::BaseTrajectory& base,
                                               const std::vector<double>& times, const Ends& ends,
                                               const LineRules& rules) {
-  SpeedSteps x{kOfSpeedStep * rules.max_speed_step_mm_s, rules.max_accel_mm_s2};
+  const double most_mm_s = kOfSpeedStep * rules.max_speed_step_mm_s;
+  SpeedSteps x{most_mm_s, rules.max_accel_mm_s2};
   SpeedSteps y = x;
   if (!rules.motors.shared_by_xy()) {
     return {x, y};
   }
-  std::array<double, 2> before{};
-  if (!ends.from_rest) {
-    before = {base.x_at(0.0).velocity_mm_s, base.y_at(0.0).velocity_mm_s};
-  }
+  const auto velocity = [&](double t, bool rests) {
+    return rests ? VelocityXY{}
+                 : VelocityXY{base.x_at(t).velocity_mm_s, base.y_at(t).velocity_mm_s};
+  };
+  VelocityXY before = velocity(0.0, ends.from_rest);
   double before_s = 0.0;
+  const auto add_join = [&](const VelocityXY& after, double after_s) {
+    const double of_x = std::abs(after[0] - before[0]);
+    const double of_y = std::abs(after[1] - before[1]);
+    const double both = std::min(most_mm_s, rules.max_accel_mm_s2 * 0.5 * (before_s + after_s));
+    const double left = std::max(both - rules.motors.largest_of_xy(of_x, of_y, 0.0), 0.0);
+    x.at_mm_s.push_back(of_x + 0.5 * left);
+    y.at_mm_s.push_back(of_y + 0.5 * left);
+    before = after;
+    before_s = after_s;
+  };
   for (std::size_t k = 0; k + 1 < times.size(); ++k) {
     const double duration_s = times[k + 1] - times[k];
-    const std::array<double, 2> speed = {
-        (base.x_at(times[k + 1]).position_mm - base.x_at(times[k]).position_mm) / duration_s,
-        (base.y_at(times[k + 1]).position_mm - base.y_at(times[k]).position_mm) / duration_s};
-    const double middles_s = 0.5 * (before_s + duration_s);
-    const double of_x = std::abs(speed[0] - before[0]) / middles_s;
-    const double of_y = std::abs(speed[1] - before[1]) / middles_s;
-    const double left = std::max(rules.max_accel_mm_s2 - of_x - of_y, 0.0);
-    x.accel_at_mm_s2.push_back(of_x + 0.5 * left);
-    y.accel_at_mm_s2.push_back(of_y + 0.5 * left);
-    before = speed;
-    before_s = duration_s;
+    add_join({(base.x_at(times[k + 1]).position_mm - base.x_at(times[k]).position_mm) / duration_s,
+              (base.y_at(times[k + 1]).position_mm - base.y_at(times[k]).position_mm) / duration_s},
+             duration_s);
   }
+  add_join(velocity(times.back(), ends.to_rest), 0.0);
   return {x, y};
 }
 

@@ -250,35 +250,29 @@ double speed_at(const BaseTrajectory& base, AxisAt axis, double t, bool rests) {
   return rests ? 0.0 : (base.*axis)(t).velocity_mm_s;
 }
 
-// The largest change of speed allowed at a join, over middles_s between the lines' middles. It is
-// at least the base's own change, `own`. If another part continues there, each side gets half.
-double most_change(double step_mm_s, double accel_mm_s2, double middles_s, bool shared,
-                   double own) {
-  const double both = std::min(step_mm_s, accel_mm_s2 * middles_s);
-  return std::max(shared ? 0.5 * both : both, std::abs(own));
-}
-
 // Sets the bounds of each u and of the last g.
 void set_bounds(const SpeedSteps& most, double before_mm_s, double after_mm_s, const Ends& ends,
                 std::vector<Stage>& stages, Ending& ending) {
-  const auto accel = [&](std::size_t k) {
-    return most.accel_at_mm_s2.empty() ? most.accel_mm_s2 : most.accel_at_mm_s2[k];
+  // The bounds at the begin of line k, or at the end of the last line. The largest change of speed
+  // is at least the base's own. If another part continues there, each side gets half.
+  const auto bounds = [&](std::size_t k, double middles_s, bool shared, double own) {
+    const double both = most.at_mm_s.empty()
+                            ? std::min(most.step_mm_s, most.accel_mm_s2 * middles_s)
+                            : most.at_mm_s[k];
+    const double step = std::max(shared ? 0.5 * both : both, std::abs(own));
+    return Bounds{-step - own, step - own};
   };
   for (std::size_t k = 0; k < stages.size(); ++k) {
     Stage& line = stages[k];
     const double own = line.chord_mm_s - (k > 0 ? stages[k - 1].chord_mm_s : before_mm_s);
     const double middles_s =
         k > 0 ? 0.5 * (stages[k - 1].duration_s + line.duration_s) : 0.5 * line.duration_s;
-    const double step =
-        most_change(most.step_mm_s, accel(k), middles_s, k == 0 && !ends.from_rest, own);
-    line.bounds = {-step - own, step - own};
+    line.bounds = bounds(k, middles_s, k == 0 && !ends.from_rest, own);
   }
   // g = v − c, and v may differ from the speed behind it by one step.
   const Stage& last = stages.back();
-  const double own = last.chord_mm_s - after_mm_s;
-  const double step = most_change(most.step_mm_s, accel(stages.size() - 1), 0.5 * last.duration_s,
-                                  !ends.to_rest, own);
-  ending.bounds = {-step - own, step - own};
+  ending.bounds =
+      bounds(stages.size(), 0.5 * last.duration_s, !ends.to_rest, last.chord_mm_s - after_mm_s);
 }
 
 }  // namespace

@@ -30,8 +30,8 @@ struct Ends {
 struct SpeedSteps {
   double step_mm_s = std::numeric_limits<double>::infinity();
   double accel_mm_s2 = std::numeric_limits<double>::infinity();
-  // accel_mm_s2 for each line, at its begin. Empty: accel_mm_s2 everywhere.
-  std::vector<double> accel_at_mm_s2 = {};
+  // In place of both, the most at each line's begin and at the last line's end. Empty: none.
+  std::vector<double> at_mm_s = {};
 };
 
 // One axis at the ends of the lines.

@@ -11,6 +11,7 @@
 #include "firmware_commands.hpp"
 #include "printer_number.hpp"
 #include "unflex/core/number.hpp"
+#include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -60,7 +61,7 @@ std::string state_name(const Command& command) {
 
 void Interpreter::extended(Event& event) {
   const std::string_view name = command_.name;
-  if (name == "SET_VELOCITY_LIMIT") {
+  if (name == "SET_VELOCITY_LIMIT" || name == kLimitsMacro) {
     return velocity_limit(event);
   }
   if (name == "SET_PRESSURE_ADVANCE") {

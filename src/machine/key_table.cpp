@@ -398,7 +398,7 @@ constexpr std::array kKeys = {
         "Klipper 1000, Marlin 200, RRF 500, by serial 100, RRF by sbc 250",
         &derived<&S::max_lines_per_s>},
     Key{"emit.max_speed_step_mm_s", &setting<&S::emit, &T::max_speed_step_mm_s>, kPositive, "mm/s",
-        "How much an axis' speed may change from line to line, where lines can be short enough"},
+        "How much a motor's speed may change from line to line, where lines can be short enough"},
     Key{"emit.accel_mm_s2", &setting<&S::emit, &T::accel_mm_s2>, kPositive, "mm/s²",
         "The firmware's acceleration while it runs compensated motion",
         "1000000, RRF 5 × base.max_accel_mm_s2", &derived<&S::emit_accel_mm_s2>},

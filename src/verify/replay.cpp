@@ -45,8 +45,8 @@ bool is_known_addition(std::string_view content, Firmware firmware) {
       return true;
     }
   } else if (command.kind == gcode::CommandKind::extended) {
-    constexpr std::array<std::string_view, 3> kNames = {"SET_VELOCITY_LIMIT", "SET_INPUT_SHAPER",
-                                                        "UNFLEX_CHECKPOINT"};
+    constexpr std::array<std::string_view, 4> kNames = {"SET_VELOCITY_LIMIT", "SET_INPUT_SHAPER",
+                                                        kCheckpointMacro, kLimitsMacro};
     return std::ranges::find(kNames, command.name) != kNames.end();
   }
   if (command.is('G', 4)) {

@@ -34,21 +34,40 @@ EmitOptions rrf_options() {
   return how;
 }
 
+// How a printer reads: by_line each line as it comes, ring_full with the queue of moves full. Then
+// the last move stays in a buffer until the next move comes, or a line that waits for standstill,
+// and limits that are set meanwhile hold for it (GCodes/GCodes.cpp, ReadMove).
+enum class Reading { by_line, ring_full };
+
 // The plan of an emitted text, by number of line.
-std::vector<planner::PlannedMove> plan_of(const std::string& text, const EmitOptions& how) {
+std::vector<planner::PlannedMove> plan_of(const std::string& text, const EmitOptions& how,
+                                          Reading reading = Reading::by_line) {
   gcode::Interpreter interpreter(how.interpreter);
   planner::RrfPlanner planner(how.printer_limits, how.fixed);
+  std::vector<gcode::Segment> buffer;
+  const auto empty_buffer = [&] {
+    for (const gcode::Segment& segment : buffer) {
+      planner.add(segment);
+    }
+    buffer.clear();
+  };
   std::size_t number = 0;
   for (const std::string& line : lines_of(text)) {
     const gcode::Event event = interpreter.interpret({line, ++number});
+    const bool is_barrier = event.kind == gcode::EventKind::barrier;
+    if (line.starts_with("G1") || is_barrier) {
+      empty_buffer();
+    }
     planner.apply(*event.limits);
-    if (event.kind == gcode::EventKind::barrier) {
+    if (is_barrier) {
       planner.stop();
     }
-    for (const gcode::Segment& segment : event.segments) {
-      planner.add(segment);
+    buffer.insert(buffer.end(), event.segments.begin(), event.segments.end());
+    if (reading == Reading::by_line) {
+      empty_buffer();
     }
   }
+  empty_buffer();
   planner.stop();
   std::vector<planner::PlannedMove> moves;
   planner.take(moves);
@@ -113,6 +132,31 @@ TEST(RrfRun, HasNoLineSlowerThanItSays) {
     ++looked_at;
   }
   EXPECT_GT(looked_at, 1000U);
+}
+
+// Filament alone before and behind runs, limits of the file's own inside them.
+TEST(RrfRun, KeepsEachLinesLimitsWhenTheRingIsFull) {
+  const EmitOptions how = rrf_options();
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> place(0.0, 20.0);
+  std::uniform_int_distribution<int> choice(0, 5);
+  std::string input = "G28\nG90\nM83\nG1 X0 Y0 Z0.2 F6000\nM400\n";
+  for (int i = 0; i < 60; ++i) {
+    const int kind = choice(random);
+    const std::string limits = "M204 P" + std::to_string(500 * (kind + 1)) + " T2000\n";
+    input += "G1 X" + std::to_string(place(random)) + " Y" + std::to_string(place(random)) +
+             " E.1 F6000\n";
+    input += kind < 2 ? "G1 E-1 F2400\nG1 E1 F1500\n" : kind < 4 ? limits : "";
+  }
+  const std::string text = testing::emit(input + "G4 P1\n", how).text;
+  const std::vector<planner::PlannedMove> as_read = plan_of(text, how);
+  const std::vector<planner::PlannedMove> ring_full = plan_of(text, how, Reading::ring_full);
+  ASSERT_EQ(as_read.size(), ring_full.size());
+  ASSERT_GT(as_read.size(), 1000U);
+  for (std::size_t i = 0; i < as_read.size(); ++i) {
+    ASSERT_EQ(as_read[i].duration_s(), ring_full[i].duration_s()) << as_read[i].segment.line;
+    ASSERT_EQ(as_read[i].end_v_mm_s, ring_full[i].end_v_mm_s) << as_read[i].segment.line;
+  }
 }
 
 }  // namespace

@@ -290,6 +290,32 @@ TEST_F(Turn, ChangesSpeedInSmallSteps) {
   EXPECT_LT(largest_step(10.0), 15.0);
 }
 
+// On CoreXY the motors do x + y and x − y, so steps of both axes add up.
+TEST_F(Turn, ChangesTheSpeedOfSharedMotorsInSmallSteps) {
+  const auto largest_step = [&](double allowed) {
+    EmitOptions how = options();
+    how.lines.tolerance_mm = 10e-3;
+    how.lines.max_speed_step_mm_s = allowed;
+    how.lines.motors = Motors(Kinematics::corexy, Firmware::klipper);
+    Stroke from{0.0, 100.0, 95.0};
+    std::array<double, 2> last{};
+    double largest = 0.0;
+    for (const Stroke& to : path_.draw(base_, how)) {
+      const double duration_s = to.end_s - from.end_s;
+      const std::array<double, 2> v = {(to.x_mm - from.x_mm) / duration_s,
+                                       (to.y_mm - from.y_mm) / duration_s};
+      if (from.end_s > 0.0) {
+        largest = std::max(largest, std::abs(v[0] - last[0]) + std::abs(v[1] - last[1]));
+      }
+      last = v;
+      from = to;
+    }
+    return largest;
+  };
+  EXPECT_GT(largest_step(1e6), 25.0);
+  EXPECT_LT(largest_step(20.0), 20.5);
+}
+
 TEST_F(Turn, IsAsWideAsTheBaseOnAverage) {
   const std::vector<Stroke> drawn = path_.draw(base_);
   double mean = 0.0;

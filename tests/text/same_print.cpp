@@ -89,8 +89,7 @@ class Comparison {
   std::string run(std::string_view emitted) {
     while (!emitted.empty() && difference_.empty()) {
       const std::string_view line = take_line(emitted);
-      emitted_.read(line);
-      follow(line);
+      read_emitted_line(line);
       // Klipper ends the print at a refused line.
       if (printer_.firmware == Firmware::klipper && sliced_.refused() > 0) {
         expect(emitted_.refused() > 0, "what is refused is not");
@@ -108,6 +107,18 @@ class Comparison {
   }
 
  private:
+  // What a run sets must not hold for the move before it, nor the file's limits for a line of a
+  // run.
+  void read_emitted_line(std::string_view line) {
+    const bool limits_act_early = emitted_.move_waits() && part_ != Part::kept;
+    const std::map<std::string, double> before =
+        limits_act_early ? emitted_.reading().limits : std::map<std::string, double>();
+    emitted_.read(line);
+    expect(!limits_act_early || emitted_.reading().limits == before,
+           "limits change while a move waits");
+    follow(line);
+  }
+
   void follow(std::string_view line) {
     if (line == ";unflex run") {
       part_ = Part::run;

@@ -26,12 +26,28 @@ TextMachine::TextMachine(Firmware firmware, Retraction retraction)
 void TextMachine::read(std::string_view text) {
   path_.clear();
   line_ = TextLine(firmware_, text);
+  const double filament_mm = reading_.filament_mm;
   try {
     carry_out();
   } catch (const Refused&) {
     ++refused_;
   }
   update();
+  note_waiting(filament_mm);
+}
+
+// GCodes2.cpp, HandleGcode() and HandleMcode(): a move waits for the buffer; G4, G28, M18, M84,
+// M400 and M593 wait for standstill. No limit is known to wait.
+void TextMachine::note_waiting(double filament_mm) {
+  constexpr std::string_view kMoves = " G0 G1 G2 G3 G10 G11 ";
+  constexpr std::string_view kStops = " G4 G28 M18 M84 M400 M593 ";
+  const std::string command = " " + line_.command() + " ";
+  if (kMoves.find(command) != std::string_view::npos) {
+    const bool moves = !path_.empty() || reading_.filament_mm != filament_mm;
+    move_waits_ = is(Firmware::rrf) && moves;
+  } else if (kStops.find(command) != std::string_view::npos) {
+    move_waits_ = false;
+  }
 }
 
 void TextMachine::carry_out() {

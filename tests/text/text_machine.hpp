@@ -63,6 +63,10 @@ class TextMachine {
   // The ends of the last line's moves in machine coordinates: one for a straight line, many along
   // an arc, none if X, Y and Z rest. Homing is no move.
   [[nodiscard]] const std::vector<std::array<double, 3>>& path() const { return path_; }
+  // Whether the last move may still be in the buffer in front of RepRapFirmware's queue of moves
+  // (GCodes.cpp, ReadMove). Limits that are set meanwhile hold for this move already. The next move
+  // waits until the buffer is empty.
+  [[nodiscard]] bool move_waits() const { return move_waits_; }
   // Commands that this machine does not know. The reading may be wrong after them.
   [[nodiscard]] const std::set<std::string>& not_followed() const { return not_followed_; }
   // The number of lines that the firmware answers with an error.
@@ -98,6 +102,7 @@ class TextMachine {
   void take_feed();
   void go_to(const Goal& goal);
   void update();
+  void note_waiting(double filament_mm);
 
   void straight();
   void arc();
@@ -124,6 +129,7 @@ class TextMachine {
   Retraction retraction_;
   Reading reading_;
   std::vector<std::array<double, 3>> path_;
+  bool move_waits_ = false;
   std::set<std::string> not_followed_;
   std::size_t refused_ = 0;
 

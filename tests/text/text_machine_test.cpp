@@ -368,5 +368,17 @@ TEST(TextMachine, KlipperOffsetsOutliveHoming) {
   EXPECT_DOUBLE_EQ(machine.reading().position_mm[2], 1.3);
 }
 
+// GCodes.cpp, ReadMove; GCodes2.cpp, G1: it waits until the buffer is empty.
+TEST(TextMachine, RrfKeepsTheLastMoveInABuffer) {
+  const auto waits = [](Firmware firmware, std::initializer_list<std::string_view> lines) {
+    return after(firmware, lines).move_waits();
+  };
+  EXPECT_TRUE(waits(Firmware::rrf, {"G1 X5"}));
+  EXPECT_TRUE(waits(Firmware::rrf, {"M83", "G1 E5", "M204 P100"}));
+  EXPECT_FALSE(waits(Firmware::rrf, {"G1 X5", "G1 F600"}));
+  EXPECT_FALSE(waits(Firmware::rrf, {"G1 X5", "M400"}));
+  EXPECT_FALSE(waits(Firmware::marlin, {"G1 X5"}));
+}
+
 }  // namespace
 }  // namespace unflex::testing

@@ -1,4 +1,5 @@
-// The comment lines by which unflex knows what it has written.
+// What unflex writes besides motion: the comment lines by which it knows its own output, and the
+// names of its Klipper macros (docs/pausing.md).
 #pragma once
 
 #include <string_view>
@@ -10,5 +11,11 @@ inline constexpr std::string_view kOwnMark = ";unflex";
 // Stands before the first line and behind the last line of each compensated run.
 inline constexpr std::string_view kRunMark = ";unflex run";
 inline constexpr std::string_view kRunEndMark = ";unflex end";
+
+// The macro that a run calls where it begins and where it has ended.
+inline constexpr std::string_view kCheckpointMacro = "UNFLEX_CHECKPOINT";
+// The macro that sets limits in the middle of a run: SET_VELOCITY_LIMIT, unless the run has been
+// interrupted.
+inline constexpr std::string_view kLimitsMacro = "UNFLEX_LIMITS";
 
 }  // namespace unflex

@@ -62,10 +62,12 @@ class Emitter {
   void set_run_modes(bool joins_file, std::string& out);
   void keep_reading_of_e_small(std::string& out);
   void set_unit(double unit_mm, std::string& out);
+  void wait_for_move(std::string& out);
   void write_stroke(const Stroke& stroke, double filament_origin, std::string& out);
   void restore_modes(std::string& out);
+  void write_feed(double feed_mm_s, std::string& out);
   void restore_shaper(std::string& out);
-  void set_limits(const planner::Limits& limits, std::string& out);
+  void set_limits(const planner::Limits& limits, std::string& out, bool may_be_interrupted = false);
   void set_shaper(const gcode::Shaper& wanted, std::string& out);
   void write_checkpoint(std::string_view words, std::string& out);
   void tell_shaper(std::string& out);
@@ -78,6 +80,7 @@ class Emitter {
   planner::Limits limits_;        // as the output has them
   bool limits_known_ = true;      // false if a macro may have changed limits_
   bool started_ = false;          // a run has been written
+  bool move_waits_ = false;       // limits written next may hold for the last move as well
   bool moving_ = false;           // the last line moves X or Y, so the next may begin at speed
   std::string told_shaper_;       // the words of the last checkpoint that put the shaper back
   std::string newline_ = "\n";    // as the input has it

@@ -29,7 +29,7 @@ struct LineRules {
   // than burst_lines begin within any burst_s, lines before and after the run counted. 0: no limit.
   int burst_lines = 0;
   double burst_s = 0.1;
-  // Largest change of speed of either axis from line to line, where lines can be short enough.
+  // Largest change of a motor's speed from line to line, where lines can be short enough.
   double max_speed_step_mm_s = 30.0;
   // Limit of the motors: change of speed divided by the time between the middles of two lines.
   double max_accel_mm_s2 = 20000.0;

@@ -154,7 +154,7 @@ struct EmitSettings {
   // lower frequency, so that lines per second hardly depend on it.
   std::optional<double> tolerance_um;
   std::optional<double> max_lines_per_s;  // hard limit; unset: by firmware
-  double max_speed_step_mm_s = 30.0;      // from line to line, per axis
+  double max_speed_step_mm_s = 30.0;      // from line to line, per motor
   // The firmware's acceleration inside a compensated run; unset: 1e6, with RepRapFirmware 5 times
   // the base's.
   std::optional<double> accel_mm_s2;
