@@ -322,13 +322,13 @@ void Emitter::write_feed(double feed_mm_s, std::string& out) {
   std::string text = "G1";
   append_word(text, 'F', feed_mm_s * 60.0 / printer_.state().unit_mm, kExactDecimals);
   write(text, out);
+  move_waits_ = false;
 }
 
 // A line without motion is read only when the move before it has left the buffer.
 void Emitter::wait_for_move(std::string& out) {
   if (move_waits_ && limits_act_early(options_.fixed.firmware)) {
     write_feed(printer_.state().feed_mm_s, out);
-    move_waits_ = false;
   }
 }
 
