@@ -37,11 +37,6 @@ std::array<double, 4> or_default(const AxisOptions& own, const std::array<double
   return values;
 }
 
-// Input shaping is part of every Klipper, but an option of Marlin's that is off by default.
-double default_shaper_hz(const PrinterSettings& printer, const AxisDynamics& dynamics) {
-  return printer.firmware == Firmware::klipper ? dynamics.freq_hz : 0.0;
-}
-
 // The default of M204 P and T.
 double default_command_accel(const Settings& settings) {
   // RepRapFirmware's DefaultPrintingAcceleration, above whatever M201 allows.
@@ -249,15 +244,22 @@ double Settings::shaper_damping_ratio_y() const {
       by_firmware(printer.firmware, kKlipperDampingRatio, kMarlinDampingRatio, kRrfDampingRatio));
 }
 
-double Settings::shaper_freq_x_hz() const {
-  return printer.input_shaper_freq_x_hz.value_or(default_shaper_hz(printer, dynamics_x));
-}
+double Settings::shaper_freq_x_hz() const { return printer.input_shaper_freq_x_hz.value_or(0.0); }
 
 // RepRapFirmware has one shaper for both axes.
 double Settings::shaper_freq_y_hz() const {
   return printer.input_shaper_freq_y_hz.value_or(printer.firmware == Firmware::rrf
                                                      ? shaper_freq_x_hz()
-                                                     : default_shaper_hz(printer, dynamics_y));
+                                                     : 0.0);
+}
+
+// Input shaping is part of every Klipper, but an option of Marlin's that is off by default.
+bool Settings::shaper_unknown_x() const {
+  return printer.firmware == Firmware::klipper && !printer.input_shaper_freq_x_hz;
+}
+
+bool Settings::shaper_unknown_y() const {
+  return printer.firmware == Firmware::klipper && !printer.input_shaper_freq_y_hz;
 }
 
 }  // namespace unflex::machine

@@ -175,6 +175,8 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
       .circles = settings.printer.arc_p_circles};
   options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
   options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
+  options.shaper_unknown_x = settings.shaper_unknown_x();
+  options.shaper_unknown_y = settings.shaper_unknown_y();
   options.shaper_type = settings.shaper_type_x();
   options.has_print_jerk = settings.has_print_jerk();
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;

@@ -125,6 +125,7 @@ void add_output(const Report& r, Json& json) {
                          {"peak_rss_mb", r.peak_rss_mb}};
   json["violation_count"] = r.violation_count;
   json["violations"] = r.violations;
+  json["shaper_left_off"] = r.shaper_left_off;
   json["warnings"] = r.warnings;
 }
 

@@ -63,7 +63,8 @@ struct PrinterSettings {
       queue_length;                 // moves the firmware plans ahead; unset: the firmware's default
   double step_clock_hz = 750000.0;  // RepRapFirmware, StepClockRate
   // Frequencies the printer's own [input_shaper] is set back to after the print (its type stays).
-  // 0: the printer has none. Unset: the frequency of the axis' dynamics.
+  // 0: the printer has none. Unset: not known on Klipper, where every printer may have one; elsewhere
+  // none.
   std::optional<double> input_shaper_freq_x_hz;
   std::optional<double> input_shaper_freq_y_hz;
   // The type of the shaper as the firmware spells it; "auto": what the firmware takes if it is told
@@ -185,6 +186,10 @@ struct Settings {
   std::vector<std::pair<std::string, std::string>> origins;
   // What the user should know about what was read.
   std::vector<Diagnostic> notes;
+  // What no source says and a default stands for, though it decides over the result: resonances, or
+  // the firmware of a print that was sliced for another one than the default. The program refuses to
+  // compensate by a guess, and tells of it where it measures by one.
+  std::vector<Diagnostic> guesses;
   // Why no print is compensated for this printer, and the way out (docs/compatibility.md).
   std::optional<Diagnostic> refusal;
 
@@ -213,8 +218,12 @@ struct Settings {
   [[nodiscard]] double period_ms() const;
   [[nodiscard]] double tolerance_um() const;
   [[nodiscard]] double emit_accel_mm_s2() const;
+  // 0 where the printer has no shaper, or where none is known.
   [[nodiscard]] double shaper_freq_x_hz() const;
   [[nodiscard]] double shaper_freq_y_hz() const;
+  // Klipper: whether the printer may have a shaper that no source tells of.
+  [[nodiscard]] bool shaper_unknown_x() const;
+  [[nodiscard]] bool shaper_unknown_y() const;
   [[nodiscard]] std::string shaper_type_x() const;
   [[nodiscard]] std::string shaper_type_y() const;
   [[nodiscard]] double shaper_damping_ratio_x() const;
