@@ -163,7 +163,8 @@ class Reader {
         return fail(ErrorKind::usage, moves->place,
                     fmt::format("[{}] moves several carriages, '{}', which unflex does not "
                                 "understand; give a printer file of unflex, with kinematics.type "
-                                "= \"corexy\" or what it is (unflex printer writes one)",
+                                "= \"corexy\" or what it is (unflex printer init writes "
+                                "one)",
                                 name, moves->text));
       }
     }

@@ -2,9 +2,9 @@
 // (extras/shaper_calibrate.py, fit_shaper). It assumes dampings of 0.075 to 0.15 and shapers of
 // 0.1, so that the best frequency is not the resonance's, and differs from type to type.
 //
-// The ratios are those of its choice for one mode of 25 to 110 Hz and damping 0.02 to 0.12 under its
-// own sweep: the middle of the least and the greatest, and half their distance, rounded up, as the
-// error. docs/configuration.md has the table.
+// The ratios are those of its choice for one mode of 25 to 110 Hz and damping 0.02 to 0.12 under
+// its own sweep: the middle of the least and the greatest, and half their distance, rounded up, as
+// the error. docs/configuration.md has the table.
 #include "klipper_shaper.hpp"
 
 #include <algorithm>

@@ -66,6 +66,12 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
       return read_marlin_dump(text, name).and_then(store);
     case SourceKind::rrf_config:
       return read_rrf_config(text, name).and_then(store);
+    case SourceKind::m115_answer:
+      return fail(ErrorKind::usage, {name, 0},
+                  "holds what M115 answers and nothing else, which tells the firmware and none of "
+                  "its limits; of a Marlin append what M503 answers, of another firmware give "
+                  "printer.cfg or config.g, and give dynamics.x.freq_hz and dynamics.y.freq_hz, "
+                  "which unflex identify finds, where they tell of no input shaper");
     case SourceKind::print:
       return fail(ErrorKind::usage, {name, 0},
                   "is a print, not a printer file; what its slicer says of the printer is read "
@@ -116,9 +122,10 @@ void note_odd_frequencies(Draft& draft) {
     const double freq_hz = (draft.settings.*frequency.dynamics).freq_hz;
     if (place && (freq_hz < kLeast_hz || freq_hz > kMost_hz)) {
       draft.settings.notes.push_back(
-          {*place, fmt::format("{} is {:.4g}, but printers swing at {} to {} Hz; look whether it is "
-                               "in Hz and of this axis, or measure it with unflex identify",
-                               frequency.key, freq_hz, kLeast_hz, kMost_hz)});
+          {*place,
+           fmt::format("{} is {:.4g}, but printers swing at {} to {} Hz; look whether it is "
+                       "in Hz and of this axis, or measure it with unflex identify",
+                       frequency.key, freq_hz, kLeast_hz, kMost_hz)});
     }
   }
 }

@@ -165,6 +165,16 @@ double Settings::max_lines_per_s() const {
   return emit.max_lines_per_s.value_or(by_transport());
 }
 
+double Settings::min_line_s() const {
+  return std::max(period_ms() * 1e-3, kClockRoom / max_lines_per_s());
+}
+
+double Settings::least_speed_step_mm_s() const {
+  // The base always has to accelerate that many times as much as the plan.
+  constexpr double kLeastHeadroom = 1.2;
+  return kLeastHeadroom * limits.max_accel_mm_s2 * min_line_s() / kSpeedStepShare;
+}
+
 double Settings::max_extrude_cross_section_mm2() const {
   return extruder.max_extrude_cross_section_mm2.value_or(4.0 * extruder.nozzle_diameter_mm *
                                                          extruder.nozzle_diameter_mm);
@@ -248,9 +258,8 @@ double Settings::shaper_freq_x_hz() const { return printer.input_shaper_freq_x_h
 
 // RepRapFirmware has one shaper for both axes.
 double Settings::shaper_freq_y_hz() const {
-  return printer.input_shaper_freq_y_hz.value_or(printer.firmware == Firmware::rrf
-                                                     ? shaper_freq_x_hz()
-                                                     : 0.0);
+  return printer.input_shaper_freq_y_hz.value_or(
+      printer.firmware == Firmware::rrf ? shaper_freq_x_hz() : 0.0);
 }
 
 // Input shaping is part of every Klipper, but an option of Marlin's that is off by default.

@@ -262,6 +262,17 @@ Status check_emission(const Draft& draft) {
                                 "base.max_accel_mm_s2); raise it or lower base.max_accel_mm_s2",
                                 s.emit_accel_mm_s2(), least_accel, kEmitAccelFactor));
   }
+  // On the other firmwares lines end on whole steps, too coarse for this key.
+  if (s.printer.firmware == Firmware::klipper && place_of(draft, "emit.max_speed_step_mm_s") &&
+      s.emit.max_speed_step_mm_s < s.least_speed_step_mm_s()) {
+    return conflict(
+        draft, {"emit.max_speed_step_mm_s"},
+        fmt::format("emit.max_speed_step_mm_s is {}, but must be at least {}, what "
+                    "limits.max_accel_mm_s2, {}, needs in lines of {:.3g} ms; raise it, "
+                    "or emit.max_lines_per_s if that makes lines so long",
+                    s.emit.max_speed_step_mm_s, at_least(s.least_speed_step_mm_s()),
+                    s.limits.max_accel_mm_s2, 1e3 * s.min_line_s()));
+  }
   if (s.emit.square_corner_velocity_mm_s < s.limits.square_corner_velocity_mm_s) {
     return conflict(
         draft, {"emit.square_corner_velocity_mm_s", "limits.square_corner_velocity_mm_s"},

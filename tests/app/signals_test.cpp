@@ -166,7 +166,7 @@ TEST_F(ProgramTest, EndsWithoutASignalWhenNobodyReadsItsOutput) {
     const int null = ::open(path("err").c_str(), O_WRONLY | O_CREAT, 0600);
     ::dup2(null, STDERR_FILENO);
     ::execl(test_paths::kProgram, "unflex", "compensate", path("in.gcode").c_str(), "-o", "-",
-            nullptr);
+            "--set", "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45", nullptr);
     ::_exit(127);
   }
   ::close(ends[0]);

@@ -93,8 +93,8 @@ struct Shaper {
   double freq_x_hz = 0.0;  // 0: off
   double freq_y_hz = 0.0;
   ShaperSettings settings;
-  // Klipper: the printer's configuration may have a shaper that nobody has told of. The frequency is
-  // 0 meanwhile.
+  // Klipper: the printer's configuration may have a shaper that nobody has told of. The frequency
+  // is 0 meanwhile.
   bool unknown_x = false;
   bool unknown_y = false;
 
@@ -379,9 +379,10 @@ class Interpreter {
   bool z_left_out_ = false;
   // X and Y: if the position is unknown, only labels and unknown commands are the reason.
   std::array<bool, 2> assumed_{};
-  bool modes_uncertain_ = false;  // a line that may or may not run has set a mode or a limit
-  bool feed_uncertain_ = false;   // a line that may or may not run has set F
-  Command command_;               // command of the line being read; kept for its storage
+  bool modes_uncertain_ = false;     // a line that may or may not run has set a mode or a limit
+  bool feed_uncertain_ = false;      // a line that may or may not run has set F
+  bool told_of_retraction_ = false;  // Klipper: the file has a G10 or G11 that does nothing
+  Command command_;                  // command of the line being read; kept for its storage
 };
 
 }  // namespace unflex::gcode
