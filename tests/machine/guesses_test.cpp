@@ -98,8 +98,9 @@ TEST(ShaperFrequency, IsNeverThatOfTheDynamics) {
 
 TEST(SpeedStep, IsKeptOrRefused) {
   EXPECT_THAT(refusal("[emit]\nmax_speed_step_mm_s = 5\n"),
-              StartsWith("p:2: emit.max_speed_step_mm_s is 5, but must be at least 6.46"));
-  EXPECT_DOUBLE_EQ(read("[emit]\nmax_speed_step_mm_s = 6.46\n").emit.max_speed_step_mm_s, 6.46);
+              StartsWith("p:2: emit.max_speed_step_mm_s is 5, but must be at least 6.47, what "
+                         "limits.max_accel_mm_s2"));
+  EXPECT_DOUBLE_EQ(read("[emit]\nmax_speed_step_mm_s = 6.47\n").emit.max_speed_step_mm_s, 6.47);
   // The default gives way.
   EXPECT_GT(read("", {"emit.max_lines_per_s=100"}).least_speed_step_mm_s(), 30.0);
 }
