@@ -130,6 +130,27 @@ void note_odd_frequencies(Draft& draft) {
   }
 }
 
+// Firmwares that limit motors hold X to the limits of a Z motor that moves it too, and runs leave
+// Z's limits as they are.
+void note_slow_z_motor(Draft& draft) {
+  const Settings& s = draft.settings;
+  constexpr std::size_t kZ = 2;
+  constexpr std::string_view kKey = "limits.max_z_accel_mm_s2";
+  const double z_mm_s2 = s.axis_max_accel_mm_s2()[kZ];
+  if (s.printer.firmware == Firmware::klipper || s.kinematics.type != Kinematics::corexz ||
+      z_mm_s2 >= s.base_max_accel_mm_s2()) {
+    return;
+  }
+  const std::optional<SourcePlace>& place = draft.places[*find_key(kKey)];
+  draft.settings.notes.push_back(
+      {place ? *place : SourcePlace{draft.printer_file, 0},
+       fmt::format(
+           "{} (M201 Z) is {}, and on a corexz the Z motor moves X too, so that the firmware "
+           "holds X to it and compensated lines, which need up to base.max_accel_mm_s2, {}, "
+           "come out wrong; raise M201 Z on the printer if its motor can do it, and the key",
+           kKey, z_mm_s2, s.base_max_accel_mm_s2())});
+}
+
 // Drops the band that a shaper's frequency brought, if neither axis has its resonance from one.
 void forget_needless_band(Draft& draft) {
   const auto is_overridden = [&](std::string_view key) {
@@ -248,6 +269,7 @@ Result<Settings> finish(Draft draft) {
   forget_needless_band(draft);
   tell_notes(draft);
   note_odd_frequencies(draft);
+  note_slow_z_motor(draft);
   note_unknown_resonances(draft);
   record_origins(draft);
   return draft.settings;

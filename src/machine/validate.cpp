@@ -336,6 +336,13 @@ std::vector<std::string> recommendations(const Settings& settings) {
         fmt::format("emit.period_ms is {}; at {:.4g} Hz {} or less follows the path better",
                     settings.period_ms(), fastest_freq_hz(settings), at_most(good_ms)));
   }
+  const double least_lines_per_s = 2.0 * fastest_freq_hz(settings);
+  if (settings.emit.max_lines_per_s && *settings.emit.max_lines_per_s < least_lines_per_s) {
+    remarks.push_back(fmt::format(
+        "emit.max_lines_per_s is {}, and lines so long cannot follow a resonance at {:.4g} Hz, so "
+        "that runs stay as sliced; give {} or more, as many as unflex printer line-test shows",
+        *settings.emit.max_lines_per_s, fastest_freq_hz(settings), at_least(least_lines_per_s)));
+  }
   return remarks;
 }
 

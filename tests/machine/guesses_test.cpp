@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 
 #include "reading.hpp"
+#include "unflex/machine/recommend.hpp"
 
 namespace unflex::machine {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -120,6 +122,25 @@ TEST(RrfKinematics, InAnExpressionAreNotTaken) {
   EXPECT_THAT(to_string(s.notes[0]), StartsWith("p.toml:4: warning: no number behind K"));
   EXPECT_THAT(read(head + "M669 K{global.kind}\n", {"kinematics.type=corexy"}).notes, IsEmpty());
   EXPECT_THAT(refusal(head + "M669 K-1\n"), HasSubstr("kinematics K-1 is a machine that"));
+}
+
+TEST(RrfKinematics, OfACorexzBlameASlowZMotor) {
+  const std::string head = "M550 P\"x\"\nM593 P\"zvd\" F40\nM201 X6000 Y6000 Z100\n";
+  const Settings s = read(head + "M669 K2\n");
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_THAT(to_string(s.notes[0]),
+              StartsWith("p.toml:3: warning: limits.max_z_accel_mm_s2 (M201 Z) is 100, and on a "
+                         "corexz the Z motor moves X too"));
+  EXPECT_THAT(read(head + "M669 K1\n").notes, IsEmpty());
+  EXPECT_THAT(read(head + "M669 K2\nM201 Z24000\n").notes, IsEmpty());
+}
+
+TEST(LineBudget, ThatIsTooLowIsNamed) {
+  EXPECT_THAT(
+      recommendations(read("", {"emit.max_lines_per_s=20"})),
+      ElementsAre(StartsWith("emit.max_lines_per_s is 20, and lines so long cannot follow a "
+                             "resonance at 45 Hz, so that runs stay as sliced; give 90")));
+  EXPECT_THAT(recommendations(read("", {"emit.max_lines_per_s=90"})), IsEmpty());
 }
 
 }  // namespace
