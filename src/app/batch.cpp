@@ -38,7 +38,9 @@ Status check_settings(const RunConfig& config) {
     return fail(ErrorKind::usage, {*config.printer_file, 0},
                 "is read for every print; give --printer a file");
   }
-  return machine::load(config.printer_file, config.overrides).map([](const machine::Settings&) {});
+  return machine::load(config.printer_file, config.overrides)
+      .and_then(without_guess)
+      .map([](const machine::Settings&) {});
 }
 
 // The folders on the way to the output that do not exist yet. Unless they are kept, the empty ones

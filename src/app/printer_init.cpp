@@ -78,8 +78,10 @@ Result<ExitCode> run_printer_init(const RunConfig& config, Console& console) {
   if (!settings) {
     return tl::unexpected(settings.error());
   }
-  for (const Diagnostic& note : settings->notes) {
-    console.line(to_string(note));
+  for (const std::vector<Diagnostic>& remarks : {settings->guesses, settings->notes}) {
+    for (const Diagnostic& remark : remarks) {
+      console.line(to_string(remark));
+    }
   }
   return write_settings(config, *settings).and_then([&] { return print_summary(config); }).map([] {
     return ExitCode::done;

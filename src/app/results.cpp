@@ -31,8 +31,22 @@ tl::unexpected<Error> interrupted(Command command, bool with_result) {
                                                : "interrupted, no file was written");
 }
 
+Result<machine::Settings> without_guess(machine::Settings settings) {
+  if (!settings.guesses.empty()) {
+    const Diagnostic& guess = settings.guesses.front();
+    return fail(ErrorKind::usage, guess.place, guess.message);
+  }
+  return settings;
+}
+
 std::vector<std::string> setting_warnings(const machine::Settings& settings) {
   std::vector<std::string> remarks;
+  for (Diagnostic guess : settings.guesses) {
+    if (guess.place.file.empty()) {
+      guess.place.file = "unflex";
+    }
+    remarks.push_back(to_string(guess));
+  }
   for (const Diagnostic& note : settings.notes) {
     remarks.push_back(to_string(note));
   }

@@ -38,6 +38,10 @@ auto with_progress(const RunConfig& config, Work work)
   return result;
 }
 
+// The settings, or an error if they rest on a guess.
+[[nodiscard]] Result<machine::Settings> without_guess(machine::Settings settings);
+
+// What is odd about the settings, and what in them is a guess.
 [[nodiscard]] std::vector<std::string> setting_warnings(const machine::Settings& settings);
 
 // What becomes of the output after an error, for messages. passed_on: the output has gone to a

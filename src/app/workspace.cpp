@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "files.hpp"
+#include "results.hpp"
 
 namespace unflex::app {
 namespace {
@@ -96,8 +97,12 @@ Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
     return tl::unexpected(print.error());
   }
   print->variables = config.slicer_settings;
-  return machine::load(
+  Result<machine::Settings> settings = machine::load(
       {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
+  if (config.command == Command::compensate) {
+    return settings.and_then(without_guess);
+  }
+  return settings;
 }
 
 Result<Workspace> open_workspace(const RunConfig& config) {

@@ -20,7 +20,7 @@ struct Workspace {
   std::optional<Output> report;
 };
 
-// The settings in force for the print that is read.
+// The settings in force for the print that is read. Nothing is compensated by a guess.
 [[nodiscard]] Result<machine::Settings> load_settings(const RunConfig& config, Input& input);
 
 // Opens the prints, the output and the report, and reads the settings.

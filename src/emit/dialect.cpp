@@ -247,8 +247,9 @@ std::string unless_interrupted(std::string line) {
 std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                       const gcode::Shaper& current) {
   std::vector<std::string> lines;
-  const bool x = wanted.freq_x_hz != current.freq_x_hz;
-  const bool y = wanted.freq_y_hz != current.freq_y_hz;
+  // What is not known cannot be set.
+  const bool x = !wanted.unknown_x && (current.unknown_x || wanted.freq_x_hz != current.freq_x_hz);
+  const bool y = !wanted.unknown_y && (current.unknown_y || wanted.freq_y_hz != current.freq_y_hz);
   switch (firmware) {
     case Firmware::klipper:
       if (x || y) {
@@ -272,6 +273,13 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
       break;
   }
   return lines;
+}
+
+std::string unknown_shaper_words(const gcode::Shaper& wanted, const gcode::Shaper& current) {
+  const bool x = wanted.unknown_x && !current.unknown_x;
+  const bool y = wanted.unknown_y && !current.unknown_y;
+  return fmt::format("{}{}{}", x ? "SHAPER_FREQ_X=..." : "", x && y ? " " : "",
+                     y ? "SHAPER_FREQ_Y=..." : "");
 }
 
 }  // namespace unflex::emit

@@ -47,9 +47,15 @@ struct ZLimits {
 // with checkpoints: the rest of such a run goes on from standstill by the printer's own limits.
 [[nodiscard]] std::string unless_interrupted(std::string line);
 
-// The lines that put `wanted` in place of `current`. A default Shaper means no shaper.
+// The lines that put `wanted` in place of `current`. A default Shaper means no shaper. An axis whose
+// wanted shaper is unknown stays as it is.
 // RepRapFirmware is told all settings, since it forgets its type while the shaper is off.
 [[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                     const gcode::Shaper& current);
+
+// The words to type after the print for those axes whose shaper is off, though the printer may have
+// one that is not known: "SHAPER_FREQ_X=... SHAPER_FREQ_Y=...". Empty if there are none.
+[[nodiscard]] std::string unknown_shaper_words(const gcode::Shaper& wanted,
+                                               const gcode::Shaper& current);
 
 }  // namespace unflex::emit

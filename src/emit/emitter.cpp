@@ -212,7 +212,19 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   write_checkpoint("", out);
 }
 
-void Emitter::finish(std::string& out) { restore_shaper(out); }
+void Emitter::finish(std::string& out) {
+  restore_shaper(out);
+  if (const std::string words = shaper_left_off(); !words.empty()) {
+    write(fmt::format("{}: the printer's own input shaper is not known and still off; set it again "
+                      "as its configuration has it: SET_INPUT_SHAPER {}",
+                      kOwnMark, words),
+          out);
+  }
+}
+
+std::string Emitter::shaper_left_off() const {
+  return unknown_shaper_words(input_.state().input_shaper(), printer_.state().input_shaper());
+}
 
 void Emitter::enter_run(std::string& out) {
   if (!started_) {

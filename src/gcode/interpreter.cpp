@@ -81,6 +81,8 @@ double ModalState::filament_factor() const {
 Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(options)) {
   state_.shaper_freq_x_hz = options_.shaper_freq_x_hz;
   state_.shaper_freq_y_hz = options_.shaper_freq_y_hz;
+  state_.shaper_unknown_x = options_.shaper_unknown_x;
+  state_.shaper_unknown_y = options_.shaper_unknown_y;
   state_.filament_diameter_mm = options_.filament_diameter_mm;
   state_.absolute_e = !options_.relative_e;
   if (options_.firmware == Firmware::marlin) {

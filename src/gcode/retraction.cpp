@@ -27,6 +27,12 @@ Interpreter::Start Interpreter::start_of_retraction() const {
 // in whole mm/min, and the flow and speed factors apply to both.
 void Interpreter::firmware_retraction(Event& event, bool retract) {
   if (!options_.firmware_retraction) {
+    if (!told_of_retraction_) {
+      told_of_retraction_ = true;
+      event.warnings.emplace_back(
+          "the printer has no [firmware_retraction], so that G10 and G11 retract nothing, here and "
+          "below; add that section to printer.cfg or switch firmware retraction off in the slicer");
+    }
     return;
   }
   if (state_.retracted == retract) {

@@ -134,6 +134,8 @@ Status apply(const Reading& reading, Draft& draft) {
     }
   }
   draft.notes.insert(draft.notes.end(), reading.notes.begin(), reading.notes.end());
+  std::vector<Diagnostic>& guesses = draft.settings.guesses;
+  guesses.insert(guesses.end(), reading.guesses.begin(), reading.guesses.end());
   return {};
 }
 

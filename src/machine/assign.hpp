@@ -42,6 +42,7 @@ struct Assignment {
 struct Reading {
   std::vector<Assignment> assignments;  // if a key occurs twice, the later wins
   std::vector<Note> notes;
+  std::vector<Diagnostic> guesses;  // Settings::guesses
 
   void add(std::string key, Value value, SourcePlace place) {
     assignments.push_back({std::move(key), std::move(value), std::move(place)});
@@ -54,6 +55,9 @@ struct Reading {
   }
   void note(SourcePlace place, std::string message, std::vector<std::string> keys = {}) {
     notes.push_back({{std::move(place), std::move(message)}, std::move(keys)});
+  }
+  void guess(SourcePlace place, std::string message) {
+    guesses.push_back({std::move(place), std::move(message)});
   }
 };
 

@@ -383,26 +383,36 @@ void add_travel(CommandReader& reader, const Travel& travel, std::string_view ax
 }
 
 Status read_rrf_kinematics(CommandReader& reader, const gcode::Command& command,
-                           const SourcePlace& place) {
+                           std::string_view arguments, const SourcePlace& place) {
   const auto refuse = [&](std::string message) {
     return fail(ErrorKind::usage, place, std::move(message));
   };
   if (command.number == 665) {
     return refuse(fmt::format("M665 makes this machine a delta, which {}", kNotSupported));
   }
-  if (command.has('X') || command.has('Y') || command.has('Z')) {
+  const std::map<char, std::vector<std::string_view>> values = values_of(arguments);
+  if (values.contains('X') || values.contains('Y') || values.contains('Z')) {
     return refuse(
         "M669 gives a matrix of its own, which unflex does not read; give a printer file of "
-        "unflex with the kinematics.type that it stands for (unflex printer writes one)");
+        "unflex with the kinematics.type that it stands for (unflex printer init writes one)");
   }
-  if (!command.has('K')) {
+  if (!values.contains('K')) {
+    return {};
+  }
+  const std::optional<double> value = parse_number(values.at('K').front());
+  if (!value) {
+    reader.reading.note(
+        place,
+        "no number behind K: this line is not taken, since unflex does not evaluate "
+        "expressions; give kinematics.type with --set",
+        {"kinematics.type"});
     return {};
   }
   // KinematicsType.
   constexpr std::array kTypes = {std::pair{0, Kinematics::cartesian},
                                  std::pair{1, Kinematics::corexy}, std::pair{2, Kinematics::corexz},
                                  std::pair{11, Kinematics::hybrid_corexy}};
-  const int number = to_int(command.value('K').value_or(-1.0));
+  const int number = to_int(*value);
   const auto* type = std::ranges::find(kTypes, number, &std::pair<int, Kinematics>::first);
   if (type == kTypes.end()) {
     return refuse(fmt::format("kinematics K{} is a machine that {}", number, kNotSupported));
@@ -461,7 +471,7 @@ Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t n
       break;
     case 665:
     case 669:
-      return read_rrf_kinematics(reader, command, place);
+      return read_rrf_kinematics(reader, command, original.arguments, place);
     default:
       break;
   }

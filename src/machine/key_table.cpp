@@ -1,6 +1,7 @@
 #include "key_table.hpp"
 
 #include <array>
+#include <limits>
 
 namespace unflex::machine {
 namespace {
@@ -33,6 +34,12 @@ std::optional<double>& of_axis(Draft& draft) {
 template <std::array<double, 4> (Settings::*Derived)() const, std::size_t Index>
 double derived_of_axis(const Settings& settings) {
   return (settings.*Derived)()[Index];
+}
+
+// Infinity, which no key takes, stands for a value that is not known.
+template <double (Settings::*Freq)() const, bool (Settings::*Unknown)() const>
+double known_shaper(const Settings& settings) {
+  return (settings.*Unknown)() ? std::numeric_limits<double>::infinity() : (settings.*Freq)();
 }
 
 using S = Settings;
@@ -150,12 +157,12 @@ constexpr std::array kKeys = {
     Key{"printer.input_shaper_freq_x_hz", &setting<&S::printer, &P::input_shaper_freq_x_hz>,
         kNotNegative, "Hz",
         "What the printer's own [input_shaper] is set back to after the print; 0 if it has none",
-        "Klipper dynamics.x.freq_hz, else 0", &derived<&S::shaper_freq_x_hz>},
+        "Klipper not known, else 0", &known_shaper<&S::shaper_freq_x_hz, &S::shaper_unknown_x>},
     Key{"printer.input_shaper_freq_y_hz", &setting<&S::printer, &P::input_shaper_freq_y_hz>,
         kNotNegative, "Hz",
         "What the printer's own [input_shaper] is set back to after the print; 0 if it has none",
-        "Klipper dynamics.y.freq_hz, Marlin 0, RRF printer.input_shaper_freq_x_hz",
-        &derived<&S::shaper_freq_y_hz>},
+        "Klipper not known, Marlin 0, RRF printer.input_shaper_freq_x_hz",
+        &known_shaper<&S::shaper_freq_y_hz, &S::shaper_unknown_y>},
     Key{"printer.input_shaper_type",
         &setting<&S::printer, &P::input_shaper_type>,
         kAny,

@@ -53,7 +53,8 @@ std::optional<std::string> own_value(const Key& key, Draft& draft) {
 std::optional<std::string> value_in_force(const Key& key, Draft& draft) {
   std::optional<std::string> own = own_value(key, draft);
   if (!own && key.in_force != nullptr) {
-    return to_toml_value(key.in_force(draft.settings));
+    const double value = key.in_force(draft.settings);
+    return std::isfinite(value) ? std::optional(to_toml_value(value)) : std::nullopt;
   }
   return own;
 }

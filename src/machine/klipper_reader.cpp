@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "klipper_config.hpp"
+#include "klipper_shaper.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -162,7 +163,8 @@ class Reader {
         return fail(ErrorKind::usage, moves->place,
                     fmt::format("[{}] moves several carriages, '{}', which unflex does not "
                                 "understand; give a printer file of unflex, with kinematics.type "
-                                "= \"corexy\" or what it is (unflex printer writes one)",
+                                "= \"corexy\" or what it is (unflex printer init writes "
+                                "one)",
                                 name, moves->text));
       }
     }
@@ -234,12 +236,13 @@ class Reader {
   }
 
   // Types that Klipper has (shaper_defs.py). Newer ones may carry parameters, "mzv(n=4,t=0.9)".
-  void shaper_type(const std::string& axis) {
+  // Returns the type as it is written, "mzv" if none is.
+  std::string shaper_type(const std::string& axis) {
     constexpr std::array<std::string_view, 6> kTypes = {"zv", "mzv",      "zvd",
                                                         "ei", "2hump_ei", "3hump_ei"};
     const KlipperSection* const section = config_->find("input_shaper");
     if (section == nullptr) {
-      return;
+      return "mzv";
     }
     const KlipperOption* type = section->find("shaper_type_" + axis);
     type = type != nullptr ? type : section->find("shaper_type");
@@ -256,23 +259,51 @@ class Reader {
                                 text),
                     {key});
     }
+    return std::string(text);
   }
 
-  // A shaper's frequency is the resonance as it was measured. input_shaper.py, shaper_defs.py.
+  // A shaper's frequency suits the shaper; the resonance follows from it within a band.
+  void resonance(const std::string& axis, const std::string& type, double shaper_freq_hz,
+                 const SourcePlace& at) {
+    const std::string key = "dynamics." + axis + ".freq_hz";
+    const std::optional<ShaperResonance> found = resonance_of_shaper(type, shaper_freq_hz);
+    if (!found) {
+      return reading_.note(at,
+                           fmt::format("what resonance Klipper chooses '{}' for is not known to "
+                                       "unflex; find it with unflex identify and give {}",
+                                       type, key),
+                           {key});
+    }
+    reading_.add(key, found->freq_hz, at);
+    freq_error_ = std::max(freq_error_, found->freq_error);
+    reading_.add("dynamics.freq_error", freq_error_, at);
+    reading_.note(
+        at,
+        fmt::format("Klipper chooses {} at some {} times the resonance, so {} of {} Hz is taken "
+                    "for {} Hz ± {:.0f} %; unflex identify finds it exactly in the same "
+                    "measurement, and if the shaper was set by hand give {} as you measured it",
+                    type, found->ratio, frequency_name(axis), shaper_freq_hz, found->freq_hz,
+                    100.0 * found->freq_error, key),
+        {key});
+  }
+
+  static std::string frequency_name(const std::string& axis) { return "shaper_freq_" + axis; }
+
+  // input_shaper.py, shaper_defs.py.
   void input_shaper(const std::string& axis) {
     constexpr double kDefaultDampingRatio = 0.1;
-    const std::string frequency = "shaper_freq_" + axis;
+    const std::string frequency = frequency_name(axis);
     const std::string damping = "damping_ratio_" + axis;
     const double freq_hz = number("input_shaper", frequency).value_or(0.0);
     const SourcePlace at = place("input_shaper", frequency);
     reading_.add("printer.input_shaper_freq_" + axis + "_hz", freq_hz, at);
-    shaper_type(axis);
+    const std::string type = shaper_type(axis);
     if (freq_hz > 0.0) {
       const auto ratio = number("input_shaper", damping);
       reading_.add("printer.input_shaper_damping_ratio_" + axis,
                    ratio.value_or(kDefaultDampingRatio),
                    ratio ? place("input_shaper", damping) : at);
-      reading_.add("dynamics." + axis + ".freq_hz", freq_hz, at);
+      resonance(axis, type, freq_hz, at);
       reading_.add("dynamics." + axis + ".damping_ratio", ratio.value_or(kDefaultDampingRatio),
                    ratio ? place("input_shaper", damping) : at);
     }
@@ -281,6 +312,7 @@ class Reader {
   const KlipperConfig* config_;
   std::string file_;
   Reading reading_;
+  double freq_error_ = 0.0;  // the greater one of the axes
   std::optional<Error> failure_;
 };
 

@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <tuple>
 #include <utility>
@@ -52,18 +53,25 @@ Draft defaults() {
 
 // Stores what a printer file says, whatever kind it is of.
 Status read_printer(std::string_view text, const std::string& name, Draft& draft) {
+  draft.printer_file = name;
   const auto store = [&](Reading reading) {
-    draft.foreign_file = name;
     recognise_firmware(text, name, reading);
     return apply(reading, draft);
   };
   switch (source_kind(text)) {
     case SourceKind::klipper:
+      draft.band_of_shaper = true;
       return read_klipper(text, name).and_then(store);
     case SourceKind::marlin_dump:
       return read_marlin_dump(text, name).and_then(store);
     case SourceKind::rrf_config:
       return read_rrf_config(text, name).and_then(store);
+    case SourceKind::m115_answer:
+      return fail(ErrorKind::usage, {name, 0},
+                  "holds what M115 answers and nothing else, which tells the firmware and none of "
+                  "its limits; of a Marlin append what M503 answers, of another firmware give "
+                  "printer.cfg or config.g, and give dynamics.x.freq_hz and dynamics.y.freq_hz, "
+                  "which unflex identify finds, where they tell of no input shaper");
     case SourceKind::print:
       return fail(ErrorKind::usage, {name, 0},
                   "is a print, not a printer file; what its slicer says of the printer is read "
@@ -74,25 +82,87 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
   return read_toml(text, name, draft);
 }
 
-// A firmware's own configuration says everything, except the resonances if no input shaper is set
-// up.
+struct AxisFrequency {
+  std::string_view axis;
+  std::string_view key;
+  AxisDynamics Settings::*dynamics;
+};
+
+constexpr std::array kFrequencies = {
+    AxisFrequency{"X", "dynamics.x.freq_hz", &Settings::dynamics_x},
+    AxisFrequency{"Y", "dynamics.y.freq_hz", &Settings::dynamics_y}};
+
+// A wrong resonance makes a print worse than it was sliced, so the default is for measuring alone.
 void note_unknown_resonances(Draft& draft) {
   std::vector<std::string_view> axes;
-  for (const std::string_view axis : {"x", "y"}) {
-    if (!draft.places[*find_key(fmt::format("dynamics.{}.freq_hz", axis))]) {
-      axes.push_back(axis);
+  std::vector<std::string> overrides;
+  for (const AxisFrequency& frequency : kFrequencies) {
+    if (!draft.places[*find_key(frequency.key)]) {
+      axes.push_back(frequency.axis);
+      overrides.push_back(fmt::format("--set {}=...", frequency.key));
     }
   }
-  if (draft.foreign_file.empty() || axes.empty()) {
+  if (axes.empty()) {
     return;
   }
-  Diagnostic note;
-  note.place.file = draft.foreign_file;
-  note.message = fmt::format(
-      "no input shaper tells the resonance along {}; measure it and give --set "
-      "dynamics.{}.freq_hz=..., until then {} Hz is a guess",
-      fmt::join(axes, " and "), axes.front(), AxisDynamics{}.freq_hz);
-  draft.settings.notes.push_back(std::move(note));
+  draft.settings.guesses.push_back(
+      {{draft.printer_file, 0},
+       fmt::format("the resonance along {} is not given, and {} Hz is assumed, a guess that "
+                   "compensate refuses; find it with unflex identify, take it from the printer's "
+                   "own configuration with unflex printer init, or give {}",
+                   fmt::join(axes, " and "), AxisDynamics{}.freq_hz, fmt::join(overrides, " "))});
+}
+
+// Printers swing between some 20 and 120 Hz. What is far from that is mostly in another unit.
+void note_odd_frequencies(Draft& draft) {
+  constexpr double kLeast_hz = 10.0;
+  constexpr double kMost_hz = 200.0;
+  for (const AxisFrequency& frequency : kFrequencies) {
+    const std::optional<SourcePlace>& place = draft.places[*find_key(frequency.key)];
+    const double freq_hz = (draft.settings.*frequency.dynamics).freq_hz;
+    if (place && (freq_hz < kLeast_hz || freq_hz > kMost_hz)) {
+      draft.settings.notes.push_back(
+          {*place,
+           fmt::format("{} is {:.4g}, but printers swing at {} to {} Hz; look whether it is "
+                       "in Hz and of this axis, or measure it with unflex identify",
+                       frequency.key, freq_hz, kLeast_hz, kMost_hz)});
+    }
+  }
+}
+
+// Firmwares that limit motors hold X to the limits of a Z motor that moves it too, and runs leave
+// Z's limits as they are.
+void note_slow_z_motor(Draft& draft) {
+  const Settings& s = draft.settings;
+  constexpr std::size_t kZ = 2;
+  constexpr std::string_view kKey = "limits.max_z_accel_mm_s2";
+  const double z_mm_s2 = s.axis_max_accel_mm_s2()[kZ];
+  if (s.printer.firmware == Firmware::klipper || s.kinematics.type != Kinematics::corexz ||
+      z_mm_s2 >= s.base_max_accel_mm_s2()) {
+    return;
+  }
+  const std::optional<SourcePlace>& place = draft.places[*find_key(kKey)];
+  draft.settings.notes.push_back(
+      {place ? *place : SourcePlace{draft.printer_file, 0},
+       fmt::format(
+           "{} (M201 Z) is {}, and on a corexz the Z motor moves X too, so that the firmware "
+           "holds X to it and compensated lines, which need up to base.max_accel_mm_s2, {}, "
+           "come out wrong; raise M201 Z on the printer if its motor can do it, and the key",
+           kKey, z_mm_s2, s.base_max_accel_mm_s2())});
+}
+
+// Drops the band that a shaper's frequency brought, if neither axis has its resonance from one.
+void forget_needless_band(Draft& draft) {
+  const auto is_overridden = [&](std::string_view key) {
+    const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
+    return place && place->file.starts_with(kOverrideMark);
+  };
+  constexpr std::string_view kBand = "dynamics.freq_error";
+  if (draft.band_of_shaper && !is_overridden(kBand) &&
+      std::ranges::all_of(kFrequencies, is_overridden, &AxisFrequency::key)) {
+    draft.settings.dynamics_error.freq = 0.0;
+    draft.places[*find_key(kBand)].reset();
+  }
 }
 
 bool is_known(const Note& note, const Draft& draft) {
@@ -196,7 +266,10 @@ Result<Settings> finish(Draft draft) {
     return tl::unexpected(checked.error());
   }
   judge_variant(draft);
+  forget_needless_band(draft);
   tell_notes(draft);
+  note_odd_frequencies(draft);
+  note_slow_z_motor(draft);
   note_unknown_resonances(draft);
   record_origins(draft);
   return draft.settings;

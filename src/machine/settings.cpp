@@ -37,11 +37,6 @@ std::array<double, 4> or_default(const AxisOptions& own, const std::array<double
   return values;
 }
 
-// Input shaping is part of every Klipper, but an option of Marlin's that is off by default.
-double default_shaper_hz(const PrinterSettings& printer, const AxisDynamics& dynamics) {
-  return printer.firmware == Firmware::klipper ? dynamics.freq_hz : 0.0;
-}
-
 // The default of M204 P and T.
 double default_command_accel(const Settings& settings) {
   // RepRapFirmware's DefaultPrintingAcceleration, above whatever M201 allows.
@@ -170,6 +165,16 @@ double Settings::max_lines_per_s() const {
   return emit.max_lines_per_s.value_or(by_transport());
 }
 
+double Settings::min_line_s() const {
+  return std::max(period_ms() * 1e-3, kClockRoom / max_lines_per_s());
+}
+
+double Settings::least_speed_step_mm_s() const {
+  // The base always has to accelerate that many times as much as the plan.
+  constexpr double kLeastHeadroom = 1.2;
+  return kLeastHeadroom * limits.max_accel_mm_s2 * min_line_s() / kSpeedStepShare;
+}
+
 double Settings::max_extrude_cross_section_mm2() const {
   return extruder.max_extrude_cross_section_mm2.value_or(4.0 * extruder.nozzle_diameter_mm *
                                                          extruder.nozzle_diameter_mm);
@@ -249,15 +254,21 @@ double Settings::shaper_damping_ratio_y() const {
       by_firmware(printer.firmware, kKlipperDampingRatio, kMarlinDampingRatio, kRrfDampingRatio));
 }
 
-double Settings::shaper_freq_x_hz() const {
-  return printer.input_shaper_freq_x_hz.value_or(default_shaper_hz(printer, dynamics_x));
-}
+double Settings::shaper_freq_x_hz() const { return printer.input_shaper_freq_x_hz.value_or(0.0); }
 
 // RepRapFirmware has one shaper for both axes.
 double Settings::shaper_freq_y_hz() const {
-  return printer.input_shaper_freq_y_hz.value_or(printer.firmware == Firmware::rrf
-                                                     ? shaper_freq_x_hz()
-                                                     : default_shaper_hz(printer, dynamics_y));
+  return printer.input_shaper_freq_y_hz.value_or(
+      printer.firmware == Firmware::rrf ? shaper_freq_x_hz() : 0.0);
+}
+
+// Input shaping is part of every Klipper, but an option of Marlin's that is off by default.
+bool Settings::shaper_unknown_x() const {
+  return printer.firmware == Firmware::klipper && !printer.input_shaper_freq_x_hz;
+}
+
+bool Settings::shaper_unknown_y() const {
+  return printer.firmware == Firmware::klipper && !printer.input_shaper_freq_y_hz;
 }
 
 }  // namespace unflex::machine

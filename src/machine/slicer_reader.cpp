@@ -105,11 +105,12 @@ class Reader {
       reading_.add("printer.firmware", std::string(to_string(meant)),
                    macro != 0 ? SourcePlace{print_->name, macro} : place);
     } else if (by_default && meant != *runs) {
-      reading_.note(place,
-                    fmt::format("sliced for {0}, but taken to be run by {1}, the default; say "
-                                "which it is with --set printer.firmware={0} or {1}, or by "
-                                "printer.firmware in the printer file",
-                                to_string(meant), to_string(*runs)));
+      reading_.guess(place,
+                     fmt::format("sliced for {0}, but taken to be run by {1}, the default, a guess "
+                                 "that compensate refuses; say which it is with --set "
+                                 "printer.firmware={0} or {1}, or by printer.firmware in the "
+                                 "printer file",
+                                 to_string(meant), to_string(*runs)));
     }
     const Firmware firmware = runs.value_or(meant);
     const SlicerOption* const usage = option("machine_limits_usage");
@@ -154,10 +155,11 @@ class Reader {
       return known->firmware;
     }
     if (by_default) {
-      reading_.note(given->place,
-                    fmt::format("unflex does not know G-code of the flavor '{}'; say what runs it "
-                                "with --set printer.firmware=...",
-                                given->text));
+      reading_.guess(given->place,
+                     fmt::format("unflex does not know G-code of the flavor '{}', and that klipper "
+                                 "runs it is a guess that compensate refuses; say what runs it "
+                                 "with --set printer.firmware=...",
+                                 given->text));
     }
     return std::nullopt;
   }

@@ -25,6 +25,7 @@ struct Traces {
   int moves = 0;
   int klipper = 0;  // sections and options no TOML of ours has
   int headers = 0;
+  int firmware_names = 0;  // as M115 tells them
 };
 
 bool is_one_of(int number, const auto& codes) {
@@ -80,6 +81,7 @@ void look_at_command(std::string_view line, Traces& traces) {
 
 void look_at(std::string_view line, Traces& traces) {
   const std::string_view content = trimmed(line);
+  traces.firmware_names += content.find("FIRMWARE_NAME:") != std::string_view::npos ? 1 : 0;
   const std::size_t echo = content.find("echo:");
   if (echo != std::string_view::npos) {
     ++traces.echoes;
@@ -121,7 +123,11 @@ SourceKind source_kind(std::string_view text) {
   if (traces.rrf_settings > traces.marlin_settings) {
     return SourceKind::rrf_config;
   }
-  return traces.settings > 1 && traces.headers == 0 ? SourceKind::marlin_dump : SourceKind::toml;
+  if (traces.settings > 1 && traces.headers == 0) {
+    return SourceKind::marlin_dump;
+  }
+  const bool is_answer = traces.firmware_names > 0 && traces.settings == 0 && traces.headers == 0;
+  return is_answer ? SourceKind::m115_answer : SourceKind::toml;
 }
 
 }  // namespace unflex::machine

@@ -10,6 +10,7 @@ enum class SourceKind {
   klipper,      // printer.cfg
   marlin_dump,  // what M503 answers
   rrf_config,   // config.g
+  m115_answer,  // what M115 answers, and nothing else
   print,        // sliced G-code
 };
 

@@ -262,6 +262,17 @@ Status check_emission(const Draft& draft) {
                                 "base.max_accel_mm_s2); raise it or lower base.max_accel_mm_s2",
                                 s.emit_accel_mm_s2(), least_accel, kEmitAccelFactor));
   }
+  // On the other firmwares lines end on whole steps, too coarse for this key.
+  if (s.printer.firmware == Firmware::klipper && place_of(draft, "emit.max_speed_step_mm_s") &&
+      s.emit.max_speed_step_mm_s < s.least_speed_step_mm_s()) {
+    return conflict(
+        draft, {"emit.max_speed_step_mm_s"},
+        fmt::format("emit.max_speed_step_mm_s is {}, but must be at least {}, what "
+                    "limits.max_accel_mm_s2, {}, needs in lines of {:.3g} ms; raise it, "
+                    "or emit.max_lines_per_s if that makes lines so long",
+                    s.emit.max_speed_step_mm_s, at_least(s.least_speed_step_mm_s()),
+                    s.limits.max_accel_mm_s2, 1e3 * s.min_line_s()));
+  }
   if (s.emit.square_corner_velocity_mm_s < s.limits.square_corner_velocity_mm_s) {
     return conflict(
         draft, {"emit.square_corner_velocity_mm_s", "limits.square_corner_velocity_mm_s"},
@@ -324,6 +335,13 @@ std::vector<std::string> recommendations(const Settings& settings) {
     remarks.push_back(
         fmt::format("emit.period_ms is {}; at {:.4g} Hz {} or less follows the path better",
                     settings.period_ms(), fastest_freq_hz(settings), at_most(good_ms)));
+  }
+  const double least_lines_per_s = 2.0 * fastest_freq_hz(settings);
+  if (settings.emit.max_lines_per_s && *settings.emit.max_lines_per_s < least_lines_per_s) {
+    remarks.push_back(fmt::format(
+        "emit.max_lines_per_s is {}, and lines so long cannot follow a resonance at {:.4g} Hz, so "
+        "that runs stay as sliced; give {} or more, as many as unflex printer line-test shows",
+        *settings.emit.max_lines_per_s, fastest_freq_hz(settings), at_least(least_lines_per_s)));
   }
   return remarks;
 }

@@ -103,8 +103,9 @@ SourcePlace first_place(const Draft& draft, std::initializer_list<std::string_vi
   return {};
 }
 
-bool has_shaper(const Settings& s) {
-  return s.shaper_freq_x_hz() > 0.0 || s.shaper_freq_y_hz() > 0.0;
+bool may_have_shaper(const Settings& s) {
+  return s.shaper_freq_x_hz() > 0.0 || s.shaper_freq_y_hz() > 0.0 || s.shaper_unknown_x() ||
+         s.shaper_unknown_y();
 }
 
 void refuse(Draft& draft, SourcePlace place, std::string message) {
@@ -123,7 +124,7 @@ void klipper_ignores_shaper_off(Draft& draft) {
   const std::array<int, 4> version = numbers_of(s.printer.version);
   const bool is_after_tag = std::equal(kTag.begin(), kTag.end(), version.begin());
   if (s.printer.firmware == Firmware::klipper && !s.printer.variant.starts_with(kKalico) &&
-      is_after_tag && version.back() >= kBroken && version.back() < kMended && has_shaper(s)) {
+      is_after_tag && version.back() >= kBroken && version.back() < kMended && may_have_shaper(s)) {
     refuse(draft, first_place(draft, {"printer.version"}),
            fmt::format("Klipper {} does not carry out SET_INPUT_SHAPER SHAPER_FREQ_X=0, so that a "
                        "compensated print would be shaped twice; update it to v0.13.0-{} or later, "
@@ -165,7 +166,7 @@ void prusa_buddy(Draft& draft) {
 
 void snapmaker_j1(Draft& draft) {
   const Settings& s = draft.settings;
-  if (s.printer.variant == kSnapmakerJ1 && has_shaper(s)) {
+  if (s.printer.variant == kSnapmakerJ1 && may_have_shaper(s)) {
     refuse(draft, first_place(draft, {"printer.input_shaper_freq_x_hz", "printer.variant"}),
            "on the Snapmaker J1 M593 F0, which switches input shaping off, stops X and Y for the "
            "rest of the print; switch its shaping off on its display before the print and set "

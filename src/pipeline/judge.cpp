@@ -211,8 +211,9 @@ Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_
   }
   // If the sliced lines themselves exceed the budget, the run may have as many as they.
   if (rate.max_per_s() > std::max(max_lines_per_s, original_rate.max_per_s())) {
-    verdict.objection = fmt::format("{:.0f} lines per second are more than {:.0f}",
-                                    rate.max_per_s(), max_lines_per_s);
+    verdict.objection =
+        fmt::format("{:.0f} lines per second are more than emit.max_lines_per_s, {:.0f}",
+                    rate.max_per_s(), max_lines_per_s);
     return verdict;
   }
   const verify::RunDeviation after = deviation_of(run, verdict.replayed, nozzle, rules, lead_in_s);

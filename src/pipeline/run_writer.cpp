@@ -113,6 +113,7 @@ Result<std::string> RunWriter::write(const RunJob& job) {
 std::string RunWriter::finish() {
   std::string text;
   emitter_.finish(text);
+  report_->shaper_left_off = emitter_.shaper_left_off();
   report_->extruded_path = path_.path();
   report_->unknown_commands = path_.unknown_commands();
   report_->line_budget.max_lines_per_s = max_lines_per_s_;

@@ -17,22 +17,9 @@ namespace {
 // that far below the limit, so that the text keeps it.
 constexpr double kGridMm = 1e-4;
 constexpr double kAccelShare = 0.98;
-// The share that the base may use of the largest change of speed from line to line. The rest lets
-// the lines make up for each other. But the base may always accelerate kLeastHeadroom times as much
-// as the plan.
-constexpr double kSpeedStepShare = 0.93;
-constexpr double kLeastHeadroom = 1.2;
-// The firmware's clock differs a little from line to line. With this room no more lines than the
-// budget begin within any 100 ms all the same.
-constexpr double kClockRoom = 1.002;
-
 // The time over which lines are counted, and the shortest line relative to the even pace.
 constexpr double kBurst_s = 0.1;
 constexpr double kShortest = 0.4;
-
-double min_line_s(const machine::Settings& settings) {
-  return std::max(settings.period_ms() * 1e-3, kClockRoom / settings.max_lines_per_s());
-}
 
 double grid_mm(const machine::Settings& settings) {
   const std::array<double, 4> steps_per_mm = settings.steps_per_mm();
@@ -53,12 +40,13 @@ bool shares_motors(const machine::Settings& settings) {
 // limit of acceleration and, if lines end on a fine grid, one of the change of speed from line to
 // line. Whole steps of a motor are too coarse for the second.
 double planned_base_accel(const machine::Settings& settings) {
-  const double shortest_s = min_line_s(settings);
+  const double shortest_s = settings.min_line_s();
   double limit = settings.base_max_accel_mm_s2();
   if (grid_mm(settings) <= kGridMm) {
-    limit =
-        std::min(limit, std::max(kSpeedStepShare * settings.emit.max_speed_step_mm_s / shortest_s,
-                                 kLeastHeadroom * settings.limits.max_accel_mm_s2));
+    limit = std::min(
+        limit, machine::kSpeedStepShare *
+                   std::max(settings.emit.max_speed_step_mm_s, settings.least_speed_step_mm_s()) /
+                   shortest_s);
   }
   const double axes =
       shares_motors(settings) ? 2.0 : 1.0;  // number of axes whose rounding a motor gets
@@ -175,6 +163,8 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
       .circles = settings.printer.arc_p_circles};
   options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
   options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
+  options.shaper_unknown_x = settings.shaper_unknown_x();
+  options.shaper_unknown_y = settings.shaper_unknown_y();
   options.shaper_type = settings.shaper_type_x();
   options.has_print_jerk = settings.has_print_jerk();
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
@@ -280,10 +270,10 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.lines.reach_x = reach(settings.printer.travel_x_mm);
   options.lines.reach_y = reach(settings.printer.travel_y_mm);
   if (settings.printer.firmware == Firmware::klipper) {
-    options.lines.min_line_s = min_line_s(settings);
+    options.lines.min_line_s = settings.min_line_s();
   } else {
     options.lines.burst_lines = static_cast<int>(settings.max_lines_per_s() * kBurst_s);
-    options.lines.burst_s = kClockRoom * kBurst_s;
+    options.lines.burst_s = machine::kClockRoom * kBurst_s;
     options.lines.min_line_s =
         std::max(settings.period_ms() * 1e-3, kShortest / settings.max_lines_per_s());
   }

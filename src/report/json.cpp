@@ -82,7 +82,7 @@ void add_work(const Report& r, Json& json) {
   if (r.solver_engine.empty()) {
     // Nothing was solved: an existing file was verified. How it was made is not known.
     for (const char* const key : {"windows", "fallbacks", "kept_moves", "extruded_path",
-                                  "unknown_commands", "line_budget", "solver"}) {
+                                  "unknown_commands", "line_budget", "solver", "shaper_left_off"}) {
       json[key] = nullptr;
     }
     json["runs"] = {{"total", nullptr}, {"compensated", r.runs_compensated}, {"fallback", nullptr}};
@@ -102,6 +102,7 @@ void add_work(const Report& r, Json& json) {
                     {"checked_windows", r.solver_check.windows},
                     {"largest_gap", r.solver_check.largest_gap},
                     {"largest_difference_mm", r.solver_check.largest_difference_mm}};
+  json["shaper_left_off"] = r.shaper_left_off;
 }
 
 void add_output(const Report& r, Json& json) {

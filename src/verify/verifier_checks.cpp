@@ -15,6 +15,7 @@ namespace {
 constexpr double kFilamentTolerance_mm = 1.5e-5 + 1e-9;
 
 // Type and damping of a shaper that is off are of no effect.
+// A shaper that is not known cannot be restored.
 bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
   const bool same_x =
       a.shaper_freq_x_hz == 0.0 ||
@@ -23,8 +24,9 @@ bool same_shaper(const gcode::ModalState& a, const gcode::ModalState& b) {
   const bool same_y =
       a.shaper_freq_y_hz == 0.0 ||
       (a.shaper.type_y == b.shaper.type_y && a.shaper.damping_ratio_y == b.shaper.damping_ratio_y);
-  return a.shaper_freq_x_hz == b.shaper_freq_x_hz && a.shaper_freq_y_hz == b.shaper_freq_y_hz &&
-         same_x && same_y;
+  const bool same_freqs = (a.shaper_unknown_x || a.shaper_freq_x_hz == b.shaper_freq_x_hz) &&
+                          (a.shaper_unknown_y || a.shaper_freq_y_hz == b.shaper_freq_y_hz);
+  return same_freqs && same_x && same_y;
 }
 
 }  // namespace

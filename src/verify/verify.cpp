@@ -173,7 +173,8 @@ void Verifier::play_run() {
   }
   if (compensated) {
     const gcode::ModalState& modal = output_.section().regime->modal;
-    if (modal.shaper_freq_x_hz != 0.0 || modal.shaper_freq_y_hz != 0.0) {
+    if (modal.shaper_freq_x_hz != 0.0 || modal.shaper_freq_y_hz != 0.0 || modal.shaper_unknown_x ||
+        modal.shaper_unknown_y) {
       violations_.in_output(output_.section().line.number,
                             "the printer's input shaper is on in a compensated run");
     }

@@ -130,7 +130,8 @@ TEST_F(BatchTest, DoesAgainOnlyWhatChanged) {
 
 TEST_F(BatchTest, DoesAllAgainForOtherSettings) {
   add("in/a.g");
-  add("printer.toml", "[limits]\nmax_accel_mm_s2 = 3000\n");
+  add("printer.toml",
+      "[limits]\nmax_accel_mm_s2 = 3000\n[dynamics]\nx.freq_hz = 45\ny.freq_hz = 45\n");
   EXPECT_EQ(states({"--printer", "printer.toml"}).at("a.g"), "done");
   // Equal settings from another source.
   EXPECT_EQ(states({"--set", "limits.max_accel_mm_s2=3000"}).at("a.g"), "unchanged");
@@ -238,7 +239,8 @@ TEST_F(BatchTest, NamesWhatItCannotMake) {
   add("in/a.g");
   add("in/b/c.g");
   add("out/b");
-  add("in/p.json", "[limits]\nmax_accel_mm_s2 = 3000\n");
+  add("in/p.json",
+      "[limits]\nmax_accel_mm_s2 = 3000\n[dynamics]\nx.freq_hz = 45\ny.freq_hz = 45\n");
   EXPECT_EQ(states(), (States{{"a.g", "done"}, {"b/c.g", "failed"}}));
   EXPECT_THAT(last().err, HasSubstr("out/b/c.g: cannot make its folder: Not a directory"));
   EXPECT_EQ(run(batch({"--printer", "in/p.json", "--summary", "in/p.json"})).err,

@@ -26,7 +26,7 @@ std::string sliced_print() {
          small_print() +
          "; filament used [mm] = 12.34\n"
          "; estimated printing time (normal mode) = 2h 0m 0s\n\n"
-         "; prusaslicer_config = begin\n; gcode_flavor = marlin2\n"
+         "; prusaslicer_config = begin\n; gcode_flavor = klipper\n"
          "; filament_diameter = 2.8125\n; machine_max_acceleration_x = 1234,1\n; "
          "machine_max_acceleration_y = 1234,1\n"
          "; machine_max_acceleration_extruding = 1234,1\n"

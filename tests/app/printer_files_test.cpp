@@ -51,7 +51,8 @@ TEST_F(PrinterFile, GivesTheSameBytesAsPrinterCfgAsTomlAndByOverrides) {
 }
 
 TEST_F(PrinterFile, MayComeFromAPipe) {
-  const std::string config = "[limits]\nmax_accel_mm_s2 = 1500\n";
+  const std::string config =
+      "[limits]\nmax_accel_mm_s2 = 1500\n[dynamics]\nx.freq_hz = 45\ny.freq_hz = 45\n";
   write_file(path("p.toml"), config);
   ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
   std::thread writer([&] { write_file(path("pipe"), config); });
@@ -95,11 +96,21 @@ TEST_F(PrinterFile, IsNotWrittenOverWhatItIsMadeFrom) {
 TEST_F(PrinterFile, IsAskedForWhereTheSlicerHadAnotherFirmwareInMind) {
   write_file(path("in.gcode"), "; gcode_flavor = reprapfirmware\n" + small_print());
   const Outcome file = run({"compensate", "in.gcode", "-o", "-", "-q"});
-  EXPECT_THAT(file.out, HasSubstr("SET_VELOCITY_LIMIT"));
-  EXPECT_THAT(file.err, HasSubstr("in.gcode:1: warning: sliced for rrf, but taken to be run by "
-                                  "klipper, the default"));
+  EXPECT_EQ(file.exit_code, 1);
+  EXPECT_EQ(file.out, "");
+  EXPECT_THAT(file.err,
+              StartsWith("in.gcode:1: sliced for rrf, but taken to be run by klipper, the "
+                         "default, a guess that compensate refuses; say which it is with "
+                         "--set printer.firmware=rrf or klipper"));
   const Outcome piped = run({"compensate", "-", "-o", "-", "-q"}, read_file(path("in.gcode")));
-  EXPECT_EQ(piped.out, file.out);
+  EXPECT_EQ(piped.exit_code, 1);
+  const Outcome inspected = run({"inspect", "in.gcode", "-q"});
+  EXPECT_EQ(inspected.exit_code, 0);
+  EXPECT_THAT(inspected.err,
+              StartsWith("in.gcode:1: warning: sliced for rrf, but taken to be run "));
+  const Outcome klipper =
+      run({"compensate", "in.gcode", "-o", "-", "-q", "--set", "printer.firmware=klipper"});
+  EXPECT_THAT(klipper.out, HasSubstr("SET_VELOCITY_LIMIT"));
   const Outcome told =
       run({"compensate", "in.gcode", "-o", "-", "-q", "--set", "printer.firmware=rrf"});
   EXPECT_THAT(told.out, HasSubstr("M566"));

@@ -43,12 +43,24 @@ std::filesystem::path make_directory() {
 
 }  // namespace
 
+std::vector<std::string> with_dynamics(std::vector<std::string> arguments) {
+  const bool is_on_print =
+      !arguments.empty() && (arguments[0] == "compensate" || arguments[0] == "batch" ||
+                             arguments[0] == "verify" || arguments[0] == "inspect");
+  if (is_on_print && std::ranges::find(arguments, "--printer") == arguments.end()) {
+    arguments.insert(arguments.begin() + 1,
+                     {"--set", "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45"});
+  }
+  return arguments;
+}
+
 Program::Program(const std::filesystem::path& directory, const std::vector<std::string>& arguments,
-                 const std::string& input, const std::function<void()>& prepare)
+                 const std::string& input, const std::function<void()>& prepare, Dynamics dynamics)
     : scratch_(make_directory()) {
   write_file(scratch_ / "in", input);
-  std::vector<std::string> words = {"unflex"};
-  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<std::string> words =
+      dynamics == Dynamics::given ? with_dynamics(arguments) : arguments;
+  words.insert(words.begin(), "unflex");
   std::vector<char*> argv;
   for (std::string& word : words) {
     argv.push_back(word.data());

@@ -17,13 +17,22 @@ struct Outcome {
   std::string err;
 };
 
+// Whether a command on a print that names no printer file is told resonances of 45 Hz, which
+// compensate does not guess.
+enum class Dynamics { given, as_typed };
+
+// The arguments with resonances of 45 Hz behind the command, if it works on a print and no printer
+// file is named.
+[[nodiscard]] std::vector<std::string> with_dynamics(std::vector<std::string> arguments);
+
 // A started program whose stdout and stderr go to files.
 class Program {
  public:
   // `input` becomes stdin; the program runs in `directory`. prepare: called in the new process just
   // before the program starts, for example to limit its memory.
   Program(const std::filesystem::path& directory, const std::vector<std::string>& arguments,
-          const std::string& input = "", const std::function<void()>& prepare = {});
+          const std::string& input = "", const std::function<void()>& prepare = {},
+          Dynamics dynamics = Dynamics::given);
   void signal(int number) const;
   [[nodiscard]] pid_t pid() const { return child_; }
   [[nodiscard]] Outcome wait();
@@ -57,6 +66,9 @@ class ProgramTest : public ::testing::Test {
                             const std::string& input = "",
                             const std::function<void()>& prepare = {}) const {
     return Program(directory_, arguments, input, prepare).wait();
+  }
+  [[nodiscard]] Outcome run_as_typed(const std::vector<std::string>& arguments) const {
+    return Program(directory_, arguments, "", {}, Dynamics::as_typed).wait();
   }
   [[nodiscard]] const std::filesystem::path& directory() const { return directory_; }
 

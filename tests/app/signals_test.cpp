@@ -89,7 +89,8 @@ TEST_F(ProgramTest, DoesNotSayThatNoReportWasWrittenOnceItWas) {
        {std::vector<std::string>{"inspect", "in.gcode", "--report", "new.json"},
         std::vector<std::string>{"printer", "init", "--from", "p.toml", "-o", "new.json"}}) {
     std::filesystem::remove(path("new.json"));
-    write_file(path("p.toml"), "[limits]\nmax_accel_mm_s2 = 3000\n");
+    write_file(path("p.toml"),
+               "[limits]\nmax_accel_mm_s2 = 3000\n[dynamics]\nx.freq_hz = 45\ny.freq_hz = 45\n");
     Program program(directory(), words, "", stop_stdout);
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     while (!std::filesystem::exists(path("new.json")) &&
@@ -166,7 +167,7 @@ TEST_F(ProgramTest, EndsWithoutASignalWhenNobodyReadsItsOutput) {
     const int null = ::open(path("err").c_str(), O_WRONLY | O_CREAT, 0600);
     ::dup2(null, STDERR_FILENO);
     ::execl(test_paths::kProgram, "unflex", "compensate", path("in.gcode").c_str(), "-o", "-",
-            nullptr);
+            "--set", "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45", nullptr);
     ::_exit(127);
   }
   ::close(ends[0]);

@@ -45,7 +45,8 @@ class Filter {
         ::close(fd);
       }
       static_cast<void>(std::freopen(errors.c_str(), "w", stderr));
-      ::execl(test_paths::kProgram, "unflex", "compensate", "-", "-o", "-", nullptr);
+      ::execl(test_paths::kProgram, "unflex", "compensate", "-", "-o", "-", "--set",
+              "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45", nullptr);
       ::_exit(127);
     }
     ::close(in[0]);

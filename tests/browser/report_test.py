@@ -25,7 +25,8 @@ def make_report(folder, name, text):
         file.write(text)
     page = os.path.join(folder, "report.html")
     subprocess.run([UNFLEX, "compensate", source, "-o", os.path.join(folder, "out.gcode"), "-q",
-                    "--engine", "banded", "--report", page], check=True)
+                    "--engine", "banded", "--set", "dynamics.x.freq_hz=45", "--set",
+                    "dynamics.y.freq_hz=45", "--report", page], check=True)
     return page
 
 

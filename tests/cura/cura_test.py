@@ -13,6 +13,9 @@ import types
 import unittest
 
 UNFLEX, SCRIPT = sys.argv[1:3]
+# Cura's prints name Marlin, and no print names resonances.
+OPTIONS = ["--engine", "banded", "--set", "printer.firmware=klipper", "--set",
+           "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45"]
 
 
 class Script:
@@ -78,7 +81,7 @@ class UnflexCompensate(unittest.TestCase):
     def setUp(self):
         Message.shown.clear()
         self.script = self.Compensate()
-        self.script.values.update(program=UNFLEX, options="--engine banded")
+        self.script.values.update(program=UNFLEX, options=" ".join(OPTIONS))
 
     def test_describes_its_settings(self):
         description = json.loads(self.script.getSettingDataString())
@@ -105,8 +108,8 @@ class UnflexCompensate(unittest.TestCase):
             with open(sliced, "w", encoding="utf-8", newline="") as file:
                 file.write("".join(self.data))
             out = os.path.join(folder, "out.gcode")
-            status = os.spawnv(os.P_WAIT, UNFLEX, [UNFLEX, "compensate", sliced, "-o", out, "-q",
-                                                   "--engine", "banded"])
+            status = os.spawnv(os.P_WAIT, UNFLEX,
+                               [UNFLEX, "compensate", sliced, "-o", out, "-q", *OPTIONS])
             self.assertEqual(status, 0)
             with open(out, encoding="utf-8", newline="") as file:
                 self.assertEqual(result, file.read())

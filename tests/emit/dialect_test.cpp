@@ -151,5 +151,20 @@ TEST(ShaperLines, SwitchOffAndBackOn) {
   EXPECT_THAT(shaper_lines(Firmware::rrf, on, on), IsEmpty());
 }
 
+TEST(ShaperLines, SwitchOffWhatIsNotKnownAndCannotSwitchItOn) {
+  gcode::Shaper unknown;
+  unknown.unknown_x = unknown.unknown_y = true;
+  EXPECT_THAT(shaper_lines(Firmware::klipper, {}, unknown),
+              ElementsAre("SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0"));
+  EXPECT_THAT(shaper_lines(Firmware::klipper, unknown, {}), IsEmpty());
+  EXPECT_EQ(unknown_shaper_words(unknown, {}), "SHAPER_FREQ_X=... SHAPER_FREQ_Y=...");
+  EXPECT_EQ(unknown_shaper_words(unknown, unknown), "");
+  unknown.unknown_y = false;
+  unknown.freq_y_hz = 40.0;
+  EXPECT_THAT(shaper_lines(Firmware::klipper, unknown, {}),
+              ElementsAre("SET_INPUT_SHAPER SHAPER_FREQ_Y=40"));
+  EXPECT_EQ(unknown_shaper_words(unknown, {}), "SHAPER_FREQ_X=...");
+}
+
 }  // namespace
 }  // namespace unflex::emit

@@ -244,6 +244,27 @@ TEST(Emitter, LeavesOutTheAxisThatHasNoShaper) {
   EXPECT_THAT(emit(input, how).text, Not(HasSubstr("SET_INPUT_SHAPER")));
 }
 
+const std::string kStaysOff =
+    ";unflex: the printer's own input shaper is not known and still off; set it again as its "
+    "configuration has it: SET_INPUT_SHAPER ";
+
+TEST(Emitter, SaysWhichShaperItCannotGiveBack) {
+  EmitOptions how = options();
+  how.interpreter.shaper_freq_x_hz = how.interpreter.shaper_freq_y_hz = 0.0;
+  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = true;
+  const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
+  const std::string text = emit(input, how).text;
+  EXPECT_THAT(text, HasSubstr("\n" + kShaperOff));
+  EXPECT_THAT(
+      text, ::testing::EndsWith("\nG4 P1\n" + kStaysOff + "SHAPER_FREQ_X=... SHAPER_FREQ_Y=...\n"));
+  // What the file sets is known.
+  const std::string set = emit(kHead + "SET_INPUT_SHAPER SHAPER_FREQ_Y=41\nG1 X10 E1\n", how).text;
+  EXPECT_THAT(set, ::testing::EndsWith("\nSET_INPUT_SHAPER SHAPER_FREQ_Y=41\n" + kStaysOff +
+                                       "SHAPER_FREQ_X=...\n"));
+  // Without a run nothing was switched off.
+  EXPECT_THAT(emit("G28\n", how).text, Not(HasSubstr("SET_INPUT_SHAPER")));
+}
+
 TEST(Emitter, WritesRelativeFilamentAndReturnsToAbsolute) {
   const std::string input = "G90\nM82\nG92 E0\nG1 X0 Y0 Z0.2 F6000\nG1 X10 E1\nG1 Y10 E2\nG4 P1\n";
   EXPECT_THAT(from_first_run(input),

@@ -168,9 +168,13 @@ TEST(FirmwareRetraction, IsIgnoredWhereItIsNotConfigured) {
   InterpreterOptions options = retracting();
   options.firmware_retraction = false;
   Session session(options);
+  std::size_t warnings = 0;
   for (const char* line : {"G10", "G11", "G10 S210 P0"}) {
-    EXPECT_EQ(session.read(line).kind, EventKind::passive) << line;
+    const Event event = session.read(line);
+    EXPECT_EQ(event.kind, EventKind::passive) << line;
+    warnings += event.warnings.size();
   }
+  EXPECT_EQ(warnings, 1U) << "it is said once";
   EXPECT_EQ(session.state().position_mm[E], 0.0);
 }
 

@@ -221,8 +221,6 @@ TEST(UnsetKeys, FollowTheKeysTheyDependOn) {
       "[dynamics.x]\nfreq_hz = 30\n");
   EXPECT_DOUBLE_EQ(s.base_max_velocity_mm_s(), 200.0);
   EXPECT_DOUBLE_EQ(s.base_max_accel_mm_s2(), 8000.0);
-  EXPECT_DOUBLE_EQ(s.shaper_freq_x_hz(), 30.0);
-  EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 45.0);
 }
 
 TEST(Tail, LastsForTheSlowerAxis) {

@@ -373,8 +373,8 @@ TEST(Slicers, DoNotChooseTheFirmwareOfACompensation) {
   EXPECT_EQ(told(*settings, "printer.firmware"), "\"klipper\" default");
   EXPECT_EQ(by_key(*settings)["limits.max_accel_mm_s2"].origin, "default") << "a Marlin's";
   EXPECT_EQ(told(*settings, "extruder.nozzle_diameter_mm"), "0.6 print.gcode:110");
-  ASSERT_THAT(settings->notes, SizeIs(1));
-  EXPECT_THAT(to_string(settings->notes[0]),
+  ASSERT_THAT(settings->guesses, SizeIs(2));
+  EXPECT_THAT(to_string(settings->guesses[0]),
               HasSubstr("print.gcode:101: warning: sliced for marlin, but taken to be run by "
                         "klipper, the default"));
   for (const char* firmware : {"klipper", "marlin"}) {
@@ -383,7 +383,7 @@ TEST(Slicers, DoNotChooseTheFirmwareOfACompensation) {
               .printer_file = {},
               .overrides = {fmt::format("printer.firmware={}", firmware)}});
     ASSERT_TRUE(chosen);
-    EXPECT_THAT(chosen->notes, IsEmpty());
+    EXPECT_THAT(chosen->guesses, SizeIs(1)) << "that of the resonances";
     EXPECT_EQ(chosen->limits.max_accel_mm_s2 == 2500.0, std::string(firmware) == "marlin");
   }
 }
@@ -401,16 +401,18 @@ TEST(Slicers, NameTheFlavorAloneInCura) {
   const PrintText print = print_of(";FLAVOR:Makerbot\n", "");
   const Settings odd = sliced(print);
   EXPECT_EQ(odd.printer.firmware, Firmware::klipper);
-  ASSERT_THAT(odd.notes, SizeIs(1));
-  EXPECT_EQ(to_string(odd.notes[0]),
-            "print.gcode:1: warning: unflex does not know G-code of the flavor 'Makerbot'; say "
-            "what runs it with --set printer.firmware=...");
+  ASSERT_THAT(odd.guesses, SizeIs(2));
+  EXPECT_EQ(
+      to_string(odd.guesses[0]),
+      "print.gcode:1: warning: unflex does not know G-code of the flavor 'Makerbot', and that "
+      "klipper runs it is a guess that compensate refuses; say what runs it with --set "
+      "printer.firmware=...");
   // A user who follows the advice does not get it again.
   const std::vector<std::string> said = {"printer.firmware=marlin"};
-  EXPECT_THAT(sliced(print, said).notes, IsEmpty());
+  EXPECT_THAT(sliced(print, said).guesses, SizeIs(1));
   const Result<Settings> to_run = load({.print = &print, .printer_file = {}, .overrides = said});
   ASSERT_TRUE(to_run);
-  EXPECT_THAT(to_run->notes, IsEmpty());
+  EXPECT_THAT(to_run->guesses, SizeIs(1));
 }
 
 TEST(Slicers, ThatWriteAtTheEndAreMissedInAPipe) {

@@ -24,6 +24,14 @@ void write_file(const std::filesystem::path& file, std::string_view text) {
 machine::Settings settings(const std::vector<std::string>& overrides) {
   Result<machine::Settings> loaded = machine::load(std::nullopt, overrides);
   EXPECT_TRUE(loaded.has_value()) << to_string(loaded.error());
+  // A Klipper has a shaper, so that every test sees it switched off and on again.
+  machine::PrinterSettings& printer = loaded->printer;
+  if (printer.firmware == Firmware::klipper) {
+    printer.input_shaper_freq_x_hz =
+        printer.input_shaper_freq_x_hz.value_or(loaded->dynamics_x.freq_hz);
+    printer.input_shaper_freq_y_hz =
+        printer.input_shaper_freq_y_hz.value_or(loaded->dynamics_y.freq_hz);
+  }
   return *loaded;
 }
 

@@ -109,7 +109,8 @@ TEST(Judge, RejectsMoreLinesPerSecondThanAllowed) {
   EXPECT_EQ(Corner(false).objection_to(text, 1000.0), std::nullopt);
   const std::optional<std::string> reason = Corner(false).objection_to(text, 100.0);
   ASSERT_TRUE(reason.has_value());
-  EXPECT_TRUE(reason->ends_with(" lines per second are more than 100")) << *reason;
+  EXPECT_TRUE(reason->ends_with(" lines per second are more than emit.max_lines_per_s, 100"))
+      << *reason;
   // The two sliced lines exceed this limit as well, and no output could have fewer lines.
   EXPECT_EQ(Corner(false).objection_to("G1 X10\nG1 Y10\n", 1.0), std::nullopt);
 }

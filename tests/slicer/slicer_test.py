@@ -15,6 +15,7 @@ import unittest
 
 UNFLEX = os.path.abspath(sys.argv[1])
 SLICER = shutil.which("prusa-slicer")
+DYNAMICS = ("--set", "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45")
 
 # A picture in the head as PrusaSlicer writes it. Its command line makes none.
 THUMBNAIL = """
@@ -89,7 +90,7 @@ class Hook(unittest.TestCase):
     def unflex(self, *options):
         return " ".join(shlex.quote(word) for word in
                         (UNFLEX, "compensate", "--in-place", "--engine", "banded",
-                         "--log", self.log, *options))
+                         "--log", self.log, *DYNAMICS, *options))
 
     def slice(self, *scripts):
         environment = {key: value for key, value in os.environ.items()
@@ -122,7 +123,8 @@ class Hook(unittest.TestCase):
             self.assertEqual(re.findall(kind, after, re.M), found)
         self.assertLess(abs(seconds(after) - seconds(before)), 0.01 * seconds(before) + 2)
         verified = subprocess.run([UNFLEX, "verify", self.output, "--against", self.sliced, "--set",
-                                   "printer.firmware=\"marlin\"", "--max-deviation", "0.1"],
+                                   "printer.firmware=\"marlin\"", "--max-deviation", "0.1",
+                                   *DYNAMICS],
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
                                   text=True)
         self.assertEqual(verified.returncode, 0, verified.stdout)
@@ -149,7 +151,8 @@ class Hook(unittest.TestCase):
     def test_run_twice_compensates_once(self):
         once = os.path.join(self.folder, "once.gcode")
         keep = self.script("cp \"$1\" '{}'\n".format(once))
-        done = self.slice(self.unflex("--quiet"), keep, self.unflex("--quiet"))
+        marlin = ("--quiet", "--set", "printer.firmware=\"marlin\"")
+        done = self.slice(self.unflex(*marlin), keep, self.unflex(*marlin))
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("this file was already compensated by unflex", done.stdout)
         self.assertIn(";unflex run", read(once))

@@ -49,6 +49,10 @@ class Emitter {
   // To be called after the last line.
   void finish(std::string& out);
 
+  // What to type behind SET_INPUT_SHAPER after the print, since the printer's own shaper is off and
+  // not known: "SHAPER_FREQ_X=... SHAPER_FREQ_Y=..."; empty if there is nothing to type.
+  [[nodiscard]] std::string shaper_left_off() const;
+
   // The printer's state after the output so far.
   [[nodiscard]] const gcode::Interpreter& printer() const { return printer_; }
   [[nodiscard]] const planner::Limits& printer_limits() const { return limits_; }

@@ -93,6 +93,10 @@ struct Shaper {
   double freq_x_hz = 0.0;  // 0: off
   double freq_y_hz = 0.0;
   ShaperSettings settings;
+  // Klipper: the printer's configuration may have a shaper that nobody has told of. The frequency
+  // is 0 meanwhile.
+  bool unknown_x = false;
+  bool unknown_y = false;
 
   [[nodiscard]] bool is_on() const { return freq_x_hz > 0.0 || freq_y_hz > 0.0; }
 };
@@ -153,9 +157,11 @@ struct InterpreterOptions {
   double unretract_speed_mm_s = 10.0;
   // Klipper's [gcode_arcs] resolution: arcs become straight pieces about this long.
   double arc_resolution_mm = 1.0;
-  // The firmware's input shaper; 0: the printer has none.
+  // The firmware's input shaper; 0: the printer has none, or it is not known which.
   double shaper_freq_x_hz = 0.0;
   double shaper_freq_y_hz = 0.0;
+  bool shaper_unknown_x = false;
+  bool shaper_unknown_y = false;
   double retract_z_hop_mm = 0.0;  // Marlin and RepRapFirmware, M207 Z
   MarlinArcs marlin_arcs{};
   // RepRapFirmware's M593 P in config.g. P"none", which switches the shaper off, replaces the type,
@@ -197,13 +203,17 @@ struct ModalState {
   bool auto_retract = false;           // Marlin, M209: moves of E alone are firmware retraction
   double shaper_freq_x_hz = 0.0;       // SET_INPUT_SHAPER, M593; 0: off
   double shaper_freq_y_hz = 0.0;
+  bool shaper_unknown_x = false;  // until the file sets it
+  bool shaper_unknown_y = false;
   ShaperSettings shaper;
   // SET_PRESSURE_ADVANCE ADVANCE, M900 K, M572 S, where the file sets it.
   std::optional<double> pressure_advance_s;
   AxisValues steps_per_mm;    // M92, where the file sets it
   bool inverse_time = false;  // RepRapFirmware, G93: F is one over minutes
 
-  [[nodiscard]] Shaper input_shaper() const { return {shaper_freq_x_hz, shaper_freq_y_hz, shaper}; }
+  [[nodiscard]] Shaper input_shaper() const {
+    return {shaper_freq_x_hz, shaper_freq_y_hz, shaper, shaper_unknown_x, shaper_unknown_y};
+  }
   // Whether an E word is a reading of the axis and not a difference.
   [[nodiscard]] bool e_is_absolute() const { return absolute_e && (absolute_xyz || !g91_covers_e); }
   // Filament per unit of E before unit and mode: M221 times, if E is a volume, one over the
@@ -369,9 +379,10 @@ class Interpreter {
   bool z_left_out_ = false;
   // X and Y: if the position is unknown, only labels and unknown commands are the reason.
   std::array<bool, 2> assumed_{};
-  bool modes_uncertain_ = false;  // a line that may or may not run has set a mode or a limit
-  bool feed_uncertain_ = false;   // a line that may or may not run has set F
-  Command command_;               // command of the line being read; kept for its storage
+  bool modes_uncertain_ = false;     // a line that may or may not run has set a mode or a limit
+  bool feed_uncertain_ = false;      // a line that may or may not run has set F
+  bool told_of_retraction_ = false;  // Klipper: the file has a G10 or G11 that does nothing
+  Command command_;                  // command of the line being read; kept for its storage
 };
 
 }  // namespace unflex::gcode

@@ -63,7 +63,8 @@ struct PrinterSettings {
       queue_length;                 // moves the firmware plans ahead; unset: the firmware's default
   double step_clock_hz = 750000.0;  // RepRapFirmware, StepClockRate
   // Frequencies the printer's own [input_shaper] is set back to after the print (its type stays).
-  // 0: the printer has none. Unset: the frequency of the axis' dynamics.
+  // 0: the printer has none. Unset: not known on Klipper, where every printer may have one;
+  // elsewhere none.
   std::optional<double> input_shaper_freq_x_hz;
   std::optional<double> input_shaper_freq_y_hz;
   // The type of the shaper as the firmware spells it; "auto": what the firmware takes if it is told
@@ -163,6 +164,14 @@ struct EmitSettings {
   bool checkpoints = false;
 };
 
+// The share that the base may use of the largest change of speed from line to line. The rest lets
+// the lines make up for each other.
+inline constexpr double kSpeedStepShare = 0.93;
+
+// The firmware's clock differs a little from line to line. With this room no more lines than the
+// budget begin within any 100 ms all the same.
+inline constexpr double kClockRoom = 1.002;
+
 struct VerifySettings {
   double step_ms = 0.1;
   double hold_s = 0.5;
@@ -185,6 +194,10 @@ struct Settings {
   std::vector<std::pair<std::string, std::string>> origins;
   // What the user should know about what was read.
   std::vector<Diagnostic> notes;
+  // What no source says and a default stands for, though it decides over the result: resonances, or
+  // the firmware of a print that was sliced for another one than the default. The program refuses
+  // to compensate by a guess, and tells of it where it measures by one.
+  std::vector<Diagnostic> guesses;
   // Why no print is compensated for this printer, and the way out (docs/compatibility.md).
   std::optional<Diagnostic> refusal;
 
@@ -204,6 +217,10 @@ struct Settings {
   [[nodiscard]] double travel_accel_mm_s2() const;
   [[nodiscard]] double retract_accel_mm_s2() const;
   [[nodiscard]] double max_lines_per_s() const;
+  // The shortest line that the budget of lines and the nodes allow.
+  [[nodiscard]] double min_line_s() const;
+  // The emit.max_speed_step_mm_s below which the base could not accelerate enough.
+  [[nodiscard]] double least_speed_step_mm_s() const;
   [[nodiscard]] double max_extrude_cross_section_mm2() const;
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;
@@ -213,8 +230,12 @@ struct Settings {
   [[nodiscard]] double period_ms() const;
   [[nodiscard]] double tolerance_um() const;
   [[nodiscard]] double emit_accel_mm_s2() const;
+  // 0 where the printer has no shaper, or where none is known.
   [[nodiscard]] double shaper_freq_x_hz() const;
   [[nodiscard]] double shaper_freq_y_hz() const;
+  // Klipper: whether the printer may have a shaper that no source tells of.
+  [[nodiscard]] bool shaper_unknown_x() const;
+  [[nodiscard]] bool shaper_unknown_y() const;
   [[nodiscard]] std::string shaper_type_x() const;
   [[nodiscard]] std::string shaper_type_y() const;
   [[nodiscard]] double shaper_damping_ratio_x() const;

@@ -138,6 +138,10 @@ struct Report {
   std::size_t solver_iterations = 0;
   SolverCheck solver_check;
 
+  // What to type behind SET_INPUT_SHAPER after the print, since the output leaves a shaper off that
+  // nobody has told of: "SHAPER_FREQ_X=..."; empty if there is nothing to type.
+  std::string shaper_left_off;
+
   std::size_t output_lines = 0;
   std::size_t output_bytes = 0;
   double max_lines_per_s = 0.0;
