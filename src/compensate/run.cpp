@@ -188,7 +188,7 @@ std::vector<WindowSpan> cruises(const Course& course, const NodeGrid& grid, cons
   std::vector<WindowSpan> found;
   for (const Course::Moves& moves : {course.before, course.moves, course.after}) {
     for (const planner::PlannedMove& move : moves) {
-      const double from_s = std::max(begin_s + move.accel_s, 0.0) + settling;
+      const double from_s = std::max(begin_s + move.lead_s + move.accel_s, 0.0) + settling;
       begin_s += move.duration_s();
       const double to_s = std::min(begin_s - move.decel_s, end_s) - settling;
       if (to_s - from_s < static_cast<double>(kShortestCruise) * grid.period_s ||

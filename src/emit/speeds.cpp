@@ -2,10 +2,16 @@
 //   d, T  a line's length after rounding, and its time      A  the firmware's acceleration
 //   c     time in the firmware's own plan, over the time by the formula
 //
+//   s     length of a step, where a line has a lead: its first step is made at v_prev
+//
 //   v = c (d + ((v − v_prev)₊² + (v − v_next)₊²) / 2A) / T
+//   v = c (d − s + (v − v_next)₊² / 2A) / (T − s / v_prev)     with a lead
 //
 // A line as fast as or slower than its neighbours has no ramp. c is 1 except for what only the
 // firmware's planner knows: junctions it slows down for, speeds it rounds to whole steps.
+//
+// A lead out of a standstill may last longer than its line, 8 ms. The motors rest until its end, so
+// all lines come that much later.
 #include "speeds.hpp"
 
 #include <algorithm>
@@ -132,6 +138,7 @@ class SpeedSolver {
         mm_s_per_feed_(mm_s_per_feed),
         distance_mm_(strokes.size()),
         accel_mm_s2_(strokes.size(), options.line_accel_mm_s2),
+        leads_(options.lines.leads),
         step_events_(strokes.size(), 0.0),
         correction_(strokes.size(), 1.0),
         speed_mm_s_(strokes.size()) {
@@ -169,10 +176,31 @@ class SpeedSolver {
     std::vector<double> next(strokes_->size());
     for (int round = 0; round <= kRampRounds; ++round) {
       for (std::size_t i = 0; i < next.size(); ++i) {
-        next[i] = (distance_mm_[i] + (round > 0 ? ramps_mm(i) : 0.0)) / given_s(i);
+        const Lead lead = round > 0 ? lead_of(i, given_s(i)) : Lead{};
+        next[i] = (distance_mm_[i] - lead.mm + (round > 0 ? ramps_mm(i) : 0.0)) /
+                  (given_s(i) - lead.s);
       }
       speed_mm_s_.swap(next);
     }
+  }
+
+  // What the lead of a line takes of its length and its time.
+  struct Lead {
+    double mm = 0.0;
+    double s = 0.0;
+  };
+
+  // The lead of line i, which is to take duration_s. None if the line is the first of a run that
+  // begins at rest, or if there is hardly time for it: then the line takes longer, and the lines
+  // after it make up for that.
+  [[nodiscard]] Lead lead_of(std::size_t i, double duration_s) const {
+    constexpr double kMostOfLine = 0.7;
+    const double before = speed_before(i);
+    if (!leads_ || before <= 0.0 || speed_mm_s_[i] <= before || step_events_[i] < 2.0) {
+      return {};
+    }
+    const double mm = distance_mm_[i] / step_events_[i];
+    return {mm, std::min(mm / before, kMostOfLine * duration_s)};
   }
 
   // Rounding and the firmware change the time that lines take. The next lines make up for that.
@@ -184,10 +212,14 @@ class SpeedSolver {
       Stroke& stroke = (*strokes_)[i];
       const double share = std::min(kMostCatchUp, kCatchUpAccel * options_->lines.max_accel_mm_s2 *
                                                       given_s(i) * given_s(i) / distance_mm_[i]);
-      const double due_s = std::clamp(stroke.end_s - clock.now_s(), (1.0 - share) * given_s(i),
-                                      (1.0 + share) * given_s(i));
-      const double way_mm = correction_[i] * (distance_mm_[i] + ramps_mm(i));
-      const double feed = way_mm / due_s / mm_s_per_feed_;
+      const double due_s =
+          i == 0 && leads_from_rest()
+              ? given_s(i)
+              : std::clamp(stroke.end_s + lead_from_rest_s_ - clock.now_s(),
+                           (1.0 - share) * given_s(i), (1.0 + share) * given_s(i));
+      const Lead lead = lead_of(i, due_s);
+      const double way_mm = correction_[i] * (distance_mm_[i] - lead.mm + ramps_mm(i));
+      const double feed = way_mm / (due_s - lead.s) / mm_s_per_feed_;
       set_speed(i, feed * mm_s_per_feed_);
       const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm,
                                   start_mm_[gcode::E] + stroke.e_mm};
@@ -195,18 +227,26 @@ class SpeedSolver {
       if (i == 0 && passing_.in_mm_s) {
         clock.pass(passing_line(line, *passing_.in_mm_s, -1.0));
       }
-      clock.add(line, way_mm / speed_mm_s_[i]);
+      clock.add(line, lead.s + way_mm / speed_mm_s_[i]);
     }
     if (passing_.out_mm_s) {
       clock.pass(passing_line(line, *passing_.out_mm_s, 1.0));
     }
     clock.finish();
-    for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
-      const double formula_s = (distance_mm_[i] + ramps_mm(i)) / speed_mm_s_[i];
-      correction_[i] =
-          std::clamp(clock.duration_s(i) / formula_s, 1.0 / kMostCorrection, kMostCorrection);
+    std::size_t first = 0;
+    if (leads_from_rest()) {
+      lead_from_rest_s_ = std::max(clock.duration_s(0) - given_s(0), 0.0);
+      first = 1;
+    }
+    for (std::size_t i = first; i < speed_mm_s_.size(); ++i) {
+      const Lead lead = lead_of(i, clock.duration_s(i));
+      const double formula_s = (distance_mm_[i] - lead.mm + ramps_mm(i)) / speed_mm_s_[i];
+      correction_[i] = std::clamp((clock.duration_s(i) - lead.s) / formula_s,
+                                  1.0 / kMostCorrection, kMostCorrection);
     }
   }
+
+  [[nodiscard]] bool leads_from_rest() const { return leads_ && !passing_.in_mm_s; }
 
   // RepRapFirmware leaves out a line's ramp up from the faster of its two ends, and so goes no
   // faster than that end, if the ramp would take less than ten step clocks and gain less than 10 %
@@ -223,7 +263,7 @@ class SpeedSolver {
   // have.
   [[nodiscard]] double keeping_the_ramps_before(std::size_t i, double v) {
     const double before = speed_mm_s_[i - 1];
-    const double began = i > 1 ? speed_mm_s_[i - 2] : magnitude(passing_.in_mm_s);
+    const double began = speed_before(i - 1);
     if (began >= before) {
       return v;
     }
@@ -299,16 +339,20 @@ class SpeedSolver {
     return (*strokes_)[i].end_s - (i > 0 ? (*strokes_)[i - 1].end_s : 0.0);
   }
 
+  // The speed with which stroke i begins.
+  [[nodiscard]] double speed_before(std::size_t i) const {
+    return i > 0 ? speed_mm_s_[i - 1] : magnitude(passing_.in_mm_s);
+  }
+
   // What the ramps of stroke i cost, as distance at its speed.
   [[nodiscard]] double ramps_mm(std::size_t i) const {
     const double v = speed_mm_s_[i];
-    const double before = i > 0 ? speed_mm_s_[i - 1] : magnitude(passing_.in_mm_s);
     const double after =
         i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : magnitude(passing_.out_mm_s);
     // No ramp lasts longer than the line. Where a ramp would have to, the line takes longer, and
     // the lines after it make up for that.
     const double most = accel_mm_s2_[i] * given_s(i);
-    const double up = std::clamp(v - before, 0.0, most);
+    const double up = leads_ ? 0.0 : std::clamp(v - speed_before(i), 0.0, most);
     const double down = std::clamp(v - after, 0.0, most);
     return (up * up + down * down) / (2.0 * accel_mm_s2_[i]);
   }
@@ -320,6 +364,8 @@ class SpeedSolver {
   double mm_s_per_feed_;
   std::vector<double> distance_mm_;
   std::vector<double> accel_mm_s2_;
+  bool leads_;
+  double lead_from_rest_s_ = 0.0;
   std::vector<double> step_events_;  // Marlin: steps of the axis that has most of them
   std::vector<double> correction_;   // c
   std::vector<double> speed_mm_s_;

@@ -46,12 +46,11 @@ dynamics::NozzleXY at_end_of(const planner::PlannedMove& move) {
 // Goes phase by phase, since the acceleration changes between phases.
 void advance(const planner::PlannedMove& move, double from_s, double to_s,
              const verify::NozzleModel& model, dynamics::NozzleXY& nozzle) {
-  const std::array<double, 3> ends_s = {move.accel_s, move.accel_s + move.cruise_s,
-                                        move.duration_s()};
-  const std::array<double, 3> accels = {move.accel_mm_s2, 0.0, -move.accel_mm_s2};
   double t = from_s;
-  for (std::size_t phase = 0; phase < ends_s.size(); ++phase) {
-    const double until_s = std::min(to_s, ends_s[phase]);
+  double end_s = 0.0;
+  for (const planner::Phase& phase : move.phases()) {
+    end_s += phase.duration_s;
+    const double until_s = std::min(to_s, end_s);
     if (until_s <= t) {
       continue;
     }
@@ -60,7 +59,7 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
     const auto step = [&](gcode::Axis axis, const dynamics::FlexibleAxis& flexible,
                           dynamics::NozzleState state) {
       const double ratio = move.kinematic ? move.direction[axis] : 0.0;
-      return dynamics::exact_step(flexible, state, {p[axis], v * ratio, accels[phase] * ratio},
+      return dynamics::exact_step(flexible, state, {p[axis], v * ratio, phase.accel_mm_s2 * ratio},
                                   until_s - t);
     };
     nozzle.x = step(gcode::X, model.x, nozzle.x);

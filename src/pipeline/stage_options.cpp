@@ -281,6 +281,8 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
     // Rounding may take a step off either end.
     options.lines.min_steps = options.fixed.min_steps_per_segment;
     options.lines.min_line_mm = (settings.printer.min_steps_per_segment + 1.0) * grid_mm(settings);
+    // With classic jerk as high as in a run, each line begins at its own speed.
+    options.lines.leads = !options.fixed.classic_jerk;
   }
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
   options.lines.max_accel_mm_s2 = planned_base_accel(settings);

@@ -53,6 +53,10 @@ Trapezoid make_trapezoid(const Block& block, float entry, float exit) {
 // The interrupt accelerates from r_i for N_a steps, though not above r_n, keeps the rate it
 // reached, and decelerates from there for the last N_d steps. If r_n is below the minimum of r_i,
 // all but the first step is at r_n.
+//
+// It accelerates from step to step, by the time that has passed, and the first step is made at r_i.
+// A ramp of many steps is nearly continuous. A ramp within one step is none: the first step takes
+// 1 / r_i, all others 1 / r_n.
 void set_profile(const Trapezoid& trapezoid, Block& block) {
   PlannedMove& move = block.move;
   const double mm_per_step = move.length_mm / block.step_events;
@@ -68,9 +72,15 @@ void set_profile(const Trapezoid& trapezoid, Block& block) {
   move.accel_mm_s2 = a * mm_per_step;
   double cruise_steps = block.step_events;
   if (a > 0.0) {
-    move.accel_s = (peak - initial) / a;
     move.decel_s = (peak - last) / a;
-    cruise_steps -= 0.5 * ((peak + initial) * move.accel_s + (peak + last) * move.decel_s);
+    cruise_steps -= 0.5 * (peak + last) * move.decel_s;
+    if (trapezoid.accel_steps == 1) {
+      move.lead_s = 1.0 / initial;
+      cruise_steps -= 1.0;
+    } else {
+      move.accel_s = (peak - initial) / a;
+      cruise_steps -= 0.5 * (peak + initial) * move.accel_s;
+    }
   }
   move.cruise_s = std::max(cruise_steps, 0.0) / peak;
 }

@@ -2,7 +2,8 @@
 //
 // Notation:
 //   v_s, v_c, v_e   speeds at the start, in the cruise and at the end      a   acceleration
-//   T_a, T_c, T_d   durations of the three phases                          L   length
+//   T_a, T_c, T_d   durations of these three phases                        L   length
+//   T_l             duration of the lead, at v_s
 // The decelerating phase is measured from the end of the move, so that both ends are exact.
 #include <algorithm>
 #include <cmath>
@@ -23,15 +24,25 @@ double ramp_distance(double v, double a, double t) { return t * (v + 0.5 * a * t
 
 }  // namespace
 
+std::array<Phase, 4> PlannedMove::phases() const {
+  return {{{lead_s, start_v_mm_s, 0.0},
+           {accel_s, start_v_mm_s, accel_mm_s2},
+           {cruise_s, cruise_v_mm_s, 0.0},
+           {decel_s, cruise_v_mm_s, -accel_mm_s2}}};
+}
+
 double PlannedMove::distance_mm(double t) const {
   const double duration = duration_s();
   if (t <= 0.0) return 0.0;
   if (t >= duration) return length_mm;
   double d = 0.0;
-  if (t < accel_s) {
-    d = ramp_distance(start_v_mm_s, accel_mm_s2, t);
-  } else if (t < accel_s + cruise_s) {
-    d = 0.5 * (start_v_mm_s + cruise_v_mm_s) * accel_s + cruise_v_mm_s * (t - accel_s);
+  if (t < lead_s) {
+    d = start_v_mm_s * t;
+  } else if (t < lead_s + accel_s) {
+    d = start_v_mm_s * lead_s + ramp_distance(start_v_mm_s, accel_mm_s2, t - lead_s);
+  } else if (t < lead_s + accel_s + cruise_s) {
+    d = start_v_mm_s * lead_s + 0.5 * (start_v_mm_s + cruise_v_mm_s) * accel_s +
+        cruise_v_mm_s * (t - lead_s - accel_s);
   } else {
     d = length_mm - ramp_distance(end_v_mm_s, accel_mm_s2, duration - t);
   }
@@ -42,8 +53,11 @@ double PlannedMove::velocity_mm_s(double t) const {
   const double duration = duration_s();
   if (t <= 0.0) return start_v_mm_s;
   if (t >= duration) return end_v_mm_s;
-  if (t < accel_s) return std::min(start_v_mm_s + accel_mm_s2 * t, cruise_v_mm_s);
-  if (t < accel_s + cruise_s) return cruise_v_mm_s;
+  if (t < lead_s) return start_v_mm_s;
+  if (t < lead_s + accel_s) {
+    return std::min(start_v_mm_s + accel_mm_s2 * (t - lead_s), cruise_v_mm_s);
+  }
+  if (t < lead_s + accel_s + cruise_s) return cruise_v_mm_s;
   return std::min(end_v_mm_s + accel_mm_s2 * (duration - t), cruise_v_mm_s);
 }
 
@@ -76,15 +90,17 @@ double PlannedMove::time_s(double distance_mm) const {
   const double duration = duration_s();
   if (distance_mm <= 0.0) return 0.0;
   if (distance_mm >= length_mm) return duration;
+  const double lead_d = start_v_mm_s * lead_s;
+  if (distance_mm < lead_d) return distance_mm / start_v_mm_s;
   const double accel_d = 0.5 * (start_v_mm_s + cruise_v_mm_s) * accel_s;
-  if (distance_mm < accel_d) {
-    return std::min(time_to_cover(distance_mm, start_v_mm_s, accel_mm_s2), accel_s);
+  if (distance_mm < lead_d + accel_d) {
+    return lead_s + std::min(time_to_cover(distance_mm - lead_d, start_v_mm_s, accel_mm_s2), accel_s);
   }
   const double remaining = length_mm - distance_mm;
   if (remaining < 0.5 * (end_v_mm_s + cruise_v_mm_s) * decel_s) {
     return duration - std::min(time_to_cover(remaining, end_v_mm_s, accel_mm_s2), decel_s);
   }
-  return accel_s + std::min((distance_mm - accel_d) / cruise_v_mm_s, cruise_s);
+  return lead_s + accel_s + std::min((distance_mm - lead_d - accel_d) / cruise_v_mm_s, cruise_s);
 }
 
 }  // namespace unflex::planner

@@ -35,17 +35,14 @@ AxisPath reference_path(const std::vector<planner::PlannedMove>& moves, gcode::A
   for (const planner::PlannedMove& move : moves) {
     const double along = move.direction[axis];
     double elapsed_s = 0.0;
-    const auto append = [&](double velocity, double acceleration, double duration_s) {
-      if (duration_s > 0.0) {
+    for (const planner::Phase& phase : move.phases()) {
+      if (phase.duration_s > 0.0) {
         path.push_back({start_s + elapsed_s,
                         {move.segment.start_mm[axis] + along * move.distance_mm(elapsed_s),
-                         along * velocity, along * acceleration}});
-        elapsed_s += duration_s;
+                         along * phase.speed_mm_s, along * phase.accel_mm_s2}});
+        elapsed_s += phase.duration_s;
       }
-    };
-    append(move.start_v_mm_s, move.accel_mm_s2, move.accel_s);
-    append(move.cruise_v_mm_s, 0.0, move.cruise_s);
-    append(move.cruise_v_mm_s, -move.accel_mm_s2, move.decel_s);
+    }
     start_s += move.duration_s();
   }
   path.push_back({start_s, {moves.back().segment.end_mm[axis], 0.0, 0.0}});

@@ -60,6 +60,7 @@ AxisPath s_curve(const std::vector<planner::PlannedMove>& moves, gcode::Axis axi
   double start_s = 0.0;
   for (const planner::PlannedMove& move : moves) {
     Builder builder(move, axis, start_s);
+    builder.cruise(path, move.start_v_mm_s, move.lead_s);
     builder.ramp(path, move.start_v_mm_s, move.cruise_v_mm_s, move.accel_s);
     builder.cruise(path, move.cruise_v_mm_s, move.cruise_s);
     builder.ramp(path, move.cruise_v_mm_s, move.end_v_mm_s, move.decel_s);

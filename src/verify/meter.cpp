@@ -166,12 +166,12 @@ double Meter::next_reference_change() {
     return std::numeric_limits<double>::infinity();
   }
   const PathPiece& piece = (*path_)[current_];
-  const double cruise_s = piece.start_s + piece.move.accel_s;
-  const double decel_s = cruise_s + piece.move.cruise_s;
-  for (const double change_s : {piece.start_s, cruise_s, decel_s}) {
+  double change_s = piece.start_s;
+  for (const planner::Phase& phase : piece.move.phases()) {
     if (change_s > time_s_ + kSameTime_s) {
       return change_s;
     }
+    change_s += phase.duration_s;
   }
   return piece.end_s;
 }
@@ -235,10 +235,13 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
   const double local_s = time_s_ - piece.start_s;
   const double middle_s = local_s + 0.5 * duration_s;
   double acceleration = 0.0;
-  if (middle_s < move.accel_s) {
-    acceleration = move.accel_mm_s2;
-  } else if (middle_s > move.accel_s + move.cruise_s) {
-    acceleration = -move.accel_mm_s2;
+  double phase_end_s = 0.0;
+  for (const planner::Phase& phase : move.phases()) {
+    phase_end_s += phase.duration_s;
+    acceleration = phase.accel_mm_s2;
+    if (middle_s < phase_end_s) {
+      break;
+    }
   }
   const double share_xy = move.length_mm > 0.0 ? piece.length_xy_mm / move.length_mm : 0.0;
   const double covered = move.distance_mm(local_s) * share_xy;

@@ -26,23 +26,21 @@ dynamics::BaseSegment along_filament(const planner::PlannedMove& move, double di
 }  // namespace
 
 void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& phases) {
-  const std::array<double, 3> durations_s = {move.accel_s, move.cruise_s, move.decel_s};
-  const std::array<double, 3> accels = {move.accel_mm_s2, 0.0, -move.accel_mm_s2};
-  const std::array<double, 3> speeds = {move.start_v_mm_s, move.cruise_v_mm_s, move.cruise_v_mm_s};
   double elapsed_s = 0.0;
-  for (std::size_t i = 0; i < durations_s.size(); ++i) {
-    if (durations_s[i] <= 0.0) {
+  for (const planner::Phase& phase : move.phases()) {
+    if (phase.duration_s <= 0.0) {
       continue;
     }
     const double distance_mm = move.distance_mm(elapsed_s);
     const auto along = [&](gcode::Axis axis) {
       const double ratio = move.kinematic ? move.direction[axis] : 0.0;
       return dynamics::BaseSegment{move.segment.start_mm[axis] + ratio * distance_mm,
-                                   ratio * speeds[i], ratio * accels[i]};
+                                   ratio * phase.speed_mm_s, ratio * phase.accel_mm_s2};
     };
     phases.push_back({along(gcode::X), along(gcode::Y),
-                      along_filament(move, distance_mm, speeds[i], accels[i]), durations_s[i]});
-    elapsed_s += durations_s[i];
+                      along_filament(move, distance_mm, phase.speed_mm_s, phase.accel_mm_s2),
+                      phase.duration_s});
+    elapsed_s += phase.duration_s;
   }
 }
 

@@ -24,6 +24,9 @@ struct LineRules {
   double min_line_s = 1e-3;    // shortest duration of a line
   double min_line_mm = 0.0;    // shortest length of a line along X or Y
   int min_steps = 1;  // fewest grid steps of a line; the firmware joins shorter lines to the next
+  // The firmware makes the first step of a line at the speed of the line before, if that is slower
+  // (planner::PlannedMove::lead_s).
+  bool leads = false;
   double max_line_s = 0.05;
   // If the firmware rounds to whole steps, single lines may be as short as min_line_s. But no more
   // than burst_lines begin within any burst_s, lines before and after the run counted. 0: no limit.

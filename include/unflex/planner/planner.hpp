@@ -3,6 +3,7 @@
 //   v_s, v_c, v_e   speed at the start, in the cruise and at the end of a move, mm/s
 //   a               acceleration of both ramps, mm/s²
 //   T_a, T_c, T_d   durations of acceleration, cruise and deceleration, s
+//   T_l             duration of the lead, s
 #pragma once
 
 #include <array>
@@ -99,6 +100,13 @@ struct FirmwareConfig {
   [[nodiscard]] Motors motors() const { return {kinematics, firmware}; }
 };
 
+// A time of constant acceleration.
+struct Phase {
+  double duration_s = 0.0;
+  double speed_mm_s = 0.0;  // where it begins
+  double accel_mm_s2 = 0.0;
+};
+
 // A segment with its trapezoid.
 struct PlannedMove {
   gcode::Segment segment;
@@ -109,11 +117,17 @@ struct PlannedMove {
   double cruise_v_mm_s = 0.0;
   double end_v_mm_s = 0.0;
   double accel_mm_s2 = 0.0;
+  // The lead: time at the speed of the start, which then jumps to that of the cruise. Marlin makes
+  // the first step of a line at its entry rate, however short the ramp would be. A move with a lead
+  // has no ramp up.
+  double lead_s = 0.0;
   double accel_s = 0.0;
   double cruise_s = 0.0;
   double decel_s = 0.0;
 
-  [[nodiscard]] double duration_s() const { return accel_s + cruise_s + decel_s; }
+  [[nodiscard]] double duration_s() const { return lead_s + accel_s + cruise_s + decel_s; }
+  // Lead, acceleration, cruise and deceleration, in this order. Any of them may last no time.
+  [[nodiscard]] std::array<Phase, 4> phases() const;
   // Distance covered t seconds after the start of the move; t is clamped to the move.
   [[nodiscard]] double distance_mm(double t) const;
   [[nodiscard]] double velocity_mm_s(double t) const;
