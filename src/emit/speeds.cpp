@@ -177,8 +177,8 @@ class SpeedSolver {
     for (int round = 0; round <= kRampRounds; ++round) {
       for (std::size_t i = 0; i < next.size(); ++i) {
         const Lead lead = round > 0 ? lead_of(i, given_s(i)) : Lead{};
-        next[i] = (distance_mm_[i] - lead.mm + (round > 0 ? ramps_mm(i) : 0.0)) /
-                  (given_s(i) - lead.s);
+        next[i] =
+            (distance_mm_[i] - lead.mm + (round > 0 ? ramps_mm(i) : 0.0)) / (given_s(i) - lead.s);
       }
       speed_mm_s_.swap(next);
     }
@@ -212,11 +212,10 @@ class SpeedSolver {
       Stroke& stroke = (*strokes_)[i];
       const double share = std::min(kMostCatchUp, kCatchUpAccel * options_->lines.max_accel_mm_s2 *
                                                       given_s(i) * given_s(i) / distance_mm_[i]);
-      const double due_s =
-          i == 0 && leads_from_rest()
-              ? given_s(i)
-              : std::clamp(stroke.end_s + lead_from_rest_s_ - clock.now_s(),
-                           (1.0 - share) * given_s(i), (1.0 + share) * given_s(i));
+      const double due_s = i == 0 && leads_from_rest()
+                               ? given_s(i)
+                               : std::clamp(stroke.end_s + lead_from_rest_s_ - clock.now_s(),
+                                            (1.0 - share) * given_s(i), (1.0 + share) * given_s(i));
       const Lead lead = lead_of(i, due_s);
       const double way_mm = correction_[i] * (distance_mm_[i] - lead.mm + ramps_mm(i));
       const double feed = way_mm / (due_s - lead.s) / mm_s_per_feed_;
@@ -241,8 +240,8 @@ class SpeedSolver {
     for (std::size_t i = first; i < speed_mm_s_.size(); ++i) {
       const Lead lead = lead_of(i, clock.duration_s(i));
       const double formula_s = (distance_mm_[i] - lead.mm + ramps_mm(i)) / speed_mm_s_[i];
-      correction_[i] = std::clamp((clock.duration_s(i) - lead.s) / formula_s,
-                                  1.0 / kMostCorrection, kMostCorrection);
+      correction_[i] = std::clamp((clock.duration_s(i) - lead.s) / formula_s, 1.0 / kMostCorrection,
+                                  kMostCorrection);
     }
   }
 

@@ -357,11 +357,12 @@ void Interpreter::marlin_pressure_advance(Event& event) {
   const std::optional<double> k = command_.value('K');
   if (command_.has_any("LST")) {  // for another extruder, or for another of its two values
     event.kind = EventKind::barrier;
-    state_.pressure_advance_s.reset();
+    pressure_advance_on_.reset();
     return;
   }
-  if (k && *k >= 0.0 && *k <= kMost && state_.pressure_advance_s != k) {
+  if (k && *k >= 0.0 && *k <= kMost && (!pressure_advance_on_ || state_.pressure_advance_s != k)) {
     state_.pressure_advance_s = k;
+    pressure_advance_on_ = *k > 0.0;
     event.kind = EventKind::barrier;
   }
 }

@@ -62,9 +62,9 @@ void Interpreter::lose_position(Event& event) {
   event.position_lost = true;
   state_.known.fill(false);
   assumed_.fill(false);
-  // another extruder may be in use
+  // Another extruder may be in use, so the next value may stop the machine. The last value known is
+  // still the best guess.
   pressure_advance_on_.reset();
-  state_.pressure_advance_s.reset();
   if (options_.firmware == Firmware::rrf) {
     lose_tool();  // a macro may select one
   }

@@ -93,7 +93,7 @@ double NozzleFollower::follow(const Piece& piece) {
   for (std::size_t i = 0; i < piece.events.size(); ++i) {
     const gcode::Event& event = piece.events[i];
     if (emit::moves_by_itself(event)) {
-      stops_s += change(printer_, std::nullopt);
+      stops_s += change(printer_, piece.pressure_advance_s);
     }
     for (std::size_t k = 0; k < piece.move_counts[i]; ++k, ++next) {
       const planner::PlannedMove& move = piece.moves[next];
@@ -115,7 +115,7 @@ double NozzleFollower::follow(const Piece& piece) {
     if (event.sets_shaper) {
       // The sliced file has this stop too, so it does not count as added.
       printer_ = *event.shaper;
-      static_cast<void>(change(printer_, std::nullopt));
+      static_cast<void>(change(printer_, piece.pressure_advance_s));
     }
   }
   return stops_s;

@@ -279,10 +279,12 @@ void PieceReader::append(gcode::Event&& event) {
     open_.move_counts.reserve(kUsualEvents);
   }
   append_between();
+  if (!open_.is_run || open_.events.empty()) {
+    open_.pressure_advance_s = interpreter_.state().pressure_advance_s;
+  }
   if (open_.is_run && open_.events.empty()) {
     // The event is a move, so it has changed nothing of this state.
     open_.start = emit::run_start(interpreter_.state(), planner_->limits());
-    open_.pressure_advance_s = interpreter_.state().pressure_advance_s;
     open_.cut_off = after_cut_;
   }
   after_cut_ = after_cut_ && stands_anywhere(event);

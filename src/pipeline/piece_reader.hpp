@@ -29,7 +29,8 @@ struct Piece {
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
   std::vector<planner::PlannedMove> moves;
   emit::RunStart start;  // only for runs and parts
-  // Pressure advance that the file has set when a run begins; nullopt: not set.
+  // Pressure advance that the file has set when a run begins, or when what is between two runs
+  // ends; nullopt: not set.
   std::optional<double> pressure_advance_s;
   gcode::Position from_mm{};  // where the piece's first move finds the machine
   // Some moves of the run around this part: none before the first part and after the last.

@@ -110,6 +110,9 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder* re
     report.recording = recorder->finish(verified);
   }
   report.uncompensated = rows(verified.uncompensated);
+  if (verified.unshaped) {
+    report.unshaped = rows(*verified.unshaped);
+  }
   report.compensated = rows(verified.compensated);
   for (std::size_t i = 0; i < verified.detuned.size(); ++i) {
     report.sensitivity.push_back({verify::kFrequencyErrors[i],

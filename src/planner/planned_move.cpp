@@ -94,7 +94,8 @@ double PlannedMove::time_s(double distance_mm) const {
   if (distance_mm < lead_d) return distance_mm / start_v_mm_s;
   const double accel_d = 0.5 * (start_v_mm_s + cruise_v_mm_s) * accel_s;
   if (distance_mm < lead_d + accel_d) {
-    return lead_s + std::min(time_to_cover(distance_mm - lead_d, start_v_mm_s, accel_mm_s2), accel_s);
+    return lead_s +
+           std::min(time_to_cover(distance_mm - lead_d, start_v_mm_s, accel_mm_s2), accel_s);
   }
   const double remaining = length_mm - distance_mm;
   if (remaining < 0.5 * (end_v_mm_s + cruise_v_mm_s) * decel_s) {

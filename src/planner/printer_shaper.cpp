@@ -55,12 +55,21 @@ ShaperPulses pulses(Firmware firmware, double freq_hz, const std::string& type,
     return {};
   }
   const ShaperKind kind = kind_of(type, firmware);
-  return *dynamics::shaper_pulses(kind, freq_hz,
-                                  std::min(damping_ratio, dynamics::max_damping_ratio(kind)));
+  ShaperPulses pulses = *dynamics::shaper_pulses(
+      kind, freq_hz, std::min(damping_ratio, dynamics::max_damping_ratio(kind)));
+  if (firmware != Firmware::klipper) {
+    const double first_s = pulses.front().time_s;
+    for (dynamics::Pulse& pulse : pulses) {
+      pulse.time_s -= first_s;
+    }
+  }
+  return pulses;
 }
 
+double lead_s(const ShaperPulses& pulses) { return pulses.empty() ? 0.0 : -pulses.front().time_s; }
+
 double reach_s(const ShaperPulses& pulses) {
-  return pulses.empty() ? 0.0 : std::max(-pulses.front().time_s, pulses.back().time_s);
+  return pulses.empty() ? 0.0 : std::max(lead_s(pulses), pulses.back().time_s);
 }
 
 double length_s(const ShaperPulses& pulses) {
@@ -75,6 +84,8 @@ bool same(const gcode::Shaper& a, const gcode::Shaper& b) {
 }
 
 }  // namespace
+
+double Shaping::lead_s() const { return std::max(planner::lead_s(x), planner::lead_s(y)); }
 
 double Shaping::reach_s() const { return std::max(planner::reach_s(x), planner::reach_s(y)); }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace unflex::record {
@@ -25,6 +26,7 @@ constexpr int kHistogramCells = 72;
 constexpr double kCellsPerOctave = 4.0;
 // Share of a scene, around its centre, that counts as being at the place.
 constexpr double kAtPlace = 0.05;
+constexpr std::size_t kNoPiece = std::numeric_limits<std::size_t>::max();
 
 double half_width_s(const verify::NozzleModel& model) {
   const double slower = std::min(model.x.omega_rad_s, model.y.omega_rad_s);
@@ -55,30 +57,46 @@ void Recorder::Gatherer::line(const gcode::Line& line) {
 
 void Recorder::Gatherer::section(const verify::ReferencePath& sliced,
                                  const verify::ReferencePath& emitted) {
+  // Under the printer's own shaper a nozzle may still be in the section before. Then it goes on
+  // there, by the numbers of the sliced file's path.
+  std::size_t needed = sliced.end();
   for (int number : {0, 1}) {
-    close_chunk(number, std::numeric_limits<double>::infinity());
+    Version& version = versions_[number];
+    const verify::ReferencePath* const path = number == 0 ? &sliced : &emitted;
+    if (path == version.path && path == &sliced && version.piece != kNoPiece) {
+      needed = std::min(needed, version.where.move);
+    } else {
+      close_chunk(number, std::numeric_limits<double>::infinity());
+      version.piece = kNoPiece;
+    }
+    version.path = path;
+    version.first_piece = path->end();
   }
-  complete_moves(cells_.end());
   section_first_ = sliced.end();
   // Moves of filament alone were never entered, so cells_ may end too early.
-  cells_.continue_at(section_first_);
   versions_[0].path = &sliced;
-  versions_[1].path = &emitted;
-  for (Version& version : versions_) {
-    version.first_piece = version.path->end();
-    version.piece = std::numeric_limits<std::size_t>::max();
+  if (cells_.first() < cells_.end()) {
+    append_moves(versions_[0], section_first_ - 1);
+  }
+  complete_moves(std::min(needed, cells_.end()));
+  if (cells_.first() == cells_.end()) {
+    cells_.continue_at(section_first_);
   }
 }
 
 void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::NozzleStep& step) {
-  if (!nozzle.emitted) {
+  using verify::NozzleBase;
+  if (nozzle.base == NozzleBase::sliced || nozzle.base == NozzleBase::unshaped) {
     bench_.add(nozzle.model, step.time_s, step.nozzle);
   }
-  if (nozzle.model != 0) {
+  if (nozzle.model != 0 || nozzle.base == NozzleBase::unshaped) {
     return;
   }
-  const int number = nozzle.emitted ? 1 : 0;
+  const int number = nozzle.base == NozzleBase::emitted ? 1 : 0;
   Version& version = versions_[number];
+  if (step.extruding) {
+    version.histogram.add_square(step.contour2_mm2, step.h_s);
+  }
   if (step.measured) {
     measured_step(number, step);
   }
@@ -105,10 +123,10 @@ void Recorder::Gatherer::measured_step(int number, const verify::NozzleStep& ste
     close_chunk(number, std::numeric_limits<double>::infinity());
     enter(number, step.piece);
   }
-  if (!step.extruding) {
+  // What is laid along moves without filament has no place in a layer.
+  if (!step.extruding || !cells_[version.where.move].extruding) {
     return;
   }
-  version.histogram.add_square(step.contour2_mm2, step.h_s);
   Chunk& chunk = version.chunk;
   chunk.weight_s += step.h_s;
   chunk.sum_contour2 += step.h_s * step.contour2_mm2;

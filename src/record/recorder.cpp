@@ -52,6 +52,14 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
     }
     contenders.push_back(std::move(shaper));
   }
+  if (verified.unshaped) {
+    std::vector<report::Spread> unshaped;
+    for (const verify::Detuned& other : verified.detuned) {
+      unshaped.push_back(spread(*other.unshaped));
+    }
+    contenders.push_back(
+        {"without the printer's shaper", in_order(spread(*verified.unshaped), unshaped)});
+  }
   recording.contenders = std::move(contenders);
   return recording;
 }

@@ -168,6 +168,12 @@ Json facts_json(const Report& r) {
                                       micrometres_text(r.robustness->rms_mm),
                                       micrometres_text(r.robustness->nominal_rms_mm)));
   }
+  if (r.unshaped) {
+    add("Without the printer's own shaper",
+        fmt::format("{} µm RMS and {} µm at most before",
+                    micrometres_text(r.unshaped->extruding.contour_rms_mm),
+                    micrometres_text(r.unshaped->extruding.contour_max_mm)));
+  }
   add("Base", fmt::format("at most {:.0f} mm/s and {:.0f} mm/s²", r.base_max_velocity_mm_s,
                           r.base_max_accel_mm_s2));
   add("Output", fmt::format("{} lines, {:.1f} MB, at most {:.0f} lines/s", r.output_lines,
@@ -259,8 +265,9 @@ std::string hero(const Report& r) {
       r.reference_time_s > 0.0 ? 100.0 * (r.emitted_time_s / r.reference_time_s - 1.0) : 0.0;
   const std::string typical = term("on average", kTypical);
   std::string html = fmt::format(
-      R"(<section class="card hero" aria-label="Result"><p class="gain">As sliced, the nozzle strays <b class="before">{}</b> from its path {}, and <b class="before">{}</b> at worst; compensated, it is <b class="after">{}</b> and <b class="after">{}</b>, {}.</p>
+      R"(<section class="card hero" aria-label="Result"><p class="gain">{}, the nozzle strays <b class="before">{}</b> from its path {}, and <b class="before">{}</b> at worst; compensated, it is <b class="after">{}</b> and <b class="after">{}</b>, {}.</p>
 )",
+      r.unshaped ? "As sliced, under the printer's own input shaper" : "As sliced",
       um_text(before.contour_rms_mm), typical, um_text(before.contour_max_mm),
       um_text(after.contour_rms_mm), um_text(after.contour_max_mm), escape_html(time_sentence(r)));
   if (r.violation_count > 0) {

@@ -67,6 +67,7 @@ Json budget_json(const LineBudget& budget) {
 void add_motion(const Report& r, Json& json) {
   json["print_time_s"] = {{"reference", r.reference_time_s}, {"emitted", r.emitted_time_s}};
   json["deviation"] = {{"uncompensated", rows_json(r.uncompensated)},
+                       {"unshaped", r.unshaped ? rows_json(*r.unshaped) : Json()},
                        {"compensated", rows_json(r.compensated)}};
   json["sensitivity"] = sensitivity_json(r.sensitivity);
   json["robustness"] = nullptr;

@@ -27,6 +27,19 @@ void write_deviation(Sink out, std::string_view moves, const DeviationRow& befor
                  cell(before.contour_rms_mm, after.contour_rms_mm));
 }
 
+// What the printer's own shaper leaves out of the figures before.
+void write_unshaped(Sink out, const std::optional<DeviationRows>& unshaped) {
+  if (unshaped) {
+    const DeviationRow& row = unshaped->extruding;
+    fmt::format_to(
+        out,
+        "shaper        the printer's own is on before; without it, extruding: {} µm max, "
+        "{} p99, {} RMS\n",
+        micrometres_text(row.contour_max_mm), micrometres_text(row.contour_p99_mm),
+        micrometres_text(row.contour_rms_mm));
+  }
+}
+
 // The error if the true frequencies are off.
 void write_sensitivity(Sink out, const std::vector<Sensitivity>& sensitivity) {
   if (sensitivity.empty()) {
@@ -164,6 +177,7 @@ std::string to_text(const Report& report) {
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "contour, µm", "max", "p99", "RMS");
   write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
   write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
+  write_unshaped(out, report.unshaped);
   write_sensitivity(out, report.sensitivity);
   if (report.robustness) {
     fmt::format_to(out, "robustness    {} µm RMS of the base as optimised, {} without a band\n",

@@ -61,14 +61,14 @@ void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm
   base_y_mm_ = base_y_mm;
 }
 
-void Meter::begin_section(ReferencePath& path) {
+void Meter::begin_section(ReferencePath& path, double unplayed_s, double unplayed_mm) {
   if (path_ != &path) {
     path_ = &path;
     near_.begin(path);
     current_ = path.first();
   }
-  time_s_ = path.section_start_s();
-  laid_mm_ = path.filament_mm();
+  time_s_ = path.section_start_s() - unplayed_s;
+  laid_mm_ = path.filament_mm() - unplayed_mm;
   section_error_ = {};
 }
 
@@ -117,13 +117,11 @@ void Meter::play(const planner::PlannedMove& move) {
   append_phases(move, phases_);
   const double start_s = time_s_;
   double elapsed_s = 0.0;
-  in_move_ = true;
   for (const BasePhase& phase : phases_) {
     play(phase);
     elapsed_s += phase.duration_s;
     time_s_ = start_s + elapsed_s;
   }
-  in_move_ = false;
   laid_mm_ += move.segment.extruding() ? move.segment.delta(gcode::E) : 0.0;
   base_x_mm_ = move.segment.end_mm[gcode::X];
   base_y_mm_ = move.segment.end_mm[gcode::Y];
@@ -215,10 +213,13 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
       time_s_ = start_s + number * h;
       advance(reference.x, h);
       advance(reference.y, h);
-      measurement = sample(reference, h);
-      if (follows_filament_ && in_move_ && reference.extruding) {
+      measurement = sample(reference, phase.extruding, h);
+      if (follows_filament_ && !waiting_ && reference.extruding) {
         measure_filament(reference, laid_mm_ + phase.e.position, h);
       }
+    } else if (phase.extruding) {
+      time_s_ = start_s + number * h;
+      measurement = sample_at_rest(h);
     }
     if (observer_ != nullptr) {
       time_s_ = start_s + number * h;
@@ -254,7 +255,8 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
           piece.extruding};
 }
 
-Meter::Sample Meter::sample(const ReferencePhase& reference, double h) {
+// laying: filament is laid by what is played now.
+Meter::Sample Meter::sample(const ReferencePhase& reference, bool laying, double h) {
   const double error_x = reference.x.position - nozzle_.x.position;
   const double error_y = reference.y.position - nozzle_.y.position;
 
@@ -265,7 +267,7 @@ Meter::Sample Meter::sample(const ReferencePhase& reference, double h) {
   const double tracking2 = error_x * error_x + error_y * error_y;
   const std::size_t line = (*path_)[nearest].move.segment.line;
   all_.add(contour2, tracking2, h, line);
-  if (reference.extruding) {
+  if (laying) {
     extruding_.add(contour2, tracking2, h, line);
     section_error_.add(contour2, h, line);
   }
@@ -274,6 +276,28 @@ Meter::Sample Meter::sample(const ReferencePhase& reference, double h) {
     const double v_y = reference.y.velocity;
     lag_.add(error_x * v_x + error_y * v_y, v_x * v_x + v_y * v_y, h);
   }
+  return {contour2, line};
+}
+
+// Filament is laid before the reference moves or after it has ended.
+Meter::Sample Meter::sample_at_rest(double h) {
+  if (path_->first() == path_->end()) {
+    return {};
+  }
+  const bool before = current_ < path_->end();
+  const std::size_t piece = before ? current_ : path_->end() - 1;
+  const double begin_s = (*path_)[piece].start_s;
+  near_.slide(*path_, std::clamp(time_s_, begin_s, (*path_)[piece].end_s));
+  std::size_t nearest = piece;
+  const double contour2 =
+      near_.squared_contour_error(*path_, nozzle_.x.position, nozzle_.y.position, nearest);
+  const gcode::Segment& segment = (*path_)[piece].move.segment;
+  const gcode::Position& at = before ? segment.start_mm : segment.end_mm;
+  const double error_x = at[gcode::X] - nozzle_.x.position;
+  const double error_y = at[gcode::Y] - nozzle_.y.position;
+  const std::size_t line = (*path_)[nearest].move.segment.line;
+  extruding_.add(contour2, error_x * error_x + error_y * error_y, h, line);
+  section_error_.add(contour2, h, line);
   return {contour2, line};
 }
 
@@ -290,15 +314,15 @@ void Meter::tell(const BasePhase& phase, double h, bool measured, const Referenc
   step.nozzle = nozzle_;
   step.base_x = phase.x;
   step.base_y = phase.y;
+  step.extruding = phase.extruding;
+  step.contour2_mm2 = sample.contour2_mm2;
+  step.line = sample.line;
   step.measured = measured;
   step.waiting = waiting_;
   if (measured) {
-    step.extruding = reference.extruding;
     step.reference_x_mm = reference.x.position;
     step.reference_y_mm = reference.y.position;
     step.piece = current_;
-    step.contour2_mm2 = sample.contour2_mm2;
-    step.line = sample.line;
   }
   observer_->step(id_, step);
 }
@@ -307,7 +331,7 @@ void Meter::look() {
   static_cast<void>(next_reference_change());
   if (current_ < path_->end() && (*path_)[current_].measured &&
       (*path_)[current_].start_s <= time_s_ + kSameTime_s) {
-    static_cast<void>(sample(reference_phase(0.0), 0.0));
+    static_cast<void>(sample(reference_phase(0.0), (*path_)[current_].extruding, 0.0));
   }
 }
 

@@ -73,13 +73,16 @@ class Meter {
 
   // The nozzle and base at the very start.
   void set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm);
-  // Measures against this path from now on. The path must live as long. The clock is set to the
-  // start of the path's current section.
-  void begin_section(ReferencePath& path);
+  // Measures against this path from now on. The path must live as long. The clock is set to
+  // unplayed_s before the start of the path's current section. unplayed_mm: filament that is still
+  // to come before the section begins, counted as in BasePhase::e.
+  void begin_section(ReferencePath& path, double unplayed_s = 0.0, double unplayed_mm = 0.0);
   // Moves the base. If it does not start where the base stands, base and nozzle are shifted there.
   void play(const planner::PlannedMove& move);
   // Moves the base by a phase that begins where the base stands.
   void play(BasePhase phase);
+  // Filament that phases have counted becomes filament laid; they will count from 0 again.
+  void add_filament(double filament_mm) { laid_mm_ += filament_mm; }
   // Moves the base by a phase while nothing is measured and the clock stands.
   void settle(const BasePhase& phase);
   // Shifts base and nozzle, so that the base is at this place.
@@ -94,7 +97,7 @@ class Meter {
   // Puts the clock forward, within a section.
   void skip(double duration_s) { time_s_ += duration_s; }
 
-  // Also measures the filament's lag while motion is played move by move.
+  // Also measures the filament's lag.
   void follow_filament() { follows_filament_ = true; }
   [[nodiscard]] LagStats filament_lag() const { return filament_lag_.stats(); }
 
@@ -109,7 +112,7 @@ class Meter {
   [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
   [[nodiscard]] const DeviationAccumulator& all() const { return all_; }
   [[nodiscard]] double reach_s() const { return near_.reach_s(); }
-  // Contour error while the reference lays filament, in the section that began last.
+  // Contour error while filament is laid, in the section that began last.
   [[nodiscard]] const SectionError& section_error() const { return section_error_; }
   // Distance of the base from the path that the reference passes within ±reach_s() of now.
   [[nodiscard]] double base_offset_mm();
@@ -136,7 +139,8 @@ class Meter {
     double contour2_mm2 = 0.0;
     std::size_t line = 0;
   };
-  Sample sample(const ReferencePhase& reference, double h);
+  Sample sample(const ReferencePhase& reference, bool laying, double h);
+  Sample sample_at_rest(double h);
   void measure_filament(const ReferencePhase& reference, double laid_mm, double h);
   void tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
             const Sample& sample);
@@ -155,9 +159,9 @@ class Meter {
   SectionError section_error_;
   FilamentLag filament_lag_;
   bool follows_filament_ = false;
-  bool in_move_ = false;  // a whole move is played, so its filament is known
-  double laid_mm_ =
-      0.0;  // filament laid before the move at hand, counted as in ReferencePath::filament_mm()
+  // Filament laid before the move or the shaped motion at hand, counted as in
+  // ReferencePath::filament_mm().
+  double laid_mm_ = 0.0;
   LagEstimate lag_;
   bool follow_lag_ = false;
   bool waiting_ = false;

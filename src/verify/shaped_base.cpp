@@ -1,6 +1,6 @@
 #include "shaped_base.hpp"
 
-#include <algorithm>
+#include <array>
 #include <limits>
 
 namespace unflex::verify {
@@ -39,23 +39,26 @@ void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& pha
     };
     phases.push_back({along(gcode::X), along(gcode::Y),
                       along_filament(move, distance_mm, phase.speed_mm_s, phase.accel_mm_s2),
-                      phase.duration_s});
+                      phase.duration_s, move.segment.extruding()});
     elapsed_s += phase.duration_s;
   }
 }
 
-ShapedBase::ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm) {
+ShapedBase::ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm)
+    : lead_s_(shaping.lead_s()) {
   const auto set = [&](std::vector<Tap>& taps, const dynamics::ShaperPulses& pulses) {
     if (pulses.empty()) {
-      taps.push_back({0.0, 1.0});
+      taps.push_back({lead_s_, 1.0});
     }
     for (const dynamics::Pulse& pulse : pulses) {
-      taps.push_back({pulse.time_s - pulses.front().time_s, pulse.weight});
+      taps.push_back({lead_s_ + pulse.time_s, pulse.weight});
       memory_s_ = std::max(memory_s_, taps.back().delay_s);
     }
   };
+  memory_s_ = lead_s_;
   set(x_, shaping.x);
   set(y_, shaping.y);
+  set(e_, {});
   // The base has rested for as long as the pulses look back.
   given_until_s_ = -memory_s_ - 1.0;
   give({{x_mm, 0.0, 0.0}, {y_mm, 0.0, 0.0}, {}, memory_s_ + 1.0});
@@ -69,18 +72,28 @@ void ShapedBase::give(const BasePhase& phase) {
 void ShapedBase::add(const planner::PlannedMove& move, std::vector<BasePhase>& shaped) {
   std::vector<BasePhase> phases;
   append_phases(move, phases);
-  for (const BasePhase& phase : phases) {
+  for (BasePhase& phase : phases) {
+    phase.e.position += filament_mm_;
     give(phase);
   }
+  filament_mm_ += move.segment.extruding() ? move.segment.delta(gcode::E) : 0.0;
   advance(shaped);
 }
 
-void ShapedBase::finish(std::vector<BasePhase>& shaped) {
+void ShapedBase::finish(std::vector<BasePhase>& until_end, std::vector<BasePhase>& behind) {
+  rest(lead_s_, until_end);
+  rest(memory_s_ - lead_s_, behind);
+}
+
+void ShapedBase::rest(double duration_s, std::vector<BasePhase>& shaped) {
+  if (duration_s <= kSameTime_s) {
+    return;
+  }
   const Timed& last = given_.back();
   BasePhase rest{later(last.phase.x, last.phase.duration_s),
                  later(last.phase.y, last.phase.duration_s),
-                 {},
-                 memory_s_};
+                 {filament_mm_, 0.0, 0.0},
+                 duration_s};
   rest.x.velocity = rest.x.acceleration = 0.0;
   rest.y.velocity = rest.y.acceleration = 0.0;
   give(rest);
@@ -89,8 +102,10 @@ void ShapedBase::finish(std::vector<BasePhase>& shaped) {
 
 void ShapedBase::advance(std::vector<BasePhase>& shaped) {
   while (given_until_s_ - time_s_ > kSameTime_s) {
-    const double until_s = std::min({given_until_s_, next_change(x_), next_change(y_)});
-    shaped.push_back({sum(x_, &BasePhase::x), sum(y_, &BasePhase::y), {}, until_s - time_s_});
+    const double until_s =
+        std::min({given_until_s_, next_change(x_), next_change(y_), next_change(e_)});
+    shaped.push_back({sum(x_, &BasePhase::x), sum(y_, &BasePhase::y), sum(e_, &BasePhase::e),
+                      until_s - time_s_, given_[e_.front().index - forgotten_].phase.extruding});
     time_s_ = until_s;
   }
   while (given_.size() > 1 && given_[1].start_s <= time_s_ - memory_s_) {

@@ -1,13 +1,14 @@
 // The base's motion while the printer's own input shaper is on.
 //
-//   b_s(t) = Σ A_i b(t − d_i)     per axis; the pulses' delays counted from the first of them
+//   b_s(t) = Σ A_i b(t − t_i)     per axis, t on the clock of the plan
+//   D      the lead: by how much the first t_i of both axes lies before 0
 //
 // Planned motion has phases of constant acceleration, and so has shaped motion: a phase ends
-// wherever a delayed phase ends. The firmware shifts the pulses by their mean delay, so this motion
-// comes some ms later than the firmware's. Distances from the path do not depend on that.
+// wherever a shifted phase ends. b_s(t) is known once the plan is known until t + D. Filament is
+// not shaped.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <cstddef>
 #include <deque>
 #include <vector>
@@ -22,9 +23,10 @@ namespace unflex::verify {
 struct BasePhase {
   dynamics::BaseSegment x;
   dynamics::BaseSegment y;
-  // Filament that comes out meanwhile. Zero for a shaped base, whose filament is not shaped.
+  // Filament that comes out meanwhile, counted from the start of the move or of the shaped motion.
   dynamics::BaseSegment e = {};
   double duration_s = 0.0;
+  bool extruding = false;  // the move lays filament
 };
 
 // Appends the phases of one move, except those without duration.
@@ -35,11 +37,20 @@ class ShapedBase {
   // The base rests at x, y.
   ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm);
 
-  // Takes the next move and appends the shaped motion that is known by then. It lasts as long as
-  // the motion given so far.
+  // Takes the next move and appends the shaped motion that is known by then. Shaped motion begins
+  // lead_s() before the first move, so it lasts as long as the motion given so far. A phase ends
+  // where the first move begins.
   void add(const planner::PlannedMove& move, std::vector<BasePhase>& shaped);
-  // The machine stands still. Appends what is left of the shaped motion.
-  void finish(std::vector<BasePhase>& shaped);
+  // The machine stands still. Appends what is left of the shaped motion: until the plan's end, and
+  // behind it.
+  void finish(std::vector<BasePhase>& until_end, std::vector<BasePhase>& behind);
+
+  // D.
+  [[nodiscard]] double lead_s() const { return lead_s_; }
+  // Duration of the given moves that the shaped motion has not reached yet.
+  [[nodiscard]] double unplayed_s() const { return std::min(lead_s_, given_until_s_); }
+  // Filament that the given moves lay.
+  [[nodiscard]] double filament_mm() const { return filament_mm_; }
 
  private:
   struct Tap {
@@ -53,6 +64,7 @@ class ShapedBase {
   };
 
   void give(const BasePhase& phase);
+  void rest(double duration_s, std::vector<BasePhase>& shaped);
   void advance(std::vector<BasePhase>& shaped);
   [[nodiscard]] double next_change(std::vector<Tap>& taps);
   [[nodiscard]] dynamics::BaseSegment sum(const std::vector<Tap>& taps,
@@ -60,11 +72,14 @@ class ShapedBase {
 
   std::vector<Tap> x_;
   std::vector<Tap> y_;
+  std::vector<Tap> e_;
+  double lead_s_ = 0.0;
   double memory_s_ = 0.0;
+  double filament_mm_ = 0.0;
   std::deque<Timed> given_;
   std::size_t forgotten_ = 0;
   double given_until_s_ = 0.0;
-  double time_s_ = 0.0;  // end of the shaped motion so far
+  double time_s_ = 0.0;  // end of the shaped motion so far, counted from its beginning
 };
 
 }  // namespace unflex::verify

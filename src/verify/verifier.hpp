@@ -22,7 +22,8 @@
 namespace unflex::verify {
 
 // Goes through both files section by section. `original_` is the nozzle if the sliced file were
-// printed as it is, measured against the plan of the whole file, `path_`. `emitted_` is the nozzle
+// printed as it is, the printer's own shaper included, measured against the plan of the whole file,
+// `path_`. `unshaped_` is that nozzle without the shaper. `emitted_` is the nozzle
 // of the emitted file. In compensated runs, which begin and end at rest, it is measured against the
 // plan of the run by itself, `run_path_`: where the sliced file passes from one section into the
 // next at speed, that plan takes some ms longer.
@@ -46,7 +47,16 @@ class Verifier {
   void play_run();
   void skip_added_barriers();
   void join_over_barrier();
-  void set_shaping(const gcode::Shaper& shaper);
+  void shape_sliced();
+  void shape_emitted();
+  // Calls action with the nozzles on the sliced file's plan.
+  template <class Action>
+  void for_sliced(Action action) {
+    action(original_);
+    if (unshaped_) {
+      action(*unshaped_);
+    }
+  }
   void play_run_moves(bool compensated);
   void play(const planner::PlannedMove& move);
   void end_section();
@@ -74,11 +84,13 @@ class Verifier {
   ReferencePath run_path_;
   ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
   Nozzles original_;
+  std::optional<Nozzles> unshaped_;  // from the first motion on that a shaper changes
   // The nozzle if the sliced moves of a compensated run were kept. It starts from the state of
   // emitted_ and is measured against run_path_.
   Meter kept_;
   Nozzles emitted_;
-  gcode::Shaper emitted_shaper_;  // shaper that acts on emitted_
+  gcode::Shaper original_shaper_;  // shaper that acts on original_
+  gcode::Shaper emitted_shaper_;   // shaper that acts on emitted_
   FilamentLedger filament_;
   BaseCheck base_;
   SectionRules rules_of_run_;

@@ -38,6 +38,18 @@ double stream_bytes(std::istream& stream) {
   return length;
 }
 
+// Makes `present` the shaper of the section. Returns whether it was another one.
+bool takes_shaper(const Section& section, gcode::Shaper& present) {
+  if (!section.regime) {
+    return false;
+  }
+  const gcode::Shaper shaper = section.regime->modal.input_shaper();
+  const bool differs = shaper.freq_x_hz != present.freq_x_hz ||
+                       shaper.freq_y_hz != present.freq_y_hz || shaper.settings != present.settings;
+  present = shaper;
+  return differs;
+}
+
 Deviation deviation(const Meter& meter) { return {meter.extruding().stats(), meter.all().stats()}; }
 
 }  // namespace
@@ -55,9 +67,9 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       lines_(input_, output_, place_tolerance_mm(rules), violations_),
       path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
       run_path_([this](planner::PlannedMove& move) { return next_resting_move(move); }),
-      original_(rules.nozzle, observation, false),
+      original_(rules.nozzle, observation, NozzleBase::sliced),
       kept_(coarse(rules.nozzle)),
-      emitted_(rules.nozzle, observation, true),
+      emitted_(rules.nozzle, observation, NozzleBase::emitted),
       base_(rules_, violations_),
       rules_of_run_(rules_, violations_),
       input_excursion_(rules_.travel),
@@ -128,17 +140,18 @@ void Verifier::begin_section(bool compensated) {
   rate_.forget();
   rules_of_run_.begin(rate_, since_kept_motion_s_ < kRingsFor_s);
   path_.begin_section();
-  original_.begin_section(path_);
+  shape_sliced();
+  for_sliced([&](Nozzles& nozzles) { nozzles.begin_section(path_); });
   if (compensated) {
+    // A run begins at rest, and it has a clock of its own.
+    emitted_.finish();
     violations_.begin_run();
     // A long rest, so that the path of the previous run does not count as near.
     run_path_.rest(kApart_s);
     run_path_.begin_section(rules_.lead_in_s);
   }
   emitted_path_ = compensated ? &run_path_ : &path_;
-  if (output_.section().regime) {
-    set_shaping(output_.section().regime->modal.input_shaper());
-  }
+  shape_emitted();
   emitted_.begin_section(*emitted_path_);
   if (compensated) {
     const Meter& emitted = emitted_.main();
@@ -210,12 +223,26 @@ void Verifier::join_over_barrier() {
   output_.join_over_barrier();
 }
 
-void Verifier::set_shaping(const gcode::Shaper& shaper) {
-  if (shaper.freq_x_hz != emitted_shaper_.freq_x_hz ||
-      shaper.freq_y_hz != emitted_shaper_.freq_y_hz ||
-      shaper.settings != emitted_shaper_.settings) {
-    emitted_shaper_ = shaper;
-    emitted_.shape(planner::shaping(rules_.fixed, shaper));
+void Verifier::shape_sliced() {
+  static_cast<void>(input_.has_move());  // so that the regime of a run is known
+  if (!takes_shaper(input_.section(), original_shaper_)) {
+    return;
+  }
+  const planner::Shaping shaping = planner::shaping(rules_.fixed, original_shaper_);
+  if (shaping.acts() && !unshaped_) {
+    unshaped_ = original_;
+    unshaped_->watch_as(NozzleBase::unshaped);
+    if (observer_ == nullptr) {
+      unshaped_->drop_detuned();
+    }
+    original_.watch_as(NozzleBase::shaped);
+  }
+  original_.shape(shaping);
+}
+
+void Verifier::shape_emitted() {
+  if (takes_shaper(output_.section(), emitted_shaper_)) {
+    emitted_.shape(planner::shaping(rules_.fixed, emitted_shaper_));
   }
 }
 
@@ -253,7 +280,7 @@ void Verifier::play_run_moves(bool compensated) {
 
 void Verifier::play(const planner::PlannedMove& move) {
   rate_.add(move);
-  const double start_s = emitted_.main().time_s();
+  const double start_s = emitted_.plan_time_s();
   const bool compensated = emitted_path_ == &run_path_;
   const bool late = emitted_path_->section_complete() &&
                     start_s >= emitted_path_->end_s() + kLate_s + emitted_.main().lag_s();
@@ -273,7 +300,7 @@ void Verifier::play(const planner::PlannedMove& move) {
     refused_line_ = move.segment.line;
   }
   // The original advances in its section as far as the emitted nozzle has in its own.
-  const double elapsed_s = emitted_.main().time_s() - emitted_path_->section_start_s();
+  const double elapsed_s = emitted_.plan_time_s() - emitted_path_->section_start_s();
   path_.extend_to(path_.section_start_s() + elapsed_s);
   let_original_follow(path_.section_start_s() + elapsed_s);
 }
@@ -282,7 +309,7 @@ void Verifier::let_original_follow(double until_s) {
   while (original_next_ < path_.end() && path_[original_next_].end_s <= until_s) {
     // A copy, because playing makes the path grow, which moves its pieces.
     const planner::PlannedMove move = path_[original_next_++].move;
-    original_.play(move);
+    for_sliced([&](Nozzles& nozzles) { nozzles.play(move); });
   }
   double needed_s = original_.main().time_s();
   if (observer_ != nullptr) {
@@ -294,7 +321,7 @@ void Verifier::let_original_follow(double until_s) {
     input_.skip_resting();
   } else {
     path_.discard_before(needed_s - original_.main().reach_s());
-    let_kept_follow(emitted_.main().time_s());
+    let_kept_follow(emitted_.plan_time_s());
     run_path_.discard_before(std::min(kept_.time_s(), emitted_.main().time_s()) -
                              emitted_.main().reach_s());
   }
@@ -308,6 +335,9 @@ void Verifier::let_kept_follow(double until_s) {
 }
 
 void Verifier::end_section() {
+  if (emitted_path_ == &run_path_) {
+    emitted_.finish();
+  }
   emitted_.wait_for_reference();
   if (emitted_path_ == &run_path_) {
     let_kept_follow(std::numeric_limits<double>::infinity());
@@ -334,7 +364,7 @@ void Verifier::play_kept_line() {
   const double output_s = output_.section().dwell_s + output_.section().switching_s;
   if (input_s > 0.0) {
     path_.rest(input_s);
-    original_.hold(input_s);
+    for_sliced([&](Nozzles& nozzles) { nozzles.hold(input_s); });
     if (observer_ != nullptr) {
       observer_->hold(input_s);
     }
@@ -351,9 +381,13 @@ void Verifier::play_kept_line() {
 void Verifier::hold() {
   begin_section(false);
   const double hold_s = rules_.nozzle.hold_s;
-  path_.hold(original_.main().base_x_mm(), original_.main().base_y_mm(), hold_s);
-  original_.play(resting(original_.main().base_x_mm(), original_.main().base_y_mm(), hold_s));
-  emitted_.play(resting(emitted_.main().base_x_mm(), emitted_.main().base_y_mm(), hold_s));
+  path_.hold(original_.plan_x_mm(), original_.plan_y_mm(), hold_s);
+  const auto rest = [&](Nozzles& nozzles) {
+    nozzles.play(resting(nozzles.plan_x_mm(), nozzles.plan_y_mm(), hold_s));
+    nozzles.finish();
+  };
+  for_sliced(rest);
+  rest(emitted_);
 }
 
 void Verifier::report_progress() {
@@ -364,9 +398,16 @@ void Verifier::report_progress() {
 VerifyReport Verifier::report() {
   VerifyReport report = totals_;
   report.uncompensated = deviation(original_.main());
+  if (unshaped_) {
+    report.unshaped = deviation(unshaped_->main());
+  }
   report.compensated = deviation(emitted_.main());
   for (std::size_t i = 0; i < original_.detuned().size(); ++i) {
-    report.detuned.push_back({deviation(original_.detuned()[i]), deviation(emitted_.detuned()[i])});
+    report.detuned.push_back(
+        {deviation(original_.detuned()[i]), std::nullopt, deviation(emitted_.detuned()[i])});
+    if (unshaped_ && i < unshaped_->detuned().size()) {
+      report.detuned.back().unshaped = deviation(unshaped_->detuned()[i]);
+    }
   }
   report.uncompensated_lag = original_.main().filament_lag();
   report.compensated_lag = emitted_.main().filament_lag();

@@ -206,6 +206,9 @@ TEST(PressureAdvance, StopsOnlyWhenItIsSwitchedOnOrOff) {
   EXPECT_EQ(session.read("SET_PRESSURE_ADVANCE EXTRUDER=extruder1 ADVANCE=0").kind,
             EventKind::barrier);
   EXPECT_FALSE(session.read("SET_PRESSURE_ADVANCE ADVANCE=0.05").position_lost);
+  session.read("MY_MACRO");
+  EXPECT_EQ(session.state().pressure_advance_s, 0.05) << "the best guess";
+  EXPECT_EQ(session.read("SET_PRESSURE_ADVANCE ADVANCE=0.05").kind, EventKind::barrier);
 }
 
 TEST(InputShaper, IsKeptForItsRestoration) {

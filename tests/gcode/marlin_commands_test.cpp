@@ -168,6 +168,8 @@ TEST(MarlinLinearAdvance, StopsOnlyForANewFactor) {
   EXPECT_EQ(session.read("M900 K0.05").kind, EventKind::passive);
   EXPECT_EQ(session.read("M900 K0").kind, EventKind::barrier);
   EXPECT_EQ(session.read("M900 K11").kind, EventKind::passive) << "out of range";
+  session.read("T1");
+  EXPECT_EQ(session.read("M900 K0").kind, EventKind::barrier) << "maybe another extruder";
 }
 
 TEST(MarlinShaper, IsKeptForItsRestoration) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -55,6 +56,35 @@ TEST(Shaping, ReachesAsFarAsKlipperSays) {
   const Shaping mzv = shaping(config_of(Firmware::klipper), kOn);
   EXPECT_NEAR(mzv.reach_s(), 0.009528, 1e-6);
   EXPECT_NEAR(mzv.length_s(), 0.75 * damped_period_s(45.0, 0.1), 1e-9);
+}
+
+double mean_s(const dynamics::ShaperPulses& pulses) {
+  double mean_s = 0.0;
+  for (const dynamics::Pulse& pulse : pulses) {
+    mean_s += pulse.weight * pulse.time_s;
+  }
+  return mean_s;
+}
+
+// kin_shaper.c, shift_pulses: each axis by itself.
+TEST(Shaping, KeepsBothAxesOfKlipperInStep) {
+  gcode::Shaper shaper = shaper_of(55.2, 43.6);
+  shaper.settings.type_y = "ei";
+  const Shaping both = shaping(config_of(Firmware::klipper), shaper);
+  EXPECT_NEAR(mean_s(both.x), 0.0, 1e-15);
+  EXPECT_NEAR(mean_s(both.y), 0.0, 1e-15);
+  EXPECT_DOUBLE_EQ(both.lead_s(), -std::min(both.x.front().time_s, both.y.front().time_s));
+}
+
+// Marlin, stepper.cpp; RepRapFirmware, AxisShaper.cpp.
+TEST(Shaping, OfTheOthersBeginsWithThePlan) {
+  for (const Firmware firmware : {Firmware::marlin, Firmware::rrf}) {
+    const Shaping both = shaping(config_of(firmware), shaper_of(45.0, 30.0));
+    EXPECT_EQ(both.x.front().time_s, 0.0);
+    EXPECT_EQ(both.y.front().time_s, 0.0);
+    EXPECT_EQ(both.lead_s(), 0.0);
+    EXPECT_GT(mean_s(both.y), 1.4 * mean_s(both.x));
+  }
 }
 
 TEST(Shaping, TakesTypeAndDampingOfTheFileBeforeThoseOfTheConfiguration) {

@@ -30,6 +30,7 @@ inline Report sample_report() {
   r.reference_time_s = 3600.0;
   r.emitted_time_s = 3618.0;
   r.uncompensated = {.extruding = sample_row(0.8), .all = sample_row(1.6)};
+  r.unshaped = {.extruding = sample_row(0.9), .all = sample_row(1.8)};
   r.compensated = {.extruding = sample_row(0.0125), .all = sample_row(0.025)};
   r.sensitivity = {{-0.1, {0.9, 0.2}, {0.03, 0.012}}, {0.05, {0.7, 0.15}, {0.02, 0.0061}}};
   r.robustness = {0.003, 0.0005};

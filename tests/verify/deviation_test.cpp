@@ -233,6 +233,35 @@ TEST(Measure, ABaseThatEndsEarlyRestsWhileTheReferenceGoesOn) {
   EXPECT_GT(std::abs(run.end.x.velocity), 0.1);
 }
 
+// Whether a moment counts as extruding is told by what is played, not by the reference.
+TEST(Measure, CountsAsExtrudingWhileTheBaseLaysFilament) {
+  const auto limits = limits_with(5000.0, 5.0);
+  const auto reference = plan_path(
+      {{0.0, 0.0, 0.0}, {10.0, 0.0, 50.0}, {10.0, 10.0, 50.0, 0.3}, {20.0, 10.0, 50.0}}, limits);
+  auto base = reference;
+  base[0].segment.end_mm[gcode::E] += 0.0005;
+  base[1].segment.end_mm[gcode::E] = base[1].segment.start_mm[gcode::E];
+  const RunDeviation run = measure(reference, base, at_rest(base), {});
+  EXPECT_NEAR(run.extruding.stats().duration_s, base[0].duration_s(), 1e-9);
+  EXPECT_EQ(run.extruding.stats().contour_max_line, 1U);
+  const RunDeviation sliced = measure(reference, reference, at_rest(base), {});
+  EXPECT_NEAR(sliced.extruding.stats().duration_s, reference[1].duration_s(), 1e-9);
+  EXPECT_NEAR(run.all.stats().contour_rms_mm, sliced.all.stats().contour_rms_mm, 1e-12);
+}
+
+// Filament after the reference's end is laid as well: 0.1 s beside the end of the path.
+TEST(Measure, CountsFilamentThatIsLaidAfterTheReferenceHasEnded) {
+  const auto limits = limits_with(5000.0, 5.0);
+  const auto reference = plan_path({{0.0, 0.0, 0.0}, {10.0, 0.0, 50.0}}, limits);
+  auto base = reference;
+  const auto late = plan_path({{10.0, 0.0, 0.0}, {10.0, 4.0, 50.0, 0.1}}, limits);
+  base.insert(base.end(), late.begin(), late.end());
+  const RunDeviation run = measure(reference, base, at_rest(base), model_with(2e4, 1.0));
+  EXPECT_NEAR(run.extruding.stats().duration_s, late.front().duration_s(), 1e-9);
+  EXPECT_NEAR(run.extruding.stats().contour_max_mm, 4.0, 0.01);
+  EXPECT_NEAR(run.all.stats().duration_s, duration_s(reference), 1e-9);
+}
+
 TEST(Measure, CarriesTheNozzleFromOneRunToTheNext) {
   const std::vector<testing::Point> points = {
       {0.0, 0.0, 0.0}, {10.0, 0.0, 100.0, 0.3}, {10.0, 10.0, 100.0, 0.3}, {0.0, 10.0, 80.0, 0.3}};

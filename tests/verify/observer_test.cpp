@@ -25,14 +25,14 @@ class Sums final : public Observer {
     paths = {&sliced, &emitted};
   }
   void step(NozzleId nozzle, const NozzleStep& step) override {
-    Nozzle& sum = nozzles[{nozzle.emitted, nozzle.model}];
+    Nozzle& sum = nozzles[{nozzle.base == NozzleBase::emitted, nozzle.model}];
     if (step.extruding) {
       sum.extruding_s += step.h_s;
       sum.squares += step.h_s * step.contour2_mm2;
       sum.most = std::max(sum.most, step.contour2_mm2);
     }
     if (step.measured) {
-      const PathPiece& piece = (*paths[nozzle.emitted ? 1 : 0])[step.piece];
+      const PathPiece& piece = (*paths[nozzle.base == NozzleBase::emitted ? 1 : 0])[step.piece];
       EXPECT_GE(step.time_s, piece.start_s - 1e-9);
       EXPECT_LE(step.time_s, piece.end_s + 1e-9);
       // The reference is on its piece.

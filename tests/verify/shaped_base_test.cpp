@@ -52,6 +52,7 @@ class Shaped : public ::testing::TestWithParam<int> {
   }
 
   [[nodiscard]] double planned(double t, gcode::Axis axis) const {
+    t = std::max(t, 0.0);
     for (const PlannedMove& move : moves_) {
       if (t <= move.duration_s()) {
         return move.position_mm(t)[axis];
@@ -61,7 +62,7 @@ class Shaped : public ::testing::TestWithParam<int> {
     return moves_.back().segment.end_mm[axis];
   }
 
-  // Σ A_i b(t − d_i)
+  // Σ A_i b(t − t_i)
   [[nodiscard]] double convolved(double t, const dynamics::ShaperPulses& pulses,
                                  gcode::Axis axis) const {
     if (pulses.empty()) {
@@ -69,9 +70,18 @@ class Shaped : public ::testing::TestWithParam<int> {
     }
     double sum = 0.0;
     for (const dynamics::Pulse& pulse : pulses) {
-      sum += pulse.weight * planned(t - (pulse.time_s - pulses.front().time_s), axis);
+      sum += pulse.weight * planned(t - pulse.time_s, axis);
     }
     return sum;
+  }
+
+  // From the first pulse of both axes to the last, the plan itself counted as one.
+  [[nodiscard]] double memory_s() const {
+    double last_s = 0.0;
+    for (const dynamics::ShaperPulses* pulses : {&shaping_.x, &shaping_.y}) {
+      last_s = pulses->empty() ? last_s : std::max(last_s, pulses->back().time_s);
+    }
+    return shaping_.lead_s() + last_s;
   }
 
   planner::Shaping shaping_;
@@ -95,9 +105,19 @@ TEST_P(Shaped, IsTheWeightedSumOfShiftedMotions) {
     }
     EXPECT_NEAR(known_s, given_s, 1e-9) << "as much is known as was given";
   }
-  base.finish(phases);
-  double t = 0.0;
+  EXPECT_NEAR(base.unplayed_s(), base.lead_s(), 1e-12);
+  std::vector<BasePhase> behind;
+  base.finish(phases, behind);
+  double t = -base.lead_s();
   for (const BasePhase& phase : phases) {
+    t += phase.duration_s;
+  }
+  EXPECT_NEAR(t, given_s, 1e-9) << "until the plan's end";
+  phases.insert(phases.end(), behind.begin(), behind.end());
+  t = -base.lead_s();
+  bool begins = false;
+  for (const BasePhase& phase : phases) {
+    begins = begins || std::abs(t) < 1e-9;
     for (const double share : {0.0, 0.3, 1.0}) {
       const double h = share * phase.duration_s;
       EXPECT_NEAR(at(phase.x, h), convolved(t + h, shaping_.x, gcode::X), 1e-8) << t + h;
@@ -105,7 +125,8 @@ TEST_P(Shaped, IsTheWeightedSumOfShiftedMotions) {
     }
     t += phase.duration_s;
   }
-  EXPECT_NEAR(t, given_s + shaping_.length_s(), 1e-9);
+  EXPECT_TRUE(begins) << "a phase begins where the plan does";
+  EXPECT_NEAR(t + base.lead_s(), given_s + memory_s(), 1e-9);
   EXPECT_NEAR(at(phases.back().x, phases.back().duration_s), moves_.back().segment.end_mm[0], 1e-8);
   EXPECT_NEAR(at(phases.back().y, phases.back().duration_s), moves_.back().segment.end_mm[1], 1e-8);
 }
@@ -117,7 +138,7 @@ TEST(ShapedBase, WithoutPulsesIsThePlan) {
   ShapedBase base({}, 1.0, 2.0);
   std::vector<BasePhase> shaped;
   base.add(move, shaped);
-  base.finish(shaped);
+  base.finish(shaped, shaped);
   std::vector<BasePhase> planned;
   append_phases(move, planned);
   ASSERT_EQ(shaped.size(), planned.size());
@@ -126,6 +147,29 @@ TEST(ShapedBase, WithoutPulsesIsThePlan) {
     EXPECT_NEAR(shaped[i].x.position, planned[i].x.position, 1e-9);
     EXPECT_NEAR(shaped[i].x.velocity, planned[i].x.velocity, 1e-6);
   }
+}
+
+TEST(ShapedBase, DoesNotShapeFilament) {
+  PlannedMove move = move_to(1.0, 2.0, 31.0, 2.0, 3000.0, 120.0);
+  move.segment.end_mm[gcode::E] = 1.5;
+  planner::Shaping shaping;
+  shaping.x = *dynamics::shaper_pulses(dynamics::ShaperKind::ei, 45.0, 0.1);
+  ShapedBase base(shaping, 1.0, 2.0);
+  std::vector<BasePhase> phases;
+  base.add(move, phases);
+  std::vector<BasePhase> behind;
+  base.finish(phases, behind);
+  double t = -base.lead_s();
+  double extruding_s = 0.0;
+  for (const BasePhase& phase : phases) {
+    const double laid_mm = t < 0.0 ? 0.0 : 1.5 * move.distance_mm(t) / move.length_mm;
+    EXPECT_NEAR(phase.e.position, laid_mm, 1e-9) << t;
+    EXPECT_EQ(phase.extruding, t > -1e-9) << t;
+    extruding_s += phase.extruding ? phase.duration_s : 0.0;
+    t += phase.duration_s;
+  }
+  EXPECT_NEAR(extruding_s, move.duration_s(), 1e-9);
+  EXPECT_DOUBLE_EQ(base.filament_mm(), 1.5);
 }
 
 }  // namespace

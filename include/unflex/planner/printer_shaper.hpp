@@ -16,11 +16,21 @@
 namespace unflex::planner {
 
 // What the shaper makes of the motion of each axis. Without pulses it leaves the axis as it is.
+//
+//   b_s(t) = Σ A_i b(t − t_i)     t on the clock of the plan
+//
+// Klipper shifts the pulses of each axis so that Σ A_i t_i = 0 (kin_shaper.c, shift_pulses). X and
+// Y stay in step at constant speed, whatever their shapers are, and the machine moves before the
+// plan. Marlin plays the plan at once and the second pulse later (stepper.cpp, pulse_phase_isr);
+// RepRapFirmware delays all pulses but the first, too. Where the axes' shapers differ, X and Y are
+// then out of step.
 struct Shaping {
   dynamics::ShaperPulses x;
   dynamics::ShaperPulses y;
 
   [[nodiscard]] bool acts() const { return !x.empty() || !y.empty(); }
+  // The longest time by which the machine moves before the plan.
+  [[nodiscard]] double lead_s() const;
   // The longest time by which the machine moves before a motion begins or after it ends.
   [[nodiscard]] double reach_s() const;
   // Time from the first pulse to the last.

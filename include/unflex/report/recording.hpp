@@ -1,7 +1,7 @@
 // What a page shows of a print besides its figures: the paths with their deviations, the worst
 // places, and how input shapers would have done. Its size is bounded, whatever the print.
 //
-//   before, after   the sliced file as the firmware plays it, and the compensated one
+//   before, after   the sliced file as the printer plays it, and the compensated one
 #pragma once
 
 #include <cstddef>

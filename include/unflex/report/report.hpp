@@ -111,7 +111,10 @@ struct Report {
   double reference_time_s = 0.0;
   double emitted_time_s = 0.0;
 
+  // The sliced file as this printer plays it, its own input shaper included.
   DeviationRows uncompensated;
+  // The sliced file without that shaper; nullopt if none acts.
+  std::optional<DeviationRows> unshaped;
   DeviationRows compensated;
   std::vector<Sensitivity> sensitivity;  // by rising error
   std::optional<Robustness> robustness;  // set if a band of frequencies was asked for

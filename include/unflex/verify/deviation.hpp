@@ -29,7 +29,7 @@ struct DeviationStats {
 };
 
 struct Deviation {
-  DeviationStats extruding;  // while the reference lays filament
+  DeviationStats extruding;  // while the text that is played lays filament
   // While the reference moves in X or Y. For a whole file, also while the base is held after its
   // end.
   DeviationStats all;

@@ -12,9 +12,17 @@
 
 namespace unflex::verify {
 
+// What a nozzle hangs on.
+enum class NozzleBase {
+  sliced,    // the sliced file's plan, as long as the printer has used no shaper
+  shaped,    // what the printer's own shaper has made of that plan
+  unshaped,  // that plan beside `shaped`, as if the printer had no shaper
+  emitted,   // the emitted file's motion as the printer plays it
+};
+
 // Tells the nozzles of a verification apart.
 struct NozzleId {
-  bool emitted = false;   // hangs on the emitted file's base, not on the sliced file's plan
+  NozzleBase base = NozzleBase::sliced;
   std::size_t model = 0;  // 0: Rules::nozzle; i + 1: Observation::detuned[i]
 };
 
@@ -25,17 +33,20 @@ struct NozzleStep {
   dynamics::NozzleXY nozzle;
   dynamics::BaseSegment base_x;
   dynamics::BaseSegment base_y;
-  // Whether the reference moves. Only then `extruding` and the fields after it are set.
+  // What is played now lays filament.
+  bool extruding = false;
+  // Distance from the path, and the line of the sliced file that is nearest to the nozzle. Set
+  // while the reference moves or filament is laid.
+  double contour2_mm2 = 0.0;
+  std::size_t line = 0;
+  // Whether the reference moves. Only then the fields after `waiting` are set.
   bool measured = false;
   // The base has ended early and rests while the reference runs on. The nozzle state is reset
   // afterwards.
   bool waiting = false;
-  bool extruding = false;
   double reference_x_mm = 0.0;
   double reference_y_mm = 0.0;
   std::size_t piece = 0;  // piece of the reference's path
-  double contour2_mm2 = 0.0;
-  std::size_t line = 0;  // line of the sliced file that is nearest to the nozzle
 };
 
 class Observer {

@@ -69,6 +69,8 @@ struct BlamedRun {
 // Deviations of a further nozzle (Observation::detuned) on the two bases.
 struct Detuned {
   Deviation uncompensated;
+  // As VerifyReport::unshaped. Only if an observer watches.
+  std::optional<Deviation> unshaped;
   Deviation compensated;
 };
 
@@ -81,8 +83,11 @@ struct LagStats {
 };
 
 struct VerifyReport {
-  // Measured against the firmware's plan of the input.
+  // The input as this printer plays it, its own shaper included. Measured against the firmware's
+  // plan of the input.
   Deviation uncompensated;
+  // The input without the printer's shaper; nullopt if none acts.
+  std::optional<Deviation> unshaped;
   // Compensated runs begin and end at rest, so each is measured against its own plan from rest to
   // rest. If the input passes into or out of the run at speed, that plan takes some ms longer.
   Deviation compensated;

@@ -237,7 +237,7 @@ const unflexReport = (() => {
       "--series-3",
       "--series-4",
     ];
-    const dashes = [null, null, null, null, null, null, "7 4", "7 4"];
+    const dashes = [null, null, null, null, null, null, "7 4", "7 4", "2 4"];
     const defined = data.contenders
       .map((contender, i) => ({
         ...contender,

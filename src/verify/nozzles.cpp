@@ -1,0 +1,119 @@
+#include "nozzles.hpp"
+
+#include <algorithm>
+
+namespace unflex::verify {
+namespace {
+
+constexpr double kSameTime_s = 1e-10;
+
+}  // namespace
+
+Nozzles::Nozzles(const NozzleModel& model, const Observation& observation, NozzleBase base)
+    : main_(model), observer_(observation.observer) {
+  for (const NozzleModel& other : observation.detuned) {
+    // One reach for all, so that one stretch of the path counts as near for all.
+    detuned_.emplace_back(other, main_.reach_s());
+  }
+  main_.follow_filament();
+  watch_as(base);
+}
+
+void Nozzles::watch_as(NozzleBase base) {
+  if (observer_ != nullptr) {
+    std::size_t number = 0;
+    for_each([&](Meter& meter) { meter.watch(observer_, {base, number++}); });
+  }
+}
+
+double Nozzles::plan_time_s() const {
+  return main_.time_s() + (shaped_ ? shaped_->unplayed_s() : 0.0);
+}
+
+double Nozzles::plan_x_mm() const { return shaped_ ? to_mm_[gcode::X] : main_.base_x_mm(); }
+
+double Nozzles::plan_y_mm() const { return shaped_ ? to_mm_[gcode::Y] : main_.base_y_mm(); }
+
+void Nozzles::begin_section(ReferencePath& path) {
+  const double unplayed_s = shaped_ ? shaped_->unplayed_s() : 0.0;
+  const double unplayed_mm = shaped_ ? shaped_->filament_mm() : 0.0;
+  for_each([&](Meter& meter) { meter.begin_section(path, unplayed_s, unplayed_mm); });
+}
+
+void Nozzles::shape(const planner::Shaping& shaping) {
+  finish();
+  shaping_ = shaping;
+}
+
+void Nozzles::play(const planner::PlannedMove& move) {
+  if (!shaping_.acts()) {
+    rested_s_ = 0.0;
+    for_each([&](Meter& meter) { meter.play(move); });
+    return;
+  }
+  const gcode::Position& from = move.segment.start_mm;
+  if (!shaped_ || from[gcode::X] != to_mm_[gcode::X] || from[gcode::Y] != to_mm_[gcode::Y]) {
+    finish();
+    begin_shaped(from);
+  }
+  to_mm_ = move.segment.end_mm;
+  phases_.clear();
+  shaped_->add(move, phases_);
+  play_shaped(phases_);
+}
+
+// The base moves before the plan, at the end of the time in which the machine stands still. So the
+// nozzles go back by that much of this time.
+void Nozzles::begin_shaped(const gcode::Position& from) {
+  shaped_.emplace(shaping_, from[gcode::X], from[gcode::Y]);
+  before_plan_s_ = shaped_->lead_s();
+  const double back_s = std::min(before_plan_s_, rested_s_);
+  for_each([&](Meter& meter) {
+    meter.hold(-back_s);
+    meter.shift_to(from[gcode::X], from[gcode::Y]);
+  });
+  rested_s_ = 0.0;
+}
+
+void Nozzles::play_shaped(const std::vector<BasePhase>& phases) {
+  for (const BasePhase& phase : phases) {
+    if (before_plan_s_ > kSameTime_s) {
+      before_plan_s_ -= phase.duration_s;
+      for_each([&](Meter& meter) { meter.settle(phase); });
+    } else {
+      for_each([&](Meter& meter) { meter.play(phase); });
+    }
+  }
+}
+
+double Nozzles::finish() {
+  if (!shaped_) {
+    return 0.0;
+  }
+  phases_.clear();
+  std::vector<BasePhase> behind;
+  shaped_->finish(phases_, behind);
+  play_shaped(phases_);
+  double duration_s = 0.0;
+  for (const BasePhase& phase : behind) {
+    for_each([&](Meter& meter) { meter.settle(phase); });
+    duration_s += phase.duration_s;
+  }
+  for_each([&](Meter& meter) { meter.add_filament(shaped_->filament_mm()); });
+  shaped_.reset();
+  return duration_s;
+}
+
+void Nozzles::wait_for_reference() {
+  if (!shaped_) {
+    for_each([](Meter& meter) { meter.wait_for_reference(); });
+  }
+}
+
+void Nozzles::hold(double duration_s) {
+  const double rest_s = std::max(0.0, duration_s - finish());
+  for_each([&](Meter& meter) { meter.hold(rest_s); });
+  rested_s_ += rest_s;
+}
+
+}  // namespace unflex::verify
