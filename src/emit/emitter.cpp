@@ -107,7 +107,8 @@ void Emitter::note_motion(const gcode::Event& event) {
     move_waits_ = true;
   } else if (event.kind == gcode::EventKind::barrier) {
     moving_ = false;
-    move_waits_ = moves_by_itself(event);
+    // A pause waits for standstill. Of other barriers it is not known, and a macro may move last.
+    move_waits_ = moves_by_itself(event) || (move_waits_ && event.dwell_s <= 0.0);
   }
 }
 
@@ -238,6 +239,7 @@ void Emitter::enter_run(std::string& out) {
     // A run begins at rest, but no firmware stops by itself between the move before it and its
     // first line. G4 without a time makes all three firmwares end their motion and go on at once.
     write("G4 P0", out);
+    move_waits_ = false;
   }
   write_checkpoint(" RUN=1", out);
   write(kRunMark, out);

@@ -10,7 +10,7 @@
 // A line as fast as or slower than its neighbours has no ramp. c is 1 except for what only the
 // firmware's planner knows: junctions it slows down for, speeds it rounds to whole steps.
 //
-// A lead out of a standstill may last longer than its line, 8 ms. The motors rest until its end, so
+// A lead out of a standstill takes the same time for every run. The motors rest until its end, so
 // all lines come that much later.
 #include "speeds.hpp"
 
@@ -138,7 +138,6 @@ class SpeedSolver {
         mm_s_per_feed_(mm_s_per_feed),
         distance_mm_(strokes.size()),
         accel_mm_s2_(strokes.size(), options.line_accel_mm_s2),
-        leads_(options.lines.leads),
         step_events_(strokes.size(), 0.0),
         correction_(strokes.size(), 1.0),
         speed_mm_s_(strokes.size()) {
@@ -190,17 +189,25 @@ class SpeedSolver {
     double s = 0.0;
   };
 
-  // The lead of line i, which is to take duration_s. None if the line is the first of a run that
-  // begins at rest, or if there is hardly time for it: then the line takes longer, and the lines
-  // after it make up for that.
+  // The lead of line i, which is to take duration_s besides the wait for a run's first step. If
+  // there is hardly time for it, the line takes longer, and the lines after it make up for that.
   [[nodiscard]] Lead lead_of(std::size_t i, double duration_s) const {
     constexpr double kMostOfLine = 0.7;
     const double before = speed_before(i);
-    if (!leads_ || before <= 0.0 || speed_mm_s_[i] <= before || step_events_[i] < 2.0) {
+    if (!leads(before) || speed_mm_s_[i] <= before || step_events_[i] < 2.0) {
       return {};
     }
     const double mm = distance_mm_[i] / step_events_[i];
-    return {mm, std::min(mm / before, kMostOfLine * duration_s)};
+    return {mm, before > 0.0 ? std::min(mm / before, kMostOfLine * duration_s) : 0.0};
+  }
+
+  // Whether a line behind one of that speed may have a lead. 0: out of a standstill.
+  [[nodiscard]] bool leads(double before_mm_s) const {
+    return before_mm_s > 0.0 ? options_->lines.leads : options_->lines.first_step_s > 0.0;
+  }
+  // How long a run that begins at rest waits for its first step.
+  [[nodiscard]] double wait_s() const {
+    return passing_.in_mm_s ? 0.0 : options_->lines.first_step_s;
   }
 
   // Rounding and the firmware change the time that lines take. The next lines make up for that.
@@ -212,10 +219,10 @@ class SpeedSolver {
       Stroke& stroke = (*strokes_)[i];
       const double share = std::min(kMostCatchUp, kCatchUpAccel * options_->lines.max_accel_mm_s2 *
                                                       given_s(i) * given_s(i) / distance_mm_[i]);
-      const double due_s = i == 0 && leads_from_rest()
-                               ? given_s(i)
-                               : std::clamp(stroke.end_s + lead_from_rest_s_ - clock.now_s(),
-                                            (1.0 - share) * given_s(i), (1.0 + share) * given_s(i));
+      const double first_s = i == 0 ? wait_s() : 0.0;
+      const double now_s = clock.now_s() - (wait_s() - first_s);
+      const double due_s =
+          std::clamp(stroke.end_s - now_s, (1.0 - share) * given_s(i), (1.0 + share) * given_s(i));
       const Lead lead = lead_of(i, due_s);
       const double way_mm = correction_[i] * (distance_mm_[i] - lead.mm + ramps_mm(i));
       const double feed = way_mm / (due_s - lead.s) / mm_s_per_feed_;
@@ -226,26 +233,20 @@ class SpeedSolver {
       if (i == 0 && passing_.in_mm_s) {
         clock.pass(passing_line(line, *passing_.in_mm_s, -1.0));
       }
-      clock.add(line, lead.s + way_mm / speed_mm_s_[i]);
+      clock.add(line, first_s + lead.s + way_mm / speed_mm_s_[i]);
     }
     if (passing_.out_mm_s) {
       clock.pass(passing_line(line, *passing_.out_mm_s, 1.0));
     }
     clock.finish();
-    std::size_t first = 0;
-    if (leads_from_rest()) {
-      lead_from_rest_s_ = std::max(clock.duration_s(0) - given_s(0), 0.0);
-      first = 1;
-    }
-    for (std::size_t i = first; i < speed_mm_s_.size(); ++i) {
-      const Lead lead = lead_of(i, clock.duration_s(i));
+    for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
+      const double moving_s = clock.duration_s(i) - (i == 0 ? wait_s() : 0.0);
+      const Lead lead = lead_of(i, moving_s);
       const double formula_s = (distance_mm_[i] - lead.mm + ramps_mm(i)) / speed_mm_s_[i];
-      correction_[i] = std::clamp((clock.duration_s(i) - lead.s) / formula_s, 1.0 / kMostCorrection,
-                                  kMostCorrection);
+      correction_[i] =
+          std::clamp((moving_s - lead.s) / formula_s, 1.0 / kMostCorrection, kMostCorrection);
     }
   }
-
-  [[nodiscard]] bool leads_from_rest() const { return leads_ && !passing_.in_mm_s; }
 
   // RepRapFirmware leaves out a line's ramp up from the faster of its two ends, and so goes no
   // faster than that end, if the ramp would take less than ten step clocks and gain less than 10 %
@@ -351,7 +352,8 @@ class SpeedSolver {
     // No ramp lasts longer than the line. Where a ramp would have to, the line takes longer, and
     // the lines after it make up for that.
     const double most = accel_mm_s2_[i] * given_s(i);
-    const double up = leads_ ? 0.0 : std::clamp(v - speed_before(i), 0.0, most);
+    const double before = speed_before(i);
+    const double up = leads(before) ? 0.0 : std::clamp(v - before, 0.0, most);
     const double down = std::clamp(v - after, 0.0, most);
     return (up * up + down * down) / (2.0 * accel_mm_s2_[i]);
   }
@@ -363,8 +365,6 @@ class SpeedSolver {
   double mm_s_per_feed_;
   std::vector<double> distance_mm_;
   std::vector<double> accel_mm_s2_;
-  bool leads_;
-  double lead_from_rest_s_ = 0.0;
   std::vector<double> step_events_;  // Marlin: steps of the axis that has most of them
   std::vector<double> correction_;   // c
   std::vector<double> speed_mm_s_;

@@ -1,4 +1,5 @@
 // The approach: most of the way of a travel whose start is only assumed, as a line of its own.
+// Before a line that draws from such a place, it goes to that place.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,11 +20,21 @@ constexpr double kShortest_mm = 0.1;
 constexpr int kDecimals = 4;
 constexpr int kDecimalsOfInches = 6;
 
+bool is_plain_move(const Command& command) {
+  return command.kind == CommandKind::traditional && command.letter == 'G' && command.number >= 0 &&
+         command.number <= 3 && command.subnumber == -1 && !command.line_number &&
+         !command.checksum;
+}
+
+// Moves X or Y, or an arc, with filament.
+bool draws(const Command& command) {
+  return is_plain_move(command) && command.has('E') &&
+         (command.has_any("XY") || command.number >= 2);
+}
+
 // G0 or G1 with X and Y, maybe F, each once, and nothing else that counts.
 bool is_plain_travel(const Command& command) {
-  if (command.kind != CommandKind::traditional || command.letter != 'G' ||
-      (command.number != 0 && command.number != 1) || command.subnumber != -1 ||
-      command.line_number || command.checksum) {
+  if (!is_plain_move(command) || command.number > 1) {
     return false;
   }
   std::array<int, 2> seen{};
@@ -39,13 +50,30 @@ bool is_plain_travel(const Command& command) {
 
 }  // namespace
 
+// The printer's own input shaper leaves no swing.
+bool Interpreter::swings() const {
+  constexpr double kLeast_s = 5e-3;
+  return swinging_s_ > kLeast_s && !state_.input_shaper().is_on();
+}
+
 std::optional<std::string> Interpreter::approach(const Line& line) const {
+  const std::string_view line_end = line.text.ends_with("\r\n") ? "\r\n" : "\n";
+  if (swings() && draws(parse(line.content()))) {
+    return fmt::format("G4 P{:.0f}{}", std::ceil(swinging_s_ * 1e3), line_end);
+  }
   const std::array<bool, 4> taken = known_or_assumed();
   if ((state_.known[X] && state_.known[Y]) || !taken[X] || !taken[Y]) {
     return std::nullopt;
   }
   const Command command = parse(line.content());
-  if (!is_plain_travel(command) || !state_.absolute_xyz || !modes_certain()) {
+  if (!state_.absolute_xyz || !modes_certain()) {
+    return std::nullopt;
+  }
+  if (draws(command)) {
+    // Behind a macro E is unknown as well, and so the line stays as it is.
+    return state_.known[E] ? std::optional(go_where_assumed().append(line_end)) : std::nullopt;
+  }
+  if (!is_plain_travel(command)) {
     return std::nullopt;
   }
   const auto target_mm = [&](Axis axis, char letter) {
@@ -68,7 +96,18 @@ std::optional<std::string> Interpreter::approach(const Line& line) const {
   if (const std::optional<double> feed = command.value('F')) {
     text += fmt::format(" F{}", *feed);
   }
-  return text + (line.text.ends_with("\r\n") ? "\r\n" : "\n");
+  return text.append(line_end);
+}
+
+// No motion, unless an object was cancelled and the machine is elsewhere. Then it goes there at the
+// file's own limits, which the line itself would not do.
+std::string Interpreter::go_where_assumed() const {
+  constexpr double kExact = 1e9;
+  const auto reading = [&](Axis axis) {
+    const double exact = (state_.position_mm[axis] - state_.base_mm[axis]) / state_.unit_mm;
+    return std::round(exact * kExact) / kExact + 0.0;
+  };
+  return fmt::format("G1 X{} Y{}", reading(X), reading(Y));
 }
 
 }  // namespace unflex::gcode

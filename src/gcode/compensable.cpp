@@ -30,6 +30,9 @@ std::string_view kept_reason(const Segment& segment, Firmware firmware) {
   if (!segment.start_known) {
     return "start unknown";
   }
+  if (segment.refused) {
+    return "too much filament";
+  }
   const double length_xy = segment.length_xy_mm();
   if (length_xy == 0.0) {
     return segment.delta(Z) == 0.0 ? "extrude only" : "Z move";

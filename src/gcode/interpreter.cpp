@@ -127,12 +127,17 @@ void Interpreter::interpret(Event& event) {
   parse(content, command_);
   switch (options_.firmware) {
     case Firmware::klipper:
-      return klipper(event);
+      klipper(event);
+      break;
     case Firmware::marlin:
-      return marlin(event, content);
+      marlin(event, content);
+      break;
     case Firmware::rrf:
-      return rrf(event, content);
+      rrf(event, content);
+      break;
   }
+  // Homing and macros take their time.
+  swinging_s_ = event.position_lost ? 0.0 : std::max(swinging_s_ - event.dwell_s, 0.0);
 }
 
 void Interpreter::klipper(Event& event) {

@@ -354,6 +354,23 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
       return;
     }
   }
+  const double filament_mm = segment.delta(E);
+  segment.refused = segment.moves_xy() && filament_mm > options_.max_extrude_dab_mm &&
+                    filament_mm > options_.max_extrude_ratio * segment.length_mm();
+  if (segment.refused && event.warnings.empty()) {
+    event.warnings.push_back(
+        fmt::format("{:.4g} mm of filament in {:.4g} mm of path: Klipper ends the print at such a "
+                    "move (max_extrude_cross_section); passed through unchanged, check the line",
+                    filament_mm, segment.length_mm()));
+  }
+  if (segment.moves_xy()) {
+    // From a known place the compensated base takes the swing away.
+    swinging_s_ = start.known || start.assumed ? 0.0 : options_.settling_s;
+  } else {
+    // Ramps make the motion last longer than this.
+    const double least_s = std::max(segment.length_mm(), std::abs(filament_mm)) / feed_mm_s;
+    swinging_s_ = std::max(swinging_s_ - least_s, 0.0);
+  }
   state_.position_mm = segment.end_mm;
   event.kind = EventKind::move;
   event.segments.push_back(segment);

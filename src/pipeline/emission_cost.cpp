@@ -10,7 +10,7 @@
 namespace unflex::pipeline {
 void EmissionCost::add(const std::vector<planner::PlannedMove>& original, double lead_in_s,
                        const dynamics::BaseTrajectory& base,
-                       const std::vector<planner::PlannedMove>& replayed,
+                       const std::vector<planner::PlannedMove>& replayed, double late_s,
                        const dynamics::NozzleXY& start, const verify::NozzleModel& model) {
   const double h = base.period_s;
   dynamics::NozzleXY optimal = start;
@@ -20,7 +20,7 @@ void EmissionCost::add(const std::vector<planner::PlannedMove>& original, double
   for (std::size_t k = 0; k + 1 < base.nodes(); ++k) {
     const double t = static_cast<double>(k + 1) * h;
     advance(base, k, model, optimal);
-    emitted.to(t, [&](const planner::PlannedMove& move, double from_s, double to_s) {
+    emitted.to(t + late_s, [&](const planner::PlannedMove& move, double from_s, double to_s) {
       advance(move, from_s, to_s, model, real);
     });
     sliced.to(t - lead_in_s, [](const planner::PlannedMove&, double, double) {});

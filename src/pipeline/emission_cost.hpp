@@ -16,10 +16,11 @@ namespace unflex::pipeline {
 class EmissionCost {
  public:
   // Adds a run. original: its sliced moves, which begin lead_in_s after the base; replayed: the
-  // printer's plan of the written lines; start: the nozzle when the base begins.
+  // printer's plan of the written lines, which begins late_s before the base; start: the nozzle
+  // when the base begins.
   void add(const std::vector<planner::PlannedMove>& original, double lead_in_s,
            const dynamics::BaseTrajectory& base, const std::vector<planner::PlannedMove>& replayed,
-           const dynamics::NozzleXY& start, const verify::NozzleModel& model);
+           double late_s, const dynamics::NozzleXY& start, const verify::NozzleModel& model);
 
   // The part of p − p* across the path, where filament is laid.
   [[nodiscard]] double rms_mm() const;

@@ -234,9 +234,10 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   emit::Emitter trial = emitter_;
   text.clear();
   trial.run(job.run(), plan, text);
+  const double first_step_s = piece.begins_run() ? rules_->emit.lines.first_step_s : 0.0;
   Verdict verdict =
       judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(), run_nozzle_,
-            rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
+            rules_->verify, job.lead_in_s() + first_step_s, line_rate_, max_lines_per_s_,
             {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(), may_be_worse,
              machine_mm_});
   if (verdict.objection) {
@@ -251,12 +252,12 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   }
   sliced_s_ += planner::duration_s(piece.moves);
   written_s_ += planner::duration_s(verdict.replayed) + switching_s_;
-  cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, run_nozzle_,
+  cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, first_step_s, run_nozzle_,
             rules_->verify.nozzle);
   robust_.add(job.robust);
   nominal_.add(job.nominal);
-  late_s_ +=
-      planner::duration_s(verdict.replayed) - planner::duration_s(piece.moves) - job.lead_in_s();
+  late_s_ += planner::duration_s(verdict.replayed) - planner::duration_s(piece.moves) -
+             job.lead_in_s() - first_step_s;
   last_lines_ = piece.ends_run() ? std::vector<gcode::Segment>() : last_lines(verdict.replayed);
   kept_lines_.clear();
   if (!verdict.replayed.empty()) {

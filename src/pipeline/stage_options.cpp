@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/planner/first_step.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
 namespace unflex::pipeline {
@@ -54,6 +55,8 @@ double planned_base_accel(const machine::Settings& settings) {
          std::min(2.0 * axes * grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);
 }
 
+// The longest pause for a swing to die away.
+constexpr double kLongestCalm_s = 0.5;
 // The weight of the middle of the band of an axis; its edges have the rest.
 constexpr double kMiddleShare = 0.25;
 
@@ -142,6 +145,21 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
   return limits;
 }
 
+// A swing dies away to a fiftieth in this time.
+double settling_of(const machine::AxisDynamics& dynamics) {
+  const dynamics::FlexibleAxis nozzle = axis(dynamics);
+  return 4.0 / (nozzle.zeta * nozzle.omega_rad_s);
+}
+
+// The most filament per mm of path that the firmware takes.
+double max_extrude_ratio(const machine::Settings& settings) {
+  if (settings.printer.firmware != Firmware::klipper) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const double radius_mm = settings.extruder.filament_diameter_mm / 2.0;
+  return settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius_mm * radius_mm);
+}
+
 }  // namespace
 
 gcode::InterpreterOptions interpreter_options(const machine::Settings& settings) {
@@ -169,6 +187,11 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   options.has_print_jerk = settings.has_print_jerk();
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
   options.steps_per_mm = settings.steps_per_mm();
+  const double settling_s =
+      std::max(settling_of(settings.dynamics_x), settling_of(settings.dynamics_y));
+  options.settling_s = std::min(settling_s, kLongestCalm_s);
+  options.max_extrude_ratio = max_extrude_ratio(settings);
+  options.max_extrude_dab_mm = settings.extruder.nozzle_diameter_mm * options.max_extrude_ratio;
   return options;
 }
 
@@ -284,6 +307,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
     // With classic jerk as high as in a run, each line begins at its own speed.
     options.lines.leads = !options.fixed.classic_jerk;
   }
+  options.lines.first_step_s = planner::first_step_s(options.fixed);
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
   options.lines.max_accel_mm_s2 = planned_base_accel(settings);
   options.lines.motors = options.fixed.motors();
@@ -297,13 +321,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.interpreter = interpreter_options(settings);
   rules.limits = planner_limits(settings);
   rules.fixed = firmware_config(settings);
-  const double radius = settings.extruder.filament_diameter_mm / 2.0;
-  if (settings.printer.firmware != Firmware::klipper) {
-    rules.max_extrude_ratio = std::numeric_limits<double>::infinity();
-  } else {
-    rules.max_extrude_ratio =
-        settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius * radius);
-  }
+  rules.max_extrude_ratio = max_extrude_ratio(settings);
   rules.nozzle_diameter_mm = settings.extruder.nozzle_diameter_mm;
   rules.nozzle = {axis(settings.dynamics_x), axis(settings.dynamics_y),
                   settings.verify.step_ms * 1e-3, settings.verify.hold_s};
@@ -320,7 +338,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.base_max_velocity_mm_s = settings.base_max_velocity_mm_s();
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
   rules.max_lines_per_s = settings.max_lines_per_s();
-  rules.lead_in_s = settings.solve.lead_in_ms * 1e-3;
+  rules.lead_in_s = settings.solve.lead_in_ms * 1e-3 + planner::first_step_s(rules.fixed);
   return rules;
 }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "marlin_integers.hpp"
+#include "unflex/planner/first_step.hpp"
 
 namespace unflex::planner::marlin {
 namespace {
@@ -55,8 +56,8 @@ Trapezoid make_trapezoid(const Block& block, float entry, float exit) {
 // all but the first step is at r_n.
 //
 // It accelerates from step to step, by the time that has passed, and the first step is made at r_i.
-// A ramp of many steps is nearly continuous. A ramp within one step is none: the first step takes
-// 1 / r_i, all others 1 / r_n.
+// A ramp of many steps is nearly continuous. A ramp much shorter than the first step is none: that
+// step takes 1 / r_i, all others 1 / r_n.
 void set_profile(const Trapezoid& trapezoid, Block& block) {
   PlannedMove& move = block.move;
   const double mm_per_step = move.length_mm / block.step_events;
@@ -74,11 +75,13 @@ void set_profile(const Trapezoid& trapezoid, Block& block) {
   if (a > 0.0) {
     move.decel_s = (peak - last) / a;
     cruise_steps -= 0.5 * (peak + last) * move.decel_s;
-    if (trapezoid.accel_steps == 1) {
+    constexpr double kJump = 0.1;  // share of the first step's time
+    move.accel_s = (peak - initial) / a;
+    if (move.accel_s > 0.0 && move.accel_s * initial < kJump) {
       move.lead_s = 1.0 / initial;
+      move.accel_s = 0.0;
       cruise_steps -= 1.0;
     } else {
-      move.accel_s = (peak - initial) / a;
       cruise_steps -= 0.5 * (peak + initial) * move.accel_s;
     }
   }
@@ -86,3 +89,11 @@ void set_profile(const Trapezoid& trapezoid, Block& block) {
 }
 
 }  // namespace unflex::planner::marlin
+
+namespace unflex::planner {
+
+double first_step_s(const FirmwareConfig& config) {
+  return config.firmware == Firmware::marlin ? 1.0 / marlin::kMinRate : 0.0;
+}
+
+}  // namespace unflex::planner

@@ -153,7 +153,7 @@ TEST_P(Determinism, HoldsFromAnyFolderAndByAnyName) {
 
 TEST_P(Determinism, HoldsOnATerminal) {
   const Made first = make();
-  Words all = words();
+  Words all = with_dynamics(words());
   all.insert(all.begin(), "unflex");
   int terminal = -1;
   const pid_t child = ::forkpty(&terminal, nullptr, nullptr, nullptr);

@@ -69,8 +69,9 @@ TEST_F(Macros, AreOnesThatKlipperCanRead) {
   // The name of each section, without regard to case, is a command, and no name occurs twice.
   EXPECT_EQ(words_after(text, "\n[gcode_macro "),
             (std::set<std::string>{"UNFLEX_CHECKPOINT", "pAUSE", "cANCEL_PRINT", "rESUME",
-                                   "_UNFLEX_LEAVE", "_UNFLEX_RETURN", "_UNFLEX_SHAPER"}));
-  EXPECT_EQ(count(text, "\n[gcode_macro "), 7U);
+                                   "UNFLEX_LIMITS", "_UNFLEX_LEAVE", "_UNFLEX_RETURN",
+                                   "_UNFLEX_SHAPER"}));
+  EXPECT_EQ(count(text, "\n[gcode_macro "), 8U);
   EXPECT_EQ(words_after(text, "rename_existing: "),
             (std::set<std::string>{"UNFLEX_BASE_PAUSE", "UNFLEX_BASE_CANCEL_PRINT",
                                    "UNFLEX_BASE_RESUME"}));

@@ -43,7 +43,8 @@ def run(command, maximum):
         with open(os.path.join(folder, "prints", "a.gcode"), "w", encoding="utf-8") as file:
             file.write(PRINT)
         with open(os.path.join(folder, "printer.toml"), "w", encoding="utf-8") as file:
-            file.write("[limits]\nmax_accel_mm_s2 = 3000\n")
+            file.write("[limits]\nmax_accel_mm_s2 = 3000\n[printer]\nfirmware = \"klipper\"\n"
+                       "[dynamics.x]\nfreq_hz = 45\n[dynamics.y]\nfreq_hz = 45\n")
         done = subprocess.run(["bash", "-ec", command], cwd=folder, stdout=subprocess.DEVNULL,
                               stderr=subprocess.DEVNULL, check=False,
                               env=dict(os.environ, MAX_DEVIATION_MM=maximum))

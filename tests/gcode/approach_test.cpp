@@ -55,10 +55,44 @@ TEST(Approach, IsMadeBehindLabelsAndUnknownCommandsOnly) {
             std::nullopt);
 }
 
+// Behind a label the machine is where it should be, unless the object was cancelled.
+TEST(Approach, OfALineThatDrawsLeadsToItsBegin) {
+  const std::string before = "M83\nG1 X10 Y20.12345 Z1 F6000\nG92 X0\n" + kLabel;
+  for (const char* line : {"G1 X40 Y60 E1", "G1 Y60 E1 F1200", "G3 X10 Y20 I5 E1"}) {
+    EXPECT_THAT(approach_behind(before, line), Optional(Eq("G1 X0 Y20.12345\n"))) << line;
+  }
+  Session session;
+  session.read(before);
+  const Event ahead = session.read("G1 X0 Y20.12345");
+  EXPECT_TRUE(ahead.segments.empty());
+  EXPECT_EQ(ahead.kind, EventKind::border);
+  EXPECT_TRUE(session.move("G1 X40 Y60 E1").start_known);
+  // Behind a macro nobody knows what an absolute E is counted from.
+  EXPECT_EQ(approach_behind("G1 X10 Y20 Z1\nMY_MACRO\n", "G1 X40 Y60 E1"), std::nullopt);
+}
+
+// Such a move stands as it is, so the nozzle swings behind it.
+TEST(Approach, OfALineThatDrawsBehindAMoveFromNowhereIsAPause) {
+  InterpreterOptions options = default_options(Firmware::klipper);
+  options.settling_s = 0.2;
+  const auto ahead = [&](const std::string& lines) {
+    Session session(options);
+    session.read("M83\nG28\n" + lines);
+    return session.approach("G1 X40 Y60 E1");
+  };
+  EXPECT_THAT(ahead("G1 X10 Y20 Z1 F6000\n"), Optional(Eq("G4 P200\n")));
+  EXPECT_THAT(ahead("G1 X10 Y20 Z1 F6000\nG1 E1 F600\n"), Optional(Eq("G4 P100\n")));
+  EXPECT_EQ(ahead("G1 X10 Y20 Z1 F6000\nG1 E4 F600\n"), std::nullopt);
+  EXPECT_EQ(ahead("G1 X10 Y20 Z1 F6000\nG4 P200\n"), std::nullopt);
+  EXPECT_EQ(ahead("G1 X10 Y20 Z1 F6000\nG1 X30 F600\n"), std::nullopt);
+  options.shaper_freq_x_hz = options.shaper_freq_y_hz = 45.0;
+  EXPECT_EQ(ahead("G1 X10 Y20 Z1 F6000\n"), std::nullopt);
+}
+
 TEST(Approach, IsOfPlainTravelOnly) {
   for (const char* line :
-       {"G1 X40 Y60 E1", "G1 X40", "G1 X40 Y60 Z2", "G2 X40 Y60 I1 J1", "G1 X40 Y60 X41",
-        "G1 X40 Y60 F0", "G1 X40 Y60 S1", "M204 S100", "MACRO X=1 Y=2", "N5 G1 X40 Y60"}) {
+       {"G1 E1", "G1 X40", "G1 X40 Y60 Z2", "G2 X40 Y60 I1 J1", "G1 X40 Y60 X41", "G1 X40 Y60 F0",
+        "G1 X40 Y60 S1", "M204 S100", "MACRO X=1 Y=2", "N5 G1 X40 Y60"}) {
     EXPECT_EQ(approach_behind("G1 X10 Y20 Z1\n" + kLabel, line), std::nullopt) << line;
   }
   EXPECT_EQ(approach_behind("G1 X10 Y20 Z1\n" + kLabel + "G91\n", "G1 X40 Y60"), std::nullopt);

@@ -20,6 +20,25 @@ TEST(Compensable, AreMovesInThePlane) {
   EXPECT_EQ(kept_reason(by(1, 0, 0, 0), Firmware::klipper), "");
 }
 
+// kinematics/extruder.py, check_move: Klipper ends the print at such a move, unless it is a dab.
+TEST(Compensable, AreNotThoseThatKlipperRefuses) {
+  InterpreterOptions options = default_options(Firmware::klipper);
+  options.max_extrude_ratio = 0.25;
+  options.max_extrude_dab_mm = 0.1;
+  Session session(options);
+  session.read("G28\nM83\nG1 X10 Y10 Z1 F6000\n");
+  const Event event = session.read("G1 X11 E8");
+  ASSERT_EQ(event.segments.size(), 1U);
+  EXPECT_EQ(kept_reason(event.segments[0], Firmware::klipper), "too much filament");
+  ASSERT_EQ(event.warnings.size(), 1U);
+  EXPECT_EQ(event.warnings[0],
+            "8 mm of filament in 1 mm of path: Klipper ends the print at such a move "
+            "(max_extrude_cross_section); passed through unchanged, check the line");
+  EXPECT_TRUE(compensable(session.move("G1 X21 E2.5"), Firmware::klipper));
+  EXPECT_TRUE(compensable(session.move("G1 X21.1 E0.09"), Firmware::klipper)) << "a dab";
+  EXPECT_TRUE(session.read("G1 E8").warnings.empty()) << "filament alone";
+}
+
 TEST(Compensable, AreNotTheOthersForAReason) {
   EXPECT_EQ(kept_reason(by(0, 0, 0, 1), Firmware::klipper), "extrude only");
   EXPECT_EQ(kept_reason(by(0, 0, 1, 0), Firmware::klipper), "Z move");

@@ -41,7 +41,9 @@ void expect_read(const std::string& bytes, const Sample& sample) {
     const Event event = interpreter.interpret(line);
     joined += event.line.text;
     EXPECT_EQ(event.line.number, lines);
-    EXPECT_THAT(event.warnings, ::testing::IsEmpty()) << line.text;
+    // Some prints have G10 and G11, which retract nothing without that section.
+    EXPECT_THAT(event.warnings, ::testing::Each(::testing::HasSubstr("[firmware_retraction]")))
+        << line.text;
     const Command command = parse(line.content());
     arcs += command.is('G', 2) || command.is('G', 3) ? 1 : 0;
     for (const Segment& segment : event.segments) {

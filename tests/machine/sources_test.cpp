@@ -79,7 +79,9 @@ TEST(MarlinDump, IsRead) {
   EXPECT_EQ(told(s, "dynamics.y.damping_ratio"), "0.12 m503.txt:22");
   EXPECT_EQ(told(s, "printer.input_shaper_freq_y_hz"), "35 m503.txt:22");
   EXPECT_EQ(told(s, "extruder.filament_diameter_mm"), "2.85 m503.txt:5");
-  EXPECT_THAT(s.notes, IsEmpty());
+  ASSERT_THAT(s.notes, SizeIs(1));
+  EXPECT_THAT(s.notes[0].message, ::testing::HasSubstr("set kinematics.type to that"));
+  EXPECT_THAT(load(fixture("m503.txt"), {"kinematics.type=corexy"})->notes, IsEmpty());
 }
 
 // M503 S0 writes no echo. M906 and M569 exist in both firmwares.
@@ -102,7 +104,7 @@ TEST(MarlinDump, OfClassicJerkIsRead) {
 TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsANote) {
   const Settings s =
       read("echo:  M92 X80 Y80\necho:  M205 J0.01\necho:  M593 F40 D0.1\n", "dump.txt");
-  ASSERT_THAT(s.notes, SizeIs(1));
+  ASSERT_THAT(s.notes, SizeIs(2));
   EXPECT_EQ(s.notes[0].place.line, 2);
   EXPECT_DOUBLE_EQ(s.dynamics_y.freq_hz, 40.0);
 }
@@ -110,16 +112,18 @@ TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsANote) {
 TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsNoNoteToWhoKnows) {
   const std::string dump = "echo:  M92 X80 Y80\necho:  M205 J0.01\necho:  M593 F40 D0.1\n";
   for (const char* deviation : {"0.013", "0.01"}) {
-    const Result<Settings> s =
-        parse(dump, "dump.txt", {fmt::format("limits.junction_deviation_mm={}", deviation)});
+    const Result<Settings> s = parse(
+        dump, "dump.txt",
+        {fmt::format("limits.junction_deviation_mm={}", deviation), "kinematics.type=cartesian"});
     ASSERT_TRUE(s);
     EXPECT_THAT(s->notes, IsEmpty());
   }
 }
 
 TEST(MarlinDump, InInchesIsConverted) {
+  // No note about the junction deviation, only that about kinematics.
   EXPECT_THAT(read("echo:  G20\necho:  M92 X80\necho:  M205 J0.01\necho:  M593 F40 D0.1\n").notes,
-              IsEmpty());
+              SizeIs(1));
   EXPECT_NEAR(*read("echo:  G20\necho:  M201 X10 Y10\n").limits.axis_max_accel_mm_s2[0], 254.0,
               1e-9);
 }

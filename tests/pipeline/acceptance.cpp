@@ -136,7 +136,7 @@ void expect_kept(const report::Report& report, const machine::Settings& settings
 }
 
 void expect_true_path(const report::Report& report, double improvement) {
-  const report::DeviationRow& before = report.uncompensated.extruding;
+  const report::DeviationRow& before = unshaped(report).extruding;
   const report::DeviationRow& after = report.compensated.extruding;
   EXPECT_GT(after.duration_s, 0.0);
   EXPECT_LE(report.compensated_lag.rms_mm, 10e-3);
@@ -188,7 +188,7 @@ void expect_compensated(const std::string& input, const Expectation& expectation
   expect_lines_kept(sliced, emitted, printer);
   EXPECT_EQ(unflex::testing::difference(sliced, emitted, printer), "");
   for (const auto& [name, value] :
-       {std::pair{"before_rms_um", report->uncompensated.extruding.contour_rms_mm * 1e3},
+       {std::pair{"before_rms_um", unshaped(*report).extruding.contour_rms_mm * 1e3},
         std::pair{"rms_um", report->compensated.extruding.contour_rms_mm * 1e3},
         std::pair{"p99_um", report->compensated.extruding.contour_p99_mm * 1e3},
         std::pair{"max_um", report->compensated.extruding.contour_max_mm * 1e3}}) {

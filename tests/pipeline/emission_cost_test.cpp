@@ -41,20 +41,21 @@ dynamics::BaseTrajectory base_at(double speed_mm_s) {
 
 TEST(EmissionCost, IsNothingForLinesThatDoWhatTheBaseDoes) {
   EmissionCost cost;
-  cost.add(move_at(50.0, true), 0.0, base_at(50.0), move_at(50.0, true), {}, model());
+  cost.add(move_at(50.0, true), 0.0, base_at(50.0), move_at(50.0, true), 0.0, {}, model());
   EXPECT_LT(cost.max_mm(), 1e-12);
   EXPECT_LE(cost.rms_mm(), cost.max_mm());
 }
 
 TEST(EmissionCost, IsNothingAlongThePath) {
   EmissionCost cost;
-  cost.add(move_at(50.0, true), 0.0, base_at(50.0), move_at(51.0, true), {}, model());
+  cost.add(move_at(50.0, true), 0.0, base_at(50.0), move_at(51.0, true), 0.0, {}, model());
   EXPECT_EQ(cost.max_mm(), 0.0);
 }
 
 TEST(EmissionCost, IsWhatTheDifferenceOfTheBasesMakesOfTheNozzleAcrossThePath) {
   EmissionCost cost;
-  cost.add(move_at(50.0, true, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), {}, model());
+  cost.add(move_at(50.0, true, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), 0.0, {},
+           model());
   // The bases differ by 1 mm/s. The model is linear, so the nozzle's error is the response to a
   // base at 1 mm/s.
   double sum = 0.0;
@@ -72,16 +73,20 @@ TEST(EmissionCost, IsWhatTheDifferenceOfTheBasesMakesOfTheNozzleAcrossThePath) {
 
 TEST(EmissionCost, CountsWhereFilamentIsLaid) {
   EmissionCost cost;
-  cost.add(move_at(50.0, false, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), {}, model());
+  cost.add(move_at(50.0, false, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), 0.0, {},
+           model());
   EXPECT_EQ(cost.rms_mm(), 0.0);
   // Only the samples of the first of two runs count.
-  cost.add(move_at(50.0, true, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), {}, model());
+  cost.add(move_at(50.0, true, gcode::Y), 0.0, base_at(50.0), move_at(51.0, true), 0.0, {},
+           model());
   const double alone = cost.rms_mm();
-  cost.add(move_at(50.0, false, gcode::Y), 0.0, base_at(50.0), move_at(55.0, true), {}, model());
+  cost.add(move_at(50.0, false, gcode::Y), 0.0, base_at(50.0), move_at(55.0, true), 0.0, {},
+           model());
   EXPECT_EQ(cost.rms_mm(), alone);
   // Nothing is laid during a lead-in, so its samples, the first ones, do not count.
   EmissionCost late;
-  late.add(move_at(50.0, true, gcode::Y), 0.1, base_at(50.0), move_at(51.0, true), {}, model());
+  late.add(move_at(50.0, true, gcode::Y), 0.1, base_at(50.0), move_at(51.0, true), 0.0, {},
+           model());
   EXPECT_GT(late.rms_mm(), alone);
 }
 

@@ -191,7 +191,7 @@ TEST(FirmwareKeys, NameTheCrossSectionThatKlipperRefuses) {
     return testing::complaints(*report);
   };
   EXPECT_THAT(violations("extruder.max_extrude_cross_section_mm2=0.64"),
-              ::testing::HasSubstr("refuses"));
+              ::testing::HasSubstr("structure differs"));
   EXPECT_THAT(violations("extruder.max_extrude_cross_section_mm2=5"),
               ::testing::Not(::testing::HasSubstr("refuses")));
 }

@@ -21,6 +21,10 @@ void write_file(const std::filesystem::path& file, std::string_view text) {
   EXPECT_TRUE(stream.flush()) << file;
 }
 
+const report::DeviationRows& unshaped(const report::Report& report) {
+  return report.unshaped ? *report.unshaped : report.uncompensated;
+}
+
 machine::Settings settings(const std::vector<std::string>& overrides) {
   Result<machine::Settings> loaded = machine::load(std::nullopt, overrides);
   EXPECT_TRUE(loaded.has_value()) << to_string(loaded.error());

@@ -143,7 +143,7 @@ TEST_P(LongRunOn, IsCompensatedWithoutASeam) {
   EXPECT_EQ(report->runs_total, 1U);
   EXPECT_EQ(report->runs_fallback, 0U) << testing::complaints(*report);
   EXPECT_TRUE(report->warnings.empty());
-  const auto& before = report->uncompensated.extruding;
+  const auto& before = testing::unshaped(*report).extruding;
   const auto& after = report->compensated.extruding;
   EXPECT_LT(after.contour_rms_mm, 0.25 * before.contour_rms_mm);
   EXPECT_LT(after.contour_max_mm, before.contour_max_mm);

@@ -55,7 +55,7 @@ TEST_P(TenLayers, AreDrawnAsTheReadmeSays) {
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_EQ(report->violation_count, 0U) << complaints(*report);
   EXPECT_EQ(report->runs_fallback, 0U) << complaints(*report);
-  const report::DeviationRow& before = report->uncompensated.extruding;
+  const report::DeviationRow& before = testing::unshaped(*report).extruding;
   const report::DeviationRow& after = report->compensated.extruding;
   const std::array<double, 4> measured_mm = {before.contour_rms_mm, after.contour_rms_mm,
                                              before.contour_p99_mm, after.contour_p99_mm};
@@ -153,7 +153,7 @@ TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
   // The emitted print may be a little shorter: a run's last line may end before the base would have
   // come to rest.
   EXPECT_GE(report->emitted_time_s, 0.97 * report->reference_time_s);
-  const double before = report->uncompensated.extruding.contour_rms_mm;
+  const double before = testing::unshaped(*report).extruding.contour_rms_mm;
   const double after = report->compensated.extruding.contour_rms_mm;
   EXPECT_LE(after, GetParam().rms_mm);
   EXPECT_LE(after, before / GetParam().improvement);

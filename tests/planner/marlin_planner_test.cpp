@@ -46,6 +46,41 @@ TEST(MarlinPlanner, MotorsStopAtWholeSteps) {
   EXPECT_DOUBLE_EQ(moves[0].segment.feed_mm_s, 50.0);
 }
 
+// stepper.cpp, block_phase_isr: acceleration acts from the second step on.
+TEST(MarlinPlanner, MakesTheFirstStepOfALineAtItsEntryRate) {
+  Limits limits = marlin_limits();
+  limits.axis_max_accel_mm_s2 = {1e6, 1e6, 1e6, 1e6};
+  limits.print_accel_mm_s2 = limits.travel_accel_mm_s2 = 1e6;
+  limits.junction_deviation_mm = 0.3;
+  std::vector<gcode::Segment> lines;
+  gcode::Position at{};
+  const std::array feeds_mm_s = {10.0, 20.0, 40.0, 80.0, 40.0};
+  const std::array ends_mm = {0.1, 0.2, 0.4, 0.8, 1.2};
+  for (std::size_t i = 0; i < feeds_mm_s.size(); ++i) {
+    const gcode::Position to = {ends_mm[i], 0.0, 0.0, 0.0};
+    lines.push_back(segment(at, to, feeds_mm_s[i]));
+    at = to;
+  }
+  const auto moves = marlin_plan(lines, limits);
+  ASSERT_EQ(moves.size(), 5U);
+  // One step at the rate of the line before, the others at the line's own.
+  EXPECT_NEAR(moves[0].duration_s(), 1.0 / 120.0 + 7.0 / 800.0, 2e-6);
+  EXPECT_NEAR(moves[1].duration_s(), 1.0 / 800.0 + 7.0 / 1600.0, 2e-6);
+  EXPECT_NEAR(moves[2].duration_s(), 1.0 / 1600.0 + 15.0 / 3200.0, 2e-6);
+  EXPECT_NEAR(moves[3].duration_s(), 1.0 / 3200.0 + 31.0 / 6400.0, 2e-6);
+  EXPECT_NEAR(moves[3].distance_mm(1.0 / 3200.0), kStep_mm, 1e-6);
+  EXPECT_NEAR(moves[3].time_s(kStep_mm), 1.0 / 3200.0, 1e-6);
+  EXPECT_NEAR(moves[4].duration_s(), 32.0 / 3200.0, 2e-5);
+  limits.axis_jerk_mm_s = {1000.0, 1000.0, 1000.0, 1000.0};
+  FirmwareConfig config = marlin_config();
+  config.classic_jerk = true;
+  const auto jerked = marlin_plan(lines, limits, config);
+  EXPECT_NEAR(jerked[0].lead_s, 1.0 / 120.0, 1e-9);
+  for (std::size_t i = 1; i < jerked.size(); ++i) {
+    EXPECT_EQ(jerked[i].lead_s, 0.0);
+  }
+}
+
 TEST(MarlinPlanner, RoundingDoesNotAddUp) {
   const auto moves = marlin_plan(dense_line(100, 0.1063, 50.0));
   ASSERT_EQ(moves.size(), 100U);

@@ -39,6 +39,23 @@ TEST(PlannedMove, CoversTheDistanceOfATrapezoid) {
   EXPECT_NEAR(move.distance_mm(1.7), 77.5 + 10.0, 1e-12);
 }
 
+TEST(PlannedMove, LeadsAtTheSpeedOfItsStart) {
+  PlannedMove move = hand_made();
+  move.lead_s = 0.25;
+  move.accel_s = 0.0;
+  move.cruise_s = 1.25;
+  EXPECT_DOUBLE_EQ(move.duration_s(), 1.9);
+  EXPECT_DOUBLE_EQ(move.distance_mm(0.2), 2.0);
+  EXPECT_DOUBLE_EQ(move.distance_mm(0.25), 2.5);
+  EXPECT_DOUBLE_EQ(move.distance_mm(0.75), 32.5);
+  EXPECT_DOUBLE_EQ(move.velocity_mm_s(0.2), 10.0);
+  EXPECT_DOUBLE_EQ(move.velocity_mm_s(0.3), 60.0);
+  EXPECT_DOUBLE_EQ(move.time_s(2.0), 0.2);
+  EXPECT_DOUBLE_EQ(move.time_s(32.5), 0.75);
+  EXPECT_DOUBLE_EQ(move.phases()[0].duration_s, 0.25);
+  EXPECT_DOUBLE_EQ(move.phases()[2].speed_mm_s, 60.0);
+}
+
 TEST(PlannedMove, HasTheVelocityOfATrapezoid) {
   const PlannedMove move = hand_made();
   EXPECT_DOUBLE_EQ(move.velocity_mm_s(-1.0), 10.0);

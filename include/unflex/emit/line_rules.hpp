@@ -24,6 +24,7 @@ struct LineRules {
   double min_line_s = 1e-3;    // shortest duration of a line
   double min_line_mm = 0.0;    // shortest length of a line along X or Y
   int min_steps = 1;  // fewest grid steps of a line; the firmware joins shorter lines to the next
+  double first_step_s = 0.0;  // planner::first_step_s()
   // The firmware makes the first step of a line at the speed of the line before, if that is slower
   // (planner::PlannedMove::lead_s).
   bool leads = false;

@@ -26,8 +26,8 @@ inline constexpr double kMaxSlope = 0.02;
 // line would move it.
 [[nodiscard]] bool names_position(std::string_view content);
 
-// Why a motion that is not compensable stays as it is: "start unknown", "extrude only",
-// "retracting move" or "Z move". Empty for a compensable one.
+// Why a motion that is not compensable stays as it is: "start unknown", "too much filament",
+// "extrude only", "retracting move" or "Z move". Empty for a compensable one.
 [[nodiscard]] std::string_view kept_reason(const Segment& segment, Firmware firmware);
 
 }  // namespace unflex::gcode

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -38,6 +39,8 @@ struct Segment {
   // piece. Marlin hands it to its planner, which then limits the junction by centripetal
   // acceleration (PlannerHints::curve_radius).
   double curve_radius_mm = 0.0;
+  // The firmware ends the print here, because the motion takes more filament than it allows.
+  bool refused = false;
 
   [[nodiscard]] double delta(Axis axis) const { return end_mm[axis] - start_mm[axis]; }
   [[nodiscard]] bool moves_xy() const { return delta(X) != 0.0 || delta(Y) != 0.0; }
@@ -171,6 +174,12 @@ struct InterpreterOptions {
   bool has_print_jerk = false;
   // Filament diameter of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
   double filament_diameter_mm = 1.75;
+  // Klipper: a move with more mm of filament per mm than this ends the print, unless it lays less
+  // than max_extrude_dab_mm (kinematics/extruder.py, check_move).
+  double max_extrude_ratio = std::numeric_limits<double>::infinity();
+  double max_extrude_dab_mm = 0.0;
+  // How long the nozzle swings after a move. 0: it is not waited for.
+  double settling_s = 0.0;
   // Steps per mm of the configuration; an M92 must agree with them.
   std::array<double, 4> steps_per_mm{80.0, 80.0, 400.0, 500.0};
 };
@@ -247,7 +256,10 @@ class Interpreter {
   // A travel whose start is only assumed (Segment::start_assumed) cannot be rewritten, and so the
   // nozzle would swing where extrusion begins. For such a travel this gives an approach: a line to
   // put before it that makes all of the way but the end. The end then starts at a known place. The
-  // approach leads nowhere that the travel does not lead. nullopt for any other line.
+  // approach leads nowhere that the travel does not lead. Behind an object's label, a line that
+  // draws from such a place gets an approach as well: it leads to that place, where the machine is
+  // unless the object was cancelled. A line that draws right behind a move from an unknown place
+  // gets a pause, in which the nozzle's swing dies away. nullopt for any other line.
   [[nodiscard]] std::optional<std::string> approach(const Line& line) const;
 
   [[nodiscard]] const ModalState& state() const { return state_; }
@@ -353,6 +365,8 @@ class Interpreter {
   };
   // ModalState::known, as if no object had been cancelled and no unknown command moved anything.
   [[nodiscard]] std::array<bool, 4> known_or_assumed() const;
+  [[nodiscard]] std::string go_where_assumed() const;
+  [[nodiscard]] bool swings() const;
   [[nodiscard]] Start start_of_retraction() const;
   // Adds a straight segment to `target`, unless it has no length, and moves the state there.
   void append_segment(Event& event, const Position& target, double feed_mm_s, const Start& start,
@@ -379,8 +393,9 @@ class Interpreter {
   bool z_left_out_ = false;
   // X and Y: if the position is unknown, only labels and unknown commands are the reason.
   std::array<bool, 2> assumed_{};
-  bool modes_uncertain_ = false;     // a line that may or may not run has set a mode or a limit
-  bool feed_uncertain_ = false;      // a line that may or may not run has set F
+  double swinging_s_ = 0.0;       // for how much longer a nozzle swings that cannot be compensated
+  bool modes_uncertain_ = false;  // a line that may or may not run has set a mode or a limit
+  bool feed_uncertain_ = false;   // a line that may or may not run has set F
   bool told_of_retraction_ = false;  // Klipper: the file has a G10 or G11 that does nothing
   Command command_;                  // command of the line being read; kept for its storage
 };
