@@ -47,9 +47,9 @@ struct ZLimits {
 // with checkpoints: the rest of such a run goes on from standstill by the printer's own limits.
 [[nodiscard]] std::string unless_interrupted(std::string line);
 
-// The lines that put `wanted` in place of `current`. A default Shaper means no shaper. An axis whose
-// wanted shaper is unknown stays as it is.
-// RepRapFirmware is told all settings, since it forgets its type while the shaper is off.
+// The lines that put `wanted` in place of `current`. A default Shaper means no shaper. An axis
+// whose wanted shaper is unknown stays as it is. RepRapFirmware is told all settings, since it
+// forgets its type while the shaper is off.
 [[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                     const gcode::Shaper& current);
 

@@ -484,10 +484,6 @@ Result<Reading> read_marlin_dump(std::string_view text, const std::string& file)
   CommandReader reader(Firmware::marlin, file);
   // What the dump does not list was not built in.
   reader.reading.add("printer.firmware_retraction", false, {file, 0});
-  reader.reading.note({file, 0},
-                      "M503 does not tell which motors move what, and cartesian is assumed; set "
-                      "kinematics.type to that, or to what the printer is, such as corexy",
-                      {"kinematics.type"});
   Status status;
   for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
     if (status) {
@@ -497,6 +493,10 @@ Result<Reading> read_marlin_dump(std::string_view text, const std::string& file)
   if (!status) {
     return tl::unexpected(status.error());
   }
+  reader.reading.note({file, 0},
+                      "M503 does not tell which motors move what, and cartesian is assumed; set "
+                      "kinematics.type to that, or to what the printer is, such as corexy",
+                      {"kinematics.type"});
   reader.finish();
   return std::move(reader.reading);
 }

@@ -75,7 +75,7 @@ void set_profile(const Trapezoid& trapezoid, Block& block) {
   if (a > 0.0) {
     move.decel_s = (peak - last) / a;
     cruise_steps -= 0.5 * (peak + last) * move.decel_s;
-    constexpr double kJump = 0.1;  // share of the first step's time
+    constexpr double kJump = 0.25;  // share of the first step's time
     move.accel_s = (peak - initial) / a;
     if (move.accel_s > 0.0 && move.accel_s * initial < kJump) {
       move.lead_s = 1.0 / initial;

@@ -190,11 +190,12 @@ std::string to_text(const Report& report) {
   text += unknown_text(report.unknown_commands);
   write_output(out, report);
   if (!report.shaper_left_off.empty()) {
-    fmt::format_to(out,
-                   "input shaper  off after the print, since the printer's own is not known; type "
-                   "SET_INPUT_SHAPER {}\n              with the frequencies of its configuration, or "
-                   "give printer.input_shaper_freq_x_hz and _y_hz\n",
-                   report.shaper_left_off);
+    fmt::format_to(
+        out,
+        "input shaper  off after the print, since the printer's own is not known; type "
+        "SET_INPUT_SHAPER {}\n              with the frequencies of its configuration, or "
+        "give printer.input_shaper_freq_x_hz and _y_hz\n",
+        report.shaper_left_off);
   }
   if (report.violation_count > 0) {
     fmt::format_to(out, "violations    {}\n", report.violation_count);

@@ -248,7 +248,8 @@ INSTANTIATE_TEST_SUITE_P(
         line("Infinity", "G1 Xinf E.2", kJoined, kLowerCase, kNoNumber),
         line("MinusInfinity", "G1 X-inf", cannot_read("X-inf")),
         // Klipper reads this as X1 E400.
-        line("OfFourHundredDigits", "G1 X1e400", passes(), kLowerCase, kExponent),
+        line("OfFourHundredDigits", "G1 X1e400",
+             warns(":11: warning: 400 mm of filament in 99 mm of path"), kLowerCase, kExponent),
         line("OfCommandTooLarge", "G99999999999 X1", cannot_read("G99999999999")),
         line("BeyondAnyMachine", "G1 X9999999999 E.2",
              warns(":11: warning: the move leads further than any machine reaches")),

@@ -52,6 +52,10 @@ Profile profile(const Row& row) {
     p.peak = std::sqrt(p.initial * p.initial + 2.0 * a * accel_until);
     p.duration_s = 2.0 * accel_until / (p.initial + p.peak);
   }
+  // The stepper interrupt makes the first step at the initial rate.
+  if (const double ramp_s = (p.peak - p.initial) / a; ramp_s > 0.0 && ramp_s * p.initial < 0.25) {
+    p.duration_s = 1.0 / p.initial + (accel_until - 1.0) / p.peak;
+  }
   p.last = std::sqrt(std::max(p.peak * p.peak - 2.0 * a * decel_steps, 0.0));
   p.duration_s += (steps - decel_steps - accel_until) / p.peak;
   p.duration_s += 2.0 * decel_steps / (p.peak + p.last);

@@ -112,11 +112,17 @@ class Comparison {
   void read_emitted_line(std::string_view line) {
     const bool limits_act_early = emitted_.move_waits() && part_ != Part::kept;
     const std::map<std::string, double> before =
-        limits_act_early ? emitted_.reading().limits : std::map<std::string, double>();
+        limits_act_early ? limits_in_force() : std::map<std::string, double>();
     emitted_.read(line);
-    expect(!limits_act_early || emitted_.reading().limits == before,
-           "limits change while a move waits");
+    expect(!limits_act_early || limits_in_force() == before, "limits change while a move waits");
     follow(line);
+  }
+
+  // The limits that the emitted text has set, or else the printer's own.
+  [[nodiscard]] std::map<std::string, double> limits_in_force() const {
+    std::map<std::string, double> limits = emitted_.reading().limits;
+    limits.insert(printer_.limits.begin(), printer_.limits.end());
+    return limits;
   }
 
   void follow(std::string_view line) {
