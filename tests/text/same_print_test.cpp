@@ -44,7 +44,7 @@ TEST(SamePrint, LetsNoLimitsOfARunHoldForTheMoveBeforeIt) {
   const std::string sliced = numbered("G28\nM83\nG1 E1 F1800\nG1 X10 E1 F6000\nM400\n");
   const std::string before = "G28\n;line 0\nM83\n;line 1\nG1 E1 F1800\n;line 2\n;unflex run\n";
   const std::string lines =
-      "M204 P100000\nG1 X5 E.5 F5900\nG1 X10 E.5 F5900\n;line 3\n;unflex end\n";
+      "M201 X100000\nM204 P100000\nG1 X5 E.5 F5900\nG1 X10 E.5 F5900\n;line 3\n;unflex end\n";
   const std::string after = "M201 X3000\nM204 P3000\nG1 F6000\nM400\n;line 4\n";
   EXPECT_EQ(difference(sliced, before + "G1 F1800\n" + lines + "G1 F5900\n" + after, printer), "");
   EXPECT_THAT(difference(sliced, before + lines + "G1 F5900\n" + after, printer),

@@ -26,25 +26,30 @@ TextMachine::TextMachine(Firmware firmware, Retraction retraction)
 void TextMachine::read(std::string_view text) {
   path_.clear();
   line_ = TextLine(firmware_, text);
-  const double filament_mm = reading_.filament_mm;
+  const Reading before = reading_;
   try {
     carry_out();
   } catch (const Refused&) {
     ++refused_;
   }
   update();
-  note_waiting(filament_mm);
+  note_waiting(before);
 }
 
 // GCodes2.cpp, HandleGcode() and HandleMcode(): a move waits for the buffer; G4, G28, M18, M84,
 // M400 and M593 wait for standstill. No limit is known to wait.
-void TextMachine::note_waiting(double filament_mm) {
+void TextMachine::note_waiting(const Reading& before) {
+  // The firmware drops a move of less than a step.
+  constexpr double kLessThanAStep_mm = 1e-4;
   constexpr std::string_view kMoves = " G0 G1 G2 G3 G10 G11 ";
   constexpr std::string_view kStops = " G4 G28 M18 M84 M400 M593 ";
   const std::string command = " " + line_.command() + " ";
   if (kMoves.find(command) != std::string_view::npos) {
-    const bool moves = !path_.empty() || reading_.filament_mm != filament_mm;
-    move_waits_ = is(Firmware::rrf) && moves;
+    double most_mm = path_.size() > 1 ? 1.0 : std::abs(reading_.filament_mm - before.filament_mm);
+    for (std::size_t axis = 0; axis < E; ++axis) {
+      most_mm = std::max(most_mm, std::abs(reading_.position_mm[axis] - before.position_mm[axis]));
+    }
+    move_waits_ = is(Firmware::rrf) && most_mm > kLessThanAStep_mm;
   } else if (kStops.find(command) != std::string_view::npos) {
     move_waits_ = false;
   }

@@ -102,7 +102,7 @@ class TextMachine {
   void take_feed();
   void go_to(const Goal& goal);
   void update();
-  void note_waiting(double filament_mm);
+  void note_waiting(const Reading& before);
 
   void straight();
   void arc();
