@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "nozzle_motion.hpp"
+#include "unflex/planner/first_step.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -216,7 +217,11 @@ Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_
                     rate.max_per_s(), max_lines_per_s);
     return verdict;
   }
-  const verify::RunDeviation after = deviation_of(run, verdict.replayed, nozzle, rules, lead_in_s);
+  if (run.begins_run() && !verdict.replayed.empty()) {
+    verdict.wait_s = planner::wait_s(verdict.replayed.front(), rules.fixed);
+  }
+  const verify::RunDeviation after =
+      deviation_of(run, verdict.replayed, nozzle, rules, lead_in_s + verdict.wait_s);
   verdict.nozzle = after.end;
   verdict.rate = std::move(rate);
   std::optional<std::string> objection = worse(before, after, run.moves.back(), rules);

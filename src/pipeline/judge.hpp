@@ -39,6 +39,7 @@ struct Verdict {
   dynamics::NozzleXY nozzle;             // at the end of the run, if there is no objection
   verify::LineRate rate;                 // with the run's lines counted, if there is no objection
   std::vector<planner::PlannedMove> replayed;  // the printer's plan of the text
+  double wait_s = 0.0;                         // planner::wait_s() of the run
 };
 
 // Replays the text of a compensated run as the printer would, in the state the printer is in before

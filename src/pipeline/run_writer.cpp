@@ -82,10 +82,13 @@ Result<std::string> RunWriter::write(const RunJob& job) {
   run_nozzle_ = at_run.nozzle();
   std::optional<std::string> failure =
       run_stands_ ? "the run's beginning stands as it is" : write_run(job, text);
-  if (failure && !last_lines_.empty()) {
-    // There is no way back to the sliced lines in the middle of the motion.
+  const bool in_motion = !last_lines_.empty();
+  const bool begins_long_run = piece.begins_run() && !piece.ends_run();
+  if (failure && (in_motion || begins_long_run)) {
+    // If the first part of a long run stood as sliced, all behind it would have to. In the middle
+    // of the motion there is no way back to the sliced lines at all.
     failure = insist(job, text);
-    if (failure) {
+    if (failure && in_motion) {
       const std::size_t line = piece.events.front().line.number;
       blocked_ = {run_line_, piece.moves.back().segment.line,
                   fmt::format("at line {}: {}", line, *failure)};
@@ -234,10 +237,9 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   emit::Emitter trial = emitter_;
   text.clear();
   trial.run(job.run(), plan, text);
-  const double first_step_s = piece.begins_run() ? rules_->emit.lines.first_step_s : 0.0;
   Verdict verdict =
       judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(), run_nozzle_,
-            rules_->verify, job.lead_in_s() + first_step_s, line_rate_, max_lines_per_s_,
+            rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
             {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(), may_be_worse,
              machine_mm_});
   if (verdict.objection) {
@@ -246,18 +248,18 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   if (verdict.worse) {
     report_->warnings.push_back(to_string(
         Diagnostic{{input_name_, piece.events.front().line.number},
-                   fmt::format("up to line {}, in the middle of a long run, the nozzle strays more "
+                   fmt::format("up to line {}, in a part of a long run, the nozzle strays more "
                                "than it would without compensation",
                                piece.events.back().line.number)}));
   }
   sliced_s_ += planner::duration_s(piece.moves);
   written_s_ += planner::duration_s(verdict.replayed) + switching_s_;
-  cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, first_step_s, run_nozzle_,
+  cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, verdict.wait_s, run_nozzle_,
             rules_->verify.nozzle);
   robust_.add(job.robust);
   nominal_.add(job.nominal);
   late_s_ += planner::duration_s(verdict.replayed) - planner::duration_s(piece.moves) -
-             job.lead_in_s() - first_step_s;
+             job.lead_in_s() - verdict.wait_s;
   last_lines_ = piece.ends_run() ? std::vector<gcode::Segment>() : last_lines(verdict.replayed);
   kept_lines_.clear();
   if (!verdict.replayed.empty()) {

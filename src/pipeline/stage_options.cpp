@@ -338,7 +338,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.base_max_velocity_mm_s = settings.base_max_velocity_mm_s();
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
   rules.max_lines_per_s = settings.max_lines_per_s();
-  rules.lead_in_s = settings.solve.lead_in_ms * 1e-3 + planner::first_step_s(rules.fixed);
+  rules.lead_in_s = settings.solve.lead_in_ms * 1e-3;
   return rules;
 }
 

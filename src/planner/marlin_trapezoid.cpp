@@ -96,4 +96,10 @@ double first_step_s(const FirmwareConfig& config) {
   return config.firmware == Firmware::marlin ? 1.0 / marlin::kMinRate : 0.0;
 }
 
+double wait_s(const PlannedMove& first, const FirmwareConfig& config) {
+  constexpr double kRounding_s = 1e-9;
+  const double longest_s = first_step_s(config);
+  return longest_s > 0.0 && first.lead_s > longest_s - kRounding_s ? longest_s : 0.0;
+}
+
 }  // namespace unflex::planner

@@ -27,6 +27,8 @@ class PlanQueue {
   [[nodiscard]] bool at_section_end() const {
     return !items_.empty() && items_.front() == Item::section_end;
   }
+  // The move that take() would give. has_move() must hold.
+  [[nodiscard]] const planner::PlannedMove& front() const { return planned_[used_]; }
   // has_move() must hold.
   [[nodiscard]] planner::PlannedMove take();
   // Drops the finished moves of the current section.

@@ -80,6 +80,8 @@ class Replay {
   [[nodiscard]] bool next(planner::PlannedMove& move);
   // Whether next() would give a move. Every line before that move has then been read.
   [[nodiscard]] bool has_move();
+  // The move that next() would give. has_move() must hold.
+  [[nodiscard]] const planner::PlannedMove& front() const { return plan_.front(); }
   [[nodiscard]] Firmware firmware() const { return fixed_.firmware; }
   // The next move of the sliced file by the resting plan, in which the machine rests at both ends
   // of every section; false at the section's end. The two plans are independent. Moves of the

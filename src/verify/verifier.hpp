@@ -82,6 +82,7 @@ class Verifier {
   LineCheck lines_;
   ReferencePath path_;
   ReferencePath run_path_;
+  double run_lead_in_s_ = 0.0;            // how long before run_path_ the emitted run starts
   ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
   Nozzles original_;
   std::optional<Nozzles> unshaped_;  // from the first motion on that a shaper changes

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "unflex/planner/first_step.hpp"
 #include "unflex/verify/endless.hpp"
 #include "verifier.hpp"
 
@@ -148,7 +149,8 @@ void Verifier::begin_section(bool compensated) {
     violations_.begin_run();
     // A long rest, so that the path of the previous run does not count as near.
     run_path_.rest(kApart_s);
-    run_path_.begin_section(rules_.lead_in_s);
+    run_lead_in_s_ = rules_.lead_in_s + planner::wait_s(output_.front(), rules_.fixed);
+    run_path_.begin_section(run_lead_in_s_);
   }
   emitted_path_ = compensated ? &run_path_ : &path_;
   shape_emitted();
@@ -158,7 +160,7 @@ void Verifier::begin_section(bool compensated) {
     kept_.begin_section(run_path_);
     kept_.set_state(emitted.nozzle(), emitted.base_x_mm(), emitted.base_y_mm());
     // The kept moves would begin at once, without a lead-in.
-    kept_.skip(rules_.lead_in_s);
+    kept_.skip(run_lead_in_s_);
     kept_next_ = run_path_.end();
   }
   if (observer_ != nullptr) {
