@@ -170,6 +170,27 @@ std::string long_run() {
   return text;
 }
 
+// If it were kept, all of the run would stand as sliced.
+TEST_F(Writer, WritesTheBeginningOfALongRunThoughItIsALittleWorse) {
+  const auto jobs = jobs_of(kHead + long_run());
+  ASSERT_GE(jobs.size(), 3U);
+  RunJob& first = *jobs[1];
+  ASSERT_TRUE(first.piece.begins_run() && !first.piece.ends_run());
+  constexpr std::size_t kNodes = 60;
+  constexpr double kBump_mm = 0.015;
+  for (std::size_t k = 0; k < kNodes; ++k) {
+    const double up = std::sin(std::numbers::pi * static_cast<double>(k) / kNodes);
+    first.base.y.position_mm[first.base.nodes() / 2 + k] += kBump_mm * up * up;
+  }
+  first.plan = emit::plan_run(first.run(), first.piece.start, rules_.emit);
+  static_cast<void>(written(*jobs[0]));
+  EXPECT_THAT(written(first), StartsWith(";unflex test"));
+  ASSERT_THAT(report_.warnings, SizeIs(1));
+  EXPECT_THAT(report_.warnings[0], HasSubstr("in a part of a long run, the nozzle strays more"));
+  EXPECT_THAT(written(*jobs[2]), HasSubstr("G1 X"));
+  EXPECT_THAT(report_.fallbacks, SizeIs(0));
+}
+
 TEST_F(Writer, EndsWithTheLinesOfAPartThatCannotBeWritten) {
   const auto jobs = jobs_of(kHead + long_run());
   ASSERT_GE(jobs.size(), 3U);
