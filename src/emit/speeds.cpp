@@ -207,7 +207,7 @@ class SpeedSolver {
   }
   // How long a run that begins at rest waits for its first step.
   [[nodiscard]] double wait_s() const {
-    return passing_.in_mm_s ? 0.0 : options_->lines.first_step_s;
+    return passing_.in_mm_s || passing_.kept_before ? 0.0 : options_->lines.first_step_s;
   }
 
   // Rounding and the firmware change the time that lines take. The next lines make up for that.
@@ -232,6 +232,11 @@ class SpeedSolver {
       line = {line.end_mm, to, stroke.speed_mm_s, i, true};
       if (i == 0 && passing_.in_mm_s) {
         clock.pass(passing_line(line, *passing_.in_mm_s, -1.0));
+      }
+      if (i == 0 && passing_.kept_before) {
+        gcode::Segment before = *passing_.kept_before;
+        before.line = kNoStroke;
+        clock.pass(before);
       }
       clock.add(line, first_s + lead.s + way_mm / speed_mm_s_[i]);
     }
@@ -341,7 +346,10 @@ class SpeedSolver {
 
   // The speed with which stroke i begins.
   [[nodiscard]] double speed_before(std::size_t i) const {
-    return i > 0 ? speed_mm_s_[i - 1] : magnitude(passing_.in_mm_s);
+    if (i > 0) {
+      return speed_mm_s_[i - 1];
+    }
+    return passing_.kept_before ? passing_.kept_before->feed_mm_s : magnitude(passing_.in_mm_s);
   }
 
   // What the ramps of stroke i cost, as distance at its speed.

@@ -13,6 +13,8 @@ namespace unflex::emit {
 struct Passing {
   std::optional<std::array<double, 2>> in_mm_s;
   std::optional<std::array<double, 2>> out_mm_s;
+  // The motion before a run, if the machine does not stop between the two.
+  std::optional<gcode::Segment> kept_before = {};
 };
 
 // Sets the speeds of the strokes, and the digits of F they need, so that the firmware takes the

@@ -288,6 +288,7 @@ Passing passing(const Run& run) {
     return std::hypot(v[0], v[1]) > kMoves_mm_s ? std::optional(v) : std::nullopt;
   };
   Passing result;
+  result.kept_before = run.kept_before;
   if (run.goes_on) {
     result.in_mm_s = velocity(0.0);
   }

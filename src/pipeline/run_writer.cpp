@@ -164,16 +164,29 @@ emit::RunPlan RunWriter::plan(const RunJob& job, double tolerance_share,
   const gcode::Position& at = emitter_.printer().state().position_mm;
   run.from_mm = std::array{at[gcode::X], at[gcode::Y]};
   run.late_s = late_s_;
+  run.kept_before = kept_before(job.piece);
   return emit::plan_run(run, emitter_.run_start(), rules_->emit);
 }
 
-// The lines that were prepared, retimed if the part begins late.
+// The kept motion before a run, where the firmware would otherwise wait for a first step. Behind a
+// kept line in X and Y the emitter stops the machine.
+std::optional<gcode::Segment> RunWriter::kept_before(const Piece& piece) const {
+  if (!piece.begins_run() || kept_lines_.empty() || kept_lines_.back().moves_xy() ||
+      rules_->emit.lines.first_step_s <= 0.0) {
+    return std::nullopt;
+  }
+  return kept_lines_.back();
+}
+
+// The lines that were prepared, retimed if the part begins late or behind kept motion.
 emit::RunPlan RunWriter::in_time(const RunJob& job) const {
-  if (std::abs(late_s_) < kLate_s || job.plan.empty()) {
+  const std::optional<gcode::Segment> before = kept_before(job.piece);
+  if ((std::abs(late_s_) < kLate_s && !before) || job.plan.empty()) {
     return job.plan;
   }
   emit::Run run = job.run();
   run.late_s = late_s_;
+  run.kept_before = before;
   return emit::retimed(job.plan, run, rules_->emit);
 }
 

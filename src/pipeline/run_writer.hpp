@@ -44,6 +44,7 @@ class RunWriter {
   [[nodiscard]] emit::RunPlan plan(const RunJob& job, double tolerance_share,
                                    double limits_share) const;
   [[nodiscard]] emit::RunPlan in_time(const RunJob& job) const;
+  [[nodiscard]] std::optional<gcode::Segment> kept_before(const Piece& piece) const;
   [[nodiscard]] bool fits(const RunJob& job) const;
   std::optional<std::string> write_run(const RunJob& job, std::string& text);
   std::optional<std::string> insist(const RunJob& job, std::string& text);

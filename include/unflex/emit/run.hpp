@@ -45,6 +45,9 @@ struct Run {
   bool goes_on = false;
   std::optional<std::array<double, 2>> from_mm = {};
   double late_s = 0.0;  // how late its first line begins
+  // The motion just before the run, if the machine does not stop between the two: filament or Z
+  // alone.
+  std::optional<gcode::Segment> kept_before = {};
   // When the next part takes over. The base still moves then, and is given for some time beyond it.
   std::optional<double> until_s = {};
 
