@@ -185,7 +185,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
       if (stays && options_.fixed.firmware == Firmware::marlin) {
         set_unit(input_.state().unit_mm, out);
       }
-      if (stays && changes(event, limits_)) {
+      if (stays && move_may_wait() && changes(event, limits_)) {
         wait_for_move(out);
       }
       follow_input(event);
@@ -339,18 +339,18 @@ void Emitter::write_feed(double feed_mm_s, std::string& out) {
   move_waits_ = false;
 }
 
-// A line without motion is read only when the move before it has left the buffer.
-void Emitter::wait_for_move(std::string& out) {
-  if (move_waits_ && limits_act_early(options_.fixed.firmware)) {
-    write_feed(printer_.state().feed_mm_s, out);
-  }
+bool Emitter::move_may_wait() const {
+  return move_waits_ && limits_act_early(options_.fixed.firmware);
 }
+
+// A line without motion is read only when the move before it has left the buffer.
+void Emitter::wait_for_move(std::string& out) { write_feed(printer_.state().feed_mm_s, out); }
 
 void Emitter::set_limits(const planner::Limits& limits, std::string& out, bool may_be_interrupted) {
   const planner::Limits current =
       limits_known_ ? limits_ : unknown_to_run(options_.fixed.firmware, limits_);
   const std::vector<std::string> lines = limit_lines(options_.fixed, limits, current);
-  if (!lines.empty()) {
+  if (!lines.empty() && move_may_wait()) {
     wait_for_move(out);
   }
   for (const std::string& text : lines) {

@@ -201,6 +201,29 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
   return result;
 }
 
+// The first step is late, and the others have caught up at the line's end. So the place lags by a
+// triangle, δ high, over the line's time T. To the nozzle this is nearly an impulse of ω² δ T / 2
+// at the triangle's centroid.
+Vector6d LineCosts::lead_kick(double line_s, double steps, const Eigen::Vector2d& speed_mm_s,
+                              double before_mm_s) const {
+  Vector6d kick = Vector6d::Zero();
+  const double v = speed_mm_s.norm();
+  if (v <= before_mm_s) {
+    return kick;
+  }
+  const double step_s = line_s / steps;
+  const double first_s = before_mm_s > 0.0 ? std::min(step_s * v / before_mm_s, line_s) : line_s;
+  const Eigen::Vector2d area = 0.5 * (first_s - step_s) * line_s * speed_mm_s;
+  const double after_s = line_s - (first_s + line_s) / 3.0;
+  const auto j = static_cast<std::size_t>(after_s / dt_s_ + 0.5);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double omega = (axis == 0 ? nozzle_x_ : nozzle_y_).omega_rad_s;
+    const auto a = static_cast<Eigen::Index>(axis);
+    kick.segment<2>(3 * a) = -omega * omega * area[a] * answers(axis).free[j].col(1);
+  }
+  return kick;
+}
+
 Quadratic LineCosts::ring_down() const {
   Quadratic result;
   result.matrix.block<2, 2>(0, 0) = weights_.back().xx * ring_down_square(nozzle_x_);

@@ -99,6 +99,12 @@ class LineCosts {
   // rules.max_line_s.
   [[nodiscard]] LineCost line(std::size_t k, std::size_t m) const;
 
+  // What the lead of a line (planner::PlannedMove::lead_s) adds to z at the line's end, for a line
+  // of `steps` steps at speed_mm_s behind one at before_mm_s. The line lasts no longer than
+  // rules.max_line_s.
+  [[nodiscard]] Vector6d lead_kick(double line_s, double steps, const Eigen::Vector2d& speed_mm_s,
+                                   double before_mm_s) const;
+
   // The cost after the last candidate: the base rests and e rings down.
   [[nodiscard]] Quadratic ring_down() const;
 

@@ -1,7 +1,6 @@
 // Notation:
 //   d, T  a line's length after rounding, and its time      A  the firmware's acceleration
 //   c     time in the firmware's own plan, over the time by the formula
-//
 //   s     length of a step, where a line has a lead: its first step is made at v_prev
 //
 //   v = c (d + ((v − v_prev)₊² + (v − v_next)₊²) / 2A) / T
@@ -82,11 +81,12 @@ int feed_decimals(double feed_mm_min) {
   return feed_mm_min >= 1.0 ? 3 : 8;
 }
 
-// Tells when the firmware, by its own plan, will have done the lines it has been given.
+// Tells when the firmware, by its own plan, will have done the lines it has been given. wait_s: how
+// long it rests before the first line, which does not count.
 class FirmwareClock {
  public:
-  FirmwareClock(std::unique_ptr<planner::Planner> firmware, double start_s)
-      : firmware_(std::move(firmware)), final_s_(start_s) {}
+  FirmwareClock(std::unique_ptr<planner::Planner> firmware, double start_s, double wait_s)
+      : firmware_(std::move(firmware)), final_s_(start_s), wait_s_(wait_s) {}
 
   // Lines are numbered from 0. expected_s: duration that is assumed for the line until the plan has
   // it.
@@ -114,7 +114,7 @@ class FirmwareClock {
       if (move.segment.line != kNoStroke) {
         double& duration_s = durations_s_[move.segment.line];
         expected_s_ -= duration_s;
-        duration_s = move.duration_s();
+        duration_s = move.duration_s() - (move.segment.line == 0 ? wait_s_ : 0.0);
         final_s_ += duration_s;
       }
     }
@@ -124,6 +124,7 @@ class FirmwareClock {
   std::vector<planner::PlannedMove> moves_;
   std::vector<double> durations_s_;  // of the planned lines, then of the expected ones
   double final_s_;
+  double wait_s_;
   double expected_s_ = 0.0;
 };
 
@@ -212,17 +213,16 @@ class SpeedSolver {
 
   // Rounding and the firmware change the time that lines take. The next lines make up for that.
   void round_to_feeds(double late_s) {
-    FirmwareClock clock(planner::make_planner(options_->run_limits, options_->fixed), late_s);
+    FirmwareClock clock(planner::make_planner(options_->run_limits, options_->fixed), late_s,
+                        wait_s());
     gcode::Segment line;
     line.end_mm = start_mm_;
     for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
       Stroke& stroke = (*strokes_)[i];
       const double share = std::min(kMostCatchUp, kCatchUpAccel * options_->lines.max_accel_mm_s2 *
                                                       given_s(i) * given_s(i) / distance_mm_[i]);
-      const double first_s = i == 0 ? wait_s() : 0.0;
-      const double now_s = clock.now_s() - (wait_s() - first_s);
-      const double due_s =
-          std::clamp(stroke.end_s - now_s, (1.0 - share) * given_s(i), (1.0 + share) * given_s(i));
+      const double due_s = std::clamp(stroke.end_s - clock.now_s(), (1.0 - share) * given_s(i),
+                                      (1.0 + share) * given_s(i));
       const Lead lead = lead_of(i, due_s);
       const double way_mm = correction_[i] * (distance_mm_[i] - lead.mm + ramps_mm(i));
       const double feed = way_mm / (due_s - lead.s) / mm_s_per_feed_;
@@ -238,18 +238,17 @@ class SpeedSolver {
         before.line = kNoStroke;
         clock.pass(before);
       }
-      clock.add(line, first_s + lead.s + way_mm / speed_mm_s_[i]);
+      clock.add(line, lead.s + way_mm / speed_mm_s_[i]);
     }
     if (passing_.out_mm_s) {
       clock.pass(passing_line(line, *passing_.out_mm_s, 1.0));
     }
     clock.finish();
     for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
-      const double moving_s = clock.duration_s(i) - (i == 0 ? wait_s() : 0.0);
-      const Lead lead = lead_of(i, moving_s);
+      const Lead lead = lead_of(i, clock.duration_s(i));
       const double formula_s = (distance_mm_[i] - lead.mm + ramps_mm(i)) / speed_mm_s_[i];
-      correction_[i] =
-          std::clamp((moving_s - lead.s) / formula_s, 1.0 / kMostCorrection, kMostCorrection);
+      correction_[i] = std::clamp((clock.duration_s(i) - lead.s) / formula_s, 1.0 / kMostCorrection,
+                                  kMostCorrection);
     }
   }
 

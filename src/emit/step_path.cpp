@@ -332,35 +332,14 @@ class Search {
     next.speed_mm_s = speed_to(state, to, next.line_s);
     next.z = lines.fan.after(lane, next.speed_mm_s);
     if (rules_->leads && state.line_s > 0.0) {
-      add_lead(state, next);
+      const Eigen::Vector2d way =
+          (grid_.mm(to) - start_mm(state)).cwiseQuotient(grid_.step_mm()).cwiseAbs();
+      next.z += costs_->lead_kick(next.line_s, std::max(way.maxCoeff(), 1.0), next.speed_mm_s,
+                                  state.speed_mm_s.norm());
     }
     next.spent = state.spent + lines.fan.cost(lane, next.speed_mm_s) + fixed_cost(lines, lane, k) +
                  too_quick(next.speed_mm_s - state.speed_mm_s, state.line_s + next.line_s);
     return next;
-  }
-
-  // Adds to next.z what the lead of its line does. The first step is late, and the others catch up
-  // with the line's end at once: the place is behind by a triangle, δ high, over the line's time T.
-  // To the nozzle that is nearly an impulse of ω² δ T / 2 at the triangle's middle, if that is
-  // added up over the line.
-  void add_lead(const State& state, State& next) const {
-    const double v = next.speed_mm_s.norm();
-    const double before = state.speed_mm_s.norm();
-    if (v <= before) {
-      return;
-    }
-    const Eigen::Vector2d way =
-        (grid_.mm(next.at) - start_mm(state)).cwiseQuotient(grid_.step_mm());
-    const double step_s = next.line_s / std::max(way.cwiseAbs().maxCoeff(), 1.0);
-    const double first_s = std::min(before > 0.0 ? step_s * v / before : next.line_s, next.line_s);
-    const Eigen::Vector2d area = 0.5 * (first_s - step_s) * next.line_s * next.speed_mm_s;
-    const double after_s = next.line_s - (first_s + next.line_s) / 3.0;
-    const auto j = static_cast<std::size_t>(after_s / costs_->dt_s() + 0.5);
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const double omega = (axis == 0 ? rules_->nozzle_x : rules_->nozzle_y).omega_rad_s;
-      const auto a = static_cast<Eigen::Index>(axis);
-      next.z.segment<2>(3 * a) -= omega * omega * area[a] * costs_->answers(axis).free[j].col(1);
-    }
   }
 
   // Where the state is. The run's begin may lie between whole steps.

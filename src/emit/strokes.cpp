@@ -179,6 +179,7 @@ std::pair<SpeedSteps, SpeedSteps> speed_steps(const dynamics::BaseTrajectory& ba
     const double of_x = std::abs(after[0] - before[0]);
     const double of_y = std::abs(after[1] - before[1]);
     const double both = std::min(most_mm_s, rules.max_accel_mm_s2 * 0.5 * (before_s + after_s));
+    // Motors do x + y or x − y, whatever the signs of the two changes.
     const double of_motors = std::max(rules.motors.largest_of_xy(of_x, of_y, 0.0),
                                       rules.motors.largest_of_xy(of_x, -of_y, 0.0));
     const double left = std::max(both - of_motors, 0.0);

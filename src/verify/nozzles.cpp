@@ -62,8 +62,8 @@ void Nozzles::play(const planner::PlannedMove& move) {
   play_shaped(phases_);
 }
 
-// The base moves before the plan, at the end of the time in which the machine stands still. So the
-// nozzles go back by that much of this time.
+// The base moves before the plan, while the machine still stands. So the nozzles' clock goes back
+// by that much, but no further than the machine has stood.
 void Nozzles::begin_shaped(const gcode::Position& from) {
   shaped_.emplace(shaping_, from[gcode::X], from[gcode::Y]);
   before_plan_s_ = shaped_->lead_s();

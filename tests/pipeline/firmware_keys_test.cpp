@@ -179,19 +179,18 @@ TEST(FirmwareKeys, BelowWhatRepRapFirmwareTakesAreWhatItMakesOfThem) {
 
 // Klipper refuses such a line. The plan does not know this limit, so verify checks it.
 TEST(FirmwareKeys, NameTheCrossSectionThatKlipperRefuses) {
-  const auto bead = [](const char* filament) {
-    return std::string("G90\nM83\nG1 X100 Y100 Z0.2 F600\nG4 P500\nG1 X101 Y100 E") + filament;
-  };
+  const std::string start = "G90\nM83\nG1 X100 Y100 Z0.2 F600\nG4 P500\n";
+  const std::string bead = "G1 X101 Y100 E";
   const auto violations = [&](const std::string& setting) {
-    const JobFolder folder(bead(".1"), {setting});
-    folder.set_output(bead(".3"));
+    const JobFolder folder(start + bead + ".1", {setting});
+    folder.set_output(start + ";unflex run\n" + bead + ".3\n;unflex end\n");
     SilentProgress progress;
     const Result<report::Report> report = verify(folder.job(), progress);
     EXPECT_TRUE(report) << to_string(report.error());
     return testing::complaints(*report);
   };
   EXPECT_THAT(violations("extruder.max_extrude_cross_section_mm2=0.64"),
-              ::testing::HasSubstr("structure differs"));
+              ::testing::HasSubstr("refuses"));
   EXPECT_THAT(violations("extruder.max_extrude_cross_section_mm2=5"),
               ::testing::Not(::testing::HasSubstr("refuses")));
 }

@@ -66,6 +66,7 @@ class Emitter {
   void set_run_modes(bool joins_file, std::string& out);
   void keep_reading_of_e_small(std::string& out);
   void set_unit(double unit_mm, std::string& out);
+  [[nodiscard]] bool move_may_wait() const;
   void wait_for_move(std::string& out);
   void write_stroke(const Stroke& stroke, double filament_origin, std::string& out);
   void restore_modes(std::string& out);
