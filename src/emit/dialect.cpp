@@ -197,6 +197,17 @@ std::string_view brand(Firmware firmware) {
   return "Klipper";
 }
 
+Limits raised(Limits in_run, double accel_mm_s2) {
+  double& x = in_run.axis_max_accel_mm_s2[gcode::X];
+  double& y = in_run.axis_max_accel_mm_s2[gcode::Y];
+  double& e = in_run.axis_max_accel_mm_s2[gcode::E];
+  for (double* limit : {&x, &y, &e, &in_run.print_accel_mm_s2, &in_run.travel_accel_mm_s2,
+                        &in_run.max_accel_mm_s2, &in_run.accel_to_decel_mm_s2}) {
+    *limit = std::max(*limit, accel_mm_s2);
+  }
+  return in_run;
+}
+
 Limits limits_in_run(Firmware firmware, const Limits& file, Limits raised) {
   if (firmware != Firmware::klipper) {
     raised.axis_max_velocity_mm_s[gcode::Z] = file.axis_max_velocity_mm_s[gcode::Z];

@@ -14,6 +14,9 @@ namespace unflex::emit {
 // The firmware's name as its makers write it.
 [[nodiscard]] std::string_view brand(Firmware firmware);
 
+// The limits of a run, with the acceleration of X, Y and filament raised to `accel_mm_s2`.
+[[nodiscard]] planner::Limits raised(planner::Limits in_run, double accel_mm_s2);
+
 // `raised` limits for X, Y and filament; what concerns Z and retraction stays as the file has it.
 [[nodiscard]] planner::Limits limits_in_run(Firmware firmware, const planner::Limits& file,
                                             planner::Limits raised);

@@ -73,8 +73,11 @@ bool changes(const gcode::Event& event, const planner::Limits& limits) {
   return changed != limits;
 }
 
-EmitOptions in_run(const RunStart& start, EmitOptions options) {
-  options.run_limits = limits_in_run(options.fixed.firmware, start.limits, options.run_limits);
+EmitOptions in_run(const Run& run, const RunStart& start, EmitOptions options) {
+  options.lines.max_accel_mm_s2 = std::max(options.lines.max_accel_mm_s2, run.accel.base_mm_s2);
+  options.line_accel_mm_s2 = std::max(options.line_accel_mm_s2, run.accel.lines_mm_s2);
+  options.run_limits = limits_in_run(options.fixed.firmware, start.limits,
+                                     raised(options.run_limits, run.accel.lines_mm_s2));
   return options;
 }
 
@@ -157,13 +160,14 @@ bool RunPlan::empty() const { return strokes == nullptr || strokes->empty(); }
 
 RunPlan plan_run(const Run& run, const RunStart& start, const EmitOptions& options) {
   const Grid grid = grid_of(start, options.fixed);
-  return {start, start_of_lines(run, grid),
-          std::make_shared<const std::vector<Stroke>>(strokes(run, grid, in_run(start, options)))};
+  return {
+      start, start_of_lines(run, grid),
+      std::make_shared<const std::vector<Stroke>>(strokes(run, grid, in_run(run, start, options)))};
 }
 
 RunPlan retimed(const RunPlan& plan, const Run& run, const EmitOptions& options) {
   std::vector<Stroke> strokes = *plan.strokes;
-  time_strokes(run, grid_of(plan.start, options.fixed), in_run(plan.start, options), strokes);
+  time_strokes(run, grid_of(plan.start, options.fixed), in_run(run, plan.start, options), strokes);
   return {plan.start, plan.from_mm,
           std::make_shared<const std::vector<Stroke>>(std::move(strokes))};
 }
@@ -173,7 +177,7 @@ RunStart Emitter::run_start() const { return emit::run_start(printer_.state(), i
 void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   const double filament_origin = input_.state().position_mm[E];
   if (!run.goes_on) {
-    enter_run(out);
+    enter_run(run, out);
   }
   std::size_t written = 0;
   const auto write_events = [&](std::size_t end) {
@@ -197,7 +201,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   bool joins_file = !run.goes_on;  // the first line follows the file's own motion
   for (const Stroke& stroke : *plan.strokes) {
     write_events(stroke.events);
-    set_run_modes(std::exchange(joins_file, false), out);
+    set_run_modes(run, std::exchange(joins_file, false), out);
     keep_reading_of_e_small(out);
     write_stroke(stroke, filament_origin, out);
   }
@@ -227,7 +231,7 @@ std::string Emitter::shaper_left_off() const {
   return unknown_shaper_words(input_.state().input_shaper(), printer_.state().input_shaper());
 }
 
-void Emitter::enter_run(std::string& out) {
+void Emitter::enter_run(const Run& run, std::string& out) {
   if (!started_) {
     started_ = true;
     write(fmt::format("{} {}: compensated for {}, not to be compensated again", kOwnMark,
@@ -242,14 +246,16 @@ void Emitter::enter_run(std::string& out) {
     move_waits_ = false;
   }
   write_checkpoint(" RUN=1", out);
-  write(kRunMark, out);
+  write(run.lead_in_s > 0.0 ? fmt::format("{}{}{:.6f}", kRunMark, kLeadInWord, run.lead_in_s)
+                            : std::string(kRunMark),
+        out);
 }
 
 // Sets a run's modes and limits, since the input's lines inside the run may have set others.
-void Emitter::set_run_modes(bool joins_file, std::string& out) {
+void Emitter::set_run_modes(const Run& run, bool joins_file, std::string& out) {
   set_unit(1.0, out);
-  planner::Limits limits =
-      limits_in_run(options_.fixed.firmware, input_limits_, options_.run_limits);
+  planner::Limits limits = limits_in_run(options_.fixed.firmware, input_limits_,
+                                         raised(options_.run_limits, run.accel.lines_mm_s2));
   if (joins_file) {
     // When a move is added, RepRapFirmware joins it to the move before by the jerk policy in force
     // at that time, and may still change the move before. With the policy of a run, filament moved

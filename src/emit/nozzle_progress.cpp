@@ -66,6 +66,11 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
   double furthest = 0.0;
   for (std::size_t k = 0; k < run.base->nodes(); ++k) {
     const double t = period_s_ * static_cast<double>(k);
+    if (t < starts_s.front()) {
+      // In the lead-in the nozzle may swing along the path, but the path has not begun.
+      progress_mm_.push_back(furthest);
+      continue;
+    }
     const double at_mm = reference_mm(t);
     furthest = std::max(furthest, nearest_mm(along_x.at(t)[0], along_y.at(t)[0], i, at_mm));
     progress_mm_.push_back(furthest);

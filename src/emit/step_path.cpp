@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "cost_to_go.hpp"
+#include "leaps.hpp"
 #include "line_cost.hpp"
 #include "line_fan.hpp"
 #include "step_ends.hpp"
@@ -85,35 +86,43 @@ struct Choice {
   std::size_t lane = 0;
 };
 
+// What one search covers: from a state to a place.
+struct Stretch {
+  State begin;
+  std::size_t last = 0;  // the last candidate
+  Place end{};
+  bool goes_on = false;  // it ends in motion, at `last`
+  int lines_after = 0;   // RunEnds::lines_after
+};
+
 class Search {
  public:
-  Search(const LineCosts& costs, const std::vector<double>& wanted, const RunEnds& ends,
-         const AxisGrid& x, const AxisGrid& y, const LineRules& rules)
+  Search(const LineCosts& costs, const std::vector<std::size_t>& wanted, const Stretch& stretch,
+         const StepGrid& grid, const LineRules& rules)
       : costs_(&costs),
-        ends_(ends),
-        grid_(x, y),
+        begin_(stretch.begin),
+        goes_on_(stretch.goes_on),
+        lines_after_(stretch.lines_after),
+        grid_(grid),
         rules_(&rules),
-        last_(ends.until_s
-                  ? std::min(static_cast<std::size_t>(nearest_whole(*ends.until_s / costs.dt_s())),
-                             costs.size() - 1)
-                  : costs.size() - 1),
+        last_(stretch.last),
         shortest_(costs.candidates(rules.min_line_s)),
         longest_(static_cast<std::size_t>(rules.max_line_s / costs.dt_s() + 1e-9)),
-        end_(grid_.nearest({ends.end_x_mm, ends.end_y_mm})),
+        wanted_(&wanted),
+        end_(stretch.end),
         to_go_(costs, rules, grid_.step_mm(), grid_.mm(end_)),
         lines_(longest_ + 1, Lines(costs)),
         ending_(longest_ + 1) {
-    for (const double t : wanted) {
-      wanted_.push_back(static_cast<std::size_t>(nearest_whole(t / costs.dt_s())));
-    }
     line_worth_ = 0.5 * rules.tolerance_mm * rules.tolerance_mm * kLineWorth_s;
   }
 
+  // The lines' ends, the stretch's own begin included. Empty if there are no such lines. The lines
+  // before it began at `lines_before_s`.
   Polygon run(const std::vector<double>& lines_before_s) {
     begins_s_ = lines_before_s;
-    begins_s_.push_back(0.0);
-    State begin = start();
-    std::size_t from = 0;
+    begins_s_.push_back(costs_->time_s(begin_.k));
+    State begin = begin_;
+    std::size_t from = begin_.k;
     while (true) {
       const std::size_t until = from + kBlock;
       const bool is_last = until + kBeyond >= last_;
@@ -134,7 +143,7 @@ class Search {
         if (!is_last && state->k > until) {
           break;
         }
-        if (taken++ > 0 || from == 0) {
+        if (taken++ > 0 || from == begin_.k) {
           if (taken > 1) {
             begins_s_.push_back(costs_->time_s(state->k));
           }
@@ -158,28 +167,12 @@ class Search {
   }
 
  private:
-  [[nodiscard]] State start() const {
-    State state;
-    state.at = grid_.nearest({ends_.start_x_mm, ends_.start_y_mm});
-    state.z[2] = ends_.start_x_mm - costs_->base_mm(0)[0];
-    state.z[5] = ends_.start_y_mm - costs_->base_mm(0)[1];
-    if (ends_.goes_on) {
-      state.speed_mm_s = base_speed_mm_s(0);
-      state.line_s = rules_->even_line_s();
-    }
-    return state;
-  }
-
-  [[nodiscard]] Eigen::Vector2d base_speed_mm_s(std::size_t k) const {
-    return (costs_->base_mm(k + 1) - costs_->base_mm(k)) / costs_->dt_s();
-  }
-
   // The durations tried for a line from candidate k on, in candidates.
   void durations(std::size_t k, std::vector<std::size_t>& result) const {
     result.clear();
     const std::size_t most = std::min(longest_, last_ - k);
-    const auto wanted = std::ranges::upper_bound(wanted_, k);
-    const std::size_t until = wanted == wanted_.end() ? most : std::min(most, *wanted - k);
+    const auto wanted = std::ranges::upper_bound(*wanted_, k);
+    const std::size_t until = wanted == wanted_->end() ? most : std::min(most, *wanted - k);
     std::size_t m = shortest_;
     for (; m <= until; m += std::max<std::size_t>(m / 12, 1)) {
       result.push_back(m);
@@ -202,15 +195,15 @@ class Search {
   // Whether lines from k on that end at every wanted time would be more than a burst may have.
   [[nodiscard]] bool too_many_wanted(std::size_t k) const {
     constexpr std::ptrdiff_t kSome = 4;
-    const auto next = std::ranges::upper_bound(wanted_, k);
-    return wanted_.end() - next >= kSome &&
+    const auto next = std::ranges::upper_bound(*wanted_, k);
+    return wanted_->end() - next >= kSome &&
            *(next + kSome - 1) < k + kSome * costs_->candidates(rules_->even_line_s());
   }
 
   // Searches the candidates from `from` to `until`. Returns the place in arena_ of the best state
   // at the end.
   std::optional<std::size_t> block(State begin, std::size_t from, std::size_t until, bool is_last) {
-    if (is_last && ends_.until_s) {
+    if (is_last && goes_on_) {
       to_go_.compute(from, std::min(until + kBeyond, costs_->size() - 1), false);
     } else {
       to_go_.compute(from, until, is_last);
@@ -229,7 +222,7 @@ class Search {
         each->duration_s = each->fan.duration_s();
         each->price = price(k - each->k);
       }
-      if (is_last && (ends_.until_s ? k == until : to_go_.may_rest(k))) {
+      if (is_last && (goes_on_ ? k == until : to_go_.may_rest(k))) {
         finish(lines, k);
       }
       if (!is_last || k < until) {
@@ -285,7 +278,7 @@ class Search {
       return 0.0;
     }
     const bool near_end = costs_->time_s(arena_[i].k) + rules_->burst_s > costs_->time_s(last_);
-    const int allowed = std::max(rules_->burst_lines - (near_end ? ends_.lines_after : 0), kFewest);
+    const int allowed = std::max(rules_->burst_lines - (near_end ? lines_after_ : 0), kFewest);
     auto ancestor = static_cast<std::int32_t>(i);
     int lines = 1;
     for (; lines < allowed && arena_[static_cast<std::size_t>(ancestor)].parent >= 0; ++lines) {
@@ -354,15 +347,14 @@ class Search {
   // Tries the last line, after which the machine rests or goes on with the next part.
   void finish(const std::vector<Lines*>& all, std::size_t k) {
     for (const Lines* lines : all) {
-      const LineFan::Choice choice =
-          lines->fan.choice(ends_.until_s ? to_go_.at(k) : to_go_.resting(k));
+      const LineFan::Choice choice = lines->fan.choice(goes_on_ ? to_go_.at(k) : to_go_.resting(k));
       const double duration_s = lines->duration_s;
       for (std::size_t lane = 0; lane < lines->count; ++lane) {
         const State& state = arena_[lines->first + lane];
         const Eigen::Vector2d speed = speed_to(state, end_, duration_s);
         const double total = state.spent + choice.at(lane, speed) + fixed_cost(*lines, lane, k) +
                              too_quick(speed - state.speed_mm_s, state.line_s + duration_s) +
-                             (ends_.until_s ? 0.0 : too_quick(speed, duration_s));
+                             (goes_on_ ? 0.0 : too_quick(speed, duration_s));
         if ((!finished_ || total < finished_->total) &&
             Places{state.at, rules_->min_steps}.far_enough(end_)) {
           finished_ = after_line(*lines, lane, k, end_, total);
@@ -450,13 +442,15 @@ class Search {
   }
 
   const LineCosts* costs_;
-  RunEnds ends_;
+  State begin_;
+  bool goes_on_;
+  int lines_after_;
   StepGrid grid_;
   const LineRules* rules_;
   std::size_t last_;      // the last candidate
   std::size_t shortest_;  // fewest candidates that a line takes
   std::size_t longest_;
-  std::vector<std::size_t> wanted_;
+  const std::vector<std::size_t>* wanted_;
   Place end_;
   double line_worth_ = 0.0;
   Polygon polygon_;               // from the blocks before
@@ -474,13 +468,81 @@ class Search {
   std::vector<Choice> kept_;
 };
 
+// Where the run begins.
+State start_of(const RunEnds& ends, const LineCosts& costs, const StepGrid& grid,
+               const LineRules& rules) {
+  State state;
+  state.at = grid.nearest({ends.start_x_mm, ends.start_y_mm});
+  state.z[2] = ends.start_x_mm - costs.base_mm(0)[0];
+  state.z[5] = ends.start_y_mm - costs.base_mm(0)[1];
+  if (ends.goes_on) {
+    state.speed_mm_s = (costs.base_mm(1) - costs.base_mm(0)) / costs.dt_s();
+    state.line_s = rules.even_line_s();
+  }
+  return state;
+}
+
+// The state at the end of a leap, all along which the nozzle has followed the line.
+State end_of(const Leap& leap, const LineCosts& costs, const StepGrid& grid) {
+  const double duration_s = costs.time_s(leap.until) - costs.time_s(leap.from);
+  const Eigen::Vector2d before = grid.mm(leap.begin) - costs.base_mm(leap.from);
+  const Eigen::Vector2d off = grid.mm(leap.end) - costs.base_mm(leap.until);
+  State state;
+  for (const int axis : {0, 1}) {
+    state.z[3 * axis] = off[axis];
+    state.z[3 * axis + 1] = (off[axis] - before[axis]) / duration_s;
+    state.z[3 * axis + 2] = off[axis];
+  }
+  state.at = leap.end;
+  state.speed_mm_s = (grid.mm(leap.end) - grid.mm(leap.begin)) / duration_s;
+  state.line_s = duration_s;
+  state.k = leap.until;
+  return state;
+}
+
+void append(const Polygon& part, Polygon& all) {
+  all.times_s.insert(all.times_s.end(), part.times_s.begin(), part.times_s.end());
+  all.x_mm.insert(all.x_mm.end(), part.x_mm.begin(), part.x_mm.end());
+  all.y_mm.insert(all.y_mm.end(), part.y_mm.begin(), part.y_mm.end());
+}
+
 }  // namespace
 
 Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double>& wanted,
                   const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
                   const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
   const LineCosts costs(base, weight, rules);
-  return Search(costs, wanted, ends, x, y, rules).run(ends.lines_before_s);
+  const StepGrid grid(x, y);
+  const auto candidate = [&](double t) {
+    return std::min(static_cast<std::size_t>(nearest_whole(t / costs.dt_s())), costs.size() - 1);
+  };
+  const std::size_t last = ends.until_s ? candidate(*ends.until_s) : costs.size() - 1;
+  std::vector<std::size_t> wanted_at;
+  for (const double t : wanted) {
+    wanted_at.push_back(candidate(t));
+  }
+  const Place end = grid.nearest({ends.end_x_mm, ends.end_y_mm});
+  Polygon all;
+  std::vector<double> lines_before_s = ends.lines_before_s;
+  const auto search = [&](const Stretch& stretch) {
+    // A leap may begin or end where the run does.
+    const Polygon part = stretch.begin.k == stretch.last
+                             ? Polygon{{costs.time_s(stretch.last)},
+                                       {grid.mm(stretch.end)[0]},
+                                       {grid.mm(stretch.end)[1]}}
+                             : Search(costs, wanted_at, stretch, grid, rules).run(lines_before_s);
+    append(part, all);
+    lines_before_s = all.times_s;
+    return !part.times_s.empty();
+  };
+  State begin = start_of(ends, costs, grid, rules);
+  for (const Leap& leap : leaps(costs, wanted_at, begin.at, last, end, grid, rules)) {
+    if (!search({begin, leap.from, leap.begin, true, 0})) {
+      return {};
+    }
+    begin = end_of(leap, costs, grid);
+  }
+  return search({begin, last, end, ends.until_s.has_value(), ends.lines_after}) ? all : Polygon{};
 }
 
 }  // namespace unflex::emit

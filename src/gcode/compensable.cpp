@@ -30,7 +30,7 @@ std::string_view kept_reason(const Segment& segment, Firmware firmware) {
   if (!segment.start_known) {
     return "start unknown";
   }
-  if (segment.refused) {
+  if (segment.too_much_filament) {
     return "too much filament";
   }
   const double length_xy = segment.length_xy_mm();

@@ -214,6 +214,16 @@ int whole_circles(const Command& command, const MarlinArcs& rules) {
              : 0;
 }
 
+// What is told of a move that has too much filament.
+std::string too_much_filament(const Segment& segment, Firmware firmware) {
+  return fmt::format(
+      "{:.4g} mm of filament in {:.4g} mm of path: {}; passed through unchanged, check the line",
+      segment.delta(E), segment.length_mm(),
+      firmware == Firmware::klipper
+          ? "Klipper ends the print at such a move (max_extrude_cross_section)"
+          : "no nozzle lays so much");
+}
+
 }  // namespace
 
 double Segment::length_xy_mm() const { return length(delta(X), delta(Y), 0.0); }
@@ -355,13 +365,10 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
     }
   }
   const double filament_mm = segment.delta(E);
-  segment.refused = segment.moves_xy() && filament_mm > options_.max_extrude_dab_mm &&
-                    filament_mm > options_.max_extrude_ratio * segment.length_mm();
-  if (segment.refused && event.warnings.empty()) {
-    event.warnings.push_back(
-        fmt::format("{:.4g} mm of filament in {:.4g} mm of path: Klipper ends the print at such a "
-                    "move (max_extrude_cross_section); passed through unchanged, check the line",
-                    filament_mm, segment.length_mm()));
+  segment.too_much_filament = segment.moves_xy() && filament_mm > options_.max_extrude_dab_mm &&
+                              filament_mm > options_.max_extrude_ratio * segment.length_mm();
+  if (segment.too_much_filament && event.warnings.empty()) {
+    event.warnings.push_back(too_much_filament(segment, options_.firmware));
   }
   if (segment.moves_xy()) {
     // From a known place the compensated base takes the swing away.

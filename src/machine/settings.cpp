@@ -7,6 +7,7 @@
 // v_max and a_max use the default cross-section even where another one is configured.
 
 #include <algorithm>
+#include <limits>
 #include <numbers>
 
 #include "unflex/machine/machine.hpp"
@@ -55,6 +56,9 @@ double by_firmware(Firmware firmware, double klipper, double marlin, double rrf)
 constexpr double kKlipperDampingRatio = 0.1;
 constexpr double kMarlinDampingRatio = 0.15;
 constexpr double kRrfDampingRatio = 0.1;
+
+// emit.accel_mm_s2 of Klipper and Marlin.
+constexpr double kEmitAccel_mm_s2 = 1e6;
 
 }  // namespace
 
@@ -194,8 +198,21 @@ double Settings::base_max_velocity_mm_s() const {
   return base.max_velocity_mm_s.value_or(2.0 * limits.max_velocity_mm_s);
 }
 
-double Settings::base_max_accel_mm_s2() const {
-  return base.max_accel_mm_s2.value_or(4.0 * limits.max_accel_mm_s2);
+double Settings::base_accel_times_asked() const {
+  constexpr double kTimes = 4.0;
+  return base.max_accel_mm_s2 ? 0.0 : kTimes;
+}
+
+double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {
+  if (base.max_accel_mm_s2) {
+    return *base.max_accel_mm_s2;
+  }
+  // RepRapFirmware's emit.accel_mm_s2 follows this limit, that of the others bounds it.
+  const bool bounded = emit.accel_mm_s2 || printer.firmware != Firmware::rrf;
+  const double most = bounded ? emit.accel_mm_s2.value_or(kEmitAccel_mm_s2) / kEmitAccelFactor
+                              : std::numeric_limits<double>::infinity();
+  return std::max(base_accel_times_asked() * limits.max_accel_mm_s2,
+                  std::min(base_accel_times_asked() * asked_mm_s2, most));
 }
 
 double Settings::tail_s() const {
@@ -206,11 +223,11 @@ double Settings::tail_s() const {
   return std::max({kShortest, settling_time_s(dynamics_x), settling_time_s(dynamics_y)});
 }
 
-double Settings::emit_accel_mm_s2() const {
+double Settings::emit_accel_mm_s2(double asked_mm_s2) const {
   // RepRapFirmware leaves out short ramps. The lower its acceleration, the fewer it leaves out.
-  constexpr double kTimesBase = 5.0;
-  return emit.accel_mm_s2.value_or(
-      printer.firmware == Firmware::rrf ? kTimesBase * base_max_accel_mm_s2() : 1e6);
+  return emit.accel_mm_s2.value_or(printer.firmware == Firmware::rrf
+                                       ? kEmitAccelFactor * base_max_accel_mm_s2(asked_mm_s2)
+                                       : kEmitAccel_mm_s2);
 }
 
 double Settings::period_ms() const {

@@ -17,7 +17,6 @@ namespace unflex::machine {
 namespace {
 
 // A firmware needs some room above the base's acceleration to follow dense lines.
-constexpr double kEmitAccelFactor = 5.0;
 // With fewer nodes per period of resonance, the optimum is worse than a ZV shaper's.
 constexpr double kLeastNodesPerPeriod = 10.0;
 

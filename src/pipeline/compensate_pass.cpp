@@ -189,24 +189,27 @@ class Compensator {
       const planner::PlannedMove& last = piece.moves.back();
       nozzle_.set(piece.ends_run() ? at_rest(last.segment.end_mm) : at_end_of(last),
                   last.segment.end_mm);
-      job->setup = setup_for(rules_.setup, piece.moves, job_.settings);
-      job->grid = compensate::node_grid(job->course(), rules_.setup);
+      RunSetup setup = setup_for(rules_.setup, piece, job->nozzle, job_.settings);
+      warn_if_capped(setup, piece);
+      job->setup = std::move(setup.setup);
+      job->accel = setup.accel;
+      job->grid = compensate::node_grid(job->course(), job->setup);
       const std::size_t nodes = job->grid.count;
       const double accel = largest_motor_accel(piece.moves, rules_.verify.fixed.motors());
       if (const verify::BlamedRun* const known = blamed_before(piece)) {
         job->failure = known->reason;
       } else if (piece.cut_off) {
         job->failure = "too many lines without motion stand in a row in the middle of the motion";
-      } else if (accel > rules_.verify.base_max_accel_mm_s2) {
+      } else if (accel > job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2)) {
         job->failure = fmt::format(
             "the plan itself accelerates a motor by {:.0f} mm/s², more than base.max_accel_mm_s2, "
             "{:.0f}; raise that if the motors can",
-            accel, rules_.verify.base_max_accel_mm_s2);
+            accel, job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2));
       } else if (nodes <= kMaxRunNodes) {
-        job->spans = compensate::mesh(job->course(), job->grid, rules_.setup);
+        job->spans = compensate::mesh(job->course(), job->grid, job->setup);
       } else {
         job->failure = fmt::format("{:.0f} s of motion without a stop are too long to be handled",
-                                   static_cast<double>(nodes) * rules_.setup.period_s);
+                                   static_cast<double>(nodes) * job->setup.period_s);
       }
       job->results.resize(job->spans.size());
       job->missing = 2 * job->spans.size();
@@ -230,6 +233,25 @@ class Compensator {
     }
     lines_queued_ += job->piece.events.size();
     queue_.push_back(std::move(job));
+  }
+
+  // Tells once that the base cannot follow what the print asks as well as the motors could.
+  void warn_if_capped(const RunSetup& setup, const Piece& piece) {
+    // Below this many times the plan's acceleration the error grows.
+    constexpr double kEnough = 2.0;
+    const double wanted_mm_s2 =
+        std::min(kEnough * setup.asked_accel_mm_s2,
+                 job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2));
+    if (told_of_cap_ || wanted_mm_s2 <= setup.accel_by_lines_mm_s2) {
+      return;
+    }
+    told_of_cap_ = true;
+    report_->warnings.push_back(to_string(Diagnostic{
+        {job_.input_name, piece.events.front().line.number},
+        fmt::format("the print asks for {:.0f} mm/s² here, and the motors may have no more than "
+                    "{:.0f}: so much do emit.max_speed_step_mm_s and emit.max_lines_per_s allow; "
+                    "raise the first if the motors can",
+                    setup.asked_accel_mm_s2, setup.accel_by_lines_mm_s2)}));
   }
 
   // What an earlier pass blamed the run for; nullptr: nothing.
@@ -431,6 +453,7 @@ class Compensator {
   std::size_t first_ticket_ = 0;  // number of the first ticket in tickets_
   double input_bytes_;            // 0: not known
   std::size_t bytes_written_ = 0;
+  bool told_of_cap_ = false;
   bool all_read_ = false;
   std::mutex mutex_;
   std::condition_variable news_;                // a piece has been read or a run been prepared

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "nozzle_motion.hpp"
-#include "unflex/planner/first_step.hpp"
 
 namespace unflex::pipeline {
 namespace {

@@ -9,7 +9,8 @@ namespace {
 
 // One of the marks, or the line that names the version: ";unflex 1.2.3: …".
 bool is_own_comment(std::string_view content) {
-  if (content == kRunMark || content == kRunEndMark) {
+  if (content == kRunMark || content == kRunEndMark ||
+      (content.starts_with(kRunMark) && content.substr(kRunMark.size()).starts_with(kLeadInWord))) {
     return true;
   }
   if (!content.starts_with(kOwnMark)) {

@@ -115,6 +115,7 @@ Result<bool> PieceReader::next(Piece& piece) {
     if (const planner::PlannedMove* const move = verify::endless(piece.moves)) {
       return tl::unexpected(verify::endless_move(*move, lines_.name()));
     }
+    warn_of_long_moves(piece.moves);
   }
   return more;
 }
@@ -267,6 +268,18 @@ void PieceReader::warn_of_travel(const gcode::Event& event) {
       warn(segment.line,
            fmt::format("the move leads out of the printer's travel, to X{:.4g} Y{:.4g}", x, y));
       return;
+    }
+  }
+}
+
+// Warns of moves that take so long that most of them are a mistake.
+void PieceReader::warn_of_long_moves(const std::vector<planner::PlannedMove>& moves) {
+  constexpr double kLong_s = 600.0;
+  for (const planner::PlannedMove& move : moves) {
+    if (move.duration_s() > kLong_s) {
+      warn(move.segment.line, fmt::format("this move takes {:.0f} minutes; check its F, its length "
+                                          "and its filament",
+                                          move.duration_s() / 60.0));
     }
   }
 }

@@ -75,6 +75,7 @@ class PieceReader {
   void read_line(gcode::Event& event);
   void warn(std::size_t line, std::string message);
   void warn_of_travel(const gcode::Event& event);
+  void warn_of_long_moves(const std::vector<planner::PlannedMove>& moves);
   void append(gcode::Event&& event);
   void append_between();
   void mark_border(const gcode::Event& event);

@@ -100,6 +100,7 @@ emit::Run RunJob::run(double tolerance_share, double limits_share,
                 .lead_in_s = lead_in_s(),
                 .tolerance_share = tolerance_share,
                 .limits_share = limits_share,
+                .accel = accel,
                 .lines_before_s = std::move(lines_before_s),
                 .lines_after = lines_after,
                 .goes_on = !piece.begins_run()};

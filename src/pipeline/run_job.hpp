@@ -42,6 +42,7 @@ struct RunJob {
   // What follows is only used for runs and parts of runs.
   dynamics::NozzleXY nozzle;  // at its begin, if every run before is compensated
   compensate::Setup setup;
+  emit::RunAccel accel;
   compensate::NodeGrid grid;
   std::vector<compensate::WindowSpan> spans;
   std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span

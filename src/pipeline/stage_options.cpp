@@ -1,13 +1,13 @@
 #include "stage_options.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 #include <optional>
 #include <utility>
 
 #include "unflex/dynamics/flexible_axis.hpp"
-#include "unflex/planner/first_step.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
 namespace unflex::pipeline {
@@ -37,18 +37,22 @@ bool shares_motors(const machine::Settings& settings) {
   return Motors(settings.kinematics.type, settings.printer.firmware).shared_by_xy();
 }
 
+// The acceleration that the largest change of speed from line to line allows the base.
+double accel_by_lines(const machine::Settings& settings) {
+  return grid_mm(settings) <= kGridMm
+             ? machine::kSpeedStepShare *
+                   std::max(settings.emit.max_speed_step_mm_s, settings.least_speed_step_mm_s()) /
+                   settings.min_line_s()
+             : std::numeric_limits<double>::infinity();
+}
+
 // The acceleration that the base may have so that the text stays within the limits. There is a
 // limit of acceleration and, if lines end on a fine grid, one of the change of speed from line to
 // line. Whole steps of a motor are too coarse for the second.
-double planned_base_accel(const machine::Settings& settings) {
+double planned_base_accel(const machine::Settings& settings, double asked_mm_s2) {
   const double shortest_s = settings.min_line_s();
-  double limit = settings.base_max_accel_mm_s2();
-  if (grid_mm(settings) <= kGridMm) {
-    limit = std::min(
-        limit, machine::kSpeedStepShare *
-                   std::max(settings.emit.max_speed_step_mm_s, settings.least_speed_step_mm_s()) /
-                   shortest_s);
-  }
+  const double limit =
+      std::min(settings.base_max_accel_mm_s2(asked_mm_s2), accel_by_lines(settings));
   const double axes =
       shares_motors(settings) ? 2.0 : 1.0;  // number of axes whose rounding a motor gets
   return kAccelShare * limit -
@@ -92,7 +96,7 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
   setup.axis = axis(dynamics);
   setup.variants = variants(dynamics, settings.dynamics_error);
   setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
-  setup.limits.max_accel_mm_s2 = planned_base_accel(settings);
+  setup.limits.max_accel_mm_s2 = planned_base_accel(settings, 0.0);
   if (settings.base.max_jerk_mm_s3 > 0.0) {
     setup.limits.max_jerk_mm_s3 =
         settings.base.max_jerk_mm_s3 / (shares_motors(settings) ? 2.0 : 1.0);
@@ -151,13 +155,36 @@ double settling_of(const machine::AxisDynamics& dynamics) {
   return 4.0 / (nozzle.zeta * nozzle.omega_rad_s);
 }
 
-// The most filament per mm of path that the firmware takes.
-double max_extrude_ratio(const machine::Settings& settings) {
-  if (settings.printer.firmware != Firmware::klipper) {
-    return std::numeric_limits<double>::infinity();
+double half_period_s(const machine::Settings& settings) {
+  return 0.5 / std::min(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
+}
+
+// Whether the run begins to lay filament while the nozzle still swings from the motion before it.
+bool draws_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
+                    const machine::Settings& settings) {
+  constexpr double kSeen_mm = 10e-3;
+  const verify::NozzleModel model{axis(settings.dynamics_x), axis(settings.dynamics_y)};
+  if (verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) < kSeen_mm) {
+    return false;
   }
+  double start_s = 0.0;
+  for (const planner::PlannedMove& move : run.moves) {
+    if (start_s > half_period_s(settings) || move.segment.extruding()) {
+      return start_s <= half_period_s(settings);
+    }
+    start_s += move.duration_s();
+  }
+  return false;
+}
+
+// Filament per mm of path, in mm, from which on a move has too much. Klipper refuses such a move.
+// The others lay it, so that only what no nozzle can lay is too much.
+double max_extrude_ratio(const machine::Settings& settings) {
+  constexpr double kNoNozzle = 5.0;
   const double radius_mm = settings.extruder.filament_diameter_mm / 2.0;
-  return settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius_mm * radius_mm);
+  const double ratio =
+      settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius_mm * radius_mm);
+  return settings.printer.firmware == Firmware::klipper ? ratio : kNoNozzle * ratio;
 }
 
 }  // namespace
@@ -259,21 +286,34 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
   return setup;
 }
 
-compensate::Setup setup_for(const compensate::Setup& setup,
-                            const std::vector<planner::PlannedMove>& run,
-                            const machine::Settings& settings) {
-  compensate::Setup result = setup;
+RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
+                   const dynamics::NozzleXY& nozzle, const machine::Settings& settings) {
+  RunSetup result;
+  result.setup = setup;
+  for (const planner::PlannedMove& move : run.moves) {
+    result.asked_accel_mm_s2 =
+        std::max(result.asked_accel_mm_s2, std::round(planner::asked_accel_mm_s2(move)));
+  }
+  result.accel = {planned_base_accel(settings, result.asked_accel_mm_s2),
+                  settings.emit_accel_mm_s2(result.asked_accel_mm_s2)};
+  result.accel_by_lines_mm_s2 = accel_by_lines(settings);
+  for (compensate::AxisSetup* const axis : {&result.setup.x, &result.setup.y}) {
+    axis->limits.max_accel_mm_s2 = result.accel.base_mm_s2;
+  }
   const auto keep_above_zero = [&](gcode::Axis axis, const std::optional<machine::Range>& travel,
                                    compensate::BaseLimits& limits) {
-    const bool above = std::ranges::all_of(run, [&](const planner::PlannedMove& move) {
+    const bool above = std::ranges::all_of(run.moves, [&](const planner::PlannedMove& move) {
       return move.segment.start_mm[axis] >= 0.0 && move.segment.end_mm[axis] >= 0.0;
     });
     if (!travel && above) {
       limits.min_position_mm = 0.0;
     }
   };
-  keep_above_zero(gcode::X, settings.printer.travel_x_mm, result.x.limits);
-  keep_above_zero(gcode::Y, settings.printer.travel_y_mm, result.y.limits);
+  keep_above_zero(gcode::X, settings.printer.travel_x_mm, result.setup.x.limits);
+  keep_above_zero(gcode::Y, settings.printer.travel_y_mm, result.setup.y.limits);
+  if (run.begins_run() && draws_swinging(run, nozzle, settings)) {
+    result.setup.lead_in_s = std::max(result.setup.lead_in_s, half_period_s(settings));
+  }
   return result;
 }
 
@@ -309,7 +349,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   }
   options.lines.first_step_s = planner::first_step_s(options.fixed);
   options.lines.max_speed_step_mm_s = settings.emit.max_speed_step_mm_s;
-  options.lines.max_accel_mm_s2 = planned_base_accel(settings);
+  options.lines.max_accel_mm_s2 = planned_base_accel(settings, 0.0);
   options.lines.motors = options.fixed.motors();
   options.version = std::move(version);
   options.checkpoints = settings.emit.checkpoints;
@@ -321,8 +361,6 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.interpreter = interpreter_options(settings);
   rules.limits = planner_limits(settings);
   rules.fixed = firmware_config(settings);
-  rules.max_extrude_ratio = max_extrude_ratio(settings);
-  rules.nozzle_diameter_mm = settings.extruder.nozzle_diameter_mm;
   rules.nozzle = {axis(settings.dynamics_x), axis(settings.dynamics_y),
                   settings.verify.step_ms * 1e-3, settings.verify.hold_s};
   const auto set_range = [](const std::optional<machine::Range>& travel, double& min, double& max,
@@ -337,8 +375,8 @@ verify::Rules verify_rules(const machine::Settings& settings) {
             rules.travel.y_min_assumed);
   rules.base_max_velocity_mm_s = settings.base_max_velocity_mm_s();
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
+  rules.base_accel_times_plan = settings.base_accel_times_asked();
   rules.max_lines_per_s = settings.max_lines_per_s();
-  rules.lead_in_s = settings.solve.lead_in_ms * 1e-3;
   return rules;
 }
 

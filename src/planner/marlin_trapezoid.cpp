@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "marlin_integers.hpp"
-#include "unflex/planner/first_step.hpp"
 
 namespace unflex::planner::marlin {
 namespace {

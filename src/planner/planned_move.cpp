@@ -104,4 +104,10 @@ double PlannedMove::time_s(double distance_mm) const {
   return lead_s + accel_s + std::min((distance_mm - lead_d - accel_d) / cruise_v_mm_s, cruise_s);
 }
 
+double asked_accel_mm_s2(const PlannedMove& move) {
+  const double share =
+      std::max(std::abs(move.direction[gcode::X]), std::abs(move.direction[gcode::Y]));
+  return move.accel_s + move.decel_s > 0.0 ? share * move.accel_mm_s2 : 0.0;
+}
+
 }  // namespace unflex::planner

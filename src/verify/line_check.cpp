@@ -44,7 +44,8 @@ PlacedLine* LineCheck::front(Replay& file) const {
   return nullptr;
 }
 
-void LineCheck::compare(bool complete) {
+void LineCheck::compare(bool complete, double place_tolerance_mm) {
+  place_tolerance_mm_ = place_tolerance_mm;
   for (;;) {
     const PlacedLine* const input = front(*input_);
     const PlacedLine* const output = front(*output_);

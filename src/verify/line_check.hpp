@@ -14,15 +14,13 @@ namespace unflex::verify {
 
 class LineCheck {
  public:
-  LineCheck(Replay& input, Replay& output, double place_tolerance_mm, Violations& violations)
-      : input_(&input),
-        output_(&output),
-        place_tolerance_mm_(place_tolerance_mm),
-        violations_(&violations) {}
+  LineCheck(Replay& input, Replay& output, Violations& violations)
+      : input_(&input), output_(&output), violations_(&violations) {}
 
   // Compares and removes what both files have read of the current run. complete: both have read
-  // all of it, so that what is left over on one side is an error.
-  void compare(bool complete);
+  // all of it, so that what is left over on one side is an error. In a compensated run a line may
+  // stand that far from its place.
+  void compare(bool complete, double place_tolerance_mm);
 
  private:
   [[nodiscard]] PlacedLine* front(Replay& file) const;
@@ -35,7 +33,7 @@ class LineCheck {
 
   Replay* input_;
   Replay* output_;
-  double place_tolerance_mm_;
+  double place_tolerance_mm_ = 0.0;
   Violations* violations_;
 };
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "unflex/core/number.hpp"
 #include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
@@ -28,6 +29,14 @@ bool is_nothing(const gcode::Event& event, const gcode::ModalState& modal) {
 bool only_word(const gcode::Command& command, char letter) {
   return command.words.size() == 1 && command.words.front().letter == letter &&
          command.words.front().value.has_value();
+}
+
+// What the line that announces a run says of its lead-in.
+double lead_in_s(std::string_view mark) {
+  mark.remove_prefix(kRunMark.size());
+  return mark.starts_with(kLeadInWord)
+             ? std::max(0.0, parse_number(mark.substr(kLeadInWord.size())).value_or(0.0))
+             : 0.0;
 }
 
 }  // namespace
@@ -239,6 +248,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   const Section& ended = sections_.back();
   Section run;
   run.compensated = section.may_be_added && ended.compensated && !ended.regime.has_value();
+  run.lead_in_s = run.compensated ? ended.lead_in_s : 0.0;
   in_compensated_run_ = run.compensated;
 
   push_section(std::move(section));
@@ -249,6 +259,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
 void Replay::place(gcode::Line line, const Regime& before, bool motion) {
   if (in_output_ && line.content().starts_with(kRunMark)) {
     sections_.back().compensated = true;
+    sections_.back().lead_in_s = lead_in_s(line.content());
     in_compensated_run_ = true;
   } else if (line.content().starts_with(kRunEndMark)) {
     in_compensated_run_ = false;

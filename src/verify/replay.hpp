@@ -48,8 +48,9 @@ struct Section {
   bool moves_by_itself = false;  // barrier: the machine moves by itself
   // barrier: its form is one that unflex adds, so the sliced file may not have this barrier.
   bool may_be_added = false;
-  // run: announced as compensated.
+  // run: announced as compensated, and how long before its plan the base begins.
   bool compensated = false;
+  double lead_in_s = 0.0;
 };
 
 // A line that is no section, and where the machine is when it comes.

@@ -47,10 +47,9 @@ const Excursion::Side* Excursion::worse_than(const Excursion& input) const {
   return nullptr;
 }
 
-void BaseCheck::Excess::offer(double a_value, double limit, std::size_t a_line) {
-  if (a_value > ratio * limit) {
+void BaseCheck::Largest::offer(double a_value, std::size_t a_line) {
+  if (a_value > value) {
     value = a_value;
-    ratio = a_value / limit;
     line = a_line;
   }
 }
@@ -58,8 +57,9 @@ void BaseCheck::Excess::offer(double a_value, double limit, std::size_t a_line) 
 void BaseCheck::begin_run() {
   end_velocity_ = {};
   last_duration_s_ = 0.0;
-  velocity_excess_ = Excess{0.0, 1.0 + kLimitTolerance, 0};
-  accel_excess_ = velocity_excess_;
+  velocity_ = {};
+  accel_ = {};
+  asked_accel_ = 0.0;
 }
 
 void BaseCheck::go_on(const planner::PlannedMove& before) {
@@ -98,8 +98,7 @@ void BaseCheck::add(const planner::PlannedMove& move) {
   for (std::size_t motor = 0; motor < velocity.size(); ++motor) {
     const double v = std::abs(velocity[motor]);
     max_velocity_ = std::max(max_velocity_, v);
-    velocity_excess_.offer(v - motors_.uncertainty(motor) * kRounding_mm / duration,
-                           rules_->base_max_velocity_mm_s, segment.line);
+    velocity_.offer(v - motors_.uncertainty(motor) * kRounding_mm / duration, segment.line);
   }
   // The firmware may pass from kept motion into the run, and out of the run, at some speed.
   if (last_duration_s_ == 0.0) {
@@ -127,23 +126,30 @@ void BaseCheck::change_of_velocity(const PerMotor& velocity, double duration_s, 
   for (std::size_t motor = 0; motor < velocity.size(); ++motor) {
     const double accel = std::abs(velocity[motor] - last_velocity_[motor]) / between_s;
     max_accel_ = std::max(max_accel_, accel);
-    accel_excess_.offer(accel - motors_.uncertainty(motor) * uncertain,
-                        rules_->base_max_accel_mm_s2, line);
+    accel_.offer(accel - motors_.uncertainty(motor) * uncertain, line);
   }
 }
 
 void BaseCheck::end_run() {
   change_of_velocity(end_velocity_, 0.0, last_line_);
-  report(velocity_excess_, "velocity", "mm/s", rules_->base_max_velocity_mm_s);
-  report(accel_excess_, "acceleration", "mm/s²", rules_->base_max_accel_mm_s2);
+  report(velocity_, "velocity", "mm/s", rules_->base_max_velocity_mm_s);
+  report(accel_, "acceleration", "mm/s²", accel_limit_mm_s2());
 }
 
-void BaseCheck::report(const Excess& excess, std::string_view what, std::string_view unit,
+void BaseCheck::report(const Largest& largest, std::string_view what, std::string_view unit,
                        double limit) {
-  if (excess.line != 0) {
-    violations_->in_output(excess.line, fmt::format("base {} {:.4g} {} is above the limit {:.4g}",
-                                                    what, excess.value, unit, limit));
+  if (largest.value > (1.0 + kLimitTolerance) * limit) {
+    violations_->in_output(largest.line, fmt::format("base {} {:.4g} {} is above the limit {:.4g}",
+                                                     what, largest.value, unit, limit));
   }
+}
+
+double BaseCheck::accel_limit_mm_s2() const {
+  return std::max(rules_->base_max_accel_mm_s2, rules_->base_accel_times_plan * asked_accel_);
+}
+
+void BaseCheck::add_planned(const planner::PlannedMove& move) {
+  asked_accel_ = std::max(asked_accel_, planner::asked_accel_mm_s2(move));
 }
 
 double BaseCheck::median_duration_s() const { return durations_s_.quantile(0.5); }
@@ -153,19 +159,20 @@ std::optional<std::string> broken_rule(const std::vector<planner::PlannedMove>& 
                                        const Rules& rules, const planner::PlannedMove* before) {
   Violations violations("", "");
   Excursion allowed(rules.travel);
-  bool refused_before = false;
-  for (const planner::PlannedMove& move : reference) {
-    allowed.add(move.segment);
-    refused_before = refused_before || refused(move, rules);
-  }
-  Excursion excursion(rules.travel);
   BaseCheck check(rules, violations);
   before != nullptr ? check.go_on(*before) : check.begin_run();
+  bool too_much_before = false;
+  for (const planner::PlannedMove& move : reference) {
+    check.add_planned(move);
+    allowed.add(move.segment);
+    too_much_before = too_much_before || move.segment.too_much_filament;
+  }
+  Excursion excursion(rules.travel);
   for (const planner::PlannedMove& move : base) {
     check.add(move);
     excursion.add(move.segment);
-    if (refused(move, rules) && !refused_before) {
-      return "the firmware would refuse so much filament on so short a way";
+    if (move.segment.too_much_filament && !too_much_before) {
+      return "so much filament is too much for so short a way";
     }
   }
   check.end_run();
@@ -174,12 +181,6 @@ std::optional<std::string> broken_rule(const std::vector<planner::PlannedMove>& 
   }
   const std::vector<Violation> found = violations.take();
   return found.empty() ? std::nullopt : std::optional(found.front().message);
-}
-
-bool refused(const planner::PlannedMove& move, const Rules& rules) {
-  const bool draws = move.segment.length_xy_mm() > 0.0;
-  return draws && move.direction[gcode::E] > rules.max_extrude_ratio &&
-         move.segment.delta(gcode::E) > rules.nozzle_diameter_mm * rules.max_extrude_ratio;
 }
 
 }  // namespace unflex::verify

@@ -52,20 +52,23 @@ class BaseCheck {
   void begin_run();
   // Begins in the middle of a run, after the move `before`.
   void go_on(const planner::PlannedMove& before);
+  // A move of the run's plan, which limits the acceleration.
+  void add_planned(const planner::PlannedMove& move);
   void add(const planner::PlannedMove& move);
   void end_run();
 
+  // The most that a motor may accelerate by what the run's plan has asked so far.
+  [[nodiscard]] double accel_limit_mm_s2() const;
   [[nodiscard]] double max_velocity_mm_s() const { return max_velocity_; }
   [[nodiscard]] double max_accel_mm_s2() const { return max_accel_; }
   [[nodiscard]] double median_duration_s() const;
 
  private:
-  // The largest excess over a limit in the current run.
-  struct Excess {
+  // The largest value in the current run.
+  struct Largest {
     double value = 0.0;
-    double ratio = 1.0;
     std::size_t line = 0;
-    void offer(double a_value, double limit, std::size_t a_line);
+    void offer(double a_value, std::size_t a_line);
   };
   using PerMotor = std::array<double, Motors::kCount>;
   // Motion of each motor for a motion of the axes; 0 for motors that move neither X nor Y.
@@ -75,7 +78,7 @@ class BaseCheck {
   [[nodiscard]] PerMotor velocity_at(const planner::PlannedMove& move, double v_mm_s) const;
   void keep(const planner::PlannedMove& move);
   void change_of_velocity(const PerMotor& velocity, double duration_s, std::size_t line);
-  void report(const Excess& excess, std::string_view what, std::string_view unit, double limit);
+  void report(const Largest& largest, std::string_view what, std::string_view unit, double limit);
 
   const Rules* rules_;
   Violations* violations_;
@@ -84,15 +87,13 @@ class BaseCheck {
   PerMotor end_velocity_{};       // at the end of the last move
   double last_duration_s_ = 0.0;  // duration of the last move; 0: at rest
   std::size_t last_line_ = 0;
-  Excess velocity_excess_;
-  Excess accel_excess_;
+  // Without what rounding may have added.
+  Largest velocity_;
+  Largest accel_;
+  double asked_accel_ = 0.0;  // by the run's plan
   double max_velocity_ = 0.0;
   double max_accel_ = 0.0;
   LogHistogram durations_s_;  // every move counts as one
 };
-
-// Whether the firmware refuses the move because it lays too much filament (Klipper:
-// klippy/kinematics/extruder.py, "Move exceeds maximum extrusion").
-[[nodiscard]] bool refused(const planner::PlannedMove& move, const Rules& rules);
 
 }  // namespace unflex::verify

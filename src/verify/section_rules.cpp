@@ -28,10 +28,10 @@ double speed_mm_s(const planner::PlannedMove& move) {
 }
 
 // How far the base may be from the path at a speed.
-double largest_offset_mm(const Rules& rules, double v_mm_s) {
+double largest_offset_mm(const Rules& rules, double max_accel_mm_s2, double v_mm_s) {
   const auto of_axis = [&](const dynamics::FlexibleAxis& axis) {
     const double omega = axis.omega_rad_s;
-    return rules.base_max_accel_mm_s2 / (omega * omega) + 2.0 * axis.zeta / omega * v_mm_s;
+    return max_accel_mm_s2 / (omega * omega) + 2.0 * axis.zeta / omega * v_mm_s;
   };
   return kRounding_mm + std::hypot(of_axis(rules.nozzle.x), of_axis(rules.nozzle.y));
 }
@@ -63,7 +63,13 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
   const std::size_t line = move.segment.line;
   first_line_ = first_line_ == 0 ? line : first_line_;
   last_line_ = line;
-  offset_.offer(meter.base_offset_mm(), largest_offset_mm(*rules_, speed_mm_s(move)), line);
+  const double offset_mm = meter.base_offset_mm();
+  const double v_mm_s = speed_mm_s(move);
+  const double over_mm =
+      offset_mm - largest_offset_mm(*rules_, rules_->base_max_accel_mm_s2, v_mm_s);
+  if (over_mm > offset_.over_mm) {
+    offset_ = {over_mm, offset_mm, v_mm_s, line};
+  }
   // Filament that a wipe pulls back does not matter.
   const double filament_mm = std::max(0.0, move.segment.delta(gcode::E));
   if (!late && move.segment.length_xy_mm() > kShort_mm) {
@@ -82,7 +88,8 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
   }
 }
 
-void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emitted) {
+void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emitted,
+                       double base_max_accel_mm_s2) {
   check_rate(rate);
   check_nozzle(kept, emitted);
   // The firmware may pass from kept motion into the run without a stop, but the run was written to
@@ -91,10 +98,10 @@ void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emi
     check_swing(kept, emitted);
   }
   check_filament();
-  if (offset_.line != 0) {
+  if (offset_.value_mm > largest_offset_mm(*rules_, base_max_accel_mm_s2, offset_.speed_mm_s)) {
     violations_->in_output(
         offset_.line,
-        fmt::format("the base is {:.3f} mm away from the sliced path", offset_.value));
+        fmt::format("the base is {:.3f} mm away from the sliced path", offset_.value_mm));
   }
 }
 

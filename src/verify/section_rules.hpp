@@ -27,8 +27,10 @@ class SectionRules {
   void add_sliced(const planner::PlannedMove& move) { sliced_rate_.add(move); }
   // A move of the emitted run, after it has been played. late: the plan had ended when it began.
   void add(const planner::PlannedMove& move, Meter& meter, bool late, double filament_tolerance_mm);
-  // The whole run has been played: as emitted, and as if its sliced moves had been kept.
-  void end(const LineRate& rate, const Meter& kept, const Meter& emitted);
+  // The whole run has been played: as emitted, and as if its sliced moves had been kept. Its motors
+  // may have accelerated that much.
+  void end(const LineRate& rate, const Meter& kept, const Meter& emitted,
+           double base_max_accel_mm_s2);
 
  private:
   // The first breach of a rule.
@@ -49,7 +51,14 @@ class SectionRules {
   double densest_ = 0.0;  // most filament per path, mm/mm
   std::size_t first_line_ = 0;
   std::size_t last_line_ = 0;
-  Breach offset_;
+  // Where the base was furthest from the path, beyond what the rules' own acceleration allows.
+  struct Offset {
+    double over_mm = 0.0;
+    double value_mm = 0.0;
+    double speed_mm_s = 0.0;
+    std::size_t line = 0;
+  };
+  Offset offset_;
   Breach filament_in_tail_;
   double swing_in_tail_mm_ = 0.0;  // largest swing in the tail
   std::size_t swing_line_ = 0;

@@ -69,6 +69,7 @@ class Verifier {
   void check_regime(const Section& input, const Section& output);
   void play_kept_line();
   void hold();
+  void compare_lines(bool complete);
   void report_progress();
   [[nodiscard]] VerifyReport report();
 
@@ -97,8 +98,8 @@ class Verifier {
   SectionRules rules_of_run_;
   Excursion input_excursion_;
   Excursion output_excursion_;
-  bool input_refused_ = false;    // the firmware refuses a sliced move of the section
-  std::size_t refused_line_ = 0;  // first line of the output that the firmware refuses; 0: none
+  bool too_much_in_input_ = false;  // a sliced move of the section has too much filament
+  std::size_t too_much_line_ = 0;   // first line of the output that has too much; 0: none
   LineRate rate_;
   double max_lines_per_s_ = 0.0;
   double since_kept_motion_s_ = 0.0;

@@ -48,8 +48,8 @@ void Verifier::check_run(bool compensated) {
         side->line, fmt::format("X{:.4f} Y{:.4f} is out of the travel by {:.4f} mm", side->x_mm,
                                 side->y_mm, side->beyond_mm));
   }
-  if (refused_line_ != 0 && !input_refused_) {
-    violations_.in_output(refused_line_, "the firmware refuses so much filament on so short a way");
+  if (too_much_line_ != 0 && !too_much_in_input_) {
+    violations_.in_output(too_much_line_, "so much filament is too much for so short a way");
   }
   const double difference_mm = filament_.output_mm() - filament_.input_mm();
   if (std::abs(difference_mm) > filament_tolerance_mm()) {
@@ -63,7 +63,7 @@ void Verifier::check_run(bool compensated) {
                 std::abs(difference_mm)});
   if (compensated) {
     base_.end_run();
-    rules_of_run_.end(rate_, kept_, emitted_.main());
+    rules_of_run_.end(rate_, kept_, emitted_.main(), base_.accel_limit_mm_s2());
     if (path_.end() == section_first_) {
       violations_.in_output(output_.following().line.number,
                             "the run before is not in the sliced file");

@@ -4,7 +4,6 @@
 #include <limits>
 #include <utility>
 
-#include "unflex/planner/first_step.hpp"
 #include "unflex/verify/endless.hpp"
 #include "verifier.hpp"
 
@@ -20,9 +19,9 @@ constexpr double kApart_s = 10.0;
 constexpr double kLate_s = 5e-4;
 constexpr double kRingsFor_s = 1.0;
 
-double place_tolerance_mm(const Rules& rules) {
+double place_tolerance_mm(const Rules& rules, double base_max_accel_mm_s2) {
   const double omega = std::min(rules.nozzle.x.omega_rad_s, rules.nozzle.y.omega_rad_s);
-  return std::max(kLeastPlaceTolerance_mm, rules.base_max_accel_mm_s2 / (omega * omega)) +
+  return std::max(kLeastPlaceTolerance_mm, base_max_accel_mm_s2 / (omega * omega)) +
          0.5 * rules.base_max_velocity_mm_s / rules.max_lines_per_s;
 }
 
@@ -65,7 +64,7 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       violations_(input_name, output_name),
       input_(input, input_name, rules.interpreter, rules.limits, rules.fixed, false),
       output_(output, output_name, rules.interpreter, rules.limits, rules.fixed, true),
-      lines_(input_, output_, place_tolerance_mm(rules), violations_),
+      lines_(input_, output_, violations_),
       path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
       run_path_([this](planner::PlannedMove& move) { return next_resting_move(move); }),
       original_(rules.nozzle, observation, NozzleBase::sliced),
@@ -115,7 +114,7 @@ bool Verifier::next_input_move(planner::PlannedMove& move) {
   totals_.reference_time_s += move.duration_s();
   totals_.input_extrusion_mm += move.segment.delta(gcode::E);
   input_excursion_.add(move.segment);
-  input_refused_ = input_refused_ || refused(move, rules_);
+  too_much_in_input_ = too_much_in_input_ || move.segment.too_much_filament;
   return true;
 }
 
@@ -124,6 +123,7 @@ bool Verifier::next_resting_move(planner::PlannedMove& move) {
     return false;
   }
   rules_of_run_.add_sliced(move);
+  base_.add_planned(move);
   violations_.add_to_run(move.segment.line);
   return true;
 }
@@ -139,6 +139,7 @@ bool Verifier::ends_here(const planner::PlannedMove& move, const Replay& file) {
 void Verifier::begin_section(bool compensated) {
   max_lines_per_s_ = std::max(max_lines_per_s_, rate_.max_per_s());
   rate_.forget();
+  base_.begin_run();
   rules_of_run_.begin(rate_, since_kept_motion_s_ < kRingsFor_s);
   path_.begin_section();
   shape_sliced();
@@ -149,7 +150,7 @@ void Verifier::begin_section(bool compensated) {
     violations_.begin_run();
     // A long rest, so that the path of the previous run does not count as near.
     run_path_.rest(kApart_s);
-    run_lead_in_s_ = rules_.lead_in_s + planner::wait_s(output_.front(), rules_.fixed);
+    run_lead_in_s_ = output_.section().lead_in_s + planner::wait_s(output_.front(), rules_.fixed);
     run_path_.begin_section(run_lead_in_s_);
   }
   emitted_path_ = compensated ? &run_path_ : &path_;
@@ -171,8 +172,8 @@ void Verifier::begin_section(bool compensated) {
   original_next_ = path_.end();
   input_excursion_.clear();
   output_excursion_.clear();
-  input_refused_ = false;
-  refused_line_ = 0;
+  too_much_in_input_ = false;
+  too_much_line_ = 0;
   if (compensated) {
     // Both nozzles begin with the same swing. If it were sampled only later, it might seem smaller.
     kept_.look();
@@ -194,7 +195,6 @@ void Verifier::play_run() {
                             "the printer's input shaper is on in a compensated run");
     }
   }
-  base_.begin_run();
   emitted_.follow_lag(compensated);
   totals_.runs += compensated ? 1 : 0;
   play_run_moves(compensated);
@@ -204,7 +204,7 @@ void Verifier::play_run() {
   }
   end_section();
   filament_.end_run();
-  lines_.compare(true);
+  compare_lines(true);
   check_run(compensated);
 }
 
@@ -260,7 +260,7 @@ void Verifier::play_run_moves(bool compensated) {
         base_.add(move);
       }
       if (++moves_ % kMovesPerUpdate == 0) {
-        lines_.compare(false);
+        compare_lines(false);
         report_progress();
         if (progress_->cancelled()) {
           return;
@@ -298,8 +298,8 @@ void Verifier::play(const planner::PlannedMove& move) {
   totals_.emitted_time_s += move.duration_s();
   totals_.output_extrusion_mm += move.segment.delta(gcode::E);
   output_excursion_.add(move.segment);
-  if (refused_line_ == 0 && refused(move, rules_)) {
-    refused_line_ = move.segment.line;
+  if (too_much_line_ == 0 && move.segment.too_much_filament) {
+    too_much_line_ = move.segment.line;
   }
   // The original advances in its section as far as the emitted nozzle has in its own.
   const double elapsed_s = emitted_.plan_time_s() - emitted_path_->section_start_s();
@@ -390,6 +390,10 @@ void Verifier::hold() {
   };
   for_sliced(rest);
   rest(emitted_);
+}
+
+void Verifier::compare_lines(bool complete) {
+  lines_.compare(complete, place_tolerance_mm(rules_, base_.accel_limit_mm_s2()));
 }
 
 void Verifier::report_progress() {

@@ -428,5 +428,85 @@ TEST(StepPath, IsTheSameWayAcrossBlocks) {
   EXPECT_LE(error_um(polygon, base, marlin_rules(), {0.0, 1.0}), 7.0);
 }
 
+// Starts and stops within 0.1 s and goes straight on at constant speed between.
+struct LongWay {
+  LongWay(double x_mm_s, double y_mm_s, double a_duration_s)
+      : duration_s(a_duration_s), x(x_mm_s), y(y_mm_s) {}
+
+  [[nodiscard]] BaseTrajectory base() const {
+    // A speed rises by the integral of s³(10 − 15s + 6s²), which is ½ at s = 1.
+    const auto ramp = [](double t) {
+      const double s = std::clamp(t / 0.1, 0.0, 1.0);
+      return 0.1 * (std::pow(s, 4) * 2.5 - 3.0 * std::pow(s, 5) + std::pow(s, 6)) +
+             std::max(t - 0.1, 0.0);
+    };
+    const auto way = [=, end = duration_s](double t) { return ramp(t) - ramp(t - end + 0.1); };
+    return testing::sampled(
+        [=, of_x = x, of_y = y](double t) {
+          return std::array{of_x * way(t), of_y * way(t)};
+        },
+        duration_s + 0.02);
+  }
+  [[nodiscard]] RunEnds ends(const BaseTrajectory& base) const {
+    const auto steps = [](double mm) { return 0.0125 * std::round(mm / 0.0125); };
+    return {0.0, 0.0, steps(base.x.position_mm.back()), steps(base.y.position_mm.back())};
+  }
+
+  double duration_s;
+  double x;
+  double y;
+};
+
+double longest_line_s(const Polygon& polygon) {
+  double longest_s = 0.0;
+  for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
+    longest_s = std::max(longest_s, polygon.times_s[i] - polygon.times_s[i - 1]);
+  }
+  return longest_s;
+}
+
+TEST(StepPath, CoversALongCruiseByOneLine) {
+  const LongWay way(17.3, 5.1, 4.0);
+  const double slant = std::hypot(17.3, 5.1);
+  const BaseTrajectory base = way.base();
+  const std::array<double, 2> normal = {-5.1 / slant, 17.3 / slant};
+  const auto across = [&](double) {
+    constexpr double kAlong = 1e-3;
+    return ErrorWeight{kAlong + normal[0] * normal[0], normal[0] * normal[1],
+                       kAlong + normal[1] * normal[1]};
+  };
+  const Polygon polygon =
+      step_path(base, {}, across, way.ends(base), kSteps, kSteps, marlin_rules());
+  ASSERT_FALSE(polygon.times_s.empty());
+  EXPECT_GT(longest_line_s(polygon), 3.0);
+  EXPECT_LT(polygon.times_s.size(), 60U);
+  EXPECT_LE(error_um(polygon, base, marlin_rules(), normal), 0.6);
+}
+
+TEST(StepPath, DoesNotPassAWantedTimeOnItsWay) {
+  const LongWay way(30.0, 11.0, 5.0);
+  const BaseTrajectory base = way.base();
+  const Polygon polygon =
+      step_path(base, {2.5}, all_alike, way.ends(base), kSteps, kSteps, marlin_rules());
+  ASSERT_FALSE(polygon.times_s.empty());
+  EXPECT_GT(longest_line_s(polygon), 1.5);
+  for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
+    if (polygon.times_s[i - 1] < 2.499 && polygon.times_s[i] > 2.501) {
+      EXPECT_LE(polygon.times_s[i] - polygon.times_s[i - 1], marlin_rules().max_line_s);
+    }
+  }
+}
+
+// At 0.5 mm/s a line of seven steps takes 175 ms, more than any other line may.
+TEST(StepPath, GoesSlowly) {
+  const LongWay way(0.5, 0.0, 20.0);
+  const BaseTrajectory base = way.base();
+  LineRules rules = marlin_rules();
+  const Polygon polygon = step_path(base, {}, all_alike, way.ends(base), kSteps, kSteps, rules);
+  ASSERT_FALSE(polygon.times_s.empty());
+  EXPECT_GT(longest_line_s(polygon), 15.0);
+  EXPECT_LE(error_um(polygon, base, rules, {0.0, 1.0}), 7.0);
+}
+
 }  // namespace
 }  // namespace unflex::emit

@@ -39,6 +39,21 @@ TEST(Compensable, AreNotThoseThatKlipperRefuses) {
   EXPECT_TRUE(session.read("G1 E8").warnings.empty()) << "filament alone";
 }
 
+TEST(Compensable, AreNotThoseWithMoreFilamentThanANozzleLays) {
+  InterpreterOptions options = default_options(Firmware::marlin);
+  options.max_extrude_ratio = 1.25;
+  options.max_extrude_dab_mm = 0.5;
+  Session session(options);
+  session.read("G28\nM83\nG1 X10 Y10 Z1 F6000\n");
+  const Event event = session.read("G1 X11 E8");
+  EXPECT_EQ(kept_reason(event.segments[0], Firmware::marlin), "too much filament");
+  ASSERT_EQ(event.warnings.size(), 1U);
+  EXPECT_EQ(event.warnings[0],
+            "8 mm of filament in 1 mm of path: no nozzle lays so much; passed through unchanged, "
+            "check the line");
+  EXPECT_TRUE(compensable(session.move("G1 X21 E10"), Firmware::marlin));
+}
+
 TEST(Compensable, AreNotTheOthersForAReason) {
   EXPECT_EQ(kept_reason(by(0, 0, 0, 1), Firmware::klipper), "extrude only");
   EXPECT_EQ(kept_reason(by(0, 0, 1, 0), Firmware::klipper), "Z move");

@@ -223,6 +223,20 @@ TEST(UnsetKeys, FollowTheKeysTheyDependOn) {
   EXPECT_DOUBLE_EQ(s.base_max_accel_mm_s2(), 8000.0);
 }
 
+TEST(BaseAccel, FollowsWhatThePrintAsksForWhileItsKeyIsUnset) {
+  const Settings klipper = read("");
+  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(3000.0), 20000.0);
+  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(12000.0), 48000.0);
+  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(1e5), 2e5) << "a fifth of emit.accel_mm_s2";
+  EXPECT_DOUBLE_EQ(read("", {"emit.accel_mm_s2=150000"}).base_max_accel_mm_s2(12000.0), 30000.0);
+  const Settings rrf = read("", {"printer.firmware=rrf"});
+  EXPECT_DOUBLE_EQ(rrf.base_max_accel_mm_s2(1e5), 4e5);
+  EXPECT_DOUBLE_EQ(rrf.emit_accel_mm_s2(1e5), 2e6);
+  const Settings given = read("[base]\nmax_accel_mm_s2 = 20000\n");
+  EXPECT_DOUBLE_EQ(given.base_max_accel_mm_s2(12000.0), 20000.0);
+  EXPECT_DOUBLE_EQ(given.base_accel_times_asked(), 0.0);
+}
+
 TEST(Tail, LastsForTheSlowerAxis) {
   const Settings s = read("[dynamics.y]\nfreq_hz = 15.915494309189533\ndamping_ratio = 0.5\n");
   EXPECT_NEAR(s.tail_s(), 0.04, 1e-12);
@@ -292,8 +306,10 @@ TEST(ToToml, ReadsBackAsTheSameSettings) {
 }
 
 TEST(ToToml, ShowsWhatHoldsForUnsetKeys) {
-  EXPECT_THAT(to_toml(read("")),
-              HasSubstr("# max_accel_mm_s2 = 20000  (unset: 4 × limits.max_accel_mm_s2)"));
+  EXPECT_THAT(
+      to_toml(read("")),
+      HasSubstr(
+          "# max_accel_mm_s2 = 20000  (unset: 4 × limits.max_accel_mm_s2, or the plan's if more)"));
 }
 
 TEST(Rows, HoldOneRowPerOriginInTheSameOrder) {

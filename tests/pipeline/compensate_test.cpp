@@ -324,12 +324,58 @@ TEST_F(Texts, KeepRunsThatThePlanDrivesHarderThanTheBaseMayBe) {
   fallbacks_ = 1;
   const std::string output = compensated(
       "G90\nM83\nG1 X100 Y100 Z0.4 F6000\nM204 S100000\nG4 P500\nG1 X120 Y100 E1\n"
-      "G1 X120 Y120 E1\nM104 S0\nM400\nM204 S2000\nG1 X100 Y120 E1\nG1 X100 Y100 E1\n");
+      "G1 X120 Y120 E1\nM104 S0\nM400\nM204 S2000\nG1 X100 Y120 E1\nG1 X100 Y100 E1\n",
+      1, {"base.max_accel_mm_s2=20000"});
   EXPECT_EQ(report_.runs_total, 2U);
   ASSERT_EQ(report_.fallbacks.size(), 1U);
   EXPECT_THAT(report_.fallbacks.front().reason, HasSubstr("100000 mm/s²"));
   EXPECT_THAT(output, HasSubstr("\nG1 X120 Y100 E1\nG1 X120 Y120 E1\n"));
   EXPECT_EQ(report_.violation_count, 0U);
+}
+
+// Three sides of a square, at an acceleration of the print's own.
+std::string square_at(std::string_view accel) {
+  return fmt::format(
+      "G90\nM83\nG1 X100 Y100 Z0.4 F6000\n{}\nG4 P500\nG1 X140 Y100 E2 F12000\n"
+      "G1 X140 Y140 E2\nG1 X100 Y140 E2\n",
+      accel);
+}
+
+TEST_F(Texts, MayAccelerateByWhatThePrintAsksFor) {
+  constexpr double kByDefault_mm_s2 = 20000.0;
+  static_cast<void>(compensated(square_at("M204 S6000"), 1, {"emit.max_speed_step_mm_s=100"}));
+  EXPECT_GT(report_.base_max_accel_mm_s2, kByDefault_mm_s2);
+  EXPECT_LE(report_.base_max_accel_mm_s2, 24000.0);
+  EXPECT_THAT(report_.warnings, ::testing::IsEmpty());
+  static_cast<void>(compensated(square_at("M204 S6000"), 1,
+                                {"emit.max_speed_step_mm_s=100", "base.max_accel_mm_s2=20000"}));
+  EXPECT_LE(report_.base_max_accel_mm_s2, kByDefault_mm_s2);
+}
+
+TEST_F(Texts, MayAccelerateByWhatThePrintAsksForOnRepRapFirmware) {
+  const std::string output = compensated(square_at("M201 X6000 Y6000"), 1,
+                                         {"printer.firmware=rrf", "limits.max_accel_mm_s2=2000"});
+  EXPECT_THAT(output, HasSubstr("\nM201 X120000 Y120000 E120000\n"));
+  EXPECT_GT(report_.base_max_accel_mm_s2, 8000.0);
+  EXPECT_LE(report_.base_max_accel_mm_s2, 24000.0);
+}
+
+TEST_F(Texts, TellWhereLinesDoNotLetTheBaseAccelerateEnough) {
+  static_cast<void>(compensated(square_at("M204 S20000")));
+  ASSERT_EQ(report_.warnings.size(), 1U);
+  EXPECT_THAT(report_.warnings.front(), HasSubstr("the print asks for 20000 mm/s² here"));
+  EXPECT_THAT(report_.warnings.front(), HasSubstr("emit.max_speed_step_mm_s"));
+}
+
+// A layer begins with a move in X, Y and Z, and draws at once.
+TEST_F(Texts, StopTheNozzleBeforeTheyDraw) {
+  const std::string layer = "G1 X100 Y100 E2 F3000\nG1 X100 Y60 E2\nG1 X60 Y60 E2\n";
+  const std::string hop = "G0 X61 Y62 Z0.6 F9000\n";
+  const std::string output =
+      compensated("G90\nM83\nG1 X60 Y60 Z0.4 F6000\nG4 P500\n" + layer + hop + layer);
+  EXPECT_THAT(output, HasSubstr("\n" + hop + "G4 P0\n;unflex run LEAD_IN=0.011111\n"));
+  EXPECT_EQ(output.find("LEAD_IN"), output.rfind("LEAD_IN"));
+  EXPECT_LT(report_.compensated.extruding.contour_max_mm, 6e-3);
 }
 
 TEST_F(Texts, StopForObjectLabelsAndSavedStates) {

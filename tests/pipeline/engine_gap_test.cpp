@@ -57,10 +57,10 @@ Gap gap_over(const std::string& text) {
     if (!piece.is_run) {
       continue;
     }
-    const compensate::Setup setup = setup_for(common, piece.moves, settings);
+    const auto start = at_rest(piece.moves.front().segment.start_mm);
+    const compensate::Setup setup = setup_for(common, piece, start, settings).setup;
     const compensate::Course course(piece.before, piece.moves, piece.after);
     const auto spans = compensate::mesh(course, compensate::node_grid(course, setup), setup);
-    const auto start = at_rest(piece.moves.front().segment.start_mm);
     const auto windows = compensate::windows(course, spans, start, setup);
     for (std::size_t i = 0; i < windows.size(); ++i) {
       if (!spans[i].cruise) {

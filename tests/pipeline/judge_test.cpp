@@ -48,7 +48,7 @@ struct Corner {
                                                         double max_lines_per_s = 1000.0) const {
     const dynamics::NozzleXY nozzle = at_rest({0.0, 0.0, 0.2, 0.0});
     return pipeline::judge(run, deviation_of(run, run.moves, nozzle, rules(), 0.0), text, printer,
-                           {}, nozzle, rules(), rules().lead_in_s, {}, max_lines_per_s, {})
+                           {}, nozzle, rules(), 0.0, {}, max_lines_per_s, {})
         .objection;
   }
 

@@ -55,6 +55,15 @@ class Reading {
     return result;
   }
 
+  // As "line: message".
+  [[nodiscard]] std::vector<std::string> warnings() const {
+    std::vector<std::string> result;
+    for (const Diagnostic& warning : reader_.warnings()) {
+      result.push_back(fmt::format("{}: {}", warning.place.line, warning.message));
+    }
+    return result;
+  }
+
   std::vector<Piece> pieces;
   std::string error;
 
@@ -257,6 +266,14 @@ TEST(PieceReader, LosesNoByteOfAnyFile) {
     }
   }
   EXPECT_GE(files, 7U);
+}
+
+TEST(PieceReader, WarnsOfMovesThatTakeLong) {
+  const Reading reading(std::string(kKnown) + "G1 X9 F6\nG1 X189 F6\nG1 E1 F6\nG1 E99 F6\n");
+  EXPECT_THAT(reading.warnings(),
+              ElementsAre("5: this move takes 30 minutes; check its F, its length and its filament",
+                          "7: this move takes 17 minutes; check its F, its length and its "
+                          "filament"));
 }
 
 }  // namespace

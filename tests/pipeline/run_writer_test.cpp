@@ -69,9 +69,11 @@ class Writer : public ::testing::Test {
     const std::vector<planner::PlannedMove>& moves = job.piece.moves;
     job.nozzle = job.piece.before.empty() ? at_rest(moves.front().segment.start_mm)
                                           : at_end_of(job.piece.before.back());
-    job.setup = setup_for(rules_.setup, moves, settings_);
-    job.grid = compensate::node_grid(job.course(), rules_.setup);
-    job.spans = compensate::mesh(job.course(), job.grid, rules_.setup);
+    RunSetup setup = setup_for(rules_.setup, job.piece, job.nozzle, settings_);
+    job.setup = std::move(setup.setup);
+    job.accel = setup.accel;
+    job.grid = compensate::node_grid(job.course(), job.setup);
+    job.spans = compensate::mesh(job.course(), job.grid, job.setup);
     job.results.resize(job.spans.size());
     solve_windows(job, 0, job.spans.size(), *compensate::make_banded_engine());
     make_lines(job, rules_);

@@ -126,7 +126,7 @@ class Comparison {
   }
 
   void follow(std::string_view line) {
-    if (line == ";unflex run") {
+    if (line.starts_with(";unflex run")) {
       part_ = Part::run;
       run_seen_ = true;
     } else if (line == ";unflex end") {

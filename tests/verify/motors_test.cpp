@@ -36,7 +36,6 @@ std::string broken(Kinematics kinematics, const planner::PlannedMove& move, doub
   rules.fixed.kinematics = kinematics;
   rules.base_max_velocity_mm_s = max_velocity;
   rules.base_max_accel_mm_s2 = max_accel;
-  rules.max_extrude_ratio = 1.0;
   return broken_rule({move}, {move}, rules).value_or("");
 }
 

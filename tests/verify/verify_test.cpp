@@ -264,6 +264,15 @@ TEST_F(Emitted, TooMuchAccelerationIsFound) {
   EXPECT_GT(report.base_max_accel_mm_s2, 1500.0);
 }
 
+TEST_F(Emitted, AccelerationThatThePlanAsksForIsAllowed) {
+  Rules rules = on_a_bed();
+  rules.base_max_accel_mm_s2 = 1500.0;
+  rules.base_accel_times_plan = 2.5;
+  EXPECT_EQ(violations_of(verify_text(kPrint, good_, rules)), "");
+  rules.base_accel_times_plan = 0.4;
+  EXPECT_THAT(violations_of(verify_text(kPrint, good_, rules)), HasSubstr("is above the limit"));
+}
+
 TEST_F(Emitted, TooMuchVelocityIsFound) {
   Rules rules = on_a_bed();
   rules.base_max_velocity_mm_s = 55.0;
@@ -337,12 +346,16 @@ TEST_F(Emitted, AnAnnouncedRunThatTheSlicedFileDoesNotHaveIsFound) {
                    "the run before is not in the sliced file");
 }
 
-TEST_F(Emitted, AMoveTheFirmwareRefusesIsFound) {
+TEST_F(Emitted, AMoveWithTooMuchFilamentIsFound) {
   const auto [at, length] = short_line(good_, 50);
   std::string thick = good_;
   const std::size_t e = thick.find(" E", at) + 2;
   thick.replace(e, thick.find(' ', e) - e, "0.15");
-  expect_violation(thick, "the firmware refuses so much filament");
+  Rules rules = on_a_bed();
+  rules.interpreter.max_extrude_ratio = 0.266080;
+  rules.interpreter.max_extrude_dab_mm = 0.106432;
+  EXPECT_THAT(violations_of(verify_text(kPrint, thick, rules)),
+              HasSubstr("too much for so short a way"));
 }
 
 TEST_F(Emitted, ALateClockIsDrift) {

@@ -62,8 +62,8 @@ class Emitter {
   void copy(const gcode::Event& event, std::string& out);  // a line of the input
   void note_motion(const gcode::Event& event);
   void follow_input(const gcode::Event& event);
-  void enter_run(std::string& out);
-  void set_run_modes(bool joins_file, std::string& out);
+  void enter_run(const Run& run, std::string& out);
+  void set_run_modes(const Run& run, bool joins_file, std::string& out);
   void keep_reading_of_e_small(std::string& out);
   void set_unit(double unit_mm, std::string& out);
   [[nodiscard]] bool move_may_wait() const;

@@ -26,6 +26,13 @@ struct RunStart {
 
 [[nodiscard]] RunStart run_start(const gcode::ModalState& state, const planner::Limits& limits);
 
+// Accelerations of a run whose plan asks for more than the printer's own limits; 0: EmitOptions has
+// them.
+struct RunAccel {
+  double base_mm_s2 = 0.0;   // LineRules::max_accel_mm_s2
+  double lines_mm_s2 = 0.0;  // EmitOptions::line_accel_mm_s2, and the firmware's own limits
+};
+
 // A compensated run, or a part of one.
 struct Run {
   // The input's lines in the run: moves, and passive and limit lines between them.
@@ -37,6 +44,7 @@ struct Run {
   double lead_in_s = 0.0;        // the first move starts this long after the base
   double tolerance_share = 1.0;  // share of LineRules::tolerance_mm that its lines may use
   double limits_share = 1.0;     // share of LineRules' burst_lines and max_accel_mm_s2 to use
+  RunAccel accel = {};
   // When the lines just before the run began, in order. The run begins at 0.
   std::vector<double> lines_before_s = {};
   int lines_after = 0;  // how many lines begin within LineRules::burst_s after the run

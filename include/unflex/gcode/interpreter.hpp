@@ -39,8 +39,8 @@ struct Segment {
   // piece. Marlin hands it to its planner, which then limits the junction by centripetal
   // acceleration (PlannerHints::curve_radius).
   double curve_radius_mm = 0.0;
-  // The firmware ends the print here, because the motion takes more filament than it allows.
-  bool refused = false;
+  // More filament than this length of path can take. Klipper ends the print here.
+  bool too_much_filament = false;
 
   [[nodiscard]] double delta(Axis axis) const { return end_mm[axis] - start_mm[axis]; }
   [[nodiscard]] bool moves_xy() const { return delta(X) != 0.0 || delta(Y) != 0.0; }
@@ -174,8 +174,8 @@ struct InterpreterOptions {
   bool has_print_jerk = false;
   // Filament diameter of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
   double filament_diameter_mm = 1.75;
-  // Klipper: a move with more mm of filament per mm than this ends the print, unless it lays less
-  // than max_extrude_dab_mm (kinematics/extruder.py, check_move).
+  // A move has too much filament if it lays more mm per mm than this, and more than
+  // max_extrude_dab_mm. Klipper ends the print at such a move (kinematics/extruder.py, check_move).
   double max_extrude_ratio = std::numeric_limits<double>::infinity();
   double max_extrude_dab_mm = 0.0;
   // How long the nozzle swings after a move. 0: it is not waited for.

@@ -167,6 +167,8 @@ struct EmitSettings {
 // The share that the base may use of the largest change of speed from line to line. The rest lets
 // the lines make up for each other.
 inline constexpr double kSpeedStepShare = 0.93;
+// The firmware's own acceleration in a run over the base's, at least.
+inline constexpr double kEmitAccelFactor = 5.0;
 
 // The firmware's clock differs a little from line to line. With this room no more lines than the
 // budget begin within any 100 ms all the same.
@@ -225,11 +227,17 @@ struct Settings {
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;
   [[nodiscard]] double base_max_velocity_mm_s() const;
-  [[nodiscard]] double base_max_accel_mm_s2() const;
+  // What a motor may do in a run whose plan accelerates the tool by up to `asked_mm_s2`: a print
+  // may set more than the printer's own limit.
+  [[nodiscard]] double base_max_accel_mm_s2(double asked_mm_s2) const;
+  [[nodiscard]] double base_max_accel_mm_s2() const { return base_max_accel_mm_s2(0.0); }
+  // base_max_accel_mm_s2() over what the plan asks; 0: it does not follow the plan.
+  [[nodiscard]] double base_accel_times_asked() const;
   [[nodiscard]] double tail_s() const;
   [[nodiscard]] double period_ms() const;
   [[nodiscard]] double tolerance_um() const;
-  [[nodiscard]] double emit_accel_mm_s2() const;
+  [[nodiscard]] double emit_accel_mm_s2(double asked_mm_s2) const;
+  [[nodiscard]] double emit_accel_mm_s2() const { return emit_accel_mm_s2(0.0); }
   // 0 where the printer has no shaper, or where none is known.
   [[nodiscard]] double shaper_freq_x_hz() const;
   [[nodiscard]] double shaper_freq_y_hz() const;

@@ -144,6 +144,19 @@ struct PlannedMove {
 [[nodiscard]] std::span<const PlannedMove> last_moves(std::span<const PlannedMove> moves,
                                                       double duration_s);
 
+// The acceleration that the plan asks of X or Y in the move, whichever is larger.
+[[nodiscard]] double asked_accel_mm_s2(const PlannedMove& move);
+
+// How long the firmware takes for the first step out of a standstill, with limits as high as those
+// of a run. 0: none.
+//
+// Marlin 2.1.2: 1 / MINIMAL_STEP_RATE (src/module/planner.cpp, calculate_trapezoid_for_block).
+[[nodiscard]] double first_step_s(const FirmwareConfig& config);
+
+// How long the machine rests before a run whose first move this is: first_step_s(), or 0 if it
+// comes from another move, such as one of filament alone, at some speed.
+[[nodiscard]] double wait_s(const PlannedMove& first, const FirmwareConfig& config);
+
 // A firmware's planner. Moves come out in order once nothing that follows can change them. The plan
 // does not depend on when, or how often, take() is called.
 class Planner {

@@ -41,15 +41,14 @@ struct Rules {
   gcode::InterpreterOptions interpreter;
   planner::Limits limits;
   planner::FirmwareConfig fixed;
-  double max_extrude_ratio = 0.266080;  // mm of filament per mm of path a firmware accepts
-  double nozzle_diameter_mm = 0.4;
   NozzleModel nozzle;
   TravelLimits travel;
   double base_max_velocity_mm_s = 600.0;
+  // A run's motors may accelerate that much, and that many times as much as its plan does.
   double base_max_accel_mm_s2 = 20000.0;
+  double base_accel_times_plan = 0.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
   Leeway leeway;
-  double lead_in_s = 0.0;  // how long before their plan compensated runs start
 };
 
 // One broken rule of the emitted file.
