@@ -138,7 +138,8 @@ void NozzleFollower::pause(double duration_s) {
 // Switches the shaper. Meanwhile the machine stands still: the motion that the old shaper has
 // delayed ends, and the nozzle rings.
 double NozzleFollower::change(const gcode::Shaper& next, std::optional<double> pressure_advance_s) {
-  const double stop_s = planner::switching_s(config_, present_, next, pressure_advance_s);
+  const double stop_s =
+      planner::switching_s(config_, {present_, pressure_advance_s}, {next, pressure_advance_s});
   if (stop_s == 0.0) {
     return stop_s;
   }

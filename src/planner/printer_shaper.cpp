@@ -101,13 +101,15 @@ Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper) {
              set.damping_ratio_y.value_or(installed.damping_ratio_y))};
 }
 
-double switching_s(const FirmwareConfig& config, const gcode::Shaper& before,
-                   const gcode::Shaper& after, std::optional<double> pressure_advance_s) {
-  if (same(before, after)) {
+double switching_s(const FirmwareConfig& config, const Filters& before, const Filters& after) {
+  const auto advances = [&](const Filters& filters) {
+    return config.firmware == Firmware::klipper &&
+           filters.pressure_advance_s.value_or(config.pressure_advance_s) > 0.0;
+  };
+  if (same(before.shaper, after.shaper) && advances(before) == advances(after)) {
     return 0.0;
   }
-  const Shaping from = shaping(config, before);
-  const Shaping to = shaping(config, after);
+  const Shaping from = shaping(config, before.shaper);
   switch (config.firmware) {
     case Firmware::marlin:
       return from.length_s();
@@ -116,10 +118,11 @@ double switching_s(const FirmwareConfig& config, const gcode::Shaper& before,
     case Firmware::klipper:
       break;
   }
-  const bool advances = pressure_advance_s.value_or(config.pressure_advance_s) > 0.0;
-  const double scan_s =
-      std::max(kLeastScan_s, advances ? 0.5 * config.pressure_advance_smooth_s : 0.0);
-  return std::max(scan_s, from.reach_s()) + std::max(scan_s, to.reach_s());
+  const auto scan_s = [&](const Filters& filters, const Shaping& of_filters) {
+    return std::max({kLeastScan_s, of_filters.reach_s(),
+                     advances(filters) ? 0.5 * config.pressure_advance_smooth_s : 0.0});
+  };
+  return scan_s(before, from) + scan_s(after, shaping(config, after.shaper));
 }
 
 }  // namespace unflex::planner

@@ -20,6 +20,23 @@ dynamics::NozzleState shifted(dynamics::NozzleState state, double by) {
   return state;
 }
 
+// In a long cruise we look so often whether the nozzle has come to rest on the base.
+constexpr double kLook_s = 1.0;
+// Below these it has. What is left, less than an atom, is dropped, and samples may be this many
+// times further apart, since nothing but the place changes any more.
+constexpr double kRests_mm = 1e-7;
+constexpr double kRests_mm_s = 1e-5;
+constexpr double kSparser = 32.0;
+
+bool is_cruise(const BasePhase& phase) {
+  return phase.x.acceleration == 0.0 && phase.y.acceleration == 0.0;
+}
+
+bool rests_on(const dynamics::NozzleState& nozzle, const dynamics::BaseSegment& base) {
+  return std::abs(nozzle.position - base.position) < kRests_mm &&
+         std::abs(nozzle.velocity - base.velocity) < kRests_mm_s;
+}
+
 // The state of the base h seconds later.
 void advance(dynamics::BaseSegment& base, double h) {
   base.position += h * (base.velocity + 0.5 * base.acceleration * h);
@@ -144,7 +161,10 @@ void Meter::play(BasePhase phase) {
     const double change_s = next_reference_change();
     const bool measured = current_ < path_->end() && (*path_)[current_].measured &&
                           (*path_)[current_].start_s <= time_s_ + kSameTime_s;
-    const double until_s = change_s < end_s - kSameTime_s ? change_s : end_s;
+    double until_s = change_s < end_s - kSameTime_s ? change_s : end_s;
+    if (is_cruise(phase) && until_s - time_s_ > 2.0 * kLook_s) {
+      until_s = time_s_ + kLook_s;
+    }
     integrate(phase, until_s - time_s_, measured);
     time_s_ = until_s;
   }
@@ -177,6 +197,15 @@ double Meter::next_reference_change() {
 void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   // For fewer steps it does not pay to set up maps.
   constexpr double kManySteps = 8.0;
+  if (is_cruise(phase) && rests_on(nozzle_.x, phase.x) && rests_on(nozzle_.y, phase.y)) {
+    const double few = std::ceil(duration_s / (kSparser * model_.step_s) - 1e-9);
+    const double h = duration_s / std::max(1.0, few);
+    integrate(phase, std::max(1.0, few), h, measured, [&] {
+      nozzle_.x = {phase.x.position + h * phase.x.velocity, phase.x.velocity};
+      nozzle_.y = {phase.y.position + h * phase.y.velocity, phase.y.velocity};
+    });
+    return;
+  }
   const double steps = std::max(1.0, std::ceil(duration_s / model_.step_s - 1e-9));
   const double h = duration_s / steps;
   if (steps < kManySteps) {

@@ -31,6 +31,10 @@ bool only_word(const gcode::Command& command, char letter) {
          command.words.front().value.has_value();
 }
 
+planner::Filters filters_of(const gcode::ModalState& state) {
+  return {state.input_shaper(), state.pressure_advance_s};
+}
+
 // What the line that announces a run says of its lead-in.
 double lead_in_s(std::string_view mark) {
   mark.remove_prefix(kRunMark.size());
@@ -235,9 +239,9 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   section.kind = kind;
   section.regime = before;
   section.dwell_s = event.dwell_s;
-  if (event.sets_shaper) {
-    section.switching_s = planner::switching_s(fixed_, before.modal.input_shaper(), *event.shaper,
-                                               before.modal.pressure_advance_s);
+  if (kind == SectionKind::barrier) {
+    section.switching_s =
+        planner::switching_s(fixed_, filters_of(before.modal), filters_of(interpreter_.state()));
   }
   section.moves_by_itself = event.position_lost;
   section.may_be_added =

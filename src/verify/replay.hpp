@@ -43,7 +43,7 @@ struct Section {
   gcode::Line line;
   std::optional<Regime> regime;  // before the line; run: before its first move; end: the final one
   double dwell_s = 0.0;
-  // barrier: for how long the machine stands still to switch its input shaper.
+  // barrier: for how long the machine stands still to switch its shaper or pressure advance.
   double switching_s = 0.0;
   bool moves_by_itself = false;  // barrier: the machine moves by itself
   // barrier: its form is one that unflex adds, so the sliced file may not have this barrier.

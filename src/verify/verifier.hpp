@@ -27,6 +27,23 @@ namespace unflex::verify {
 // of the emitted file. In compensated runs, which begin and end at rest, it is measured against the
 // plan of the run by itself, `run_path_`: where the sliced file passes from one section into the
 // next at speed, that plan takes some ms longer.
+// How long a file's machine has stood still for lines that switch its filters.
+class Switching {
+ public:
+  // The stop that one more such line adds. Lines in a row are one stop.
+  [[nodiscard]] double stop(double switching_s) {
+    const double added_s = std::max(switching_s - since_motion_s_, 0.0);
+    since_motion_s_ += added_s;
+    return added_s;
+  }
+  void move() { since_motion_s_ = 0.0; }
+  // What no motion has followed yet. At the end of a file nothing waits for it.
+  [[nodiscard]] double since_motion_s() const { return since_motion_s_; }
+
+ private:
+  double since_motion_s_ = 0.0;
+};
+
 class Verifier {
  public:
   // The streams, the progress and the observer must outlive the Verifier.
@@ -93,6 +110,8 @@ class Verifier {
   Nozzles emitted_;
   gcode::Shaper original_shaper_;  // shaper that acts on original_
   gcode::Shaper emitted_shaper_;   // shaper that acts on emitted_
+  Switching input_switching_;
+  Switching output_switching_;
   FilamentLedger filament_;
   BaseCheck base_;
   SectionRules rules_of_run_;

@@ -111,6 +111,7 @@ bool Verifier::next_input_move(planner::PlannedMove& move) {
   if (failure_ || !input_.next(move) || ends_here(move, input_)) {
     return false;
   }
+  input_switching_.move();
   totals_.reference_time_s += move.duration_s();
   totals_.input_extrusion_mm += move.segment.delta(gcode::E);
   input_excursion_.add(move.segment);
@@ -218,7 +219,7 @@ void Verifier::skip_added_barriers() {
 
 // The machine stands still where unflex switches its shaper.
 void Verifier::join_over_barrier() {
-  const double switching_s = output_.following().switching_s;
+  const double switching_s = output_switching_.stop(output_.following().switching_s);
   emitted_.hold(switching_s);
   totals_.emitted_time_s += switching_s;
   since_kept_motion_s_ += switching_s;
@@ -282,6 +283,7 @@ void Verifier::play_run_moves(bool compensated) {
 
 void Verifier::play(const planner::PlannedMove& move) {
   rate_.add(move);
+  output_switching_.move();
   const double start_s = emitted_.plan_time_s();
   const bool compensated = emitted_path_ == &run_path_;
   const bool late = emitted_path_->section_complete() &&
@@ -362,8 +364,10 @@ void Verifier::play_kept_line() {
     play(move);
   }
   end_section();
-  const double input_s = input_.section().dwell_s + input_.section().switching_s;
-  const double output_s = output_.section().dwell_s + output_.section().switching_s;
+  const double input_s =
+      input_.section().dwell_s + input_switching_.stop(input_.section().switching_s);
+  const double output_s =
+      output_.section().dwell_s + output_switching_.stop(output_.section().switching_s);
   if (input_s > 0.0) {
     path_.rest(input_s);
     for_sliced([&](Nozzles& nozzles) { nozzles.hold(input_s); });
@@ -403,6 +407,8 @@ void Verifier::report_progress() {
 
 VerifyReport Verifier::report() {
   VerifyReport report = totals_;
+  report.reference_time_s -= input_switching_.since_motion_s();
+  report.emitted_time_s -= output_switching_.since_motion_s();
   report.uncompensated = deviation(original_.main());
   if (unshaped_) {
     report.unshaped = deviation(unshaped_->main());

@@ -222,7 +222,7 @@ TEST(NozzleFollower, AnExactShaperLeavesTheRunAfterItAtRest) {
       EXPECT_EQ(follower.follow(piece), 0.0) << "nothing switches it";
     }
     const double stop_s = follower.begin_run(run);
-    EXPECT_EQ(stop_s, planner::switching_s(exact.fixed, printers, {}, {}));
+    EXPECT_EQ(stop_s, planner::switching_s(exact.fixed, {printers}, {}));
     EXPECT_EQ(follower.begin_run(run), 0.0) << "it is off";
     return follower.nozzle();
   };
@@ -245,9 +245,9 @@ TEST(NozzleFollower, TheShaperComesBackBeforeWhatMovesByItself) {
   for (const Piece& piece : pieces_of(text)) {
     stops_s += piece.is_run ? follower.begin_run(piece) : follower.follow(piece);
   }
-  const double once_s = planner::switching_s(rules().fixed, shaper, {}, {});
+  const double once_s = planner::switching_s(rules().fixed, {shaper}, {});
   EXPECT_GT(once_s, 0.0);
-  EXPECT_DOUBLE_EQ(stops_s, once_s + planner::switching_s(rules().fixed, {}, shaper, {}));
+  EXPECT_DOUBLE_EQ(stops_s, once_s + planner::switching_s(rules().fixed, {}, {shaper}));
 }
 
 }  // namespace

@@ -108,11 +108,11 @@ TEST(Shaping, TakesTheFirmwaresDefaultForATypeThatItDoesNotKnow) {
 // Measured in a replay by Klipper's own host code, August 2026.
 TEST(Switching, StopsKlipperForBothOfItsFilters) {
   const FirmwareConfig config = config_of(Firmware::klipper);
-  EXPECT_NEAR(switching_s(config, kOn, kOff, {}), 0.010528, 1e-6);
-  EXPECT_NEAR(switching_s(config, kOff, kOn, {}), 0.010528, 1e-6);
-  EXPECT_NEAR(switching_s(config, kOn, shaper_of(45.0, 0.0), {}), 2 * 0.009528, 2e-6);
-  EXPECT_DOUBLE_EQ(switching_s(config, kOn, kOn, {}), 0.0);
-  EXPECT_DOUBLE_EQ(switching_s(config, kOff, kOff, {}), 0.0);
+  EXPECT_NEAR(switching_s(config, {kOn}, {kOff}), 0.010528, 1e-6);
+  EXPECT_NEAR(switching_s(config, {kOff}, {kOn}), 0.010528, 1e-6);
+  EXPECT_NEAR(switching_s(config, {kOn}, {shaper_of(45.0, 0.0)}), 2 * 0.009528, 2e-6);
+  EXPECT_DOUBLE_EQ(switching_s(config, {kOn}, {kOn}), 0.0);
+  EXPECT_DOUBLE_EQ(switching_s(config, {kOff}, {kOff}), 0.0);
 }
 
 // The type and damping of a shaper that is off do not matter.
@@ -121,32 +121,40 @@ TEST(Switching, DoesNotStopWhereBothAreOff) {
   typed.settings.type_x = "ei";
   typed.settings.kept_freq_hz = 40.0;
   for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
-    EXPECT_DOUBLE_EQ(switching_s(config_of(firmware), typed, kOff, {}), 0.0);
-    EXPECT_DOUBLE_EQ(switching_s(config_of(firmware), kOff, typed, {}), 0.0);
+    EXPECT_DOUBLE_EQ(switching_s(config_of(firmware), {typed}, {kOff}), 0.0);
+    EXPECT_DOUBLE_EQ(switching_s(config_of(firmware), {kOff}, {typed}), 0.0);
   }
 }
 
 TEST(Switching, WaitsForTheFilterOfPressureAdvanceToo) {
   FirmwareConfig config = config_of(Firmware::klipper);
-  EXPECT_NEAR(switching_s(config, kOn, kOff, 0.05), 0.040, 1e-12);
+  EXPECT_NEAR(switching_s(config, {kOn, 0.05}, {kOff, 0.05}), 0.040, 1e-12);
   config.pressure_advance_s = 0.03;
-  EXPECT_NEAR(switching_s(config, kOn, kOff, {}), 0.040, 1e-12);
-  EXPECT_NEAR(switching_s(config, kOn, kOff, 0.0), 0.010528, 1e-6)
+  EXPECT_NEAR(switching_s(config, {kOn}, {kOff}), 0.040, 1e-12);
+  EXPECT_NEAR(switching_s(config, {kOn, 0.0}, {kOff, 0.0}), 0.010528, 1e-6)
       << "the file has switched it off";
   config.pressure_advance_smooth_s = 0.01;
-  EXPECT_NEAR(switching_s(config, kOn, kOff, {}), 0.009528 + 0.005, 1e-6);
+  EXPECT_NEAR(switching_s(config, {kOn}, {kOff}), 0.009528 + 0.005, 1e-6);
+}
+
+TEST(Switching, StopsKlipperWherePressureAdvanceIsSwitchedOnOrOff) {
+  const FirmwareConfig config = config_of(Firmware::klipper);
+  EXPECT_NEAR(switching_s(config, {kOn, 0.0}, {kOn, 0.05}), 0.009528 + 0.020, 1e-6);
+  EXPECT_NEAR(switching_s(config, {kOff, 0.05}, {kOff, 0.0}), 0.020 + 0.001, 1e-12);
+  EXPECT_DOUBLE_EQ(switching_s(config, {kOn, 0.03}, {kOn, 0.05}), 0.0);
+  EXPECT_DOUBLE_EQ(switching_s(config_of(Firmware::marlin), {kOn, 0.0}, {kOn, 0.05}), 0.0);
 }
 
 TEST(Switching, WaitsForTheDelayedPartOfTheMotionInMarlin) {
   const FirmwareConfig config = config_of(Firmware::marlin);
-  EXPECT_NEAR(switching_s(config, kOn, kOff, {}), 0.5 * damped_period_s(45.0, 0.15), 1e-12);
-  EXPECT_DOUBLE_EQ(switching_s(config, kOff, kOn, {}), 0.0);
+  EXPECT_NEAR(switching_s(config, {kOn}, {kOff}), 0.5 * damped_period_s(45.0, 0.15), 1e-12);
+  EXPECT_DOUBLE_EQ(switching_s(config, {kOff}, {kOn}), 0.0);
 }
 
 TEST(Switching, EndsInRepRapFirmwaresGracePeriod) {
   const FirmwareConfig config = config_of(Firmware::rrf);
-  EXPECT_NEAR(switching_s(config, kOn, kOff, {}), damped_period_s(45.0, 0.1) + 0.010, 1e-12);
-  EXPECT_NEAR(switching_s(config, kOff, kOn, {}), 0.010, 1e-12);
+  EXPECT_NEAR(switching_s(config, {kOn}, {kOff}), damped_period_s(45.0, 0.1) + 0.010, 1e-12);
+  EXPECT_NEAR(switching_s(config, {kOff}, {kOn}), 0.010, 1e-12);
 }
 
 }  // namespace

@@ -158,6 +158,30 @@ TEST(Measure, HalvingTheStepChangesNothingThatMatters) {
   EXPECT_NEAR(a.duration_s, b.duration_s, 1e-9);
 }
 
+// The nozzle comes to rest on the base in the long sides, where samples are far apart. What happens
+// at the corner is that of short sides, and a base that is off counts over the whole side.
+TEST(Measure, LongCruisesChangeNothingThatMatters) {
+  const auto corner = [](double side_mm, double speed_mm_s) {
+    return plan_path(
+        {{0.0, 0.0, 0.0}, {side_mm, 0.0, speed_mm_s, 0.3}, {side_mm, side_mm, speed_mm_s, 0.3}},
+        limits_with(5000.0, 5.0));
+  };
+  const NozzleModel model = model_with(280.0, 0.06);
+  const auto long_sides = corner(200.0, 20.0);
+  const DeviationStats slow =
+      measure(long_sides, long_sides, at_rest(long_sides), model).extruding.stats();
+  const auto short_sides = corner(15.0, 20.0);
+  const DeviationStats quick =
+      measure(short_sides, short_sides, at_rest(short_sides), model).extruding.stats();
+  EXPECT_NEAR(slow.contour_max_mm, quick.contour_max_mm, 1e-6);
+  EXPECT_NEAR(slow.contour_rms_mm * std::sqrt(slow.duration_s),
+              quick.contour_rms_mm * std::sqrt(quick.duration_s), 1e-6);
+  EXPECT_NEAR(slow.duration_s, planner::duration_s(long_sides), 1e-9);
+  const auto beside = shifted(long_sides, 0.0, 0.02);
+  const DeviationStats off = measure(long_sides, beside, at_rest(beside), model).extruding.stats();
+  EXPECT_NEAR(off.contour_rms_mm, 0.02 / std::sqrt(2.0), 3e-4);
+}
+
 TEST(Measure, AStiffAxisDrawsThePath) {
   const auto moves = plan_path({{0.0, 0.0, 0.0}, {10.0, 0.0, 100.0, 0.3}, {10.0, 10.0, 100.0, 0.3}},
                                limits_with(5000.0, 5.0));

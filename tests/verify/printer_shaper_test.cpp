@@ -177,7 +177,7 @@ TEST(PrinterShaper, OfTheSlicedFileActsFromItsLineOn) {
 TEST(PrinterShaper, SwitchesAsSlowlyBehindAMacroAsBefore) {
   const auto switched_s = [](const std::string& between) {
     const std::string text = "G28\nG90\nM83\nG1 Z1 F600\nG1 X20 Y20 F6000\n" + between +
-                             "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\n";
+                             "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\nG1 E1 F600\n";
     return verify_text(text, text, rules_with("mzv", 100.0, "mzv", 100.0)).emitted_time_s;
   };
   const double without_s = switched_s("MY_MACRO\n");

@@ -117,6 +117,21 @@ TEST(Verify, CountsDwellsInThePrintTime) {
   EXPECT_NEAR(with.emitted_time_s, 1.5, 1e-12);
 }
 
+TEST(Verify, CountsSwitchesOfFiltersInThePrintTime) {
+  const std::string there = "G90\nM83\nG28\nG1 X10 Y10 Z1 F6000\nG1 X50 E1\n";
+  const std::string back = "G1 X10 E1\n";
+  const auto takes_s = [&](const std::string& switches, const std::string& after) {
+    return verify_text(there + switches + back + after, there + switches + back + after)
+        .emitted_time_s;
+  };
+  const double plain_s = takes_s("G4 P0\n", "");
+  const std::string on = "SET_PRESSURE_ADVANCE ADVANCE=0.05\n";
+  const std::string off = "SET_PRESSURE_ADVANCE ADVANCE=0\n";
+  EXPECT_NEAR(takes_s(on, ""), plain_s + 0.021, 1e-9);
+  EXPECT_NEAR(takes_s(on + off, ""), plain_s + 0.021, 1e-9) << "in a row they are one stop";
+  EXPECT_NEAR(takes_s(on, off), plain_s + 0.021, 1e-9) << "nothing follows the last one";
+}
+
 TEST(Verify, TheDeviationOfAFileIsThatOfItsPlan) {
   const std::string text =
       "G90\nM83\nG1 Z0.2 F600\nG1 X1 Y1 F600\nG4 P3000\nG1 X40 Y1 E1 F6000\nG1 X40 Y40 E1\n";

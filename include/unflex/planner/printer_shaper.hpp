@@ -41,19 +41,26 @@ struct Shaping {
 // configuration. An unknown type counts as the firmware's default.
 [[nodiscard]] Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper);
 
-// The shortest time that the machine stands still when a line changes the shaper from `before` to
-// `after`. 0 if they are the same.
+// What filters a printer's steps.
+struct Filters {
+  gcode::Shaper shaper;
+  // The value in force, where the file sets it; nullopt: the configuration's.
+  std::optional<double> pressure_advance_s = {};
+};
+
+// The shortest time that the machine stands still when a line changes the filters. 0 if they are
+// the same.
 //
 // Klipper generates all steps of what is queued. This takes as long as its filters look ahead and
 // back, once with the old settings and once with the new ones (flush_all_steps,
 // calc_step_gen_restart):
 //   stop = d(before) + d(after),   d = max(1 ms, reach of the shaper, half of the smooth time of
 //   pressure advance)
+// It does so for a pressure advance of 0 that becomes another one, too, and the other way round
+// (kinematics/extruder.py, _set_pressure_advance).
 // Marlin waits until the delayed part of the motion is over. RepRapFirmware does so too, and starts
 // from standstill when it has waited 10 ms for further lines (Configuration.h, DefaultGracePeriod).
-// pressure_advance_s: the value in force, where the file sets it; nullopt: the configuration's.
-[[nodiscard]] double switching_s(const FirmwareConfig& config, const gcode::Shaper& before,
-                                 const gcode::Shaper& after,
-                                 std::optional<double> pressure_advance_s);
+[[nodiscard]] double switching_s(const FirmwareConfig& config, const Filters& before,
+                                 const Filters& after);
 
 }  // namespace unflex::planner
