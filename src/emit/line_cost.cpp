@@ -70,6 +70,10 @@ LineCosts::LineCosts(const BaseTrajectory& base, const std::function<ErrorWeight
   const Followed follows_x(base, &BaseTrajectory::x_at, nozzle_x_);
   const Followed follows_y(base, &BaseTrajectory::y_at, nozzle_y_);
   const std::size_t count = (base.nodes() - 1) * kPerNode + 1;
+  base_.reserve(count);
+  nozzle_x_at_.reserve(count);
+  nozzle_y_at_.reserve(count);
+  weights_.reserve(count);
   for (std::size_t k = 0; k < count; ++k) {
     const double t = time_s(k);
     base_.emplace_back(base.x_at(t).position_mm, base.y_at(t).position_mm);

@@ -221,7 +221,7 @@ std::string too_much_filament(const Segment& segment, Firmware firmware) {
       segment.delta(E), segment.length_mm(),
       firmware == Firmware::klipper
           ? "Klipper ends the print at such a move (max_extrude_cross_section)"
-          : "no nozzle lays so much");
+          : "no nozzle takes so much");
 }
 
 }  // namespace
@@ -365,8 +365,11 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
     }
   }
   const double filament_mm = segment.delta(E);
-  segment.too_much_filament = segment.moves_xy() && filament_mm > options_.max_extrude_dab_mm &&
-                              filament_mm > options_.max_extrude_ratio * segment.length_mm();
+  // Klipper limits what is pulled back in another way.
+  const double counted_mm =
+      options_.firmware == Firmware::klipper ? filament_mm : std::abs(filament_mm);
+  segment.too_much_filament = segment.moves_xy() && counted_mm > options_.max_extrude_dab_mm &&
+                              counted_mm > options_.max_extrude_ratio * segment.length_mm();
   if (segment.too_much_filament && event.warnings.empty()) {
     event.warnings.push_back(too_much_filament(segment, options_.firmware));
   }

@@ -15,9 +15,8 @@ namespace {
 constexpr std::size_t kMostListed = 1000;
 // Share of the tolerance, for a run that fails with all of it.
 constexpr double kFineTolerance = 0.05;
-// Share of the limits to aim at, for a run that exceeds them.
-constexpr double kLower = 0.85;
-// Shares of the limits to aim at, for a part that must be written.
+// Shares of the limits to aim at, for a run that exceeds them, and for a part that must be written.
+constexpr double kLower[] = {0.85, 0.7};
 constexpr double kLowest[] = {0.7, 0.5};
 // The lines of this last stretch of a part decide how the printer arrives at the next part.
 constexpr double kLastLines_s = 0.05;
@@ -219,8 +218,10 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
     objection = try_run(job, plan(job, 1.0, 1.0), false, text);
   }
   // Whole steps may make a line too quick, or the lines a few too many. Aiming lower helps.
-  if (objection && counts_steps) {
-    objection = try_run(job, plan(job, 1.0, kLower), false, text);
+  for (const double share : kLower) {
+    if (objection && counts_steps) {
+      objection = try_run(job, plan(job, 1.0, share), false, text);
+    }
   }
   // If long lines break a limit or cost too much, short ones may do.
   return objection ? try_run(job, plan(job, kFineTolerance, 1.0), false, text) : objection;

@@ -39,7 +39,7 @@ TEST(Compensable, AreNotThoseThatKlipperRefuses) {
   EXPECT_TRUE(session.read("G1 E8").warnings.empty()) << "filament alone";
 }
 
-TEST(Compensable, AreNotThoseWithMoreFilamentThanANozzleLays) {
+TEST(Compensable, AreNotThoseWithMoreFilamentThanANozzleTakes) {
   InterpreterOptions options = default_options(Firmware::marlin);
   options.max_extrude_ratio = 1.25;
   options.max_extrude_dab_mm = 0.5;
@@ -49,8 +49,10 @@ TEST(Compensable, AreNotThoseWithMoreFilamentThanANozzleLays) {
   EXPECT_EQ(kept_reason(event.segments[0], Firmware::marlin), "too much filament");
   ASSERT_EQ(event.warnings.size(), 1U);
   EXPECT_EQ(event.warnings[0],
-            "8 mm of filament in 1 mm of path: no nozzle lays so much; passed through unchanged, "
+            "8 mm of filament in 1 mm of path: no nozzle takes so much; passed through unchanged, "
             "check the line");
+  EXPECT_EQ(kept_reason(session.read("G1 X12 E-8").segments[0], Firmware::marlin),
+            "too much filament");
   EXPECT_TRUE(compensable(session.move("G1 X21 E10"), Firmware::marlin));
 }
 
