@@ -21,6 +21,12 @@ float squared(float value) { return value * value; }
 
 float per_clock(double mm_s, float clock_hz) { return static_cast<float>(mm_s) / clock_hz; }
 
+// F in mm/min as the firmware reads it (GCodeBuffer.cpp, ConvertSpeed). Another order of roundings
+// decides whether a ramp of n + ½ clocks takes n or n + 1.
+float feed_per_clock(double mm_s, float clock_hz) {
+  return static_cast<float>(60.0 * mm_s) * (1.0F / (60.0F * clock_hz));
+}
+
 // The factor by which the unit vector grows until it touches the box (VectorBoxIntersection).
 float reach(const Vector& direction, const Vector& box) {
   float factor = 0.0F;
@@ -156,7 +162,7 @@ bool start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda
   }
   dda.decel = dda.accel;
   dda.requested_speed =
-      std::min(std::max(per_clock(segment.feed_mm_s, settings.clock_hz), settings.min_speed),
+      std::min(std::max(feed_per_clock(segment.feed_mm_s, settings.clock_hz), settings.min_speed),
                reach(dda.direction, settings.max_speed));
   limit_by_motors(settings, dda);
   dda.start_speed = 0.0F;

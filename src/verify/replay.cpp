@@ -173,7 +173,9 @@ void Replay::read_line() {
 void Replay::read_approach(const gcode::Line& line) {
   if (std::optional<std::string> text = interpreter_.approach(line)) {
     const Regime before{interpreter_.state(), plan_.limits()};
-    read_event(interpreter_.interpret({std::move(*text), line.number}), before);
+    gcode::Event event = interpreter_.interpret({std::move(*text), line.number});
+    event.added = true;
+    read_event(std::move(event), before);
   }
 }
 
@@ -244,6 +246,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
         planner::switching_s(fixed_, filters_of(before.modal), filters_of(interpreter_.state()));
   }
   section.moves_by_itself = event.position_lost;
+  section.is_approach = event.added;
   section.may_be_added =
       kind == SectionKind::barrier && is_known_addition(event.line.content(), fixed_.firmware);
   section.line = std::move(event.line);

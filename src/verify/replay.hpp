@@ -46,6 +46,8 @@ struct Section {
   // barrier: for how long the machine stands still to switch its shaper or pressure advance.
   double switching_s = 0.0;
   bool moves_by_itself = false;  // barrier: the machine moves by itself
+  // barrier: not a line of the sliced file, but an Interpreter::approach that is read with it.
+  bool is_approach = false;
   // barrier: its form is one that unflex adds, so the sliced file may not have this barrier.
   bool may_be_added = false;
   // run: announced as compensated, and how long before its plan the base begins.

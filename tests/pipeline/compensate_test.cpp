@@ -367,6 +367,15 @@ TEST_F(Texts, TellWhereLinesDoNotLetTheBaseAccelerateEnough) {
   EXPECT_THAT(report_.warnings.front(), HasSubstr("emit.max_speed_step_mm_s"));
 }
 
+// The sliced file has no pause behind a travel from an unknown place.
+TEST_F(Texts, TellHowLongTheSlicedFileItselfTakes) {
+  const std::string output = compensated(
+      "G28\nG90\nM83\nG1 Z0.2 F600\nG1 X100 Y100 F9000\nG1 X140 Y100 E2\nG1 X140 Y140 E2\n", 1,
+      {"printer.input_shaper_freq_x_hz=0", "printer.input_shaper_freq_y_hz=0"});
+  EXPECT_THAT(output, HasSubstr("\nG4 P236\n"));
+  EXPECT_NEAR(report_.emitted_time_s, report_.reference_time_s + 0.236, 0.03);
+}
+
 // A layer begins with a move in X, Y and Z, and draws at once.
 TEST_F(Texts, StopTheNozzleBeforeTheyDraw) {
   const std::string layer = "G1 X100 Y100 E2 F3000\nG1 X100 Y60 E2\nG1 X60 Y60 E2\n";
