@@ -70,15 +70,15 @@ gcode::Segment passing_line(const gcode::Segment& next, const std::array<double,
   return line;
 }
 
-// Digits of F in mm/min that keep a line's duration within 0.05 %.
-int feed_decimals(double feed_mm_min) {
-  if (feed_mm_min >= 1000.0) {
-    return 0;
+// Digits of F in mm/min that keep a line's duration within 0.05 %, and within 0.1 ms.
+int feed_decimals(double feed_mm_min, double duration_s) {
+  constexpr double kLate_s = 1e-4;
+  constexpr int kMost = 8;
+  int decimals = feed_mm_min >= 1000.0 ? 0 : feed_mm_min >= 100.0 ? 1 : feed_mm_min >= 1.0 ? 3 : 8;
+  while (decimals < kMost && 0.5 / power_of_ten(decimals) * duration_s > kLate_s * feed_mm_min) {
+    ++decimals;
   }
-  if (feed_mm_min >= 100.0) {
-    return 1;
-  }
-  return feed_mm_min >= 1.0 ? 3 : 8;
+  return decimals;
 }
 
 // Tells when the firmware, by its own plan, will have done the lines it has been given. wait_s: how
@@ -331,7 +331,9 @@ class SpeedSolver {
       told = (rate - 0.5) * mm_per_step_event;
     }
     const double feed = told / mm_s_per_feed_;
-    stroke.feed_decimals = feed_decimals(feed) + (step_events_[i] > 0.0 ? 1 : 0);
+    // Marlin has whole steps per second, so that no more digits would help a long line.
+    stroke.feed_decimals =
+        step_events_[i] > 0.0 ? feed_decimals(feed, 0.0) + 1 : feed_decimals(feed, given_s(i));
     stroke.speed_mm_s =
         static_cast<double>(std::max<std::int64_t>(to_scaled(feed, stroke.feed_decimals), 1)) /
         power_of_ten(stroke.feed_decimals) * mm_s_per_feed_;
