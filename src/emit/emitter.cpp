@@ -73,11 +73,17 @@ bool changes(const gcode::Event& event, const planner::Limits& limits) {
   return changed != limits;
 }
 
+// The firmware's limits in the run, with `file` as the input has them.
+planner::Limits run_limits(const Run& run, const planner::Limits& file,
+                           const EmitOptions& options) {
+  return limits_in_run(options.fixed.firmware, file,
+                       raised(options.run_limits, run.accel.lines_mm_s2));
+}
+
 EmitOptions in_run(const Run& run, const RunStart& start, EmitOptions options) {
   options.lines.max_accel_mm_s2 = std::max(options.lines.max_accel_mm_s2, run.accel.base_mm_s2);
   options.line_accel_mm_s2 = std::max(options.line_accel_mm_s2, run.accel.lines_mm_s2);
-  options.run_limits = limits_in_run(options.fixed.firmware, start.limits,
-                                     raised(options.run_limits, run.accel.lines_mm_s2));
+  options.run_limits = run_limits(run, start.limits, options);
   return options;
 }
 
@@ -254,8 +260,7 @@ void Emitter::enter_run(const Run& run, std::string& out) {
 // Sets a run's modes and limits, since the input's lines inside the run may have set others.
 void Emitter::set_run_modes(const Run& run, bool joins_file, std::string& out) {
   set_unit(1.0, out);
-  planner::Limits limits = limits_in_run(options_.fixed.firmware, input_limits_,
-                                         raised(options_.run_limits, run.accel.lines_mm_s2));
+  planner::Limits limits = run_limits(run, input_limits_, options_);
   if (joins_file) {
     // When a move is added, RepRapFirmware joins it to the move before by the jerk policy in force
     // at that time, and may still change the move before. With the policy of a run, filament moved

@@ -248,9 +248,9 @@ class Compensator {
     told_of_cap_ = true;
     report_->warnings.push_back(to_string(Diagnostic{
         {job_.input_name, piece.events.front().line.number},
-        fmt::format("the print asks for {:.0f} mm/s² here, and the motors may have no more than "
-                    "{:.0f}: so much do emit.max_speed_step_mm_s and emit.max_lines_per_s allow; "
-                    "raise the first if the motors can",
+        fmt::format("the print asks for {:.0f} mm/s² here, and emit.max_speed_step_mm_s and "
+                    "emit.max_lines_per_s allow the motors no more than {:.0f}; raise the first "
+                    "if the motors can do more",
                     setup.asked_accel_mm_s2, setup.accel_by_lines_mm_s2)}));
   }
 

@@ -131,7 +131,8 @@ class Filter {
 };
 
 constexpr std::string_view kFirstRun =
-    "; sliced\nG28\nG90\nM83\nM73 P0 R1\nG1 Z0.4 F6000\nG1 X20 Y20 F6000\nG1 X40 Y20 E0.8 F3000\n"
+    "; sliced\nG28\nG90\nM83\nM73 P0 R10\nG1 Z0.4 F6000\nG1 X20 Y20 F6000\nG4 P500\nG1 X40 Y20 "
+    "E0.8 F3000\n"
     "G1 X40 Y40 E0.8\nG1 E-1\n";
 constexpr std::string_view kSecondRun = "G1 X20 Y40 F6000\nG1 E1\nG1 X20 Y20 E0.8 F3000\nM84\n";
 

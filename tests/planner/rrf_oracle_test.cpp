@@ -48,6 +48,20 @@ gcode::LimitChange change(const Row& row) {
   return result;
 }
 
+// The feed of which the planner makes this speed per step clock. The table's functions got mm/s
+// divided by the clock, but the firmware multiplies an F in mm/min. The two roundings differ in the
+// last bit.
+double feed_mm_s(double mm_s, double clock_hz) {
+  const float wanted = static_cast<float>(mm_s) / static_cast<float>(clock_hz);
+  const float per_mm_min = 1.0F / (60.0F * static_cast<float>(clock_hz));
+  const auto nearest = static_cast<float>(60.0 * mm_s);
+  for (const float mm_min :
+       {nearest, std::nextafter(nearest, 0.0F), std::nextafter(nearest, 2.0F * nearest)}) {
+    if (mm_min * per_mm_min == wanted) return static_cast<double>(mm_min) / 60.0;
+  }
+  return mm_s;
+}
+
 // One case's planner, fed row by row.
 class Run {
  public:
@@ -65,7 +79,7 @@ class Run {
       gcode::Segment segment;
       segment.start_mm = at_mm_;
       segment.end_mm = axes(row);
-      segment.feed_mm_s = number(row, 5);
+      segment.feed_mm_s = feed_mm_s(number(row, 5), clock_hz_);
       segment.line = ++count_;
       planner_->add(segment);
       at_mm_ = segment.end_mm;
@@ -141,25 +155,30 @@ TEST_F(RrfOracle, EveryMoveHasTheSameLength) {
   });
 }
 
-// The functions got the feed in mm/s. From an F in mm/min it differs in the last bit, which may
-// round a ramp to one step clock more or less.
 TEST_F(RrfOracle, EveryMoveTakesTheSameTime) {
   for_each_move([](const auto& name, const Plan& plan, const PlannedMove& move, const Row& row) {
-    ASSERT_NEAR(move.duration_s(), number(row, 3) / plan.clock_hz, 1.01 / plan.clock_hz)
+    ASSERT_NEAR(move.duration_s(), number(row, 3) / plan.clock_hz, 1e-9)
         << name << " move " << move.segment.line;
   });
 }
 
-// One step clock more or less changes a speed by a millionth.
+// The plan agrees to the eight digits of the table, but for a few moves whose feed no F gives
+// exactly (feed_mm_s). Those, or their neighbours, are off by a millionth.
 TEST_F(RrfOracle, EveryMoveHasTheSameSpeedsAndAcceleration) {
-  for_each_move([](const auto& name, const Plan&, const PlannedMove& move, const Row& row) {
+  constexpr int kNoExactFeed = 6;
+  int off = 0;
+  for_each_move([&](const auto& name, const Plan&, const PlannedMove& move, const Row& row) {
     const std::array<double, 4> planned = {move.start_v_mm_s, move.cruise_v_mm_s, move.end_v_mm_s,
                                            move.accel_mm_s2};
+    bool is_off = false;
     for (std::size_t i = 0; i < planned.size(); ++i) {
+      is_off = is_off || std::abs(planned[i] - number(row, 4 + i)) > 1e-7 * planned[i];
       ASSERT_NEAR(planned[i], number(row, 4 + i), 2e-6 * planned[i])
           << name << " move " << move.segment.line << " column " << 4 + i;
     }
+    off += is_off ? 1 : 0;
   });
+  EXPECT_LE(off, kNoExactFeed);
 }
 
 }  // namespace

@@ -227,8 +227,8 @@ struct Settings {
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;
   [[nodiscard]] double base_max_velocity_mm_s() const;
-  // What a motor may do in a run whose plan accelerates the tool by up to `asked_mm_s2`: a print
-  // may set more than the printer's own limit.
+  // What a motor may do in a run whose plan accelerates X or Y by up to `asked_mm_s2`. A print may
+  // set more than the printer's own limit.
   [[nodiscard]] double base_max_accel_mm_s2(double asked_mm_s2) const;
   [[nodiscard]] double base_max_accel_mm_s2() const { return base_max_accel_mm_s2(0.0); }
   // base_max_accel_mm_s2() over what the plan asks; 0: it does not follow the plan.
