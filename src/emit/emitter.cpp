@@ -276,12 +276,35 @@ void Emitter::set_run_modes(const Run& run, bool joins_file, std::string& out) {
   if (state.absolute_e) {
     write("M83", out);
   }
+  if (options_.fixed.firmware == Firmware::marlin && (!input_.state().absolute_e || e_is_known())) {
+    // Marlin rounds each line's E to whole steps before M221 and M200 scale it, and rounds again
+    // (planner.cpp, _populate_block, esteps). A run's lines have so few steps that a factor near
+    // one would have no effect. So E is filament as it is laid, and the difference of readings is
+    // put right when the run ends.
+    set_filament_factor(1.0, false, out);
+  }
+}
+
+bool Emitter::e_is_known() const { return input_.state().known[E] && printer_.state().known[E]; }
+
+// M221 and M200. `volumetric`: E is a volume.
+void Emitter::set_filament_factor(double flow_factor, bool volumetric, std::string& out) {
+  constexpr double kPercent = 100.0;
+  const gcode::ModalState& state = printer_.state();
+  if (state.flow_factor != flow_factor) {
+    write(fmt::format("M221 S{:.0f}", flow_factor * kPercent), out);
+  }
+  if (state.volumetric != volumetric) {
+    write(volumetric ? fmt::format("M200 D{}", input_.state().filament_diameter_mm / state.unit_mm)
+                     : "M200 D0",
+          out);
+  }
 }
 
 // Only if the file's own reading of E is known: then it is put back after the run.
 void Emitter::keep_reading_of_e_small(std::string& out) {
   const gcode::ModalState& state = printer_.state();
-  if (options_.fixed.firmware == Firmware::marlin && input_.state().known[E] && state.known[E] &&
+  if (options_.fixed.firmware == Firmware::marlin && e_is_known() &&
       std::abs(state.e_reading()) > kMostReadingOfE_mm) {
     write("G92 E0", out);
   }
@@ -321,6 +344,9 @@ void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::st
 void Emitter::restore_modes(std::string& out) {
   const gcode::ModalState& wanted = input_.state();
   const gcode::ModalState& state = printer_.state();
+  if (options_.fixed.firmware == Firmware::marlin) {
+    set_filament_factor(wanted.flow_factor, wanted.volumetric, out);
+  }
   // If a G92 E of the input stood at a moment inside one of our lines, put its zero right. Not if a
   // macro has left an unknown reading of E, since the next E would then be measured from a wrong
   // zero.

@@ -493,10 +493,6 @@ Result<Reading> read_marlin_dump(std::string_view text, const std::string& file)
   if (!status) {
     return tl::unexpected(status.error());
   }
-  reader.reading.note({file, 0},
-                      "M503 does not tell which motors move what, and cartesian is assumed; set "
-                      "kinematics.type to that, or to what the printer is, such as corexy",
-                      {"kinematics.type"});
   reader.finish();
   return std::move(reader.reading);
 }

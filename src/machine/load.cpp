@@ -130,6 +130,20 @@ void note_odd_frequencies(Draft& draft) {
   }
 }
 
+// Neither M503 nor a slicer tells which motors of a Marlin move what, and the limits of a run are
+// those of motors. config.g and printer.cfg tell it.
+void note_assumed_kinematics(Draft& draft) {
+  constexpr std::string_view kKey = "kinematics.type";
+  if (draft.settings.printer.firmware != Firmware::marlin || draft.places[*find_key(kKey)]) {
+    return;
+  }
+  draft.settings.notes.push_back(
+      {{draft.printer_file, 0},
+       fmt::format("nothing tells which motors of this Marlin move what, and cartesian is assumed; "
+                   "set {} to that, or to what the printer is, such as corexy",
+                   kKey)});
+}
+
 // Firmwares that limit motors hold X to the limits of a Z motor that moves it too, and runs leave
 // Z's limits as they are.
 void note_slow_z_motor(Draft& draft) {
@@ -269,6 +283,7 @@ Result<Settings> finish(Draft draft) {
   forget_needless_band(draft);
   tell_notes(draft);
   note_odd_frequencies(draft);
+  note_assumed_kinematics(draft);
   note_slow_z_motor(draft);
   note_unknown_resonances(draft);
   record_origins(draft);

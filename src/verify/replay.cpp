@@ -51,10 +51,13 @@ bool is_known_addition(std::string_view content, Firmware firmware) {
   }
   const gcode::Command command = gcode::parse(content);
   if (firmware != Firmware::klipper) {
-    constexpr std::array<int, 5> kLimits = {201, 203, 204, 205, 593};  // and M566
-    if (command.is('M', 566)
-            ? firmware == Firmware::rrf
-            : std::ranges::any_of(kLimits, [&](int number) { return command.is('M', number); })) {
+    constexpr std::array<int, 5> kLimits = {201, 203, 204, 205, 593};
+    constexpr std::array<int, 2> kOfMarlin = {200, 221};  // what E means
+    const auto is_any_of = [&](const auto& numbers) {
+      return std::ranges::any_of(numbers, [&](int number) { return command.is('M', number); });
+    };
+    if (is_any_of(kLimits) || (firmware == Firmware::marlin && is_any_of(kOfMarlin)) ||
+        (firmware == Firmware::rrf && command.is('M', 566))) {
       return true;
     }
   } else if (command.kind == gcode::CommandKind::extended) {

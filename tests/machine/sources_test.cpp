@@ -120,6 +120,22 @@ TEST(MarlinDump, ThatRoundsTheJunctionDeviationBringsNoNoteToWhoKnows) {
   }
 }
 
+// M503 does not tell it, and neither does a slicer.
+TEST(Kinematics, OfAMarlinAreAskedForWhereverItsSettingsComeFrom) {
+  const std::string dump = "echo:  M92 X80 Y80\necho:  M593 F40 D0.1\n";
+  const std::string toml = "[printer]\nfirmware = \"marlin\"\n";
+  for (const std::string& text : {dump, toml}) {
+    const Result<Settings> silent = parse(text, "printer", {});
+    ASSERT_TRUE(silent);
+    ASSERT_FALSE(silent->notes.empty()) << text;
+    EXPECT_THAT(to_string(silent->notes.front()), HasSubstr("set kinematics.type"));
+    const Result<Settings> told = parse(text, "printer", {"kinematics.type=corexy"});
+    ASSERT_TRUE(told);
+    EXPECT_THAT(told->notes, IsEmpty()) << text;
+  }
+  EXPECT_THAT(read("[printer]\nfirmware = \"klipper\"\n").notes, IsEmpty());
+}
+
 TEST(MarlinDump, InInchesIsConverted) {
   // No note about the junction deviation, only that about kinematics.
   EXPECT_THAT(read("echo:  G20\necho:  M92 X80\necho:  M205 J0.01\necho:  M593 F40 D0.1\n").notes,
