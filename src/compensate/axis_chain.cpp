@@ -44,8 +44,8 @@ void ScaledWindow::assign(const AxisWindow& from) {
   jerk_weight = from.jerk_weight;
   start.reset();
   if (from.start) {
-    start = {to_scaled_position(from.start->nozzle.position), from.start->nozzle.velocity / unit[1],
-             to_scaled_position(from.start->base_mm), 0.0};
+    start = {to_scaled_position(from.start->nozzle.position()),
+             from.start->nozzle.velocity() / unit[1], to_scaled_position(from.start->base_mm), 0.0};
   }
   end_base.reset();
   if (from.end_base_mm) {

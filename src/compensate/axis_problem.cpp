@@ -19,26 +19,31 @@ AxisProblem::AxisProblem(const AxisWindow& window, ActiveLimits active)
     : window_(&window), active_(active), origin_mm_(window.reference_mm.front()) {
   for (std::size_t i = 0; i < window.models(); ++i) {
     const AxisVariant model = window.model(i);
-    const double omega_h = model.axis.omega_rad_s * window.period_s;
-    models_.push_back({2.0 * model.axis.zeta * omega_h, std::pow(omega_h, 2), model.share});
+    const std::size_t first = modes_.size();
+    for (const dynamics::Mode& mode : model.axis.modes()) {
+      const double omega_h = mode.omega_rad_s * window.period_s;
+      modes_.push_back({2.0 * mode.zeta * omega_h, std::pow(omega_h, 2), mode.gain});
+    }
+    models_.push_back({first, modes_.size(), model.share});
   }
 }
 
-int AxisProblem::place(Component component, std::size_t model) const {
+int AxisProblem::place(Component component, std::size_t mode) const {
   if (component == kBaseAccel) {
     return states();
   }
-  const bool other_nozzle = model > 0 && (component == kNozzle || component == kNozzleRate);
-  return component + (other_nozzle ? 2 + 2 * static_cast<int>(model) : 0);
+  const bool other_mode = mode > 0 && (component == kNozzle || component == kNozzleRate);
+  return component + (other_mode ? 2 + 2 * static_cast<int>(mode) : 0);
 }
 
 void AxisProblem::dynamics(double /*t*/, const PointVector& z, StateVector& f) const {
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    const int p = place(kNozzle, i);
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    const int q = place(kNozzle, i);
     const int rate = place(kNozzleRate, i);
-    f(p) = z(rate);
-    f(rate) =
-        models_[i].damping * (z(kBaseRate) - z(rate)) + models_[i].stiffness * (z(kBase) - z(p));
+    const Mode& mode = modes_[i];
+    f(q) = z(rate);
+    f(rate) = mode.damping * (mode.gain * z(kBaseRate) - z(rate)) +
+              mode.stiffness * (mode.gain * z(kBase) - z(q));
   }
   f(kBase) = z(kBaseRate);
   f(kBaseRate) = z(place(kBaseAccel));
@@ -47,14 +52,15 @@ void AxisProblem::dynamics(double /*t*/, const PointVector& z, StateVector& f) c
 void AxisProblem::dynamics_jacobian(double /*t*/, const PointVector& /*z*/,
                                     StateByPoint& fz) const {
   fz.setZero();
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    const int p = place(kNozzle, i);
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    const int q = place(kNozzle, i);
     const int rate = place(kNozzleRate, i);
-    fz(p, rate) = 1.0;
-    fz(rate, p) = -models_[i].stiffness;
-    fz(rate, rate) = -models_[i].damping;
-    fz(rate, kBase) = models_[i].stiffness;
-    fz(rate, kBaseRate) = models_[i].damping;
+    const Mode& mode = modes_[i];
+    fz(q, rate) = 1.0;
+    fz(rate, q) = -mode.stiffness;
+    fz(rate, rate) = -mode.damping;
+    fz(rate, kBase) = mode.gain * mode.stiffness;
+    fz(rate, kBaseRate) = mode.gain * mode.damping;
   }
   fz(kBase, kBaseRate) = 1.0;
   fz(kBaseRate, place(kBaseAccel)) = 1.0;
@@ -68,11 +74,11 @@ void AxisProblem::dynamics_hessian(double /*t*/, const PointVector& /*z*/,
 StateByPointPattern AxisProblem::dynamics_pattern() const {
   StateByPointPattern pattern(states(), states() + 1);
   pattern.setConstant(false);
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    const int p = place(kNozzle, i);
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    const int q = place(kNozzle, i);
     const int rate = place(kNozzleRate, i);
-    pattern(p, rate) = true;
-    for (const int of : {p, rate, place(kBase), place(kBaseRate)}) {
+    pattern(q, rate) = true;
+    for (const int of : {q, rate, place(kBase), place(kBaseRate)}) {
       pattern(rate, of) = true;
     }
   }
@@ -85,12 +91,20 @@ std::size_t AxisProblem::sample(double t) const {
   return static_cast<std::size_t>(std::lround(2.0 * t));
 }
 
+double AxisProblem::error(const Model& model, std::size_t sampled, const PointVector& z) const {
+  double nozzle = z(place(kNozzle, model.first_mode));
+  for (std::size_t i = model.first_mode + 1; i < model.end_mode; ++i) {
+    nozzle += z(place(kNozzle, i));
+  }
+  return nozzle - to_scaled(kNozzle, window_->reference_mm[sampled]);
+}
+
 double AxisProblem::cost(double t, const PointVector& z) const {
   const std::size_t sampled = sample(t);
   double sum = 0.0;
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    const double error = z(place(kNozzle, i)) - to_scaled(kNozzle, window_->reference_mm[sampled]);
-    sum += models_[i].share * error * error;
+  for (const Model& model : models_) {
+    const double away = error(model, sampled, z);
+    sum += model.share * away * away;
   }
   return window_->weight[sampled] * sum;
 }
@@ -98,26 +112,34 @@ double AxisProblem::cost(double t, const PointVector& z) const {
 void AxisProblem::cost_gradient(double t, const PointVector& z, PointVector& gradient) const {
   const std::size_t sampled = sample(t);
   gradient.setZero();
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    const int p = place(kNozzle, i);
-    gradient(p) = 2.0 * window_->weight[sampled] * models_[i].share *
-                  (z(p) - to_scaled(kNozzle, window_->reference_mm[sampled]));
+  for (const Model& model : models_) {
+    const double slope = 2.0 * window_->weight[sampled] * model.share * error(model, sampled, z);
+    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
+      gradient(place(kNozzle, i)) = slope;
+    }
   }
 }
 
 void AxisProblem::cost_hessian(double t, const PointVector& /*z*/, PointByPoint& h) const {
   h.setZero();
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    const int p = place(kNozzle, i);
-    h(p, p) = 2.0 * window_->weight[sample(t)] * models_[i].share;
+  for (const Model& model : models_) {
+    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
+      for (std::size_t j = model.first_mode; j < model.end_mode; ++j) {
+        h(place(kNozzle, i), place(kNozzle, j)) = 2.0 * window_->weight[sample(t)] * model.share;
+      }
+    }
   }
 }
 
 PointByPointPattern AxisProblem::cost_pattern() const {
   PointByPointPattern pattern(states() + 1, states() + 1);
   pattern.setConstant(false);
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    pattern(place(kNozzle, i), place(kNozzle, i)) = true;
+  for (const Model& model : models_) {
+    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
+      for (std::size_t j = model.first_mode; j < model.end_mode; ++j) {
+        pattern(place(kNozzle, i), place(kNozzle, j)) = true;
+      }
+    }
   }
   return pattern;
 }
@@ -147,21 +169,31 @@ void AxisProblem::node_bounds(int k, int n, PointVector& lower, PointVector& upp
   bound(kBase, bounds.position);
   bound(kBaseRate, bounds.velocity);
   bound(kBaseAccel, bounds.accel);
-  const auto fix = [&](Component component, double physical, std::size_t model = 0) {
-    const int at = place(component, model);
+  const auto fix = [&](Component component, double physical) {
+    const int at = place(component);
     lower(at) = upper(at) = to_scaled(component, physical);
   };
   if (k == 0 && window_->start) {
-    for (std::size_t i = 0; i < models_.size(); ++i) {
-      fix(kNozzle, window_->start->nozzle.position, i);
-      fix(kNozzleRate, window_->start->nozzle.velocity, i);
-    }
+    set_nozzle(window_->start->nozzle, window_->start->base_mm, lower);
+    set_nozzle(window_->start->nozzle, window_->start->base_mm, upper);
     fix(kBase, window_->start->base_mm);
     fix(kBaseRate, 0.0);
   }
   if (k == n - 1 && window_->end_base_mm) {
     fix(kBase, *window_->end_base_mm);
     fix(kBaseRate, 0.0);
+  }
+}
+
+void AxisProblem::set_nozzle(const dynamics::NozzleState& nozzle, double base_mm,
+                             PointVector& z) const {
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const dynamics::NozzleState state = window_->in_model(i, nozzle, base_mm);
+    for (std::size_t mode = models_[i].first_mode; mode < models_[i].end_mode; ++mode) {
+      const dynamics::NozzleMotion& part = state.parts[mode - models_[i].first_mode];
+      z(place(kNozzle, mode)) = (part.position - modes_[mode].gain * origin_mm_) / kLengthUnitMm;
+      z(place(kNozzleRate, mode)) = to_scaled(kNozzleRate, part.velocity);
+    }
   }
 }
 
@@ -180,13 +212,10 @@ void AxisProblem::guess(int k, double /*t*/, PointVector& z) const {
       return window_->reference_mm[static_cast<std::size_t>(2 * std::clamp(node, 0, n - 1))];
     };
     const double rate = 0.5 * (r(k + 1) - r(k - 1)) / h;
-    nozzle = {r(k), rate};
+    nozzle = window_->axis.riding(r(k), rate);
     base = {r(k), rate, (r(k + 1) - 2.0 * r(k) + r(k - 1)) / (h * h)};
   }
-  for (std::size_t i = 0; i < models_.size(); ++i) {
-    z(place(kNozzle, i)) = to_scaled(kNozzle, nozzle.position);
-    z(place(kNozzleRate, i)) = to_scaled(kNozzleRate, nozzle.velocity);
-  }
+  set_nozzle(nozzle, base.position_mm, z);
   z(kBase) = to_scaled(kBase, base.position_mm);
   z(kBaseRate) = to_scaled(kBaseRate, base.velocity_mm_s);
   z(place(kBaseAccel)) = to_scaled(kBaseAccel, base.accel_mm_s2);

@@ -13,19 +13,21 @@ namespace unflex::compensate {
 
 inline constexpr double kLengthUnitMm = 0.01;
 
-// States p, ṗ, b, ḃ, then p_i, ṗ_i of the other models of the axis; control b̈.
+// States q, q̇, b, ḃ, then q_i, q̇_i of the other modes and of the other models of the axis; control
+// b̈. With one mode q is p, the nozzle.
 class AxisProblem final : public collocation::OptimalControlProblem {
  public:
-  // The numbers are places in z if the axis has one model only.
+  // The numbers are places in z if the axis has one model of one mode.
   enum Component : int { kNozzle = 0, kNozzleRate, kBase, kBaseRate, kBaseAccel };
 
   // The window must outlive the problem.
   AxisProblem(const AxisWindow& window, ActiveLimits active);
 
-  // The place of a component in z. A component of the nozzle has one place for each model.
-  [[nodiscard]] int place(Component component, std::size_t model = 0) const;
+  // The place of a component in z. A component of the nozzle has one place for each mode; modes are
+  // counted through all models.
+  [[nodiscard]] int place(Component component, std::size_t mode = 0) const;
 
-  int states() const override { return 2 + 2 * static_cast<int>(window_->models()); }
+  int states() const override { return 2 + 2 * static_cast<int>(modes_.size()); }
   int controls() const override { return 1; }
 
   void dynamics(double t, const collocation::PointVector& z,
@@ -64,12 +66,24 @@ class AxisProblem final : public collocation::OptimalControlProblem {
   const AxisWindow* window_;
   ActiveLimits active_;
   double origin_mm_;
-  struct Model {
+  struct Mode {
     double damping;    // 2ζωh
     double stiffness;  // (ωh)²
-    double share;      // α
+    double gain;       // g
+  };
+  std::vector<Mode> modes_;  // of all models
+  struct Model {
+    std::size_t first_mode;
+    std::size_t end_mode;
+    double share;  // α
   };
   std::vector<Model> models_;
+  // Sets the places of the nozzle in z, of all models.
+  void set_nozzle(const dynamics::NozzleState& nozzle, double base_mm,
+                  collocation::PointVector& z) const;
+  // p − r of a model.
+  [[nodiscard]] double error(const Model& model, std::size_t sampled,
+                             const collocation::PointVector& z) const;
 };
 
 }  // namespace unflex::compensate

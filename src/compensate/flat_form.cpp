@@ -86,7 +86,7 @@ const Stencil& FlatStencils::of(RowKind kind) const {
 bool FlatForm::suits(const ScaledWindow& scaled) {
   const AxisWindow& window = *scaled.window;
   return scaled.nodes >= kFewestNodes &&
-         window.axis.omega_rad_s * window.period_s >= kSmallestOmegaH;
+         window.axis.main().omega_rad_s * window.period_s >= kSmallestOmegaH;
 }
 
 void FlatForm::assign(const ScaledWindow& scaled) {
@@ -94,8 +94,7 @@ void FlatForm::assign(const ScaledWindow& scaled) {
   faint_pull_ = kFaintPull;
   nodes_ = scaled.nodes;
   const AxisWindow& window = *scaled.window;
-  const FlatStencils stencils(
-      AxisChain(window.axis.omega_rad_s * window.period_s, window.axis.zeta));
+  const FlatStencils stencils(AxisChain(window.axis.main(), window.period_s));
   for (const RowKind kind : kRowKinds) {
     stencils_[index_of(kind)] = stencils.of(kind);
   }
@@ -140,8 +139,8 @@ void FlatForm::find_ends() {
   const Stencil& position = stencils_[index_of(RowKind::position)];
   const Stencil& velocity = stencils_[index_of(RowKind::velocity)];
   if (window_->start) {
-    const FlatStencils stencils(AxisChain(
-        window_->window->axis.omega_rad_s * window_->window->period_s, window_->window->axis.zeta));
+    const AxisWindow& window = *window_->window;
+    const FlatStencils stencils(AxisChain(window.axis.main(), window.period_s));
     ChainMatrix to_state;
     for (Eigen::Index component = 0; component < 5; ++component) {
       for (Eigen::Index i = 0; i < 5; ++i) {

@@ -2,7 +2,7 @@
 // recursion. It is several times the work of the flat form (flat_form.hpp), but takes any window.
 // The recursion never expresses the nozzle by differences of the base's motion, so a small ωh costs
 // no digits, and two nodes are enough. It also takes several models of the axis
-// (AxisWindow::variants); then
+// (AxisWindow::variants), each of one mode; then
 //
 //   z_k = (p_1, ṗ_1, …, p_m, ṗ_m, b, ḃ, b̈)
 //

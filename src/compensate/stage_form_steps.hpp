@@ -33,7 +33,7 @@ void StageForm<kModels>::assign(const ScaledWindow& scaled) {
   for (std::size_t i = 0; i < kModels; ++i) {
     const AxisVariant model = window.model(i);
     share_(static_cast<Eigen::Index>(i)) = model.share;
-    const AxisChain chain(model.axis.omega_rad_s * window.period_s, model.axis.zeta);
+    const AxisChain chain(model.axis.main(), window.period_s);
     const Eigen::Index p = nozzle(i);
     growth.template block<2, 2>(p, p) = chain.growth.topLeftCorner<2, 2>();
     growth.template block<2, 3>(p, kBase) = chain.growth.topRightCorner<2, 3>();

@@ -1,26 +1,26 @@
 // Notation:
-//   ω, ζ   natural frequency and damping ratio          b, p   base and nozzle
+//   ω, ζ, g   natural frequency, damping ratio and gain of a mode     b, q   base, the mode's part
 //   ω_d    ω√(1−ζ²), damped frequency (ζ < 1)            κ      ω√(ζ²−1)      (ζ > 1)
-//   y      p minus its steady response to the base: the free motion ÿ + 2ζωẏ + ω²y = 0
+//   y      q minus its steady response to the base: the free motion ÿ + 2ζωẏ + ω²y = 0
 //
 // The closed form is the textbook solution of the damped oscillator, e.g. Inman, Engineering
 // Vibration, 4th ed., eq. 1.36 to 1.46.
 #include "unflex/dynamics/flexible_axis.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 namespace unflex::dynamics {
 namespace {
 
-double nozzle_acceleration(const FlexibleAxis& axis, const NozzleState& nozzle,
-                           const NozzleState& base) {
-  const double omega = axis.omega_rad_s;
-  return 2.0 * axis.zeta * omega * (base.velocity - nozzle.velocity) +
-         omega * omega * (base.position - nozzle.position);
+double acceleration(const Mode& mode, const NozzleMotion& part, const NozzleMotion& base) {
+  const double omega = mode.omega_rad_s;
+  return 2.0 * mode.zeta * omega * (mode.gain * base.velocity - part.velocity) +
+         omega * omega * (mode.gain * base.position - part.position);
 }
 
-NozzleState base_at(const BaseSegment& base, double t) {
+NozzleMotion base_at(const BaseSegment& base, double t) {
   return {base.position + t * (base.velocity + 0.5 * base.acceleration * t),
           base.velocity + base.acceleration * t};
 }
@@ -50,55 +50,169 @@ FreeResponse overdamped(double omega, double zeta, double h) {
           slow * h * (two_kappa_h > 0.0 ? fast_part / two_kappa_h : 1.0)};
 }
 
-}  // namespace
-
-FlexibleAxis from_frequency(double freq_hz, double damping_ratio) {
-  return {2.0 * std::numbers::pi * freq_hz, damping_ratio};
-}
-
-NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state, const BaseSegment& base,
-                     double h) {
-  // moved(): the start moved along `slope` over dt. slope_at(): the slope of (p, ṗ) at `at`.
-  const auto moved = [&](const NozzleState& slope, double dt) {
-    return NozzleState{state.position + dt * slope.position, state.velocity + dt * slope.velocity};
+NozzleMotion rk4_part(const Mode& mode, NozzleMotion part, const BaseSegment& base, double h) {
+  // moved(): the start moved along `slope` over dt. slope_at(): the slope of (q, q̇) at `at`.
+  const auto moved = [&](const NozzleMotion& slope, double dt) {
+    return NozzleMotion{part.position + dt * slope.position, part.velocity + dt * slope.velocity};
   };
-  const auto slope_at = [&](const NozzleState& at, const NozzleState& base_then) {
-    return NozzleState{at.velocity, nozzle_acceleration(axis, at, base_then)};
+  const auto slope_at = [&](const NozzleMotion& at, const NozzleMotion& base_then) {
+    return NozzleMotion{at.velocity, acceleration(mode, at, base_then)};
   };
-  const NozzleState base_middle = base_at(base, 0.5 * h);
-  const NozzleState k1 = slope_at(state, base_at(base, 0.0));
-  const NozzleState k2 = slope_at(moved(k1, 0.5 * h), base_middle);
-  const NozzleState k3 = slope_at(moved(k2, 0.5 * h), base_middle);
-  const NozzleState k4 = slope_at(moved(k3, h), base_at(base, h));
+  const NozzleMotion base_middle = base_at(base, 0.5 * h);
+  const NozzleMotion k1 = slope_at(part, base_at(base, 0.0));
+  const NozzleMotion k2 = slope_at(moved(k1, 0.5 * h), base_middle);
+  const NozzleMotion k3 = slope_at(moved(k2, 0.5 * h), base_middle);
+  const NozzleMotion k4 = slope_at(moved(k3, h), base_at(base, h));
   return {
-      state.position + h / 6.0 * (k1.position + 2.0 * (k2.position + k3.position) + k4.position),
-      state.velocity + h / 6.0 * (k1.velocity + 2.0 * (k2.velocity + k3.velocity) + k4.velocity)};
+      part.position + h / 6.0 * (k1.position + 2.0 * (k2.position + k3.position) + k4.position),
+      part.velocity + h / 6.0 * (k1.velocity + 2.0 * (k2.velocity + k3.velocity) + k4.velocity)};
 }
 
-StepMap::StepMap(OneStep one_step, const FlexibleAxis& axis, double h)
-    : of_position_(one_step(axis, {1.0, 0.0}, {}, h)),
-      of_velocity_(one_step(axis, {0.0, 1.0}, {}, h)),
-      of_base_velocity_(one_step(axis, {}, {0.0, 1.0, 0.0}, h)),
-      of_base_acceleration_(one_step(axis, {}, {0.0, 0.0, 1.0}, h)) {}
-
-Rk4Map::Rk4Map(const FlexibleAxis& axis, double h) : StepMap(&rk4_step, axis, h) {}
-ExactMap::ExactMap(const FlexibleAxis& axis, double h) : StepMap(&exact_step, axis, h) {}
-
-NozzleState exact_step(const FlexibleAxis& axis, NozzleState state, const BaseSegment& base,
-                       double h) {
-  const double omega = axis.omega_rad_s;
-  const double zeta = axis.zeta;
+NozzleMotion exact_part(const Mode& mode, NozzleMotion part, const BaseSegment& base, double h) {
+  const double omega = mode.omega_rad_s;
+  const double zeta = mode.zeta;
   // Under constant acceleration of the base the nozzle settles a/ω² behind it.
-  const double lag = base.acceleration / (omega * omega);
-  const double y0 = state.position - base.position + lag;
-  const double yd0 = state.velocity - base.velocity;
+  const double lag = mode.gain * (base.acceleration / (omega * omega));
+  const double y0 = part.position - mode.gain * base.position + lag;
+  const double yd0 = part.velocity - mode.gain * base.velocity;
 
   const FreeResponse free = zeta < 1.0 ? underdamped(omega, zeta, h) : overdamped(omega, zeta, h);
   const double y = free.c * y0 + free.s * (zeta * omega * y0 + yd0);
   const double yd = free.c * yd0 - free.s * (zeta * omega * yd0 + omega * omega * y0);
 
-  const NozzleState base_end = base_at(base, h);
-  return {base_end.position - lag + y, base_end.velocity + yd};
+  const NozzleMotion base_end = base_at(base, h);
+  return {mode.gain * base_end.position - lag + y, mode.gain * base_end.velocity + yd};
 }
+
+}  // namespace
+
+FlexibleAxis::FlexibleAxis(std::span<const Mode> modes) : count_(modes.size()) {
+  std::ranges::copy(modes, modes_.begin());
+}
+
+const Mode& FlexibleAxis::main() const {
+  return *std::ranges::max_element(modes(), {}, [](const Mode& m) { return std::abs(m.gain); });
+}
+
+double FlexibleAxis::main_hz() const { return main().omega_rad_s / (2.0 * std::numbers::pi); }
+
+double FlexibleAxis::slowest_rad_s() const {
+  return std::ranges::min(modes(), {}, &Mode::omega_rad_s).omega_rad_s;
+}
+
+double FlexibleAxis::fastest_rad_s() const {
+  return std::ranges::max(modes(), {}, &Mode::omega_rad_s).omega_rad_s;
+}
+
+double FlexibleAxis::settling_s() const {
+  double longest_s = 0.0;
+  for (const Mode& mode : modes()) {
+    longest_s = std::max(longest_s, 4.0 / (mode.zeta * mode.omega_rad_s));
+  }
+  return longest_s;
+}
+
+double FlexibleAxis::ringing_s(double least_zeta) const {
+  double longest_s = 0.0;
+  for (const Mode& mode : modes()) {
+    longest_s =
+        std::max(longest_s, 1.0 / (4.0 * std::max(mode.zeta, least_zeta) * mode.omega_rad_s));
+  }
+  return longest_s;
+}
+
+double FlexibleAxis::decay_per_s() const {
+  const auto of_mode = [](const Mode& mode) {
+    return mode.zeta < 1.0 ? mode.zeta * mode.omega_rad_s : 0.5 * mode.omega_rad_s / mode.zeta;
+  };
+  return of_mode(std::ranges::min(modes(), {}, of_mode));
+}
+
+double FlexibleAxis::largest_lag_mm(double accel_mm_s2, double velocity_mm_s) const {
+  double sum_mm = 0.0;
+  for (const Mode& mode : modes()) {
+    const double omega = mode.omega_rad_s;
+    sum_mm += std::abs(mode.gain) *
+              (accel_mm_s2 / (omega * omega) + 2.0 * mode.zeta / omega * velocity_mm_s);
+  }
+  return sum_mm;
+}
+
+double FlexibleAxis::stiffness_per_s2() const {
+  double sum = 0.0;
+  for (const Mode& mode : modes()) {
+    sum += mode.gain * mode.stiffness_per_s2();
+  }
+  return sum;
+}
+
+double FlexibleAxis::damping_per_s() const {
+  double sum = 0.0;
+  for (const Mode& mode : modes()) {
+    sum += mode.gain * mode.damping_per_s();
+  }
+  return sum;
+}
+
+FlexibleAxis FlexibleAxis::detuned(double factor) const {
+  FlexibleAxis axis = *this;
+  for (Mode& mode : axis.modes_) {
+    mode.omega_rad_s *= factor;
+  }
+  return axis;
+}
+
+NozzleState FlexibleAxis::riding(double position_mm, double velocity_mm_s) const {
+  NozzleState state;
+  for (std::size_t i = 0; i < count_; ++i) {
+    state.parts[i] = {modes_[i].gain * position_mm, modes_[i].gain * velocity_mm_s};
+  }
+  return state;
+}
+
+FlexibleAxis::Gap FlexibleAxis::gap(const NozzleState& a, const NozzleState& b) const {
+  Gap sum;
+  for (std::size_t i = 0; i < count_; ++i) {
+    sum.place_mm += std::abs(a.parts[i].position - b.parts[i].position);
+    sum.speed_mm += std::abs((a.parts[i].velocity - b.parts[i].velocity) / modes_[i].omega_rad_s);
+  }
+  return sum;
+}
+
+FlexibleAxis from_frequency(double freq_hz, double damping_ratio) {
+  return {2.0 * std::numbers::pi * freq_hz, damping_ratio};
+}
+
+NozzleState rk4_step(const FlexibleAxis& axis, const NozzleState& state, const BaseSegment& base,
+                     double h) {
+  NozzleState next;
+  const std::span<const Mode> modes = axis.modes();
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    next.parts[i] = rk4_part(modes[i], state.parts[i], base, h);
+  }
+  return next;
+}
+
+NozzleState exact_step(const FlexibleAxis& axis, const NozzleState& state, const BaseSegment& base,
+                       double h) {
+  NozzleState next;
+  const std::span<const Mode> modes = axis.modes();
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    next.parts[i] = exact_part(modes[i], state.parts[i], base, h);
+  }
+  return next;
+}
+
+StepMap::StepMap(OneStep one_step, const FlexibleAxis& axis, double h)
+    : count_(axis.modes().size()) {
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Mode& mode = axis.modes()[i];
+    maps_[i] = {mode.gain, one_step(mode, {1.0, 0.0}, {}, h), one_step(mode, {0.0, 1.0}, {}, h),
+                one_step(mode, {}, {0.0, 1.0, 0.0}, h), one_step(mode, {}, {0.0, 0.0, 1.0}, h)};
+  }
+}
+
+Rk4Map::Rk4Map(const FlexibleAxis& axis, double h) : StepMap(&rk4_part, axis, h) {}
+ExactMap::ExactMap(const FlexibleAxis& axis, double h) : StepMap(&exact_part, axis, h) {}
 
 }  // namespace unflex::dynamics

@@ -15,7 +15,8 @@ constexpr double kPatience = 2.5;
 
 // The duration that the cost to go assumes for a line from k on: the shortest that covers enough
 // steps at an even pace or slower.
-std::size_t CostToGo::usual(std::size_t k) const {
+template <int kModes>
+std::size_t CostToGo<kModes>::usual(std::size_t k) const {
   const std::size_t left = costs_->size() - 1 - k;
   std::size_t m = costs_->candidates(rules_->even_line_s());
   if (left < 2 * m) {
@@ -35,25 +36,27 @@ std::size_t CostToGo::usual(std::size_t k) const {
 
 // The cost after the last line: the machine rests at the run's end while the base still moves. Then
 // o is given, so the cost is a quadratic of e alone.
-void CostToGo::compute_resting(std::size_t until) {
+template <int kModes>
+void CostToGo<kModes>::compute_resting(std::size_t until) {
   rest_.assign(until - rest_from_ + 1, {});
   rest_.back() = costs_->ring_down();
   for (std::size_t k = until; k-- > rest_from_;) {
-    const LineCost line = costs_->line(k, 1);
+    const LineCost<kModes> line = costs_->line(k, 1);
     const Eigen::Vector2d o = end_mm_ - costs_->base_mm(k);
     const Eigen::Vector2d u = end_mm_ - costs_->base_mm(k + 1);
     const auto [all, slope, constant] = whole_cost(line, resting(k + 1));
     // w = e + fixed
-    Vector8d fixed = Vector8d::Zero();
-    fixed[2] = o[0];
-    fixed[5] = o[1];
-    fixed[6] = u[0];
-    fixed[7] = u[1];
-    Quadratic& here = rest_[k - rest_from_];
-    here.matrix = all.topLeftCorner<6, 6>();
-    here.slope = (slope + all * fixed).head<6>();
+    constexpr int kZ = kOfZ<kModes>;
+    WVector<kModes> fixed = WVector<kModes>::Zero();
+    fixed[place_of_o<kModes>(0)] = o[0];
+    fixed[place_of_o<kModes>(1)] = o[1];
+    fixed[kZ] = u[0];
+    fixed[kZ + 1] = u[1];
+    Quadratic<kModes>& here = rest_[k - rest_from_];
+    here.matrix = all.template topLeftCorner<kZ, kZ>();
+    here.slope = (slope + all * fixed).template head<kZ>();
     here.constant = constant + slope.dot(fixed) + 0.5 * fixed.dot(all * fixed);
-    for (const Eigen::Index i : {2, 5}) {
+    for (const Eigen::Index i : {place_of_o<kModes>(0), place_of_o<kModes>(1)}) {
       here.matrix.row(i).setZero();
       here.matrix.col(i).setZero();
       here.slope[i] = 0.0;
@@ -61,7 +64,8 @@ void CostToGo::compute_resting(std::size_t until) {
   }
 }
 
-void CostToGo::compute(std::size_t from, std::size_t until, bool is_last) {
+template <int kModes>
+void CostToGo<kModes>::compute(std::size_t from, std::size_t until, bool is_last) {
   from_ = from;
   to_go_.assign(until - from + 1, {});
   rest_from_ = until + 1;
@@ -69,9 +73,9 @@ void CostToGo::compute(std::size_t from, std::size_t until, bool is_last) {
     rest_from_ = std::max(from, until - std::min(until, kEarliest));
     compute_resting(until);
   }
-  const Quadratic at_end = costs_->ring_down();
+  const Quadratic<kModes> at_end = costs_->ring_down();
   for (std::size_t k = until + 1; k-- > from;) {
-    Quadratic& here = to_go_[k - from];
+    Quadratic<kModes>& here = to_go_[k - from];
     const std::size_t m = k < until ? usual(k) : 0;
     if (k == until || k + m > until) {
       here = is_last ? resting(k) : at_end;
@@ -82,5 +86,9 @@ void CostToGo::compute(std::size_t from, std::size_t until, bool is_last) {
     }
   }
 }
+
+template class CostToGo<1>;
+template class CostToGo<2>;
+template class CostToGo<3>;
 
 }  // namespace unflex::emit

@@ -1,5 +1,6 @@
 #include "followed.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -7,18 +8,62 @@
 namespace unflex::emit {
 namespace {
 
+using dynamics::Mode;
+using dynamics::NozzleMotion;
+using dynamics::NozzleState;
+
 // Integration steps per node period.
 constexpr int kSubsteps = 4;
 
+// ∫ q_i q_j of two modes that ring down, by the states of both: AᵢᵀX + XAⱼ + E = 0, where E takes
+// the product of the positions.
+Eigen::Matrix2d ring_down_product(const Mode& a, const Mode& b) {
+  const auto rate = [](const Mode& mode) {
+    constexpr double kLeastZeta = 0.01;
+    const double omega = mode.omega_rad_s;
+    Eigen::Matrix2d matrix;
+    matrix << 0.0, 1.0, -omega * omega, -2.0 * std::max(mode.zeta, kLeastZeta) * omega;
+    return matrix;
+  };
+  const Eigen::Matrix2d of_a = rate(a);
+  const Eigen::Matrix2d of_b = rate(b);
+  Eigen::Matrix4d equations = Eigen::Matrix4d::Zero();  // for X by columns
+  for (Eigen::Index column = 0; column < 2; ++column) {
+    equations.block<2, 2>(2 * column, 2 * column) += of_a.transpose();
+    for (Eigen::Index other = 0; other < 2; ++other) {
+      equations.block<2, 2>(2 * column, 2 * other) +=
+          of_b(other, column) * Eigen::Matrix2d::Identity();
+    }
+  }
+  const Eigen::Vector4d solution =
+      equations.fullPivLu().solve(Eigen::Vector4d(-Eigen::Vector4d::UnitX()));
+  return Eigen::Map<const Eigen::Matrix2d>(solution.data());
+}
+
+Eigen::Matrix2d ring_down_of(const Mode& mode) {
+  const double omega = mode.omega_rad_s;
+  const double zeta = std::max(mode.zeta, 0.01);
+  const double mixed = 0.5 / (omega * omega);
+  Eigen::Matrix2d result;
+  result << (1.0 + 4.0 * zeta * zeta) / (4.0 * zeta * omega), mixed, mixed,
+      1.0 / (4.0 * zeta * std::pow(omega, 3));
+  return result;
+}
+
 }  // namespace
 
-StepMatrix::StepMatrix(const dynamics::FlexibleAxis& axis, double dt) : dt_(dt) {
-  const auto column = [&](int i, dynamics::NozzleState from, dynamics::BaseSegment base) {
-    const dynamics::NozzleState to = dynamics::exact_step(axis, from, base, dt);
+StepMatrix::StepMatrix(const dynamics::FlexibleAxis& axis, std::size_t mode, double dt) : dt_(dt) {
+  if (mode >= axis.modes().size()) {
+    return;
+  }
+  gain_ = axis.modes()[mode].gain;
+  const dynamics::FlexibleAxis alone(axis.modes().subspan(mode, 1));
+  const auto column = [&](int i, const NozzleState& from, const dynamics::BaseSegment& base) {
+    const NozzleMotion to = dynamics::exact_step(alone, from, base, dt).parts[0];
     columns_.col(i) << to.position, to.velocity;
   };
-  column(0, {1.0, 0.0}, {});
-  column(1, {0.0, 1.0}, {});
+  column(0, {{NozzleMotion{1.0, 0.0}}}, {});
+  column(1, {{NozzleMotion{0.0, 1.0}}}, {});
   column(2, {}, {1.0, 0.0, 0.0});
   column(3, {}, {0.0, 1.0, 0.0});
   column(4, {}, {0.0, 0.0, 1.0});
@@ -27,50 +72,74 @@ StepMatrix::StepMatrix(const dynamics::FlexibleAxis& axis, double dt) : dt_(dt) 
 Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
                    const dynamics::FlexibleAxis& nozzle)
     : Followed(base, axis, nozzle,
-               {(base.*axis)(0.0).position_mm, (base.*axis)(0.0).velocity_mm_s}) {}
+               nozzle.riding((base.*axis)(0.0).position_mm, (base.*axis)(0.0).velocity_mm_s)) {}
 
 Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
-                   const dynamics::FlexibleAxis& nozzle, const std::array<double, 2>& start)
-    : period_s_(base.period_s) {
-  const StepMatrix step(nozzle, base.period_s / kSubsteps);
-  Eigen::Vector2d state(start[0], start[1]);
-  states_.push_back({state[0], state[1]});
+                   const dynamics::FlexibleAxis& nozzle, const NozzleState& start)
+    : period_s_(base.period_s), modes_(nozzle.modes().size()) {
+  std::vector<StepMatrix> steps;
+  for (std::size_t mode = 0; mode < modes_; ++mode) {
+    steps.emplace_back(nozzle, mode, base.period_s / kSubsteps);
+  }
+  const double dt = steps.front().dt();
+  NozzleState state = start;
+  states_.push_back(state);
   for (std::size_t k = 1; k < base.nodes(); ++k) {
     for (int i = 0; i < kSubsteps; ++i) {
-      const double t = base.period_s * static_cast<double>(k - 1) + i * step.dt();
+      const double t = base.period_s * static_cast<double>(k - 1) + i * dt;
       const dynamics::AxisMotion from = (base.*axis)(t);
-      const double middle = (base.*axis)(t + 0.5 * step.dt()).accel_mm_s2;
-      const Eigen::Vector2d origin(from.position_mm, 0.0);
-      state = step.free() * (state - origin) + step.base(0.0, from.velocity_mm_s, middle) + origin;
+      const double middle = (base.*axis)(t + 0.5 * dt).accel_mm_s2;
+      for (std::size_t mode = 0; mode < modes_; ++mode) {
+        const StepMatrix& step = steps[mode];
+        NozzleMotion& part = state.parts[mode];
+        const Eigen::Vector2d origin(step.gain() * from.position_mm, 0.0);
+        const Eigen::Vector2d next =
+            step.free() * (Eigen::Vector2d(part.position, part.velocity) - origin) +
+            step.base(0.0, from.velocity_mm_s, middle) + origin;
+        part = {next[0], next[1]};
+      }
     }
-    states_.push_back({state[0], state[1]});
+    states_.push_back(state);
   }
 }
 
 // Interpolates by cubics between the nodes.
-Eigen::Vector2d Followed::at(double t) const {
+NozzleState Followed::at(double t) const {
   const double scaled = t / period_s_;
   const auto k = std::min(static_cast<std::size_t>(std::max(scaled, 0.0)), states_.size() - 2);
   const double s = scaled - static_cast<double>(k);
-  const std::array<double, 2>& a = states_[k];
-  const std::array<double, 2>& b = states_[k + 1];
-  const double rise = b[0] - a[0];
-  const double va = a[1] * period_s_;
-  const double vb = b[1] * period_s_;
-  const double square = 3.0 * rise - 2.0 * va - vb;
-  const double cube = va + vb - 2.0 * rise;
-  return {a[0] + s * (va + s * (square + s * cube)),
-          (va + s * (2.0 * square + 3.0 * s * cube)) / period_s_};
-}
-
-Eigen::Matrix2d ring_down_square(const dynamics::FlexibleAxis& axis) {
-  const double omega = axis.omega_rad_s;
-  const double zeta = std::max(axis.zeta, 0.01);
-  const double mixed = 0.5 / (omega * omega);
-  Eigen::Matrix2d result;
-  result << (1.0 + 4.0 * zeta * zeta) / (4.0 * zeta * omega), mixed, mixed,
-      1.0 / (4.0 * zeta * std::pow(omega, 3));
+  NozzleState result;
+  for (std::size_t mode = 0; mode < modes_; ++mode) {
+    const NozzleMotion& a = states_[k].parts[mode];
+    const NozzleMotion& b = states_[k + 1].parts[mode];
+    const double rise = b.position - a.position;
+    const double va = a.velocity * period_s_;
+    const double vb = b.velocity * period_s_;
+    const double square = 3.0 * rise - 2.0 * va - vb;
+    const double cube = va + vb - 2.0 * rise;
+    result.parts[mode] = {a.position + s * (va + s * (square + s * cube)),
+                          (va + s * (2.0 * square + 3.0 * s * cube)) / period_s_};
+  }
   return result;
 }
+
+template <int kModes>
+ModesSquare<kModes> ring_down_square(const dynamics::FlexibleAxis& axis) {
+  ModesSquare<kModes> result = ModesSquare<kModes>::Zero();
+  const std::size_t count = axis.modes().size();
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < count; ++j) {
+      result.template block<2, 2>(static_cast<Eigen::Index>(2 * i),
+                                  static_cast<Eigen::Index>(2 * j)) =
+          i == j ? ring_down_of(axis.modes()[i])
+                 : ring_down_product(axis.modes()[i], axis.modes()[j]);
+    }
+  }
+  return result;
+}
+
+template ModesSquare<1> ring_down_square<1>(const dynamics::FlexibleAxis&);
+template ModesSquare<2> ring_down_square<2>(const dynamics::FlexibleAxis&);
+template ModesSquare<3> ring_down_square<3>(const dynamics::FlexibleAxis&);
 
 }  // namespace unflex::emit

@@ -26,7 +26,7 @@ struct Cruise {
 
 class Cruises {
  public:
-  Cruises(const LineCosts& costs, const std::vector<std::size_t>& wanted, std::size_t last)
+  Cruises(const Candidates& costs, const std::vector<std::size_t>& wanted, std::size_t last)
       : costs_(&costs), wanted_(&wanted), last_(last) {}
 
   // The next stretch without acceleration from candidate k on; empty at the end.
@@ -53,13 +53,13 @@ class Cruises {
     return bend.norm() <= kStraight_mm_s2 * costs_->dt_s() * costs_->dt_s();
   }
 
-  const LineCosts* costs_;
+  const Candidates* costs_;
   const std::vector<std::size_t>* wanted_;
   std::size_t last_;
 };
 
 // The candidate of the stretch at which the base is closest to whole steps across its path.
-std::size_t closest_to_steps(const LineCosts& costs, const StepGrid& grid, const Cruise& stretch) {
+std::size_t closest_to_steps(const Candidates& costs, const StepGrid& grid, const Cruise& stretch) {
   std::size_t best = stretch.from;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = stretch.from; k <= stretch.until; ++k) {
@@ -76,7 +76,7 @@ std::size_t closest_to_steps(const LineCosts& costs, const StepGrid& grid, const
 }
 
 // Whether the base stays near the straight line between the two candidates, in place and time.
-bool is_near_chord(const LineCosts& costs, std::size_t from, std::size_t until, double most_mm) {
+bool is_near_chord(const Candidates& costs, std::size_t from, std::size_t until, double most_mm) {
   const Eigen::Vector2d way = costs.base_mm(until) - costs.base_mm(from);
   for (std::size_t k = from; k <= until; ++k) {
     const double share = static_cast<double>(k - from) / static_cast<double>(until - from);
@@ -89,7 +89,7 @@ bool is_near_chord(const LineCosts& costs, std::size_t from, std::size_t until, 
 
 }  // namespace
 
-std::vector<Leap> leaps(const LineCosts& costs, const std::vector<std::size_t>& wanted,
+std::vector<Leap> leaps(const Candidates& costs, const std::vector<std::size_t>& wanted,
                         const Place& start, std::size_t last, const Place& end,
                         const StepGrid& grid, const LineRules& rules) {
   std::vector<Leap> result;

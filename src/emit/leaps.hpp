@@ -21,7 +21,7 @@ struct Leap {
 // The leaps between candidate 0, at place `start`, and `last`, at place `end`, in order. None lies
 // across one of the `wanted` candidates. A leap begins and ends where the base comes closest to
 // whole steps across its path.
-[[nodiscard]] std::vector<Leap> leaps(const LineCosts& costs,
+[[nodiscard]] std::vector<Leap> leaps(const Candidates& costs,
                                       const std::vector<std::size_t>& wanted, const Place& start,
                                       std::size_t last, const Place& end, const StepGrid& grid,
                                       const LineRules& rules);

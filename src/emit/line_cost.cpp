@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace unflex::emit {
 namespace {
@@ -16,131 +15,173 @@ constexpr std::size_t kPerNode = 2;
 // During a line the error is sampled at no more than this many moments.
 constexpr std::size_t kLooks = 16;
 
-// Where (e, ė, o, u) of an axis stand in w.
-constexpr std::array<std::array<int, 4>, 2> kPlace = {{{0, 1, 2, 6}, {3, 4, 5, 7}}};
-
-NozzleAnswers nozzle_answers(const FlexibleAxis& axis, double dt, std::size_t count) {
-  const StepMatrix step(axis, dt);
-  NozzleAnswers result;
-  result.free.emplace_back(Eigen::Matrix2d::Identity());
-  result.step.emplace_back(Eigen::Vector2d::Zero());
-  result.ramp.emplace_back(Eigen::Vector2d::Zero());
-  for (std::size_t j = 0; j < count; ++j) {
-    result.free.emplace_back(step.free() * result.free.back());
-    result.step.emplace_back(step.free() * result.step.back() + step.base(1.0, 0.0));
-    result.ramp.emplace_back(step.free() * result.ramp.back() +
-                             step.base(static_cast<double>(j) * dt, 1.0));
+template <int kModes>
+NozzleAnswers<kModes> nozzle_answers(const FlexibleAxis& axis, double dt, std::size_t count) {
+  NozzleAnswers<kModes> result;
+  result.free.resize(count + 1);
+  result.step.resize(count + 1);
+  result.ramp.resize(count + 1);
+  for (std::size_t mode = 0; mode < kModes; ++mode) {
+    const StepMatrix step(axis, mode, dt);
+    const auto at = static_cast<Eigen::Index>(2 * mode);
+    result.free[0].template middleCols<2>(at).setIdentity();
+    result.step[0].template segment<2>(at).setZero();
+    result.ramp[0].template segment<2>(at).setZero();
+    for (std::size_t j = 0; j < count; ++j) {
+      result.free[j + 1].template middleCols<2>(at) =
+          step.free() * result.free[j].template middleCols<2>(at);
+      result.step[j + 1].template segment<2>(at) =
+          step.free() * result.step[j].template segment<2>(at) + step.base(1.0, 0.0);
+      result.ramp[j + 1].template segment<2>(at) =
+          step.free() * result.ramp[j].template segment<2>(at) +
+          step.base(static_cast<double>(j) * dt, 1.0);
+    }
   }
+  return result;
+}
+
+// Where (e, o, u) of an axis stand in w.
+template <int kModes>
+constexpr std::array<int, kOfAxis<kModes> + 1> places(int axis) {
+  std::array<int, kOfAxis<kModes> + 1> result{};
+  for (int i = 0; i < kOfAxis<kModes>; ++i) {
+    result[static_cast<std::size_t>(i)] = axis * kOfAxis<kModes> + i;
+  }
+  result[kOfAxis<kModes>] = kOfZ<kModes> + axis;
   return result;
 }
 
 }  // namespace
 
-WholeCost whole_cost(const LineCost& line, const Quadratic& to_go) {
+template <int kModes>
+WholeCost<kModes> whole_cost(const LineCost<kModes>& line, const Quadratic<kModes>& to_go) {
   // lazyProduct: Eigen's blocked product does not pay at this size.
-  const Eigen::Matrix<double, 6, 8> moved = to_go.matrix.lazyProduct(line.move);
-  const Vector6d pull = to_go.matrix.lazyProduct(line.shift) + to_go.slope;
+  const typename LineCost<kModes>::Move moved = to_go.matrix.lazyProduct(line.move);
+  const ZVector<kModes> pull = to_go.matrix.lazyProduct(line.shift) + to_go.slope;
   return {line.matrix + line.move.transpose().lazyProduct(moved),
           line.slope + line.move.transpose().lazyProduct(pull),
           line.constant + to_go.at(line.shift)};
 }
 
-LineChoice best_end(const LineCost& line, const Quadratic& to_go) {
+template <int kModes>
+LineChoice<kModes> best_end(const LineCost<kModes>& line, const Quadratic<kModes>& to_go) {
+  constexpr int kZ = kOfZ<kModes>;
   const auto [all, slope, constant] = whole_cost(line, to_go);
-  LineChoice choice;
-  choice.stiffness = all.bottomRightCorner<2, 2>();
+  LineChoice<kModes> choice;
+  choice.stiffness = all.template bottomRightCorner<2, 2>();
   const Eigen::Matrix2d inverse = choice.stiffness.inverse();
-  choice.feedback = -inverse * all.bottomLeftCorner<2, 6>();
-  choice.feed_forward = -inverse * slope.tail<2>();
-  choice.value.matrix = all.topLeftCorner<6, 6>() + all.topRightCorner<6, 2>() * choice.feedback;
-  choice.value.slope = slope.head<6>() + all.topRightCorner<6, 2>() * choice.feed_forward;
-  choice.value.constant =
-      line.constant + to_go.at(line.shift) + 0.5 * slope.tail<2>().dot(choice.feed_forward);
+  choice.feedback = -inverse * all.template bottomLeftCorner<2, kZ>();
+  choice.feed_forward = -inverse * slope.template tail<2>();
+  choice.value.matrix =
+      all.template topLeftCorner<kZ, kZ>() + all.template topRightCorner<kZ, 2>() * choice.feedback;
+  choice.value.slope =
+      slope.template head<kZ>() + all.template topRightCorner<kZ, 2>() * choice.feed_forward;
+  choice.value.constant = line.constant + to_go.at(line.shift) +
+                          0.5 * slope.template tail<2>().dot(choice.feed_forward);
   return choice;
 }
 
-Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go) {
+template <int kModes>
+Quadratic<kModes> ending_on_base(const LineCost<kModes>& line, const Quadratic<kModes>& to_go) {
+  constexpr int kZ = kOfZ<kModes>;
   const auto [all, slope, constant] = whole_cost(line, to_go);
-  return {all.topLeftCorner<6, 6>(), slope.head<6>(), constant};
+  return {all.template topLeftCorner<kZ, kZ>(), slope.template head<kZ>(), constant};
 }
 
-LineCosts::LineCosts(const BaseTrajectory& base, const std::function<ErrorWeight(double)>& weight,
-                     const LineRules& rules)
-    : nozzle_x_(rules.nozzle_x), nozzle_y_(rules.nozzle_y), dt_s_(base.period_s / kPerNode) {
-  const Followed follows_x(base, &BaseTrajectory::x_at, nozzle_x_);
-  const Followed follows_y(base, &BaseTrajectory::y_at, nozzle_y_);
+Candidates::Candidates(const BaseTrajectory& base, const std::function<ErrorWeight(double)>& weight)
+    : dt_s_(base.period_s / kPerNode) {
   const std::size_t count = (base.nodes() - 1) * kPerNode + 1;
   base_.reserve(count);
-  nozzle_x_at_.reserve(count);
-  nozzle_y_at_.reserve(count);
   weights_.reserve(count);
   for (std::size_t k = 0; k < count; ++k) {
     const double t = time_s(k);
     base_.emplace_back(base.x_at(t).position_mm, base.y_at(t).position_mm);
-    nozzle_x_at_.push_back(follows_x.at(t));
-    nozzle_y_at_.push_back(follows_y.at(t));
     weights_.push_back(weight(t));
   }
-  const auto longest = static_cast<std::size_t>(std::ceil(rules.max_line_s / dt_s_)) + 1;
-  x_ = nozzle_answers(nozzle_x_, dt_s_, longest);
-  y_ = nozzle_answers(nozzle_y_, dt_s_, longest);
+}
+
+std::size_t Candidates::candidates(double duration_s) const {
+  return static_cast<std::size_t>(std::ceil(duration_s / dt_s_ - 1e-9));
+}
+
+template <int kModes>
+LineCosts<kModes>::LineCosts(const BaseTrajectory& base,
+                             const std::function<ErrorWeight(double)>& weight,
+                             const LineRules& rules)
+    : Candidates(base, weight) {
+  const auto longest = static_cast<std::size_t>(std::ceil(rules.max_line_s / dt_s())) + 1;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    Nozzle& nozzle = nozzles_[axis];
+    nozzle.model = axis == 0 ? rules.nozzle_x : rules.nozzle_y;
+    const Followed follows(base, axis == 0 ? &BaseTrajectory::x_at : &BaseTrajectory::y_at,
+                           nozzle.model);
+    nozzle.at.reserve(size());
+    for (std::size_t k = 0; k < size(); ++k) {
+      nozzle.at.push_back(vector_of<kModes>(follows.at(time_s(k))));
+    }
+    nozzle.answers = nozzle_answers<kModes>(nozzle.model, dt_s(), longest);
+  }
   shapes_.emplace_back();
   for (std::size_t m = 1; m <= longest; ++m) {
     shapes_.push_back(shape(m));
   }
-  same_weight_until_.assign(count, count - 1);
-  for (std::size_t k = count - 1; k-- > 0;) {
-    same_weight_until_[k] = weights_[k] == weights_[k + 1] ? same_weight_until_[k + 1] : k;
+  same_weight_until_.assign(size(), size() - 1);
+  for (std::size_t k = size() - 1; k-- > 0;) {
+    same_weight_until_[k] = this->weight(k) == this->weight(k + 1) ? same_weight_until_[k + 1] : k;
   }
 }
 
-std::size_t LineCosts::candidates(double duration_s) const {
-  return static_cast<std::size_t>(std::ceil(duration_s / dt_s_ - 1e-9));
-}
-
-LineCosts::Shape LineCosts::shape(std::size_t m) const {
-  const double duration = static_cast<double>(m) * dt_s_;
+template <int kModes>
+typename LineCosts<kModes>::Shape LineCosts<kModes>::shape(std::size_t m) const {
+  const double duration = static_cast<double>(m) * dt_s();
   Shape result;
   const std::size_t looks = std::min(m, kLooks);
   const double between_s = duration / static_cast<double>(looks);
   for (std::size_t look = 1; look <= looks; ++look) {
     const std::size_t j = look * m / looks;
-    const auto row = [&](const NozzleAnswers& answer) {
-      const double ramp = answer.ramp[j][0] / duration;
-      return Row(answer.free[j](0, 0), answer.free[j](0, 1), answer.step[j][0] - ramp, ramp);
+    const auto row = [&](const NozzleAnswers<kModes>& answer) {
+      Row result_row;
+      for (Eigen::Index i = 0; i < 2 * kModes; ++i) {
+        result_row[i] = answer.free[j](0, i);
+      }
+      const double ramp = position_of(answer.ramp[j]) / duration;
+      result_row[2 * kModes] = position_of(answer.step[j]) - ramp;
+      result_row[2 * kModes + 1] = ramp;
+      return result_row;
     };
     const double s = static_cast<double>(j) / static_cast<double>(m);
-    result.looks.push_back({j, s, row(x_), row(y_)});
+    result.looks.push_back({j, s, row(answers(0)), row(answers(1))});
     const Row& x = result.looks.back().x;
     const Row& y = result.looks.back().y;
     result.xx += between_s * x.transpose() * x;
     result.xy += between_s * x.transpose() * y;
     result.yy += between_s * y.transpose() * y;
-    const Row base(0.0, 0.0, 1.0 - s, s);
+    Row base = Row::Zero();
+    base[2 * kModes] = 1.0 - s;
+    base[2 * kModes + 1] = s;
     result.base += kBaseWeight * between_s * base.transpose() * base;
   }
   return result;
 }
 
-LineCost LineCosts::line(std::size_t k, std::size_t m) const {
-  const double duration = static_cast<double>(m) * dt_s_;
+template <int kModes>
+LineCost<kModes> LineCosts<kModes>::line(std::size_t k, std::size_t m) const {
+  const double duration = static_cast<double>(m) * dt_s();
   const Shape& shape = shapes_[m];
-  LineCost result;
-  const std::array<const NozzleAnswers*, 2> answers = {&x_, &y_};
-  const std::array<const std::vector<Eigen::Vector2d>*, 2> nozzle = {&nozzle_x_at_, &nozzle_y_at_};
+  LineCost<kModes> result;
   // The motion that the chord from b_k to b_{k+m} alone would make.
-  std::array<Eigen::Vector2d, 2> begin;
+  std::array<ModesVector<kModes>, 2> begin;
   std::array<double, 2> speed{};
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    begin[axis] = (*nozzle[axis])[k] - Eigen::Vector2d(base_[k][a], 0.0);
-    speed[axis] = (base_[k + m][a] - base_[k][a]) / duration;
+    begin[axis] = nozzle(axis, k) - riding(axis, base_mm(k)[a]);
+    speed[axis] = (base_mm(k + m)[a] - base_mm(k)[a]) / duration;
   }
   const bool same_weight = same_weight_until_[k + 1] >= k + m;
-  const ErrorWeight& only = weights_[k + 1];
-  Eigen::Matrix4d xx = shape.base;
-  Eigen::Matrix4d xy = Eigen::Matrix4d::Zero();
-  Eigen::Matrix4d yy = shape.base;
+  const ErrorWeight& only = weight(k + 1);
+  RowSquare xx = shape.base;
+  RowSquare xy = RowSquare::Zero();
+  RowSquare yy = shape.base;
   if (same_weight) {
     xx += only.xx * shape.xx;
     xy = only.xy * shape.xy;
@@ -150,18 +191,22 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
   Row slope_y = Row::Zero();
   const double between_s = duration / static_cast<double>(shape.looks.size());
   const double base_weight = kBaseWeight * between_s;
-  for (const Shape::Look& look : shape.looks) {
+  for (const typename Shape::Look& look : shape.looks) {
     const std::size_t j = look.j;
     std::array<double, 2> off{};
     std::array<double, 2> off_base{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const auto a = static_cast<Eigen::Index>(axis);
-      const NozzleAnswers& answer = *answers[axis];
-      off[axis] = answer.free[j](0, 0) * begin[axis][0] + answer.free[j](0, 1) * begin[axis][1] +
-                  answer.ramp[j][0] * speed[axis] - ((*nozzle[axis])[k + j][0] - base_[k][a]);
-      off_base[axis] = speed[axis] * look.s * duration - (base_[k + j][a] - base_[k][a]);
+      const NozzleAnswers<kModes>& answer = answers(axis);
+      double swing = answer.free[j](0, 0) * begin[axis][0];
+      for (Eigen::Index i = 1; i < 2 * kModes; ++i) {
+        swing += answer.free[j](0, i) * begin[axis][i];
+      }
+      off[axis] = swing + position_of(answer.ramp[j]) * speed[axis] -
+                  (nozzle_mm(axis, k + j) - base_mm(k)[a]);
+      off_base[axis] = speed[axis] * look.s * duration - (base_mm(k + j)[a] - base_mm(k)[a]);
     }
-    const ErrorWeight& w = weights_[k + j];
+    const ErrorWeight& w = weight(k + j);
     if (!same_weight) {
       xx += between_s * w.xx * look.x.transpose() * look.x;
       xy += between_s * w.xy * look.x.transpose() * look.y;
@@ -171,18 +216,22 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
     const double to_y = between_s * (w.xy * off[0] + w.yy * off[1]);
     slope_x += to_x * look.x;
     slope_y += to_y * look.y;
-    const Row base(0.0, 0.0, 1.0 - look.s, look.s);
+    Row base = Row::Zero();
+    base[2 * kModes] = 1.0 - look.s;
+    base[2 * kModes + 1] = look.s;
     slope_x += base_weight * off_base[0] * base;
     slope_y += base_weight * off_base[1] * base;
     result.constant += 0.5 * (to_x * off[0] + to_y * off[1]) +
                        0.5 * base_weight * (off_base[0] * off_base[0] + off_base[1] * off_base[1]);
   }
-  for (int i = 0; i < 4; ++i) {
-    const int xi = kPlace[0][static_cast<std::size_t>(i)];
-    const int yi = kPlace[1][static_cast<std::size_t>(i)];
-    for (int j = 0; j < 4; ++j) {
-      const int xj = kPlace[0][static_cast<std::size_t>(j)];
-      const int yj = kPlace[1][static_cast<std::size_t>(j)];
+  static constexpr auto kPlacesX = places<kModes>(0);
+  static constexpr auto kPlacesY = places<kModes>(1);
+  for (int i = 0; i < kRow; ++i) {
+    const int xi = kPlacesX[static_cast<std::size_t>(i)];
+    const int yi = kPlacesY[static_cast<std::size_t>(i)];
+    for (int j = 0; j < kRow; ++j) {
+      const int xj = kPlacesX[static_cast<std::size_t>(j)];
+      const int yj = kPlacesY[static_cast<std::size_t>(j)];
       result.matrix(xi, xj) = xx(i, j);
       result.matrix(xi, yj) = xy(i, j);
       result.matrix(yj, xi) = xy(i, j);
@@ -191,26 +240,35 @@ LineCost LineCosts::line(std::size_t k, std::size_t m) const {
     result.slope[xi] = slope_x[i];
     result.slope[yi] = slope_y[i];
   }
+  constexpr int kStates = 2 * kModes;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    const NozzleAnswers& answer = *answers[axis];
-    const Eigen::Index first = 3 * a;
-    result.move.block<2, 2>(first, first) = answer.free[m];
-    result.move.block<2, 1>(first, first + 2) = answer.step[m] - answer.ramp[m] / duration;
-    result.move.block<2, 1>(first, 6 + a) = answer.ramp[m] / duration;
-    result.move(first + 2, 6 + a) = 1.0;
-    result.shift.segment<2>(first) = answer.free[m] * begin[axis] + answer.ramp[m] * speed[axis] -
-                                     ((*nozzle[axis])[k + m] - Eigen::Vector2d(base_[k][a], 0.0));
+    const NozzleAnswers<kModes>& answer = answers(axis);
+    const Eigen::Index first = kOfAxis<kModes> * a;
+    const Eigen::Index u = kOfZ<kModes> + a;
+    for (Eigen::Index i = 0; i < kStates; i += 2) {
+      result.move.template block<2, 2>(first + i, first + i) =
+          answer.free[m].template middleCols<2>(i);
+    }
+    result.move.template block<kStates, 1>(first, first + kStates) =
+        answer.step[m] - answer.ramp[m] / duration;
+    result.move.template block<kStates, 1>(first, u) = answer.ramp[m] / duration;
+    result.move(first + kStates, u) = 1.0;
+    result.shift.template segment<kStates>(first) =
+        answer.after(m, begin[axis]) + answer.ramp[m] * speed[axis] -
+        (nozzle(axis, k + m) - riding(axis, base_mm(k)[a]));
   }
   return result;
 }
 
 // The first step is late, and the others have caught up at the line's end. So the place lags by a
-// triangle, δ high, over the line's time T. To the nozzle this is nearly an impulse of ω² δ T / 2
-// at the triangle's centroid.
-Vector6d LineCosts::lead_kick(double line_s, double steps, const Eigen::Vector2d& speed_mm_s,
-                              double before_mm_s) const {
-  Vector6d kick = Vector6d::Zero();
+// triangle, δ high, over the line's time T. To a mode this is nearly an impulse of g ω² δ T / 2 at
+// the triangle's centroid.
+template <int kModes>
+ZVector<kModes> LineCosts<kModes>::lead_kick(double line_s, double steps,
+                                             const Eigen::Vector2d& speed_mm_s,
+                                             double before_mm_s) const {
+  ZVector<kModes> kick = ZVector<kModes>::Zero();
   const double v = speed_mm_s.norm();
   if (v <= before_mm_s) {
     return kick;
@@ -219,20 +277,40 @@ Vector6d LineCosts::lead_kick(double line_s, double steps, const Eigen::Vector2d
   const double first_s = before_mm_s > 0.0 ? std::min(step_s * v / before_mm_s, line_s) : line_s;
   const Eigen::Vector2d area = 0.5 * (first_s - step_s) * line_s * speed_mm_s;
   const double after_s = line_s - (first_s + line_s) / 3.0;
-  const auto j = static_cast<std::size_t>(after_s / dt_s_ + 0.5);
+  const auto j = static_cast<std::size_t>(after_s / dt_s() + 0.5);
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    const double omega = (axis == 0 ? nozzle_x_ : nozzle_y_).omega_rad_s;
     const auto a = static_cast<Eigen::Index>(axis);
-    kick.segment<2>(3 * a) = -omega * omega * area[a] * answers(axis).free[j].col(1);
+    Eigen::Index at = kOfAxis<kModes> * a;
+    for (const dynamics::Mode& mode : nozzles_[axis].model.modes()) {
+      const Eigen::Index column = at - kOfAxis<kModes> * a + 1;
+      kick.template segment<2>(at) =
+          -mode.gain * mode.stiffness_per_s2() * area[a] * answers(axis).free[j].col(column);
+      at += 2;
+    }
   }
   return kick;
 }
 
-Quadratic LineCosts::ring_down() const {
-  Quadratic result;
-  result.matrix.block<2, 2>(0, 0) = weights_.back().xx * ring_down_square(nozzle_x_);
-  result.matrix.block<2, 2>(3, 3) = weights_.back().yy * ring_down_square(nozzle_y_);
+template <int kModes>
+Quadratic<kModes> LineCosts<kModes>::ring_down() const {
+  constexpr int kStates = 2 * kModes;
+  const ErrorWeight& w = weight(size() - 1);
+  Quadratic<kModes> result;
+  result.matrix.template block<kStates, kStates>(0, 0) =
+      w.xx * ring_down_square<kModes>(nozzles_[0].model);
+  result.matrix.template block<kStates, kStates>(kOfAxis<kModes>, kOfAxis<kModes>) =
+      w.yy * ring_down_square<kModes>(nozzles_[1].model);
   return result;
 }
+
+#define UNFLEX_FOR_MODES(kModes)                                                                \
+  template WholeCost<kModes> whole_cost(const LineCost<kModes>&, const Quadratic<kModes>&);     \
+  template LineChoice<kModes> best_end(const LineCost<kModes>&, const Quadratic<kModes>&);      \
+  template Quadratic<kModes> ending_on_base(const LineCost<kModes>&, const Quadratic<kModes>&); \
+  template class LineCosts<kModes>;
+
+UNFLEX_FOR_MODES(1)
+UNFLEX_FOR_MODES(2)
+UNFLEX_FOR_MODES(3)
 
 }  // namespace unflex::emit

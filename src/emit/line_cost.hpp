@@ -2,17 +2,21 @@
 // ends.
 //
 // Notation:
-//   τ_k        candidate times of line ends; b_k, f_k  base and nozzle state (p, ṗ) there
-//   e          state of the nozzle that follows the lines, minus f
+//   τ_k        candidate times of line ends; b_k, f_k  base and nozzle state there
+//   e          state of the nozzle that follows the lines, minus f: (e_1, ė_1, …) over the modes
 //   o_k        a line's end at τ_k, minus b_k
-//   z          (e_x, ė_x, o_x, e_y, ė_y, o_y) at the line's begin
+//   z          (e_x, o_x, e_y, o_y) at the line's begin
 //   u          (o_x, o_y) at its end
 //   w          (z, u)
-//   J          ½ ∫ eᵀWe + ε|d|² dt, d being the line minus the base
+//   J          ½ ∫ pᵀWp + ε|d|² dt, p being the places of e, and d the line minus the base
+//
+// Both axes have kModes modes. An axis that has fewer gets modes that never move.
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "followed.hpp"
@@ -20,65 +24,107 @@
 
 namespace unflex::emit {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Vector8d = Eigen::Matrix<double, 8, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Matrix8d = Eigen::Matrix<double, 8, 8>;
+// Sizes by the number of modes: of what one axis has in z, of z, and of w.
+template <int kModes>
+inline constexpr int kOfAxis = 2 * kModes + 1;
+template <int kModes>
+inline constexpr int kOfZ = 2 * kOfAxis<kModes>;
+template <int kModes>
+inline constexpr int kOfW = kOfZ<kModes> + 2;
+
+template <int kModes>
+using ZVector = Eigen::Matrix<double, kOfZ<kModes>, 1>;
+template <int kModes>
+using ZMatrix = Eigen::Matrix<double, kOfZ<kModes>, kOfZ<kModes>>;
+template <int kModes>
+using WVector = Eigen::Matrix<double, kOfW<kModes>, 1>;
+template <int kModes>
+using WMatrix = Eigen::Matrix<double, kOfW<kModes>, kOfW<kModes>>;
+
+// The place of o in z, of X and of Y.
+template <int kModes>
+[[nodiscard]] constexpr Eigen::Index place_of_o(std::size_t axis) {
+  return static_cast<Eigen::Index>(axis) * kOfAxis<kModes> + 2 * kModes;
+}
 
 // ½ zᵀPz + pᵀz + c.
+template <int kModes>
 struct Quadratic {
-  Matrix6d matrix = Matrix6d::Zero();
-  Vector6d slope = Vector6d::Zero();
+  ZMatrix<kModes> matrix = ZMatrix<kModes>::Zero();
+  ZVector<kModes> slope = ZVector<kModes>::Zero();
   double constant = 0.0;
 
-  [[nodiscard]] double at(const Vector6d& z) const {
+  [[nodiscard]] double at(const ZVector<kModes>& z) const {
     return z.dot(0.5 * (matrix * z) + slope) + constant;
   }
 };
 
 // A line from τ_k to τ_{k+m}: J = ½ wᵀHw + hᵀw + c, z' = Mw + m.
+template <int kModes>
 struct LineCost {
-  Matrix8d matrix = Matrix8d::Zero();
-  Vector8d slope = Vector8d::Zero();
+  using Move = Eigen::Matrix<double, kOfZ<kModes>, kOfW<kModes>>;
+  WMatrix<kModes> matrix = WMatrix<kModes>::Zero();
+  WVector<kModes> slope = WVector<kModes>::Zero();
   double constant = 0.0;
-  Eigen::Matrix<double, 6, 8> move = Eigen::Matrix<double, 6, 8>::Zero();
-  Vector6d shift = Vector6d::Zero();
+  Move move = Move::Zero();
+  ZVector<kModes> shift = ZVector<kModes>::Zero();
 };
 
 // The cost of a line and all that comes after it, by z and u:
 // value(z) + ½ (u − u*)ᵀ S (u − u*), u* = feedback z + feed_forward.
+template <int kModes>
 struct LineChoice {
-  Quadratic value;
+  using Feedback = Eigen::Matrix<double, 2, kOfZ<kModes>>;
+  Quadratic<kModes> value;
   Eigen::Matrix2d stiffness = Eigen::Matrix2d::Zero();
-  Eigen::Matrix<double, 2, 6> feedback = Eigen::Matrix<double, 2, 6>::Zero();
+  Feedback feedback = Feedback::Zero();
   Eigen::Vector2d feed_forward = Eigen::Vector2d::Zero();
 };
 
 // The cost of a line and all that comes after it: ½ wᵀHw + hᵀw + c.
+template <int kModes>
 struct WholeCost {
-  Matrix8d matrix;
-  Vector8d slope;
+  WMatrix<kModes> matrix;
+  WVector<kModes> slope;
   double constant = 0.0;
 };
 
-[[nodiscard]] WholeCost whole_cost(const LineCost& line, const Quadratic& to_go);
-[[nodiscard]] LineChoice best_end(const LineCost& line, const Quadratic& to_go);
+template <int kModes>
+[[nodiscard]] WholeCost<kModes> whole_cost(const LineCost<kModes>& line,
+                                           const Quadratic<kModes>& to_go);
+template <int kModes>
+[[nodiscard]] LineChoice<kModes> best_end(const LineCost<kModes>& line,
+                                          const Quadratic<kModes>& to_go);
 // The cost by z of a line that ends on the base (u = 0), and all that comes after it.
-[[nodiscard]] Quadratic ending_on_base(const LineCost& line, const Quadratic& to_go);
+template <int kModes>
+[[nodiscard]] Quadratic<kModes> ending_on_base(const LineCost<kModes>& line,
+                                               const Quadratic<kModes>& to_go);
 
 // Responses of the nozzle on one axis after j candidate intervals: to its own state, and to a step
-// and a ramp of the base.
+// and a ramp of the base. The nozzle's place is the sum of those of its modes.
+template <int kModes>
 struct NozzleAnswers {
-  std::vector<Eigen::Matrix2d> free;
-  std::vector<Eigen::Vector2d> step;
-  std::vector<Eigen::Vector2d> ramp;
+  // What each mode makes of its own state: one block of 2 × 2 beside the other.
+  using Free = Eigen::Matrix<double, 2, 2 * kModes>;
+  std::vector<Free> free;
+  std::vector<ModesVector<kModes>> step;
+  std::vector<ModesVector<kModes>> ramp;
+
+  [[nodiscard]] ModesVector<kModes> after(std::size_t j, const ModesVector<kModes>& state) const {
+    ModesVector<kModes> result;
+    for (Eigen::Index i = 0; i < kModes; ++i) {
+      result.template segment<2>(2 * i) =
+          free[j].template middleCols<2>(2 * i) * state.template segment<2>(2 * i);
+    }
+    return result;
+  }
 };
 
-// The candidate times, equally spaced, and what lines between them cost.
-class LineCosts {
+// The candidate times, equally spaced, and the base there.
+class Candidates {
  public:
-  LineCosts(const dynamics::BaseTrajectory& base, const std::function<ErrorWeight(double)>& weight,
-            const LineRules& rules);
+  Candidates(const dynamics::BaseTrajectory& base,
+             const std::function<ErrorWeight(double)>& weight);
 
   // Number of candidate times.
   [[nodiscard]] std::size_t size() const { return base_.size(); }
@@ -88,30 +134,64 @@ class LineCosts {
   // The fewest candidate intervals that last at least this long.
   [[nodiscard]] std::size_t candidates(double duration_s) const;
   [[nodiscard]] const Eigen::Vector2d& base_mm(std::size_t k) const { return base_[k]; }
-  // f of one axis at candidate k.
-  [[nodiscard]] const Eigen::Vector2d& nozzle(std::size_t axis, std::size_t k) const {
-    return axis == 0 ? nozzle_x_at_[k] : nozzle_y_at_[k];
-  }
   [[nodiscard]] const ErrorWeight& weight(std::size_t k) const { return weights_[k]; }
-  [[nodiscard]] const NozzleAnswers& answers(std::size_t axis) const { return axis == 0 ? x_ : y_; }
+
+ private:
+  double dt_s_;
+  std::vector<Eigen::Vector2d> base_;
+  std::vector<ErrorWeight> weights_;
+};
+
+// What lines between candidates cost.
+template <int kModes>
+class LineCosts : public Candidates {
+ public:
+  LineCosts(const dynamics::BaseTrajectory& base, const std::function<ErrorWeight(double)>& weight,
+            const LineRules& rules);
+
+  // The place of f on one axis at candidate k.
+  [[nodiscard]] double nozzle_mm(std::size_t axis, std::size_t k) const {
+    return position_of(nozzle(axis, k));
+  }
+  // f of one axis at candidate k.
+  [[nodiscard]] const ModesVector<kModes>& nozzle(std::size_t axis, std::size_t k) const {
+    return nozzles_[axis].at[k];
+  }
+  // A nozzle that goes along with the base.
+  [[nodiscard]] ModesVector<kModes> riding(std::size_t axis, double position_mm,
+                                           double velocity_mm_s = 0.0) const {
+    return vector_of<kModes>(nozzles_[axis].model.riding(position_mm, velocity_mm_s));
+  }
+  // The gain of a mode; 0 if the axis does not have it.
+  [[nodiscard]] double gain(std::size_t axis, std::size_t mode) const {
+    const auto modes = nozzles_[axis].model.modes();
+    return mode < modes.size() ? modes[mode].gain : 0.0;
+  }
+  [[nodiscard]] const NozzleAnswers<kModes>& answers(std::size_t axis) const {
+    return nozzles_[axis].answers;
+  }
 
   // The line from candidate k to k + m. k + m < size(), and the line lasts no longer than
   // rules.max_line_s.
-  [[nodiscard]] LineCost line(std::size_t k, std::size_t m) const;
+  [[nodiscard]] LineCost<kModes> line(std::size_t k, std::size_t m) const;
 
   // What the lead of a line (planner::PlannedMove::lead_s) adds to z at the line's end, for a line
   // of `steps` steps at speed_mm_s behind one at before_mm_s. The line lasts no longer than
   // rules.max_line_s.
-  [[nodiscard]] Vector6d lead_kick(double line_s, double steps, const Eigen::Vector2d& speed_mm_s,
-                                   double before_mm_s) const;
+  [[nodiscard]] ZVector<kModes> lead_kick(double line_s, double steps,
+                                          const Eigen::Vector2d& speed_mm_s,
+                                          double before_mm_s) const;
 
   // The cost after the last candidate: the base rests and e rings down.
-  [[nodiscard]] Quadratic ring_down() const;
+  [[nodiscard]] Quadratic<kModes> ring_down() const;
 
  private:
-  using Row = Eigen::RowVector4d;
-  // What all lines over m candidates share: e of an axis by (e, ė, o, u) at some moments, and the
-  // sums of its squares.
+  // Coefficients of (e, o, u) of one axis.
+  static constexpr int kRow = kOfAxis<kModes> + 1;
+  using Row = Eigen::Matrix<double, 1, kRow>;
+  using RowSquare = Eigen::Matrix<double, kRow, kRow>;
+  // What all lines over m candidates share: the nozzle's place on an axis by (e, o, u) at some
+  // moments, and the sums of its squares.
   struct Shape {
     struct Look {
       std::size_t j = 0;  // candidates since the line's begin
@@ -120,24 +200,26 @@ class LineCosts {
       Row y;
     };
     std::vector<Look> looks;
-    Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();
-    Eigen::Matrix4d xy = Eigen::Matrix4d::Zero();
-    Eigen::Matrix4d yy = Eigen::Matrix4d::Zero();
-    Eigen::Matrix4d base = Eigen::Matrix4d::Zero();
+    RowSquare xx = RowSquare::Zero();
+    RowSquare xy = RowSquare::Zero();
+    RowSquare yy = RowSquare::Zero();
+    RowSquare base = RowSquare::Zero();
   };
   [[nodiscard]] Shape shape(std::size_t m) const;
 
-  dynamics::FlexibleAxis nozzle_x_;
-  dynamics::FlexibleAxis nozzle_y_;
-  double dt_s_;
-  std::vector<Eigen::Vector2d> base_;
-  std::vector<Eigen::Vector2d> nozzle_x_at_;  // f
-  std::vector<Eigen::Vector2d> nozzle_y_at_;
-  std::vector<ErrorWeight> weights_;
+  struct Nozzle {
+    dynamics::FlexibleAxis model;
+    std::vector<ModesVector<kModes>> at;  // f
+    NozzleAnswers<kModes> answers;
+  };
+
+  std::array<Nozzle, 2> nozzles_;
   std::vector<std::size_t> same_weight_until_;
-  NozzleAnswers x_;
-  NozzleAnswers y_;
   std::vector<Shape> shapes_;  // by m
 };
+
+extern template class LineCosts<1>;
+extern template class LineCosts<2>;
+extern template class LineCosts<3>;
 
 }  // namespace unflex::emit

@@ -5,6 +5,7 @@
 //
 // A fitted line leaves ∫d = ∫∫d = 0 at its end. A line is short against the resonance's period, so
 // e = ω²∬d + 2ζω∫d: the error begins and ends with the line, and each line can be judged alone.
+// With several modes ω² and 2ζω are sums over them, by their gains.
 #include "line_ends.hpp"
 
 #include <algorithm>
@@ -43,7 +44,8 @@ std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, AxisA
     inertia += weight(i) * s(i) * s(i);
   }
   const double dt = duration / steps;
-  const double omega = axis.omega_rad_s;
+  const double omega = std::sqrt(std::abs(axis.stiffness_per_s2()));
+  const double damping = axis.damping_per_s() / omega;
   double last = 0.0;
   double once = 0.0;   // ∫d
   double twice = 0.0;  // ∬d
@@ -56,7 +58,7 @@ std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, AxisA
       twice += 0.5 * dt * (before + once);
     }
     last = off;
-    value = omega * (omega * twice + 2.0 * axis.zeta * once);
+    value = omega * (omega * twice + damping * once);
   }
   return d;
 }

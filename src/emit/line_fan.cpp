@@ -1,8 +1,11 @@
 #include "line_fan.hpp"
 
+#include <tuple>
+
 namespace unflex::emit {
 
-void LineFan::begin(std::size_t k, std::span<const Vector6d> states) {
+template <int kModes>
+void LineFan<kModes>::begin(std::size_t k, std::span<const ZVector<kModes>> states) {
   k_ = k;
   m_ = 0;
   x_ = {.answers = &costs_->answers(0)};
@@ -11,33 +14,43 @@ void LineFan::begin(std::size_t k, std::span<const Vector6d> states) {
   ramps_xy_ = base_square_ = times_s_ = times_squared_ = 0.0;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    const Eigen::Vector2d& nozzle = costs_->nozzle(axis, k);
+    const ModesVector<kModes>& nozzle = costs_->nozzle(axis, k);
+    const ModesVector<kModes> base = costs_->riding(axis, costs_->base_mm(k)[a]);
     Axis& all = axis == 0 ? x_ : y_;
     for (std::size_t i = 0; i < states.size(); ++i) {
       const auto lane = static_cast<Eigen::Index>(i);
-      const auto& z = states[i].segment<3>(3 * a);
-      all.place[lane] = z[2];
-      all.behind[lane] = z[0] + nozzle[0] - costs_->base_mm(k)[a] - z[2];
-      all.speed[lane] = z[1] + nozzle[1];
+      const auto& z = states[i].template segment<kOfAxis<kModes>>(kOfAxis<kModes> * a);
+      const double place = z[2 * kModes];
+      const ModesVector<kModes> begun = costs_->riding(axis, place);
+      all.place[lane] = place;
+      for (Eigen::Index part = 0; part < 2 * kModes; ++part) {
+        all.behind[static_cast<std::size_t>(part)][lane] =
+            z[part] + nozzle[part] - base[part] - begun[part];
+      }
     }
   }
 }
 
-void LineFan::reach(std::size_t m) {
+template <int kModes>
+void LineFan<kModes>::reach(std::size_t m) {
   const Eigen::Vector2d& base = costs_->base_mm(k_);
   for (std::size_t j = m_ + 1; j <= m; ++j) {
     const ErrorWeight& w = costs_->weight(k_ + j);
     const auto error = [&](const Axis& axis, std::size_t index) -> Lanes {
-      const Eigen::Matrix2d& free = axis.answers->free[j];
-      const double off = base[static_cast<Eigen::Index>(index)] - costs_->nozzle(index, k_ + j)[0];
-      return axis.place + off + free(0, 0) * axis.behind + free(0, 1) * axis.speed;
+      const auto& free = axis.answers->free[j];
+      const double off = base[static_cast<Eigen::Index>(index)] - costs_->nozzle_mm(index, k_ + j);
+      Lanes sum = axis.place + off + free(0, 0) * axis.behind[0] + free(0, 1) * axis.behind[1];
+      for (Eigen::Index part = 2; part < 2 * kModes; ++part) {
+        sum += free(0, part) * axis.behind[static_cast<std::size_t>(part)];
+      }
+      return sum;
     };
     const Lanes ex = error(x_, 0);
     const Lanes ey = error(y_, 1);
     const Lanes to_x = w.xx * ex + w.xy * ey;
     const Lanes to_y = w.xy * ex + w.yy * ey;
-    const double ramp_x = x_.answers->ramp[j][0];
-    const double ramp_y = y_.answers->ramp[j][0];
+    const double ramp_x = position_of(x_.answers->ramp[j]);
+    const double ramp_y = position_of(y_.answers->ramp[j]);
     square_ += to_x * ex + to_y * ey;
     x_.pull += ramp_x * to_x;
     y_.pull += ramp_y * to_y;
@@ -64,46 +77,71 @@ void LineFan::reach(std::size_t m) {
   stiffness_xy_ = costs_->dt_s() * ramps_xy_;
 }
 
-void LineFan::finish(Axis& axis, Eigen::Index index) const {
+template <int kModes>
+void LineFan<kModes>::finish(Axis& axis, Eigen::Index index) const {
   const double dt = costs_->dt_s();
   axis.slope = dt * (axis.pull + kBaseWeight * (times_s_ * axis.place - axis.time_base));
   axis.stiffness = dt * (axis.ramps + kBaseWeight * times_squared_);
-  const Eigen::Matrix2d& free = axis.answers->free[m_];
-  const Eigen::Vector2d& nozzle = costs_->nozzle(static_cast<std::size_t>(index), k_ + m_);
+  const auto& free = axis.answers->free[m_];
+  const auto which = static_cast<std::size_t>(index);
+  const ModesVector<kModes>& nozzle = costs_->nozzle(which, k_ + m_);
   const double from = costs_->base_mm(k_)[index];
-  axis.error = axis.place + (from - nozzle[0]) + free(0, 0) * axis.behind + free(0, 1) * axis.speed;
-  axis.error_speed = free(1, 0) * axis.behind + free(1, 1) * axis.speed - nozzle[1];
+  const ModesVector<kModes> base = costs_->riding(which, from);
+  for (std::size_t mode = 0; mode < kModes; ++mode) {
+    const auto at = static_cast<Eigen::Index>(2 * mode);
+    const double gain = costs_->gain(which, mode);
+    const Lanes& behind = axis.behind[2 * mode];
+    const Lanes& speed = axis.behind[2 * mode + 1];
+    axis.error[2 * mode] = gain * axis.place + (base[at] - nozzle[at]) + free(0, at) * behind +
+                           free(0, at + 1) * speed;
+    axis.error[2 * mode + 1] = free(1, at) * behind + free(1, at + 1) * speed - nozzle[at + 1];
+  }
   axis.end = axis.place + (from - costs_->base_mm(k_ + m_)[index]);
-  axis.ramp = axis.answers->ramp[m_][0];
-  axis.ramp_speed = axis.answers->ramp[m_][1];
+  axis.ramp = axis.answers->ramp[m_];
 }
 
-LineFan::Choice LineFan::choice(const Quadratic& to_go) const {
-  const Matrix6d& p = to_go.matrix;
-  const Vector6d along_x = p.col(0) * x_.ramp + p.col(1) * x_.ramp_speed + p.col(2) * duration_s_;
-  const Vector6d along_y = p.col(3) * y_.ramp + p.col(4) * y_.ramp_speed + p.col(5) * duration_s_;
-  const auto gain_x = [&](const Vector6d& v) {
-    return x_.ramp * v[0] + x_.ramp_speed * v[1] + duration_s_ * v[2];
+template <int kModes>
+FanChoice LineFan<kModes>::choice(const Quadratic<kModes>& to_go) const {
+  constexpr int kZ = kOfZ<kModes>;
+  constexpr int kAxis = kOfAxis<kModes>;
+  const ZMatrix<kModes>& p = to_go.matrix;
+  const auto along = [&](const Axis& axis, Eigen::Index first) {
+    ZVector<kModes> sum = p.col(first) * axis.ramp[0];
+    for (Eigen::Index i = 1; i < 2 * kModes; ++i) {
+      sum += p.col(first + i) * axis.ramp[i];
+    }
+    return ZVector<kModes>(sum + p.col(first + 2 * kModes) * duration_s_);
   };
-  const auto gain_y = [&](const Vector6d& v) {
-    return y_.ramp * v[3] + y_.ramp_speed * v[4] + duration_s_ * v[5];
+  const ZVector<kModes> along_x = along(x_, 0);
+  const ZVector<kModes> along_y = along(y_, kAxis);
+  const auto gain = [&](const Axis& axis, Eigen::Index first, const ZVector<kModes>& v) {
+    double sum = axis.ramp[0] * v[first];
+    for (Eigen::Index i = 1; i < 2 * kModes; ++i) {
+      sum += axis.ramp[i] * v[first + i];
+    }
+    return sum + duration_s_ * v[first + 2 * kModes];
   };
-  Choice result;
-  result.xx = x_.stiffness + gain_x(along_x);
-  result.xy = stiffness_xy_ + gain_y(along_x);
-  result.yy = y_.stiffness + gain_y(along_y);
+  FanChoice result;
+  result.xx = x_.stiffness + gain(x_, 0, along_x);
+  result.xy = stiffness_xy_ + gain(y_, kAxis, along_x);
+  result.yy = y_.stiffness + gain(y_, kAxis, along_y);
 
-  const std::array<const Lanes*, 6> z = {&x_.error, &x_.error_speed, &x_.end,
-                                         &y_.error, &y_.error_speed, &y_.end};
-  Lanes slope_x = x_.slope + gain_x(to_go.slope);
-  Lanes slope_y = y_.slope + gain_y(to_go.slope);
+  std::array<const Lanes*, kZ> z{};
+  for (std::size_t i = 0; i < 2 * kModes; ++i) {
+    z[i] = &x_.error[i];
+    z[kAxis + i] = &y_.error[i];
+  }
+  z[2 * kModes] = &x_.end;
+  z[kAxis + 2 * kModes] = &y_.end;
+  Lanes slope_x = x_.slope + gain(x_, 0, to_go.slope);
+  Lanes slope_y = y_.slope + gain(y_, kAxis, to_go.slope);
   Lanes still = held_ + to_go.constant;  // for v = 0
-  for (std::size_t i = 0; i < 6; ++i) {
+  for (std::size_t i = 0; i < kZ; ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     slope_x += along_x[row] * *z[i];
     slope_y += along_y[row] * *z[i];
     Lanes pull = to_go.slope[row] + 0.5 * p(row, row) * *z[i];
-    for (std::size_t j = i + 1; j < 6; ++j) {
+    for (std::size_t j = i + 1; j < kZ; ++j) {
       pull += p(static_cast<Eigen::Index>(j), row) * *z[j];
     }
     still += pull * *z[i];
@@ -115,19 +153,29 @@ LineFan::Choice LineFan::choice(const Quadratic& to_go) const {
   return result;
 }
 
-double LineFan::cost(std::size_t lane, const Eigen::Vector2d& v) const {
+template <int kModes>
+double LineFan<kModes>::cost(std::size_t lane, const Eigen::Vector2d& v) const {
   const auto i = static_cast<Eigen::Index>(lane);
   return held_[i] + v[0] * (x_.slope[i] + 0.5 * x_.stiffness * v[0] + stiffness_xy_ * v[1]) +
          v[1] * (y_.slope[i] + 0.5 * y_.stiffness * v[1]);
 }
 
-Vector6d LineFan::after(std::size_t lane, const Eigen::Vector2d& v) const {
+template <int kModes>
+ZVector<kModes> LineFan<kModes>::after(std::size_t lane, const Eigen::Vector2d& v) const {
   const auto i = static_cast<Eigen::Index>(lane);
-  Vector6d z;
-  z << x_.error[i] + x_.ramp * v[0], x_.error_speed[i] + x_.ramp_speed * v[0],
-      x_.end[i] + duration_s_ * v[0], y_.error[i] + y_.ramp * v[1],
-      y_.error_speed[i] + y_.ramp_speed * v[1], y_.end[i] + duration_s_ * v[1];
+  ZVector<kModes> z;
+  for (const auto& [axis, first, speed] : {std::tuple{&x_, Eigen::Index{0}, v[0]},
+                                           std::tuple{&y_, Eigen::Index{kOfAxis<kModes>}, v[1]}}) {
+    for (Eigen::Index part = 0; part < 2 * kModes; ++part) {
+      z[first + part] = axis->error[static_cast<std::size_t>(part)][i] + axis->ramp[part] * speed;
+    }
+    z[first + 2 * kModes] = axis->end[i] + duration_s_ * speed;
+  }
   return z;
 }
+
+template class LineFan<1>;
+template class LineFan<2>;
+template class LineFan<3>;
 
 }  // namespace unflex::emit

@@ -1,7 +1,6 @@
 #include "nozzle_progress.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -47,10 +46,10 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
   };
   // A run begins at rest. A part of a run begins in motion, and we take the nozzle to be on the
   // reference then.
-  std::array<std::array<double, 2>, 2> state{};
   const dynamics::AxisMotion x = run.base->x_at(0.0);
   const dynamics::AxisMotion y = run.base->y_at(0.0);
-  state = {{{x.position_mm, x.velocity_mm_s}, {y.position_mm, y.velocity_mm_s}}};
+  dynamics::NozzleXY state{nozzle_x.riding(x.position_mm, x.velocity_mm_s),
+                           nozzle_y.riding(y.position_mm, y.velocity_mm_s)};
   if (run.goes_on) {
     const std::size_t first = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(
         std::upper_bound(starts_s.begin(), starts_s.end(), 0.0) - starts_s.begin() - 1, 0,
@@ -59,10 +58,11 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
     const double local_s = std::clamp(-starts_s[first], 0.0, move.duration_s());
     const gcode::Position at = move.position_mm(local_s);
     const double v = move.velocity_mm_s(local_s);
-    state = {{{at[X], v * move.direction[X]}, {at[Y], v * move.direction[Y]}}};
+    state = {nozzle_x.riding(at[X], v * move.direction[X]),
+             nozzle_y.riding(at[Y], v * move.direction[Y])};
   }
-  const Followed along_x(*run.base, &dynamics::BaseTrajectory::x_at, nozzle_x, state[0]);
-  const Followed along_y(*run.base, &dynamics::BaseTrajectory::y_at, nozzle_y, state[1]);
+  const Followed along_x(*run.base, &dynamics::BaseTrajectory::x_at, nozzle_x, state.x);
+  const Followed along_y(*run.base, &dynamics::BaseTrajectory::y_at, nozzle_y, state.y);
   double furthest = 0.0;
   for (std::size_t k = 0; k < run.base->nodes(); ++k) {
     const double t = period_s_ * static_cast<double>(k);
@@ -72,7 +72,8 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
       continue;
     }
     const double at_mm = reference_mm(t);
-    furthest = std::max(furthest, nearest_mm(along_x.at(t)[0], along_y.at(t)[0], i, at_mm));
+    furthest = std::max(furthest,
+                        nearest_mm(along_x.at(t).position(), along_y.at(t).position(), i, at_mm));
     progress_mm_.push_back(furthest);
   }
 }

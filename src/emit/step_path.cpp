@@ -10,12 +10,13 @@ namespace unflex::emit {
 namespace {
 
 // Where the run begins.
-State start_of(const RunEnds& ends, const LineCosts& costs, const StepGrid& grid,
-               const LineRules& rules) {
-  State state;
+template <int kModes>
+State<kModes> start_of(const RunEnds& ends, const LineCosts<kModes>& costs, const StepGrid& grid,
+                       const LineRules& rules) {
+  State<kModes> state;
   state.at = grid.nearest({ends.start_x_mm, ends.start_y_mm});
-  state.z[2] = ends.start_x_mm - costs.base_mm(0)[0];
-  state.z[5] = ends.start_y_mm - costs.base_mm(0)[1];
+  state.z[place_of_o<kModes>(0)] = ends.start_x_mm - costs.base_mm(0)[0];
+  state.z[place_of_o<kModes>(1)] = ends.start_y_mm - costs.base_mm(0)[1];
   if (ends.goes_on) {
     state.speed_mm_s = (costs.base_mm(1) - costs.base_mm(0)) / costs.dt_s();
     state.line_s = rules.even_line_s();
@@ -24,15 +25,17 @@ State start_of(const RunEnds& ends, const LineCosts& costs, const StepGrid& grid
 }
 
 // The state at the end of a leap, all along which the nozzle has followed the line.
-State end_of(const Leap& leap, const LineCosts& costs, const StepGrid& grid) {
+template <int kModes>
+State<kModes> end_of(const Leap& leap, const LineCosts<kModes>& costs, const StepGrid& grid) {
   const double duration_s = costs.time_s(leap.until) - costs.time_s(leap.from);
   const Eigen::Vector2d before = grid.mm(leap.begin) - costs.base_mm(leap.from);
   const Eigen::Vector2d off = grid.mm(leap.end) - costs.base_mm(leap.until);
-  State state;
-  for (const int axis : {0, 1}) {
-    state.z[3 * axis] = off[axis];
-    state.z[3 * axis + 1] = (off[axis] - before[axis]) / duration_s;
-    state.z[3 * axis + 2] = off[axis];
+  State<kModes> state;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    state.z.template segment<2 * kModes>(a * kOfAxis<kModes>) =
+        costs.riding(axis, off[a], (off[a] - before[a]) / duration_s);
+    state.z[place_of_o<kModes>(axis)] = off[a];
   }
   state.at = leap.end;
   state.speed_mm_s = (grid.mm(leap.end) - grid.mm(leap.begin)) / duration_s;
@@ -47,12 +50,11 @@ void append(const Polygon& part, Polygon& all) {
   all.y_mm.insert(all.y_mm.end(), part.y_mm.begin(), part.y_mm.end());
 }
 
-}  // namespace
-
-Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double>& wanted,
-                  const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
-                  const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
-  const LineCosts costs(base, weight, rules);
+template <int kModes>
+Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>& wanted,
+                const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
+                const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
+  const LineCosts<kModes> costs(base, weight, rules);
   const StepGrid grid(x, y);
   const auto candidate = [&](double t) {
     return std::min(static_cast<std::size_t>(nearest_whole(t / costs.dt_s())), costs.size() - 1);
@@ -65,7 +67,7 @@ Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double
   const Place end = grid.nearest({ends.end_x_mm, ends.end_y_mm});
   Polygon all;
   std::vector<double> lines_before_s = ends.lines_before_s;
-  const auto go_on = [&](const Stretch& stretch) {
+  const auto go_on = [&](const Stretch<kModes>& stretch) {
     // A leap may begin or end where the run does.
     const Polygon part = stretch.begin.k == stretch.last
                              ? Polygon{{costs.time_s(stretch.last)},
@@ -76,7 +78,7 @@ Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double
     lines_before_s = all.times_s;
     return !part.times_s.empty();
   };
-  State begin = start_of(ends, costs, grid, rules);
+  State<kModes> begin = start_of(ends, costs, grid, rules);
   for (const Leap& leap : leaps(costs, wanted_at, begin.at, last, end, grid, rules)) {
     if (!go_on({begin, leap.from, leap.begin, true, 0})) {
       return {};
@@ -84,6 +86,17 @@ Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double
     begin = end_of(leap, costs, grid);
   }
   return go_on({begin, last, end, ends.until_s.has_value(), ends.lines_after}) ? all : Polygon{};
+}
+
+}  // namespace
+
+Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double>& wanted,
+                  const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
+                  const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
+  const std::size_t modes = std::max(rules.nozzle_x.modes().size(), rules.nozzle_y.modes().size());
+  return with_modes(modes, [&](auto count) {
+    return path_of<decltype(count)::value>(base, wanted, weight, ends, x, y, rules);
+  });
 }
 
 }  // namespace unflex::emit

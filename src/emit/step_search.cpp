@@ -20,7 +20,7 @@ namespace unflex::emit {
 namespace {
 
 // States kept for each candidate time.
-constexpr std::size_t kKept = LineFan::kLanes;
+constexpr std::size_t kKept = kLanes;
 // This many lines to a candidate, the most promising ones, are tried first. They set the bar for
 // the others.
 constexpr std::ptrdiff_t kFirst = 8;
@@ -41,14 +41,15 @@ constexpr double kTooQuick = 1e-4;
 constexpr double kTooMany = 1e-4;
 
 // All lines from the states of one candidate time.
+template <int kModes>
 struct Lines {
-  explicit Lines(const LineCosts& costs) : fan(costs) {}
+  explicit Lines(const LineCosts<kModes>& costs) : fan(costs) {}
 
-  LineFan fan;
+  LineFan<kModes> fan;
   // For the lines that end at the candidate being searched:
   double duration_s = 0.0;
   double price = 0.0;  // see Search::price()
-  LineFan::Choice choice;
+  FanChoice choice;
   Bowl bowl;
   std::size_t k = 0;
   std::size_t first = 0;  // place in the arena of the first state
@@ -57,24 +58,27 @@ struct Lines {
 };
 
 // All lines of one duration from one state.
+template <int kModes>
 struct Option {
   double least = 0.0;  // total
-  const Lines* lines = nullptr;
+  const Lines<kModes>* lines = nullptr;
   std::size_t lane = 0;
 };
 
 // One line of an Option.
+template <int kModes>
 struct Choice {
   double total = 0.0;
   Place to{};
-  const Lines* lines = nullptr;
+  const Lines<kModes>* lines = nullptr;
   std::size_t lane = 0;
 };
 
+template <int kModes>
 class Search {
  public:
-  Search(const LineCosts& costs, const std::vector<std::size_t>& wanted, const Stretch& stretch,
-         const StepGrid& grid, const LineRules& rules)
+  Search(const LineCosts<kModes>& costs, const std::vector<std::size_t>& wanted,
+         const Stretch<kModes>& stretch, const StepGrid& grid, const LineRules& rules)
       : costs_(&costs),
         begin_(stretch.begin),
         goes_on_(stretch.goes_on),
@@ -87,7 +91,7 @@ class Search {
         wanted_(&wanted),
         end_(stretch.end),
         to_go_(costs, rules, grid_.step_mm(), grid_.mm(end_)),
-        lines_(longest_ + 1, Lines(costs)),
+        lines_(longest_ + 1, Lines<kModes>(costs)),
         ending_(longest_ + 1) {
     line_worth_ = 0.5 * rules.tolerance_mm * rules.tolerance_mm * kLineWorth_s;
   }
@@ -95,7 +99,7 @@ class Search {
   Polygon run(const std::vector<double>& lines_before_s) {
     begins_s_ = lines_before_s;
     begins_s_.push_back(costs_->time_s(begin_.k));
-    State begin = begin_;
+    State<kModes> begin = begin_;
     std::size_t from = begin_.k;
     while (true) {
       const std::size_t until = from + kBlock;
@@ -106,14 +110,14 @@ class Search {
         return {};
       }
       // The best state's ancestors, the youngest last.
-      std::vector<const State*> way;
+      std::vector<const State<kModes>*> way;
       for (auto i = static_cast<std::int32_t>(*best); i >= 0;
            i = arena_[static_cast<std::size_t>(i)].parent) {
         way.push_back(&arena_[static_cast<std::size_t>(i)]);
       }
       std::ranges::reverse(way);
       std::size_t taken = 0;
-      for (const State* state : way) {
+      for (const State<kModes>* state : way) {
         if (!is_last && state->k > until) {
           break;
         }
@@ -133,7 +137,7 @@ class Search {
       if (taken < 2) {
         return {};  // one line is longer than a block
       }
-      State next = *way[taken - 1];
+      State<kModes> next = *way[taken - 1];
       next.parent = -1;
       from = next.k;
       begin = next;
@@ -176,7 +180,8 @@ class Search {
 
   // Searches the candidates from `from` to `until`. Returns the place in arena_ of the best state
   // at the end.
-  std::optional<std::size_t> block(State begin, std::size_t from, std::size_t until, bool is_last) {
+  std::optional<std::size_t> block(State<kModes> begin, std::size_t from, std::size_t until,
+                                   bool is_last) {
     if (is_last && goes_on_) {
       to_go_.compute(from, std::min(until + kBeyond, costs_->size() - 1), false);
     } else {
@@ -189,9 +194,9 @@ class Search {
     arena_.push_back(begin);
     spread(0, until);
     for (std::size_t k = from + 1; k <= until; ++k) {
-      std::vector<Lines*>& lines = ending_[k % ending_.size()];
+      std::vector<Lines<kModes>*>& lines = ending_[k % ending_.size()];
       const std::size_t first = arena_.size();
-      for (Lines* each : lines) {
+      for (Lines<kModes>* each : lines) {
         each->fan.reach(k - each->k);
         each->duration_s = each->fan.duration_s();
         each->price = price(k - each->k);
@@ -227,11 +232,11 @@ class Search {
   // Begins lines from all states in the arena from `first` on. They have the same candidate time.
   void spread(std::size_t first, std::size_t until) {
     const std::size_t k = arena_[first].k;
-    Lines& lines = lines_[k % lines_.size()];
+    Lines<kModes>& lines = lines_[k % lines_.size()];
     lines.k = k;
     lines.first = first;
     lines.count = arena_.size() - first;
-    std::array<Vector6d, kKept> z;
+    std::array<ZVector<kModes>, kKept> z;
     for (std::size_t lane = 0; lane < lines.count; ++lane) {
       z[lane] = arena_[first + lane].z;
       lines.earliest_s[lane] = earliest_end_s(first + lane);
@@ -282,15 +287,16 @@ class Search {
   }
 
   // What a line that ends at candidate k costs beyond J, at whatever place it ends.
-  [[nodiscard]] double fixed_cost(const Lines& lines, std::size_t lane, std::size_t k) const {
+  [[nodiscard]] double fixed_cost(const Lines<kModes>& lines, std::size_t lane,
+                                  std::size_t k) const {
     return lines.price + (costs_->time_s(k) < lines.earliest_s[lane] ? kTooMany : 0.0);
   }
 
   // The state after a line from another state to the place `to`.
-  [[nodiscard]] State after_line(const Lines& lines, std::size_t lane, std::size_t k,
-                                 const Place& to, double total) const {
-    const State& state = arena_[lines.first + lane];
-    State next;
+  [[nodiscard]] State<kModes> after_line(const Lines<kModes>& lines, std::size_t lane,
+                                         std::size_t k, const Place& to, double total) const {
+    const State<kModes>& state = arena_[lines.first + lane];
+    State<kModes> next;
     next.total = total;
     next.k = k;
     next.at = to;
@@ -310,21 +316,22 @@ class Search {
   }
 
   // Where the state is. The run's begin may lie between whole steps.
-  [[nodiscard]] Eigen::Vector2d start_mm(const State& state) const {
-    return costs_->base_mm(state.k) + Eigen::Vector2d(state.z[2], state.z[5]);
+  [[nodiscard]] Eigen::Vector2d start_mm(const State<kModes>& state) const {
+    return costs_->base_mm(state.k) +
+           Eigen::Vector2d(state.z[place_of_o<kModes>(0)], state.z[place_of_o<kModes>(1)]);
   }
-  [[nodiscard]] Eigen::Vector2d speed_to(const State& state, const Place& to,
+  [[nodiscard]] Eigen::Vector2d speed_to(const State<kModes>& state, const Place& to,
                                          double duration_s) const {
     return (grid_.mm(to) - start_mm(state)) / duration_s;
   }
 
   // Tries the last line, after which the machine rests or goes on with the next part.
-  void finish(const std::vector<Lines*>& all, std::size_t k) {
-    for (const Lines* lines : all) {
-      const LineFan::Choice choice = lines->fan.choice(goes_on_ ? to_go_.at(k) : to_go_.resting(k));
+  void finish(const std::vector<Lines<kModes>*>& all, std::size_t k) {
+    for (const Lines<kModes>* lines : all) {
+      const FanChoice choice = lines->fan.choice(goes_on_ ? to_go_.at(k) : to_go_.resting(k));
       const double duration_s = lines->duration_s;
       for (std::size_t lane = 0; lane < lines->count; ++lane) {
-        const State& state = arena_[lines->first + lane];
+        const State<kModes>& state = arena_[lines->first + lane];
         const Eigen::Vector2d speed = speed_to(state, end_, duration_s);
         const double total = state.spent + choice.at(lane, speed) + fixed_cost(*lines, lane, k) +
                              too_quick(speed - state.speed_mm_s, state.line_s + duration_s) +
@@ -339,9 +346,9 @@ class Search {
 
   // Tries lines that end at candidate k, the most promising ones first. Each goes to the places
   // that cost least around its best end.
-  void extend(const std::vector<Lines*>& all, std::size_t k) {
+  void extend(const std::vector<Lines<kModes>*>& all, std::size_t k) {
     options_.clear();
-    for (Lines* lines : all) {
+    for (Lines<kModes>* lines : all) {
       lines->choice = lines->fan.choice(to_go_.at(k));
       const Eigen::Vector2d per_step = grid_.step_mm() / lines->duration_s;
       lines->bowl = Bowl(lines->choice.xx * per_step[0] * per_step[0],
@@ -365,23 +372,23 @@ class Search {
                   .most = grid_.steps(most_mm.cwiseMax(base + slack))};
     // The best few set the bar; the order of the others does not matter.
     if (std::ssize(options_) > kFirst) {
-      std::ranges::nth_element(options_, options_.begin() + kFirst, {}, &Option::least);
+      std::ranges::nth_element(options_, options_.begin() + kFirst, {}, &Option<kModes>::least);
     }
     kept_.clear();
-    for (const Option& option : options_) {
+    for (const Option<kModes>& option : options_) {
       if (option.least < most_to_keep()) {
         places.from = arena_[option.lines->first + option.lane].at;
         extend(option, places);
       }
     }
-    for (const Choice& line : kept_) {
+    for (const Choice<kModes>& line : kept_) {
       arena_.push_back(after_line(*line.lines, line.lane, k, line.to, line.total));
     }
   }
 
-  void extend(const Option& option, const Places& places) {
+  void extend(const Option<kModes>& option, const Places& places) {
     const auto& [least, lines, lane] = option;
-    const State& state = arena_[lines->first + lane];
+    const State<kModes>& state = arena_[lines->first + lane];
     const double duration_s = lines->duration_s;
     const Eigen::Vector2d best =
         grid_.steps(start_mm(state) + duration_s * lines->choice.best_mm_s(lane));
@@ -397,26 +404,26 @@ class Search {
   }
 
   // Keeps the best kKept lines, one to each place, in order.
-  void keep(const Choice& line) {
+  void keep(const Choice<kModes>& line) {
     if (line.total >= most_to_keep()) {
       return;
     }
-    const auto same = std::ranges::find(kept_, line.to, &Choice::to);
+    const auto same = std::ranges::find(kept_, line.to, &Choice<kModes>::to);
     if (same != kept_.end()) {
       if (same->total <= line.total) {
         return;
       }
       kept_.erase(same);
     }
-    const auto place = std::ranges::upper_bound(kept_, line.total, {}, &Choice::total);
+    const auto place = std::ranges::upper_bound(kept_, line.total, {}, &Choice<kModes>::total);
     kept_.insert(place, line);
     if (kept_.size() > kKept) {
       kept_.pop_back();
     }
   }
 
-  const LineCosts* costs_;
-  State begin_;
+  const LineCosts<kModes>* costs_;
+  State<kModes> begin_;
   bool goes_on_;
   int lines_after_;
   StepGrid grid_;
@@ -430,24 +437,34 @@ class Search {
   Polygon polygon_;               // from the blocks before
   std::vector<double> begins_s_;  // when its lines began, and those before the run
   // For the block being searched:
-  CostToGo to_go_;
-  std::vector<State> arena_;
-  std::optional<State> finished_;
+  CostToGo<kModes> to_go_;
+  std::vector<State<kModes>> arena_;
+  std::optional<State<kModes>> finished_;
   // Rings by candidate: the lines that begin there, and those that end there.
-  std::vector<Lines> lines_;
-  std::vector<std::vector<Lines*>> ending_;
+  std::vector<Lines<kModes>> lines_;
+  std::vector<std::vector<Lines<kModes>*>> ending_;
   // For the candidate being searched:
   std::vector<std::size_t> tried_;
-  std::vector<Option> options_;
-  std::vector<Choice> kept_;
+  std::vector<Option<kModes>> options_;
+  std::vector<Choice<kModes>> kept_;
 };
 
 }  // namespace
 
-Polygon search(const LineCosts& costs, const std::vector<std::size_t>& wanted,
-               const Stretch& stretch, const StepGrid& grid, const LineRules& rules,
+template <int kModes>
+Polygon search(const LineCosts<kModes>& costs, const std::vector<std::size_t>& wanted,
+               const Stretch<kModes>& stretch, const StepGrid& grid, const LineRules& rules,
                const std::vector<double>& lines_before_s) {
-  return Search(costs, wanted, stretch, grid, rules).run(lines_before_s);
+  return Search<kModes>(costs, wanted, stretch, grid, rules).run(lines_before_s);
 }
+
+#define UNFLEX_FOR_MODES(kModes)                                                     \
+  template Polygon search(const LineCosts<kModes>&, const std::vector<std::size_t>&, \
+                          const Stretch<kModes>&, const StepGrid&, const LineRules&, \
+                          const std::vector<double>&);
+
+UNFLEX_FOR_MODES(1)
+UNFLEX_FOR_MODES(2)
+UNFLEX_FOR_MODES(3)
 
 }  // namespace unflex::emit

@@ -13,10 +13,11 @@
 namespace unflex::emit {
 
 // A line's end, with all lines before it.
+template <int kModes>
 struct State {
   double total = 0.0;  // what the state has cost and will cost
   double spent = 0.0;
-  Vector6d z = Vector6d::Zero();
+  ZVector<kModes> z = ZVector<kModes>::Zero();
   Place at{};
   Eigen::Vector2d speed_mm_s = Eigen::Vector2d::Zero();  // of the line that ends here
   double line_s = 0.0;                                   // duration of that line
@@ -25,8 +26,9 @@ struct State {
 };
 
 // What one search covers: from a state to a place.
+template <int kModes>
 struct Stretch {
-  State begin;
+  State<kModes> begin;
   std::size_t last = 0;  // the last candidate
   Place end{};
   bool goes_on = false;  // it ends in motion, at `last`
@@ -36,8 +38,9 @@ struct Stretch {
 // The lines' ends on the stretch, its own begin included. Empty if there are no such lines. The
 // lines before it began at `lines_before_s`. Only short lines lie across one of the `wanted`
 // candidates.
-[[nodiscard]] Polygon search(const LineCosts& costs, const std::vector<std::size_t>& wanted,
-                             const Stretch& stretch, const StepGrid& grid, const LineRules& rules,
-                             const std::vector<double>& lines_before_s);
+template <int kModes>
+[[nodiscard]] Polygon search(const LineCosts<kModes>& costs, const std::vector<std::size_t>& wanted,
+                             const Stretch<kModes>& stretch, const StepGrid& grid,
+                             const LineRules& rules, const std::vector<double>& lines_before_s);
 
 }  // namespace unflex::emit

@@ -187,7 +187,8 @@ class Compensator {
       static_cast<void>(nozzle_.begin_run(piece));
       job->nozzle = nozzle_.nozzle();
       const planner::PlannedMove& last = piece.moves.back();
-      nozzle_.set(piece.ends_run() ? at_rest(last.segment.end_mm) : at_end_of(last),
+      nozzle_.set(piece.ends_run() ? at_rest(last.segment.end_mm, rules_.verify.nozzle)
+                                   : at_end_of(last, rules_.verify.nozzle),
                   last.segment.end_mm);
       RunSetup setup = setup_for(rules_.setup, piece, job->nozzle, job_.settings);
       warn_if_capped(setup, piece);

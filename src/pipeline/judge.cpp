@@ -145,7 +145,7 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
     return a <= std::max((1.0 + kSampling) * b, nothing);
   };
   const double chance = chance_mm(rules.fixed);
-  const dynamics::NozzleXY as_planned = at_end_of(last);
+  const dynamics::NozzleXY as_planned = at_end_of(last, rules.nozzle);
   const double swing_before_mm = verify::apart_mm(before.end, as_planned, rules.nozzle);
   const double swing_after_mm = verify::apart_mm(after.end, as_planned, rules.nozzle);
   if (before.extruding.stats().duration_s > 0.0) {

@@ -13,11 +13,12 @@ namespace {
 // Advances the nozzle by one node period. The base's acceleration is linear between nodes; for the
 // nozzle, the mean of each half is accurate enough.
 dynamics::NozzleState after_node(const dynamics::AxisTrajectory& base, std::size_t k, double h,
-                                 const dynamics::FlexibleAxis& axis, dynamics::NozzleState state) {
+                                 const dynamics::FlexibleAxis& axis,
+                                 const dynamics::NozzleState& before) {
   const double change = base.accel_mm_s2[k + 1] - base.accel_mm_s2[k];
   const dynamics::AxisMotion middle = dynamics::between(base, k, 0.5 * h, h);
-  state = dynamics::exact_step(
-      axis, state,
+  const dynamics::NozzleState state = dynamics::exact_step(
+      axis, before,
       {base.position_mm[k], base.velocity_mm_s[k], base.accel_mm_s2[k] + 0.25 * change}, 0.5 * h);
   return dynamics::exact_step(
       axis, state, {middle.position_mm, middle.velocity_mm_s, base.accel_mm_s2[k] + 0.75 * change},
@@ -32,15 +33,15 @@ dynamics::NozzleState swing(const dynamics::FlexibleAxis& axis,
 
 }  // namespace
 
-dynamics::NozzleXY at_rest(const gcode::Position& position) {
-  return {{position[gcode::X], 0.0}, {position[gcode::Y], 0.0}};
+dynamics::NozzleXY at_rest(const gcode::Position& position, const verify::NozzleModel& model) {
+  return {model.x.riding(position[gcode::X]), model.y.riding(position[gcode::Y])};
 }
 
-dynamics::NozzleXY at_end_of(const planner::PlannedMove& move) {
+dynamics::NozzleXY at_end_of(const planner::PlannedMove& move, const verify::NozzleModel& model) {
   const gcode::Position& end = move.segment.end_mm;
   const double v = move.end_v_mm_s;
-  return {{end[gcode::X], v * move.direction[gcode::X]},
-          {end[gcode::Y], v * move.direction[gcode::Y]}};
+  return {model.x.riding(end[gcode::X], v * move.direction[gcode::X]),
+          model.y.riding(end[gcode::Y], v * move.direction[gcode::Y])};
 }
 
 // Goes phase by phase, since the acceleration changes between phases.
@@ -57,7 +58,7 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
     const gcode::Position p = move.position_mm(t);
     const double v = move.velocity_mm_s(t);
     const auto step = [&](gcode::Axis axis, const dynamics::FlexibleAxis& flexible,
-                          dynamics::NozzleState state) {
+                          const dynamics::NozzleState& state) {
       const double ratio = move.kinematic ? move.direction[axis] : 0.0;
       return dynamics::exact_step(flexible, state, {p[axis], v * ratio, phase.accel_mm_s2 * ratio},
                                   until_s - t);
@@ -99,7 +100,7 @@ double NozzleFollower::follow(const Piece& piece) {
       const planner::PlannedMove& move = piece.moves[next];
       if (!move.segment.start_known && !move.segment.start_assumed) {
         // The start is not known. All that is known is that the machine starts at rest.
-        set(at_rest(move.segment.start_mm), move.segment.start_mm);
+        set(at_rest(move.segment.start_mm, model_), move.segment.start_mm);
       }
       advance(move, 0.0, move.duration_s(), model_, driven_);
       ringing_ = {swing(model_.x, ringing_.x, move.duration_s()),
@@ -108,7 +109,8 @@ double NozzleFollower::follow(const Piece& piece) {
     }
     if (event.position_lost) {
       // Homing and macros take their time: the nozzle has come to rest.
-      set(at_rest({base_mm_[0], base_mm_[1], 0.0, 0.0}), {base_mm_[0], base_mm_[1], 0.0, 0.0});
+      const gcode::Position base_mm{base_mm_[0], base_mm_[1], 0.0, 0.0};
+      set(at_rest(base_mm, model_), base_mm);
     } else if (event.dwell_s > 0.0) {
       pause(event.dwell_s);
     }
@@ -143,38 +145,36 @@ double NozzleFollower::change(const gcode::Shaper& next, std::optional<double> p
   if (stop_s == 0.0) {
     return stop_s;
   }
-  const auto after_stop = [&](const dynamics::FlexibleAxis& axis,
-                              const dynamics::ShaperPulses& pulses,
-                              const dynamics::NozzleState& driven,
-                              const dynamics::NozzleState& ringing, double base_mm) {
-    const dynamics::NozzleState deviation{driven.position - base_mm, driven.velocity};
-    dynamics::NozzleState sum = swing(axis, ringing, stop_s);
-    const auto add = [&](double weight, double since_s) {
-      const dynamics::NozzleState part = swing(axis, deviation, std::max(0.0, since_s));
-      sum.position += weight * part.position;
-      sum.velocity += weight * part.velocity;
-    };
-    if (pulses.empty()) {
-      add(1.0, stop_s);
-    }
-    for (const dynamics::Pulse& pulse : pulses) {
-      add(pulse.weight, stop_s - pulse.time_s);
-    }
-    return sum;
-  };
-  const dynamics::NozzleXY ringing{
-      after_stop(model_.x, shaping_.x, driven_.x, ringing_.x, base_mm_[0]),
-      after_stop(model_.y, shaping_.y, driven_.y, ringing_.y, base_mm_[1])};
+  const auto after_stop =
+      [&](const dynamics::FlexibleAxis& axis, const dynamics::ShaperPulses& pulses,
+          const dynamics::NozzleState& driven, const dynamics::NozzleState& ringing,
+          const dynamics::NozzleState& rest) {
+        dynamics::NozzleState deviation = driven;
+        deviation.add(rest, -1.0);
+        dynamics::NozzleState sum = swing(axis, ringing, stop_s);
+        const auto add = [&](double weight, double since_s) {
+          sum.add(swing(axis, deviation, std::max(0.0, since_s)), weight);
+        };
+        if (pulses.empty()) {
+          add(1.0, stop_s);
+        }
+        for (const dynamics::Pulse& pulse : pulses) {
+          add(pulse.weight, stop_s - pulse.time_s);
+        }
+        return sum;
+      };
+  const dynamics::NozzleXY rest = at_rest({base_mm_[0], base_mm_[1], 0.0, 0.0}, model_);
+  const dynamics::NozzleXY ringing{after_stop(model_.x, shaping_.x, driven_.x, ringing_.x, rest.x),
+                                   after_stop(model_.y, shaping_.y, driven_.y, ringing_.y, rest.y)};
   present_ = next;
   shaping_ = planner::shaping(config_, next);
-  const dynamics::NozzleXY rest{{base_mm_[0], 0.0}, {base_mm_[1], 0.0}};
+  driven_ = rest;
   if (shaping_.acts()) {
-    driven_ = rest;
     ringing_ = ringing;
     return stop_s;
   }
-  driven_ = {{rest.x.position + ringing.x.position, ringing.x.velocity},
-             {rest.y.position + ringing.y.position, ringing.y.velocity}};
+  driven_.x.add(ringing.x);
+  driven_.y.add(ringing.y);
   ringing_ = {};
   return stop_s;
 }

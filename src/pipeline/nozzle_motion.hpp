@@ -13,10 +13,12 @@
 
 namespace unflex::pipeline {
 
-[[nodiscard]] dynamics::NozzleXY at_rest(const gcode::Position& position);
+[[nodiscard]] dynamics::NozzleXY at_rest(const gcode::Position& position,
+                                         const verify::NozzleModel& model);
 
 // A nozzle that follows the plan exactly, at the end of the move.
-[[nodiscard]] dynamics::NozzleXY at_end_of(const planner::PlannedMove& move);
+[[nodiscard]] dynamics::NozzleXY at_end_of(const planner::PlannedMove& move,
+                                           const verify::NozzleModel& model);
 
 // Takes the nozzle from one moment of the move to a later one, seconds after its start.
 void advance(const planner::PlannedMove& move, double from_s, double to_s,

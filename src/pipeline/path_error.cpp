@@ -28,8 +28,9 @@ PathError path_error(const std::vector<planner::PlannedMove>& plan, double lead_
     sliced.to(t, [](const planner::PlannedMove&, double, double) {});
     if (t > 0.0 && !sliced.at_end() && sliced.move().segment.extruding()) {
       const gcode::Position planned = sliced.position_mm();
-      const double away_mm = across_mm(sliced.move().segment, nozzle.x.position - planned[gcode::X],
-                                       nozzle.y.position - planned[gcode::Y]);
+      const double away_mm =
+          across_mm(sliced.move().segment, nozzle.x.position() - planned[gcode::X],
+                    nozzle.y.position() - planned[gcode::Y]);
       error.sum_mm2 += away_mm * away_mm;
       ++error.samples;
     }

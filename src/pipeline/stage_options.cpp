@@ -150,10 +150,7 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
 }
 
 // A swing dies away to a fiftieth in this time.
-double settling_of(const machine::AxisDynamics& dynamics) {
-  const dynamics::FlexibleAxis nozzle = axis(dynamics);
-  return 4.0 / (nozzle.zeta * nozzle.omega_rad_s);
-}
+double settling_of(const machine::AxisDynamics& dynamics) { return axis(dynamics).settling_s(); }
 
 double half_period_s(const machine::Settings& settings) {
   return 0.5 / std::min(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);

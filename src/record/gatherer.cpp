@@ -29,7 +29,7 @@ constexpr double kAtPlace = 0.05;
 constexpr std::size_t kNoPiece = std::numeric_limits<std::size_t>::max();
 
 double half_width_s(const verify::NozzleModel& model) {
-  const double slower = std::min(model.x.omega_rad_s, model.y.omega_rad_s);
+  const double slower = std::min(model.x.slowest_rad_s(), model.y.slowest_rad_s());
   return std::clamp(kPeriods * 2.0 * std::numbers::pi / slower, kShortest_s, kLongest_s);
 }
 

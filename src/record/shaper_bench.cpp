@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "unflex/dynamics/shapers.hpp"
 
@@ -26,22 +25,18 @@ constexpr int kFine = 8;
 // So many intervals lie between the last state of a machine and the last moment measured.
 constexpr double kMargin = 2.0;
 
-double frequency_hz(const dynamics::FlexibleAxis& axis) {
-  return axis.omega_rad_s / (2.0 * std::numbers::pi);
-}
-
 }  // namespace
 
 ShaperBench::ShaperBench(const verify::NozzleModel& model, std::size_t machines)
-    : interval_s_(std::clamp(
-          1.0 / (kPerPeriod * std::max(frequency_hz(model.x), frequency_hz(model.y))), 5e-4, 2e-3)),
+    : interval_s_(std::clamp(1.0 / (kPerPeriod * std::max(model.x.main_hz(), model.y.main_hz())),
+                             5e-4, 2e-3)),
       last_add_s_(machines, -1.0),
       last_(machines),
       near_(verify::reach_s(model)) {
   for (const dynamics::ShaperKind kind : dynamics::kShaperKinds) {
     Shaper shaper{std::string(dynamics::name(kind)), {}};
-    const auto x = dynamics::shaper_pulses(kind, frequency_hz(model.x), model.x.zeta);
-    const auto y = dynamics::shaper_pulses(kind, frequency_hz(model.y), model.y.zeta);
+    const auto x = dynamics::shaper_pulses(kind, model.x.main_hz(), model.x.main().zeta);
+    const auto y = dynamics::shaper_pulses(kind, model.y.main_hz(), model.y.main().zeta);
     if (x && y) {
       shaper.nozzles.assign(machines, Nozzle{rivals::ShapedNozzle(*x, *y)});
       lookahead_s_ = std::max(lookahead_s_, shaper.nozzles.front().shaped.lookahead_s());
@@ -50,12 +45,13 @@ ShaperBench::ShaperBench(const verify::NozzleModel& model, std::size_t machines)
   }
 }
 
-void ShaperBench::add(std::size_t machine, double time_s, const dynamics::NozzleXY& unshaped) {
+void ShaperBench::add(std::size_t machine, double time_s,
+                      const dynamics::NozzleMotionXY& unshaped) {
   const double last_s = last_add_s_[machine];
   if (time_s - last_s < interval_s_) {
     return;
   }
-  const auto add = [&](double at_s, const dynamics::NozzleXY& nozzle) {
+  const auto add = [&](double at_s, const dynamics::NozzleMotionXY& nozzle) {
     for (Shaper& shaper : shapers_) {
       if (!shaper.nozzles.empty()) {
         shaper.nozzles[machine].shaped.add(at_s, nozzle);
@@ -64,7 +60,7 @@ void ShaperBench::add(std::size_t machine, double time_s, const dynamics::Nozzle
   };
   if (last_s >= 0.0 && time_s - last_s > kGap * interval_s_) {
     // Two states at rest, so that no cubic spans the whole rest.
-    const dynamics::NozzleXY& last = last_[machine];
+    const dynamics::NozzleMotionXY& last = last_[machine];
     add(last_s + interval_s_, {{last.x.position, 0.0}, {last.y.position, 0.0}});
     add(time_s - interval_s_, {{unshaped.x.position, 0.0}, {unshaped.y.position, 0.0}});
   }
@@ -145,7 +141,7 @@ void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
 // Without `counts` the nozzle is only let to forget what is past.
 double ShaperBench::squared_contour_error(Nozzle& nozzle, const verify::ReferencePath& path,
                                           double time_s, bool counts) {
-  const dynamics::NozzleXY state = nozzle.shaped.at(time_s);
+  const dynamics::NozzleMotionXY state = nozzle.shaped.at(time_s);
   std::size_t nearest = 0;
   return counts ? near_.squared_contour_error(path, state.x.position, state.y.position, nearest)
                 : 0.0;

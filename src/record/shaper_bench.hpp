@@ -22,7 +22,7 @@ class ShaperBench {
   ShaperBench(const verify::NozzleModel& model, std::size_t machines);
 
   // The state of a machine's nozzle without a shaper. Times must increase.
-  void add(std::size_t machine, double time_s, const dynamics::NozzleXY& unshaped);
+  void add(std::size_t machine, double time_s, const dynamics::NozzleMotionXY& unshaped);
   // All machines have come to this time of the path.
   void advance(const verify::ReferencePath& path, double time_s);
   // For how long a piece of the path is needed after its time, s.
@@ -51,7 +51,7 @@ class ShaperBench {
   double lookahead_s_ = 0.0;
   std::vector<Shaper> shapers_;
   std::vector<double> last_add_s_;  // per machine
-  std::vector<dynamics::NozzleXY> last_;
+  std::vector<dynamics::NozzleMotionXY> last_;
   verify::NearPath near_;
   bool begun_ = false;
   std::size_t piece_ = 0;  // piece of the path at next_s_

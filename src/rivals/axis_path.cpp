@@ -96,7 +96,7 @@ AxisPath through_nodes(const dynamics::AxisTrajectory& nodes, double start_s, do
   return path;
 }
 
-dynamics::NozzleState PathCursor::at(double t) {
+dynamics::NozzleMotion PathCursor::at(double t) {
   const dynamics::BaseSegment motion = motion_at(*path_, index_, t);
   return {motion.position, motion.velocity};
 }
@@ -116,7 +116,7 @@ NozzleWalk::NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path,
     : axis_(axis),
       path_(&path),
       now_s_(start_s),
-      nozzle_{path.front().motion.position, 0.0},
+      nozzle_(axis.riding(path.front().motion.position)),
       map_(axis, 0.0) {}
 
 void NozzleWalk::step(const dynamics::BaseSegment& base, double h) {

@@ -65,9 +65,8 @@ AxisPath basis_path(const BasisTable& table, double knot_s) {
 // φ at the samples, as far as it matters, and at most `longest` of them.
 std::vector<double> filtered_basis(const BasisTable& table, const dynamics::FlexibleAxis& axis,
                                    double knot_s, std::size_t longest) {
-  const double rate =
-      axis.zeta < 1.0 ? axis.zeta * axis.omega_rad_s : 0.5 * axis.omega_rad_s / axis.zeta;
-  const double memory_s = kSupport * knot_s - std::log(kForgotten) / std::max(rate, 1e-9);
+  const double memory_s =
+      kSupport * knot_s - std::log(kForgotten) / std::max(axis.decay_per_s(), 1e-9);
   const double samples = std::ceil(kSamples * memory_s / knot_s);
   TimeGrid grid{0.0, knot_s / kSamples, longest};
   if (samples < static_cast<double>(longest)) {
@@ -75,7 +74,7 @@ std::vector<double> filtered_basis(const BasisTable& table, const dynamics::Flex
   }
   std::vector<double> result;
   for (const dynamics::NozzleState& state : nozzle_on(axis, basis_path(table, knot_s), grid)) {
-    result.push_back(state.position);
+    result.push_back(state.position());
   }
   return result;
 }

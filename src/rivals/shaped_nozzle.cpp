@@ -7,8 +7,8 @@ namespace unflex::rivals {
 namespace {
 
 // Cubic through position and velocity at both ends of an interval of length h, at fraction u.
-dynamics::NozzleState hermite(const dynamics::NozzleState& a, const dynamics::NozzleState& b,
-                              double h, double u) {
+dynamics::NozzleMotion hermite(const dynamics::NozzleMotion& a, const dynamics::NozzleMotion& b,
+                               double h, double u) {
   const double rise = b.position - a.position;
   const double from = a.velocity * h;
   const double to = b.velocity * h;
@@ -33,7 +33,7 @@ ShapedNozzle::ShapedNozzle(const dynamics::ShaperPulses& x, const dynamics::Shap
   set(y_, y);
 }
 
-void ShapedNozzle::add(double time_s, const dynamics::NozzleXY& unshaped) {
+void ShapedNozzle::add(double time_s, const dynamics::NozzleMotionXY& unshaped) {
   samples_.push_back({time_s, unshaped});
 }
 
@@ -42,10 +42,10 @@ double ShapedNozzle::known_until_s() const {
                           : samples_.back().time_s - lookahead_s_;
 }
 
-dynamics::NozzleState ShapedNozzle::sum(std::vector<Tap>& taps,
-                                        dynamics::NozzleState dynamics::NozzleXY::*axis,
-                                        double time_s) {
-  dynamics::NozzleState result;
+dynamics::NozzleMotion ShapedNozzle::sum(std::vector<Tap>& taps,
+                                         dynamics::NozzleMotion dynamics::NozzleMotionXY::*axis,
+                                         double time_s) {
+  dynamics::NozzleMotion result;
   for (Tap& tap : taps) {
     const double t = time_s - tap.pulse.time_s;
     std::size_t i = std::max(tap.index, forgotten_) - forgotten_;
@@ -54,7 +54,7 @@ dynamics::NozzleState ShapedNozzle::sum(std::vector<Tap>& taps,
     }
     tap.index = i + forgotten_;
     const Sample& from = samples_[i];
-    dynamics::NozzleState delayed{(from.nozzle.*axis).position, 0.0};
+    dynamics::NozzleMotion delayed{(from.nozzle.*axis).position, 0.0};
     if (t >= from.time_s && i + 1 < samples_.size()) {
       const Sample& to = samples_[i + 1];
       const double h = to.time_s - from.time_s;
@@ -73,9 +73,9 @@ void ShapedNozzle::forget_before(double time_s) {
   }
 }
 
-dynamics::NozzleXY ShapedNozzle::at(double time_s) {
-  const dynamics::NozzleXY result{sum(x_, &dynamics::NozzleXY::x, time_s),
-                                  sum(y_, &dynamics::NozzleXY::y, time_s)};
+dynamics::NozzleMotionXY ShapedNozzle::at(double time_s) {
+  const dynamics::NozzleMotionXY result{sum(x_, &dynamics::NozzleMotionXY::x, time_s),
+                                        sum(y_, &dynamics::NozzleMotionXY::y, time_s)};
   forget_before(time_s - memory_s_);
   return result;
 }

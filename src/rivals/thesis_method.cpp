@@ -21,7 +21,7 @@ Form unit(FormPart part) { return Form::Unit(part); }
 
 struct Nodes {
   double h;
-  std::vector<dynamics::NozzleState> nozzle;
+  std::vector<dynamics::NozzleMotion> nozzle;
 
   [[nodiscard]] std::size_t count() const { return nozzle.size(); }
 };
@@ -43,11 +43,11 @@ struct Defects {
 
 // The defects of the interval that begins at node k.
 Defects defects(const Nodes& nodes, const dynamics::FlexibleAxis& axis, std::size_t k) {
-  const dynamics::NozzleState& p1 = nodes.nozzle[k];
-  const dynamics::NozzleState& p2 = nodes.nozzle[k + 1];
+  const dynamics::NozzleMotion& p1 = nodes.nozzle[k];
+  const dynamics::NozzleMotion& p2 = nodes.nozzle[k + 1];
   const double h = nodes.h;
-  const double stiffness = axis.omega_rad_s * axis.omega_rad_s;
-  const double damping = 2.0 * axis.zeta * axis.omega_rad_s;
+  const double stiffness = axis.main().stiffness_per_s2();
+  const double damping = axis.main().damping_per_s();
   const Form one = unit(kConstant);
   const Form base1 = unit(kBase);
   const Form base2 = base1 + 0.5 * h * (unit(kNow) + unit(kNext));

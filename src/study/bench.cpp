@@ -15,12 +15,7 @@ constexpr double kReachRoom_s = 0.02;
 
 double reach_s(const compensate::Setup& setup) {
   return kReachRoom_s +
-         std::numbers::pi / std::min(setup.x.axis.omega_rad_s, setup.y.axis.omega_rad_s);
-}
-
-dynamics::FlexibleAxis off_by(dynamics::FlexibleAxis axis, double error) {
-  axis.omega_rad_s *= 1.0 + error;
-  return axis;
+         std::numbers::pi / std::min(setup.x.axis.slowest_rad_s(), setup.y.axis.slowest_rad_s());
 }
 
 double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan) {
@@ -45,8 +40,8 @@ Trace trace_of(const BaseMotion& base, const std::vector<planner::PlannedMove>& 
   for (std::size_t k = 0; k < trace.grid.count; ++k) {
     const double t = trace.grid.at(k);
     trace.base.push_back({base_x.at(t), base_y.at(t)});
-    trace.nozzle.push_back({x.at(t), y.at(t)});
-    const dynamics::NozzleXY& nozzle = trace.nozzle.back();
+    trace.nozzle.push_back({x.at(t).motion(), y.at(t).motion()});
+    const dynamics::NozzleMotionXY& nozzle = trace.nozzle.back();
     trace.error_mm.push_back(gauge.measure(t, nozzle.x.position, nozzle.y.position).distance_mm);
   }
   return trace;
@@ -99,13 +94,13 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
   const rivals::TimeGrid grid{
       -before * setup.step_s, setup.step_s,
       static_cast<std::size_t>(before + std::ceil(end_s / setup.step_s - 1e-6)) + 1};
-  rivals::NozzleWalk x(off_by(setup.unflex.x.axis, frequency_error), base.x, grid.start_s);
-  rivals::NozzleWalk y(off_by(setup.unflex.y.axis, frequency_error), base.y, grid.start_s);
+  rivals::NozzleWalk x(setup.unflex.x.axis.detuned(1.0 + frequency_error), base.x, grid.start_s);
+  rivals::NozzleWalk y(setup.unflex.y.axis.detuned(1.0 + frequency_error), base.y, grid.start_s);
   ContourGauge gauge(plan, reach_s(setup.unflex));
   Straying result;
   for (std::size_t k = 0; k < grid.count; ++k) {
     const double t = grid.at(k);
-    const auto reading = gauge.measure(t, x.at(t).position, y.at(t).position);
+    const auto reading = gauge.measure(t, x.at(t).position(), y.at(t).position());
     if (t > plan_end_s) {
       result.after_max_mm = std::max(result.after_max_mm, reading.distance_mm);
     } else if (t >= 0.0 && reading.extruding) {

@@ -73,8 +73,9 @@ compensate::RunWindow window_of(const Run& run, const BenchSetup& bench, double 
   setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   const std::size_t nodes = compensate::node_grid(run.plan, setup).count;
   const gcode::Position& start = run.plan.front().segment.start_mm;
-  return compensate::windows(run.plan, {{0, nodes - 1, 0, nodes - 1}},
-                             {{start[gcode::X], 0.0}, {start[gcode::Y], 0.0}}, setup)
+  return compensate::windows(
+             run.plan, {{0, nodes - 1, 0, nodes - 1}},
+             {setup.x.axis.riding(start[gcode::X]), setup.y.axis.riding(start[gcode::Y])}, setup)
       .front();
 }
 

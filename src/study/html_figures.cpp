@@ -26,7 +26,7 @@ struct Track {
   Stroke stroke;
   double width_px;
   const rivals::TimeGrid* grid;
-  const std::vector<dynamics::NozzleXY>* states;
+  const std::vector<dynamics::NozzleMotionXY>* states;
 };
 
 std::vector<Track> tracks(const CaseResult& result, const MethodResult& method) {
@@ -52,7 +52,7 @@ Plot in_the_plane(const std::vector<Track>& list, std::string title) {
   Plot plot{.title = std::move(title), .x_label = "x, mm", .y_label = "y, mm", .equal_scale = true};
   for (const Track& track : list) {
     PlotCurve curve = curve_of(track);
-    for (const dynamics::NozzleXY& at : *track.states) {
+    for (const dynamics::NozzleMotionXY& at : *track.states) {
       curve.points.push_back({at.x.position, at.y.position});
     }
     plot.curves.push_back(std::move(curve));
@@ -61,11 +61,11 @@ Plot in_the_plane(const std::vector<Track>& list, std::string title) {
 }
 
 // A quantity of both axes of every track over time, minus its value in `from`.
-Plot over_time(const std::vector<Track>& list, double dynamics::NozzleState::*quantity,
-               const dynamics::NozzleXY& from, std::string title, std::string label) {
+Plot over_time(const std::vector<Track>& list, double dynamics::NozzleMotion::*quantity,
+               const dynamics::NozzleMotionXY& from, std::string title, std::string label) {
   Plot plot{.title = std::move(title), .x_label = "t, ms", .y_label = std::move(label)};
   for (const Track& track : list) {
-    for (const auto axis : {&dynamics::NozzleXY::x, &dynamics::NozzleXY::y}) {
+    for (const auto axis : {&dynamics::NozzleMotionXY::x, &dynamics::NozzleMotionXY::y}) {
       PlotCurve curve = curve_of(track);
       for (std::size_t k = 0; k < track.states->size(); ++k) {
         curve.points.push_back(
@@ -102,7 +102,7 @@ std::string figures(const CaseResult& result, const MethodResult& method) {
       kLeastZoom_mm);
 
   // Displacements are relative to the start of the plan.
-  const dynamics::NozzleXY& start = list.front().states->front();
+  const dynamics::NozzleMotionXY& start = list.front().states->front();
 
   const Plot plane = in_the_plane(list, fmt::format("Path in the plane, {}", of));
   Plot corner = in_the_plane(list, fmt::format("Zoomed in, {}", of));
@@ -112,10 +112,10 @@ std::string figures(const CaseResult& result, const MethodResult& method) {
   html += figure("Path in the plane", plane);
   html += figure("Zoomed in where it matters", corner);
   html += figure("Displacement, x then y",
-                 over_time(list, &dynamics::NozzleState::position, start,
+                 over_time(list, &dynamics::NozzleMotion::position, start,
                            fmt::format("Displacement over time, {}", of), "mm"));
   html +=
-      figure("Velocity, x then y", over_time(list, &dynamics::NozzleState::velocity, {},
+      figure("Velocity, x then y", over_time(list, &dynamics::NozzleMotion::velocity, {},
                                              fmt::format("Velocity over time, {}", of), "mm/s"));
   html += figure("Distance of the nozzle from the path",
                  error_over_time(method, fmt::format("Contour error over time, {}", of)));

@@ -30,14 +30,14 @@ struct BuiltShaper {
 };
 
 Result<BuiltShaper> build(dynamics::ShaperKind kind, const dynamics::FlexibleAxis& axis) {
-  if (axis.zeta >= 1.0) {
+  const double damping_ratio = axis.main().zeta;
+  if (damping_ratio >= 1.0) {
     return fail(ErrorKind::input, "undefined at ζ = 1: without vibration there is no period");
   }
   const double most = dynamics::max_damping_ratio(kind);
-  const double zeta = std::min(axis.zeta, most);
-  const double freq_hz = axis.omega_rad_s / (2.0 * std::numbers::pi);
-  BuiltShaper built{*dynamics::shaper_pulses(kind, freq_hz, zeta), {}};
-  if (zeta < axis.zeta) {
+  const double zeta = std::min(damping_ratio, most);
+  BuiltShaper built{*dynamics::shaper_pulses(kind, axis.main_hz(), zeta), {}};
+  if (zeta < damping_ratio) {
     built.remark = fmt::format("built for ζ = {}, the most it is defined for", most);
   }
   return built;
@@ -65,7 +65,7 @@ BaseMotion both_axes(const Moves& plan, const compensate::Setup& setup, const Ma
 }
 
 rivals::AxisPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
-  const double knot_s = 2.0 * std::numbers::pi / axis.omega_rad_s / kKnotsPerPeriod;
+  const double knot_s = 2.0 * std::numbers::pi / axis.main().omega_rad_s / kKnotsPerPeriod;
   return rivals::filtered_spline(reference, axis,
                                  {knot_s, kSplineEndKnots * knot_s, kSplineEndKnots * knot_s});
 }
@@ -78,7 +78,8 @@ Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSe
   const compensate::NodeGrid grid = compensate::node_grid(plan, setup);
   const auto spans = compensate::mesh(plan, grid, setup);
   const gcode::Position& start = plan.front().segment.start_mm;
-  const dynamics::NozzleXY nozzle{{start[gcode::X], 0.0}, {start[gcode::Y], 0.0}};
+  const dynamics::NozzleXY nozzle{setup.x.axis.riding(start[gcode::X]),
+                                  setup.y.axis.riding(start[gcode::Y])};
   std::vector<dynamics::AxisTrajectory> x;
   std::vector<dynamics::AxisTrajectory> y;
   BaseMotion result;

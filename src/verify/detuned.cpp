@@ -14,8 +14,8 @@ std::vector<NozzleModel> detuned(const NozzleModel& model) {
   std::vector<NozzleModel> result;
   for (const double error : kFrequencyErrors) {
     NozzleModel other = model;
-    other.x.omega_rad_s *= 1.0 + error;
-    other.y.omega_rad_s *= 1.0 + error;
+    other.x = model.x.detuned(1.0 + error);
+    other.y = model.y.detuned(1.0 + error);
     other.step_s = std::max(model.step_s, kCoarseStep_s);
     result.push_back(other);
   }

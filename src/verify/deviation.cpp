@@ -26,20 +26,20 @@ DeviationStats DeviationAccumulator::stats() const {
 
 NozzleModel coarse(NozzleModel model) {
   constexpr double kSamplesPerPeriod = 40.0;
-  const double fastest_rad_s = std::max(model.x.omega_rad_s, model.y.omega_rad_s);
+  const double fastest_rad_s = std::max(model.x.fastest_rad_s(), model.y.fastest_rad_s());
   model.step_s =
       std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));
   return model;
 }
 
 double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model) {
-  return std::hypot(
-      a.x.position - b.x.position, (a.x.velocity - b.x.velocity) / model.x.omega_rad_s,
-      std::hypot(a.y.position - b.y.position, (a.y.velocity - b.y.velocity) / model.y.omega_rad_s));
+  const dynamics::FlexibleAxis::Gap x = model.x.gap(a.x, b.x);
+  const dynamics::FlexibleAxis::Gap y = model.y.gap(a.y, b.y);
+  return std::hypot(x.place_mm, x.speed_mm, std::hypot(y.place_mm, y.speed_mm));
 }
 
 double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleModel& model) {
-  return apart_mm(nozzle, {{at[gcode::X], 0.0}, {at[gcode::Y], 0.0}}, model);
+  return apart_mm(nozzle, {model.x.riding(at[gcode::X]), model.y.riding(at[gcode::Y])}, model);
 }
 
 RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration_s, double swing_mm,
@@ -49,10 +49,9 @@ RunError run_error(double contour2_mm2_s, double contour_max_mm, double duration
   }
   // A lower limit, because an undamped swing would count for ever.
   static constexpr double kLeastDamping = 0.01;
-  const auto ringing_s = [](const dynamics::FlexibleAxis& axis) {
-    return 1.0 / (4.0 * std::max(axis.zeta, kLeastDamping) * axis.omega_rad_s);
-  };
-  const double left_mm2_s = swing_mm * swing_mm * std::max(ringing_s(model.x), ringing_s(model.y));
+  const double left_mm2_s =
+      swing_mm * swing_mm *
+      std::max(model.x.ringing_s(kLeastDamping), model.y.ringing_s(kLeastDamping));
   return {std::sqrt((contour2_mm2_s + left_mm2_s) / duration_s),
           std::max(contour_max_mm, swing_mm)};
 }
@@ -72,7 +71,7 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
   Meter meter(model);
   meter.begin_section(path);
   if (base.empty() && reference.empty()) {
-    meter.set_state(start, start.x.position, start.y.position);
+    meter.set_state(start, start.x.position(), start.y.position());
   } else {
     const planner::PlannedMove& first = base.empty() ? reference.front() : base.front();
     meter.set_state(start, first.segment.start_mm[gcode::X], first.segment.start_mm[gcode::Y]);

@@ -15,26 +15,22 @@ constexpr double kLagMemory_s = 0.1;
 constexpr double kLagLeastMemory_s = 0.05;
 constexpr double kLagLeastSpeed_mm_s = 5.0;
 
-dynamics::NozzleState shifted(dynamics::NozzleState state, double by) {
-  state.position += by;
-  return state;
-}
-
 // In a long cruise we look so often whether the nozzle has come to rest on the base.
 constexpr double kLook_s = 1.0;
-// Below these it has. What is left, less than an atom, is dropped, and samples may be this many
+// Below this it has. What is left, less than an atom, is dropped, and samples may be this many
 // times further apart, since nothing but the place changes any more.
 constexpr double kRests_mm = 1e-7;
-constexpr double kRests_mm_s = 1e-5;
 constexpr double kSparser = 32.0;
 
 bool is_cruise(const BasePhase& phase) {
   return phase.x.acceleration == 0.0 && phase.y.acceleration == 0.0;
 }
 
-bool rests_on(const dynamics::NozzleState& nozzle, const dynamics::BaseSegment& base) {
-  return std::abs(nozzle.position - base.position) < kRests_mm &&
-         std::abs(nozzle.velocity - base.velocity) < kRests_mm_s;
+bool rests_on(const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
+              const dynamics::BaseSegment& base) {
+  const dynamics::FlexibleAxis::Gap gap =
+      axis.gap(nozzle, axis.riding(base.position, base.velocity));
+  return std::max(gap.place_mm, gap.speed_mm) < kRests_mm;
 }
 
 // The state of the base h seconds later.
@@ -122,8 +118,8 @@ void Meter::follow_lag(bool on) {
 }
 
 void Meter::shift_to(double x_mm, double y_mm) {
-  nozzle_.x = shifted(nozzle_.x, x_mm - base_x_mm_);
-  nozzle_.y = shifted(nozzle_.y, y_mm - base_y_mm_);
+  nozzle_.x.add(model_.x.riding(x_mm - base_x_mm_));
+  nozzle_.y.add(model_.y.riding(y_mm - base_y_mm_));
   base_x_mm_ = x_mm;
   base_y_mm_ = y_mm;
 }
@@ -197,12 +193,13 @@ double Meter::next_reference_change() {
 void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   // For fewer steps it does not pay to set up maps.
   constexpr double kManySteps = 8.0;
-  if (is_cruise(phase) && rests_on(nozzle_.x, phase.x) && rests_on(nozzle_.y, phase.y)) {
+  if (is_cruise(phase) && rests_on(model_.x, nozzle_.x, phase.x) &&
+      rests_on(model_.y, nozzle_.y, phase.y)) {
     const double few = std::ceil(duration_s / (kSparser * model_.step_s) - 1e-9);
     const double h = duration_s / std::max(1.0, few);
     integrate(phase, std::max(1.0, few), h, measured, [&] {
-      nozzle_.x = {phase.x.position + h * phase.x.velocity, phase.x.velocity};
-      nozzle_.y = {phase.y.position + h * phase.y.velocity, phase.y.velocity};
+      nozzle_.x = model_.x.riding(phase.x.position + h * phase.x.velocity, phase.x.velocity);
+      nozzle_.y = model_.y.riding(phase.y.position + h * phase.y.velocity, phase.y.velocity);
     });
     return;
   }
@@ -286,13 +283,13 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
 
 // laying: filament is laid by what is played now.
 Meter::Sample Meter::sample(const ReferencePhase& reference, bool laying, double h) {
-  const double error_x = reference.x.position - nozzle_.x.position;
-  const double error_y = reference.y.position - nozzle_.y.position;
+  const double error_x = reference.x.position - nozzle_.x.position();
+  const double error_y = reference.y.position - nozzle_.y.position();
 
   near_.slide(*path_, time_s_);
   std::size_t nearest = current_;
   const double contour2 =
-      near_.squared_contour_error(*path_, nozzle_.x.position, nozzle_.y.position, nearest);
+      near_.squared_contour_error(*path_, nozzle_.x.position(), nozzle_.y.position(), nearest);
   const double tracking2 = error_x * error_x + error_y * error_y;
   const std::size_t line = (*path_)[nearest].move.segment.line;
   all_.add(contour2, tracking2, h, line);
@@ -319,11 +316,11 @@ Meter::Sample Meter::sample_at_rest(double h) {
   near_.slide(*path_, std::clamp(time_s_, begin_s, (*path_)[piece].end_s));
   std::size_t nearest = piece;
   const double contour2 =
-      near_.squared_contour_error(*path_, nozzle_.x.position, nozzle_.y.position, nearest);
+      near_.squared_contour_error(*path_, nozzle_.x.position(), nozzle_.y.position(), nearest);
   const gcode::Segment& segment = (*path_)[piece].move.segment;
   const gcode::Position& at = before ? segment.start_mm : segment.end_mm;
-  const double error_x = at[gcode::X] - nozzle_.x.position;
-  const double error_y = at[gcode::Y] - nozzle_.y.position;
+  const double error_x = at[gcode::X] - nozzle_.x.position();
+  const double error_y = at[gcode::Y] - nozzle_.y.position();
   const std::size_t line = (*path_)[nearest].move.segment.line;
   extruding_.add(contour2, error_x * error_x + error_y * error_y, h, line);
   section_error_.add(contour2, h, line);
@@ -332,7 +329,7 @@ Meter::Sample Meter::sample_at_rest(double h) {
 
 void Meter::measure_filament(const ReferencePhase& reference, double laid_mm, double h) {
   filament_lag_.add(*path_, current_, reference.x.position, reference.y.position,
-                    nozzle_.x.position, nozzle_.y.position, laid_mm, h);
+                    nozzle_.x.position(), nozzle_.y.position(), laid_mm, h);
 }
 
 void Meter::tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
@@ -340,7 +337,7 @@ void Meter::tell(const BasePhase& phase, double h, bool measured, const Referenc
   NozzleStep step;
   step.time_s = time_s_;
   step.h_s = h;
-  step.nozzle = nozzle_;
+  step.nozzle = nozzle_.motion();
   step.base_x = phase.x;
   step.base_y = phase.y;
   step.extruding = phase.extruding;

@@ -13,7 +13,8 @@ constexpr double kClockReach_s = 0.02;
 }  // namespace
 
 double reach_s(const NozzleModel& model) {
-  return kClockReach_s + std::numbers::pi / std::min(model.x.omega_rad_s, model.y.omega_rad_s);
+  return kClockReach_s +
+         std::numbers::pi / std::min(model.x.slowest_rad_s(), model.y.slowest_rad_s());
 }
 
 void NearPath::begin(const ReferencePath& path) {

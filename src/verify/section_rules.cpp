@@ -29,11 +29,8 @@ double speed_mm_s(const planner::PlannedMove& move) {
 
 // How far the base may be from the path at a speed.
 double largest_offset_mm(const Rules& rules, double max_accel_mm_s2, double v_mm_s) {
-  const auto of_axis = [&](const dynamics::FlexibleAxis& axis) {
-    const double omega = axis.omega_rad_s;
-    return max_accel_mm_s2 / (omega * omega) + 2.0 * axis.zeta / omega * v_mm_s;
-  };
-  return kRounding_mm + std::hypot(of_axis(rules.nozzle.x), of_axis(rules.nozzle.y));
+  return kRounding_mm + std::hypot(rules.nozzle.x.largest_lag_mm(max_accel_mm_s2, v_mm_s),
+                                   rules.nozzle.y.largest_lag_mm(max_accel_mm_s2, v_mm_s));
 }
 
 }  // namespace

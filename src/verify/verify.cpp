@@ -20,7 +20,7 @@ constexpr double kLate_s = 5e-4;
 constexpr double kRingsFor_s = 1.0;
 
 double place_tolerance_mm(const Rules& rules, double base_max_accel_mm_s2) {
-  const double omega = std::min(rules.nozzle.x.omega_rad_s, rules.nozzle.y.omega_rad_s);
+  const double omega = std::min(rules.nozzle.x.slowest_rad_s(), rules.nozzle.y.slowest_rad_s());
   return std::max(kLeastPlaceTolerance_mm, base_max_accel_mm_s2 / (omega * omega)) +
          0.5 * rules.base_max_velocity_mm_s / rules.max_lines_per_s;
 }

@@ -92,7 +92,8 @@ class BadInput : public ProgramTest, public ::testing::WithParamInterface<Bad> {
  protected:
   static std::vector<std::string> with_options(std::vector<std::string> arguments,
                                                const std::string& firmware) {
-    std::vector<std::string> options = {"--quiet", "--set", "printer.firmware=" + firmware};
+    std::vector<std::string> options = {"--quiet", "--set", "printer.firmware=" + firmware, "--set",
+                                        "kinematics.type=cartesian"};
     // A known travel prevents the warning about an unknown one.
     if (GetParam().travel) {
       options.insert(options.end(), {"--set", "printer.travel_x_mm=[0, 250]", "--set",

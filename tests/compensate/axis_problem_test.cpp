@@ -77,8 +77,8 @@ TEST(AxisProblem, IsTheOscillatorOnItsBase) {
     }
     collocation::StateVector f(4);
     problem.dynamics(0.0, z, f);
-    const double omega = window.axis.omega_rad_s;
-    const double accel = 2.0 * window.axis.zeta * omega * (physical[3] - physical[1]) +
+    const double omega = window.axis.main().omega_rad_s;
+    const double accel = 2.0 * window.axis.main().zeta * omega * (physical[3] - physical[1]) +
                          omega * omega * (physical[2] - physical[0]);
     const double h = window.period_s;
     const double scale = kLengthUnitMm / h;
@@ -184,7 +184,7 @@ TEST(AxisProblem, ItsSolutionIsWhatTheNozzleDoes) {
   // Compares the nozzle's states in the program with the exact response to the base's motion.
   const auto moves = testing::plan({{0.0, 0.0}, {10.0, 0.0}, {4.0, 3.0}, {4.0, 9.0}},
                                    testing::planner_limits(100.0, 5000.0, 5.0));
-  for (const dynamics::FlexibleAxis axis :
+  for (const dynamics::FlexibleAxis& axis :
        {dynamics::FlexibleAxis{}, dynamics::FlexibleAxis{100.0, 0.5}}) {
     const AxisWindow window = testing::x_window(moves, testing::setup_for(axis, 2e4));
     const AxisProblem problem(window, {.accel = true});
@@ -207,8 +207,8 @@ TEST(AxisProblem, ItsSolutionIsWhatTheNozzleDoes) {
     double worst_mm_s = 0.0;
     for (std::size_t k = 0; k < window.nodes(); ++k) {
       const dynamics::NozzleState& exact = played[k * testing::kSubsteps];
-      worst_mm = std::max(worst_mm, std::abs(nozzle[k].position - exact.position));
-      worst_mm_s = std::max(worst_mm_s, std::abs(nozzle[k].velocity - exact.velocity));
+      worst_mm = std::max(worst_mm, std::abs(nozzle[k].position() - exact.position()));
+      worst_mm_s = std::max(worst_mm_s, std::abs(nozzle[k].velocity() - exact.velocity()));
     }
     EXPECT_LT(worst_mm, 1e-5);
     EXPECT_LT(worst_mm_s, 1e-2);

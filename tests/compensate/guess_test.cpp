@@ -43,7 +43,7 @@ TEST(Guess, IsWhereTheProgramStarts) {
   collocation::PointVector z(5);
   problem.guess(17, 17.0, z);
   EXPECT_NEAR(problem.to_physical(AxisProblem::kNozzle, z(AxisProblem::kNozzle)),
-              window.guess->nozzle[17].position, 1e-12);
+              window.guess->nozzle[17].position(), 1e-12);
   EXPECT_NEAR(problem.to_physical(AxisProblem::kBase, z(AxisProblem::kBase)),
               solution.base.position_mm[17], 1e-12);
   EXPECT_NEAR(problem.to_physical(AxisProblem::kBaseAccel, z(AxisProblem::kBaseAccel)),

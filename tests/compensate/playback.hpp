@@ -61,7 +61,7 @@ inline Setup setup_for(const dynamics::FlexibleAxis& axis, double base_accel) {
   Setup setup;
   setup.x.axis = setup.y.axis = axis;
   setup.x.limits.max_accel_mm_s2 = setup.y.limits.max_accel_mm_s2 = base_accel;
-  setup.tail_s = std::max(8.0 * axis.zeta / axis.omega_rad_s, 2e-3);
+  setup.tail_s = std::max(8.0 * axis.main().zeta / axis.main().omega_rad_s, 2e-3);
   return setup;
 }
 
@@ -105,7 +105,7 @@ inline double replayed_objective(const AxisWindow& window, const dynamics::AxisT
   double sum = 0.0;
   for (std::size_t k = 0; k + 1 < window.nodes(); ++k) {
     const auto cost = [&](std::size_t half) {
-      const double error = p[half * (kSubsteps / 2)].position - window.reference_mm[half];
+      const double error = p[half * (kSubsteps / 2)].position() - window.reference_mm[half];
       return window.weight[half] * error * error;
     };
     sum += h / 6.0 * (cost(2 * k) + 4.0 * cost(2 * k + 1) + cost(2 * k + 2));

@@ -201,9 +201,9 @@ TEST(Windows, OfACutRunAreSlicesOfTheWhole) {
     EXPECT_EQ(parts[i].x.start.has_value(), i == 0);
     EXPECT_EQ(parts[i].x.end_base_mm.has_value(), i + 1 == parts.size());
   }
-  EXPECT_EQ(parts[0].x.start->nozzle.position, nozzle.x.position);
-  EXPECT_EQ(parts[0].x.start->nozzle.velocity, 2.0);
-  EXPECT_EQ(parts[0].y.start->nozzle.velocity, -1.0);
+  EXPECT_EQ(parts[0].x.start->nozzle.position(), nozzle.x.position());
+  EXPECT_EQ(parts[0].x.start->nozzle.velocity(), 2.0);
+  EXPECT_EQ(parts[0].y.start->nozzle.velocity(), -1.0);
   EXPECT_EQ(parts[0].x.start->base_mm, moves.front().segment.start_mm[gcode::X]);
   EXPECT_NEAR(*parts.back().y.end_base_mm, moves.back().segment.end_mm[gcode::Y], 1e-12);
 }
@@ -223,8 +223,9 @@ TEST(Windows, WidenTheTravelToThePathAndNoFurther) {
   EXPECT_NEAR(run.y.limits.min_position_mm, 20.0, 1e-12);
   EXPECT_EQ(run.y.limits.max_position_mm, 40.0);
   EXPECT_EQ(run.x.limits.max_accel_mm_s2, 2e4);
-  EXPECT_DOUBLE_EQ(run.x.jerk_weight,
-                   setup.jerk_weight * std::pow(setup.x.axis.omega_rad_s * setup.period_s, 4));
+  EXPECT_DOUBLE_EQ(
+      run.x.jerk_weight,
+      setup.jerk_weight * std::pow(setup.x.axis.main().omega_rad_s * setup.period_s, 4));
 }
 
 // ---- joining -----------------------------------------------------------------------------------

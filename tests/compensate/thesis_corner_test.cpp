@@ -51,8 +51,8 @@ Contour contour(const std::vector<planner::PlannedMove>& moves,
   double sum = 0.0;
   std::size_t count = 0;
   for (; count < x.size() && static_cast<double>(count) * step_s <= end; ++count) {
-    const double error = std::min(distance_mm(moves[0], x[count].position, y[count].position),
-                                  distance_mm(moves[1], x[count].position, y[count].position));
+    const double error = std::min(distance_mm(moves[0], x[count].position(), y[count].position()),
+                                  distance_mm(moves[1], x[count].position(), y[count].position()));
     worst = std::max(worst, error);
     sum += error * error;
   }

@@ -70,8 +70,8 @@ double error_um(const Polygon& polygon, const BaseTrajectory& base, const LineRu
   double sum = 0.0;
   int count = 0;
   follow(polygon, rules, base.duration_s(), [&](double t, NozzleState x, NozzleState y) {
-    const double off =
-        normal[0] * (x.position - fx.at(t)[0]) + normal[1] * (y.position - fy.at(t)[0]);
+    const double off = normal[0] * (x.position() - fx.at(t).position()) +
+                       normal[1] * (y.position() - fy.at(t).position());
     sum += off * off;
     ++count;
   });
@@ -97,7 +97,7 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
   LineRules rules;
   rules.nozzle_y = dynamics::from_frequency(37.0, 0.1);
   const ErrorWeight weight{0.9, 0.2, 0.3};
-  const LineCosts costs(
+  const LineCosts<1> costs(
       base, [&](double t) { return t < 0.06 ? weight : ErrorWeight{}; }, rules);
   const Followed fx(base, &BaseTrajectory::x_at, rules.nozzle_x);
   const Followed fy(base, &BaseTrajectory::y_at, rules.nozzle_y);
@@ -105,7 +105,7 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
   std::normal_distribution<double> normal(0.0, 0.02);
   for (const std::size_t k : {0U, 50U, 115U}) {  // the last line sees two weights
     const std::size_t m = 10;
-    Vector8d w;
+    WVector<1> w;
     for (Eigen::Index i = 0; i < 8; ++i) {
       w[i] = normal(random) * (i == 1 || i == 4 ? 100.0 : 1.0);
     }
@@ -114,8 +114,8 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
     const Eigen::Vector2d start = costs.base_mm(k) + Eigen::Vector2d(w[2], w[5]);
     const Eigen::Vector2d end = costs.base_mm(k + m) + Eigen::Vector2d(w[6], w[7]);
     const Eigen::Vector2d speed = (end - start) / duration;
-    NozzleState x{fx.at(from)[0] + w[0], fx.at(from)[1] + w[1]};
-    NozzleState y{fy.at(from)[0] + w[3], fy.at(from)[1] + w[4]};
+    NozzleState x{fx.at(from).position() + w[0], fx.at(from).velocity() + w[1]};
+    NozzleState y{fy.at(from).position() + w[3], fy.at(from).velocity() + w[4]};
     double cost = 0.0;
     for (std::size_t j = 1; j <= m; ++j) {
       const double h = costs.dt_s();
@@ -123,20 +123,20 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
       x = dynamics::exact_step(rules.nozzle_x, x, {at[0], speed[0], 0.0}, h);
       y = dynamics::exact_step(rules.nozzle_y, y, {at[1], speed[1], 0.0}, h);
       const double t = costs.time_s(k + j);
-      const double ex = x.position - fx.at(t)[0];
-      const double ey = y.position - fy.at(t)[0];
+      const double ex = x.position() - fx.at(t).position();
+      const double ey = y.position() - fy.at(t).position();
       const ErrorWeight used = t < 0.06 ? weight : ErrorWeight{};
       const Eigen::Vector2d off = at + speed * h - costs.base_mm(k + j);
       cost += 0.5 * h * (used.xx * ex * ex + 2.0 * used.xy * ex * ey + used.yy * ey * ey) +
               0.5 * h * 1e-3 * off.squaredNorm();
     }
-    const LineCost line = costs.line(k, m);
-    const Vector6d z = line.move * w + line.shift;
-    EXPECT_NEAR(z[0], x.position - fx.at(from + duration)[0], 1e-10);
-    EXPECT_NEAR(z[1], x.velocity - fx.at(from + duration)[1], 1e-8);
+    const LineCost<1> line = costs.line(k, m);
+    const ZVector<1> z = line.move * w + line.shift;
+    EXPECT_NEAR(z[0], x.position() - fx.at(from + duration).position(), 1e-10);
+    EXPECT_NEAR(z[1], x.velocity() - fx.at(from + duration).velocity(), 1e-8);
     EXPECT_DOUBLE_EQ(z[2], w[6]);
-    EXPECT_NEAR(z[3], y.position - fy.at(from + duration)[0], 1e-10);
-    EXPECT_NEAR(z[4], y.velocity - fy.at(from + duration)[1], 1e-8);
+    EXPECT_NEAR(z[3], y.position() - fy.at(from + duration).position(), 1e-10);
+    EXPECT_NEAR(z[4], y.velocity() - fy.at(from + duration).velocity(), 1e-8);
     EXPECT_DOUBLE_EQ(z[5], w[7]);
     const double claimed = w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant;
     EXPECT_NEAR(claimed, cost, 1e-9 * cost);
@@ -151,7 +151,7 @@ TEST(LineFan, AgreesWithLineCostsAndBestEnd) {
       0.1);
   LineRules rules;
   rules.nozzle_y = dynamics::from_frequency(37.0, 0.1);
-  const LineCosts costs(
+  const LineCosts<1> costs(
       base,
       [](double t) {
         return t < 0.06 ? ErrorWeight{0.9, 0.2, 0.3} : ErrorWeight{};
@@ -159,27 +159,27 @@ TEST(LineFan, AgreesWithLineCostsAndBestEnd) {
       rules);
   std::mt19937 random(11);
   std::normal_distribution<double> normal(0.0, 0.02);
-  Quadratic to_go = costs.ring_down();
-  const Matrix6d any = Matrix6d::NullaryExpr([&] { return 1e-2 * normal(random); });
+  Quadratic<1> to_go = costs.ring_down();
+  const ZMatrix<1> any = ZMatrix<1>::NullaryExpr([&] { return 1e-2 * normal(random); });
   to_go.matrix += any * any.transpose();
-  to_go.slope = Vector6d::NullaryExpr([&] { return 1e-3 * normal(random); });
+  to_go.slope = ZVector<1>::NullaryExpr([&] { return 1e-3 * normal(random); });
   to_go.constant = 1e-5;
-  LineFan fan(costs);
+  LineFan<1> fan(costs);
   for (const std::size_t k : {0U, 50U, 115U}) {  // some of the last lines see two weights
-    std::array<Vector6d, LineFan::kLanes - 1> states;
-    for (Vector6d& z : states) {
-      z = Vector6d::NullaryExpr([&] { return normal(random); });
+    std::array<ZVector<1>, kLanes - 1> states;
+    for (ZVector<1>& z : states) {
+      z = ZVector<1>::NullaryExpr([&] { return normal(random); });
       z[1] *= 100.0;
       z[4] *= 100.0;
     }
     fan.begin(k, states);
     for (const std::size_t m : {1U, 7U, 12U, 16U}) {
       fan.reach(m);
-      const LineCost line = costs.line(k, m);
-      const LineChoice expected = best_end(line, to_go);
-      const LineFan::Choice choice = fan.choice(to_go);
+      const LineCost<1> line = costs.line(k, m);
+      const LineChoice<1> expected = best_end(line, to_go);
+      const FanChoice choice = fan.choice(to_go);
       for (std::size_t lane = 0; lane < states.size(); ++lane) {
-        const Vector6d& z = states[lane];
+        const ZVector<1>& z = states[lane];
         const Eigen::Vector2d start = costs.base_mm(k) + Eigen::Vector2d(z[2], z[5]);
         const Eigen::Vector2d best_mm =
             costs.base_mm(k + m) + expected.feedback * z + expected.feed_forward;
@@ -188,9 +188,9 @@ TEST(LineFan, AgreesWithLineCostsAndBestEnd) {
         EXPECT_NEAR(choice.least[static_cast<Eigen::Index>(lane)], least, 1e-9 * std::abs(least));
 
         const Eigen::Vector2d v(normal(random) * 1e3, normal(random) * 1e3);
-        Vector8d w;
+        WVector<1> w;
         w << z, start + fan.duration_s() * v - costs.base_mm(k + m);
-        const Vector6d after = line.move * w + line.shift;
+        const ZVector<1> after = line.move * w + line.shift;
         EXPECT_LE((fan.after(lane, v) - after).cwiseAbs().maxCoeff(), 1e-8);
         const double cost = w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant;
         EXPECT_NEAR(fan.cost(lane, v), cost, 1e-9 * cost);
@@ -233,8 +233,8 @@ TEST(CheapestEnds, AreTheCheapestOfAll) {
 TEST(LineCosts, RingDownIsTheIntegralOfTheSquare) {
   const BaseTrajectory base = testing::sampled([](double) { return std::array{0.0, 0.0}; }, 0.01);
   const LineRules rules;
-  const LineCosts costs(base, all_alike, rules);
-  Vector6d z = Vector6d::Zero();
+  const LineCosts<1> costs(base, all_alike, rules);
+  ZVector<1> z = ZVector<1>::Zero();
   z[0] = 0.01;
   z[1] = -2.0;
   NozzleState x{z[0], z[1]};
@@ -242,7 +242,7 @@ TEST(LineCosts, RingDownIsTheIntegralOfTheSquare) {
   constexpr double kStep = 1e-5;
   for (int i = 0; i < 200000; ++i) {
     const NozzleState next = dynamics::exact_step(rules.nozzle_x, x, {}, kStep);
-    sum += 0.25 * kStep * (x.position * x.position + next.position * next.position);
+    sum += 0.25 * kStep * (x.position() * x.position() + next.position() * next.position());
     x = next;
   }
   EXPECT_NEAR(costs.ring_down().at(z), sum, 1e-5 * sum);
@@ -254,27 +254,27 @@ TEST(LineCosts, BestEndIsTheMinimum) {
         return std::array{3.0 * rise(t, 0.05), 1.0 * rise(t, 0.05)};
       },
       0.05);
-  const LineCosts costs(base, all_alike, LineRules{});
-  const Quadratic to_go = costs.ring_down();
-  const LineCost line = costs.line(20, 8);
-  const LineChoice choice = best_end(line, to_go);
+  const LineCosts<1> costs(base, all_alike, LineRules{});
+  const Quadratic<1> to_go = costs.ring_down();
+  const LineCost<1> line = costs.line(20, 8);
+  const LineChoice<1> choice = best_end(line, to_go);
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0.0, 0.01);
   for (int i = 0; i < 20; ++i) {
-    Vector6d z;
+    ZVector<1> z;
     for (Eigen::Index j = 0; j < 6; ++j) {
       z[j] = normal(random);
     }
     const Eigen::Vector2d best = choice.feedback * z + choice.feed_forward;
     const Eigen::Vector2d off(normal(random), normal(random));
-    Vector8d w;
+    WVector<1> w;
     w << z, best + off;
     const double real = w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant +
                         to_go.at(line.move * w + line.shift);
     EXPECT_NEAR(real, choice.value.at(z) + 0.5 * off.dot(choice.stiffness * off), 1e-12);
   }
-  const Vector6d rest = Vector6d::Zero();
-  Vector8d on_base = Vector8d::Zero();
+  const ZVector<1> rest = ZVector<1>::Zero();
+  WVector<1> on_base = WVector<1>::Zero();
   EXPECT_NEAR(ending_on_base(line, to_go).at(rest),
               on_base.dot(line.slope) + line.constant + to_go.at(line.shift), 1e-15);
 }

@@ -211,8 +211,8 @@ class Turn : public ::testing::Test {
       };
       advance([&](double s) { return at(drawn, start, s); }, on_strokes);
       advance([&](double s) { return circle(s); }, on_circle);
-      const double error = std::hypot(on_strokes[0].position - on_circle[0].position,
-                                      on_strokes[1].position - on_circle[1].position);
+      const double error = std::hypot(on_strokes[0].position() - on_circle[0].position(),
+                                      on_strokes[1].position() - on_circle[1].position());
       worst = std::max(worst, error);
       square += error * error;
     }

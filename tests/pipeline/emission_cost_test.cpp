@@ -63,7 +63,7 @@ TEST(EmissionCost, IsWhatTheDifferenceOfTheBasesMakesOfTheNozzleAcrossThePath) {
   for (std::size_t k = 1; k < kNodes; ++k) {
     const double off =
         dynamics::exact_step(model().x, {}, {0.0, 1.0, 0.0}, kPeriod_s * static_cast<double>(k))
-            .position;
+            .position();
     sum += off * off;
     largest = std::max(largest, std::abs(off));
   }

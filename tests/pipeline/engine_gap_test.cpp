@@ -57,7 +57,7 @@ Gap gap_over(const std::string& text) {
     if (!piece.is_run) {
       continue;
     }
-    const auto start = at_rest(piece.moves.front().segment.start_mm);
+    const auto start = at_rest(piece.moves.front().segment.start_mm, verify_rules(settings).nozzle);
     const compensate::Setup setup = setup_for(common, piece, start, settings).setup;
     const compensate::Course course(piece.before, piece.moves, piece.after);
     const auto spans = compensate::mesh(course, compensate::node_grid(course, setup), setup);

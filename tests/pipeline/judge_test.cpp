@@ -46,7 +46,7 @@ struct Corner {
 
   [[nodiscard]] std::optional<std::string> objection_to(const std::string& text,
                                                         double max_lines_per_s = 1000.0) const {
-    const dynamics::NozzleXY nozzle = at_rest({0.0, 0.0, 0.2, 0.0});
+    const dynamics::NozzleXY nozzle = at_rest({0.0, 0.0, 0.2, 0.0}, rules().nozzle);
     return pipeline::judge(run, deviation_of(run, run.moves, nozzle, rules(), 0.0), text, printer,
                            {}, nozzle, rules(), 0.0, {}, max_lines_per_s, {})
         .objection;
@@ -91,9 +91,9 @@ TEST(Judge, TakesOnlyWhatIsOffThePlanAsSwingWhereAPartEnds) {
   for (const char* line : {"G90\n", "M83\n", "G1 X0 Y0 Z0.2 F6000\n"}) {
     static_cast<void>(printer.interpret({line, 0}));
   }
-  const dynamics::NozzleXY still = at_rest({0.0, 0.0, 0.2, 0.0});
+  const dynamics::NozzleXY still = at_rest({0.0, 0.0, 0.2, 0.0}, rules().nozzle);
   dynamics::NozzleXY swinging = still;
-  swinging.y.position = 0.02;
+  swinging.y.add(rules().nozzle.y.riding(0.02));
   const Verdict verdict =
       judge(part, deviation_of(part, part.moves, swinging, rules(), 0.0), "G1 X10 E0.5 F6030\n",
             printer, {}, still, rules(), 0.0, {}, 1000.0, {.lines_before = {}, .goes_on = true});
@@ -125,9 +125,11 @@ TEST(Judge, ReplaysByTheLimitsInTheText) {
 // with the oscillator's impulse response g: p(T) = ∫ g(T − t) (2ζω ḃ + ω² b) dt.
 double nozzle_by_convolution(const std::vector<planner::PlannedMove>& moves) {
   const dynamics::FlexibleAxis axis = rules().nozzle.x;
-  const double damped = axis.omega_rad_s * std::sqrt(1.0 - axis.zeta * axis.zeta);
+  const double damped =
+      axis.main().omega_rad_s * std::sqrt(1.0 - axis.main().zeta * axis.main().zeta);
   const auto impulse = [&](double t) {
-    return std::exp(-axis.zeta * axis.omega_rad_s * t) * std::sin(damped * t) / damped;
+    return std::exp(-axis.main().zeta * axis.main().omega_rad_s * t) * std::sin(damped * t) /
+           damped;
   };
   double sum = 0.0;
   double end = 0.0;
@@ -143,7 +145,8 @@ double nozzle_by_convolution(const std::vector<planner::PlannedMove>& moves) {
       const double b = move.position_mm(t)[gcode::X] - start;
       const double v = move.velocity_mm_s(t) * move.direction[gcode::X];
       sum += step * impulse(end - origin - t) *
-             (2.0 * axis.zeta * axis.omega_rad_s * v + axis.omega_rad_s * axis.omega_rad_s * b);
+             (2.0 * axis.main().zeta * axis.main().omega_rad_s * v +
+              axis.main().omega_rad_s * axis.main().omega_rad_s * b);
     }
     origin += move.duration_s();
   }
@@ -163,7 +166,7 @@ TEST(NozzleFollower, TheNozzleIsWhereTheConvolutionPutsIt) {
   const std::string text = "G90\nG1 X10 Y10 Z1 F6000\nM400\nG1 X12 Z5\nG1 X17.5 Z8\n";
   const std::vector<Piece> pieces = pieces_of(text);
   std::vector<planner::PlannedMove> moves(pieces.back().moves.end() - 2, pieces.back().moves.end());
-  dynamics::NozzleXY nozzle = at_rest({10.0, 10.0, 1.0, 0.0});
+  dynamics::NozzleXY nozzle = at_rest({10.0, 10.0, 1.0, 0.0}, rules().nozzle);
   Piece last = pieces.back();
   last.events.erase(last.events.begin(), last.events.end() - 2);
   last.move_counts.assign(2, 1);
@@ -172,9 +175,9 @@ TEST(NozzleFollower, TheNozzleIsWhereTheConvolutionPutsIt) {
   follower.set(nozzle, {10.0, 10.0, 1.0, 0.0});
   follower.follow(last);
   nozzle = follower.nozzle();
-  EXPECT_NEAR(nozzle.x.position, nozzle_by_convolution(moves), 1e-6);
-  EXPECT_GT(std::abs(nozzle.x.position - 17.5), 1e-3) << "the case shows nothing";
-  EXPECT_NEAR(nozzle.y.position, 10.0, 1e-12);
+  EXPECT_NEAR(nozzle.x.position(), nozzle_by_convolution(moves), 1e-6);
+  EXPECT_GT(std::abs(nozzle.x.position() - 17.5), 1e-3) << "the case shows nothing";
+  EXPECT_NEAR(nozzle.y.position(), 10.0, 1e-12);
 }
 
 TEST(NozzleFollower, APauseLetsTheNozzleRingOn) {
@@ -183,9 +186,9 @@ TEST(NozzleFollower, APauseLetsTheNozzleRingOn) {
   const dynamics::NozzleXY after = nozzle_after(moved + "G4 P7\n");
   const dynamics::NozzleState expected =
       dynamics::exact_step(rules().nozzle.x, before.x, {17.5, 0.0, 0.0}, 7e-3);
-  EXPECT_NEAR(after.x.position, expected.position, 1e-9);
-  EXPECT_NEAR(after.x.velocity, expected.velocity, 1e-6);
-  EXPECT_NE(after.x.velocity, before.x.velocity);
+  EXPECT_NEAR(after.x.position(), expected.position(), 1e-9);
+  EXPECT_NEAR(after.x.velocity(), expected.velocity(), 1e-6);
+  EXPECT_NE(after.x.velocity(), before.x.velocity());
 }
 
 TEST(NozzleFollower, APauseRightAfterARunDoesSo) {
@@ -194,14 +197,14 @@ TEST(NozzleFollower, APauseRightAfterARunDoesSo) {
   const dynamics::NozzleXY after = nozzle_after(moved + "G4 P7\n");
   const dynamics::NozzleState expected =
       dynamics::exact_step(rules().nozzle.x, before.x, {17.5, 0.0, 0.0}, 7e-3);
-  EXPECT_NEAR(after.x.position, expected.position, 1e-9);
-  EXPECT_NE(after.x.velocity, before.x.velocity);
+  EXPECT_NEAR(after.x.position(), expected.position(), 1e-9);
+  EXPECT_NE(after.x.velocity(), before.x.velocity());
 }
 
 TEST(NozzleFollower, HomingLetsTheNozzleComeToRest) {
   const dynamics::NozzleXY after = nozzle_after("G90\nG1 X10 Y10 Z1 F6000\nG1 X17.5 Z8\nG28\n");
-  EXPECT_EQ(after.x.velocity, 0.0);
-  EXPECT_EQ(after.y.velocity, 0.0);
+  EXPECT_EQ(after.x.velocity(), 0.0);
+  EXPECT_EQ(after.y.velocity(), 0.0);
 }
 
 // An exactly tuned shaper leaves no swing.
@@ -209,7 +212,7 @@ TEST(NozzleFollower, AnExactShaperLeavesTheRunAfterItAtRest) {
   const std::string text =
       "G90\nM83\nG1 X10 Y10 Z1 F6000\nM400\nG1 X17.5 Y12 Z1.5\nM400\nG1 X20 E1\nG1 Y15 E1\n";
   verify::Rules exact = rules();
-  exact.fixed.shaper = {"zv", "zv", exact.nozzle.x.zeta, exact.nozzle.y.zeta};
+  exact.fixed.shaper = {"zv", "zv", exact.nozzle.x.main().zeta, exact.nozzle.y.main().zeta};
   gcode::Shaper shaper;
   shaper.freq_x_hz = 45.0;
   shaper.freq_y_hz = 30.0;
@@ -227,11 +230,11 @@ TEST(NozzleFollower, AnExactShaperLeavesTheRunAfterItAtRest) {
     return follower.nozzle();
   };
   const dynamics::NozzleXY shaped = before_run(shaper);
-  EXPECT_NEAR(shaped.x.position, 17.5, 1e-9);
-  EXPECT_NEAR(shaped.x.velocity, 0.0, 1e-6);
-  EXPECT_NEAR(shaped.y.position, 12.0, 1e-9);
-  EXPECT_NEAR(shaped.y.velocity, 0.0, 1e-6);
-  EXPECT_GT(std::abs(before_run({}).x.velocity), 0.1) << "the case shows nothing";
+  EXPECT_NEAR(shaped.x.position(), 17.5, 1e-9);
+  EXPECT_NEAR(shaped.x.velocity(), 0.0, 1e-6);
+  EXPECT_NEAR(shaped.y.position(), 12.0, 1e-9);
+  EXPECT_NEAR(shaped.y.velocity(), 0.0, 1e-6);
+  EXPECT_GT(std::abs(before_run({}).x.velocity()), 0.1) << "the case shows nothing";
 }
 
 // Before a line that may move the machine by itself, the shaper is switched on again, and the wipe

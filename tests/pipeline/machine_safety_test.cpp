@@ -302,13 +302,13 @@ std::vector<At> nozzle_path(const Lines& lines, const machine::Settings& setting
   std::vector<planner::PlannedMove> moves;
   planner->take(moves);
   std::vector<At> path;
-  dynamics::NozzleXY nozzle = at_rest({60.0, 60.0, 0.2, 0.0});
+  dynamics::NozzleXY nozzle = at_rest({60.0, 60.0, 0.2, 0.0}, rules.nozzle);
   for (std::size_t i = 1; i < moves.size(); ++i) {
     const int steps = std::max(1, static_cast<int>(std::ceil(moves[i].duration_s() / 5e-4)));
     for (int step = 0; step < steps; ++step) {
       const double h = moves[i].duration_s() / steps;
       advance(moves[i], h * step, h * (step + 1), rules.nozzle, nozzle);
-      path.push_back({nozzle.x.position, nozzle.y.position});
+      path.push_back({nozzle.x.position(), nozzle.y.position()});
     }
   }
   return path;

@@ -67,8 +67,9 @@ class Writer : public ::testing::Test {
  private:
   void solve(RunJob& job) {
     const std::vector<planner::PlannedMove>& moves = job.piece.moves;
-    job.nozzle = job.piece.before.empty() ? at_rest(moves.front().segment.start_mm)
-                                          : at_end_of(job.piece.before.back());
+    job.nozzle = job.piece.before.empty()
+                     ? at_rest(moves.front().segment.start_mm, rules_.verify.nozzle)
+                     : at_end_of(job.piece.before.back(), rules_.verify.nozzle);
     RunSetup setup = setup_for(rules_.setup, job.piece, job.nozzle, settings_);
     job.setup = std::move(setup.setup);
     job.accel = setup.accel;

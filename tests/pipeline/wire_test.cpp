@@ -23,12 +23,12 @@ compensate::AxisWindow some_window() {
 }
 
 void expect_same(const compensate::AxisWindow& a, const compensate::AxisWindow& b) {
-  EXPECT_EQ(a.axis.omega_rad_s, b.axis.omega_rad_s);
-  EXPECT_EQ(a.axis.zeta, b.axis.zeta);
+  EXPECT_EQ(a.axis.main().omega_rad_s, b.axis.main().omega_rad_s);
+  EXPECT_EQ(a.axis.main().zeta, b.axis.main().zeta);
   ASSERT_EQ(a.variants.size(), b.variants.size());
   for (std::size_t i = 0; i < a.variants.size(); ++i) {
-    EXPECT_EQ(a.variants[i].axis.omega_rad_s, b.variants[i].axis.omega_rad_s);
-    EXPECT_EQ(a.variants[i].axis.zeta, b.variants[i].axis.zeta);
+    EXPECT_EQ(a.variants[i].axis.main().omega_rad_s, b.variants[i].axis.main().omega_rad_s);
+    EXPECT_EQ(a.variants[i].axis.main().zeta, b.variants[i].axis.main().zeta);
     EXPECT_EQ(a.variants[i].share, b.variants[i].share);
   }
   EXPECT_EQ(a.period_s, b.period_s);
@@ -42,8 +42,8 @@ void expect_same(const compensate::AxisWindow& a, const compensate::AxisWindow& 
   EXPECT_EQ(a.limits.max_position_mm, b.limits.max_position_mm);
   ASSERT_EQ(a.start.has_value(), b.start.has_value());
   if (a.start) {
-    EXPECT_EQ(a.start->nozzle.position, b.start->nozzle.position);
-    EXPECT_EQ(a.start->nozzle.velocity, b.start->nozzle.velocity);
+    EXPECT_EQ(a.start->nozzle.position(), b.start->nozzle.position());
+    EXPECT_EQ(a.start->nozzle.velocity(), b.start->nozzle.velocity());
     EXPECT_EQ(a.start->base_mm, b.start->base_mm);
   }
   EXPECT_EQ(a.end_base_mm, b.end_base_mm);

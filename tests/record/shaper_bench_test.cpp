@@ -48,7 +48,7 @@ struct Benched {
       const auto on_x = rivals::nozzle_on(model(errors[machine]).x, x, grid);
       const auto on_y = rivals::nozzle_on(model(errors[machine]).y, y, grid);
       for (std::size_t k = 0; k < grid.count; ++k) {
-        bench.add(machine, grid.at(k), {on_x[k], on_y[k]});
+        bench.add(machine, grid.at(k), {on_x[k].motion(), on_y[k].motion()});
       }
     }
     bench.advance(path, path.end_s() + 0.2);
@@ -75,8 +75,8 @@ report::Spread exactly(dynamics::ShaperKind kind, double error) {
     if (grid.at(k) < 0.0 || grid.at(k) > end_s) {
       continue;
     }
-    const double p_x = x[k].position;
-    const double p_y = y[k].position;
+    const double p_x = x[k].position();
+    const double p_y = y[k].position();
     const double to_first = std::hypot(p_x - std::clamp(p_x, 0.0, 12.0), p_y);
     const double to_second = std::hypot(p_x - 12.0, p_y - std::clamp(p_y, 0.0, 12.0));
     const double contour = std::min(to_first, to_second);

@@ -10,7 +10,7 @@
 namespace unflex::rivals {
 namespace {
 
-using dynamics::NozzleState;
+using dynamics::NozzleMotion;
 
 TEST(AxisPath, OfAPlanIsThePlan) {
   const auto moves = testing::corner_plan(100.0, 5000.0, 5.0);
@@ -53,18 +53,18 @@ TEST(AxisPath, CarriesTheNozzleAsFineStepsDo) {
   const TimeGrid grid{-0.01, 3.7e-3, 80};
   const auto coarse = nozzle_on(axis, path, grid);
   ASSERT_EQ(coarse.size(), 80U);
-  NozzleState nozzle;
+  dynamics::NozzleState nozzle;
   PathCursor cursor(path);
   std::size_t k = 0;
   const double h = 1e-5;
   for (long i = 0; k < grid.count; ++i) {
     const double t = -0.01 + static_cast<double>(i) * h;
     while (k < grid.count && grid.at(k) <= t + 1e-9) {
-      EXPECT_NEAR(nozzle.position, coarse[k].position, 1e-6) << k;
+      EXPECT_NEAR(nozzle.position(), coarse[k].position(), 1e-6) << k;
       ++k;
     }
-    const NozzleState base = cursor.at(t);
-    const NozzleState next = PathCursor(path).at(t + h);
+    const NozzleMotion base = cursor.at(t);
+    const NozzleMotion next = PathCursor(path).at(t + h);
     nozzle = dynamics::rk4_step(
         axis, nozzle, {base.position, base.velocity, (next.velocity - base.velocity) / h}, h);
   }
@@ -88,12 +88,12 @@ TEST(ShapedNozzle, IsTheNozzleOnTheShapedBase) {
     ShapedNozzle nozzle(x, y);
     std::size_t next = 0;
     for (std::size_t k = 0; k < grid.count; ++k) {
-      nozzle.add(grid.at(k), {plain_x[k], plain_y[k]});
+      nozzle.add(grid.at(k), {plain_x[k].motion(), plain_y[k].motion()});
       for (; next < grid.count && grid.at(next) <= nozzle.known_until_s(); ++next) {
-        const dynamics::NozzleXY at = nozzle.at(grid.at(next));
-        EXPECT_NEAR(at.x.position, shaped_x[next].position, 1e-6) << dynamics::name(kind);
-        EXPECT_NEAR(at.y.position, shaped_y[next].position, 1e-6) << dynamics::name(kind);
-        EXPECT_NEAR(at.x.velocity, shaped_x[next].velocity, 5e-3) << dynamics::name(kind);
+        const dynamics::NozzleMotionXY at = nozzle.at(grid.at(next));
+        EXPECT_NEAR(at.x.position, shaped_x[next].position(), 1e-6) << dynamics::name(kind);
+        EXPECT_NEAR(at.y.position, shaped_y[next].position(), 1e-6) << dynamics::name(kind);
+        EXPECT_NEAR(at.x.velocity, shaped_x[next].velocity(), 5e-3) << dynamics::name(kind);
       }
     }
     EXPECT_GT(next, 900U);

@@ -21,8 +21,8 @@ TEST(SCurve, TakesTheSameTimeForTheSameRampsAtTwiceTheAcceleration) {
   PathCursor on_curve(curve);
   // At the ends of all ramps both have the same place and speed.
   for (const double t : {0.0, 0.02, 0.05, 0.1, 0.12, 0.2}) {
-    const dynamics::NozzleState a = on_plan.at(t);
-    const dynamics::NozzleState b = on_curve.at(t);
+    const dynamics::NozzleMotion a = on_plan.at(t);
+    const dynamics::NozzleMotion b = on_curve.at(t);
     EXPECT_NEAR(a.position, b.position, 1e-9) << t;
     EXPECT_NEAR(a.velocity, b.velocity, 1e-9) << t;
   }
@@ -66,28 +66,28 @@ double tracking_error(const AxisPath& path, const AxisPath& reference,
   PathCursor cursor(reference);
   double worst = 0.0;
   for (std::size_t k = 0; k < grid.count; ++k) {
-    worst = std::max(worst, std::abs(nozzle[k].position - cursor.at(grid.at(k)).position));
+    worst = std::max(worst, std::abs(nozzle[k].position() - cursor.at(grid.at(k)).position));
   }
   return worst;
 }
 
 TEST(FilteredSpline, BeginsAndEndsAtRestWithinItsLeadInAndTail) {
   const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const SplineOptions given = options(kAxis.omega_rad_s);
+  const SplineOptions given = options(kAxis.main().omega_rad_s);
   const AxisPath path = filtered_spline(reference, kAxis, given);
   EXPECT_NEAR(path.front().start_s, -given.lead_in_s, 1e-12);
   EXPECT_EQ(path.front().motion.position, 0.0);
   EXPECT_NEAR(path.front().motion.velocity, 0.0, 1e-9);
   EXPECT_NEAR(path.back().motion.position, 10.0, 1e-9);
   PathCursor cursor(path);
-  const dynamics::NozzleState end = cursor.at(end_s(reference) + given.tail_s + given.knot_s);
+  const dynamics::NozzleMotion end = cursor.at(end_s(reference) + given.tail_s + given.knot_s);
   EXPECT_NEAR(end.position, 10.0, 1e-6);
   EXPECT_NEAR(end.velocity, 0.0, 1e-3);
 }
 
 TEST(FilteredSpline, BringsTheNozzleMuchCloserToTheReference) {
   const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const AxisPath path = filtered_spline(reference, kAxis, options(kAxis.omega_rad_s));
+  const AxisPath path = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s));
   EXPECT_GT(tracking_error(reference, reference, kAxis), 0.1);
   EXPECT_LT(tracking_error(path, reference, kAxis), 0.002);
 }
@@ -96,9 +96,9 @@ TEST(FilteredSpline, BringsTheNozzleMuchCloserToTheReference) {
 // knots in windows of 60.
 TEST(FilteredSpline, LosesNothingByItsLimitedPreview) {
   AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const AxisPath alone = filtered_spline(reference, kAxis, options(kAxis.omega_rad_s));
+  const AxisPath alone = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s));
   reference.push_back({1.0, {10.0, 0.0, 0.0}});
-  const AxisPath amid = filtered_spline(reference, kAxis, options(kAxis.omega_rad_s));
+  const AxisPath amid = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s));
   EXPECT_GT(amid.size(), 2 * alone.size());
   PathCursor a(alone);
   PathCursor b(amid);

@@ -13,7 +13,7 @@ namespace {
 
 struct Sampled {
   double h;
-  std::vector<dynamics::NozzleState> p;
+  std::vector<dynamics::NozzleMotion> p;
 };
 
 Sampled sampled(const AxisPath& reference, double h) {
@@ -29,8 +29,8 @@ Sampled sampled(const AxisPath& reference, double h) {
 Eigen::VectorXd residuals(const Sampled& plan, const dynamics::FlexibleAxis& axis,
                           const Eigen::VectorXd& v, bool velocity_defects_alone) {
   const double h = plan.h;
-  const double w2 = axis.omega_rad_s * axis.omega_rad_s;
-  const double c = 2.0 * axis.zeta * axis.omega_rad_s;
+  const double w2 = axis.main().omega_rad_s * axis.main().omega_rad_s;
+  const double c = 2.0 * axis.main().zeta * axis.main().omega_rad_s;
   const auto n = static_cast<int>(plan.p.size());
   std::vector<double> b = {plan.p[0].position};
   for (int k = 0; k + 1 < n; ++k) {
@@ -123,7 +123,7 @@ TEST(ThesisMethod, RingsFromNodeToNodeWithThePoleOfItsDefect) {
   const double settled = kAccel * (1.0 - std::pow(kOmega * kPeriod, 2) / 12.0);
   std::vector<double> off;
   for (std::size_t k = 0; k < 39; ++k) {
-    const dynamics::NozzleState p = cursor.at(static_cast<double>(k) * kPeriod);
+    const dynamics::NozzleMotion p = cursor.at(static_cast<double>(k) * kPeriod);
     off.push_back(kOmega * kOmega * (base[k].motion.position - p.position) +
                   2.0 * kZeta * kOmega * (base[k].motion.velocity - p.velocity) - settled);
   }

@@ -133,7 +133,7 @@ TEST(Measure, OnAStraightLineTheNozzleIsLateOrEarlyButOnThePath) {
       plan_path({{0.0, 0.0, 0.0}, {50.0, 0.0, 100.0}, {70.0, 0.0, 50.0, 1.0}, {99.0, 0.0, 50.0}},
                 limits_with(1e4, 5.0));
   const DeviationStats stats = measure(moves, moves, at_rest(moves), {}).extruding.stats();
-  const double omega = NozzleModel{}.x.omega_rad_s;
+  const double omega = NozzleModel{}.x.main().omega_rad_s;
   // Braking from 100 to 50 mm/s throws the nozzle forward by a/ω², and it swings on from there.
   EXPECT_GT(stats.tracking_max_mm, 0.5 * 1e4 / (omega * omega));
   EXPECT_LT(stats.contour_max_mm, 1e-12);
@@ -254,7 +254,7 @@ TEST(Measure, ABaseThatEndsEarlyRestsWhileTheReferenceGoesOn) {
   EXPECT_NEAR(stats.duration_s, duration_s(moves), 1e-9);
   EXPECT_NEAR(stats.tracking_max_mm, 10.0, 0.01);
   // run.end is the nozzle at the end of the base's own motion, still swinging.
-  EXPECT_GT(std::abs(run.end.x.velocity), 0.1);
+  EXPECT_GT(std::abs(run.end.x.velocity()), 0.1);
 }
 
 // Whether a moment counts as extruding is told by what is played, not by the reference.
@@ -295,10 +295,10 @@ TEST(Measure, CarriesTheNozzleFromOneRunToTheNext) {
   for (const planner::PlannedMove& move : moves) {
     nozzle = measure({move}, {move}, nozzle, {}).end;
   }
-  EXPECT_NEAR(nozzle.x.position, whole.end.x.position, 1e-12);
-  EXPECT_NEAR(nozzle.x.velocity, whole.end.x.velocity, 1e-9);
-  EXPECT_NEAR(nozzle.y.position, whole.end.y.position, 1e-12);
-  EXPECT_NEAR(nozzle.y.velocity, whole.end.y.velocity, 1e-9);
+  EXPECT_NEAR(nozzle.x.position(), whole.end.x.position(), 1e-12);
+  EXPECT_NEAR(nozzle.x.velocity(), whole.end.x.velocity(), 1e-9);
+  EXPECT_NEAR(nozzle.y.position(), whole.end.y.position(), 1e-12);
+  EXPECT_NEAR(nozzle.y.velocity(), whole.end.y.velocity(), 1e-9);
 }
 
 TEST(Measure, OnACircleTheNozzleRunsOutside) {
@@ -314,7 +314,7 @@ TEST(Measure, OnACircleTheNozzleRunsOutside) {
   const auto moves = plan_path(points, limits_with(5000.0, 5.0));
   const DeviationStats stats = measure(moves, moves, at_rest(moves), {}).extruding.stats();
   // At radius R and speed v the nozzle is outside by v²/(Rω²), to first order in v/(Rω).
-  const double omega = NozzleModel{}.x.omega_rad_s;
+  const double omega = NozzleModel{}.x.main().omega_rad_s;
   const double outside_mm = 60.0 * 60.0 / (20.0 * omega * omega);
   EXPECT_NEAR(stats.contour_rms_mm, outside_mm, 0.03 * outside_mm);
   EXPECT_NEAR(stats.contour_max_mm, outside_mm, 0.1 * outside_mm);
@@ -323,7 +323,7 @@ TEST(Measure, OnACircleTheNozzleRunsOutside) {
 TEST(Measure, OfNothingIsNothing) {
   const RunDeviation run = measure({}, {}, {{1.0, 0.0}, {2.0, 0.0}}, {});
   EXPECT_EQ(run.all.stats().duration_s, 0.0);
-  EXPECT_EQ(run.end.x.position, 1.0);
+  EXPECT_EQ(run.end.x.position(), 1.0);
 }
 
 }  // namespace

@@ -73,7 +73,7 @@ TEST(Observation, IsToldEveryLineAndEveryStepOfEveryNozzle) {
   Observation observation;
   observation.observer = &sums;
   observation.detuned.resize(2);
-  observation.detuned[1].x.omega_rad_s *= 0.8;
+  observation.detuned[1].x = observation.detuned[1].x.detuned(0.8);
   const VerifyReport report = observed(testing::PlainEmitter().emit(kPrint), observation);
   ASSERT_EQ(report.violation_count, 0U);
   ASSERT_EQ(sums.lines.size(), 13U);

@@ -13,7 +13,7 @@
 
 namespace unflex::collocation {
 
-inline constexpr int kMaxStates = 12;
+inline constexpr int kMaxStates = 32;
 inline constexpr int kMaxControls = 4;
 inline constexpr int kMaxPoint = kMaxStates + kMaxControls;
 

@@ -2,7 +2,7 @@
 // which its solvers stand.
 //
 //   min Σ_i α_i ∫ w(t) (p_i − r)² dt + ρ ∫ (d b̈/dt)² dt
-//   s.t.  p̈_i = 2ζ_i ω_i (ḃ − ṗ_i) + ω_i² (b − p_i),   b̈ piecewise linear,
+//   s.t.  p_i hangs on b as dynamics/flexible_axis.hpp says,   b̈ piecewise linear,
 //         |ḃ| ≤ V,  |b̈| ≤ A,  |d b̈/dt| ≤ J,  b_min ≤ b ≤ b_max
 //
 //   r  reference, mm       p  nozzle, mm       b  base, mm       w  weight       h  node period, s
@@ -41,12 +41,10 @@ struct AxisVariant {
   dynamics::FlexibleAxis axis;
   double share = 0.0;  // α
 };
-// An axis has 1, 3 or 5 models.
-inline constexpr std::size_t kMostVariants = 4;
 
 struct AxisWindow {
   dynamics::FlexibleAxis axis;
-  std::vector<AxisVariant> variants;  // 0, 2 or 4; `axis` has the share that they leave
+  std::vector<AxisVariant> variants;  // `axis` has the share that they leave
   double period_s = 1e-3;             // h
   // r and w at the nodes and in the middles between them: 2n − 1 values for n nodes, n ≥ 2.
   std::vector<double> reference_mm;
@@ -79,6 +77,10 @@ struct AxisWindow {
   // Model i: `axis` is model 0, variants[i − 1] is model i.
   [[nodiscard]] std::size_t models() const { return variants.size() + 1; }
   [[nodiscard]] AxisVariant model(std::size_t i) const;
+  // `nozzle` is a state of `axis` while the base is at base_mm. Returns the state of model i that
+  // swings as it does.
+  [[nodiscard]] dynamics::NozzleState in_model(std::size_t i, const dynamics::NozzleState& nozzle,
+                                               double base_mm) const;
 };
 
 struct AxisSolution {

@@ -1,35 +1,79 @@
-// One axis of the machine as two points joined by a spring and a damper: the base, which the motor
-// moves, and the nozzle, which hangs on it.
+// One axis of the machine: the base, which the motor moves, and the nozzle, which hangs on it by a
+// spring and a damper, or by several.
 //
-//   p̈ = 2ζω(ḃ − ṗ) + ω²(b − p)
+//   p = Σ q_i        q̈_i = 2ζ_i ω_i (g_i ḃ − q̇_i) + ω_i² (g_i b − q_i)        Σ g_i = 1
 //
-//   b   base position, mm        p   nozzle position, mm
-//   ω   natural frequency, rad/s  ζ   damping ratio
+//   b   base position, mm          p   nozzle position, mm          i   modes
+//   ω   natural frequency, rad/s   ζ   damping ratio                g   gain, of either sign
+//   q   the mode's part of p
 //
-// Cisalpino (UFLA, 2023) eq. 3.17 and 3.18 with ζ = c/(2√(mk)); docs/theory.md lists where the
-// printed forms differ.
+// With one mode: Cisalpino (UFLA, 2023) eq. 3.17 and 3.18 with ζ = c/(2√(mk)); docs/theory.md lists
+// where the printed forms differ. Several modes are the modal form of a base-excited structure
+// (Meirovitch, Fundamentals of Vibrations, § 7.7).
+//
+// Other modules ask the axis and its states. They do not read modes, unless they take the equation
+// above apart.
 #pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
 
 namespace unflex::dynamics {
 
-struct FlexibleAxis {
+// The most modes that an axis can have.
+inline constexpr std::size_t kMostModes = 3;
+
+struct Mode {
   double omega_rad_s = 282.743338823;  // 45 Hz
   double zeta = 0.06;
+  double gain = 1.0;
+
+  // ω² and 2ζω, before the gain.
+  [[nodiscard]] constexpr double stiffness_per_s2() const { return omega_rad_s * omega_rad_s; }
+  [[nodiscard]] constexpr double damping_per_s() const { return 2.0 * zeta * omega_rad_s; }
 };
 
-// ω = 2πf.
-[[nodiscard]] FlexibleAxis from_frequency(double freq_hz, double damping_ratio);
-
 // Position and velocity of the nozzle on one axis, mm and mm/s.
-struct NozzleState {
+struct NozzleMotion {
   double position = 0.0;
   double velocity = 0.0;
 };
+
+struct NozzleMotionXY {
+  NozzleMotion x;
+  NozzleMotion y;
+};
+
+// All that determines the nozzle's motion on one axis, once that of the base is given: q_i and its
+// velocity. States of the same axis may be added up and scaled.
+struct NozzleState {
+  std::array<NozzleMotion, kMostModes> parts{};  // zero where the axis has fewer modes
+
+  [[nodiscard]] double position() const {
+    return parts[0].position + parts[1].position + parts[2].position;
+  }
+  [[nodiscard]] double velocity() const {
+    return parts[0].velocity + parts[1].velocity + parts[2].velocity;
+  }
+  [[nodiscard]] NozzleMotion motion() const { return {position(), velocity()}; }
+
+  // Adds `times` the other state.
+  void add(const NozzleState& other, double times = 1.0) {
+    for (std::size_t i = 0; i < kMostModes; ++i) {
+      parts[i].position += times * other.parts[i].position;
+      parts[i].velocity += times * other.parts[i].velocity;
+    }
+  }
+};
+static_assert(kMostModes == 3, "NozzleState adds up three parts");
 
 // The nozzle on both axes.
 struct NozzleXY {
   NozzleState x;
   NozzleState y;
+
+  [[nodiscard]] NozzleMotionXY motion() const { return {x.motion(), y.motion()}; }
 };
 
 // Motion of the base over one step of constant acceleration: b(t) = b0 + v0 t + a t²/2.
@@ -39,14 +83,64 @@ struct BaseSegment {
   double acceleration = 0.0;  // a, mm/s²
 };
 
+class FlexibleAxis {
+ public:
+  constexpr FlexibleAxis() = default;
+  // One mode.
+  constexpr FlexibleAxis(double omega_rad_s, double zeta) : modes_{Mode{omega_rad_s, zeta}} {}
+  // 1 to kMostModes modes, whose gains add up to 1.
+  explicit FlexibleAxis(std::span<const Mode> modes);
+
+  [[nodiscard]] std::span<const Mode> modes() const { return {modes_.data(), count_}; }
+  // The mode with the largest gain, for what knows one mode only: shapers and older methods.
+  [[nodiscard]] const Mode& main() const;
+  [[nodiscard]] double main_hz() const;
+
+  [[nodiscard]] double slowest_rad_s() const;
+  [[nodiscard]] double fastest_rad_s() const;
+  // In this time every swing dies away to a fiftieth.
+  [[nodiscard]] double settling_s() const;
+  // The longest 1/(4ζω): ∫ of the square of a swing of amplitude 1. A smaller ζ than the least
+  // counts as that.
+  [[nodiscard]] double ringing_s(double least_zeta) const;
+  // The slowest rate at which a free motion dies away, 1/s.
+  [[nodiscard]] double decay_per_s() const;
+  // How far base and nozzle are apart at most when both move evenly at this acceleration, or the
+  // base at this speed while dampers hold the nozzle, mm.
+  [[nodiscard]] double largest_lag_mm(double accel_mm_s2, double velocity_mm_s) const;
+  // The nozzle's acceleration when the base is 1 mm ahead, and when it is 1 mm/s faster: Σ gω² and
+  // Σ 2gζω. To a push that is short against all periods the nozzle answers by these alone.
+  [[nodiscard]] double stiffness_per_s2() const;
+  [[nodiscard]] double damping_per_s() const;
+
+  // The axis with all frequencies times this factor.
+  [[nodiscard]] FlexibleAxis detuned(double factor) const;
+
+  // The nozzle that goes along with a base in even motion, as after a long time.
+  [[nodiscard]] NozzleState riding(double position_mm, double velocity_mm_s = 0.0) const;
+  // The difference between two states as places: Σ |Δq| and Σ |Δq̇|/ω, mm.
+  struct Gap {
+    double place_mm = 0.0;
+    double speed_mm = 0.0;
+  };
+  [[nodiscard]] Gap gap(const NozzleState& a, const NozzleState& b) const;
+
+ private:
+  std::array<Mode, kMostModes> modes_{};
+  std::size_t count_ = 1;
+};
+
+// One mode, ω = 2πf.
+[[nodiscard]] FlexibleAxis from_frequency(double freq_hz, double damping_ratio);
+
 // One step of the classical fourth-order Runge–Kutta method, h seconds. The base is sampled exactly
 // at the beginning, the middle and the end of the step.
-[[nodiscard]] NozzleState rk4_step(const FlexibleAxis& axis, NozzleState state,
+[[nodiscard]] NozzleState rk4_step(const FlexibleAxis& axis, const NozzleState& state,
                                    const BaseSegment& base, double h);
 
 // The exact state h seconds later under the same motion of the base, from the closed form of the
 // damped oscillator (any ζ ≥ 0).
-[[nodiscard]] NozzleState exact_step(const FlexibleAxis& axis, NozzleState state,
+[[nodiscard]] NozzleState exact_step(const FlexibleAxis& axis, const NozzleState& state,
                                      const BaseSegment& base, double h);
 
 // A step of a fixed length as a linear map, for many steps of that length.
@@ -54,25 +148,38 @@ class StepMap {
  public:
   // The base's position is carried along so that numbers stay small.
   [[nodiscard]] NozzleState step(const NozzleState& state, const BaseSegment& base) const {
-    const double y = state.position - base.position;
-    return {base.position + of_position_.position * y + of_velocity_.position * state.velocity +
-                of_base_velocity_.position * base.velocity +
-                of_base_acceleration_.position * base.acceleration,
-            of_position_.velocity * y + of_velocity_.velocity * state.velocity +
-                of_base_velocity_.velocity * base.velocity +
-                of_base_acceleration_.velocity * base.acceleration};
+    NozzleState next;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const OfMode& map = maps_[i];
+      const NozzleMotion& part = state.parts[i];
+      const double place = map.gain * base.position;
+      const double y = part.position - place;
+      next.parts[i] = {place + map.of_position.position * y +
+                           map.of_velocity.position * part.velocity +
+                           map.of_base_velocity.position * base.velocity +
+                           map.of_base_acceleration.position * base.acceleration,
+                       map.of_position.velocity * y + map.of_velocity.velocity * part.velocity +
+                           map.of_base_velocity.velocity * base.velocity +
+                           map.of_base_acceleration.velocity * base.acceleration};
+    }
+    return next;
   }
 
  protected:
-  using OneStep = NozzleState (*)(const FlexibleAxis&, NozzleState, const BaseSegment&, double);
+  using OneStep = NozzleMotion (*)(const Mode&, NozzleMotion, const BaseSegment&, double);
   StepMap(OneStep one_step, const FlexibleAxis& axis, double h);
 
  private:
-  // The state after the step that one unit of each makes.
-  NozzleState of_position_;
-  NozzleState of_velocity_;
-  NozzleState of_base_velocity_;
-  NozzleState of_base_acceleration_;
+  // What one unit of each makes of a mode's part in one step.
+  struct OfMode {
+    double gain = 1.0;
+    NozzleMotion of_position;
+    NozzleMotion of_velocity;
+    NozzleMotion of_base_velocity;
+    NozzleMotion of_base_acceleration;
+  };
+  std::array<OfMode, kMostModes> maps_;
+  std::size_t count_ = 1;
 };
 
 // rk4_step() as a map.

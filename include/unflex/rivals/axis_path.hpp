@@ -41,7 +41,7 @@ using AxisPath = std::vector<Parabola>;
 class PathCursor {
  public:
   explicit PathCursor(const AxisPath& path) : path_(&path) {}
-  [[nodiscard]] dynamics::NozzleState at(double t);
+  [[nodiscard]] dynamics::NozzleMotion at(double t);
 
  private:
   const AxisPath* path_;

@@ -28,7 +28,7 @@ class ShapedNozzle {
   // Adds a sample of the unshaped nozzle; times must increase. Between samples the nozzle is on the
   // cubic through position and velocity (off by less than 1e-6 mm for samples 0.5 ms apart at 100
   // Hz and 10 000 mm/s²). Before the first sample it rests at that sample.
-  void add(double time_s, const dynamics::NozzleXY& unshaped);
+  void add(double time_s, const dynamics::NozzleMotionXY& unshaped);
 
   // The samples given so far determine the shaped nozzle up to this time, which is lookahead_s()
   // before the last sample.
@@ -38,21 +38,21 @@ class ShapedNozzle {
   // The shaped nozzle's state at a time up to known_until_s(). For a later time the unshaped nozzle
   // is taken to rest at the last sample. Times must not decrease from call to call, because samples
   // that no later time needs are forgotten.
-  [[nodiscard]] dynamics::NozzleXY at(double time_s);
+  [[nodiscard]] dynamics::NozzleMotionXY at(double time_s);
 
  private:
   struct Sample {
     double time_s;
-    dynamics::NozzleXY nozzle;
+    dynamics::NozzleMotionXY nozzle;
   };
   struct Tap {
     dynamics::Pulse pulse;
     std::size_t index = 0;  // number of the sample at or before the delayed time
   };
 
-  [[nodiscard]] dynamics::NozzleState sum(std::vector<Tap>& taps,
-                                          dynamics::NozzleState dynamics::NozzleXY::*axis,
-                                          double time_s);
+  [[nodiscard]] dynamics::NozzleMotion sum(std::vector<Tap>& taps,
+                                           dynamics::NozzleMotion dynamics::NozzleMotionXY::*axis,
+                                           double time_s);
   void forget_before(double time_s);
 
   std::vector<Tap> x_;

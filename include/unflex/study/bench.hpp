@@ -81,8 +81,8 @@ struct Straying {
 // What base and nozzle do, for figures.
 struct Trace {
   rivals::TimeGrid grid;
-  std::vector<dynamics::NozzleXY> base;
-  std::vector<dynamics::NozzleXY> nozzle;
+  std::vector<dynamics::NozzleMotionXY> base;
+  std::vector<dynamics::NozzleMotionXY> nozzle;
   std::vector<double> error_mm;  // distance of the nozzle from the path
 };
 

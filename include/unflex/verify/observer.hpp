@@ -30,7 +30,7 @@ struct NozzleId {
 struct NozzleStep {
   double time_s = 0.0;  // on the clock of the nozzle's reference
   double h_s = 0.0;
-  dynamics::NozzleXY nozzle;
+  dynamics::NozzleMotionXY nozzle;
   dynamics::BaseSegment base_x;
   dynamics::BaseSegment base_y;
   // What is played now lays filament.

@@ -1,0 +1,469 @@
+#include "modal_form.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+
+namespace unflex::compensate {
+namespace {
+
+// The kinds with a row at every node. Each row is a component of z.
+constexpr std::array<RowKind, 3> kNodeKinds = {RowKind::position, RowKind::velocity,
+                                               RowKind::accel};
+
+// b' = b + ḃ + b̈/2 + j/6 and so on.
+constexpr std::array<double, 3> kBaseByJerk = {1.0 / 6.0, 0.5, 1.0};
+
+// From b, ḃ and b̈ one interval before the base rests: the place where it will rest, and what an
+// input in that interval's predecessor does to it (see stage_form.hpp).
+constexpr std::array<double, 3> kRestingSoon = {1.0, 2.0 / 3.0, 1.0 / 6.0};
+constexpr double kRestingSoonByJerk = 1.0 / 6.0 + 0.5 * 2.0 / 3.0 + 1.0 / 6.0;
+
+}  // namespace
+
+ModeStep::ModeStep(const dynamics::Mode& mode, double period_s) {
+  const AxisChain chain(mode, period_s);
+  const ChainMatrix& growth = chain.growth;
+  own = {1.0 + growth(0, 0), growth(0, 1), growth(1, 0), 1.0 + growth(1, 1)};
+  by_accel = {mode.gain * (growth(0, 4) - growth(2, 4)), mode.gain * (growth(1, 4) - growth(3, 4))};
+  by_jerk = {mode.gain * (chain.input(0) - chain.input(2)),
+             mode.gain * (chain.input(1) - chain.input(3))};
+}
+
+void ModalForm::set_models(const AxisWindow& window) {
+  modes_.clear();
+  gains_.clear();
+  models_.clear();
+  for (std::size_t c = 0; c < window.models(); ++c) {
+    const AxisVariant variant = window.model(c);
+    Model model;
+    model.first_mode = modes_.size();
+    for (const dynamics::Mode& mode : variant.axis.modes()) {
+      modes_.emplace_back(mode, window.period_s);
+      gains_.push_back(mode.gain);
+    }
+    model.end_mode = modes_.size();
+    model.share = variant.share;
+    models_.push_back(std::move(model));
+  }
+  size_ = base() + 3;
+  const auto n = static_cast<Eigen::Index>(size_);
+  node_square_.setZero(n, n);
+  middle_square_.setZero(n, n);
+  middle_cross_.setZero(n);
+  middle_curvature_ = 0.0;
+  for (Model& model : models_) {
+    Vector place = Vector::Zero(n);
+    Vector rate = Vector::Zero(n);
+    place(static_cast<Eigen::Index>(base())) = 1.0;
+    rate(static_cast<Eigen::Index>(base()) + 1) = 1.0;
+    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
+      place(static_cast<Eigen::Index>(2 * i)) = 1.0;
+      rate(static_cast<Eigen::Index>(2 * i) + 1) = 1.0;
+    }
+    // p_c = (p₁ + p₂)/2 + (ṗ₁ − ṗ₂)/8.
+    Vector after = 0.5 * place - 0.125 * rate;
+    model.middle_input = by_input(after.data());
+    transpose_step(after.data());
+    model.middle = 0.5 * place + 0.125 * rate + after;
+    node_square_ += model.share * place * place.transpose();
+    middle_square_ += model.share * model.middle * model.middle.transpose();
+    middle_cross_ += model.share * model.middle_input * model.middle;
+    middle_curvature_ += model.share * model.middle_input * model.middle_input;
+  }
+}
+
+void ModalForm::assign(const ScaledWindow& scaled) {
+  window_ = &scaled;
+  faint_pull_ = kFaintPull;
+  nodes_ = scaled.nodes;
+  const AxisWindow& window = *scaled.window;
+  set_models(window);
+  const auto n = static_cast<Eigen::Index>(size_);
+  states_.resize(nodes_ * size_);
+  state_steps_.resize(nodes_ * size_);
+  feedback_.resize((nodes_ - 1) * size_);
+  node_pull_.resize(nodes_ * models_.size());
+  middle_pull_.resize((nodes_ - 1) * models_.size());
+  for (Padded* values :
+       {&inputs_, &input_steps_, &feedforward_, &middle_weight_, &inverse_curvature_}) {
+    values->resize(nodes_ - 1);
+  }
+  node_weight_.resize(nodes_);
+  for (Matrix* matrix : {&cost_to_go_, &half_next_, &next_}) {
+    matrix->resize(n, n);
+  }
+  by_input_.resize(n);
+  cross_.resize(n);
+  for (std::size_t k = 0; k < nodes_; ++k) {
+    const bool at_end = k == 0 || k + 1 == nodes_;
+    node_weight_[k] = window.weight[2 * k] * (at_end ? 1.0 / 6.0 : 1.0 / 3.0);
+  }
+  for (std::size_t k = 0; k + 1 < nodes_; ++k) {
+    middle_weight_[k] = window.weight[2 * k + 1] * (2.0 / 3.0);
+  }
+  set_start();
+}
+
+// Goes from the given start, or from rest at the first reference point, without any jerk until the
+// end asks for it.
+void ModalForm::set_start() {
+  const AxisWindow& window = *window_->window;
+  const auto n = static_cast<Eigen::Index>(size_);
+  const auto accel = static_cast<Eigen::Index>(place(RowKind::accel));
+  Vector first = Vector::Zero(n);
+  if (window.start) {
+    const double b = window_->to_scaled_position(window.start->base_mm);
+    first(accel - 2) = b;
+    for (std::size_t c = 0; c < models_.size(); ++c) {
+      const dynamics::NozzleState nozzle =
+          window.in_model(c, window.start->nozzle, window.start->base_mm);
+      for (std::size_t i = models_[c].first_mode; i < models_[c].end_mode; ++i) {
+        const dynamics::NozzleMotion& part = nozzle.parts[i - models_[c].first_mode];
+        const auto at = static_cast<Eigen::Index>(2 * i);
+        first(at) = (part.position - gains_[i] * window.start->base_mm) / window_->unit[0];
+        first(at + 1) = part.velocity / window_->unit[1];
+      }
+    }
+    start_basis_.setZero(n, 1);
+    start_basis_(accel, 0) = 1.0;
+  } else {
+    start_basis_.setIdentity(n, n);
+  }
+  if (window_->end_base && nodes_ == 2) {
+    // The only input cannot keep both b and ḃ. So b̈ at the first node is tied to the rest of that
+    // state.
+    first(accel) = 6.0 * (*window_->end_base - first(accel - 2)) - 4.0 * first(accel - 1);
+    if (window_->start) {
+      start_basis_.resize(n, 0);
+    } else {
+      start_basis_.setIdentity(n, n - 1);
+      start_basis_(accel, accel - 2) = -6.0;
+      start_basis_(accel, accel - 1) = -4.0;
+    }
+  }
+  roll_out(first);
+}
+
+void ModalForm::roll_out(const Vector& first) {
+  std::ranges::copy(first, states_.begin());
+  std::vector<double> feedback(size_);
+  for (std::size_t k = 0; k + 1 < nodes_; ++k) {
+    const double* const z = state(states_, k);
+    double input = 0.0;
+    if (prescribed(k)) {
+      set_prescribed_feedback(k, feedback.data());
+      for (std::size_t i = base(); i < size_; ++i) {
+        input += feedback[i] * z[i];
+      }
+      if (k + 3 == nodes_) {
+        input += *window_->end_base / kRestingSoonByJerk;
+      }
+    }
+    inputs_[k] = input;
+    step(z, input, state(states_, k + 1));
+  }
+}
+
+void ModalForm::step(const double* z, double input, double* next) const {
+  const double* const b = z + base();
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    const ModeStep& mode = modes_[i];
+    const double y = z[2 * i];
+    const double rate = z[2 * i + 1];
+    next[2 * i] =
+        mode.own[0] * y + mode.own[1] * rate + mode.by_accel[0] * b[2] + mode.by_jerk[0] * input;
+    next[2 * i + 1] =
+        mode.own[2] * y + mode.own[3] * rate + mode.by_accel[1] * b[2] + mode.by_jerk[1] * input;
+  }
+  double* const to = next + base();
+  to[0] = b[0] + b[1] + 0.5 * b[2] + kBaseByJerk[0] * input;
+  to[1] = b[1] + b[2] + kBaseByJerk[1] * input;
+  to[2] = b[2] + input;
+}
+
+void ModalForm::transpose_step(double* v) const {
+  double* const b = v + base();
+  double by_accel = 0.5 * b[0] + b[1] + b[2];
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    const ModeStep& mode = modes_[i];
+    const double y = v[2 * i];
+    const double rate = v[2 * i + 1];
+    by_accel += mode.by_accel[0] * y + mode.by_accel[1] * rate;
+    v[2 * i] = mode.own[0] * y + mode.own[2] * rate;
+    v[2 * i + 1] = mode.own[1] * y + mode.own[3] * rate;
+  }
+  b[1] += b[0];
+  b[2] = by_accel;
+}
+
+double ModalForm::by_input(const double* v) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    sum += modes_[i].by_jerk[0] * v[2 * i] + modes_[i].by_jerk[1] * v[2 * i + 1];
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    sum += kBaseByJerk[i] * v[base() + i];
+  }
+  return sum;
+}
+
+double ModalForm::swing(const Model& model, const double* z, std::size_t rate) const {
+  double sum = 0.0;
+  for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
+    sum += z[2 * i + rate];
+  }
+  return sum;
+}
+
+void ModalForm::evaluate(const PerKind<bool>& kinds) {
+  half_cost_ = 0.0;
+  const std::size_t count = models_.size();
+  for (std::size_t k = 0; k < nodes_; ++k) {
+    const double* const z = state(states_, k);
+    const double* const next = k + 1 < nodes_ ? state(states_, k + 1) : nullptr;
+    for (std::size_t c = 0; c < count; ++c) {
+      const Model& model = models_[c];
+      const double p = z[base()] + swing(model, z);
+      const double error = p - window_->reference[2 * k];
+      const double pull = node_weight_[k] * model.share * error;
+      node_pull_[k * count + c] = pull;
+      half_cost_ += 0.5 * pull * error;
+      if (next != nullptr) {
+        const double rate = z[base() + 1] + swing(model, z, 1);
+        const double p_next = next[base()] + swing(model, next);
+        const double rate_next = next[base() + 1] + swing(model, next, 1);
+        const double middle_error =
+            0.5 * (p + p_next) + 0.125 * (rate - rate_next) - window_->reference[2 * k + 1];
+        const double middle_pull = middle_weight_[k] * model.share * middle_error;
+        middle_pull_[k * count + c] = middle_pull;
+        half_cost_ += 0.5 * middle_pull * middle_error;
+      }
+    }
+    if (next != nullptr) {
+      half_cost_ += 0.5 * window_->jerk_weight * inputs_[k] * inputs_[k];
+    }
+  }
+  split_rows(states_, inputs_, kinds, rows_);
+}
+
+void ModalForm::split_rows(const std::vector<double>& states, const Padded& inputs,
+                           const PerKind<bool>& kinds, PerKind<Padded>& rows) const {
+  for (const RowKind kind : kNodeKinds) {
+    if (kinds[index_of(kind)]) {
+      Padded& row = rows[index_of(kind)];
+      row.resize(nodes_);
+      for (std::size_t k = 0; k < nodes_; ++k) {
+        row[k] = state(states, k)[place(kind)];
+      }
+    }
+  }
+  if (kinds[index_of(RowKind::jerk)]) {
+    rows[index_of(RowKind::jerk)] = inputs;
+  }
+}
+
+void ModalForm::carry_back() {
+  const std::size_t n = size_;
+  const std::size_t b = base();
+  // P Φ, row by row.
+  for (std::size_t r = 0; r < n; ++r) {
+    double* const to = half_next_.data() + r * n;
+    std::copy_n(cost_to_go_.data() + r * n, n, to);
+    transpose_step(to);
+  }
+  // Φᵀ times that.
+  double* const accel = next_.data() + (b + 2) * n;
+  const double* const b0 = half_next_.data() + b * n;
+  const double* const b1 = b0 + n;
+  const double* const b2 = b1 + n;
+  for (std::size_t j = 0; j < n; ++j) {
+    next_.data()[b * n + j] = b0[j];
+    next_.data()[(b + 1) * n + j] = b0[j] + b1[j];
+    accel[j] = 0.5 * b0[j] + b1[j] + b2[j];
+  }
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    const ModeStep& mode = modes_[i];
+    const double* const y = half_next_.data() + 2 * i * n;
+    const double* const rate = y + n;
+    double* const to = next_.data() + 2 * i * n;
+    for (std::size_t j = 0; j < n; ++j) {
+      accel[j] += mode.by_accel[0] * y[j] + mode.by_accel[1] * rate[j];
+      to[j] = mode.own[0] * y[j] + mode.own[2] * rate[j];
+      to[n + j] = mode.own[1] * y[j] + mode.own[3] * rate[j];
+    }
+  }
+}
+
+bool ModalForm::prescribed(std::size_t k) const {
+  return window_->end_base.has_value() && k + 3 >= nodes_;
+}
+
+void ModalForm::set_prescribed_feedback(std::size_t k, double* feedback) const {
+  std::fill_n(feedback, size_, 0.0);
+  double* const b = feedback + base();
+  if (k + 2 == nodes_) {
+    b[1] = b[2] = -2.0;
+    return;
+  }
+  std::ranges::copy(kRestingSoon, b);
+  transpose_step(feedback);
+  for (std::size_t i = 0; i < size_; ++i) {
+    feedback[i] /= -kRestingSoonByJerk;
+  }
+}
+
+bool ModalForm::factor(const PerKind<const double*>& weights) {
+  const auto add_node = [&](std::size_t k, Matrix& p) {
+    p += node_weight_[k] * node_square_;
+    for (const RowKind kind : kNodeKinds) {
+      if (weights[index_of(kind)] != nullptr) {
+        const auto at = static_cast<Eigen::Index>(place(kind));
+        p(at, at) += weights[index_of(kind)][k];
+      }
+    }
+  };
+  const double* const jerk_weight = weights[index_of(RowKind::jerk)];
+  cost_to_go_.setZero();
+  add_node(nodes_ - 1, cost_to_go_);
+  const auto n = static_cast<Eigen::Index>(size_);
+  for (std::size_t k = nodes_ - 1; k-- > 0;) {
+    by_input_.setZero();
+    for (std::size_t i = 0; i < modes_.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(2 * i);
+      by_input_ += modes_[i].by_jerk[0] * cost_to_go_.row(at).transpose() +
+                   modes_[i].by_jerk[1] * cost_to_go_.row(at + 1).transpose();
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      by_input_ +=
+          kBaseByJerk[i] * cost_to_go_.row(static_cast<Eigen::Index>(base() + i)).transpose();
+    }
+    const double middle = middle_weight_[k];
+    const double curvature = window_->jerk_weight +
+                             (jerk_weight != nullptr ? jerk_weight[k] : 0.0) +
+                             by_input(by_input_.data()) + middle * middle_curvature_;
+    if (!(curvature > 0.0)) {
+      return false;
+    }
+    cross_ = by_input_;
+    transpose_step(cross_.data());
+    cross_ += middle * middle_cross_;
+    carry_back();
+    next_ += middle * middle_square_;
+    Eigen::Map<Vector> feedback(state(feedback_, k), n);
+    if (prescribed(k)) {
+      set_prescribed_feedback(k, feedback.data());
+      inverse_curvature_[k] = 0.0;
+      cross_ += 0.5 * curvature * feedback;
+      next_ += cross_ * feedback.transpose() + feedback * cross_.transpose();
+    } else {
+      inverse_curvature_[k] = 1.0 / curvature;
+      feedback = -inverse_curvature_[k] * cross_;
+      next_ += cross_ * feedback.transpose();
+    }
+    cost_to_go_ = 0.5 * (next_ + next_.transpose());
+    add_node(k, cost_to_go_);
+  }
+  return factor_start();
+}
+
+bool ModalForm::factor_start() {
+  const Eigen::MatrixXd reduced = start_basis_.transpose() * cost_to_go_ * start_basis_;
+  start_inverse_ = Eigen::MatrixXd::Identity(reduced.rows(), reduced.rows());
+  if (reduced.rows() > 0) {
+    const Eigen::LLT<Eigen::MatrixXd> llt(reduced);
+    if (llt.info() != Eigen::Success) {
+      return false;
+    }
+    llt.solveInPlace(start_inverse_);
+  }
+  return true;
+}
+
+void ModalForm::solve(const PerKind<const double*>& forces) {
+  faint_pull_ = -faint_pull_;
+  PerKind<bool> kinds{};
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    kinds[i] = forces[i] != nullptr;
+  }
+  const std::size_t count = models_.size();
+  const auto add_node = [&](std::size_t k, Vector& g) {
+    for (std::size_t c = 0; c < count; ++c) {
+      const double pull = node_pull_[k * count + c] - faint_pull_;
+      for (std::size_t i = models_[c].first_mode; i < models_[c].end_mode; ++i) {
+        g(static_cast<Eigen::Index>(2 * i)) += pull;
+      }
+      g(static_cast<Eigen::Index>(base())) += pull;
+    }
+    for (const RowKind kind : kNodeKinds) {
+      if (forces[index_of(kind)] != nullptr) {
+        g(static_cast<Eigen::Index>(place(kind))) -= forces[index_of(kind)][k];
+      }
+    }
+  };
+  const auto n = static_cast<Eigen::Index>(size_);
+  const double* const jerk_force = forces[index_of(RowKind::jerk)];
+  // The model's decrease is ½ Σ r²/R over the inputs, plus such a term for the start.
+  decrement_ = 0.0;
+  Vector g = Vector::Zero(n);
+  add_node(nodes_ - 1, g);
+  for (std::size_t k = nodes_ - 1; k-- > 0;) {
+    double slope = window_->jerk_weight * inputs_[k] -
+                   (jerk_force != nullptr ? jerk_force[k] : 0.0) + by_input(g.data());
+    for (std::size_t c = 0; c < count; ++c) {
+      slope += middle_pull_[k * count + c] * models_[c].middle_input;
+    }
+    feedforward_[k] = -slope * inverse_curvature_[k];
+    decrement_ -= 0.5 * slope * feedforward_[k];
+    transpose_step(g.data());
+    for (std::size_t c = 0; c < count; ++c) {
+      g += middle_pull_[k * count + c] * models_[c].middle;
+    }
+    g += slope * Eigen::Map<const Vector>(state(feedback_, k), n);
+    add_node(k, g);
+  }
+  const Vector at_start = start_basis_.transpose() * g;
+  const Vector first = -start_inverse_ * at_start;
+  decrement_ -= 0.5 * first.dot(at_start);
+  Eigen::Map<Vector>(state_steps_.data(), n) = start_basis_ * first;
+  for (std::size_t k = 0; k + 1 < nodes_; ++k) {
+    const double* const z = state(state_steps_, k);
+    input_steps_[k] =
+        Eigen::Map<const Vector>(state(feedback_, k), n).dot(Eigen::Map<const Vector>(z, n)) +
+        feedforward_[k];
+    step(z, input_steps_[k], state(state_steps_, k + 1));
+  }
+  split_rows(state_steps_, input_steps_, kinds, row_steps_);
+}
+
+void ModalForm::advance(double length) {
+  const auto size = static_cast<Eigen::Index>(states_.size());
+  Eigen::Map<Vector>(states_.data(), size) +=
+      length * Eigen::Map<const Vector>(state_steps_.data(), size);
+  as_array(inputs_) += length * as_array(input_steps_);
+}
+
+void ModalForm::save() {
+  saved_states_ = states_;
+  saved_inputs_ = inputs_;
+}
+
+void ModalForm::restore() {
+  states_ = saved_states_;
+  inputs_ = saved_inputs_;
+}
+
+void ModalForm::write(dynamics::AxisTrajectory& base) const {
+  const auto put = [&](RowKind kind, double offset, std::vector<double>& to) {
+    to.resize(nodes_);
+    for (std::size_t k = 0; k < nodes_; ++k) {
+      to[k] = offset + window_->unit[index_of(kind)] * state(states_, k)[place(kind)];
+    }
+  };
+  put(RowKind::position, window_->origin_mm, base.position_mm);
+  put(RowKind::velocity, 0.0, base.velocity_mm_s);
+  put(RowKind::accel, 0.0, base.accel_mm_s2);
+  window_->keep_ends(base);
+}
+
+}  // namespace unflex::compensate

@@ -1,0 +1,137 @@
+// The window stage by stage, like StageForm, for axes of several modes and for any number of models
+// of the axis (AxisWindow::variants).
+//
+// Notation, beside that of axis_chain.hpp and stage_form.hpp:
+//   q_i, g_i    a mode's part of the nozzle's motion and its gain, of any model
+//   y_i         q_i − g_i b
+//   z           (y_1, ẏ_1, …, y_K, ẏ_K, b, ḃ, b̈)
+//   c           models; p_c = b + Σ y_i over the modes of c
+//
+// A base that moves evenly takes all modes along, so y depends on its acceleration alone:
+//
+//   (y_i, ẏ_i)' = A_i (y_i, ẏ_i) + a_i b̈ + β_i j      b' = b + ḃ + b̈/2 + j/6      …
+//
+// Φ is then 2×2 blocks and one column, and Φᵀ P Φ costs 12 n K multiplications for n = 2K + 3
+// states instead of 2 n³.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "axis_chain.hpp"
+#include "padded.hpp"
+
+namespace unflex::compensate {
+
+// How a mode goes from node to node: A, a and β above.
+struct ModeStep {
+  std::array<double, 4> own{};  // A, by rows
+  std::array<double, 2> by_accel{};
+  std::array<double, 2> by_jerk{};
+
+  // period_s: h.
+  ModeStep(const dynamics::Mode& mode, double period_s);
+};
+
+class ModalForm {
+ public:
+  // As in FlatForm.
+  void assign(const ScaledWindow& window);
+
+  void evaluate(const PerKind<bool>& kinds);
+  [[nodiscard]] double half_cost() const { return half_cost_; }
+  [[nodiscard]] const double* rows(RowKind kind) const { return rows_[index_of(kind)].data(); }
+
+  [[nodiscard]] bool factor(const PerKind<const double*>& weights);
+  void solve(const PerKind<const double*>& forces);
+  [[nodiscard]] const double* row_steps(RowKind kind) const {
+    return row_steps_[index_of(kind)].data();
+  }
+  [[nodiscard]] double decrement() const { return decrement_; }
+  void advance(double length);
+
+  void save();
+  void restore();
+
+  void write(dynamics::AxisTrajectory& base) const;
+
+ private:
+  using Vector = Eigen::VectorXd;
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  // A model of the axis: what its nozzle is made of.
+  struct Model {
+    std::size_t first_mode = 0;
+    std::size_t end_mode = 0;
+    double share = 0.0;         // α
+    Vector middle;              // coefficients of z_k in p_c in the middle of the interval
+    double middle_input = 0.0;  // coefficient of j_k there
+  };
+
+  [[nodiscard]] std::size_t base() const { return 2 * modes_.size(); }  // place of b in z
+  [[nodiscard]] std::size_t place(RowKind kind) const { return base() + index_of(kind); }
+  [[nodiscard]] double* state(std::vector<double>& of, std::size_t k) const {
+    return of.data() + k * size_;
+  }
+  [[nodiscard]] const double* state(const std::vector<double>& of, std::size_t k) const {
+    return of.data() + k * size_;
+  }
+
+  void set_models(const AxisWindow& window);
+  void set_start();
+  void roll_out(const Vector& first);
+  // z_{k+1} from z_k and j_k.
+  void step(const double* z, double input, double* next) const;
+  // v ← Φᵀ v
+  void transpose_step(double* v) const;
+  [[nodiscard]] double by_input(const double* v) const;  // Bᵀ v
+  // p_c − b, or its rate, or its step.
+  [[nodiscard]] double swing(const Model& model, const double* z, std::size_t rate = 0) const;
+  void split_rows(const std::vector<double>& states, const Padded& inputs,
+                  const PerKind<bool>& kinds, PerKind<Padded>& rows) const;
+  // Φᵀ P Φ into next_, from cost_to_go_.
+  void carry_back();
+  [[nodiscard]] bool prescribed(std::size_t k) const;
+  void set_prescribed_feedback(std::size_t k, double* feedback) const;
+  [[nodiscard]] bool factor_start();
+
+  const ScaledWindow* window_ = nullptr;
+  std::size_t nodes_ = 0;
+  std::size_t size_ = 0;  // n
+  std::vector<ModeStep> modes_;
+  std::vector<double> gains_;
+  std::vector<Model> models_;
+  Matrix node_square_;    // Σ α of the squares of p_c
+  Matrix middle_square_;  // likewise in the middle
+  Vector middle_cross_;   // Σ α μ_c m_c
+  double middle_curvature_ = 0.0;
+  Matrix start_basis_;  // δz_0 = start_basis_ y with y free
+  Eigen::MatrixXd start_inverse_;
+
+  std::vector<double> states_;  // n for each node
+  std::vector<double> saved_states_;
+  std::vector<double> state_steps_;
+  Padded inputs_;
+  Padded saved_inputs_;
+  Padded input_steps_;
+  Padded feedforward_;
+  std::vector<double> feedback_;  // n for each interval
+  Padded inverse_curvature_;      // 0 where the feedback is prescribed
+  Padded node_weight_;
+  Padded middle_weight_;
+  std::vector<double> node_pull_;  // of each model at each node
+  std::vector<double> middle_pull_;
+  Matrix cost_to_go_;  // P
+  Matrix half_next_;   // P Φ
+  Matrix next_;
+  Vector by_input_;
+  Vector cross_;
+  double half_cost_ = 0.0;
+  double decrement_ = 0.0;
+  double faint_pull_ = 0.0;
+  PerKind<Padded> rows_;
+  PerKind<Padded> row_steps_;
+};
+
+}  // namespace unflex::compensate
