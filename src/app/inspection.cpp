@@ -74,9 +74,8 @@ void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
   fmt::format_to(out, "printer       {}, {} mm/s, {} mm/s², corners {} mm/s\n",
                  to_string(s.printer.firmware), s.limits.max_velocity_mm_s,
                  s.limits.max_accel_mm_s2, s.limits.square_corner_velocity_mm_s);
-  fmt::format_to(out, "dynamics      X {:.4g} Hz, ζ {:.3g}; Y {:.4g} Hz, ζ {:.3g}\n",
-                 s.dynamics_x.freq_hz, s.dynamics_x.damping_ratio, s.dynamics_y.freq_hz,
-                 s.dynamics_y.damping_ratio);
+  fmt::format_to(out, "dynamics      X {}; Y {}\n", s.dynamics_x.description(),
+                 s.dynamics_y.description());
 }
 
 // Fewer digits for values that follow from other keys. The report has all digits.

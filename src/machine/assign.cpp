@@ -12,6 +12,9 @@
 namespace unflex::machine {
 namespace {
 
+constexpr std::size_t kFewestModes = 2;
+constexpr std::size_t kMostModes = 3;
+
 // One overload per type a member can have. Each returns what is wrong, or nothing.
 std::string store(const Value& value, const Key& key, double& target) {
   const double* const number = std::get_if<double>(&value.content);
@@ -109,6 +112,68 @@ std::string store(const Value& value, const Key& key, std::optional<Range>& targ
                        range.min, range.max);
   }
   target = range;
+  return {};
+}
+
+// One value of a mode; `row` has the bounds of the key that stands for one mode.
+std::string store(const NamedValue& value, const Key& key, std::size_t number, ModeSettings& mode) {
+  const std::string name = fmt::format("{}, number {}: {}", key.name, number, value.name);
+  const auto number_of = [&](std::string_view row, double& target) {
+    Key named = row.empty() ? key : key_table()[*find_key(row)];
+    named.name = name;
+    return store(value.value, named, target);
+  };
+  if (value.name == "freq_hz") {
+    return number_of("dynamics.x.freq_hz", mode.freq_hz);
+  }
+  if (value.name == "damping_ratio") {
+    return number_of("dynamics.x.damping_ratio", mode.damping_ratio);
+  }
+  if (value.name == "gain") {
+    return number_of("", mode.gain);
+  }
+  return fmt::format(
+      "{}, number {}: unknown value '{}'; a mode has freq_hz, damping_ratio and gain", key.name,
+      number, value.name);
+}
+
+std::string store(const Value& value, const Key& key, std::vector<ModeSettings>& target) {
+  const auto* list = std::get_if<std::vector<Value>>(&value.content);
+  const auto is_table = [](const Value& element) {
+    return std::holds_alternative<std::vector<NamedValue>>(element.content);
+  };
+  if (list == nullptr || list->size() < kFewestModes || list->size() > kMostModes ||
+      !std::ranges::all_of(*list, is_table)) {
+    return fmt::format(
+        "{} must be {} to {} tables, [[{}]], each with freq_hz, damping_ratio and gain; give one "
+        "mode as freq_hz and damping_ratio",
+        key.name, kFewestModes, kMostModes, key.name);
+  }
+  std::vector<ModeSettings> modes;
+  double sum = 0.0;
+  for (const Value& element : *list) {
+    const auto& table = std::get<std::vector<NamedValue>>(element.content);
+    ModeSettings& mode = modes.emplace_back();
+    for (const std::string_view needed : {"freq_hz", "damping_ratio", "gain"}) {
+      if (std::ranges::find(table, needed, &NamedValue::name) == table.end()) {
+        return fmt::format("{}, number {}: {} is missing", key.name, modes.size(), needed);
+      }
+    }
+    for (const NamedValue& given : table) {
+      if (std::string wrong = store(given, key, modes.size(), mode); !wrong.empty()) {
+        return wrong;
+      }
+    }
+    sum += mode.gain;
+  }
+  constexpr double kRounding = 2e-3;
+  if (std::abs(sum - 1.0) > kRounding) {
+    return fmt::format("the gains of {} add up to {:.4g}, but must add up to 1", key.name, sum);
+  }
+  for (ModeSettings& mode : modes) {
+    mode.gain /= sum;
+  }
+  target = std::move(modes);
   return {};
 }
 

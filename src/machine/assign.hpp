@@ -11,6 +11,8 @@
 
 namespace unflex::machine {
 
+struct NamedValue;
+
 // What a source may hold for a key. monostate stands for a value that no key takes.
 struct Value {
   Value(double number) : content(number), kind("a number") {}
@@ -20,6 +22,7 @@ struct Value {
   Value(const Range& range)
       : content(std::vector<Value>{Value(range.min), Value(range.max)}), kind("an array") {}
   Value(std::vector<Value> list) : content(std::move(list)), kind("an array") {}
+  Value(std::vector<NamedValue> table);
   [[nodiscard]] static Value other(std::string kind) {
     Value value(0.0);
     value.content = std::monostate{};
@@ -27,9 +30,19 @@ struct Value {
     return value;
   }
 
-  std::variant<std::monostate, double, bool, std::string, std::vector<Value>> content;
+  std::variant<std::monostate, double, bool, std::string, std::vector<Value>,
+               std::vector<NamedValue>>
+      content;
   std::string kind;  // in words, for messages
 };
+
+// A value of a table.
+struct NamedValue {
+  std::string name;
+  Value value;
+};
+
+inline Value::Value(std::vector<NamedValue> table) : content(std::move(table)), kind("a table") {}
 
 // A key's value and where it was read.
 struct Assignment {

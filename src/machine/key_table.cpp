@@ -298,6 +298,10 @@ constexpr std::array kKeys = {
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along X"},
     Key{"dynamics.x.damping_ratio", &setting<&S::dynamics_x, &D::damping_ratio>,
         Bounds{.min = 0.0, .max = 1.0}, "", "Damping ratio ζ along X"},
+    Key{"dynamics.x.mode", &setting<&S::dynamics_x, &D::modes>, kAny, "",
+        "Modes along X, in place of freq_hz and damping_ratio: [[dynamics.x.mode]] with freq_hz, "
+        "damping_ratio and gain; the gains add up to 1",
+        "one mode"},
     Key{"dynamics.x.mass_g",
         &mass_form<&Draft::mass_x, &M::mass_g>,
         kPositive,
@@ -329,6 +333,10 @@ constexpr std::array kKeys = {
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along Y"},
     Key{"dynamics.y.damping_ratio", &setting<&S::dynamics_y, &D::damping_ratio>,
         Bounds{.min = 0.0, .max = 1.0}, "", "Damping ratio ζ along Y"},
+    Key{"dynamics.y.mode", &setting<&S::dynamics_y, &D::modes>, kAny, "",
+        "Modes along Y, in place of freq_hz and damping_ratio: [[dynamics.y.mode]] with freq_hz, "
+        "damping_ratio and gain; the gains add up to 1",
+        "one mode"},
     Key{"dynamics.y.mass_g",
         &mass_form<&Draft::mass_y, &M::mass_g>,
         kPositive,
@@ -380,7 +388,8 @@ constexpr std::array kKeys = {
     Key{"solve.window_s", &setting<&S::solve, &O::window_s>, Bounds{.min = 0.05, .max = 60.0}, "s",
         "Part of a long run that is solved at once"},
     Key{"solve.overlap_s", &setting<&S::solve, &O::overlap_s>, Bounds{.min = 0.0, .max = 10.0}, "s",
-        "How much of its neighbours on either side such a part takes into account"},
+        "How much of its neighbours on either side such a part takes into account, at least; axes of "
+        "several modes need more"},
     Key{"solve.lead_in_ms", &setting<&S::solve, &O::lead_in_ms>, Bounds{.min = 0.0, .max = 1000.0},
         "ms", "How long before the plan the base may start"},
     Key{"solve.tail_ms", &setting<&S::solve, &O::tail_ms>, Bounds{.min = 0.0, .max = 1000.0}, "ms",

@@ -24,9 +24,10 @@ struct Bounds {
 };
 
 // The member behind a key. The alternative held says what type of value the key takes.
-using Member = std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&),
-                            bool& (*)(Draft&), Firmware& (*)(Draft&), Kinematics& (*)(Draft&),
-                            std::optional<Range>& (*)(Draft&), std::string& (*)(Draft&)>;
+using Member =
+    std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&), bool& (*)(Draft&),
+                 Firmware& (*)(Draft&), Kinematics& (*)(Draft&), std::optional<Range>& (*)(Draft&),
+                 std::string& (*)(Draft&), std::vector<ModeSettings>& (*)(Draft&)>;
 
 struct Key {
   std::string_view name;

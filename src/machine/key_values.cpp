@@ -20,6 +20,10 @@ std::optional<std::string> text_of(const std::optional<T>& value) {
   return value ? std::optional(to_toml_value(*value)) : std::nullopt;
 }
 
+std::optional<std::string> text_of(const std::vector<ModeSettings>& value) {
+  return value.empty() ? std::nullopt : std::optional(to_toml_value(value));
+}
+
 std::string bounds_text(const Bounds& bounds) {
   const std::string low = std::isfinite(bounds.min)
                               ? fmt::format("{}{}", bounds.min_open ? "> " : "≥ ", bounds.min)
@@ -44,6 +48,15 @@ std::string to_toml_value(const std::string& value) { return fmt::format("\"{}\"
 
 std::string to_toml_value(const Range& value) {
   return fmt::format("[{}, {}]", value.min, value.max);
+}
+
+std::string to_toml_value(const std::vector<ModeSettings>& value) {
+  std::string text;
+  for (const ModeSettings& mode : value) {
+    text += fmt::format("{}{{freq_hz = {}, damping_ratio = {}, gain = {}}}",
+                        text.empty() ? "" : ", ", mode.freq_hz, mode.damping_ratio, mode.gain);
+  }
+  return "[" + text + "]";
 }
 
 std::optional<std::string> own_value(const Key& key, Draft& draft) {
@@ -75,6 +88,9 @@ std::string range_text(const Key& key) {
   }
   if (std::holds_alternative<std::optional<Range>& (*)(Draft&)>(key.member)) {
     return "min < max";
+  }
+  if (std::holds_alternative<std::vector<ModeSettings>& (*)(Draft&)>(key.member)) {
+    return "2 or 3 modes";
   }
   if (std::holds_alternative<std::string& (*)(Draft&)>(key.member)) {
     return key.words.empty() ? "a text" : fmt::format("\"{}\"", fmt::join(key.words, "\", \""));

@@ -15,6 +15,7 @@ namespace unflex::machine {
 [[nodiscard]] std::string to_toml_value(Kinematics value);
 [[nodiscard]] std::string to_toml_value(const std::string& value);
 [[nodiscard]] std::string to_toml_value(const Range& value);
+[[nodiscard]] std::string to_toml_value(const std::vector<ModeSettings>& value);
 
 // The value the key itself holds; nullopt while unset.
 [[nodiscard]] std::optional<std::string> own_value(const Key& key, Draft& draft);

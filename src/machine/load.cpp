@@ -25,6 +25,8 @@ namespace unflex::machine {
 namespace {
 
 constexpr std::string_view kDefaultOrigin = "default";
+// How the key of several modes ends, which is the origin of what follows from it.
+constexpr std::string_view kModes = ".mode";
 
 std::string origin_text(const std::optional<SourcePlace>& place) {
   if (!place) {
@@ -36,11 +38,23 @@ std::string origin_text(const std::optional<SourcePlace>& place) {
   return place->line == 0 ? place->file : fmt::format("{}:{}", place->file, place->line);
 }
 
+// A key of one mode whose value is that of the largest of several.
+bool is_of_modes(const Draft& draft, std::string_view key) {
+  const auto is_of = [&](std::string_view section, const AxisDynamics& axis) {
+    return !axis.modes.empty() && key.starts_with(section) && !key.ends_with(kModes);
+  };
+  return is_of("dynamics.x.", draft.settings.dynamics_x) ||
+         is_of("dynamics.y.", draft.settings.dynamics_y);
+}
+
 void record_origins(Draft& draft) {
   for (std::size_t i = 0; i < key_table().size(); ++i) {
     const Key& key = key_table()[i];
     if (!key.converted) {
-      draft.settings.origins.emplace_back(key.name, origin_text(draft.places[i]));
+      draft.settings.origins.emplace_back(
+          key.name, is_of_modes(draft, key.name)
+                        ? std::string(key.name.substr(0, key.name.rfind('.'))) + std::string(kModes)
+                        : origin_text(draft.places[i]));
     }
   }
 }
@@ -85,19 +99,21 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
 struct AxisFrequency {
   std::string_view axis;
   std::string_view key;
+  std::string_view key_of_modes;
   AxisDynamics Settings::*dynamics;
 };
 
 constexpr std::array kFrequencies = {
-    AxisFrequency{"X", "dynamics.x.freq_hz", &Settings::dynamics_x},
-    AxisFrequency{"Y", "dynamics.y.freq_hz", &Settings::dynamics_y}};
+    AxisFrequency{"X", "dynamics.x.freq_hz", "dynamics.x.mode", &Settings::dynamics_x},
+    AxisFrequency{"Y", "dynamics.y.freq_hz", "dynamics.y.mode", &Settings::dynamics_y}};
 
 // A wrong resonance makes a print worse than it was sliced, so the default is for measuring alone.
 void note_unknown_resonances(Draft& draft) {
   std::vector<std::string_view> axes;
   std::vector<std::string> overrides;
   for (const AxisFrequency& frequency : kFrequencies) {
-    if (!draft.places[*find_key(frequency.key)]) {
+    if (!draft.places[*find_key(frequency.key)] &&
+        (draft.settings.*frequency.dynamics).modes.empty()) {
       axes.push_back(frequency.axis);
       overrides.push_back(fmt::format("--set {}=...", frequency.key));
     }
@@ -118,14 +134,18 @@ void note_odd_frequencies(Draft& draft) {
   constexpr double kLeast_hz = 10.0;
   constexpr double kMost_hz = 200.0;
   for (const AxisFrequency& frequency : kFrequencies) {
-    const std::optional<SourcePlace>& place = draft.places[*find_key(frequency.key)];
-    const double freq_hz = (draft.settings.*frequency.dynamics).freq_hz;
-    if (place && (freq_hz < kLeast_hz || freq_hz > kMost_hz)) {
-      draft.settings.notes.push_back(
-          {*place,
-           fmt::format("{} is {:.4g}, but printers swing at {} to {} Hz; look whether it is "
-                       "in Hz and of this axis, or measure it with unflex identify",
-                       frequency.key, freq_hz, kLeast_hz, kMost_hz)});
+    const AxisDynamics& axis = draft.settings.*frequency.dynamics;
+    const std::string_view key = axis.modes.empty() ? frequency.key : frequency.key_of_modes;
+    const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
+    for (const double freq_hz : {axis.slowest_hz(), axis.fastest_hz()}) {
+      if (place && (freq_hz < kLeast_hz || freq_hz > kMost_hz)) {
+        draft.settings.notes.push_back(
+            {*place,
+             fmt::format("{} is {:.4g}, but printers swing at {} to {} Hz; look whether it is "
+                         "in Hz and of this axis, or measure it with unflex identify",
+                         key, freq_hz, kLeast_hz, kMost_hz)});
+        break;
+      }
     }
   }
 }
@@ -340,7 +360,7 @@ std::string toml_line(const Key& key, std::string_view name, const std::string& 
                       Draft& draft) {
   const std::optional<std::string> own = own_value(key, draft);
   const std::optional<std::string> value = value_in_force(key, draft);
-  if (own && origin == kDefaultOrigin) {
+  if (own && (origin == kDefaultOrigin || origin.ends_with(kModes))) {
     return fmt::format("# {} = {}\n", name, *own);
   }
   if (own) {

@@ -27,7 +27,12 @@ double default_extrude_ratio(const ExtruderSettings& extruder) {
 // The zero of the axis' transfer function lies at −ω/2ζ; after four of its time constants, 8ζ/ω,
 // what the base still does is below a fiftieth.
 double settling_time_s(const AxisDynamics& axis) {
-  return 8.0 * axis.damping_ratio / (2.0 * std::numbers::pi * axis.freq_hz);
+  double longest_s = 8.0 * axis.damping_ratio / (2.0 * std::numbers::pi * axis.freq_hz);
+  for (const ModeSettings& mode : axis.modes) {
+    longest_s =
+        std::max(longest_s, 8.0 * mode.damping_ratio / (2.0 * std::numbers::pi * mode.freq_hz));
+  }
+  return longest_s;
 }
 
 std::array<double, 4> or_default(const AxisOptions& own, const std::array<double, 4>& otherwise) {
@@ -215,6 +220,26 @@ double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {
                   std::min(base_accel_times_asked() * asked_mm_s2, most));
 }
 
+double AxisDynamics::slowest_hz() const {
+  return modes.empty() ? freq_hz : std::ranges::min(modes, {}, &ModeSettings::freq_hz).freq_hz;
+}
+
+double AxisDynamics::fastest_hz() const {
+  return modes.empty() ? freq_hz : std::ranges::max(modes, {}, &ModeSettings::freq_hz).freq_hz;
+}
+
+std::string AxisDynamics::description() const {
+  if (modes.empty()) {
+    return fmt::format("{:.4g} Hz, ζ {:.3g}", freq_hz, damping_ratio);
+  }
+  std::string text;
+  for (const ModeSettings& mode : modes) {
+    text += fmt::format("{}{:.4g} Hz, ζ {:.3g}, gain {:.3g}", text.empty() ? "" : " + ",
+                        mode.freq_hz, mode.damping_ratio, mode.gain);
+  }
+  return text;
+}
+
 double Settings::tail_s() const {
   constexpr double kShortest = 2e-3;
   if (solve.tail_ms) {
@@ -232,7 +257,7 @@ double Settings::emit_accel_mm_s2(double asked_mm_s2) const {
 
 double Settings::period_ms() const {
   constexpr double kLongest_ms = 1.0;
-  const double fastest_hz = std::max(dynamics_x.freq_hz, dynamics_y.freq_hz);
+  const double fastest_hz = std::max(dynamics_x.fastest_hz(), dynamics_y.fastest_hz());
   return emit.period_ms.value_or(std::min(kLongest_ms, 1e3 / (kGoodNodesPerPeriod * fastest_hz)));
 }
 

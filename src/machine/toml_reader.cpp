@@ -37,7 +37,14 @@ Value value_of(const toml::node& node) {
     }
     return list;
   }
-  return Value::other(node.is_table() ? "a table" : "a date or time");
+  if (const auto* table = node.as_table()) {
+    std::vector<NamedValue> values;
+    for (const auto& [key, inner] : *table) {
+      values.push_back({std::string(key.str()), value_of(inner)});
+    }
+    return values;
+  }
+  return Value::other("a date or time");
 }
 
 std::string check_schema(const toml::node& node) {

@@ -93,9 +93,42 @@ Status check_mass_keys(const Draft& draft, const std::string& section) {
   return {};
 }
 
+// Several modes or one: what is overridden counts, of two from the same source neither can. Sets
+// the frequency and damping of an axis with several modes to those of its largest.
+Status resolve_modes(const Draft& draft, const std::string& section, AxisDynamics& axis) {
+  if (axis.modes.empty()) {
+    return {};
+  }
+  const std::string modes_key = section + ".mode";
+  const bool override = is_overridden(draft, modes_key);
+  for (const std::string_view name :
+       {kModalKeys[0], kModalKeys[1], kMassKeys[0], kMassKeys[1], kMassKeys[2]}) {
+    const std::string key = fmt::format("{}.{}", section, name);
+    if (!place_of(draft, key) || (override && !is_overridden(draft, key))) {
+      continue;
+    }
+    if (is_overridden(draft, key) && !override) {
+      axis.modes.clear();
+      return {};
+    }
+    return conflict(draft, {key, modes_key},
+                    fmt::format("{} and {} are both given, but an axis is either of one mode or "
+                                "of several; remove one of them",
+                                key, modes_key));
+  }
+  const ModeSettings& main = *std::ranges::max_element(
+      axis.modes, {}, [](const ModeSettings& mode) { return std::abs(mode.gain); });
+  axis.freq_hz = main.freq_hz;
+  axis.damping_ratio = main.damping_ratio;
+  return {};
+}
+
 Status resolve_axis(Draft& draft, const std::string& section, const MassSpringDamper& mass,
                     AxisDynamics& axis) {
   if (Status checked = check_mass_keys(draft, section); !checked) {
+    return checked;
+  }
+  if (Status checked = resolve_modes(draft, section, axis); !checked || !axis.modes.empty()) {
     return checked;
   }
   if (!mass.mass_g || !mass.stiffness_n_mm || !mass.damping_n_s_mm) {
@@ -288,7 +321,7 @@ Status check_emission(const Draft& draft) {
 }
 
 double fastest_freq_hz(const Settings& settings) {
-  return std::max(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
+  return std::max(settings.dynamics_x.fastest_hz(), settings.dynamics_y.fastest_hz());
 }
 
 Status check_grid(const Draft& draft) {

@@ -29,8 +29,19 @@ double grid_mm(const machine::Settings& settings) {
              : kGridMm;
 }
 
-dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
-  return dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio);
+// The axis with its frequencies and damping ratios times these factors.
+dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics, double freq_factor = 1.0,
+                            double damping_factor = 1.0) {
+  if (dynamics.modes.empty()) {
+    return dynamics::from_frequency(dynamics.freq_hz * freq_factor,
+                                    dynamics.damping_ratio * damping_factor);
+  }
+  std::vector<dynamics::Mode> modes;
+  for (const machine::ModeSettings& mode : dynamics.modes) {
+    modes.push_back({2.0 * std::numbers::pi * mode.freq_hz * freq_factor,
+                     mode.damping_ratio * damping_factor, mode.gain});
+  }
+  return dynamics::FlexibleAxis(modes);
 }
 
 bool shares_motors(const machine::Settings& settings) {
@@ -72,8 +83,7 @@ std::vector<compensate::AxisVariant> variants(const machine::AxisDynamics& dynam
     return edges;
   }
   const auto add = [&](double freq_factor, double damping_factor) {
-    edges.push_back({dynamics::from_frequency(dynamics.freq_hz * freq_factor,
-                                              dynamics.damping_ratio * damping_factor)});
+    edges.push_back({axis(dynamics, freq_factor, damping_factor)});
   };
   for (const double sign : {-1.0, 1.0}) {
     if (error.freq > 0.0 && error.damping > 0.0) {
@@ -153,7 +163,7 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
 double settling_of(const machine::AxisDynamics& dynamics) { return axis(dynamics).settling_s(); }
 
 double half_period_s(const machine::Settings& settings) {
-  return 0.5 / std::min(settings.dynamics_x.freq_hz, settings.dynamics_y.freq_hz);
+  return 0.5 / std::min(settings.dynamics_x.slowest_hz(), settings.dynamics_y.slowest_hz());
 }
 
 // Whether the run begins to lay filament while the nozzle still swings from the motion before it.
@@ -277,7 +287,8 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
   setup.lead_in_s = settings.solve.lead_in_ms * 1e-3;
   setup.tail_s = settings.tail_s();
   setup.window_s = settings.solve.window_s;
-  setup.overlap_s = settings.solve.overlap_s;
+  setup.overlap_s = std::clamp(std::max(setup.x.axis.unseen_s(), setup.y.axis.unseen_s()),
+                               settings.solve.overlap_s, settings.solve.window_s);
   setup.travel_weight = settings.solve.travel_weight;
   setup.jerk_weight = settings.solve.jerk_weight;
   return setup;

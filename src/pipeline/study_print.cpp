@@ -29,10 +29,8 @@ study::BenchSetup bench_setup(const machine::Settings& settings) {
 }
 
 std::string describe(const machine::Settings& settings) {
-  return fmt::format("X {:.4g} Hz, ζ {:.3g}; Y {:.4g} Hz, ζ {:.3g}; {} mm/s²",
-                     settings.dynamics_x.freq_hz, settings.dynamics_x.damping_ratio,
-                     settings.dynamics_y.freq_hz, settings.dynamics_y.damping_ratio,
-                     settings.limits.max_accel_mm_s2);
+  return fmt::format("X {}; Y {}; {} mm/s²", settings.dynamics_x.description(),
+                     settings.dynamics_y.description(), settings.limits.max_accel_mm_s2);
 }
 
 }  // namespace

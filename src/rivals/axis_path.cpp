@@ -121,7 +121,7 @@ NozzleWalk::NozzleWalk(const dynamics::FlexibleAxis& axis, const AxisPath& path,
 
 void NozzleWalk::step(const dynamics::BaseSegment& base, double h) {
   if (std::abs(h - map_step_s_) <= kSameTime_s) {
-    nozzle_ = map_.step(nozzle_, base);
+    map_.advance(base, nozzle_);
     return;
   }
   nozzle_ = dynamics::exact_step(axis_, nozzle_, base, h);

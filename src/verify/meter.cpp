@@ -215,8 +215,8 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   const dynamics::Rk4Map map_x(model_.x, h);
   const dynamics::Rk4Map map_y(model_.y, h);
   integrate(phase, steps, h, measured, [&] {
-    nozzle_.x = map_x.step(nozzle_.x, phase.x);
-    nozzle_.y = map_y.step(nozzle_.y, phase.y);
+    map_x.advance(phase.x, nozzle_.x);
+    map_y.advance(phase.y, nozzle_.y);
   });
 }
 
@@ -283,13 +283,15 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
 
 // laying: filament is laid by what is played now.
 Meter::Sample Meter::sample(const ReferencePhase& reference, bool laying, double h) {
-  const double error_x = reference.x.position - nozzle_.x.position();
-  const double error_y = reference.y.position - nozzle_.y.position();
+  const double nozzle_x_mm = nozzle_.x.position();
+  const double nozzle_y_mm = nozzle_.y.position();
+  const double error_x = reference.x.position - nozzle_x_mm;
+  const double error_y = reference.y.position - nozzle_y_mm;
 
   near_.slide(*path_, time_s_);
   std::size_t nearest = current_;
   const double contour2 =
-      near_.squared_contour_error(*path_, nozzle_.x.position(), nozzle_.y.position(), nearest);
+      near_.squared_contour_error(*path_, nozzle_x_mm, nozzle_y_mm, nearest);
   const double tracking2 = error_x * error_x + error_y * error_y;
   const std::size_t line = (*path_)[nearest].move.segment.line;
   all_.add(contour2, tracking2, h, line);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -161,6 +162,12 @@ TEST(Rk4Step, HasTheLocalErrorOfAFourthOrderTaylorSeries) {
   EXPECT_NEAR(got.velocity() / 100.0, -x + x * x * x / 6.0, 1e-15);
 }
 
+template <class Map>
+NozzleState stepped(const Map& map, NozzleState state, const BaseSegment& base) {
+  map.advance(base, state);
+  return state;
+}
+
 TEST(StepMaps, AreTheirSteps) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -171,11 +178,11 @@ TEST(StepMaps, AreTheirSteps) {
                            2e4 * unit(random)};
     const double h = 1e-3 * (1.01 + unit(random));
     const NozzleState rk4 = rk4_step(axis, start, base, h);
-    const NozzleState by_rk4_map = Rk4Map(axis, h).step(start, base);
+    const NozzleState by_rk4_map = stepped(Rk4Map(axis, h), start, base);
     ASSERT_NEAR(by_rk4_map.position(), rk4.position(), 1e-12);
     ASSERT_NEAR(by_rk4_map.velocity(), rk4.velocity(), 1e-9);
     const NozzleState exact = exact_step(axis, start, base, h);
-    const NozzleState by_exact_map = ExactMap(axis, h).step(start, base);
+    const NozzleState by_exact_map = stepped(ExactMap(axis, h), start, base);
     ASSERT_NEAR(by_exact_map.position(), exact.position(), 1e-12);
     ASSERT_NEAR(by_exact_map.velocity(), exact.velocity(), 1e-9);
   }
@@ -194,6 +201,79 @@ TEST(Rk4Step, AgreesWithTheExactStepForSmallSteps) {
     ASSERT_NEAR(got.position(), exact.position(), 1e-9);
     ASSERT_NEAR(got.velocity(), exact.velocity(), 1e-6);
   }
+}
+
+const std::array<Mode, 3> kModes = {Mode{280.0, 0.06, 1.1}, Mode{690.0, 0.1, -0.25},
+                                    Mode{430.0, 0.03, 0.15}};
+
+// p(s) = Σ g H_i(s) b(s), so each mode moves as it would alone, times its gain.
+TEST(SeveralModes, AddUp) {
+  const FlexibleAxis axis(kModes);
+  NozzleState all = axis.riding(3.0, -7.0);
+  std::array<NozzleState, 3> alone;
+  for (std::size_t i = 0; i < 3; ++i) {
+    alone[i] = FlexibleAxis{kModes[i].omega_rad_s, kModes[i].zeta}.riding(3.0, -7.0);
+  }
+  BaseSegment base{3.0, -7.0, 4000.0};
+  for (int step = 0; step < 20; ++step) {
+    all = exact_step(axis, all, base, 1e-3);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      alone[i] = exact_step({kModes[i].omega_rad_s, kModes[i].zeta}, alone[i], base, 1e-3);
+      sum += kModes[i].gain * alone[i].position();
+    }
+    ASSERT_NEAR(all.position(), sum, 1e-13);
+    base.position += 1e-3 * (base.velocity + 0.5 * base.acceleration * 1e-3);
+    base.velocity += base.acceleration * 1e-3;
+  }
+}
+
+TEST(SeveralModes, StepAsFineRungeKuttaStepsDo) {
+  const FlexibleAxis axis(kModes);
+  NozzleState start;
+  start.parts = {NozzleMotion{0.2, -3.0}, NozzleMotion{-0.1, 9.0}, NozzleMotion{0.05, 1.0}};
+  const BaseSegment base{0.3, 20.0, -9000.0};
+  const NozzleState exact = exact_step(axis, start, base, 5e-3);
+  const NozzleState fine = advance_rk4(axis, start, base, 5e-3, 500);
+  const NozzleState by_map = stepped(ExactMap(axis, 5e-3), start, base);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(exact.parts[i].position, fine.parts[i].position, 1e-9) << i;
+    EXPECT_NEAR(exact.parts[i].velocity, fine.parts[i].velocity, 1e-6) << i;
+    EXPECT_NEAR(exact.parts[i].position, by_map.parts[i].position, 1e-13) << i;
+  }
+}
+
+TEST(SeveralModes, GoAlongWithAnEvenMotion) {
+  const FlexibleAxis axis(kModes);
+  const NozzleState later = exact_step(axis, axis.riding(10.0, 30.0), {10.0, 30.0, 0.0}, 0.25);
+  const FlexibleAxis::Gap gap = axis.gap(later, axis.riding(17.5, 30.0));
+  EXPECT_LE(gap.place_mm + gap.speed_mm, 1e-12);
+  EXPECT_NEAR(later.position(), 17.5, 1e-12);
+  EXPECT_NEAR(later.velocity(), 30.0, 1e-10);
+}
+
+TEST(SeveralModes, TellWhatIsAskedOfThem) {
+  const FlexibleAxis axis(kModes);
+  EXPECT_EQ(axis.main().omega_rad_s, 280.0);
+  EXPECT_EQ(axis.slowest_rad_s(), 280.0);
+  EXPECT_EQ(axis.fastest_rad_s(), 690.0);
+  EXPECT_DOUBLE_EQ(axis.settling_s(), 4.0 / (0.03 * 430.0));
+  EXPECT_DOUBLE_EQ(axis.decay_per_s(), 0.03 * 430.0);
+  EXPECT_NEAR(axis.stiffness_per_s2(),
+              1.1 * 280.0 * 280.0 - 0.25 * 690.0 * 690.0 + 0.15 * 430.0 * 430.0, 1e-8);
+  EXPECT_DOUBLE_EQ(axis.detuned(1.1).fastest_rad_s(), 759.0);
+}
+
+// A base that moves as e^{st} with s at a zero leaves the nozzle at rest. For two modes of equal
+// damping ratio the zeros come from the antiresonance, f₁f₂/√(g₁f₁² + g₂f₂²).
+TEST(SeveralModes, AreBlindAtTheirZeros) {
+  EXPECT_EQ(FlexibleAxis(280.0, 0.06).unseen_s(), 0.0);
+  const std::array<Mode, 2> modes = {Mode{282.743, 0.06, 0.8}, Mode{691.150, 0.06, 0.2}};
+  const double antiresonance =
+      282.743 * 691.150 / std::sqrt(0.8 * 282.743 * 282.743 + 0.2 * 691.150 * 691.150);
+  // Lightly damped modes: the zero's real part is nearly ζ times what both modes' dampings leave.
+  const double longest = std::log(1000.0) / FlexibleAxis(modes).unseen_s();
+  EXPECT_NEAR(longest / antiresonance, 0.06, 0.02);
 }
 
 }  // namespace

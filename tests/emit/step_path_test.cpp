@@ -9,6 +9,7 @@
 #include <functional>
 #include <numbers>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "line_cost.hpp"
@@ -141,6 +142,102 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
     const double claimed = w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant;
     EXPECT_NEAR(claimed, cost, 1e-9 * cost);
   }
+}
+
+// Two modes along X and three along Y: the cost and the state behind a line, and the same from the
+// fan, against the nozzle step by step.
+TEST(LineCosts, AgreeWithANozzleOfSeveralModes) {
+  using dynamics::Mode;
+  constexpr int kThree = 3;
+  const BaseTrajectory base = testing::sampled(
+      [](double t) {
+        return std::array{5.0 * rise(t, 0.1), 2.0 * std::sin(30.0 * t) * rise(t, 0.1)};
+      },
+      0.1);
+  const std::array along_x = {Mode{282.7, 0.06, 1.2}, Mode{691.2, 0.1, -0.2}};
+  const std::array along_y = {Mode{285.3, 0.071, 0.36}, Mode{365.1, 0.085, 0.37},
+                              Mode{206.1, 0.152, 0.27}};
+  LineRules rules;
+  rules.nozzle_x = dynamics::FlexibleAxis(along_x);
+  rules.nozzle_y = dynamics::FlexibleAxis(along_y);
+  const ErrorWeight weight{0.9, 0.2, 0.3};
+  const LineCosts<kThree> costs(
+      base, [&](double) { return weight; }, rules);
+  const Followed fx(base, &BaseTrajectory::x_at, rules.nozzle_x);
+  const Followed fy(base, &BaseTrajectory::y_at, rules.nozzle_y);
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0.0, 0.02);
+  const auto swing = [&](const dynamics::FlexibleAxis& axis) {
+    NozzleState state;
+    for (std::size_t i = 0; i < axis.modes().size(); ++i) {
+      state.parts[i] = {normal(random), 100.0 * normal(random)};
+    }
+    return state;
+  };
+  LineFan<kThree> fan(costs);
+  for (const std::size_t k : {0U, 50U, 115U}) {
+    const std::size_t m = 10;
+    const NozzleState swing_x = swing(rules.nozzle_x);
+    const NozzleState swing_y = swing(rules.nozzle_y);
+    WVector<kThree> w;
+    w << vector_of<kThree>(swing_x), normal(random), vector_of<kThree>(swing_y), normal(random),
+        normal(random), normal(random);
+    const ZVector<kThree> z_before = w.head<kOfZ<kThree>>();
+    const double from = costs.time_s(k);
+    const double duration = costs.time_s(k + m) - from;
+    const Eigen::Vector2d start = costs.base_mm(k) + Eigen::Vector2d(w[6], w[13]);
+    const Eigen::Vector2d end = costs.base_mm(k + m) + Eigen::Vector2d(w[14], w[15]);
+    const Eigen::Vector2d speed = (end - start) / duration;
+    NozzleState x = fx.at(from);
+    NozzleState y = fy.at(from);
+    x.add(swing_x);
+    y.add(swing_y);
+    double cost = 0.0;
+    const double h = costs.dt_s();
+    for (std::size_t j = 1; j <= m; ++j) {
+      const Eigen::Vector2d at = start + speed * (static_cast<double>(j - 1) * h);
+      x = dynamics::exact_step(rules.nozzle_x, x, {at[0], speed[0], 0.0}, h);
+      y = dynamics::exact_step(rules.nozzle_y, y, {at[1], speed[1], 0.0}, h);
+      const double t = costs.time_s(k + j);
+      const double ex = x.position() - fx.at(t).position();
+      const double ey = y.position() - fy.at(t).position();
+      const Eigen::Vector2d off = at + speed * h - costs.base_mm(k + j);
+      cost += 0.5 * h * (weight.xx * ex * ex + 2.0 * weight.xy * ex * ey + weight.yy * ey * ey) +
+              0.5 * h * 1e-3 * off.squaredNorm();
+    }
+    x.add(fx.at(from + duration), -1.0);
+    y.add(fy.at(from + duration), -1.0);
+    ZVector<kThree> expected;
+    expected << vector_of<kThree>(x), w[14], vector_of<kThree>(y), w[15];
+    const LineCost<kThree> line = costs.line(k, m);
+    EXPECT_LE((line.move * w + line.shift - expected).cwiseAbs().maxCoeff(), 1e-7);
+    EXPECT_NEAR(w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant, cost, 1e-9 * cost);
+    fan.begin(k, std::span(&z_before, 1));
+    fan.reach(m);
+    EXPECT_LE((fan.after(0, speed) - expected).cwiseAbs().maxCoeff(), 1e-7);
+    EXPECT_NEAR(fan.cost(0, speed), cost, 1e-8 * cost);
+    const Quadratic<kThree> to_go = costs.ring_down();
+    EXPECT_NEAR(fan.choice(to_go).at(0, speed), cost + to_go.at(expected),
+                1e-8 * (cost + to_go.at(expected)));
+  }
+}
+
+TEST(LineCosts, RingDownIsTheIntegralOfTheSquareOfSeveralModes) {
+  using dynamics::Mode;
+  const std::array modes = {Mode{282.7, 0.06, 1.2}, Mode{691.2, 0.1, -0.2}, Mode{300.0, 0.05, 0.0}};
+  const dynamics::FlexibleAxis axis(modes);
+  NozzleState state;
+  state.parts = {dynamics::NozzleMotion{0.01, -2.0}, dynamics::NozzleMotion{-0.004, 5.0},
+                 dynamics::NozzleMotion{0.003, 1.0}};
+  const ModesVector<3> z = vector_of<3>(state);
+  double sum = 0.0;
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < 100000; ++i) {
+    const NozzleState next = dynamics::exact_step(axis, state, {}, kStep);
+    sum += 0.5 * kStep * (std::pow(state.position(), 2) + std::pow(next.position(), 2));
+    state = next;
+  }
+  EXPECT_NEAR(z.dot(ring_down_square<3>(axis) * z), sum, 1e-5 * sum);
 }
 
 TEST(LineFan, AgreesWithLineCostsAndBestEnd) {

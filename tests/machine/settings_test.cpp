@@ -359,5 +359,69 @@ TEST(Load, ReadsAFile) {
   EXPECT_EQ(origin(*settings, "limits.max_accel_mm_s2"), file.string() + ":2");
 }
 
+const std::string kTwoModes =
+    "[[dynamics.x.mode]]\nfreq_hz = 45\ndamping_ratio = 0.06\ngain = 0.8\n"
+    "[[dynamics.x.mode]]\nfreq_hz = 110\ndamping_ratio = 0.1\ngain = 0.2\n";
+
+TEST(Modes, AreReadAndWrittenBack) {
+  const Result<Settings> read = parse(kTwoModes, "printer.toml", {});
+  ASSERT_TRUE(read) << to_string(read.error());
+  const AxisDynamics& x = read->dynamics_x;
+  ASSERT_EQ(x.modes.size(), 2U);
+  EXPECT_EQ(x.modes[1].freq_hz, 110.0);
+  EXPECT_EQ(x.modes[1].damping_ratio, 0.1);
+  EXPECT_DOUBLE_EQ(x.modes[1].gain, 0.2);
+  EXPECT_EQ(x.freq_hz, 45.0);
+  EXPECT_EQ(x.fastest_hz(), 110.0);
+  EXPECT_EQ(x.description(), "45 Hz, ζ 0.06, gain 0.8 + 110 Hz, ζ 0.1, gain 0.2");
+  const Result<Settings> again = parse(to_toml(*read), "again.toml", {});
+  ASSERT_TRUE(again) << to_string(again.error());
+  EXPECT_EQ(again->dynamics_x.description(), x.description());
+  EXPECT_TRUE(again->dynamics_y.modes.empty());
+}
+
+TEST(Modes, AreOverriddenByOneModeAndTheOtherWayRound) {
+  const Result<Settings> one = parse(kTwoModes, "", {"dynamics.x.freq_hz=50"});
+  ASSERT_TRUE(one) << to_string(one.error());
+  EXPECT_TRUE(one->dynamics_x.modes.empty());
+  EXPECT_EQ(one->dynamics_x.freq_hz, 50.0);
+  const std::string modes =
+      "dynamics.y.mode=[{freq_hz=40, damping_ratio=0.1, gain=-0.1}, "
+      "{freq_hz=60, damping_ratio=0.05, gain=1.1}]";
+  const Result<Settings> several = parse("[dynamics.y]\nfreq_hz = 30\n", "", {modes});
+  ASSERT_TRUE(several) << to_string(several.error());
+  EXPECT_EQ(several->dynamics_y.freq_hz, 60.0);
+  EXPECT_EQ(several->dynamics_y.slowest_hz(), 40.0);
+}
+
+TEST(Modes, AreKnownResonances) {
+  const Result<Settings> x = parse(kTwoModes, "", {"dynamics.y.freq_hz=40"});
+  ASSERT_TRUE(x);
+  EXPECT_TRUE(x->guesses.empty());
+}
+
+TEST(Modes, AreRefusedWhereTheyCannotBeMeant) {
+  const auto refusal = [](const std::string& text) {
+    const Result<Settings> read = parse(text, "p.toml", {});
+    return read ? std::string() : to_string(read.error());
+  };
+  EXPECT_THAT(refusal(kTwoModes + "[dynamics.x]\nfreq_hz = 45\n"), HasSubstr("p.toml"));
+  const auto mode = [](const std::string& first, const std::string& second) {
+    return "[dynamics]\nx.mode = [{" + first + "}, {" + second + "}]\n";
+  };
+  const std::string good = "freq_hz = 45, damping_ratio = 0.1, gain = 0.7";
+  EXPECT_THAT(
+      refusal(mode(good, "freq_hz = 90, damping_ratio = 0.1, gain = 0.2")),
+      HasSubstr("p.toml:2: the gains of dynamics.x.mode add up to 0.9, but must add up to 1"));
+  EXPECT_THAT(refusal(mode(good, "freq_hz = 0, damping_ratio = 0.1, gain = 0.3")),
+              HasSubstr("dynamics.x.mode, number 2: freq_hz is 0, but must be"));
+  EXPECT_THAT(refusal(mode(good, "freq_hz = 90, gain = 0.3")),
+              HasSubstr("dynamics.x.mode, number 2: damping_ratio is missing"));
+  EXPECT_THAT(refusal(mode(good, "freq_hz = 90, damping_ratio = 0.1, gain = 0.3, mass = 1")),
+              HasSubstr("number 2: unknown value 'mass'"));
+  EXPECT_THAT(refusal("[dynamics]\nx.mode = [{" + good + "}]\n"), HasSubstr("2 to 3 tables"));
+  EXPECT_THAT(refusal("[dynamics]\nx.mode = 3\n"), HasSubstr("2 to 3 tables"));
+}
+
 }  // namespace
 }  // namespace unflex::machine

@@ -113,6 +113,11 @@ class FlexibleAxis {
   [[nodiscard]] double stiffness_per_s2() const;
   [[nodiscard]] double damping_per_s() const;
 
+  // For how long a motion of the base that moves the nozzle nowhere lasts until it has died away to
+  // a thousandth. With one mode it dies at once. Several modes leave the base such a motion near
+  // each antiresonance.
+  [[nodiscard]] double unseen_s() const;
+
   // The axis with all frequencies times this factor.
   [[nodiscard]] FlexibleAxis detuned(double factor) const;
 
@@ -147,22 +152,19 @@ class FlexibleAxis {
 class StepMap {
  public:
   // The base's position is carried along so that numbers stay small.
-  [[nodiscard]] NozzleState step(const NozzleState& state, const BaseSegment& base) const {
-    NozzleState next;
+  void advance(const BaseSegment& base, NozzleState& state) const {
     for (std::size_t i = 0; i < count_; ++i) {
       const OfMode& map = maps_[i];
-      const NozzleMotion& part = state.parts[i];
+      NozzleMotion& part = state.parts[i];
       const double place = map.gain * base.position;
       const double y = part.position - place;
-      next.parts[i] = {place + map.of_position.position * y +
-                           map.of_velocity.position * part.velocity +
-                           map.of_base_velocity.position * base.velocity +
-                           map.of_base_acceleration.position * base.acceleration,
-                       map.of_position.velocity * y + map.of_velocity.velocity * part.velocity +
-                           map.of_base_velocity.velocity * base.velocity +
-                           map.of_base_acceleration.velocity * base.acceleration};
+      part = {place + map.of_position.position * y + map.of_velocity.position * part.velocity +
+                  map.of_base_velocity.position * base.velocity +
+                  map.of_base_acceleration.position * base.acceleration,
+              map.of_position.velocity * y + map.of_velocity.velocity * part.velocity +
+                  map.of_base_velocity.velocity * base.velocity +
+                  map.of_base_acceleration.velocity * base.acceleration};
     }
-    return next;
   }
 
  protected:

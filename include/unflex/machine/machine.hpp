@@ -115,11 +115,25 @@ struct ExtruderSettings {
   double pressure_advance_smooth_s = 0.04;
 };
 
+// One of several modes of an axis. The gains of an axis add up to 1.
+struct ModeSettings {
+  double freq_hz = 0.0;
+  double damping_ratio = 0.0;
+  double gain = 0.0;
+};
+
 // A printer file gives either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and
-// damping_n_s_mm, which are converted when read.
+// damping_n_s_mm, which are converted when read, or several modes. Then freq_hz and damping_ratio
+// are those of the mode with the largest gain.
 struct AxisDynamics {
   double freq_hz = 45.0;
   double damping_ratio = 0.06;
+  std::vector<ModeSettings> modes = {};
+
+  [[nodiscard]] double slowest_hz() const;
+  [[nodiscard]] double fastest_hz() const;
+  // "45 Hz, ζ 0.06", or that of each mode with its gain.
+  [[nodiscard]] std::string description() const;
 };
 
 // By what share the axes' frequencies and damping ratios may be off, either way.

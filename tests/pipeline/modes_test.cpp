@@ -1,0 +1,73 @@
+// Prints on axes of several modes.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "jobs.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+using testing::JobFolder;
+
+struct Case {
+  std::string name;
+  std::string modes;
+  std::string firmware;
+  double most_um = 0.0;
+};
+
+void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
+
+const std::string kTwo =
+    "[{freq_hz=45, damping_ratio=0.06, gain=0.8}, {freq_hz=110, damping_ratio=0.06, gain=0.2}]";
+const std::string kOpposed =
+    "[{freq_hz=45, damping_ratio=0.06, gain=1.2}, {freq_hz=110, damping_ratio=0.06, gain=-0.2}]";
+const std::string kThree =
+    "[{freq_hz=45.4, damping_ratio=0.071, gain=0.36}, {freq_hz=58.1, damping_ratio=0.085, "
+    "gain=0.37}, {freq_hz=32.8, damping_ratio=0.152, gain=0.27}]";
+
+// Four squares with a notch each, 80 mm/s.
+std::string squares() {
+  std::string text = "G28\nG90\nM83\nG1 X80 Y80 Z0.2 F6000\nG4 P500\nG1 F4800\n";
+  for (int i = 0; i < 4; ++i) {
+    text +=
+        "G1 X110 E1\nG1 Y110 E1\nG1 X97 E0.5\nG1 X95 Y106 E0.2\nG1 X93 Y110 E0.2\n"
+        "G1 X80 E0.5\nG1 Y80 E1\n";
+  }
+  return text + "M84\n";
+}
+
+class Modes : public ::testing::TestWithParam<Case> {};
+
+TEST_P(Modes, AreCompensated) {
+  const Case& one = GetParam();
+  const auto report_with = [&](const std::string& x, const std::string& y) {
+    const JobFolder folder(squares(), {"printer.firmware=" + one.firmware, x, y});
+    SilentProgress progress;
+    Result<report::Report> made = compensate(folder.job(), progress);
+    EXPECT_TRUE(made) << to_string(made.error());
+    return made.value_or(report::Report{});
+  };
+  const report::Report made =
+      report_with("dynamics.x.mode=" + one.modes, "dynamics.y.mode=" + one.modes);
+  EXPECT_EQ(made.violation_count, 0U) << testing::complaints(made);
+  EXPECT_EQ(made.runs_fallback, 0U) << testing::complaints(made);
+  const double after_mm = made.compensated.extruding.contour_rms_mm;
+  EXPECT_LE(1e3 * after_mm, one.most_um);
+  EXPECT_GE(testing::unshaped(made).extruding.contour_rms_mm, 5.0 * after_mm);
+}
+
+INSTANTIATE_TEST_SUITE_P(On, Modes,
+                         ::testing::Values(Case{"TwoOnKlipper", kTwo, "klipper", 0.5},
+                                           Case{"OpposedOnKlipper", kOpposed, "klipper", 0.5},
+                                           Case{"ThreeOnKlipper", kThree, "klipper", 0.7},
+                                           Case{"TwoOnMarlin", kTwo, "marlin", 2.0},
+                                           Case{"ThreeOnRrf", kThree, "rrf", 1.5}),
+                         [](const auto& one) { return one.param.name; });
+
+}  // namespace
+}  // namespace unflex::pipeline
