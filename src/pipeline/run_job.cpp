@@ -79,6 +79,32 @@ void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
   }
 }
 
+// A large window is checked by its beginning, as a problem of its own: Ipopt takes seconds for all
+// of a window of several modes.
+void set_probe(const compensate::Engine& engine, compensate::AxisWindow window,
+               const compensate::AxisSolution& solution, Probe& probe) {
+  // Nodes times states. All windows of one mode have fewer, unless solve.window_s is raised.
+  constexpr std::size_t kMost = 11000;
+  const std::size_t states = 2 * window.axis.modes().size() + 3;
+  const std::size_t most = std::max<std::size_t>(kMost / states, 2);
+  if (window.nodes() <= most) {
+    probe.problem = std::move(window);
+    probe.solution = solution;
+    return;
+  }
+  for (std::vector<double>* values : {&window.reference_mm, &window.weight}) {
+    values->resize(2 * most - 1);
+  }
+  for (std::vector<double>* values : {&window.max_velocity_at_mm_s, &window.max_accel_at_mm_s2}) {
+    values->resize(std::min(values->size(), most));
+  }
+  window.end_base_mm.reset();
+  if (Result<compensate::AxisSolution> beginning = engine.solve(window)) {
+    probe.problem = std::move(window);
+    probe.solution = std::move(*beginning);
+  }
+}
+
 // If the firmware counts steps, the cut of a run depends on the lines before it. These are not
 // known yet, so we assume as many as allowed, at an even pace.
 std::vector<double> even_lines_before_s(const emit::LineRules& rules) {
@@ -133,8 +159,7 @@ void solve_windows(RunJob& job, std::size_t first, std::size_t count,
       Result<compensate::AxisSolution>& solution = solutions[axis];
       for (Probe& probe : job.probes) {
         if (solution && probe.window == first + i && probe.axis == axis) {
-          probe.problem = std::move(*problems[axis]);
-          probe.solution = *solution;
+          set_probe(engine, std::move(*problems[axis]), *solution, probe);
         }
       }
       job.results[first + i][axis] = axis_result(std::move(solution));

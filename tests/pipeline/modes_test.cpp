@@ -30,10 +30,10 @@ const std::string kThree =
     "[{freq_hz=45.4, damping_ratio=0.071, gain=0.36}, {freq_hz=58.1, damping_ratio=0.085, "
     "gain=0.37}, {freq_hz=32.8, damping_ratio=0.152, gain=0.27}]";
 
-// Four squares with a notch each, 80 mm/s.
+// Two squares with a notch each, 80 mm/s.
 std::string squares() {
   std::string text = "G28\nG90\nM83\nG1 X80 Y80 Z0.2 F6000\nG4 P500\nG1 F4800\n";
-  for (int i = 0; i < 4; ++i) {
+  for (int i = 0; i < 2; ++i) {
     text +=
         "G1 X110 E1\nG1 Y110 E1\nG1 X97 E0.5\nG1 X95 Y106 E0.2\nG1 X93 Y110 E0.2\n"
         "G1 X80 E0.5\nG1 Y80 E1\n";
