@@ -93,6 +93,7 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
   constexpr double kLeastGain = -1.9;
   constexpr double kMostOfAllGains = 4.0;
   constexpr double kNear = 1.03;
+  constexpr double kMostDampingOfMain = 0.3;
   double all = 0.0;
   const std::vector<ModeOfAxis> modes = modes_of(theta);
   for (const ModeOfAxis& mode : modes) {
@@ -106,6 +107,9 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
     if (mode.damping_ratio < kLeastDamping * kNear && &mode == &modes.front()) {
       return "its damping vanishes";
     }
+  }
+  if (modes.front().damping_ratio > kMostDampingOfMain) {
+    return "its damping grows without bound";
   }
   if (all > kMostOfAllGains) {
     return "its gains nearly cancel";
@@ -128,6 +132,7 @@ struct Choice {
   std::vector<Eigen::VectorXd> rivals;
   std::vector<double> rival_odds;  // to the best's 1
   std::string doubt;               // of the best of all, where another was taken
+  Eigen::MatrixXd spread;  // of (log f, log ζ, g) among the fits that nearly equal the best
 };
 
 bool has_mode_near(const Eigen::VectorXd& theta, double freq_log) {
@@ -138,6 +143,25 @@ bool has_mode_near(const Eigen::VectorXd& theta, double freq_log) {
     }
   }
   return false;
+}
+
+// How (log f, log ζ, g) of another fit differ, for each mode of the best from its nearest.
+Eigen::VectorXd difference(const std::vector<ModeOfAxis>& best,
+                           const std::vector<ModeOfAxis>& other) {
+  constexpr double kFarthest = 0.15;
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(best.size()));
+  for (std::size_t m = 0; m < best.size(); ++m) {
+    const auto distance = [&](const ModeOfAxis& mode) {
+      return std::abs(std::log(mode.freq_hz / best[m].freq_hz));
+    };
+    const ModeOfAxis nearest = std::ranges::min(other, {}, distance);
+    if (distance(nearest) < kFarthest) {
+      result.segment(3 * static_cast<Eigen::Index>(m), 3)
+          << std::log(nearest.freq_hz / best[m].freq_hz),
+          std::log(nearest.damping_ratio / best[m].damping_ratio), nearest.gain - best[m].gain;
+    }
+  }
+  return result;
 }
 
 Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
@@ -155,6 +179,7 @@ Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
   }
   std::ranges::stable_sort(all, {}, [&](const Solution* s) { return merit(*s); });
   Choice choice;
+  double odds = 1.0;
   for (const Solution* solution : all) {
     const Eigen::VectorXd theta = in_order(solution->fit.parameters, band);
     const std::string reason = doubt(theta, band, model);
@@ -165,12 +190,21 @@ Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
     } else if (choice.best == nullptr) {
       choice.best = solution;
       choice.theta = theta;
-    } else if (merit(*solution) - merit(*choice.best) < kNearlyEqual &&
-               (!has_mode_near(choice.theta, theta[0]) || !has_mode_near(theta, choice.theta[0]))) {
-      choice.rivals.push_back(theta);
-      choice.rival_odds.push_back(std::exp(0.5 * (merit(*choice.best) - merit(*solution))));
+      choice.spread = Eigen::MatrixXd::Zero(theta.size() - 2, theta.size() - 2);
+    } else {
+      const double worse = merit(*solution) - merit(*choice.best);
+      const double odd = std::exp(-0.5 * worse);
+      const Eigen::VectorXd off = difference(modes_of(choice.theta), modes_of(theta));
+      choice.spread += odd * off * off.transpose();
+      odds += odd;
+      if (worse < kNearlyEqual &&
+          (!has_mode_near(choice.theta, theta[0]) || !has_mode_near(theta, choice.theta[0]))) {
+        choice.rivals.push_back(theta);
+        choice.rival_odds.push_back(odd);
+      }
     }
   }
+  choice.spread /= odds;
   return choice;
 }
 
@@ -178,8 +212,9 @@ std::string numbered(std::size_t modes) {
   return modes == 1 ? "one mode" : fmt::format("{} modes", modes);
 }
 
-void fill_curves(const Band& band, const ModesModel& model, const Eigen::VectorXd& theta,
-                 ModesFit& fit) {
+// Returns the frequency of a peak that the fit does not have, or 0.
+double fill_curves(const Band& band, const ModesModel& model, const Eigen::VectorXd& theta,
+                   ModesFit& fit) {
   const auto list = [](const Eigen::ArrayXd& values) {
     return std::vector<double>(values.begin(), values.end());
   };
@@ -195,15 +230,12 @@ void fill_curves(const Band& band, const ModesModel& model, const Eigen::VectorX
   const Misfit misfit = misfit_of(band.freq_hz, band.density, fitted, noise.minCoeff(), 3);
   fit.unexplained = misfit.unexplained;
   constexpr double kTooMuch = 0.35;
-  if (misfit.other_peak_hz > 0.0) {
-    fit.warnings.push_back(
-        fmt::format("{} do not explain this: there is another peak near {:.1f} Hz",
-                    numbered(fit.modes.size()), misfit.other_peak_hz));
-  } else if (misfit.unexplained > kTooMuch) {
+  if (misfit.unexplained > kTooMuch) {
     fit.warnings.push_back(
         fmt::format("{} do not explain this: {:.0f} % of what was measured is something else",
                     numbered(fit.modes.size()), 100.0 * misfit.unexplained));
   }
+  return misfit.other_peak_hz;
 }
 
 void add_rivals(const Choice& choice, ModesFit& fit) {
@@ -224,10 +256,75 @@ void add_rivals(const Choice& choice, ModesFit& fit) {
   }
 }
 
+Result<ModesFit> fit_density(const Spectrum& spectrum, const std::vector<double>& density,
+                             const Sweep& sweep) {
+  constexpr double kWorthOfAMode = 12.0;
+  constexpr double kWorstScatter = 0.7;
+  constexpr double kWidestInterval = 1.35;
+  const Result<Band> band = band_of(spectrum, density, sweep);
+  if (!band) {
+    return tl::unexpected(band.error());
+  }
+  const ModesModel model(*band, sweep.start_hz);
+  const Solution still = rigid(model, band->density.log());
+  const std::vector<std::vector<Solution>> found = search(*band, model, sweep, kMostModes);
+  ModesFit fit;
+  fit.bic.push_back(still.bic);
+  for (const std::vector<Solution>& some : found) {
+    fit.bic.push_back(std::ranges::min(some, {}, &Solution::bic).bic);
+  }
+  const std::string advice =
+      "; check that the sensor sits tight and measure again with a higher ACCEL_PER_HZ";
+  if (*std::ranges::min_element(fit.bic) > still.bic - kWorthOfAMode) {
+    return fail(ErrorKind::input, "it shows no resonance" + advice);
+  }
+  const Choice choice = choose(found, *band, model);
+  if (choice.best == nullptr) {
+    return fail(ErrorKind::input, "no model of it can be trusted: " + choice.doubt + advice);
+  }
+  if (choice.best->bic > still.bic - kWorthOfAMode) {
+    return fail(ErrorKind::input, "no model of it can be trusted: " + choice.doubt + advice);
+  }
+  const double scatter = std::sqrt(choice.best->fit.residual.square().mean());
+  if (scatter > kWorstScatter) {
+    return fail(ErrorKind::input,
+                fmt::format("up to {} modes do not explain it", kMostModes) + advice);
+  }
+  fit.modes = modes_of(choice.theta);
+  fit.is_minimum_phase = choice.best->is_minimum_phase;
+  if (!choice.doubt.empty()) {
+    fit.warnings.push_back(fmt::format("{} are taken, as a closer fit is not to be trusted: {}",
+                                       numbered(fit.modes.size()), choice.doubt));
+  }
+  add_intervals(model, *band, prior_of(modes_in(choice.theta), sweep), choice.theta, choice.spread,
+                fit);
+  add_rivals(choice, fit);
+  const Estimate& main_hz = fit.intervals.front().freq_hz;
+  if (main_hz.high > kWidestInterval * main_hz.low) {
+    return fail(ErrorKind::input,
+                fmt::format("its main resonance may be anywhere from {:.0f} to {:.0f} Hz",
+                            main_hz.low, main_hz.high) +
+                    advice);
+  }
+  if (!choice.rivals.empty()) {
+    fit.warnings.push_back(
+        fmt::format("another model fits as well, with {:.1f} Hz instead of {:.1f} Hz: measure once "
+                    "more",
+                    std::exp(choice.rivals.front()[0]), main_hz.value));
+  }
+  const double other_peak_hz = fill_curves(*band, model, choice.theta, fit);
+  if (other_peak_hz > 0.0) {
+    return fail(ErrorKind::input, fmt::format("{} do not explain its peak near {:.1f} Hz",
+                                              numbered(fit.modes.size()), other_peak_hz) +
+                                      advice);
+  }
+  return fit;
+}
+
 }  // namespace
 
 AxisDensity density_of_axis(const Spectrum& spectrum, const Sweep& sweep) {
-  constexpr double kMajority = 2.0 / 3.0;
+  constexpr double kMajority = 0.6;
   AxisDensity result;
   if (!(spectrum.step_hz > 0.0)) {
     return result;
@@ -258,62 +355,11 @@ AxisDensity density_of_axis(const Spectrum& spectrum, const Sweep& sweep) {
 }
 
 Result<ModesFit> fit_modes(const Spectrum& spectrum, const Sweep& sweep) {
-  constexpr double kWorthOfAMode = 12.0;
-  constexpr double kWorstScatter = 0.7;
-  constexpr double kWidestInterval = 1.35;
   const AxisDensity density = density_of_axis(spectrum, sweep);
-  const Result<Band> band = band_of(spectrum, density.density, sweep);
-  if (!band) {
-    return tl::unexpected(band.error());
+  Result<ModesFit> fit = fit_density(spectrum, density.density, sweep);
+  if (fit) {
+    fit->column = density.column;
   }
-  const ModesModel model(*band, sweep.start_hz);
-  const Solution still = rigid(model, band->density.log());
-  const std::vector<std::vector<Solution>> found = search(*band, model, sweep, kMostModes);
-  ModesFit fit;
-  fit.bic.push_back(still.bic);
-  for (const std::vector<Solution>& some : found) {
-    fit.bic.push_back(std::ranges::min(some, {}, &Solution::bic).bic);
-  }
-  const std::string advice =
-      "; check that the sensor sits tight and measure again with a higher ACCEL_PER_HZ";
-  if (*std::ranges::min_element(fit.bic) > still.bic - kWorthOfAMode) {
-    return fail(ErrorKind::input, "it shows no resonance" + advice);
-  }
-  const Choice choice = choose(found, *band, model);
-  if (choice.best == nullptr) {
-    return fail(ErrorKind::input, "no model of it can be trusted: " + choice.doubt + advice);
-  }
-  if (choice.best->bic > still.bic - kWorthOfAMode) {
-    return fail(ErrorKind::input, "no model of it can be trusted: " + choice.doubt + advice);
-  }
-  const double scatter = std::sqrt(choice.best->fit.residual.square().mean());
-  if (scatter > kWorstScatter) {
-    return fail(ErrorKind::input,
-                fmt::format("up to {} modes do not explain it", kMostModes) + advice);
-  }
-  fit.column = density.column;
-  fit.modes = modes_of(choice.theta);
-  fit.is_minimum_phase = choice.best->is_minimum_phase;
-  if (!choice.doubt.empty()) {
-    fit.warnings.push_back(fmt::format("{} are taken, as a closer fit is not to be trusted: {}",
-                                       numbered(fit.modes.size()), choice.doubt));
-  }
-  add_intervals(model, *band, prior_of(modes_in(choice.theta), sweep), choice.theta, fit);
-  add_rivals(choice, fit);
-  const Estimate& main_hz = fit.intervals.front().freq_hz;
-  if (main_hz.high > kWidestInterval * main_hz.low) {
-    return fail(ErrorKind::input,
-                fmt::format("its main resonance may be anywhere from {:.0f} to {:.0f} Hz",
-                            main_hz.low, main_hz.high) +
-                    advice);
-  }
-  if (!choice.rivals.empty()) {
-    fit.warnings.push_back(
-        fmt::format("another model fits as well, with {:.1f} Hz instead of {:.1f} Hz: measure once "
-                    "more",
-                    std::exp(choice.rivals.front()[0]), main_hz.value));
-  }
-  fill_curves(*band, model, choice.theta, fit);
   return fit;
 }
 

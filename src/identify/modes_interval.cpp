@@ -27,7 +27,7 @@ Eigen::MatrixXd correlations(const ModesModel& model, Eigen::Index bins) {
 // Covariance of θ.
 Eigen::MatrixXd covariance_of(const ModesModel& model, const Band& band, const Prior& prior,
                               const Eigen::VectorXd& theta) {
-  constexpr double kCaution = 1.15;
+  constexpr double kCaution = 1.5;
   Eigen::ArrayXd values;
   Eigen::MatrixXd jacobian;
   model(theta, values, &jacobian);
@@ -70,12 +70,17 @@ Eigen::MatrixXd of_gains(const Eigen::MatrixXd& covariance, const Eigen::VectorX
 
 std::vector<ModeOfAxis> moved(const std::vector<ModeOfAxis>& modes, const Eigen::VectorXd& by) {
   std::vector<ModeOfAxis> result = modes;
+  double sum = 0.0;
   for (std::size_t m = 0; m < modes.size(); ++m) {
     const auto at = 3 * static_cast<Eigen::Index>(m);
     result[m].freq_hz *= std::exp(by[at]);
     result[m].damping_ratio = std::clamp(modes[m].damping_ratio * std::exp(by[at + 1]),
                                          0.5 * kLeastDamping, 1.5 * kMostDamping);
     result[m].gain += by[at + 2];
+    sum += result[m].gain;
+  }
+  for (ModeOfAxis& mode : result) {
+    mode.gain /= sum;
   }
   return result;
 }
@@ -121,10 +126,10 @@ std::vector<Plant> plants_of(const Eigen::ArrayXd& freq_hz, const std::vector<Mo
 }  // namespace
 
 void add_intervals(const ModesModel& model, const Band& band, const Prior& prior,
-                   const Eigen::VectorXd& theta, ModesFit& fit) {
+                   const Eigen::VectorXd& theta, const Eigen::MatrixXd& spread, ModesFit& fit) {
   constexpr double kQuantile = 1.959964;  // of the normal distribution, 97.5 %
   const Eigen::MatrixXd covariance =
-      of_gains(covariance_of(model, band, prior, theta), theta, fit.modes);
+      of_gains(covariance_of(model, band, prior, theta), theta, fit.modes) + spread;
   for (std::size_t m = 0; m < fit.modes.size(); ++m) {
     const ModeOfAxis& mode = fit.modes[m];
     const auto at = 3 * static_cast<Eigen::Index>(m);
