@@ -34,6 +34,8 @@ std::size_t bin_behind(const Spectrum& spectrum, const Sweep& sweep) {
 Result<Band> band_of(const Spectrum& spectrum, const std::vector<double>& density,
                      const Sweep& sweep) {
   constexpr std::size_t kFewest = 25;
+  constexpr double kFloor = 0.01;
+  constexpr double kNoiseEnds_hz = 30.0;
   if (!(spectrum.step_hz > 0.0)) {
     return fail(ErrorKind::input, "its frequencies do not grow");
   }
@@ -56,8 +58,11 @@ Result<Band> band_of(const Spectrum& spectrum, const std::vector<double>& densit
   if (!std::isfinite(mean) || !(mean > 0.0)) {
     return fail(ErrorKind::input, "there is no motion in the band of the sweep");
   }
-  // A bin of nothing would be infinitely far below any model.
-  band.density = (band.density / mean).max(1e-6);
+  band.density /= mean;
+  // The floor is a share of the swing, whose density is P/ν², without the noise at low frequencies.
+  const Eigen::ArrayXd square = band.freq_hz.square();
+  const Eigen::ArrayXd is_high = (band.freq_hz > kNoiseEnds_hz).cast<double>();
+  band.floor = kFloor * (band.density / square * is_high).sum() / is_high.sum() * square;
   return band;
 }
 
@@ -91,7 +96,8 @@ Eigen::VectorXd in_order(const Eigen::VectorXd& theta, const Band& band) {
 std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesModel& model) {
   constexpr double kMostGain = 2.9;
   constexpr double kLeastGain = -1.9;
-  constexpr double kMostOfAllGains = 4.0;
+  constexpr double kMostOfAllGains = 3.0;
+  constexpr double kNoiseEnds = 1.35;  // of the band's start
   constexpr double kNear = 1.03;
   constexpr double kMostDampingOfMain = 0.3;
   double all = 0.0;
@@ -100,6 +106,9 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
     all += std::abs(mode.gain);
     if (!(mode.gain < kMostGain && mode.gain > kLeastGain)) {
       return "its gains nearly cancel";
+    }
+    if (mode.freq_hz < kNoiseEnds * band.freq_hz[0]) {
+      return "what it takes for a resonance may be the noise at low frequencies";
     }
     if (mode.damping_ratio > kMostDamping / kNear) {
       return "its damping grows without bound";
@@ -114,8 +123,7 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
   if (all > kMostOfAllGains) {
     return "its gains nearly cancel";
   }
-  if (modes.front().freq_hz < 1.05 * band.freq_hz[0] ||
-      modes.front().freq_hz > band.freq_hz[band.freq_hz.size() - 1]) {
+  if (modes.front().freq_hz > band.freq_hz[band.freq_hz.size() - 1]) {
     return "its resonance lies at the edge of the sweep or beyond";
   }
   Eigen::Index at = 0;
@@ -218,9 +226,7 @@ double fill_curves(const Band& band, const ModesModel& model, const Eigen::Vecto
   const auto list = [](const Eigen::ArrayXd& values) {
     return std::vector<double>(values.begin(), values.end());
   };
-  Eigen::ArrayXd logarithms;
-  model(theta, logarithms, nullptr);
-  const Eigen::ArrayXd fitted = logarithms.exp();
+  const Eigen::ArrayXd fitted = model.density(theta);
   fit.curve = {.x = list(band.freq_hz), .measured = list(band.density), .fitted = list(fitted)};
   for (Eigen::Index m = 0; m < modes_in(theta); ++m) {
     fit.mode_curves.push_back(list(model.mode_density(theta, m)));
@@ -232,7 +238,7 @@ double fill_curves(const Band& band, const ModesModel& model, const Eigen::Vecto
   constexpr double kTooMuch = 0.35;
   if (misfit.unexplained > kTooMuch) {
     fit.warnings.push_back(
-        fmt::format("{} do not explain this: {:.0f} % of what was measured is something else",
+        fmt::format("{} cannot explain this: {:.0f} % of what was measured is something else",
                     numbered(fit.modes.size()), 100.0 * misfit.unexplained));
   }
   return misfit.other_peak_hz;
@@ -259,14 +265,14 @@ void add_rivals(const Choice& choice, ModesFit& fit) {
 Result<ModesFit> fit_density(const Spectrum& spectrum, const std::vector<double>& density,
                              const Sweep& sweep) {
   constexpr double kWorthOfAMode = 12.0;
-  constexpr double kWorstScatter = 0.7;
+  constexpr double kWorstScatter = 0.6;
   constexpr double kWidestInterval = 1.35;
   const Result<Band> band = band_of(spectrum, density, sweep);
   if (!band) {
     return tl::unexpected(band.error());
   }
   const ModesModel model(*band, sweep.start_hz);
-  const Solution still = rigid(model, band->density.log());
+  const Solution still = rigid(model, band->logarithms());
   const std::vector<std::vector<Solution>> found = search(*band, model, sweep, kMostModes);
   ModesFit fit;
   fit.bic.push_back(still.bic);
@@ -285,15 +291,16 @@ Result<ModesFit> fit_density(const Spectrum& spectrum, const std::vector<double>
   if (choice.best->bic > still.bic - kWorthOfAMode) {
     return fail(ErrorKind::input, "no model of it can be trusted: " + choice.doubt + advice);
   }
-  const double scatter = std::sqrt(choice.best->fit.residual.square().mean());
+  const double scatter =
+      std::sqrt(choice.best->fit.loss / static_cast<double>(band->freq_hz.size()));
   if (scatter > kWorstScatter) {
     return fail(ErrorKind::input,
-                fmt::format("up to {} modes do not explain it", kMostModes) + advice);
+                fmt::format("up to {} modes cannot explain it", kMostModes) + advice);
   }
   fit.modes = modes_of(choice.theta);
   fit.is_minimum_phase = choice.best->is_minimum_phase;
   if (!choice.doubt.empty()) {
-    fit.warnings.push_back(fmt::format("{} are taken, as a closer fit is not to be trusted: {}",
+    fit.warnings.push_back(fmt::format("a closer fit than that of {} is not to be trusted: {}",
                                        numbered(fit.modes.size()), choice.doubt));
   }
   add_intervals(model, *band, prior_of(modes_in(choice.theta), sweep), choice.theta, choice.spread,
@@ -314,7 +321,7 @@ Result<ModesFit> fit_density(const Spectrum& spectrum, const std::vector<double>
   }
   const double other_peak_hz = fill_curves(*band, model, choice.theta, fit);
   if (other_peak_hz > 0.0) {
-    return fail(ErrorKind::input, fmt::format("{} do not explain its peak near {:.1f} Hz",
+    return fail(ErrorKind::input, fmt::format("{} cannot explain its peak near {:.1f} Hz",
                                               numbered(fit.modes.size()), other_peak_hz) +
                                       advice);
   }

@@ -31,7 +31,7 @@ Eigen::MatrixXd covariance_of(const ModesModel& model, const Band& band, const P
   Eigen::ArrayXd values;
   Eigen::MatrixXd jacobian;
   model(theta, values, &jacobian);
-  const Eigen::ArrayXd residual = band.density.log() - values;
+  const Eigen::ArrayXd residual = band.logarithms() - values;
   const Eigen::ArrayXd weights = ((residual / kLossScale).square() + 1.0).sqrt().inverse();
   const Eigen::Index bins = residual.size();
   const Eigen::Index unknowns = theta.size();

@@ -59,7 +59,8 @@ Eigen::VectorXd numerator(const std::vector<ModeOfAxis>& modes) {
 
 }  // namespace
 
-ModesModel::ModesModel(const Band& band, double start_hz) : freq_hz_(band.freq_hz) {
+ModesModel::ModesModel(const Band& band, double start_hz)
+    : freq_hz_(band.freq_hz), floor_(band.floor) {
   const Eigen::VectorXd amplitude = kaiser_amplitude();
   const double energy = amplitude.squaredNorm();
   kernel_ = amplitude.cwiseAbs2() / energy;
@@ -150,7 +151,7 @@ void ModesModel::operator()(const Eigen::VectorXd& theta, Eigen::ArrayXd& values
   }
   const double white = std::exp(theta[3 * modes]);
   const double rise = std::exp(theta[3 * modes + 1]);
-  const Eigen::ArrayXd density = smeared.col(0).array() + white + rise * noise_shape_;
+  const Eigen::ArrayXd density = smeared.col(0).array() + white + rise * noise_shape_ + floor_;
   values = density.log();
   if (jacobian != nullptr) {
     jacobian->resize(bins, theta.size());
@@ -161,13 +162,17 @@ void ModesModel::operator()(const Eigen::VectorXd& theta, Eigen::ArrayXd& values
   }
 }
 
+Eigen::ArrayXd ModesModel::density(const Eigen::VectorXd& theta) const {
+  Eigen::ArrayXd values;
+  (*this)(theta, values, nullptr);
+  return (values.exp() - floor_).max(0.0);
+}
+
 Eigen::ArrayXd ModesModel::mode_density(const Eigen::VectorXd& theta, Eigen::Index mode) const {
   constexpr double kNone = -60.0;
   Eigen::VectorXd alone(5);
   alone << theta.segment(3 * mode, 3), kNone, kNone;
-  Eigen::ArrayXd values;
-  (*this)(alone, values, nullptr);
-  return values.exp();
+  return density(alone);
 }
 
 Eigen::ArrayXd ModesModel::noise_density(const Eigen::VectorXd& theta) const {

@@ -19,16 +19,22 @@ struct Band {
   Eigen::Index first = 0;
   Eigen::ArrayXd freq_hz;
   Eigen::ArrayXd density;
+  // Joins measured and fitted density before their logarithms are compared. What lies below moves
+  // the nozzle little, and must not cost a mode.
+  Eigen::ArrayXd floor;
+
+  [[nodiscard]] Eigen::ArrayXd logarithms() const { return (density + floor).log(); }
 };
 
 class ModesModel {
  public:
   ModesModel(const Band& band, double start_hz);
 
-  // Logarithm of the density at the bins.
+  // Logarithm of the density and its floor at the bins.
   void operator()(const Eigen::VectorXd& theta, Eigen::ArrayXd& values,
                   Eigen::MatrixXd* jacobian) const;
-  // Density of one mode alone, and of the noise.
+  // Density of the whole, of one mode alone, and of the noise.
+  [[nodiscard]] Eigen::ArrayXd density(const Eigen::VectorXd& theta) const;
   [[nodiscard]] Eigen::ArrayXd mode_density(const Eigen::VectorXd& theta, Eigen::Index mode) const;
   [[nodiscard]] Eigen::ArrayXd noise_density(const Eigen::VectorXd& theta) const;
   // Correlation of the scatter of bins k apart: the window makes neighbours alike.
@@ -39,6 +45,7 @@ class ModesModel {
 
  private:
   Eigen::ArrayXd freq_hz_;
+  Eigen::ArrayXd floor_;
   Eigen::ArrayXd noise_shape_;  // of N₁
   Eigen::ArrayXd fine_hz_;
   Eigen::ArrayXd excitation_;

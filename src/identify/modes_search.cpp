@@ -92,7 +92,7 @@ bool is_same(const Solution& a, const Solution& b) {
 class Search {
  public:
   Search(const Band& band, const ModesModel& model, const Sweep& sweep)
-      : band_(band), model_(model), sweep_(sweep), logarithms_(band.density.log()) {}
+      : band_(band), model_(model), sweep_(sweep), logarithms_(band.logarithms()) {}
 
   std::vector<Solution> first() {
     std::vector<Eigen::VectorXd> starts;

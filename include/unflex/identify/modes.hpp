@@ -29,8 +29,8 @@ struct Plant {
   double share = 0.0;             // its probability
 };
 
-// Which density of a spectrum stands for the axis: the column with two thirds of the energy in the
-// band, as a sensor may be mounted turned, or else the sum of all three.
+// Which density of a spectrum stands for the axis: the column with three fifths of the energy in
+// the band, as a sensor may be mounted turned, or else the sum of all three.
 struct AxisDensity {
   std::vector<double> density;  // as Spectrum's
   int column = -1;              // 0, 1, 2: X, Y, Z; -1: the sum
