@@ -313,6 +313,12 @@ Result<ModesFit> fit_density(const Spectrum& spectrum, const std::vector<double>
                             main_hz.low, main_hz.high) +
                     advice);
   }
+  if (fit.intervals.front().gain.low < 0.0 && fit.intervals.front().gain.high > 0.0) {
+    return fail(
+        ErrorKind::input,
+        fmt::format("it leaves open how strong its resonance at {:.1f} Hz is", main_hz.value) +
+            advice);
+  }
   if (!choice.rivals.empty()) {
     fit.warnings.push_back(
         fmt::format("another model fits as well, with {:.1f} Hz instead of {:.1f} Hz: measure once "

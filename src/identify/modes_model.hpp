@@ -21,7 +21,7 @@ struct Band {
   Eigen::ArrayXd density;
   // Joins measured and fitted density before their logarithms are compared. What lies below moves
   // the nozzle little, and must not cost a mode.
-  Eigen::ArrayXd floor;
+  Eigen::ArrayXd floor = {};
 
   [[nodiscard]] Eigen::ArrayXd logarithms() const { return (density + floor).log(); }
 };
