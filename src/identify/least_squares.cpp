@@ -67,6 +67,84 @@ LeastSquares minimise(const Model& model, const Eigen::ArrayXd& data, const Eige
   return fit;
 }
 
+namespace {
+
+double soft_loss(const Eigen::ArrayXd& residual, double scale) {
+  return 2.0 * scale * scale * (((residual / scale).square() + 1.0).sqrt() - 1.0).sum();
+}
+
+double prior_cost(const Prior& prior, const Eigen::VectorXd& at) {
+  return (prior.precision.array() * (at - prior.centre).array().square()).sum();
+}
+
+}  // namespace
+
+RobustFit minimise_robust(const ModelWithJacobian& model, const Eigen::ArrayXd& data, double scale,
+                          const Prior& prior, Eigen::VectorXd start, int most_steps) {
+  constexpr double kLongestStep = 1.0;
+  constexpr double kLeastGain = 1e-7;
+  constexpr double kMostDamping = 1e9;
+  RobustFit fit;
+  fit.parameters = start.cwiseMax(prior.low).cwiseMin(prior.high);
+  Eigen::ArrayXd values;
+  const auto weigh = [&] {
+    fit.weights = ((fit.residual / scale).square() + 1.0).sqrt().inverse();
+  };
+  model(fit.parameters, values, &fit.jacobian);
+  fit.residual = data - values;
+  fit.loss = soft_loss(fit.residual, scale);
+  fit.cost = fit.loss + prior_cost(prior, fit.parameters);
+  weigh();
+  double damping = 1e-2;
+  bool moves = true;
+  for (int step = 0; step < most_steps && moves; ++step) {
+    const Eigen::MatrixXd weighted = fit.weights.matrix().asDiagonal() * fit.jacobian;
+    Eigen::MatrixXd normal = fit.jacobian.transpose() * weighted;
+    normal.diagonal() += prior.precision;
+    Eigen::VectorXd gradient =
+        weighted.transpose() * fit.residual.matrix() -
+        (prior.precision.array() * (fit.parameters - prior.centre).array()).matrix();
+    for (Eigen::Index i = 0; i < gradient.size(); ++i) {
+      if ((fit.parameters[i] <= prior.low[i] && gradient[i] < 0.0) ||
+          (fit.parameters[i] >= prior.high[i] && gradient[i] > 0.0)) {
+        normal.row(i).setZero();
+        normal.col(i).setZero();
+        normal(i, i) = 1.0;
+        gradient[i] = 0.0;
+      }
+    }
+    moves = false;
+    for (; damping < kMostDamping && !moves; damping *= moves ? 0.2 : 6.0) {
+      Eigen::MatrixXd damped = normal;
+      damped.diagonal() +=
+          damping * normal.diagonal() + Eigen::VectorXd::Constant(gradient.size(), 1e-12);
+      const Eigen::VectorXd change = damped.ldlt().solve(gradient);
+      if (!(change.cwiseAbs().maxCoeff() <= kLongestStep)) {
+        continue;
+      }
+      const Eigen::VectorXd candidate =
+          (fit.parameters + change).cwiseMax(prior.low).cwiseMin(prior.high);
+      model(candidate, values, nullptr);
+      const Eigen::ArrayXd residual = data - values;
+      const double loss = soft_loss(residual, scale);
+      const double cost = loss + prior_cost(prior, candidate);
+      if (cost < fit.cost) {
+        moves = true;
+        step = fit.cost - cost < kLeastGain * fit.cost ? most_steps : step;
+        fit.parameters = candidate;
+        fit.residual = residual;
+        fit.loss = loss;
+        fit.cost = cost;
+      }
+    }
+    if (moves) {
+      model(fit.parameters, values, &fit.jacobian);
+      weigh();
+    }
+  }
+  return fit;
+}
+
 Eigen::MatrixXd sandwich(const LeastSquares& fit, const Eigen::ArrayXd& weights,
                          Eigen::Index block) {
   const Eigen::Index unknowns = fit.parameters.size();

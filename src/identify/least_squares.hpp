@@ -23,6 +23,34 @@ struct LeastSquares {
 [[nodiscard]] LeastSquares minimise(const Model& model, const Eigen::ArrayXd& data,
                                     const Eigen::ArrayXd& weights, Eigen::VectorXd start);
 
+// Values of the model and their derivatives, data × parameters.
+using ModelWithJacobian =
+    std::function<void(const Eigen::VectorXd&, Eigen::ArrayXd& values, Eigen::MatrixXd* jacobian)>;
+
+// Bounds of the parameters, and what is known of them before: centre and precision of each.
+struct Prior {
+  Eigen::VectorXd low;
+  Eigen::VectorXd high;
+  Eigen::VectorXd centre;
+  Eigen::VectorXd precision;  // in units of the loss
+};
+
+struct RobustFit {
+  Eigen::VectorXd parameters;
+  Eigen::MatrixXd jacobian;
+  Eigen::ArrayXd residual;
+  Eigen::ArrayXd weights;  // 1 / √(1 + r²/s²)
+  double loss = 0.0;       // of the data alone
+  double cost = 0.0;       // with the prior
+};
+
+// Minimises the soft L1 loss Σ 2s² (√(1 + r²/s²) − 1) plus Σ precision (θ − centre)² within bounds,
+// by Levenberg's and Marquardt's method with weights of its own for each step. Parameters on a
+// bound that want to leave it are held.
+[[nodiscard]] RobustFit minimise_robust(const ModelWithJacobian& model, const Eigen::ArrayXd& data,
+                                        double scale, const Prior& prior, Eigen::VectorXd start,
+                                        int most_steps);
+
 // Covariance of the parameters. It holds whatever the variances of the residuals are, also if
 // neighbours in blocks of `block` data go together (White, A Heteroskedasticity-Consistent
 // Covariance Matrix Estimator, Econometrica 1980, with clusters):

@@ -1,0 +1,72 @@
+// The density of several modes, its derivatives, and the zeros of H.
+//
+// Parameters θ: log f, log ζ and a for each mode in turn, then log N₀ and log N₁. Gains follow from
+// g_i = a_i / Σ a and C from (Σ a)², so nothing binds them.
+#pragma once
+
+#include <Eigen/Core>
+#include <complex>
+#include <vector>
+
+#include "least_squares.hpp"
+#include "unflex/identify/modes.hpp"
+
+namespace unflex::identify {
+
+// The bins of a density in the band of the sweep, relative to their mean, as acceleration.
+struct Band {
+  double step_hz = 0.0;
+  Eigen::Index first = 0;
+  Eigen::ArrayXd freq_hz;
+  Eigen::ArrayXd density;
+  // Joins measured and fitted density before their logarithms are compared. What lies below moves
+  // the nozzle little, and must not cost a mode.
+  Eigen::ArrayXd floor = {};
+
+  [[nodiscard]] Eigen::ArrayXd logarithms() const { return (density + floor).log(); }
+};
+
+class ModesModel {
+ public:
+  ModesModel(const Band& band, double start_hz);
+
+  // Logarithm of the density and its floor at the bins.
+  void operator()(const Eigen::VectorXd& theta, Eigen::ArrayXd& values,
+                  Eigen::MatrixXd* jacobian) const;
+  // Density of the whole, of one mode alone, and of the noise.
+  [[nodiscard]] Eigen::ArrayXd density(const Eigen::VectorXd& theta) const;
+  [[nodiscard]] Eigen::ArrayXd mode_density(const Eigen::VectorXd& theta, Eigen::Index mode) const;
+  [[nodiscard]] Eigen::ArrayXd noise_density(const Eigen::VectorXd& theta) const;
+  // Correlation of the scatter of bins k apart: the window makes neighbours alike.
+  [[nodiscard]] double correlation(Eigen::Index apart) const;
+  // How many independent bins tell as much as those of the band.
+  [[nodiscard]] double independent_bins() const;
+  [[nodiscard]] const Eigen::ArrayXd& freq_hz() const { return freq_hz_; }
+
+ private:
+  Eigen::ArrayXd freq_hz_;
+  Eigen::ArrayXd floor_;
+  Eigen::ArrayXd noise_shape_;  // of N₁
+  Eigen::ArrayXd fine_hz_;
+  Eigen::ArrayXd excitation_;
+  Eigen::VectorXd kernel_;
+  std::vector<double> correlation_;
+};
+
+[[nodiscard]] inline Eigen::Index modes_in(const Eigen::VectorXd& theta) {
+  return (theta.size() - 2) / 3;
+}
+
+[[nodiscard]] std::vector<ModeOfAxis> modes_of(const Eigen::VectorXd& theta);
+
+// H of one mode at frequencies ν, without its gain.
+[[nodiscard]] Eigen::ArrayXcd mode_response(const Eigen::ArrayXd& freq_hz, double mode_hz,
+                                            double damping_ratio);
+
+[[nodiscard]] std::vector<std::complex<double>> zeros_of(const std::vector<ModeOfAxis>& modes);
+[[nodiscard]] bool is_minimum_phase(const std::vector<ModeOfAxis>& modes);
+
+// θ with the amplitudes a that come closest to H with its zeros mirrored into the left half plane.
+[[nodiscard]] Eigen::VectorXd mirrored(const Eigen::VectorXd& theta, const Eigen::ArrayXd& freq_hz);
+
+}  // namespace unflex::identify
