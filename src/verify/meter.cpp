@@ -290,8 +290,7 @@ Meter::Sample Meter::sample(const ReferencePhase& reference, bool laying, double
 
   near_.slide(*path_, time_s_);
   std::size_t nearest = current_;
-  const double contour2 =
-      near_.squared_contour_error(*path_, nozzle_x_mm, nozzle_y_mm, nearest);
+  const double contour2 = near_.squared_contour_error(*path_, nozzle_x_mm, nozzle_y_mm, nearest);
   const double tracking2 = error_x * error_x + error_y * error_y;
   const std::size_t line = (*path_)[nearest].move.segment.line;
   all_.add(contour2, tracking2, h, line);

@@ -18,6 +18,7 @@ UNFLEX, EXAMPLES, DOCS = (os.path.abspath(path) for path in sys.argv[1:4])
 PRINT = "G28\nG90\nM83\nG1 X20 Y20 F6000\nG1 X40 Y20 E0.8 F3000\n"
 KEY = r"(# )?(\w+) = "
 MASS = re.compile(r"(# )?(mass_g|stiffness_n_mm|damping_n_s_mm) = ")
+SEVERAL = re.compile(r"(# )?mode = ")
 MODAL = re.compile(r"(# )?(freq_hz|damping_ratio) = ")
 
 
@@ -50,7 +51,8 @@ class PrinterFile(unittest.TestCase):
 
     def test_what_is_a_comment_is_the_default(self):
         given = self.settings(self.lines)
-        shown = self.settings(uncommented([line for line in self.lines if not MASS.match(line)]))
+        shown = self.settings(uncommented([line for line in self.lines
+                                           if not MASS.match(line) and not SEVERAL.match(line)]))
         self.assertEqual(given.keys(), shown.keys())
         for key, value in given.items():
             if isinstance(value, float):
@@ -60,10 +62,18 @@ class PrinterFile(unittest.TestCase):
                 self.assertEqual(shown[key], value, key)
 
     def test_the_mass_may_stand_for_the_frequency(self):
-        shown = self.settings(uncommented([line for line in self.lines if not MODAL.match(line)]))
+        shown = self.settings(uncommented([line for line in self.lines
+                                           if not MODAL.match(line) and not SEVERAL.match(line)]))
         for axis in "xy":
             self.assertAlmostEqual(shown[f"dynamics.{axis}.freq_hz"], 45, places=1)
             self.assertAlmostEqual(shown[f"dynamics.{axis}.damping_ratio"], 0.06, places=3)
+
+    def test_several_modes_may_stand_for_the_frequency(self):
+        shown = self.settings(uncommented([line for line in self.lines
+                                           if not MODAL.match(line) and not MASS.match(line)]))
+        for axis in "xy":
+            self.assertIn("70", str(shown[f"dynamics.{axis}.mode"]))
+            self.assertEqual(shown[f"dynamics.{axis}.freq_hz"], 45)
 
     def test_every_key_that_klipper_needs_is_there(self):
         there = set()
