@@ -70,9 +70,11 @@ class PrinterFile(unittest.TestCase):
 
     def test_several_modes_may_stand_for_the_frequency(self):
         shown = self.settings(uncommented([line for line in self.lines
-                                           if not MODAL.match(line) and not MASS.match(line)]))
+                                           if not MODAL.match(line) and not MASS.match(line)
+                                           # What suits 45 Hz is too long for 110 Hz.
+                                           and "period_ms" not in line]))
         for axis in "xy":
-            self.assertIn("70", str(shown[f"dynamics.{axis}.mode"]))
+            self.assertIn("110", str(shown[f"dynamics.{axis}.mode"]))
             self.assertEqual(shown[f"dynamics.{axis}.freq_hz"], 45)
 
     def test_every_key_that_klipper_needs_is_there(self):
