@@ -78,7 +78,10 @@ Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
                    const dynamics::FlexibleAxis& nozzle, const NozzleState& start)
     : period_s_(base.period_s), modes_(nozzle.modes().size()) {
   const double dt = base.period_s / kSubsteps;
-  const dynamics::ExactMap step(nozzle, dt);
+  std::vector<StepMatrix> steps;
+  for (std::size_t mode = 0; mode < modes_; ++mode) {
+    steps.emplace_back(nozzle, mode, dt);
+  }
   NozzleState state = start;
   states_.push_back(state);
   for (std::size_t k = 1; k < base.nodes(); ++k) {
@@ -86,7 +89,15 @@ Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
       const double t = base.period_s * static_cast<double>(k - 1) + i * dt;
       const dynamics::AxisMotion from = (base.*axis)(t);
       const double middle = (base.*axis)(t + 0.5 * dt).accel_mm_s2;
-      step.advance({from.position_mm, from.velocity_mm_s, middle}, state);
+      for (std::size_t mode = 0; mode < modes_; ++mode) {
+        const StepMatrix& step = steps[mode];
+        NozzleMotion& part = state.parts[mode];
+        const Eigen::Vector2d origin(step.gain() * from.position_mm, 0.0);
+        const Eigen::Vector2d next =
+            step.free() * (Eigen::Vector2d(part.position, part.velocity) - origin) +
+            step.base(0.0, from.velocity_mm_s, middle) + origin;
+        part = {next[0], next[1]};
+      }
     }
     states_.push_back(state);
   }
