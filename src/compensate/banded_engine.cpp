@@ -12,7 +12,6 @@
 #include "flat_form.hpp"
 #include "interior_point.hpp"
 #include "limits.hpp"
-#include "modal_form.hpp"
 #include "stage_form.hpp"
 
 namespace unflex::compensate {
@@ -91,10 +90,7 @@ struct Workspace {
   ScaledWindow scaled;
   InteriorPoint interior_point;
   FlatForm flat;
-  StageForm<1> stages;
-  StageForm<3> stages_of_three;
-  StageForm<5> stages_of_five;
-  ModalForm modal;
+  StageForm stages;
 };
 
 // There are as many workspaces as windows were ever solved at once. They do not belong to threads:
@@ -124,12 +120,6 @@ class Workspaces {
   std::vector<std::unique_ptr<Workspace>> idle_;
 };
 
-// Whether a model of the axis has several modes.
-bool has_modes(const AxisWindow& window) {
-  const auto several = [](const dynamics::FlexibleAxis& axis) { return axis.modes().size() > 1; };
-  return several(window.axis) || std::ranges::any_of(window.variants, several, &AxisVariant::axis);
-}
-
 class BandedEngine final : public Engine {
  public:
   explicit BandedEngine(BandedForm form) : form_(form) {}
@@ -147,20 +137,9 @@ class BandedEngine final : public Engine {
   Result<AxisSolution> solve_in(Workspace& work, const AxisWindow& window) const {
     ScaledWindow& scaled = work.scaled;
     scaled.assign(window);
-    if (has_modes(window) || form_ == BandedForm::modal) {
-      return solve_by(work.modal, work.interior_point, scaled, false);
-    }
-    switch (window.models()) {
-      case 1:
-        break;
-      case 3:
-        return solve_by(work.stages_of_three, work.interior_point, scaled, false);
-      case 5:
-        return solve_by(work.stages_of_five, work.interior_point, scaled, false);
-      default:
-        return solve_by(work.modal, work.interior_point, scaled, false);
-    }
-    if (form_ == BandedForm::flat || (form_ == BandedForm::fitting && FlatForm::suits(scaled))) {
+    const bool is_flat =
+        form_ == BandedForm::flat || (form_ == BandedForm::fitting && FlatForm::suits(scaled));
+    if (is_flat && FlatForm::takes(window)) {
       // If the flat form runs out of digits, the stage form has some left.
       Result<AxisSolution> solution =
           solve_by(work.flat, work.interior_point, scaled, form_ == BandedForm::fitting);

@@ -11,7 +11,6 @@ enum class BandedForm {
   fitting,  // flat where it suits and succeeds, else stages
   flat,
   stages,
-  modal,  // as for axes of several modes
 };
 
 [[nodiscard]] std::unique_ptr<Engine> make_banded_engine(BandedForm form);

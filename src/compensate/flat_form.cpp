@@ -83,6 +83,10 @@ const Stencil& FlatStencils::of(RowKind kind) const {
   }
 }
 
+bool FlatForm::takes(const AxisWindow& window) {
+  return window.models() == 1 && window.axis.modes().size() == 1;
+}
+
 bool FlatForm::suits(const ScaledWindow& scaled) {
   const AxisWindow& window = *scaled.window;
   return scaled.nodes >= kFewestNodes &&

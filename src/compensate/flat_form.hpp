@@ -42,6 +42,8 @@ struct FlatStencils {
 
 class FlatForm {
  public:
+  // Whether the axis is one model of one mode.
+  [[nodiscard]] static bool takes(const AxisWindow& window);
   // Whether the window is long enough for its two ends not to meet, and ωh large enough for the
   // numbers, which grow by (ωh)⁻² from p to b̈ and back.
   [[nodiscard]] static bool suits(const ScaledWindow& window);

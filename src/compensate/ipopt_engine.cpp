@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <utility>
 
 #include "axis_problem.hpp"
@@ -21,6 +23,12 @@ class IpoptEngine final : public Engine {
  private:
   static Result<AxisSolution> solve_with(const AxisWindow& window, ActiveLimits active) {
     const AxisProblem problem(window, active);
+    if (problem.states() > collocation::kMaxStates) {
+      return fail(
+          ErrorKind::internal,
+          fmt::format("{} states are more than Ipopt is given, {}; the banded engine takes them",
+                      problem.states(), collocation::kMaxStates));
+    }
     const std::size_t n = window.nodes();
     std::vector<double> times(n);
     for (std::size_t k = 0; k < n; ++k) {

@@ -1,10 +1,19 @@
-// The window stage by stage: states z_k and inputs j_k of axis_chain.hpp, stepped by a Riccati
-// recursion. It is several times the work of the flat form (flat_form.hpp), but takes any window.
-// The recursion never expresses the nozzle by differences of the base's motion, so a small ωh costs
-// no digits, and two nodes are enough. It also takes several models of the axis
-// (AxisWindow::variants), each of one mode; then
+// The window stage by stage: states z_k and inputs j_k, stepped by a Riccati recursion. It is
+// several times the work of the flat form (flat_form.hpp), but takes any window: of two nodes, of
+// any ωh, axes of several modes, and any number of models of the axis (AxisWindow::variants).
 //
-//   z_k = (p_1, ṗ_1, …, p_m, ṗ_m, b, ḃ, b̈)
+// Notation, beside that of axis_chain.hpp:
+//   q_i, g_i    a mode's part of the nozzle's motion and its gain, of any model
+//   y_i         q_i − g_i b
+//   z           (y_1, ẏ_1, …, y_K, ẏ_K, b, ḃ, b̈)
+//   c           models; p_c = b + Σ y_i over the modes of c
+//
+// A base that moves evenly takes all modes along, so y depends on its acceleration alone:
+//
+//   (y_i, ẏ_i)' = A_i (y_i, ẏ_i) + a_i b̈ + β_i j      b' = b + ḃ + b̈/2 + j/6      …
+//
+// Φ is then 2×2 blocks and one column, and Φᵀ P Φ costs 12 n K multiplications for n = 2K + 3
+// states instead of 2 n³.
 //
 // C. V. Rao, S. J. Wright, J. B. Rawlings, "Application of interior-point methods to model
 // predictive control", J. Optim. Theory Appl. 99 (1998) 723–757. With the quadratic
@@ -30,14 +39,18 @@
 
 namespace unflex::compensate {
 
-// kModels: m.
-template <int kModels>
+// How a mode goes from node to node: A, a and β above.
+struct ModeStep {
+  std::array<double, 4> own{};  // A, by rows
+  std::array<double, 2> by_accel{};
+  std::array<double, 2> by_jerk{};
+
+  // period_s: h.
+  ModeStep(const dynamics::Mode& mode, double period_s);
+};
+
 class StageForm {
  public:
-  static constexpr int kStates = 2 * kModels + 3;
-  using State = Eigen::Matrix<double, kStates, 1>;
-  using Square = Eigen::Matrix<double, kStates, kStates>;
-
   void assign(const ScaledWindow& window);
 
   void evaluate(const PerKind<bool>& kinds);
@@ -58,71 +71,81 @@ class StageForm {
   void write(dynamics::AxisTrajectory& base) const;
 
  private:
-  struct Stage {
-    State feedback;            // Kᵀ
-    double inverse_curvature;  // 1/R; 0 where K is prescribed
+  using Vector = Eigen::VectorXd;
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  // A model of the axis: what its nozzle is made of.
+  struct Model {
+    std::size_t first_mode = 0;
+    std::size_t end_mode = 0;
+    double share = 0.0;         // α
+    Vector middle;              // coefficients of z_k in p_c in the middle of the interval
+    double middle_input = 0.0;  // coefficient of j_k there
   };
 
-  // Whether the input of interval k is prescribed, so as to keep the end.
-  [[nodiscard]] bool prescribed(std::size_t k) const;
-  [[nodiscard]] State prescribed_feedback(std::size_t k) const;
-  [[nodiscard]] bool factor_start(const Square& to_come);
-  void first_guess();
-  void roll_out(const State& first);
-  void split_rows(const std::vector<State>& states, const Padded& inputs,
+  [[nodiscard]] std::size_t base() const { return 2 * modes_.size(); }  // place of b in z
+  [[nodiscard]] std::size_t place(RowKind kind) const { return base() + index_of(kind); }
+  [[nodiscard]] double* state(std::vector<double>& of, std::size_t k) const {
+    return of.data() + k * size_;
+  }
+  [[nodiscard]] const double* state(const std::vector<double>& of, std::size_t k) const {
+    return of.data() + k * size_;
+  }
+
+  void set_models(const AxisWindow& window);
+  void set_start();
+  void roll_out(const Vector& first);
+  // z_{k+1} from z_k and j_k.
+  void step(const double* z, double input, double* next) const;
+  // v ← Φᵀ v
+  void transpose_step(double* v) const;
+  [[nodiscard]] double by_input(const double* v) const;  // Bᵀ v
+  // p_c − b, or its rate, or its step.
+  [[nodiscard]] double swing(const Model& model, const double* z, std::size_t rate = 0) const;
+  void split_rows(const std::vector<double>& states, const Padded& inputs,
                   const PerKind<bool>& kinds, PerKind<Padded>& rows) const;
+  // Φᵀ P Φ into next_, from cost_to_go_.
+  void carry_back();
+  [[nodiscard]] bool prescribed(std::size_t k) const;
+  void set_prescribed_feedback(std::size_t k, double* feedback) const;
+  [[nodiscard]] bool factor_start();
 
   const ScaledWindow* window_ = nullptr;
   std::size_t nodes_ = 0;
-  // Places in z.
-  static constexpr Eigen::Index kBase = 2 * kModels;
-  static constexpr Eigen::Index kBaseRate = kBase + 1;
-  static constexpr Eigen::Index kBaseAccel = kBase + 2;
-  static constexpr Eigen::Index nozzle(std::size_t model) {
-    return 2 * static_cast<Eigen::Index>(model);
-  }
-  static constexpr Eigen::Index component_of(RowKind kind) {
-    return kBase + static_cast<Eigen::Index>(kind);
-  }
-  [[nodiscard]] static State resting_soon();
+  std::size_t size_ = 0;  // n
+  std::vector<ModeStep> modes_;
+  std::vector<double> gains_;
+  std::vector<Model> models_;
+  Matrix node_square_;    // Σ α of the squares of p_c
+  Matrix middle_square_;  // likewise in the middle
+  Vector middle_cross_;   // Σ α μ_c m_c
+  double middle_curvature_ = 0.0;
+  Matrix start_basis_;  // δz_0 = start_basis_ y with y free
+  Eigen::MatrixXd start_inverse_;
 
-  using Middles = Eigen::Matrix<double, kStates, kModels>;
-  using PerModel = Eigen::Matrix<double, kModels, 1>;
-  // p_c − r in the interval after node k, and p − r at node k.
-  [[nodiscard]] PerModel middle_errors(std::size_t k) const;
-  [[nodiscard]] PerModel errors(std::size_t k) const;
-
-  Square transition_;      // Φ
-  State input_;            // B
-  Middles middle_;         // coefficients of z_k in p_c
-  PerModel middle_input_;  // coefficient of j_k in p_c
-  PerModel share_;         // α
-  // δz_0 = start_basis_ y with y free, found by start_inverse_.
-  Eigen::Matrix<double, kStates, Eigen::Dynamic, 0, kStates, kStates> start_basis_;
-  using Reduced = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kStates, kStates>;
-  Reduced start_inverse_;
-
-  std::vector<State> states_;
-  std::vector<State> saved_states_;
-  std::vector<State> state_steps_;
+  std::vector<double> states_;  // n for each node
+  std::vector<double> saved_states_;
+  std::vector<double> state_steps_;
   Padded inputs_;
   Padded saved_inputs_;
   Padded input_steps_;
   Padded feedforward_;
-  std::vector<Stage> stages_;
+  std::vector<double> feedback_;  // n for each interval
+  Padded inverse_curvature_;      // 0 where the feedback is prescribed
   Padded node_weight_;
   Padded middle_weight_;
-  std::vector<PerModel> node_pull_;
-  std::vector<PerModel> middle_pull_;
+  std::vector<double> node_pull_;  // of each model at each node
+  std::vector<double> middle_pull_;
+  Matrix cost_to_go_;  // P
+  Matrix half_next_;   // P Φ
+  Matrix next_;
+  Vector by_input_;
+  Vector cross_;
   double half_cost_ = 0.0;
   double decrement_ = 0.0;
   double faint_pull_ = 0.0;
   PerKind<Padded> rows_;
   PerKind<Padded> row_steps_;
 };
-
-extern template class StageForm<1>;
-extern template class StageForm<3>;
-extern template class StageForm<5>;
 
 }  // namespace unflex::compensate

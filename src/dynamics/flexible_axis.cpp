@@ -7,12 +7,11 @@
 // Vibration, 4th ed., eq. 1.36 to 1.46.
 #include "unflex/dynamics/flexible_axis.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <numbers>
-#include <vector>
 
 namespace unflex::dynamics {
 namespace {
@@ -53,43 +52,11 @@ FreeResponse overdamped(double omega, double zeta, double h) {
           slow * h * (two_kappa_h > 0.0 ? fast_part / two_kappa_h : 1.0)};
 }
 
-using Polynomial = std::vector<double>;  // coefficients of 1, s, s² …
-
-Polynomial product(const Polynomial& a, const Polynomial& b) {
-  Polynomial result(a.size() + b.size() - 1, 0.0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      result[i + j] += a[i] * b[j];
-    }
-  }
-  return result;
-}
-
-// All roots at once, by Weierstrass's method (Kerner, "Ein Gesamtschrittverfahren zur Berechnung
-// der Nullstellen von Polynomen", Numer. Math. 8 (1966) 290–294).
-std::vector<std::complex<double>> roots(Polynomial of) {
-  while (of.size() > 1 && of.back() == 0.0) {
-    of.pop_back();
-  }
-  const std::size_t degree = of.size() - 1;
-  std::vector<std::complex<double>> result(degree);
-  const double size = std::pow(std::abs(of.front() / of.back()), 1.0 / static_cast<double>(degree));
-  for (std::size_t i = 0; i < degree; ++i) {
-    result[i] = size * std::pow(std::complex<double>(0.4, 0.9), static_cast<double>(i));
-  }
-  constexpr int kRounds = 200;
-  for (int round = 0; round < kRounds; ++round) {
-    for (std::size_t i = 0; i < degree; ++i) {
-      std::complex<double> value = of.back();
-      for (std::size_t k = degree; k-- > 0;) {
-        value = value * result[i] + of[k];
-      }
-      std::complex<double> others = of.back();
-      for (std::size_t j = 0; j < degree; ++j) {
-        others *= j != i ? result[i] - result[j] : 1.0;
-      }
-      result[i] -= value / others;
-    }
+// Coefficients from the constant on.
+Eigen::VectorXd product(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(a.size() + b.size() - 1);
+  for (Eigen::Index i = 0; i < a.size(); ++i) {
+    result.segment(i, b.size()) += a[i] * b;
   }
   return result;
 }
@@ -198,35 +165,48 @@ double FlexibleAxis::damping_per_s() const {
   return sum;
 }
 
-// The motions of the base that the nozzle does not see are e^{st} at the zeros s of the transfer
-// function, Σ g_i (2ζ_i ω_i s + ω_i²) Π_{j≠i} (s² + 2ζ_j ω_j s + ω_j²) = 0.
+// Σ g_i (2ζ_i ω_i s + ω_i²) Π_{j≠i} (s² + 2ζ_j ω_j s + ω_j²) = 0, by the eigenvalues of the
+// polynomial's companion matrix.
+std::vector<std::complex<double>> FlexibleAxis::zeros() const {
+  // Frequencies relative to the first one's, so that coefficients are of like size.
+  const double unit = modes_[0].omega_rad_s;
+  Eigen::VectorXd numerator = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(count_));
+  for (std::size_t i = 0; i < count_; ++i) {
+    const double omega = modes_[i].omega_rad_s / unit;
+    Eigen::VectorXd term =
+        modes_[i].gain * Eigen::Vector2d(omega * omega, 2.0 * modes_[i].zeta * omega);
+    for (std::size_t j = 0; j < count_; ++j) {
+      if (j != i) {
+        const double other = modes_[j].omega_rad_s / unit;
+        term = product(term, Eigen::Vector3d(other * other, 2.0 * modes_[j].zeta * other, 1.0));
+      }
+    }
+    numerator += term;
+  }
+  const Eigen::Index degree = numerator.size() - 1;
+  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(degree, degree);
+  for (Eigen::Index i = 0; i < degree; ++i) {
+    companion(i, degree - 1) = -numerator[i] / numerator[degree];
+    if (i > 0) {
+      companion(i, i - 1) = 1.0;
+    }
+  }
+  if (!companion.allFinite()) {
+    return {};
+  }
+  const Eigen::VectorXcd values = companion.eigenvalues() * unit;
+  return {values.begin(), values.end()};
+}
+
 double FlexibleAxis::unseen_s() const {
   if (count_ < 2) {
     return 0.0;
   }
-  // Frequencies relative to the first one's, so that coefficients are of like size.
-  const double unit = modes_[0].omega_rad_s;
-  Polynomial numerator;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const double omega = modes_[i].omega_rad_s / unit;
-    Polynomial term = {modes_[i].gain * omega * omega,
-                       modes_[i].gain * 2.0 * modes_[i].zeta * omega};
-    for (std::size_t j = 0; j < count_; ++j) {
-      if (j != i) {
-        const double other = modes_[j].omega_rad_s / unit;
-        term = product(term, {other * other, 2.0 * modes_[j].zeta * other, 1.0});
-      }
-    }
-    numerator.resize(term.size(), 0.0);
-    for (std::size_t k = 0; k < term.size(); ++k) {
-      numerator[k] += term[k];
-    }
-  }
   // A zero on the wrong side is unseen backwards in time. The least is a limit to that.
   constexpr double kLeast_per_s = 10.0;
   double slowest_per_s = std::numeric_limits<double>::infinity();
-  for (const std::complex<double>& zero : roots(numerator)) {
-    slowest_per_s = std::min(slowest_per_s, std::abs(zero.real()) * unit);
+  for (const std::complex<double>& zero : zeros()) {
+    slowest_per_s = std::min(slowest_per_s, std::abs(zero.real()));
   }
   return std::log(1000.0) / std::max(slowest_per_s, kLeast_per_s);
 }

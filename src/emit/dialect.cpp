@@ -234,6 +234,8 @@ Limits unknown_to_run(Firmware firmware, const Limits& file) {
 
 bool limits_act_early(Firmware firmware) { return firmware == Firmware::rrf; }
 
+bool scales_whole_steps_of_e(Firmware firmware) { return firmware == Firmware::marlin; }
+
 std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, const Limits& wanted,
                                      const Limits& current) {
   std::vector<std::string> lines;

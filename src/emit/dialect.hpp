@@ -40,6 +40,10 @@ struct ZLimits {
 // (GCodes/GCodes.cpp, ReadMove; GCodes2.cpp, M201, M203, M566; GCodes5.cpp, M204).
 [[nodiscard]] bool limits_act_early(Firmware firmware);
 
+// Whether E is rounded to whole steps before M221 and M200 scale it, and then once more. Marlin
+// does so line by line (planner.cpp, _populate_block, esteps).
+[[nodiscard]] bool scales_whole_steps_of_e(Firmware firmware);
+
 // The lines, without their endings, that put `wanted` in force. They contain only what differs from
 // `current`.
 [[nodiscard]] std::vector<std::string> limit_lines(const planner::FirmwareConfig& config,

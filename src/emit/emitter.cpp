@@ -276,11 +276,10 @@ void Emitter::set_run_modes(const Run& run, bool joins_file, std::string& out) {
   if (state.absolute_e) {
     write("M83", out);
   }
-  if (options_.fixed.firmware == Firmware::marlin && (!input_.state().absolute_e || e_is_known())) {
-    // Marlin rounds each line's E to whole steps before M221 and M200 scale it, and rounds again
-    // (planner.cpp, _populate_block, esteps). A run's lines have so few steps that a factor near
-    // one would have no effect. So E is filament as it is laid, and the difference of readings is
-    // put right when the run ends.
+  if (scales_whole_steps_of_e(options_.fixed.firmware) &&
+      (!input_.state().absolute_e || e_is_known())) {
+    // A run's lines have so few steps that a factor near one would have no effect. So E is filament
+    // as it is laid, and the difference of readings is put right when the run ends.
     set_filament_factor(1.0, false, out);
   }
 }
@@ -344,9 +343,7 @@ void Emitter::write_stroke(const Stroke& stroke, double filament_origin, std::st
 void Emitter::restore_modes(std::string& out) {
   const gcode::ModalState& wanted = input_.state();
   const gcode::ModalState& state = printer_.state();
-  if (options_.fixed.firmware == Firmware::marlin) {
-    set_filament_factor(wanted.flow_factor, wanted.volumetric, out);
-  }
+  set_filament_factor(wanted.flow_factor, wanted.volumetric, out);
   // If a G92 E of the input stood at a moment inside one of our lines, put its zero right. Not if a
   // macro has left an unknown reading of E, since the next E would then be measured from a wrong
   // zero.

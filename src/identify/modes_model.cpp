@@ -1,61 +1,19 @@
 #include "modes_model.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "response.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "welch_window.hpp"
 
 namespace unflex::identify {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr int kParts = 8;  // places per bin
-constexpr int kReach = 4;  // bins to either side
 constexpr double kNoiseCorner_hz = 30.0;
-
-// Spectrum of Klipper's Kaiser window, as in spectrum_fit.cpp, with its sign.
-Eigen::VectorXd kaiser_amplitude() {
-  constexpr double kBeta = 6.0;
-  Eigen::VectorXd amplitude(2 * kParts * kReach + 1);
-  for (Eigen::Index i = 0; i < amplitude.size(); ++i) {
-    const double x = static_cast<double>(i) / kParts - kReach;
-    const double square = kBeta * kBeta - std::numbers::pi * std::numbers::pi * x * x;
-    const double root = std::sqrt(std::abs(square));
-    amplitude[i] = root < 1e-9 ? 1.0 : (square > 0.0 ? std::sinh(root) : std::sin(root)) / root;
-  }
-  return amplitude;
-}
-
-// Coefficients from the constant on.
-Eigen::VectorXd product(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-  Eigen::VectorXd result = Eigen::VectorXd::Zero(a.size() + b.size() - 1);
-  for (Eigen::Index i = 0; i < a.size(); ++i) {
-    result.segment(i, b.size()) += a[i] * b;
-  }
-  return result;
-}
-
-// Numerator of H. The time is in units of 1 / (2π 50 Hz), which keeps coefficients of like size.
-constexpr double kUnit_hz = 50.0;
-
-Eigen::VectorXd numerator(const std::vector<ModeOfAxis>& modes) {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(modes.size()));
-  for (std::size_t i = 0; i < modes.size(); ++i) {
-    const double w = modes[i].freq_hz / kUnit_hz;
-    Eigen::VectorXd term = modes[i].gain * Eigen::Vector2d(w * w, 2.0 * modes[i].damping_ratio * w);
-    for (std::size_t j = 0; j < modes.size(); ++j) {
-      if (j != i) {
-        const double v = modes[j].freq_hz / kUnit_hz;
-        term = product(term, Eigen::Vector3d(v * v, 2.0 * modes[j].damping_ratio * v, 1.0));
-      }
-    }
-    sum += term;
-  }
-  return sum;
-}
 
 }  // namespace
 
@@ -64,29 +22,30 @@ ModesModel::ModesModel(const Band& band, double start_hz)
   const Eigen::VectorXd amplitude = kaiser_amplitude();
   const double energy = amplitude.squaredNorm();
   kernel_ = amplitude.cwiseAbs2() / energy;
-  for (Eigen::Index k = 0; k < kReach; ++k) {
-    const Eigen::Index shift = k * kParts;
+  for (Eigen::Index k = 0; k < kReachOfWindow; ++k) {
+    const Eigen::Index shift = k * kPartsOfBin;
     const Eigen::Index both = amplitude.size() - shift;
     const double common = amplitude.head(both).dot(amplitude.tail(both)) / energy;
     correlation_.push_back(common * common);
   }
-  const Eigen::Index places = (freq_hz_.size() + 2 * kReach) * kParts;
-  const double from_hz = (static_cast<double>(band.first) - kReach) * band.step_hz;
-  fine_hz_ = Eigen::ArrayXd::LinSpaced(
-                 places, from_hz, from_hz + static_cast<double>(places - 1) / kParts * band.step_hz)
-                 .max(0.0);
+  const Eigen::Index places = (freq_hz_.size() + 2 * kReachOfWindow) * kPartsOfBin;
+  const double from_hz = (static_cast<double>(band.first) - kReachOfWindow) * band.step_hz;
+  fine_hz_ =
+      Eigen::ArrayXd::LinSpaced(
+          places, from_hz, from_hz + static_cast<double>(places - 1) / kPartsOfBin * band.step_hz)
+          .max(0.0);
   excitation_ = sweep_energy(fine_hz_, start_hz);
   excitation_ /= excitation_.mean();
   noise_shape_ = (kNoiseCorner_hz / freq_hz_).square();
 }
 
 double ModesModel::correlation(Eigen::Index apart) const {
-  return apart < kReach ? correlation_[static_cast<std::size_t>(apart)] : 0.0;
+  return apart < kReachOfWindow ? correlation_[static_cast<std::size_t>(apart)] : 0.0;
 }
 
 double ModesModel::independent_bins() const {
   double together = 1.0;
-  for (Eigen::Index k = 1; k < kReach; ++k) {
+  for (Eigen::Index k = 1; k < kReachOfWindow; ++k) {
     together += 2.0 * correlation(k);
   }
   return static_cast<double>(freq_hz_.size()) / together;
@@ -146,7 +105,7 @@ void ModesModel::operator()(const Eigen::VectorXd& theta, Eigen::ArrayXd& values
   Eigen::MatrixXd smeared(bins, columns);
   for (Eigen::Index c = 0; c < columns; ++c) {
     for (Eigen::Index i = 0; i < bins; ++i) {
-      smeared(i, c) = kernel_.dot(fine.col(c).segment(i * kParts, kernel_.size()));
+      smeared(i, c) = kernel_.dot(fine.col(c).segment(i * kPartsOfBin, kernel_.size()));
     }
   }
   const double white = std::exp(theta[3 * modes]);
@@ -194,21 +153,11 @@ std::vector<ModeOfAxis> modes_of(const Eigen::VectorXd& theta) {
 }
 
 std::vector<Complex> zeros_of(const std::vector<ModeOfAxis>& modes) {
-  const Eigen::VectorXd polynomial = numerator(modes);
-  const Eigen::Index degree = polynomial.size() - 1;
-  const double leading = polynomial[degree];
-  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(degree, degree);
-  for (Eigen::Index i = 0; i < degree; ++i) {
-    companion(i, degree - 1) = -polynomial[i] / leading;
-    if (i > 0) {
-      companion(i, i - 1) = 1.0;
-    }
+  std::vector<dynamics::Mode> list;
+  for (const ModeOfAxis& mode : modes) {
+    list.push_back({2.0 * std::numbers::pi * mode.freq_hz, mode.damping_ratio, mode.gain});
   }
-  if (!companion.allFinite()) {
-    return {};
-  }
-  const Eigen::VectorXcd values = companion.eigenvalues() * (2.0 * std::numbers::pi * kUnit_hz);
-  return {values.begin(), values.end()};
+  return dynamics::FlexibleAxis(list).zeros();
 }
 
 bool is_minimum_phase(const std::vector<ModeOfAxis>& modes) {

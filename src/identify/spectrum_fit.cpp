@@ -1,8 +1,5 @@
-// A spectrum by Welch's method is the sweep's energy behind the mode, smeared by the window's own
-// spectrum. We neglect that its windows weigh some moments more than others. Klipper's window is
-// Kaiser's with β = 6, whose energy at x bins from the centre is (Kaiser and Schafer, On the Use of
-// the I0-sinh Window for Spectrum Analysis, 1980)
-//   ( sinh √(β² − π²x²) / √(β² − π²x²) )².
+// A spectrum by Welch's method is the sweep's energy behind the mode, smeared by the energy of the
+// window's own spectrum. We neglect that its windows weigh some moments more than others.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -11,25 +8,15 @@
 #include "least_squares.hpp"
 #include "response.hpp"
 #include "unflex/identify/mode.hpp"
+#include "welch_window.hpp"
 
 namespace unflex::identify {
 namespace {
 
-constexpr int kParts = 8;  // places per bin
-constexpr int kReach = 4;  // bins to either side
 constexpr double kLowest_hz = 12.0;
 
 Eigen::ArrayXd kaiser_energy() {
-  constexpr double kBeta = 6.0;
-  Eigen::ArrayXd energy(2 * kParts * kReach + 1);
-  for (Eigen::Index i = 0; i < energy.size(); ++i) {
-    const double x = static_cast<double>(i) / kParts - kReach;
-    const double square = kBeta * kBeta - std::numbers::pi * std::numbers::pi * x * x;
-    const double root = std::sqrt(std::abs(square));
-    const double value =
-        root < 1e-9 ? 1.0 : (square > 0.0 ? std::sinh(root) : std::sin(root)) / root;
-    energy[i] = value * value;
-  }
+  const Eigen::ArrayXd energy = kaiser_amplitude().array().square();
   return energy / energy.sum();
 }
 
@@ -37,10 +24,11 @@ class WelchModel {
  public:
   WelchModel(const Spectrum& spectrum, Eigen::Index first, Eigen::Index count, double start_hz)
       : count_(count), kernel_(kaiser_energy()) {
-    const Eigen::Index places = (count + 2 * kReach) * kParts;
-    const double from_hz = (static_cast<double>(first) - kReach) * spectrum.step_hz;
+    const Eigen::Index places = (count + 2 * kReachOfWindow) * kPartsOfBin;
+    const double from_hz = (static_cast<double>(first) - kReachOfWindow) * spectrum.step_hz;
     fine_hz_ = Eigen::ArrayXd::LinSpaced(
-        places, from_hz, from_hz + static_cast<double>(places - 1) / kParts * spectrum.step_hz);
+        places, from_hz,
+        from_hz + static_cast<double>(places - 1) / kPartsOfBin * spectrum.step_hz);
     excitation_ = sweep_energy(fine_hz_, start_hz);
     divisor_ = Eigen::ArrayXd::Ones(count);
     if (spectrum.is_normalized) {
@@ -55,7 +43,7 @@ class WelchModel {
         p.scale * excitation_ * gain_squared(fine_hz_, p.mode_hz, p.damping_ratio);
     Eigen::ArrayXd bins(count_);
     for (Eigen::Index i = 0; i < count_; ++i) {
-      bins[i] = (fine.segment(i * kParts, kernel_.size()) * kernel_).sum() + p.noise;
+      bins[i] = (fine.segment(i * kPartsOfBin, kernel_.size()) * kernel_).sum() + p.noise;
     }
     return bins / divisor_;
   }
@@ -149,7 +137,7 @@ Eigen::VectorXd variances(const Candidate& candidate) {
       spread * (fit.jacobian.transpose() * candidate.weights.matrix().asDiagonal() * fit.jacobian)
                    .ldlt()
                    .solve(Eigen::MatrixXd::Identity(unknowns, unknowns));
-  const Eigen::MatrixXd together = sandwich(fit, candidate.weights, kReach);
+  const Eigen::MatrixXd together = sandwich(fit, candidate.weights, kReachOfWindow);
   return kCaution * even.diagonal().cwiseMax(together.diagonal());
 }
 

@@ -13,7 +13,6 @@ namespace unflex::machine {
 namespace {
 
 constexpr std::size_t kFewestModes = 2;
-constexpr std::size_t kMostModes = 3;
 
 // One overload per type a member can have. Each returns what is wrong, or nothing.
 std::string store(const Value& value, const Key& key, double& target) {

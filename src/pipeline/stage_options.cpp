@@ -29,6 +29,8 @@ double grid_mm(const machine::Settings& settings) {
              : kGridMm;
 }
 
+static_assert(machine::kMostModes == dynamics::kMostModes);
+
 // The axis with its frequencies and damping ratios times these factors.
 dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics, double freq_factor = 1.0,
                             double damping_factor = 1.0) {

@@ -32,6 +32,14 @@ double rise(double t, double duration_s) {
   return s * s * s * (10.0 + s * (6.0 * s - 15.0));
 }
 
+BaseTrajectory wavy_base() {
+  return testing::sampled(
+      [](double t) {
+        return std::array{5.0 * rise(t, 0.1), 2.0 * std::sin(30.0 * t) * rise(t, 0.1)};
+      },
+      0.1);
+}
+
 ErrorWeight all_alike(double) { return {}; }
 
 // Moves a nozzle by exact_step, in steps of at most 0.1 ms, while the base follows straight lines
@@ -90,11 +98,7 @@ LineRules marlin_rules() {
 const AxisGrid kSteps{0.0, 0.0125};
 
 TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
-  const BaseTrajectory base = testing::sampled(
-      [](double t) {
-        return std::array{5.0 * rise(t, 0.1), 2.0 * std::sin(30.0 * t) * rise(t, 0.1)};
-      },
-      0.1);
+  const BaseTrajectory base = wavy_base();
   LineRules rules;
   rules.nozzle_y = dynamics::from_frequency(37.0, 0.1);
   const ErrorWeight weight{0.9, 0.2, 0.3};
@@ -149,11 +153,7 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
 TEST(LineCosts, AgreeWithANozzleOfSeveralModes) {
   using dynamics::Mode;
   constexpr int kThree = 3;
-  const BaseTrajectory base = testing::sampled(
-      [](double t) {
-        return std::array{5.0 * rise(t, 0.1), 2.0 * std::sin(30.0 * t) * rise(t, 0.1)};
-      },
-      0.1);
+  const BaseTrajectory base = wavy_base();
   const std::array along_x = {Mode{282.7, 0.06, 1.2}, Mode{691.2, 0.1, -0.2}};
   const std::array along_y = {Mode{285.3, 0.071, 0.36}, Mode{365.1, 0.085, 0.37},
                               Mode{206.1, 0.152, 0.27}};
@@ -241,11 +241,7 @@ TEST(LineCosts, RingDownIsTheIntegralOfTheSquareOfSeveralModes) {
 }
 
 TEST(LineFan, AgreesWithLineCostsAndBestEnd) {
-  const BaseTrajectory base = testing::sampled(
-      [](double t) {
-        return std::array{5.0 * rise(t, 0.1), 2.0 * std::sin(30.0 * t) * rise(t, 0.1)};
-      },
-      0.1);
+  const BaseTrajectory base = wavy_base();
   LineRules rules;
   rules.nozzle_y = dynamics::from_frequency(37.0, 0.1);
   const LineCosts<1> costs(

@@ -45,15 +45,13 @@ class Modes : public ::testing::TestWithParam<Case> {};
 
 TEST_P(Modes, AreCompensated) {
   const Case& one = GetParam();
-  const auto report_with = [&](const std::string& x, const std::string& y) {
-    const JobFolder folder(squares(), {"printer.firmware=" + one.firmware, x, y});
-    SilentProgress progress;
-    Result<report::Report> made = compensate(folder.job(), progress);
-    EXPECT_TRUE(made) << to_string(made.error());
-    return made.value_or(report::Report{});
-  };
-  const report::Report made =
-      report_with("dynamics.x.mode=" + one.modes, "dynamics.y.mode=" + one.modes);
+  const JobFolder folder(squares(),
+                         {"printer.firmware=" + one.firmware, "dynamics.x.mode=" + one.modes,
+                          "dynamics.y.mode=" + one.modes});
+  SilentProgress progress;
+  const Result<report::Report> result = compensate(folder.job(), progress);
+  ASSERT_TRUE(result) << to_string(result.error());
+  const report::Report& made = *result;
   EXPECT_EQ(made.violation_count, 0U) << testing::complaints(made);
   EXPECT_EQ(made.runs_fallback, 0U) << testing::complaints(made);
   const double after_mm = made.compensated.extruding.contour_rms_mm;

@@ -16,8 +16,10 @@
 #pragma once
 
 #include <array>
+#include <complex>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 namespace unflex::dynamics {
 
@@ -113,6 +115,9 @@ class FlexibleAxis {
   [[nodiscard]] double stiffness_per_s2() const;
   [[nodiscard]] double damping_per_s() const;
 
+  // The zeros of the transfer function from base to nozzle, rad/s: while the base moves as e^{st}
+  // with s at a zero, the nozzle rests. Empty if the highest coefficient vanishes.
+  [[nodiscard]] std::vector<std::complex<double>> zeros() const;
   // For how long a motion of the base that moves the nozzle nowhere lasts until it has died away to
   // a thousandth. With one mode it dies at once. Several modes leave the base such a motion near
   // each antiresonance.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -114,6 +115,9 @@ struct ExtruderSettings {
   double pressure_advance_s = 0.0;
   double pressure_advance_smooth_s = 0.04;
 };
+
+// The most modes that an axis can have.
+inline constexpr std::size_t kMostModes = 3;
 
 // One of several modes of an axis. The gains of an axis add up to 1.
 struct ModeSettings {

@@ -1,4 +1,4 @@
-#include "modal_form.hpp"
+#include "stage_form.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -14,8 +14,8 @@ constexpr std::array<RowKind, 3> kNodeKinds = {RowKind::position, RowKind::veloc
 // b' = b + ḃ + b̈/2 + j/6 and so on.
 constexpr std::array<double, 3> kBaseByJerk = {1.0 / 6.0, 0.5, 1.0};
 
-// From b, ḃ and b̈ one interval before the base rests: the place where it will rest, and what an
-// input in that interval's predecessor does to it (see stage_form.hpp).
+// From b, ḃ and b̈ one interval before the base rests: the place where it will rest, and what the
+// input of the interval before does to it.
 constexpr std::array<double, 3> kRestingSoon = {1.0, 2.0 / 3.0, 1.0 / 6.0};
 constexpr double kRestingSoonByJerk = 1.0 / 6.0 + 0.5 * 2.0 / 3.0 + 1.0 / 6.0;
 
@@ -30,7 +30,7 @@ ModeStep::ModeStep(const dynamics::Mode& mode, double period_s) {
              mode.gain * (chain.input(1) - chain.input(3))};
 }
 
-void ModalForm::set_models(const AxisWindow& window) {
+void StageForm::set_models(const AxisWindow& window) {
   modes_.clear();
   gains_.clear();
   models_.clear();
@@ -73,7 +73,7 @@ void ModalForm::set_models(const AxisWindow& window) {
   }
 }
 
-void ModalForm::assign(const ScaledWindow& scaled) {
+void StageForm::assign(const ScaledWindow& scaled) {
   window_ = &scaled;
   faint_pull_ = kFaintPull;
   nodes_ = scaled.nodes;
@@ -107,7 +107,7 @@ void ModalForm::assign(const ScaledWindow& scaled) {
 
 // Goes from the given start, or from rest at the first reference point, without any jerk until the
 // end asks for it.
-void ModalForm::set_start() {
+void StageForm::set_start() {
   const AxisWindow& window = *window_->window;
   const auto n = static_cast<Eigen::Index>(size_);
   const auto accel = static_cast<Eigen::Index>(place(RowKind::accel));
@@ -145,7 +145,7 @@ void ModalForm::set_start() {
   roll_out(first);
 }
 
-void ModalForm::roll_out(const Vector& first) {
+void StageForm::roll_out(const Vector& first) {
   std::ranges::copy(first, states_.begin());
   std::vector<double> feedback(size_);
   for (std::size_t k = 0; k + 1 < nodes_; ++k) {
@@ -165,7 +165,7 @@ void ModalForm::roll_out(const Vector& first) {
   }
 }
 
-void ModalForm::step(const double* z, double input, double* next) const {
+void StageForm::step(const double* z, double input, double* next) const {
   const double* const b = z + base();
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     const ModeStep& mode = modes_[i];
@@ -182,7 +182,7 @@ void ModalForm::step(const double* z, double input, double* next) const {
   to[2] = b[2] + input;
 }
 
-void ModalForm::transpose_step(double* v) const {
+void StageForm::transpose_step(double* v) const {
   double* const b = v + base();
   double by_accel = 0.5 * b[0] + b[1] + b[2];
   for (std::size_t i = 0; i < modes_.size(); ++i) {
@@ -197,7 +197,7 @@ void ModalForm::transpose_step(double* v) const {
   b[2] = by_accel;
 }
 
-double ModalForm::by_input(const double* v) const {
+double StageForm::by_input(const double* v) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     sum += modes_[i].by_jerk[0] * v[2 * i] + modes_[i].by_jerk[1] * v[2 * i + 1];
@@ -208,7 +208,7 @@ double ModalForm::by_input(const double* v) const {
   return sum;
 }
 
-double ModalForm::swing(const Model& model, const double* z, std::size_t rate) const {
+double StageForm::swing(const Model& model, const double* z, std::size_t rate) const {
   double sum = 0.0;
   for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
     sum += z[2 * i + rate];
@@ -216,7 +216,7 @@ double ModalForm::swing(const Model& model, const double* z, std::size_t rate) c
   return sum;
 }
 
-void ModalForm::evaluate(const PerKind<bool>& kinds) {
+void StageForm::evaluate(const PerKind<bool>& kinds) {
   half_cost_ = 0.0;
   const std::size_t count = models_.size();
   for (std::size_t k = 0; k < nodes_; ++k) {
@@ -247,7 +247,7 @@ void ModalForm::evaluate(const PerKind<bool>& kinds) {
   split_rows(states_, inputs_, kinds, rows_);
 }
 
-void ModalForm::split_rows(const std::vector<double>& states, const Padded& inputs,
+void StageForm::split_rows(const std::vector<double>& states, const Padded& inputs,
                            const PerKind<bool>& kinds, PerKind<Padded>& rows) const {
   for (const RowKind kind : kNodeKinds) {
     if (kinds[index_of(kind)]) {
@@ -263,7 +263,7 @@ void ModalForm::split_rows(const std::vector<double>& states, const Padded& inpu
   }
 }
 
-void ModalForm::carry_back() {
+void StageForm::carry_back() {
   const std::size_t n = size_;
   const std::size_t b = base();
   // P Φ, row by row.
@@ -295,11 +295,11 @@ void ModalForm::carry_back() {
   }
 }
 
-bool ModalForm::prescribed(std::size_t k) const {
+bool StageForm::prescribed(std::size_t k) const {
   return window_->end_base.has_value() && k + 3 >= nodes_;
 }
 
-void ModalForm::set_prescribed_feedback(std::size_t k, double* feedback) const {
+void StageForm::set_prescribed_feedback(std::size_t k, double* feedback) const {
   std::fill_n(feedback, size_, 0.0);
   double* const b = feedback + base();
   if (k + 2 == nodes_) {
@@ -313,7 +313,7 @@ void ModalForm::set_prescribed_feedback(std::size_t k, double* feedback) const {
   }
 }
 
-bool ModalForm::factor(const PerKind<const double*>& weights) {
+bool StageForm::factor(const PerKind<const double*>& weights) {
   const auto add_node = [&](std::size_t k, Matrix& p) {
     p += node_weight_[k] * node_square_;
     for (const RowKind kind : kNodeKinds) {
@@ -367,7 +367,7 @@ bool ModalForm::factor(const PerKind<const double*>& weights) {
   return factor_start();
 }
 
-bool ModalForm::factor_start() {
+bool StageForm::factor_start() {
   const Eigen::MatrixXd reduced = start_basis_.transpose() * cost_to_go_ * start_basis_;
   start_inverse_ = Eigen::MatrixXd::Identity(reduced.rows(), reduced.rows());
   if (reduced.rows() > 0) {
@@ -380,7 +380,7 @@ bool ModalForm::factor_start() {
   return true;
 }
 
-void ModalForm::solve(const PerKind<const double*>& forces) {
+void StageForm::solve(const PerKind<const double*>& forces) {
   faint_pull_ = -faint_pull_;
   PerKind<bool> kinds{};
   for (std::size_t i = 0; i < kinds.size(); ++i) {
@@ -436,24 +436,24 @@ void ModalForm::solve(const PerKind<const double*>& forces) {
   split_rows(state_steps_, input_steps_, kinds, row_steps_);
 }
 
-void ModalForm::advance(double length) {
+void StageForm::advance(double length) {
   const auto size = static_cast<Eigen::Index>(states_.size());
   Eigen::Map<Vector>(states_.data(), size) +=
       length * Eigen::Map<const Vector>(state_steps_.data(), size);
   as_array(inputs_) += length * as_array(input_steps_);
 }
 
-void ModalForm::save() {
+void StageForm::save() {
   saved_states_ = states_;
   saved_inputs_ = inputs_;
 }
 
-void ModalForm::restore() {
+void StageForm::restore() {
   states_ = saved_states_;
   inputs_ = saved_inputs_;
 }
 
-void ModalForm::write(dynamics::AxisTrajectory& base) const {
+void StageForm::write(dynamics::AxisTrajectory& base) const {
   const auto put = [&](RowKind kind, double offset, std::vector<double>& to) {
     to.resize(nodes_);
     for (std::size_t k = 0; k < nodes_; ++k) {

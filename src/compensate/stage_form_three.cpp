@@ -1,7 +1,0 @@
-#include "stage_form_steps.hpp"
-
-namespace unflex::compensate {
-
-template class StageForm<3>;
-
-}  // namespace unflex::compensate
