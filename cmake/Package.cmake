@@ -37,7 +37,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 # The packages that unflexDependencies.cmake looks for.
 string(JOIN ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   pkg-config coinor-libipopt-dev libblas-dev liblapack-dev libeigen3-dev libexpected-dev libfmt-dev
-  libtomlplusplus-dev nlohmann-json3-dev zlib1g-dev)
+  libtomlplusplus-dev nlohmann-json3-dev libzstd-dev zlib1g-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
 "library that takes the flex out of a 3D printer, for development
 unflex rewrites sliced G-code so that the nozzle of a 3D printer draws the

@@ -11,7 +11,7 @@ packages=(
   # Ipopt links LAPACK and BLAS, which its package merely recommends.
   coinor-libipopt-dev libblas-dev liblapack-dev
   libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev nlohmann-json3-dev
-  zlib1g-dev
+  libzstd-dev zlib1g-dev
 )
 test_packages=(
   libgmock-dev libgtest-dev

@@ -17,7 +17,7 @@ _unflex_options() {
     printer) echo '-h --help' ;;
     'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer macros') echo '-h --help -o --output --printer --set -q --quiet' ;;
-    'printer init') echo '-h --help --from -o --output --set -q --quiet' ;;
+    'printer init') echo '-h --help --from --record -o --output --set -q --quiet' ;;
   esac
 }
 
@@ -41,6 +41,7 @@ _unflex_value() {
     *:--log) echo 'files *.@(log|txt)' ;;
     *:-o | *:--output | *:--against) echo "files $print" ;;
     *:--from | *:--printer) echo "files $printer" ;;
+    *:--record) echo 'files *.csv' ;;
     inspect:--report) echo 'files *.json' ;;
     *:--report) echo 'files *.@(json|html)' ;;
     study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;

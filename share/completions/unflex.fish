@@ -71,6 +71,7 @@ complete -c unflex -n '__unflex_in identify' -l speed-mm-s -x -d 'Of a ringing t
 complete -c unflex -n '__unflex_in identify' -l decay -x -d 'Of a ringing tower: height of a wave over that of the next'
 
 complete -c unflex -n '__unflex_in "printer init"' -l from -x -a $printer -d 'What describes the printer'
+complete -c unflex -n '__unflex_in "printer init"' -l record -x -a '(__unflex_files .csv)' -d 'A record of a resonance; repeatable'
 complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unflex_files .toml)' -d 'Where to write, - for stdout'
 
 complete -c unflex -n '__unflex_in "printer line-test"' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'

@@ -181,6 +181,10 @@ void add_printer(CLI::App& program, RunConfig& config) {
                    "Klipper's printer.cfg, Marlin's M503, RRF's config.g, or a sliced print")
       ->type_name("FILE")
       ->required();
+  init->add_option("--record", config.identify.records,
+                   "Record of a resonance, as identify takes it; repeatable")
+      ->type_name("CSV")
+      ->allow_extra_args(false);
   init->add_option("-o,--output", config.output, "Where to write, - for stdout")
       ->type_name("OUT")
       ->required();

@@ -5,24 +5,29 @@
 #include <string>
 #include <vector>
 
-#include "unflex/identify/mode.hpp"
+#include "unflex/identify/axis_model.hpp"
 
 namespace unflex::app {
 
 struct IdentifiedRecord {
   std::string name;
   identify::Axis axis = identify::Axis::x;
-  identify::Mode mode;
+  identify::RecordFit fit;
 };
 
 struct Identification {
-  std::vector<IdentifiedRecord> records;          // in the order of the command line
-  std::map<identify::Axis, identify::Mode> axes;  // from all records of an axis
-  std::vector<std::string> warnings;              // "file: warning: …"
+  std::vector<IdentifiedRecord> records;  // in the order of the command line
+  // From all trusted records of an axis. An axis without one is missing.
+  std::map<identify::Axis, identify::AxisModel> axes;
+  std::vector<std::string> warnings;  // "file: warning: …"
+  std::vector<std::string> refusals;  // "file: …", of axes without a trusted record
 };
 
 // The lines to paste into a printer file.
 [[nodiscard]] std::string snippet(const Identification& identification);
+
+// What the lines say, as overrides: "key=value".
+[[nodiscard]] std::vector<std::string> dynamics_overrides(const Identification& identification);
 
 [[nodiscard]] std::string identification_text(const Identification& identification);
 

@@ -53,14 +53,14 @@ Status add_set(const IdentifyConfig& config, const identify::DataSet& set, Ident
   if (!axis) {
     return tl::unexpected(axis.error());
   }
-  Result<identify::Mode> mode = fit(set, *axis, config.sweep);
-  if (!mode) {
-    return tl::unexpected(mode.error());
+  Result<identify::RecordFit> fitted = fit(set, *axis, config.sweep);
+  if (!fitted) {
+    return tl::unexpected(fitted.error());
   }
-  for (const std::string& warning : mode->warnings) {
+  for (const std::string& warning : fitted->warnings) {
     warn(all, set.name, warning);
   }
-  all.records.push_back({set.name, *axis, std::move(*mode)});
+  all.records.push_back({set.name, *axis, std::move(*fitted)});
   return {};
 }
 
@@ -69,7 +69,7 @@ Status add_file(const IdentifyConfig& config, const std::string& name, Identific
   if (!text) {
     return tl::unexpected(text.error());
   }
-  const Result<std::vector<identify::DataSet>> sets = identify::parse_csv(*text, name);
+  const Result<std::vector<identify::DataSet>> sets = identify::parse_records(*text, name);
   if (!sets) {
     return tl::unexpected(sets.error());
   }
@@ -83,19 +83,44 @@ Status add_file(const IdentifyConfig& config, const std::string& name, Identific
 
 Status add_tower(const IdentifyConfig& config, Identification& all) {
   constexpr std::string_view kName = "ringing tower";
-  Result<identify::Mode> mode = fit_tower(*config.tower);
-  if (!mode) {
-    return tl::unexpected(mode.error());
+  Result<identify::RecordFit> fitted = fit_tower(*config.tower);
+  if (!fitted) {
+    return tl::unexpected(fitted.error());
   }
-  for (const std::string& warning : mode->warnings) {
+  for (const std::string& warning : fitted->warnings) {
     warn(all, std::string(kName), warning);
   }
   all.records.push_back(
-      {std::string(kName), config.axis.value_or(identify::Axis::x), std::move(*mode)});
+      {std::string(kName), config.axis.value_or(identify::Axis::x), std::move(*fitted)});
   return {};
 }
 
-Result<Identification> identify_all(const IdentifyConfig& config) {
+// One model for each axis. A record that carries none is left out where others do.
+void combine_records(Identification& all) {
+  std::map<identify::Axis, std::vector<identify::AxisModel>> by_axis;
+  for (const IdentifiedRecord& record : all.records) {
+    if (record.fit.is_trusted()) {
+      by_axis[record.axis].push_back(record.fit.model);
+    }
+  }
+  for (const auto& [axis, models] : by_axis) {
+    all.axes[axis] = combine(models);
+  }
+  for (const IdentifiedRecord& record : all.records) {
+    if (record.fit.is_trusted()) {
+      continue;
+    }
+    if (all.axes.contains(record.axis)) {
+      warn(all, record.name, "is left out: " + record.fit.refusal);
+    } else {
+      all.refusals.push_back(fmt::format("{}: {}", record.name, record.fit.refusal));
+    }
+  }
+}
+
+}  // namespace
+
+Result<Identification> identify_records(const IdentifyConfig& config) {
   Identification all;
   for (const std::string& name : config.records) {
     if (Status added = add_file(config, name, all); !added) {
@@ -107,15 +132,11 @@ Result<Identification> identify_all(const IdentifyConfig& config) {
       return tl::unexpected(added.error());
     }
   }
-  std::map<identify::Axis, std::vector<identify::Mode>> by_axis;
-  for (const IdentifiedRecord& record : all.records) {
-    by_axis[record.axis].push_back(record.mode);
-  }
-  for (const auto& [axis, modes] : by_axis) {
-    all.axes[axis] = combine(modes);
-  }
+  combine_records(all);
   return all;
 }
+
+namespace {
 
 Status write_report(const std::string& name, const Identification& all) {
   Result<Output> output = Output::open(name);
@@ -130,7 +151,7 @@ Status write_report(const std::string& name, const Identification& all) {
 }  // namespace
 
 Result<ExitCode> run_identify(const RunConfig& config, Console& console) {
-  const Result<Identification> all = identify_all(config.identify);
+  const Result<Identification> all = identify_records(config.identify);
   if (!all) {
     return tl::unexpected(all.error());
   }
@@ -140,11 +161,13 @@ Result<ExitCode> run_identify(const RunConfig& config, Console& console) {
       return tl::unexpected(written.error());
     }
   }
+  console.lines(all->refusals, all->refusals.size(), "refusals; --report lists them");
+  const ExitCode code = all->refusals.empty() ? ExitCode::done : ExitCode::input;
   // If quiet, only the lines to paste are left, without figures and drawings.
   const Status written = config.report == kStandardStream
                              ? Status{}
                              : write_last(config.quiet ? snippet(*all) : identification_text(*all));
-  return written.map([] { return ExitCode::done; });
+  return written.map([&] { return code; });
 }
 
 }  // namespace unflex::app

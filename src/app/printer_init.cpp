@@ -7,6 +7,7 @@
 
 #include "console.hpp"
 #include "files.hpp"
+#include "identify.hpp"
 #include "inputs.hpp"
 #include "outputs.hpp"
 #include "results.hpp"
@@ -55,6 +56,40 @@ Status write_settings(const RunConfig& config, const machine::Settings& settings
   return output->write(machine::to_toml(settings)).and_then([&] { return output->commit(); });
 }
 
+// The modes behind the records. Every record must carry a model, since the file is written once and
+// used for long.
+Result<Identification> identify(const RunConfig& config, Console& console) {
+  Result<Identification> found = identify_records(config.identify);
+  if (!found) {
+    return tl::unexpected(found.error());
+  }
+  console.warnings(found->warnings);
+  for (const IdentifiedRecord& record : found->records) {
+    if (!found->axes.contains(record.axis)) {
+      return fail(ErrorKind::input, {record.name, 0}, record.fit.refusal);
+    }
+  }
+  return found;
+}
+
+// The records are where the keys that they give came from.
+void name_records(const Identification& found, machine::Settings& settings) {
+  for (const auto& [axis, model] : found.axes) {
+    std::string names;
+    for (const IdentifiedRecord& record : found.records) {
+      if (record.axis == axis && record.fit.is_trusted()) {
+        names += (names.empty() ? "" : ", ") + record.name;
+      }
+    }
+    const std::string section = fmt::format("dynamics.{}.", letter(axis));
+    for (auto& [key, origin] : settings.origins) {
+      if (key.starts_with(section) && origin == "--set") {
+        origin = names;
+      }
+    }
+  }
+}
+
 Status print_summary(const RunConfig& config) {
   if (config.quiet || config.output == kStandardStream) {
     return {};
@@ -64,7 +99,18 @@ Status print_summary(const RunConfig& config) {
 
 }  // namespace
 
-Result<ExitCode> run_printer_init(const RunConfig& config, Console& console) {
+Result<ExitCode> run_printer_init(const RunConfig& asked, Console& console) {
+  RunConfig config = asked;
+  Identification found;
+  if (!config.identify.records.empty()) {
+    Result<Identification> identified = identify(config, console);
+    if (!identified) {
+      return tl::unexpected(identified.error());
+    }
+    found = std::move(*identified);
+    const std::vector<std::string> overrides = dynamics_overrides(found);
+    config.overrides.insert(config.overrides.begin(), overrides.begin(), overrides.end());
+  }
   Result<Input> input = Input::open(config.input);
   if (!input) {
     return tl::unexpected(input.error());
@@ -74,10 +120,11 @@ Result<ExitCode> run_printer_init(const RunConfig& config, Console& console) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is what it is made from too; give it a name of its own");
   }
-  const Result<machine::Settings> settings = settings_from(config, *input);
+  Result<machine::Settings> settings = settings_from(config, *input);
   if (!settings) {
     return tl::unexpected(settings.error());
   }
+  name_records(found, *settings);
   for (const std::vector<Diagnostic>& remarks : {settings->guesses, settings->notes}) {
     for (const Diagnostic& remark : remarks) {
       console.line(to_string(remark));

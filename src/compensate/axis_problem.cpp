@@ -18,7 +18,7 @@ using collocation::StateVector;
 AxisProblem::AxisProblem(const AxisWindow& window, ActiveLimits active)
     : window_(&window), active_(active), origin_mm_(window.reference_mm.front()) {
   for (std::size_t i = 0; i < window.models(); ++i) {
-    const AxisVariant model = window.model(i);
+    const Plant model = window.model(i);
     const std::size_t first = modes_.size();
     for (const dynamics::Mode& mode : model.axis.modes()) {
       const double omega_h = mode.omega_rad_s * window.period_s;

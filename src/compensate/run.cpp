@@ -84,7 +84,7 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
                      std::vector<double> reference, std::vector<double> weight) {
   AxisWindow window;
   window.axis = axis.axis;
-  window.variants = axis.variants;
+  window.plants = axis.plants;
   window.period_s = period_s;
   // The effect of the base's jerk on the nozzle's motion goes with (ωh)². With this weight one
   // value serves all resonances.
@@ -101,20 +101,20 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
 
 }  // namespace
 
-AxisVariant AxisWindow::model(std::size_t i) const {
+Plant AxisWindow::model(std::size_t i) const {
   if (i > 0) {
-    return variants[i - 1];
+    return plants[i - 1];
   }
   double share = 1.0;
-  for (const AxisVariant& variant : variants) {
-    share -= variant.share;
+  for (const Plant& plant : plants) {
+    share -= plant.share;
   }
   return {axis, share};
 }
 
 dynamics::NozzleState AxisWindow::in_model(std::size_t i, const dynamics::NozzleState& nozzle,
                                            double base_mm) const {
-  const dynamics::FlexibleAxis& other = i > 0 ? variants[i - 1].axis : axis;
+  const dynamics::FlexibleAxis& other = i > 0 ? plants[i - 1].axis : axis;
   dynamics::NozzleState state = nozzle;
   if (other.modes().size() != axis.modes().size()) {
     // There is no telling which mode swings, so all do, by their gains.

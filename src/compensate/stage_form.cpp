@@ -35,15 +35,15 @@ void StageForm::set_models(const AxisWindow& window) {
   gains_.clear();
   models_.clear();
   for (std::size_t c = 0; c < window.models(); ++c) {
-    const AxisVariant variant = window.model(c);
+    const Plant plant = window.model(c);
     Model model;
     model.first_mode = modes_.size();
-    for (const dynamics::Mode& mode : variant.axis.modes()) {
+    for (const dynamics::Mode& mode : plant.axis.modes()) {
       modes_.emplace_back(mode, window.period_s);
       gains_.push_back(mode.gain);
     }
     model.end_mode = modes_.size();
-    model.share = variant.share;
+    model.share = plant.share;
     models_.push_back(std::move(model));
   }
   size_ = base() + 3;

@@ -1,6 +1,6 @@
 // The window stage by stage: states z_k and inputs j_k, stepped by a Riccati recursion. It is
 // several times the work of the flat form (flat_form.hpp), but takes any window: of two nodes, of
-// any ωh, axes of several modes, and any number of models of the axis (AxisWindow::variants).
+// any ωh, axes of several modes, and any number of models of the axis (AxisWindow::plants).
 //
 // Notation, beside that of axis_chain.hpp:
 //   q_i, g_i    a mode's part of the nozzle's motion and its gain, of any model

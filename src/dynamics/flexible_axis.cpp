@@ -208,7 +208,7 @@ double FlexibleAxis::unseen_s() const {
   for (const std::complex<double>& zero : zeros()) {
     slowest_per_s = std::min(slowest_per_s, std::abs(zero.real()));
   }
-  return std::log(1000.0) / std::max(slowest_per_s, kLeast_per_s);
+  return std::log(1e5) / std::max(slowest_per_s, kLeast_per_s);
 }
 
 FlexibleAxis FlexibleAxis::detuned(double factor) const {

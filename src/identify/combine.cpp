@@ -1,64 +1,191 @@
+// Several records of an axis: each tells of the machine as it was, with errors of its own, and the
+// machine itself changes from record to record. This is the random-effects model of DerSimonian and
+// Laird (Meta-analysis in Clinical Trials, 1986):
+//   x_k = μ + δ_k + ε_k,   var ε_k = σ_k²,   var δ_k = τ²,
+// for each parameter x of (log f, log ζ, g). The axis on another day is μ + δ, with variance
+// τ² + var μ.
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
-#include "response.hpp"
-#include "ring_fit.hpp"
-#include "sweep_fit.hpp"
-#include "unflex/identify/mode.hpp"
+#include "modes_interval.hpp"
+#include "unflex/identify/axis_model.hpp"
 
 namespace unflex::identify {
 namespace {
 
-constexpr double kQuantile = 1.959964;
+constexpr double kLeastVariance = 1e-12;
 
-// Mean of logarithms, weighted by their intervals. If the values scatter more than their intervals
-// tell, the interval of the mean grows by as much (Birge, The Calculation of Errors by the Method
-// of Least Squares, 1932).
-Estimate mean_of(const std::vector<Mode>& modes, Estimate Mode::*which) {
-  double weights = 0.0;
-  double sum = 0.0;
-  for (const Mode& mode : modes) {
-    const Estimate& e = mode.*which;
-    const double spread = std::max(std::log(e.high / e.low) / (2.0 * kQuantile), 1e-9);
-    weights += 1.0 / (spread * spread);
-    sum += std::log(e.value) / (spread * spread);
-  }
-  const double mean = sum / weights;
-  double scatter = 0.0;
-  for (const Mode& mode : modes) {
-    const Estimate& e = mode.*which;
-    const double spread = std::max(std::log(e.high / e.low) / (2.0 * kQuantile), 1e-9);
-    scatter += std::pow((std::log(e.value) - mean) / spread, 2);
-  }
-  const double excess = modes.size() > 1 ? scatter / static_cast<double>(modes.size() - 1) : 1.0;
-  return estimate_of(std::exp(mean), std::max(1.0, excess) / weights);
+Eigen::MatrixXd covariance_of(const AxisModel& model) {
+  const auto count = 3 * static_cast<Eigen::Index>(model.modes.size());
+  return Eigen::Map<const Eigen::MatrixXd>(model.covariance.data(), count, count);
 }
 
-// How much an axis moved. Differences of neighbours favour the band in which resonances are.
-double motion(const std::vector<double>& samples) {
-  double sum = 0.0;
-  for (std::size_t i = 1; i < samples.size(); ++i) {
-    sum += std::pow(samples[i] - samples[i - 1], 2);
+// (log f, log ζ, g) for each mode in turn.
+Eigen::VectorXd parameters_of(const std::vector<ModeOfAxis>& modes) {
+  Eigen::VectorXd result(3 * static_cast<Eigen::Index>(modes.size()));
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    result.segment(3 * static_cast<Eigen::Index>(m), 3) << std::log(modes[m].freq_hz),
+        std::log(modes[m].damping_ratio), modes[m].gain;
   }
-  return sum;
+  return result;
 }
 
-double motion(const DataSet& set, std::size_t axis) {
-  if (const auto* recording = std::get_if<Recording>(&set.data)) {
-    return motion(recording->accel[axis]);
+std::vector<ModeOfAxis> modes_of_parameters(const Eigen::VectorXd& parameters) {
+  std::vector<ModeOfAxis> modes;
+  double gains = 0.0;
+  for (Eigen::Index i = 0; i < parameters.size(); i += 3) {
+    modes.push_back({std::exp(parameters[i]), std::exp(parameters[i + 1]), parameters[i + 2]});
+    gains += parameters[i + 2];
   }
-  double sum = 0.0;
-  for (const double density : std::get<Spectrum>(set.data).density[axis]) {
-    sum += density;
+  for (ModeOfAxis& mode : modes) {
+    mode.gain /= gains;
   }
-  return sum;
+  return modes;
 }
 
-// Whether the value lies in a finite interval above 0.
-bool is_known(const Estimate& estimate) {
-  return estimate.low > 0.0 && estimate.low <= estimate.value && estimate.value <= estimate.high &&
-         std::isfinite(estimate.high);
+// The modes in the order of those of `like`: each the one of nearest frequency. Empty if their
+// numbers differ, if two would share one, or if one is too far off to be the same.
+std::vector<std::size_t> matched(const std::vector<ModeOfAxis>& modes,
+                                 const std::vector<ModeOfAxis>& like) {
+  constexpr double kFarthest = 0.15;  // of the logarithm of the frequency
+  std::vector<std::size_t> order;
+  if (modes.size() != like.size()) {
+    return order;
+  }
+  for (const ModeOfAxis& one : like) {
+    const auto distance = [&](const ModeOfAxis& mode) {
+      return std::abs(std::log(mode.freq_hz / one.freq_hz));
+    };
+    const auto nearest = std::ranges::min_element(modes, {}, distance);
+    const auto at = static_cast<std::size_t>(nearest - modes.begin());
+    if (distance(*nearest) > kFarthest || std::ranges::find(order, at) != order.end()) {
+      return {};
+    }
+    order.push_back(at);
+  }
+  return order;
+}
+
+struct Measurement {
+  Eigen::VectorXd parameters;
+  Eigen::MatrixXd covariance;
+};
+
+// The records' parameters in the order of the first one's modes; empty if their modes are not the
+// same.
+std::vector<Measurement> measurements(const std::vector<AxisModel>& models) {
+  std::vector<Measurement> result;
+  for (const AxisModel& model : models) {
+    const std::vector<std::size_t> order = matched(model.values(), models.front().values());
+    if (order.empty()) {
+      return {};
+    }
+    std::vector<Eigen::Index> places;
+    for (const std::size_t m : order) {
+      for (Eigen::Index i = 0; i < 3; ++i) {
+        places.push_back(3 * static_cast<Eigen::Index>(m) + i);
+      }
+    }
+    result.push_back({parameters_of(model.values())(places), covariance_of(model)(places, places)});
+  }
+  return result;
+}
+
+// τ² of one parameter.
+double spread_of(const Eigen::ArrayXd& values, const Eigen::ArrayXd& variances) {
+  const Eigen::ArrayXd weights = variances.inverse();
+  const double mean = (weights * values).sum() / weights.sum();
+  const double scatter = (weights * (values - mean).square()).sum();
+  const double freedom = static_cast<double>(values.size() - 1);
+  const double scale = weights.sum() - weights.square().sum() / weights.sum();
+  return std::max(0.0, (scatter - freedom) / scale);
+}
+
+AxisModel averaged(const std::vector<Measurement>& all) {
+  const Eigen::Index count = all.front().parameters.size();
+  const auto records = static_cast<Eigen::Index>(all.size());
+  Eigen::VectorXd mean(count);
+  Eigen::VectorXd spread(count);
+  Eigen::MatrixXd shares(count, records);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    Eigen::ArrayXd values(records);
+    Eigen::ArrayXd variances(records);
+    for (Eigen::Index k = 0; k < records; ++k) {
+      const Measurement& one = all[static_cast<std::size_t>(k)];
+      values[k] = one.parameters[i];
+      variances[k] = std::max(one.covariance(i, i), kLeastVariance);
+    }
+    spread[i] = spread_of(values, variances);
+    const Eigen::ArrayXd weights = (variances + spread[i]).inverse();
+    shares.row(i) = (weights / weights.sum()).matrix().transpose();
+    mean[i] = shares.row(i).dot(values.matrix());
+  }
+  // var μ = Σ w² (σ² + τ²), and δ on top.
+  Eigen::MatrixXd covariance = spread.asDiagonal();
+  for (Eigen::Index k = 0; k < records; ++k) {
+    const Eigen::VectorXd w = shares.col(k);
+    Eigen::MatrixXd of_record = all[static_cast<std::size_t>(k)].covariance;
+    of_record.diagonal() += spread;
+    covariance += w.asDiagonal() * of_record * w.asDiagonal();
+  }
+  return model_of(Method::combined, modes_of_parameters(mean), covariance);
+}
+
+using Modes = std::vector<ModeOfAxis>;
+
+Eigen::ArrayXd places_hz() { return Eigen::ArrayXd::LinSpaced(120, 12.0, 131.0); }
+
+// How far apart the nozzles of two models swing, per speed of the base.
+double distance(const Modes& a, const Modes& b) {
+  const Eigen::ArrayXd places = places_hz();
+  return ((response_of(places, a) - response_of(places, b)) / places).matrix().norm();
+}
+
+// How far a nozzle swings from its base, likewise.
+double swing(const Modes& modes) {
+  const Eigen::ArrayXd places = places_hz();
+  return ((response_of(places, modes) - 1.0) / places).matrix().norm();
+}
+
+double width(const AxisModel& model) {
+  const Estimate& main_hz = model.modes.front().freq_hz;
+  return std::log(main_hz.high / main_hz.low);
+}
+
+// The record whose model is nearest to the others', of equals the one that is most certain of
+// itself. The others are plants.
+AxisModel with_others_as_plants(const std::vector<AxisModel>& models) {
+  const AxisModel* middle = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const AxisModel& model : models) {
+    double sum = 0.0;
+    for (const AxisModel& other : models) {
+      sum += distance(model.values(), other.values());
+    }
+    const bool is_equal = middle != nullptr && sum < 1.001 * least;
+    if (sum < 0.999 * least || (is_equal && width(model) < width(*middle))) {
+      least = sum;
+      middle = &model;
+    }
+  }
+  AxisModel result = *middle;
+  result.method = Method::combined;
+  const double share = 1.0 / static_cast<double>(models.size());
+  for (Plant& plant : result.plants) {
+    plant.share *= share;
+  }
+  Estimate& main_hz = result.modes.front().freq_hz;
+  for (const AxisModel& model : models) {
+    if (&model != middle) {
+      result.plants.push_back({.modes = model.values(), .share = share});
+      main_hz.low = std::min(main_hz.low, model.values().front().freq_hz);
+      main_hz.high = std::max(main_hz.high, model.values().front().freq_hz);
+    }
+  }
+  return result;
 }
 
 }  // namespace
@@ -69,44 +196,39 @@ std::string_view to_string(Method method) {
   return kNames[static_cast<std::size_t>(method)];
 }
 
-Axis dominant_axis(const DataSet& set) {
-  return motion(set, 1) > motion(set, 0) ? Axis::y : Axis::x;
+std::vector<Plant> other_plants(const AxisModel& model) {
+  constexpr double kNear = 0.03;
+  constexpr std::size_t kMost = 6;
+  const auto away = [&](const Plant& plant) { return distance(plant.modes, model.values()); };
+  std::vector<Plant> others(model.plants.begin() + 1, model.plants.end());
+  const double far = kNear * swing(model.values());
+  if (std::ranges::all_of(others, [&](const Plant& plant) { return away(plant) < far; })) {
+    return {};
+  }
+  // The ones that weigh most stand for all.
+  double all = 0.0;
+  for (const Plant& plant : others) {
+    all += plant.share;
+  }
+  std::ranges::stable_sort(others, std::ranges::greater{},
+                           [&](const Plant& plant) { return plant.share * away(plant); });
+  others.resize(std::min(others.size(), kMost));
+  double kept = 0.0;
+  for (const Plant& plant : others) {
+    kept += plant.share;
+  }
+  for (Plant& plant : others) {
+    plant.share *= all / kept;
+  }
+  return others;
 }
 
-Result<Mode> fit_recording(const Recording& recording, Axis axis, const Sweep& sweep) {
-  const std::vector<double>& samples = recording.accel[axis == Axis::x ? 0 : 1];
-  return holds_sweep(samples, recording.rate_hz) ? fit_sweep(samples, recording.rate_hz, sweep)
-                                                 : fit_ringing(samples, recording.rate_hz);
-}
-
-Result<Mode> fit(const DataSet& set, Axis axis, const Sweep& sweep) {
-  const auto* recording = std::get_if<Recording>(&set.data);
-  Result<Mode> mode = recording != nullptr
-                          ? fit_recording(*recording, axis, sweep)
-                          : fit_spectrum(std::get<Spectrum>(set.data), axis, sweep);
-  if (!mode) {
-    return fail(mode.error().kind, {set.name, 0}, mode.error().message);
+AxisModel combine(const std::vector<AxisModel>& models) {
+  if (models.size() == 1) {
+    return models.front();
   }
-  // Such numbers do not describe a resonance.
-  if (!is_known(mode->freq_hz) || !is_known(mode->damping_ratio) ||
-      !(mode->damping_ratio.value < 1.0)) {
-    return fail(ErrorKind::input, {set.name, 0}, "no resonance can be made out in it");
-  }
-  return mode;
-}
-
-Mode combine(const std::vector<Mode>& modes) {
-  if (modes.size() == 1) {
-    return modes.front();
-  }
-  Mode mode;
-  mode.method = Method::combined;
-  mode.freq_hz = mean_of(modes, &Mode::freq_hz);
-  mode.damping_ratio = mean_of(modes, &Mode::damping_ratio);
-  for (const Mode& one : modes) {
-    mode.unexplained = std::max(mode.unexplained, one.unexplained);
-  }
-  return mode;
+  const std::vector<Measurement> all = measurements(models);
+  return all.empty() ? with_others_as_plants(models) : averaged(all);
 }
 
 }  // namespace unflex::identify

@@ -4,12 +4,12 @@
 #include <charconv>
 #include <cmath>
 
+#include "samples.hpp"
+#include "stdata.hpp"
 #include "unflex/identify/record.hpp"
 
 namespace unflex::identify {
 namespace {
-
-using Row = std::vector<double>;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r";
@@ -146,43 +146,10 @@ class Parser {
     return table;
   }
 
-  [[nodiscard]] DataSet set_of(std::string name) const {
-    DataSet set;
-    set.name = std::move(name);
-    set.axis = axis_in_name(set.name);
-    set.is_diagonal = !set.axis && set.name.find("axis=") != std::string::npos;
-    return set;
-  }
-
-  static Recording samples(const Table& table, double rate_hz) {
-    Recording recording;
-    recording.rate_hz = rate_hz;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (const Row& row : table.rows) {
-        recording.accel[axis].push_back(row[axis + 1]);
-      }
-    }
-    return recording;
-  }
-
   Result<std::vector<DataSet>> klipper_recording(const Table& table) const {
-    const double duration_s = table.rows.back()[0] - table.rows.front()[0];
-    const double step_s = duration_s / static_cast<double>(table.rows.size() - 1);
-    if (!(duration_s > 0.0)) {
-      return fail(ErrorKind::input, {file_, 0}, "its times do not grow");
-    }
-    DataSet set = set_of(file_);
-    set.data = samples(table, 1.0 / step_s);
-    double longest_s = 0.0;
-    for (std::size_t i = 1; i < table.rows.size(); ++i) {
-      longest_s = std::max(longest_s, table.rows[i][0] - table.rows[i - 1][0]);
-    }
-    if (longest_s > 3.0 * step_s) {
-      set.notes.push_back(
-          fmt::format("samples are missing: up to {:.1f} ms between two, {:.2f} ms on average",
-                      1e3 * longest_s, 1e3 * step_s));
-    }
-    return std::vector{std::move(set)};
+    return timed_set(file_, table.rows).map([](DataSet&& set) {
+      return std::vector{std::move(set)};
+    });
   }
 
   Result<std::vector<DataSet>> rrf_recording(const Table& table) const {
@@ -195,8 +162,10 @@ class Parser {
                   "ends without the line 'Rate ..., overflows ...' that M956 writes; the recording "
                   "was broken off");
     }
-    DataSet set = set_of(file_);
-    set.data = samples(table, *rate);
+    DataSet set = named_set(file_);
+    Recording recording = recording_of(table.rows, *rate);
+    recording.is_along_axes = true;
+    set.data = std::move(recording);
     if (!last.ends_with("overflows 0")) {
       set.notes.push_back(fmt::format("samples are missing: {}", last));
     }
@@ -225,14 +194,14 @@ class Parser {
     const bool is_normalized = std::ranges::find(header_, "shapers:") != header_.end();
     const std::size_t columns = table.rows.front().size();
     if (header_[1] == "psd_x" && columns >= 4) {
-      DataSet set = set_of(file_);
+      DataSet set = named_set(file_);
       set.data = spectrum(table, step_hz, is_normalized, {1, 2, 3});
       return std::vector{std::move(set)};
     }
     // Each column is the sum over all three axes at one of several points.
     std::vector<DataSet> sets;
     for (std::size_t column = 1; column < columns; ++column) {
-      DataSet set = set_of(fmt::format("{} ({})", file_, header_[column]));
+      DataSet set = named_set(fmt::format("{} ({})", file_, header_[column]));
       set.data = spectrum(table, step_hz, is_normalized, {column, column, column});
       sets.push_back(std::move(set));
     }
@@ -311,8 +280,8 @@ std::optional<Axis> axis_in_name(std::string_view file) {
   return found;
 }
 
-Result<std::vector<DataSet>> parse_csv(std::string_view text, const std::string& file) {
-  return Parser(text, file).parse();
+Result<std::vector<DataSet>> parse_records(std::string_view bytes, const std::string& file) {
+  return is_stdata(bytes) ? parse_stdata(bytes, file) : Parser(bytes, file).parse();
 }
 
 }  // namespace unflex::identify

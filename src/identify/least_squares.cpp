@@ -152,14 +152,22 @@ Eigen::MatrixXd sandwich(const LeastSquares& fit, const Eigen::ArrayXd& weights,
   const Eigen::MatrixXd bread = (fit.jacobian.transpose() * weighted)
                                     .ldlt()
                                     .solve(Eigen::MatrixXd::Identity(unknowns, unknowns));
-  Eigen::MatrixXd filling = Eigen::MatrixXd::Zero(unknowns, unknowns);
-  for (Eigen::Index at = 0; at < fit.residual.size(); at += block) {
-    const Eigen::Index count = std::min(block, fit.residual.size() - at);
-    const Eigen::VectorXd g =
-        weighted.middleRows(at, count).transpose() * fit.residual.segment(at, count).matrix();
-    filling += g * g.transpose();
-  }
-  return bread * filling * bread;
+  const auto in_blocks = [&](Eigen::Index of) -> Eigen::MatrixXd {
+    Eigen::MatrixXd filling = Eigen::MatrixXd::Zero(unknowns, unknowns);
+    for (Eigen::Index at = 0; at < fit.residual.size(); at += of) {
+      const Eigen::Index count = std::min(of, fit.residual.size() - at);
+      const Eigen::VectorXd g =
+          weighted.middleRows(at, count).transpose() * fit.residual.segment(at, count).matrix();
+      filling += g * g.transpose();
+    }
+    return bread * filling * bread;
+  };
+  const Eigen::MatrixXd together = in_blocks(block);
+  const Eigen::ArrayXd least = in_blocks(1).diagonal();
+  const Eigen::ArrayXd own = together.diagonal();
+  const Eigen::VectorXd stretch =
+      (own > 0.0).select((least.max(own) / own).sqrt(), Eigen::ArrayXd::Ones(unknowns)).matrix();
+  return stretch.asDiagonal() * together * stretch.asDiagonal();
 }
 
 }  // namespace unflex::identify

@@ -55,6 +55,7 @@ struct RobustFit {
 // neighbours in blocks of `block` data go together (White, A Heteroskedasticity-Consistent
 // Covariance Matrix Estimator, Econometrica 1980, with clusters):
 //   (JᵀWJ)⁻¹ Σ_blocks g gᵀ (JᵀWJ)⁻¹,   g = Σ_block w r J.
+// Each variance is at least the one that blocks of one give.
 [[nodiscard]] Eigen::MatrixXd sandwich(const LeastSquares& fit, const Eigen::ArrayXd& weights,
                                        Eigen::Index block);
 

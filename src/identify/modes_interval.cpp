@@ -14,6 +14,8 @@
 namespace unflex::identify {
 namespace {
 
+constexpr double kQuantile = 1.959964;  // of the normal distribution, 97.5 %
+
 Eigen::MatrixXd correlations(const ModesModel& model, Eigen::Index bins) {
   Eigen::MatrixXd result(bins, bins);
   for (Eigen::Index i = 0; i < bins; ++i) {
@@ -51,23 +53,6 @@ Eigen::MatrixXd covariance_of(const ModesModel& model, const Band& band, const P
   return kCaution * variance * inverse * middle * inverse;
 }
 
-// Covariance of (log f, log ζ, g), with g_i = a_i / Σ a.
-Eigen::MatrixXd of_gains(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& theta,
-                         const std::vector<ModeOfAxis>& modes) {
-  const Eigen::Index count = 3 * modes_in(theta);
-  double sum = 0.0;
-  for (Eigen::Index i = 2; i < count; i += 3) {
-    sum += theta[i];
-  }
-  Eigen::MatrixXd map = Eigen::MatrixXd::Identity(count, count);
-  for (Eigen::Index i = 2; i < count; i += 3) {
-    for (Eigen::Index j = 2; j < count; j += 3) {
-      map(i, j) = ((i == j ? 1.0 : 0.0) - modes[static_cast<std::size_t>(i / 3)].gain) / sum;
-    }
-  }
-  return map * covariance.topLeftCorner(count, count) * map.transpose();
-}
-
 std::vector<ModeOfAxis> moved(const std::vector<ModeOfAxis>& modes, const Eigen::VectorXd& by) {
   std::vector<ModeOfAxis> result = modes;
   double sum = 0.0;
@@ -83,14 +68,6 @@ std::vector<ModeOfAxis> moved(const std::vector<ModeOfAxis>& modes, const Eigen:
     mode.gain /= sum;
   }
   return result;
-}
-
-Eigen::ArrayXcd response_of(const Eigen::ArrayXd& freq_hz, const std::vector<ModeOfAxis>& modes) {
-  Eigen::ArrayXcd sum = Eigen::ArrayXcd::Zero(freq_hz.size());
-  for (const ModeOfAxis& mode : modes) {
-    sum += mode.gain * mode_response(freq_hz, mode.freq_hz, mode.damping_ratio);
-  }
-  return sum;
 }
 
 // The fit, and points to either side along the two directions of the covariance that change H the
@@ -123,27 +100,60 @@ std::vector<Plant> plants_of(const Eigen::ArrayXd& freq_hz, const std::vector<Mo
   return plants;
 }
 
+// Where H is compared.
+Eigen::ArrayXd places_hz() { return Eigen::ArrayXd::LinSpaced(120, 12.0, 131.0); }
+
 }  // namespace
 
-void add_intervals(const ModesModel& model, const Band& band, const Prior& prior,
-                   const Eigen::VectorXd& theta, const Eigen::MatrixXd& spread, ModesFit& fit) {
-  constexpr double kQuantile = 1.959964;  // of the normal distribution, 97.5 %
-  const Eigen::MatrixXd covariance =
-      of_gains(covariance_of(model, band, prior, theta), theta, fit.modes) + spread;
-  for (std::size_t m = 0; m < fit.modes.size(); ++m) {
-    const ModeOfAxis& mode = fit.modes[m];
+Eigen::MatrixXd of_gains(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& theta) {
+  const std::vector<ModeOfAxis> modes = modes_of(theta);
+  const auto count = 3 * static_cast<Eigen::Index>(modes.size());
+  double sum = 0.0;
+  for (Eigen::Index i = 2; i < count; i += 3) {
+    sum += theta[i];
+  }
+  Eigen::MatrixXd map = Eigen::MatrixXd::Identity(count, count);
+  for (Eigen::Index i = 2; i < count; i += 3) {
+    for (Eigen::Index j = 2; j < count; j += 3) {
+      map(i, j) = ((i == j ? 1.0 : 0.0) - modes[static_cast<std::size_t>(i / 3)].gain) / sum;
+    }
+  }
+  return map * covariance.topLeftCorner(count, count) * map.transpose();
+}
+
+Eigen::MatrixXd covariance_of_modes(const ModesModel& model, const Band& band, const Prior& prior,
+                                    const Eigen::VectorXd& theta) {
+  return of_gains(covariance_of(model, band, prior, theta), theta);
+}
+
+Eigen::ArrayXcd response_of(const Eigen::ArrayXd& freq_hz, const std::vector<ModeOfAxis>& modes) {
+  Eigen::ArrayXcd sum = Eigen::ArrayXcd::Zero(freq_hz.size());
+  for (const ModeOfAxis& mode : modes) {
+    sum += mode.gain * mode_response(freq_hz, mode.freq_hz, mode.damping_ratio);
+  }
+  return sum;
+}
+
+AxisModel model_of(Method method, const std::vector<ModeOfAxis>& modes,
+                   const Eigen::MatrixXd& covariance) {
+  AxisModel model;
+  model.method = method;
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    const ModeOfAxis& mode = modes[m];
     const auto at = 3 * static_cast<Eigen::Index>(m);
     const double gain_spread = kQuantile * std::sqrt(std::max(covariance(at + 2, at + 2), 0.0));
-    fit.intervals.push_back(
+    model.modes.push_back(
         {.freq_hz = estimate_of(mode.freq_hz, covariance(at, at)),
          .damping_ratio = estimate_of(mode.damping_ratio, covariance(at + 1, at + 1)),
          .gain = {
              .value = mode.gain, .low = mode.gain - gain_spread, .high = mode.gain + gain_spread}});
   }
   for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
-    fit.covariance.insert(fit.covariance.end(), covariance.row(i).begin(), covariance.row(i).end());
+    const Eigen::VectorXd row = covariance.row(i);
+    model.covariance.insert(model.covariance.end(), row.begin(), row.end());
   }
-  fit.plants = plants_of(band.freq_hz, fit.modes, covariance);
+  model.plants = plants_of(places_hz(), modes, covariance);
+  return model;
 }
 
 }  // namespace unflex::identify

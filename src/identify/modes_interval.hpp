@@ -1,13 +1,27 @@
 // What a record leaves open around a fit.
 #pragma once
 
+#include <vector>
+
 #include "modes_model.hpp"
 
 namespace unflex::identify {
 
-// Sets fit.covariance, fit.intervals and fit.plants for fit.modes, which are those of θ.
-// `spread` is the covariance of (log f, log ζ, g) among other fits, and adds to that of this one.
-void add_intervals(const ModesModel& model, const Band& band, const Prior& prior,
-                   const Eigen::VectorXd& theta, const Eigen::MatrixXd& spread, ModesFit& fit);
+// Covariance of (log f, log ζ, g) for each mode of θ, from one whose first rows are those of the
+// modes in θ; g_i = a_i / Σ a.
+[[nodiscard]] Eigen::MatrixXd of_gains(const Eigen::MatrixXd& covariance,
+                                       const Eigen::VectorXd& theta);
+
+// Likewise for a fit to a spectrum.
+[[nodiscard]] Eigen::MatrixXd covariance_of_modes(const ModesModel& model, const Band& band,
+                                                  const Prior& prior, const Eigen::VectorXd& theta);
+
+// H of all modes at frequencies ν.
+[[nodiscard]] Eigen::ArrayXcd response_of(const Eigen::ArrayXd& freq_hz,
+                                          const std::vector<ModeOfAxis>& modes);
+
+// The modes with their intervals, and plants around them, by the covariance of (log f, log ζ, g).
+[[nodiscard]] AxisModel model_of(Method method, const std::vector<ModeOfAxis>& modes,
+                                 const Eigen::MatrixXd& covariance);
 
 }  // namespace unflex::identify

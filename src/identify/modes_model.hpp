@@ -8,23 +8,10 @@
 #include <complex>
 #include <vector>
 
+#include "band.hpp"
 #include "least_squares.hpp"
-#include "unflex/identify/modes.hpp"
 
 namespace unflex::identify {
-
-// The bins of a density in the band of the sweep, relative to their mean, as acceleration.
-struct Band {
-  double step_hz = 0.0;
-  Eigen::Index first = 0;
-  Eigen::ArrayXd freq_hz;
-  Eigen::ArrayXd density;
-  // Joins measured and fitted density before their logarithms are compared. What lies below moves
-  // the nozzle little, and must not cost a mode.
-  Eigen::ArrayXd floor = {};
-
-  [[nodiscard]] Eigen::ArrayXd logarithms() const { return (density + floor).log(); }
-};
 
 class ModesModel {
  public:

@@ -9,7 +9,6 @@ namespace unflex::identify {
 
 inline constexpr double kLeastDamping = 0.01;
 inline constexpr double kMostDamping = 0.4;
-inline constexpr double kFitFrom_hz = 15.0;
 inline constexpr double kLossScale = 0.3;  // of the logarithm of the density
 
 struct Solution {

@@ -1,7 +1,5 @@
 #include "response.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,12 +20,6 @@ Eigen::ArrayXd smoothed(const Eigen::ArrayXd& values, Eigen::Index width) {
 
 }  // namespace
 
-Eigen::ArrayXd gain_squared(const Eigen::ArrayXd& freq_hz, double mode_hz, double damping_ratio) {
-  const Eigen::ArrayXd r2 = (freq_hz / mode_hz).square();
-  const Eigen::ArrayXd damping = 4.0 * damping_ratio * damping_ratio * r2;
-  return (1.0 + damping) / ((1.0 - r2).square() + damping);
-}
-
 Eigen::ArrayXd sweep_energy(const Eigen::ArrayXd& freq_hz, double start_hz) {
   constexpr std::array kHarmonics = {3.0, 5.0};
   Eigen::ArrayXd energy = freq_hz.square();
@@ -35,18 +27,6 @@ Eigen::ArrayXd sweep_energy(const Eigen::ArrayXd& freq_hz, double start_hz) {
     energy += (freq_hz > n * start_hz).select(freq_hz.square() / std::pow(n, 5), 0.0);
   }
   return energy;
-}
-
-SpectrumParameters SpectrumParameters::from(const Eigen::VectorXd& logarithms) {
-  return {.mode_hz = std::exp(logarithms[0]),
-          .damping_ratio = std::exp(logarithms[1]),
-          .scale = std::exp(logarithms[2]),
-          .noise = std::exp(logarithms[3])};
-}
-
-Eigen::VectorXd SpectrumParameters::logarithms() const {
-  return Eigen::Vector4d(std::log(mode_hz), std::log(damping_ratio), std::log(scale),
-                         std::log(noise));
 }
 
 Estimate estimate_of(double value, double log_variance) {
@@ -76,27 +56,6 @@ Misfit misfit_of(const Eigen::ArrayXd& freq_hz, const Eigen::ArrayXd& measured,
     }
   }
   return misfit;
-}
-
-void add_warnings(const Misfit& misfit, const Sweep& sweep, Mode& mode) {
-  constexpr double kTooMuch = 0.35;
-  mode.unexplained = misfit.unexplained;
-  if (misfit.other_peak_hz > 0.0) {
-    mode.warnings.push_back(
-        fmt::format("one mode does not explain this: there is another peak near {:.1f} Hz",
-                    misfit.other_peak_hz));
-  } else if (misfit.unexplained > kTooMuch) {
-    mode.warnings.push_back(
-        fmt::format("one mode does not explain this: {:.0f} % of what was measured is something "
-                    "else",
-                    100.0 * misfit.unexplained));
-  }
-  if (mode.freq_hz.value < 1.5 * sweep.start_hz || mode.freq_hz.value > 0.97 * sweep.end_hz) {
-    mode.warnings.push_back(
-        fmt::format("{:.1f} Hz is at the edge of the sweep from {} to {} Hz: the resonance may be "
-                    "elsewhere",
-                    mode.freq_hz.value, sweep.start_hz, sweep.end_hz));
-  }
 }
 
 }  // namespace unflex::identify

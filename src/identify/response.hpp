@@ -1,33 +1,17 @@
-// How a mode answers a sweep with a given excitation.
+// What a sweep excites, and how measured and fitted values compare.
 #pragma once
 
 #include <Eigen/Core>
 
-#include "unflex/identify/mode.hpp"
+#include "unflex/identify/axis_model.hpp"
 
 namespace unflex::identify {
-
-// |H|² of a mode at frequencies ν, all in Hz.
-[[nodiscard]] Eigen::ArrayXd gain_squared(const Eigen::ArrayXd& freq_hz, double mode_hz,
-                                          double damping_ratio);
 
 // Energy of the base's acceleration per Hz in a sweep of Klipper's, up to a factor. The sweep is a
 // square wave whose amplitude grows with its frequency, and whose frequency grows steadily. Its
 // fundamental gives ν². Its odd harmonic n is 1/n as high, comes from an n times lower and weaker
 // fundamental, and passes n times as fast. So it adds ν²/n⁵, from n times the sweep's start on.
 [[nodiscard]] Eigen::ArrayXd sweep_energy(const Eigen::ArrayXd& freq_hz, double start_hz);
-
-// Frequency, damping and two levels. Fits use their logarithms, which keeps them positive and of
-// like size.
-struct SpectrumParameters {
-  double mode_hz = 0.0;
-  double damping_ratio = 0.0;
-  double scale = 0.0;  // factor of the sweep's energy
-  double noise = 0.0;  // level of the white noise
-
-  [[nodiscard]] static SpectrumParameters from(const Eigen::VectorXd& logarithms);
-  [[nodiscard]] Eigen::VectorXd logarithms() const;
-};
 
 // The estimate with the interval value · exp(± 1.96 σ), where σ belongs to the logarithm.
 [[nodiscard]] Estimate estimate_of(double value, double log_variance);
@@ -40,9 +24,5 @@ struct Misfit {
 };
 [[nodiscard]] Misfit misfit_of(const Eigen::ArrayXd& freq_hz, const Eigen::ArrayXd& measured,
                                const Eigen::ArrayXd& fitted, double noise, Eigen::Index width);
-
-// Sets mode.unexplained. Warns of a mode that does not explain the measurement, or lies at the edge
-// of the sweep or beyond.
-void add_warnings(const Misfit& misfit, const Sweep& sweep, Mode& mode);
 
 }  // namespace unflex::identify

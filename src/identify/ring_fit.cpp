@@ -12,7 +12,7 @@
 
 #include "fourier.hpp"
 #include "least_squares.hpp"
-#include "response.hpp"
+#include "modes_interval.hpp"
 
 namespace unflex::identify {
 namespace {
@@ -137,7 +137,7 @@ std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, double rate_hz) 
 
 }  // namespace
 
-Result<Mode> fit_ringing(const std::vector<double>& samples, double rate_hz) {
+Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz) {
   const Eigen::Map<const Eigen::ArrayXd> given(samples.data(),
                                                static_cast<Eigen::Index>(samples.size()));
   if (given.size() < 2 * kFewestSamples || !(given.minCoeff() < given.maxCoeff())) {
@@ -153,35 +153,33 @@ Result<Mode> fit_ringing(const std::vector<double>& samples, double rate_hz) {
   const Eigen::ArrayXd weights = Eigen::ArrayXd::Ones(ring->data.size());
   const auto period = std::max<Eigen::Index>(
       1, static_cast<Eigen::Index>(rate_hz / std::exp(ring->fit.parameters[0])));
-  const Eigen::MatrixXd alone = sandwich(ring->fit, weights, 1);
-  const Eigen::MatrixXd together = sandwich(ring->fit, weights, period);
-  Mode mode;
-  mode.method = Method::ringing;
-  mode.freq_hz =
-      estimate_of(std::exp(ring->fit.parameters[0]), std::max(alone(0, 0), together(0, 0)));
-  mode.damping_ratio =
-      estimate_of(std::exp(ring->fit.parameters[1]), std::max(alone(1, 1), together(1, 1)));
+  const double freq_hz = std::exp(ring->fit.parameters[0]);
+  const double damping_ratio = std::exp(ring->fit.parameters[1]);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(3, 3);
+  covariance.topLeftCorner(2, 2) = sandwich(ring->fit, weights, period).topLeftCorner(2, 2);
+  RecordFit record;
+  record.model = model_of(Method::ringing, {{freq_hz, damping_ratio}}, covariance);
   // The unexplained share is that of the stretch that rings, not of the noise behind it.
-  const double time_constant_s =
-      1.0 / (2.0 * std::numbers::pi * mode.freq_hz.value * mode.damping_ratio.value);
+  const double time_constant_s = 1.0 / (2.0 * std::numbers::pi * freq_hz * damping_ratio);
   const auto shown =
       std::clamp<Eigen::Index>(static_cast<Eigen::Index>(4.0 * time_constant_s * rate_hz),
                                kFewestSamples, ring->data.size());
   const Eigen::ArrayXd signal = ring->data.head(shown) - ring->fit.parameters[4];
-  mode.unexplained = std::min(
+  record.unexplained = std::min(
       1.0, std::sqrt(ring->fit.residual.head(shown).square().sum() / signal.square().sum()));
   constexpr double kTooMuch = 0.5;
-  if (mode.unexplained > kTooMuch) {
-    mode.warnings.emplace_back(
-        "one mode does not explain this: the decay is noise or several resonances");
+  if (record.unexplained > kTooMuch) {
+    record.refusal =
+        "one mode does not explain this: the decay is noise or several resonances; record a sweep, "
+        "or the stop after a faster move";
   }
-  mode.curve.is_spectrum = false;
+  record.curve.is_spectrum = false;
   for (Eigen::Index i = 0; i < shown; ++i) {
-    mode.curve.x.push_back(ring->time_s[i]);
-    mode.curve.measured.push_back(ring->data[i]);
-    mode.curve.fitted.push_back(ring->data[i] - ring->fit.residual[i]);
+    record.curve.x.push_back(ring->time_s[i]);
+    record.curve.measured.push_back(ring->data[i]);
+    record.curve.fitted.push_back(ring->data[i] - ring->fit.residual[i]);
   }
-  return mode;
+  return record;
 }
 
 }  // namespace unflex::identify

@@ -3,10 +3,10 @@
 
 #include <vector>
 
-#include "unflex/identify/mode.hpp"
+#include "unflex/identify/axis_model.hpp"
 
 namespace unflex::identify {
 
-[[nodiscard]] Result<Mode> fit_ringing(const std::vector<double>& samples, double rate_hz);
+[[nodiscard]] Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz);
 
 }  // namespace unflex::identify

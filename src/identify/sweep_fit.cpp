@@ -1,7 +1,8 @@
-// The fit uses the energy spectrum |Y(ν)|² of the whole recording without its phase. So neither the
-// moment at which the sweep began nor the clocks matter. Y is the mode's answer to the sweep, with
-// energy s, plus white noise of mean energy S, independent from bin to bin; then (Rice,
-// Mathematical Analysis of Random Noise, 1945)
+// The fit by Welch's spectrum (modes_fit.hpp) tells how many modes there are and about where. Then
+// all their parameters are fitted to the energy spectrum |Y(ν)|² of the whole recording, which is
+// finer by a factor of fifty, without its phase. So neither the moment at which the sweep began nor
+// the clocks matter. Y is the modes' answer to the sweep, with energy s, plus white noise of mean
+// energy S, independent from bin to bin; then (Rice, Mathematical Analysis of Random Noise, 1945)
 //   E|Y|² = s + S,   var|Y|² = 2 s S + S².
 // s is c·E(ν)·|H(ν)|² (response.hpp) but for a ripple of some percent. The ripple arises where the
 // third harmonic of an earlier moment meets the fundamental. It changes fast enough with ν to count
@@ -15,13 +16,17 @@
 
 #include "fourier.hpp"
 #include "least_squares.hpp"
+#include "modes_fit.hpp"
+#include "modes_interval.hpp"
+#include "modes_model.hpp"
 #include "response.hpp"
+#include "welch.hpp"
 
 namespace unflex::identify {
 namespace {
 
 // The spectrum in the band of the sweep; each value is the mean of `values_each` bins.
-struct Band {
+struct FineBand {
   Eigen::ArrayXd freq_hz;
   Eigen::ArrayXd energy;
   double step_hz = 0.0;
@@ -42,7 +47,7 @@ Eigen::ArrayXd variance(const Eigen::ArrayXd& signal, double noise, double value
   return (2.0 * signal * noise + noise * noise + (kRipple * signal).square()) / values_each;
 }
 
-Band band_of(const EnergySpectrum& spectrum, const Sweep& sweep) {
+FineBand fine_band_of(const EnergySpectrum& spectrum, const Sweep& sweep) {
   const double low_hz = std::max(kLowest_hz, 1.2 * sweep.start_hz);
   const auto first = static_cast<Eigen::Index>(std::ceil(low_hz / spectrum.step_hz));
   const auto last = std::min(static_cast<Eigen::Index>(sweep.end_hz / spectrum.step_hz),
@@ -50,10 +55,10 @@ Band band_of(const EnergySpectrum& spectrum, const Sweep& sweep) {
   const auto each = std::max<Eigen::Index>(
       1, static_cast<Eigen::Index>(std::lround(kGroup_hz / spectrum.step_hz)));
   const Eigen::Index groups = std::max<Eigen::Index>(0, (last - first) / each);
-  Band band{.freq_hz = Eigen::ArrayXd(groups),
-            .energy = Eigen::ArrayXd(groups),
-            .step_hz = spectrum.step_hz * static_cast<double>(each),
-            .values_each = static_cast<double>(each)};
+  FineBand band{.freq_hz = Eigen::ArrayXd(groups),
+                .energy = Eigen::ArrayXd(groups),
+                .step_hz = spectrum.step_hz * static_cast<double>(each),
+                .values_each = static_cast<double>(each)};
   for (Eigen::Index i = 0; i < groups; ++i) {
     const Eigen::Index at = first + i * each;
     band.energy[i] = spectrum.energy.segment(at, each).mean();
@@ -63,85 +68,119 @@ Band band_of(const EnergySpectrum& spectrum, const Sweep& sweep) {
   return band;
 }
 
-Eigen::ArrayXd model_of(const Band& band, const Eigen::ArrayXd& excitation,
-                        const SpectrumParameters& p) {
-  return p.scale * excitation * gain_squared(band.freq_hz, p.mode_hz, p.damping_ratio) + p.noise;
+// Parameters are those of ModesModel but with one noise, of the white kind: log f, log ζ and a for
+// each mode, then log S.
+Eigen::Index modes_of_fine(const Eigen::VectorXd& p) { return (p.size() - 1) / 3; }
+
+double noise_of(const Eigen::VectorXd& p) { return std::exp(p[p.size() - 1]); }
+
+// What mode m alone would give at frequencies ν.
+Eigen::ArrayXcd answer(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p, Eigen::Index m) {
+  return p[3 * m + 2] * mode_response(freq_hz, std::exp(p[3 * m]), std::exp(p[3 * m + 1]));
+}
+
+Eigen::ArrayXd energy_of(const Eigen::ArrayXd& freq_hz, const Eigen::ArrayXd& excitation,
+                         const Eigen::VectorXd& p) {
+  Eigen::ArrayXcd sum = Eigen::ArrayXcd::Zero(freq_hz.size());
+  for (Eigen::Index m = 0; m < modes_of_fine(p); ++m) {
+    sum += answer(freq_hz, p, m);
+  }
+  return excitation * sum.abs2() + noise_of(p);
 }
 
 // Weights for parameters near the right ones.
-Eigen::ArrayXd weights_at(const Band& band, const Eigen::ArrayXd& model, double noise) {
+Eigen::ArrayXd weights_at(const FineBand& band, const Eigen::ArrayXd& model, double noise) {
   const Eigen::ArrayXd spread = variance(model - noise, noise, band.values_each);
   return (band.energy - model > kOutlier * spread.sqrt()).select(0.0, spread.inverse()).eval();
 }
 
-// The frequency at which the response is highest against the excitation, in means over 1 Hz.
-double first_guess_hz(const Band& band) {
-  const auto width = static_cast<Eigen::Index>(1.0 / band.step_hz);
-  double best = 0.0;
-  double best_hz = 40.0;
-  for (Eigen::Index i = 0; i + width < band.energy.size();
-       i += std::max<Eigen::Index>(width / 4, 1)) {
-    const double freq_hz = band.freq_hz[i + width / 2];
-    const double height = band.energy.segment(i, width).mean() / freq_hz;
-    if (height > best) {
-      best = height;
-      best_hz = freq_hz;
-    }
-  }
-  return best_hz;
-}
-
-struct Candidate {
+struct FineFit {
   LeastSquares fit;
   Eigen::ArrayXd weights;
-  double cost = 0.0;
 };
 
-// The weights follow from the fit and the fit from the weights, so we repeat both. The cost
-// compares candidates by the likelihood of their residuals.
-Candidate refine(const Band& band, const Eigen::ArrayXd& excitation, SpectrumParameters start) {
+// The weights follow from the fit and the fit from the weights, so we repeat both.
+FineFit refine(const FineBand& band, const Eigen::ArrayXd& excitation, Eigen::VectorXd at) {
   constexpr int kRounds = 6;
-  const Model model = [&](const Eigen::VectorXd& logarithms) {
-    return model_of(band, excitation, SpectrumParameters::from(logarithms));
+  const Model model = [&](const Eigen::VectorXd& p) {
+    return energy_of(band.freq_hz, excitation, p);
   };
-  Candidate candidate;
-  Eigen::VectorXd at = start.logarithms();
+  FineFit fine;
   for (int round = 0; round < kRounds; ++round) {
-    candidate.weights = weights_at(band, model(at), SpectrumParameters::from(at).noise);
-    candidate.fit = minimise(model, band.energy, candidate.weights, at);
-    at = candidate.fit.parameters;
+    fine.weights = weights_at(band, model(at), noise_of(at));
+    fine.fit = minimise(model, band.energy, fine.weights, at);
+    at = fine.fit.parameters;
   }
-  const SpectrumParameters p = SpectrumParameters::from(at);
-  const Eigen::ArrayXd spread = variance(model(at) - p.noise, p.noise, band.values_each);
-  candidate.cost =
-      ((candidate.fit.residual.square() / spread).min(kOutlier * kOutlier) + spread.log()).sum();
-  return candidate;
+  return fine;
 }
 
-Candidate best_of(const Band& band, const Eigen::ArrayXd& excitation) {
-  const double guess_hz = first_guess_hz(band);
-  Candidate best;
-  for (const double damping_ratio : {0.03, 0.1, 0.25}) {
-    SpectrumParameters start{guess_hz, damping_ratio, 1.0, 0.05};
-    start.scale = 1.0 / (excitation * gain_squared(band.freq_hz, guess_hz, damping_ratio)).mean();
-    Candidate candidate = refine(band, excitation, start);
-    if (best.weights.size() == 0 || candidate.cost < best.cost) {
-      best = std::move(candidate);
+// θ of a coarse fit as a start.
+Eigen::VectorXd start_of(const FineBand& band, const Eigen::ArrayXd& excitation,
+                         const Eigen::VectorXd& theta) {
+  constexpr double kFirstNoise = 0.05;
+  Eigen::VectorXd start = theta.head(theta.size() - 1);
+  start[start.size() - 1] = std::log(kFirstNoise);
+  const double mean = energy_of(band.freq_hz, excitation, start).mean() - kFirstNoise;
+  for (Eigen::Index m = 0; m < modes_of_fine(start); ++m) {
+    start[3 * m + 2] /= std::sqrt(mean);
+  }
+  return start;
+}
+
+// Whether the fine fit found the modes of the coarse one. If not, the record is not what it takes
+// it for: the base's motion is not even, or the noise is not white.
+bool agrees(const Eigen::VectorXd& fine, const Eigen::VectorXd& coarse) {
+  constexpr double kMain = 0.02;
+  constexpr double kOther = 0.06;
+  constexpr double kDamping = 0.7;
+  for (Eigen::Index m = 0; m < modes_of_fine(fine); ++m) {
+    if (!(std::abs(fine[3 * m] - coarse[3 * m]) < (m == 0 ? kMain : kOther)) ||
+        !(std::abs(fine[3 * m + 1] - coarse[3 * m + 1]) < kDamping)) {
+      return false;
     }
   }
-  return best;
+  return true;
 }
 
-// The curve in steps of 1 Hz.
-Curve curve_of(const Band& band, const Eigen::ArrayXd& fitted) {
+// The curves in steps of 1 Hz.
+Curve curve_of(const FineBand& band, const Eigen::ArrayXd& excitation, const Eigen::VectorXd& p) {
   const auto one_hz = static_cast<Eigen::Index>(1.0 / band.step_hz);
-  Curve curve;
-  for (Eigen::Index i = 0; i + one_hz <= band.energy.size(); i += one_hz) {
-    curve.x.push_back(band.freq_hz.segment(i, one_hz).mean());
-    curve.measured.push_back(band.energy.segment(i, one_hz).mean());
-    curve.fitted.push_back(fitted.segment(i, one_hz).mean());
+  const auto in_steps = [&](const Eigen::ArrayXd& values) {
+    std::vector<double> means;
+    for (Eigen::Index i = 0; i + one_hz <= values.size(); i += one_hz) {
+      means.push_back(values.segment(i, one_hz).mean());
+    }
+    return means;
+  };
+  Curve curve{.x = in_steps(band.freq_hz),
+              .measured = in_steps(band.energy),
+              .fitted = in_steps(energy_of(band.freq_hz, excitation, p)),
+              .modes = {},
+              .noise = {}};
+  for (Eigen::Index m = 0; m < modes_of_fine(p); ++m) {
+    curve.modes.push_back(in_steps(excitation * answer(band.freq_hz, p, m).abs2()));
   }
+  curve.noise.assign(curve.x.size(), noise_of(p));
   return curve;
+}
+
+void fit_finely(const std::vector<double>& samples, double rate_hz, const Sweep& sweep,
+                const Eigen::VectorXd& theta, RecordFit& record) {
+  FineBand band = fine_band_of(energy_spectrum(samples, rate_hz), sweep);
+  band.energy /= band.energy.mean();
+  const Eigen::ArrayXd excitation = sweep_energy(band.freq_hz, sweep.start_hz);
+  const FineFit fine = refine(band, excitation, start_of(band, excitation, theta));
+  const Eigen::VectorXd& p = fine.fit.parameters;
+  if (!agrees(p, theta)) {
+    return;
+  }
+  Eigen::VectorXd refined = theta;
+  refined.head(p.size()) = p;
+  // Deviations that are not noise go together over some tenths of a Hz.
+  const auto block = static_cast<Eigen::Index>(0.5 / band.step_hz);
+  record.model = model_of(Method::sweep, modes_of(refined),
+                          of_gains(sandwich(fine.fit, fine.weights, block), refined));
+  record.curve = curve_of(band, excitation, p);
 }
 
 }  // namespace
@@ -151,7 +190,8 @@ bool holds_sweep(const std::vector<double>& samples, double rate_hz) {
   return static_cast<double>(samples.size()) / rate_hz > kShortest_s;
 }
 
-Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const Sweep& sweep) {
+Result<RecordFit> fit_sweep(const std::vector<double>& samples, double rate_hz,
+                            const Sweep& sweep) {
   if (rate_hz < kSamplesPerPeriod * sweep.end_hz) {
     return fail(ErrorKind::input,
                 fmt::format("{:.0f} samples a second do not show a sweep up to {:g} Hz; say with "
@@ -159,32 +199,19 @@ Result<Mode> fit_sweep(const std::vector<double>& samples, double rate_hz, const
                             rate_hz, sweep.end_hz, std::floor(rate_hz / kSamplesPerPeriod)));
   }
   const auto [least, most] = std::ranges::minmax(samples);
-  Band band = band_of(energy_spectrum(samples, rate_hz), sweep);
-  if (band.energy.size() < 100 || !(least < most)) {
+  if (!(least < most)) {
     return fail(ErrorKind::input, "there is no motion in the band of the sweep");
   }
-  band.energy /= band.energy.mean();
-  const Eigen::ArrayXd excitation = sweep_energy(band.freq_hz, sweep.start_hz);
-  const Candidate best = best_of(band, excitation);
-  const SpectrumParameters p = SpectrumParameters::from(best.fit.parameters);
-  const Eigen::ArrayXd fitted = model_of(band, excitation, p);
-  // White noise looks like a mode far below the band that is nearly all damper.
-  constexpr double kFlat = 3.0;
-  if (fitted.maxCoeff() < kFlat * fitted.minCoeff()) {
-    return fail(ErrorKind::input, "no resonance stands out of the noise in it");
+  Result<ModesFit> coarse = fit_modes(welch_spectrum(samples, rate_hz), sweep);
+  if (!coarse) {
+    return tl::unexpected(coarse.error());
   }
-  // Deviations that are not noise go together over some tenths of a Hz.
-  const auto block = static_cast<Eigen::Index>(0.5 / band.step_hz);
-  const Eigen::MatrixXd alone = sandwich(best.fit, best.weights, 1);
-  const Eigen::MatrixXd together = sandwich(best.fit, best.weights, block);
-  Mode mode;
-  mode.method = Method::sweep;
-  mode.freq_hz = estimate_of(p.mode_hz, std::max(alone(0, 0), together(0, 0)));
-  mode.damping_ratio = estimate_of(p.damping_ratio, std::max(alone(1, 1), together(1, 1)));
-  const auto one_hz = static_cast<Eigen::Index>(1.0 / band.step_hz);
-  add_warnings(misfit_of(band.freq_hz, band.energy, fitted, p.noise, one_hz), sweep, mode);
-  mode.curve = curve_of(band, fitted);
-  return mode;
+  RecordFit record = std::move(coarse->record);
+  record.model.method = Method::sweep;
+  if (record.is_trusted() && !coarse->has_rivals) {
+    fit_finely(samples, rate_hz, sweep, coarse->theta, record);
+  }
+  return record;
 }
 
 }  // namespace unflex::identify

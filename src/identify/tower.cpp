@@ -3,8 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "response.hpp"
-#include "unflex/identify/mode.hpp"
+#include "modes_interval.hpp"
 
 namespace unflex::identify {
 namespace {
@@ -19,7 +18,7 @@ double damping_of(double ratio) {
 
 }  // namespace
 
-Result<Mode> fit_tower(const Tower& tower) {
+Result<RecordFit> fit_tower(const Tower& tower) {
   constexpr double kLeast = 1e-3;
   if (!(tower.spacing_mm > 0.0) || !(tower.speed_mm_s > 0.0)) {
     return fail(ErrorKind::usage, "the waves' spacing and the speed must be above 0");
@@ -39,21 +38,24 @@ Result<Mode> fit_tower(const Tower& tower) {
                     "printer's belts have; give the spacing in mm and the speed in mm/s",
                     tower.spacing_mm, tower.speed_mm_s, freq_hz));
   }
-  Mode mode;
-  mode.method = Method::tower;
+  RecordFit record;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(3, 3);
   const double spread = std::max(tower.spacing_spread_mm / tower.spacing_mm, kLeast);
-  mode.freq_hz = estimate_of(freq_hz, std::pow(spread / kQuantile, 2));
+  covariance(0, 0) = std::pow(spread / kQuantile, 2);
+  Estimate damping{.value = 0.1, .low = 0.03, .high = 0.2};
   if (tower.decay == 0.0) {
-    mode.damping_ratio = {.value = 0.1, .low = 0.03, .high = 0.2};
-    mode.warnings.emplace_back(
+    record.warnings.emplace_back(
         "the damping is a guess: measure how much lower each wave is than the one before");
-    return mode;
+  } else {
+    const double least = std::max(tower.decay - tower.decay_spread, 1.0 + kLeast);
+    damping = {.value = damping_of(tower.decay),
+               .low = damping_of(least),
+               .high = damping_of(tower.decay + tower.decay_spread)};
   }
-  const double least = std::max(tower.decay - tower.decay_spread, 1.0 + kLeast);
-  mode.damping_ratio = {.value = damping_of(tower.decay),
-                        .low = damping_of(least),
-                        .high = damping_of(tower.decay + tower.decay_spread)};
-  return mode;
+  covariance(1, 1) = std::pow(std::log(damping.high / damping.low) / (2.0 * kQuantile), 2);
+  record.model = model_of(Method::tower, {{freq_hz, damping.value}}, covariance);
+  record.model.modes.front().damping_ratio = damping;
+  return record;
 }
 
 }  // namespace unflex::identify

@@ -6,11 +6,11 @@
 namespace unflex::identify {
 
 Eigen::VectorXd kaiser_amplitude() {
-  constexpr double kBeta = 6.0;
   Eigen::VectorXd amplitude(2 * kPartsOfBin * kReachOfWindow + 1);
   for (Eigen::Index i = 0; i < amplitude.size(); ++i) {
     const double x = static_cast<double>(i) / kPartsOfBin - kReachOfWindow;
-    const double square = kBeta * kBeta - std::numbers::pi * std::numbers::pi * x * x;
+    const double square =
+        kBetaOfWindow * kBetaOfWindow - std::numbers::pi * std::numbers::pi * x * x;
     const double root = std::sqrt(std::abs(square));
     amplitude[i] = root < 1e-9 ? 1.0 : (square > 0.0 ? std::sinh(root) : std::sin(root)) / root;
   }

@@ -7,6 +7,7 @@
 
 namespace unflex::identify {
 
+inline constexpr double kBetaOfWindow = 6.0;
 inline constexpr int kPartsOfBin = 8;     // places per bin
 inline constexpr int kReachOfWindow = 4;  // bins to either side
 

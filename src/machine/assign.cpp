@@ -13,6 +13,7 @@ namespace unflex::machine {
 namespace {
 
 constexpr std::size_t kFewestModes = 2;
+constexpr std::size_t kMostPlants = 8;
 
 // One overload per type a member can have. Each returns what is wrong, or nothing.
 std::string store(const Value& value, const Key& key, double& target) {
@@ -114,9 +115,12 @@ std::string store(const Value& value, const Key& key, std::optional<Range>& targ
   return {};
 }
 
+using Table = std::vector<NamedValue>;
+
 // One value of a mode; `row` has the bounds of the key that stands for one mode.
-std::string store(const NamedValue& value, const Key& key, std::size_t number, ModeSettings& mode) {
-  const std::string name = fmt::format("{}, number {}: {}", key.name, number, value.name);
+std::string store(const NamedValue& value, const Key& key, const std::string& whose,
+                  ModeSettings& mode) {
+  const std::string name = fmt::format("{}: {}", whose, value.name);
   const auto number_of = [&](std::string_view row, double& target) {
     Key named = row.empty() ? key : key_table()[*find_key(row)];
     named.name = name;
@@ -131,35 +135,48 @@ std::string store(const NamedValue& value, const Key& key, std::size_t number, M
   if (value.name == "gain") {
     return number_of("", mode.gain);
   }
-  return fmt::format(
-      "{}, number {}: unknown value '{}'; a mode has freq_hz, damping_ratio and gain", key.name,
-      number, value.name);
+  return fmt::format("{}: unknown value '{}'; a mode has freq_hz, damping_ratio and gain", whose,
+                     value.name);
 }
 
-std::string store(const Value& value, const Key& key, std::vector<ModeSettings>& target) {
+// The tables of a list; nothing if it is none, or has fewer or more.
+std::optional<std::vector<const Table*>> tables_of(const Value& value, std::size_t fewest,
+                                                   std::size_t most) {
   const auto* list = std::get_if<std::vector<Value>>(&value.content);
-  const auto is_table = [](const Value& element) {
-    return std::holds_alternative<std::vector<NamedValue>>(element.content);
-  };
-  if (list == nullptr || list->size() < kFewestModes || list->size() > kMostModes ||
-      !std::ranges::all_of(*list, is_table)) {
-    return fmt::format(
-        "{} must be {} to {} tables, [[{}]], each with freq_hz, damping_ratio and gain; give one "
-        "mode as freq_hz and damping_ratio",
-        key.name, kFewestModes, kMostModes, key.name);
+  if (list == nullptr || list->size() < fewest || list->size() > most) {
+    return std::nullopt;
   }
+  std::vector<const Table*> tables;
+  for (const Value& element : *list) {
+    const auto* table = std::get_if<Table>(&element.content);
+    if (table == nullptr) {
+      return std::nullopt;
+    }
+    tables.push_back(table);
+  }
+  return tables;
+}
+
+const NamedValue* find(const Table& table, std::string_view name) {
+  const auto found = std::ranges::find(table, name, &NamedValue::name);
+  return found == table.end() ? nullptr : &*found;
+}
+
+// `whose` stands before the number of a mode in messages.
+std::string store_modes(const std::vector<const Table*>& tables, const Key& key,
+                        const std::string& whose, std::vector<ModeSettings>& target) {
   std::vector<ModeSettings> modes;
   double sum = 0.0;
-  for (const Value& element : *list) {
-    const auto& table = std::get<std::vector<NamedValue>>(element.content);
+  for (const Table* table : tables) {
     ModeSettings& mode = modes.emplace_back();
+    const std::string number = fmt::format("{}, number {}", whose, modes.size());
     for (const std::string_view needed : {"freq_hz", "damping_ratio", "gain"}) {
-      if (std::ranges::find(table, needed, &NamedValue::name) == table.end()) {
-        return fmt::format("{}, number {}: {} is missing", key.name, modes.size(), needed);
+      if (find(*table, needed) == nullptr) {
+        return fmt::format("{}: {} is missing", number, needed);
       }
     }
-    for (const NamedValue& given : table) {
-      if (std::string wrong = store(given, key, modes.size(), mode); !wrong.empty()) {
+    for (const NamedValue& given : *table) {
+      if (std::string wrong = store(given, key, number, mode); !wrong.empty()) {
         return wrong;
       }
     }
@@ -167,12 +184,75 @@ std::string store(const Value& value, const Key& key, std::vector<ModeSettings>&
   }
   constexpr double kRounding = 2e-3;
   if (std::abs(sum - 1.0) > kRounding) {
-    return fmt::format("the gains of {} add up to {:.4g}, but must add up to 1", key.name, sum);
+    return fmt::format("the gains of {} add up to {:.4g}, but must add up to 1", whose, sum);
   }
   for (ModeSettings& mode : modes) {
     mode.gain /= sum;
   }
   target = std::move(modes);
+  return {};
+}
+
+std::string store(const Value& value, const Key& key, std::vector<ModeSettings>& target) {
+  const auto tables = tables_of(value, kFewestModes, kMostModes);
+  if (!tables) {
+    return fmt::format(
+        "{} must be {} to {} tables, [[{}]], each with freq_hz, damping_ratio and gain; give one "
+        "mode as freq_hz and damping_ratio",
+        key.name, kFewestModes, kMostModes, key.name);
+  }
+  return store_modes(*tables, key, std::string(key.name), target);
+}
+
+std::string store(const Table& table, const Key& key, const std::string& whose,
+                  PlantSettings& plant) {
+  for (const NamedValue& given : table) {
+    if (given.name != "share" && given.name != "mode") {
+      return fmt::format("{}: unknown value '{}'; a plant has share and mode", whose, given.name);
+    }
+  }
+  const NamedValue* const share = find(table, "share");
+  const NamedValue* const mode = find(table, "mode");
+  if (share == nullptr || mode == nullptr) {
+    return fmt::format("{}: {} is missing", whose, share == nullptr ? "share" : "mode");
+  }
+  const auto* number = std::get_if<double>(&share->value.content);
+  if (number == nullptr || !(*number > 0.0 && *number < 1.0)) {
+    return fmt::format("{}: share must be a number above 0 and below 1", whose);
+  }
+  plant.share = *number;
+  const auto modes = tables_of(mode->value, 1, kMostModes);
+  if (!modes) {
+    return fmt::format(
+        "{}: mode must be a list of 1 to {} tables, each {{freq_hz = …, damping_ratio = …, gain = "
+        "…}}",
+        whose, kMostModes);
+  }
+  return store_modes(*modes, key, whose + ", mode", plant.modes);
+}
+
+std::string store(const Value& value, const Key& key, std::vector<PlantSettings>& target) {
+  const auto tables = tables_of(value, 1, kMostPlants);
+  if (!tables) {
+    return fmt::format("{} must be 1 to {} tables, [[{}]], each with share and mode", key.name,
+                       kMostPlants, key.name);
+  }
+  std::vector<PlantSettings> plants;
+  double sum = 0.0;
+  for (const Table* table : *tables) {
+    PlantSettings& plant = plants.emplace_back();
+    const std::string whose = fmt::format("{}, number {}", key.name, plants.size());
+    if (std::string wrong = store(*table, key, whose, plant); !wrong.empty()) {
+      return wrong;
+    }
+    sum += plant.share;
+  }
+  if (!(sum < 1.0)) {
+    return fmt::format(
+        "the shares of {} add up to {:.4g}, but must leave some for the axis as it is given",
+        key.name, sum);
+  }
+  target = std::move(plants);
   return {};
 }
 

@@ -302,6 +302,10 @@ constexpr std::array kKeys = {
         "Modes along X, in place of freq_hz and damping_ratio: [[dynamics.x.mode]] with freq_hz, "
         "damping_ratio and gain; the gains add up to 1",
         "one mode"},
+    Key{"dynamics.x.plant", &setting<&S::dynamics_x, &D::plants>, kAny, "",
+        "Other models that X may have: [[dynamics.x.plant]] with share, its probability, and mode, "
+        "a list as above; the base then suits them all",
+        "none"},
     Key{"dynamics.x.mass_g",
         &mass_form<&Draft::mass_x, &M::mass_g>,
         kPositive,
@@ -337,6 +341,10 @@ constexpr std::array kKeys = {
         "Modes along Y, in place of freq_hz and damping_ratio: [[dynamics.y.mode]] with freq_hz, "
         "damping_ratio and gain; the gains add up to 1",
         "one mode"},
+    Key{"dynamics.y.plant", &setting<&S::dynamics_y, &D::plants>, kAny, "",
+        "Other models that Y may have: [[dynamics.y.plant]] with share, its probability, and mode, "
+        "a list as above; the base then suits them all",
+        "none"},
     Key{"dynamics.y.mass_g",
         &mass_form<&Draft::mass_y, &M::mass_g>,
         kPositive,

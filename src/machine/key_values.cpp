@@ -24,6 +24,10 @@ std::optional<std::string> text_of(const std::vector<ModeSettings>& value) {
   return value.empty() ? std::nullopt : std::optional(to_toml_value(value));
 }
 
+std::optional<std::string> text_of(const std::vector<PlantSettings>& value) {
+  return value.empty() ? std::nullopt : std::optional(to_toml_value(value));
+}
+
 std::string bounds_text(const Bounds& bounds) {
   const std::string low = std::isfinite(bounds.min)
                               ? fmt::format("{}{}", bounds.min_open ? "> " : "≥ ", bounds.min)
@@ -55,6 +59,15 @@ std::string to_toml_value(const std::vector<ModeSettings>& value) {
   for (const ModeSettings& mode : value) {
     text += fmt::format("{}{{freq_hz = {}, damping_ratio = {}, gain = {}}}",
                         text.empty() ? "" : ", ", mode.freq_hz, mode.damping_ratio, mode.gain);
+  }
+  return "[" + text + "]";
+}
+
+std::string to_toml_value(const std::vector<PlantSettings>& value) {
+  std::string text;
+  for (const PlantSettings& plant : value) {
+    text += fmt::format("{}{{share = {}, mode = {}}}", text.empty() ? "" : ", ", plant.share,
+                        to_toml_value(plant.modes));
   }
   return "[" + text + "]";
 }
@@ -91,6 +104,9 @@ std::string range_text(const Key& key) {
   }
   if (std::holds_alternative<std::vector<ModeSettings>& (*)(Draft&)>(key.member)) {
     return "2 or 3 modes";
+  }
+  if (std::holds_alternative<std::vector<PlantSettings>& (*)(Draft&)>(key.member)) {
+    return "shares > 0 with a sum < 1, 1 to 3 modes each";
   }
   if (std::holds_alternative<std::string& (*)(Draft&)>(key.member)) {
     return key.words.empty() ? "a text" : fmt::format("\"{}\"", fmt::join(key.words, "\", \""));

@@ -16,6 +16,7 @@ namespace unflex::machine {
 [[nodiscard]] std::string to_toml_value(const std::string& value);
 [[nodiscard]] std::string to_toml_value(const Range& value);
 [[nodiscard]] std::string to_toml_value(const std::vector<ModeSettings>& value);
+[[nodiscard]] std::string to_toml_value(const std::vector<PlantSettings>& value);
 
 // The value the key itself holds; nullopt while unset.
 [[nodiscard]] std::optional<std::string> own_value(const Key& key, Draft& draft);

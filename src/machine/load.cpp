@@ -27,6 +27,7 @@ namespace {
 constexpr std::string_view kDefaultOrigin = "default";
 // How the key of several modes ends, which is the origin of what follows from it.
 constexpr std::string_view kModes = ".mode";
+constexpr std::string_view kPlants = ".plant";
 
 std::string origin_text(const std::optional<SourcePlace>& place) {
   if (!place) {
@@ -41,7 +42,8 @@ std::string origin_text(const std::optional<SourcePlace>& place) {
 // A key of one mode whose value is that of the largest of several.
 bool is_of_modes(const Draft& draft, std::string_view key) {
   const auto is_of = [&](std::string_view section, const AxisDynamics& axis) {
-    return !axis.modes.empty() && key.starts_with(section) && !key.ends_with(kModes);
+    return !axis.modes.empty() && key.starts_with(section) && !key.ends_with(kModes) &&
+           !key.ends_with(kPlants);
   };
   return is_of("dynamics.x.", draft.settings.dynamics_x) ||
          is_of("dynamics.y.", draft.settings.dynamics_y);

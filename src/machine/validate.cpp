@@ -123,8 +123,21 @@ Status resolve_modes(const Draft& draft, const std::string& section, AxisDynamic
   return {};
 }
 
+// The plants of a file belong to its model. Whoever overrides that model leaves them behind.
+void resolve_plants(const Draft& draft, const std::string& section, AxisDynamics& axis) {
+  const auto is_set = [&](std::string_view name) {
+    return is_overridden(draft, fmt::format("{}.{}", section, name));
+  };
+  const bool other_model = std::ranges::any_of(kModalKeys, is_set) ||
+                           std::ranges::any_of(kMassKeys, is_set) || is_set("mode");
+  if (other_model && !is_set("plant")) {
+    axis.plants.clear();
+  }
+}
+
 Status resolve_axis(Draft& draft, const std::string& section, const MassSpringDamper& mass,
                     AxisDynamics& axis) {
+  resolve_plants(draft, section, axis);
   if (Status checked = check_mass_keys(draft, section); !checked) {
     return checked;
   }

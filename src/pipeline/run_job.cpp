@@ -51,8 +51,8 @@ dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
 // The base optimised for the nominal axes alone.
 std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
   compensate::Setup setup = job.setup;
-  setup.x.variants.clear();
-  setup.y.variants.clear();
+  setup.x.plants.clear();
+  setup.y.plants.clear();
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
   auto windows = compensate::windows(job.course(), job.spans, job.nozzle, setup);
   std::vector<dynamics::AxisTrajectory> x;
@@ -69,7 +69,7 @@ std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
 }
 
 void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
-  if (job.setup.x.variants.empty()) {
+  if (!job.setup.is_robust()) {
     return;
   }
   if (const std::optional<dynamics::BaseTrajectory> nominal = nominal_base(job)) {
@@ -85,7 +85,10 @@ void set_probe(const compensate::Engine& engine, compensate::AxisWindow window,
                const compensate::AxisSolution& solution, Probe& probe) {
   // Nodes times states. All windows of one mode have fewer, unless solve.window_s is raised.
   constexpr std::size_t kMost = 11000;
-  const std::size_t states = 2 * window.axis.modes().size() + 3;
+  std::size_t states = 3;
+  for (std::size_t i = 0; i < window.models(); ++i) {
+    states += 2 * window.model(i).axis.modes().size();
+  }
   const std::size_t most = std::max<std::size_t>(kMost / states, 2);
   if (window.nodes() <= most) {
     probe.problem = std::move(window);

@@ -121,7 +121,7 @@ std::string RunWriter::finish() {
   report_->line_budget.max_lines_per_s = max_lines_per_s_;
   report_->line_budget.cost_rms_mm = cost_.rms_mm();
   report_->line_budget.cost_max_mm = cost_.max_mm();
-  if (!rules_->setup.x.variants.empty()) {
+  if (rules_->setup.is_robust()) {
     report_->robustness = {robust_.rms_mm(), nominal_.rms_mm()};
   }
   return text;

@@ -31,19 +31,22 @@ double grid_mm(const machine::Settings& settings) {
 
 static_assert(machine::kMostModes == dynamics::kMostModes);
 
-// The axis with its frequencies and damping ratios times these factors.
-dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics, double freq_factor = 1.0,
-                            double damping_factor = 1.0) {
-  if (dynamics.modes.empty()) {
-    return dynamics::from_frequency(dynamics.freq_hz * freq_factor,
-                                    dynamics.damping_ratio * damping_factor);
-  }
+dynamics::FlexibleAxis axis(const std::vector<machine::ModeSettings>& settings,
+                            double freq_factor = 1.0, double damping_factor = 1.0) {
   std::vector<dynamics::Mode> modes;
-  for (const machine::ModeSettings& mode : dynamics.modes) {
+  for (const machine::ModeSettings& mode : settings) {
     modes.push_back({2.0 * std::numbers::pi * mode.freq_hz * freq_factor,
                      mode.damping_ratio * damping_factor, mode.gain});
   }
   return dynamics::FlexibleAxis(modes);
+}
+
+// The axis with its frequencies and damping ratios times these factors.
+dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics, double freq_factor = 1.0,
+                            double damping_factor = 1.0) {
+  return dynamics.modes.empty() ? dynamics::from_frequency(dynamics.freq_hz * freq_factor,
+                                                           dynamics.damping_ratio * damping_factor)
+                                : axis(dynamics.modes, freq_factor, damping_factor);
 }
 
 bool shares_motors(const machine::Settings& settings) {
@@ -78,14 +81,14 @@ constexpr double kLongestCalm_s = 0.5;
 constexpr double kMiddleShare = 0.25;
 
 // The edges of the band that the axis may be in; empty if there is no such band.
-std::vector<compensate::AxisVariant> variants(const machine::AxisDynamics& dynamics,
-                                              const machine::DynamicsError& error) {
-  std::vector<compensate::AxisVariant> edges;
+std::vector<compensate::Plant> edges(const machine::AxisDynamics& dynamics,
+                                     const machine::DynamicsError& error) {
+  std::vector<compensate::Plant> result;
   if (error.freq <= 0.0 && error.damping <= 0.0) {
-    return edges;
+    return result;
   }
   const auto add = [&](double freq_factor, double damping_factor) {
-    edges.push_back({axis(dynamics, freq_factor, damping_factor)});
+    result.push_back({axis(dynamics, freq_factor, damping_factor)});
   };
   for (const double sign : {-1.0, 1.0}) {
     if (error.freq > 0.0 && error.damping > 0.0) {
@@ -95,10 +98,25 @@ std::vector<compensate::AxisVariant> variants(const machine::AxisDynamics& dynam
       add(1.0 + sign * error.freq, 1.0 + sign * error.damping);
     }
   }
-  for (compensate::AxisVariant& edge : edges) {
-    edge.share = (1.0 - kMiddleShare) / static_cast<double>(edges.size());
+  return result;
+}
+
+// All models that the axis may have besides the one it is given as: the plants of the settings, and
+// the edges of the band around that one, which share with it what the plants leave.
+std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
+                                      const machine::DynamicsError& error) {
+  std::vector<compensate::Plant> result;
+  double left = 1.0;
+  for (const machine::PlantSettings& plant : dynamics.plants) {
+    result.push_back({axis(plant.modes), plant.share});
+    left -= plant.share;
   }
-  return edges;
+  std::vector<compensate::Plant> band = edges(dynamics, error);
+  for (compensate::Plant& edge : band) {
+    edge.share = left * (1.0 - kMiddleShare) / static_cast<double>(band.size());
+    result.push_back(edge);
+  }
+  return result;
 }
 
 compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
@@ -106,7 +124,7 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
                                  const machine::Settings& settings) {
   compensate::AxisSetup setup;
   setup.axis = axis(dynamics);
-  setup.variants = variants(dynamics, settings.dynamics_error);
+  setup.plants = plants(dynamics, settings.dynamics_error);
   setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
   setup.limits.max_accel_mm_s2 = planned_base_accel(settings, 0.0);
   if (settings.base.max_jerk_mm_s3 > 0.0) {
@@ -194,6 +212,26 @@ double max_extrude_ratio(const machine::Settings& settings) {
   const double ratio =
       settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius_mm * radius_mm);
   return settings.printer.firmware == Firmware::klipper ? ratio : kNoNozzle * ratio;
+}
+
+// The nozzle of each plant: the n-th of both axes, or the axis as given where it has fewer.
+std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& settings,
+                                                   const verify::NozzleModel& nominal) {
+  const std::vector<machine::PlantSettings>& x = settings.dynamics_x.plants;
+  const std::vector<machine::PlantSettings>& y = settings.dynamics_y.plants;
+  // As coarse as those with other frequencies (verify::detuned).
+  constexpr double kCoarseStep_s = 1e-3;
+  std::vector<verify::NozzleModel> nozzles(std::max(x.size(), y.size()), nominal);
+  for (std::size_t i = 0; i < nozzles.size(); ++i) {
+    nozzles[i].step_s = std::max(nominal.step_s, kCoarseStep_s);
+    if (i < x.size()) {
+      nozzles[i].x = axis(x[i].modes);
+    }
+    if (i < y.size()) {
+      nozzles[i].y = axis(y[i].modes);
+    }
+  }
+  return nozzles;
 }
 
 }  // namespace
@@ -373,6 +411,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.fixed = firmware_config(settings);
   rules.nozzle = {axis(settings.dynamics_x), axis(settings.dynamics_y),
                   settings.verify.step_ms * 1e-3, settings.verify.hold_s};
+  rules.plants = nozzles_of_plants(settings, rules.nozzle);
   const auto set_range = [](const std::optional<machine::Range>& travel, double& min, double& max,
                             bool& min_assumed) {
     min_assumed = !travel;

@@ -101,7 +101,10 @@ std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rul
 }
 
 verify::Observation observation_of(record::Recorder* recorder, const verify::Rules& rules) {
-  return {verify::detuned(rules.nozzle), recorder != nullptr ? &recorder->observer() : nullptr};
+  verify::Observation observation{verify::detuned(rules.nozzle),
+                                  recorder != nullptr ? &recorder->observer() : nullptr};
+  observation.detuned.insert(observation.detuned.end(), rules.plants.begin(), rules.plants.end());
+  return observation;
 }
 
 void add_verification(const verify::VerifyReport& verified, record::Recorder* recorder,
@@ -114,10 +117,15 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder* re
     report.unshaped = rows(*verified.unshaped);
   }
   report.compensated = rows(verified.compensated);
+  constexpr std::size_t kErrors = verify::kFrequencyErrors.size();
   for (std::size_t i = 0; i < verified.detuned.size(); ++i) {
-    report.sensitivity.push_back({verify::kFrequencyErrors[i],
-                                  spread(verified.detuned[i].uncompensated),
-                                  spread(verified.detuned[i].compensated)});
+    const report::Spread before = spread(verified.detuned[i].uncompensated);
+    const report::Spread after = spread(verified.detuned[i].compensated);
+    if (i < kErrors) {
+      report.sensitivity.push_back({verify::kFrequencyErrors[i], before, after});
+    } else {
+      report.plants.push_back({before, after});
+    }
   }
   report.reference_time_s = verified.reference_time_s;
   report.emitted_time_s = verified.emitted_time_s;

@@ -85,9 +85,9 @@ bool transfer(int socket, char* data, std::size_t size, bool sending) {
 std::string pack(const compensate::AxisWindow& window) {
   Writer writer;
   writer.value(window.axis);
-  writer.value(window.variants.size());
-  for (const compensate::AxisVariant& variant : window.variants) {
-    writer.value(variant);
+  writer.value(window.plants.size());
+  for (const compensate::Plant& plant : window.plants) {
+    writer.value(plant);
   }
   writer.value(window.period_s);
   writer.values(window.reference_mm);
@@ -105,9 +105,9 @@ compensate::AxisWindow unpack_window(std::string_view bytes) {
   Reader reader(bytes);
   compensate::AxisWindow window;
   window.axis = reader.value<dynamics::FlexibleAxis>();
-  window.variants.resize(reader.value<std::size_t>());
-  for (compensate::AxisVariant& variant : window.variants) {
-    variant = reader.value<compensate::AxisVariant>();
+  window.plants.resize(reader.value<std::size_t>());
+  for (compensate::Plant& plant : window.plants) {
+    plant = reader.value<compensate::Plant>();
   }
   window.period_s = reader.value<double>();
   window.reference_mm = reader.values();

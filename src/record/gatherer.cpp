@@ -86,7 +86,8 @@ void Recorder::Gatherer::section(const verify::ReferencePath& sliced,
 
 void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::NozzleStep& step) {
   using verify::NozzleBase;
-  if (nozzle.base == NozzleBase::sliced || nozzle.base == NozzleBase::unshaped) {
+  const bool is_drawn = nozzle.model <= verify::kFrequencyErrors.size();
+  if (is_drawn && (nozzle.base == NozzleBase::sliced || nozzle.base == NozzleBase::unshaped)) {
     bench_.add(nozzle.model, step.time_s, step.nozzle);
   }
   if (nozzle.model != 0 || nozzle.base == NozzleBase::unshaped) {

@@ -1,6 +1,7 @@
 #include "unflex/record/recorder.hpp"
 
 #include <array>
+#include <span>
 
 #include "gatherer.hpp"
 
@@ -38,7 +39,9 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
       in_order(0.0, {verify::kFrequencyErrors.begin(), verify::kFrequencyErrors.end()});
   std::vector<report::Spread> before;
   std::vector<report::Spread> after;
-  for (const verify::Detuned& other : verified.detuned) {
+  const std::span<const verify::Detuned> detuned =
+      std::span(verified.detuned).first(verify::kFrequencyErrors.size());
+  for (const verify::Detuned& other : detuned) {
     before.push_back(spread(other.uncompensated));
     after.push_back(spread(other.compensated));
   }
@@ -54,7 +57,7 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
   }
   if (verified.unshaped) {
     std::vector<report::Spread> unshaped;
-    for (const verify::Detuned& other : verified.detuned) {
+    for (const verify::Detuned& other : detuned) {
       unshaped.push_back(spread(*other.unshaped));
     }
     contenders.push_back(

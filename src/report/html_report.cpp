@@ -163,10 +163,16 @@ Json facts_json(const Report& r) {
                     unknown.command.substr(0, kLongestText), unknown.count, unknown.first_line,
                     unknown.moves_kept));
   }
+  if (!r.plants.empty()) {
+    const auto rms = [](const PlantDeviation& plant) { return plant.compensated.rms_mm; };
+    const auto [least, most] = std::ranges::minmax(r.plants, {}, rms);
+    add("If the axes are as one of the plants",
+        fmt::format("{} to {} µm RMS", micrometres_text(rms(least)), micrometres_text(rms(most))));
+  }
   if (r.robustness) {
-    add("Band of models", fmt::format("{} µm RMS as optimised, {} without the band",
-                                      micrometres_text(r.robustness->rms_mm),
-                                      micrometres_text(r.robustness->nominal_rms_mm)));
+    add("Suits several models", fmt::format("{} µm RMS as optimised, {} for the nominal alone",
+                                            micrometres_text(r.robustness->rms_mm),
+                                            micrometres_text(r.robustness->nominal_rms_mm)));
   }
   if (r.unshaped) {
     add("Without the printer's own shaper",

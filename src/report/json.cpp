@@ -23,15 +23,25 @@ Json row_json(const DeviationRow& row) {
           {"contour_max_line", row.contour_max_line}};
 }
 
+Json spread_json(const Spread& s) {
+  return {{"contour_max_mm", s.max_mm}, {"contour_rms_mm", s.rms_mm}};
+}
+
 Json sensitivity_json(const std::vector<Sensitivity>& sensitivity) {
-  const auto spread = [](const Spread& s) {
-    return Json{{"contour_max_mm", s.max_mm}, {"contour_rms_mm", s.rms_mm}};
-  };
   Json array = Json::array();
   for (const Sensitivity& one : sensitivity) {
     array.push_back({{"frequency_error", one.frequency_error},
-                     {"uncompensated", spread(one.uncompensated)},
-                     {"compensated", spread(one.compensated)}});
+                     {"uncompensated", spread_json(one.uncompensated)},
+                     {"compensated", spread_json(one.compensated)}});
+  }
+  return array;
+}
+
+Json plants_json(const std::vector<PlantDeviation>& plants) {
+  Json array = Json::array();
+  for (const PlantDeviation& plant : plants) {
+    array.push_back({{"uncompensated", spread_json(plant.uncompensated)},
+                     {"compensated", spread_json(plant.compensated)}});
   }
   return array;
 }
@@ -70,6 +80,7 @@ void add_motion(const Report& r, Json& json) {
                        {"unshaped", r.unshaped ? rows_json(*r.unshaped) : Json()},
                        {"compensated", rows_json(r.compensated)}};
   json["sensitivity"] = sensitivity_json(r.sensitivity);
+  json["plants"] = plants_json(r.plants);
   json["robustness"] = nullptr;
   if (r.robustness) {
     json["robustness"] = {{"rms_mm", r.robustness->rms_mm},

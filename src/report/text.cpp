@@ -54,6 +54,21 @@ void write_sensitivity(Sink out, const std::vector<Sensitivity>& sensitivity) {
   fmt::format_to(out, "sensitivity   {} µm RMS if frequencies are off by {} %\n", rms, errors);
 }
 
+// "0.9 to 3.1"
+std::string range_text(const std::vector<PlantDeviation>& plants, Spread PlantDeviation::*which) {
+  const auto rms = [&](const PlantDeviation& plant) { return (plant.*which).rms_mm; };
+  const auto [least, most] = std::ranges::minmax(plants, {}, rms);
+  return fmt::format("{} to {}", micrometres_text(rms(least)), micrometres_text(rms(most)));
+}
+
+void write_plants(Sink out, const std::vector<PlantDeviation>& plants) {
+  if (!plants.empty()) {
+    fmt::format_to(out, "plants        {} µm RMS if the axes are as one of {} plants, {} before\n",
+                   range_text(plants, &PlantDeviation::compensated), plants.size(),
+                   range_text(plants, &PlantDeviation::uncompensated));
+  }
+}
+
 void write_times(Sink out, const Report& r) {
   const double change = r.reference_time_s > 0.0
                             ? 100.0 * (r.emitted_time_s - r.reference_time_s) / r.reference_time_s
@@ -179,10 +194,12 @@ std::string to_text(const Report& report) {
   write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
   write_unshaped(out, report.unshaped);
   write_sensitivity(out, report.sensitivity);
+  write_plants(out, report.plants);
   if (report.robustness) {
-    fmt::format_to(out, "robustness    {} µm RMS of the base as optimised, {} without a band\n",
-                   micrometres_text(report.robustness->rms_mm),
-                   micrometres_text(report.robustness->nominal_rms_mm));
+    fmt::format_to(
+        out, "robustness    {} µm RMS of the base as optimised, {} for the nominal axes alone\n",
+        micrometres_text(report.robustness->rms_mm),
+        micrometres_text(report.robustness->nominal_rms_mm));
   }
   write_times(out, report);
   write_runs(out, report);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -62,7 +63,7 @@ TEST_F(Identify, GivesLinesThatAPrinterFileTakes) {
 
 TEST_F(Identify, DrawsWhatItFitted) {
   const Outcome outcome = run({"identify", "a_x.csv"});
-  EXPECT_THAT(outcome.out, StartsWith("a_x.csv: along x, ringing\n"));
+  EXPECT_THAT(outcome.out, StartsWith("a_x.csv: along x, the sensor's x, ringing\n"));
   EXPECT_THAT(outcome.out, ::testing::ContainsRegex("\n  measured  .*█"));
   EXPECT_THAT(outcome.out, ::testing::ContainsRegex("\n  fitted    .*█"));
 }
@@ -79,8 +80,9 @@ TEST_F(Identify, TakesTheAxisThatMovedMostAndSaysSo) {
 TEST_F(Identify, WritesAReportWhoseKeysAreDocumented) {
   ASSERT_EQ(run({"identify", "a_x.csv", "a_y.csv", "--report", "r.json"}).exit_code, 0);
   const auto json = nlohmann::json::parse(read_file(path("r.json")));
-  EXPECT_NEAR(json["dynamics"]["x"]["freq_hz"]["value"].get<double>(), 50.0, 0.05);
-  EXPECT_LE(json["dynamics"]["x"]["freq_hz"]["low"], json["dynamics"]["x"]["freq_hz"]["high"]);
+  const nlohmann::json& freq_hz = json["dynamics"]["x"]["modes"][0]["freq_hz"];
+  EXPECT_NEAR(freq_hz["value"].get<double>(), 50.0, 0.05);
+  EXPECT_LE(freq_hz["low"], freq_hz["high"]);
   std::set<std::string> keys;
   report::collect_keys(json, "", keys);
   keys.insert("records[].curve.freq_hz");  // spectra have it instead of time_s
@@ -120,6 +122,87 @@ TEST_F(Identify, SaysWhatItCannotUse) {
   outcome = run({"identify", "a_x.csv"}, "", fill_stdout);
   EXPECT_EQ(outcome.exit_code, 4);
   EXPECT_EQ(outcome.err, "stdout: cannot write: No space left on device; make room there\n");
+}
+
+// Records of a real printer's resonance test (bassco/klipper-configs, CC0).
+std::string real_record(const std::string& name) {
+  return std::string(test_paths::kData) + "/spectra/" + name + ".csv";
+}
+
+const std::string kTwoPeaks = real_record("ender3_resonances_x_20210821_152037");
+const std::string kNoModel = real_record("ender3_resonances_x_20210701_223821");
+const std::string kTurnedSensor = real_record("ender3_resonances_y_20210630_223910");
+
+TEST_F(Identify, FindsTheModesOfARealRecordAndWhatTheyLeaveOpen) {
+  const Outcome outcome = run({"identify", kTwoPeaks, kTurnedSensor, "-q"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  write_file(path("p.toml"), outcome.out);
+  write_file(path("in.gcode"), small_print());
+  const Outcome inspected =
+      run({"inspect", "in.gcode", "--printer", "p.toml", "-q", "--report", "-"});
+  ASSERT_EQ(inspected.exit_code, 0) << inspected.err;
+  const auto printer = nlohmann::json::parse(inspected.out)["printer"];
+  const auto& modes = printer["dynamics.x.mode"]["value"];
+  EXPECT_THAT(modes.get<std::string>(), HasSubstr("freq_hz = 58."));
+  EXPECT_THAT(printer["dynamics.x.plant"]["value"].get<std::string>(), HasSubstr("share = "));
+  // Both peaks are within 5 % of what the printer's owner sees.
+  const Outcome shown = run({"identify", kTwoPeaks, "--report", "r.json"});
+  EXPECT_THAT(shown.out, AllOf(HasSubstr("\n  58.1 Hz "), HasSubstr("\n  noise "),
+                               HasSubstr("\n  unexplained ")));
+  const auto found = nlohmann::json::parse(read_file(path("r.json")))["dynamics"]["x"]["modes"];
+  EXPECT_NEAR(found[0]["freq_hz"]["value"].get<double>(), 45.0, 2.2);
+  EXPECT_NEAR(found[1]["freq_hz"]["value"].get<double>(), 58.5, 2.9);
+}
+
+TEST_F(Identify, ReadsARecordOfATurnedSensor) {
+  const Outcome outcome = run({"identify", kTurnedSensor});
+  EXPECT_THAT(outcome.out, HasSubstr("along y, the sensor's"));
+  EXPECT_THAT(outcome.out, HasSubstr("[[dynamics.y.mode]]\nfreq_hz = 45."));
+}
+
+TEST_F(Identify, GivesNoLinesForARecordWithoutAModel) {
+  Outcome outcome = run({"identify", kNoModel});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("no model of it is to be trusted"),
+                                 HasSubstr("\n  measured "), HasSubstr("\n  closest fit ")));
+  EXPECT_EQ(outcome.out.find("freq_hz"), std::string::npos);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr(kNoModel + ": it leaves open"),
+                                 HasSubstr("; check that the sensor sits tight")));
+  outcome = run({"identify", kNoModel, "-q"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.out, "");
+  // The other axis has its lines all the same, and a better record of this one makes up for it.
+  outcome = run({"identify", kNoModel, kTurnedSensor, "-q"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.out, StartsWith("[[dynamics.y.mode]]"));
+  outcome = run({"identify", kNoModel, kTwoPeaks, "-q"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.out, StartsWith("[[dynamics.x.mode]]"));
+  EXPECT_THAT(outcome.err, HasSubstr("warning: is left out: it leaves open"));
+}
+
+TEST_F(Identify, DrawsModesAndWhatIsLeftOnItsPage) {
+  ASSERT_EQ(run({"identify", kTwoPeaks, kNoModel, "--report", "r.html"}).exit_code, 0);
+  const std::string page = read_file(path("r.html"));
+  for (const std::string_view part : {"58.1 Hz", "unexplained", "noise", "closest fit",
+                                      "<strong>Not used:</strong>", "<th>gain"}) {
+    EXPECT_THAT(page, HasSubstr(part));
+  }
+}
+
+TEST_F(Identify, WritesThePrinterFileItself) {
+  write_file(path("printer.cfg"),
+             "[printer]\nkinematics: corexy\nmax_velocity: 300\nmax_accel: 4000\n");
+  Outcome outcome = run({"printer", "init", "--from", "printer.cfg", "--record", kTwoPeaks,
+                         "--record", kTurnedSensor, "-o", "p.toml"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string file = read_file(path("p.toml"));
+  EXPECT_THAT(file, AllOf(HasSubstr("freq_hz = 58.1"), HasSubstr("{share = "),
+                          HasSubstr("ender3_resonances_x_20210821_152037.csv")));
+  outcome = run({"printer", "init", "--from", "printer.cfg", "--record", kNoModel, "-o", "q.toml"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("it leaves open"));
+  EXPECT_FALSE(std::filesystem::exists(path("q.toml")));
 }
 
 TEST_F(Identify, SaysWhatIsMissing) {

@@ -48,7 +48,7 @@ TEST(AxisProblem, HasExactDerivatives) {
   std::mt19937_64 random(1);
   for (int trial = 0; trial < 20; ++trial) {
     AxisWindow window = random_window(random, 2 + static_cast<std::size_t>(trial) % 6);
-    window.variants.assign(trial % 3 == 0 ? 0 : (trial % 3 == 1 ? 2 : 4), {{200.0, 0.1}, 0.2});
+    window.plants.assign(trial % 3 == 0 ? 0 : (trial % 3 == 1 ? 2 : 4), {{200.0, 0.1}, 0.2});
     for (const ActiveLimits active : {ActiveLimits{}, kAllActive}) {
       const AxisProblem problem(window, active);
       const auto program = collocation::transcribe(problem, node_times(window.nodes()));

@@ -136,11 +136,11 @@ TEST_P(BandedEngineUnder, FindsIpoptsOptimumForAnAxisThatMayBeSeveralThings) {
     const WindowKind kind{.start = trial % 2 == 0, .end = trial % 4 < 2};
     AxisWindow window = random_path(random, 60 + 40 * static_cast<std::size_t>(trial), kind);
     GetParam().set(window);
-    window.variants = {{{1.1 * kind.omega_rad_s, kind.zeta}, 0.3},
-                       {{0.9 * kind.omega_rad_s, kind.zeta}, 0.4}};
+    window.plants = {{{1.1 * kind.omega_rad_s, kind.zeta}, 0.3},
+                     {{0.9 * kind.omega_rad_s, kind.zeta}, 0.4}};
     if (trial % 3 == 0) {
-      window.variants.push_back({{0.9 * kind.omega_rad_s, 0.5 * kind.zeta}, 0.1});
-      window.variants.push_back({{1.1 * kind.omega_rad_s, 1.5 * kind.zeta}, 0.05});
+      window.plants.push_back({{0.9 * kind.omega_rad_s, 0.5 * kind.zeta}, 0.1});
+      window.plants.push_back({{1.1 * kind.omega_rad_s, 1.5 * kind.zeta}, 0.05});
     }
     SCOPED_TRACE(std::string(GetParam().name) + ", window " + std::to_string(trial));
     solved += solved_as_by_ipopt(window, {BandedForm::fitting});
@@ -174,7 +174,7 @@ TEST_P(BandedEngineUnder, FindsIpoptsOptimumForAxesOfSeveralModes) {
       }
     }
     if (trial >= 6) {
-      window.variants = {{window.axis.detuned(1.1), 0.3}, {axes[0].detuned(0.9), 0.2}};
+      window.plants = {{window.axis.detuned(1.1), 0.3}, {axes[0].detuned(0.9), 0.2}};
     }
     SCOPED_TRACE(std::string(GetParam().name) + ", window " + std::to_string(trial));
     solved += solved_as_by_ipopt(window, {BandedForm::fitting});
@@ -239,10 +239,10 @@ TEST(BandedEngine, TakesAnyResonanceDampingAndPeriod) {
 
 TEST(BandedEngine, TakesVariantsThatAreTheAxisItselfForOneThing) {
   std::mt19937_64 random(12);
-  for (const std::size_t variants : {2U, 4U}) {
+  for (const std::size_t plants : {2U, 4U}) {
     AxisWindow window = random_path(random, 200, {});
     const AxisSolution alone = solve(window);
-    window.variants.assign(variants, {window.axis, 0.2});
+    window.plants.assign(plants, {window.axis, 0.2});
     expect_same(solve(window), alone, 1e-9, 1e-9);
   }
 }

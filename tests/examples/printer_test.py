@@ -18,7 +18,7 @@ UNFLEX, EXAMPLES, DOCS = (os.path.abspath(path) for path in sys.argv[1:4])
 PRINT = "G28\nG90\nM83\nG1 X20 Y20 F6000\nG1 X40 Y20 E0.8 F3000\n"
 KEY = r"(# )?(\w+) = "
 MASS = re.compile(r"(# )?(mass_g|stiffness_n_mm|damping_n_s_mm) = ")
-SEVERAL = re.compile(r"(# )?mode = ")
+SEVERAL = re.compile(r"# (mode|plant) = ")
 MODAL = re.compile(r"(# )?(freq_hz|damping_ratio) = ")
 
 

@@ -29,7 +29,7 @@ std::string klipper_samples(int count) {
 }
 
 std::vector<DataSet> good(const std::string& text, const std::string& name) {
-  Result<std::vector<DataSet>> sets = parse_csv(text, name);
+  Result<std::vector<DataSet>> sets = parse_records(text, name);
   EXPECT_TRUE(sets) << to_string(sets.error());
   return sets.value_or(std::vector<DataSet>{});
 }
@@ -125,7 +125,7 @@ std::string repeated(const std::string& row, int times) {
 
 TEST(Records, ThatAreNoneNameTheirPlace) {
   const auto failure = [](const std::string& text) {
-    const auto sets = parse_csv(text, "a.csv");
+    const auto sets = parse_records(text, "a.csv");
     EXPECT_FALSE(sets);
     EXPECT_TRUE(sets || sets.error().kind == ErrorKind::input);
     return sets ? "" : to_string(sets.error());

@@ -8,7 +8,7 @@
 
 #include "modes_simulation.hpp"
 #include "sweep_simulation.hpp"
-#include "unflex/identify/modes.hpp"
+#include "unflex/identify/axis_model.hpp"
 #include "welch.hpp"
 
 namespace unflex::identify {
@@ -21,52 +21,25 @@ const std::vector<ModeOfAxis> kThreeModes = {
     {45.0, 0.07, 0.75}, {75.0, 0.05, 0.35}, {105.0, 0.05, -0.1}};
 
 TEST(ModesFit, FindsThreeModesWithTheirGains) {
-  const Result<ModesFit> fit =
-      fit_modes(simulate({.modes = kThreeModes, .noise = 1e-4, .rise = 1e-4, .windows = 60}), {});
+  const Result<RecordFit> fit = fit_spectrum(
+      simulate({.modes = kThreeModes, .noise = 1e-4, .rise = 1e-4, .windows = 60}), {});
   ASSERT_TRUE(fit) << fit.error().message;
-  ASSERT_THAT(fit->modes, SizeIs(3));
-  EXPECT_EQ(fit->column, 0);
+  ASSERT_THAT(fit->model.values(), SizeIs(3));
+  EXPECT_TRUE(fit->is_trusted());
+  EXPECT_GT(fit->direction[0], 0.95);
   for (std::size_t m = 0; m < 3; ++m) {
-    EXPECT_NEAR(fit->modes[m].freq_hz, kThreeModes[m].freq_hz, 0.02 * kThreeModes[m].freq_hz) << m;
-    EXPECT_NEAR(fit->modes[m].damping_ratio, kThreeModes[m].damping_ratio, 0.02) << m;
-    EXPECT_NEAR(fit->modes[m].gain, kThreeModes[m].gain, 0.08) << m;
+    EXPECT_NEAR(fit->model.values()[m].freq_hz, kThreeModes[m].freq_hz,
+                0.02 * kThreeModes[m].freq_hz)
+        << m;
+    EXPECT_NEAR(fit->model.values()[m].damping_ratio, kThreeModes[m].damping_ratio, 0.02) << m;
+    EXPECT_NEAR(fit->model.values()[m].gain, kThreeModes[m].gain, 0.08) << m;
   }
   EXPECT_LT(fit->unexplained, 0.15);
   EXPECT_TRUE(fit->warnings.empty());
   EXPECT_THAT(fit->bic, SizeIs(4));
-  EXPECT_THAT(fit->covariance, SizeIs(81));
-  EXPECT_EQ(fit->curve.x.size(), fit->noise_curve.size());
-  EXPECT_THAT(fit->mode_curves, SizeIs(3));
-}
-
-// One mode of 25 to 110 Hz with up to two weaker ones, at least 8 Hz apart.
-std::vector<ModeOfAxis> drawn_modes(std::mt19937& random) {
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
-  const auto swing = [](const ModeOfAxis& m) {
-    return std::abs(m.gain) / (m.damping_ratio * m.freq_hz);
-  };
-  const auto count = static_cast<std::size_t>(uniform(1.0, 3.999));
-  for (;;) {
-    std::vector<ModeOfAxis> modes = {{uniform(25.0, 110.0), uniform(0.03, 0.15), 1.0}};
-    bool is_fine = true;
-    while (modes.size() < count) {
-      const double gain = uniform(0.05, 0.4) * (uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0);
-      modes.push_back({uniform(25.0, 125.0), uniform(0.03, 0.15), gain});
-      modes.front().gain -= gain;
-      for (std::size_t i = 0; i + 1 < modes.size(); ++i) {
-        is_fine &= std::abs(modes[i].freq_hz - modes.back().freq_hz) >= 8.0;
-      }
-    }
-    for (std::size_t i = 1; i < modes.size(); ++i) {
-      // Chance would tell which of two alike is the main one.
-      is_fine &= 1.3 * swing(modes[i]) < swing(modes.front());
-    }
-    if (is_fine) {
-      return modes;
-    }
-  }
+  EXPECT_THAT(fit->model.covariance, SizeIs(81));
+  EXPECT_EQ(fit->curve.x.size(), fit->curve.noise.size());
+  EXPECT_THAT(fit->curve.modes, SizeIs(3));
 }
 
 TEST(ModesFit, FindsTheMainModeOfRandomAxesWithTurnedSensors) {
@@ -83,14 +56,15 @@ TEST(ModesFit, FindsTheMainModeOfRandomAxesWithTurnedSensors) {
       part /= length;
     }
     const std::vector<ModeOfAxis> modes = drawn_modes(random);
-    const Result<ModesFit> fit = fit_modes(simulate({.modes = modes,
-                                                     .direction = direction,
-                                                     .windows = 20,
-                                                     .seed = static_cast<std::uint32_t>(i + 1)}),
-                                           {});
-    if (fit) {
+    const Result<RecordFit> fit =
+        fit_spectrum(simulate({.modes = modes,
+                               .direction = direction,
+                               .windows = 20,
+                               .seed = static_cast<std::uint32_t>(i + 1)}),
+                     {});
+    if (fit && fit->is_trusted()) {
       const double true_hz = modes.front().freq_hz;
-      const Estimate& main_hz = fit->intervals.front().freq_hz;
+      const Estimate& main_hz = fit->model.modes.front().freq_hz;
       ++accepted;
       near += std::abs(main_hz.value - true_hz) < 0.02 * true_hz ? 1 : 0;
       held += main_hz.low <= true_hz && true_hz <= main_hz.high ? 1 : 0;
@@ -104,21 +78,22 @@ TEST(ModesFit, FindsTheMainModeOfRandomAxesWithTurnedSensors) {
 TEST(ModesFit, OfASimulatedSweepTellsItsOneMode) {
   const SimulatedTest test{.mode_hz = 52.0, .damping_ratio = 0.08};
   for (const bool is_normalized : {false, true}) {
-    const Result<ModesFit> fit = fit_modes(welch(simulate(test), test.rate_hz, is_normalized), {});
+    const Result<RecordFit> fit =
+        fit_spectrum(welch(simulate(test), test.rate_hz, is_normalized), {});
     ASSERT_TRUE(fit) << fit.error().message;
-    EXPECT_EQ(fit->column, -1);
-    EXPECT_NEAR(fit->modes.front().freq_hz, 52.0, 0.52);
-    EXPECT_NEAR(fit->modes.front().damping_ratio, 0.08, 0.012);
-    EXPECT_NEAR(fit->modes.front().gain, 1.0, 0.1);
+    EXPECT_NEAR(fit->direction[0], std::sqrt(1.0 / 3.0), 1e-9);
+    EXPECT_NEAR(fit->model.values().front().freq_hz, 52.0, 0.52);
+    EXPECT_NEAR(fit->model.values().front().damping_ratio, 0.08, 0.012);
+    EXPECT_NEAR(fit->model.values().front().gain, 1.0, 0.1);
   }
 }
 
 TEST(ModesFit, PlantsAreTheFitAndMachinesAroundIt) {
-  const Result<ModesFit> fit = fit_modes(simulate({.modes = kThreeModes}), {});
+  const Result<RecordFit> fit = fit_spectrum(simulate({.modes = kThreeModes}), {});
   ASSERT_TRUE(fit) << fit.error().message;
-  ASSERT_GE(fit->plants.size(), 5U);
+  ASSERT_GE(fit->model.plants.size(), 5U);
   double shares = 0.0;
-  for (const Plant& plant : fit->plants) {
+  for (const Plant& plant : fit->model.plants) {
     double gains = 0.0;
     for (const ModeOfAxis& mode : plant.modes) {
       gains += mode.gain;
@@ -128,45 +103,55 @@ TEST(ModesFit, PlantsAreTheFitAndMachinesAroundIt) {
     shares += plant.share;
   }
   EXPECT_NEAR(shares, 1.0, 1e-9);
-  EXPECT_EQ(fit->plants.front().modes.front().freq_hz, fit->modes.front().freq_hz);
-  EXPECT_NE(fit->plants[1].modes.front().freq_hz, fit->modes.front().freq_hz);
+  EXPECT_EQ(fit->model.plants.front().modes.front().freq_hz, fit->model.values().front().freq_hz);
+  EXPECT_NE(fit->model.plants[1].modes.front().freq_hz, fit->model.values().front().freq_hz);
 }
 
 TEST(ModesFit, GivesTheSameNumbersEachTime) {
   const Spectrum spectrum = simulate({.modes = kThreeModes});
-  const Result<ModesFit> first = fit_modes(spectrum, {});
-  const Result<ModesFit> second = fit_modes(spectrum, {});
+  const Result<RecordFit> first = fit_spectrum(spectrum, {});
+  const Result<RecordFit> second = fit_spectrum(spectrum, {});
   ASSERT_TRUE(first && second);
-  EXPECT_EQ(first->covariance, second->covariance);
+  EXPECT_EQ(first->model.covariance, second->model.covariance);
   EXPECT_EQ(first->curve.fitted, second->curve.fitted);
 }
 
 TEST(ModesFit, WithoutAResonanceIsRefused) {
   Spectrum spectrum = simulate({.modes = {{1e5, 0.1, 1.0}}});
-  const Result<ModesFit> rigid = fit_modes(spectrum, {});
-  ASSERT_FALSE(rigid);
-  EXPECT_EQ(rigid.error().kind, ErrorKind::input);
-  EXPECT_THAT(rigid.error().message, HasSubstr("measure again"));
-  const Result<ModesFit> noise =
-      fit_modes(simulate({.modes = kThreeModes, .noise = 1e4, .rise = 1e3}), {});
-  EXPECT_FALSE(noise);
+  const Result<RecordFit> rigid = fit_spectrum(spectrum, {});
+  ASSERT_TRUE(rigid);
+  EXPECT_THAT(rigid->refusal, HasSubstr("measure again"));
+  EXPECT_EQ(rigid->curve.x.size(), rigid->curve.fitted.size());
+  const Result<RecordFit> noise =
+      fit_spectrum(simulate({.modes = kThreeModes, .noise = 1e4, .rise = 1e3}), {});
+  ASSERT_TRUE(noise);
+  EXPECT_FALSE(noise->is_trusted());
   spectrum.density.fill(std::vector<double>(100, 0.0));
-  const Result<ModesFit> still = fit_modes(spectrum, {});
+  const Result<RecordFit> still = fit_spectrum(spectrum, {});
   ASSERT_FALSE(still);
   EXPECT_EQ(still.error().message, "there is no motion in the band of the sweep");
   spectrum.density.fill(std::vector<double>(20, 1.0));
-  EXPECT_FALSE(fit_modes(spectrum, {}));
+  EXPECT_FALSE(fit_spectrum(spectrum, {}));
 }
 
-TEST(DensityOfAxis, IsTheColumnWithMostOfTheMotionOrTheSum) {
-  const AxisDensity turned =
-      density_of_axis(simulate({.modes = kThreeModes, .direction = {0.1, 0.2, 0.97}}), {});
-  EXPECT_EQ(turned.column, 2);
-  EXPECT_GT(turned.share, 0.9);
+TEST(ModesFit, TakesTheColumnWithMostOfTheMotionOrTheSum) {
+  const SimulatedSpectrum turned{.modes = kThreeModes, .direction = {0.1, 0.2, 0.97}};
+  const Result<RecordFit> column = fit_spectrum(simulate(turned), {});
+  ASSERT_TRUE(column);
+  EXPECT_GT(column->direction[2], 0.95);
   const Spectrum odd = simulate({.modes = kThreeModes, .direction = {0.0, 0.7, 0.7}});
-  const AxisDensity sum = density_of_axis(odd, {});
-  EXPECT_EQ(sum.column, -1);
-  EXPECT_DOUBLE_EQ(sum.density[30], odd.density[0][30] + odd.density[1][30] + odd.density[2][30]);
+  const Result<RecordFit> sum = fit_spectrum(odd, {});
+  ASSERT_TRUE(sum);
+  EXPECT_NEAR(sum->direction[1], std::sqrt(0.5), 0.05);
+  Spectrum added{.step_hz = odd.step_hz, .density = {}};
+  added.density.fill({});
+  for (std::size_t k = 0; k < odd.density[0].size(); ++k) {
+    added.density[0].push_back(odd.density[0][k] + odd.density[1][k] + odd.density[2][k]);
+  }
+  added.density[1] = added.density[2] = std::vector<double>(odd.density[0].size(), 0.0);
+  const Result<RecordFit> as_one = fit_spectrum(added, {});
+  ASSERT_TRUE(as_one);
+  EXPECT_EQ(sum->curve.fitted, as_one->curve.fitted);
 }
 
 }  // namespace

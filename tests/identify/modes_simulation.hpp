@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "unflex/identify/modes.hpp"
+#include "unflex/identify/axis_model.hpp"
 
 namespace unflex::identify {
 
@@ -85,6 +85,36 @@ inline Spectrum simulate(const SimulatedSpectrum& of) {
     }
   }
   return spectrum;
+}
+
+// One mode of 25 to 110 Hz with up to two weaker ones, at least 8 Hz apart.
+inline std::vector<ModeOfAxis> drawn_modes(std::mt19937& random) {
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const auto swing = [](const ModeOfAxis& m) {
+    return std::abs(m.gain) / (m.damping_ratio * m.freq_hz);
+  };
+  const auto count = static_cast<std::size_t>(uniform(1.0, 3.999));
+  for (;;) {
+    std::vector<ModeOfAxis> modes = {{uniform(25.0, 110.0), uniform(0.03, 0.15), 1.0}};
+    bool is_fine = true;
+    while (modes.size() < count) {
+      const double gain = uniform(0.05, 0.4) * (uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0);
+      modes.push_back({uniform(25.0, 125.0), uniform(0.03, 0.15), gain});
+      modes.front().gain -= gain;
+      for (std::size_t i = 0; i + 1 < modes.size(); ++i) {
+        is_fine &= std::abs(modes[i].freq_hz - modes.back().freq_hz) >= 8.0;
+      }
+    }
+    for (std::size_t i = 1; i < modes.size(); ++i) {
+      // Chance would tell which of two alike is the main one.
+      is_fine &= 1.3 * swing(modes[i]) < swing(modes.front());
+    }
+    if (is_fine) {
+      return modes;
+    }
+  }
 }
 
 }  // namespace unflex::identify

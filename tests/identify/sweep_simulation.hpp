@@ -9,6 +9,12 @@
 
 namespace unflex::identify {
 
+struct FurtherMode {
+  double freq_hz = 0.0;
+  double damping_ratio = 0.0;
+  double gain = 0.0;
+};
+
 struct SimulatedTest {
   double mode_hz = 45.0;
   double damping_ratio = 0.06;
@@ -22,6 +28,7 @@ struct SimulatedTest {
   double noise_share = 0.1;  // standard deviation, as a share of the response's peak
   double offset = 250.0;     // gravity on a chip that is not level
   std::uint32_t seed = 1;
+  std::vector<FurtherMode> further = {};  // the first mode has the gain that they leave
 };
 
 struct Pulse {
@@ -97,11 +104,10 @@ class Belt {
   double v_ = 0.0;
 };
 
-// The nozzle's acceleration at the samples' times, with half a second of rest before and after.
-inline std::vector<double> response(const SimulatedTest& test, const std::vector<Pulse>& pulses,
-                                    double shift_s) {
+// One mode's acceleration at the samples' times, with half a second of rest before and after.
+inline std::vector<double> response_of_mode(const SimulatedTest& test, Belt belt,
+                                            const std::vector<Pulse>& pulses, double shift_s) {
   constexpr double kRest_s = 0.5;
-  Belt belt(test.mode_hz, test.damping_ratio);
   std::vector<double> samples;
   double now_s = -kRest_s + shift_s;
   std::size_t pulse = 0;
@@ -119,6 +125,28 @@ inline std::vector<double> response(const SimulatedTest& test, const std::vector
     samples.push_back(belt.accel());
   }
   return samples;
+}
+
+// The nozzle's acceleration: that of all modes by their gains.
+inline std::vector<double> response(const SimulatedTest& test, const std::vector<Pulse>& pulses,
+                                    double shift_s) {
+  std::vector<double> sum =
+      response_of_mode(test, Belt(test.mode_hz, test.damping_ratio), pulses, shift_s);
+  double first_gain = 1.0;
+  for (const FurtherMode& mode : test.further) {
+    first_gain -= mode.gain;
+  }
+  for (double& sample : sum) {
+    sample *= first_gain;
+  }
+  for (const FurtherMode& mode : test.further) {
+    const std::vector<double> samples =
+        response_of_mode(test, Belt(mode.freq_hz, mode.damping_ratio), pulses, shift_s);
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      sum[i] += mode.gain * samples[i];
+    }
+  }
+  return sum;
 }
 
 inline std::vector<double> simulate(const SimulatedTest& test) {

@@ -423,5 +423,57 @@ TEST(Modes, AreRefusedWhereTheyCannotBeMeant) {
   EXPECT_THAT(refusal("[dynamics]\nx.mode = 3\n"), HasSubstr("2 to 3 tables"));
 }
 
+constexpr std::string_view kPlants =
+    "[dynamics.x]\nfreq_hz = 45\n"
+    "[[dynamics.x.plant]]\nshare = 0.25\n"
+    "mode = [{freq_hz = 46, damping_ratio = 0.06, gain = 1}]\n"
+    "[[dynamics.x.plant]]\nshare = 0.125\n"
+    "mode = [{freq_hz = 44, damping_ratio = 0.06, gain = 0.9},\n"
+    "        {freq_hz = 90, damping_ratio = 0.1, gain = 0.1}]\n";
+
+TEST(Plants, AreReadAndWrittenAgain) {
+  const Result<Settings> settings = parse(kPlants, "p.toml", {});
+  ASSERT_TRUE(settings) << to_string(settings.error());
+  const std::vector<PlantSettings>& plants = settings->dynamics_x.plants;
+  ASSERT_EQ(plants.size(), 2U);
+  EXPECT_EQ(plants[0].share, 0.25);
+  ASSERT_EQ(plants[1].modes.size(), 2U);
+  EXPECT_EQ(plants[1].modes[1].freq_hz, 90.0);
+  const Result<Settings> again = parse(to_toml(*settings), "again.toml", {});
+  ASSERT_TRUE(again) << to_string(again.error());
+  EXPECT_EQ(again->dynamics_x.plants.size(), 2U);
+  EXPECT_EQ(again->dynamics_x.plants[1].modes[0].gain, 0.9);
+}
+
+TEST(Plants, StayBehindIfTheModelIsOverridden) {
+  const Result<Settings> other = parse(kPlants, "p.toml", {"dynamics.x.freq_hz=50"});
+  ASSERT_TRUE(other);
+  EXPECT_TRUE(other->dynamics_x.plants.empty());
+  const Result<Settings> kept = parse(kPlants, "p.toml", {"dynamics.y.freq_hz=50"});
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->dynamics_x.plants.size(), 2U);
+}
+
+TEST(Plants, ThatAreNoneNameTheirPlace) {
+  const auto refusal = [](const std::string& plant) {
+    const Result<Settings> settings =
+        parse("[dynamics]\nx.freq_hz = 45\nx.plant = [" + plant + "]\n", "p.toml", {});
+    return settings ? std::string{} : to_string(settings.error());
+  };
+  const std::string mode = "mode = [{freq_hz = 46, damping_ratio = 0.06, gain = 1}]";
+  EXPECT_EQ(refusal("{share = 0.5, " + mode + "}"), "");
+  EXPECT_THAT(refusal("{share = 0.5, " + mode + "}, {share = 0.5, " + mode + "}"),
+              HasSubstr("p.toml:3: the shares of dynamics.x.plant add up to 1, but must leave"));
+  EXPECT_THAT(refusal("{share = 0, " + mode + "}"),
+              HasSubstr("dynamics.x.plant, number 1: share must be a number above 0 and below 1"));
+  EXPECT_THAT(refusal("{" + mode + "}"), HasSubstr("number 1: share is missing"));
+  EXPECT_THAT(refusal("{share = 0.5, mode = 3}"), HasSubstr("mode must be a list of 1 to 3"));
+  EXPECT_THAT(refusal("{share = 0.5, mode = [{freq_hz = 0, damping_ratio = 0.1, gain = 1}]}"),
+              HasSubstr("number 1, mode, number 1: freq_hz is 0, but must be"));
+  EXPECT_THAT(refusal("{share = 0.5, weight = 1, " + mode + "}"),
+              HasSubstr("unknown value 'weight'; a plant has share and mode"));
+  EXPECT_THAT(refusal("3"), HasSubstr("1 to 8 tables"));
+}
+
 }  // namespace
 }  // namespace unflex::machine

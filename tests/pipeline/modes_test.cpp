@@ -1,6 +1,7 @@
 // Prints on axes of several modes.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,49 @@ INSTANTIATE_TEST_SUITE_P(On, Modes,
                                            Case{"TwoOnMarlin", kTwo, "marlin", 2.0},
                                            Case{"ThreeOnRrf", kThree, "rrf", 1.5}),
                          [](const auto& one) { return one.param.name; });
+
+// The axis is either as given or as one of two plants, each with this share.
+std::string plants(double share) {
+  const auto plant = [&](int freq_hz) {
+    return "{share=" + std::to_string(share) + ", mode=[{freq_hz=" + std::to_string(freq_hz) +
+           ", damping_ratio=0.06, gain=1}]}";
+  };
+  return "[" + plant(42) + ", " + plant(49) + "]";
+}
+
+report::Report made_for(const std::vector<std::string>& plants) {
+  std::vector<std::string> settings = {"printer.firmware=klipper", "dynamics.x.freq_hz=45",
+                                       "dynamics.y.freq_hz=45"};
+  settings.insert(settings.end(), plants.begin(), plants.end());
+  const JobFolder folder(squares(), settings);
+  SilentProgress progress;
+  Result<report::Report> result = compensate(folder.job(), progress);
+  EXPECT_TRUE(result) << to_string(result.error());
+  return *result;
+}
+
+TEST(Plants, AreSuitedByTheBaseAndMeasured) {
+  EXPECT_TRUE(made_for({}).plants.empty());
+  const auto of_both = [](double share) {
+    return made_for({"dynamics.x.plant=" + plants(share), "dynamics.y.plant=" + plants(share)});
+  };
+  const report::Report hardly = of_both(1e-6);
+  const report::Report suited = of_both(0.3);
+  EXPECT_EQ(suited.runs_fallback, 0U) << testing::complaints(suited);
+  ASSERT_EQ(suited.plants.size(), 2U);
+  ASSERT_EQ(hardly.plants.size(), 2U);
+  ASSERT_TRUE(suited.robustness.has_value());
+  const auto together_mm = [](const report::Report& made) {
+    return std::hypot(made.plants[0].compensated.rms_mm, made.plants[1].compensated.rms_mm);
+  };
+  EXPECT_LT(together_mm(suited), 0.85 * together_mm(hardly));
+  EXPECT_GT(suited.compensated.extruding.contour_rms_mm,
+            hardly.compensated.extruding.contour_rms_mm);
+  // One axis alone may have plants.
+  const report::Report of_y = made_for({"dynamics.y.plant=" + plants(0.3)});
+  EXPECT_EQ(of_y.plants.size(), 2U);
+  EXPECT_TRUE(of_y.robustness.has_value());
+}
 
 }  // namespace
 }  // namespace unflex::pipeline

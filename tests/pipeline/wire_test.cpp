@@ -25,11 +25,11 @@ compensate::AxisWindow some_window() {
 void expect_same(const compensate::AxisWindow& a, const compensate::AxisWindow& b) {
   EXPECT_EQ(a.axis.main().omega_rad_s, b.axis.main().omega_rad_s);
   EXPECT_EQ(a.axis.main().zeta, b.axis.main().zeta);
-  ASSERT_EQ(a.variants.size(), b.variants.size());
-  for (std::size_t i = 0; i < a.variants.size(); ++i) {
-    EXPECT_EQ(a.variants[i].axis.main().omega_rad_s, b.variants[i].axis.main().omega_rad_s);
-    EXPECT_EQ(a.variants[i].axis.main().zeta, b.variants[i].axis.main().zeta);
-    EXPECT_EQ(a.variants[i].share, b.variants[i].share);
+  ASSERT_EQ(a.plants.size(), b.plants.size());
+  for (std::size_t i = 0; i < a.plants.size(); ++i) {
+    EXPECT_EQ(a.plants[i].axis.main().omega_rad_s, b.plants[i].axis.main().omega_rad_s);
+    EXPECT_EQ(a.plants[i].axis.main().zeta, b.plants[i].axis.main().zeta);
+    EXPECT_EQ(a.plants[i].share, b.plants[i].share);
   }
   EXPECT_EQ(a.period_s, b.period_s);
   EXPECT_EQ(a.reference_mm, b.reference_mm);
@@ -54,7 +54,7 @@ TEST(Wire, BringsAWindowAcrossUnchanged) {
   expect_same(window, unpack_window(pack(window)));
   window.start = compensate::AxisWindow::Start{{2.5, -31.0}, 2.25};
   window.end_base_mm = -0.125;
-  window.variants = {{{100.5, 0.03}, 0.25}, {{140.0, 0.3}, 0.125}};
+  window.plants = {{{100.5, 0.03}, 0.25}, {{140.0, 0.3}, 0.125}};
   expect_same(window, unpack_window(pack(window)));
 }
 

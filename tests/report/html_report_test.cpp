@@ -102,16 +102,17 @@ TEST(HtmlReport, HoldsTheDataThatItsScriptReads) {
   EXPECT_EQ(data["remarks"]["violations"][0], "out.gcode:7: outside the travel");
 }
 
-TEST(HtmlReport, TellsWhatABandOfModelsCosts) {
+TEST(HtmlReport, TellsWhatSeveralModelsCost) {
   Report report = recorded_report();
   report.robustness = {0.003, 0.0005};
   const auto facts = [&] {
     return nlohmann::json::parse(element(to_html(report), "data"))["facts"];
   };
-  EXPECT_NE(facts().dump().find("3.00 µm RMS as optimised, 0.50 without the band"),
+  EXPECT_NE(facts().dump().find("3.00 µm RMS as optimised, 0.50 for the nominal alone"),
             std::string::npos);
   report.robustness.reset();
-  EXPECT_EQ(facts().dump().find("band"), std::string::npos);
+  EXPECT_EQ(facts().dump().find("several models"), std::string::npos);
+  EXPECT_NE(facts().dump().find("4.00 to 9.00 µm RMS"), std::string::npos);
 }
 
 TEST(HtmlReport, LetsNoTextFromOutsideBecomeMarkup) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
-#include "unflex/identify/mode.hpp"
+#include "unflex/identify/axis_model.hpp"
 #include "unflex/machine/print_text.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 

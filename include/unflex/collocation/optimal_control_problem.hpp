@@ -13,7 +13,7 @@
 
 namespace unflex::collocation {
 
-inline constexpr int kMaxStates = 32;  // five models of an axis with three modes each
+inline constexpr int kMaxStates = 48;  // seven models of an axis with three modes each
 inline constexpr int kMaxControls = 4;
 inline constexpr int kMaxPoint = kMaxStates + kMaxControls;
 

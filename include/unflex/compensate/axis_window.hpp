@@ -37,15 +37,15 @@ struct BaseLimits {
 };
 
 // Another model that the axis may have.
-struct AxisVariant {
+struct Plant {
   dynamics::FlexibleAxis axis;
   double share = 0.0;  // α
 };
 
 struct AxisWindow {
   dynamics::FlexibleAxis axis;
-  std::vector<AxisVariant> variants;  // `axis` has the share that they leave
-  double period_s = 1e-3;             // h
+  std::vector<Plant> plants;  // `axis` has the share that they leave
+  double period_s = 1e-3;     // h
   // r and w at the nodes and in the middles between them: 2n − 1 values for n nodes, n ≥ 2.
   std::vector<double> reference_mm;
   std::vector<double> weight;
@@ -74,9 +74,9 @@ struct AxisWindow {
   std::optional<Guess> guess;
 
   [[nodiscard]] std::size_t nodes() const { return (reference_mm.size() + 1) / 2; }
-  // Model i: `axis` is model 0, variants[i − 1] is model i.
-  [[nodiscard]] std::size_t models() const { return variants.size() + 1; }
-  [[nodiscard]] AxisVariant model(std::size_t i) const;
+  // Model i: `axis` is model 0, plants[i − 1] is model i.
+  [[nodiscard]] std::size_t models() const { return plants.size() + 1; }
+  [[nodiscard]] Plant model(std::size_t i) const;
   // `nozzle` is a state of `axis` while the base is at base_mm. Returns the state of model i that
   // swings as it does.
   [[nodiscard]] dynamics::NozzleState in_model(std::size_t i, const dynamics::NozzleState& nozzle,

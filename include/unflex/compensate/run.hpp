@@ -19,7 +19,7 @@ namespace unflex::compensate {
 
 struct AxisSetup {
   dynamics::FlexibleAxis axis;
-  std::vector<AxisVariant> variants;  // as in AxisWindow
+  std::vector<Plant> plants;  // as in AxisWindow
   // Position limits may be widened per run to where the sliced path itself goes.
   BaseLimits limits;
 };
@@ -37,6 +37,9 @@ struct Setup {
   double overlap_s = 0.06;     // pre-roll and post-roll of such windows
   double travel_weight = 0.1;  // w where nothing is extruded; 1 where something is
   double jerk_weight = 1.5;    // ρ / (h⁶ (ωh)⁴)
+
+  // Whether the base is to suit more models than the axes as given.
+  [[nodiscard]] bool is_robust() const { return !x.plants.empty() || !y.plants.empty(); }
 };
 
 // What the nozzle shall follow: the plan of a run, or of a part of one.

@@ -119,7 +119,7 @@ class FlexibleAxis {
   // with s at a zero, the nozzle rests. Empty if the highest coefficient vanishes.
   [[nodiscard]] std::vector<std::complex<double>> zeros() const;
   // For how long a motion of the base that moves the nozzle nowhere lasts until it has died away to
-  // a thousandth. With one mode it dies at once. Several modes leave the base such a motion near
+  // 10⁻⁵. With one mode it dies at once. Several modes leave the base such a motion near
   // each antiresonance.
   [[nodiscard]] double unseen_s() const;
 

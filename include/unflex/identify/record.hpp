@@ -20,6 +20,8 @@ enum class Axis { x, y };
 struct Recording {
   double rate_hz = 0.0;
   std::array<std::vector<double>, 3> accel;  // X, Y, Z, of equal length, in any unit
+  // RepRapFirmware turns the sensor's axes into the printer's (M955 I).
+  bool is_along_axes = false;
 };
 
 // Power spectral densities as Klipper computes them from a recording (shaper_calibrate.py): Welch's
@@ -39,14 +41,15 @@ struct DataSet {
   std::vector<std::string> notes;
 };
 
-// Reads the text of a file:
+// Reads a file of records, whatever its name:
 //   Klipper's raw recording, also Shake&Tune's   #time,accel_x,accel_y,accel_z
 //   Klipper's spectrum                           freq,psd_x,psd_y,psd_z,psd_xyz[,shapers:,…],
 //                                                or one column for each of several points
+//   Shake&Tune's .stdata                         lines of JSON, packed by Zstandard
 //   RepRapFirmware's M956                        Sample,X,Y,Z … Rate 1344, overflows 0
 // Errors are of kind input: another header, a line that is no row of numbers, too few rows.
-[[nodiscard]] Result<std::vector<DataSet>> parse_csv(std::string_view text,
-                                                     const std::string& file);
+[[nodiscard]] Result<std::vector<DataSet>> parse_records(std::string_view bytes,
+                                                         const std::string& file);
 
 // The axis a file's name tells: "raw_data_x_1.csv", "resonances_axis=0.000,1.000,0.000.csv".
 [[nodiscard]] std::optional<Axis> axis_in_name(std::string_view file);

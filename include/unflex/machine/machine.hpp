@@ -126,6 +126,12 @@ struct ModeSettings {
   double gain = 0.0;
 };
 
+// Another model that the axis may have, and how probable it is.
+struct PlantSettings {
+  double share = 0.0;
+  std::vector<ModeSettings> modes;
+};
+
 // A printer file gives either freq_hz and damping_ratio, or mass_g, stiffness_n_mm and
 // damping_n_s_mm, which are converted when read, or several modes. Then freq_hz and damping_ratio
 // are those of the mode with the largest gain.
@@ -133,6 +139,7 @@ struct AxisDynamics {
   double freq_hz = 45.0;
   double damping_ratio = 0.06;
   std::vector<ModeSettings> modes = {};
+  std::vector<PlantSettings> plants = {};  // besides the axis as given, which has the rest
 
   [[nodiscard]] double slowest_hz() const;
   [[nodiscard]] double fastest_hz() const;

@@ -42,6 +42,12 @@ struct Sensitivity {
   Spread compensated;
 };
 
+// Contour error of extruding moves if the axes are other models that the settings allow.
+struct PlantDeviation {
+  Spread uncompensated;
+  Spread compensated;
+};
+
 // A run that kept its original moves, and why.
 struct Fallback {
   std::size_t first_line = 0;
@@ -117,7 +123,8 @@ struct Report {
   std::optional<DeviationRows> unshaped;
   DeviationRows compensated;
   std::vector<Sensitivity> sensitivity;  // by rising error
-  std::optional<Robustness> robustness;  // set if a band of frequencies was asked for
+  std::vector<PlantDeviation> plants;    // in the order of the settings
+  std::optional<Robustness> robustness;  // set if the base is to suit more models than one
 
   double base_max_velocity_mm_s = 0.0;
   double base_max_accel_mm_s2 = 0.0;

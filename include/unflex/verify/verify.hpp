@@ -42,6 +42,7 @@ struct Rules {
   planner::Limits limits;
   planner::FirmwareConfig fixed;
   NozzleModel nozzle;
+  std::vector<NozzleModel> plants;  // what else the axes may be
   TravelLimits travel;
   double base_max_velocity_mm_s = 600.0;
   // A run's motors may accelerate that much, and that many times as much as its plan does.

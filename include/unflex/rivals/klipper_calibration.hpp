@@ -1,0 +1,42 @@
+// Which input shaper Klipper's SHAPER_CALIBRATE sets up for a record (klippy/extras/
+// shaper_calibrate.py, commit 84104bb).
+//
+//   P(ν)   power spectral density of the record over ν, as SHAPER_CALIBRATE looks at it
+//   v      share of P that a shaper leaves, at the worst of three damping ratios
+//   s      smoothing: how far the shaper cuts a corner at 5000 mm/s², mm
+//
+// Of all frequencies that leave little more than the least v, it takes the one with the lowest
+// score s (v^1.5 + v/5 + 1/100); of all shapers the one whose score is lower by more than a little.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "unflex/dynamics/shapers.hpp"
+
+namespace unflex::rivals {
+
+struct FittedShaper {
+  dynamics::ShaperKind kind = dynamics::ShaperKind::zv;
+  double freq_hz = 0.0;
+  double vibration = 0.0;  // v
+  double smoothing_mm = 0.0;
+  double score = 0.0;
+
+  // Its pulses, for the damping ratio that Klipper takes if it is told none.
+  [[nodiscard]] dynamics::ShaperPulses pulses() const;
+};
+
+struct KlipperCalibration {
+  std::vector<FittedShaper> shapers;  // ZV, MZV, EI, 2HUMP_EI, 3HUMP_EI, each at its own frequency
+  FittedShaper recommended;
+
+  [[nodiscard]] const FittedShaper& of(dynamics::ShaperKind kind) const;
+};
+
+// `density`: sum over the sensor's columns at k · step_hz, acceleration² per Hz. nullopt if there
+// is no motion in it.
+[[nodiscard]] std::optional<KlipperCalibration> klipper_calibration(
+    double step_hz, const std::vector<double>& density);
+
+}  // namespace unflex::rivals

@@ -1,0 +1,42 @@
+// The part of a spectrum that a fit looks at.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/identify/axis_model.hpp"
+
+namespace unflex::identify {
+
+inline constexpr double kFitFrom_hz = 15.0;
+
+// Which density of a spectrum stands for the axis: the column with three fifths of the energy in
+// the band, as a sensor may be mounted turned, or else the sum of all three.
+struct AxisDensity {
+  std::vector<double> density;        // as Spectrum's
+  std::array<double, 3> direction{};  // roots of the columns' shares of the energy
+};
+
+[[nodiscard]] AxisDensity density_of_axis(const Spectrum& spectrum, const Sweep& sweep);
+
+// The bins of a density in the band of the sweep, relative to their mean, as acceleration.
+struct Band {
+  double step_hz = 0.0;
+  Eigen::Index first = 0;
+  Eigen::ArrayXd freq_hz;
+  Eigen::ArrayXd density;
+  // Joins measured and fitted density before their logarithms are compared. What lies below moves
+  // the nozzle little, and must not cost a mode.
+  Eigen::ArrayXd floor = {};
+
+  [[nodiscard]] Eigen::ArrayXd logarithms() const { return (density + floor).log(); }
+  [[nodiscard]] double top_hz() const { return freq_hz[freq_hz.size() - 1]; }
+};
+
+// Errors are of kind input: too few frequencies, or no motion.
+[[nodiscard]] Result<Band> band_of(const Spectrum& spectrum, const std::vector<double>& density,
+                                   const Sweep& sweep);
+
+}  // namespace unflex::identify

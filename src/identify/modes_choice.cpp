@@ -1,0 +1,154 @@
+#include "modes_choice.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace unflex::identify {
+namespace {
+
+// Order of the modes by their swing, those in the band first.
+std::vector<Eigen::Index> by_swing(const std::vector<ModeOfAxis>& modes, const Band& band) {
+  std::vector<Eigen::Index> order(modes.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    order[i] = static_cast<Eigen::Index>(i);
+  }
+  const double top_hz = band.top_hz();
+  const auto swing = [&](Eigen::Index i) {
+    const ModeOfAxis& mode = modes[static_cast<std::size_t>(i)];
+    const bool is_inside = mode.freq_hz <= top_hz;
+    return (is_inside ? 1.0 : 1e-6) * std::abs(mode.gain) / (mode.damping_ratio * mode.freq_hz);
+  };
+  std::ranges::stable_sort(order, std::ranges::greater{}, swing);
+  return order;
+}
+
+// Main mode first.
+Eigen::VectorXd in_order(const Eigen::VectorXd& theta, const Band& band) {
+  Eigen::VectorXd result = theta;
+  Eigen::Index to = 0;
+  for (const Eigen::Index from : by_swing(modes_of(theta), band)) {
+    result.segment(3 * to++, 3) = theta.segment(3 * from, 3);
+  }
+  return result;
+}
+
+// Why a solution is not to be trusted; empty if it is.
+std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesModel& model) {
+  constexpr double kMostGain = 2.9;
+  constexpr double kLeastGain = -1.9;
+  constexpr double kMostOfAllGains = 3.0;
+  constexpr double kNoiseEnds = 1.35;  // of the band's start
+  constexpr double kNear = 1.03;
+  constexpr double kMostDampingOfMain = 0.3;
+  double all = 0.0;
+  const std::vector<ModeOfAxis> modes = modes_of(theta);
+  for (const ModeOfAxis& mode : modes) {
+    all += std::abs(mode.gain);
+    if (!(mode.gain < kMostGain && mode.gain > kLeastGain)) {
+      return "its gains nearly cancel";
+    }
+    if (mode.freq_hz < kNoiseEnds * band.freq_hz[0]) {
+      return "what it takes for a resonance may be the noise at low frequencies";
+    }
+    if (mode.damping_ratio > kMostDamping / kNear) {
+      return "its damping grows without bound";
+    }
+    if (mode.damping_ratio < kLeastDamping * kNear && &mode == &modes.front()) {
+      return "its damping vanishes";
+    }
+  }
+  if (modes.front().damping_ratio > kMostDampingOfMain) {
+    return "its damping grows without bound";
+  }
+  if (all > kMostOfAllGains) {
+    return "its gains nearly cancel";
+  }
+  if (modes.front().freq_hz > band.top_hz()) {
+    return "its resonance lies at the edge of the sweep or beyond";
+  }
+  Eigen::Index at = 0;
+  (band.freq_hz - modes.front().freq_hz).abs().minCoeff(&at);
+  if (model.mode_density(theta, 0)[at] < 2.0 * model.noise_density(theta)[at]) {
+    return "its resonance does not stand out of the noise";
+  }
+  return {};
+}
+
+bool has_mode_near(const Eigen::VectorXd& theta, double freq_log) {
+  constexpr double kNear = 0.05;
+  for (Eigen::Index m = 0; m < modes_in(theta); ++m) {
+    if (std::abs(theta[3 * m] - freq_log) < kNear) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// How (log f, log ζ, g) of another fit differ, for each mode of the best from its nearest.
+Eigen::VectorXd difference(const std::vector<ModeOfAxis>& best,
+                           const std::vector<ModeOfAxis>& other) {
+  constexpr double kFarthest = 0.15;
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(best.size()));
+  for (std::size_t m = 0; m < best.size(); ++m) {
+    const auto distance = [&](const ModeOfAxis& mode) {
+      return std::abs(std::log(mode.freq_hz / best[m].freq_hz));
+    };
+    const ModeOfAxis nearest = std::ranges::min(other, {}, distance);
+    if (distance(nearest) < kFarthest) {
+      result.segment(3 * static_cast<Eigen::Index>(m), 3)
+          << std::log(nearest.freq_hz / best[m].freq_hz),
+          std::log(nearest.damping_ratio / best[m].damping_ratio), nearest.gain - best[m].gain;
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
+              const ModesModel& model) {
+  constexpr double kNearlyEqual = 2.0;  // differences of the criterion
+  constexpr double kPhaseWorth = 4.0;
+  const auto merit = [](const Solution& s) {
+    return s.bic + (s.is_minimum_phase ? 0.0 : kPhaseWorth);
+  };
+  std::vector<const Solution*> all;
+  for (const std::vector<Solution>& some : found) {
+    for (const Solution& solution : some) {
+      all.push_back(&solution);
+    }
+  }
+  std::ranges::stable_sort(all, {}, [&](const Solution* s) { return merit(*s); });
+  Choice choice;
+  double odds = 1.0;
+  choice.theta = in_order(all.front()->fit.parameters, band);
+  choice.spread = Eigen::MatrixXd::Zero(choice.theta.size() - 2, choice.theta.size() - 2);
+  for (const Solution* solution : all) {
+    const Eigen::VectorXd theta = in_order(solution->fit.parameters, band);
+    const std::string reason = doubt(theta, band, model);
+    if (!reason.empty()) {
+      if (choice.best == nullptr && choice.doubt.empty()) {
+        choice.doubt = reason;
+      }
+    } else if (choice.best == nullptr) {
+      choice.best = solution;
+      choice.theta = theta;
+      choice.spread = Eigen::MatrixXd::Zero(theta.size() - 2, theta.size() - 2);
+    } else {
+      const double worse = merit(*solution) - merit(*choice.best);
+      const double odd = std::exp(-0.5 * worse);
+      const Eigen::VectorXd off = difference(modes_of(choice.theta), modes_of(theta));
+      choice.spread += odd * off * off.transpose();
+      odds += odd;
+      if (worse < kNearlyEqual &&
+          (!has_mode_near(choice.theta, theta[0]) || !has_mode_near(theta, choice.theta[0]))) {
+        choice.rivals.push_back(theta);
+        choice.rival_odds.push_back(odd);
+      }
+    }
+  }
+  choice.spread /= odds;
+  return choice;
+}
+
+}  // namespace unflex::identify

@@ -1,0 +1,25 @@
+// Which of the fits of a record to trust.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "band.hpp"
+#include "modes_search.hpp"
+
+namespace unflex::identify {
+
+struct Choice {
+  const Solution* best = nullptr;  // none: no fit is to be trusted
+  Eigen::VectorXd theta;           // of the best, or else of the closest; main mode first
+  std::vector<Eigen::VectorXd> rivals;
+  std::vector<double> rival_odds;  // to the best's 1
+  std::string doubt;               // of the closest of all, where it is not the best
+  Eigen::MatrixXd spread;  // of (log f, log ζ, g) among the fits that nearly equal the best
+};
+
+// `found` as search() finds it.
+[[nodiscard]] Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
+                            const ModesModel& model);
+
+}  // namespace unflex::identify
