@@ -105,6 +105,14 @@ void combine_records(Identification& all) {
   }
   for (const auto& [axis, models] : by_axis) {
     all.axes[axis] = combine(models);
+    if (!agree(models)) {
+      Diagnostic warning;
+      warning.message = fmt::format(
+          "the records along {} disagree by more than 5 %, as if they were of different machines; "
+          "leave out those that are not of today's",
+          letter(axis));
+      all.warnings.push_back(to_string(warning));
+    }
   }
   for (const IdentifiedRecord& record : all.records) {
     if (record.fit.is_trusted()) {

@@ -223,12 +223,27 @@ std::vector<Plant> other_plants(const AxisModel& model) {
   return others;
 }
 
+bool agree(const std::vector<AxisModel>& models) {
+  constexpr double kApart = 0.05;
+  const auto main_log = [](const AxisModel& model) {
+    return std::log(model.values().front().freq_hz);
+  };
+  const auto [least, most] = std::ranges::minmax(models, {}, main_log);
+  return main_log(most) - main_log(least) < kApart;
+}
+
 AxisModel combine(const std::vector<AxisModel>& models) {
   if (models.size() == 1) {
     return models.front();
   }
   const std::vector<Measurement> all = measurements(models);
-  return all.empty() ? with_others_as_plants(models) : averaged(all);
+  if (all.empty()) {
+    return with_others_as_plants(models);
+  }
+  // Means of gains say nothing where the records share them out in other ways.
+  AxisModel mean = averaged(all);
+  const Estimate& gain = mean.modes.front().gain;
+  return gain.low < 0.0 && gain.high > 0.0 ? with_others_as_plants(models) : mean;
 }
 
 }  // namespace unflex::identify

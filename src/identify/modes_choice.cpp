@@ -40,10 +40,19 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
   constexpr double kNoiseEnds = 1.35;  // of the band's start
   constexpr double kNear = 1.03;
   constexpr double kMostDampingOfMain = 0.3;
+  constexpr double kLeastOfPair = 0.25;
+  constexpr double kApart = 0.15;
   double all = 0.0;
   const std::vector<ModeOfAxis> modes = modes_of(theta);
   for (const ModeOfAxis& mode : modes) {
     all += std::abs(mode.gain);
+    for (const ModeOfAxis& other : modes) {
+      // Two modes at one place that work against each other stand for a shape that is neither's.
+      if (mode.gain > kLeastOfPair && other.gain < -kLeastOfPair &&
+          std::abs(std::log(mode.freq_hz / other.freq_hz)) < kApart) {
+        return "its gains nearly cancel";
+      }
+    }
     if (!(mode.gain < kMostGain && mode.gain > kLeastGain)) {
       return "its gains nearly cancel";
     }
@@ -63,8 +72,14 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
   if (all > kMostOfAllGains) {
     return "its gains nearly cancel";
   }
-  if (modes.front().freq_hz > band.top_hz()) {
-    return "its resonance lies at the edge of the sweep or beyond";
+  // What is known of the damping beyond the sweep is little.
+  const auto swing = [](const ModeOfAxis& mode, double least_damping) {
+    return std::abs(mode.gain) / (std::max(mode.damping_ratio, least_damping) * mode.freq_hz);
+  };
+  for (const ModeOfAxis& mode : modes) {
+    if (mode.freq_hz > band.top_hz() && swing(mode, 0.05) >= swing(modes.front(), 0.0)) {
+      return "its resonance lies at the edge of the sweep or beyond";
+    }
   }
   Eigen::Index at = 0;
   (band.freq_hz - modes.front().freq_hz).abs().minCoeff(&at);
@@ -132,6 +147,7 @@ Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
       }
     } else if (choice.best == nullptr) {
       choice.best = solution;
+      choice.closer_by = merit(*solution) - merit(*all.front());
       choice.theta = theta;
       choice.spread = Eigen::MatrixXd::Zero(theta.size() - 2, theta.size() - 2);
     } else {

@@ -15,6 +15,7 @@ struct Choice {
   std::vector<Eigen::VectorXd> rivals;
   std::vector<double> rival_odds;  // to the best's 1
   std::string doubt;               // of the closest of all, where it is not the best
+  double closer_by = 0.0;          // by how much the closest of all is the better one then
   Eigen::MatrixXd spread;  // of (log f, log ζ, g) among the fits that nearly equal the best
 };
 

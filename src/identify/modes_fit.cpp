@@ -56,9 +56,11 @@ void add_rivals(const Choice& choice, AxisModel& model) {
 
 // Why the record carries no model; empty if it does.
 std::string refusal_of(const Choice& choice, const Band& band, const RecordFit& record,
-                       const Misfit& misfit) {
+                       const Eigen::MatrixXd& covariance, const Misfit& misfit) {
   constexpr double kWorstScatter = 0.6;
   constexpr double kWidestInterval = 1.35;
+  constexpr double kWidestSwing = 0.4;  // standard deviation
+  constexpr double kTooMuch = 0.35;
   const double still = record.bic.front();
   if (*std::ranges::min_element(record.bic) > still - kWorthOfAMode) {
     return "it shows no resonance";
@@ -75,19 +77,26 @@ std::string refusal_of(const Choice& choice, const Band& band, const RecordFit& 
     return fmt::format("its main resonance may be anywhere from {:.0f} to {:.0f} Hz",
                        main.freq_hz.low, main.freq_hz.high);
   }
-  if (main.gain.low < 0.0 && main.gain.high > 0.0) {
+  // Gains of modes close to each other may be open although their sum is not.
+  const double spread = spread_of_response(main.freq_hz.value, record.model.values(), covariance);
+  if (spread > kWidestSwing) {
     return fmt::format("it leaves open how strong its resonance at {:.1f} Hz is",
                        main.freq_hz.value);
+  }
+  if (misfit.unexplained > kTooMuch) {
+    return fmt::format("{} cannot explain it: {:.0f} % of what was measured is something else",
+                       numbered(modes), 100.0 * misfit.unexplained);
   }
   return misfit.other_peak_hz > 0.0 ? fmt::format("{} cannot explain its peak near {:.1f} Hz",
                                                   numbered(modes), misfit.other_peak_hz)
                                     : std::string{};
 }
 
-void add_warnings(const Choice& choice, RecordFit& record) {
-  constexpr double kTooMuch = 0.35;
+void add_warnings(const Choice& choice, const Band& band, RecordFit& record) {
+  constexpr double kLargeGain = 0.15;
+  constexpr double kMuch = 0.25;
   const std::size_t modes = record.model.modes.size();
-  if (!choice.doubt.empty()) {
+  if (!choice.doubt.empty() && choice.closer_by > kWorthOfAMode) {
     record.warnings.push_back(fmt::format("a closer fit than that of {} is not to be trusted: {}",
                                           numbered(modes), choice.doubt));
   }
@@ -97,7 +106,15 @@ void add_warnings(const Choice& choice, RecordFit& record) {
                     "more",
                     std::exp(choice.rivals.front()[0]), record.model.modes.front().freq_hz.value));
   }
-  if (record.unexplained > kTooMuch) {
+  for (const ModeEstimate& mode : record.model.modes) {
+    if (mode.freq_hz.value > band.top_hz() && std::abs(mode.gain.value) > kLargeGain) {
+      record.warnings.push_back(
+          fmt::format("its mode at {:.0f} Hz lies beyond the sweep, so that little is known of it; "
+                      "sweep further, and say with --freq-end how far",
+                      mode.freq_hz.value));
+    }
+  }
+  if (record.unexplained > kMuch) {
     record.warnings.push_back(
         fmt::format("{} cannot explain this: {:.0f} % of what was measured is something else",
                     numbered(modes), 100.0 * record.unexplained));
@@ -125,16 +142,17 @@ Result<ModesFit> fit_modes(const Spectrum& spectrum, const Sweep& sweep) {
   fit.theta = choice.theta;
   fit.has_rivals = !choice.rivals.empty();
   const Prior prior = prior_of(modes_in(fit.theta), sweep);
-  record.model = model_of(Method::spectrum, modes_of(fit.theta),
-                          covariance_of_modes(model, *band, prior, fit.theta) + choice.spread);
+  const Eigen::MatrixXd covariance =
+      covariance_of_modes(model, *band, prior, fit.theta) + choice.spread;
+  record.model = model_of(Method::spectrum, modes_of(fit.theta), covariance);
   add_rivals(choice, record.model);
   fill_curves(*band, model, fit.theta, record.curve);
   const Misfit misfit = misfit_of(band->freq_hz, band->density, model.density(fit.theta),
                                   model.noise_density(fit.theta).minCoeff(), 3);
   record.unexplained = misfit.unexplained;
-  record.refusal = refusal_of(choice, *band, record, misfit);
+  record.refusal = refusal_of(choice, *band, record, covariance, misfit);
   if (record.is_trusted()) {
-    add_warnings(choice, record);
+    add_warnings(choice, *band, record);
   } else {
     record.refusal +=
         "; check that the sensor sits tight and measure again with a higher ACCEL_PER_HZ";

@@ -15,6 +15,7 @@ namespace unflex::identify {
 namespace {
 
 constexpr double kQuantile = 1.959964;  // of the normal distribution, 97.5 %
+constexpr double kStep = 1e-4;          // of differences, in standard deviations
 
 Eigen::MatrixXd correlations(const ModesModel& model, Eigen::Index bins) {
   Eigen::MatrixXd result(bins, bins);
@@ -70,6 +71,12 @@ std::vector<ModeOfAxis> moved(const std::vector<ModeOfAxis>& modes, const Eigen:
   return result;
 }
 
+// A matrix R with R Rᵀ the covariance.
+Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(covariance);
+  return parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
 // The fit, and points to either side along the two directions of the covariance that change H the
 // most, per frequency: √3 standard deviations away with a sixth of the weight each, which gives
 // mean and variance along them (Julier and Uhlmann, Unscented Filtering and Nonlinear Estimation,
@@ -77,11 +84,8 @@ std::vector<ModeOfAxis> moved(const std::vector<ModeOfAxis>& modes, const Eigen:
 std::vector<Plant> plants_of(const Eigen::ArrayXd& freq_hz, const std::vector<ModeOfAxis>& modes,
                              const Eigen::MatrixXd& covariance) {
   constexpr Eigen::Index kDirections = 2;
-  constexpr double kStep = 1e-4;
   const Eigen::Index count = covariance.rows();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(covariance);
-  const Eigen::MatrixXd root =
-      parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd root = root_of(covariance);
   const Eigen::ArrayXcd middle = response_of(freq_hz, modes);
   Eigen::MatrixXd change(2 * freq_hz.size(), count);
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -132,6 +136,20 @@ Eigen::ArrayXcd response_of(const Eigen::ArrayXd& freq_hz, const std::vector<Mod
     sum += mode.gain * mode_response(freq_hz, mode.freq_hz, mode.damping_ratio);
   }
   return sum;
+}
+
+double spread_of_response(double freq_hz, const std::vector<ModeOfAxis>& modes,
+                          const Eigen::MatrixXd& covariance) {
+  const Eigen::ArrayXd place = Eigen::ArrayXd::Constant(1, freq_hz);
+  const std::complex<double> middle = response_of(place, modes)[0];
+  const Eigen::MatrixXd root = root_of(covariance);
+  double variance = 0.0;
+  for (Eigen::Index i = 0; i < root.cols(); ++i) {
+    const std::complex<double> by =
+        (response_of(place, moved(modes, kStep * root.col(i)))[0] - middle) / kStep;
+    variance += std::pow((by / middle).real(), 2);
+  }
+  return std::sqrt(variance);
 }
 
 AxisModel model_of(Method method, const std::vector<ModeOfAxis>& modes,

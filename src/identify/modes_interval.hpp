@@ -20,6 +20,10 @@ namespace unflex::identify {
 [[nodiscard]] Eigen::ArrayXcd response_of(const Eigen::ArrayXd& freq_hz,
                                           const std::vector<ModeOfAxis>& modes);
 
+// Standard deviation of |H(ν)| at one frequency, as a share of it.
+[[nodiscard]] double spread_of_response(double freq_hz, const std::vector<ModeOfAxis>& modes,
+                                        const Eigen::MatrixXd& covariance);
+
 // The modes with their intervals, and plants around them, by the covariance of (log f, log ζ, g).
 [[nodiscard]] AxisModel model_of(Method method, const std::vector<ModeOfAxis>& modes,
                                  const Eigen::MatrixXd& covariance);

@@ -4,6 +4,8 @@
 // after the peak from which on this fits about as well as from any later one.
 #include "ring_fit.hpp"
 
+#include <fmt/core.h>
+
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -168,10 +170,20 @@ Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz
   record.unexplained = std::min(
       1.0, std::sqrt(ring->fit.residual.head(shown).square().sum() / signal.square().sum()));
   constexpr double kTooMuch = 0.5;
+  // What sounds on for a hundred periods, or faster than any belt swings, is a motor's step.
+  constexpr double kLeastDamping = 0.005;
+  constexpr double kFastest_hz = 180.0;
   if (record.unexplained > kTooMuch) {
     record.refusal =
         "one mode does not explain this: the decay is noise or several resonances; record a sweep, "
         "or the stop after a faster move";
+  }
+  if (damping_ratio < kLeastDamping || freq_hz > kFastest_hz) {
+    record.refusal = fmt::format(
+        "what sounds in it at {:.1f} Hz is no belt but a motor or a fan; record a sweep, or the "
+        "stop "
+        "after a fast move",
+        freq_hz);
   }
   record.curve.is_spectrum = false;
   for (Eigen::Index i = 0; i < shown; ++i) {

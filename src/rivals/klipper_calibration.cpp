@@ -110,7 +110,7 @@ std::vector<FittedShaper> tried(const Candidate& candidate, const Bins& bins) {
 
 // Not much worse than the one that leaves least, but much less smoothing.
 FittedShaper selected(const std::vector<FittedShaper>& results) {
-  // Of equals the highest frequency counts.
+  // Among equals the highest frequency counts.
   const auto least =
       std::ranges::min_element(results.rbegin(), results.rend(), {}, &FittedShaper::vibration);
   FittedShaper best = *least;

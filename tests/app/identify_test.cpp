@@ -100,6 +100,14 @@ TEST_F(Identify, WritesAPageOfItsOwn) {
   EXPECT_EQ(page.find("http://"), std::string::npos);
 }
 
+TEST_F(Identify, SaysWhereRecordsDisagree) {
+  write_file(path("b_x.csv"), ringing(45.0, 40.0));
+  const Outcome outcome = run({"identify", "a_x.csv", "b_x.csv", "-q"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("the records along x disagree by more than 5 %"));
+  EXPECT_THAT(outcome.out, HasSubstr("[[dynamics.x.plant]]"));
+}
+
 TEST_F(Identify, TakesARingingTower) {
   const Outcome outcome = run({"identify", "--wave-spacing-mm", "2", "--speed-mm-s", "100",
                                "--decay", "1.5", "--axis", "y", "-q"});

@@ -62,6 +62,16 @@ TEST(Ringing, ThatDrownsInNoiseIsRefusedOrDoubted) {
   EXPECT_TRUE(!fit || !fit->is_trusted());
 }
 
+// A stepper that runs on sounds at the frequency of its steps and does not die away.
+TEST(Ringing, OfAMotorIsRefused) {
+  for (const auto& [tone_hz, damping_ratio] : {std::pair{120.0, 0.0005}, std::pair{210.0, 0.03}}) {
+    const Result<RecordFit> fit =
+        fit_recording(stop_of_a_move(tone_hz, damping_ratio, 5.0), Axis::x, {});
+    ASSERT_TRUE(fit);
+    EXPECT_THAT(fit->refusal, ::testing::HasSubstr("is no belt but a motor or a fan"));
+  }
+}
+
 TEST(Tower, TellsFrequencyBySpacingAndDampingByDecay) {
   const double damping_ratio = 0.08;
   const double decay = std::exp(2.0 * std::numbers::pi * damping_ratio /
@@ -147,6 +157,11 @@ TEST(Combined, RecordsThatDisagreeWidenTheIntervalAndThePlants) {
   }
   EXPECT_LT(lowest_hz, 40.1);
   EXPECT_NEAR(shares, 1.0, 1e-12);
+}
+
+TEST(Combined, RecordsAgreeIfTheirMainModesDo) {
+  EXPECT_TRUE(agree({measured(40.0, 0.01), measured(41.0, 0.01)}));
+  EXPECT_FALSE(agree({measured(40.0, 0.01), measured(40.5, 0.1), measured(43.0, 0.1)}));
 }
 
 TEST(Combined, ModesAreMatchedByFrequency) {

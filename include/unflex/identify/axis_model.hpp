@@ -107,6 +107,9 @@ struct Sweep {
                                               const Sweep& sweep);
 [[nodiscard]] Result<RecordFit> fit_spectrum(const Spectrum& spectrum, const Sweep& sweep);
 
+// Whether the main modes of these models are within 5 % of each other.
+[[nodiscard]] bool agree(const std::vector<AxisModel>& models);
+
 // The plants besides the estimate, at most six. None if all of them swing as it does within 3 %, as
 // those of a good record do.
 [[nodiscard]] std::vector<Plant> other_plants(const AxisModel& model);

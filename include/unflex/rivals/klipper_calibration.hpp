@@ -5,8 +5,9 @@
 //   v      share of P that a shaper leaves, at the worst of three damping ratios
 //   s      smoothing: how far the shaper cuts a corner at 5000 mm/s², mm
 //
-// Of all frequencies that leave little more than the least v, it takes the one with the lowest
-// score s (v^1.5 + v/5 + 1/100); of all shapers the one whose score is lower by more than a little.
+// A shaper gets the frequency with the lowest score s (v^1.5 + v/5 + 1/100) among those that leave
+// little more than the least v. Recommended is the shaper whose score is lower by more than a
+// little.
 #pragma once
 
 #include <optional>
