@@ -77,6 +77,19 @@ Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
   return parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
+// A step that goes no farther than H changes about evenly with (log f, log ζ, g).
+Eigen::VectorXd shortened(const Eigen::VectorXd& step) {
+  constexpr double kFreq = 0.1;
+  constexpr double kDamping = 0.7;
+  constexpr double kGain = 0.3;
+  double share = 1.0;
+  for (Eigen::Index i = 0; i < step.size(); ++i) {
+    const double most = i % 3 == 0 ? kFreq : i % 3 == 1 ? kDamping : kGain;
+    share = std::min(share, most / std::max(std::abs(step[i]), most));
+  }
+  return share * step;
+}
+
 // The fit, and points to either side along the two directions of the covariance that change H the
 // most, per frequency: √3 standard deviations away with a sixth of the weight each, which gives
 // mean and variance along them (Julier and Uhlmann, Unscented Filtering and Nonlinear Estimation,
@@ -97,7 +110,7 @@ std::vector<Plant> plants_of(const Eigen::ArrayXd& freq_hz, const std::vector<Mo
   std::vector<Plant> plants = {{.modes = modes, .share = 1.0 - kDirections / 3.0}};
   for (Eigen::Index i = 0; i < kDirections; ++i) {
     const Eigen::VectorXd along =
-        std::sqrt(3.0) * (root * swings.eigenvectors().col(count - 1 - i));
+        shortened(std::sqrt(3.0) * (root * swings.eigenvectors().col(count - 1 - i)));
     plants.push_back({.modes = moved(modes, along), .share = 1.0 / 6.0});
     plants.push_back({.modes = moved(modes, -along), .share = 1.0 / 6.0});
   }
