@@ -153,6 +153,10 @@ void add_study(CLI::App& program, RunConfig& config) {
   command->add_option("--case", config.cases, "Only this case of the corner; repeatable")
       ->type_name("NAME")
       ->allow_extra_args(false);
+  command
+      ->add_option("--machines", config.machines,
+                   "With IN: judge unflex and shapers on the machines whose records are in DIR")
+      ->type_name("DIR");
   add_common_options(*command, config);
   add_engine(*command, config, "What solves for unflex: banded (auto), or ipopt");
   add_jobs(*command, config);
@@ -359,6 +363,9 @@ Status complete(RunConfig& config) {
   }
   if (config.command == Command::study && !config.input.empty() && !config.cases.empty()) {
     return usage("--case is of the corner; a print has none");
+  }
+  if (config.command == Command::study && config.input.empty() && !config.machines.empty()) {
+    return usage("--machines needs a print to judge them by");
   }
   if (config.command == Command::study && config.input.empty() &&
       (config.printer_file || !config.overrides.empty())) {

@@ -14,6 +14,7 @@
 #include "identify.hpp"
 #include "inspection.hpp"
 #include "log.hpp"
+#include "machines.hpp"
 #include "print_run.hpp"
 #include "printer_init.hpp"
 #include "printer_line_test.hpp"
@@ -140,7 +141,7 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
     case Command::identify:
       return run_identify(config, console);
     case Command::study:
-      return run_study(config, console);
+      return config.machines.empty() ? run_study(config, console) : run_machines(config, console);
     case Command::batch:
       return run_batch(config, console);
     case Command::compensate:

@@ -48,6 +48,7 @@ AxisDensity density_of_axis(const Spectrum& spectrum, const Sweep& sweep) {
     result.density = spectrum.density[most];
     return result;
   }
+  result.most_of_sum = most;
   const std::size_t length = std::ranges::min(
       {spectrum.density[0].size(), spectrum.density[1].size(), spectrum.density[2].size()});
   for (std::size_t k = 0; k < length; ++k) {

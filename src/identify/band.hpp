@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "unflex/core/error.hpp"
@@ -15,7 +17,9 @@ inline constexpr double kFitFrom_hz = 15.0;
 // Which density of a spectrum stands for the axis: the column with three fifths of the energy in
 // the band, as a sensor may be mounted turned, or else the sum of all three.
 struct AxisDensity {
-  std::vector<double> density;        // as Spectrum's
+  std::vector<double> density;  // as Spectrum's
+  // The column with the most energy, where the density is the sum.
+  std::optional<std::size_t> most_of_sum;
   std::array<double, 3> direction{};  // roots of the columns' shares of the energy
 };
 

@@ -134,22 +134,6 @@ AxisModel averaged(const std::vector<Measurement>& all) {
   return model_of(Method::combined, modes_of_parameters(mean), covariance);
 }
 
-using Modes = std::vector<ModeOfAxis>;
-
-Eigen::ArrayXd places_hz() { return Eigen::ArrayXd::LinSpaced(120, 12.0, 131.0); }
-
-// How far apart the nozzles of two models swing, per speed of the base.
-double distance(const Modes& a, const Modes& b) {
-  const Eigen::ArrayXd places = places_hz();
-  return ((response_of(places, a) - response_of(places, b)) / places).matrix().norm();
-}
-
-// How far a nozzle swings from its base, likewise.
-double swing(const Modes& modes) {
-  const Eigen::ArrayXd places = places_hz();
-  return ((response_of(places, modes) - 1.0) / places).matrix().norm();
-}
-
 double width(const AxisModel& model) {
   const Estimate& main_hz = model.modes.front().freq_hz;
   return std::log(main_hz.high / main_hz.low);

@@ -67,11 +67,11 @@ LeastSquares minimise(const Model& model, const Eigen::ArrayXd& data, const Eige
   return fit;
 }
 
-namespace {
-
 double soft_loss(const Eigen::ArrayXd& residual, double scale) {
   return 2.0 * scale * scale * (((residual / scale).square() + 1.0).sqrt() - 1.0).sum();
 }
+
+namespace {
 
 double prior_cost(const Prior& prior, const Eigen::VectorXd& at) {
   return (prior.precision.array() * (at - prior.centre).array().square()).sum();

@@ -44,6 +44,9 @@ struct RobustFit {
   double cost = 0.0;       // with the prior
 };
 
+// Σ 2s² (√(1 + r²/s²) − 1) over residuals r.
+[[nodiscard]] double soft_loss(const Eigen::ArrayXd& residual, double scale);
+
 // Minimises the soft L1 loss Σ 2s² (√(1 + r²/s²) − 1) plus Σ precision (θ − centre)² within bounds,
 // by Levenberg's and Marquardt's method with weights of its own for each step. Parameters on a
 // bound that want to leave it are held.

@@ -2,9 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+
+#include "modes_interval.hpp"
 
 namespace unflex::identify {
 namespace {
+
+constexpr std::string_view kTooDamped = "its damping grows without bound";
 
 // Order of the modes by their swing, those in the band first.
 std::vector<Eigen::Index> by_swing(const std::vector<ModeOfAxis>& modes, const Band& band) {
@@ -60,14 +65,14 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
       return "what it takes for a resonance may be the noise at low frequencies";
     }
     if (mode.damping_ratio > kMostDamping / kNear) {
-      return "its damping grows without bound";
+      return std::string(kTooDamped);
     }
     if (mode.damping_ratio < kLeastDamping * kNear && &mode == &modes.front()) {
       return "its damping vanishes";
     }
   }
   if (modes.front().damping_ratio > kMostDampingOfMain) {
-    return "its damping grows without bound";
+    return std::string(kTooDamped);
   }
   if (all > kMostOfAllGains) {
     return "its gains nearly cancel";
@@ -87,6 +92,12 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
     return "its resonance does not stand out of the noise";
   }
   return {};
+}
+
+// In the lowest mode of a chain of masses all move the same way, as they do at rest.
+bool lowest_is_positive(const Eigen::VectorXd& theta) {
+  const std::vector<ModeOfAxis> modes = modes_of(theta);
+  return std::ranges::min(modes, {}, &ModeOfAxis::freq_hz).gain > 0.0;
 }
 
 bool has_mode_near(const Eigen::VectorXd& theta, double freq_log) {
@@ -118,14 +129,47 @@ Eigen::VectorXd difference(const std::vector<ModeOfAxis>& best,
   return result;
 }
 
+// Takes a solution that is `worse` by the criterion for a rival, if it is nearly as good as the
+// best and its response differs from that of all before. A machine may well be damped more than a
+// fit is trusted with.
+void add_rival(const Solution& solution, double worse, const Band& band, const ModesModel& model,
+               Choice& choice) {
+  constexpr double kNearlyEqual = 6.0;
+  constexpr double kAsGood = 2.0;
+  constexpr double kOther = 0.07;
+  const Eigen::VectorXd theta = in_order(solution.fit.parameters, band);
+  const std::string reason = doubt(theta, band, model);
+  if (worse > kNearlyEqual || (!reason.empty() && reason != kTooDamped)) {
+    return;
+  }
+  const std::vector<ModeOfAxis> modes = modes_of(theta);
+  const std::vector<ModeOfAxis> best = modes_of(choice.theta);
+  const double far = kOther * swing(best);
+  const bool is_known =
+      distance(modes, best) < far || std::ranges::any_of(choice.rivals, [&](const Rival& rival) {
+        return distance(modes, modes_of(rival.theta)) < far;
+      });
+  if (!is_known) {
+    choice.rivals.push_back(
+        {theta, std::exp(-0.5 * std::max(worse, 0.0)),
+         reason.empty() && worse < kAsGood &&
+             (!has_mode_near(choice.theta, theta[0]) || !has_mode_near(theta, choice.theta[0]))});
+  }
+}
+
 }  // namespace
+
+bool has_other_main(const Choice& choice) {
+  return std::ranges::any_of(choice.rivals, &Rival::has_other_main);
+}
 
 Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
               const ModesModel& model) {
-  constexpr double kNearlyEqual = 2.0;  // differences of the criterion
-  constexpr double kPhaseWorth = 4.0;
+  constexpr double kPhaseWorth = 4.0;  // of the criterion
+  constexpr double kSignWorth = 6.0;
   const auto merit = [](const Solution& s) {
-    return s.bic + (s.is_minimum_phase ? 0.0 : kPhaseWorth);
+    return s.bic + (s.is_minimum_phase ? 0.0 : kPhaseWorth) +
+           (lowest_is_positive(s.fit.parameters) ? 0.0 : kSignWorth);
   };
   std::vector<const Solution*> all;
   for (const std::vector<Solution>& some : found) {
@@ -151,19 +195,18 @@ Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
       choice.theta = theta;
       choice.spread = Eigen::MatrixXd::Zero(theta.size() - 2, theta.size() - 2);
     } else {
-      const double worse = merit(*solution) - merit(*choice.best);
-      const double odd = std::exp(-0.5 * worse);
+      const double odd = std::exp(-0.5 * (merit(*solution) - merit(*choice.best)));
       const Eigen::VectorXd off = difference(modes_of(choice.theta), modes_of(theta));
       choice.spread += odd * off * off.transpose();
       odds += odd;
-      if (worse < kNearlyEqual &&
-          (!has_mode_near(choice.theta, theta[0]) || !has_mode_near(theta, choice.theta[0]))) {
-        choice.rivals.push_back(theta);
-        choice.rival_odds.push_back(odd);
-      }
     }
   }
   choice.spread /= odds;
+  for (const Solution* solution : all) {
+    if (choice.best != nullptr && solution != choice.best) {
+      add_rival(*solution, merit(*solution) - merit(*choice.best), band, model, choice);
+    }
+  }
   return choice;
 }
 

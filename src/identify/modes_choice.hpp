@@ -9,15 +9,24 @@
 
 namespace unflex::identify {
 
+// Another fit that is nearly as good, with another response.
+struct Rival {
+  Eigen::VectorXd theta;
+  double odds = 0.0;            // to the best's 1
+  bool has_other_main = false;  // its main mode is none of the best's, or the other way round
+};
+
 struct Choice {
   const Solution* best = nullptr;  // none: no fit is to be trusted
   Eigen::VectorXd theta;           // of the best, or else of the closest; main mode first
-  std::vector<Eigen::VectorXd> rivals;
-  std::vector<double> rival_odds;  // to the best's 1
-  std::string doubt;               // of the closest of all, where it is not the best
-  double closer_by = 0.0;          // by how much the closest of all is the better one then
+  std::vector<Rival> rivals;
+  std::string doubt;       // of the closest of all, where it is not the best
+  double closer_by = 0.0;  // by how much the closest of all is the better one then
   Eigen::MatrixXd spread;  // of (log f, log ζ, g) among the fits that nearly equal the best
 };
+
+// Whether main modes differ between rivals, so that the record leaves open which one it is.
+[[nodiscard]] bool has_other_main(const Choice& choice);
 
 // `found` as search() finds it.
 [[nodiscard]] Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,

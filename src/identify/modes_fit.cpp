@@ -35,22 +35,23 @@ void fill_curves(const Band& band, const ModesModel& model, const Eigen::VectorX
   }
 }
 
-// Other models that fit as well become plants, and the main mode may lie where theirs does.
+// Other models that fit about as well become plants. The main mode may lie where theirs does.
 void add_rivals(const Choice& choice, AxisModel& model) {
   double odds = 1.0;
-  for (const double rival : choice.rival_odds) {
-    odds += rival;
+  for (const Rival& rival : choice.rivals) {
+    odds += rival.odds;
   }
   for (Plant& plant : model.plants) {
     plant.share /= odds;
   }
   Estimate& main_hz = model.modes.front().freq_hz;
-  for (std::size_t i = 0; i < choice.rivals.size(); ++i) {
-    model.plants.push_back(
-        {.modes = modes_of(choice.rivals[i]), .share = choice.rival_odds[i] / odds});
-    const double freq_hz = model.plants.back().modes.front().freq_hz;
-    main_hz.low = std::min(main_hz.low, freq_hz);
-    main_hz.high = std::max(main_hz.high, freq_hz);
+  for (const Rival& rival : choice.rivals) {
+    model.plants.push_back({.modes = modes_of(rival.theta), .share = rival.odds / odds});
+    if (rival.has_other_main) {
+      const double freq_hz = model.plants.back().modes.front().freq_hz;
+      main_hz.low = std::min(main_hz.low, freq_hz);
+      main_hz.high = std::max(main_hz.high, freq_hz);
+    }
   }
 }
 
@@ -100,11 +101,12 @@ void add_warnings(const Choice& choice, const Band& band, RecordFit& record) {
     record.warnings.push_back(fmt::format("a closer fit than that of {} is not to be trusted: {}",
                                           numbered(modes), choice.doubt));
   }
-  if (!choice.rivals.empty()) {
+  const auto rival = std::ranges::find_if(choice.rivals, &Rival::has_other_main);
+  if (rival != choice.rivals.end()) {
     record.warnings.push_back(
         fmt::format("another model fits as well, with {:.1f} Hz instead of {:.1f} Hz: measure once "
                     "more",
-                    std::exp(choice.rivals.front()[0]), record.model.modes.front().freq_hz.value));
+                    std::exp(rival->theta[0]), record.model.modes.front().freq_hz.value));
   }
   for (const ModeEstimate& mode : record.model.modes) {
     if (mode.freq_hz.value > band.top_hz() && std::abs(mode.gain.value) > kLargeGain) {
@@ -123,9 +125,11 @@ void add_warnings(const Choice& choice, const Band& band, RecordFit& record) {
 
 }  // namespace
 
-Result<ModesFit> fit_modes(const Spectrum& spectrum, const Sweep& sweep) {
-  const AxisDensity axis = density_of_axis(spectrum, sweep);
-  const Result<Band> band = band_of(spectrum, axis.density, sweep);
+namespace {
+
+Result<ModesFit> fit_density(const Spectrum& spectrum, const std::vector<double>& density,
+                             const Sweep& sweep) {
+  const Result<Band> band = band_of(spectrum, density, sweep);
   if (!band) {
     return tl::unexpected(band.error());
   }
@@ -133,14 +137,13 @@ Result<ModesFit> fit_modes(const Spectrum& spectrum, const Sweep& sweep) {
   const std::vector<std::vector<Solution>> found = search(*band, model, sweep, kMostModes);
   ModesFit fit;
   RecordFit& record = fit.record;
-  record.direction = axis.direction;
   record.bic.push_back(rigid(model, band->logarithms()).bic);
   for (const std::vector<Solution>& some : found) {
     record.bic.push_back(std::ranges::min(some, {}, &Solution::bic).bic);
   }
   const Choice choice = choose(found, *band, model);
   fit.theta = choice.theta;
-  fit.has_rivals = !choice.rivals.empty();
+  fit.has_rivals = has_other_main(choice);
   const Prior prior = prior_of(modes_in(fit.theta), sweep);
   const Eigen::MatrixXd covariance =
       covariance_of_modes(model, *band, prior, fit.theta) + choice.spread;
@@ -153,7 +156,41 @@ Result<ModesFit> fit_modes(const Spectrum& spectrum, const Sweep& sweep) {
   record.refusal = refusal_of(choice, *band, record, covariance, misfit);
   if (record.is_trusted()) {
     add_warnings(choice, *band, record);
-  } else {
+  }
+  return fit;
+}
+
+// Where the columns of a sensor share the motion, they show the same resonances, unless the tool
+// moves in more directions than one.
+std::string disagreement(const RecordFit& sum, const RecordFit& column) {
+  constexpr double kApart = 0.2;
+  const double of_sum_hz = sum.model.values().front().freq_hz;
+  const double of_column_hz = column.model.values().front().freq_hz;
+  return std::abs(std::log(of_sum_hz / of_column_hz)) > kApart
+             ? fmt::format(
+                   "the sensor's columns tell of different resonances, {:.1f} Hz and "
+                   "{:.1f} Hz",
+                   of_column_hz, of_sum_hz)
+             : std::string{};
+}
+
+}  // namespace
+
+Result<ModesFit> fit_modes(const Spectrum& spectrum, const Sweep& sweep) {
+  const AxisDensity axis = density_of_axis(spectrum, sweep);
+  Result<ModesFit> fit = fit_density(spectrum, axis.density, sweep);
+  if (!fit) {
+    return fit;
+  }
+  RecordFit& record = fit->record;
+  record.direction = axis.direction;
+  if (axis.most_of_sum && record.is_trusted()) {
+    if (const Result<ModesFit> column =
+            fit_density(spectrum, spectrum.density[*axis.most_of_sum], sweep)) {
+      record.refusal = disagreement(record, column->record);
+    }
+  }
+  if (!record.is_trusted()) {
     record.refusal +=
         "; check that the sensor sits tight and measure again with a higher ACCEL_PER_HZ";
   }

@@ -9,7 +9,7 @@ namespace unflex::identify {
 struct ModesFit {
   RecordFit record;
   Eigen::VectorXd theta;    // as ModesModel's, main mode first
-  bool has_rivals = false;  // other models fit as well
+  bool has_rivals = false;  // another main mode fits as well
 };
 
 // Errors are those of band_of().

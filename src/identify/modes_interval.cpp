@@ -151,6 +151,16 @@ Eigen::ArrayXcd response_of(const Eigen::ArrayXd& freq_hz, const std::vector<Mod
   return sum;
 }
 
+double distance(const std::vector<ModeOfAxis>& a, const std::vector<ModeOfAxis>& b) {
+  const Eigen::ArrayXd places = places_hz();
+  return ((response_of(places, a) - response_of(places, b)) / places).matrix().norm();
+}
+
+double swing(const std::vector<ModeOfAxis>& modes) {
+  const Eigen::ArrayXd places = places_hz();
+  return ((response_of(places, modes) - 1.0) / places).matrix().norm();
+}
+
 double spread_of_response(double freq_hz, const std::vector<ModeOfAxis>& modes,
                           const Eigen::MatrixXd& covariance) {
   const Eigen::ArrayXd place = Eigen::ArrayXd::Constant(1, freq_hz);

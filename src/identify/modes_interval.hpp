@@ -20,6 +20,11 @@ namespace unflex::identify {
 [[nodiscard]] Eigen::ArrayXcd response_of(const Eigen::ArrayXd& freq_hz,
                                           const std::vector<ModeOfAxis>& modes);
 
+// How far apart the nozzles of two models swing, and how far one swings from its base, per speed of
+// the base: ‖ΔH/ν‖ and ‖(H − 1)/ν‖ over the frequencies of a sweep.
+[[nodiscard]] double distance(const std::vector<ModeOfAxis>& a, const std::vector<ModeOfAxis>& b);
+[[nodiscard]] double swing(const std::vector<ModeOfAxis>& modes);
+
 // Standard deviation of |H(ν)| at one frequency, as a share of it.
 [[nodiscard]] double spread_of_response(double freq_hz, const std::vector<ModeOfAxis>& modes,
                                         const Eigen::MatrixXd& covariance);

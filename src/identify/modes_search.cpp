@@ -84,6 +84,32 @@ std::vector<double> places_for_mode(const Band& band, const Solution* base) {
   return places;
 }
 
+// Gains that nearly cancel can draw any shape. So Σ|g| beyond a machine's counts like a bin that is
+// off; the values get a last row for it.
+void append_cancelling(const Eigen::VectorXd& theta, Eigen::ArrayXd& values,
+                       Eigen::MatrixXd* jacobian) {
+  constexpr double kMostOfAllGains = 1.7;
+  constexpr double kWeight = 1.0;
+  const double sum = sum_of_a(theta);
+  double all = 0.0;
+  for (Eigen::Index m = 0; m < modes_in(theta); ++m) {
+    all += std::abs(theta[3 * m + 2]);
+  }
+  const double excess = all / std::abs(sum) - kMostOfAllGains;
+  const Eigen::Index row = values.size();
+  values.conservativeResize(row + 1);
+  values[row] = kWeight * std::max(excess, 0.0);
+  if (jacobian != nullptr) {
+    jacobian->conservativeResize(row + 1, Eigen::NoChange);
+    jacobian->row(row).setZero();
+    for (Eigen::Index m = 0; excess > 0.0 && m < modes_in(theta); ++m) {
+      const double a = theta[3 * m + 2];
+      (*jacobian)(row, 3 * m + 2) =
+          kWeight * (std::copysign(1.0, a) / std::abs(sum) - all / (sum * std::abs(sum)));
+    }
+  }
+}
+
 bool is_same(const Solution& a, const Solution& b) {
   return std::abs(a.fit.cost - b.fit.cost) < 1e-3 * (a.fit.cost + 1e-3) &&
          a.is_minimum_phase == b.is_minimum_phase;
@@ -154,10 +180,18 @@ class Search {
     const ModelWithJacobian call = [this](const Eigen::VectorXd& theta, Eigen::ArrayXd& values,
                                           Eigen::MatrixXd* jacobian) {
       model_(theta, values, jacobian);
+      append_cancelling(theta, values, jacobian);
     };
+    const Eigen::Index bins = logarithms_.size();
+    Eigen::ArrayXd data(bins + 1);
+    data << logarithms_, 0.0;
     Solution solution;
-    solution.fit = minimise_robust(call, logarithms_, kLossScale, prior_of(modes_in(start), sweep_),
-                                   start, steps);
+    RobustFit& fit = solution.fit;
+    fit = minimise_robust(call, data, kLossScale, prior_of(modes_in(start), sweep_), start, steps);
+    fit.residual.conservativeResize(bins);
+    fit.weights.conservativeResize(bins);
+    fit.jacobian.conservativeResize(bins, Eigen::NoChange);
+    fit.loss = soft_loss(fit.residual, kLossScale);
     return solution;
   }
 

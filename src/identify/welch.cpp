@@ -29,6 +29,28 @@ Eigen::ArrayXd kaiser_window(Eigen::Index length) {
 
 }  // namespace
 
+Spectrum spectrum_of(const DataSet& set) {
+  Spectrum result;
+  if (const auto* recording = std::get_if<Recording>(&set.data)) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      Spectrum column = welch_spectrum(recording->accel[c], recording->rate_hz);
+      result.step_hz = column.step_hz;
+      result.density[c] = std::move(column.density[0]);
+    }
+    return result;
+  }
+  result = std::get<Spectrum>(set.data);
+  if (result.is_normalized) {
+    for (std::vector<double>& column : result.density) {
+      for (std::size_t k = 0; k < column.size(); ++k) {
+        column[k] *= static_cast<double>(k) * result.step_hz + 0.1;
+      }
+    }
+    result.is_normalized = false;
+  }
+  return result;
+}
+
 Spectrum welch_spectrum(const std::vector<double>& samples, double rate_hz) {
   const Eigen::Index length = window_length(rate_hz);
   const Eigen::ArrayXd window = kaiser_window(length);

@@ -11,6 +11,7 @@
 #include "unflex/rivals/s_curve.hpp"
 #include "unflex/rivals/thesis_method.hpp"
 #include "unflex/study/bench.hpp"
+#include "unflex_base.hpp"
 
 namespace unflex::study {
 namespace {
@@ -70,11 +71,26 @@ rivals::AxisPath spline(const rivals::AxisPath& reference, const dynamics::Flexi
                                  {knot_s, kSplineEndKnots * knot_s, kSplineEndKnots * knot_s});
 }
 
-Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSetup& bench,
-                               const compensate::Engine& engine) {
+Result<BaseMotion> limited_base(double multiple, const Moves& plan, const BenchSetup& bench,
+                                const compensate::Engine& engine) {
   compensate::Setup setup = bench.unflex;
   setup.x.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
+  return unflex_base(setup, plan, bench.parts, engine);
+}
+
+std::optional<dynamics::ShaperKind> shaper_of(Method method) {
+  const int number = static_cast<int>(method) - static_cast<int>(Method::zv);
+  if (number < 0 || number >= static_cast<int>(dynamics::kShaperKinds.size())) {
+    return std::nullopt;
+  }
+  return dynamics::kShaperKinds[static_cast<std::size_t>(number)];
+}
+
+}  // namespace
+
+Result<BaseMotion> unflex_base(const compensate::Setup& setup, const Moves& plan, int parts,
+                               const compensate::Engine& engine) {
   const compensate::NodeGrid grid = compensate::node_grid(plan, setup);
   const auto spans = compensate::mesh(plan, grid, setup);
   const gcode::Position& start = plan.front().segment.start_mm;
@@ -95,22 +111,12 @@ Result<BaseMotion> unflex_base(double multiple, const Moves& plan, const BenchSe
   }
   const auto path = [&](const std::vector<dynamics::AxisTrajectory>& solutions) {
     return rivals::through_nodes(compensate::join(spans, solutions), -setup.lead_in_s,
-                                 grid.period_s, bench.parts);
+                                 grid.period_s, parts);
   };
   result.x = path(x);
   result.y = path(y);
   return result;
 }
-
-std::optional<dynamics::ShaperKind> shaper_of(Method method) {
-  const int number = static_cast<int>(method) - static_cast<int>(Method::zv);
-  if (number < 0 || number >= static_cast<int>(dynamics::kShaperKinds.size())) {
-    return std::nullopt;
-  }
-  return dynamics::kShaperKinds[static_cast<std::size_t>(number)];
-}
-
-}  // namespace
 
 std::string_view name(Method method) {
   if (const auto kind = shaper_of(method)) {
@@ -167,11 +173,11 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
     case Method::thesis_velocity_defects:
       return thesis(&rivals::thesis_velocity_defects);
     case Method::unflex_2x:
-      return unflex_base(2.0, run.plan, setup, engine);
+      return limited_base(2.0, run.plan, setup, engine);
     case Method::unflex_4x:
-      return unflex_base(4.0, run.plan, setup, engine);
+      return limited_base(4.0, run.plan, setup, engine);
     case Method::unflex_10x:
-      return unflex_base(10.0, run.plan, setup, engine);
+      return limited_base(10.0, run.plan, setup, engine);
     default:
       return both_axes(run.plan, setup.unflex,
                        [](const auto& reference, const auto& /*axis*/) { return reference; });

@@ -10,6 +10,8 @@
 #include <mutex>
 #include <thread>
 
+#include "tasks.hpp"
+
 namespace unflex::study {
 namespace {
 
@@ -28,29 +30,6 @@ constexpr double kChainMultiple = 4.0;
 // If all cases are run, coarse-to-fine is measured on the reference, the softest and the least
 // damped case.
 constexpr std::array<std::string_view, 3> kChainCases = {"ref", "1A", "2A"};
-
-// Calls work(i) for i = 0 … count − 1 in several threads, in any order.
-void in_parallel(std::size_t count, unsigned workers,
-                 const std::function<void(std::size_t)>& work) {
-  std::atomic<std::size_t> next = 0;
-  const auto loop = [&] {
-    for (std::size_t i = next++; i < count; i = next++) {
-      work(i);
-    }
-  };
-  std::vector<std::jthread> threads;
-  for (unsigned i = 1; i < std::min<std::size_t>(workers, count); ++i) {
-    threads.emplace_back(loop);
-  }
-  loop();
-}
-
-std::unique_ptr<compensate::Engine> make_engine(const Options& options) {
-  return options.ipopt ? compensate::make_ipopt_engine() : compensate::make_banded_engine();
-}
-
-// Ipopt's linear solver must not run in two threads.
-unsigned threads(const Options& options) { return options.ipopt ? 1 : options.workers; }
 
 Run run_of(const Case& of) {
   return {corner(of, of.accel_mm_s2), corner(of, 0.5 * of.accel_mm_s2)};

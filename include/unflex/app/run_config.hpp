@@ -70,6 +70,7 @@ struct RunConfig {
   bool strict = false;  // compensate, verify, inspect: warnings are errors
   IdentifyConfig identify;
   std::vector<std::string> cases;  // study: names, none for all
+  std::string machines;            // study: folder of records; empty: none
 };
 
 // The command line understood: either work to do, or a text to print instead (--help, --version).

@@ -1,0 +1,37 @@
+#include "unflex/pipeline/study_machines.hpp"
+
+#include "run_batches.hpp"
+#include "stage_options.hpp"
+
+namespace unflex::pipeline {
+
+Result<study::MachinesOutcome> study_machines(const Job& job,
+                                              const std::vector<KnownMachine>& machines,
+                                              Progress& progress) {
+  const study::Options options{.ipopt = job.engine == EngineChoice::ipopt, .workers = job.workers};
+  std::vector<study::MachineBench> benches;
+  for (const KnownMachine& known : machines) {
+    benches.emplace_back(
+        study::Machine{known.name, known.x, known.y, compensate_setup(known.settings)}, options);
+  }
+  const Result<std::vector<Diagnostic>> warnings =
+      for_each_batch(job, progress, [&](std::vector<study::Run>&& batch) {
+        for (study::MachineBench& bench : benches) {
+          bench.add(batch);
+        }
+      });
+  if (!warnings) {
+    return tl::unexpected(warnings.error());
+  }
+  study::MachinesOutcome outcome;
+  outcome.input = job.input_name;
+  for (const study::MachineBench& bench : benches) {
+    outcome.machines.push_back(bench.result());
+  }
+  for (const Diagnostic& warning : *warnings) {
+    outcome.warnings.push_back(to_string(warning));
+  }
+  return outcome;
+}
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,213 @@
+#include "unflex/study/machines.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "contour.hpp"
+#include "tasks.hpp"
+#include "unflex/verify/log_histogram.hpp"
+#include "unflex_base.hpp"
+
+namespace unflex::study {
+namespace {
+
+constexpr double kSampleStep_s = 2e-4;
+constexpr int kParts = 5;
+constexpr double kReachRoom_s = 0.02;
+
+// The nozzle of a machine on a base: each of its modes hangs there by itself.
+class TrueNozzle {
+ public:
+  TrueNozzle(const std::vector<dynamics::Mode>& modes, const rivals::AxisPath& base,
+             double start_s) {
+    for (const dynamics::Mode& mode : modes) {
+      parts_.push_back(
+          {mode.gain,
+           rivals::NozzleWalk(dynamics::FlexibleAxis(mode.omega_rad_s, mode.zeta), base, start_s)});
+    }
+  }
+
+  [[nodiscard]] double at(double t) {
+    double sum = 0.0;
+    for (Part& part : parts_) {
+      sum += part.gain * part.walk.at(t).position();
+    }
+    return sum;
+  }
+
+ private:
+  struct Part {
+    double gain;
+    rivals::NozzleWalk walk;
+  };
+  std::vector<Part> parts_;
+};
+
+struct Distances {
+  verify::LogHistogram histogram;
+  double square_sum = 0.0;
+  double samples = 0.0;
+  double max_mm = 0.0;
+
+  void add(double distance_mm) {
+    const double square = distance_mm * distance_mm;
+    histogram.add_square(square, 1.0);
+    square_sum += square;
+    samples += 1.0;
+    max_mm = std::max(max_mm, distance_mm);
+  }
+};
+
+double reach_s(const Machine& machine) {
+  double slowest = std::numeric_limits<double>::infinity();
+  for (const MachineAxis* axis : {&machine.x, &machine.y}) {
+    for (const dynamics::Mode& mode : axis->truth) {
+      slowest = std::min(slowest, mode.omega_rad_s);
+    }
+  }
+  return kReachRoom_s + std::numbers::pi / slowest;
+}
+
+std::vector<double> distances(const Machine& machine, const BaseMotion& base, const Run& run) {
+  const double start_s = std::min({0.0, base.x.front().start_s, base.y.front().start_s});
+  TrueNozzle x(machine.x.truth, base.x, start_s);
+  TrueNozzle y(machine.y.truth, base.y, start_s);
+  ContourGauge gauge(run.plan, reach_s(machine));
+  std::vector<double> result;
+  const double end_s = planner::duration_s(run.plan);
+  for (int k = 0; k * kSampleStep_s <= end_s; ++k) {
+    const double t = k * kSampleStep_s;
+    const auto reading = gauge.measure(t, x.at(t), y.at(t));
+    if (reading.extruding) {
+      result.push_back(reading.distance_mm);
+    }
+  }
+  return result;
+}
+
+std::optional<rivals::FittedShaper> shaper_of(Contender contender,
+                                              const rivals::KlipperCalibration& calibration) {
+  switch (contender) {
+    case Contender::zv:
+      return calibration.of(dynamics::ShaperKind::zv);
+    case Contender::mzv:
+      return calibration.of(dynamics::ShaperKind::mzv);
+    case Contender::ei:
+      return calibration.of(dynamics::ShaperKind::ei);
+    case Contender::recommended:
+      return calibration.recommended;
+    case Contender::uncompensated:
+    case Contender::unflex:
+      break;
+  }
+  return std::nullopt;
+}
+
+rivals::AxisPath shaped(Contender contender, const rivals::KlipperCalibration& calibration,
+                        rivals::AxisPath reference) {
+  const auto shaper = shaper_of(contender, calibration);
+  return shaper ? rivals::shaped(reference, shaper->pulses()) : std::move(reference);
+}
+
+std::string model_text(const std::vector<dynamics::Mode>& modes) {
+  std::string text;
+  for (const dynamics::Mode& mode : modes) {
+    text += fmt::format("{}{:.1f} Hz ζ {:.3f}", text.empty() ? "" : " + ",
+                        mode.omega_rad_s / (2.0 * std::numbers::pi), mode.zeta);
+    text += modes.size() > 1 ? fmt::format(" gain {:.2f}", mode.gain) : std::string{};
+  }
+  return text;
+}
+
+std::string axis_text(const MachineAxis& axis, const compensate::AxisSetup& known) {
+  const auto modes = known.axis.modes();
+  return fmt::format(
+      "known from {}: {}{}; machine by {}: {}; Klipper: {} {:.1f} Hz", axis.known_from,
+      model_text({modes.begin(), modes.end()}),
+      known.plants.empty() ? std::string{} : fmt::format(" and {} plants", known.plants.size()),
+      axis.truth_from, model_text(axis.truth), dynamics::name(axis.shapers.recommended.kind),
+      axis.shapers.recommended.freq_hz);
+}
+
+}  // namespace
+
+struct MachineBench::Measured {
+  std::array<Distances, kContenderCount> contenders;
+  std::size_t failed_runs = 0;
+};
+
+std::string_view name(Contender contender) {
+  constexpr std::array<std::string_view, kContenderCount> kNames = {
+      "as sliced", "ZV", "MZV", "EI", "Klipper's choice", "unflex"};
+  return kNames[static_cast<std::size_t>(contender)];
+}
+
+const ContenderResult& MachineResult::best_shaper() const {
+  return *std::min_element(
+      contenders.begin() + static_cast<std::ptrdiff_t>(Contender::zv),
+      contenders.begin() + static_cast<std::ptrdiff_t>(Contender::unflex),
+      [](const ContenderResult& a, const ContenderResult& b) { return a.rms_mm < b.rms_mm; });
+}
+
+MachineBench::MachineBench(Machine machine, const Options& options)
+    : machine_(std::move(machine)), options_(options), measured_(std::make_unique<Measured>()) {}
+MachineBench::~MachineBench() = default;
+MachineBench::MachineBench(MachineBench&&) noexcept = default;
+
+void MachineBench::add(const std::vector<Run>& runs) {
+  const std::unique_ptr<compensate::Engine> engine = make_engine(options_);
+  struct OfRun {
+    std::array<std::vector<double>, kContenderCount> distances_mm;
+    bool failed = false;
+  };
+  std::vector<OfRun> results(runs.size());
+  in_parallel(runs.size(), threads(options_), [&](std::size_t i) {
+    const Run& run = runs[i];
+    const rivals::AxisPath x = rivals::reference_path(run.plan, gcode::X);
+    const rivals::AxisPath y = rivals::reference_path(run.plan, gcode::Y);
+    for (std::size_t c = 0; c < kContenderCount; ++c) {
+      const auto contender = static_cast<Contender>(c);
+      BaseMotion base{shaped(contender, machine_.x.shapers, x),
+                      shaped(contender, machine_.y.shapers, y),
+                      0,
+                      {}};
+      if (contender == Contender::unflex) {
+        Result<BaseMotion> solved = unflex_base(machine_.unflex, run.plan, kParts, *engine);
+        results[i].failed = !solved;
+        base = solved ? std::move(*solved) : std::move(base);
+      }
+      results[i].distances_mm[c] = distances(machine_, base, run);
+    }
+  });
+  for (const OfRun& of_run : results) {
+    measured_->failed_runs += of_run.failed ? 1 : 0;
+    for (std::size_t c = 0; c < kContenderCount; ++c) {
+      for (const double distance_mm : of_run.distances_mm[c]) {
+        measured_->contenders[c].add(distance_mm);
+      }
+    }
+  }
+}
+
+MachineResult MachineBench::result() const {
+  MachineResult result{machine_.name,
+                       fmt::format("X {}\nY {}", axis_text(machine_.x, machine_.unflex.x),
+                                   axis_text(machine_.y, machine_.unflex.y)),
+                       {},
+                       measured_->failed_runs};
+  for (std::size_t c = 0; c < kContenderCount; ++c) {
+    const Distances& of = measured_->contenders[c];
+    if (of.samples > 0.0) {
+      result.contenders[c] = {std::sqrt(of.square_sum / of.samples), of.histogram.quantile(0.99),
+                              of.max_mm};
+    }
+  }
+  return result;
+}
+
+}  // namespace unflex::study

@@ -1,0 +1,125 @@
+// What the bench of real machines found: for people, for programs and as a page.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+
+#include "unflex/report/format.hpp"
+#include "unflex/report/html_page.hpp"
+#include "unflex/report/json_parts.hpp"
+#include "unflex/study/machines.hpp"
+
+namespace unflex::study {
+namespace {
+
+using report::escape_html;
+using report::Json;
+using report::micrometres_text;
+using Sink = std::back_insert_iterator<std::string>;
+
+constexpr std::string_view kStyle = R"(
+.machine { display: grid; grid-template-columns: max-content 1fr max-content; gap: .3rem .8rem; }
+.machine i { display: block; height: 1rem; border-radius: 3px; background: var(--before); }
+.machine i.unflex { background: var(--after); }
+.machine b { font-variant-numeric: tabular-nums; font-weight: 600; }
+.note { color: var(--muted); white-space: pre-line; }
+)";
+
+double ratio(const MachineResult& machine) {
+  const double best_mm = machine.best_shaper().rms_mm;
+  return best_mm > 0.0 ? machine.of(Contender::unflex).rms_mm / best_mm : 0.0;
+}
+
+void write_bars(Sink out, const MachineResult& machine) {
+  double most_mm = 1e-9;
+  for (const ContenderResult& of : machine.contenders) {
+    most_mm = std::max(most_mm, of.rms_mm);
+  }
+  fmt::format_to(out, "<div class=\"machine\">\n");
+  for (std::size_t c = 0; c < kContenderCount; ++c) {
+    const auto contender = static_cast<Contender>(c);
+    const ContenderResult& of = machine.contenders[c];
+    fmt::format_to(out,
+                   "<span>{}</span><span><i class=\"{}\" style=\"width:{:.1f}%\"></i></span>"
+                   "<b>{} µm RMS, {} p99</b>\n",
+                   name(contender), contender == Contender::unflex ? "unflex" : "other",
+                   100.0 * of.rms_mm / most_mm, micrometres_text(of.rms_mm),
+                   micrometres_text(of.p99_mm));
+  }
+  fmt::format_to(out, "</div>\n");
+}
+
+}  // namespace
+
+std::string to_text(const MachinesOutcome& outcome) {
+  std::string text;
+  const Sink out = std::back_inserter(text);
+  fmt::format_to(out, "{}\n{:<28}", outcome.input, "contour, RMS (p99) µm");
+  for (std::size_t c = 0; c < kContenderCount; ++c) {
+    fmt::format_to(out, "{:>18}", name(static_cast<Contender>(c)));
+  }
+  fmt::format_to(out, "{:>18}\n", "of best shaper");
+  for (const MachineResult& machine : outcome.machines) {
+    fmt::format_to(out, "  {:<26}", machine.name);
+    for (const ContenderResult& of : machine.contenders) {
+      fmt::format_to(
+          out, "{:>18}",
+          fmt::format("{} ({})", micrometres_text(of.rms_mm), micrometres_text(of.p99_mm)));
+    }
+    fmt::format_to(out, "{:>18.2f}\n", ratio(machine));
+  }
+  for (const MachineResult& machine : outcome.machines) {
+    fmt::format_to(out, "\n{}\n{}\n", machine.name, machine.description);
+    if (machine.failed_runs > 0) {
+      fmt::format_to(out, "{} runs without a solution, measured as sliced\n", machine.failed_runs);
+    }
+  }
+  return text;
+}
+
+std::string to_json(const MachinesOutcome& outcome) {
+  Json json;
+  json["schema_version"] = report::kSchemaVersion;
+  json["command"] = "study";
+  json["version"] = outcome.version;
+  json["input"] = outcome.input;
+  json["printer"] = report::settings_json(outcome.printer);
+  json["machines"] = Json::array();
+  for (const MachineResult& machine : outcome.machines) {
+    Json contenders = Json::array();
+    for (std::size_t c = 0; c < kContenderCount; ++c) {
+      const ContenderResult& of = machine.contenders[c];
+      contenders.push_back({{"name", name(static_cast<Contender>(c))},
+                            {"contour_rms_mm", of.rms_mm},
+                            {"contour_p99_mm", of.p99_mm},
+                            {"contour_max_mm", of.max_mm}});
+    }
+    json["machines"].push_back({{"machine", machine.name},
+                                {"description", machine.description},
+                                {"contenders", std::move(contenders)},
+                                {"failed_runs", machine.failed_runs}});
+  }
+  json["warnings"] = outcome.warnings;
+  return report::dump(json);
+}
+
+std::string to_html(const MachinesOutcome& outcome) {
+  std::string body;
+  const Sink out = std::back_inserter(body);
+  for (const MachineResult& machine : outcome.machines) {
+    fmt::format_to(out,
+                   "<section class=\"card\"><h2>{}</h2>\n<p>With unflex the nozzle strays {:.2f} "
+                   "times as far as with the best of ZV, MZV, EI and what Klipper's calibration "
+                   "recommends.</p>\n",
+                   escape_html(machine.name), ratio(machine));
+    write_bars(out, machine);
+    fmt::format_to(out, "<p class=\"note\">{}</p></section>\n", escape_html(machine.description));
+  }
+  return report::html_page({.title = "Real machines, " + outcome.input,
+                            .style = std::string(kStyle),
+                            .body = std::move(body),
+                            .script = {}});
+}
+
+}  // namespace unflex::study
