@@ -10,7 +10,7 @@ _unflex_options() {
     batch) echo "-h --help -o --output $print --summary --max-deviation --engine -j --jobs" ;;
     verify) echo "-h --help --against --strict $print --max-deviation" ;;
     inspect) echo "-h --help --strict $print" ;;
-    study) echo "-h --help --case $print --engine -j --jobs" ;;
+    study) echo "-h --help --case --machines $print --engine -j --jobs" ;;
     identify)
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
            '--report -q --quiet' ;;
@@ -46,6 +46,7 @@ _unflex_value() {
     *:--report) echo 'files *.@(json|html)' ;;
     study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;
     *:--axis) echo 'words x y' ;;
+    *:--machines) echo 'folders' ;;
     *:--case) echo 'words ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' ;;
     *:--set | *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
       *:--wave-spacing-mm | *:--speed-mm-s | *:--decay) echo 'any' ;;

@@ -61,6 +61,7 @@ complete -c unflex -n '__unflex_in compensate verify inspect' -l strict -d 'Take
 complete -c unflex -n '__unflex_in compensate batch verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'
 complete -c unflex -n '__unflex_in compensate batch study' -l engine -x -a 'auto banded ipopt' -d 'What solves'
 complete -c unflex -n '__unflex_in compensate batch study' -s j -l jobs -x -d 'How many to compute at once'
+complete -c unflex -n '__unflex_in study' -l machines -x -a '(__fish_complete_directories (commandline -ct))' -d 'Folder of resonance records of real machines'
 complete -c unflex -n '__unflex_in study' -l case -x -a 'ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' -d 'Only this case of the corner'
 
 complete -c unflex -n '__unflex_in identify' -l axis -x -a 'x y' -d 'The axis the records are of'

@@ -149,9 +149,10 @@ Eigen::MatrixXd sandwich(const LeastSquares& fit, const Eigen::ArrayXd& weights,
                          Eigen::Index block) {
   const Eigen::Index unknowns = fit.parameters.size();
   const Eigen::MatrixXd weighted = weights.matrix().asDiagonal() * fit.jacobian;
-  const Eigen::MatrixXd bread = (fit.jacobian.transpose() * weighted)
-                                    .ldlt()
-                                    .solve(Eigen::MatrixXd::Identity(unknowns, unknowns));
+  Eigen::MatrixXd normal = fit.jacobian.transpose() * weighted;
+  // A parameter that the data do not depend on must not spoil the others.
+  normal.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();
+  const Eigen::MatrixXd bread = normal.ldlt().solve(Eigen::MatrixXd::Identity(unknowns, unknowns));
   const auto in_blocks = [&](Eigen::Index of) -> Eigen::MatrixXd {
     Eigen::MatrixXd filling = Eigen::MatrixXd::Zero(unknowns, unknowns);
     for (Eigen::Index at = 0; at < fit.residual.size(); at += of) {

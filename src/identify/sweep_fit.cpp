@@ -1,7 +1,7 @@
 // The fit by Welch's spectrum (modes_fit.hpp) tells how many modes there are and about where. Then
 // all their parameters are fitted to the energy spectrum |Y(ν)|² of the whole recording, which is
 // finer by a factor of fifty, without its phase. So neither the moment at which the sweep began nor
-// the clocks matter. Y is the modes' answer to the sweep, with energy s, plus white noise of mean
+// the clocks matter. Y is the modes' answer to the sweep, with energy s, plus noise of mean
 // energy S, independent from bin to bin; then (Rice, Mathematical Analysis of Random Noise, 1945)
 //   E|Y|² = s + S,   var|Y|² = 2 s S + S².
 // s is c·E(ν)·|H(ν)|² (response.hpp) but for a ripple of some percent. The ripple arises where the
@@ -42,9 +42,10 @@ constexpr double kLowest_hz = 12.0;
 // ripple do not get there.
 constexpr double kOutlier = 8.0;
 
-Eigen::ArrayXd variance(const Eigen::ArrayXd& signal, double noise, double values_each) {
+Eigen::ArrayXd variance(const Eigen::ArrayXd& signal, const Eigen::ArrayXd& noise,
+                        double values_each) {
   constexpr double kRipple = 0.09;
-  return (2.0 * signal * noise + noise * noise + (kRipple * signal).square()) / values_each;
+  return (2.0 * signal * noise + noise.square() + (kRipple * signal).square()) / values_each;
 }
 
 FineBand fine_band_of(const EnergySpectrum& spectrum, const Sweep& sweep) {
@@ -68,11 +69,11 @@ FineBand fine_band_of(const EnergySpectrum& spectrum, const Sweep& sweep) {
   return band;
 }
 
-// Parameters are those of ModesModel but with one noise, of the white kind: log f, log ζ and a for
-// each mode, then log S.
-Eigen::Index modes_of_fine(const Eigen::VectorXd& p) { return (p.size() - 1) / 3; }
-
-double noise_of(const Eigen::VectorXd& p) { return std::exp(p[p.size() - 1]); }
+// Parameters are those of ModesModel: log f, log ζ and a for each mode, then log N₀ and log N₁.
+Eigen::ArrayXd noise_of(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p) {
+  constexpr double kCorner_hz = 30.0;
+  return std::exp(p[p.size() - 2]) + std::exp(p[p.size() - 1]) * (kCorner_hz / freq_hz).square();
+}
 
 // What mode m alone would give at frequencies ν.
 Eigen::ArrayXcd answer(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p, Eigen::Index m) {
@@ -82,14 +83,15 @@ Eigen::ArrayXcd answer(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p, 
 Eigen::ArrayXd energy_of(const Eigen::ArrayXd& freq_hz, const Eigen::ArrayXd& excitation,
                          const Eigen::VectorXd& p) {
   Eigen::ArrayXcd sum = Eigen::ArrayXcd::Zero(freq_hz.size());
-  for (Eigen::Index m = 0; m < modes_of_fine(p); ++m) {
+  for (Eigen::Index m = 0; m < modes_in(p); ++m) {
     sum += answer(freq_hz, p, m);
   }
-  return excitation * sum.abs2() + noise_of(p);
+  return excitation * sum.abs2() + noise_of(freq_hz, p);
 }
 
 // Weights for parameters near the right ones.
-Eigen::ArrayXd weights_at(const FineBand& band, const Eigen::ArrayXd& model, double noise) {
+Eigen::ArrayXd weights_at(const FineBand& band, const Eigen::ArrayXd& model,
+                          const Eigen::ArrayXd& noise) {
   const Eigen::ArrayXd spread = variance(model - noise, noise, band.values_each);
   return (band.energy - model > kOutlier * spread.sqrt()).select(0.0, spread.inverse()).eval();
 }
@@ -107,7 +109,7 @@ FineFit refine(const FineBand& band, const Eigen::ArrayXd& excitation, Eigen::Ve
   };
   FineFit fine;
   for (int round = 0; round < kRounds; ++round) {
-    fine.weights = weights_at(band, model(at), noise_of(at));
+    fine.weights = weights_at(band, model(at), noise_of(band.freq_hz, at));
     fine.fit = minimise(model, band.energy, fine.weights, at);
     at = fine.fit.parameters;
   }
@@ -118,22 +120,23 @@ FineFit refine(const FineBand& band, const Eigen::ArrayXd& excitation, Eigen::Ve
 Eigen::VectorXd start_of(const FineBand& band, const Eigen::ArrayXd& excitation,
                          const Eigen::VectorXd& theta) {
   constexpr double kFirstNoise = 0.05;
-  Eigen::VectorXd start = theta.head(theta.size() - 1);
-  start[start.size() - 1] = std::log(kFirstNoise);
-  const double mean = energy_of(band.freq_hz, excitation, start).mean() - kFirstNoise;
-  for (Eigen::Index m = 0; m < modes_of_fine(start); ++m) {
+  Eigen::VectorXd start = theta;
+  start.tail(2).setConstant(std::log(kFirstNoise));
+  const double mean =
+      (energy_of(band.freq_hz, excitation, start) - noise_of(band.freq_hz, start)).mean();
+  for (Eigen::Index m = 0; m < modes_in(start); ++m) {
     start[3 * m + 2] /= std::sqrt(mean);
   }
   return start;
 }
 
 // Whether the fine fit found the modes of the coarse one. If not, the record is not what it takes
-// it for: the base's motion is not even, or the noise is not white.
+// it for: the base's motion is not even, or the noise is of another kind.
 bool agrees(const Eigen::VectorXd& fine, const Eigen::VectorXd& coarse) {
   constexpr double kMain = 0.02;
   constexpr double kOther = 0.06;
   constexpr double kDamping = 0.7;
-  for (Eigen::Index m = 0; m < modes_of_fine(fine); ++m) {
+  for (Eigen::Index m = 0; m < modes_in(fine); ++m) {
     if (!(std::abs(fine[3 * m] - coarse[3 * m]) < (m == 0 ? kMain : kOther)) ||
         !(std::abs(fine[3 * m + 1] - coarse[3 * m + 1]) < kDamping)) {
       return false;
@@ -157,10 +160,10 @@ Curve curve_of(const FineBand& band, const Eigen::ArrayXd& excitation, const Eig
               .fitted = in_steps(energy_of(band.freq_hz, excitation, p)),
               .modes = {},
               .noise = {}};
-  for (Eigen::Index m = 0; m < modes_of_fine(p); ++m) {
+  for (Eigen::Index m = 0; m < modes_in(p); ++m) {
     curve.modes.push_back(in_steps(excitation * answer(band.freq_hz, p, m).abs2()));
   }
-  curve.noise.assign(curve.x.size(), noise_of(p));
+  curve.noise = in_steps(noise_of(band.freq_hz, p));
   return curve;
 }
 
@@ -174,12 +177,10 @@ void fit_finely(const std::vector<double>& samples, double rate_hz, const Sweep&
   if (!agrees(p, theta)) {
     return;
   }
-  Eigen::VectorXd refined = theta;
-  refined.head(p.size()) = p;
   // Deviations that are not noise go together over some tenths of a Hz.
   const auto block = static_cast<Eigen::Index>(0.5 / band.step_hz);
-  record.model = model_of(Method::sweep, modes_of(refined),
-                          of_gains(sandwich(fine.fit, fine.weights, block), refined));
+  record.model =
+      model_of(Method::sweep, modes_of(p), of_gains(sandwich(fine.fit, fine.weights, block), p));
   record.curve = curve_of(band, excitation, p);
 }
 

@@ -2,9 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "app/program.hpp"
+#include "paths.hpp"
 
 namespace unflex::app {
 namespace {
@@ -69,6 +71,45 @@ TEST_F(Study, OfAFileWithoutMotionSaysSo) {
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_EQ(outcome.err,
             "in.gcode: has no stretch that could be compensated; unflex inspect tells why\n");
+}
+
+TEST_F(Study, JudgesOnTheMachinesOfAFolder) {
+  const std::string spectra = std::string(test_paths::kData) + "/spectra/";
+  std::filesystem::create_directories(path("machines/ender"));
+  for (const std::string name :
+       {"ender3_resonances_x_20210821_152037.csv", "ender3_resonances_y_20210630_223910.csv"}) {
+    write_file(path("machines/ender/" + name), read_file(spectra + name));
+  }
+  write_file(path("machines/notes.txt"), "passed by");
+  write_file(path("in.gcode"), small_print());
+  const Outcome outcome =
+      run({"study", "in.gcode", "--machines", "machines", "--report", "r.json"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("Klipper's choice"));
+  const auto json = nlohmann::json::parse(read_file(path("r.json")));
+  ASSERT_EQ(json["machines"].size(), 1U);
+  EXPECT_EQ(json["machines"][0]["machine"], "ender/ender3");
+  const auto& contenders = json["machines"][0]["contenders"];
+  const auto rms = [&](std::size_t number) {
+    return contenders[number]["contour_rms_mm"].get<double>();
+  };
+  ASSERT_EQ(contenders[5]["name"], "unflex");
+  EXPECT_LT(rms(5), 0.5 * rms(0));
+  EXPECT_LT(rms(5), rms(1));
+}
+
+TEST_F(Study, SaysWhatIsWrongWithTheMachines) {
+  EXPECT_THAT(run({"study", "--machines", "machines"}).err, HasSubstr("needs a print"));
+  write_file(path("in.gcode"), small_print());
+  EXPECT_THAT(run({"study", "in.gcode", "--machines", "none"}).err,
+              HasSubstr("none: cannot read the folder"));
+  std::filesystem::create_directories(path("empty"));
+  EXPECT_THAT(run({"study", "in.gcode", "--machines", "empty"}).err,
+              HasSubstr("holds no machine with records of both axes"));
+  write_file(path("empty/resonances_x_1.csv"), "freq,what\n");
+  const Outcome broken = run({"study", "in.gcode", "--machines", "empty"});
+  EXPECT_EQ(broken.exit_code, 2);
+  EXPECT_THAT(broken.err, StartsWith("empty/resonances_x_1.csv"));
 }
 
 }  // namespace

@@ -51,8 +51,8 @@ struct DataSet {
 [[nodiscard]] Result<std::vector<DataSet>> parse_records(std::string_view bytes,
                                                          const std::string& file);
 
-// The density of the acceleration, as a test of Klipper's measured it: not divided by the frequency,
-// and of a recording by Klipper's own method.
+// The density of the acceleration, as a test of Klipper's measured it: not divided by the
+// frequency, and of a recording by Klipper's own method.
 [[nodiscard]] Spectrum spectrum_of(const DataSet& set);
 
 // The axis a file's name tells: "raw_data_x_1.csv", "resonances_axis=0.000,1.000,0.000.csv".
