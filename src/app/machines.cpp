@@ -59,8 +59,8 @@ Densities densities_of(const DataSet& set) {
 struct KnownAxis {
   std::string name;
   std::optional<identify::AxisModel> model;  // missing if the record carries none
-  std::optional<std::vector<dynamics::Mode>> truth;
   std::optional<rivals::KlipperCalibration> shapers;
+  Densities densities;
   std::string refusal;
 };
 
@@ -72,9 +72,8 @@ KnownAxis known_axis(const DataSet& set, Axis axis, const identify::Sweep& sweep
     known.model = fitted->model;
   }
   known.refusal = fitted ? fitted->refusal : fitted.error().message;
-  const Densities densities = densities_of(set);
-  known.truth = study::fitted_truth(densities.step_hz, densities.column);
-  known.shapers = rivals::klipper_calibration(densities.step_hz, densities.sum);
+  known.densities = densities_of(set);
+  known.shapers = rivals::klipper_calibration(known.densities.step_hz, known.densities.sum);
   return known;
 }
 
@@ -82,13 +81,23 @@ KnownAxis known_axis(const DataSet& set, Axis axis, const identify::Sweep& sweep
 struct Pair {
   const KnownAxis* known = nullptr;
   const KnownAxis* machine = nullptr;
+  std::vector<dynamics::Mode> truth;
 };
+
+std::optional<Pair> paired(const KnownAxis& known, const KnownAxis& machine) {
+  if (!known.model || !known.shapers) {
+    return std::nullopt;
+  }
+  std::optional<std::vector<dynamics::Mode>> truth =
+      study::fitted_truth(machine.densities.step_hz, machine.densities.column);
+  return truth ? std::optional(Pair{&known, &machine, std::move(*truth)}) : std::nullopt;
+}
 
 // The last record with a model, on the machine that an independent fit to it tells of.
 std::optional<Pair> alone(const std::vector<KnownAxis>& records) {
   for (auto record = records.rbegin(); record != records.rend(); ++record) {
-    if (record->model && record->truth && record->shapers) {
-      return Pair{&*record, &*record};
+    if (std::optional<Pair> pair = paired(*record, *record)) {
+      return pair;
     }
   }
   return std::nullopt;
@@ -97,17 +106,15 @@ std::optional<Pair> alone(const std::vector<KnownAxis>& records) {
 // The last two records: the first is known, and the other one tells of the machine.
 std::optional<Pair> across(const std::vector<KnownAxis>& records) {
   for (std::size_t i = records.size(); i > 1; --i) {
-    const KnownAxis& known = records[i - 2];
-    const KnownAxis& machine = records[i - 1];
-    if (known.model && known.shapers && machine.truth) {
-      return Pair{&known, &machine};
+    if (std::optional<Pair> pair = paired(records[i - 2], records[i - 1])) {
+      return pair;
     }
   }
   return std::nullopt;
 }
 
 study::MachineAxis machine_axis(const Pair& pair) {
-  return {pair.known->name, pair.machine->name, *pair.machine->truth, *pair.known->shapers};
+  return {pair.known->name, pair.machine->name, pair.truth, *pair.known->shapers};
 }
 
 // A machine on the bench; its settings are still to be read.

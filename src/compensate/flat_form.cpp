@@ -84,13 +84,13 @@ const Stencil& FlatStencils::of(RowKind kind) const {
 }
 
 bool FlatForm::takes(const AxisWindow& window) {
-  return window.models() == 1 && window.axis.modes().size() == 1;
+  return window.models() == 1 && window.axis.mode_count() == 1;
 }
 
 bool FlatForm::suits(const ScaledWindow& scaled) {
   const AxisWindow& window = *scaled.window;
   return scaled.nodes >= kFewestNodes &&
-         window.axis.main().omega_rad_s * window.period_s >= kSmallestOmegaH;
+         window.axis.main_rad_s() * window.period_s >= kSmallestOmegaH;
 }
 
 void FlatForm::assign(const ScaledWindow& scaled) {
@@ -98,7 +98,8 @@ void FlatForm::assign(const ScaledWindow& scaled) {
   faint_pull_ = kFaintPull;
   nodes_ = scaled.nodes;
   const AxisWindow& window = *scaled.window;
-  const FlatStencils stencils(AxisChain(window.axis.main(), window.period_s));
+  const FlatStencils stencils(
+      AxisChain(window.axis.main_rad_s() * window.period_s, window.axis.main_damping_ratio()));
   for (const RowKind kind : kRowKinds) {
     stencils_[index_of(kind)] = stencils.of(kind);
   }
@@ -144,7 +145,8 @@ void FlatForm::find_ends() {
   const Stencil& velocity = stencils_[index_of(RowKind::velocity)];
   if (window_->start) {
     const AxisWindow& window = *window_->window;
-    const FlatStencils stencils(AxisChain(window.axis.main(), window.period_s));
+    const FlatStencils stencils(
+        AxisChain(window.axis.main_rad_s() * window.period_s, window.axis.main_damping_ratio()));
     ChainMatrix to_state;
     for (Eigen::Index component = 0; component < 5; ++component) {
       for (Eigen::Index i = 0; i < 5; ++i) {

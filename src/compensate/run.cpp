@@ -88,7 +88,7 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
   window.period_s = period_s;
   // The effect of the base's jerk on the nozzle's motion goes with (ωh)². With this weight one
   // value serves all resonances.
-  window.jerk_weight = setup.jerk_weight * std::pow(axis.axis.main().omega_rad_s * period_s, 4);
+  window.jerk_weight = setup.jerk_weight * std::pow(axis.axis.main_rad_s() * period_s, 4);
   window.limits = axis.limits;
   // If the sliced path itself leaves the travel, the base may go as far but no further.
   const auto [low, high] = std::ranges::minmax(reference);
@@ -115,15 +115,7 @@ Plant AxisWindow::model(std::size_t i) const {
 dynamics::NozzleState AxisWindow::in_model(std::size_t i, const dynamics::NozzleState& nozzle,
                                            double base_mm) const {
   const dynamics::FlexibleAxis& other = i > 0 ? plants[i - 1].axis : axis;
-  dynamics::NozzleState state = nozzle;
-  if (other.modes().size() != axis.modes().size()) {
-    // There is no telling which mode swings, so all do, by their gains.
-    return other.riding(nozzle.position(), nozzle.velocity());
-  }
-  for (std::size_t mode = 0; mode < other.modes().size(); ++mode) {
-    state.parts[mode].position += (other.modes()[mode].gain - axis.modes()[mode].gain) * base_mm;
-  }
-  return state;
+  return other.swinging_as(axis, nozzle, base_mm);
 }
 
 NodeGrid node_grid(const Course& course, const Setup& setup) {

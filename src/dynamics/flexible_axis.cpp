@@ -227,6 +227,19 @@ NozzleState FlexibleAxis::riding(double position_mm, double velocity_mm_s) const
   return state;
 }
 
+NozzleState FlexibleAxis::swinging_as(const FlexibleAxis& other, const NozzleState& nozzle,
+                                      double base_mm) const {
+  if (other.count_ != count_) {
+    // There is no telling which mode swings, so all do, by their gains.
+    return riding(nozzle.position(), nozzle.velocity());
+  }
+  NozzleState state = nozzle;
+  for (std::size_t i = 0; i < count_; ++i) {
+    state.parts[i].position += (modes_[i].gain - other.modes_[i].gain) * base_mm;
+  }
+  return state;
+}
+
 FlexibleAxis::Gap FlexibleAxis::gap(const NozzleState& a, const NozzleState& b) const {
   Gap sum;
   for (std::size_t i = 0; i < count_; ++i) {

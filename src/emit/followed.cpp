@@ -53,7 +53,7 @@ Eigen::Matrix2d ring_down_of(const Mode& mode) {
 }  // namespace
 
 StepMatrix::StepMatrix(const dynamics::FlexibleAxis& axis, std::size_t mode, double dt) : dt_(dt) {
-  if (mode >= axis.modes().size()) {
+  if (mode >= axis.mode_count()) {
     return;
   }
   gain_ = axis.modes()[mode].gain;
@@ -76,7 +76,7 @@ Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
 
 Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
                    const dynamics::FlexibleAxis& nozzle, const NozzleState& start)
-    : period_s_(base.period_s), modes_(nozzle.modes().size()) {
+    : period_s_(base.period_s), modes_(nozzle.mode_count()) {
   const double dt = base.period_s / kSubsteps;
   std::vector<StepMatrix> steps;
   for (std::size_t mode = 0; mode < modes_; ++mode) {
@@ -126,7 +126,7 @@ NozzleState Followed::at(double t) const {
 template <int kModes>
 ModesSquare<kModes> ring_down_square(const dynamics::FlexibleAxis& axis) {
   ModesSquare<kModes> result = ModesSquare<kModes>::Zero();
-  const std::size_t count = axis.modes().size();
+  const std::size_t count = axis.mode_count();
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t j = 0; j < count; ++j) {
       result.template block<2, 2>(static_cast<Eigen::Index>(2 * i),

@@ -93,7 +93,7 @@ Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>&
 Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double>& wanted,
                   const std::function<ErrorWeight(double)>& weight, const RunEnds& ends,
                   const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
-  const std::size_t modes = std::max(rules.nozzle_x.modes().size(), rules.nozzle_y.modes().size());
+  const std::size_t modes = std::max(rules.nozzle_x.mode_count(), rules.nozzle_y.mode_count());
   return with_modes(modes, [&](auto count) {
     return path_of<decltype(count)::value>(base, wanted, weight, ends, x, y, rules);
   });

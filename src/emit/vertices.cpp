@@ -439,7 +439,7 @@ AxisVertices VertexChooser::choose(const std::vector<double>& times, const AxisG
     return choose_vertices<decltype(modes)::value>(*base_, axis_, nozzle_, followed_, times, grid,
                                                    reach, most, ends);
   };
-  return with_modes(nozzle_.modes().size(), choose);
+  return with_modes(nozzle_.mode_count(), choose);
 }
 
 }  // namespace unflex::emit

@@ -87,7 +87,7 @@ void set_probe(const compensate::Engine& engine, compensate::AxisWindow window,
   constexpr std::size_t kMost = 11000;
   std::size_t states = 3;
   for (std::size_t i = 0; i < window.models(); ++i) {
-    states += 2 * window.model(i).axis.modes().size();
+    states += 2 * window.model(i).axis.mode_count();
   }
   const std::size_t most = std::max<std::size_t>(kMost / states, 2);
   if (window.nodes() <= most) {

@@ -35,8 +35,8 @@ ShaperBench::ShaperBench(const verify::NozzleModel& model, std::size_t machines)
       near_(verify::reach_s(model)) {
   for (const dynamics::ShaperKind kind : dynamics::kShaperKinds) {
     Shaper shaper{std::string(dynamics::name(kind)), {}};
-    const auto x = dynamics::shaper_pulses(kind, model.x.main_hz(), model.x.main().zeta);
-    const auto y = dynamics::shaper_pulses(kind, model.y.main_hz(), model.y.main().zeta);
+    const auto x = dynamics::shaper_pulses(kind, model.x.main_hz(), model.x.main_damping_ratio());
+    const auto y = dynamics::shaper_pulses(kind, model.y.main_hz(), model.y.main_damping_ratio());
     if (x && y) {
       shaper.nozzles.assign(machines, Nozzle{rivals::ShapedNozzle(*x, *y)});
       lookahead_s_ = std::max(lookahead_s_, shaper.nozzles.front().shaped.lookahead_s());

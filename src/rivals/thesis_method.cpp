@@ -46,8 +46,8 @@ Defects defects(const Nodes& nodes, const dynamics::FlexibleAxis& axis, std::siz
   const dynamics::NozzleMotion& p1 = nodes.nozzle[k];
   const dynamics::NozzleMotion& p2 = nodes.nozzle[k + 1];
   const double h = nodes.h;
-  const double stiffness = axis.main().stiffness_per_s2();
-  const double damping = axis.main().damping_per_s();
+  const double stiffness = axis.main_rad_s() * axis.main_rad_s();
+  const double damping = 2.0 * axis.main_damping_ratio() * axis.main_rad_s();
   const Form one = unit(kConstant);
   const Form base1 = unit(kBase);
   const Form base2 = base1 + 0.5 * h * (unit(kNow) + unit(kNext));

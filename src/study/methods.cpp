@@ -31,7 +31,7 @@ struct BuiltShaper {
 };
 
 Result<BuiltShaper> build(dynamics::ShaperKind kind, const dynamics::FlexibleAxis& axis) {
-  const double damping_ratio = axis.main().zeta;
+  const double damping_ratio = axis.main_damping_ratio();
   if (damping_ratio >= 1.0) {
     return fail(ErrorKind::input, "undefined at ζ = 1: without vibration there is no period");
   }
@@ -66,7 +66,7 @@ BaseMotion both_axes(const Moves& plan, const compensate::Setup& setup, const Ma
 }
 
 rivals::AxisPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
-  const double knot_s = 2.0 * std::numbers::pi / axis.main().omega_rad_s / kKnotsPerPeriod;
+  const double knot_s = 2.0 * std::numbers::pi / axis.main_rad_s() / kKnotsPerPeriod;
   return rivals::filtered_spline(reference, axis,
                                  {knot_s, kSplineEndKnots * knot_s, kSplineEndKnots * knot_s});
 }

@@ -36,8 +36,9 @@ Run run_of(const Case& of) {
 }
 
 std::string describe(const Case& of) {
-  return fmt::format("ω {} rad/s, ζ {}, {} mm/s², {} mm/s, step {} ms", of.axis.main().omega_rad_s,
-                     of.axis.main().zeta, of.accel_mm_s2, of.velocity_mm_s, of.period_s * 1e3);
+  return fmt::format("ω {} rad/s, ζ {}, {} mm/s², {} mm/s, step {} ms", of.axis.main_rad_s(),
+                     of.axis.main_damping_ratio(), of.accel_mm_s2, of.velocity_mm_s,
+                     of.period_s * 1e3);
 }
 
 // Cases 5A and 5B change only the thesis' nodes. So all methods but the thesis' own move as in the
@@ -105,7 +106,7 @@ BenchSetup corner_setup(const Case& of) {
   setup.unflex.x.axis = setup.unflex.y.axis = of.axis;
   setup.unflex.lead_in_s = kLeadIn_s;
   setup.unflex.tail_s =
-      std::max(8.0 * of.axis.main().zeta / of.axis.main().omega_rad_s, kLeastTail_s);
+      std::max(8.0 * of.axis.main_damping_ratio() / of.axis.main_rad_s(), kLeastTail_s);
   setup.unflex.jerk_weight = kJerkWeight;
   setup.plan_accel_mm_s2 = of.accel_mm_s2;
   setup.thesis_period_s = of.period_s;

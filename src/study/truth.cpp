@@ -70,12 +70,11 @@ double damping_of(const Eigen::VectorXd& p, int mode) {
   return std::exp(within(std::log(kLeastDamping), std::log(kMostDamping), p[3 * mode + 1]));
 }
 
-int modes_of(const Eigen::VectorXd& p) { return static_cast<int>(p.size() - 2) / 3; }
+int modes_of(const Eigen::VectorXd& p) { return static_cast<int>(p.size() - 1) / 3; }
 
 Eigen::ArrayXd logarithm_of(const Eigen::VectorXd& p, const Eigen::ArrayXd& freq_hz) {
   Eigen::ArrayXd result(freq_hz.size());
-  const double white = std::exp(p[p.size() - 2]);
-  const double rise = std::exp(p[p.size() - 1]);
+  const double noise = std::exp(p[p.size() - 1]);
   for (Eigen::Index k = 0; k < freq_hz.size(); ++k) {
     Complex sum = 0.0;
     for (int m = 0; m < modes_of(p); ++m) {
@@ -84,7 +83,7 @@ Eigen::ArrayXd logarithm_of(const Eigen::VectorXd& p, const Eigen::ArrayXd& freq
       sum += p[3 * m + 2] * (1.0 + loss) / (1.0 - r * r + loss);
     }
     const double square = freq_hz[k] * freq_hz[k] / 3600.0;
-    result[k] = std::log(std::norm(sum) + white / square + rise / (square * square) + 1e-14);
+    result[k] = std::log(std::norm(sum) + noise / square + 1e-14);
   }
   return result;
 }
@@ -116,7 +115,7 @@ struct Residuals {
     result.segment(count, unknowns) = kPull * p;
     double sum = 0.0;
     double all = 0.0;
-    for (Eigen::Index i = 2; i < p.size() - 2; i += 3) {
+    for (Eigen::Index i = 2; i < p.size() - 1; i += 3) {
       sum += p[i];
       all += std::abs(p[i]);
     }
@@ -160,10 +159,10 @@ std::vector<double> peaks_of(const Bins& bins, const Eigen::ArrayXd& heights, st
 }
 
 Eigen::VectorXd with_mode(const Eigen::VectorXd& p, double freq_hz, double damping, double a) {
-  const Eigen::Index count = p.size() - 2;
+  const Eigen::Index count = p.size() - 1;
   Eigen::VectorXd result(p.size() + 3);
   result << p.head(count), inside(std::log(kLeast_hz), std::log(kMost_hz), std::log(freq_hz)),
-      inside(std::log(kLeastDamping), std::log(kMostDamping), std::log(damping)), a, p.tail(2);
+      inside(std::log(kLeastDamping), std::log(kMostDamping), std::log(damping)), a, p.tail(1);
   return result;
 }
 
@@ -217,7 +216,7 @@ std::vector<Fit> extended(const Bins& bins, const std::vector<Fit>& fewer) {
   }
   std::vector<Fit> fits;
   if (fewer.empty()) {
-    const Eigen::VectorXd noise = Eigen::Vector2d::Constant(-9.0);
+    const Eigen::VectorXd noise = Eigen::VectorXd::Constant(1, -9.0);
     for (const double freq_hz : places) {
       for (const double damping : {0.05, 0.15}) {
         fits.push_back(minimised(bins, scaled(with_mode(noise, freq_hz, damping, 0.02), bins)));

@@ -94,9 +94,12 @@ class FlexibleAxis {
   explicit FlexibleAxis(std::span<const Mode> modes);
 
   [[nodiscard]] std::span<const Mode> modes() const { return {modes_.data(), count_}; }
+  [[nodiscard]] std::size_t mode_count() const { return count_; }
   // The mode with the largest gain, for what knows one mode only: shapers and older methods.
   [[nodiscard]] const Mode& main() const;
   [[nodiscard]] double main_hz() const;
+  [[nodiscard]] double main_rad_s() const { return main().omega_rad_s; }
+  [[nodiscard]] double main_damping_ratio() const { return main().zeta; }
 
   [[nodiscard]] double slowest_rad_s() const;
   [[nodiscard]] double fastest_rad_s() const;
@@ -128,6 +131,10 @@ class FlexibleAxis {
 
   // The nozzle that goes along with a base in even motion, as after a long time.
   [[nodiscard]] NozzleState riding(double position_mm, double velocity_mm_s = 0.0) const;
+  // The state of this axis that swings as `nozzle` does, a state of `other` while the base is at
+  // base_mm.
+  [[nodiscard]] NozzleState swinging_as(const FlexibleAxis& other, const NozzleState& nozzle,
+                                        double base_mm) const;
   // The difference between two states as places: Σ |Δq| and Σ |Δq̇|/ω, mm.
   struct Gap {
     double place_mm = 0.0;

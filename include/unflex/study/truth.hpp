@@ -10,7 +10,7 @@
 namespace unflex::study {
 
 // One to four modes whose density
-//   P(ν) = ν² |Σ a_i h_i(ν)|² + N₀ + N₁/ν²,   h_i = (1 + 2iζr) / (1 − r² + 2iζr),   r = ν/f_i,
+//   P(ν) = ν² |Σ a_i h_i(ν)|² + N₀,   h_i = (1 + 2iζr) / (1 − r² + 2iζr),   r = ν/f_i,
 // is nearest to `density`, that of the tool's acceleration at k · step_hz. Distances are those of
 // log P/ν² from 15 to 128 Hz, with a soft L1 loss. The number of modes is the one with the lowest
 // Bayesian information criterion. Among fits of about equal size those count whose zeros lie in the
