@@ -1,6 +1,6 @@
 // The fit by Welch's spectrum (modes_fit.hpp) tells how many modes there are and about where. Then
 // all their parameters are fitted to the energy spectrum |Y(ν)|² of the whole recording, which is
-// finer by a factor of fifty, without its phase. So neither the moment at which the sweep began nor
+// finer by a factor of forty, without its phase. So neither the moment at which the sweep began nor
 // the clocks matter. Y is the modes' answer to the sweep, with energy s, plus noise of mean
 // energy S, independent from bin to bin; then (Rice, Mathematical Analysis of Random Noise, 1945)
 //   E|Y|² = s + S,   var|Y|² = 2 s S + S².
