@@ -6,10 +6,6 @@
 namespace unflex::identify {
 namespace {
 
-double divisor(const Spectrum& spectrum, std::size_t k) {
-  return spectrum.is_normalized ? static_cast<double>(k) * spectrum.step_hz + 0.1 : 1.0;
-}
-
 std::size_t first_bin(const Spectrum& spectrum, const Sweep& sweep) {
   return static_cast<std::size_t>(
       std::ceil(std::max(kFitFrom_hz, 1.2 * sweep.start_hz) / spectrum.step_hz));
@@ -34,7 +30,7 @@ AxisDensity density_of_axis(const Spectrum& spectrum, const Sweep& sweep) {
   std::array<double, 3> energy{};
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t k = first; k < end; ++k) {
-      energy[c] += spectrum.density[c][k] * divisor(spectrum, k);
+      energy[c] += spectrum.density[c][k];
     }
   }
   const double whole = energy[0] + energy[1] + energy[2];
@@ -79,7 +75,7 @@ Result<Band> band_of(const Spectrum& spectrum, const std::vector<double>& densit
                                            static_cast<double>(end - 1) * spectrum.step_hz),
       .density = Eigen::ArrayXd(count)};
   for (std::size_t k = first; k < end; ++k) {
-    band.density[static_cast<Eigen::Index>(k - first)] = density[k] * divisor(spectrum, k);
+    band.density[static_cast<Eigen::Index>(k - first)] = density[k];
   }
   const double mean = band.density.mean();
   if (!std::isfinite(mean) || !(mean > 0.0)) {

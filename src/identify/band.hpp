@@ -23,6 +23,7 @@ struct AxisDensity {
   std::array<double, 3> direction{};  // roots of the columns' shares of the energy
 };
 
+// `spectrum`: of the acceleration, as as_acceleration() gives it.
 [[nodiscard]] AxisDensity density_of_axis(const Spectrum& spectrum, const Sweep& sweep);
 
 // The bins of a density in the band of the sweep, relative to their mean, as acceleration.

@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "modes_interval.hpp"
+#include "response.hpp"
 #include "unflex/identify/axis_model.hpp"
 
 namespace unflex::identify {
@@ -31,19 +32,6 @@ Eigen::VectorXd parameters_of(const std::vector<ModeOfAxis>& modes) {
         std::log(modes[m].damping_ratio), modes[m].gain;
   }
   return result;
-}
-
-std::vector<ModeOfAxis> modes_of_parameters(const Eigen::VectorXd& parameters) {
-  std::vector<ModeOfAxis> modes;
-  double gains = 0.0;
-  for (Eigen::Index i = 0; i < parameters.size(); i += 3) {
-    modes.push_back({std::exp(parameters[i]), std::exp(parameters[i + 1]), parameters[i + 2]});
-    gains += parameters[i + 2];
-  }
-  for (ModeOfAxis& mode : modes) {
-    mode.gain /= gains;
-  }
-  return modes;
 }
 
 // The modes in the order of those of `like`: each the one of nearest frequency. Empty if their
@@ -131,7 +119,7 @@ AxisModel averaged(const std::vector<Measurement>& all) {
     of_record.diagonal() += spread;
     covariance += w.asDiagonal() * of_record * w.asDiagonal();
   }
-  return model_of(Method::combined, modes_of_parameters(mean), covariance);
+  return model_of(Method::combined, modes_of_logarithms(mean), covariance);
 }
 
 double width(const AxisModel& model) {
@@ -139,8 +127,8 @@ double width(const AxisModel& model) {
   return std::log(main_hz.high / main_hz.low);
 }
 
-// The record whose model is nearest to the others', of equals the one that is most certain of
-// itself. The others are plants.
+// The record whose model is nearest to the others'. Where two are as near, the one with the
+// narrower interval counts. The others are plants.
 AxisModel with_others_as_plants(const std::vector<AxisModel>& models) {
   const AxisModel* middle = nullptr;
   double least = std::numeric_limits<double>::infinity();
@@ -165,8 +153,7 @@ AxisModel with_others_as_plants(const std::vector<AxisModel>& models) {
   for (const AxisModel& model : models) {
     if (&model != middle) {
       result.plants.push_back({.modes = model.values(), .share = share});
-      main_hz.low = std::min(main_hz.low, model.values().front().freq_hz);
-      main_hz.high = std::max(main_hz.high, model.values().front().freq_hz);
+      widen(main_hz, model.values().front().freq_hz);
     }
   }
   return result;

@@ -11,6 +11,11 @@ namespace {
 
 constexpr std::string_view kTooDamped = "its damping grows without bound";
 
+// How far a mode swings the nozzle, up to a factor, if it is damped by at least that much.
+double swing_of(const ModeOfAxis& mode, double least_damping = 0.0) {
+  return std::abs(mode.gain) / (std::max(mode.damping_ratio, least_damping) * mode.freq_hz);
+}
+
 // Order of the modes by their swing, those in the band first.
 std::vector<Eigen::Index> by_swing(const std::vector<ModeOfAxis>& modes, const Band& band) {
   std::vector<Eigen::Index> order(modes.size());
@@ -18,12 +23,10 @@ std::vector<Eigen::Index> by_swing(const std::vector<ModeOfAxis>& modes, const B
     order[i] = static_cast<Eigen::Index>(i);
   }
   const double top_hz = band.top_hz();
-  const auto swing = [&](Eigen::Index i) {
+  std::ranges::stable_sort(order, std::ranges::greater{}, [&](Eigen::Index i) {
     const ModeOfAxis& mode = modes[static_cast<std::size_t>(i)];
-    const bool is_inside = mode.freq_hz <= top_hz;
-    return (is_inside ? 1.0 : 1e-6) * std::abs(mode.gain) / (mode.damping_ratio * mode.freq_hz);
-  };
-  std::ranges::stable_sort(order, std::ranges::greater{}, swing);
+    return std::pair(mode.freq_hz <= top_hz, swing_of(mode));
+  });
   return order;
 }
 
@@ -77,12 +80,10 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
   if (all > kMostOfAllGains) {
     return "its gains nearly cancel";
   }
-  // What is known of the damping beyond the sweep is little.
-  const auto swing = [](const ModeOfAxis& mode, double least_damping) {
-    return std::abs(mode.gain) / (std::max(mode.damping_ratio, least_damping) * mode.freq_hz);
-  };
+  // Little is known of the damping beyond the sweep.
+  constexpr double kDampingBeyond = 0.05;
   for (const ModeOfAxis& mode : modes) {
-    if (mode.freq_hz > band.top_hz() && swing(mode, 0.05) >= swing(modes.front(), 0.0)) {
+    if (mode.freq_hz > band.top_hz() && swing_of(mode, kDampingBeyond) >= swing_of(modes.front())) {
       return "its resonance lies at the edge of the sweep or beyond";
     }
   }

@@ -9,6 +9,7 @@
 
 #include "modes_interval.hpp"
 #include "response.hpp"
+#include "welch.hpp"
 
 namespace unflex::identify {
 namespace {
@@ -48,9 +49,7 @@ void add_rivals(const Choice& choice, AxisModel& model) {
   for (const Rival& rival : choice.rivals) {
     model.plants.push_back({.modes = modes_of(rival.theta), .share = rival.odds / odds});
     if (rival.has_other_main) {
-      const double freq_hz = model.plants.back().modes.front().freq_hz;
-      main_hz.low = std::min(main_hz.low, freq_hz);
-      main_hz.high = std::max(main_hz.high, freq_hz);
+      widen(main_hz, model.plants.back().modes.front().freq_hz);
     }
   }
 }
@@ -176,7 +175,8 @@ std::string disagreement(const RecordFit& sum, const RecordFit& column) {
 
 }  // namespace
 
-Result<ModesFit> fit_modes(const Spectrum& spectrum, const Sweep& sweep) {
+Result<ModesFit> fit_modes(const Spectrum& given, const Sweep& sweep) {
+  const Spectrum spectrum = as_acceleration(given);
   const AxisDensity axis = density_of_axis(spectrum, sweep);
   Result<ModesFit> fit = fit_density(spectrum, axis.density, sweep);
   if (!fit) {

@@ -14,8 +14,7 @@
 namespace unflex::identify {
 namespace {
 
-constexpr double kQuantile = 1.959964;  // of the normal distribution, 97.5 %
-constexpr double kStep = 1e-4;          // of differences, in standard deviations
+constexpr double kStep = 1e-4;  // of differences, in standard deviations
 
 Eigen::MatrixXd correlations(const ModesModel& model, Eigen::Index bins) {
   Eigen::MatrixXd result(bins, bins);

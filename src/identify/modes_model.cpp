@@ -13,9 +13,13 @@ namespace unflex::identify {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double kNoiseCorner_hz = 30.0;
 
 }  // namespace
+
+Eigen::ArrayXd noise_rise(const Eigen::ArrayXd& freq_hz) {
+  constexpr double kCorner_hz = 30.0;
+  return (kCorner_hz / freq_hz).square();
+}
 
 ModesModel::ModesModel(const Band& band, double start_hz)
     : freq_hz_(band.freq_hz), floor_(band.floor) {
@@ -36,7 +40,7 @@ ModesModel::ModesModel(const Band& band, double start_hz)
           .max(0.0);
   excitation_ = sweep_energy(fine_hz_, start_hz);
   excitation_ /= excitation_.mean();
-  noise_shape_ = (kNoiseCorner_hz / freq_hz_).square();
+  noise_shape_ = noise_rise(freq_hz_);
 }
 
 double ModesModel::correlation(Eigen::Index apart) const {
@@ -139,15 +143,19 @@ Eigen::ArrayXd ModesModel::noise_density(const Eigen::VectorXd& theta) const {
 }
 
 std::vector<ModeOfAxis> modes_of(const Eigen::VectorXd& theta) {
+  return modes_of_logarithms(theta.head(3 * modes_in(theta)));
+}
+
+std::vector<ModeOfAxis> modes_of_logarithms(const Eigen::VectorXd& parameters) {
   double sum = 0.0;
-  for (Eigen::Index m = 0; m < modes_in(theta); ++m) {
-    sum += theta[3 * m + 2];
+  for (Eigen::Index i = 2; i < parameters.size(); i += 3) {
+    sum += parameters[i];
   }
   std::vector<ModeOfAxis> modes;
-  for (Eigen::Index m = 0; m < modes_in(theta); ++m) {
-    modes.push_back({.freq_hz = std::exp(theta[3 * m]),
-                     .damping_ratio = std::exp(theta[3 * m + 1]),
-                     .gain = theta[3 * m + 2] / sum});
+  for (Eigen::Index i = 0; i < parameters.size(); i += 3) {
+    modes.push_back({.freq_hz = std::exp(parameters[i]),
+                     .damping_ratio = std::exp(parameters[i + 1]),
+                     .gain = parameters[i + 2] / sum});
   }
   return modes;
 }

@@ -45,6 +45,11 @@ class ModesModel {
 }
 
 [[nodiscard]] std::vector<ModeOfAxis> modes_of(const Eigen::VectorXd& theta);
+// The modes of (log f, log ζ, a) for each in turn.
+[[nodiscard]] std::vector<ModeOfAxis> modes_of_logarithms(const Eigen::VectorXd& parameters);
+
+// How N₁ falls with frequency, 1 at 30 Hz.
+[[nodiscard]] Eigen::ArrayXd noise_rise(const Eigen::ArrayXd& freq_hz);
 
 // H of one mode at frequencies ν, without its gain.
 [[nodiscard]] Eigen::ArrayXcd mode_response(const Eigen::ArrayXd& freq_hz, double mode_hz,

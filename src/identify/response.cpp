@@ -30,9 +30,13 @@ Eigen::ArrayXd sweep_energy(const Eigen::ArrayXd& freq_hz, double start_hz) {
 }
 
 Estimate estimate_of(double value, double log_variance) {
-  constexpr double kQuantile = 1.959964;  // of the normal distribution, 97.5 %
   const double factor = std::exp(kQuantile * std::sqrt(std::max(log_variance, 0.0)));
   return {.value = value, .low = value / factor, .high = value * factor};
+}
+
+void widen(Estimate& estimate, double value) {
+  estimate.low = std::min(estimate.low, value);
+  estimate.high = std::max(estimate.high, value);
 }
 
 Misfit misfit_of(const Eigen::ArrayXd& freq_hz, const Eigen::ArrayXd& measured,

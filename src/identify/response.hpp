@@ -13,8 +13,13 @@ namespace unflex::identify {
 // fundamental, and passes n times as fast. So it adds ν²/n⁵, from n times the sweep's start on.
 [[nodiscard]] Eigen::ArrayXd sweep_energy(const Eigen::ArrayXd& freq_hz, double start_hz);
 
+inline constexpr double kQuantile = 1.959964;  // of the normal distribution, 97.5 %
+
 // The estimate with the interval value · exp(± 1.96 σ), where σ belongs to the logarithm.
 [[nodiscard]] Estimate estimate_of(double value, double log_variance);
+
+// Widens the interval so that it holds the value.
+void widen(Estimate& estimate, double value);
 
 // Compares measured and fitted values, both smoothed: how much of the measurement the fit does not
 // explain, and where the measurement has another peak.

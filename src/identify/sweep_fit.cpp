@@ -71,8 +71,7 @@ FineBand fine_band_of(const EnergySpectrum& spectrum, const Sweep& sweep) {
 
 // Parameters are those of ModesModel: log f, log ζ and a for each mode, then log N₀ and log N₁.
 Eigen::ArrayXd noise_of(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p) {
-  constexpr double kCorner_hz = 30.0;
-  return std::exp(p[p.size() - 2]) + std::exp(p[p.size() - 1]) * (kCorner_hz / freq_hz).square();
+  return std::exp(p[p.size() - 2]) + std::exp(p[p.size() - 1]) * noise_rise(freq_hz);
 }
 
 // What mode m alone would give at frequencies ν.

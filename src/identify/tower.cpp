@@ -4,11 +4,10 @@
 #include <numbers>
 
 #include "modes_interval.hpp"
+#include "response.hpp"
 
 namespace unflex::identify {
 namespace {
-
-constexpr double kQuantile = 1.959964;
 
 // ζ from the ratio of two successive waves: δ = ln ratio = 2πζ / √(1 − ζ²).
 double damping_of(double ratio) {

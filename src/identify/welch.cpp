@@ -29,6 +29,18 @@ Eigen::ArrayXd kaiser_window(Eigen::Index length) {
 
 }  // namespace
 
+Spectrum as_acceleration(Spectrum spectrum) {
+  if (spectrum.is_normalized) {
+    for (std::vector<double>& column : spectrum.density) {
+      for (std::size_t k = 0; k < column.size(); ++k) {
+        column[k] *= static_cast<double>(k) * spectrum.step_hz + 0.1;
+      }
+    }
+    spectrum.is_normalized = false;
+  }
+  return spectrum;
+}
+
 Spectrum spectrum_of(const DataSet& set) {
   Spectrum result;
   if (const auto* recording = std::get_if<Recording>(&set.data)) {
@@ -39,16 +51,7 @@ Spectrum spectrum_of(const DataSet& set) {
     }
     return result;
   }
-  result = std::get<Spectrum>(set.data);
-  if (result.is_normalized) {
-    for (std::vector<double>& column : result.density) {
-      for (std::size_t k = 0; k < column.size(); ++k) {
-        column[k] *= static_cast<double>(k) * result.step_hz + 0.1;
-      }
-    }
-    result.is_normalized = false;
-  }
-  return result;
+  return as_acceleration(std::get<Spectrum>(set.data));
 }
 
 Spectrum welch_spectrum(const std::vector<double>& samples, double rate_hz) {

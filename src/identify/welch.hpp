@@ -11,4 +11,7 @@ namespace unflex::identify {
 // β = 6, half overlapping, of half a second or more, without their mean (shaper_calibrate.py).
 [[nodiscard]] Spectrum welch_spectrum(const std::vector<double>& samples, double rate_hz);
 
+// The spectrum without SHAPER_CALIBRATE's division by the frequency.
+[[nodiscard]] Spectrum as_acceleration(Spectrum spectrum);
+
 }  // namespace unflex::identify
