@@ -59,7 +59,6 @@ Densities densities_of(const DataSet& set) {
 struct KnownAxis {
   std::string name;
   std::optional<identify::AxisModel> model;  // missing if the record carries none
-  std::optional<rivals::KlipperCalibration> shapers;
   Densities densities;
   std::string refusal;
 };
@@ -73,7 +72,6 @@ KnownAxis known_axis(const DataSet& set, Axis axis, const identify::Sweep& sweep
   }
   known.refusal = fitted ? fitted->refusal : fitted.error().message;
   known.densities = densities_of(set);
-  known.shapers = rivals::klipper_calibration(known.densities.step_hz, known.densities.sum);
   return known;
 }
 
@@ -81,16 +79,23 @@ KnownAxis known_axis(const DataSet& set, Axis axis, const identify::Sweep& sweep
 struct Pair {
   const KnownAxis* known = nullptr;
   const KnownAxis* machine = nullptr;
+  rivals::KlipperCalibration shapers;
   std::vector<dynamics::Mode> truth;
 };
 
-std::optional<Pair> paired(const KnownAxis& known, const KnownAxis& machine) {
-  if (!known.model || !known.shapers) {
+// truth: of the machine's record if it is at hand, since the fit takes seconds.
+std::optional<Pair> paired(const KnownAxis& known, const KnownAxis& machine,
+                           std::optional<std::vector<dynamics::Mode>> truth = std::nullopt) {
+  if (!known.model) {
     return std::nullopt;
   }
-  std::optional<std::vector<dynamics::Mode>> truth =
-      study::fitted_truth(machine.densities.step_hz, machine.densities.column);
-  return truth ? std::optional(Pair{&known, &machine, std::move(*truth)}) : std::nullopt;
+  auto shapers = rivals::klipper_calibration(known.densities.step_hz, known.densities.sum);
+  if (shapers && !truth) {
+    truth = study::fitted_truth(machine.densities.step_hz, machine.densities.column);
+  }
+  return truth && shapers
+             ? std::optional(Pair{&known, &machine, std::move(*shapers), std::move(*truth)})
+             : std::nullopt;
 }
 
 // The last record with a model, on the machine that an independent fit to it tells of.
@@ -103,10 +108,13 @@ std::optional<Pair> alone(const std::vector<KnownAxis>& records) {
   return std::nullopt;
 }
 
-// The last two records: the first is known, and the other one tells of the machine.
-std::optional<Pair> across(const std::vector<KnownAxis>& records) {
+// The last two records: the first is known, and the other one tells of the machine. `own` is that
+// of alone().
+std::optional<Pair> across(const std::vector<KnownAxis>& records, const Pair& own) {
   for (std::size_t i = records.size(); i > 1; --i) {
-    if (std::optional<Pair> pair = paired(records[i - 2], records[i - 1])) {
+    const KnownAxis& machine = records[i - 1];
+    auto truth = &machine == own.machine ? std::optional(own.truth) : std::nullopt;
+    if (std::optional<Pair> pair = paired(records[i - 2], machine, std::move(truth))) {
       return pair;
     }
   }
@@ -114,7 +122,7 @@ std::optional<Pair> across(const std::vector<KnownAxis>& records) {
 }
 
 study::MachineAxis machine_axis(const Pair& pair) {
-  return {pair.known->name, pair.machine->name, pair.truth, *pair.known->shapers};
+  return {pair.known->name, pair.machine->name, pair.truth, pair.shapers};
 }
 
 // A machine on the bench; its settings are still to be read.
@@ -141,20 +149,35 @@ std::vector<Candidate> candidates(const std::string& name, const KnownAxes& axes
     return result;
   }
   result.push_back({name, *x, *y});
-  const std::optional<Pair> other_x = across(axes[0]);
-  const std::optional<Pair> other_y = across(axes[1]);
+  const std::optional<Pair> other_x = across(axes[0], *x);
+  const std::optional<Pair> other_y = across(axes[1], *y);
   if (other_x || other_y) {
     result.push_back({name + ", next record", other_x.value_or(*x), other_y.value_or(*y)});
   }
   return result;
 }
 
-Result<machine::Settings> settings_of(const RunConfig& config, const Candidate& candidate,
-                                      Input& input) {
-  RunConfig with = config;
+// The configuration with the axes as they are known.
+RunConfig with_axes(RunConfig config, const Candidate& candidate) {
   const std::vector<std::string> overrides = candidate.overrides();
-  with.overrides.insert(with.overrides.end(), overrides.begin(), overrides.end());
-  return load_settings(with, input);
+  config.overrides.insert(config.overrides.end(), overrides.begin(), overrides.end());
+  return config;
+}
+
+// Fits all records of a machine. Those without a model bring a warning.
+KnownAxes known_axes(const MachineRecords& records, const identify::Sweep& sweep,
+                     std::vector<std::string>& warnings) {
+  KnownAxes axes;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    for (const DataSet& set : records.axes[i]) {
+      const KnownAxis& known =
+          axes[i].emplace_back(known_axis(set, i == 0 ? Axis::x : Axis::y, sweep));
+      if (!known.model) {
+        warnings.push_back(fmt::format("{}: warning: is left out: {}", set.name, known.refusal));
+      }
+    }
+  }
+  return axes;
 }
 
 }  // namespace
@@ -165,37 +188,26 @@ Result<ExitCode> run_machines(const RunConfig& config, Console& console) {
     return tl::unexpected(machines.error());
   }
   std::vector<std::string> warnings;
-  std::vector<KnownAxes> axes(machines->size());
+  // Candidates point into it.
+  std::vector<KnownAxes> axes;
+  axes.reserve(machines->size());
   std::vector<Candidate> all;
-  for (std::size_t i = 0; i < machines->size(); ++i) {
-    const MachineRecords& records = (*machines)[i];
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      for (const DataSet& set : records.axes[axis]) {
-        axes[i][axis].push_back(
-            known_axis(set, axis == 0 ? Axis::x : Axis::y, config.identify.sweep));
-        if (!axes[i][axis].back().model) {
-          warnings.push_back(
-              fmt::format("{}: warning: is left out: {}", set.name, axes[i][axis].back().refusal));
-        }
-      }
-    }
-    std::ranges::move(candidates(records.name, axes[i]), std::back_inserter(all));
+  for (const MachineRecords& records : *machines) {
+    axes.push_back(known_axes(records, config.identify.sweep, warnings));
+    std::ranges::move(candidates(records.name, axes.back()), std::back_inserter(all));
   }
   if (all.empty()) {
     console.warnings(warnings);
     return fail(ErrorKind::input, {config.machines, 0},
                 "holds no machine whose records carry a model of both axes");
   }
-  RunConfig first = config;
-  const std::vector<std::string> overrides = all.front().overrides();
-  first.overrides.insert(first.overrides.end(), overrides.begin(), overrides.end());
-  Result<Workspace> space = open_workspace(first);
+  Result<Workspace> space = open_workspace(with_axes(config, all.front()));
   if (!space) {
     return tl::unexpected(space.error());
   }
   std::vector<pipeline::KnownMachine> known;
   for (const Candidate& candidate : all) {
-    Result<machine::Settings> settings = settings_of(config, candidate, space->input);
+    Result<machine::Settings> settings = load_settings(with_axes(config, candidate), space->input);
     if (!settings) {
       return tl::unexpected(settings.error());
     }

@@ -56,9 +56,9 @@ Status write_settings(const RunConfig& config, const machine::Settings& settings
   return output->write(machine::to_toml(settings)).and_then([&] { return output->commit(); });
 }
 
-// The modes behind the records. Every record must carry a model, since the file is written once and
-// used for long.
-Result<Identification> identify(const RunConfig& config, Console& console) {
+// The modes behind the records. Each axis with records must have one that carries a model, since
+// the file is written once and used for long.
+Result<Identification> identified(const RunConfig& config, Console& console) {
   Result<Identification> found = identify_records(config.identify);
   if (!found) {
     return tl::unexpected(found.error());
@@ -103,11 +103,11 @@ Result<ExitCode> run_printer_init(const RunConfig& asked, Console& console) {
   RunConfig config = asked;
   Identification found;
   if (!config.identify.records.empty()) {
-    Result<Identification> identified = identify(config, console);
-    if (!identified) {
-      return tl::unexpected(identified.error());
+    Result<Identification> result = identified(config, console);
+    if (!result) {
+      return tl::unexpected(result.error());
     }
-    found = std::move(*identified);
+    found = std::move(*result);
     const std::vector<std::string> overrides = dynamics_overrides(found);
     config.overrides.insert(config.overrides.begin(), overrides.begin(), overrides.end());
   }

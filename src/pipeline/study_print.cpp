@@ -8,16 +8,13 @@
 namespace unflex::pipeline {
 namespace {
 
-constexpr double kSampleStep_s = 2e-4;
-constexpr int kParts = 5;
-
 study::BenchSetup bench_setup(const machine::Settings& settings) {
   study::BenchSetup setup;
   setup.unflex = compensate_setup(settings);
   setup.plan_accel_mm_s2 = settings.limits.max_accel_mm_s2;
   setup.thesis_period_s = setup.unflex.period_s;
-  setup.step_s = kSampleStep_s;
-  setup.parts = kParts;
+  setup.step_s = study::kPrintStep_s;
+  setup.parts = study::kPrintParts;
   return setup;
 }
 

@@ -164,10 +164,8 @@ Json facts_json(const Report& r) {
                     unknown.moves_kept));
   }
   if (!r.plants.empty()) {
-    const auto rms = [](const PlantDeviation& plant) { return plant.compensated.rms_mm; };
-    const auto [least, most] = std::ranges::minmax(r.plants, {}, rms);
     add("If the axes are as one of the plants",
-        fmt::format("{} to {} µm RMS", micrometres_text(rms(least)), micrometres_text(rms(most))));
+        fmt::format("{} µm RMS", range_text(r.plants, &PlantDeviation::compensated)));
   }
   if (r.robustness) {
     add("Suits several models", fmt::format("{} µm RMS as optimised, {} for the nominal alone",

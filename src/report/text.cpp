@@ -54,13 +54,6 @@ void write_sensitivity(Sink out, const std::vector<Sensitivity>& sensitivity) {
   fmt::format_to(out, "sensitivity   {} µm RMS if frequencies are off by {} %\n", rms, errors);
 }
 
-// "0.9 to 3.1"
-std::string range_text(const std::vector<PlantDeviation>& plants, Spread PlantDeviation::*which) {
-  const auto rms = [&](const PlantDeviation& plant) { return (plant.*which).rms_mm; };
-  const auto [least, most] = std::ranges::minmax(plants, {}, rms);
-  return fmt::format("{} to {}", micrometres_text(rms(least)), micrometres_text(rms(most)));
-}
-
 void write_plants(Sink out, const std::vector<PlantDeviation>& plants) {
   if (!plants.empty()) {
     fmt::format_to(out, "plants        {} µm RMS if the axes are as one of {} plants, {} before\n",
@@ -166,6 +159,12 @@ std::string unknown_text(const std::vector<UnknownCommand>& commands) {
                    commands.size() - listed);
   }
   return text;
+}
+
+std::string range_text(const std::vector<PlantDeviation>& plants, Spread PlantDeviation::*which) {
+  const auto rms = [&](const PlantDeviation& plant) { return (plant.*which).rms_mm; };
+  const auto [least, most] = std::ranges::minmax(plants, {}, rms);
+  return fmt::format("{} to {}", micrometres_text(rms(least)), micrometres_text(rms(most)));
 }
 
 std::string share_text(double share) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "contour.hpp"
 #include "gauge.hpp"
@@ -10,12 +9,8 @@
 namespace unflex::study {
 namespace {
 
-// The reach is that of the verifier: half a period of the slower axis, and this much room.
-constexpr double kReachRoom_s = 0.02;
-
 double reach_s(const compensate::Setup& setup) {
-  return kReachRoom_s +
-         std::numbers::pi / std::min(setup.x.axis.slowest_rad_s(), setup.y.axis.slowest_rad_s());
+  return reach_of(std::min(setup.x.axis.slowest_rad_s(), setup.y.axis.slowest_rad_s()));
 }
 
 double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan) {

@@ -3,8 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace unflex::study {
+
+double reach_of(double slowest_rad_s) {
+  constexpr double kRoom_s = 0.02;
+  return kRoom_s + std::numbers::pi / slowest_rad_s;
+}
 
 ContourGauge::ContourGauge(const std::vector<planner::PlannedMove>& moves, double reach_s)
     : reach_s_(reach_s) {

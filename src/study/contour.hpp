@@ -8,6 +8,9 @@
 
 namespace unflex::study {
 
+// Half a period of the slowest mode of a nozzle, and some room: the reach of the verifier.
+[[nodiscard]] double reach_of(double slowest_rad_s);
+
 // Measures against the part of the path that the plan passes within ±reach of the given time, since
 // the path may pass close to itself elsewhere. The part consists of whole moves.
 class ContourGauge {

@@ -10,15 +10,11 @@
 
 #include "contour.hpp"
 #include "tasks.hpp"
-#include "unflex/verify/log_histogram.hpp"
+#include "unflex/verify/deviation.hpp"
 #include "unflex_base.hpp"
 
 namespace unflex::study {
 namespace {
-
-constexpr double kSampleStep_s = 2e-4;
-constexpr int kParts = 5;
-constexpr double kReachRoom_s = 0.02;
 
 // The nozzle of a machine on a base: each of its modes hangs there by itself.
 class TrueNozzle {
@@ -48,21 +44,6 @@ class TrueNozzle {
   std::vector<Part> parts_;
 };
 
-struct Distances {
-  verify::LogHistogram histogram;
-  double square_sum = 0.0;
-  double samples = 0.0;
-  double max_mm = 0.0;
-
-  void add(double distance_mm) {
-    const double square = distance_mm * distance_mm;
-    histogram.add_square(square, 1.0);
-    square_sum += square;
-    samples += 1.0;
-    max_mm = std::max(max_mm, distance_mm);
-  }
-};
-
 double reach_s(const Machine& machine) {
   double slowest = std::numeric_limits<double>::infinity();
   for (const MachineAxis* axis : {&machine.x, &machine.y}) {
@@ -70,7 +51,7 @@ double reach_s(const Machine& machine) {
       slowest = std::min(slowest, mode.omega_rad_s);
     }
   }
-  return kReachRoom_s + std::numbers::pi / slowest;
+  return reach_of(slowest);
 }
 
 std::vector<double> distances(const Machine& machine, const BaseMotion& base, const Run& run) {
@@ -80,8 +61,8 @@ std::vector<double> distances(const Machine& machine, const BaseMotion& base, co
   ContourGauge gauge(run.plan, reach_s(machine));
   std::vector<double> result;
   const double end_s = planner::duration_s(run.plan);
-  for (int k = 0; k * kSampleStep_s <= end_s; ++k) {
-    const double t = k * kSampleStep_s;
+  for (int k = 0; k * kPrintStep_s <= end_s; ++k) {
+    const double t = k * kPrintStep_s;
     const auto reading = gauge.measure(t, x.at(t), y.at(t));
     if (reading.extruding) {
       result.push_back(reading.distance_mm);
@@ -137,7 +118,7 @@ std::string axis_text(const MachineAxis& axis, const compensate::AxisSetup& know
 }  // namespace
 
 struct MachineBench::Measured {
-  std::array<Distances, kContenderCount> contenders;
+  std::array<verify::DeviationAccumulator, kContenderCount> contenders;
   std::size_t failed_runs = 0;
 };
 
@@ -177,7 +158,7 @@ void MachineBench::add(const std::vector<Run>& runs) {
                       0,
                       {}};
       if (contender == Contender::unflex) {
-        Result<BaseMotion> solved = unflex_base(machine_.unflex, run.plan, kParts, *engine);
+        Result<BaseMotion> solved = unflex_base(machine_.unflex, run.plan, kPrintParts, *engine);
         results[i].failed = !solved;
         base = solved ? std::move(*solved) : std::move(base);
       }
@@ -188,7 +169,7 @@ void MachineBench::add(const std::vector<Run>& runs) {
     measured_->failed_runs += of_run.failed ? 1 : 0;
     for (std::size_t c = 0; c < kContenderCount; ++c) {
       for (const double distance_mm : of_run.distances_mm[c]) {
-        measured_->contenders[c].add(distance_mm);
+        measured_->contenders[c].add(distance_mm * distance_mm, 0.0, kPrintStep_s, 0);
       }
     }
   }
@@ -201,11 +182,8 @@ MachineResult MachineBench::result() const {
                        {},
                        measured_->failed_runs};
   for (std::size_t c = 0; c < kContenderCount; ++c) {
-    const Distances& of = measured_->contenders[c];
-    if (of.samples > 0.0) {
-      result.contenders[c] = {std::sqrt(of.square_sum / of.samples), of.histogram.quantile(0.99),
-                              of.max_mm};
-    }
+    const verify::DeviationStats of = measured_->contenders[c].stats();
+    result.contenders[c] = {of.contour_rms_mm, of.contour_p99_mm, of.contour_max_mm};
   }
   return result;
 }

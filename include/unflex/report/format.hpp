@@ -11,6 +11,10 @@ namespace unflex::report {
 // Three figures, so that 1234 µm and 0.05 µm fit the same column; without the unit.
 [[nodiscard]] std::string micrometres_text(double mm);
 
+// "0.90 to 3.10": the least and the greatest RMS of the plants, µm, without the unit.
+[[nodiscard]] std::string range_text(const std::vector<PlantDeviation>& plants,
+                                     Spread PlantDeviation::*which);
+
 // 0.9876 → "98.7 %". Only a share of 1 is "100.0 %".
 [[nodiscard]] std::string share_text(double share);
 

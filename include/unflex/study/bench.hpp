@@ -39,6 +39,10 @@ inline constexpr std::size_t kMethodCount = 15;
 // Relative errors of the true natural frequency against the one that the base was made for.
 inline constexpr std::array<double, 5> kFrequencyErrors = {0.0, -0.10, -0.05, 0.05, 0.10};
 
+// BenchSetup::step_s and parts for prints, which are long.
+inline constexpr double kPrintStep_s = 2e-4;
+inline constexpr int kPrintParts = 5;
+
 struct BenchSetup {
   compensate::Setup unflex;          // its acceleration limits are set per method
   double plan_accel_mm_s2 = 5000.0;  // unflex_2x, 4x, 10x allow multiples of it

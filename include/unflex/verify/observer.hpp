@@ -81,8 +81,8 @@ inline constexpr std::array<double, 4> kFrequencyErrors = {-0.10, -0.05, 0.05, 0
 
 // What to measure besides the rules' nozzle, and who watches.
 struct Observation {
-  // Further nozzles that hang on the same two bases: those of detuned() first if there is a
-  // recorder, then any others.
+  // Further nozzles that hang on the same two bases: those of verify::detuned() first, which a
+  // recorder needs, then any others.
   std::vector<NozzleModel> detuned;
   Observer* observer = nullptr;
 };
