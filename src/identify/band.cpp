@@ -59,6 +59,7 @@ Result<Band> band_of(const Spectrum& spectrum, const std::vector<double>& densit
   constexpr std::size_t kFewest = 25;
   constexpr double kFloor = 0.01;
   constexpr double kNoiseEnds_hz = 30.0;
+  constexpr double kFewestAboveNoise = 10.0;
   if (!(spectrum.step_hz > 0.0)) {
     return fail(ErrorKind::input, "its frequencies do not grow");
   }
@@ -85,7 +86,13 @@ Result<Band> band_of(const Spectrum& spectrum, const std::vector<double>& densit
   // The floor is a share of the swing, whose density is P/ν², without the noise at low frequencies.
   const Eigen::ArrayXd square = band.freq_hz.square();
   const Eigen::ArrayXd is_high = (band.freq_hz > kNoiseEnds_hz).cast<double>();
+  if (is_high.sum() < kFewestAboveNoise) {
+    return fail(ErrorKind::input, "it has too few frequencies in the band of the sweep");
+  }
   band.floor = kFloor * (band.density / square * is_high).sum() / is_high.sum() * square;
+  if (!band.logarithms().isFinite().all()) {
+    return fail(ErrorKind::input, "it has densities that are no numbers or below 0");
+  }
   return band;
 }
 

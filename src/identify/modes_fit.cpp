@@ -134,6 +134,9 @@ Result<ModesFit> fit_density(const Spectrum& spectrum, const std::vector<double>
   }
   const ModesModel model(*band, sweep.start_hz);
   const std::vector<std::vector<Solution>> found = search(*band, model, sweep, kMostModes);
+  if (found.empty()) {
+    return fail(ErrorKind::input, "no modes can be fitted to it");
+  }
   ModesFit fit;
   RecordFit& record = fit.record;
   record.bic.push_back(rigid(model, band->logarithms()).bic);

@@ -299,9 +299,14 @@ Solution rigid(const ModesModel& model, const Eigen::ArrayXd& logarithms) {
 std::vector<std::vector<Solution>> search(const Band& band, const ModesModel& model,
                                           const Sweep& sweep, Eigen::Index most) {
   Search search(band, model, sweep);
-  std::vector<std::vector<Solution>> found = {search.first()};
-  while (static_cast<Eigen::Index>(found.size()) < most) {
-    found.push_back(search.next(found.back()));
+  std::vector<std::vector<Solution>> found;
+  std::vector<Solution> some = search.first();
+  while (!some.empty()) {
+    found.push_back(std::move(some));
+    if (static_cast<Eigen::Index>(found.size()) == most) {
+      break;
+    }
+    some = search.next(found.back());
   }
   return found;
 }

@@ -38,12 +38,13 @@ void check_fit(const identify::RecordFit& fit) {
   require(fit.curve.measured.size() == fit.curve.x.size() &&
               fit.curve.fitted.size() == fit.curve.x.size(),
           "a curve in parts of different lengths");
-  require_one_line(fit.refusal);
   for (const std::string& warning : fit.warnings) {
     require_one_line(warning);
   }
   if (fit.is_trusted()) {
     check_model(fit.model);
+  } else {
+    require_one_line(fit.refusal);
   }
 }
 
