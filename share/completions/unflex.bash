@@ -13,7 +13,7 @@ _unflex_options() {
     study) echo "-h --help --case --machines $print --engine -j --jobs" ;;
     identify)
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
-           '--report -q --quiet' ;;
+           '--second --make-test -o --output --printer --set --report -q --quiet' ;;
     printer) echo '-h --help' ;;
     'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer macros') echo '-h --help -o --output --printer --set -q --quiet' ;;
@@ -45,7 +45,7 @@ _unflex_value() {
     inspect:--report) echo 'files *.json' ;;
     *:--report) echo 'files *.@(json|html)' ;;
     study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;
-    *:--axis) echo 'words x y' ;;
+    *:--axis | *:--make-test) echo 'words x y' ;;
     *:--machines) echo 'folders' ;;
     *:--case) echo 'words ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' ;;
     *:--set | *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \

@@ -71,6 +71,10 @@ complete -c unflex -n '__unflex_in identify' -l wave-spacing-mm -x -d 'Of a ring
 complete -c unflex -n '__unflex_in identify' -l speed-mm-s -x -d 'Of a ringing tower: speed of its walls'
 complete -c unflex -n '__unflex_in identify' -l decay -x -d 'Of a ringing tower: height of a wave over that of the next'
 
+complete -c unflex -n '__unflex_in identify' -l second -d 'Find what still rings behind compensated stops'
+complete -c unflex -n '__unflex_in identify' -l make-test -x -a 'x y' -d 'Write G-code with such stops along an axis'
+complete -c unflex -n '__unflex_in identify' -s o -l output -x -a $gcode -d 'Where --make-test writes, - for stdout'
+
 complete -c unflex -n '__unflex_in "printer init"' -l from -x -a $printer -d 'What describes the printer'
 complete -c unflex -n '__unflex_in "printer init"' -l record -x -a '(__unflex_files .csv)' -d 'A record of a resonance; repeatable'
 complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unflex_files .toml)' -d 'Where to write, - for stdout'
@@ -78,8 +82,8 @@ complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unfl
 complete -c unflex -n '__unflex_in "printer line-test"' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
 complete -c unflex -n '__unflex_in "printer macros"' -s o -l output -x -a '(__unflex_files .cfg)' -d 'Where to write, - for stdout'
 
-complete -c unflex -n "__unflex_in $prints batch 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
-complete -c unflex -n "__unflex_in $prints batch 'printer init' 'printer line-test' 'printer macros'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n "__unflex_in $prints batch identify 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
+complete -c unflex -n "__unflex_in $prints batch identify 'printer init' 'printer line-test' 'printer macros'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
 complete -c unflex -n '__unflex_in inspect' -l report -x -a '(__unflex_files .json)' -d 'Write a report, - for stdout'
 complete -c unflex -n '__unflex_in compensate verify study identify' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
 complete -c unflex -n "__unflex_in $prints batch identify 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'

@@ -250,11 +250,12 @@ void add_identify(CLI::App& program, RunConfig& config) {
       ->add_option("CSV", identify.records,
                    "Records of Klipper, Shake&Tune or RepRapFirmware, any number of them")
       ->type_name("");
+  const CLI::Transformer letters(
+      std::map<std::string, identify::Axis>{{"x", identify::Axis::x}, {"y", identify::Axis::y}},
+      CLI::ignore_case);
   command->add_option("--axis", identify.axis, "The axis they are of, if their names do not tell")
       ->type_name("x|y")
-      ->transform(CLI::Transformer(
-          std::map<std::string, identify::Axis>{{"x", identify::Axis::x}, {"y", identify::Axis::y}},
-          CLI::ignore_case));
+      ->transform(letters);
   command
       ->add_option("--freq-start", identify.sweep.start_hz, "Where the sweep began, 5 by default")
       ->type_name("HZ")
@@ -263,6 +264,16 @@ void add_identify(CLI::App& program, RunConfig& config) {
       ->type_name("HZ")
       ->check(positive());
   add_tower(*command, config);
+  command->add_flag("--second", identify.second,
+                    "Find what still rings behind compensated stops; needs --printer");
+  command
+      ->add_option("--make-test", identify.make_test,
+                   "Write G-code with such stops along this axis to -o; needs --printer")
+      ->type_name("x|y")
+      ->transform(letters);
+  command->add_option("-o,--output", config.output, "Where --make-test writes, - for stdout")
+      ->type_name("OUT");
+  add_settings(*command, config);
   command
       ->add_option("--report", config.report,
                    "Write a report, FILE.json or FILE.html, or - for stdout")
@@ -316,7 +327,32 @@ Status check_report(const RunConfig& config) {
              : check_has_name("--report", name, {".json", ".html"});
 }
 
-Status check_records(const IdentifyConfig& config) {
+Status check_test(const RunConfig& config) {
+  if (!config.identify.records.empty() || config.identify.tower || config.identify.second) {
+    return usage(
+        "--make-test writes a test and takes no records; give them to identify --second "
+        "once the printer has made them");
+  }
+  if (config.output.empty()) {
+    return usage("where to write the test? give -o OUT, or -o - for stdout");
+  }
+  if (config.report) {
+    return usage("--make-test writes no report; unflex verify makes one of its output");
+  }
+  return {};
+}
+
+Status check_records(const RunConfig& run_config) {
+  const IdentifyConfig& config = run_config.identify;
+  if (!run_config.output.empty()) {
+    return usage("-o is where --make-test writes; records are answered on stdout");
+  }
+  if (!config.second && (run_config.printer_file || !run_config.overrides.empty())) {
+    return usage("--printer and --set go with --second and --make-test");
+  }
+  if (config.second && config.tower) {
+    return usage("--second needs recordings; a ringing tower shows one mode only");
+  }
   if (config.records.empty() && !config.tower) {
     return usage("what to identify from? give records, or --wave-spacing-mm and --speed-mm-s");
   }
@@ -372,7 +408,8 @@ Status complete(RunConfig& config) {
     return usage("--printer and --set are of a print; the corner's cases have their own settings");
   }
   if (config.command == Command::identify) {
-    if (Status checked = check_records(config.identify); !checked) {
+    if (Status checked = config.identify.make_test ? check_test(config) : check_records(config);
+        !checked) {
       return checked;
     }
   }

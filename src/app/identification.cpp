@@ -202,6 +202,19 @@ std::string modes_text(identify::Axis axis, const AxisModel& model) {
   return text;
 }
 
+std::string second_text(const Identification& identification) {
+  std::string text;
+  for (const auto& [axis, model] : identification.axes) {
+    const ModeEstimate& mode = model.modes.front();
+    for (const auto& [key, e] :
+         {std::pair("freq_hz", mode.freq_hz), std::pair("damping_ratio", mode.damping_ratio)}) {
+      text += fmt::format("{}_{} = {}  # 95 %: {}\n", letter(axis), key, estimate_text(e),
+                          interval_text(e));
+    }
+  }
+  return text.empty() ? text : "[second]\n" + text;
+}
+
 Json estimate_json(const Estimate& e) {
   return {{"value", e.value}, {"low", e.low}, {"high", e.high}};
 }
@@ -318,6 +331,9 @@ std::string found_text(const Identification& identification) {
 }  // namespace
 
 std::string snippet(const Identification& identification) {
+  if (identification.is_second) {
+    return second_text(identification);
+  }
   std::string text;
   for (const auto& [axis, model] : identification.axes) {
     text += (text.empty() ? "" : "\n") + modes_text(axis, model) + plants_text(axis, model);
@@ -381,9 +397,10 @@ std::string identification_html(const Identification& identification) {
       found.empty()
           ? std::string("<section class=\"card\"><h2>No record carries a model</h2></section>\n")
           : fmt::format(
-                "<section class=\"card\"><h2>The nozzle swings: {}</h2>\n<p>For the "
+                "<section class=\"card\"><h2>{}: {}</h2>\n<p>For the "
                 "printer file:</p>\n<pre>{}</pre></section>\n",
-                found, report::escape_html(snippet(identification)));
+                identification.is_second ? "What still rings" : "The nozzle swings", found,
+                report::escape_html(snippet(identification)));
   for (const IdentifiedRecord& record : identification.records) {
     body += record_card(record);
   }

@@ -20,6 +20,7 @@ struct Identification {
   // From all trusted records of an axis. An axis without one is missing.
   std::map<identify::Axis, identify::AxisModel> axes;
   std::vector<std::string> warnings;  // "file: warning: …"
+  bool is_second = false;  // the modes are those behind the ones that are compensated for
   std::vector<std::string> refusals;  // "file: …", of axes without a trusted record
 };
 

@@ -1,12 +1,23 @@
 #include "identify.hpp"
 
 #include <fmt/core.h>
+#include <sys/mman.h>
+
+#include <cerrno>
+#include <string>
+#include <vector>
 
 #include "console.hpp"
+#include "files.hpp"
 #include "identification.hpp"
 #include "inputs.hpp"
 #include "outputs.hpp"
+#include "print_run.hpp"
 #include "results.hpp"
+#include "unflex/core/errno_text.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/machine/ring_test.hpp"
+#include "workspace.hpp"
 
 namespace unflex::app {
 namespace {
@@ -53,7 +64,9 @@ Status add_set(const IdentifyConfig& config, const identify::DataSet& set, Ident
   if (!axis) {
     return tl::unexpected(axis.error());
   }
-  Result<identify::RecordFit> fitted = fit(set, *axis, config.sweep);
+  Result<identify::RecordFit> fitted =
+      config.second ? fit_second(set, *axis, config.known.at(*axis == identify::Axis::x ? 0 : 1))
+                    : fit(set, *axis, config.sweep);
   if (!fitted) {
     return tl::unexpected(fitted.error());
   }
@@ -130,6 +143,7 @@ void combine_records(Identification& all) {
 
 Result<Identification> identify_records(const IdentifyConfig& config) {
   Identification all;
+  all.is_second = config.second;
   for (const std::string& name : config.records) {
     if (Status added = add_file(config, name, all); !added) {
       return tl::unexpected(added.error());
@@ -156,10 +170,67 @@ Status write_report(const std::string& name, const Identification& all) {
       .and_then([&] { return output->commit(); });
 }
 
+// The modes that the axes are compensated for.
+std::vector<identify::ModeOfAxis> modes_of(const machine::AxisDynamics& dynamics) {
+  if (dynamics.modes.empty()) {
+    return {{dynamics.freq_hz, dynamics.damping_ratio, 1.0}};
+  }
+  std::vector<identify::ModeOfAxis> modes;
+  for (const machine::ModeSettings& mode : dynamics.modes) {
+    modes.push_back({mode.freq_hz, mode.damping_ratio, mode.gain});
+  }
+  return modes;
+}
+
+// Writes the test as a print that nobody keeps, and compensates it by the first stage alone.
+Result<ExitCode> make_test(const RunConfig& config, Console& console) {
+  RunConfig print = config;
+  print.command = Command::compensate;
+  print.print_name = "the test";
+  print.overrides.emplace_back("second.shaper=none");
+  const Result<machine::Settings> settings =
+      machine::load(print.printer_file, print.overrides).and_then(without_guess);
+  if (!settings) {
+    return tl::unexpected(settings.error());
+  }
+  const Result<std::string> text = ring_test(*settings, letter(*config.identify.make_test));
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  const FileDescriptor file(::memfd_create("unflex-test", MFD_CLOEXEC));
+  if (file.get() < 0) {
+    return fail(ErrorKind::internal, fmt::format("no memory for the test: {}", errno_text(errno)));
+  }
+  if (const int error = write_all(file.get(), *text); error != 0) {
+    return fail(ErrorKind::internal, fmt::format("no memory for the test: {}", errno_text(error)));
+  }
+  print.input = fmt::format("/proc/self/fd/{}", file.get());
+  return work_on_print(print, console).map([](const PrintOutcome& outcome) {
+    return outcome.verdict;
+  });
+}
+
+// The records' configuration with what the printer file says of the known modes.
+Result<IdentifyConfig> with_known(const RunConfig& config) {
+  IdentifyConfig result = config.identify;
+  if (result.second) {
+    const Result<machine::Settings> settings =
+        machine::load(config.printer_file, config.overrides).and_then(without_guess);
+    if (!settings) {
+      return tl::unexpected(settings.error());
+    }
+    result.known = {modes_of(settings->dynamics_x), modes_of(settings->dynamics_y)};
+  }
+  return result;
+}
+
 }  // namespace
 
 Result<ExitCode> run_identify(const RunConfig& config, Console& console) {
-  const Result<Identification> all = identify_records(config.identify);
+  if (config.identify.make_test) {
+    return make_test(config, console);
+  }
+  const Result<Identification> all = with_known(config).and_then(identify_records);
   if (!all) {
     return tl::unexpected(all.error());
   }

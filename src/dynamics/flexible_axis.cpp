@@ -8,6 +8,7 @@
 #include "unflex/dynamics/flexible_axis.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,7 +20,7 @@ namespace {
 double acceleration(const Mode& mode, const NozzleMotion& part, const NozzleMotion& base) {
   const double omega = mode.omega_rad_s;
   return 2.0 * mode.zeta * omega * (mode.gain * base.velocity - part.velocity) +
-         omega * omega * (mode.gain * base.position - part.position);
+         omega * omega * (mode.gain * base.position - part.position + mode.lead_s * base.velocity);
 }
 
 NozzleMotion base_at(const BaseSegment& base, double t) {
@@ -82,17 +83,21 @@ NozzleMotion rk4_part(const Mode& mode, NozzleMotion part, const BaseSegment& ba
 NozzleMotion exact_part(const Mode& mode, NozzleMotion part, const BaseSegment& base, double h) {
   const double omega = mode.omega_rad_s;
   const double zeta = mode.zeta;
-  // Under constant acceleration of the base the nozzle settles a/ω² behind it.
-  const double lag = mode.gain * (base.acceleration / (omega * omega));
-  const double y0 = part.position - mode.gain * base.position + lag;
-  const double yd0 = part.velocity - mode.gain * base.velocity;
+  // Under constant acceleration of the base the nozzle settles a/ω² behind it, and with a lead τ
+  // 2ζτa/ω more.
+  const double lead = mode.lead_s;
+  const double lag = mode.gain * (base.acceleration / (omega * omega)) +
+                     2.0 * zeta * lead / omega * base.acceleration;
+  const double y0 = part.position - mode.gain * base.position - lead * base.velocity + lag;
+  const double yd0 = part.velocity - mode.gain * base.velocity - lead * base.acceleration;
 
   const FreeResponse free = zeta < 1.0 ? underdamped(omega, zeta, h) : overdamped(omega, zeta, h);
   const double y = free.c * y0 + free.s * (zeta * omega * y0 + yd0);
   const double yd = free.c * yd0 - free.s * (zeta * omega * yd0 + omega * omega * y0);
 
   const NozzleMotion base_end = base_at(base, h);
-  return {mode.gain * base_end.position - lag + y, mode.gain * base_end.velocity + yd};
+  return {mode.gain * base_end.position + lead * base_end.velocity - lag + y,
+          mode.gain * base_end.velocity + lead * base.acceleration + yd};
 }
 
 }  // namespace
@@ -144,7 +149,8 @@ double FlexibleAxis::largest_lag_mm(double accel_mm_s2, double velocity_mm_s) co
   for (const Mode& mode : modes()) {
     const double omega = mode.omega_rad_s;
     sum_mm += std::abs(mode.gain) *
-              (accel_mm_s2 / (omega * omega) + 2.0 * mode.zeta / omega * velocity_mm_s);
+                  (accel_mm_s2 / (omega * omega) + 2.0 * mode.zeta / omega * velocity_mm_s) +
+              std::abs(mode.lead_s) * velocity_mm_s;
   }
   return sum_mm;
 }
@@ -160,13 +166,13 @@ double FlexibleAxis::stiffness_per_s2() const {
 double FlexibleAxis::damping_per_s() const {
   double sum = 0.0;
   for (const Mode& mode : modes()) {
-    sum += mode.gain * mode.damping_per_s();
+    sum += mode.gain * mode.damping_per_s() + mode.stiffness_per_s2() * mode.lead_s;
   }
   return sum;
 }
 
-// Σ g_i (2ζ_i ω_i s + ω_i²) Π_{j≠i} (s² + 2ζ_j ω_j s + ω_j²) = 0, by the eigenvalues of the
-// polynomial's companion matrix.
+// Σ (g_i (2ζ_i ω_i s + ω_i²) + ω_i² τ_i s) Π_{j≠i} (s² + 2ζ_j ω_j s + ω_j²) = 0, by the eigenvalues
+// of the polynomial's companion matrix.
 std::vector<std::complex<double>> FlexibleAxis::zeros() const {
   // Frequencies relative to the first one's, so that coefficients are of like size.
   const double unit = modes_[0].omega_rad_s;
@@ -175,6 +181,7 @@ std::vector<std::complex<double>> FlexibleAxis::zeros() const {
     const double omega = modes_[i].omega_rad_s / unit;
     Eigen::VectorXd term =
         modes_[i].gain * Eigen::Vector2d(omega * omega, 2.0 * modes_[i].zeta * omega);
+    term[1] += omega * omega * modes_[i].lead_s * unit;
     for (std::size_t j = 0; j < count_; ++j) {
       if (j != i) {
         const double other = modes_[j].omega_rad_s / unit;
@@ -183,7 +190,12 @@ std::vector<std::complex<double>> FlexibleAxis::zeros() const {
     }
     numerator += term;
   }
-  const Eigen::Index degree = numerator.size() - 1;
+  // Where the highest coefficient vanishes but for rounding, its zero lies at infinity.
+  constexpr double kVanishing = 1e-13;
+  Eigen::Index degree = numerator.size() - 1;
+  while (degree > 0 && std::abs(numerator[degree]) < kVanishing * numerator.cwiseAbs().maxCoeff()) {
+    --degree;
+  }
   Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(degree, degree);
   for (Eigen::Index i = 0; i < degree; ++i) {
     companion(i, degree - 1) = -numerator[i] / numerator[degree];
@@ -211,10 +223,46 @@ double FlexibleAxis::unseen_s() const {
   return std::log(1e5) / std::max(slowest_per_s, kLeast_per_s);
 }
 
+// With N_i and D_i the numerator and denominator of mode i, a s + b and α s + β are what solves
+//   (a s + b) D₂ + (α s + β) D_i = N_i N₂.
+FlexibleAxis FlexibleAxis::followed_by(double omega_rad_s, double zeta) const {
+  const double unit = omega_rad_s;
+  const Eigen::Vector3d last(1.0, 2.0 * zeta, 1.0);  // from the constant on
+  const auto mode_of = [&](double omega, double damping, double constant, double slope) {
+    const double gain = constant / (omega * omega);
+    return Mode{omega * unit, damping, gain,
+                (slope - 2.0 * damping * omega * gain) / (omega * omega) / unit};
+  };
+  FlexibleAxis axis = *this;
+  double constant = 0.0;
+  double slope = 0.0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Mode& mode = modes_[i];
+    const double omega = mode.omega_rad_s / unit;
+    const Eigen::Vector3d own(omega * omega, 2.0 * mode.zeta * omega, 1.0);
+    const Eigen::Vector2d numerator(mode.gain * own[0],
+                                    mode.gain * own[1] + omega * omega * mode.lead_s * unit);
+    Eigen::Matrix4d parts = Eigen::Matrix4d::Zero();
+    for (Eigen::Index k = 0; k < 2; ++k) {
+      parts.block<3, 1>(k, k) = last;
+      parts.block<3, 1>(k, k + 2) = own;
+    }
+    Eigen::Vector4d right = Eigen::Vector4d::Zero();
+    right.head<3>() = product(numerator, last.head<2>());
+    const Eigen::Vector4d found = parts.partialPivLu().solve(right);
+    axis.modes_[i] = mode_of(omega, mode.zeta, found[0], found[1]);
+    constant += found[2];
+    slope += found[3];
+  }
+  axis.modes_[axis.count_++] = mode_of(1.0, zeta, constant, slope);
+  return axis;
+}
+
 FlexibleAxis FlexibleAxis::detuned(double factor) const {
   FlexibleAxis axis = *this;
   for (Mode& mode : axis.modes_) {
     mode.omega_rad_s *= factor;
+    mode.lead_s /= factor;
   }
   return axis;
 }
@@ -222,7 +270,8 @@ FlexibleAxis FlexibleAxis::detuned(double factor) const {
 NozzleState FlexibleAxis::riding(double position_mm, double velocity_mm_s) const {
   NozzleState state;
   for (std::size_t i = 0; i < count_; ++i) {
-    state.parts[i] = {modes_[i].gain * position_mm, modes_[i].gain * velocity_mm_s};
+    state.parts[i] = {modes_[i].gain * position_mm + modes_[i].lead_s * velocity_mm_s,
+                      modes_[i].gain * velocity_mm_s};
   }
   return state;
 }

@@ -73,7 +73,9 @@ constexpr std::array<std::string_view, 23> kPassiveNames = {
 
 // Mainsail's and Fluidd's macros turn SET_PRINT_STATS_INFO into the pause that the user has asked
 // for at a layer.
-constexpr std::array<std::string_view, 9> kStoppingNames = {
+constexpr std::array<std::string_view, 11> kStoppingNames = {
+    "ACCELEROMETER_MEASURE",
+    "ACCELEROMETER_QUERY",
     "DUMP_TMC",
     "INIT_TMC",
     "QUERY_ENDSTOPS",

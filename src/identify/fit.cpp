@@ -93,6 +93,27 @@ Result<RecordFit> fit_recording(const Recording& recording, Axis axis, const Swe
   return record;
 }
 
+Result<RecordFit> fit_second(const DataSet& set, Axis axis, const std::vector<ModeOfAxis>& known) {
+  const auto* recording = std::get_if<Recording>(&set.data);
+  if (recording == nullptr) {
+    return fail(ErrorKind::input, {set.name, 0},
+                "is a spectrum; a second mode shows in recordings of compensated stops, which "
+                "unflex identify --make-test makes the printer do");
+  }
+  const Samples all = centred(*recording);
+  const Eigen::Vector3d direction = direction_of(*recording, all, axis);
+  const Eigen::VectorXd along = all * direction;
+  Result<RecordFit> record = fit_ringing({along.begin(), along.end()}, recording->rate_hz, known);
+  if (!record) {
+    RecordFit refused;
+    refused.model.method = Method::ringing;
+    refused.refusal = record.error().message;
+    return refused;
+  }
+  record->direction = {direction[0], direction[1], direction[2]};
+  return record;
+}
+
 Result<RecordFit> fit(const DataSet& set, Axis axis, const Sweep& sweep) {
   const auto* recording = std::get_if<Recording>(&set.data);
   Result<RecordFit> record = recording != nullptr

@@ -101,6 +101,15 @@ bool lowest_is_positive(const Eigen::VectorXd& theta) {
   return std::ranges::min(modes, {}, &ModeOfAxis::freq_hz).gain > 0.0;
 }
 
+// Σ|g|, which is 1 where all modes move the same way.
+double all_gains(const Eigen::VectorXd& theta) {
+  double all = 0.0;
+  for (const ModeOfAxis& mode : modes_of(theta)) {
+    all += std::abs(mode.gain);
+  }
+  return all;
+}
+
 bool has_mode_near(const Eigen::VectorXd& theta, double freq_log) {
   constexpr double kNear = 0.05;
   for (Eigen::Index m = 0; m < modes_in(theta); ++m) {
@@ -168,9 +177,13 @@ Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
               const ModesModel& model) {
   constexpr double kPhaseWorth = 4.0;  // of the criterion
   constexpr double kSignWorth = 6.0;
+  constexpr double kRiseWorth = 3.0;
+  constexpr double kGainWorth = 5.0;
   const auto merit = [](const Solution& s) {
     return s.bic + (s.is_minimum_phase ? 0.0 : kPhaseWorth) +
-           (lowest_is_positive(s.fit.parameters) ? 0.0 : kSignWorth);
+           (lowest_is_positive(s.fit.parameters) ? 0.0 : kSignWorth) +
+           (rises(s.fit.parameters) ? kRiseWorth : 0.0) +
+           kGainWorth * (all_gains(s.fit.parameters) - 1.0);
   };
   std::vector<const Solution*> all;
   for (const std::vector<Solution>& some : found) {

@@ -146,7 +146,7 @@ Result<ModesFit> fit_density(const Spectrum& spectrum, const std::vector<double>
   const Choice choice = choose(found, *band, model);
   fit.theta = choice.theta;
   fit.has_rivals = has_other_main(choice);
-  const Prior prior = prior_of(modes_in(fit.theta), sweep);
+  const Prior prior = prior_of(fit.theta, sweep);
   const Eigen::MatrixXd covariance =
       covariance_of_modes(model, *band, prior, fit.theta) + choice.spread;
   record.model = model_of(Method::spectrum, modes_of(fit.theta), covariance);

@@ -44,6 +44,12 @@ class ModesModel {
   return (theta.size() - 2) / 3;
 }
 
+// log N₁ of noise that is the same at all frequencies.
+inline constexpr double kNoRise_log = -40.0;
+[[nodiscard]] inline bool rises(const Eigen::VectorXd& theta) {
+  return theta[theta.size() - 1] > kNoRise_log;
+}
+
 [[nodiscard]] std::vector<ModeOfAxis> modes_of(const Eigen::VectorXd& theta);
 // The modes of (log f, log ζ, a) for each in turn.
 [[nodiscard]] std::vector<ModeOfAxis> modes_of_logarithms(const Eigen::VectorXd& parameters);

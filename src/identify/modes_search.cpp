@@ -117,12 +117,16 @@ bool is_same(const Solution& a, const Solution& b) {
 
 class Search {
  public:
-  Search(const Band& band, const ModesModel& model, const Sweep& sweep)
-      : band_(band), model_(model), sweep_(sweep), logarithms_(band.logarithms()) {}
+  Search(const Band& band, const ModesModel& model, const Sweep& sweep, bool noise_rises)
+      : band_(band),
+        model_(model),
+        sweep_(sweep),
+        noise_rises_(noise_rises),
+        logarithms_(band.logarithms()) {}
 
   std::vector<Solution> first() {
     std::vector<Eigen::VectorXd> starts;
-    Eigen::VectorXd empty = Eigen::Vector2d::Constant(std::log(kFirstNoise));
+    const Eigen::VectorXd empty = without_modes();
     for (const double freq_hz : places_for_mode(band_, nullptr)) {
       for (const double damping_ratio : {0.05, 0.15}) {
         starts.push_back(scaled(with_mode(empty, freq_hz, damping_ratio, 1.0)));
@@ -154,6 +158,11 @@ class Search {
     return low + (high - low) * static_cast<double>(random_()) / 4294967296.0;
   }
 
+  [[nodiscard]] Eigen::VectorXd without_modes() const {
+    return Eigen::Vector2d(std::log(kFirstNoise),
+                           noise_rises_ ? std::log(kFirstNoise) : kNoRise_log);
+  }
+
   // Scales all amplitudes so that the logarithm of the density is right on average.
   [[nodiscard]] Eigen::VectorXd scaled(Eigen::VectorXd theta) const {
     Eigen::ArrayXd values;
@@ -166,7 +175,7 @@ class Search {
   }
 
   [[nodiscard]] Eigen::VectorXd random_start(Eigen::Index modes) {
-    Eigen::VectorXd theta = Eigen::Vector2d::Constant(std::log(kFirstNoise));
+    Eigen::VectorXd theta = without_modes();
     for (Eigen::Index m = 0; m < modes; ++m) {
       const double freq_hz = 20.0 * std::pow(6.5, uniform(0.0, 1.0));
       const double damping_ratio = 0.03 * std::pow(8.0, uniform(0.0, 1.0));
@@ -187,7 +196,7 @@ class Search {
     data << logarithms_, 0.0;
     Solution solution;
     RobustFit& fit = solution.fit;
-    fit = minimise_robust(call, data, kLossScale, prior_of(modes_in(start), sweep_), start, steps);
+    fit = minimise_robust(call, data, kLossScale, prior_of(start, sweep_), start, steps);
     fit.residual.conservativeResize(bins);
     fit.weights.conservativeResize(bins);
     fit.jacobian.conservativeResize(bins, Eigen::NoChange);
@@ -197,7 +206,7 @@ class Search {
 
   void finish(Solution& solution) const {
     const Eigen::VectorXd& theta = solution.fit.parameters;
-    solution.bic = bic_of(model_, solution.fit, theta.size());
+    solution.bic = bic_of(model_, solution.fit, theta.size() - (rises(theta) ? 0 : 1));
     solution.is_minimum_phase = is_minimum_phase(modes_of(theta));
   }
 
@@ -239,6 +248,7 @@ class Search {
   const Band& band_;
   const ModesModel& model_;
   const Sweep& sweep_;
+  bool noise_rises_;
   Eigen::ArrayXd logarithms_;
   std::mt19937 random_{1};
 };
@@ -248,9 +258,10 @@ class Search {
 // What is known before: damping ratios are about 0.08 within a factor of 2.2, amplitudes are of the
 // order of 1, and noise is somewhere below the motion. All of it is weak: it holds what the record
 // leaves open. Precisions are for a scatter of 0.2 of the logarithm.
-Prior prior_of(Eigen::Index modes, const Sweep& sweep) {
+Prior prior_of(const Eigen::VectorXd& theta, const Sweep& sweep) {
   constexpr double kVariance = 0.04;
-  const Eigen::Index count = 3 * modes + 2;
+  const Eigen::Index modes = modes_in(theta);
+  const Eigen::Index count = theta.size();
   Prior prior{.low = Eigen::VectorXd(count),
               .high = Eigen::VectorXd(count),
               .centre = Eigen::VectorXd(count),
@@ -270,13 +281,16 @@ Prior prior_of(Eigen::Index modes, const Sweep& sweep) {
   for (Eigen::Index i = 3 * modes; i < count; ++i) {
     set(i, std::log(1e-8), std::log(10.0), std::log(1e-3), 3.0);
   }
+  if (!rises(theta)) {
+    prior.low[count - 1] = prior.high[count - 1] = prior.centre[count - 1] = kNoRise_log;
+  }
   return prior;
 }
 
 Solution rigid(const ModesModel& model, const Eigen::ArrayXd& logarithms) {
   constexpr double kFarAbove_hz = 1e5;
   constexpr Eigen::Index kUnknowns = 3;
-  Prior prior = prior_of(1, Sweep{});
+  Prior prior = prior_of(Eigen::VectorXd::Zero(5), Sweep{});
   prior.low[0] = prior.high[0] = prior.centre[0] = std::log(kFarAbove_hz);
   prior.low[1] = prior.high[1] = prior.centre[1];
   Solution best;
@@ -298,16 +312,19 @@ Solution rigid(const ModesModel& model, const Eigen::ArrayXd& logarithms) {
 
 std::vector<std::vector<Solution>> search(const Band& band, const ModesModel& model,
                                           const Sweep& sweep, Eigen::Index most) {
-  Search search(band, model, sweep);
-  std::vector<std::vector<Solution>> found;
-  std::vector<Solution> some = search.first();
-  while (!some.empty()) {
-    found.push_back(std::move(some));
-    if (static_cast<Eigen::Index>(found.size()) == most) {
-      break;
+  std::vector<std::vector<Solution>> found(static_cast<std::size_t>(most));
+  for (const bool noise_rises : {false, true}) {
+    Search search(band, model, sweep, noise_rises);
+    std::vector<Solution> some;
+    for (std::vector<Solution>& all : found) {
+      some = &all == &found.front() ? search.first() : search.next(some);
+      if (some.empty()) {
+        break;
+      }
+      all.insert(all.end(), some.begin(), some.end());
     }
-    some = search.next(found.back());
   }
+  std::erase_if(found, [](const std::vector<Solution>& all) { return all.empty(); });
   return found;
 }
 

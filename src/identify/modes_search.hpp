@@ -17,12 +17,13 @@ struct Solution {
   bool is_minimum_phase = true;
 };
 
-[[nodiscard]] Prior prior_of(Eigen::Index modes, const Sweep& sweep);
+// What is known of θ before: where noise does not rise, N₁ is held.
+[[nodiscard]] Prior prior_of(const Eigen::VectorXd& theta, const Sweep& sweep);
 
 // Without modes: the tool moves as the base does.
 [[nodiscard]] Solution rigid(const ModesModel& model, const Eigen::ArrayXd& logarithms);
 
-// Minima with 1 to `most` modes, for each number the best first.
+// Minima with 1 to `most` modes, for each number in turn, with noise that rises and without.
 [[nodiscard]] std::vector<std::vector<Solution>> search(const Band& band, const ModesModel& model,
                                                         const Sweep& sweep, Eigen::Index most);
 

@@ -2,6 +2,9 @@
 //   y(t) = e^(−ζωt) (a cos ω_d t + b sin ω_d t) + c,   ω_d = ω√(1−ζ²),
 // c being gravity. The record does not say when the base comes to rest. We take the earliest moment
 // after the peak from which on this fits about as well as from any later one.
+//
+// Known modes may ring along. Each adds such a term of its own frequency and damping, whose a and b
+// are free.
 #include "ring_fit.hpp"
 
 #include <fmt/core.h>
@@ -25,31 +28,58 @@ constexpr double kHighest_hz = 250.0;
 // A faster decay is over before the nozzle has swung to and fro.
 constexpr double kMostDamping = 0.4;
 
-// The model; p is ln f, ln ζ, a, b, c.
-Eigen::ArrayXd ringing(const Eigen::ArrayXd& time_s, const Eigen::VectorXd& p) {
-  const double damping_ratio = std::min(std::exp(p[1]), 0.95);
-  const double omega = 2.0 * std::numbers::pi * std::exp(p[0]);
+using Known = std::vector<ModeOfAxis>;
+
+// e^(−ζωt) cos ω_d t and e^(−ζωt) sin ω_d t.
+struct Swings {
+  Eigen::ArrayXd cosine;
+  Eigen::ArrayXd sine;
+};
+
+Swings swings(const Eigen::ArrayXd& time_s, double freq_hz, double damping_ratio) {
+  const double omega = 2.0 * std::numbers::pi * freq_hz;
   const double omega_d = omega * std::sqrt(1.0 - damping_ratio * damping_ratio);
   const Eigen::ArrayXd envelope = (-damping_ratio * omega * time_s).exp();
-  return envelope * (p[2] * (omega_d * time_s).cos() + p[3] * (omega_d * time_s).sin()) + p[4];
+  return {envelope * (omega_d * time_s).cos(), envelope * (omega_d * time_s).sin()};
 }
 
-// The best a, b, c for a frequency and a damping ratio.
+// The model; p is ln f, ln ζ, a, b, c, then a and b of each known mode.
+Eigen::ArrayXd ringing(const Eigen::ArrayXd& time_s, const Eigen::VectorXd& p, const Known& known) {
+  const Swings own = swings(time_s, std::exp(p[0]), std::min(std::exp(p[1]), 0.95));
+  Eigen::ArrayXd sum = p[2] * own.cosine + p[3] * own.sine + p[4];
+  Eigen::Index at = 5;
+  for (const ModeOfAxis& mode : known) {
+    const Swings other = swings(time_s, mode.freq_hz, std::min(mode.damping_ratio, 0.95));
+    sum += p[at] * other.cosine + p[at + 1] * other.sine;
+    at += 2;
+  }
+  return sum;
+}
+
+// The best amplitudes and c for a frequency and a damping ratio.
 Eigen::VectorXd with_amplitudes(const Eigen::ArrayXd& time_s, const Eigen::ArrayXd& data,
-                                double freq_hz, double damping_ratio) {
-  Eigen::VectorXd p(5);
-  p << std::log(freq_hz), std::log(damping_ratio), 0.0, 0.0, 0.0;
-  Eigen::MatrixXd columns(data.size(), 3);
-  for (int column = 0; column < 3; ++column) {
+                                double freq_hz, double damping_ratio, const Known& known) {
+  const Eigen::Index amplitudes = 3 + 2 * static_cast<Eigen::Index>(known.size());
+  Eigen::VectorXd p = Eigen::VectorXd::Zero(2 + amplitudes);
+  p.head(2) << std::log(freq_hz), std::log(damping_ratio);
+  Eigen::MatrixXd columns(data.size(), amplitudes);
+  for (Eigen::Index column = 0; column < amplitudes; ++column) {
     Eigen::VectorXd unit = p;
     unit[2 + column] = 1.0;
-    columns.col(column) = ringing(time_s, unit).matrix();
+    columns.col(column) = ringing(time_s, unit, known).matrix();
   }
-  p.tail(3) = columns.colPivHouseholderQr().solve(data.matrix());
+  p.tail(amplitudes) = columns.colPivHouseholderQr().solve(data.matrix());
   return p;
 }
 
-std::optional<double> strongest_hz(const Eigen::ArrayXd& data, double rate_hz) {
+// Whether the frequency is far enough from all known ones to be another mode's.
+bool is_apart(double freq_hz, const Known& known) {
+  return std::ranges::none_of(known, [&](const ModeOfAxis& mode) {
+    return std::abs(freq_hz / mode.freq_hz - 1.0) < kApartOfKnown;
+  });
+}
+
+std::optional<double> strongest_hz(const Eigen::ArrayXd& data, double rate_hz, const Known& known) {
   // A few oscillations make a broad peak. Zeros behind them show where its top is.
   const auto length = static_cast<std::size_t>(std::max<Eigen::Index>(4096, data.size()));
   std::vector<double> padded(length, 0.0);
@@ -64,9 +94,16 @@ std::optional<double> strongest_hz(const Eigen::ArrayXd& data, double rate_hz) {
   if (last <= first) {
     return std::nullopt;
   }
-  Eigen::Index at = 0;
-  spectrum.energy.segment(first, last - first).maxCoeff(&at);
-  return static_cast<double>(first + at) * spectrum.step_hz;
+  double most = 0.0;
+  std::optional<double> strongest;
+  for (Eigen::Index k = first; k < last; ++k) {
+    const double freq_hz = static_cast<double>(k) * spectrum.step_hz;
+    if (spectrum.energy[k] > most && is_apart(freq_hz, known)) {
+      most = spectrum.energy[k];
+      strongest = freq_hz;
+    }
+  }
+  return strongest;
 }
 
 struct Ringing {
@@ -80,42 +117,42 @@ struct Ringing {
   }
 };
 
-std::optional<Ringing> fit_from(const Eigen::ArrayXd& all, Eigen::Index start, double rate_hz) {
+std::optional<Ringing> fit_from(const Eigen::ArrayXd& all, Eigen::Index start, double rate_hz,
+                                const Known& known) {
   Ringing result;
   result.data = all.tail(all.size() - start);
   result.time_s = Eigen::ArrayXd::LinSpaced(result.data.size(), 0.0,
                                             static_cast<double>(result.data.size() - 1) / rate_hz);
-  const std::optional<double> guess_hz = strongest_hz(result.data, rate_hz);
+  const std::optional<double> guess_hz = strongest_hz(result.data, rate_hz, known);
   if (!guess_hz) {
     return std::nullopt;
   }
   const Eigen::ArrayXd weights = Eigen::ArrayXd::Ones(result.data.size());
-  const Model model = [&](const Eigen::VectorXd& p) { return ringing(result.time_s, p); };
+  const Model model = [&](const Eigen::VectorXd& p) { return ringing(result.time_s, p, known); };
   bool is_first = true;
   for (const double damping_ratio : {0.03, 0.12}) {
     LeastSquares fit =
         minimise(model, result.data, weights,
-                 with_amplitudes(result.time_s, result.data, *guess_hz, damping_ratio));
+                 with_amplitudes(result.time_s, result.data, *guess_hz, damping_ratio, known));
     if (is_first || fit.weighted_sum < result.fit.weighted_sum) {
       result.fit = std::move(fit);
       is_first = false;
     }
   }
   const double freq_hz = std::exp(result.fit.parameters[0]);
-  result.spread = std::sqrt(result.fit.weighted_sum / static_cast<double>(result.data.size() - 5));
+  result.spread = std::sqrt(result.fit.weighted_sum /
+                            static_cast<double>(result.data.size() - result.fit.parameters.size()));
   const bool usable = freq_hz > kLowest_hz && freq_hz < kHighest_hz &&
-                      std::exp(result.fit.parameters[1]) < kMostDamping;
+                      std::exp(result.fit.parameters[1]) < kMostDamping && is_apart(freq_hz, known);
   return usable ? std::optional(std::move(result)) : std::nullopt;
 }
 
 // Fits from places between the peak and two thirds of what follows. Returns the first fit that is
 // as good as the best.
-std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, double rate_hz) {
+std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, Eigen::Index peak, double rate_hz,
+                                     const Known& known) {
   constexpr Eigen::Index kStarts = 24;
   constexpr double kAboveNoise = 3.0;
-  const double rest = all.tail(all.size() / 5).mean();
-  Eigen::Index peak = 0;
-  (all - rest).abs().maxCoeff(&peak);
   std::vector<Ringing> found;
   const Eigen::Index room = (all.size() - peak) * 2 / 3;
   for (Eigen::Index i = 0; i < kStarts; ++i) {
@@ -123,7 +160,7 @@ std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, double rate_hz) 
     if (all.size() - start < kFewestSamples) {
       break;
     }
-    std::optional<Ringing> candidate = fit_from(all, start, rate_hz);
+    std::optional<Ringing> candidate = fit_from(all, start, rate_hz, known);
     if (candidate && candidate->amplitude() > kAboveNoise * candidate->spread) {
       found.push_back(std::move(*candidate));
     }
@@ -137,20 +174,41 @@ std::optional<Ringing> earliest_good(const Eigen::ArrayXd& all, double rate_hz) 
   return first == found.end() ? std::nullopt : std::optional(std::move(*first));
 }
 
+// Where the ringing can begin at the earliest: at the peak, or, behind a move whose beginning is
+// part of the record, at the last place that is nearly as high.
+Eigen::Index peak_of(const Eigen::ArrayXd& all, bool is_last) {
+  constexpr double kNearlyAsHigh = 0.6;
+  const Eigen::ArrayXd height = (all - all.tail(all.size() / 5).mean()).abs();
+  Eigen::Index peak = 0;
+  const double highest = height.maxCoeff(&peak);
+  for (Eigen::Index i = height.size(); is_last && i-- > peak;) {
+    if (height[i] >= kNearlyAsHigh * highest) {
+      return i;
+    }
+  }
+  return peak;
+}
+
 }  // namespace
 
-Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz) {
+Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz,
+                              const std::vector<ModeOfAxis>& known) {
   const Eigen::Map<const Eigen::ArrayXd> given(samples.data(),
                                                static_cast<Eigen::Index>(samples.size()));
   if (given.size() < 2 * kFewestSamples || !(given.minCoeff() < given.maxCoeff())) {
     return fail(ErrorKind::input, "there is no motion in it, or it is too short");
   }
   const double height = (given - given.mean()).abs().maxCoeff();
-  const std::optional<Ringing> ring = earliest_good((given - given.mean()) / height, rate_hz);
+  const Eigen::ArrayXd all = (given - given.mean()) / height;
+  const std::optional<Ringing> ring =
+      earliest_good(all, peak_of(all, !known.empty()), rate_hz, known);
   if (!ring) {
     return fail(
         ErrorKind::input,
-        "no ringing stands out of the noise; record a sweep, or the stop after a fast move");
+        known.empty()
+            ? "no ringing stands out of the noise; record a sweep, or the stop after a fast move"
+            : "no ringing but that of the known modes stands out of the noise, so that there is "
+              "nothing for a second stage; leave [second] out");
   }
   const Eigen::ArrayXd weights = Eigen::ArrayXd::Ones(ring->data.size());
   const auto period = std::max<Eigen::Index>(

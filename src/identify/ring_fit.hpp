@@ -1,4 +1,5 @@
-// The mode behind the ringing after a move.
+// The mode behind the ringing after a move. `known`: modes that may ring along, at least 25 % away
+// from the one that is looked for.
 #pragma once
 
 #include <vector>
@@ -7,6 +8,9 @@
 
 namespace unflex::identify {
 
-[[nodiscard]] Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz);
+inline constexpr double kApartOfKnown = 0.25;
+
+[[nodiscard]] Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz,
+                                            const std::vector<ModeOfAxis>& known = {});
 
 }  // namespace unflex::identify

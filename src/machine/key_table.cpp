@@ -47,6 +47,7 @@ using P = PrinterSettings;
 using L = LimitSettings;
 using E = ExtruderSettings;
 using D = AxisDynamics;
+using N = SecondSettings;
 using K = KinematicsSettings;
 using R = DynamicsError;
 using M = MassSpringDamper;
@@ -65,6 +66,7 @@ constexpr std::array<std::string_view, 11> kShaperTypes = {
 // The variants that variants.cpp knows, besides "auto" and "mainline".
 constexpr std::array<std::string_view, 7> kVariants = {
     "auto", "mainline", "kalico", "kalico_limited", "kalico_smooth", "prusa_buddy", "snapmaker_j1"};
+constexpr std::array<std::string_view, 5> kSecondShapers = {"zv", "mzv", "zvd", "ei", "none"};
 constexpr std::array<std::string_view, 4> kTransports = {"auto", "card", "serial", "sbc"};
 
 constexpr std::array kKeys = {
@@ -380,6 +382,24 @@ constexpr std::array kKeys = {
     Key{"dynamics.damping_error", &setting<&S::dynamics_error, &R::damping>,
         Bounds{.min = 0.0, .max = 0.9}, "",
         "How far both damping ratios may be off, either way, as a share"},
+
+    Key{"second.x_freq_hz", &setting<&S::second, &N::x_freq_hz>, Bounds{.min = 0.0, .max = 1000.0},
+        "Hz",
+        "What X still rings at once it is compensated; the base is shaped against it. 0: none"},
+    Key{"second.x_damping_ratio", &setting<&S::second, &N::x_damping_ratio>,
+        Bounds{.min = 0.0, .max = 0.5}, "", "Damping ratio of that mode"},
+    Key{"second.y_freq_hz", &setting<&S::second, &N::y_freq_hz>, Bounds{.min = 0.0, .max = 1000.0},
+        "Hz", "The same along Y"},
+    Key{"second.y_damping_ratio", &setting<&S::second, &N::y_damping_ratio>,
+        Bounds{.min = 0.0, .max = 0.5}, "", "Damping ratio of that mode"},
+    Key{"second.shaper",
+        &setting<&S::second, &N::shaper>,
+        kAny,
+        "",
+        "Shaper of the base for these modes; none: they are verified and reported, not shaped",
+        {},
+        nullptr,
+        kSecondShapers},
 
     Key{"kinematics.type", &setting<&S::kinematics, &K::type>, kAny, "",
         "Which motors move which axes. base.* limits are those of motors"},

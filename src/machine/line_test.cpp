@@ -7,6 +7,8 @@
 #include <cmath>
 #include <optional>
 
+#include "test_place.hpp"
+
 namespace unflex::machine {
 namespace {
 
@@ -17,12 +19,8 @@ constexpr double kLeastSpeed_mm_s = 20.0;
 constexpr double kMostSpeed_mm_s = 100.0;
 constexpr double kStage_s = 6.0;
 constexpr double kPause_ms = 500.0;
-// Above whatever homing leaves on the bed.
-constexpr double kHeight_mm = 10.0;
 constexpr double kLayer_mm = 0.2;
 constexpr double kRow_mm = 2.0;
-// If the size of the bed is not known, we assume that it is at least this large.
-constexpr double kSmallBed_mm = 100.0;
 
 // The shortest line of the test. Marlin joins lines of too few steps to the next
 // (MIN_STEPS_PER_SEGMENT).
@@ -78,18 +76,6 @@ std::optional<LineTestStage> stage_of(double lines_per_s, const Settings& settin
   return stage;
 }
 
-// Where the test begins along an axis, if it is `length_mm` long and in the middle.
-Result<double> begin_of(const std::optional<Range>& travel, double length_mm,
-                        std::string_view key) {
-  const Range range = travel.value_or(Range{0.0, kSmallBed_mm});
-  if (range.max - range.min < length_mm) {
-    return fail(ErrorKind::usage, fmt::format("{} leaves no {} mm for the test's moves; it says "
-                                              "where the tool may be",
-                                              key, length_mm));
-  }
-  return (range.min + range.max - length_mm) / 2.0;
-}
-
 void write_stroke(const LineTestStage& stage, double from_mm, double to_mm, double y_mm,
                   std::string& text) {
   const double lines = std::round(kStroke_mm * stage.lines_per_s / stage.speed_mm_s);
@@ -132,12 +118,12 @@ Result<std::string> line_test(const Settings& settings) {
       "; No heat, no filament. Each stage goes back and forth along X at an even speed; one that\n"
       "; stutters, or takes longer than it says, is more than the printer takes.\n"
       "G28\nG21\nG90\nG1 Z{:.2f} F600\n",
-      kHeight_mm);
+      kTestHeight_mm);
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const LineTestStage& stage = stages[i];
     const double row_mm = *y_mm + kRow_mm * static_cast<double>(i);
     text += fmt::format(";LAYER_CHANGE\n;LAYER:{}\nG1 X{:.4f} Y{:.4f} Z{:.2f} F1200\nM400\n", i,
-                        *x_mm, row_mm, kHeight_mm + kLayer_mm * static_cast<double>(i + 1));
+                        *x_mm, row_mm, kTestHeight_mm + kLayer_mm * static_cast<double>(i + 1));
     const std::string label =
         fmt::format("{} lines/s, {:.1f} s", stage.lines_per_s, stage.duration_s);
     text += fmt::format("M117 {0}\nM118 unflex line-test begins: {0}\nG4 P{1}\n", label, kPause_ms);

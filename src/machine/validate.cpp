@@ -333,6 +333,50 @@ Status check_emission(const Draft& draft) {
   return {};
 }
 
+// A second mode must be another one, and there must be room for it.
+Status check_second(const Draft& draft) {
+  constexpr double kNear = 0.05;
+  const Settings& s = draft.settings;
+  const auto check = [&](const AxisDynamics& axis, const std::string& name,
+                         double second_hz) -> Status {
+    if (second_hz == 0.0) {
+      return {};
+    }
+    const std::string key = "second." + name + "_freq_hz";
+    std::vector<double> known_hz = {axis.freq_hz};
+    std::size_t most = axis.modes.size();
+    const auto add = [&](const std::vector<ModeSettings>& modes) {
+      most = std::max(most, modes.size());
+      for (const ModeSettings& mode : modes) {
+        known_hz.push_back(mode.freq_hz);
+      }
+    };
+    add(axis.modes);
+    for (const PlantSettings& plant : axis.plants) {
+      add(plant.modes);
+    }
+    if (most >= kMostModes) {
+      return conflict(draft, {key},
+                      fmt::format("{} is {}, but the axis has {} modes already, the most there may "
+                                  "be; leave it out",
+                                  key, second_hz, most));
+    }
+    for (const double hz : known_hz) {
+      if (std::abs(std::log(second_hz / hz)) < kNear) {
+        return conflict(draft, {key},
+                        fmt::format("{} is {}, the same as the axis' own {:.4g} Hz; measure the "
+                                    "axis again instead",
+                                    key, second_hz, hz));
+      }
+    }
+    return {};
+  };
+  if (Status x = check(s.dynamics_x, "x", s.second.x_freq_hz); !x) {
+    return x;
+  }
+  return check(s.dynamics_y, "y", s.second.y_freq_hz);
+}
+
 double fastest_freq_hz(const Settings& settings) {
   return std::max(settings.dynamics_x.fastest_hz(), settings.dynamics_y.fastest_hz());
 }
@@ -364,8 +408,8 @@ Status resolve_dynamics(Draft& draft) {
 }
 
 Status check_consistency(const Draft& draft) {
-  for (auto* check :
-       {check_printer, check_shaper, check_kinematics, check_base, check_emission, check_grid}) {
+  for (auto* check : {check_printer, check_shaper, check_kinematics, check_base, check_emission,
+                      check_second, check_grid}) {
     if (Status checked = check(draft); !checked) {
       return checked;
     }

@@ -26,14 +26,20 @@ std::string failure_of(const RunJob& job) {
   return {};
 }
 
-// Joins the solutions of the windows, from the course's first node on. For a part this includes the
-// nodes after its last one.
-dynamics::AxisTrajectory joined(const RunJob& job,
-                                const std::vector<dynamics::AxisTrajectory>& solutions) {
-  dynamics::AxisTrajectory base = compensate::join(job.spans, solutions);
+// The base of the first stage, shaped by the second, from the course's first node on. For a part
+// this includes the nodes after its last one.
+dynamics::BaseTrajectory both_stages(const RunJob& job, dynamics::AxisTrajectory x,
+                                     dynamics::AxisTrajectory y) {
+  dynamics::BaseTrajectory base{job.grid.period_s, std::move(x), std::move(y)};
+  const std::size_t more = compensate::nodes_of_shaping(job.setup, job.grid.period_s);
+  base = compensate::shaped(base, job.setup, job.piece.begins_run() ? more : 0,
+                            job.piece.ends_run() ? more : 0);
   const auto before = static_cast<std::ptrdiff_t>(job.grid.first);
-  for (std::vector<double>* values : {&base.position_mm, &base.velocity_mm_s, &base.accel_mm_s2}) {
-    values->erase(values->begin(), values->begin() + before);
+  for (dynamics::AxisTrajectory* axis : {&base.x, &base.y}) {
+    for (std::vector<double>* values :
+         {&axis->position_mm, &axis->velocity_mm_s, &axis->accel_mm_s2}) {
+      values->erase(values->begin(), values->begin() + before);
+    }
   }
   return base;
 }
@@ -45,7 +51,7 @@ dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
     solutions.push_back(std::move(result[axis].base));
     job.iterations += static_cast<std::size_t>(result[axis].iterations);
   }
-  return joined(job, solutions);
+  return compensate::join(job.spans, solutions);
 }
 
 // The base optimised for the nominal axes alone.
@@ -54,7 +60,7 @@ std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
   setup.x.plants.clear();
   setup.y.plants.clear();
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
-  auto windows = compensate::windows(job.course(), job.spans, job.nozzle, setup);
+  auto windows = compensate::windows(job.course(), job.spans, job.first_stage, setup);
   std::vector<dynamics::AxisTrajectory> x;
   std::vector<dynamics::AxisTrajectory> y;
   for (std::size_t i = 0; i < windows.size(); ++i) {
@@ -65,7 +71,7 @@ std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
     x.push_back(std::move(of_x->base));
     y.push_back(std::move(of_y->base));
   }
-  return dynamics::BaseTrajectory{job.grid.period_s, joined(job, x), joined(job, y)};
+  return both_stages(job, compensate::join(job.spans, x), compensate::join(job.spans, y));
 }
 
 void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
@@ -134,7 +140,8 @@ emit::Run RunJob::run(double tolerance_share, double limits_share,
                 .lines_after = lines_after,
                 .goes_on = !piece.begins_run()};
   if (!piece.ends_run()) {
-    run.until_s = static_cast<double>(grid.last - grid.first) * grid.period_s;
+    run.until_s = static_cast<double>(grid.last - grid.first) * grid.period_s +
+                  (piece.begins_run() ? shaping_s() : 0.0);
   }
   return run;
 }
@@ -148,7 +155,7 @@ AxisResult axis_result(Result<compensate::AxisSolution> solution) {
 
 std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
                                               std::size_t count) {
-  return compensate::windows(job.course(), job.spans, first, count, job.nozzle, job.setup);
+  return compensate::windows(job.course(), job.spans, first, count, job.first_stage, job.setup);
 }
 
 void solve_windows(RunJob& job, std::size_t first, std::size_t count,
@@ -177,7 +184,8 @@ void make_lines(RunJob& job, const RunRules& rules) noexcept {
   try {
     job.failure = failure_of(job);
     if (job.failure.empty()) {
-      job.base = {job.grid.period_s, joined(job, 0), joined(job, 1)};
+      dynamics::AxisTrajectory x = joined(job, 0);
+      job.base = both_stages(job, std::move(x), joined(job, 1));
       measure_robustness(job, rules.verify.nozzle);
       job.plan = emit::plan_run(job.run(1.0, 1.0, even_lines_before_s(rules.emit.lines)),
                                 job.piece.start, rules.emit);

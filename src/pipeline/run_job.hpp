@@ -14,6 +14,7 @@
 #include "piece_reader.hpp"
 #include "unflex/compensate/axis_window.hpp"
 #include "unflex/compensate/run.hpp"
+#include "unflex/compensate/second_stage.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/emit/emit_options.hpp"
 #include "unflex/emit/run.hpp"
@@ -40,7 +41,8 @@ struct Probe {
 struct RunJob {
   Piece piece;
   // What follows is only used for runs and parts of runs.
-  dynamics::NozzleXY nozzle;  // at its begin, if every run before is compensated
+  dynamics::NozzleXY nozzle;       // at its begin, if every run before is compensated
+  dynamics::NozzleXY first_stage;  // the same as a state of the setup's axes
   compensate::Setup setup;
   emit::RunAccel accel;
   compensate::NodeGrid grid;
@@ -68,7 +70,13 @@ struct RunJob {
     return {piece.before, piece.moves, piece.after};
   }
   // How long before the plan the base begins.
-  [[nodiscard]] double lead_in_s() const { return piece.begins_run() ? setup.lead_in_s : 0.0; }
+  [[nodiscard]] double lead_in_s() const {
+    return piece.begins_run() ? setup.lead_in_s + shaping_s() : 0.0;
+  }
+  // By how much shaping makes a run longer at either end.
+  [[nodiscard]] double shaping_s() const {
+    return static_cast<double>(compensate::nodes_of_shaping(setup, grid.period_s)) * grid.period_s;
+  }
   // What the emitter is to write; the arguments are Run's.
   [[nodiscard]] emit::Run run(double tolerance_share = 1.0, double limits_share = 1.0,
                               std::vector<double> lines_before_s = {}) const;

@@ -49,6 +49,12 @@ dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics, double freq_f
                                 : axis(dynamics.modes, freq_factor, damping_factor);
 }
 
+// The axis with the second mode behind it, if there is one.
+dynamics::FlexibleAxis behind(const dynamics::FlexibleAxis& axis, double freq_hz,
+                              double damping_ratio) {
+  return freq_hz > 0.0 ? axis.followed_by(2.0 * std::numbers::pi * freq_hz, damping_ratio) : axis;
+}
+
 bool shares_motors(const machine::Settings& settings) {
   return Motors(settings.kinematics.type, settings.printer.firmware).shared_by_xy();
 }
@@ -119,6 +125,24 @@ std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
   return result;
 }
 
+// Pulses against a mode that hangs behind the axis.
+dynamics::ShaperPulses pulses_of(const machine::Settings& settings, double freq_hz,
+                                 double damping_ratio) {
+  using dynamics::ShaperKind;
+  constexpr std::pair<std::string_view, ShaperKind> kKinds[] = {{"zv", ShaperKind::zv},
+                                                                {"mzv", ShaperKind::mzv},
+                                                                {"zvd", ShaperKind::zvd},
+                                                                {"ei", ShaperKind::ei}};
+  for (const auto& [name, kind] : kKinds) {
+    if (freq_hz > 0.0 && name == settings.second.shaper) {
+      return dynamics::shaper_pulses(kind, freq_hz,
+                                     std::min(damping_ratio, dynamics::max_damping_ratio(kind)))
+          .value();
+    }
+  }
+  return {};
+}
+
 compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
                                  const std::optional<machine::Range>& travel,
                                  const machine::Settings& settings) {
@@ -179,9 +203,6 @@ planner::Limits run_limits(planner::Limits limits, const machine::Settings& sett
   return limits;
 }
 
-// A swing dies away to a fiftieth in this time.
-double settling_of(const machine::AxisDynamics& dynamics) { return axis(dynamics).settling_s(); }
-
 double half_period_s(const machine::Settings& settings) {
   return 0.5 / std::min(settings.dynamics_x.slowest_hz(), settings.dynamics_y.slowest_hz());
 }
@@ -190,7 +211,7 @@ double half_period_s(const machine::Settings& settings) {
 bool draws_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
                     const machine::Settings& settings) {
   constexpr double kSeen_mm = 10e-3;
-  const verify::NozzleModel model{axis(settings.dynamics_x), axis(settings.dynamics_y)};
+  const verify::NozzleModel model{nozzle_x(settings), nozzle_y(settings)};
   if (verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) < kSeen_mm) {
     return false;
   }
@@ -219,22 +240,33 @@ std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& sett
                                                    const verify::NozzleModel& nominal) {
   const std::vector<machine::PlantSettings>& x = settings.dynamics_x.plants;
   const std::vector<machine::PlantSettings>& y = settings.dynamics_y.plants;
+  const machine::SecondSettings& second = settings.second;
   // As coarse as those with other frequencies (verify::detuned).
   constexpr double kCoarseStep_s = 1e-3;
   std::vector<verify::NozzleModel> nozzles(std::max(x.size(), y.size()), nominal);
   for (std::size_t i = 0; i < nozzles.size(); ++i) {
     nozzles[i].step_s = std::max(nominal.step_s, kCoarseStep_s);
     if (i < x.size()) {
-      nozzles[i].x = axis(x[i].modes);
+      nozzles[i].x = behind(axis(x[i].modes), second.x_freq_hz, second.x_damping_ratio);
     }
     if (i < y.size()) {
-      nozzles[i].y = axis(y[i].modes);
+      nozzles[i].y = behind(axis(y[i].modes), second.y_freq_hz, second.y_damping_ratio);
     }
   }
   return nozzles;
 }
 
 }  // namespace
+
+dynamics::FlexibleAxis nozzle_x(const machine::Settings& settings) {
+  return behind(axis(settings.dynamics_x), settings.second.x_freq_hz,
+                settings.second.x_damping_ratio);
+}
+
+dynamics::FlexibleAxis nozzle_y(const machine::Settings& settings) {
+  return behind(axis(settings.dynamics_y), settings.second.y_freq_hz,
+                settings.second.y_damping_ratio);
+}
 
 gcode::InterpreterOptions interpreter_options(const machine::Settings& settings) {
   gcode::InterpreterOptions options = gcode::default_options(settings.printer.firmware);
@@ -262,7 +294,7 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
   options.steps_per_mm = settings.steps_per_mm();
   const double settling_s =
-      std::max(settling_of(settings.dynamics_x), settling_of(settings.dynamics_y));
+      std::max(nozzle_x(settings).settling_s(), nozzle_y(settings).settling_s());
   options.settling_s = std::min(settling_s, kLongestCalm_s);
   options.max_extrude_ratio = max_extrude_ratio(settings);
   options.max_extrude_dab_mm = settings.extruder.nozzle_diameter_mm * options.max_extrude_ratio;
@@ -322,6 +354,8 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
   compensate::Setup setup;
   setup.x = axis_setup(settings.dynamics_x, settings.printer.travel_x_mm, settings);
   setup.y = axis_setup(settings.dynamics_y, settings.printer.travel_y_mm, settings);
+  setup.x.pulses = pulses_of(settings, settings.second.x_freq_hz, settings.second.x_damping_ratio);
+  setup.y.pulses = pulses_of(settings, settings.second.y_freq_hz, settings.second.y_damping_ratio);
   setup.shares_motors = shares_motors(settings);
   setup.period_s = settings.period_ms() * 1e-3;
   setup.lead_in_s = settings.solve.lead_in_ms * 1e-3;
@@ -373,8 +407,9 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.run_limits = run_limits(options.printer_limits, settings);
   options.line_accel_mm_s2 = settings.emit_accel_mm_s2();
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
-  options.lines.nozzle_x = axis(settings.dynamics_x);
-  options.lines.nozzle_y = axis(settings.dynamics_y);
+  // Costs of lines leave the lead of modes behind each other out, which is small.
+  options.lines.nozzle_x = nozzle_x(settings);
+  options.lines.nozzle_y = nozzle_y(settings);
   const auto reach = [](const std::optional<machine::Range>& travel) {
     return travel ? emit::Reach{travel->min, travel->max} : emit::Reach{.min_mm = 0.0};
   };
@@ -409,8 +444,8 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.interpreter = interpreter_options(settings);
   rules.limits = planner_limits(settings);
   rules.fixed = firmware_config(settings);
-  rules.nozzle = {axis(settings.dynamics_x), axis(settings.dynamics_y),
-                  settings.verify.step_ms * 1e-3, settings.verify.hold_s};
+  rules.nozzle = {nozzle_x(settings), nozzle_y(settings), settings.verify.step_ms * 1e-3,
+                  settings.verify.hold_s};
   rules.plants = nozzles_of_plants(settings, rules.nozzle);
   const auto set_range = [](const std::optional<machine::Range>& travel, double& min, double& max,
                             bool& min_assumed) {

@@ -19,6 +19,10 @@ namespace unflex::pipeline {
 [[nodiscard]] planner::Limits planner_limits(const machine::Settings& settings);
 [[nodiscard]] planner::FirmwareConfig firmware_config(const machine::Settings& settings);
 [[nodiscard]] compensate::Setup compensate_setup(const machine::Settings& settings);
+// The axes as they swing. Windows are solved for the axes of `dynamics` alone, without what rings
+// behind them (machine::SecondSettings).
+[[nodiscard]] dynamics::FlexibleAxis nozzle_x(const machine::Settings& settings);
+[[nodiscard]] dynamics::FlexibleAxis nozzle_y(const machine::Settings& settings);
 
 // How a run is solved and written.
 struct RunSetup {

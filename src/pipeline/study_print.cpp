@@ -11,6 +11,9 @@ namespace {
 study::BenchSetup bench_setup(const machine::Settings& settings) {
   study::BenchSetup setup;
   setup.unflex = compensate_setup(settings);
+  if (settings.second.x_freq_hz > 0.0 || settings.second.y_freq_hz > 0.0) {
+    setup.two_stage = study::Nozzle{nozzle_x(settings), nozzle_y(settings)};
+  }
   setup.plan_accel_mm_s2 = settings.limits.max_accel_mm_s2;
   setup.thesis_period_s = setup.unflex.period_s;
   setup.step_s = study::kPrintStep_s;

@@ -9,8 +9,8 @@
 namespace unflex::study {
 namespace {
 
-double reach_s(const compensate::Setup& setup) {
-  return reach_of(std::min(setup.x.axis.slowest_rad_s(), setup.y.axis.slowest_rad_s()));
+double reach_s(const Nozzle& nozzle) {
+  return reach_of(std::min(nozzle.x.slowest_rad_s(), nozzle.y.slowest_rad_s()));
 }
 
 double gap_mm(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan) {
@@ -27,11 +27,12 @@ Trace trace_of(const BaseMotion& base, const std::vector<planner::PlannedMove>& 
   const auto walk = [&](const dynamics::FlexibleAxis& axis, const rivals::AxisPath& path) {
     return rivals::NozzleWalk(axis, path, std::min(path.front().start_s, setup.trace_from_s));
   };
-  rivals::NozzleWalk x = walk(setup.unflex.x.axis, base.x);
-  rivals::NozzleWalk y = walk(setup.unflex.y.axis, base.y);
+  const Nozzle hung = setup.nozzle();
+  rivals::NozzleWalk x = walk(hung.x, base.x);
+  rivals::NozzleWalk y = walk(hung.y, base.y);
   rivals::PathCursor base_x(base.x);
   rivals::PathCursor base_y(base.y);
-  ContourGauge gauge(plan, reach_s(setup.unflex));
+  ContourGauge gauge(plan, reach_s(hung));
   for (std::size_t k = 0; k < trace.grid.count; ++k) {
     const double t = trace.grid.at(k);
     trace.base.push_back({base_x.at(t), base_y.at(t)});
@@ -89,9 +90,10 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
   const rivals::TimeGrid grid{
       -before * setup.step_s, setup.step_s,
       static_cast<std::size_t>(before + std::ceil(end_s / setup.step_s - 1e-6)) + 1};
-  rivals::NozzleWalk x(setup.unflex.x.axis.detuned(1.0 + frequency_error), base.x, grid.start_s);
-  rivals::NozzleWalk y(setup.unflex.y.axis.detuned(1.0 + frequency_error), base.y, grid.start_s);
-  ContourGauge gauge(plan, reach_s(setup.unflex));
+  const Nozzle hung = setup.nozzle();
+  rivals::NozzleWalk x(hung.x.detuned(1.0 + frequency_error), base.x, grid.start_s);
+  rivals::NozzleWalk y(hung.y.detuned(1.0 + frequency_error), base.y, grid.start_s);
+  ContourGauge gauge(plan, reach_s(hung));
   Straying result;
   for (std::size_t k = 0; k < grid.count; ++k) {
     const double t = grid.at(k);
@@ -124,7 +126,8 @@ void Straying::merge(const Straying& other) {
 
 BenchResult try_all(const Run& run, const BenchSetup& setup, const compensate::Engine& engine) {
   BenchResult result;
-  for (std::size_t i = 0; i < kMethodCount; ++i) {
+  const std::size_t methods = kMethodCount + (setup.two_stage ? 1 : 0);
+  for (std::size_t i = 0; i < methods; ++i) {
     result.push_back(try_one(static_cast<Method>(i), run, setup, engine));
   }
   return result;

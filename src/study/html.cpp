@@ -86,7 +86,7 @@ void write_maxima(Sink out, const Outcome& outcome) {
     fmt::format_to(out, "<th scope=\"col\">{}</th>", report::term(result.name, result.description));
   }
   fmt::format_to(out, "</tr></thead><tbody>\n");
-  for (std::size_t i = 0; i < kMethodCount; ++i) {
+  for (std::size_t i = 0; i < outcome.cases.front().methods.size(); ++i) {
     write_row_start(out, static_cast<Method>(i));
     for (const CaseResult& result : outcome.cases) {
       const MethodResult& method = result.methods[i];
@@ -208,7 +208,7 @@ void write_figures(Sink out, const Outcome& outcome) {
                    escape_html(result.description));
   }
   fmt::format_to(out, "</select></label><label>Method <select id=\"method\">");
-  for (std::size_t i = 0; i < kMethodCount; ++i) {
+  for (std::size_t i = 0; i < outcome.cases.front().methods.size(); ++i) {
     const auto method = static_cast<Method>(i);
     fmt::format_to(out, "<option value=\"{}\"{}>{}</option>", i,
                    method == Method::unflex_4x ? " selected" : "", name(method));

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "unflex/compensate/second_stage.hpp"
 #include "unflex/dynamics/shapers.hpp"
 #include "unflex/rivals/filtered_spline.hpp"
 #include "unflex/rivals/s_curve.hpp"
@@ -109,12 +110,16 @@ Result<BaseMotion> unflex_base(const compensate::Setup& setup, const Moves& plan
     x.push_back(std::move(of_x->base));
     y.push_back(std::move(of_y->base));
   }
-  const auto path = [&](const std::vector<dynamics::AxisTrajectory>& solutions) {
-    return rivals::through_nodes(compensate::join(spans, solutions), -setup.lead_in_s,
+  const std::size_t more = compensate::nodes_of_shaping(setup, grid.period_s);
+  const auto path = [&](const dynamics::AxisTrajectory& solutions) {
+    return rivals::through_nodes(solutions,
+                                 -setup.lead_in_s - static_cast<double>(more) * grid.period_s,
                                  grid.period_s, parts);
   };
-  result.x = path(x);
-  result.y = path(y);
+  const dynamics::BaseTrajectory base = compensate::shaped(
+      {grid.period_s, compensate::join(spans, x), compensate::join(spans, y)}, setup, more, more);
+  result.x = path(base.x);
+  result.y = path(base.y);
   return result;
 }
 
@@ -139,6 +144,8 @@ std::string_view name(Method method) {
       return "unflex 4×";
     case Method::unflex_10x:
       return "unflex 10×";
+    case Method::first_stage_4x:
+      return "unflex 4×, first stage";
     default:
       return "uncompensated";
   }
@@ -178,6 +185,12 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
       return limited_base(4.0, run.plan, setup, engine);
     case Method::unflex_10x:
       return limited_base(10.0, run.plan, setup, engine);
+    case Method::first_stage_4x: {
+      BenchSetup first = setup;
+      first.unflex.x.pulses.clear();
+      first.unflex.y.pulses.clear();
+      return limited_base(4.0, run.plan, first, engine);
+    }
     default:
       return both_axes(run.plan, setup.unflex,
                        [](const auto& reference, const auto& /*axis*/) { return reference; });

@@ -30,7 +30,7 @@ void write_maxima(Sink out, const Outcome& outcome) {
   for (const CaseResult& result : outcome.cases) {
     fmt::format_to(out, "{:>8}", result.name);
   }
-  for (std::size_t i = 0; i < kMethodCount; ++i) {
+  for (std::size_t i = 0; i < outcome.cases.front().methods.size(); ++i) {
     fmt::format_to(out, "\n  {:<26}", name(static_cast<Method>(i)));
     for (const CaseResult& result : outcome.cases) {
       const MethodResult& method = result.methods[i];

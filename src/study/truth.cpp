@@ -187,12 +187,21 @@ std::vector<dynamics::Mode> modes_from(const Eigen::VectorXd& p) {
   return modes;
 }
 
-// Whether the modes are those of a machine. Large gains that nearly cancel are a shape's, not its.
+// Whether the modes are those of a machine. Large gains that nearly cancel are a shape's, not its,
+// and so is a damping ratio on its bound, unless the mode lies beyond the band. In the lowest mode
+// of a chain of masses all move the same way, as they do at rest.
 bool is_machine(const std::vector<dynamics::Mode>& modes) {
   constexpr double kApart = 0.15;
+  constexpr double kNear = 1.03;
+  if (std::ranges::min(modes, {}, &dynamics::Mode::omega_rad_s).gain < 0.0) {
+    return false;
+  }
   double all = 0.0;
   for (const dynamics::Mode& mode : modes) {
     all += std::abs(mode.gain);
+    if (mode.zeta > kMostDamping / kNear && mode.omega_rad_s < 2.0 * std::numbers::pi * kTo_hz) {
+      return false;
+    }
     for (const dynamics::Mode& other : modes) {
       if (mode.gain > 0.2 && other.gain < -0.2 &&
           std::abs(std::log(mode.omega_rad_s / other.omega_rad_s)) < kApart) {

@@ -17,6 +17,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 // RepRapFirmware's record of ringing along X and Y.
@@ -240,6 +241,29 @@ TEST_F(Identify, SaysWhatIsMissing) {
   const Outcome outcome = run({"identify", "in.gcode"});
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("is no record that unflex knows"));
+}
+
+TEST_F(Identify, MakesATestAndFindsWhatRingsBehindItsStops) {
+  write_file(path("p.toml"),
+             "[printer]\nfirmware = \"rrf\"\n[dynamics.x]\nfreq_hz = 45\n[dynamics.y]\n"
+             "freq_hz = 45\n[second]\nx_freq_hz = 90\n");
+  const Outcome test =
+      run({"identify", "--make-test", "x", "--printer", "p.toml", "-o", "t.gcode"});
+  EXPECT_EQ(test.exit_code, 0) << test.err;
+  EXPECT_THAT(
+      read_file(path("t.gcode")),
+      AllOf(HasSubstr(";unflex run"), HasSubstr("M956 P0 S2560 A1"), Not(HasSubstr("LEAD_IN"))));
+  write_file(path("stop_x.csv"), ringing(110.0, 40.0));
+  const Outcome found = run({"identify", "--second", "stop_x.csv", "--printer", "p.toml", "-q"});
+  EXPECT_EQ(found.exit_code, 0) << found.err;
+  EXPECT_THAT(found.out, StartsWith("[second]\nx_freq_hz = 110"));
+  EXPECT_THAT(found.out, HasSubstr("x_damping_ratio = 0.06"));
+  // What rings is the known mode.
+  write_file(path("known_x.csv"), ringing(45.0, 40.0));
+  const Outcome none = run({"identify", "--second", "known_x.csv", "--printer", "p.toml", "-q"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_EQ(none.out, "");
+  EXPECT_THAT(none.err, HasSubstr("nothing for a second stage"));
 }
 
 }  // namespace

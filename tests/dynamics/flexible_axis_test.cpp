@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <random>
+#include <utility>
+#include <vector>
 
 namespace unflex::dynamics {
 namespace {
@@ -274,6 +278,110 @@ TEST(SeveralModes, AreBlindAtTheirZeros) {
   // Lightly damped modes: the zero's real part is nearly ζ times what both modes' dampings leave.
   const double longest = std::log(1e5) / FlexibleAxis(modes).unseen_s();
   EXPECT_NEAR(longest / antiresonance, 0.06, 0.02);
+}
+
+// A mode behind the nozzle of another axis: p̈₂ = 2ζω(ṗ − ṗ₂) + ω²(p − p₂), by Runge–Kutta steps of
+// both equations as they stand.
+struct Chain {
+  Mode first;
+  Mode second;
+  std::array<double, 4> state{};  // p, ṗ, p₂, ṗ₂
+
+  [[nodiscard]] std::array<double, 4> slope(const std::array<double, 4>& z, double b,
+                                            double rate) const {
+    const auto pull = [](const Mode& mode, double place, double speed) {
+      return mode.damping_per_s() * speed + mode.stiffness_per_s2() * place;
+    };
+    return {z[1], pull(first, b - z[0], rate - z[1]), z[3], pull(second, z[0] - z[2], z[1] - z[3])};
+  }
+
+  void step(const BaseSegment& base, double h) {
+    const auto at = [&](double t, const std::array<double, 4>& z) {
+      return slope(z, base.position + t * (base.velocity + 0.5 * base.acceleration * t),
+                   base.velocity + base.acceleration * t);
+    };
+    const auto moved = [&](const std::array<double, 4>& k, double t) {
+      std::array<double, 4> z = state;
+      for (std::size_t i = 0; i < 4; ++i) {
+        z[i] += t * k[i];
+      }
+      return z;
+    };
+    const auto k1 = at(0.0, state);
+    const auto k2 = at(0.5 * h, moved(k1, 0.5 * h));
+    const auto k3 = at(0.5 * h, moved(k2, 0.5 * h));
+    const auto k4 = at(h, moved(k3, h));
+    for (std::size_t i = 0; i < 4; ++i) {
+      state[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+    }
+  }
+};
+
+TEST(FollowedBy, SwingsAsTheChainDoes) {
+  for (const auto& [first, second] : {std::pair(Mode{282.7, 0.06}, Mode{691.0, 0.05}),
+                                      std::pair(Mode{400.0, 0.3}, Mode{200.0, 0.1}),
+                                      std::pair(Mode{282.7, 0.0}, Mode{691.0, 0.0}),
+                                      std::pair(Mode{300.0, 1.2}, Mode{500.0, 0.4})}) {
+    const FlexibleAxis axis =
+        FlexibleAxis(first.omega_rad_s, first.zeta).followed_by(second.omega_rad_s, second.zeta);
+    Chain chain{first, second};
+    NozzleState exact;
+    NozzleState rk4;
+    BaseSegment base;
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> accel(-1e4, 1e4);
+    constexpr double kStep_s = 1e-3;
+    constexpr int kFine = 50;
+    for (int i = 0; i < 200; ++i) {
+      base.acceleration = accel(random);
+      exact = exact_step(axis, exact, base, kStep_s);
+      for (int k = 0; k < kFine; ++k) {
+        const double h = kStep_s / kFine;
+        chain.step(base, h);
+        rk4 = rk4_step(axis, rk4, base, h);
+        base.position += h * (base.velocity + 0.5 * base.acceleration * h);
+        base.velocity += base.acceleration * h;
+      }
+      EXPECT_NEAR(exact.position(), chain.state[2], 1e-7);
+      EXPECT_NEAR(exact.velocity(), chain.state[3], 1e-4);
+      EXPECT_NEAR(rk4.position(), chain.state[2], 1e-7);
+    }
+  }
+}
+
+TEST(FollowedBy, RidesWithoutLag) {
+  const FlexibleAxis axis = from_frequency(45.0, 0.06).followed_by(691.0, 0.05);
+  const NozzleState riding = axis.riding(3.0, 100.0);
+  EXPECT_NEAR(riding.position(), 3.0, 1e-12);
+  EXPECT_NEAR(riding.velocity(), 100.0, 1e-10);
+  const NozzleState later = exact_step(axis, riding, {3.0, 100.0, 0.0}, 0.01);
+  EXPECT_NEAR(later.position(), 4.0, 1e-12);
+  EXPECT_NEAR(later.velocity(), 100.0, 1e-9);
+}
+
+TEST(FollowedBy, HasNoZerosButThoseOfTheDampers) {
+  // (2ζ₁ω₁ s + ω₁²)(2ζ₂ω₂ s + ω₂²), so −ω/2ζ for each, and one that has gone to infinity.
+  const FlexibleAxis axis = FlexibleAxis(300.0, 0.1).followed_by(700.0, 0.2);
+  std::vector<double> near;
+  for (const std::complex<double>& zero : axis.zeros()) {
+    if (std::abs(zero) < 1e5) {
+      EXPECT_NEAR(zero.imag(), 0.0, 1e-3);
+      near.push_back(zero.real());
+    }
+  }
+  std::ranges::sort(near);
+  ASSERT_EQ(near.size(), 2U);
+  EXPECT_NEAR(near[0], -1750.0, 0.1);
+  EXPECT_NEAR(near[1], -1500.0, 0.1);
+}
+
+TEST(FollowedBy, MayBeDetuned) {
+  const FlexibleAxis once = FlexibleAxis(300.0, 0.1).followed_by(700.0, 0.2).detuned(1.1);
+  const FlexibleAxis twice = FlexibleAxis(330.0, 0.1).followed_by(770.0, 0.2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_NEAR(once.modes()[i].gain, twice.modes()[i].gain, 1e-12);
+    EXPECT_NEAR(once.modes()[i].lead_s, twice.modes()[i].lead_s, 1e-15);
+  }
 }
 
 }  // namespace

@@ -28,6 +28,51 @@ Recording stop_of_a_move(double mode_hz, double damping_ratio, double noise) {
   return {.rate_hz = test.rate_hz, .accel = {samples, samples, samples}};
 }
 
+DataSet stop(std::variant<Recording, Spectrum> data) {
+  DataSet set;
+  set.name = "stop";
+  set.data = std::move(data);
+  return set;
+}
+
+// A record of a nozzle that follows the move but for a mode behind it, and rings a little with the
+// one that it is compensated for.
+DataSet compensated_stop(double second_hz, double second_damping, double rest, double noise) {
+  Recording recording = stop_of_a_move(second_hz, second_damping, noise);
+  const double rate_hz = recording.rate_hz;
+  constexpr double kStop_s = 0.9;
+  for (std::size_t i = 0; i < recording.accel[0].size(); ++i) {
+    const double t = static_cast<double>(i) / rate_hz - kStop_s;
+    if (t > 0.0) {
+      const double omega = 2.0 * std::numbers::pi * 46.0;
+      recording.accel[0][i] += rest * std::exp(-0.06 * omega * t) * std::cos(omega * t);
+    }
+  }
+  return stop(recording);
+}
+
+TEST(SecondMode, RingsBehindACompensatedStop) {
+  const std::vector<ModeOfAxis> known = {{45.0, 0.06, 1.0}};
+  for (const auto& [freq_hz, damping_ratio] : {std::pair(110.0, 0.05), std::pair(71.0, 0.04)}) {
+    for (const double rest : {0.0, 600.0}) {
+      const Result<RecordFit> fit =
+          fit_second(compensated_stop(freq_hz, damping_ratio, rest, 40.0), Axis::x, known);
+      ASSERT_TRUE(fit && fit->is_trusted()) << freq_hz << (fit ? fit->refusal : "");
+      EXPECT_NEAR(fit->model.modes.front().freq_hz.value, freq_hz, 0.02 * freq_hz);
+      EXPECT_NEAR(fit->model.modes.front().damping_ratio.value, damping_ratio,
+                  0.35 * damping_ratio);
+    }
+  }
+}
+
+TEST(SecondMode, IsNotTheKnownOne) {
+  const std::vector<ModeOfAxis> known = {{45.0, 0.06, 1.0}};
+  const Result<RecordFit> fit = fit_second(stop(stop_of_a_move(46.0, 0.05, 60.0)), Axis::x, known);
+  ASSERT_TRUE(fit);
+  EXPECT_FALSE(fit->is_trusted()) << fit->model.modes.front().freq_hz.value;
+  EXPECT_FALSE(fit_second(stop(Spectrum{}), Axis::x, known));
+}
+
 TEST(Ringing, AfterAMoveTellsTheMode) {
   for (const auto& [mode_hz, damping_ratio] : {std::pair{30.0, 0.05}, std::pair{62.0, 0.09}}) {
     const Result<RecordFit> fit =

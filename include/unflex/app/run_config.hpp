@@ -1,6 +1,7 @@
 // What the user asked for, as plain data.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -43,6 +44,11 @@ struct IdentifyConfig {
   std::optional<identify::Axis> axis;  // axis of all records; unset: as each record tells
   identify::Sweep sweep;
   std::optional<identify::Tower> tower;
+  // The mode behind those that the printer is compensated for is looked for (identify --second).
+  bool second = false;
+  std::array<std::vector<identify::ModeOfAxis>, 2> known = {};  // X's and Y's, for `second`
+  // The axis that a test of stops is written for, instead (identify --make-test).
+  std::optional<identify::Axis> make_test;
 };
 
 struct RunConfig {

@@ -13,6 +13,7 @@
 #include "unflex/compensate/axis_window.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/shapers.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::compensate {
@@ -22,6 +23,7 @@ struct AxisSetup {
   std::vector<Plant> plants;  // as in AxisWindow
   // Position limits may be widened per run to where the sliced path itself goes.
   BaseLimits limits;
+  dynamics::ShaperPulses pulses;  // of the second stage (second_stage.hpp); empty: there is none
 };
 
 struct Setup {

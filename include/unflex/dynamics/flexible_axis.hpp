@@ -1,11 +1,12 @@
 // One axis of the machine: the base, which the motor moves, and the nozzle, which hangs on it by a
 // spring and a damper, or by several.
 //
-//   p = Σ q_i        q̈_i = 2ζ_i ω_i (g_i ḃ − q̇_i) + ω_i² (g_i b − q_i)        Σ g_i = 1
+//   p = Σ q_i        q̈_i = 2ζ_i ω_i (g_i ḃ − q̇_i) + ω_i² (g_i b + τ_i ḃ − q_i)
+//   Σ g_i = 1        Σ τ_i = 0
 //
 //   b   base position, mm          p   nozzle position, mm          i   modes
 //   ω   natural frequency, rad/s   ζ   damping ratio                g   gain, of either sign
-//   q   the mode's part of p
+//   q   the mode's part of p       τ   lead, s: 0 but for modes behind each other
 //
 // With one mode: Cisalpino (UFLA, 2023) eq. 3.17 and 3.18 with ζ = c/(2√(mk)); docs/theory.md lists
 // where the printed forms differ. Several modes are the modal form of a base-excited structure
@@ -30,6 +31,7 @@ struct Mode {
   double omega_rad_s = 282.743338823;  // 45 Hz
   double zeta = 0.06;
   double gain = 1.0;
+  double lead_s = 0.0;
 
   // ω² and 2ζω, before the gain.
   [[nodiscard]] constexpr double stiffness_per_s2() const { return omega_rad_s * omega_rad_s; }
@@ -119,13 +121,17 @@ class FlexibleAxis {
   [[nodiscard]] double damping_per_s() const;
 
   // The zeros of the transfer function from base to nozzle, rad/s: while the base moves as e^{st}
-  // with s at a zero, the nozzle rests. Empty if the highest coefficient vanishes.
+  // with s at a zero, the nozzle rests. Those at infinity are left out.
   [[nodiscard]] std::vector<std::complex<double>> zeros() const;
   // For how long a motion of the base that moves the nozzle nowhere lasts until it has died away to
   // 10⁻⁵. With one mode it dies at once. Several modes leave the base such a motion near
   // each antiresonance.
   [[nodiscard]] double unseen_s() const;
 
+  // The axis with a mode that hangs behind its nozzle: p̈₂ = 2ζω(ṗ − ṗ₂) + ω²(p − p₂), by the
+  // partial fractions of the product of both transfer functions. The axis must have room for a mode
+  // more, and none like it.
+  [[nodiscard]] FlexibleAxis followed_by(double omega_rad_s, double zeta) const;
   // The axis with all frequencies times this factor.
   [[nodiscard]] FlexibleAxis detuned(double factor) const;
 

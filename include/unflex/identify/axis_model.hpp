@@ -107,6 +107,12 @@ struct Sweep {
                                               const Sweep& sweep);
 [[nodiscard]] Result<RecordFit> fit_spectrum(const Spectrum& spectrum, const Sweep& sweep);
 
+// Fits the mode that still rings behind a stop of a compensated axis to a recording of it. `known`:
+// the modes that it is compensated for; the one found is at least 25 % away from them. A stop
+// behind which nothing else rings is refused. A spectrum is an error of kind input.
+[[nodiscard]] Result<RecordFit> fit_second(const DataSet& set, Axis axis,
+                                           const std::vector<ModeOfAxis>& known);
+
 // Whether the main modes of these models are within 5 % of each other.
 [[nodiscard]] bool agree(const std::vector<AxisModel>& models);
 

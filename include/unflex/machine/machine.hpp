@@ -153,6 +153,16 @@ struct DynamicsError {
   double damping = 0.0;
 };
 
+// What still rings once the axes are made up for: a second mode, which hangs behind the ones of
+// `dynamics`. The base is then shaped against it. 0 Hz: there is none.
+struct SecondSettings {
+  double x_freq_hz = 0.0;
+  double x_damping_ratio = 0.05;
+  double y_freq_hz = 0.0;
+  double y_damping_ratio = 0.05;
+  std::string shaper = "zv";  // "none": the mode is told of and verified, but not shaped
+};
+
 struct KinematicsSettings {
   Kinematics type = Kinematics::cartesian;
 };
@@ -211,6 +221,7 @@ struct Settings {
   AxisDynamics dynamics_x;
   AxisDynamics dynamics_y;
   DynamicsError dynamics_error;
+  SecondSettings second;
   KinematicsSettings kinematics;
   BaseSettings base;
   SolveSettings solve;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,8 +31,10 @@ enum class Method {
   unflex_2x,
   unflex_4x,
   unflex_10x,
+  // unflex 4× without its second stage; tried only where there is one.
+  first_stage_4x,
 };
-inline constexpr std::size_t kMethodCount = 15;
+inline constexpr std::size_t kMethodCount = 15;  // without first_stage_4x
 
 // "uncompensated", "ZV", "unflex 4×" …
 [[nodiscard]] std::string_view name(Method method);
@@ -43,8 +46,15 @@ inline constexpr std::array<double, 5> kFrequencyErrors = {0.0, -0.10, -0.05, 0.
 inline constexpr double kPrintStep_s = 2e-4;
 inline constexpr int kPrintParts = 5;
 
+// The axes that hang on the base.
+struct Nozzle {
+  dynamics::FlexibleAxis x;
+  dynamics::FlexibleAxis y;
+};
+
 struct BenchSetup {
   compensate::Setup unflex;          // its acceleration limits are set per method
+  std::optional<Nozzle> two_stage;   // the axes with what rings behind them, if anything does
   double plan_accel_mm_s2 = 5000.0;  // unflex_2x, 4x, 10x allow multiples of it
   double thesis_period_s = 5e-3;
   int parts = 10;             // parabolas per node interval of unflex' base
@@ -53,6 +63,10 @@ struct BenchSetup {
   double trace_step_s = 0.0;  // between samples of the traces; 0: no traces
   double trace_from_s = 0.0;  // begin of the traces in the plan
   double trace_to_s = 0.0;    // end of the traces in the plan
+
+  [[nodiscard]] Nozzle nozzle() const {
+    return two_stage.value_or(Nozzle{unflex.x.axis, unflex.y.axis});
+  }
 };
 
 // A stretch of motion from rest to rest.

@@ -1,0 +1,92 @@
+#include "unflex/compensate/second_stage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace unflex::compensate {
+namespace {
+
+// One train of pulses after the other.
+dynamics::ShaperPulses both(const dynamics::ShaperPulses& a, const dynamics::ShaperPulses& b) {
+  if (a.empty() || b.empty()) {
+    return a.empty() ? b : a;
+  }
+  dynamics::ShaperPulses result;
+  for (const dynamics::Pulse& p : a) {
+    for (const dynamics::Pulse& q : b) {
+      result.push_back({p.time_s + q.time_s, p.weight * q.weight});
+    }
+  }
+  return result;
+}
+
+std::pair<dynamics::ShaperPulses, dynamics::ShaperPulses> pulses_of(const Setup& setup) {
+  if (setup.shares_motors) {
+    const dynamics::ShaperPulses joint = both(setup.x.pulses, setup.y.pulses);
+    return {joint, joint};
+  }
+  return {setup.x.pulses, setup.y.pulses};
+}
+
+double reach_s(const dynamics::ShaperPulses& pulses) {
+  double reach = 0.0;
+  for (const dynamics::Pulse& pulse : pulses) {
+    reach = std::max(reach, std::abs(pulse.time_s));
+  }
+  return reach;
+}
+
+// b at t seconds behind the first node.
+dynamics::AxisMotion motion_at(const dynamics::AxisTrajectory& base, double t, double h) {
+  const std::size_t last = base.position_mm.size() - 1;
+  if (t < 0.0) {
+    return {base.position_mm.front(), 0.0, 0.0};
+  }
+  if (t > static_cast<double>(last) * h) {
+    return {base.position_mm.back(), 0.0, 0.0};
+  }
+  const auto k = std::min(static_cast<std::size_t>(t / h), last - 1);
+  return dynamics::between(base, k, t - static_cast<double>(k) * h, h);
+}
+
+dynamics::AxisTrajectory shaped(const dynamics::AxisTrajectory& base, double h,
+                                const dynamics::ShaperPulses& pulses, std::size_t more_before,
+                                std::size_t more_after) {
+  static const dynamics::ShaperPulses kNone = {{0.0, 1.0}};
+  const std::size_t nodes = base.position_mm.size() + more_before + more_after;
+  dynamics::AxisTrajectory result;
+  for (std::size_t k = 0; k < nodes; ++k) {
+    const double t = (static_cast<double>(k) - static_cast<double>(more_before)) * h;
+    dynamics::AxisMotion sum;
+    for (const dynamics::Pulse& pulse : pulses.empty() ? kNone : pulses) {
+      const dynamics::AxisMotion motion = motion_at(base, t - pulse.time_s, h);
+      sum.position_mm += pulse.weight * motion.position_mm;
+      sum.velocity_mm_s += pulse.weight * motion.velocity_mm_s;
+      sum.accel_mm_s2 += pulse.weight * motion.accel_mm_s2;
+    }
+    result.position_mm.push_back(sum.position_mm);
+    result.velocity_mm_s.push_back(sum.velocity_mm_s);
+    result.accel_mm_s2.push_back(sum.accel_mm_s2);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::size_t nodes_of_shaping(const Setup& setup, double period_s) {
+  const auto [x, y] = pulses_of(setup);
+  return static_cast<std::size_t>(std::ceil(std::max(reach_s(x), reach_s(y)) / period_s));
+}
+
+dynamics::BaseTrajectory shaped(const dynamics::BaseTrajectory& base, const Setup& setup,
+                                std::size_t more_before, std::size_t more_after) {
+  const auto [x, y] = pulses_of(setup);
+  if (x.empty() && y.empty() && more_before + more_after == 0) {
+    return base;
+  }
+  return {base.period_s, shaped(base.x, base.period_s, x, more_before, more_after),
+          shaped(base.y, base.period_s, y, more_before, more_after)};
+}
+
+}  // namespace unflex::compensate
