@@ -179,14 +179,6 @@ class Compensator {
     return false;
   }
 
-  // The nozzle, which swings with all its modes, as a state of the axes that the windows are for.
-  [[nodiscard]] dynamics::NozzleXY first_stage(const dynamics::NozzleXY& nozzle, const Piece& piece,
-                                               const compensate::Setup& setup) const {
-    const auto& start_mm = piece.moves.front().segment.start_mm;
-    return {setup.x.axis.swinging_as(rules_.verify.nozzle.x, nozzle.x, start_mm[gcode::X]),
-            setup.y.axis.swinging_as(rules_.verify.nozzle.y, nozzle.y, start_mm[gcode::Y])};
-  }
-
   // Prepares the work on the piece and queues it.
   void admit(std::shared_ptr<RunJob> job) {
     const Piece& piece = job->piece;
@@ -202,7 +194,7 @@ class Compensator {
       warn_if_capped(setup, piece);
       job->setup = std::move(setup.setup);
       job->accel = setup.accel;
-      job->first_stage = first_stage(job->nozzle, piece, job->setup);
+      job->first_stage = first_stage(*job, rules_.verify.nozzle);
       job->grid = compensate::node_grid(job->course(), job->setup);
       const std::size_t nodes = job->grid.count;
       const double accel = largest_motor_accel(piece.moves, rules_.verify.fixed.motors());

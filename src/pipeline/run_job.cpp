@@ -153,6 +153,12 @@ AxisResult axis_result(Result<compensate::AxisSolution> solution) {
   return {std::move(solution->base), solution->iterations, {}};
 }
 
+dynamics::NozzleXY first_stage(const RunJob& job, const verify::NozzleModel& model) {
+  const gcode::Position& start_mm = job.piece.moves.front().segment.start_mm;
+  return {job.setup.x.axis.swinging_as(model.x, job.nozzle.x, start_mm[gcode::X]),
+          job.setup.y.axis.swinging_as(model.y, job.nozzle.y, start_mm[gcode::Y])};
+}
+
 std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
                                               std::size_t count) {
   return compensate::windows(job.course(), job.spans, first, count, job.first_stage, job.setup);

@@ -91,6 +91,10 @@ struct RunRules {
 
 [[nodiscard]] AxisResult axis_result(Result<compensate::AxisSolution> solution);
 
+// The job's nozzle, which swings with all the modes of the model, as a state of the axes that the
+// windows are for.
+[[nodiscard]] dynamics::NozzleXY first_stage(const RunJob& job, const verify::NozzleModel& model);
+
 // The problems of `count` windows of the run from number `first` on.
 [[nodiscard]] std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
                                                             std::size_t count);

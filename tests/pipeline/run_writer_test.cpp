@@ -73,6 +73,7 @@ class Writer : public ::testing::Test {
     RunSetup setup = setup_for(rules_.setup, job.piece, job.nozzle, settings_);
     job.setup = std::move(setup.setup);
     job.accel = setup.accel;
+    job.first_stage = first_stage(job, rules_.verify.nozzle);
     job.grid = compensate::node_grid(job.course(), job.setup);
     job.spans = compensate::mesh(job.course(), job.grid, job.setup);
     job.results.resize(job.spans.size());
