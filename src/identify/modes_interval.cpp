@@ -29,7 +29,7 @@ Eigen::MatrixXd correlations(const ModesModel& model, Eigen::Index bins) {
 // Covariance of θ.
 Eigen::MatrixXd covariance_of(const ModesModel& model, const Band& band, const Prior& prior,
                               const Eigen::VectorXd& theta) {
-  constexpr double kCaution = 1.5;
+  constexpr double kCaution = 1.8;
   Eigen::ArrayXd values;
   Eigen::MatrixXd jacobian;
   model(theta, values, &jacobian);
