@@ -205,9 +205,16 @@ Result<ExitCode> make_test(const RunConfig& config, Console& console) {
     return fail(ErrorKind::internal, fmt::format("no memory for the test: {}", errno_text(error)));
   }
   print.input = fmt::format("/proc/self/fd/{}", file.get());
-  return work_on_print(print, console).map([](const PrintOutcome& outcome) {
-    return outcome.verdict;
-  });
+  const Result<PrintOutcome> outcome = work_on_print(print, console);
+  if (!outcome) {
+    return tl::unexpected(outcome.error());
+  }
+  const bool says = !config.quiet && config.output != kStandardStream;
+  return (says ? write_last(fmt::format("{}: stops along {}, to be printed; then unflex identify "
+                                        "--second with the records\n",
+                                        config.output, letter(*config.identify.make_test)))
+               : Status{})
+      .map([&] { return outcome->verdict; });
 }
 
 // The records' configuration with what the printer file says of the known modes.
