@@ -250,6 +250,7 @@ TEST_F(Identify, MakesATestAndFindsWhatRingsBehindItsStops) {
   const Outcome test =
       run({"identify", "--make-test", "x", "--printer", "p.toml", "-o", "t.gcode"});
   EXPECT_EQ(test.exit_code, 0) << test.err;
+  EXPECT_THAT(test.out, StartsWith("t.gcode: stops along x"));
   EXPECT_THAT(
       read_file(path("t.gcode")),
       AllOf(HasSubstr(";unflex run"), HasSubstr("M956 P0 S2560 A1"), Not(HasSubstr("LEAD_IN"))));
