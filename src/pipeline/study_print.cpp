@@ -22,8 +22,15 @@ study::BenchSetup bench_setup(const machine::Settings& settings) {
 }
 
 std::string describe(const machine::Settings& settings) {
-  return fmt::format("X {}; Y {}; {} mm/s²", settings.dynamics_x.description(),
-                     settings.dynamics_y.description(), settings.limits.max_accel_mm_s2);
+  const auto behind = [](double freq_hz, double damping_ratio) {
+    return freq_hz > 0.0 ? fmt::format(", behind it {:.4g} Hz, ζ {:.3g}", freq_hz, damping_ratio)
+                         : std::string{};
+  };
+  const machine::SecondSettings& second = settings.second;
+  return fmt::format(
+      "X {}{}; Y {}{}; {} mm/s²", settings.dynamics_x.description(),
+      behind(second.x_freq_hz, second.x_damping_ratio), settings.dynamics_y.description(),
+      behind(second.y_freq_hz, second.y_damping_ratio), settings.limits.max_accel_mm_s2);
 }
 
 }  // namespace
