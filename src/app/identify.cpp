@@ -182,14 +182,18 @@ std::vector<identify::ModeOfAxis> modes_of(const machine::AxisDynamics& dynamics
   return modes;
 }
 
+// The settings for what needs the axes: those of a guess are refused.
+Result<machine::Settings> settings_of(const RunConfig& config) {
+  return machine::load(config.printer_file, config.overrides).and_then(without_guess);
+}
+
 // Writes the test as a print that nobody keeps, and compensates it by the first stage alone.
 Result<ExitCode> make_test(const RunConfig& config, Console& console) {
   RunConfig print = config;
   print.command = Command::compensate;
   print.print_name = "the test";
   print.overrides.emplace_back("second.shaper=none");
-  const Result<machine::Settings> settings =
-      machine::load(print.printer_file, print.overrides).and_then(without_guess);
+  const Result<machine::Settings> settings = settings_of(print);
   if (!settings) {
     return tl::unexpected(settings.error());
   }
@@ -221,8 +225,7 @@ Result<ExitCode> make_test(const RunConfig& config, Console& console) {
 Result<IdentifyConfig> with_known(const RunConfig& config) {
   IdentifyConfig result = config.identify;
   if (result.second) {
-    const Result<machine::Settings> settings =
-        machine::load(config.printer_file, config.overrides).and_then(without_guess);
+    const Result<machine::Settings> settings = settings_of(config);
     if (!settings) {
       return tl::unexpected(settings.error());
     }

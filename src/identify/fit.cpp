@@ -1,6 +1,7 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "ring_fit.hpp"
@@ -62,6 +63,19 @@ Eigen::Vector3d direction_of(const Recording& recording, const Samples& samples,
   return is_column ? Eigen::Vector3d(Eigen::Vector3d::Unit(column)) : principal;
 }
 
+// The axis' motion as the sensor felt it.
+struct Motion {
+  std::vector<double> samples;
+  std::array<double, 3> direction{};  // as RecordFit's
+};
+
+Motion motion_of(const Recording& recording, Axis axis) {
+  const Samples all = centred(recording);
+  const Eigen::Vector3d direction = direction_of(recording, all, axis);
+  const Eigen::VectorXd along = all * direction;
+  return {{along.begin(), along.end()}, {direction[0], direction[1], direction[2]}};
+}
+
 // Whether the value lies in a finite interval above 0.
 bool is_known(const Estimate& estimate) {
   return estimate.low > 0.0 && estimate.low <= estimate.value && estimate.value <= estimate.high &&
@@ -80,15 +94,12 @@ Axis dominant_axis(const DataSet& set) {
 }
 
 Result<RecordFit> fit_recording(const Recording& recording, Axis axis, const Sweep& sweep) {
-  const Samples all = centred(recording);
-  const Eigen::Vector3d direction = direction_of(recording, all, axis);
-  const Eigen::VectorXd along = all * direction;
-  const std::vector<double> samples(along.begin(), along.end());
-  Result<RecordFit> record = holds_sweep(samples, recording.rate_hz)
-                                 ? fit_sweep(samples, recording.rate_hz, sweep)
-                                 : fit_ringing(samples, recording.rate_hz);
+  const Motion motion = motion_of(recording, axis);
+  Result<RecordFit> record = holds_sweep(motion.samples, recording.rate_hz)
+                                 ? fit_sweep(motion.samples, recording.rate_hz, sweep)
+                                 : fit_ringing(motion.samples, recording.rate_hz);
   if (record) {
-    record->direction = {direction[0], direction[1], direction[2]};
+    record->direction = motion.direction;
   }
   return record;
 }
@@ -100,17 +111,15 @@ Result<RecordFit> fit_second(const DataSet& set, Axis axis, const std::vector<Mo
                 "is a spectrum; a second mode shows in recordings of compensated stops, which "
                 "unflex identify --make-test makes the printer do");
   }
-  const Samples all = centred(*recording);
-  const Eigen::Vector3d direction = direction_of(*recording, all, axis);
-  const Eigen::VectorXd along = all * direction;
-  Result<RecordFit> record = fit_ringing({along.begin(), along.end()}, recording->rate_hz, known);
+  const Motion motion = motion_of(*recording, axis);
+  Result<RecordFit> record = fit_ringing(motion.samples, recording->rate_hz, known);
   if (!record) {
     RecordFit refused;
     refused.model.method = Method::ringing;
     refused.refusal = record.error().message;
     return refused;
   }
-  record->direction = {direction[0], direction[1], direction[2]};
+  record->direction = motion.direction;
   return record;
 }
 

@@ -40,6 +40,15 @@ Eigen::VectorXd in_order(const Eigen::VectorXd& theta, const Band& band) {
   return result;
 }
 
+// Σ|g|, which is 1 where all modes move the same way.
+double all_gains(const Eigen::VectorXd& theta) {
+  double all = 0.0;
+  for (const ModeOfAxis& mode : modes_of(theta)) {
+    all += std::abs(mode.gain);
+  }
+  return all;
+}
+
 // Why a solution is not to be trusted; empty if it is.
 std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesModel& model) {
   constexpr double kMostGain = 2.9;
@@ -50,10 +59,8 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
   constexpr double kMostDampingOfMain = 0.3;
   constexpr double kLeastOfPair = 0.25;
   constexpr double kApart = 0.15;
-  double all = 0.0;
   const std::vector<ModeOfAxis> modes = modes_of(theta);
   for (const ModeOfAxis& mode : modes) {
-    all += std::abs(mode.gain);
     for (const ModeOfAxis& other : modes) {
       // Two modes at one place that work against each other stand for a shape that is neither's.
       if (mode.gain > kLeastOfPair && other.gain < -kLeastOfPair &&
@@ -77,7 +84,7 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
   if (modes.front().damping_ratio > kMostDampingOfMain) {
     return std::string(kTooDamped);
   }
-  if (all > kMostOfAllGains) {
+  if (all_gains(theta) > kMostOfAllGains) {
     return "its gains nearly cancel";
   }
   // Little is known of the damping beyond the sweep.
@@ -99,15 +106,6 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
 bool lowest_is_positive(const Eigen::VectorXd& theta) {
   const std::vector<ModeOfAxis> modes = modes_of(theta);
   return std::ranges::min(modes, {}, &ModeOfAxis::freq_hz).gain > 0.0;
-}
-
-// Σ|g|, which is 1 where all modes move the same way.
-double all_gains(const Eigen::VectorXd& theta) {
-  double all = 0.0;
-  for (const ModeOfAxis& mode : modes_of(theta)) {
-    all += std::abs(mode.gain);
-  }
-  return all;
 }
 
 bool has_mode_near(const Eigen::VectorXd& theta, double freq_log) {

@@ -317,7 +317,7 @@ std::vector<std::vector<Solution>> search(const Band& band, const ModesModel& mo
     Search search(band, model, sweep, noise_rises);
     std::vector<Solution> some;
     for (std::vector<Solution>& all : found) {
-      some = &all == &found.front() ? search.first() : search.next(some);
+      some = some.empty() ? search.first() : search.next(some);
       if (some.empty()) {
         break;
       }

@@ -30,13 +30,15 @@ constexpr double kMostDamping = 0.4;
 
 using Known = std::vector<ModeOfAxis>;
 
-// e^(−ζωt) cos ω_d t and e^(−ζωt) sin ω_d t.
+// e^(−ζωt) cos ω_d t and e^(−ζωt) sin ω_d t. A ζ above the greatest counts as that.
 struct Swings {
   Eigen::ArrayXd cosine;
   Eigen::ArrayXd sine;
 };
 
-Swings swings(const Eigen::ArrayXd& time_s, double freq_hz, double damping_ratio) {
+Swings swings(const Eigen::ArrayXd& time_s, double freq_hz, double given_damping_ratio) {
+  constexpr double kGreatest = 0.95;
+  const double damping_ratio = std::min(given_damping_ratio, kGreatest);
   const double omega = 2.0 * std::numbers::pi * freq_hz;
   const double omega_d = omega * std::sqrt(1.0 - damping_ratio * damping_ratio);
   const Eigen::ArrayXd envelope = (-damping_ratio * omega * time_s).exp();
@@ -45,11 +47,11 @@ Swings swings(const Eigen::ArrayXd& time_s, double freq_hz, double damping_ratio
 
 // The model; p is ln f, ln ζ, a, b, c, then a and b of each known mode.
 Eigen::ArrayXd ringing(const Eigen::ArrayXd& time_s, const Eigen::VectorXd& p, const Known& known) {
-  const Swings own = swings(time_s, std::exp(p[0]), std::min(std::exp(p[1]), 0.95));
+  const Swings own = swings(time_s, std::exp(p[0]), std::exp(p[1]));
   Eigen::ArrayXd sum = p[2] * own.cosine + p[3] * own.sine + p[4];
   Eigen::Index at = 5;
   for (const ModeOfAxis& mode : known) {
-    const Swings other = swings(time_s, mode.freq_hz, std::min(mode.damping_ratio, 0.95));
+    const Swings other = swings(time_s, mode.freq_hz, mode.damping_ratio);
     sum += p[at] * other.cosine + p[at + 1] * other.sine;
     at += 2;
   }

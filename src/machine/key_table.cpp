@@ -389,7 +389,7 @@ constexpr std::array kKeys = {
     Key{"second.x_damping_ratio", &setting<&S::second, &N::x_damping_ratio>,
         Bounds{.min = 0.0, .max = 0.5}, "", "Damping ratio of that mode"},
     Key{"second.y_freq_hz", &setting<&S::second, &N::y_freq_hz>, Bounds{.min = 0.0, .max = 1000.0},
-        "Hz", "The same along Y"},
+        "Hz", "What Y still rings at, likewise"},
     Key{"second.y_damping_ratio", &setting<&S::second, &N::y_damping_ratio>,
         Bounds{.min = 0.0, .max = 0.5}, "", "Damping ratio of that mode"},
     Key{"second.shaper",

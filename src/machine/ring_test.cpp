@@ -2,10 +2,11 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "test_place.hpp"
@@ -16,33 +17,35 @@ namespace {
 constexpr std::array kSpeeds_mm_s = {20.0, 50.0, 100.0};
 constexpr double kRest_ms = 1000.0;
 constexpr double kStroke_mm = 60.0;
-// RepRapFirmware records so many samples; few accelerometers give more in a second.
+// M956 is told how many samples to record. Few accelerometers give more than this.
 constexpr double kSamplesPerSecond = 1600.0;
 
 // The commands before and after a move whose stop is recorded.
 using Around = std::pair<std::string, std::string>;
 
-Around around(Firmware firmware, char axis, double speed_mm_s) {
-  if (firmware == Firmware::rrf) {
-    const double samples =
-        std::ceil(kSamplesPerSecond * (kStroke_mm / speed_mm_s + kRest_ms * 1e-3));
-    // A1 waits until the next move begins.
-    return {
-        fmt::format("M956 P0 S{:.0f} A1 F\"unflex_{}_{:.0f}.csv\"\n", samples, axis, speed_mm_s),
-        ""};
+// nullopt if the firmware has none.
+std::optional<Around> around(Firmware firmware, char axis, double speed_mm_s) {
+  const std::string name = fmt::format("unflex_{}_{:.0f}", axis, speed_mm_s);
+  switch (firmware) {
+    case Firmware::klipper: {
+      const std::string command = fmt::format("ACCELEROMETER_MEASURE NAME={}\n", name);
+      return Around{command, command};
+    }
+    case Firmware::rrf: {
+      const double samples =
+          std::ceil(kSamplesPerSecond * (kStroke_mm / speed_mm_s + kRest_ms * 1e-3));
+      // A1 waits until the next move begins.
+      return Around{fmt::format("M956 P0 S{:.0f} A1 F\"{}.csv\"\n", samples, name), ""};
+    }
+    case Firmware::marlin:
+      break;
   }
-  const std::string command =
-      fmt::format("ACCELEROMETER_MEASURE NAME=unflex_{}_{:.0f}\n", axis, speed_mm_s);
-  return {command, command};
+  return std::nullopt;
 }
 
 }  // namespace
 
 Result<std::string> ring_test(const Settings& settings, char axis) {
-  if (settings.printer.firmware == Firmware::marlin) {
-    return fail(ErrorKind::usage,
-                "Marlin has no command that records an accelerometer, so there is no test to make");
-  }
   const bool is_x = axis == 'x';
   const Result<double> x_mm =
       begin_of(settings.printer.travel_x_mm, is_x ? kStroke_mm : 0.0, "printer.travel_x_mm");
@@ -59,10 +62,16 @@ Result<std::string> ring_test(const Settings& settings, char axis) {
       "G28\nG21\nG90\nG1 Z{:.2f} F600\nG1 X{:.3f} Y{:.3f} F3000\nG1 {}{:.3f} F3000\n",
       axis, kTestHeight_mm, *x_mm, *y_mm, word, from_mm + kStroke_mm);
   for (const double speed_mm_s : kSpeeds_mm_s) {
-    const auto [before, after] = around(settings.printer.firmware, axis, speed_mm_s);
+    const auto commands = around(settings.printer.firmware, axis, speed_mm_s);
+    if (!commands) {
+      return fail(
+          ErrorKind::usage,
+          "Marlin has no command that records an accelerometer, so there is no test to make");
+    }
     text += fmt::format(
         "G1 {0}{1:.3f} F3000\nM400\nG4 P{2:.0f}\n{3}G1 {0}{4:.3f} F{5:.0f}\nM400\nG4 P{2:.0f}\n{6}",
-        word, from_mm, kRest_ms, before, from_mm + kStroke_mm, 60.0 * speed_mm_s, after);
+        word, from_mm, kRest_ms, commands->first, from_mm + kStroke_mm, 60.0 * speed_mm_s,
+        commands->second);
   }
   return text;
 }

@@ -407,7 +407,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.run_limits = run_limits(options.printer_limits, settings);
   options.line_accel_mm_s2 = settings.emit_accel_mm_s2();
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
-  // Costs of lines leave the lead of modes behind each other out, which is small.
+  // The costs of lines leave out the lead of modes behind each other.
   options.lines.nozzle_x = nozzle_x(settings);
   options.lines.nozzle_y = nozzle_y(settings);
   const auto reach = [](const std::optional<machine::Range>& travel) {

@@ -1,8 +1,7 @@
 // The second stage: a base that makes up for the axes is shaped once more, against a mode that was
 // found behind them (Cisalpino, UFLA, 2023, § 4.3.1).
 //
-//   b'(t) = Σ A_i b(t − t_i)       A_i, t_i   pulses of an input shaper, with mean delay Σ A_i t_i
-//   0
+//   b'(t) = Σ A_i b(t − t_i)       A_i, t_i   pulses of an input shaper; Σ A_i t_i = 0
 //
 // As a weighted mean of motions that keep the limits, b' keeps them, too.
 #pragma once
