@@ -38,9 +38,7 @@ void ScaledWindow::assign(const AxisWindow& from) {
   origin_mm = from.reference_mm.front();
   const double h = from.period_s;
   unit = {kLengthUnitMm, kLengthUnitMm / h, kLengthUnitMm / (h * h), kLengthUnitMm / (h * h * h)};
-  reference.resize(from.reference_mm.size());
-  std::ranges::transform(from.reference_mm, reference.begin(),
-                         [&](double mm) { return to_scaled_position(mm); });
+  set_aims();
   jerk_weight = from.jerk_weight;
   start.reset();
   if (from.start) {
@@ -50,6 +48,16 @@ void ScaledWindow::assign(const AxisWindow& from) {
   end_base.reset();
   if (from.end_base_mm) {
     end_base = to_scaled_position(*from.end_base_mm);
+  }
+}
+
+void ScaledWindow::set_aims() {
+  aims.resize(std::max<std::size_t>(window->aims_mm.size(), 1));
+  for (std::size_t i = 0; i < aims.size(); ++i) {
+    const std::vector<double>& aim_mm = window->aim_mm(i);
+    aims[i].resize(aim_mm.size());
+    std::ranges::transform(aim_mm, aims[i].begin(),
+                           [&](double mm) { return to_scaled_position(mm); });
   }
 }
 

@@ -65,13 +65,18 @@ struct ScaledWindow {
   const AxisWindow* window = nullptr;
   std::size_t nodes = 0;
   double origin_mm = 0.0;
-  PerKind<double> unit{};                // mm, mm/s, … per scaled unit
-  std::vector<double> reference;         // at nodes and middles
-  double jerk_weight = 0.0;              // ρ
-  std::optional<Eigen::Vector4d> start;  // p, ṗ, b, ḃ at the first node
-  std::optional<double> end_base;        // b at the last node, where ḃ = 0
+  PerKind<double> unit{};                 // mm, mm/s, … per scaled unit
+  std::vector<std::vector<double>> aims;  // of each model, at nodes and middles; one if all are r
+  double jerk_weight = 0.0;               // ρ
+  std::optional<Eigen::Vector4d> start;   // p, ṗ, b, ḃ at the first node
+  std::optional<double> end_base;         // b at the last node, where ḃ = 0
 
   void assign(const AxisWindow& window);
+  // Takes the window's aims anew.
+  void set_aims();
+  [[nodiscard]] const std::vector<double>& aim(std::size_t model) const {
+    return aims[aims.size() == 1 ? 0 : model];
+  }
   [[nodiscard]] double to_scaled_position(double mm) const;
   // Sets the base at its ends to exactly what the window gives, so that rounding has no effect
   // there.

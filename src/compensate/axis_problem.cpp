@@ -96,7 +96,8 @@ double AxisProblem::error(const Model& model, std::size_t sampled, const PointVe
   for (std::size_t i = model.first_mode + 1; i < model.end_mode; ++i) {
     nozzle += z(place(kNozzle, i));
   }
-  return nozzle - to_scaled(kNozzle, window_->reference_mm[sampled]);
+  const auto index = static_cast<std::size_t>(&model - models_.data());
+  return nozzle - to_scaled(kNozzle, window_->aim_mm(index)[sampled]);
 }
 
 double AxisProblem::cost(double t, const PointVector& z) const {

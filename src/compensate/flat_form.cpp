@@ -124,19 +124,27 @@ void FlatForm::assign(const ScaledWindow& scaled) {
   for (std::size_t k = 0; k < nodes_; ++k) {
     const bool at_end = k == 0 || k + 1 == nodes_;
     node_weight_[k] = window.weight[2 * k] * (at_end ? 1.0 / 6.0 : 1.0 / 3.0);
-    node_reference_[k] = scaled.reference[2 * k];
   }
   for (std::size_t k = 0; k + 1 < nodes_; ++k) {
     middle_weight_[k] = window.weight[2 * k + 1] * (2.0 / 3.0);
-    middle_reference_[k] = scaled.reference[2 * k + 1];
   }
+  set_aims();
   add_up_cost();
 
   for (std::size_t i = 0; i < unknowns; ++i) {
     const std::size_t k = std::clamp(i, kMiddle, nodes_ + 1) - kMiddle;
-    c_[i] = scaled.reference[2 * k];
+    c_[i] = scaled.aim(0)[2 * k];
   }
   find_ends();
+}
+
+void FlatForm::set_aims() {
+  for (std::size_t k = 0; k < nodes_; ++k) {
+    node_reference_[k] = window_->aim(0)[2 * k];
+  }
+  for (std::size_t k = 0; k + 1 < nodes_; ++k) {
+    middle_reference_[k] = window_->aim(0)[2 * k + 1];
+  }
 }
 
 // Finds what keeps the fixed ends, and sets the first guess there.
@@ -367,6 +375,16 @@ void FlatForm::write(dynamics::AxisTrajectory& base) {
   put(RowKind::velocity, 0.0, base.velocity_mm_s);
   put(RowKind::accel, 0.0, base.accel_mm_s2);
   window_->keep_ends(base);
+}
+
+void FlatForm::write_nozzles(std::vector<std::vector<double>>& nozzles_mm) {
+  nozzles_mm.assign(1, std::vector<double>(2 * nodes_ - 1));
+  loops::apply<kHalfBand>(nozzle_, c_.data(), node_pull_.data(), nodes_);
+  loops::apply<kHalfBand + 1>(middle_, c_.data(), middle_pull_.data(), nodes_ - 1);
+  for (std::size_t i = 0; i < 2 * nodes_ - 1; ++i) {
+    const double p = i % 2 == 0 ? node_pull_[i / 2] : middle_pull_[i / 2];
+    nozzles_mm[0][i] = window_->origin_mm + window_->unit[0] * p;
+  }
 }
 
 }  // namespace unflex::compensate

@@ -50,6 +50,8 @@ class FlatForm {
 
   // Takes the window, which must outlive the form, and goes to a first guess that keeps its ends.
   void assign(const ScaledWindow& window);
+  // Takes the window's aims anew; the matrix stays.
+  void set_aims();
 
   // Computes half the cost and half its gradient at the present c, and the values of the rows of
   // these kinds.
@@ -77,6 +79,7 @@ class FlatForm {
   void restore() { c_ = saved_; }
 
   void write(dynamics::AxisTrajectory& base);
+  void write_nozzles(std::vector<std::vector<double>>& nozzles_mm);
 
  private:
   [[nodiscard]] std::size_t row_count(RowKind kind) const {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "contour.hpp"
 #include "shared_motors.hpp"
 
 namespace unflex::compensate {
@@ -97,6 +98,57 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
   window.reference_mm = std::move(reference);
   window.weight = std::move(weight);
   return window;
+}
+
+// Whether the path bends by more than 20° between the directions.
+bool is_sharp(const gcode::Position& before, const gcode::Position& after) {
+  constexpr double kCosine = 0.9397;
+  const double lengths =
+      std::hypot(before[gcode::X], before[gcode::Y]) * std::hypot(after[gcode::X], after[gcode::Y]);
+  return before[gcode::X] * after[gcode::X] + before[gcode::Y] * after[gcode::Y] <
+         kCosine * lengths;
+}
+
+// The vertices of a course's path, in half node periods from its first node on.
+// origin_s: when the course's own moves begin.
+std::vector<PathVertex> path_of(const Course& course, double origin_s, double period_s) {
+  std::vector<PathVertex> path;
+  double time_s = origin_s - planner::duration_s(course.before);
+  const gcode::Position* direction = nullptr;  // of the last move in X and Y
+  const auto add = [&](const gcode::Position& place, bool sharp) {
+    path.push_back({place[gcode::X], place[gcode::Y], 2.0 * time_s / period_s, sharp});
+  };
+  for (const Course::Moves& moves : {course.before, course.moves, course.after}) {
+    for (const planner::PlannedMove& move : moves) {
+      if (path.empty()) {
+        add(move.position_mm(0.0), true);
+      }
+      time_s += move.duration_s();
+      const bool is_flat = move.direction[gcode::X] != 0.0 || move.direction[gcode::Y] != 0.0;
+      if (is_flat && direction != nullptr && is_sharp(*direction, move.direction)) {
+        path.back().is_sharp = true;
+      }
+      direction = is_flat ? &move.direction : direction;
+      add(move.position_mm(move.duration_s()), false);
+    }
+  }
+  path.back().is_sharp = true;
+  return path;
+}
+
+// The part of the path that a window of so many samples needs, from this sample on.
+std::vector<PathVertex> part_of(const std::vector<PathVertex>& path, std::size_t first,
+                                std::size_t samples, double reach) {
+  const double from = static_cast<double>(first) - reach;
+  const double to = static_cast<double>(first + samples) + reach;
+  const auto begin = std::ranges::lower_bound(path, from, {}, &PathVertex::sample);
+  const auto end = std::ranges::upper_bound(path, to, {}, &PathVertex::sample);
+  std::vector<PathVertex> part(begin == path.begin() ? begin : begin - 1,
+                               end == path.end() ? end : end + 1);
+  for (PathVertex& vertex : part) {
+    vertex.sample -= static_cast<double>(first);
+  }
+  return part;
 }
 
 }  // namespace
@@ -266,6 +318,12 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
     y.push_back(sample.y_mm);
     weight.push_back(sample.weight);
   }
+  std::vector<PathVertex> path;
+  if (setup.contour) {
+    path = path_of(course,
+                   from_rest ? setup.lead_in_s : static_cast<double>(grid.first) * grid.period_s,
+                   grid.period_s);
+  }
   std::vector<RunWindow> result;
   for (std::size_t w = first; w < first + count; ++w) {
     const WindowSpan& span = spans[w];
@@ -276,7 +334,13 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
     };
     RunWindow window{make_axis(setup.x, setup, grid.period_s, slice(x), slice(weight)),
                      make_axis(setup.y, setup, grid.period_s, slice(y), slice(weight)),
-                     setup.shares_motors};
+                     setup.shares_motors,
+                     setup.contour,
+                     {}};
+    if (setup.contour) {
+      window.path = part_of(path, 2 * span.first, window.x.reference_mm.size(),
+                            2.0 * setup.contour->reach_s / grid.period_s);
+    }
     if (from_rest && span.first == 0) {
       window.x.start = AxisWindow::Start{nozzle.x, window.x.reference_mm.front()};
       window.y.start = AxisWindow::Start{nozzle.y, window.y.reference_mm.front()};
@@ -306,6 +370,9 @@ AxisSolution along(const AxisWindow& window) {
 AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window) {
   if (span.cruise) {
     return {along(window.x), along(window.y)};
+  }
+  if (window.contour) {
+    aim(window);
   }
   return window.shares_motors ? solve_with_shared_motors(engine, window)
                               : AxisSolutions{engine.solve(window.x), engine.solve(window.y)};

@@ -225,7 +225,8 @@ void StageForm::evaluate(const PerKind<bool>& kinds) {
     for (std::size_t c = 0; c < count; ++c) {
       const Model& model = models_[c];
       const double p = z[base()] + swing(model, z);
-      const double error = p - window_->reference[2 * k];
+      const std::vector<double>& aim = window_->aim(c);
+      const double error = p - aim[2 * k];
       const double pull = node_weight_[k] * model.share * error;
       node_pull_[k * count + c] = pull;
       half_cost_ += 0.5 * pull * error;
@@ -234,7 +235,7 @@ void StageForm::evaluate(const PerKind<bool>& kinds) {
         const double p_next = next[base()] + swing(model, next);
         const double rate_next = next[base() + 1] + swing(model, next, 1);
         const double middle_error =
-            0.5 * (p + p_next) + 0.125 * (rate - rate_next) - window_->reference[2 * k + 1];
+            0.5 * (p + p_next) + 0.125 * (rate - rate_next) - aim[2 * k + 1];
         const double middle_pull = middle_weight_[k] * model.share * middle_error;
         middle_pull_[k * count + c] = middle_pull;
         half_cost_ += 0.5 * middle_pull * middle_error;
@@ -451,6 +452,29 @@ void StageForm::save() {
 void StageForm::restore() {
   states_ = saved_states_;
   inputs_ = saved_inputs_;
+}
+
+void StageForm::write_nozzles(std::vector<std::vector<double>>& nozzles_mm) const {
+  nozzles_mm.assign(models_.size(), std::vector<double>(2 * nodes_ - 1));
+  for (std::size_t c = 0; c < models_.size(); ++c) {
+    const Model& model = models_[c];
+    double p = 0.0;
+    double rate = 0.0;
+    for (std::size_t k = 0; k < nodes_; ++k) {
+      const double* const z = state(states_, k);
+      const double p_next = z[base()] + swing(model, z);
+      const double rate_next = z[base() + 1] + swing(model, z, 1);
+      const auto in_mm = [&](double position) {
+        return window_->origin_mm + window_->unit[0] * position;
+      };
+      if (k > 0) {
+        nozzles_mm[c][2 * k - 1] = in_mm(0.5 * (p + p_next) + 0.125 * (rate - rate_next));
+      }
+      nozzles_mm[c][2 * k] = in_mm(p_next);
+      p = p_next;
+      rate = rate_next;
+    }
+  }
 }
 
 void StageForm::write(dynamics::AxisTrajectory& base) const {

@@ -52,6 +52,8 @@ struct ModeStep {
 class StageForm {
  public:
   void assign(const ScaledWindow& window);
+  // The window's aims are read where they are.
+  void set_aims() {}
 
   void evaluate(const PerKind<bool>& kinds);
   [[nodiscard]] double half_cost() const { return half_cost_; }
@@ -69,6 +71,8 @@ class StageForm {
   void restore();
 
   void write(dynamics::AxisTrajectory& base) const;
+  // p of each model at nodes and middles.
+  void write_nozzles(std::vector<std::vector<double>>& nozzles_mm) const;
 
  private:
   using Vector = Eigen::VectorXd;

@@ -426,10 +426,16 @@ constexpr std::array kKeys = {
         [](const Settings& settings) { return settings.tail_s() * 1e3; }},
     Key{"solve.travel_weight", &setting<&S::solve, &O::travel_weight>,
         Bounds{.min = 0.0, .max = 1.0, .min_open = true}, "",
-        "Weight of the tracking error where nothing is extruded, 1 where something is"},
+        "Weight of the nozzle's error where nothing is extruded, 1 where something is"},
+    Key{"solve.along_weight", &setting<&S::solve, &O::along_weight>,
+        Bounds{.min = 1e-4, .max = 1.0}, "",
+        "Weight of the nozzle's error along the path, if that across it has 1. 1: the nozzle is to "
+        "be in its place at the time",
+        "0.01 where the base suits several models, otherwise 1", &derived<&S::along_weight>},
     Key{"solve.jerk_weight", &setting<&S::solve, &O::jerk_weight>,
         Bounds{.min = 0.0, .max = 1e6, .min_open = true}, "",
-        "Weight of the base's jerk against the tracking error"},
+        "Weight of the base's jerk against the nozzle's error",
+        "15 where solve.along_weight is below 1, otherwise 1.5", &derived<&S::jerk_weight>},
 
     Key{"emit.period_ms", &setting<&S::emit, &T::period_ms>, Bounds{.min = 0.05, .max = 50.0}, "ms",
         "Node period: time between two points of the base's motion",

@@ -248,6 +248,22 @@ double Settings::tail_s() const {
   return std::max({kShortest, settling_time_s(dynamics_x), settling_time_s(dynamics_y)});
 }
 
+bool Settings::has_several_models() const {
+  return !dynamics_x.plants.empty() || !dynamics_y.plants.empty() || dynamics_error.freq > 0.0 ||
+         dynamics_error.damping > 0.0;
+}
+
+double Settings::along_weight() const {
+  constexpr double kRobust = 0.01;
+  return solve.along_weight.value_or(has_several_models() ? kRobust : 1.0);
+}
+
+double Settings::jerk_weight() const {
+  constexpr double kOfTracking = 1.5;
+  constexpr double kOfContour = 15.0;
+  return solve.jerk_weight.value_or(along_weight() < 1.0 ? kOfContour : kOfTracking);
+}
+
 double Settings::emit_accel_mm_s2(double asked_mm_s2) const {
   // RepRapFirmware leaves out short ramps. The lower its acceleration, the fewer it leaves out.
   return emit.accel_mm_s2.value_or(printer.firmware == Firmware::rrf

@@ -59,6 +59,7 @@ std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
   compensate::Setup setup = job.setup;
   setup.x.plants.clear();
   setup.y.plants.clear();
+  setup.contour.reset();
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
   auto windows = compensate::windows(job.course(), job.spans, job.first_stage, setup);
   std::vector<dynamics::AxisTrajectory> x;
@@ -103,6 +104,9 @@ void set_probe(const compensate::Engine& engine, compensate::AxisWindow window,
   }
   for (std::vector<double>* values : {&window.reference_mm, &window.weight}) {
     values->resize(2 * most - 1);
+  }
+  for (std::vector<double>& aim_mm : window.aims_mm) {
+    aim_mm.resize(2 * most - 1);
   }
   for (std::vector<double>* values : {&window.max_velocity_at_mm_s, &window.max_accel_at_mm_s2}) {
     values->resize(std::min(values->size(), most));

@@ -84,7 +84,7 @@ double planned_base_accel(const machine::Settings& settings, double asked_mm_s2)
 // The longest pause for a swing to die away.
 constexpr double kLongestCalm_s = 0.5;
 // The weight of the middle of the band of an axis; its edges have the rest.
-constexpr double kMiddleShare = 0.25;
+constexpr double kMiddleShare = 1.0 / 3.0;
 
 // The edges of the band that the axis may be in; empty if there is no such band.
 std::vector<compensate::Plant> edges(const machine::AxisDynamics& dynamics,
@@ -364,7 +364,14 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
   setup.overlap_s = std::clamp(std::max(setup.x.axis.unseen_s(), setup.y.axis.unseen_s()),
                                settings.solve.overlap_s, settings.solve.window_s);
   setup.travel_weight = settings.solve.travel_weight;
-  setup.jerk_weight = settings.solve.jerk_weight;
+  setup.jerk_weight = settings.jerk_weight();
+  if (settings.along_weight() < 1.0) {
+    // A motion that is free along the path takes longer to settle than one that is not.
+    constexpr double kLeastOverlap_s = 0.2;
+    setup.overlap_s = std::min(std::max(setup.overlap_s, kLeastOverlap_s), setup.window_s);
+    setup.contour = compensate::Contour{.along_weight = settings.along_weight(),
+                                        .pairs = compensate::pairs_of(setup.x, setup.y)};
+  }
   return setup;
 }
 

@@ -92,6 +92,10 @@ std::string pack(const compensate::AxisWindow& window) {
   writer.value(window.period_s);
   writer.values(window.reference_mm);
   writer.values(window.weight);
+  writer.value(window.aims_mm.size());
+  for (const std::vector<double>& aim_mm : window.aims_mm) {
+    writer.values(aim_mm);
+  }
   writer.value(window.jerk_weight);
   writer.value(window.limits);
   writer.values(window.max_velocity_at_mm_s);
@@ -112,6 +116,10 @@ compensate::AxisWindow unpack_window(std::string_view bytes) {
   window.period_s = reader.value<double>();
   window.reference_mm = reader.values();
   window.weight = reader.values();
+  window.aims_mm.resize(reader.value<std::size_t>());
+  for (std::vector<double>& aim_mm : window.aims_mm) {
+    aim_mm = reader.values();
+  }
   window.jerk_weight = reader.value<double>();
   window.limits = reader.value<compensate::BaseLimits>();
   window.max_velocity_at_mm_s = reader.values();

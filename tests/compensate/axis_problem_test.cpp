@@ -36,6 +36,17 @@ AxisWindow random_window(std::mt19937_64& random, std::size_t nodes) {
   return window;
 }
 
+// Every other window has an aim of its own for each model.
+void give_aims(std::mt19937_64& random, AxisWindow& window, int trial) {
+  std::uniform_real_distribution<double> uniform(-0.1, 0.1);
+  for (std::size_t i = 0; trial % 2 == 1 && i < window.models(); ++i) {
+    window.aims_mm.push_back(window.reference_mm);
+    for (double& aim_mm : window.aims_mm.back()) {
+      aim_mm += uniform(random);
+    }
+  }
+}
+
 std::vector<double> node_times(std::size_t nodes) {
   std::vector<double> times(nodes);
   for (std::size_t k = 0; k < nodes; ++k) {
@@ -49,6 +60,7 @@ TEST(AxisProblem, HasExactDerivatives) {
   for (int trial = 0; trial < 20; ++trial) {
     AxisWindow window = random_window(random, 2 + static_cast<std::size_t>(trial) % 6);
     window.plants.assign(trial % 3 == 0 ? 0 : (trial % 3 == 1 ? 2 : 4), {{200.0, 0.1}, 0.2});
+    give_aims(random, window, trial);
     for (const ActiveLimits active : {ActiveLimits{}, kAllActive}) {
       const AxisProblem problem(window, active);
       const auto program = collocation::transcribe(problem, node_times(window.nodes()));

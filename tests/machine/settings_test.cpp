@@ -299,7 +299,7 @@ TEST(ToToml, ReadsBackAsTheSameSettings) {
   }
   EXPECT_THAT(text, HasSubstr("\nmax_accel_mm_s2 = 3333.3  # --set\n"));
   EXPECT_DOUBLE_EQ(second.limits.max_accel_mm_s2, 3333.3);
-  EXPECT_DOUBLE_EQ(second.solve.jerk_weight, 1e-9);
+  EXPECT_EQ(second.solve.jerk_weight, 1e-9);
   EXPECT_DOUBLE_EQ(second.printer.travel_y_mm->min, -1.25);
   EXPECT_FALSE(second.printer.travel_x_mm);
   EXPECT_FALSE(second.base.max_accel_mm_s2);

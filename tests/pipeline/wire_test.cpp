@@ -34,6 +34,7 @@ void expect_same(const compensate::AxisWindow& a, const compensate::AxisWindow& 
   EXPECT_EQ(a.period_s, b.period_s);
   EXPECT_EQ(a.reference_mm, b.reference_mm);
   EXPECT_EQ(a.weight, b.weight);
+  EXPECT_EQ(a.aims_mm, b.aims_mm);
   EXPECT_EQ(a.jerk_weight, b.jerk_weight);
   EXPECT_EQ(a.limits.max_velocity_mm_s, b.limits.max_velocity_mm_s);
   EXPECT_EQ(a.limits.max_accel_mm_s2, b.limits.max_accel_mm_s2);
@@ -55,6 +56,7 @@ TEST(Wire, BringsAWindowAcrossUnchanged) {
   window.start = compensate::AxisWindow::Start{{2.5, -31.0}, 2.25};
   window.end_base_mm = -0.125;
   window.plants = {{{100.5, 0.03}, 0.25}, {{140.0, 0.3}, 0.125}};
+  window.aims_mm = {{1.0, 2.0, 3.0, 4.0, 5.0}, {0.1, 0.2, 0.3, 0.4, 0.5}, {}};
   expect_same(window, unpack_window(pack(window)));
 }
 

@@ -1,13 +1,14 @@
 // The optimal-control problem of one axis over one window, as plain data, and the interface behind
 // which its solvers stand.
 //
-//   min Σ_i α_i ∫ w(t) (p_i − r)² dt + ρ ∫ (d b̈/dt)² dt
+//   min Σ_i α_i ∫ w(t) (p_i − a_i)² dt + ρ ∫ (d b̈/dt)² dt
 //   s.t.  p_i hangs on b as dynamics/flexible_axis.hpp says,   b̈ piecewise linear,
 //         |ḃ| ≤ V,  |b̈| ≤ A,  |d b̈/dt| ≤ J,  b_min ≤ b ≤ b_max
 //
 //   r  reference, mm       p  nozzle, mm       b  base, mm       w  weight       h  node period, s
 //   i  models of the axis: one if it is known, several on the same base if it is not; their shares
 //      α_i add up to 1
+//   a  where the nozzle of model i shall be, mm: r, or another place near it for each
 //
 // Nozzle and base are both unknown: with the nozzle fixed to the plan the problem is
 // overdetermined (docs/theory.md).
@@ -49,6 +50,8 @@ struct AxisWindow {
   // r and w at the nodes and in the middles between them: 2n − 1 values for n nodes, n ≥ 2.
   std::vector<double> reference_mm;
   std::vector<double> weight;
+  // a of each model, at the places of r. Empty: r for all.
+  std::vector<std::vector<double>> aims_mm;
   // ρ/h⁶: without dimension, so that one value serves all periods.
   double jerk_weight = 1e-2;
   BaseLimits limits;
@@ -77,6 +80,9 @@ struct AxisWindow {
   // Model i: `axis` is model 0, plants[i − 1] is model i.
   [[nodiscard]] std::size_t models() const { return plants.size() + 1; }
   [[nodiscard]] Plant model(std::size_t i) const;
+  [[nodiscard]] const std::vector<double>& aim_mm(std::size_t i) const {
+    return aims_mm.empty() ? reference_mm : aims_mm[i];
+  }
   // `nozzle` is a state of `axis` while the base is at base_mm. Returns the state of model i that
   // swings as it does.
   [[nodiscard]] dynamics::NozzleState in_model(std::size_t i, const dynamics::NozzleState& nozzle,

@@ -179,8 +179,12 @@ struct SolveSettings {
   double overlap_s = 0.06;        // pre-roll and post-roll of such a window
   double lead_in_ms = 0.0;        // the base may start this much before the plan does
   std::optional<double> tail_ms;  // the base may settle this much longer; unset: max(8ζ/ω, 2 ms)
-  double travel_weight = 0.1;     // weight of the tracking error where nothing is extruded
-  double jerk_weight = 1.5;       // regularisation (docs/theory.md)
+  double travel_weight = 0.1;     // weight of the error where nothing is extruded
+  // Weight of the error along the path, if that across it has 1. Unset: 0.01 where the base is to
+  // suit several models of an axis, otherwise 1.
+  std::optional<double> along_weight;
+  // Regularisation (docs/theory.md). Unset: 1.5, or 15 where along_weight is below 1.
+  std::optional<double> jerk_weight;
 };
 
 struct EmitSettings {
@@ -270,6 +274,10 @@ struct Settings {
   // base_max_accel_mm_s2() over what the plan asks; 0: it does not follow the plan.
   [[nodiscard]] double base_accel_times_asked() const;
   [[nodiscard]] double tail_s() const;
+  // Whether the base is to suit more models than the axes as given.
+  [[nodiscard]] bool has_several_models() const;
+  [[nodiscard]] double along_weight() const;
+  [[nodiscard]] double jerk_weight() const;
   [[nodiscard]] double period_ms() const;
   [[nodiscard]] double tolerance_um() const;
   [[nodiscard]] double emit_accel_mm_s2(double asked_mm_s2) const;

@@ -1,0 +1,216 @@
+#include "contour.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "free_solver.hpp"
+
+namespace unflex::compensate {
+namespace {
+
+constexpr int kRounds = 12;
+constexpr double kOverRelaxation = 1.7;
+constexpr double kCornerReach_s = 1e-3;
+
+struct Place {
+  double x_mm = 0.0;
+  double y_mm = 0.0;
+};
+
+// The place nearest to p on the edges from vertex `first` to vertex `last`.
+Place nearest(const std::vector<PathVertex>& path, std::size_t first, std::size_t last,
+              const Place& p) {
+  Place found{path[first].x_mm, path[first].y_mm};
+  double least = std::hypot(found.x_mm - p.x_mm, found.y_mm - p.y_mm);
+  least *= least;
+  for (std::size_t i = first; i < last; ++i) {
+    const double dx = path[i + 1].x_mm - path[i].x_mm;
+    const double dy = path[i + 1].y_mm - path[i].y_mm;
+    const double square = dx * dx + dy * dy;
+    if (square == 0.0) {
+      continue;
+    }
+    const double s = std::clamp(
+        ((p.x_mm - path[i].x_mm) * dx + (p.y_mm - path[i].y_mm) * dy) / square, 0.0, 1.0);
+    const Place place{path[i].x_mm + s * dx, path[i].y_mm + s * dy};
+    const double away = (place.x_mm - p.x_mm) * (place.x_mm - p.x_mm) +
+                        (place.y_mm - p.y_mm) * (place.y_mm - p.y_mm);
+    if (away < least) {
+      least = away;
+      found = place;
+    }
+  }
+  return found;
+}
+
+class Aiming {
+ public:
+  explicit Aiming(RunWindow& window)
+      : window_(window), contour_(*window.contour), samples_(window.x.reference_mm.size()) {
+    set_along_weights();
+    for (std::size_t i = 0; i < samples_; ++i) {
+      const double factor = 1.0 + along_[i];
+      window_.x.weight[i] *= factor;
+      window_.y.weight[i] *= factor;
+    }
+    const Place none;
+    nearest_.assign(contour_.pairs.size(), std::vector<Place>(samples_, none));
+    for (std::vector<Place>& places : nearest_) {
+      for (std::size_t i = 0; i < samples_; ++i) {
+        places[i] = {window_.x.reference_mm[i], window_.y.reference_mm[i]};
+      }
+    }
+    set_aims();
+  }
+
+  void set_aims() {
+    aims_of(
+        window_.x, [](const ModelPair& pair) { return pair.x; },
+        [](const Place& place) { return place.x_mm; });
+    aims_of(
+        window_.y, [](const ModelPair& pair) { return pair.y; },
+        [](const Place& place) { return place.y_mm; });
+  }
+
+  // Takes q farther towards the places nearest to the nozzles.
+  void follow(const std::vector<std::vector<double>>& x_mm,
+              const std::vector<std::vector<double>>& y_mm) {
+    const double reach = 2.0 * contour_.reach_s / window_.x.period_s;
+    const std::vector<PathVertex>& path = window_.path;
+    std::size_t first = 0;
+    std::size_t last = 0;
+    for (std::size_t i = 0; i < samples_; ++i) {
+      const auto now = static_cast<double>(i);
+      while (first + 1 < path.size() && path[first + 1].sample < now - reach) {
+        ++first;
+      }
+      while (last + 1 < path.size() && path[last].sample < now + reach) {
+        ++last;
+      }
+      for (std::size_t c = 0; c < contour_.pairs.size(); ++c) {
+        const ModelPair& pair = contour_.pairs[c];
+        const Place found = nearest(path, first, last, {x_mm[pair.x][i], y_mm[pair.y][i]});
+        Place& q = nearest_[c][i];
+        q.x_mm += kOverRelaxation * (found.x_mm - q.x_mm);
+        q.y_mm += kOverRelaxation * (found.y_mm - q.y_mm);
+      }
+    }
+  }
+
+ private:
+  // ε + λ of each sample.
+  void set_along_weights() {
+    along_.assign(samples_, contour_.along_weight);
+    const double reach = 2.0 * kCornerReach_s / window_.x.period_s;
+    for (const PathVertex& vertex : window_.path) {
+      if (vertex.is_sharp) {
+        const double from = std::max(std::ceil(vertex.sample - reach), 0.0);
+        for (auto i = static_cast<std::size_t>(from);
+             i < samples_ && static_cast<double>(i) <= vertex.sample + reach; ++i) {
+          along_[i] = contour_.along_weight + contour_.corner_weight;
+        }
+      }
+    }
+  }
+
+  template <class Model, class Coordinate>
+  void aims_of(AxisWindow& axis, const Model& model_of, const Coordinate& coordinate) const {
+    axis.aims_mm.resize(axis.models());
+    for (std::size_t m = 0; m < axis.models(); ++m) {
+      std::vector<double>& aim = axis.aims_mm[m];
+      aim.assign(samples_, 0.0);
+      double share = 0.0;
+      for (std::size_t c = 0; c < contour_.pairs.size(); ++c) {
+        if (model_of(contour_.pairs[c]) == m) {
+          share += contour_.pairs[c].share;
+          for (std::size_t i = 0; i < samples_; ++i) {
+            aim[i] += contour_.pairs[c].share * coordinate(nearest_[c][i]);
+          }
+        }
+      }
+      for (std::size_t i = 0; i < samples_; ++i) {
+        aim[i] = (aim[i] / share + along_[i] * axis.reference_mm[i]) / (1.0 + along_[i]);
+      }
+    }
+  }
+
+  RunWindow& window_;
+  const Contour& contour_;
+  std::size_t samples_;
+  std::vector<double> along_;
+  std::vector<std::vector<Place>> nearest_;  // q of each pair
+};
+
+// Models by rising frequency.
+struct ModelShare {
+  std::size_t model = 0;
+  double freq_rad_s = 0.0;
+  double share = 0.0;
+};
+
+std::vector<ModelShare> by_frequency(const AxisSetup& setup) {
+  std::vector<ModelShare> models = {{0, setup.axis.main_rad_s(), 1.0}};
+  for (std::size_t i = 0; i < setup.plants.size(); ++i) {
+    const Plant& plant = setup.plants[i];
+    models.push_back({i + 1, plant.axis.main_rad_s(), plant.share});
+    models.front().share -= plant.share;
+  }
+  std::ranges::stable_sort(models, {}, &ModelShare::freq_rad_s);
+  return models;
+}
+
+// Adds the pairs that give each model its share and that go through both lists in their order.
+void add_in_order(std::vector<ModelShare> x, std::vector<ModelShare> y, double weight,
+                  std::vector<ModelPair>& pairs) {
+  constexpr double kNothing = 1e-9;
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < x.size() && j < y.size()) {
+    const double share = std::min(x[i].share, y[j].share);
+    if (share > kNothing) {
+      const auto known = std::ranges::find_if(pairs, [&](const ModelPair& pair) {
+        return pair.x == x[i].model && pair.y == y[j].model;
+      });
+      if (known == pairs.end()) {
+        pairs.push_back({x[i].model, y[j].model, weight * share});
+      } else {
+        known->share += weight * share;
+      }
+    }
+    x[i].share -= share;
+    y[j].share -= share;
+    i += x[i].share <= kNothing ? 1 : 0;
+    j += y[j].share <= kNothing ? 1 : 0;
+  }
+}
+
+}  // namespace
+
+std::vector<ModelPair> pairs_of(const AxisSetup& x, const AxisSetup& y) {
+  constexpr double kOppositeWays = 0.3;
+  std::vector<ModelPair> pairs;
+  std::vector<ModelShare> of_y = by_frequency(y);
+  add_in_order(by_frequency(x), of_y, 1.0 - kOppositeWays, pairs);
+  std::ranges::reverse(of_y);
+  add_in_order(by_frequency(x), of_y, kOppositeWays, pairs);
+  return pairs;
+}
+
+void aim(RunWindow& window) {
+  Aiming aiming(window);
+  FreeSolver x(window.x);
+  FreeSolver y(window.y);
+  if (!x.is_ready() || !y.is_ready()) {
+    return;
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    x.solve();
+    y.solve();
+    aiming.follow(x.nozzles_mm(), y.nozzles_mm());
+    aiming.set_aims();
+  }
+}
+
+}  // namespace unflex::compensate
