@@ -79,8 +79,15 @@ void Meter::begin_section(ReferencePath& path, double unplayed_s, double unplaye
     path_ = &path;
     near_.begin(path);
     current_ = path.first();
+    corner_piece_ = path.end();
+    while (corner_piece_ > path.first() && path[corner_piece_ - 1].section == path.section()) {
+      --corner_piece_;
+    }
   }
-  time_s_ = path.section_start_s() - unplayed_s;
+  corner_section_ = path.section();
+  const double begin_s = path.section_start_s() - unplayed_s;
+  corner_shift_s_ += time_s_ - begin_s;
+  time_s_ = begin_s;
   laid_mm_ = path.filament_mm() - unplayed_mm;
   section_error_ = {};
 }
@@ -118,6 +125,9 @@ void Meter::follow_lag(bool on) {
 }
 
 void Meter::shift_to(double x_mm, double y_mm) {
+  if (corners_ && (x_mm != base_x_mm_ || y_mm != base_y_mm_)) {
+    corners_->lift();
+  }
   nozzle_.x.add(model_.x.riding(x_mm - base_x_mm_));
   nozzle_.y.add(model_.y.riding(y_mm - base_y_mm_));
   base_x_mm_ = x_mm;
@@ -143,6 +153,9 @@ void Meter::play(const planner::PlannedMove& move) {
 void Meter::settle(const BasePhase& phase) {
   nozzle_.x = dynamics::exact_step(model_.x, nozzle_.x, phase.x, phase.duration_s);
   nozzle_.y = dynamics::exact_step(model_.y, nozzle_.y, phase.y, phase.duration_s);
+  if (corners_) {
+    corners_->lift();
+  }
   BasePhase end = phase;
   advance(end.x, phase.duration_s);
   advance(end.y, phase.duration_s);
@@ -172,6 +185,7 @@ void Meter::play(BasePhase phase) {
 // section has ended.
 double Meter::next_reference_change() {
   path_->extend_to(time_s_ + reach_s());
+  take_corners();
   current_ = std::max(current_, path_->first());
   while (current_ < path_->end() && (*path_)[current_].end_s <= time_s_ + kSameTime_s) {
     ++current_;
@@ -188,6 +202,18 @@ double Meter::next_reference_change() {
     change_s += phase.duration_s;
   }
   return piece.end_s;
+}
+
+// Pieces of a later section are on a clock that begin_section() will tell.
+void Meter::take_corners() {
+  if (!corners_) {
+    return;
+  }
+  corner_piece_ = std::max(corner_piece_, path_->first());
+  while (corner_piece_ < path_->end() && (*path_)[corner_piece_].section <= corner_section_) {
+    const PathPiece& piece = (*path_)[corner_piece_++];
+    corners_->follow(piece.move, piece.start_s + corner_shift_s_);
+  }
 }
 
 void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
@@ -227,6 +253,7 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
   ReferencePhase reference;
   if (measured) {
     path_->extend_to(start_s + steps * h + reach_s());
+    take_corners();
     reference = reference_phase(steps * h);
   }
   for (double number = 1.0; number <= steps; number += 1.0) {
@@ -234,6 +261,10 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
     advance(phase.x, h);
     advance(phase.y, h);
     advance(phase.e, h);
+    if (corners_) {
+      corners_->sample(start_s + number * h + corner_shift_s_, nozzle_.x.position(),
+                       nozzle_.y.position());
+    }
     Sample measurement;
     if (measured) {
       time_s_ = start_s + number * h;
@@ -374,12 +405,19 @@ void Meter::wait_for_reference() {
   }
   waiting_ = false;
   nozzle_ = nozzle;
+  corner_shift_s_ += time_s_ - time_s;
   time_s_ = time_s;
+  if (corners_) {
+    corners_->lift();
+  }
 }
 
 void Meter::hold(double duration_s) {
   nozzle_.x = dynamics::exact_step(model_.x, nozzle_.x, {base_x_mm_, 0.0, 0.0}, duration_s);
   nozzle_.y = dynamics::exact_step(model_.y, nozzle_.y, {base_y_mm_, 0.0, 0.0}, duration_s);
+  if (corners_) {
+    corners_->lift();
+  }
 }
 
 }  // namespace unflex::verify

@@ -3,10 +3,12 @@
 
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "filament_lag.hpp"
 #include "shaped_base.hpp"
+#include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/near_path.hpp"
 #include "unflex/verify/observer.hpp"
@@ -101,6 +103,10 @@ class Meter {
   void follow_filament() { follows_filament_ = true; }
   [[nodiscard]] LagStats filament_lag() const { return filament_lag_.stats(); }
 
+  // Also measures how far the nozzle passes from corners.
+  void follow_corners() { corners_.emplace(near_.reach_s()); }
+  [[nodiscard]] CornerStats corners() const { return corners_ ? corners_->stats() : CornerStats{}; }
+
   void follow_lag(bool on);
   [[nodiscard]] double worst_lag_s() const { return lag_.worst_s(); }
   [[nodiscard]] double lag_s() const { return lag_.present_s(); }
@@ -133,6 +139,7 @@ class Meter {
   template <typename OneStep>
   void integrate(BasePhase& phase, double steps, double h, bool measured, const OneStep& step);
   [[nodiscard]] double next_reference_change();
+  void take_corners();
   [[nodiscard]] ReferencePhase reference_phase(double duration_s) const;
   // What was measured of the nozzle.
   struct Sample {
@@ -162,6 +169,12 @@ class Meter {
   // Filament laid before the move or the shaped motion at hand, counted as in
   // ReferencePath::filament_mm().
   double laid_mm_ = 0.0;
+  std::optional<CornerGauge> corners_;
+  // What corners_ has of the path: the pieces before this one, in the sections up to this one.
+  std::size_t corner_piece_ = 0;
+  std::size_t corner_section_ = 0;
+  // What corners_ adds to the clock, which jumps where one path takes another's place.
+  double corner_shift_s_ = 0.0;
   LagEstimate lag_;
   bool follow_lag_ = false;
   bool waiting_ = false;

@@ -16,6 +16,7 @@ Nozzles::Nozzles(const NozzleModel& model, const Observation& observation, Nozzl
     detuned_.emplace_back(other, main_.reach_s());
   }
   main_.follow_filament();
+  main_.follow_corners();
   watch_as(base);
 }
 

@@ -24,6 +24,7 @@ double PathPiece::covered_xy_mm(double t) const {
 }
 
 void ReferencePath::begin_section(double lead_in_s) {
+  ++section_;
   section_start_s_ = end_s_;
   end_s_ += lead_in_s;
   section_complete_ = false;
@@ -48,6 +49,7 @@ void ReferencePath::hold(double x_mm, double y_mm, double duration_s) {
 void ReferencePath::append(planner::PlannedMove move, bool measured) {
   PathPiece piece;
   piece.measured = measured;
+  piece.section = section_;
   piece.start_s = end_s_;
   piece.end_s = end_s_ + move.duration_s();
   piece.x_mm = move.segment.start_mm[gcode::X];

@@ -424,6 +424,8 @@ VerifyReport Verifier::report() {
   }
   report.uncompensated_lag = original_.main().filament_lag();
   report.compensated_lag = emitted_.main().filament_lag();
+  report.uncompensated_corners = original_.main().corners();
+  report.compensated_corners = emitted_.main().corners();
   report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
   report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
   report.worst_run_drift_s = emitted_.main().worst_lag_s();

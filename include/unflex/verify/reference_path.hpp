@@ -29,6 +29,7 @@ struct PathPiece {
   bool measured = false;  // deviations count here
   bool extruding = false;
   double filament_mm = 0.0;  // filament that extruding pieces have laid before this one
+  std::size_t section = 0;   // number of its section
   planner::PlannedMove move;
 
   // Length of the XY path the move has covered at time t, in [0, length_xy_mm].
@@ -42,6 +43,8 @@ class ReferencePath {
   // Starts the next section where the last one ended; its first move begins lead_in_s later.
   void begin_section(double lead_in_s = 0.0);
   [[nodiscard]] double section_start_s() const { return section_start_s_; }
+  // Number of the current section.
+  [[nodiscard]] std::size_t section() const { return section_; }
 
   // Pulls moves until the path reaches beyond t or the section ends. References to pieces do not
   // survive this.
@@ -77,6 +80,7 @@ class ReferencePath {
   double end_s_ = 0.0;
   double filament_mm_ = 0.0;
   double section_start_s_ = 0.0;
+  std::size_t section_ = 0;
   bool section_complete_ = false;
 };
 

@@ -12,6 +12,7 @@
 #include "unflex/core/progress.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
+#include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/observer.hpp"
 
@@ -107,6 +108,9 @@ struct VerifyReport {
   double worst_move_extrusion_error_mm = 0.0;
   LagStats uncompensated_lag;
   LagStats compensated_lag;
+  // How far the nozzle passes from the corners of the sliced path.
+  CornerStats uncompensated_corners;
+  CornerStats compensated_corners;
   // Longest lag or lead of the nozzle against the plan of its run, averaged over 0.1 s.
   double worst_run_drift_s = 0.0;
   double max_lines_per_s = 0.0;    // most lines begun in any 100 ms of the output, × 10

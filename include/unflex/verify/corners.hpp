@@ -1,0 +1,96 @@
+// How far a nozzle passes from the corners of a path. A nozzle that rounds a corner may stay near
+// the path all the time, so the contour error does not show it.
+//
+// Notation:
+//   corner   place where an extruding move in X and Y ends and the next move in X and Y, which
+//            extrudes too, leaves in a direction more than 20° off; between them may be a stop
+//   τ        reach: how far from its time a corner counts as near, s
+//   corner distance   the smallest distance from the corner to p([t₁ − τ, t₂ + τ]), where the plan
+//            reaches the corner at t₁ and leaves it at t₂
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <limits>
+
+#include "unflex/planner/planner.hpp"
+#include "unflex/verify/log_histogram.hpp"
+
+namespace unflex::verify {
+
+// Every corner counts as much as any other.
+struct CornerStats {
+  std::size_t count = 0;
+  double rms_mm = 0.0;
+  double p99_mm = 0.0;  // from a histogram with cells less than 1 % apart
+  double max_mm = 0.0;
+  std::size_t max_line = 0;  // line of the sliced file that leads to the corner of max_mm
+};
+
+class CornerAccumulator {
+ public:
+  void add(double distance2_mm2, std::size_t line);
+  [[nodiscard]] CornerStats stats() const;
+
+ private:
+  LogHistogram corners_;  // corners per cell
+  double sum_distance2_ = 0.0;
+  double distance2_max_ = 0.0;
+  std::size_t count_ = 0;
+  std::size_t line_ = 0;
+};
+
+// Holds the corners that the nozzle has not left behind yet.
+class CornerGauge {
+ public:
+  explicit CornerGauge(double reach_s) : reach_s_(reach_s) {}
+
+  // The next move of the path begins at start_s. Moves come in their order, each before the nozzle
+  // is within reach of its end.
+  void follow(const planner::PlannedMove& move, double start_s);
+  // The nozzle is here at time_s. It has come straight from the last place, so samples must be
+  // close. Times must not decrease.
+  void sample(double time_s, double x_mm, double y_mm) {
+    // A verification comes here at every step, mostly with no corner within reach.
+    if (time_s < next_s_) {
+      drawn_ = false;
+    } else {
+      look(time_s, x_mm, y_mm);
+    }
+  }
+  // Nothing is known of the nozzle's way from its last place to the next one.
+  void lift() { drawn_ = false; }
+  // Corners that the nozzle has come within reach of.
+  [[nodiscard]] CornerStats stats() const;
+
+ private:
+  struct Corner {
+    double from_s = 0.0;
+    double until_s = 0.0;
+    double x_mm = 0.0;
+    double y_mm = 0.0;
+    double distance2_mm2 = 0.0;  // smallest so far
+    std::size_t line = 0;
+  };
+
+  void look(double time_s, double x_mm, double y_mm);
+  void let_go();
+  void find_next();
+
+  double reach_s_;
+  // By their times. If open_, the last one is the end of the last move, of which only the next one
+  // tells whether it is a corner.
+  std::deque<Corner> corners_;
+  // From when on the first of them counts; infinity if there is none.
+  double next_s_ = std::numeric_limits<double>::infinity();
+  bool open_ = false;
+  gcode::Position end_mm_{};  // where the last move in X and Y has ended, and its direction
+  double direction_x_ = 0.0;
+  double direction_y_ = 0.0;
+  bool drawn_ = false;  // the nozzle's last place is known
+  double last_x_mm_ = 0.0;
+  double last_y_mm_ = 0.0;
+  CornerAccumulator left_behind_;
+};
+
+}  // namespace unflex::verify

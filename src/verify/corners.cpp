@@ -1,0 +1,113 @@
+#include "unflex/verify/corners.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace unflex::verify {
+namespace {
+
+constexpr double kCosineOfSharpest = 0.93969262078590838;  // cos 20°
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+void CornerAccumulator::add(double distance2_mm2, std::size_t line) {
+  corners_.add_square(distance2_mm2, 1.0);
+  sum_distance2_ += distance2_mm2;
+  ++count_;
+  if (distance2_mm2 > distance2_max_) {
+    distance2_max_ = distance2_mm2;
+    line_ = line;
+  }
+}
+
+CornerStats CornerAccumulator::stats() const {
+  CornerStats stats;
+  if (count_ == 0) {
+    return stats;
+  }
+  stats.count = count_;
+  stats.max_mm = std::sqrt(distance2_max_);
+  stats.p99_mm = std::min(stats.max_mm, corners_.quantile(0.99));
+  stats.rms_mm = std::sqrt(sum_distance2_ / static_cast<double>(count_));
+  stats.max_line = line_;
+  return stats;
+}
+
+void CornerGauge::follow(const planner::PlannedMove& move, double start_s) {
+  const gcode::Segment& segment = move.segment;
+  const double length_mm = segment.length_xy_mm();
+  if (!(length_mm > 0.0)) {
+    return;
+  }
+  const double x = segment.delta(gcode::X) / length_mm;
+  const double y = segment.delta(gcode::Y) / length_mm;
+  if (open_) {
+    const bool goes_on = segment.extruding() && segment.start_mm[gcode::X] == end_mm_[gcode::X] &&
+                         segment.start_mm[gcode::Y] == end_mm_[gcode::Y] &&
+                         segment.start_mm[gcode::Z] == end_mm_[gcode::Z];
+    if (goes_on && x * direction_x_ + y * direction_y_ < kCosineOfSharpest) {
+      corners_.back().until_s = start_s + reach_s_;
+    } else {
+      corners_.pop_back();
+    }
+  }
+  open_ = segment.extruding();
+  if (open_) {
+    end_mm_ = segment.end_mm;
+    direction_x_ = x;
+    direction_y_ = y;
+    corners_.push_back({start_s + move.duration_s() - reach_s_, kNever, end_mm_[gcode::X],
+                        end_mm_[gcode::Y], kNever, segment.line});
+  }
+  find_next();
+}
+
+void CornerGauge::look(double time_s, double x_mm, double y_mm) {
+  while (!corners_.empty() && corners_.front().until_s < time_s) {
+    let_go();
+  }
+  const double way_x = drawn_ ? last_x_mm_ - x_mm : 0.0;
+  const double way_y = drawn_ ? last_y_mm_ - y_mm : 0.0;
+  const double way2 = way_x * way_x + way_y * way_y;
+  const double inverse_way2 = way2 > 0.0 ? 1.0 / way2 : 0.0;
+  for (Corner& corner : corners_) {
+    if (time_s < corner.from_s) {
+      break;
+    }
+    const double x = corner.x_mm - x_mm;
+    const double y = corner.y_mm - y_mm;
+    const double share = std::clamp((x * way_x + y * way_y) * inverse_way2, 0.0, 1.0);
+    const double across_x = x - share * way_x;
+    const double across_y = y - share * way_y;
+    corner.distance2_mm2 =
+        std::min(corner.distance2_mm2, across_x * across_x + across_y * across_y);
+  }
+  drawn_ = true;
+  last_x_mm_ = x_mm;
+  last_y_mm_ = y_mm;
+}
+
+void CornerGauge::let_go() {
+  // A nozzle that nobody looked at has no distance.
+  if (corners_.front().distance2_mm2 < kNever) {
+    left_behind_.add(corners_.front().distance2_mm2, corners_.front().line);
+  }
+  corners_.pop_front();
+  find_next();
+}
+
+void CornerGauge::find_next() { next_s_ = corners_.empty() ? kNever : corners_.front().from_s; }
+
+CornerStats CornerGauge::stats() const {
+  CornerAccumulator all = left_behind_;
+  for (const Corner& corner : corners_) {
+    if (corner.until_s < kNever && corner.distance2_mm2 < kNever) {
+      all.add(corner.distance2_mm2, corner.line);
+    }
+  }
+  return all.stats();
+}
+
+}  // namespace unflex::verify
