@@ -23,6 +23,10 @@ report::DeviationRow row(const verify::DeviationStats& stats) {
           stats.tracking_rms_mm, stats.duration_s,     stats.contour_max_line};
 }
 
+report::CornerRow row(const verify::CornerStats& stats) {
+  return {stats.count, stats.rms_mm, stats.p99_mm, stats.max_mm, stats.max_line};
+}
+
 report::Spread spread(const verify::Deviation& deviation) {
   return {deviation.extruding.contour_max_mm, deviation.extruding.contour_rms_mm};
 }
@@ -117,6 +121,8 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder* re
     report.unshaped = rows(*verified.unshaped);
   }
   report.compensated = rows(verified.compensated);
+  report.uncompensated_corners = row(verified.uncompensated_corners);
+  report.compensated_corners = row(verified.compensated_corners);
   constexpr std::size_t kErrors = verify::kFrequencyErrors.size();
   for (std::size_t i = 0; i < verified.detuned.size(); ++i) {
     const report::Spread before = spread(verified.detuned[i].uncompensated);

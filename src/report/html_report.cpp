@@ -178,6 +178,17 @@ Json facts_json(const Report& r) {
                     micrometres_text(r.unshaped->extruding.contour_rms_mm),
                     micrometres_text(r.unshaped->extruding.contour_max_mm)));
   }
+  const CornerRow& corners = r.uncompensated_corners;
+  const CornerRow& left = r.compensated_corners;
+  if (corners.count > 0) {
+    add(fmt::format("Distance from {} corners", corners.count),
+        fmt::format("{} → {} µm RMS, 99 % within {} → {} µm, {} → {} µm at most, as sliced in line "
+                    "{}, compensated in line {}",
+                    micrometres_text(corners.rms_mm), micrometres_text(left.rms_mm),
+                    micrometres_text(corners.p99_mm), micrometres_text(left.p99_mm),
+                    micrometres_text(corners.max_mm), micrometres_text(left.max_mm),
+                    corners.max_line, left.max_line));
+  }
   add("Base", fmt::format("at most {:.0f} mm/s and {:.0f} mm/s²", r.base_max_velocity_mm_s,
                           r.base_max_accel_mm_s2));
   add("Output", fmt::format("{} lines, {:.1f} MB, at most {:.0f} lines/s", r.output_lines,
@@ -290,6 +301,13 @@ std::string hero(const Report& r) {
                  "The greatest distance of the nozzle from the sliced path anywhere in the print "
                  "while filament is laid.",
                  before.contour_max_mm, after.contour_max_mm);
+  const CornerRow& corners = r.uncompensated_corners;
+  if (corners.count > 0) {
+    html += figure("Typical corner",
+                   "How far the nozzle passes from the corners of the path: the root mean square "
+                   "over all places where an extruding path turns by more than 20°.",
+                   corners.rms_mm, r.compensated_corners.rms_mm);
+  }
   html +=
       key_figure("Print time", "As the firmware's planner makes it, heating and macros excluded.",
                  duration_text(r.reference_time_s), duration_text(r.emitted_time_s),

@@ -23,6 +23,14 @@ Json row_json(const DeviationRow& row) {
           {"contour_max_line", row.contour_max_line}};
 }
 
+Json corners_json(const CornerRow& row) {
+  return {{"count", row.count},
+          {"rms_mm", row.rms_mm},
+          {"p99_mm", row.p99_mm},
+          {"max_mm", row.max_mm},
+          {"max_line", row.max_line}};
+}
+
 Json spread_json(const Spread& s) {
   return {{"contour_max_mm", s.max_mm}, {"contour_rms_mm", s.rms_mm}};
 }
@@ -79,6 +87,8 @@ void add_motion(const Report& r, Json& json) {
   json["deviation"] = {{"uncompensated", rows_json(r.uncompensated)},
                        {"unshaped", r.unshaped ? rows_json(*r.unshaped) : Json()},
                        {"compensated", rows_json(r.compensated)}};
+  json["corners"] = {{"uncompensated", corners_json(r.uncompensated_corners)},
+                     {"compensated", corners_json(r.compensated_corners)}};
   json["sensitivity"] = sensitivity_json(r.sensitivity);
   json["plants"] = plants_json(r.plants);
   json["robustness"] = nullptr;

@@ -16,15 +16,25 @@ constexpr std::size_t kListedCommands = 5;
 
 using Sink = std::back_insert_iterator<std::string>;
 
+std::string change_text(double from_mm, double to_mm) {
+  return fmt::format("{} → {}", micrometres_text(from_mm), micrometres_text(to_mm));
+}
+
 void write_deviation(Sink out, std::string_view moves, const DeviationRow& before,
                      const DeviationRow& after) {
-  const auto cell = [](double from_mm, double to_mm) {
-    return fmt::format("{} → {}", micrometres_text(from_mm), micrometres_text(to_mm));
-  };
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", moves,
-                 cell(before.contour_max_mm, after.contour_max_mm),
-                 cell(before.contour_p99_mm, after.contour_p99_mm),
-                 cell(before.contour_rms_mm, after.contour_rms_mm));
+                 change_text(before.contour_max_mm, after.contour_max_mm),
+                 change_text(before.contour_p99_mm, after.contour_p99_mm),
+                 change_text(before.contour_rms_mm, after.contour_rms_mm));
+}
+
+void write_corners(Sink out, const CornerRow& before, const CornerRow& after) {
+  if (before.count > 0) {
+    fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", fmt::format("{} corners", before.count),
+                   change_text(before.max_mm, after.max_mm),
+                   change_text(before.p99_mm, after.p99_mm),
+                   change_text(before.rms_mm, after.rms_mm));
+  }
 }
 
 // What the printer's own shaper leaves out of the figures before.
@@ -191,6 +201,7 @@ std::string to_text(const Report& report) {
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "contour, µm", "max", "p99", "RMS");
   write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
   write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
+  write_corners(out, report.uncompensated_corners, report.compensated_corners);
   write_unshaped(out, report.unshaped);
   write_sensitivity(out, report.sensitivity);
   write_plants(out, report.plants);

@@ -67,6 +67,16 @@ TEST(HtmlReport, SaysInOneSentenceWhatWasGained) {
   EXPECT_THAT(page, HasSubstr("+0.50 %"));
 }
 
+TEST(HtmlReport, SaysHowFarTheNozzlePassesFromCorners) {
+  Report report = recorded_report();
+  const std::string page = to_html(report);
+  EXPECT_THAT(page, HasSubstr("Typical corner"));
+  EXPECT_THAT(page, HasSubstr("60.0 → 0.50 µm RMS, 99 % within 110 → 2.50 µm, 120 → 15.0 µm at "
+                              "most, as sliced in line 41, compensated in line 43"));
+  report.uncompensated_corners = report.compensated_corners = {};
+  EXPECT_THAT(to_html(report), Not(HasSubstr("corner")));
+}
+
 TEST(HtmlReport, SaysWhenRulesAreBroken) {
   Report report = recorded_report();
   EXPECT_THAT(to_html(report), HasSubstr("breaks 3 rules; do not print it"));
@@ -77,6 +87,7 @@ TEST(HtmlReport, SaysWhenRulesAreBroken) {
 TEST(HtmlReport, DoesNotSpeakOfGainWhereThereIsNone) {
   Report report = recorded_report();
   report.compensated = report.uncompensated;
+  report.compensated_corners = report.uncompensated_corners;
   report.emitted_time_s = report.reference_time_s;
   const std::string page = to_html(report);
   EXPECT_THAT(page, Not(HasSubstr("× less")));

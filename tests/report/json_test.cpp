@@ -65,6 +65,16 @@ TEST(JsonReport, TellsTheFourDeviationsApart) {
   EXPECT_EQ(deviation["compensated"]["all"]["contour_max_line"], 17);
 }
 
+TEST(JsonReport, SaysHowFarTheNozzlePassesFromCorners) {
+  const nlohmann::json corners = parsed(sample_report())["corners"];
+  EXPECT_EQ(
+      corners["uncompensated"],
+      (nlohmann::json{
+          {"count", 321}, {"rms_mm", 0.06}, {"p99_mm", 0.11}, {"max_mm", 0.12}, {"max_line", 41}}));
+  EXPECT_EQ(corners["compensated"]["max_mm"], 0.015);
+  EXPECT_EQ(corners["compensated"]["max_line"], 43);
+}
+
 TEST(JsonReport, GivesSettingsTheirTypes) {
   const nlohmann::json printer = parsed(sample_report())["printer"];
   EXPECT_EQ(printer["printer.firmware"]["value"], "klipper");

@@ -19,6 +19,7 @@ TEST(Summary, IsExactlyThis) {
       "  contour, µm     max                 p99                 RMS\n"
       "  extruding       800 → 12.5          400 → 6.25          200 → 3.12\n"
       "  all moves       1600 → 25.0         800 → 12.5          400 → 6.25\n"
+      "  321 corners     120 → 15.0          110 → 2.50          60.0 → 0.50\n"
       "shaper        the printer's own is on before; without it, extruding: 900 µm max, 450 p99, "
       "225 "
       "RMS\n"
@@ -57,6 +58,12 @@ TEST(Summary, DoesNotSpeakOfRunsWhereNothingWasSolved) {
   report.solver_engine.clear();
   EXPECT_THAT(to_text(report), Not(HasSubstr("solver")));
   EXPECT_THAT(to_text(report), Not(HasSubstr("per second in")));
+}
+
+TEST(Summary, DoesNotSpeakOfCornersWhereThereAreNone) {
+  Report report = sample_report();
+  report.uncompensated_corners = report.compensated_corners = {};
+  EXPECT_THAT(to_text(report), Not(HasSubstr("corners")));
 }
 
 TEST(Summary, SaysThatTheBudgetOfLinesHolds) {

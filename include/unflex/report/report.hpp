@@ -34,6 +34,15 @@ struct DeviationRows {
   DeviationRow all;
 };
 
+// How far the nozzle passes from the corners of the sliced path.
+struct CornerRow {
+  std::size_t count = 0;
+  double rms_mm = 0.0;
+  double p99_mm = 0.0;
+  double max_mm = 0.0;
+  std::size_t max_line = 0;  // of the input
+};
+
 // Contour error of extruding moves if the true frequencies are the assumed ones times 1 +
 // frequency_error.
 struct Sensitivity {
@@ -122,6 +131,8 @@ struct Report {
   // The sliced file without that shaper; nullopt if none acts.
   std::optional<DeviationRows> unshaped;
   DeviationRows compensated;
+  CornerRow uncompensated_corners;
+  CornerRow compensated_corners;
   std::vector<Sensitivity> sensitivity;  // by rising error
   std::vector<PlantDeviation> plants;    // in the order of the settings
   std::optional<Robustness> robustness;  // set if the base is to suit more models than one
