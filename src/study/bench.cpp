@@ -5,6 +5,7 @@
 
 #include "contour.hpp"
 #include "gauge.hpp"
+#include "unflex/verify/corners.hpp"
 
 namespace unflex::study {
 namespace {
@@ -77,6 +78,13 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
   return result;
 }
 
+void take_corners(const verify::CornerStats& corners, Straying& result) {
+  const auto count = static_cast<double>(corners.count);
+  result.corners = corners.count;
+  result.corner_square_sum_mm2 = corners.rms_mm * corners.rms_mm * count;
+  result.corner_max_mm = corners.max_mm;
+}
+
 }  // namespace
 
 Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
@@ -94,10 +102,19 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
   rivals::NozzleWalk x(hung.x.detuned(1.0 + frequency_error), base.x, grid.start_s);
   rivals::NozzleWalk y(hung.y.detuned(1.0 + frequency_error), base.y, grid.start_s);
   ContourGauge gauge(plan, reach_s(hung));
+  verify::CornerGauge corners(reach_s(hung));
+  double move_start_s = 0.0;
+  for (const planner::PlannedMove& move : plan) {
+    corners.follow(move, move_start_s);
+    move_start_s += move.duration_s();
+  }
   Straying result;
   for (std::size_t k = 0; k < grid.count; ++k) {
     const double t = grid.at(k);
-    const auto reading = gauge.measure(t, x.at(t).position(), y.at(t).position());
+    const double x_mm = x.at(t).position();
+    const double y_mm = y.at(t).position();
+    corners.sample(t, x_mm, y_mm);
+    const auto reading = gauge.measure(t, x_mm, y_mm);
     if (t > plan_end_s) {
       result.after_max_mm = std::max(result.after_max_mm, reading.distance_mm);
     } else if (t >= 0.0 && reading.extruding) {
@@ -109,10 +126,15 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
       result.time_s += setup.step_s;
     }
   }
+  take_corners(corners.stats(), result);
   return result;
 }
 
 double Straying::rms_mm() const { return time_s > 0.0 ? std::sqrt(square_sum_mm2s / time_s) : 0.0; }
+
+double Straying::corner_rms_mm() const {
+  return corners > 0 ? std::sqrt(corner_square_sum_mm2 / static_cast<double>(corners)) : 0.0;
+}
 
 void Straying::merge(const Straying& other) {
   if (other.max_mm > max_mm) {
@@ -122,6 +144,9 @@ void Straying::merge(const Straying& other) {
   square_sum_mm2s += other.square_sum_mm2s;
   time_s += other.time_s;
   after_max_mm = std::max(after_max_mm, other.after_max_mm);
+  corners += other.corners;
+  corner_square_sum_mm2 += other.corner_square_sum_mm2;
+  corner_max_mm = std::max(corner_max_mm, other.corner_max_mm);
 }
 
 BenchResult try_all(const Run& run, const BenchSetup& setup, const compensate::Engine& engine) {

@@ -165,14 +165,18 @@ void write_depth(Sink out, const CaseResult& result) {
       out,
       "<div class=\"scroll\"><table class=\"data\"><thead><tr><th>method</th><th>RMS, µm</th>"
       "<th>−10 %</th><th>−5 %</th><th>exact</th><th>+5 %</th><th>+10 %</th><th>{}</th><th>{}</th>"
+      "<th>{}</th><th>{}</th>"
       "<th>base, mm/s</th><th>base, mm/s²</th><th>{}</th></tr></thead><tbody>\n",
+      report::term("corners, µm",
+                   "How far the nozzle passes from the corners of the path, root mean square"),
+      report::term("at most, µm", "The largest of these distances"),
       report::term("after, µm", "Largest contour error from the plan's end on"),
       report::term("gap, µm", "How far from its target the base comes to rest"),
       report::term("longer, ms", "How much later than the plan the base comes to rest"));
   for (const MethodResult& method : result.methods) {
     write_row_start(out, method.method);
     if (!method.used) {
-      fmt::format_to(out, "<td class=\"none\" colspan=\"11\">{}</td></tr>\n",
+      fmt::format_to(out, "<td class=\"none\" colspan=\"13\">{}</td></tr>\n",
                      escape_html(method.remark));
       continue;
     }
@@ -181,7 +185,10 @@ void write_depth(Sink out, const CaseResult& result) {
       fmt::format_to(out, "<td>{}</td>", micrometres_text(method.straying[i].max_mm));
     }
     fmt::format_to(out,
-                   "<td>{}</td><td>{}</td><td>{:.0f}</td><td>{:.0f}</td><td>{:.0f}</td></tr>\n",
+                   "<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0f}</td><td>{:.0f}</td>"
+                   "<td>{:.0f}</td></tr>\n",
+                   micrometres_text(method.straying[0].corner_rms_mm()),
+                   micrometres_text(method.straying[0].corner_max_mm),
                    micrometres_text(method.straying[0].after_max_mm),
                    micrometres_text(method.end_gap_mm), method.base_peak.velocity_mm_s,
                    method.base_peak.accel_mm_s2, std::max(0.0, method.longer_s * 1e3));

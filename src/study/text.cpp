@@ -61,9 +61,9 @@ void write_gaps(Sink out, const Outcome& outcome) {
 
 // One case in depth: what a wrong frequency costs, and what the motion asks of the machine.
 void write_case(Sink out, const CaseResult& result) {
-  fmt::format_to(out, "\n{:<28}{:>8}{:>8}{:>8}{:>8}{:>8}{:>9}{:>9}{:>9}{:>9}{:>9}\n",
+  fmt::format_to(out, "\n{:<28}{:>8}{:>8}{:>8}{:>8}{:>8}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}\n",
                  fmt::format("{}, µm", result.name), "RMS", "−10 %", "−5 %", "+5 %", "+10 %",
-                 "after", "gap", "mm/s", "mm/s²", "longer");
+                 "corners", "at most", "after", "gap", "mm/s", "mm/s²", "longer");
   for (const MethodResult& method : result.methods) {
     if (!method.used) {
       fmt::format_to(out, "  {:<26}{:>8}  {}\n", name(method.method), kNone, method.remark);
@@ -74,7 +74,9 @@ void write_case(Sink out, const CaseResult& result) {
     for (std::size_t i = 1; i < kFrequencyErrors.size(); ++i) {
       fmt::format_to(out, "{:>8}", micrometres_text(method.straying[i].max_mm));
     }
-    fmt::format_to(out, "{:>9}{:>9}{:>9.0f}{:>9.0f}{:>6.0f} ms{}{}\n",
+    fmt::format_to(out, "{:>9}{:>9}{:>9}{:>9}{:>9.0f}{:>9.0f}{:>6.0f} ms{}{}\n",
+                   micrometres_text(method.straying[0].corner_rms_mm()),
+                   micrometres_text(method.straying[0].corner_max_mm),
                    micrometres_text(method.straying[0].after_max_mm),
                    micrometres_text(method.end_gap_mm), method.base_peak.velocity_mm_s,
                    method.base_peak.accel_mm_s2, std::max(0.0, method.longer_s * 1e3),
@@ -110,9 +112,12 @@ std::string to_text(const Outcome& outcome) {
   write_gaps(out, outcome);
   if (!outcome.cases.empty()) {
     write_case(out, outcome.cases.front());
-    fmt::format_to(out,
-                   "  after: contour error after the plan's end; gap: how far from its target the "
-                   "base rests\n");
+    fmt::format_to(
+        out,
+        "  corners, at most: how far the nozzle passes from corners of the path, RMS and "
+        "largest\n"
+        "  after: contour error after the plan's end; gap: how far from its target the "
+        "base rests\n");
   }
   write_chains(out, outcome);
   fmt::format_to(out, "\n{} in all\n", report::duration_text(outcome.wall_s));

@@ -55,6 +55,26 @@ TEST(StudyJson, IsDocumentedKeyByKey) {
   EXPECT_EQ(report::documented_keys(std::string(test_paths::kDocs) + "/report.md", "study"), keys);
 }
 
+// Uncompensated the nozzle overshoots straight through the corner; a long shaper cuts it.
+TEST(StudyJson, SaysHowFarTheNozzlePassesFromCorners) {
+  const auto json = nlohmann::json::parse(to_json(outcome()));
+  for (const auto& method : json["cases"][0]["methods"]) {
+    if (method["used"] == true) {
+      const auto& exact = method["deviation"][0];
+      EXPECT_EQ(exact["corners"], 1) << method["method"];
+      EXPECT_EQ(exact["corner_max_mm"], exact["corner_rms_mm"]) << method["method"];
+    }
+  }
+  const auto distance_mm = [&](Method method) {
+    return json["cases"][0]["methods"][static_cast<std::size_t>(method)]["deviation"][0]
+               ["corner_max_mm"]
+                   .get<double>();
+  };
+  EXPECT_LT(distance_mm(Method::uncompensated), 1e-4);
+  EXPECT_NEAR(distance_mm(Method::zvd), 0.210, 0.005);
+  EXPECT_LT(distance_mm(Method::unflex_4x), 1e-4);
+}
+
 TEST(StudyJson, SaysWhyAMethodIsNotUsed) {
   const auto json = nlohmann::json::parse(to_json(outcome()));
   const auto& zv = json["cases"][1]["methods"][1];

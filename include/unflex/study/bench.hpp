@@ -91,8 +91,13 @@ struct Straying {
   double time_s = 0.0;
   double max_at_s = 0.0;      // time of max_mm in the plan of the run
   double after_max_mm = 0.0;  // largest distance from the plan's end on
+  // How far the nozzle passes from the corners of the path (unflex/verify/corners.hpp).
+  std::size_t corners = 0;
+  double corner_square_sum_mm2 = 0.0;
+  double corner_max_mm = 0.0;
 
   [[nodiscard]] double rms_mm() const;
+  [[nodiscard]] double corner_rms_mm() const;
   void merge(const Straying& other);
 };
 
