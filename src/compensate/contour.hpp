@@ -4,7 +4,7 @@
 //
 //   c  pairs of a model of X and one of Y, with shares α_c
 //   q  the place of the path nearest to p_c, among those that r passes within a reach of the time
-//   λ  5 within a ms of sharp corners, which the nozzle would else cut, and 0 elsewhere
+//   λ  3 within a ms of sharp corners, which the nozzle would else cut, and 0 elsewhere
 //
 // q follows p_c. For a given q the cost is one of X plus one of Y, each a sum of squares of an
 // AxisWindow:

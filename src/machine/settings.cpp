@@ -259,9 +259,13 @@ double Settings::along_weight() const {
 }
 
 double Settings::jerk_weight() const {
-  constexpr double kOfTracking = 1.5;
   constexpr double kOfContour = 15.0;
-  return solve.jerk_weight.value_or(along_weight() < 1.0 ? kOfContour : kOfTracking);
+  return along_weight() < 1.0 ? solve.jerk_weight.value_or(kOfContour) : tracking_jerk_weight();
+}
+
+double Settings::tracking_jerk_weight() const {
+  constexpr double kOfTracking = 1.5;
+  return solve.jerk_weight.value_or(kOfTracking);
 }
 
 double Settings::emit_accel_mm_s2(double asked_mm_s2) const {

@@ -59,7 +59,10 @@ std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
   compensate::Setup setup = job.setup;
   setup.x.plants.clear();
   setup.y.plants.clear();
-  setup.contour.reset();
+  if (setup.contour) {
+    setup.jerk_weight = setup.contour->tracking_jerk_weight;
+    setup.contour.reset();
+  }
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
   auto windows = compensate::windows(job.course(), job.spans, job.first_stage, setup);
   std::vector<dynamics::AxisTrajectory> x;

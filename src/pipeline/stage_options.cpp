@@ -370,6 +370,7 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
     constexpr double kLeastOverlap_s = 0.2;
     setup.overlap_s = std::min(std::max(setup.overlap_s, kLeastOverlap_s), setup.window_s);
     setup.contour = compensate::Contour{.along_weight = settings.along_weight(),
+                                        .tracking_jerk_weight = settings.tracking_jerk_weight(),
                                         .pairs = compensate::pairs_of(setup.x, setup.y)};
   }
   return setup;

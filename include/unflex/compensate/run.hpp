@@ -36,9 +36,10 @@ struct ModelPair {
 
 // What strays from the path counts, and what is early or late on it hardly does (contour.hpp).
 struct Contour {
-  double along_weight = 0.01;  // ε
-  double corner_weight = 5.0;  // λ
-  double reach_s = 0.031;      // how far from its time the nozzle's nearest place is looked for
+  double along_weight = 0.01;         // ε
+  double corner_weight = 5.0;         // λ
+  double tracking_jerk_weight = 1.5;  // Setup::jerk_weight as it is without a contour
+  double reach_s = 0.031;  // how far from its time the nozzle's nearest place is looked for
   std::vector<ModelPair> pairs = {{}};  // shares add up to 1
 };
 

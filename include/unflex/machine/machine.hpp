@@ -278,6 +278,8 @@ struct Settings {
   [[nodiscard]] bool has_several_models() const;
   [[nodiscard]] double along_weight() const;
   [[nodiscard]] double jerk_weight() const;
+  // jerk_weight() as it is where along_weight() is 1.
+  [[nodiscard]] double tracking_jerk_weight() const;
   [[nodiscard]] double period_ms() const;
   [[nodiscard]] double tolerance_um() const;
   [[nodiscard]] double emit_accel_mm_s2(double asked_mm_s2) const;
