@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace unflex::compensate {
 namespace {
@@ -21,13 +22,28 @@ constexpr double kRestingSoonByJerk = 1.0 / 6.0 + 0.5 * 2.0 / 3.0 + 1.0 / 6.0;
 
 }  // namespace
 
-ModeStep::ModeStep(const dynamics::Mode& mode, double period_s) {
+void ModeSteps::clear() {
+  for (std::vector<double>& part : own) {
+    part.clear();
+  }
+  for (std::array<std::vector<double>, 2>* of : {&by_accel, &by_jerk}) {
+    for (std::vector<double>& part : *of) {
+      part.clear();
+    }
+  }
+}
+
+void ModeSteps::add(const dynamics::Mode& mode, double period_s) {
   const AxisChain chain(mode, period_s);
   const ChainMatrix& growth = chain.growth;
-  own = {1.0 + growth(0, 0), growth(0, 1), growth(1, 0), 1.0 + growth(1, 1)};
-  by_accel = {mode.gain * (growth(0, 4) - growth(2, 4)), mode.gain * (growth(1, 4) - growth(3, 4))};
-  by_jerk = {mode.gain * (chain.input(0) - chain.input(2)),
-             mode.gain * (chain.input(1) - chain.input(3))};
+  own[0].push_back(1.0 + growth(0, 0));
+  own[1].push_back(growth(0, 1));
+  own[2].push_back(growth(1, 0));
+  own[3].push_back(1.0 + growth(1, 1));
+  by_accel[0].push_back(mode.gain * (growth(0, 4) - growth(2, 4)));
+  by_accel[1].push_back(mode.gain * (growth(1, 4) - growth(3, 4)));
+  by_jerk[0].push_back(mode.gain * (chain.input(0) - chain.input(2)));
+  by_jerk[1].push_back(mode.gain * (chain.input(1) - chain.input(3)));
 }
 
 void StageForm::set_models(const AxisWindow& window) {
@@ -37,12 +53,12 @@ void StageForm::set_models(const AxisWindow& window) {
   for (std::size_t c = 0; c < window.models(); ++c) {
     const Plant plant = window.model(c);
     Model model;
-    model.first_mode = modes_.size();
+    model.first_mode = modes_.count();
     for (const dynamics::Mode& mode : plant.axis.modes()) {
-      modes_.emplace_back(mode, window.period_s);
+      modes_.add(mode, window.period_s);
       gains_.push_back(mode.gain);
     }
-    model.end_mode = modes_.size();
+    model.end_mode = modes_.count();
     model.share = plant.share;
     models_.push_back(std::move(model));
   }
@@ -58,8 +74,8 @@ void StageForm::set_models(const AxisWindow& window) {
     place(static_cast<Eigen::Index>(base())) = 1.0;
     rate(static_cast<Eigen::Index>(base()) + 1) = 1.0;
     for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
-      place(static_cast<Eigen::Index>(2 * i)) = 1.0;
-      rate(static_cast<Eigen::Index>(2 * i) + 1) = 1.0;
+      place(static_cast<Eigen::Index>(i)) = 1.0;
+      rate(static_cast<Eigen::Index>(rates() + i)) = 1.0;
     }
     // p_c = (p₁ + p₂)/2 + (ṗ₁ − ṗ₂)/8.
     Vector after = 0.5 * place - 0.125 * rate;
@@ -90,11 +106,15 @@ void StageForm::assign(const ScaledWindow& scaled) {
     values->resize(nodes_ - 1);
   }
   node_weight_.resize(nodes_);
-  for (Matrix* matrix : {&cost_to_go_, &half_next_, &next_}) {
-    matrix->resize(n, n);
+  for (Matrix* matrix : {&cost_to_go_, &next_}) {
+    matrix->setZero(n, n);
   }
-  by_input_.resize(n);
-  cross_.resize(n);
+  for (Vector* vector : {&by_input_, &by_accel_, &cross_, &pivot_row_}) {
+    vector->resize(n);
+  }
+  for (std::vector<double>& row : in_rows_) {
+    row.resize(modes_.count());
+  }
   for (std::size_t k = 0; k < nodes_; ++k) {
     const bool at_end = k == 0 || k + 1 == nodes_;
     node_weight_[k] = window.weight[2 * k] * (at_end ? 1.0 / 6.0 : 1.0 / 3.0);
@@ -120,9 +140,9 @@ void StageForm::set_start() {
           window.in_model(c, window.start->nozzle, window.start->base_mm);
       for (std::size_t i = models_[c].first_mode; i < models_[c].end_mode; ++i) {
         const dynamics::NozzleMotion& part = nozzle.parts[i - models_[c].first_mode];
-        const auto at = static_cast<Eigen::Index>(2 * i);
-        first(at) = (part.position - gains_[i] * window.start->base_mm) / window_->unit[0];
-        first(at + 1) = part.velocity / window_->unit[1];
+        first(static_cast<Eigen::Index>(i)) =
+            (part.position - gains_[i] * window.start->base_mm) / window_->unit[0];
+        first(static_cast<Eigen::Index>(rates() + i)) = part.velocity / window_->unit[1];
       }
     }
     start_basis_.setZero(n, 1);
@@ -166,15 +186,14 @@ void StageForm::roll_out(const Vector& first) {
 }
 
 void StageForm::step(const double* z, double input, double* next) const {
+  const std::size_t count = modes_.count();
+  const double* const rate = z + count;
   const double* const b = z + base();
-  for (std::size_t i = 0; i < modes_.size(); ++i) {
-    const ModeStep& mode = modes_[i];
-    const double y = z[2 * i];
-    const double rate = z[2 * i + 1];
-    next[2 * i] =
-        mode.own[0] * y + mode.own[1] * rate + mode.by_accel[0] * b[2] + mode.by_jerk[0] * input;
-    next[2 * i + 1] =
-        mode.own[2] * y + mode.own[3] * rate + mode.by_accel[1] * b[2] + mode.by_jerk[1] * input;
+  for (std::size_t i = 0; i < count; ++i) {
+    next[i] = modes_.own[0][i] * z[i] + modes_.own[1][i] * rate[i] + modes_.by_accel[0][i] * b[2] +
+              modes_.by_jerk[0][i] * input;
+    next[count + i] = modes_.own[2][i] * z[i] + modes_.own[3][i] * rate[i] +
+                      modes_.by_accel[1][i] * b[2] + modes_.by_jerk[1][i] * input;
   }
   double* const to = next + base();
   to[0] = b[0] + b[1] + 0.5 * b[2] + kBaseByJerk[0] * input;
@@ -183,24 +202,26 @@ void StageForm::step(const double* z, double input, double* next) const {
 }
 
 void StageForm::transpose_step(double* v) const {
+  const std::size_t count = modes_.count();
+  double* const rates = v + count;
   double* const b = v + base();
   double by_accel = 0.5 * b[0] + b[1] + b[2];
-  for (std::size_t i = 0; i < modes_.size(); ++i) {
-    const ModeStep& mode = modes_[i];
-    const double y = v[2 * i];
-    const double rate = v[2 * i + 1];
-    by_accel += mode.by_accel[0] * y + mode.by_accel[1] * rate;
-    v[2 * i] = mode.own[0] * y + mode.own[2] * rate;
-    v[2 * i + 1] = mode.own[1] * y + mode.own[3] * rate;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double y = v[i];
+    const double rate = rates[i];
+    by_accel += modes_.by_accel[0][i] * y + modes_.by_accel[1][i] * rate;
+    v[i] = modes_.own[0][i] * y + modes_.own[2][i] * rate;
+    rates[i] = modes_.own[1][i] * y + modes_.own[3][i] * rate;
   }
   b[1] += b[0];
   b[2] = by_accel;
 }
 
 double StageForm::by_input(const double* v) const {
+  const std::size_t count = modes_.count();
   double sum = 0.0;
-  for (std::size_t i = 0; i < modes_.size(); ++i) {
-    sum += modes_[i].by_jerk[0] * v[2 * i] + modes_[i].by_jerk[1] * v[2 * i + 1];
+  for (std::size_t i = 0; i < count; ++i) {
+    sum += modes_.by_jerk[0][i] * v[i] + modes_.by_jerk[1][i] * v[count + i];
   }
   for (std::size_t i = 0; i < 3; ++i) {
     sum += kBaseByJerk[i] * v[base() + i];
@@ -209,9 +230,10 @@ double StageForm::by_input(const double* v) const {
 }
 
 double StageForm::swing(const Model& model, const double* z, std::size_t rate) const {
+  const double* const of = z + rate * modes_.count();
   double sum = 0.0;
   for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
-    sum += z[2 * i + rate];
+    sum += of[i];
   }
   return sum;
 }
@@ -264,36 +286,80 @@ void StageForm::split_rows(const std::vector<double>& states, const Padded& inpu
   }
 }
 
+void StageForm::weigh_rows(const std::array<std::vector<double>, 2>& of_modes,
+                           const std::array<double, 3>& of_base, Vector& sum) const {
+  const std::size_t n = size_;
+  const std::size_t count = modes_.count();
+  double* const to = sum.data();
+  std::fill_n(to, n, 0.0);
+  const auto add = [&](std::size_t row, double factor) {
+    const double* const p = cost_to_go_.data() + row * n;
+    for (std::size_t j = 0; j < n; ++j) {
+      to[j] += factor * p[j];
+    }
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    add(i, of_modes[0][i]);
+    add(count + i, of_modes[1][i]);
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    add(base() + i, of_base[i]);
+  }
+}
+
 void StageForm::carry_back() {
   const std::size_t n = size_;
+  const std::size_t count = modes_.count();
   const std::size_t b = base();
-  // P Φ, row by row.
-  for (std::size_t r = 0; r < n; ++r) {
-    double* const to = half_next_.data() + r * n;
-    std::copy_n(cost_to_go_.data() + r * n, n, to);
-    transpose_step(to);
-  }
-  // Φᵀ times that.
-  double* const accel = next_.data() + (b + 2) * n;
-  const double* const b0 = half_next_.data() + b * n;
-  const double* const b1 = b0 + n;
-  const double* const b2 = b1 + n;
-  for (std::size_t j = 0; j < n; ++j) {
-    next_.data()[b * n + j] = b0[j];
-    next_.data()[(b + 1) * n + j] = b0[j] + b1[j];
-    accel[j] = 0.5 * b0[j] + b1[j] + b2[j];
-  }
-  for (std::size_t i = 0; i < modes_.size(); ++i) {
-    const ModeStep& mode = modes_[i];
-    const double* const y = half_next_.data() + 2 * i * n;
-    const double* const rate = y + n;
-    double* const to = next_.data() + 2 * i * n;
-    for (std::size_t j = 0; j < n; ++j) {
-      accel[j] += mode.by_accel[0] * y[j] + mode.by_accel[1] * rate[j];
-      to[j] = mode.own[0] * y[j] + mode.own[2] * rate[j];
-      to[n + j] = mode.own[1] * y[j] + mode.own[3] * rate[j];
+  weigh_rows(modes_.by_accel, {0.5, 1.0, 1.0}, by_accel_);
+  const double* const u = by_accel_.data();
+  const auto& [own_0, own_1, own_2, own_3] = modes_.own;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* const of_place = cost_to_go_.data() + i * n;
+    const double* const of_rate = cost_to_go_.data() + (count + i) * n;
+    double* const place = next_.data() + i * n;
+    double* const rate = next_.data() + (count + i) * n;
+    // P Φ in these two rows, at the places and at the rates.
+    double* const p_p = in_rows_[0].data();
+    double* const p_r = in_rows_[1].data();
+    double* const r_p = in_rows_[2].data();
+    double* const r_r = in_rows_[3].data();
+    for (std::size_t j = 0; j < count; ++j) {
+      p_p[j] = own_0[j] * of_place[j] + own_2[j] * of_place[count + j];
+      p_r[j] = own_1[j] * of_place[j] + own_3[j] * of_place[count + j];
+      r_p[j] = own_0[j] * of_rate[j] + own_2[j] * of_rate[count + j];
+      r_r[j] = own_1[j] * of_rate[j] + own_3[j] * of_rate[count + j];
     }
+    const double a_0 = own_0[i];
+    const double a_1 = own_1[i];
+    const double a_2 = own_2[i];
+    const double a_3 = own_3[i];
+    for (std::size_t j = 0; j < count; ++j) {
+      place[j] = a_0 * p_p[j] + a_2 * r_p[j];
+      place[count + j] = a_0 * p_r[j] + a_2 * r_r[j];
+      rate[count + j] = a_1 * p_r[j] + a_3 * r_r[j];
+    }
+    const auto at_base = [&](std::size_t column, double p, double r) {
+      place[b + column] = a_0 * p + a_2 * r;
+      rate[b + column] = a_1 * p + a_3 * r;
+    };
+    at_base(0, of_place[b], of_rate[b]);
+    at_base(1, of_place[b] + of_place[b + 1], of_rate[b] + of_rate[b + 1]);
+    at_base(2, u[i], u[count + i]);
   }
+  const double* const p_0 = cost_to_go_.data() + b * n + b;
+  const double* const p_1 = p_0 + n;
+  double* const to = next_.data() + b * n + b;
+  to[0] = p_0[0];
+  to[1] = p_0[0] + p_0[1];
+  to[2] = u[b];
+  to[n + 1] = p_0[0] + 2.0 * p_0[1] + p_1[1];
+  to[n + 2] = u[b] + u[b + 1];
+  double last = 0.5 * u[b] + u[b + 1] + u[b + 2];
+  for (std::size_t i = 0; i < count; ++i) {
+    last += modes_.by_accel[0][i] * u[i] + modes_.by_accel[1][i] * u[count + i];
+  }
+  to[2 * n + 2] = last;
 }
 
 bool StageForm::prescribed(std::size_t k) const {
@@ -315,8 +381,8 @@ void StageForm::set_prescribed_feedback(std::size_t k, double* feedback) const {
 }
 
 bool StageForm::factor(const PerKind<const double*>& weights) {
-  const auto add_node = [&](std::size_t k, Matrix& p) {
-    p += node_weight_[k] * node_square_;
+  const std::size_t n = size_;
+  const auto add_rows = [&](std::size_t k, Matrix& p) {
     for (const RowKind kind : kNodeKinds) {
       if (weights[index_of(kind)] != nullptr) {
         const auto at = static_cast<Eigen::Index>(place(kind));
@@ -325,20 +391,10 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
     }
   };
   const double* const jerk_weight = weights[index_of(RowKind::jerk)];
-  cost_to_go_.setZero();
-  add_node(nodes_ - 1, cost_to_go_);
-  const auto n = static_cast<Eigen::Index>(size_);
+  cost_to_go_ = node_weight_[nodes_ - 1] * node_square_;
+  add_rows(nodes_ - 1, cost_to_go_);
   for (std::size_t k = nodes_ - 1; k-- > 0;) {
-    by_input_.setZero();
-    for (std::size_t i = 0; i < modes_.size(); ++i) {
-      const auto at = static_cast<Eigen::Index>(2 * i);
-      by_input_ += modes_[i].by_jerk[0] * cost_to_go_.row(at).transpose() +
-                   modes_[i].by_jerk[1] * cost_to_go_.row(at + 1).transpose();
-    }
-    for (std::size_t i = 0; i < 3; ++i) {
-      by_input_ +=
-          kBaseByJerk[i] * cost_to_go_.row(static_cast<Eigen::Index>(base() + i)).transpose();
-    }
+    weigh_rows(modes_.by_jerk, kBaseByJerk, by_input_);
     const double middle = middle_weight_[k];
     const double curvature = window_->jerk_weight +
                              (jerk_weight != nullptr ? jerk_weight[k] : 0.0) +
@@ -350,8 +406,17 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
     transpose_step(cross_.data());
     cross_ += middle * middle_cross_;
     carry_back();
-    next_ += middle * middle_square_;
-    Eigen::Map<Vector> feedback(state(feedback_, k), n);
+    Eigen::Map<Vector> feedback(state(feedback_, k), static_cast<Eigen::Index>(n));
+    const double node = node_weight_[k];
+    // The upper triangle and the stage's own cost, without what the input takes off.
+    for (std::size_t r = 0; r < n; ++r) {
+      double* const to = next_.data() + r * n;
+      const double* const of_middle = middle_square_.data() + r * n;
+      const double* const of_node = node_square_.data() + r * n;
+      for (std::size_t c = r; c < n; ++c) {
+        to[c] += middle * of_middle[c] + node * of_node[c];
+      }
+    }
     if (prescribed(k)) {
       set_prescribed_feedback(k, feedback.data());
       inverse_curvature_[k] = 0.0;
@@ -360,10 +425,22 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
     } else {
       inverse_curvature_[k] = 1.0 / curvature;
       feedback = -inverse_curvature_[k] * cross_;
-      next_ += cross_ * feedback.transpose();
+      pivot_row_ = std::sqrt(inverse_curvature_[k]) * cross_;
+      const double* const pivot = pivot_row_.data();
+      for (std::size_t r = 0; r < n; ++r) {
+        double* const to = next_.data() + r * n;
+        for (std::size_t c = r; c < n; ++c) {
+          to[c] -= pivot[r] * pivot[c];
+        }
+      }
     }
-    cost_to_go_ = 0.5 * (next_ + next_.transpose());
-    add_node(k, cost_to_go_);
+    add_rows(k, next_);
+    for (std::size_t r = 1; r < n; ++r) {
+      for (std::size_t c = 0; c < r; ++c) {
+        next_.data()[r * n + c] = next_.data()[c * n + r];
+      }
+    }
+    cost_to_go_.swap(next_);
   }
   return factor_start();
 }
@@ -392,7 +469,7 @@ void StageForm::solve(const PerKind<const double*>& forces) {
     for (std::size_t c = 0; c < count; ++c) {
       const double pull = node_pull_[k * count + c] - faint_pull_;
       for (std::size_t i = models_[c].first_mode; i < models_[c].end_mode; ++i) {
-        g(static_cast<Eigen::Index>(2 * i)) += pull;
+        g(static_cast<Eigen::Index>(i)) += pull;
       }
       g(static_cast<Eigen::Index>(base())) += pull;
     }

@@ -5,15 +5,16 @@
 // Notation, beside that of axis_chain.hpp:
 //   q_i, g_i    a mode's part of the nozzle's motion and its gain, of any model
 //   y_i         q_i − g_i b
-//   z           (y_1, ẏ_1, …, y_K, ẏ_K, b, ḃ, b̈)
+//   z           (y_1, …, y_K, ẏ_1, …, ẏ_K, b, ḃ, b̈)
 //   c           models; p_c = b + Σ y_i over the modes of c
 //
 // A base that moves evenly takes all modes along, so y depends on its acceleration alone:
 //
 //   (y_i, ẏ_i)' = A_i (y_i, ẏ_i) + a_i b̈ + β_i j      b' = b + ḃ + b̈/2 + j/6      …
 //
-// Φ is then 2×2 blocks and one column, and Φᵀ P Φ costs 12 n K multiplications for n = 2K + 3
-// states instead of 2 n³.
+// Φ is then four diagonals and one column, a, and Φᵀ P Φ costs 8 K² + n² multiplications for n = 2K
+// + 3 states instead of 2 n³. As P is symmetric, only its upper triangle is computed. All loops run
+// along rows, so that the compiler takes several columns at once.
 //
 // C. V. Rao, S. J. Wright, J. B. Rawlings, "Application of interior-point methods to model
 // predictive control", J. Optim. Theory Appl. 99 (1998) 723–757. With the quadratic
@@ -39,14 +40,16 @@
 
 namespace unflex::compensate {
 
-// How a mode goes from node to node: A, a and β above.
-struct ModeStep {
-  std::array<double, 4> own{};  // A, by rows
-  std::array<double, 2> by_accel{};
-  std::array<double, 2> by_jerk{};
+// How the modes go from node to node: A, a and β above, each part for all modes.
+struct ModeSteps {
+  std::array<std::vector<double>, 4> own;  // A, by rows
+  std::array<std::vector<double>, 2> by_accel;
+  std::array<std::vector<double>, 2> by_jerk;
 
+  void clear();
   // period_s: h.
-  ModeStep(const dynamics::Mode& mode, double period_s);
+  void add(const dynamics::Mode& mode, double period_s);
+  [[nodiscard]] std::size_t count() const { return own[0].size(); }
 };
 
 class StageForm {
@@ -87,7 +90,8 @@ class StageForm {
     double middle_input = 0.0;  // coefficient of j_k there
   };
 
-  [[nodiscard]] std::size_t base() const { return 2 * modes_.size(); }  // place of b in z
+  [[nodiscard]] std::size_t rates() const { return modes_.count(); }     // place of ẏ_1 in z
+  [[nodiscard]] std::size_t base() const { return 2 * modes_.count(); }  // place of b in z
   [[nodiscard]] std::size_t place(RowKind kind) const { return base() + index_of(kind); }
   [[nodiscard]] double* state(std::vector<double>& of, std::size_t k) const {
     return of.data() + k * size_;
@@ -108,7 +112,10 @@ class StageForm {
   [[nodiscard]] double swing(const Model& model, const double* z, std::size_t rate = 0) const;
   void split_rows(const std::vector<double>& states, const Padded& inputs,
                   const PerKind<bool>& kinds, PerKind<Padded>& rows) const;
-  // Φᵀ P Φ into next_, from cost_to_go_.
+  // Σ f_i P_i over the rows of P, for factors of the modes' places and rates, and of the base's.
+  void weigh_rows(const std::array<std::vector<double>, 2>& of_modes,
+                  const std::array<double, 3>& of_base, Vector& sum) const;
+  // The upper triangle of Φᵀ P Φ into next_, from cost_to_go_.
   void carry_back();
   [[nodiscard]] bool prescribed(std::size_t k) const;
   void set_prescribed_feedback(std::size_t k, double* feedback) const;
@@ -117,7 +124,7 @@ class StageForm {
   const ScaledWindow* window_ = nullptr;
   std::size_t nodes_ = 0;
   std::size_t size_ = 0;  // n
-  std::vector<ModeStep> modes_;
+  ModeSteps modes_;
   std::vector<double> gains_;
   std::vector<Model> models_;
   Matrix node_square_;    // Σ α of the squares of p_c
@@ -141,8 +148,10 @@ class StageForm {
   std::vector<double> node_pull_;  // of each model at each node
   std::vector<double> middle_pull_;
   Matrix cost_to_go_;  // P
-  Matrix half_next_;   // P Φ
   Matrix next_;
+  Vector by_accel_;   // P a, the last column of P Φ
+  Vector pivot_row_;  // what a stage's input takes off P, as the square of this row
+  std::array<std::vector<double>, 4> in_rows_;  // a row of P Φ for a mode's place and rate
   Vector by_input_;
   Vector cross_;
   double half_cost_ = 0.0;
