@@ -23,8 +23,8 @@ struct Place {
 Place nearest(const std::vector<PathVertex>& path, std::size_t first, std::size_t last,
               const Place& p) {
   Place found{path[first].x_mm, path[first].y_mm};
-  double least = std::hypot(found.x_mm - p.x_mm, found.y_mm - p.y_mm);
-  least *= least;
+  double least =
+      (found.x_mm - p.x_mm) * (found.x_mm - p.x_mm) + (found.y_mm - p.y_mm) * (found.y_mm - p.y_mm);
   for (std::size_t i = first; i < last; ++i) {
     const double dx = path[i + 1].x_mm - path[i].x_mm;
     const double dy = path[i + 1].y_mm - path[i].y_mm;

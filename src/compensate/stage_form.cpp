@@ -12,6 +12,14 @@ namespace {
 constexpr std::array<RowKind, 3> kNodeKinds = {RowKind::position, RowKind::velocity,
                                                RowKind::accel};
 
+// Wider registers where the processor has them. Multiplications and additions are not fused and
+// sums keep their order, so the result is the same without.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define UNFLEX_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define UNFLEX_WIDE
+#endif
+
 // b' = b + ḃ + b̈/2 + j/6 and so on.
 constexpr std::array<double, 3> kBaseByJerk = {1.0 / 6.0, 0.5, 1.0};
 
@@ -19,6 +27,25 @@ constexpr std::array<double, 3> kBaseByJerk = {1.0 / 6.0, 0.5, 1.0};
 // input of the interval before does to it.
 constexpr std::array<double, 3> kRestingSoon = {1.0, 2.0 / 3.0, 1.0 / 6.0};
 constexpr double kRestingSoonByJerk = 1.0 / 6.0 + 0.5 * 2.0 / 3.0 + 1.0 / 6.0;
+
+// Upper triangles of n × n: to += f a + g b.
+UNFLEX_WIDE void add_squares(std::size_t n, double f, const double* a, double g, const double* b,
+                             double* __restrict to) {
+  for (std::size_t r = 0; r < n; ++r) {
+    for (std::size_t c = r * n + r; c < (r + 1) * n; ++c) {
+      to[c] += f * a[c] + g * b[c];
+    }
+  }
+}
+
+// The upper triangle of n × n: to −= v vᵀ.
+UNFLEX_WIDE void take_off_square(std::size_t n, const double* v, double* __restrict to) {
+  for (std::size_t r = 0; r < n; ++r) {
+    for (std::size_t c = r; c < n; ++c) {
+      to[r * n + c] -= v[r] * v[c];
+    }
+  }
+}
 
 }  // namespace
 
@@ -68,6 +95,18 @@ void StageForm::set_models(const AxisWindow& window) {
   middle_square_.setZero(n, n);
   middle_cross_.setZero(n);
   middle_curvature_ = 0.0;
+  accel_column_.setZero(n);
+  input_column_.setZero(n);
+  for (std::size_t i = 0; i < modes_.count(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const auto rate_at = static_cast<Eigen::Index>(rates() + i);
+    accel_column_(at) = modes_.by_accel[0][i];
+    accel_column_(rate_at) = modes_.by_accel[1][i];
+    input_column_(at) = modes_.by_jerk[0][i];
+    input_column_(rate_at) = modes_.by_jerk[1][i];
+  }
+  accel_column_.tail(3) << 0.5, 1.0, 1.0;
+  input_column_.tail(3) << kBaseByJerk[0], kBaseByJerk[1], kBaseByJerk[2];
   for (Model& model : models_) {
     Vector place = Vector::Zero(n);
     Vector rate = Vector::Zero(n);
@@ -286,32 +325,11 @@ void StageForm::split_rows(const std::vector<double>& states, const Padded& inpu
   }
 }
 
-void StageForm::weigh_rows(const std::array<std::vector<double>, 2>& of_modes,
-                           const std::array<double, 3>& of_base, Vector& sum) const {
-  const std::size_t n = size_;
-  const std::size_t count = modes_.count();
-  double* const to = sum.data();
-  std::fill_n(to, n, 0.0);
-  const auto add = [&](std::size_t row, double factor) {
-    const double* const p = cost_to_go_.data() + row * n;
-    for (std::size_t j = 0; j < n; ++j) {
-      to[j] += factor * p[j];
-    }
-  };
-  for (std::size_t i = 0; i < count; ++i) {
-    add(i, of_modes[0][i]);
-    add(count + i, of_modes[1][i]);
-  }
-  for (std::size_t i = 0; i < 3; ++i) {
-    add(base() + i, of_base[i]);
-  }
-}
-
-void StageForm::carry_back() {
+UNFLEX_WIDE void StageForm::carry_back() {
   const std::size_t n = size_;
   const std::size_t count = modes_.count();
   const std::size_t b = base();
-  weigh_rows(modes_.by_accel, {0.5, 1.0, 1.0}, by_accel_);
+  by_accel_.noalias() = cost_to_go_ * accel_column_;
   const double* const u = by_accel_.data();
   const auto& [own_0, own_1, own_2, own_3] = modes_.own;
   for (std::size_t i = 0; i < count; ++i) {
@@ -325,18 +343,22 @@ void StageForm::carry_back() {
     double* const r_p = in_rows_[2].data();
     double* const r_r = in_rows_[3].data();
     for (std::size_t j = 0; j < count; ++j) {
-      p_p[j] = own_0[j] * of_place[j] + own_2[j] * of_place[count + j];
       p_r[j] = own_1[j] * of_place[j] + own_3[j] * of_place[count + j];
-      r_p[j] = own_0[j] * of_rate[j] + own_2[j] * of_rate[count + j];
       r_r[j] = own_1[j] * of_rate[j] + own_3[j] * of_rate[count + j];
+    }
+    for (std::size_t j = i; j < count; ++j) {
+      p_p[j] = own_0[j] * of_place[j] + own_2[j] * of_place[count + j];
+      r_p[j] = own_0[j] * of_rate[j] + own_2[j] * of_rate[count + j];
     }
     const double a_0 = own_0[i];
     const double a_1 = own_1[i];
     const double a_2 = own_2[i];
     const double a_3 = own_3[i];
     for (std::size_t j = 0; j < count; ++j) {
-      place[j] = a_0 * p_p[j] + a_2 * r_p[j];
       place[count + j] = a_0 * p_r[j] + a_2 * r_r[j];
+    }
+    for (std::size_t j = i; j < count; ++j) {
+      place[j] = a_0 * p_p[j] + a_2 * r_p[j];
       rate[count + j] = a_1 * p_r[j] + a_3 * r_r[j];
     }
     const auto at_base = [&](std::size_t column, double p, double r) {
@@ -394,7 +416,7 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
   cost_to_go_ = node_weight_[nodes_ - 1] * node_square_;
   add_rows(nodes_ - 1, cost_to_go_);
   for (std::size_t k = nodes_ - 1; k-- > 0;) {
-    weigh_rows(modes_.by_jerk, kBaseByJerk, by_input_);
+    by_input_.noalias() = cost_to_go_ * input_column_;
     const double middle = middle_weight_[k];
     const double curvature = window_->jerk_weight +
                              (jerk_weight != nullptr ? jerk_weight[k] : 0.0) +
@@ -408,15 +430,7 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
     carry_back();
     Eigen::Map<Vector> feedback(state(feedback_, k), static_cast<Eigen::Index>(n));
     const double node = node_weight_[k];
-    // The upper triangle and the stage's own cost, without what the input takes off.
-    for (std::size_t r = 0; r < n; ++r) {
-      double* const to = next_.data() + r * n;
-      const double* const of_middle = middle_square_.data() + r * n;
-      const double* const of_node = node_square_.data() + r * n;
-      for (std::size_t c = r; c < n; ++c) {
-        to[c] += middle * of_middle[c] + node * of_node[c];
-      }
-    }
+    add_squares(n, middle, middle_square_.data(), node, node_square_.data(), next_.data());
     if (prescribed(k)) {
       set_prescribed_feedback(k, feedback.data());
       inverse_curvature_[k] = 0.0;
@@ -426,13 +440,7 @@ bool StageForm::factor(const PerKind<const double*>& weights) {
       inverse_curvature_[k] = 1.0 / curvature;
       feedback = -inverse_curvature_[k] * cross_;
       pivot_row_ = std::sqrt(inverse_curvature_[k]) * cross_;
-      const double* const pivot = pivot_row_.data();
-      for (std::size_t r = 0; r < n; ++r) {
-        double* const to = next_.data() + r * n;
-        for (std::size_t c = r; c < n; ++c) {
-          to[c] -= pivot[r] * pivot[c];
-        }
-      }
+      take_off_square(n, pivot_row_.data(), next_.data());
     }
     add_rows(k, next_);
     for (std::size_t r = 1; r < n; ++r) {

@@ -112,9 +112,6 @@ class StageForm {
   [[nodiscard]] double swing(const Model& model, const double* z, std::size_t rate = 0) const;
   void split_rows(const std::vector<double>& states, const Padded& inputs,
                   const PerKind<bool>& kinds, PerKind<Padded>& rows) const;
-  // Σ f_i P_i over the rows of P, for factors of the modes' places and rates, and of the base's.
-  void weigh_rows(const std::array<std::vector<double>, 2>& of_modes,
-                  const std::array<double, 3>& of_base, Vector& sum) const;
   // The upper triangle of Φᵀ P Φ into next_, from cost_to_go_.
   void carry_back();
   [[nodiscard]] bool prescribed(std::size_t k) const;
@@ -152,6 +149,8 @@ class StageForm {
   Vector by_accel_;   // P a, the last column of P Φ
   Vector pivot_row_;  // what a stage's input takes off P, as the square of this row
   std::array<std::vector<double>, 4> in_rows_;  // a row of P Φ for a mode's place and rate
+  Vector accel_column_;                         // the last column of Φ
+  Vector input_column_;                         // B
   Vector by_input_;
   Vector cross_;
   double half_cost_ = 0.0;

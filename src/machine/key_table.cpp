@@ -439,7 +439,9 @@ constexpr std::array kKeys = {
 
     Key{"emit.period_ms", &setting<&S::emit, &T::period_ms>, Bounds{.min = 0.05, .max = 50.0}, "ms",
         "Node period: time between two points of the base's motion",
-        "1, or a twentieth of the shorter resonance's period", &derived<&S::period_ms>},
+        "1, or a twentieth of the shorter resonance's period; up to an eleventh where its gain is "
+        "small",
+        &derived<&S::period_ms>},
     Key{"emit.tolerance_um", &setting<&S::emit, &T::tolerance_um>,
         Bounds{.min = 0.0, .max = 1000.0}, "µm",
         "How far a straight line may move the nozzle from where the base's own curve would have it",

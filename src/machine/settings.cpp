@@ -7,6 +7,7 @@
 // v_max and a_max use the default cross-section even where another one is configured.
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -228,6 +229,20 @@ double AxisDynamics::fastest_hz() const {
   return modes.empty() ? freq_hz : std::ranges::max(modes, {}, &ModeSettings::freq_hz).freq_hz;
 }
 
+double AxisDynamics::good_period_ms() const {
+  constexpr double kFewestNodes = 11.0;
+  if (modes.empty()) {
+    return 1e3 / (kGoodNodesPerPeriod * freq_hz);
+  }
+  double shortest_ms = std::numeric_limits<double>::infinity();
+  for (const ModeSettings& mode : modes) {
+    const double nodes = std::clamp(kGoodNodesPerPeriod * std::sqrt(std::abs(mode.gain)),
+                                    kFewestNodes, kGoodNodesPerPeriod);
+    shortest_ms = std::min(shortest_ms, 1e3 / (nodes * mode.freq_hz));
+  }
+  return shortest_ms;
+}
+
 std::string AxisDynamics::description() const {
   if (modes.empty()) {
     return fmt::format("{:.4g} Hz, ζ {:.3g}", freq_hz, damping_ratio);
@@ -277,8 +292,8 @@ double Settings::emit_accel_mm_s2(double asked_mm_s2) const {
 
 double Settings::period_ms() const {
   constexpr double kLongest_ms = 1.0;
-  const double fastest_hz = std::max(dynamics_x.fastest_hz(), dynamics_y.fastest_hz());
-  return emit.period_ms.value_or(std::min(kLongest_ms, 1e3 / (kGoodNodesPerPeriod * fastest_hz)));
+  return emit.period_ms.value_or(
+      std::min({kLongest_ms, dynamics_x.good_period_ms(), dynamics_y.good_period_ms()}));
 }
 
 double Settings::tolerance_um() const {

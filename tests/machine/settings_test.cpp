@@ -373,6 +373,8 @@ TEST(Modes, AreReadAndWrittenBack) {
   EXPECT_DOUBLE_EQ(x.modes[1].gain, 0.2);
   EXPECT_EQ(x.freq_hz, 45.0);
   EXPECT_EQ(x.fastest_hz(), 110.0);
+  // The second mode has a gain of 0.2, for which eleven nodes in its period do.
+  EXPECT_DOUBLE_EQ(x.good_period_ms(), 1e3 / (11.0 * 110.0));
   EXPECT_EQ(x.description(), "45 Hz, ζ 0.06, gain 0.8 + 110 Hz, ζ 0.1, gain 0.2");
   const Result<Settings> again = parse(to_toml(*read), "again.toml", {});
   ASSERT_TRUE(again) << to_string(again.error());

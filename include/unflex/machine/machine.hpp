@@ -143,6 +143,9 @@ struct AxisDynamics {
 
   [[nodiscard]] double slowest_hz() const;
   [[nodiscard]] double fastest_hz() const;
+  // The node period at which a window follows all modes: a twentieth of the period of one with a
+  // gain of 1, and up to an eleventh where the gain is small.
+  [[nodiscard]] double good_period_ms() const;
   // "45 Hz, ζ 0.06", or that of each mode with its gain.
   [[nodiscard]] std::string description() const;
 };
@@ -188,7 +191,7 @@ struct SolveSettings {
 };
 
 struct EmitSettings {
-  // Node period; unset: 1 ms, or a twentieth of the faster resonance's period if that is shorter.
+  // Node period; unset: 1 ms, or AxisDynamics::good_period_ms() if that is shorter.
   std::optional<double> period_ms;
   // How far the shape of a line may move the nozzle. Unset: 0.25 µm at 45 Hz, in proportion to the
   // lower frequency, so that lines per second hardly depend on it.
