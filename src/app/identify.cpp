@@ -193,6 +193,9 @@ Result<ExitCode> make_test(const RunConfig& config, Console& console) {
   print.command = Command::compensate;
   print.print_name = "the test";
   print.overrides.emplace_back("second.shaper=none");
+  // A base that suits several models leaves more of the known modes behind.
+  print.overrides.emplace_back("dynamics.freq_error=0");
+  print.overrides.emplace_back("solve.along_weight=1");
   const Result<machine::Settings> settings = settings_of(print);
   if (!settings) {
     return tl::unexpected(settings.error());

@@ -33,8 +33,6 @@ struct Draft {
   // Parallel to key_table(): where the key was given last; empty while it has its default.
   std::vector<std::optional<SourcePlace>> places;
   std::string printer_file;  // the name it goes by in messages; empty if none is given
-  // The printer file's dynamics.freq_error, if it has one, is due to a shaper (klipper_shaper.hpp).
-  bool band_of_shaper = false;
 };
 
 }  // namespace unflex::machine

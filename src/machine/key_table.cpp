@@ -377,8 +377,9 @@ constexpr std::array kKeys = {
 
     Key{"dynamics.freq_error", &setting<&S::dynamics_error, &R::freq>,
         Bounds{.min = 0.0, .max = 0.5}, "",
-        "How far both frequencies may be off, either way, as a share; the base then suits them "
-        "all"},
+        "How far both frequencies may be off, either way, as a share; the base suits them all. 0: "
+        "the frequencies are exact",
+        "0.1", &derived<&S::freq_error>},
     Key{"dynamics.damping_error", &setting<&S::dynamics_error, &R::damping>,
         Bounds{.min = 0.0, .max = 0.9}, "",
         "How far both damping ratios may be off, either way, as a share"},

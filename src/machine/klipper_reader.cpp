@@ -262,7 +262,7 @@ class Reader {
     return std::string(text);
   }
 
-  // A shaper's frequency suits the shaper; the resonance follows from it within a band.
+  // A shaper's frequency suits the shaper; the resonance follows from it within a few percent.
   void resonance(const std::string& axis, const std::string& type, double shaper_freq_hz,
                  const SourcePlace& at) {
     const std::string key = "dynamics." + axis + ".freq_hz";
@@ -275,8 +275,6 @@ class Reader {
                            {key});
     }
     reading_.add(key, found->freq_hz, at);
-    freq_error_ = std::max(freq_error_, found->freq_error);
-    reading_.add("dynamics.freq_error", freq_error_, at);
     reading_.note(
         at,
         fmt::format("Klipper chooses {} at some {} times the resonance, so {} of {} Hz is taken "
@@ -312,7 +310,6 @@ class Reader {
   const KlipperConfig* config_;
   std::string file_;
   Reading reading_;
-  double freq_error_ = 0.0;  // the greater one of the axes
   std::optional<Error> failure_;
 };
 

@@ -76,7 +76,6 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
   };
   switch (source_kind(text)) {
     case SourceKind::klipper:
-      draft.band_of_shaper = true;
       return read_klipper(text, name).and_then(store);
     case SourceKind::marlin_dump:
       return read_marlin_dump(text, name).and_then(store);
@@ -187,20 +186,6 @@ void note_slow_z_motor(Draft& draft) {
            kKey, z_mm_s2, s.base_max_accel_mm_s2())});
 }
 
-// Drops the band that a shaper's frequency brought, if neither axis has its resonance from one.
-void forget_needless_band(Draft& draft) {
-  const auto is_overridden = [&](std::string_view key) {
-    const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
-    return place && place->file.starts_with(kOverrideMark);
-  };
-  constexpr std::string_view kBand = "dynamics.freq_error";
-  if (draft.band_of_shaper && !is_overridden(kBand) &&
-      std::ranges::all_of(kFrequencies, is_overridden, &AxisFrequency::key)) {
-    draft.settings.dynamics_error.freq = 0.0;
-    draft.places[*find_key(kBand)].reset();
-  }
-}
-
 bool is_known(const Note& note, const Draft& draft) {
   const auto given_by_others = [&](const std::string& key) {
     const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
@@ -302,7 +287,6 @@ Result<Settings> finish(Draft draft) {
     return tl::unexpected(checked.error());
   }
   judge_variant(draft);
-  forget_needless_band(draft);
   tell_notes(draft);
   note_odd_frequencies(draft);
   note_assumed_kinematics(draft);

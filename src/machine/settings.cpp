@@ -263,8 +263,13 @@ double Settings::tail_s() const {
   return std::max({kShortest, settling_time_s(dynamics_x), settling_time_s(dynamics_y)});
 }
 
+double Settings::freq_error() const {
+  constexpr double kUsual = 0.1;
+  return dynamics_error.freq.value_or(kUsual);
+}
+
 bool Settings::has_several_models() const {
-  return !dynamics_x.plants.empty() || !dynamics_y.plants.empty() || dynamics_error.freq > 0.0 ||
+  return !dynamics_x.plants.empty() || !dynamics_y.plants.empty() || freq_error() > 0.0 ||
          dynamics_error.damping > 0.0;
 }
 

@@ -88,20 +88,22 @@ constexpr double kMiddleShare = 1.0 / 3.0;
 
 // The edges of the band that the axis may be in; empty if there is no such band.
 std::vector<compensate::Plant> edges(const machine::AxisDynamics& dynamics,
-                                     const machine::DynamicsError& error) {
+                                     const machine::Settings& settings) {
+  const double freq_error = settings.freq_error();
+  const double damping_error = settings.dynamics_error.damping;
   std::vector<compensate::Plant> result;
-  if (error.freq <= 0.0 && error.damping <= 0.0) {
+  if (freq_error <= 0.0 && damping_error <= 0.0) {
     return result;
   }
   const auto add = [&](double freq_factor, double damping_factor) {
     result.push_back({axis(dynamics, freq_factor, damping_factor)});
   };
   for (const double sign : {-1.0, 1.0}) {
-    if (error.freq > 0.0 && error.damping > 0.0) {
-      add(1.0 + sign * error.freq, 1.0 - error.damping);
-      add(1.0 + sign * error.freq, 1.0 + error.damping);
+    if (freq_error > 0.0 && damping_error > 0.0) {
+      add(1.0 + sign * freq_error, 1.0 - damping_error);
+      add(1.0 + sign * freq_error, 1.0 + damping_error);
     } else {
-      add(1.0 + sign * error.freq, 1.0 + sign * error.damping);
+      add(1.0 + sign * freq_error, 1.0 + sign * damping_error);
     }
   }
   return result;
@@ -110,14 +112,14 @@ std::vector<compensate::Plant> edges(const machine::AxisDynamics& dynamics,
 // All models that the axis may have besides the one it is given as: the plants of the settings, and
 // the edges of the band around that one, which share with it what the plants leave.
 std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
-                                      const machine::DynamicsError& error) {
+                                      const machine::Settings& settings) {
   std::vector<compensate::Plant> result;
   double left = 1.0;
   for (const machine::PlantSettings& plant : dynamics.plants) {
     result.push_back({axis(plant.modes), plant.share});
     left -= plant.share;
   }
-  std::vector<compensate::Plant> band = edges(dynamics, error);
+  std::vector<compensate::Plant> band = edges(dynamics, settings);
   for (compensate::Plant& edge : band) {
     edge.share = left * (1.0 - kMiddleShare) / static_cast<double>(band.size());
     result.push_back(edge);
@@ -148,7 +150,7 @@ compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
                                  const machine::Settings& settings) {
   compensate::AxisSetup setup;
   setup.axis = axis(dynamics);
-  setup.plants = plants(dynamics, settings.dynamics_error);
+  setup.plants = plants(dynamics, settings);
   setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
   setup.limits.max_accel_mm_s2 = planned_base_accel(settings, 0.0);
   if (settings.base.max_jerk_mm_s3 > 0.0) {

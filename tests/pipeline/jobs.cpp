@@ -26,7 +26,10 @@ const report::DeviationRows& unshaped(const report::Report& report) {
 }
 
 machine::Settings settings(const std::vector<std::string>& overrides) {
-  Result<machine::Settings> loaded = machine::load(std::nullopt, overrides);
+  // Frequencies are exact unless a test says otherwise.
+  std::vector<std::string> all = {"dynamics.freq_error=0"};
+  all.insert(all.end(), overrides.begin(), overrides.end());
+  Result<machine::Settings> loaded = machine::load(std::nullopt, all);
   EXPECT_TRUE(loaded.has_value()) << to_string(loaded.error());
   // A Klipper has a shaper, so that every test sees it switched off and on again.
   machine::PrinterSettings& printer = loaded->printer;

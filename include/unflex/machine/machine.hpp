@@ -152,7 +152,7 @@ struct AxisDynamics {
 
 // By what share the axes' frequencies and damping ratios may be off, either way.
 struct DynamicsError {
-  double freq = 0.0;
+  std::optional<double> freq;  // unset: Settings::freq_error()
   double damping = 0.0;
 };
 
@@ -277,6 +277,9 @@ struct Settings {
   // base_max_accel_mm_s2() over what the plan asks; 0: it does not follow the plan.
   [[nodiscard]] double base_accel_times_asked() const;
   [[nodiscard]] double tail_s() const;
+  // By what share the frequencies may be off. A band of 10 % costs little where they are right, and
+  // at 5 % off it is better than a band of 5 % (docs/theory.md).
+  [[nodiscard]] double freq_error() const;
   // Whether the base is to suit more models than the axes as given.
   [[nodiscard]] bool has_several_models() const;
   [[nodiscard]] double along_weight() const;
