@@ -11,18 +11,24 @@ namespace unflex::compensate {
 namespace {
 
 constexpr int kRounds = 12;
-constexpr double kOverRelaxation = 1.7;
+// In so many rounds the nearest place is looked for as far as the contour reaches.
+constexpr int kWideRounds = 3;
+constexpr std::size_t kAround = 4;  // edges
+constexpr double kOverRelaxation = 1.85;
+// What q may still move by when it counts as found.
+constexpr double kSettled_mm = 3e-4;
 constexpr double kCornerReach_s = 1e-3;
 
 struct Place {
   double x_mm = 0.0;
   double y_mm = 0.0;
+  std::size_t vertex = 0;  // where the edge begins that it lies on
 };
 
 // The place nearest to p on the edges from vertex `first` to vertex `last`.
 Place nearest(const std::vector<PathVertex>& path, std::size_t first, std::size_t last,
               const Place& p) {
-  Place found{path[first].x_mm, path[first].y_mm};
+  Place found{path[first].x_mm, path[first].y_mm, first};
   double least =
       (found.x_mm - p.x_mm) * (found.x_mm - p.x_mm) + (found.y_mm - p.y_mm) * (found.y_mm - p.y_mm);
   for (std::size_t i = first; i < last; ++i) {
@@ -34,7 +40,7 @@ Place nearest(const std::vector<PathVertex>& path, std::size_t first, std::size_
     }
     const double s = std::clamp(
         ((p.x_mm - path[i].x_mm) * dx + (p.y_mm - path[i].y_mm) * dy) / square, 0.0, 1.0);
-    const Place place{path[i].x_mm + s * dx, path[i].y_mm + s * dy};
+    const Place place{path[i].x_mm + s * dx, path[i].y_mm + s * dy, i};
     const double away = (place.x_mm - p.x_mm) * (place.x_mm - p.x_mm) +
                         (place.y_mm - p.y_mm) * (place.y_mm - p.y_mm);
     if (away < least) {
@@ -59,7 +65,7 @@ class Aiming {
     nearest_.assign(contour_.pairs.size(), std::vector<Place>(samples_, none));
     for (std::vector<Place>& places : nearest_) {
       for (std::size_t i = 0; i < samples_; ++i) {
-        places[i] = {window_.x.reference_mm[i], window_.y.reference_mm[i]};
+        places[i] = {window_.x.reference_mm[i], window_.y.reference_mm[i], 0};
       }
     }
     set_aims();
@@ -74,14 +80,17 @@ class Aiming {
         [](const Place& place) { return place.y_mm; });
   }
 
-  // Takes q farther towards the places nearest to the nozzles.
-  void follow(const std::vector<std::vector<double>>& x_mm,
-              const std::vector<std::vector<double>>& y_mm) {
+  // Takes q farther towards the places nearest to the nozzles, at nodes; in the middles between
+  // them it is as far from r as on the average of both nodes. Returns the longest way that a q
+  // went.
+  double follow(const std::vector<std::vector<double>>& x_mm,
+                const std::vector<std::vector<double>>& y_mm, bool everywhere) {
     const double reach = 2.0 * contour_.reach_s / window_.x.period_s;
     const std::vector<PathVertex>& path = window_.path;
     std::size_t first = 0;
     std::size_t last = 0;
-    for (std::size_t i = 0; i < samples_; ++i) {
+    double farthest = 0.0;
+    for (std::size_t i = 0; i < samples_; i += 2) {
       const auto now = static_cast<double>(i);
       while (first + 1 < path.size() && path[first + 1].sample < now - reach) {
         ++first;
@@ -91,15 +100,35 @@ class Aiming {
       }
       for (std::size_t c = 0; c < contour_.pairs.size(); ++c) {
         const ModelPair& pair = contour_.pairs[c];
-        const Place found = nearest(path, first, last, {x_mm[pair.x][i], y_mm[pair.y][i]});
-        Place& q = nearest_[c][i];
-        q.x_mm += kOverRelaxation * (found.x_mm - q.x_mm);
-        q.y_mm += kOverRelaxation * (found.y_mm - q.y_mm);
+        std::vector<Place>& places = nearest_[c];
+        const std::size_t around = places[i].vertex;
+        const std::size_t from =
+            everywhere || around < first + kAround ? first : std::min(around - kAround, last);
+        const std::size_t to = everywhere ? last : std::min(last, around + kAround);
+        const Place found = nearest(path, from, to, {x_mm[pair.x][i], y_mm[pair.y][i]});
+        const double x = kOverRelaxation * (found.x_mm - places[i].x_mm);
+        const double y = kOverRelaxation * (found.y_mm - places[i].y_mm);
+        places[i].x_mm += x;
+        places[i].y_mm += y;
+        places[i].vertex = found.vertex;
+        farthest = std::max({farthest, std::abs(x), std::abs(y)});
+        if (i > 0) {
+          places[i - 1] = between(places, i - 1);
+        }
       }
     }
+    return farthest;
   }
 
  private:
+  [[nodiscard]] Place between(const std::vector<Place>& places, std::size_t i) const {
+    const auto off = [&](const std::vector<double>& r, double before, double after) {
+      return r[i] + 0.5 * (before - r[i - 1] + after - r[i + 1]);
+    };
+    return {off(window_.x.reference_mm, places[i - 1].x_mm, places[i + 1].x_mm),
+            off(window_.y.reference_mm, places[i - 1].y_mm, places[i + 1].y_mm), 0};
+  }
+
   // ε + λ of each sample.
   void set_along_weights() {
     along_.assign(samples_, contour_.along_weight);
@@ -208,8 +237,11 @@ void aim(RunWindow& window) {
   for (int round = 0; round < kRounds; ++round) {
     x.solve();
     y.solve();
-    aiming.follow(x.nozzles_mm(), y.nozzles_mm());
+    const double farthest = aiming.follow(x.nozzles_mm(), y.nozzles_mm(), round < kWideRounds);
     aiming.set_aims();
+    if (farthest < kSettled_mm) {
+      break;
+    }
   }
 }
 

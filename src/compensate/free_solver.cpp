@@ -16,17 +16,14 @@ FreeSolver::FreeSolver(const AxisWindow& window) {
 }
 
 void FreeSolver::solve() {
-  // The second step takes back what the first one lost by rounding.
-  constexpr int kSteps = 2;
   scaled_.set_aims();
   std::visit(
       [&](auto& form) {
         form.set_aims();
-        for (int step = 0; step < kSteps; ++step) {
-          form.evaluate({});
-          form.solve({});
-          form.advance(1.0);
-        }
+        // What a step loses by rounding the next one, for other aims, takes back.
+        form.evaluate({});
+        form.solve({});
+        form.advance(1.0);
         form.write_nozzles(nozzles_mm_);
       },
       form_);

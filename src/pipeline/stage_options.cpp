@@ -109,8 +109,21 @@ std::vector<compensate::Plant> edges(const machine::AxisDynamics& dynamics,
   return result;
 }
 
-// All models that the axis may have besides the one it is given as: the plants of the settings, and
-// the edges of the band around that one, which share with it what the plants leave.
+// Most axes have a second mode that whoever gives one frequency does not know. A base that suits
+// this one, too, does not move at such frequencies more than it must.
+compensate::Plant with_unknown_mode(const machine::AxisDynamics& dynamics) {
+  constexpr double kTimesFaster = 2.4;
+  constexpr double kGain = 0.2;
+  constexpr double kShare = 0.04;
+  const std::vector<machine::ModeSettings> modes = {
+      {dynamics.freq_hz, dynamics.damping_ratio, 1.0 - kGain},
+      {kTimesFaster * dynamics.freq_hz, dynamics.damping_ratio, kGain}};
+  return {axis(modes), kShare};
+}
+
+// All models that the axis may have besides the one it is given as: the plants of the settings or
+// a mode that nobody knows of, and the edges of the band around that one, which share with it what
+// the others leave.
 std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
                                       const machine::Settings& settings) {
   std::vector<compensate::Plant> result;
@@ -120,6 +133,10 @@ std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
     left -= plant.share;
   }
   std::vector<compensate::Plant> band = edges(dynamics, settings);
+  if (!band.empty() && dynamics.plants.empty() && dynamics.modes.empty()) {
+    result.push_back(with_unknown_mode(dynamics));
+    left -= result.back().share;
+  }
   for (compensate::Plant& edge : band) {
     edge.share = left * (1.0 - kMiddleShare) / static_cast<double>(band.size());
     result.push_back(edge);
