@@ -12,8 +12,8 @@ namespace {
 
 constexpr int kRounds = 12;
 // In so many rounds the nearest place is looked for as far as the contour reaches.
-constexpr int kWideRounds = 3;
-constexpr std::size_t kAround = 4;  // edges
+constexpr int kWideRounds = 2;
+constexpr std::size_t kAround = 2;  // edges
 constexpr double kOverRelaxation = 1.85;
 // What q may still move by when it counts as found.
 constexpr double kSettled_mm = 3e-4;
@@ -25,22 +25,39 @@ struct Place {
   std::size_t vertex = 0;  // where the edge begins that it lies on
 };
 
+// An edge of the path: from a vertex to the next.
+struct Edge {
+  double x_mm = 0.0;
+  double y_mm = 0.0;
+  double dx_mm = 0.0;
+  double dy_mm = 0.0;
+  double inverse_square = 0.0;  // of its length; 0 if it has none
+};
+
+std::vector<Edge> edges_of(const std::vector<PathVertex>& path) {
+  std::vector<Edge> edges;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const PathVertex& next = path[std::min(i + 1, path.size() - 1)];
+    const double dx = next.x_mm - path[i].x_mm;
+    const double dy = next.y_mm - path[i].y_mm;
+    const double square = dx * dx + dy * dy;
+    edges.push_back({path[i].x_mm, path[i].y_mm, dx, dy, square > 0.0 ? 1.0 / square : 0.0});
+  }
+  return edges;
+}
+
 // The place nearest to p on the edges from vertex `first` to vertex `last`.
-Place nearest(const std::vector<PathVertex>& path, std::size_t first, std::size_t last,
-              const Place& p) {
-  Place found{path[first].x_mm, path[first].y_mm, first};
+Place nearest(const std::vector<Edge>& edges, std::size_t first, std::size_t last, const Place& p) {
+  Place found{edges[first].x_mm, edges[first].y_mm, first};
   double least =
       (found.x_mm - p.x_mm) * (found.x_mm - p.x_mm) + (found.y_mm - p.y_mm) * (found.y_mm - p.y_mm);
   for (std::size_t i = first; i < last; ++i) {
-    const double dx = path[i + 1].x_mm - path[i].x_mm;
-    const double dy = path[i + 1].y_mm - path[i].y_mm;
-    const double square = dx * dx + dy * dy;
-    if (square == 0.0) {
-      continue;
-    }
-    const double s = std::clamp(
-        ((p.x_mm - path[i].x_mm) * dx + (p.y_mm - path[i].y_mm) * dy) / square, 0.0, 1.0);
-    const Place place{path[i].x_mm + s * dx, path[i].y_mm + s * dy, i};
+    const Edge& edge = edges[i];
+    const double s =
+        std::clamp(((p.x_mm - edge.x_mm) * edge.dx_mm + (p.y_mm - edge.y_mm) * edge.dy_mm) *
+                       edge.inverse_square,
+                   0.0, 1.0);
+    const Place place{edge.x_mm + s * edge.dx_mm, edge.y_mm + s * edge.dy_mm, i};
     const double away = (place.x_mm - p.x_mm) * (place.x_mm - p.x_mm) +
                         (place.y_mm - p.y_mm) * (place.y_mm - p.y_mm);
     if (away < least) {
@@ -54,7 +71,10 @@ Place nearest(const std::vector<PathVertex>& path, std::size_t first, std::size_
 class Aiming {
  public:
   explicit Aiming(RunWindow& window)
-      : window_(window), contour_(*window.contour), samples_(window.x.reference_mm.size()) {
+      : window_(window),
+        contour_(*window.contour),
+        samples_(window.x.reference_mm.size()),
+        edges_(edges_of(window.path)) {
     set_along_weights();
     for (std::size_t i = 0; i < samples_; ++i) {
       const double factor = 1.0 + along_[i];
@@ -105,7 +125,7 @@ class Aiming {
         const std::size_t from =
             everywhere || around < first + kAround ? first : std::min(around - kAround, last);
         const std::size_t to = everywhere ? last : std::min(last, around + kAround);
-        const Place found = nearest(path, from, to, {x_mm[pair.x][i], y_mm[pair.y][i]});
+        const Place found = nearest(edges_, from, to, {x_mm[pair.x][i], y_mm[pair.y][i]});
         const double x = kOverRelaxation * (found.x_mm - places[i].x_mm);
         const double y = kOverRelaxation * (found.y_mm - places[i].y_mm);
         places[i].x_mm += x;
@@ -159,6 +179,11 @@ class Aiming {
           }
         }
       }
+      if (share == 0.0) {
+        // Nobody asks where this model's nozzle is.
+        aim = axis.reference_mm;
+        continue;
+      }
       for (std::size_t i = 0; i < samples_; ++i) {
         aim[i] = (aim[i] / share + along_[i] * axis.reference_mm[i]) / (1.0 + along_[i]);
       }
@@ -168,6 +193,7 @@ class Aiming {
   RunWindow& window_;
   const Contour& contour_;
   std::size_t samples_;
+  std::vector<Edge> edges_;
   std::vector<double> along_;
   std::vector<std::vector<Place>> nearest_;  // q of each pair
 };

@@ -176,6 +176,17 @@ TEST(ContourWindow, IsTheTrackingWindowIfAlongWeighsAsMuchAsMuchMore) {
   }
 }
 
+TEST(ContourWindow, TakesAModelWithoutAnyShare) {
+  const auto moves = corners();
+  compensate::Setup setup = robust(0.1);
+  setup.x.plants.push_back({kAxis.detuned(1.2), 0.0});
+  const Path path = nozzle_path(moves, with_contour(setup), 1.0, 1.0);
+  const Path without = nozzle_path(moves, with_contour(robust(0.1)), 1.0, 1.0);
+  for (std::size_t i = 0; i < path.x_mm.size(); i += 50) {
+    EXPECT_NEAR(path.x_mm[i], without.x_mm[i], 1e-5);
+  }
+}
+
 TEST(ContourWindow, IsAProblemOfEachAxisThatBothEnginesSolveAlike) {
   const auto moves =
       testing::plan({{0.0, 0.0}, {6.0, 0.0}, {6.0, 4.0}}, planner_limits(100.0, 5000.0, 5.0));
