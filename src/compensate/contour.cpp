@@ -68,6 +68,15 @@ Place nearest(const std::vector<Edge>& edges, std::size_t first, std::size_t las
   return found;
 }
 
+// Whether the path bends by more than 20° between the directions.
+bool is_sharp(const gcode::Position& before, const gcode::Position& after) {
+  constexpr double kCosine = 0.9397;
+  const double lengths =
+      std::hypot(before[gcode::X], before[gcode::Y]) * std::hypot(after[gcode::X], after[gcode::Y]);
+  return before[gcode::X] * after[gcode::X] + before[gcode::Y] * after[gcode::Y] <
+         kCosine * lengths;
+}
+
 class Aiming {
  public:
   explicit Aiming(RunWindow& window)
@@ -81,13 +90,11 @@ class Aiming {
       window_.x.weight[i] *= factor;
       window_.y.weight[i] *= factor;
     }
-    const Place none;
-    nearest_.assign(contour_.pairs.size(), std::vector<Place>(samples_, none));
-    for (std::vector<Place>& places : nearest_) {
-      for (std::size_t i = 0; i < samples_; ++i) {
-        places[i] = {window_.x.reference_mm[i], window_.y.reference_mm[i], 0};
-      }
+    std::vector<Place> reference;
+    for (std::size_t i = 0; i < samples_; ++i) {
+      reference.push_back({window_.x.reference_mm[i], window_.y.reference_mm[i], 0});
     }
+    nearest_.assign(contour_.pairs.size(), reference);
     set_aims();
   }
 
@@ -180,7 +187,7 @@ class Aiming {
         }
       }
       if (share == 0.0) {
-        // Nobody asks where this model's nozzle is.
+        // No pair holds this model, as its share is zero. So its aim has no weight.
         aim = axis.reference_mm;
         continue;
       }
@@ -242,6 +249,45 @@ void add_in_order(std::vector<ModelShare> x, std::vector<ModelShare> y, double w
 }
 
 }  // namespace
+
+std::vector<PathVertex> path_of(const Course& course, double origin_s, double period_s) {
+  std::vector<PathVertex> path;
+  double time_s = origin_s - planner::duration_s(course.before);
+  const gcode::Position* direction = nullptr;  // of the last move in X and Y
+  const auto add = [&](const gcode::Position& place, bool sharp) {
+    path.push_back({place[gcode::X], place[gcode::Y], 2.0 * time_s / period_s, sharp});
+  };
+  for (const Course::Moves& moves : {course.before, course.moves, course.after}) {
+    for (const planner::PlannedMove& move : moves) {
+      if (path.empty()) {
+        add(move.position_mm(0.0), true);
+      }
+      time_s += move.duration_s();
+      const bool is_flat = move.direction[gcode::X] != 0.0 || move.direction[gcode::Y] != 0.0;
+      if (is_flat && direction != nullptr && is_sharp(*direction, move.direction)) {
+        path.back().is_sharp = true;
+      }
+      direction = is_flat ? &move.direction : direction;
+      add(move.position_mm(move.duration_s()), false);
+    }
+  }
+  path.back().is_sharp = true;
+  return path;
+}
+
+std::vector<PathVertex> part_of(const std::vector<PathVertex>& path, std::size_t first,
+                                std::size_t samples, double reach) {
+  const double from = static_cast<double>(first) - reach;
+  const double to = static_cast<double>(first + samples) + reach;
+  const auto begin = std::ranges::lower_bound(path, from, {}, &PathVertex::sample);
+  const auto end = std::ranges::upper_bound(path, to, {}, &PathVertex::sample);
+  std::vector<PathVertex> part(begin == path.begin() ? begin : begin - 1,
+                               end == path.end() ? end : end + 1);
+  for (PathVertex& vertex : part) {
+    vertex.sample -= static_cast<double>(first);
+  }
+  return part;
+}
 
 std::vector<ModelPair> pairs_of(const AxisSetup& x, const AxisSetup& y) {
   constexpr double kOppositeWays = 0.3;

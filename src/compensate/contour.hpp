@@ -4,21 +4,34 @@
 //
 //   c  pairs of a model of X and one of Y, with shares α_c
 //   q  the place of the path nearest to p_c, among those that r passes within a reach of the time
-//   λ  3 within a ms of sharp corners, which the nozzle would else cut, and 0 elsewhere
+//   λ  5 within a ms of sharp corners, which the nozzle would else cut, and 0 elsewhere
 //
 // q follows p_c. For a given q the cost is one of X plus one of Y, each a sum of squares of an
 // AxisWindow:
 //
 //   w (1 + ε + λ) Σ_i α_i (p_i − a_i)²     a_i = (q̄_i + (ε + λ) r) / (1 + ε + λ)
 //
-// where q̄_i is the mean of q over the pairs that hold model i. So both axes are solved in turns
-// with finding q anew. Each turn q goes 1.7 times as far as it should, since what is left of the
+// where q̄_i is the mean of q over the pairs that hold model i. So solving both axes and finding q
+// anew alternate. In each round q goes farther than to the nearest place, since what is left of the
 // error along the path falls slowly otherwise.
 #pragma once
+
+#include <cstddef>
+#include <vector>
 
 #include "unflex/compensate/run.hpp"
 
 namespace unflex::compensate {
+
+// The vertices of a course's path, in half node periods from its first node on.
+// origin_s: when the course's own moves begin.
+[[nodiscard]] std::vector<PathVertex> path_of(const Course& course, double origin_s,
+                                              double period_s);
+
+// The part of the path that a window of so many samples needs, from this sample on. reach: in half
+// node periods.
+[[nodiscard]] std::vector<PathVertex> part_of(const std::vector<PathVertex>& path,
+                                              std::size_t first, std::size_t samples, double reach);
 
 // Finds q, and sets aims and weights of the window. Its limits do not count for q.
 void aim(RunWindow& window);

@@ -100,57 +100,6 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
   return window;
 }
 
-// Whether the path bends by more than 20° between the directions.
-bool is_sharp(const gcode::Position& before, const gcode::Position& after) {
-  constexpr double kCosine = 0.9397;
-  const double lengths =
-      std::hypot(before[gcode::X], before[gcode::Y]) * std::hypot(after[gcode::X], after[gcode::Y]);
-  return before[gcode::X] * after[gcode::X] + before[gcode::Y] * after[gcode::Y] <
-         kCosine * lengths;
-}
-
-// The vertices of a course's path, in half node periods from its first node on.
-// origin_s: when the course's own moves begin.
-std::vector<PathVertex> path_of(const Course& course, double origin_s, double period_s) {
-  std::vector<PathVertex> path;
-  double time_s = origin_s - planner::duration_s(course.before);
-  const gcode::Position* direction = nullptr;  // of the last move in X and Y
-  const auto add = [&](const gcode::Position& place, bool sharp) {
-    path.push_back({place[gcode::X], place[gcode::Y], 2.0 * time_s / period_s, sharp});
-  };
-  for (const Course::Moves& moves : {course.before, course.moves, course.after}) {
-    for (const planner::PlannedMove& move : moves) {
-      if (path.empty()) {
-        add(move.position_mm(0.0), true);
-      }
-      time_s += move.duration_s();
-      const bool is_flat = move.direction[gcode::X] != 0.0 || move.direction[gcode::Y] != 0.0;
-      if (is_flat && direction != nullptr && is_sharp(*direction, move.direction)) {
-        path.back().is_sharp = true;
-      }
-      direction = is_flat ? &move.direction : direction;
-      add(move.position_mm(move.duration_s()), false);
-    }
-  }
-  path.back().is_sharp = true;
-  return path;
-}
-
-// The part of the path that a window of so many samples needs, from this sample on.
-std::vector<PathVertex> part_of(const std::vector<PathVertex>& path, std::size_t first,
-                                std::size_t samples, double reach) {
-  const double from = static_cast<double>(first) - reach;
-  const double to = static_cast<double>(first + samples) + reach;
-  const auto begin = std::ranges::lower_bound(path, from, {}, &PathVertex::sample);
-  const auto end = std::ranges::upper_bound(path, to, {}, &PathVertex::sample);
-  std::vector<PathVertex> part(begin == path.begin() ? begin : begin - 1,
-                               end == path.end() ? end : end + 1);
-  for (PathVertex& vertex : part) {
-    vertex.sample -= static_cast<double>(first);
-  }
-  return part;
-}
-
 }  // namespace
 
 Plant AxisWindow::model(std::size_t i) const {
@@ -365,6 +314,19 @@ AxisSolution along(const AxisWindow& window) {
       nodes, (window.reference_mm.back() - window.reference_mm.front()) / duration_s);
   solution.base.accel_mm_s2.assign(nodes, 0.0);
   return solution;
+}
+
+void prepare(const Engine& divider, const WindowSpan& span, RunWindow& window) {
+  if (span.cruise) {
+    return;
+  }
+  if (window.contour) {
+    aim(window);
+  }
+  if (window.shares_motors) {
+    // The solution counts for its limits alone.
+    static_cast<void>(solve_with_shared_motors(divider, window));
+  }
 }
 
 AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window) {

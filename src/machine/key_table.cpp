@@ -418,8 +418,7 @@ constexpr std::array kKeys = {
         "Part of a long run that is solved at once"},
     Key{"solve.overlap_s", &setting<&S::solve, &O::overlap_s>, Bounds{.min = 0.0, .max = 10.0}, "s",
         "How much of its neighbours on either side such a part takes into account, at least; axes "
-        "of "
-        "several modes need more"},
+        "of several modes and a base that suits several models need more"},
     Key{"solve.lead_in_ms", &setting<&S::solve, &O::lead_in_ms>, Bounds{.min = 0.0, .max = 1000.0},
         "ms", "How long before the plan the base may start"},
     Key{"solve.tail_ms", &setting<&S::solve, &O::tail_ms>, Bounds{.min = 0.0, .max = 1000.0}, "ms",

@@ -295,10 +295,13 @@ double Settings::emit_accel_mm_s2(double asked_mm_s2) const {
                                        : kEmitAccel_mm_s2);
 }
 
+double Settings::good_period_ms() const {
+  return std::min(dynamics_x.good_period_ms(), dynamics_y.good_period_ms());
+}
+
 double Settings::period_ms() const {
   constexpr double kLongest_ms = 1.0;
-  return emit.period_ms.value_or(
-      std::min({kLongest_ms, dynamics_x.good_period_ms(), dynamics_y.good_period_ms()}));
+  return emit.period_ms.value_or(std::min(kLongest_ms, good_period_ms()));
 }
 
 double Settings::tolerance_um() const {

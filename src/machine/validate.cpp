@@ -381,10 +381,6 @@ double fastest_freq_hz(const Settings& settings) {
   return std::max(settings.dynamics_x.fastest_hz(), settings.dynamics_y.fastest_hz());
 }
 
-double good_period_ms(const Settings& settings) {
-  return std::min(settings.dynamics_x.good_period_ms(), settings.dynamics_y.good_period_ms());
-}
-
 Status check_grid(const Draft& draft) {
   const Settings& s = draft.settings;
   const double longest_ms = 1e3 / (kLeastNodesPerPeriod * fastest_freq_hz(s));
@@ -393,7 +389,7 @@ Status check_grid(const Draft& draft) {
                     fmt::format("emit.period_ms is {}, too long for a resonance at {:.4g} Hz; "
                                 "at most {}, better {}",
                                 s.period_ms(), fastest_freq_hz(s), at_most(longest_ms),
-                                at_most(good_period_ms(s))));
+                                at_most(s.good_period_ms())));
   }
   if (s.solve.overlap_s > s.solve.window_s) {
     return conflict(draft, {"solve.overlap_s", "solve.window_s"},
@@ -423,7 +419,7 @@ Status check_consistency(const Draft& draft) {
 
 std::vector<std::string> recommendations(const Settings& settings) {
   std::vector<std::string> remarks;
-  const double good_ms = good_period_ms(settings);
+  const double good_ms = settings.good_period_ms();
   if (settings.period_ms() > good_ms) {
     remarks.push_back(
         fmt::format("emit.period_ms is {}; at {:.4g} Hz {} or less follows the path better",

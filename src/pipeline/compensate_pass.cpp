@@ -305,11 +305,7 @@ class Compensator {
   void solve_in_process(const std::shared_ptr<RunJob>& job, std::size_t first, std::size_t count) {
     std::vector<compensate::RunWindow> windows = windows_of(*job, first, count);
     for (std::size_t i = 0; i < count; ++i) {
-      if ((windows[i].shares_motors || windows[i].contour) && !job->spans[first + i].cruise) {
-        // This only finds the aims and divides the motors' limits, so that each axis is a problem
-        // of its own. The process finds the solution.
-        static_cast<void>(compensate::solve(*divider_, job->spans[first + i], windows[i]));
-      }
+      compensate::prepare(*divider_, job->spans[first + i], windows[i]);
       for (std::size_t axis = 0; axis < 2; ++axis) {
         tickets_.push_back({job, first + i, axis});
         const compensate::AxisWindow& window = axis == 0 ? windows[i].x : windows[i].y;

@@ -155,6 +155,10 @@ struct RunWindow {
 using AxisSolutions = std::array<Result<AxisSolution>, 2>;
 [[nodiscard]] AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& window);
 
+// Makes each axis of a window a problem of its own, as solve() does, for an engine that solves it
+// elsewhere. divider: solves here what has to be solved for that.
+void prepare(const Engine& divider, const WindowSpan& span, RunWindow& window);
+
 // Joins the solutions of the windows, in the order of `spans`, blending over the middle of each
 // overlap.
 [[nodiscard]] dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,

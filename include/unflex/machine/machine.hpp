@@ -286,6 +286,8 @@ struct Settings {
   [[nodiscard]] double jerk_weight() const;
   // jerk_weight() as it is where along_weight() is 1.
   [[nodiscard]] double tracking_jerk_weight() const;
+  // The shorter AxisDynamics::good_period_ms() of both axes.
+  [[nodiscard]] double good_period_ms() const;
   [[nodiscard]] double period_ms() const;
   [[nodiscard]] double tolerance_um() const;
   [[nodiscard]] double emit_accel_mm_s2(double asked_mm_s2) const;
