@@ -1,11 +1,13 @@
 #include "unflex/verify/verify.hpp"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <istream>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -14,6 +16,7 @@
 #include "stage_options.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "unflex/planner/printer_shaper.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -57,6 +60,37 @@ Status check_measure(std::istream& input, const std::string& name) {
   return {};
 }
 
+// "MZV 48"
+std::string shaper_text(std::string type, double freq_hz) {
+  if (!(freq_hz > 0.0)) {
+    return "none";
+  }
+  std::ranges::transform(type, type.begin(), [](char c) {
+    return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+  });
+  return fmt::format("{} {:.4g}", type, freq_hz);
+}
+
+// The shaper that the printer's configuration has, whatever the print sets.
+std::optional<record::PrinterShaper> printer_shaper(const verify::Rules& rules) {
+  gcode::Shaper shaper;
+  shaper.freq_x_hz = rules.interpreter.shaper_freq_x_hz;
+  shaper.freq_y_hz = rules.interpreter.shaper_freq_y_hz;
+  planner::Shaping shaping = planner::shaping(rules.fixed, shaper);
+  if (!shaping.acts()) {
+    return std::nullopt;
+  }
+  const planner::InstalledShaper& installed = rules.fixed.shaper;
+  std::string name = shaper_text(installed.type_x, shaper.freq_x_hz);
+  if (const std::string y = shaper_text(installed.type_y, shaper.freq_y_hz); y != name) {
+    const bool differs_in_hz_only =
+        installed.type_x == installed.type_y && !shaping.x.empty() && !shaping.y.empty();
+    name += "/" + (differs_in_hz_only ? fmt::format("{:.4g}", shaper.freq_y_hz) : y);
+  }
+  return record::PrinterShaper{"printer's " + name + " Hz", std::move(shaping.x),
+                               std::move(shaping.y)};
+}
+
 double cpu_s(int who) {
   rusage usage{};
   getrusage(who, &usage);
@@ -88,6 +122,7 @@ report::Report new_report(std::string command, const Job& job) {
   report.input = job.input_name;
   report.output = job.output_name;
   report.firmware = to_string(job.settings.printer.firmware);
+  report.freq_error = job.settings.freq_error();
   for (machine::SettingRow& setting : machine::rows(job.settings)) {
     report.printer.push_back(
         {std::move(setting.key), std::move(setting.value), std::move(setting.origin)});
@@ -101,6 +136,7 @@ std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rul
   }
   record::Options options;
   options.nozzle = rules.nozzle;
+  options.printer_shaper = printer_shaper(rules);
   return std::make_unique<record::Recorder>(options);
 }
 

@@ -49,7 +49,7 @@ Recorder::Gatherer::Gatherer(const Options& options, std::size_t machines)
     : store_(options.paths_bytes),
       versions_{Version(half_width_s(options.nozzle), options.places),
                 Version(half_width_s(options.nozzle), options.places)},
-      bench_(options.nozzle, machines) {}
+      bench_(options.nozzle, options.printer_shaper, machines) {}
 
 void Recorder::Gatherer::line(const gcode::Line& line) {
   features_.read(line.content(), line.number);

@@ -1,6 +1,6 @@
 #include "unflex/record/recorder.hpp"
 
-#include <array>
+#include <algorithm>
 #include <span>
 
 #include "gatherer.hpp"
@@ -9,7 +9,8 @@ namespace unflex::record {
 namespace {
 
 // Number of negative frequency errors, which come first.
-constexpr std::size_t kBelow = 2;
+constexpr std::ptrdiff_t kBelow =
+    std::ranges::count_if(verify::kFrequencyErrors, [](double error) { return error < 0.0; });
 
 report::Spread spread(const verify::Deviation& deviation) {
   return {deviation.extruding.contour_max_mm, deviation.extruding.contour_rms_mm};
@@ -19,7 +20,7 @@ report::Spread spread(const verify::Deviation& deviation) {
 template <class Value>
 std::vector<Value> in_order(const Value& main, const std::vector<Value>& others) {
   std::vector<Value> result = others;
-  result.insert(result.begin() + static_cast<std::ptrdiff_t>(kBelow), main);
+  result.insert(result.begin() + kBelow, main);
   return result;
 }
 
@@ -37,17 +38,27 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
   report::Recording recording = gatherer_->finish();
   recording.frequency_errors =
       in_order(0.0, {verify::kFrequencyErrors.begin(), verify::kFrequencyErrors.end()});
-  std::vector<report::Spread> before;
-  std::vector<report::Spread> after;
   const std::span<const verify::Detuned> detuned =
       std::span(verified.detuned).first(verify::kFrequencyErrors.size());
-  for (const verify::Detuned& other : detuned) {
-    before.push_back(spread(other.uncompensated));
-    after.push_back(spread(other.compensated));
-  }
+  const auto spreads = [&](const verify::Deviation& main, const auto& of_other) {
+    std::vector<report::Spread> others;
+    for (const verify::Detuned& other : detuned) {
+      others.push_back(spread(of_other(other)));
+    }
+    return in_order(spread(main), others);
+  };
+  report::Contender played{
+      "as sliced",
+      spreads(verified.uncompensated, [](const auto& other) { return other.uncompensated; }), true};
   std::vector<report::Contender> contenders = {
-      {"uncompensated", in_order(spread(verified.uncompensated), before)},
-      {"unflex", in_order(spread(verified.compensated), after)}};
+      verified.unshaped
+          ? report::Contender{"as sliced",
+                              spreads(*verified.unshaped,
+                                      [](const auto& other) { return *other.unshaped; }),
+                              true}
+          : played,
+      {"unflex", spreads(verified.compensated, [](const auto& other) { return other.compensated; }),
+       true}};
   for (report::Contender& shaper : recording.contenders) {
     if (!shaper.spreads.empty()) {
       shaper.spreads =
@@ -56,12 +67,10 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
     contenders.push_back(std::move(shaper));
   }
   if (verified.unshaped) {
-    std::vector<report::Spread> unshaped;
-    for (const verify::Detuned& other : detuned) {
-      unshaped.push_back(spread(*other.unshaped));
-    }
-    contenders.push_back(
-        {"without the printer's shaper", in_order(spread(*verified.unshaped), unshaped)});
+    // Where the printer's own shaper is known, its curve is there already.
+    played.name = "as sliced, shaper on";
+    played.drawn = !options_.printer_shaper;
+    contenders.push_back(std::move(played));
   }
   recording.contenders = std::move(contenders);
   return recording;

@@ -25,24 +25,65 @@ constexpr int kFine = 8;
 // So many intervals lie between the last state of a machine and the last moment measured.
 constexpr double kMargin = 2.0;
 
+// The shapers that printers use most. The others would crowd the figure.
+bool is_drawn(dynamics::ShaperKind kind) {
+  return kind == dynamics::ShaperKind::zv || kind == dynamics::ShaperKind::mzv ||
+         kind == dynamics::ShaperKind::ei;
+}
+
+double mean_delay_s(const dynamics::ShaperPulses& pulses) {
+  double delay_s = 0.0;
+  for (const dynamics::Pulse& pulse : pulses) {
+    delay_s += pulse.weight * pulse.time_s;
+  }
+  return delay_s;
+}
+
+dynamics::ShaperPulses earlier(const dynamics::ShaperPulses& pulses, double shift_s) {
+  dynamics::ShaperPulses result = pulses.empty() ? dynamics::ShaperPulses{{0.0, 1.0}} : pulses;
+  for (dynamics::Pulse& pulse : result) {
+    pulse.time_s -= shift_s;
+  }
+  return result;
+}
+
+// Some firmwares delay the whole motion. What the axes have of that in common only makes the print
+// late. It is taken away, because the bench looks for the nozzle near where the plan is.
+PrinterShaper without_common_delay(const PrinterShaper& shaper) {
+  const double shift_s = 0.5 * (mean_delay_s(shaper.x) + mean_delay_s(shaper.y));
+  return {shaper.name, earlier(shaper.x, shift_s), earlier(shaper.y, shift_s)};
+}
+
 }  // namespace
 
-ShaperBench::ShaperBench(const verify::NozzleModel& model, std::size_t machines)
+ShaperBench::ShaperBench(const verify::NozzleModel& model,
+                         const std::optional<PrinterShaper>& printer_shaper, std::size_t machines)
     : interval_s_(std::clamp(1.0 / (kPerPeriod * std::max(model.x.main_hz(), model.y.main_hz())),
                              5e-4, 2e-3)),
       last_add_s_(machines, -1.0),
       last_(machines),
       near_(verify::reach_s(model)) {
   for (const dynamics::ShaperKind kind : dynamics::kShaperKinds) {
-    Shaper shaper{std::string(dynamics::name(kind)), {}};
+    Shaper shaper{std::string(dynamics::name(kind)), is_drawn(kind), {}};
     const auto x = dynamics::shaper_pulses(kind, model.x.main_hz(), model.x.main_damping_ratio());
     const auto y = dynamics::shaper_pulses(kind, model.y.main_hz(), model.y.main_damping_ratio());
     if (x && y) {
-      shaper.nozzles.assign(machines, Nozzle{rivals::ShapedNozzle(*x, *y)});
-      lookahead_s_ = std::max(lookahead_s_, shaper.nozzles.front().shaped.lookahead_s());
+      install(shaper, *x, *y, machines);
     }
     shapers_.push_back(std::move(shaper));
   }
+  if (printer_shaper) {
+    const PrinterShaper own = without_common_delay(*printer_shaper);
+    Shaper shaper{own.name, true, {}};
+    install(shaper, own.x, own.y, machines);
+    shapers_.push_back(std::move(shaper));
+  }
+}
+
+void ShaperBench::install(Shaper& shaper, const dynamics::ShaperPulses& x,
+                          const dynamics::ShaperPulses& y, std::size_t machines) {
+  shaper.nozzles.assign(machines, Nozzle{rivals::ShapedNozzle(x, y)});
+  lookahead_s_ = std::max(lookahead_s_, shaper.nozzles.front().shaped.lookahead_s());
 }
 
 void ShaperBench::add(std::size_t machine, double time_s,
@@ -150,7 +191,7 @@ double ShaperBench::squared_contour_error(Nozzle& nozzle, const verify::Referenc
 std::vector<report::Contender> ShaperBench::contenders() const {
   std::vector<report::Contender> result;
   for (const Shaper& shaper : shapers_) {
-    report::Contender contender{shaper.name, {}};
+    report::Contender contender{shaper.name, {}, shaper.drawn};
     for (const Nozzle& nozzle : shaper.nozzles) {
       contender.spreads.push_back(
           {std::sqrt(nozzle.contour2_max_mm2),

@@ -1,15 +1,17 @@
 // How the firmware's input shapers would have done on the same print. Each is built for the
 // frequencies of the settings and measured on machines whose true frequencies are as set or
-// somewhat off.
+// somewhat off. The printer's own shaper, built for its own frequencies, is measured beside them.
 //
 // A whole print has too many moments to measure all. So after some time only every second, then
 // every fourth second is measured (and so on), and counts 2, 4, … times.
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "unflex/record/recorder.hpp"
 #include "unflex/report/recording.hpp"
 #include "unflex/rivals/shaped_nozzle.hpp"
 #include "unflex/verify/near_path.hpp"
@@ -19,7 +21,8 @@ namespace unflex::record {
 class ShaperBench {
  public:
   // `model` is the printer of the settings; `machines` is the number of machines.
-  ShaperBench(const verify::NozzleModel& model, std::size_t machines);
+  ShaperBench(const verify::NozzleModel& model, const std::optional<PrinterShaper>& printer_shaper,
+              std::size_t machines);
 
   // The state of a machine's nozzle without a shaper. Times must increase.
   void add(std::size_t machine, double time_s, const dynamics::NozzleMotionXY& unshaped);
@@ -28,6 +31,7 @@ class ShaperBench {
   // For how long a piece of the path is needed after its time, s.
   [[nodiscard]] double memory_s() const;
 
+  // The printer's own shaper, if there is one, comes last.
   [[nodiscard]] std::vector<report::Contender> contenders() const;
   [[nodiscard]] double measured_s() const { return measured_s_; }
 
@@ -39,9 +43,12 @@ class ShaperBench {
   };
   struct Shaper {
     std::string name;
+    bool drawn = false;
     std::vector<Nozzle> nozzles;  // one per machine; none if it is not defined for the printer
   };
 
+  void install(Shaper& shaper, const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y,
+               std::size_t machines);
   void measure(const verify::ReferencePath& path, bool counts);
   [[nodiscard]] double squared_contour_error(Nozzle& nozzle, const verify::ReferencePath& path,
                                              double time_s, bool counts);

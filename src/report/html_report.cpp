@@ -106,7 +106,7 @@ Json contenders_json(const std::vector<Contender>& contenders) {
     for (const Spread& spread : contender.spreads) {
       spreads.push_back(spread_json(spread));
     }
-    array.push_back({{"name", contender.name}, {"spreads", spreads}});
+    array.push_back({{"name", contender.name}, {"spreads", spreads}, {"drawn", contender.drawn}});
   }
   return array;
 }
@@ -221,6 +221,7 @@ Json data_json(const Report& r) {
           {"worst", {places_json(recording.worst_before), places_json(recording.worst_after)}},
           {"histogram", histogram_json(recording.histogram)},
           {"frequency_errors", recording.frequency_errors},
+          {"freq_error", r.freq_error},
           {"contenders", contenders_json(recording.contenders)},
           {"extruding_s", rounded(r.uncompensated.extruding.duration_s, 0.1)},
           {"shapers_s", rounded(recording.shapers_measured_s, 0.1)},

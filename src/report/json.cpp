@@ -84,12 +84,13 @@ Json budget_json(const LineBudget& budget) {
 
 void add_motion(const Report& r, Json& json) {
   json["print_time_s"] = {{"reference", r.reference_time_s}, {"emitted", r.emitted_time_s}};
+  json["freq_error"] = r.freq_error;
+  json["sensitivity"] = sensitivity_json(r.sensitivity);
   json["deviation"] = {{"uncompensated", rows_json(r.uncompensated)},
                        {"unshaped", r.unshaped ? rows_json(*r.unshaped) : Json()},
                        {"compensated", rows_json(r.compensated)}};
   json["corners"] = {{"uncompensated", corners_json(r.uncompensated_corners)},
                      {"compensated", corners_json(r.compensated_corners)}};
-  json["sensitivity"] = sensitivity_json(r.sensitivity);
   json["plants"] = plants_json(r.plants);
   json["robustness"] = nullptr;
   if (r.robustness) {

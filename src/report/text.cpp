@@ -50,18 +50,28 @@ void write_unshaped(Sink out, const std::optional<DeviationRows>& unshaped) {
   }
 }
 
-// The error if the true frequencies are off.
-void write_sensitivity(Sink out, const std::vector<Sensitivity>& sensitivity) {
-  if (sensitivity.empty()) {
+// The error by how far the true frequencies are off.
+void write_sensitivity(Sink out, const Report& r) {
+  if (r.sensitivity.empty()) {
     return;
   }
   std::string errors;
   std::string rms;
-  for (const Sensitivity& one : sensitivity) {
-    errors += fmt::format("{}{:+.0f}", errors.empty() ? "" : ", ", 100.0 * one.frequency_error);
-    rms += fmt::format("{}{}", rms.empty() ? "" : ", ", micrometres_text(one.compensated.rms_mm));
+  const auto add = [&](const std::string& error, double rms_mm) {
+    errors += (errors.empty() ? "" : ", ") + error;
+    rms += (rms.empty() ? "" : ", ") + micrometres_text(rms_mm);
+  };
+  bool has_exact = false;
+  for (const Sensitivity& one : r.sensitivity) {
+    if (!has_exact && one.frequency_error > 0.0) {
+      add("0", r.compensated.extruding.contour_rms_mm);
+      has_exact = true;
+    }
+    add(fmt::format("{:+.0f}", 100.0 * one.frequency_error), one.compensated.rms_mm);
   }
-  fmt::format_to(out, "sensitivity   {} µm RMS if frequencies are off by {} %\n", rms, errors);
+  fmt::format_to(
+      out, "sensitivity   {} µm RMS if frequencies are off by {} %{}\n", rms, errors,
+      r.freq_error > 0.0 ? fmt::format("; made for ±{:.3g} %", 100.0 * r.freq_error) : "");
 }
 
 void write_plants(Sink out, const std::vector<PlantDeviation>& plants) {
@@ -202,8 +212,8 @@ std::string to_text(const Report& report) {
   write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
   write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
   write_corners(out, report.uncompensated_corners, report.compensated_corners);
+  write_sensitivity(out, report);
   write_unshaped(out, report.unshaped);
-  write_sensitivity(out, report.sensitivity);
   write_plants(out, report.plants);
   if (report.robustness) {
     fmt::format_to(

@@ -3,15 +3,27 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
+#include <string>
 
+#include "unflex/dynamics/shapers.hpp"
 #include "unflex/report/recording.hpp"
 #include "unflex/verify/observer.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::record {
 
+// The printer's own input shaper, built for the frequencies and dampings of its configuration. An
+// axis without pulses is not shaped.
+struct PrinterShaper {
+  std::string name;
+  dynamics::ShaperPulses x;
+  dynamics::ShaperPulses y;
+};
+
 struct Options {
-  verify::NozzleModel nozzle;  // Rules::nozzle of the verification
+  verify::NozzleModel nozzle;                     // Rules::nozzle of the verification
+  std::optional<PrinterShaper> printer_shaper{};  // nullopt if it has none or none is known
   std::size_t paths_bytes = 1'500'000;
   std::size_t places = 12;  // number of worst places, for each of before and after
 };

@@ -85,6 +85,7 @@ struct HistogramCell {
 struct Contender {
   std::string name;
   std::vector<Spread> spreads;  // one for each of Recording::frequency_errors, or none
+  bool drawn = false;           // in the figure too, not only in the table
 };
 
 struct Recording {
@@ -94,8 +95,8 @@ struct Recording {
   std::vector<Place> worst_before, worst_after;  // the worst first
   std::vector<HistogramCell> histogram;
   std::vector<double> frequency_errors;  // 0.05: the true ones are 5 % above
-  std::vector<Contender>
-      contenders;  // first the sliced file, then the compensated one, then the shapers
+  // First the sliced file without a shaper, then the compensated one, then the shapers.
+  std::vector<Contender> contenders;
   double shapers_measured_s = 0.0;  // print time for which the shapers were measured
 };
 

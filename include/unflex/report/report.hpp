@@ -133,6 +133,8 @@ struct Report {
   DeviationRows compensated;
   CornerRow uncompensated_corners;
   CornerRow compensated_corners;
+  // The output is made for frequencies up to this share off, either way; 0: for exact ones.
+  double freq_error = 0.0;
   std::vector<Sensitivity> sensitivity;  // by rising error
   std::vector<PlantDeviation> plants;    // in the order of the settings
   std::optional<Robustness> robustness;  // set if the base is to suit more models than one

@@ -73,8 +73,8 @@ class Observer {
   Observer() = default;
 };
 
-// Relative errors of the frequencies, for which detuned nozzles are measured.
-inline constexpr std::array<double, 4> kFrequencyErrors = {-0.10, -0.05, 0.05, 0.10};
+// Relative errors of the frequencies, rising, for which detuned nozzles are measured.
+inline constexpr std::array<double, 6> kFrequencyErrors = {-0.15, -0.10, -0.05, 0.05, 0.10, 0.15};
 
 // `model` with each of kFrequencyErrors.
 [[nodiscard]] std::vector<NozzleModel> detuned(const NozzleModel& model);

@@ -75,13 +75,15 @@ const plot = (() => {
 
   // spec: series [{name, x, y, colour (a custom property), dash, width, points}], xLabel, yLabel,
   // xLog, yLog, x, y ([low, high]), equal (both axes to one scale), labels (names at the right end),
-  // zero (a line at y = 0), title, value (text of a y), marks ([{x, y, text}]), onpick(x).
+  // zero (a line at y = 0), title, value (text of a y), marks ([{x, y, text}]), onpick(x), band
+  // (shaded: {from, to, text}).
   return (box, spec) => {
     const draw = () => {
       const width = box.clientWidth,
         height = box.clientHeight;
       if (width < 40 || height < 40) return;
-      const right = spec.labels ? 112 : margin.right;
+      const longest = Math.max(0, ...spec.series.map(one => (one.name || "").length));
+      const right = spec.labels ? 6.6 * longest + 16 : margin.right;
       const inner = {
         left: margin.left,
         right: width - right,
@@ -93,7 +95,7 @@ const plot = (() => {
       if (!spec.y) {
         if (spec.yLog) {
           y0 /= 1.2;
-          y1 *= 1.2;
+          y1 *= spec.band ? 1.6 : 1.2;
         } else {
           const pad = 0.06 * (y1 - y0) || 1;
           y0 = spec.fromZero ? 0 : y0 - pad;
@@ -155,6 +157,27 @@ const plot = (() => {
         );
       }
       texts.append(make("text", {x: inner.left + 4, y: inner.top + 9}, spec.yLabel || ""));
+      if (spec.band) {
+        const from = Math.max(x.at(spec.band.from), inner.left),
+          to = Math.min(x.at(spec.band.to), inner.right);
+        svg.append(
+          make("rect", {
+            class: "band",
+            x: from,
+            y: inner.top,
+            width: to - from,
+            height: inner.bottom - inner.top,
+            fill: "var(--raised)",
+          }),
+        );
+        texts.append(
+          make(
+            "text",
+            {x: (from + to) / 2, y: inner.top + 9, "text-anchor": "middle"},
+            spec.band.text,
+          ),
+        );
+      }
       svg.append(grid);
       if (spec.centre !== undefined) {
         const px = x.at(spec.centre);

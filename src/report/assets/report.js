@@ -227,34 +227,30 @@ const unflexReport = (() => {
   const rivals = () => {
     const errors = data.frequency_errors.map(e => 100 * e),
       exact = errors.indexOf(0);
-    const colours = [
-      "--before",
-      "--after",
-      "--series-3",
-      "--series-4",
-      "--series-5",
-      "--series-6",
-      "--series-3",
-      "--series-4",
+    // As sliced, unflex, then the shapers.
+    const looks = [
+      ["--before"],
+      ["--after"],
+      ["--series-3"],
+      ["--series-4"],
+      ["--series-5"],
+      ["--series-6", "7 4"],
     ];
-    const dashes = [null, null, null, null, null, null, "7 4", "7 4", "2 4"];
-    const defined = data.contenders
-      .map((contender, i) => ({
-        ...contender,
-        colour: colours[i % colours.length],
-        dash: dashes[i % dashes.length],
-      }))
-      .filter(c => c.spreads.length);
+    const drawn = data.contenders.filter(c => c.drawn);
+    const band = 100 * data.freq_error;
     plot(byId("sensitivity"), {
-      series: defined.map((c, i) => ({
-        name: c.name,
-        x: errors,
-        y: c.spreads.map(s => Math.max(s[1], 1e-3)),
-        colour: c.colour,
-        dash: c.dash,
-        points: true,
-        width: i === 1 ? 3.5 : 1.8,
-      })),
+      series: drawn
+        .map((c, i) => ({
+          name: c.name,
+          x: errors,
+          y: c.spreads.map(s => Math.max(s[1], 1e-3)),
+          colour: looks[i % looks.length][0],
+          dash: looks[i % looks.length][1],
+          points: true,
+          width: i === 1 ? 3.5 : 1.8,
+        }))
+        .filter(c => c.y.length),
+      band: band > 0 && {from: -band, to: band, text: `designed for ±${+band.toFixed(1)} %`},
       yLog: true,
       labels: true,
       xTicks: errors,
@@ -271,7 +267,7 @@ const unflexReport = (() => {
         ),
       );
     byId("contenders").replaceChildren(
-      head("Typical, µm", "exact", "±5 %", "±10 %", "largest, exact"),
+      head("Typical, µm", "exact", "±5 %", "±10 %", "±15 %", "largest, exact"),
       make(
         "tbody",
         {},
@@ -285,9 +281,10 @@ const unflexReport = (() => {
                   contender.spreads[exact][1],
                   worst(contender, 5, 1),
                   worst(contender, 10, 1),
+                  worst(contender, 15, 1),
                   contender.spreads[exact][0],
                 ].map(um => make("td", {}, figures(um)))
-              : [make("td", {colspan: 4}, "not defined for this damping")]),
+              : [make("td", {colspan: 5}, "not defined for this damping")]),
           ),
         ),
       ),
@@ -295,7 +292,7 @@ const unflexReport = (() => {
     const minutes = s => (s < 120 ? `${s.toFixed(0)} s` : `${(s / 60).toFixed(0)} min`);
     const all = data.shapers_s > 0.98 * data.extruding_s;
     byId("rivals-note").textContent =
-      "The same print with the firmware's input shapers, each tuned to the frequencies in the settings, and what becomes of each method if the machine's true frequency is a little different. Shapers leave the print time as sliced." +
+      "What becomes of each method if the machine's true frequency is a little different. Input shapers are tuned to the frequencies in the settings, the printer's own to those of its configuration. They leave the print time as sliced." +
       (all
         ? ""
         : ` They were measured during ${minutes(data.shapers_s)} of ${minutes(data.extruding_s)}, spread over the print.`);
@@ -336,7 +333,9 @@ const unflexReport = (() => {
     );
   };
 
-  // First the picture of the most telling layer. The rest is built when that is on screen.
+  // First how robust the print is and the picture of the most telling layer. The rest is built when
+  // they are on screen.
+  rivals();
   const weight = (row, i) => (row[2] - (i ? rows[i - 1][2] : 0)) * row[4] ** 2;
   const telling = rows.reduce(
     (best, row, i) => (weight(row, i) > weight(rows[best], best) ? i : best),
@@ -349,7 +348,6 @@ const unflexReport = (() => {
     setTimeout(() => {
       histogram();
       features();
-      rivals();
       details();
       if (places.length) look(places[0], buttons[0]);
       else byId("moment").hidden = true;
