@@ -16,8 +16,10 @@ constexpr double kBlock_s = 1.0;
 constexpr double kStrideLasts_s = 60.0;
 // After so many skipped moments the nozzles are asked once, so that they forget the past.
 constexpr std::size_t kSkipped = 128;
-// A nozzle without a new state for so many intervals has stood still.
+// A nozzle without a new state for so many intervals has stood still, or moved steadily: then it is
+// this near to where its velocity has led it.
 constexpr double kGap = 4.0;
+constexpr double kSteady_mm = 1e-4;
 // At a corner the deviation peaks in a kink. So if its square exceeds kNearPeak times the largest
 // so far, it is measured kFine times in the interval.
 constexpr double kNearPeak = 0.16;
@@ -29,6 +31,13 @@ constexpr double kMargin = 2.0;
 bool is_drawn(dynamics::ShaperKind kind) {
   return kind == dynamics::ShaperKind::zv || kind == dynamics::ShaperKind::mzv ||
          kind == dynamics::ShaperKind::ei;
+}
+
+bool is_steady(const dynamics::NozzleMotion& from, const dynamics::NozzleMotion& to,
+               double duration_s) {
+  const double way_mm = to.position - from.position;
+  return std::abs(way_mm - duration_s * from.velocity) < kSteady_mm &&
+         std::abs(way_mm - duration_s * to.velocity) < kSteady_mm;
 }
 
 double mean_delay_s(const dynamics::ShaperPulses& pulses) {
@@ -99,9 +108,11 @@ void ShaperBench::add(std::size_t machine, double time_s,
       }
     }
   };
-  if (last_s >= 0.0 && time_s - last_s > kGap * interval_s_) {
+  const dynamics::NozzleMotionXY& last = last_[machine];
+  if (last_s >= 0.0 && time_s - last_s > kGap * interval_s_ &&
+      !(is_steady(last.x, unshaped.x, time_s - last_s) &&
+        is_steady(last.y, unshaped.y, time_s - last_s))) {
     // Two states at rest, so that no cubic spans the whole rest.
-    const dynamics::NozzleMotionXY& last = last_[machine];
     add(last_s + interval_s_, {{last.x.position, 0.0}, {last.y.position, 0.0}});
     add(time_s - interval_s_, {{unshaped.x.position, 0.0}, {unshaped.y.position, 0.0}});
   }

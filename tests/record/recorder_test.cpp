@@ -211,26 +211,46 @@ TEST(Recorder, MeasuresOtherFrequenciesAndShapers) {
   const std::string input = print(3);
   const Recorded recorded(input, input);
   const Recording& recording = recorded.recording;
-  EXPECT_THAT(recording.frequency_errors, ElementsAre(-0.1, -0.05, 0.0, 0.05, 0.1));
+  EXPECT_THAT(recording.frequency_errors, ElementsAre(-0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15));
   ASSERT_THAT(recording.contenders, SizeIs(8));
-  EXPECT_EQ(recording.contenders[0].name, "uncompensated");
+  EXPECT_EQ(recording.contenders[0].name, "as sliced");
   EXPECT_EQ(recording.contenders[1].name, "unflex");
   EXPECT_EQ(recording.contenders[2].name, "ZV");
   for (const report::Contender& contender : recording.contenders) {
-    ASSERT_THAT(contender.spreads, SizeIs(5)) << contender.name;
+    ASSERT_THAT(contender.spreads, SizeIs(7)) << contender.name;
   }
   const std::vector<report::Spread>& plain = recording.contenders[0].spreads;
-  EXPECT_DOUBLE_EQ(plain[2].rms_mm, recorded.verified.uncompensated.extruding.contour_rms_mm);
+  EXPECT_DOUBLE_EQ(plain[3].rms_mm, recorded.verified.uncompensated.extruding.contour_rms_mm);
   // A softer machine swings further.
-  EXPECT_GT(plain[0].rms_mm, plain[2].rms_mm);
-  EXPECT_GT(plain[2].rms_mm, plain[4].rms_mm);
+  EXPECT_GT(plain[0].rms_mm, plain[3].rms_mm);
+  EXPECT_GT(plain[3].rms_mm, plain[6].rms_mm);
   // An exact shaper is better than none, and better than one that is off.
   const std::vector<report::Spread>& zv = recording.contenders[2].spreads;
-  EXPECT_LT(zv[2].rms_mm, 0.5 * plain[2].rms_mm);
-  EXPECT_LT(zv[2].rms_mm, zv[0].rms_mm);
-  EXPECT_LT(zv[2].rms_mm, zv[4].rms_mm);
+  EXPECT_LT(zv[3].rms_mm, 0.5 * plain[3].rms_mm);
+  EXPECT_LT(zv[3].rms_mm, zv[0].rms_mm);
+  EXPECT_LT(zv[3].rms_mm, zv[6].rms_mm);
   EXPECT_NEAR(recording.shapers_measured_s, recorded.verified.uncompensated.extruding.duration_s,
               0.1);
+}
+
+TEST(Recorder, DrawsThePrintersOwnShaper) {
+  const std::string input = print(3);
+  Options options;
+  const auto pulses = [](double freq_hz, double damping_ratio) {
+    return dynamics::shaper_pulses(dynamics::ShaperKind::ei, freq_hz, damping_ratio).value();
+  };
+  options.printer_shaper = {"own", pulses(45.0, 0.06), pulses(60.0, 0.1)};
+  const std::vector<report::Contender> contenders =
+      Recorded(input, input, options).recording.contenders;
+  ASSERT_THAT(contenders, SizeIs(9));
+  EXPECT_EQ(contenders.back().name, "own");
+  std::vector<std::string> drawn;
+  for (const report::Contender& contender : contenders) {
+    if (contender.drawn) {
+      drawn.push_back(contender.name);
+    }
+  }
+  EXPECT_THAT(drawn, ElementsAre("as sliced", "unflex", "ZV", "MZV", "EI", "own"));
 }
 
 TEST(Recorder, NeedsNoMoreSpaceForALongPrint) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "planner/plan_helpers.hpp"
 #include "unflex/dynamics/shapers.hpp"
@@ -29,7 +30,9 @@ verify::NozzleModel model(double error = 0.0) {
 
 // Runs the bench on the corner, on machines with these errors.
 struct Benched {
-  explicit Benched(const std::vector<double>& errors) : bench(model(), errors.size()) {
+  explicit Benched(const std::vector<double>& errors,
+                   const std::optional<PrinterShaper>& printer_shaper = std::nullopt)
+      : bench(model(), printer_shaper, errors.size()) {
     const std::vector<planner::PlannedMove> moves = corner();
     std::size_t taken = 0;
     verify::ReferencePath path([&](planner::PlannedMove& move) {
@@ -103,16 +106,40 @@ TEST(ShaperBench, FindsWhatTheClosedFormFinds) {
   }
 }
 
+// A firmware that delays the whole motion makes the print late, no worse.
+TEST(ShaperBench, MeasuresThePrintersOwnShaperAsAnyOther) {
+  const std::vector<double> errors = {0.0, -0.15, 0.15};
+  const dynamics::ShaperPulses pulses =
+      dynamics::shaper_pulses(dynamics::ShaperKind::mzv, kFreq_hz, kZeta).value();
+  dynamics::ShaperPulses late = pulses;
+  for (dynamics::Pulse& pulse : late) {
+    pulse.time_s -= pulses.front().time_s;
+  }
+  for (const PrinterShaper& own :
+       {PrinterShaper{"own", pulses, pulses}, PrinterShaper{"own", late, late}}) {
+    const std::vector<report::Contender> found = Benched(errors, own).bench.contenders();
+    ASSERT_EQ(found.size(), dynamics::kShaperKinds.size() + 1);
+    EXPECT_EQ(found.back().name, "own");
+    EXPECT_TRUE(found.back().drawn);
+    const report::Contender& mzv = found[1];
+    ASSERT_EQ(mzv.name, "MZV");
+    for (std::size_t k = 0; k < errors.size(); ++k) {
+      EXPECT_NEAR(found.back().spreads[k].max_mm, mzv.spreads[k].max_mm, 1e-9);
+      EXPECT_NEAR(found.back().spreads[k].rms_mm, mzv.spreads[k].rms_mm, 1e-9);
+    }
+  }
+}
+
 TEST(ShaperBench, SaysNothingOfShapersThatTheDampingForbids) {
   const dynamics::FlexibleAxis stiff = dynamics::from_frequency(kFreq_hz, 1.0);
-  ShaperBench bench({stiff, stiff}, 2);
+  ShaperBench bench({stiff, stiff}, std::nullopt, 2);
   for (const report::Contender& contender : bench.contenders()) {
     EXPECT_TRUE(contender.spreads.empty()) << contender.name;
   }
 }
 
 TEST(ShaperBench, MeasuresALongPrintOnlyNowAndThen) {
-  ShaperBench bench(model(), 1);
+  ShaperBench bench(model(), std::nullopt, 1);
   constexpr double kLong_s = 400.0;
   planner::PlannedMove move;
   move.segment = planner::testing::segment({}, {kLong_s, 0.0, 0.0, 100.0}, 1.0);

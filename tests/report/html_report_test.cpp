@@ -30,7 +30,8 @@ Recording sample_recording() {
   recording.worst_before = {place};
   recording.histogram = {{0.0, 1.0, 2.0}, {1e-3, 3.0, 4.0}};
   recording.frequency_errors = {-0.1, 0.0, 0.1};
-  recording.contenders = {{"uncompensated", {{0.1, 0.03}, {0.08, 0.02}, {0.07, 0.01}}}, {"EI", {}}};
+  recording.contenders = {{"as sliced", {{0.1, 0.03}, {0.08, 0.02}, {0.07, 0.01}}, true},
+                          {"EI", {}}};
   return recording;
 }
 
@@ -108,9 +109,19 @@ TEST(HtmlReport, HoldsTheDataThatItsScriptReads) {
   EXPECT_EQ(data["worst"][1], nlohmann::json::array());
   EXPECT_EQ(data["histogram"], nlohmann::json::parse("[[0.0, 1.0, 2.0], [1.0, 3.0, 4.0]]"));
   EXPECT_EQ(data["contenders"][0]["spreads"][2], nlohmann::json::parse("[70.0, 10.0]"));
+  EXPECT_EQ(data["contenders"][0]["drawn"], true);
   EXPECT_EQ(data["contenders"][1]["spreads"], nlohmann::json::array());
+  EXPECT_EQ(data["contenders"][1]["drawn"], false);
+  EXPECT_EQ(data["freq_error"], 0.1);
   EXPECT_EQ(data["settings"].size(), sample_report().printer.size());
   EXPECT_EQ(data["remarks"]["violations"][0], "out.gcode:7: outside the travel");
+}
+
+TEST(HtmlReport, ShowsFirstHowRobustThePrintIs) {
+  const std::string page = to_html(recorded_report());
+  const std::size_t at = page.find("id=\"sensitivity\"");
+  EXPECT_LT(page.find("class=\"card hero\""), at);
+  EXPECT_LT(at, page.find("id=\"print\""));
 }
 
 TEST(HtmlReport, TellsWhatSeveralModelsCost) {

@@ -75,6 +75,14 @@ TEST(JsonReport, SaysHowFarTheNozzlePassesFromCorners) {
   EXPECT_EQ(corners["compensated"]["max_line"], 43);
 }
 
+TEST(JsonReport, SaysHowRobustTheOutputIs) {
+  const nlohmann::json json = parsed(sample_report());
+  EXPECT_EQ(json["freq_error"], 0.1);
+  ASSERT_EQ(json["sensitivity"].size(), 2U);
+  EXPECT_EQ(json["sensitivity"][0]["frequency_error"], -0.1);
+  EXPECT_EQ(json["sensitivity"][0]["compensated"]["contour_rms_mm"], 0.012);
+}
+
 TEST(JsonReport, GivesSettingsTheirTypes) {
   const nlohmann::json printer = parsed(sample_report())["printer"];
   EXPECT_EQ(printer["printer.firmware"]["value"], "klipper");

@@ -34,6 +34,7 @@ inline Report sample_report() {
   r.compensated = {.extruding = sample_row(0.0125), .all = sample_row(0.025)};
   r.uncompensated_corners = {321, 0.06, 0.11, 0.12, 41};
   r.compensated_corners = {321, 0.0005, 0.0025, 0.015, 43};
+  r.freq_error = 0.1;
   r.sensitivity = {{-0.1, {0.9, 0.2}, {0.03, 0.012}}, {0.05, {0.7, 0.15}, {0.02, 0.0061}}};
   r.plants = {{{0.8, 0.18}, {0.02, 0.004}}, {{0.7, 0.15}, {0.03, 0.009}}};
   r.robustness = {0.003, 0.0005};

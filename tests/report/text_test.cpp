@@ -20,10 +20,11 @@ TEST(Summary, IsExactlyThis) {
       "  extruding       800 → 12.5          400 → 6.25          200 → 3.12\n"
       "  all moves       1600 → 25.0         800 → 12.5          400 → 6.25\n"
       "  321 corners     120 → 15.0          110 → 2.50          60.0 → 0.50\n"
+      "sensitivity   12.0, 3.12, 6.10 µm RMS if frequencies are off by -10, 0, +5 %; made for "
+      "±10 %\n"
       "shaper        the printer's own is on before; without it, extruding: 900 µm max, 450 p99, "
       "225 "
       "RMS\n"
-      "sensitivity   12.0, 6.10 µm RMS if frequencies are off by -10, +5 %\n"
       "plants        4.00 to 9.00 µm RMS if the axes are as one of 2 plants, 150 to 180 before\n"
       "robustness    3.00 µm RMS of the base as optimised, 0.50 for the nominal axes alone\n"
       "print time    1h 00m 00s planned, 1h 00m 18s emitted (+0.50 %)\n"
@@ -58,6 +59,12 @@ TEST(Summary, DoesNotSpeakOfRunsWhereNothingWasSolved) {
   report.solver_engine.clear();
   EXPECT_THAT(to_text(report), Not(HasSubstr("solver")));
   EXPECT_THAT(to_text(report), Not(HasSubstr("per second in")));
+}
+
+TEST(Summary, SpeaksOfNoBandWhereTheFrequenciesAreExact) {
+  Report report = sample_report();
+  report.freq_error = 0.0;
+  EXPECT_THAT(to_text(report), HasSubstr("are off by -10, 0, +5 %\n"));
 }
 
 TEST(Summary, DoesNotSpeakOfCornersWhereThereAreNone) {

@@ -74,7 +74,7 @@ const plot = (() => {
   };
 
   // spec: series [{name, x, y, colour (a custom property), dash, width, points}], xLabel, yLabel,
-  // xLog, yLog, x, y ([low, high]), equal (both axes to one scale), labels (names at the right end),
+  // xLog, yLog, x, y ([low, high]), equal (both axes to one scale), labels (names at the right end if there is room),
   // zero (a line at y = 0), title, value (text of a y), marks ([{x, y, text}]), onpick(x), band
   // (shaded: {from, to, text}).
   return (box, spec) => {
@@ -83,7 +83,8 @@ const plot = (() => {
         height = box.clientHeight;
       if (width < 40 || height < 40) return;
       const longest = Math.max(0, ...spec.series.map(one => (one.name || "").length));
-      const right = spec.labels ? 6.6 * longest + 16 : margin.right;
+      const labelled = spec.labels && width >= 380;
+      const right = labelled ? 6.6 * longest + 16 : margin.right;
       const inner = {
         left: margin.left,
         right: width - right,
@@ -94,8 +95,8 @@ const plot = (() => {
       let [y0, y1] = spec.y || extent(spec.series, "y");
       if (!spec.y) {
         if (spec.yLog) {
-          y0 /= 1.2;
-          y1 *= spec.band ? 1.6 : 1.2;
+          y0 /= spec.band ? 1.6 : 1.2;
+          y1 *= 1.2;
         } else {
           const pad = 0.06 * (y1 - y0) || 1;
           y0 = spec.fromZero ? 0 : y0 - pad;
@@ -173,7 +174,7 @@ const plot = (() => {
         texts.append(
           make(
             "text",
-            {x: (from + to) / 2, y: inner.top + 9, "text-anchor": "middle"},
+            {x: (from + to) / 2, y: inner.bottom - 6, "text-anchor": "middle"},
             spec.band.text,
           ),
         );
@@ -246,7 +247,7 @@ const plot = (() => {
         );
       }
       svg.append(texts);
-      if (spec.labels) svg.append(endLabels(spec.series, x, y, inner));
+      if (labelled) svg.append(endLabels(spec.series, x, y, inner));
       const cursor = make("g");
       svg.append(cursor);
       hover(svg, cursor, spec, x, y, inner, width);

@@ -236,20 +236,31 @@ const unflexReport = (() => {
       ["--series-5"],
       ["--series-6", "7 4"],
     ];
-    const drawn = data.contenders.filter(c => c.drawn);
+    const series = data.contenders
+      .filter(c => c.drawn)
+      .map((c, i) => ({
+        name: c.name,
+        x: errors,
+        y: c.spreads.map(s => Math.max(s[1], 1e-3)),
+        colour: looks[i % looks.length][0],
+        dash: looks[i % looks.length][1],
+        points: true,
+        width: i === 1 ? 3.5 : 1.8,
+      }))
+      .filter(c => c.y.length);
+    byId("sensitivity-legend").replaceChildren(
+      ...series.map(c =>
+        make(
+          "span",
+          {},
+          make("i", {style: `border-color: var(${c.colour}); border-top-style: ${c.dash ? "dashed" : "solid"}`}),
+          c.name,
+        ),
+      ),
+    );
     const band = 100 * data.freq_error;
     plot(byId("sensitivity"), {
-      series: drawn
-        .map((c, i) => ({
-          name: c.name,
-          x: errors,
-          y: c.spreads.map(s => Math.max(s[1], 1e-3)),
-          colour: looks[i % looks.length][0],
-          dash: looks[i % looks.length][1],
-          points: true,
-          width: i === 1 ? 3.5 : 1.8,
-        }))
-        .filter(c => c.y.length),
+      series,
       band: band > 0 && {from: -band, to: band, text: `designed for ±${+band.toFixed(1)} %`},
       yLog: true,
       labels: true,
