@@ -70,11 +70,18 @@ class Report(unittest.TestCase):
     def focus(self, selector):
         self.run_js(f"document.querySelector({json.dumps(selector)}).focus()")
 
-    def test_first_view_says_what_was_gained_above_the_picture(self):
+    def test_first_view_says_what_was_gained_and_how_robust_it_is(self):
         hero = self.run_js("document.querySelector('.hero .gain').textContent")
         self.assertRegex(hero, r"As sliced, the nozzle strays [\d.]+ µm .* and the print takes")
-        top = self.run_js("document.getElementById('view-after').getBoundingClientRect().top")
-        self.assertLess(top, 500)
+        box = self.run_js("(b => [b.top, b.bottom])"
+                          "(document.getElementById('sensitivity').getBoundingClientRect())")
+        self.assertLess(box[0], 500)
+        self.assertLess(box[1], 820)
+        texts = self.run_js("[...document.querySelectorAll('#sensitivity text')].map(t => t.textContent)")
+        self.assertLessEqual({"designed for ±10 %", "as sliced", "unflex", "ZV", "MZV", "EI",
+                              "-15 %", "+15 %"}, set(texts))
+        self.assertGreater(self.run_js("document.querySelector('#sensitivity rect.band')"
+                                       ".getBoundingClientRect().width"), 100)
         for canvas in ("view-before", "view-after"):
             blank = self.run_js(
                 f"(() => {{ const c = document.getElementById('{canvas}');"

@@ -84,7 +84,7 @@ const plot = (() => {
       if (width < 40 || height < 40) return;
       const longest = Math.max(0, ...spec.series.map(one => (one.name || "").length));
       const labelled = spec.labels && width >= 380;
-      const right = labelled ? 6.6 * longest + 16 : margin.right;
+      const right = labelled ? 6.6 * longest + 16 : spec.xTicks ? 20 : margin.right;
       const inner = {
         left: margin.left,
         right: width - right,
@@ -96,7 +96,7 @@ const plot = (() => {
       if (!spec.y) {
         if (spec.yLog) {
           y0 /= spec.band ? 1.6 : 1.2;
-          y1 *= 1.2;
+          y1 *= spec.band ? 1.5 : 1.2;
         } else {
           const pad = 0.06 * (y1 - y0) || 1;
           y0 = spec.fromZero ? 0 : y0 - pad;
