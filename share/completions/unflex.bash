@@ -14,6 +14,9 @@ _unflex_options() {
     identify)
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
            '--second --make-test -o --output --printer --set --report -q --quiet' ;;
+    tune)
+      echo '-h --help --read -o --output --like --nozzle-temp --bed-temp --printer --set --report' \
+           '-j --jobs -q --quiet' ;;
     printer) echo '-h --help' ;;
     'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer macros') echo '-h --help -o --output --printer --set -q --quiet' ;;
@@ -23,7 +26,7 @@ _unflex_options() {
 
 _unflex_commands() {
   case $1 in
-    '') echo 'compensate batch verify inspect study identify printer' ;;
+    '') echo 'compensate batch verify inspect study identify tune printer' ;;
     printer) echo 'init line-test macros' ;;
   esac
 }
@@ -39,9 +42,10 @@ _unflex_value() {
     batch: | batch:-o | batch:--output | batch:--report) echo 'folders' ;;
     batch:--summary) echo 'files *.@(json|xml)' ;;
     *:--log) echo 'files *.@(log|txt)' ;;
-    *:-o | *:--output | *:--against) echo "files $print" ;;
+    *:-o | *:--output | *:--against | *:--like) echo "files $print" ;;
     *:--from | *:--printer) echo "files $printer" ;;
     *:--record) echo 'files *.csv' ;;
+    tune:--report) echo 'files *.html' ;;
     inspect:--report) echo 'files *.json' ;;
     *:--report) echo 'files *.@(json|html)' ;;
     study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;
@@ -49,8 +53,9 @@ _unflex_value() {
     *:--machines) echo 'folders' ;;
     *:--case) echo 'words ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' ;;
     *:--set | *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
-      *:--wave-spacing-mm | *:--speed-mm-s | *:--decay) echo 'any' ;;
-    compensate: | verify: | inspect: | study:) echo "files $print" ;;
+      *:--wave-spacing-mm | *:--speed-mm-s | *:--decay | *:--read | *:--nozzle-temp | \
+      *:--bed-temp) echo 'any' ;;
+    compensate: | verify: | inspect: | study: | tune:) echo "files $print" ;;
     identify:) echo 'files *.csv' ;;
   esac
 }

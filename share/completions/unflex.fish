@@ -26,7 +26,7 @@ function __unflex_files
     string match --regex -- "^[^\t]*(?:$ends|/)(?:\t.*)?\$" $all; or printf '%s\n' $all
 end
 
-set -g __unflex_commands compensate batch verify inspect study identify printer
+set -g __unflex_commands compensate batch verify inspect study identify tune printer
 set -l gcode '(__unflex_files .gcode .gco .g .bgcode .gcode.gz)'
 set -l printer '(__unflex_files .toml .cfg .g .txt)'
 set -l prints compensate verify inspect study
@@ -41,6 +41,7 @@ complete -c unflex -n '__unflex_in ""' -a verify -d 'Measure how far the nozzle 
 complete -c unflex -n '__unflex_in ""' -a inspect -d 'Show what is understood of a G-code file'
 complete -c unflex -n '__unflex_in ""' -a study -d 'Measure all ways to move the base against each other'
 complete -c unflex -n '__unflex_in ""' -a identify -d 'Find the resonances in records of accelerometers or a ringing tower'
+complete -c unflex -n '__unflex_in ""' -a tune -d 'Find the resonances by printing towers and looking at their walls'
 complete -c unflex -n '__unflex_in ""' -a printer -d 'Printer files'
 complete -c unflex -n '__unflex_in printer' -a init -d 'Write a printer file from what already describes the printer'
 complete -c unflex -n '__unflex_in printer' -a line-test -d 'Write G-code that shows how many lines per second the printer takes'
@@ -48,6 +49,7 @@ complete -c unflex -n '__unflex_in printer' -a macros -d 'Write macros by which 
 
 complete -c unflex -n "__unflex_in $prints" -a $gcode
 complete -c unflex -n '__unflex_in identify' -a '(__unflex_files .csv)'
+complete -c unflex -n '__unflex_in tune' -a $gcode
 
 complete -c unflex -n '__unflex_in compensate' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
 complete -c unflex -n '__unflex_in compensate' -l in-place -d 'Replace the input'
@@ -60,7 +62,7 @@ complete -c unflex -n '__unflex_in verify' -l against -x -a $gcode -d 'The slice
 complete -c unflex -n '__unflex_in compensate verify inspect' -l strict -d 'Take warnings for errors'
 complete -c unflex -n '__unflex_in compensate batch verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'
 complete -c unflex -n '__unflex_in compensate batch study' -l engine -x -a 'auto banded ipopt' -d 'What solves'
-complete -c unflex -n '__unflex_in compensate batch study' -s j -l jobs -x -d 'How many to compute at once'
+complete -c unflex -n '__unflex_in compensate batch study tune' -s j -l jobs -x -d 'How many to compute at once'
 complete -c unflex -n '__unflex_in study' -l machines -x -a '(__fish_complete_directories (commandline -ct))' -d 'Folder of resonance records of real machines'
 complete -c unflex -n '__unflex_in study' -l case -x -a 'ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' -d 'Only this case of the corner'
 
@@ -75,6 +77,13 @@ complete -c unflex -n '__unflex_in identify' -l second -d 'Find what still rings
 complete -c unflex -n '__unflex_in identify' -l make-test -x -a 'x y' -d 'Write G-code with such stops along an axis'
 complete -c unflex -n '__unflex_in identify' -s o -l output -x -a $gcode -d 'Where --make-test writes, - for stdout'
 
+complete -c unflex -n '__unflex_in tune' -l read -x -d 'Bands without waves, x=FIRST..LAST; repeatable'
+complete -c unflex -n '__unflex_in tune' -s o -l output -x -a $gcode -d 'Where to write the next tower, - for stdout'
+complete -c unflex -n '__unflex_in tune' -l like -x -a $gcode -d 'A sliced print, for its start code and end code'
+complete -c unflex -n '__unflex_in tune' -l nozzle-temp -x -d 'Without --like: degrees Celsius'
+complete -c unflex -n '__unflex_in tune' -l bed-temp -x -d 'Without --like: degrees Celsius'
+complete -c unflex -n '__unflex_in tune' -l report -x -a '(__unflex_files .html)' -d 'Write a page with pictures of the walls'
+
 complete -c unflex -n '__unflex_in "printer init"' -l from -x -a $printer -d 'What describes the printer'
 complete -c unflex -n '__unflex_in "printer init"' -l record -x -a '(__unflex_files .csv)' -d 'A record of a resonance; repeatable'
 complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unflex_files .toml)' -d 'Where to write, - for stdout'
@@ -82,8 +91,8 @@ complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unfl
 complete -c unflex -n '__unflex_in "printer line-test"' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
 complete -c unflex -n '__unflex_in "printer macros"' -s o -l output -x -a '(__unflex_files .cfg)' -d 'Where to write, - for stdout'
 
-complete -c unflex -n "__unflex_in $prints batch identify 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
-complete -c unflex -n "__unflex_in $prints batch identify 'printer init' 'printer line-test' 'printer macros'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n "__unflex_in $prints batch identify tune 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
+complete -c unflex -n "__unflex_in $prints batch identify tune 'printer init' 'printer line-test' 'printer macros'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
 complete -c unflex -n '__unflex_in inspect' -l report -x -a '(__unflex_files .json)' -d 'Write a report, - for stdout'
 complete -c unflex -n '__unflex_in compensate verify study identify' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
-complete -c unflex -n "__unflex_in $prints batch identify 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'
+complete -c unflex -n "__unflex_in $prints batch identify tune 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'

@@ -10,6 +10,7 @@
 
 #include "console.hpp"
 #include "unflex/app/run_config.hpp"
+#include "unflex/core/number.hpp"
 
 namespace unflex::app {
 namespace {
@@ -282,6 +283,74 @@ void add_identify(CLI::App& program, RunConfig& config) {
   command->callback([&config] { config.command = Command::identify; });
 }
 
+// "x=12..19", or "x=14" for a single band.
+std::string read_zone(const std::string& text, TuneConfig& tune) {
+  const bool has_axis = text.size() > 2 && text[1] == '=' &&
+                        std::string_view("xyXY").find(text[0]) != std::string_view::npos;
+  const std::string_view bands =
+      std::string_view(text).substr(std::min<std::size_t>(2, text.size()));
+  const std::size_t dots = bands.find("..");
+  const bool is_range = dots != std::string_view::npos;
+  const std::optional<double> first = parse_number(bands.substr(0, dots));
+  const std::optional<double> last = is_range ? parse_number(bands.substr(dots + 2)) : first;
+  const auto is_band = [](const std::optional<double>& value) {
+    constexpr double kMost = 1000.0;
+    return value && *value >= 1.0 && *value <= kMost && *value == std::floor(*value);
+  };
+  if (!has_axis || !is_band(first) || !is_band(last)) {
+    return fmt::format(
+        "'{}' must have the form x=12..19, the first and the last band whose walls "
+        "show no waves",
+        text);
+  }
+  tune.zones[text[0] == 'x' || text[0] == 'X' ? 0 : 1] =
+      tune::Zone{static_cast<std::size_t>(*first), static_cast<std::size_t>(*last)};
+  return {};
+}
+
+void add_tune(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "tune", "Find the resonances by printing towers and looking at their walls");
+  TuneConfig& tune = config.tune;
+  command->add_option("TOWER", config.input, "The tower that was printed; without it, the first")
+      ->type_name("");
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--read",
+          [&tune](const std::vector<std::string>& zones) {
+            for (const std::string& zone : zones) {
+              if (const std::string wrong = read_zone(zone, tune); !wrong.empty()) {
+                throw CLI::ValidationError("--read", wrong);
+              }
+            }
+          },
+          "The bands of TOWER without waves: x=FIRST..LAST, y=FIRST..LAST; repeatable")
+      ->type_name("ZONE")
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", config.output, "Where to write the next tower, - for stdout")
+      ->type_name("OUT");
+  command
+      ->add_option("--like", tune.like,
+                   "A sliced print, whose start code and end code the first tower shall have")
+      ->type_name("IN");
+  command
+      ->add_option("--nozzle-temp", tune.nozzle_temp_c,
+                   "Without --like: the nozzle's temperature, in degrees Celsius")
+      ->type_name("C")
+      ->check(positive());
+  command->add_option("--bed-temp", tune.bed_temp_c, "Without --like: the bed's temperature")
+      ->type_name("C")
+      ->check(positive());
+  add_settings(*command, config);
+  command
+      ->add_option("--report", config.report,
+                   "Write a page, FILE.html, with pictures of the walls to expect")
+      ->type_name("FILE");
+  add_jobs(*command, config);
+  command->add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
+  command->callback([&config] { config.command = Command::tune; });
+}
+
 tl::unexpected<Error> usage(std::string message) {
   return fail(ErrorKind::usage, std::move(message));
 }
@@ -368,6 +437,43 @@ Status check_records(const RunConfig& run_config) {
   return {};
 }
 
+Status check_tune(const RunConfig& config) {
+  const TuneConfig& tune = config.tune;
+  const bool has_zone = tune.zones[0] || tune.zones[1];
+  if (config.input.empty() && has_zone) {
+    return usage("--read is of a tower that was printed; give its file too");
+  }
+  if (!config.input.empty() && !has_zone) {
+    return usage("what do its walls show? give --read x=FIRST..LAST or y=FIRST..LAST");
+  }
+  if (config.input.empty() && config.output.empty()) {
+    return usage("where to write the tower? give -o OUT, or -o - for stdout");
+  }
+  if (config.input == kStandardStream) {
+    return usage("the tower that was printed must be a file");
+  }
+  if (config.input.empty() && !tune.like && !tune.nozzle_temp_c) {
+    return usage(
+        "how does a print begin on this printer? give --like with a sliced print of yours, or "
+        "--nozzle-temp and --bed-temp");
+  }
+  if (tune.like && (tune.nozzle_temp_c || tune.bed_temp_c > 0.0)) {
+    return usage("--like brings its own temperatures; give either it or --nozzle-temp");
+  }
+  if (!config.input.empty() && (tune.like || tune.nozzle_temp_c || tune.bed_temp_c > 0.0)) {
+    return usage(
+        "the next tower begins and ends as TOWER did; --like and temperatures are for "
+        "the first");
+  }
+  if (config.report && config.output.empty()) {
+    return usage("--report is a page on the tower to write; give -o too");
+  }
+  if (config.report && !is_html(*config.report)) {
+    return usage(fmt::format("--report {}: the name must end in .html", *config.report));
+  }
+  return config.report ? check_has_name("--report", *config.report, {".html"}) : Status{};
+}
+
 Status check_batch(const RunConfig& config) {
   for (const std::string& folder : {config.input, config.output, config.report.value_or(".")}) {
     if (folder == kStandardStream) {
@@ -415,6 +521,9 @@ Status complete(RunConfig& config) {
   }
   if (config.command == Command::batch) {
     return check_batch(config);
+  }
+  if (config.command == Command::tune) {
+    return check_tune(config);
   }
   return config.report ? check_report(config) : Status{};
 }
@@ -471,6 +580,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   add_inspect(program, config);
   add_printer(program, config);
   add_identify(program, config);
+  add_tune(program, config);
   add_study(program, config);
   program.footer(
       "Exit codes: 0 done, 1 usage or configuration, 2 bad input, 3 deviation above\n"

@@ -21,6 +21,7 @@
 #include "printer_macros.hpp"
 #include "results.hpp"
 #include "signals.hpp"
+#include "tune.hpp"
 #include "unflex/core/caught.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 #include "unflex/pipeline/study_print.hpp"
@@ -144,6 +145,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return config.machines.empty() ? run_study(config, console) : run_machines(config, console);
     case Command::batch:
       return run_batch(config, console);
+    case Command::tune:
+      return run_tune(config, console);
     case Command::compensate:
     case Command::verify:
       break;

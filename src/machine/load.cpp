@@ -125,7 +125,8 @@ void note_unknown_resonances(Draft& draft) {
   draft.settings.guesses.push_back(
       {{draft.printer_file, 0},
        fmt::format("the resonance along {} is not given, and {} Hz is assumed, a guess that "
-                   "compensate refuses; find it with unflex identify, take it from the printer's "
+                   "compensate refuses; find it with unflex identify or unflex tune, take it from "
+                   "the printer's "
                    "own configuration with unflex printer init, or give {}",
                    fmt::join(axes, " and "), AxisDynamics{}.freq_hz, fmt::join(overrides, " "))});
 }

@@ -35,7 +35,8 @@ std::string refusal(const std::string& text) {
 TEST(Guesses, AreTheResonancesThatNobodyGives) {
   EXPECT_EQ(guess(read("[limits]\nmax_accel_mm_s2 = 4000\n")),
             "p.toml: warning: the resonance along X and Y is not given, and 45 Hz is assumed, a "
-            "guess that compensate refuses; find it with unflex identify, take it from the "
+            "guess that compensate refuses; find it with unflex identify or unflex tune, take it "
+            "from the "
             "printer's own configuration with unflex printer init, or give --set "
             "dynamics.x.freq_hz=... --set dynamics.y.freq_hz=...");
   const Result<Settings> nothing = load({}, {});

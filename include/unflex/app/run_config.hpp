@@ -11,6 +11,7 @@
 #include "unflex/identify/axis_model.hpp"
 #include "unflex/machine/print_text.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "unflex/tune/trial.hpp"
 
 namespace unflex::app {
 
@@ -23,7 +24,8 @@ enum class Command {
   line_test,
   identify,
   study,
-  batch
+  batch,
+  tune
 };
 
 // The codes the program exits with, see docs/cli.md.
@@ -51,12 +53,22 @@ struct IdentifyConfig {
   std::optional<identify::Axis> make_test;
 };
 
+// What `tune` works on, besides the tower to read (RunConfig::input, empty for the first tower).
+struct TuneConfig {
+  // The bands without waves, for X and Y.
+  std::array<std::optional<tune::Zone>, 2> zones;
+  std::optional<std::string> like;  // a sliced print, for its start and end codes
+  std::optional<double> nozzle_temp_c;
+  double bed_temp_c = 0.0;
+};
+
 struct RunConfig {
   Command command = Command::compensate;
   // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
-  // empty for the thesis' cases; batch: the folder of the prints
+  // empty for the thesis' cases; batch: the folder of the prints; tune: the tower that was printed,
+  // empty for the first
   std::string input;
-  // compensate, printer init, printer macros, printer line-test, batch: -o, or the input with
+  // compensate, printer init, printer macros, printer line-test, batch, tune: -o, or the input with
   // --in-place; verify: OUT
   std::string output;
   bool in_place = false;
@@ -75,6 +87,7 @@ struct RunConfig {
   bool quiet = false;
   bool strict = false;  // compensate, verify, inspect: warnings are errors
   IdentifyConfig identify;
+  TuneConfig tune;
   std::vector<std::string> cases;  // study: names, none for all
   std::string machines;            // study: folder of records; empty: none
 };

@@ -1,0 +1,59 @@
+// A tower compensated band by band, and the walls that a printer makes of it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/tune/tower.hpp"
+
+namespace unflex::pipeline {
+
+// A band as it was sliced and as it was compensated, each a whole file, with the tower's start code
+// and its foot. Below the first band lies the tower's base; the others begin where they will.
+struct Band {
+  machine::Settings made_for;
+  std::string sliced;
+  std::string compensated;
+};
+
+// Compensates each band for the values that its number has in the trials, by the exact design of
+// one mode for each axis, since a base that suits several models hides what is looked for. Whatever
+// else `settings` say holds. workers: how many threads. Errors: those of compensate(), and a rule
+// that is broken, of kind internal.
+[[nodiscard]] Result<std::vector<Band>> compensate_bands(const tune::Tower& tower,
+                                                         const tune::TowerSettings& towers,
+                                                         const machine::Settings& settings,
+                                                         unsigned workers, Progress& progress);
+
+// The bands as one file.
+[[nodiscard]] std::string join_bands(const std::vector<Band>& bands);
+
+// The axes of a printer as they are.
+struct TrueAxes {
+  std::array<double, 2> freq_hz{};  // X, Y
+  std::array<double, 2> damping_ratio{};
+};
+
+// The straight part of a wall in a band's last layer: how far the nozzle is inside of the line at
+// every kRelief_mm from the part's begin on.
+inline constexpr double kRelief_mm = 0.1;
+struct Relief {
+  std::vector<double> inward_um;
+
+  // From the deepest trough to the highest crest, µm.
+  [[nodiscard]] double height_um() const;
+};
+
+// What a printer with these axes makes of the bands: for each band the relief of each of the
+// tower's walls, by a simulation of the compensated file's replay.
+[[nodiscard]] Result<std::vector<std::vector<Relief>>> print_bands(const std::vector<Band>& bands,
+                                                                   const tune::Tower& tower,
+                                                                   const TrueAxes& axes,
+                                                                   Progress& progress);
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,85 @@
+// Calibration by printing: each band of a tower is compensated for another frequency or damping
+// ratio, and whoever looks at the walls tells between which bands no waves can be seen.
+//
+//   δ        error of the frequency, as a share
+//   Δζ       error of the damping ratio
+//   k        height of the waves for an error of 1 % (or of 0.01), from trough to crest, µm
+//
+// A base made for other values than the axis has leaves waves of the height 100 k √(δ² + Δζ²),
+// since its transfer function is 2(δ + iΔζ) instead of 0 at the axis' pole. So the zone without
+// waves lies around the true value, whatever the other value is, if only that is not too far off.
+// The rounds therefore alternate: frequency, damping ratio, frequency, ….
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "unflex/core/error.hpp"
+
+namespace unflex::tune {
+
+// What is known of an axis, and how far it may be off either way.
+struct Knowledge {
+  double freq_hz = 0.0;     // 0: nothing is known
+  double freq_error = 0.0;  // share
+  double damping_ratio = 0.08;
+  double damping_error = 0.07;
+  std::size_t rounds = 0;  // prints read so far
+
+  [[nodiscard]] bool has_freq() const { return freq_hz > 0.0; }
+};
+
+enum class Parameter { freq_hz, damping_ratio };
+
+// How the wall of a tower makes the axis swing: a wave across it, from one side of the wall to the
+// straight line and back, as often as `count` says.
+struct Waves {
+  double freq_hz = 0.0;
+  double accel_mm_s2 = 0.0;  // the largest acceleration across the wall
+  int count = 1;
+
+  // From the straight line to the crest: 2a/ω².
+  [[nodiscard]] double height_mm() const;
+};
+
+// What one tower tries for one axis: band n of 1 … bands has the value first · stepⁿ⁻¹ for a
+// frequency and first + (n − 1) · step for a damping ratio.
+struct Trial {
+  Parameter parameter = Parameter::freq_hz;
+  std::size_t bands = 0;
+  double first = 0.0;
+  double step = 0.0;
+  Knowledge known = {};  // before this tower
+  Waves waves = {};
+
+  [[nodiscard]] double value(std::size_t band) const;
+  // What a band is compensated for.
+  [[nodiscard]] double freq_hz(std::size_t band) const;
+  [[nodiscard]] double damping_ratio(std::size_t band) const;
+};
+
+// The bands in which no waves are seen, from 1 on.
+struct Zone {
+  std::size_t first = 0;
+  std::size_t last = 0;
+};
+
+// What to try next for an axis whose print accelerates by as much.
+[[nodiscard]] Trial next_trial(const Knowledge& known, double accel_mm_s2);
+
+// What the zone tells. If it reaches an end of the bands, the true value may lie beyond, and the
+// error says so. Errors are of kind usage: the trial has no such bands.
+[[nodiscard]] Result<Knowledge> read(const Trial& trial, const Zone& zone);
+
+// A trial as a line of comment in the tower's G-code, without its end, and back. from_comment():
+// an error of kind input if the line begins like one but is none; `place` is the line's.
+inline constexpr std::string_view kTrialMark = "; unflex tune: axis=";
+[[nodiscard]] std::string to_comment(char axis, const Trial& trial);
+struct AxisTrial {
+  char axis = 'x';
+  Trial trial;
+};
+[[nodiscard]] Result<AxisTrial> from_comment(std::string_view line, const SourcePlace& place);
+
+}  // namespace unflex::tune

@@ -1,0 +1,216 @@
+#include "unflex/pipeline/tune.hpp"
+
+#include <fmt/core.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "stage_options.hpp"
+#include "unflex/core/errno_text.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// A file in memory, by a name that others can open.
+class MemoryFile {
+ public:
+  MemoryFile() : fd_(::memfd_create("unflex-tune", MFD_CLOEXEC)) {}
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  ~MemoryFile() {
+    if (fd_ >= 0) {
+      ::close(fd_);
+    }
+  }
+
+  [[nodiscard]] bool is_open() const { return fd_ >= 0; }
+  [[nodiscard]] std::string name() const { return fmt::format("/proc/self/fd/{}", fd_); }
+
+ private:
+  int fd_;
+};
+
+machine::Settings settings_of_band(const machine::Settings& settings,
+                                   const tune::TowerSettings& tower, std::size_t band) {
+  machine::Settings result = settings;
+  const auto set = [&](machine::AxisDynamics& axis, const tune::Trial& trial) {
+    const std::size_t number = std::min(band, trial.bands);
+    axis = {.freq_hz = trial.freq_hz(number), .damping_ratio = trial.damping_ratio(number)};
+  };
+  set(result.dynamics_x, tower.trials[0]);
+  set(result.dynamics_y, tower.trials[1]);
+  result.dynamics_error = {.freq = 0.0, .damping = 0.0};
+  result.second = {};
+  result.solve.along_weight = 1.0;
+  return result;
+}
+
+Result<std::string> compensate_text(const std::string& sliced, const machine::Settings& settings,
+                                    const std::string& name, unsigned workers, Progress& progress) {
+  const MemoryFile input;
+  const MemoryFile output;
+  if (!input.is_open() || !output.is_open()) {
+    return fail(ErrorKind::internal, fmt::format("no memory for the tower: {}", errno_text(errno)));
+  }
+  std::ofstream(input.name(), std::ios::binary) << sliced;
+  const Job job{.input = input.name(),
+                .input_name = name,
+                .output = output.name(),
+                .output_name = name,
+                .settings = settings,
+                .engine = EngineChoice::banded,
+                .workers = workers};
+  const Result<report::Report> report = compensate(job, progress);
+  if (!report) {
+    return tl::unexpected(report.error());
+  }
+  if (report->violation_count > 0) {
+    return fail(ErrorKind::internal, fmt::format("a band breaks a rule, which is a fault of "
+                                                 "unflex: {}",
+                                                 report->violations.front()));
+  }
+  std::ostringstream text;
+  text << std::ifstream(output.name(), std::ios::binary).rdbuf();
+  return text.str();
+}
+
+// Progress of one band among all.
+class BandProgress final : public Progress {
+ public:
+  BandProgress(Progress& all, std::size_t bands) : all_(&all), bands_(bands) {}
+  void begin(std::size_t band) { band_ = band; }
+  void update(std::string_view, double fraction) override {
+    all_->update("compensating the tower", (static_cast<double>(band_) + std::max(0.0, fraction)) /
+                                               static_cast<double>(bands_));
+  }
+  [[nodiscard]] bool cancelled() const override { return all_->cancelled(); }
+
+ private:
+  Progress* all_;
+  std::size_t bands_;
+  std::size_t band_ = 0;
+};
+
+// Looks at the nozzle in the straight parts of walls.
+class WallWatcher final : public verify::Observer {
+ public:
+  explicit WallWatcher(const std::vector<tune::Wall>& walls) : walls_(&walls) {
+    for (const tune::Wall& wall : walls) {
+      const double length_mm = wall.to_mm - wall.from_mm;
+      reliefs_.push_back(
+          {std::vector<double>(static_cast<std::size_t>(std::floor(length_mm / kRelief_mm)), 0.0)});
+    }
+  }
+
+  void line(const gcode::Line&) override {}
+  void section(const verify::ReferencePath&, const verify::ReferencePath&) override {}
+  void hold(double) override {}
+  void advanced(const verify::ReferencePath&, double) override {}
+  [[nodiscard]] double memory_s() const override { return 0.0; }
+
+  void step(verify::NozzleId nozzle, const verify::NozzleStep& step) override {
+    if (nozzle.base != verify::NozzleBase::emitted || nozzle.model != 1 || !step.extruding) {
+      return;
+    }
+    for (std::size_t i = 0; i < walls_->size(); ++i) {
+      look(step.nozzle, (*walls_)[i], reliefs_[i]);
+    }
+  }
+
+  [[nodiscard]] const std::vector<Relief>& reliefs() const { return reliefs_; }
+
+ private:
+  // Later layers lie upon earlier ones, and only the outer ring counts.
+  static void look(const dynamics::NozzleMotionXY& nozzle, const tune::Wall& wall, Relief& relief) {
+    constexpr double kNear_mm = 0.15;
+    const double along_mm = (wall.shows_x ? nozzle.y.position : nozzle.x.position) - wall.from_mm;
+    // The right wall's inside is towards −X, the bottom wall's towards +Y.
+    const double inward_mm =
+        wall.shows_x ? wall.at_mm - nozzle.x.position : nozzle.y.position - wall.at_mm;
+    const double place = along_mm / kRelief_mm;
+    if (std::abs(inward_mm) < kNear_mm && place >= 0.0 &&
+        place < static_cast<double>(relief.inward_um.size())) {
+      relief.inward_um[static_cast<std::size_t>(place)] = 1e3 * inward_mm;
+    }
+  }
+
+  const std::vector<tune::Wall>* walls_;
+  std::vector<Relief> reliefs_;
+};
+
+}  // namespace
+
+double Relief::height_um() const {
+  if (inward_um.empty()) {
+    return 0.0;
+  }
+  const auto [low, high] = std::ranges::minmax(inward_um);
+  return high - low;
+}
+
+Result<std::vector<Band>> compensate_bands(const tune::Tower& tower,
+                                           const tune::TowerSettings& towers,
+                                           const machine::Settings& settings, unsigned workers,
+                                           Progress& progress) {
+  std::vector<Band> result;
+  BandProgress part(progress, tower.bands.size());
+  for (std::size_t number = 1; number <= tower.bands.size(); ++number) {
+    part.begin(number - 1);
+    std::string sliced = tower.start + (number == 1 ? tower.base : tower.approach(number)) +
+                         tune::band_begins(number) + tower.bands[number - 1] +
+                         tune::band_ends(number) + tower.foot;
+    machine::Settings made_for = settings_of_band(settings, towers, number);
+    Result<std::string> compensated = compensate_text(
+        sliced, made_for, fmt::format("band {} of the tower", number), workers, part);
+    if (!compensated) {
+      return tl::unexpected(compensated.error());
+    }
+    result.push_back({std::move(made_for), std::move(sliced), std::move(*compensated)});
+  }
+  return result;
+}
+
+std::string join_bands(const std::vector<Band>& bands) {
+  std::string text;
+  for (std::size_t number = 1; number <= bands.size(); ++number) {
+    const std::string& file = bands[number - 1].compensated;
+    // The first band has the tower's head, the last its foot.
+    const std::size_t begin = number == 1 ? 0 : file.find(tune::band_begins(number));
+    const std::string mark = tune::band_ends(number);
+    const std::size_t end = number == bands.size() ? file.size() : file.find(mark) + mark.size();
+    text += file.substr(begin, end - begin);
+  }
+  return text;
+}
+
+Result<std::vector<std::vector<Relief>>> print_bands(const std::vector<Band>& bands,
+                                                     const tune::Tower& tower, const TrueAxes& axes,
+                                                     Progress& progress) {
+  std::vector<std::vector<Relief>> result;
+  const verify::NozzleModel model{dynamics::from_frequency(axes.freq_hz[0], axes.damping_ratio[0]),
+                                  dynamics::from_frequency(axes.freq_hz[1], axes.damping_ratio[1])};
+  for (const Band& band : bands) {
+    WallWatcher watcher(tower.walls);
+    std::istringstream sliced(band.sliced);
+    std::istringstream compensated(band.compensated);
+    const Result<verify::VerifyReport> report = verify::verify(
+        sliced, "the tower", compensated, "the compensated tower", verify_rules(band.made_for),
+        progress, {.detuned = {model}, .observer = &watcher});
+    if (!report) {
+      return tl::unexpected(report.error());
+    }
+    result.push_back(watcher.reliefs());
+  }
+  return result;
+}
+
+}  // namespace unflex::pipeline
