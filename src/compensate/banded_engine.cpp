@@ -10,14 +10,13 @@
 
 #include "axis_chain.hpp"
 #include "flat_form.hpp"
+#include "free_steps.hpp"
 #include "interior_point.hpp"
 #include "limits.hpp"
 #include "stage_form.hpp"
 
 namespace unflex::compensate {
 namespace {
-
-constexpr int kMostFreeSteps = 4;
 
 const char* name_of(RowKind kind) {
   switch (kind) {
@@ -32,42 +31,22 @@ const char* name_of(RowKind kind) {
   }
 }
 
-// Steps the form to the optimum without limits. Without rounding one step would do.
-template <class Form>
-bool solve_without_limits(Form& form, std::size_t nodes) {
-  if (!form.factor({})) {
-    return false;
-  }
-  form.evaluate({});
-  for (int step = 0; step < kMostFreeSteps; ++step) {
-    form.solve({});
-    const double cost = std::max(form.half_cost(), kIdleHalfCost * static_cast<double>(nodes));
-    form.advance(1.0);
-    if (form.decrement() <= kGapShare * cost) {
-      return true;
-    }
-    form.evaluate({});
-  }
-  return false;
-}
-
 template <class Form>
 Result<AxisSolution> solve_by(Form& form, InteriorPoint& interior_point, const ScaledWindow& scaled,
                               bool strict) {
   form.assign(scaled);
-  if (!solve_without_limits(form, scaled.nodes)) {
+  if (!form.factor({}) || !step_without_limits(form, scaled.nodes)) {
     return fail(ErrorKind::internal, "the window's program cannot be solved even without limits");
   }
   form.save();
   const AxisWindow& window = *scaled.window;
   return solve_within_limits(window, [&](const ActiveLimits& active) -> Result<AxisSolution> {
-    AxisSolution solution;
-    solution.iterations = 1;
+    int iterations = 1;
     if (active != ActiveLimits{}) {
       form.restore();
       const InteriorPoint::Outcome outcome =
           interior_point.solve(form, scaled.nodes, row_bounds(scaled, active), strict);
-      solution.iterations = outcome.iterations;
+      iterations = outcome.iterations;
       if (!outcome.converged) {
         return fail(
             ErrorKind::internal,
@@ -78,8 +57,8 @@ Result<AxisSolution> solve_by(Form& form, InteriorPoint& interior_point, const S
                         name_of(outcome.worst_kind), outcome.worst_row));
       }
     }
-    solution.objective = 2.0 * form.half_cost() * scaled.unit[0] * scaled.unit[0] * window.period_s;
-    form.write(solution.base);
+    AxisSolution solution = solution_of(form, scaled);
+    solution.iterations = iterations;
     return solution;
   });
 }

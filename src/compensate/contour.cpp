@@ -10,11 +10,14 @@
 namespace unflex::compensate {
 namespace {
 
-constexpr int kRounds = 12;
+constexpr int kRounds = 6;
 // In so many rounds the nearest place is looked for as far as the contour reaches.
 constexpr int kWideRounds = 2;
 constexpr std::size_t kAround = 2;  // edges
-constexpr double kOverRelaxation = 1.85;
+// How far q goes in a round: so many times the way to the nearest place, and this share of the way
+// that it went in the round before.
+constexpr double kStep = 2.3;
+constexpr double kInertia = 0.3;
 // What q may still move by when it counts as found.
 constexpr double kSettled_mm = 3e-4;
 constexpr double kCornerReach_s = 1e-3;
@@ -23,6 +26,8 @@ struct Place {
   double x_mm = 0.0;
   double y_mm = 0.0;
   std::size_t vertex = 0;  // where the edge begins that it lies on
+  double by_x_mm = 0.0;    // the way of the last round
+  double by_y_mm = 0.0;
 };
 
 // An edge of the path: from a vertex to the next.
@@ -133,12 +138,13 @@ class Aiming {
             everywhere || around < first + kAround ? first : std::min(around - kAround, last);
         const std::size_t to = everywhere ? last : std::min(last, around + kAround);
         const Place found = nearest(edges_, from, to, {x_mm[pair.x][i], y_mm[pair.y][i]});
-        const double x = kOverRelaxation * (found.x_mm - places[i].x_mm);
-        const double y = kOverRelaxation * (found.y_mm - places[i].y_mm);
-        places[i].x_mm += x;
-        places[i].y_mm += y;
-        places[i].vertex = found.vertex;
-        farthest = std::max({farthest, std::abs(x), std::abs(y)});
+        Place& q = places[i];
+        q.by_x_mm = kInertia * q.by_x_mm + kStep * (found.x_mm - q.x_mm);
+        q.by_y_mm = kInertia * q.by_y_mm + kStep * (found.y_mm - q.y_mm);
+        q.x_mm += q.by_x_mm;
+        q.y_mm += q.by_y_mm;
+        q.vertex = found.vertex;
+        farthest = std::max({farthest, std::abs(q.by_x_mm), std::abs(q.by_y_mm)});
         if (i > 0) {
           places[i - 1] = between(places, i - 1);
         }
@@ -299,12 +305,12 @@ std::vector<ModelPair> pairs_of(const AxisSetup& x, const AxisSetup& y) {
   return pairs;
 }
 
-void aim(RunWindow& window) {
+FreeSolutions aim(RunWindow& window) {
   Aiming aiming(window);
   FreeSolver x(window.x);
   FreeSolver y(window.y);
   if (!x.is_ready() || !y.is_ready()) {
-    return;
+    return {};
   }
   for (int round = 0; round < kRounds; ++round) {
     x.solve();
@@ -315,6 +321,7 @@ void aim(RunWindow& window) {
       break;
     }
   }
+  return {x.solution(), y.solution()};
 }
 
 }  // namespace unflex::compensate

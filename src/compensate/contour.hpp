@@ -12,11 +12,15 @@
 //   w (1 + ε + λ) Σ_i α_i (p_i − a_i)²     a_i = (q̄_i + (ε + λ) r) / (1 + ε + λ)
 //
 // where q̄_i is the mean of q over the pairs that hold model i. So solving both axes and finding q
-// anew alternate. In each round q goes farther than to the nearest place, since what is left of the
-// error along the path falls slowly otherwise.
+// anew alternate. In each round q goes farther than to the nearest place and keeps a share of its
+// last way, as a heavy ball does (B. T. Polyak, "Some methods of speeding up the convergence of
+// iteration methods", USSR Comput. Math. Math. Phys. 4 (1964) 1-17). What is left of the error
+// along the path falls slowly otherwise.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "unflex/compensate/run.hpp"
@@ -33,7 +37,9 @@ namespace unflex::compensate {
 [[nodiscard]] std::vector<PathVertex> part_of(const std::vector<PathVertex>& path,
                                               std::size_t first, std::size_t samples, double reach);
 
-// Finds q, and sets aims and weights of the window. Its limits do not count for q.
-void aim(RunWindow& window);
+// Finds q, and sets aims and weights of the window. Its limits do not count for q. Returns the
+// optimum of each axis without limits, where rounding lets it be found.
+using FreeSolutions = std::array<std::optional<AxisSolution>, 2>;
+FreeSolutions aim(RunWindow& window);
 
 }  // namespace unflex::compensate

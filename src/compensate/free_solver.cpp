@@ -1,5 +1,7 @@
 #include "free_solver.hpp"
 
+#include "free_steps.hpp"
+
 namespace unflex::compensate {
 
 FreeSolver::FreeSolver(const AxisWindow& window) {
@@ -25,6 +27,17 @@ void FreeSolver::solve() {
         form.solve({});
         form.advance(1.0);
         form.write_nozzles(nozzles_mm_);
+      },
+      form_);
+}
+
+std::optional<AxisSolution> FreeSolver::solution() {
+  scaled_.set_aims();
+  return std::visit(
+      [&](auto& form) -> std::optional<AxisSolution> {
+        form.set_aims();
+        return step_without_limits(form, scaled_.nodes) ? std::optional(solution_of(form, scaled_))
+                                                        : std::nullopt;
       },
       form_);
 }

@@ -2,6 +2,7 @@
 // program is factored once, since its matrix does not depend on the aims.
 #pragma once
 
+#include <optional>
 #include <variant>
 #include <vector>
 
@@ -21,7 +22,10 @@ class FreeSolver {
 
   // Whether the program can be solved.
   [[nodiscard]] bool is_ready() const { return ready_; }
+  // One step from where the last solve() ended, which is all but the optimum for today's aims.
   void solve();
+  // The optimum for today's aims; nullopt if rounding keeps it away.
+  [[nodiscard]] std::optional<AxisSolution> solution();
   // p of each model, at the places of r, mm.
   [[nodiscard]] const std::vector<std::vector<double>>& nozzles_mm() const { return nozzles_mm_; }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "contour.hpp"
+#include "limits.hpp"
 #include "shared_motors.hpp"
 
 namespace unflex::compensate {
@@ -321,7 +322,7 @@ void prepare(const Engine& divider, const WindowSpan& span, RunWindow& window) {
     return;
   }
   if (window.contour) {
-    aim(window);
+    static_cast<void>(aim(window));
   }
   if (window.shares_motors) {
     // The solution counts for its limits alone.
@@ -333,11 +334,16 @@ AxisSolutions solve(const Engine& engine, const WindowSpan& span, RunWindow& win
   if (span.cruise) {
     return {along(window.x), along(window.y)};
   }
-  if (window.contour) {
-    aim(window);
+  const FreeSolutions free = window.contour ? aim(window) : FreeSolutions{};
+  if (window.shares_motors) {
+    return solve_with_shared_motors(engine, window);
   }
-  return window.shares_motors ? solve_with_shared_motors(engine, window)
-                              : AxisSolutions{engine.solve(window.x), engine.solve(window.y)};
+  const auto solved = [&](const AxisWindow& axis, const std::optional<AxisSolution>& without) {
+    // A solution that keeps the limits by itself is the one within them, too.
+    return without && broken(without->base, axis) == ActiveLimits{} ? Result<AxisSolution>(*without)
+                                                                    : engine.solve(axis);
+  };
+  return {solved(window.x, free[0]), solved(window.y, free[1])};
 }
 
 dynamics::AxisTrajectory join(const std::vector<WindowSpan>& spans,

@@ -19,12 +19,14 @@ namespace {
 // The nozzle of a machine on a base: each of its modes hangs there by itself.
 class TrueNozzle {
  public:
-  TrueNozzle(const std::vector<dynamics::Mode>& modes, const rivals::AxisPath& base,
+  // shift: share by which all frequencies are off.
+  TrueNozzle(const std::vector<dynamics::Mode>& modes, double shift, const rivals::AxisPath& base,
              double start_s) {
     for (const dynamics::Mode& mode : modes) {
       parts_.push_back(
           {mode.gain,
-           rivals::NozzleWalk(dynamics::FlexibleAxis(mode.omega_rad_s, mode.zeta), base, start_s)});
+           rivals::NozzleWalk(dynamics::FlexibleAxis(mode.omega_rad_s * (1.0 + shift), mode.zeta),
+                              base, start_s)});
     }
   }
 
@@ -54,10 +56,11 @@ double reach_s(const Machine& machine) {
   return reach_of(slowest);
 }
 
-std::vector<double> distances(const Machine& machine, const BaseMotion& base, const Run& run) {
+std::vector<double> distances(const Machine& machine, double shift, const BaseMotion& base,
+                              const Run& run) {
   const double start_s = std::min({0.0, base.x.front().start_s, base.y.front().start_s});
-  TrueNozzle x(machine.x.truth, base.x, start_s);
-  TrueNozzle y(machine.y.truth, base.y, start_s);
+  TrueNozzle x(machine.x.truth, shift, base.x, start_s);
+  TrueNozzle y(machine.y.truth, shift, base.y, start_s);
   ContourGauge gauge(run.plan, reach_s(machine));
   std::vector<double> result;
   const double end_s = planner::duration_s(run.plan);
@@ -118,7 +121,8 @@ std::string axis_text(const MachineAxis& axis, const compensate::AxisSetup& know
 }  // namespace
 
 struct MachineBench::Measured {
-  std::array<verify::DeviationAccumulator, kContenderCount> contenders;
+  std::array<std::array<verify::DeviationAccumulator, kContenderCount>, kMachineShifts.size()>
+      shifted;
   std::size_t failed_runs = 0;
 };
 
@@ -128,11 +132,17 @@ std::string_view name(Contender contender) {
   return kNames[static_cast<std::size_t>(contender)];
 }
 
-const ContenderResult& MachineResult::best_shaper() const {
+const ContenderResult& MachineResult::best_shaper(std::size_t shift) const {
+  const AllContenders& contenders = shifted[shift];
   return *std::min_element(
       contenders.begin() + static_cast<std::ptrdiff_t>(Contender::zv),
       contenders.begin() + static_cast<std::ptrdiff_t>(Contender::unflex),
       [](const ContenderResult& a, const ContenderResult& b) { return a.rms_mm < b.rms_mm; });
+}
+
+double MachineResult::ratio(std::size_t shift) const {
+  const double best_mm = best_shaper(shift).rms_mm;
+  return best_mm > 0.0 ? of(Contender::unflex, shift).rms_mm / best_mm : 0.0;
 }
 
 MachineBench::MachineBench(Machine machine, const Options& options)
@@ -143,7 +153,8 @@ MachineBench::MachineBench(MachineBench&&) noexcept = default;
 void MachineBench::add(const std::vector<Run>& runs) {
   const std::unique_ptr<compensate::Engine> engine = make_engine(options_);
   struct OfRun {
-    std::array<std::vector<double>, kContenderCount> distances_mm;
+    std::array<std::array<std::vector<double>, kContenderCount>, kMachineShifts.size()>
+        distances_mm;
     bool failed = false;
   };
   std::vector<OfRun> results(runs.size());
@@ -162,14 +173,18 @@ void MachineBench::add(const std::vector<Run>& runs) {
         results[i].failed = !solved;
         base = solved ? std::move(*solved) : std::move(base);
       }
-      results[i].distances_mm[c] = distances(machine_, base, run);
+      for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
+        results[i].distances_mm[s][c] = distances(machine_, kMachineShifts[s], base, run);
+      }
     }
   });
   for (const OfRun& of_run : results) {
     measured_->failed_runs += of_run.failed ? 1 : 0;
-    for (std::size_t c = 0; c < kContenderCount; ++c) {
-      for (const double distance_mm : of_run.distances_mm[c]) {
-        measured_->contenders[c].add(distance_mm * distance_mm, 0.0, kPrintStep_s, 0);
+    for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
+      for (std::size_t c = 0; c < kContenderCount; ++c) {
+        for (const double distance_mm : of_run.distances_mm[s][c]) {
+          measured_->shifted[s][c].add(distance_mm * distance_mm, 0.0, kPrintStep_s, 0);
+        }
       }
     }
   }
@@ -181,9 +196,11 @@ MachineResult MachineBench::result() const {
                                    axis_text(machine_.y, machine_.unflex.y)),
                        {},
                        measured_->failed_runs};
-  for (std::size_t c = 0; c < kContenderCount; ++c) {
-    const verify::DeviationStats of = measured_->contenders[c].stats();
-    result.contenders[c] = {of.contour_rms_mm, of.contour_p99_mm, of.contour_max_mm};
+  for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
+    for (std::size_t c = 0; c < kContenderCount; ++c) {
+      const verify::DeviationStats of = measured_->shifted[s][c].stats();
+      result.shifted[s][c] = {of.contour_rms_mm, of.contour_p99_mm, of.contour_max_mm};
+    }
   }
   return result;
 }

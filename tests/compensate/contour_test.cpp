@@ -187,6 +187,34 @@ TEST(ContourWindow, TakesAModelWithoutAnyShare) {
   }
 }
 
+// The rounds end with a solution without limits. Where it keeps the limits, the engine need not
+// solve the window again; where it does not, the engine must.
+TEST(ContourWindow, HasTheEnginesSolutionWithAndWithoutActiveLimits) {
+  const std::vector<planner::PlannedMove> moves = corners();
+  for (const double limit_mm_s2 : {5e4, 4000.0}) {
+    compensate::Setup setup = with_contour(robust(0.1));
+    setup.x.limits.max_accel_mm_s2 = setup.y.limits.max_accel_mm_s2 = limit_mm_s2;
+    const std::size_t nodes = node_grid(moves, setup).count;
+    const WindowSpan span{0, nodes - 1, 0, nodes - 1};
+    RunWindow window = windows(moves, {span}, testing::at_rest(moves), setup).front();
+    const auto engine = make_banded_engine();
+    const auto solved = solve(*engine, span, window);
+    double fastest_mm_s2 = 0.0;
+    for (const auto& [axis, solution] :
+         {std::pair(&window.x, &solved[0]), std::pair(&window.y, &solved[1])}) {
+      const Result<AxisSolution> by_engine = engine->solve(*axis);
+      ASSERT_TRUE(*solution && by_engine);
+      for (std::size_t k = 0; k < nodes; ++k) {
+        EXPECT_NEAR((*solution)->base.position_mm[k], by_engine->base.position_mm[k], 1e-6);
+        fastest_mm_s2 = std::max(fastest_mm_s2, std::abs((*solution)->base.accel_mm_s2[k]));
+      }
+      EXPECT_NEAR((*solution)->objective, by_engine->objective, 1e-7 * by_engine->objective);
+    }
+    EXPECT_LE(fastest_mm_s2, limit_mm_s2 * (1.0 + 1e-6));
+    EXPECT_GT(fastest_mm_s2, 3990.0);
+  }
+}
+
 TEST(ContourWindow, IsAProblemOfEachAxisThatBothEnginesSolveAlike) {
   const auto moves =
       testing::plan({{0.0, 0.0}, {6.0, 0.0}, {6.0, 4.0}}, planner_limits(100.0, 5000.0, 5.0));
