@@ -137,8 +137,14 @@ std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
     result.push_back(with_unknown_mode(dynamics));
     left -= result.back().share;
   }
+  // The slower an axis, the farther it strays for the same error of its frequency. With shares as
+  // 1/ω both edges come out nearly alike.
+  double periods = 0.0;
+  for (const compensate::Plant& edge : band) {
+    periods += 1.0 / edge.axis.main_hz();
+  }
   for (compensate::Plant& edge : band) {
-    edge.share = left * (1.0 - kMiddleShare) / static_cast<double>(band.size());
+    edge.share = left * (1.0 - kMiddleShare) / (edge.axis.main_hz() * periods);
     result.push_back(edge);
   }
   return result;

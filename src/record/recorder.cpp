@@ -24,6 +24,10 @@ std::vector<Value> in_order(const Value& main, const std::vector<Value>& others)
   return result;
 }
 
+std::optional<double> rms_of(const verify::CornerStats& corners) {
+  return corners.count > 0 ? std::optional(corners.rms_mm) : std::nullopt;
+}
+
 }  // namespace
 
 Recorder::Recorder(const Options& options)
@@ -49,16 +53,17 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
   };
   report::Contender played{
       "as sliced",
-      spreads(verified.uncompensated, [](const auto& other) { return other.uncompensated; }), true};
+      spreads(verified.uncompensated, [](const auto& other) { return other.uncompensated; }), true,
+      rms_of(verified.uncompensated_corners)};
   std::vector<report::Contender> contenders = {
       verified.unshaped
           ? report::Contender{"as sliced",
                               spreads(*verified.unshaped,
                                       [](const auto& other) { return *other.unshaped; }),
-                              true}
+                              true, std::nullopt}
           : played,
       {"unflex", spreads(verified.compensated, [](const auto& other) { return other.compensated; }),
-       true}};
+       true, rms_of(verified.compensated_corners)}};
   for (report::Contender& shaper : recording.contenders) {
     if (!shaper.spreads.empty()) {
       shaper.spreads =

@@ -73,7 +73,10 @@ ShaperBench::ShaperBench(const verify::NozzleModel& model,
       last_(machines),
       near_(verify::reach_s(model)) {
   for (const dynamics::ShaperKind kind : dynamics::kShaperKinds) {
-    Shaper shaper{std::string(dynamics::name(kind)), is_drawn(kind), {}};
+    Shaper shaper{std::string(dynamics::name(kind)),
+                  is_drawn(kind),
+                  {},
+                  verify::CornerGauge(verify::reach_s(model))};
     const auto x = dynamics::shaper_pulses(kind, model.x.main_hz(), model.x.main_damping_ratio());
     const auto y = dynamics::shaper_pulses(kind, model.y.main_hz(), model.y.main_damping_ratio());
     if (x && y) {
@@ -83,7 +86,7 @@ ShaperBench::ShaperBench(const verify::NozzleModel& model,
   }
   if (printer_shaper) {
     const PrinterShaper own = without_common_delay(*printer_shaper);
-    Shaper shaper{own.name, true, {}};
+    Shaper shaper{own.name, true, {}, verify::CornerGauge(verify::reach_s(model))};
     install(shaper, own.x, own.y, machines);
     shapers_.push_back(std::move(shaper));
   }
@@ -133,6 +136,11 @@ void ShaperBench::advance(const verify::ReferencePath& path, double time_s) {
     near_.begin(path);
   }
   piece_ = std::max(piece_, path.first());
+  for (followed_ = std::max(followed_, path.first()); followed_ < path.end(); ++followed_) {
+    for (Shaper& shaper : shapers_) {
+      shaper.corners.follow(path[followed_].move, path[followed_].start_s);
+    }
+  }
   for (const double until_s = time_s - lookahead_s_ - kMargin * interval_s_; next_s_ <= until_s;
        next_s_ += interval_s_) {
     while (piece_ < path.end() && path[piece_].end_s <= next_s_) {
@@ -161,13 +169,28 @@ void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
   }
   const double weight = static_cast<double>(stride_) * interval_s_;
   peaking_.clear();
+  const auto squared_error = [&](const dynamics::NozzleMotionXY& state) {
+    std::size_t nearest = 0;
+    return near_.squared_contour_error(path, state.x.position, state.y.position, nearest);
+  };
   for (Shaper& shaper : shapers_) {
     for (Nozzle& nozzle : shaper.nozzles) {
-      const double contour2 = squared_contour_error(nozzle, path, next_s_, counts);
+      // Asked in any case, so that the nozzle forgets what is past.
+      const dynamics::NozzleMotionXY state = nozzle.shaped.at(next_s_);
+      if (!counts) {
+        continue;
+      }
+      if (&nozzle == shaper.nozzles.data()) {
+        shaper.corners.sample(next_s_, state.x.position, state.y.position);
+      }
+      const double contour2 = squared_error(state);
       nozzle.sum_contour2 += weight * contour2;
-      if (counts && contour2 > kNearPeak * nozzle.contour2_max_mm2) {
+      if (contour2 > kNearPeak * nozzle.contour2_max_mm2) {
         peaking_.push_back(&nozzle);
       }
+    }
+    if (!counts) {
+      shaper.corners.lift();
     }
   }
   if (!counts) {
@@ -178,7 +201,7 @@ void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
     near_.slide(path, time_s);
     for (Nozzle* const nozzle : peaking_) {
       nozzle->contour2_max_mm2 =
-          std::max(nozzle->contour2_max_mm2, squared_contour_error(*nozzle, path, time_s, true));
+          std::max(nozzle->contour2_max_mm2, squared_error(nozzle->shaped.at(time_s)));
     }
   }
   weight_s_ += weight;
@@ -190,19 +213,14 @@ void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
   }
 }
 
-// Without `counts` the nozzle is only let to forget what is past.
-double ShaperBench::squared_contour_error(Nozzle& nozzle, const verify::ReferencePath& path,
-                                          double time_s, bool counts) {
-  const dynamics::NozzleMotionXY state = nozzle.shaped.at(time_s);
-  std::size_t nearest = 0;
-  return counts ? near_.squared_contour_error(path, state.x.position, state.y.position, nearest)
-                : 0.0;
-}
-
 std::vector<report::Contender> ShaperBench::contenders() const {
   std::vector<report::Contender> result;
   for (const Shaper& shaper : shapers_) {
-    report::Contender contender{shaper.name, {}, shaper.drawn};
+    report::Contender contender{shaper.name, {}, shaper.drawn, std::nullopt};
+    const verify::CornerStats corners = shaper.corners.stats();
+    if (corners.count > 0) {
+      contender.corner_rms_mm = corners.rms_mm;
+    }
     for (const Nozzle& nozzle : shaper.nozzles) {
       contender.spreads.push_back(
           {std::sqrt(nozzle.contour2_max_mm2),

@@ -14,6 +14,7 @@
 #include "unflex/record/recorder.hpp"
 #include "unflex/report/recording.hpp"
 #include "unflex/rivals/shaped_nozzle.hpp"
+#include "unflex/verify/corners.hpp"
 #include "unflex/verify/near_path.hpp"
 
 namespace unflex::record {
@@ -45,13 +46,12 @@ class ShaperBench {
     std::string name;
     bool drawn = false;
     std::vector<Nozzle> nozzles;  // one per machine; none if it is not defined for the printer
+    verify::CornerGauge corners;  // of the first machine
   };
 
   void install(Shaper& shaper, const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y,
                std::size_t machines);
   void measure(const verify::ReferencePath& path, bool counts);
-  [[nodiscard]] double squared_contour_error(Nozzle& nozzle, const verify::ReferencePath& path,
-                                             double time_s, bool counts);
   [[nodiscard]] bool is_sampled(double time_s) const;
 
   double interval_s_;
@@ -61,7 +61,8 @@ class ShaperBench {
   std::vector<dynamics::NozzleMotionXY> last_;
   verify::NearPath near_;
   bool begun_ = false;
-  std::size_t piece_ = 0;  // piece of the path at next_s_
+  std::size_t piece_ = 0;     // piece of the path at next_s_
+  std::size_t followed_ = 0;  // pieces whose corners are known
   double next_s_ = 0.0;
   std::vector<Nozzle*> peaking_;
   std::size_t skipped_ = 0;

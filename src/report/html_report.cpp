@@ -106,7 +106,12 @@ Json contenders_json(const std::vector<Contender>& contenders) {
     for (const Spread& spread : contender.spreads) {
       spreads.push_back(spread_json(spread));
     }
-    array.push_back({{"name", contender.name}, {"spreads", spreads}, {"drawn", contender.drawn}});
+    array.push_back(
+        {{"name", contender.name},
+         {"spreads", spreads},
+         {"drawn", contender.drawn},
+         {"corners", contender.corner_rms_mm ? Json(rounded(*contender.corner_rms_mm * 1e3, 1e-3))
+                                             : Json(nullptr)}});
   }
   return array;
 }

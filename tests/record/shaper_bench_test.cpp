@@ -60,7 +60,12 @@ struct Benched {
   ShaperBench bench;
 };
 
-report::Spread exactly(dynamics::ShaperKind kind, double error) {
+struct Exactly {
+  report::Spread spread;
+  double corner_mm = 0.0;  // how far the nozzle passes from the corner
+};
+
+Exactly exactly(dynamics::ShaperKind kind, double error) {
   const std::vector<planner::PlannedMove> moves = corner();
   const dynamics::ShaperPulses pulses = dynamics::shaper_pulses(kind, kFreq_hz, kZeta).value();
   const double end_s = planner::duration_s(moves);
@@ -74,6 +79,7 @@ report::Spread exactly(dynamics::ShaperKind kind, double error) {
   double sum = 0.0;
   double weight = 0.0;
   double most = 0.0;
+  double corner_mm = 1e9;
   for (std::size_t k = 0; k < grid.count; ++k) {
     if (grid.at(k) < 0.0 || grid.at(k) > end_s) {
       continue;
@@ -83,11 +89,12 @@ report::Spread exactly(dynamics::ShaperKind kind, double error) {
     const double to_first = std::hypot(p_x - std::clamp(p_x, 0.0, 12.0), p_y);
     const double to_second = std::hypot(p_x - 12.0, p_y - std::clamp(p_y, 0.0, 12.0));
     const double contour = std::min(to_first, to_second);
+    corner_mm = std::min(corner_mm, std::hypot(p_x - 12.0, p_y));
     sum += contour * contour;
     weight += 1.0;
     most = std::max(most, contour);
   }
-  return {most, std::sqrt(sum / weight)};
+  return {{most, std::sqrt(sum / weight)}, corner_mm};
 }
 
 TEST(ShaperBench, FindsWhatTheClosedFormFinds) {
@@ -97,8 +104,11 @@ TEST(ShaperBench, FindsWhatTheClosedFormFinds) {
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i].name, dynamics::name(dynamics::kShaperKinds[i]));
     ASSERT_EQ(found[i].spreads.size(), errors.size());
+    // Between two moments the nozzle is taken to go straight.
+    const double corner_mm = exactly(dynamics::kShaperKinds[i], 0.0).corner_mm;
+    EXPECT_NEAR(found[i].corner_rms_mm.value(), corner_mm, 0.04 * corner_mm) << found[i].name;
     for (std::size_t k = 0; k < errors.size(); ++k) {
-      const report::Spread wanted = exactly(dynamics::kShaperKinds[i], errors[k]);
+      const report::Spread wanted = exactly(dynamics::kShaperKinds[i], errors[k]).spread;
       EXPECT_NEAR(found[i].spreads[k].max_mm, wanted.max_mm, 0.02 * wanted.max_mm) << found[i].name;
       // The tolerance is wide: there is a single corner, with sixteen moments per period.
       EXPECT_NEAR(found[i].spreads[k].rms_mm, wanted.rms_mm, 0.08 * wanted.rms_mm) << found[i].name;

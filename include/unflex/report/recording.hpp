@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -86,6 +87,9 @@ struct Contender {
   std::string name;
   std::vector<Spread> spreads;  // one for each of Recording::frequency_errors, or none
   bool drawn = false;           // in the figure too, not only in the table
+  // How far the nozzle passes from sharp corners if the frequencies are those of the settings;
+  // unset if there are no corners, or if it is not known.
+  std::optional<double> corner_rms_mm = std::nullopt;
 };
 
 struct Recording {

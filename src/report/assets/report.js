@@ -278,7 +278,7 @@ const unflexReport = (() => {
         ),
       );
     byId("contenders").replaceChildren(
-      head("Typical, µm", "exact", "±5 %", "±10 %", "±15 %", "largest, exact"),
+      head("Typical, µm", "exact", "±5 %", "±10 %", "±15 %", "largest, exact", "at corners, exact"),
       make(
         "tbody",
         {},
@@ -294,8 +294,9 @@ const unflexReport = (() => {
                   worst(contender, 10, 1),
                   worst(contender, 15, 1),
                   contender.spreads[exact][0],
-                ].map(um => make("td", {}, figures(um)))
-              : [make("td", {colspan: 5}, "not defined for this damping")]),
+                  contender.corners,
+                ].map(um => make("td", {}, um === null ? "–" : figures(um)))
+              : [make("td", {colspan: 6}, "not defined for this damping")]),
           ),
         ),
       ),
