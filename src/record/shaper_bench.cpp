@@ -181,7 +181,7 @@ void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
         continue;
       }
       if (&nozzle == shaper.nozzles.data()) {
-        shaper.corners.sample(next_s_, state.x.position, state.y.position);
+        look_at_corners(shaper, state);
       }
       const double contour2 = squared_error(state);
       nozzle.sum_contour2 += weight * contour2;
@@ -211,6 +211,21 @@ void ShaperBench::measure(const verify::ReferencePath& path, bool counts) {
     stride_ *= 2;
     at_stride_s_ = 0.0;
   }
+}
+
+void ShaperBench::look_at_corners(Shaper& shaper, const dynamics::NozzleMotionXY& state) const {
+  const double h = next_s_ - shaper.last_s;
+  // Between two moments a nozzle that rounds a corner does not go straight.
+  const int parts = h < 1.5 * interval_s_ && shaper.corners.is_near(next_s_) ? kFine : 1;
+  for (int part = 1; part < parts; ++part) {
+    const double u = static_cast<double>(part) / kFine;
+    shaper.corners.sample(shaper.last_s + u * h,
+                          rivals::on_cubic(shaper.last.x, state.x, h, u).position,
+                          rivals::on_cubic(shaper.last.y, state.y, h, u).position);
+  }
+  shaper.corners.sample(next_s_, state.x.position, state.y.position);
+  shaper.last_s = next_s_;
+  shaper.last = state;
 }
 
 std::vector<report::Contender> ShaperBench::contenders() const {

@@ -46,12 +46,17 @@ class ShaperBench {
     std::string name;
     bool drawn = false;
     std::vector<Nozzle> nozzles;  // one per machine; none if it is not defined for the printer
-    verify::CornerGauge corners;  // of the first machine
+    // The first machine's, and its state at the last moment that was measured.
+    verify::CornerGauge corners;
+    double last_s = -1.0;
+    dynamics::NozzleMotionXY last = {};
   };
 
   void install(Shaper& shaper, const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y,
                std::size_t machines);
   void measure(const verify::ReferencePath& path, bool counts);
+  // The nozzle's way to where it is now.
+  void look_at_corners(Shaper& shaper, const dynamics::NozzleMotionXY& state) const;
   [[nodiscard]] bool is_sampled(double time_s) const;
 
   double interval_s_;

@@ -4,11 +4,9 @@
 #include <limits>
 
 namespace unflex::rivals {
-namespace {
 
-// Cubic through position and velocity at both ends of an interval of length h, at fraction u.
-dynamics::NozzleMotion hermite(const dynamics::NozzleMotion& a, const dynamics::NozzleMotion& b,
-                               double h, double u) {
+dynamics::NozzleMotion on_cubic(const dynamics::NozzleMotion& a, const dynamics::NozzleMotion& b,
+                                double h, double u) {
   const double rise = b.position - a.position;
   const double from = a.velocity * h;
   const double to = b.velocity * h;
@@ -17,8 +15,6 @@ dynamics::NozzleMotion hermite(const dynamics::NozzleMotion& a, const dynamics::
   return {a.position + u * (from + u * (second + u * third)),
           (from + u * (2.0 * second + 3.0 * u * third)) / h};
 }
-
-}  // namespace
 
 ShapedNozzle::ShapedNozzle(const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y) {
   const auto set = [&](std::vector<Tap>& taps, const dynamics::ShaperPulses& pulses) {
@@ -58,7 +54,7 @@ dynamics::NozzleMotion ShapedNozzle::sum(std::vector<Tap>& taps,
     if (t >= from.time_s && i + 1 < samples_.size()) {
       const Sample& to = samples_[i + 1];
       const double h = to.time_s - from.time_s;
-      delayed = hermite(from.nozzle.*axis, to.nozzle.*axis, h, (t - from.time_s) / h);
+      delayed = on_cubic(from.nozzle.*axis, to.nozzle.*axis, h, (t - from.time_s) / h);
     }
     result.position += tap.pulse.weight * delayed.position;
     result.velocity += tap.pulse.weight * delayed.velocity;

@@ -104,9 +104,8 @@ TEST(ShaperBench, FindsWhatTheClosedFormFinds) {
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i].name, dynamics::name(dynamics::kShaperKinds[i]));
     ASSERT_EQ(found[i].spreads.size(), errors.size());
-    // Between two moments the nozzle is taken to go straight.
     const double corner_mm = exactly(dynamics::kShaperKinds[i], 0.0).corner_mm;
-    EXPECT_NEAR(found[i].corner_rms_mm.value(), corner_mm, 0.04 * corner_mm) << found[i].name;
+    EXPECT_NEAR(found[i].corner_rms_mm.value(), corner_mm, 0.02 * corner_mm) << found[i].name;
     for (std::size_t k = 0; k < errors.size(); ++k) {
       const report::Spread wanted = exactly(dynamics::kShaperKinds[i], errors[k]).spread;
       EXPECT_NEAR(found[i].spreads[k].max_mm, wanted.max_mm, 0.02 * wanted.max_mm) << found[i].name;

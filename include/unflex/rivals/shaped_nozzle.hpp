@@ -19,6 +19,11 @@
 
 namespace unflex::rivals {
 
+// On the cubic through position and velocity at both ends of an interval of length h, at fraction
+// u.
+[[nodiscard]] dynamics::NozzleMotion on_cubic(const dynamics::NozzleMotion& a,
+                                              const dynamics::NozzleMotion& b, double h, double u);
+
 class ShapedNozzle {
  public:
   // The trains of the two axes may belong to different shapers. An empty train leaves its axis as

@@ -58,6 +58,8 @@ class CornerGauge {
       look(time_s, x_mm, y_mm);
     }
   }
+  // Whether a corner is within reach.
+  [[nodiscard]] bool is_near(double time_s) const { return time_s >= next_s_; }
   // Nothing is known of the nozzle's way from its last place to the next one.
   void lift() { drawn_ = false; }
   // Corners that the nozzle has come within reach of.
