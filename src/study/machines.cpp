@@ -171,7 +171,9 @@ void MachineBench::add(const std::vector<Run>& runs) {
       if (contender == Contender::unflex) {
         Result<BaseMotion> solved = unflex_base(machine_.unflex, run.plan, kPrintParts, *engine);
         results[i].failed = !solved;
-        base = solved ? std::move(*solved) : std::move(base);
+        if (solved) {
+          base = std::move(*solved);
+        }
       }
       for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
         results[i].distances_mm[s][c] = distances(machine_, kMachineShifts[s], base, run);

@@ -26,7 +26,6 @@ constexpr double kTravelSpeed_mm_s = 100.0;
 constexpr double kLiftSpeed_mm_s = 10.0;
 constexpr std::size_t kBaseLayers = 4;
 constexpr int kBrimLoops = 8;
-constexpr int kLinesPerWave = 16;
 // A wall is even for so long before its waves begin.
 constexpr double kLeadIn_mm = 3.0;
 // The axis can be seen to swing so many times behind the waves.
@@ -52,6 +51,10 @@ double speed_of(const TowerSettings& settings, const Trial& trial) {
   return std::min({wanted, settings.max_velocity_mm_s,
                    std::sqrt(2.0 * settings.accel_mm_s2 * kLongestRunUp_mm)});
 }
+
+// Marlin slows down for the angle between short lines. With whole steps that angle is mostly
+// rounding, and large where lines are short.
+int lines_per_wave(Firmware firmware) { return firmware == Firmware::marlin ? 6 : 16; }
 
 // The parts of a wall, one behind the other.
 struct Parts {
@@ -189,9 +192,10 @@ class Writer {
               parts.speed_mm_s);
     };
     to(parts.lead_in_mm, 0.0);
-    const int lines = kLinesPerWave * waves.count;
+    const int per_wave = lines_per_wave(settings_->firmware);
+    const int lines = per_wave * waves.count;
     for (int i = 1; i <= lines; ++i) {
-      const double waves_done = static_cast<double>(i) / kLinesPerWave;
+      const double waves_done = static_cast<double>(i) / per_wave;
       to(parts.lead_in_mm + parts.wave_mm * waves_done,
          0.5 * waves.height_mm() * (1.0 - std::cos(2.0 * kPi * waves_done)));
     }

@@ -9,6 +9,9 @@
 #include <random>
 #include <string>
 
+#include "pipeline/jobs.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+
 namespace unflex::pipeline {
 namespace {
 
@@ -25,6 +28,7 @@ machine::Settings printer(const std::vector<std::string>& more = {}) {
 tune::TowerSettings tower_settings(const machine::Settings& settings,
                                    const std::array<tune::Knowledge, 2>& known) {
   tune::TowerSettings tower;
+  tower.firmware = settings.printer.firmware;
   tower.accel_mm_s2 = settings.limits.max_accel_mm_s2;
   tower.trials = {tune::next_trial(known[0], tower.accel_mm_s2),
                   tune::next_trial(known[1], tower.accel_mm_s2)};
@@ -115,6 +119,67 @@ TEST(Tune, ThreeRoundsFindAxesThatNobodyKnows) {
     }
   }
   EXPECT_GE(right, 0.95 * machines);
+}
+
+// A tower of three bands that are all made for the same, so that one model verifies them all.
+tune::TowerSettings even_tower(const machine::Settings& settings) {
+  tune::TowerSettings towers = tower_settings(settings, {});
+  for (tune::Trial& trial : towers.trials) {
+    trial = tune::next_trial({.freq_hz = 45.0, .freq_error = 0.02, .damping_ratio = 0.06},
+                             towers.accel_mm_s2);
+    trial.bands = 3;
+    trial.first = 45.0;
+    trial.step = 1.0;
+  }
+  return towers;
+}
+
+TEST(Tune, BandsMakeOnePrintThatBreaksNoRule) {
+  for (const std::vector<std::string>& firmware :
+       {std::vector<std::string>{}, {"printer.firmware=marlin"}, {"printer.firmware=rrf"}}) {
+    const machine::Settings settings = printer(firmware);
+    const tune::TowerSettings towers = even_tower(settings);
+    const tune::Tower tower = tune::tower(towers);
+    SilentProgress progress;
+    const auto bands = compensate_bands(tower, towers, settings, 2, progress);
+    ASSERT_TRUE(bands) << to_string(bands.error());
+    std::string sliced = tower.start + tower.base;
+    for (std::size_t number = 1; number <= tower.bands.size(); ++number) {
+      sliced += tune::band_begins(number) + tower.bands[number - 1] + tune::band_ends(number);
+    }
+    const testing::JobFolder folder(sliced + tower.foot);
+    folder.set_output(join_bands(*bands));
+    Job job = folder.job();
+    job.settings = bands->front().made_for;
+    const Result<report::Report> report = verify(job, progress);
+    ASSERT_TRUE(report) << to_string(report.error());
+    EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
+    // One run for each layer of the base, and one for each of the bands'.
+    EXPECT_EQ(report->runs_compensated, 4U + 3U * towers.layers_per_band);
+    EXPECT_LT(report->compensated.extruding.contour_rms_mm,
+              0.3 * report->uncompensated.extruding.contour_rms_mm);
+  }
+}
+
+TEST(Tune, GivesTheSameForAnyNumberOfThreads) {
+  const machine::Settings settings = printer();
+  const tune::TowerSettings towers = even_tower(settings);
+  const tune::Tower tower = tune::tower(towers);
+  SilentProgress progress;
+  const auto one = compensate_bands(tower, towers, settings, 1, progress);
+  const auto three = compensate_bands(tower, towers, settings, 3, progress);
+  ASSERT_TRUE(one && three);
+  EXPECT_EQ(join_bands(*one), join_bands(*three));
+}
+
+TEST(Tune, RefusesAPrinterThatCannotBeCompensated) {
+  machine::Settings settings = printer();
+  settings.refusal = Diagnostic{{"p.toml", 3}, "this firmware caps limits"};
+  const tune::TowerSettings towers = even_tower(settings);
+  SilentProgress progress;
+  const auto bands = compensate_bands(tune::tower(towers), towers, settings, 1, progress);
+  ASSERT_FALSE(bands);
+  EXPECT_EQ(bands.error().message, "this firmware caps limits");
 }
 
 }  // namespace

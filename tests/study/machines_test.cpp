@@ -117,6 +117,24 @@ TEST(MachineBench, GivesTheSameForAnyNumberOfThreads) {
   }
 }
 
+TEST(MachineBench, MeasuresARunWithoutASolutionAsSliced) {
+  Machine machine = machine_of(45.0);
+  machine.unflex.x.limits.max_velocity_mm_s = 1.0;
+  const MachineResult result = measured(machine);
+  EXPECT_EQ(result.failed_runs, 2U);
+  EXPECT_EQ(result.of(Contender::unflex).rms_mm, result.of(Contender::uncompensated).rms_mm);
+}
+
+TEST(MachineBench, TellsOfFrequenciesThatAreOff) {
+  const MachineResult result = measured(machine_of(45.0));
+  for (const std::size_t shift : {0U, 2U}) {
+    EXPECT_GT(result.of(Contender::unflex, shift).rms_mm,
+              10.0 * result.of(Contender::unflex).rms_mm);
+  }
+  EXPECT_NEAR(result.ratio(kNoShift),
+              result.of(Contender::unflex).rms_mm / result.best_shaper().rms_mm, 1e-12);
+}
+
 TEST(MachinesReport, IsDocumentedAndNamesEachContender) {
   MachinesOutcome outcome;
   outcome.input = "print.gcode";
