@@ -32,6 +32,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -80,6 +81,10 @@ class StageForm {
  private:
   using Vector = Eigen::VectorXd;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  // The kinds with a row at every node. Each row is a component of z.
+  static constexpr std::array<RowKind, 3> kNodeKinds = {RowKind::position, RowKind::velocity,
+                                                        RowKind::accel};
 
   // A model of the axis: what its nozzle is made of.
   struct Model {
