@@ -88,6 +88,7 @@ class Aiming {
       : window_(window),
         contour_(*window.contour),
         samples_(window.x.reference_mm.size()),
+        nodes_(window.x.nodes()),
         edges_(edges_of(window.path)) {
     set_along_weights();
     for (std::size_t i = 0; i < samples_; ++i) {
@@ -96,8 +97,8 @@ class Aiming {
       window_.y.weight[i] *= factor;
     }
     std::vector<Place> reference;
-    for (std::size_t i = 0; i < samples_; ++i) {
-      reference.push_back({window_.x.reference_mm[i], window_.y.reference_mm[i], 0});
+    for (std::size_t k = 0; k < nodes_; ++k) {
+      reference.push_back({window_.x.reference_mm[2 * k], window_.y.reference_mm[2 * k]});
     }
     nearest_.assign(contour_.pairs.size(), reference);
     set_aims();
@@ -112,9 +113,8 @@ class Aiming {
         [](const Place& place) { return place.y_mm; });
   }
 
-  // Takes q farther towards the places nearest to the nozzles, at nodes; in the middles between
-  // them it is as far from r as on the average of both nodes. Returns the longest way that a q
-  // went.
+  // Takes q farther towards the places nearest to the nozzles. x_mm and y_mm: of each model at each
+  // node. Returns the longest way that a q went.
   double follow(const std::vector<std::vector<double>>& x_mm,
                 const std::vector<std::vector<double>>& y_mm, bool everywhere) {
     const double reach = 2.0 * contour_.reach_s / window_.x.period_s;
@@ -122,8 +122,8 @@ class Aiming {
     std::size_t first = 0;
     std::size_t last = 0;
     double farthest = 0.0;
-    for (std::size_t i = 0; i < samples_; i += 2) {
-      const auto now = static_cast<double>(i);
+    for (std::size_t k = 0; k < nodes_; ++k) {
+      const auto now = static_cast<double>(2 * k);
       while (first + 1 < path.size() && path[first + 1].sample < now - reach) {
         ++first;
       }
@@ -132,36 +132,24 @@ class Aiming {
       }
       for (std::size_t c = 0; c < contour_.pairs.size(); ++c) {
         const ModelPair& pair = contour_.pairs[c];
-        std::vector<Place>& places = nearest_[c];
-        const std::size_t around = places[i].vertex;
+        Place& q = nearest_[c][k];
+        const std::size_t around = q.vertex;
         const std::size_t from =
             everywhere || around < first + kAround ? first : std::min(around - kAround, last);
         const std::size_t to = everywhere ? last : std::min(last, around + kAround);
-        const Place found = nearest(edges_, from, to, {x_mm[pair.x][i], y_mm[pair.y][i]});
-        Place& q = places[i];
+        const Place found = nearest(edges_, from, to, {x_mm[pair.x][k], y_mm[pair.y][k]});
         q.by_x_mm = kInertia * q.by_x_mm + kStep * (found.x_mm - q.x_mm);
         q.by_y_mm = kInertia * q.by_y_mm + kStep * (found.y_mm - q.y_mm);
         q.x_mm += q.by_x_mm;
         q.y_mm += q.by_y_mm;
         q.vertex = found.vertex;
         farthest = std::max({farthest, std::abs(q.by_x_mm), std::abs(q.by_y_mm)});
-        if (i > 0) {
-          places[i - 1] = between(places, i - 1);
-        }
       }
     }
     return farthest;
   }
 
  private:
-  [[nodiscard]] Place between(const std::vector<Place>& places, std::size_t i) const {
-    const auto off = [&](const std::vector<double>& r, double before, double after) {
-      return r[i] + 0.5 * (before - r[i - 1] + after - r[i + 1]);
-    };
-    return {off(window_.x.reference_mm, places[i - 1].x_mm, places[i + 1].x_mm),
-            off(window_.y.reference_mm, places[i - 1].y_mm, places[i + 1].y_mm), 0};
-  }
-
   // ε + λ of each sample.
   void set_along_weights() {
     along_.assign(samples_, contour_.along_weight);
@@ -177,28 +165,36 @@ class Aiming {
     }
   }
 
+  // In the middle between two nodes q is as far from r as on the average of both.
   template <class Model, class Coordinate>
-  void aims_of(AxisWindow& axis, const Model& model_of, const Coordinate& coordinate) const {
+  void aims_of(AxisWindow& axis, const Model& model_of, const Coordinate& coordinate) {
+    const std::vector<double>& r = axis.reference_mm;
     axis.aims_mm.resize(axis.models());
     for (std::size_t m = 0; m < axis.models(); ++m) {
       std::vector<double>& aim = axis.aims_mm[m];
-      aim.assign(samples_, 0.0);
+      mean_mm_.assign(nodes_, 0.0);
       double share = 0.0;
       for (std::size_t c = 0; c < contour_.pairs.size(); ++c) {
         if (model_of(contour_.pairs[c]) == m) {
           share += contour_.pairs[c].share;
-          for (std::size_t i = 0; i < samples_; ++i) {
-            aim[i] += contour_.pairs[c].share * coordinate(nearest_[c][i]);
+          for (std::size_t k = 0; k < nodes_; ++k) {
+            mean_mm_[k] += contour_.pairs[c].share * coordinate(nearest_[c][k]);
           }
         }
       }
+      aim = r;
       if (share == 0.0) {
         // No pair holds this model, as its share is zero. So its aim has no weight.
-        aim = axis.reference_mm;
         continue;
       }
-      for (std::size_t i = 0; i < samples_; ++i) {
-        aim[i] = (aim[i] / share + along_[i] * axis.reference_mm[i]) / (1.0 + along_[i]);
+      double before_mm = 0.0;  // how far q is from r, at the node before
+      for (std::size_t k = 0; k < nodes_; ++k) {
+        const double off_mm = mean_mm_[k] / share - r[2 * k];
+        aim[2 * k] += off_mm / (1.0 + along_[2 * k]);
+        if (k > 0) {
+          aim[2 * k - 1] += 0.5 * (before_mm + off_mm) / (1.0 + along_[2 * k - 1]);
+        }
+        before_mm = off_mm;
       }
     }
   }
@@ -206,9 +202,11 @@ class Aiming {
   RunWindow& window_;
   const Contour& contour_;
   std::size_t samples_;
+  std::size_t nodes_;
   std::vector<Edge> edges_;
   std::vector<double> along_;
-  std::vector<std::vector<Place>> nearest_;  // q of each pair
+  std::vector<std::vector<Place>> nearest_;  // q of each pair, at the nodes
+  std::vector<double> mean_mm_;
 };
 
 // Models by rising frequency.

@@ -378,12 +378,10 @@ void FlatForm::write(dynamics::AxisTrajectory& base) {
 }
 
 void FlatForm::write_nozzles(std::vector<std::vector<double>>& nozzles_mm) {
-  nozzles_mm.assign(1, std::vector<double>(2 * nodes_ - 1));
+  nozzles_mm.assign(1, std::vector<double>(nodes_));
   loops::apply<kHalfBand>(nozzle_, c_.data(), node_pull_.data(), nodes_);
-  loops::apply<kHalfBand + 1>(middle_, c_.data(), middle_pull_.data(), nodes_ - 1);
-  for (std::size_t i = 0; i < 2 * nodes_ - 1; ++i) {
-    const double p = i % 2 == 0 ? node_pull_[i / 2] : middle_pull_[i / 2];
-    nozzles_mm[0][i] = window_->origin_mm + window_->unit[0] * p;
+  for (std::size_t k = 0; k < nodes_; ++k) {
+    nozzles_mm[0][k] = window_->origin_mm + window_->unit[0] * node_pull_[k];
   }
 }
 

@@ -79,6 +79,7 @@ class FlatForm {
   void restore() { c_ = saved_; }
 
   void write(dynamics::AxisTrajectory& base);
+  // p of the only model at the nodes.
   void write_nozzles(std::vector<std::vector<double>>& nozzles_mm);
 
  private:

@@ -26,7 +26,7 @@ class FreeSolver {
   void solve();
   // The optimum for today's aims; nullopt if rounding keeps it away.
   [[nodiscard]] std::optional<AxisSolution> solution();
-  // p of each model, at the places of r, mm.
+  // p of each model at the nodes, mm.
   [[nodiscard]] const std::vector<std::vector<double>>& nozzles_mm() const { return nozzles_mm_; }
 
  private:

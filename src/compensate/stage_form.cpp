@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 
-
 namespace unflex::compensate {
 namespace {
 
@@ -385,24 +384,12 @@ void StageForm::restore() {
 }
 
 void StageForm::write_nozzles(std::vector<std::vector<double>>& nozzles_mm) const {
-  nozzles_mm.assign(models_.size(), std::vector<double>(2 * nodes_ - 1));
+  nozzles_mm.resize(models_.size());
   for (std::size_t c = 0; c < models_.size(); ++c) {
-    const Model& model = models_[c];
-    double p = 0.0;
-    double rate = 0.0;
+    nozzles_mm[c].resize(nodes_);
     for (std::size_t k = 0; k < nodes_; ++k) {
       const double* const z = state(states_, k);
-      const double p_next = z[base()] + swing(model, z);
-      const double rate_next = z[base() + 1] + swing(model, z, 1);
-      const auto in_mm = [&](double position) {
-        return window_->origin_mm + window_->unit[0] * position;
-      };
-      if (k > 0) {
-        nozzles_mm[c][2 * k - 1] = in_mm(0.5 * (p + p_next) + 0.125 * (rate - rate_next));
-      }
-      nozzles_mm[c][2 * k] = in_mm(p_next);
-      p = p_next;
-      rate = rate_next;
+      nozzles_mm[c][k] = window_->origin_mm + window_->unit[0] * (z[base()] + swing(models_[c], z));
     }
   }
 }

@@ -75,7 +75,7 @@ class StageForm {
   void restore();
 
   void write(dynamics::AxisTrajectory& base) const;
-  // p of each model at nodes and middles.
+  // p of each model at the nodes.
   void write_nozzles(std::vector<std::vector<double>>& nozzles_mm) const;
 
  private:
