@@ -44,6 +44,7 @@ void StageForm::set_models(const AxisWindow& window) {
   modes_.clear();
   gains_.clear();
   models_.clear();
+  model_of_.clear();
   for (std::size_t c = 0; c < window.models(); ++c) {
     const Plant plant = window.model(c);
     Model model;
@@ -53,6 +54,7 @@ void StageForm::set_models(const AxisWindow& window) {
       gains_.push_back(mode.gain);
     }
     model.end_mode = modes_.count();
+    model_of_.resize(modes_.count(), c);
     model.share = plant.share;
     models_.push_back(std::move(model));
   }
@@ -74,6 +76,7 @@ void StageForm::set_models(const AxisWindow& window) {
   }
   accel_column_.tail(3) << 0.5, 1.0, 1.0;
   input_column_.tail(3) << kBaseByJerk[0], kBaseByJerk[1], kBaseByJerk[2];
+  middle_of_.resize(base());
   for (Model& model : models_) {
     Vector place = Vector::Zero(n);
     Vector rate = Vector::Zero(n);
@@ -88,6 +91,11 @@ void StageForm::set_models(const AxisWindow& window) {
     model.middle_input = by_input(after.data());
     transpose_step(after.data());
     model.middle = 0.5 * place + 0.125 * rate + after;
+    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
+      for (const std::size_t at : {i, rates() + i}) {
+        middle_of_[at] = model.middle(static_cast<Eigen::Index>(at));
+      }
+    }
     node_square_ += model.share * place * place.transpose();
     middle_square_ += model.share * model.middle * model.middle.transpose();
     middle_cross_ += model.share * model.middle_input * model.middle;
@@ -225,14 +233,28 @@ void StageForm::transpose_step(double* v) const {
 
 double StageForm::by_input(const double* v) const {
   const std::size_t count = modes_.count();
-  double sum = 0.0;
+  const double* const b = v + base();
+  // Sums side by side, since each addition has to wait for the one before it.
+  double places = kBaseByJerk[0] * b[0] + kBaseByJerk[1] * b[1];
+  double rates = kBaseByJerk[2] * b[2];
   for (std::size_t i = 0; i < count; ++i) {
-    sum += modes_.by_jerk[0][i] * v[i] + modes_.by_jerk[1][i] * v[count + i];
+    places += modes_.by_jerk[0][i] * v[i];
+    rates += modes_.by_jerk[1][i] * v[count + i];
   }
-  for (std::size_t i = 0; i < 3; ++i) {
-    sum += kBaseByJerk[i] * v[base() + i];
+  return places + rates;
+}
+
+double StageForm::by_feedback(std::size_t k, const double* z) const {
+  const std::size_t count = modes_.count();
+  const double* const feedback = state(feedback_, k);
+  const double* const b = feedback + base();
+  double places = b[0] * z[base()] + b[1] * z[base() + 1];
+  double rates = b[2] * z[base() + 2];
+  for (std::size_t i = 0; i < count; ++i) {
+    places += feedback[i] * z[i];
+    rates += feedback[count + i] * z[count + i];
   }
-  return sum;
+  return places + rates;
 }
 
 double StageForm::swing(const Model& model, const double* z, std::size_t rate) const {
@@ -310,47 +332,66 @@ void StageForm::set_prescribed_feedback(std::size_t k, double* feedback) const {
   }
 }
 
+// What the node adds to the slope of the cost of what is still to come.
+void StageForm::add_node(std::size_t k, const PerKind<const double*>& forces, double* g) const {
+  const double* const pull = node_pull_.data() + k * models_.size();
+  for (std::size_t i = 0; i < modes_.count(); ++i) {
+    g[i] += pull[model_of_[i]] - faint_pull_;
+  }
+  for (std::size_t c = 0; c < models_.size(); ++c) {
+    g[base()] += pull[c] - faint_pull_;
+  }
+  for (const RowKind kind : kNodeKinds) {
+    if (forces[index_of(kind)] != nullptr) {
+      g[place(kind)] -= forces[index_of(kind)][k];
+    }
+  }
+}
+
+// Takes the slope from behind an interval to before it, and sets the interval's feedforward.
+void StageForm::carry_slope_back(std::size_t k, const PerKind<const double*>& forces, double* g) {
+  const std::size_t count = modes_.count();
+  const double* const pull = middle_pull_.data() + k * models_.size();
+  const double* const jerk_force = forces[index_of(RowKind::jerk)];
+  double slope = window_->jerk_weight * inputs_[k] - (jerk_force != nullptr ? jerk_force[k] : 0.0) +
+                 by_input(g);
+  for (std::size_t c = 0; c < models_.size(); ++c) {
+    slope += pull[c] * models_[c].middle_input;
+  }
+  feedforward_[k] = -slope * inverse_curvature_[k];
+  decrement_ -= 0.5 * slope * feedforward_[k];
+  transpose_step(g);
+  // A model's place in the middle hangs on its own modes and on the base.
+  for (std::size_t i = 0; i < count; ++i) {
+    g[i] += pull[model_of_[i]] * middle_of_[i];
+    g[count + i] += pull[model_of_[i]] * middle_of_[count + i];
+  }
+  for (std::size_t c = 0; c < models_.size(); ++c) {
+    const double* const middle = models_[c].middle.data() + base();
+    for (std::size_t i = 0; i < 3; ++i) {
+      g[base() + i] += pull[c] * middle[i];
+    }
+  }
+  const double* const feedback = state(feedback_, k);
+  for (std::size_t i = 0; i < size_; ++i) {
+    g[i] += slope * feedback[i];
+  }
+}
+
 void StageForm::solve(const PerKind<const double*>& forces) {
   faint_pull_ = -faint_pull_;
   PerKind<bool> kinds{};
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     kinds[i] = forces[i] != nullptr;
   }
-  const std::size_t count = models_.size();
-  const auto add_node = [&](std::size_t k, Vector& g) {
-    for (std::size_t c = 0; c < count; ++c) {
-      const double pull = node_pull_[k * count + c] - faint_pull_;
-      for (std::size_t i = models_[c].first_mode; i < models_[c].end_mode; ++i) {
-        g(static_cast<Eigen::Index>(i)) += pull;
-      }
-      g(static_cast<Eigen::Index>(base())) += pull;
-    }
-    for (const RowKind kind : kNodeKinds) {
-      if (forces[index_of(kind)] != nullptr) {
-        g(static_cast<Eigen::Index>(place(kind))) -= forces[index_of(kind)][k];
-      }
-    }
-  };
   const auto n = static_cast<Eigen::Index>(size_);
-  const double* const jerk_force = forces[index_of(RowKind::jerk)];
   // The model's decrease is ½ Σ r²/R over the inputs, plus such a term for the start.
   decrement_ = 0.0;
   Vector g = Vector::Zero(n);
-  add_node(nodes_ - 1, g);
+  add_node(nodes_ - 1, forces, g.data());
   for (std::size_t k = nodes_ - 1; k-- > 0;) {
-    double slope = window_->jerk_weight * inputs_[k] -
-                   (jerk_force != nullptr ? jerk_force[k] : 0.0) + by_input(g.data());
-    for (std::size_t c = 0; c < count; ++c) {
-      slope += middle_pull_[k * count + c] * models_[c].middle_input;
-    }
-    feedforward_[k] = -slope * inverse_curvature_[k];
-    decrement_ -= 0.5 * slope * feedforward_[k];
-    transpose_step(g.data());
-    for (std::size_t c = 0; c < count; ++c) {
-      g += middle_pull_[k * count + c] * models_[c].middle;
-    }
-    g += slope * Eigen::Map<const Vector>(state(feedback_, k), n);
-    add_node(k, g);
+    carry_slope_back(k, forces, g.data());
+    add_node(k, forces, g.data());
   }
   const Vector at_start = start_basis_.transpose() * g;
   const Vector first = -start_inverse_ * at_start;
@@ -358,9 +399,7 @@ void StageForm::solve(const PerKind<const double*>& forces) {
   Eigen::Map<Vector>(state_steps_.data(), n) = start_basis_ * first;
   for (std::size_t k = 0; k + 1 < nodes_; ++k) {
     const double* const z = state(state_steps_, k);
-    input_steps_[k] =
-        Eigen::Map<const Vector>(state(feedback_, k), n).dot(Eigen::Map<const Vector>(z, n)) +
-        feedforward_[k];
+    input_steps_[k] = by_feedback(k, z) + feedforward_[k];
     step(z, input_steps_[k], state(state_steps_, k + 1));
   }
   split_rows(state_steps_, input_steps_, kinds, row_steps_);

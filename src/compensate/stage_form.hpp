@@ -112,7 +112,10 @@ class StageForm {
   void step(const double* z, double input, double* next) const;
   // v ← Φᵀ v
   void transpose_step(double* v) const;
-  [[nodiscard]] double by_input(const double* v) const;  // Bᵀ v
+  [[nodiscard]] double by_input(const double* v) const;                    // Bᵀ v
+  [[nodiscard]] double by_feedback(std::size_t k, const double* z) const;  // K z
+  void add_node(std::size_t k, const PerKind<const double*>& forces, double* g) const;
+  void carry_slope_back(std::size_t k, const PerKind<const double*>& forces, double* g);
   // p_c − b, or its rate, or its step.
   [[nodiscard]] double swing(const Model& model, const double* z, std::size_t rate = 0) const;
   void split_rows(const std::vector<double>& states, const Padded& inputs,
@@ -129,6 +132,9 @@ class StageForm {
   ModeSteps modes_;
   std::vector<double> gains_;
   std::vector<Model> models_;
+  std::vector<std::size_t> model_of_;  // of each mode
+  // Coefficients of each mode's y and ẏ in p_c of its own model in the middle of the interval.
+  std::vector<double> middle_of_;
   Matrix node_square_;    // Σ α of the squares of p_c
   Matrix middle_square_;  // likewise in the middle
   Vector middle_cross_;   // Σ α μ_c m_c
