@@ -156,7 +156,13 @@ void ShaperBench::advance(const verify::ReferencePath& path, double time_s) {
       next_s_ += interval_s_ * std::max(0.0, std::ceil(rest_s / interval_s_) - 1.0);
       continue;
     }
-    const bool counts = piece.extruding && piece.start_s <= next_s_ && is_sampled(next_s_);
+    const bool sampled = is_sampled(next_s_);
+    const bool counts = piece.extruding && piece.start_s <= next_s_ && sampled;
+    for (Shaper& shaper : shapers_) {
+      if (!sampled) {
+        shaper.corners.miss(next_s_);
+      }
+    }
     if (counts || ++skipped_ % kSkipped == 0) {
       measure(path, counts);
     }

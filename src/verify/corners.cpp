@@ -59,7 +59,7 @@ void CornerGauge::follow(const planner::PlannedMove& move, double start_s) {
     direction_x_ = x;
     direction_y_ = y;
     corners_.push_back({start_s + move.duration_s() - reach_s_, kNever, end_mm_[gcode::X],
-                        end_mm_[gcode::Y], kNever, segment.line});
+                        end_mm_[gcode::Y], kNever, segment.line, false});
   }
   find_next();
 }
@@ -89,9 +89,22 @@ void CornerGauge::look(double time_s, double x_mm, double y_mm) {
   last_y_mm_ = y_mm;
 }
 
+void CornerGauge::miss(double time_s) {
+  drawn_ = false;
+  while (!corners_.empty() && corners_.front().until_s < time_s) {
+    let_go();
+  }
+  for (Corner& corner : corners_) {
+    if (time_s < corner.from_s) {
+      break;
+    }
+    corner.missed = true;
+  }
+}
+
 void CornerGauge::let_go() {
   // A nozzle that nobody looked at has no distance.
-  if (corners_.front().distance2_mm2 < kNever) {
+  if (!corners_.front().missed && corners_.front().distance2_mm2 < kNever) {
     left_behind_.add(corners_.front().distance2_mm2, corners_.front().line);
   }
   corners_.pop_front();
@@ -103,7 +116,7 @@ void CornerGauge::find_next() { next_s_ = corners_.empty() ? kNever : corners_.f
 CornerStats CornerGauge::stats() const {
   CornerAccumulator all = left_behind_;
   for (const Corner& corner : corners_) {
-    if (corner.until_s < kNever && corner.distance2_mm2 < kNever) {
+    if (!corner.missed && corner.until_s < kNever && corner.distance2_mm2 < kNever) {
       all.add(corner.distance2_mm2, corner.line);
     }
   }

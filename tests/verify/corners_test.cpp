@@ -120,6 +120,26 @@ TEST(CornerGauge, LooksOnlyNearTheTimeOfTheCorner) {
   EXPECT_EQ(unseen.stats().count, 0U);
 }
 
+// The corner is reached at 0.1 s. Half of its time is not looked at, so nothing is known of it.
+TEST(CornerGauge, CountsNoCornerThatItMissed) {
+  CornerGauge missing = gauge_on(bent_by(90.0));
+  for (double time_s = 0.0; time_s < 0.095; time_s += 1e-3) {
+    missing.sample(time_s, 100.0 * time_s, 0.0);
+  }
+  missing.miss(0.095);
+  missing.miss(0.11);
+  missing.sample(0.2, 10.0, 10.0);
+  EXPECT_EQ(missing.stats().count, 0U);
+  // Not to look far from a corner costs nothing.
+  CornerGauge seeing = gauge_on(bent_by(90.0));
+  seeing.miss(0.05);
+  for (double time_s = 0.06; time_s < 0.2; time_s += 1e-3) {
+    seeing.sample(time_s, std::min(100.0 * time_s, 10.0), std::max(0.0, 100.0 * time_s - 10.0));
+  }
+  seeing.miss(0.2);
+  EXPECT_EQ(seeing.stats().count, 1U);
+}
+
 TEST(CornerGauge, TakesOnlySharpTurnsForCorners) {
   for (const auto& [degrees, corners] :
        {std::pair{15.0, 0U}, std::pair{19.9, 0U}, std::pair{20.1, 1U}, std::pair{-25.0, 1U},

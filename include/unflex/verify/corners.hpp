@@ -58,6 +58,9 @@ class CornerGauge {
       look(time_s, x_mm, y_mm);
     }
   }
+  // Nobody looks at this time. What is within reach now counts for nothing, since the nozzle may
+  // pass it unseen.
+  void miss(double time_s);
   // Whether a corner is within reach.
   [[nodiscard]] bool is_near(double time_s) const { return time_s >= next_s_; }
   // Nothing is known of the nozzle's way from its last place to the next one.
@@ -73,6 +76,7 @@ class CornerGauge {
     double y_mm = 0.0;
     double distance2_mm2 = 0.0;  // smallest so far
     std::size_t line = 0;
+    bool missed = false;
   };
 
   void look(double time_s, double x_mm, double y_mm);
