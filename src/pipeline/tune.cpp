@@ -54,8 +54,24 @@ machine::Settings settings_of_band(const machine::Settings& settings,
   return result;
 }
 
-Result<std::string> compensate_text(const std::string& sliced, const machine::Settings& settings,
-                                    const std::string& name, unsigned workers, Progress& progress) {
+// The first of the band's runs that stays as sliced, and so shows nothing; null if there is none.
+const report::Fallback* kept_run(const report::Report& report, const std::string& sliced,
+                                 std::size_t band) {
+  const auto line_of = [&](const std::string& mark) {
+    const auto end = sliced.begin() + static_cast<std::ptrdiff_t>(sliced.find(mark));
+    return static_cast<std::size_t>(std::count(sliced.begin(), end, '\n')) + 1;
+  };
+  const std::size_t first = line_of(tune::band_begins(band));
+  const std::size_t last = line_of(tune::band_ends(band));
+  const auto found = std::ranges::find_if(report.fallbacks, [&](const report::Fallback& fallback) {
+    return fallback.last_line >= first && fallback.first_line <= last;
+  });
+  return found == report.fallbacks.end() ? nullptr : &*found;
+}
+
+Result<std::string> compensate_band(const std::string& sliced, const machine::Settings& settings,
+                                    std::size_t band, unsigned workers, Progress& progress) {
+  const std::string name = fmt::format("band {} of the tower", band);
   const MemoryFile input;
   const MemoryFile output;
   if (!input.is_open() || !output.is_open()) {
@@ -77,6 +93,11 @@ Result<std::string> compensate_text(const std::string& sliced, const machine::Se
     return fail(ErrorKind::internal, fmt::format("a band breaks a rule, which is a fault of "
                                                  "unflex: {}",
                                                  report->violations.front()));
+  }
+  if (const report::Fallback* const kept = kept_run(*report, sliced, band)) {
+    return fail(
+        ErrorKind::usage,
+        fmt::format("{} stays as sliced, so nothing can be read from it: {}", name, kept->reason));
   }
   std::ostringstream text;
   text << std::ifstream(output.name(), std::ios::binary).rdbuf();
@@ -169,8 +190,7 @@ Result<std::vector<Band>> compensate_bands(const tune::Tower& tower,
                          tune::band_begins(number) + tower.bands[number - 1] +
                          tune::band_ends(number) + tower.foot;
     machine::Settings made_for = settings_of_band(settings, towers, number);
-    Result<std::string> compensated = compensate_text(
-        sliced, made_for, fmt::format("band {} of the tower", number), workers, part);
+    Result<std::string> compensated = compensate_band(sliced, made_for, number, workers, part);
     if (!compensated) {
       return tl::unexpected(compensated.error());
     }

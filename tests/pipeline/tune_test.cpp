@@ -169,5 +169,17 @@ TEST(Tune, RefusesAPrinterThatCannotBeCompensated) {
   EXPECT_EQ(bands.error().message, "this firmware caps limits");
 }
 
+TEST(Tune, RefusesABandThatStaysAsSliced) {
+  // The printer takes far fewer lines per second than the waves have.
+  const machine::Settings settings = printer({"emit.max_lines_per_s=12"});
+  const tune::TowerSettings towers = even_tower(settings);
+  SilentProgress progress;
+  const auto bands = compensate_bands(tune::tower(towers), towers, settings, 1, progress);
+  ASSERT_FALSE(bands);
+  EXPECT_EQ(bands.error().kind, ErrorKind::usage);
+  EXPECT_NE(bands.error().message.find("stays as sliced"), std::string::npos)
+      << bands.error().message;
+}
+
 }  // namespace
 }  // namespace unflex::pipeline
