@@ -10,14 +10,14 @@
 namespace unflex::compensate {
 namespace {
 
-constexpr int kRounds = 6;
+constexpr int kRounds = 5;
 // In so many rounds the nearest place is looked for as far as the contour reaches.
 constexpr int kWideRounds = 2;
 constexpr std::size_t kAround = 2;  // edges
 // How far q goes in a round: so many times the way to the nearest place, and this share of the way
 // that it went in the round before.
-constexpr double kStep = 2.3;
-constexpr double kInertia = 0.3;
+constexpr double kStep = 2.8;
+constexpr double kInertia = 0.45;
 // What q may still move by when it counts as found.
 constexpr double kSettled_mm = 3e-4;
 constexpr double kCornerReach_s = 1e-3;
