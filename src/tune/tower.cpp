@@ -43,6 +43,7 @@ constexpr double kLeastSide_mm = 50.0;
 constexpr double kGroove_mm = 0.2;
 constexpr std::size_t kDeepGroove = 5;
 constexpr double kLiftAtEnd_mm = 10.0;
+constexpr double kClear_mm = 2.0;
 
 double speed_of(const TowerSettings& settings, const Trial& trial) {
   const double wanted = trial.known.has_freq() ? std::clamp(kSwing_mm * trial.known.freq_hz,
@@ -280,6 +281,9 @@ Tower tower(const TowerSettings& settings) {
   }
   writer.line(accel_command(settings));
   result.start = comments + whole_lines(settings.codes.start) + writer.take();
+  // Above whatever the start code has laid.
+  writer.lift(kClear_mm);
+  writer.travel(writer.begin(-kBrimLoops * width_mm));
   double z_mm = layer_mm;
   for (std::size_t layer = 0; layer < kBaseLayers; ++layer, z_mm += layer_mm) {
     writer.begin_layer(z_mm);

@@ -56,6 +56,20 @@ TEST(Tower, BeginsAndEndsEachBandAtOnePlace) {
   }
 }
 
+// A priming line may lie on the way.
+TEST(Tower, ComesFromTheStartCodeAboveTheBed) {
+  const Tower built = tower(settings());
+  bool moved = false;
+  for (const gcode::Segment& segment : segments_of(built.start + "G1 Z0.2\n" + built.base)) {
+    if (segment.moves_xy() && !moved) {
+      moved = true;
+      EXPECT_FALSE(segment.extruding());
+      EXPECT_GE(segment.end_mm[gcode::Z], 1.0);
+    }
+  }
+  EXPECT_TRUE(moved);
+}
+
 TEST(Tower, StandsAroundItsCenterAndIsAsLargeAsItSays) {
   const Tower built = tower(settings());
   double low_mm = 1e9;
