@@ -6,6 +6,8 @@
 //   a_max = A · 4 d² / (π D² / 4)    A  max_accel
 // v_max and a_max use the default cross-section even where another one is configured.
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
