@@ -52,7 +52,7 @@ Result<std::string> read_text(const Input& input) {
 bool is_given(const machine::Settings& settings, const std::string& key) {
   const auto found =
       std::ranges::find(settings.origins, key, &std::pair<std::string, std::string>::first);
-  return found != settings.origins.end() && found->second != "default";
+  return found != settings.origins.end() && found->second != machine::kDefaultOrigin;
 }
 
 // What the settings say of an axis. Several modes are more than a tower shows.

@@ -24,7 +24,6 @@
 namespace unflex::machine {
 namespace {
 
-constexpr std::string_view kDefaultOrigin = "default";
 // How the key of several modes ends, which is the origin of what follows from it.
 constexpr std::string_view kModes = ".mode";
 constexpr std::string_view kPlants = ".plant";

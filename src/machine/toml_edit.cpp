@@ -83,7 +83,7 @@ std::optional<std::map<std::string, std::string>> others(std::string_view text,
   std::map<std::string, std::string> values;
   for (SettingRow& row : rows(*settings)) {
     // A default may depend on what is edited.
-    if (row.origin != "default" &&
+    if (row.origin != kDefaultOrigin &&
         std::ranges::find(edits, row.key, &TomlEdit::key) == edits.end()) {
       values[std::move(row.key)] = std::move(row.value);
     }

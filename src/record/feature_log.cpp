@@ -4,6 +4,8 @@
 #include <array>
 #include <optional>
 
+#include "unflex/gcode/layer_mark.hpp"
+
 namespace unflex::record {
 namespace {
 
@@ -33,17 +35,6 @@ std::optional<std::string_view> after(std::string_view text,
   return std::nullopt;
 }
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
-bool begins_layer(std::string_view comment) {
-  if (comment == "LAYER_CHANGE" || comment == "CHANGE_LAYER") {
-    return true;
-  }
-  constexpr std::array<std::string_view, 2> kNumbered = {"LAYER:", "layer "};
-  const std::optional<std::string_view> number = after(comment, kNumbered);
-  return number && !number->empty() && (is_digit(number->front()) || number->front() == '-');
-}
-
 }  // namespace
 
 void FeatureLog::read(std::string_view content, std::size_t number) {
@@ -54,7 +45,7 @@ void FeatureLog::read(std::string_view content, std::size_t number) {
   constexpr std::array<std::string_view, 3> kFeature = {"TYPE:", "FEATURE:", "feature "};
   if (const std::optional<std::string_view> name = after(comment, kFeature)) {
     last_.feature = number_of(*name);
-  } else if (begins_layer(comment)) {
+  } else if (gcode::begins_layer(content)) {
     ++last_.layers_begun;
   } else {
     return;

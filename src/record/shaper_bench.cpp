@@ -158,8 +158,8 @@ void ShaperBench::advance(const verify::ReferencePath& path, double time_s) {
     }
     const bool sampled = is_sampled(next_s_);
     const bool counts = piece.extruding && piece.start_s <= next_s_ && sampled;
-    for (Shaper& shaper : shapers_) {
-      if (!sampled) {
+    if (!sampled) {
+      for (Shaper& shaper : shapers_) {
         shaper.corners.miss(next_s_);
       }
     }

@@ -9,18 +9,12 @@
 
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/interpreter.hpp"
+#include "unflex/gcode/layer_mark.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/tune/tower.hpp"
 
 namespace unflex::tune {
 namespace {
-
-bool begins_layer(std::string_view content) {
-  constexpr std::array<std::string_view, 4> kMarks = {";LAYER_CHANGE", "; CHANGE_LAYER",
-                                                      ";LAYER:", "; layer "};
-  return std::ranges::any_of(kMarks,
-                             [&](std::string_view mark) { return content.starts_with(mark); });
-}
 
 // Lines of one print that another has no use for: comments, progress, and objects that it has not.
 bool is_of_this_print(const gcode::Command& command) {
@@ -67,7 +61,7 @@ Result<Codes> codes_of(const std::string& print, const std::string& name, Firmwa
       break;
     }
     const std::string content(line.content());
-    if (!in_layers && begins_layer(content)) {
+    if (!in_layers && gcode::begins_layer(content)) {
       in_layers = true;
       // What was laid before is the start code's.
       x_mm = {};

@@ -80,12 +80,9 @@ Trial broad_trial(const Knowledge& known, double accel_mm_s2) {
   return trial;
 }
 
-// Bands from −reach to +reach.
-void lay_out(double reach, double half_zone, Trial& trial, double& step) {
-  const double halves =
-      std::min(std::ceil(reach / (half_zone / kStepsPerHalfZone)), (kMostBands - 1.0) / 2.0);
-  step = reach / halves;
-  trial.bands = static_cast<std::size_t>(2.0 * halves + 1.0);
+// How many steps lead from the middle band to the last one, `reach` away.
+double steps_to_end(double reach, double half_zone) {
+  return std::min(std::ceil(reach / (half_zone / kStepsPerHalfZone)), (kMostBands - 1.0) / 2.0);
 }
 
 Trial freq_trial(const Knowledge& known, double accel_mm_s2) {
@@ -93,10 +90,11 @@ Trial freq_trial(const Knowledge& known, double accel_mm_s2) {
   trial.waves = waves_for(known, std::max(kNarrowestZone, kWiderThanOther * known.damping_error),
                           accel_mm_s2);
   const double half_zone = half_zone_of(trial.waves, known.damping_ratio);
-  double step = 0.0;
-  lay_out(known.freq_error + kBeyond * half_zone, half_zone, trial, step);
-  trial.step = 1.0 + step;
-  trial.first = known.freq_hz * std::pow(trial.step, -0.5 * static_cast<double>(trial.bands - 1));
+  const double reach = known.freq_error + kBeyond * half_zone;
+  const double steps = steps_to_end(reach, half_zone);
+  trial.bands = static_cast<std::size_t>(2.0 * steps + 1.0);
+  trial.step = 1.0 + reach / steps;
+  trial.first = known.freq_hz * std::pow(trial.step, -steps);
   return trial;
 }
 
@@ -108,7 +106,10 @@ Trial damping_trial(const Knowledge& known, double accel_mm_s2) {
   const double reach = known.damping_error + kBeyond * half_zone;
   trial.first = std::max(kLeastDamping, known.damping_ratio - reach);
   const double last = std::min(kMostDamping, known.damping_ratio + reach);
-  lay_out((last - trial.first) / 2.0, half_zone, trial, trial.step);
+  const double half = (last - trial.first) / 2.0;
+  const double steps = steps_to_end(half, half_zone);
+  trial.bands = static_cast<std::size_t>(2.0 * steps + 1.0);
+  trial.step = half / steps;
   return trial;
 }
 

@@ -221,6 +221,9 @@ struct VerifySettings {
   double hold_s = 0.5;
 };
 
+// Where a key came from that no source gives.
+inline constexpr std::string_view kDefaultOrigin = "default";
+
 struct Settings {
   PrinterSettings printer;
   LimitSettings limits;

@@ -1,0 +1,38 @@
+#include "unflex/gcode/layer_mark.hpp"
+
+#include <algorithm>
+
+#include "characters.hpp"
+
+namespace unflex::gcode {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  const auto* const begin = std::find_if_not(text.begin(), text.end(), is_blank);
+  text.remove_prefix(static_cast<std::size_t>(begin - text.begin()));
+  while (!text.empty() && is_blank(text.back())) {
+    text.remove_suffix(1);
+  }
+  return text;
+}
+
+}  // namespace
+
+bool begins_layer(std::string_view line) {
+  if (!line.starts_with(';')) {
+    return false;
+  }
+  const std::string_view comment = trimmed(line.substr(1));
+  if (comment == "LAYER_CHANGE" || comment == "CHANGE_LAYER") {
+    return true;
+  }
+  for (const std::string_view mark : {"LAYER:", "layer "}) {
+    if (comment.starts_with(mark)) {
+      const std::string_view number = trimmed(comment.substr(mark.size()));
+      return !number.empty() && (is_digit(number.front()) || number.front() == '-');
+    }
+  }
+  return false;
+}
+
+}  // namespace unflex::gcode
