@@ -78,13 +78,6 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
   return result;
 }
 
-void take_corners(const verify::CornerStats& corners, Straying& result) {
-  const auto count = static_cast<double>(corners.count);
-  result.corners = corners.count;
-  result.corner_square_sum_mm2 = corners.rms_mm * corners.rms_mm * count;
-  result.corner_max_mm = corners.max_mm;
-}
-
 }  // namespace
 
 Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove>& plan,
@@ -126,14 +119,24 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
       result.time_s += setup.step_s;
     }
   }
-  take_corners(corners.stats(), result);
+  result.corners.add(corners.stats());
   return result;
 }
 
 double Straying::rms_mm() const { return time_s > 0.0 ? std::sqrt(square_sum_mm2s / time_s) : 0.0; }
 
-double Straying::corner_rms_mm() const {
-  return corners > 0 ? std::sqrt(corner_square_sum_mm2 / static_cast<double>(corners)) : 0.0;
+void CornerSums::add(const verify::CornerStats& run) {
+  add(CornerSums{run.count, run.rms_mm * run.rms_mm * static_cast<double>(run.count), run.max_mm});
+}
+
+void CornerSums::add(const CornerSums& other) {
+  count += other.count;
+  square_sum_mm2 += other.square_sum_mm2;
+  max_mm = std::max(max_mm, other.max_mm);
+}
+
+double CornerSums::rms_mm() const {
+  return count > 0 ? std::sqrt(square_sum_mm2 / static_cast<double>(count)) : 0.0;
 }
 
 void Straying::merge(const Straying& other) {
@@ -144,9 +147,7 @@ void Straying::merge(const Straying& other) {
   square_sum_mm2s += other.square_sum_mm2s;
   time_s += other.time_s;
   after_max_mm = std::max(after_max_mm, other.after_max_mm);
-  corners += other.corners;
-  corner_square_sum_mm2 += other.corner_square_sum_mm2;
-  corner_max_mm = std::max(corner_max_mm, other.corner_max_mm);
+  corners.add(other.corners);
 }
 
 BenchResult try_all(const Run& run, const BenchSetup& setup, const compensate::Engine& engine) {

@@ -187,8 +187,8 @@ void write_depth(Sink out, const CaseResult& result) {
     fmt::format_to(out,
                    "<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0f}</td><td>{:.0f}</td>"
                    "<td>{:.0f}</td></tr>\n",
-                   micrometres_text(method.straying[0].corner_rms_mm()),
-                   micrometres_text(method.straying[0].corner_max_mm),
+                   micrometres_text(method.straying[0].corners.rms_mm()),
+                   micrometres_text(method.straying[0].corners.max_mm),
                    micrometres_text(method.straying[0].after_max_mm),
                    micrometres_text(method.end_gap_mm), method.base_peak.velocity_mm_s,
                    method.base_peak.accel_mm_s2, std::max(0.0, method.longer_s * 1e3));

@@ -9,13 +9,10 @@ namespace {
 using report::Json;
 
 Json straying_json(const Straying& straying, double frequency_error) {
-  return {{"frequency_error", frequency_error},
-          {"contour_max_mm", straying.max_mm},
-          {"contour_rms_mm", straying.rms_mm()},
-          {"after_max_mm", straying.after_max_mm},
-          {"corners", straying.corners},
-          {"corner_max_mm", straying.corner_max_mm},
-          {"corner_rms_mm", straying.corner_rms_mm()}};
+  return {{"frequency_error", frequency_error},        {"contour_max_mm", straying.max_mm},
+          {"contour_rms_mm", straying.rms_mm()},       {"after_max_mm", straying.after_max_mm},
+          {"corners", straying.corners.count},         {"corner_max_mm", straying.corners.max_mm},
+          {"corner_rms_mm", straying.corners.rms_mm()}};
 }
 
 Json method_json(const MethodResult& method) {

@@ -10,6 +10,7 @@
 
 #include "contour.hpp"
 #include "tasks.hpp"
+#include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex_base.hpp"
 
@@ -56,21 +57,36 @@ double reach_s(const Machine& machine) {
   return reach_of(slowest);
 }
 
-std::vector<double> distances(const Machine& machine, double shift, const BaseMotion& base,
-                              const Run& run) {
+// How far the nozzle strays in one run.
+struct RunStraying {
+  std::vector<double> distances_mm;  // while filament is laid, at even times
+  verify::CornerStats corners;
+};
+
+RunStraying straying_of(const Machine& machine, double shift, const BaseMotion& base,
+                        const Run& run) {
   const double start_s = std::min({0.0, base.x.front().start_s, base.y.front().start_s});
   TrueNozzle x(machine.x.truth, shift, base.x, start_s);
   TrueNozzle y(machine.y.truth, shift, base.y, start_s);
   ContourGauge gauge(run.plan, reach_s(machine));
-  std::vector<double> result;
-  const double end_s = planner::duration_s(run.plan);
+  verify::CornerGauge corners(reach_s(machine));
+  double end_s = 0.0;
+  for (const planner::PlannedMove& move : run.plan) {
+    corners.follow(move, end_s);
+    end_s += move.duration_s();
+  }
+  RunStraying result;
   for (int k = 0; k * kPrintStep_s <= end_s; ++k) {
     const double t = k * kPrintStep_s;
-    const auto reading = gauge.measure(t, x.at(t), y.at(t));
+    const double x_mm = x.at(t);
+    const double y_mm = y.at(t);
+    corners.sample(t, x_mm, y_mm);
+    const auto reading = gauge.measure(t, x_mm, y_mm);
     if (reading.extruding) {
-      result.push_back(reading.distance_mm);
+      result.distances_mm.push_back(reading.distance_mm);
     }
   }
+  result.corners = corners.stats();
   return result;
 }
 
@@ -121,8 +137,19 @@ std::string axis_text(const MachineAxis& axis, const compensate::AxisSetup& know
 }  // namespace
 
 struct MachineBench::Measured {
-  std::array<std::array<verify::DeviationAccumulator, kContenderCount>, kMachineShifts.size()>
-      shifted;
+  // Of one contender on the machine with one shift.
+  struct Sums {
+    verify::DeviationAccumulator distances;
+    CornerSums corners;
+
+    void add(const RunStraying& run) {
+      for (const double distance_mm : run.distances_mm) {
+        distances.add(distance_mm * distance_mm, 0.0, kPrintStep_s, 0);
+      }
+      corners.add(run.corners);
+    }
+  };
+  std::array<std::array<Sums, kContenderCount>, kMachineShifts.size()> shifted;
   std::size_t failed_runs = 0;
 };
 
@@ -153,8 +180,7 @@ MachineBench::MachineBench(MachineBench&&) noexcept = default;
 void MachineBench::add(const std::vector<Run>& runs) {
   const std::unique_ptr<compensate::Engine> engine = make_engine(options_);
   struct OfRun {
-    std::array<std::array<std::vector<double>, kContenderCount>, kMachineShifts.size()>
-        distances_mm;
+    std::array<std::array<RunStraying, kContenderCount>, kMachineShifts.size()> straying;
     bool failed = false;
   };
   std::vector<OfRun> results(runs.size());
@@ -176,7 +202,7 @@ void MachineBench::add(const std::vector<Run>& runs) {
         }
       }
       for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
-        results[i].distances_mm[s][c] = distances(machine_, kMachineShifts[s], base, run);
+        results[i].straying[s][c] = straying_of(machine_, kMachineShifts[s], base, run);
       }
     }
   });
@@ -184,9 +210,7 @@ void MachineBench::add(const std::vector<Run>& runs) {
     measured_->failed_runs += of_run.failed ? 1 : 0;
     for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
       for (std::size_t c = 0; c < kContenderCount; ++c) {
-        for (const double distance_mm : of_run.distances_mm[s][c]) {
-          measured_->shifted[s][c].add(distance_mm * distance_mm, 0.0, kPrintStep_s, 0);
-        }
+        measured_->shifted[s][c].add(of_run.straying[s][c]);
       }
     }
   }
@@ -197,11 +221,15 @@ MachineResult MachineBench::result() const {
                        fmt::format("X {}\nY {}", axis_text(machine_.x, machine_.unflex.x),
                                    axis_text(machine_.y, machine_.unflex.y)),
                        {},
+                       0,
                        measured_->failed_runs};
   for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
     for (std::size_t c = 0; c < kContenderCount; ++c) {
-      const verify::DeviationStats of = measured_->shifted[s][c].stats();
-      result.shifted[s][c] = {of.contour_rms_mm, of.contour_p99_mm, of.contour_max_mm};
+      const Measured::Sums& sums = measured_->shifted[s][c];
+      const verify::DeviationStats of = sums.distances.stats();
+      result.corners = sums.corners.count;
+      result.shifted[s][c] = {of.contour_rms_mm, of.contour_p99_mm, of.contour_max_mm,
+                              sums.corners.rms_mm(), sums.corners.max_mm};
     }
   }
   return result;

@@ -43,10 +43,10 @@ void write_bars(Sink out, const MachineResult& machine) {
     const ContenderResult& of = machine.of(contender);
     fmt::format_to(out,
                    "<span>{}</span><span><i class=\"{}\" style=\"width:{:.1f}%\"></i></span>"
-                   "<b>{} µm RMS, {} p99</b>\n",
+                   "<b>{} µm RMS, {} p99, {} from corners</b>\n",
                    name(contender), contender == Contender::unflex ? "unflex" : "other",
                    100.0 * of.rms_mm / most_mm, micrometres_text(of.rms_mm),
-                   micrometres_text(of.p99_mm));
+                   micrometres_text(of.p99_mm), micrometres_text(of.corner_rms_mm));
   }
   fmt::format_to(out, "</div>\n");
 }
@@ -69,6 +69,20 @@ std::string to_text(const MachinesOutcome& outcome) {
           fmt::format("{} ({})", micrometres_text(of.rms_mm), micrometres_text(of.p99_mm)));
     }
     fmt::format_to(out, "{:>18.2f}\n", machine.ratio(kNoShift));
+  }
+  fmt::format_to(out, "\n{:<28}", "corners, RMS (largest) µm");
+  for (std::size_t c = 0; c < kContenderCount; ++c) {
+    fmt::format_to(out, "{:>18}", name(static_cast<Contender>(c)));
+  }
+  fmt::format_to(out, "{:>18}\n", "corners");
+  for (const MachineResult& machine : outcome.machines) {
+    fmt::format_to(out, "  {:<26}", machine.name);
+    for (const ContenderResult& of : machine.shifted[kNoShift]) {
+      fmt::format_to(out, "{:>18}",
+                     fmt::format("{} ({})", micrometres_text(of.corner_rms_mm),
+                                 micrometres_text(of.corner_max_mm)));
+    }
+    fmt::format_to(out, "{:>18}\n", machine.corners);
   }
   fmt::format_to(out, "\n{:<28}", "frequencies off by");
   for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
@@ -110,16 +124,20 @@ std::string to_json(const MachinesOutcome& outcome) {
       Json shifted = Json::array();
       for (std::size_t s = 0; s < kMachineShifts.size(); ++s) {
         shifted.push_back({{"frequency_shift", kMachineShifts[s]},
-                           {"contour_rms_mm", machine.of(contender, s).rms_mm}});
+                           {"contour_rms_mm", machine.of(contender, s).rms_mm},
+                           {"corner_rms_mm", machine.of(contender, s).corner_rms_mm}});
       }
       contenders.push_back({{"name", name(contender)},
                             {"contour_rms_mm", of.rms_mm},
                             {"contour_p99_mm", of.p99_mm},
                             {"contour_max_mm", of.max_mm},
+                            {"corner_rms_mm", of.corner_rms_mm},
+                            {"corner_max_mm", of.corner_max_mm},
                             {"shifted", std::move(shifted)}});
     }
     json["machines"].push_back({{"machine", machine.name},
                                 {"description", machine.description},
+                                {"corners", machine.corners},
                                 {"contenders", std::move(contenders)},
                                 {"failed_runs", machine.failed_runs}});
   }

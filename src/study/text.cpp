@@ -75,8 +75,8 @@ void write_case(Sink out, const CaseResult& result) {
       fmt::format_to(out, "{:>8}", micrometres_text(method.straying[i].max_mm));
     }
     fmt::format_to(out, "{:>9}{:>9}{:>9}{:>9}{:>9.0f}{:>9.0f}{:>6.0f} ms{}{}\n",
-                   micrometres_text(method.straying[0].corner_rms_mm()),
-                   micrometres_text(method.straying[0].corner_max_mm),
+                   micrometres_text(method.straying[0].corners.rms_mm()),
+                   micrometres_text(method.straying[0].corners.max_mm),
                    micrometres_text(method.straying[0].after_max_mm),
                    micrometres_text(method.end_gap_mm), method.base_peak.velocity_mm_s,
                    method.base_peak.accel_mm_s2, std::max(0.0, method.longer_s * 1e3),

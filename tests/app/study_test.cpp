@@ -97,6 +97,14 @@ TEST_F(Study, JudgesOnTheMachinesOfAFolder) {
   ASSERT_EQ(contenders[5]["name"], "unflex");
   EXPECT_LT(rms(5), 0.5 * rms(0));
   EXPECT_LT(rms(5), rms(1));
+  EXPECT_GT(json["machines"][0]["corners"], 0);
+  const auto from_corners = [&](std::size_t number) {
+    return contenders[number]["corner_rms_mm"].get<double>();
+  };
+  // MZV cuts corners.
+  EXPECT_LT(from_corners(5), 0.5 * from_corners(2));
+  EXPECT_EQ(contenders[5]["shifted"][1]["corner_rms_mm"], from_corners(5));
+  EXPECT_GT(contenders[5]["corner_max_mm"], from_corners(5));
 }
 
 TEST_F(Study, SaysWhatIsWrongWithTheMachines) {

@@ -12,6 +12,7 @@
 #include "unflex/compensate/run.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/rivals/axis_path.hpp"
+#include "unflex/verify/corners.hpp"
 
 namespace unflex::study {
 
@@ -84,6 +85,19 @@ struct BaseMotion {
   std::string remark;
 };
 
+// How far the nozzle passes from corners of the path (unflex/verify/corners.hpp), over several
+// runs.
+struct CornerSums {
+  std::size_t count = 0;
+  double square_sum_mm2 = 0.0;
+  double max_mm = 0.0;
+
+  void add(const verify::CornerStats& run);
+  void add(const CornerSums& other);
+  // 0 without any corner.
+  [[nodiscard]] double rms_mm() const;
+};
+
 // Distances of the nozzle from the path.
 struct Straying {
   double max_mm = 0.0;           // while filament is laid
@@ -91,13 +105,9 @@ struct Straying {
   double time_s = 0.0;
   double max_at_s = 0.0;      // time of max_mm in the plan of the run
   double after_max_mm = 0.0;  // largest distance from the plan's end on
-  // How far the nozzle passes from the corners of the path (unflex/verify/corners.hpp).
-  std::size_t corners = 0;
-  double corner_square_sum_mm2 = 0.0;
-  double corner_max_mm = 0.0;
+  CornerSums corners;
 
   [[nodiscard]] double rms_mm() const;
-  [[nodiscard]] double corner_rms_mm() const;
   void merge(const Straying& other);
 };
 

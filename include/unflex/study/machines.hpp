@@ -40,11 +40,14 @@ inline constexpr std::size_t kContenderCount = 6;
 inline constexpr std::array<double, 3> kMachineShifts = {-0.07, 0.0, 0.07};
 inline constexpr std::size_t kNoShift = 1;
 
-// Distances of the nozzle from the path while filament is laid.
 struct ContenderResult {
+  // Distances of the nozzle from the path while filament is laid.
   double rms_mm = 0.0;
   double p99_mm = 0.0;
   double max_mm = 0.0;
+  // How far the nozzle passes from corners of the path (unflex/verify/corners.hpp); 0 without any.
+  double corner_rms_mm = 0.0;
+  double corner_max_mm = 0.0;
 };
 
 struct MachineResult {
@@ -52,6 +55,7 @@ struct MachineResult {
   std::string description;  // records, models and shapers
   using AllContenders = std::array<ContenderResult, kContenderCount>;
   std::array<AllContenders, kMachineShifts.size()> shifted;
+  std::size_t corners = 0;      // of the print
   std::size_t failed_runs = 0;  // runs without a solution; measured uncompensated
 
   // The best of ZV, MZV, EI and what Klipper recommends, by RMS.
