@@ -105,6 +105,7 @@ TEST(MachineBench, ShowsWhatAModelIsWorth) {
   for (const ContenderResult& of : exact.shifted[kNoShift]) {
     EXPECT_LE(of.rms_mm, of.p99_mm);
     EXPECT_LE(of.p99_mm, 1.01 * of.max_mm);
+    EXPECT_LE(of.corner_rms_mm, of.corner_max_mm);
   }
 }
 
