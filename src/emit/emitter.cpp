@@ -137,6 +137,9 @@ void Emitter::follow_input(const gcode::Event& event) {
 }
 
 void Emitter::line(const gcode::Event& event, std::string& out) {
+  if (event.added) {
+    sign(out);
+  }
   if (moves_by_itself(event)) {
     restore_shaper(out);
     limits_known_ = false;
@@ -237,13 +240,17 @@ std::string Emitter::shaper_left_off() const {
   return unknown_shaper_words(input_.state().input_shaper(), printer_.state().input_shaper());
 }
 
-void Emitter::enter_run(const Run& run, std::string& out) {
-  if (!started_) {
-    started_ = true;
+// Before the first line that is not the sliced file's.
+void Emitter::sign(std::string& out) {
+  if (!std::exchange(signed_, true)) {
     write(fmt::format("{} {}: compensated for {}, not to be compensated again", kOwnMark,
                       options_.version, brand(options_.fixed.firmware)),
           out);
   }
+}
+
+void Emitter::enter_run(const Run& run, std::string& out) {
+  sign(out);
   set_shaper({}, out);
   if (moving_) {
     // A run begins at rest, but no firmware stops by itself between the move before it and its

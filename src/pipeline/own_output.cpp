@@ -22,13 +22,39 @@ bool is_own_comment(std::string_view content) {
 
 }  // namespace
 
+Error compensated_already(const std::string& file, std::size_t line) {
+  return {ErrorKind::input,
+          {file, line},
+          "this file was already compensated by unflex; give the file as it was sliced, and let a "
+          "slicer run unflex once"};
+}
+
 Status check_as_sliced(const gcode::Line& line, const std::string& file) {
   if (!is_own_comment(line.content())) {
     return {};
   }
-  return fail(ErrorKind::input, {file, line.number},
-              "this file was already compensated by unflex; give the file as it was sliced, and "
-              "let a slicer run unflex once");
+  return tl::unexpected(compensated_already(file, line.number));
+}
+
+Result<std::optional<std::size_t>> own_line(std::istream& stream, const std::string& file) {
+  gcode::LineReader lines(stream, file);
+  gcode::Line line;
+  std::optional<std::size_t> found;
+  while (!found) {
+    const Result<bool> more = lines.next(line);
+    if (!more) {
+      return tl::unexpected(more.error());
+    }
+    if (!*more) {
+      break;
+    }
+    if (is_own_comment(line.content())) {
+      found = line.number;
+    }
+  }
+  stream.clear();
+  stream.seekg(0);
+  return found;
 }
 
 }  // namespace unflex::pipeline

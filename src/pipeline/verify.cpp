@@ -38,28 +38,6 @@ report::DeviationRows rows(const verify::Deviation& deviation) {
   return {row(deviation.extruding), row(deviation.all)};
 }
 
-// Refuses an input that unflex has compensated: compared with it, the output would look as good as
-// sliced.
-Status check_measure(std::istream& input, const std::string& name) {
-  gcode::LineReader lines(input, name);
-  gcode::Line line;
-  for (;;) {
-    const Result<bool> more = lines.next(line);
-    if (!more) {
-      return tl::unexpected(more.error());
-    }
-    if (!*more) {
-      break;
-    }
-    if (Status sliced = check_as_sliced(line, name); !sliced) {
-      return sliced;
-    }
-  }
-  input.clear();
-  input.seekg(0);
-  return {};
-}
-
 // "MZV 48"
 std::string shaper_text(std::string type, double freq_hz) {
   if (!(freq_hz > 0.0)) {
@@ -203,10 +181,20 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   if (!output) {
     return fail(ErrorKind::input, {job.output_name, 0}, "cannot read the file");
   }
-  if (Status sliced = check_measure(input, job.input_name); !sliced) {
-    return sliced;
+  const Result<std::optional<std::size_t>> measured_with = own_line(input, job.input_name);
+  if (!measured_with) {
+    return tl::unexpected(measured_with.error());
   }
-  const verify::Rules rules = verify_rules(job.settings);
+  if (*measured_with) {
+    // Compared with it, the output would look as good as sliced.
+    return tl::unexpected(compensated_already(job.input_name, **measured_with));
+  }
+  const Result<std::optional<std::size_t>> own = own_line(output, job.output_name);
+  if (!own) {
+    return tl::unexpected(own.error());
+  }
+  verify::Rules rules = verify_rules(job.settings);
+  rules.approaches = own->has_value();
   const std::unique_ptr<record::Recorder> recorder = recorder_for(job, rules);
   const Result<verify::VerifyReport> result =
       verify::verify(input, job.input_name, output, job.output_name, rules, progress,

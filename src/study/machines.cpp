@@ -137,7 +137,7 @@ std::string axis_text(const MachineAxis& axis, const compensate::AxisSetup& know
 }  // namespace
 
 struct MachineBench::Measured {
-  // Of one contender on the machine with one shift.
+  // What one contender leaves on the machine with one shift.
   struct Sums {
     verify::DeviationAccumulator distances;
     CornerSums corners;

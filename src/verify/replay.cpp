@@ -82,13 +82,14 @@ bool is_known_addition(std::string_view content, Firmware firmware) {
 }
 
 Replay::Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
-               const planner::Limits& limits, const planner::FirmwareConfig& fixed, bool in_output)
+               const planner::Limits& limits, const planner::FirmwareConfig& fixed,
+               ReplayedFile file)
     : reader_(stream, std::move(name)),
       interpreter_(interpreter),
       plan_(limits, fixed),
       resting_plan_(limits, fixed),
       fixed_(fixed),
-      in_output_(in_output) {
+      file_(file) {
   sections_.push_back(Section{});
 }
 
@@ -154,7 +155,7 @@ void Replay::read_line() {
     if (listener_) {
       listener_(line);
     }
-    if (!in_output_) {
+    if (file_ == ReplayedFile::sliced_with_approaches) {
       read_approach(line);
     }
   }
@@ -267,7 +268,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
 }
 
 void Replay::place(gcode::Line line, const Regime& before, bool motion) {
-  if (in_output_ && line.content().starts_with(kRunMark)) {
+  if (is_emitted() && line.content().starts_with(kRunMark)) {
     sections_.back().compensated = true;
     sections_.back().lead_in_s = lead_in_s(line.content());
     in_compensated_run_ = true;

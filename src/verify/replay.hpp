@@ -67,12 +67,17 @@ struct PlacedLine {
 // Whether unflex adds lines of this form to a file.
 [[nodiscard]] bool is_known_addition(std::string_view content, Firmware firmware);
 
+enum class ReplayedFile {
+  sliced,
+  sliced_with_approaches,  // reads an Interpreter::approach before each line that has one
+  emitted,  // runs may be announced as compensated, which is ignored in a sliced file; there is no
+            // resting plan
+};
+
 class Replay {
  public:
-  // in_output: this is the emitted file. Then runs may be announced as compensated, which is
-  // ignored in the sliced file, and there is no resting plan.
   Replay(std::istream& stream, std::string name, const gcode::InterpreterOptions& interpreter,
-         const planner::Limits& limits, const planner::FirmwareConfig& fixed, bool in_output);
+         const planner::Limits& limits, const planner::FirmwareConfig& fixed, ReplayedFile file);
 
   // Calls `listener` with every line, before the line is interpreted.
   void on_line(std::function<void(const gcode::Line&)> listener) {
@@ -123,11 +128,12 @@ class Replay {
   template <class Action>
   void for_each_plan(Action action) {
     action(plan_);
-    if (!in_output_) {
+    if (!is_emitted()) {
       action(resting_plan_);
     }
   }
   void push_section(Section section);
+  [[nodiscard]] bool is_emitted() const { return file_ == ReplayedFile::emitted; }
   [[nodiscard]] bool stays_in_run(const gcode::Event& event) const;
 
   gcode::LineReader reader_;
@@ -136,7 +142,7 @@ class Replay {
   PlanQueue resting_plan_;
   planner::FirmwareConfig fixed_;
   std::function<void(const gcode::Line&)> listener_;
-  bool in_output_;
+  ReplayedFile file_;
   bool in_compensated_run_ = false;  // between the lines that announce its begin and its end
   bool at_end_ = false;
   std::optional<Error> error_;

@@ -138,6 +138,28 @@ TEST_F(SmallPrint, IsVerifiedWithTheFiguresOfItsCompensation) {
   EXPECT_EQ(c["print_time_s"], v["print_time_s"]);
 }
 
+// Behind a macro unflex would write an approach. A file that is not unflex's has none.
+TEST_F(SmallPrint, HasTheSameFiguresBeforeAndAfterIfItIsVerifiedAgainstItself) {
+  write_file(path("in.gcode"),
+             "START\nG92 E0\nG90\nM83\nG1 X5 Y5 Z0.3 F9000\nG1 X60 E5 F3000\n" + small_print());
+  for (const std::string shaper : {"0", "45"}) {
+    const Outcome outcome =
+        run({"verify", "in.gcode", "--against", "in.gcode", "--report", "-", "--set",
+             "printer.firmware=klipper", "--set", "printer.input_shaper_freq_x_hz=" + shaper,
+             "--set", "printer.input_shaper_freq_y_hz=" + shaper});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    const auto json = nlohmann::json::parse(outcome.out);
+    EXPECT_EQ(json["violation_count"], 0);
+    EXPECT_GT(json["deviation"]["uncompensated"]["extruding"]["contour_rms_mm"], 0.0);
+    EXPECT_EQ(json["deviation"]["uncompensated"], json["deviation"]["compensated"]);
+    EXPECT_EQ(json["corners"]["uncompensated"], json["corners"]["compensated"]);
+    for (const auto& one : json["sensitivity"]) {
+      EXPECT_EQ(one["uncompensated"], one["compensated"]);
+    }
+    EXPECT_EQ(json["print_time_s"]["reference"], json["print_time_s"]["emitted"]);
+  }
+}
+
 TEST_F(SmallPrint, IsVerifiedFromStdin) {
   const std::string output = compensated();
   EXPECT_EQ(run({"verify", "-", "--against", "in.gcode"}, output).exit_code, 0);

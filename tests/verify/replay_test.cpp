@@ -16,9 +16,9 @@ constexpr char kStart[] = "G90\nM83\nG1 Z0.2 F600\nG1 X10 Y10 F6000\n";  // thre
 class Sections : public ::testing::Test {
  protected:
   // One word per section: its kind, and for runs the number of moves.
-  std::vector<std::string> walk(const std::string& text, bool in_output = false) {
+  std::vector<std::string> walk(const std::string& text, ReplayedFile file = ReplayedFile::sliced) {
     std::istringstream stream(text);
-    Replay replay(stream, "file", {}, {}, {}, in_output);
+    Replay replay(stream, "file", {}, {}, {}, file);
     std::vector<std::string> words;
     for (;;) {
       planner::PlannedMove move;
@@ -75,15 +75,15 @@ TEST_F(Sections, RunsEndAtRetractionsLiftsAndBarriers) {
 
 TEST_F(Sections, OnlyTheOutputAnnouncesCompensatedRuns) {
   const std::string text = std::string(kStart) + ";unflex run\nG1 X20 E1\nG1 X21 E1\n";
-  EXPECT_THAT(walk(text, true),
+  EXPECT_THAT(walk(text, ReplayedFile::emitted),
               ElementsAre("run0", "move1", "run0", "move1", "compensated2", "end"));
-  EXPECT_THAT(walk(text, false), ElementsAre("run0", "move1", "run0", "move1", "run2", "end"));
+  EXPECT_THAT(walk(text), ElementsAre("run0", "move1", "run0", "move1", "run2", "end"));
 }
 
 TEST_F(Sections, AnAnnouncementHoldsOverTheStopThatSetsUpTheRun) {
   EXPECT_THAT(walk(std::string(kStart) + ";unflex run\nSET_INPUT_SHAPER SHAPER_FREQ_X=0\nG1 X20 "
                                          "E1\n;unflex end\nG1 Z2\nG1 X10\n",
-                   true),
+                   ReplayedFile::emitted),
               ElementsAre("run0", "move1", "run0", "move1", "compensated0", "barrier",
                           "compensated1", "move1", "run1", "end"));
 }
@@ -91,18 +91,18 @@ TEST_F(Sections, AnAnnouncementHoldsOverTheStopThatSetsUpTheRun) {
 TEST_F(Sections, ACompensatedRunLastsUntilItsEndIsAnnounced) {
   const std::string run = ";unflex run\nG1 X20 E1\nG1 X20.003 Z0.2002\n";
   const std::string steep = "G1 X20.004 Z0.2003\n";
-  EXPECT_THAT(walk(kStart + run, true),
+  EXPECT_THAT(walk(kStart + run, ReplayedFile::emitted),
               ElementsAre("run0", "move1", "run0", "move1", "compensated2", "end"));
   EXPECT_THAT(
-      walk(kStart + run + ";unflex end\n" + steep, true),
+      walk(kStart + run + ";unflex end\n" + steep, ReplayedFile::emitted),
       ElementsAre("run0", "move1", "run0", "move1", "compensated2", "move1", "run0", "end"));
-  EXPECT_THAT(walk(kStart + run, false),
+  EXPECT_THAT(walk(kStart + run),
               ElementsAre("run0", "move1", "run0", "move1", "run1", "move1", "run0", "end"));
 }
 
 TEST_F(Sections, MovesOfNoLengthAreMotionAndPartOfTheRun) {
   std::istringstream stream(std::string(kStart) + "G1 X10 Y10\nG1 F1200\n");
-  Replay replay(stream, "file", {}, {}, {}, false);
+  Replay replay(stream, "file", {}, {}, {}, ReplayedFile::sliced);
   while (replay.section().kind != SectionKind::end) {
     planner::PlannedMove move;
     while (replay.next(move)) {
@@ -118,7 +118,7 @@ TEST_F(Sections, MovesOfNoLengthAreMotionAndPartOfTheRun) {
 TEST_F(Sections, JoinedOverABarrierAreOneRun) {
   std::istringstream stream(std::string(kStart) +
                             "G1 X20 E1\nSET_INPUT_SHAPER SHAPER_FREQ_X=0\n;unflex run\nG1 X30\n");
-  Replay replay(stream, "file", {}, {}, {}, true);
+  Replay replay(stream, "file", {}, {}, {}, ReplayedFile::emitted);
   planner::PlannedMove move;
   for (int i = 0; i < 4; ++i) {
     while (replay.next(move)) {
@@ -148,7 +148,7 @@ TEST_F(Sections, TheMachineRestsAtEveryBarrier) {
 TEST_F(Sections, TheRestingPlanStopsBetweenSections) {
   // A wipe in the direction of the line before it, which the machine enters at full speed.
   std::istringstream stream(std::string(kStart) + "G4 P1\nG1 X60 E1\nG1 X70 E-.2\n");
-  Replay replay(stream, "file", {}, {}, {}, false);
+  Replay replay(stream, "file", {}, {}, {}, ReplayedFile::sliced);
   std::vector<planner::PlannedMove> moves;
   std::vector<planner::PlannedMove> resting;
   for (; replay.section().kind != SectionKind::end; replay.next_section()) {
@@ -170,7 +170,7 @@ TEST_F(Sections, TheRestingPlanStopsBetweenSections) {
 
 TEST_F(Sections, WhatIsNotAskedForOfTheRestingPlanIsDropped) {
   std::istringstream stream(std::string(kStart) + "G1 X20\nG1 X30\nM400\nG1 X40\n");
-  Replay replay(stream, "file", {}, {}, {}, false);
+  Replay replay(stream, "file", {}, {}, {}, ReplayedFile::sliced);
   planner::PlannedMove move;
   while (replay.section().id < 6) {
     while (replay.next(move)) {

@@ -62,6 +62,7 @@ class Emitter {
   void copy(const gcode::Event& event, std::string& out);  // a line of the input
   void note_motion(const gcode::Event& event);
   void follow_input(const gcode::Event& event);
+  void sign(std::string& out);
   void enter_run(const Run& run, std::string& out);
   void set_run_modes(const Run& run, bool joins_file, std::string& out);
   [[nodiscard]] bool e_is_known() const;
@@ -86,7 +87,7 @@ class Emitter {
   planner::Limits input_limits_;  // as the input has them
   planner::Limits limits_;        // as the output has them
   bool limits_known_ = true;      // false if a macro may have changed limits_
-  bool started_ = false;          // a run has been written
+  bool signed_ = false;           // the line that names the version has been written
   bool move_waits_ = false;       // limits written next may hold for the last move as well
   bool moving_ = false;           // the last line moves X or Y, so the next may begin at speed
   std::string told_shaper_;       // the words of the last checkpoint that put the shaper back

@@ -51,6 +51,9 @@ struct Rules {
   double base_accel_times_plan = 0.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
   Leeway leeway;
+  // The emitted file has an Interpreter::approach wherever unflex would write one. A file that
+  // unflex has not written has none.
+  bool approaches = true;
 };
 
 // One broken rule of the emitted file.
