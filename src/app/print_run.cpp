@@ -61,10 +61,11 @@ Status deliver_output(Workspace& space, std::string_view report) {
 }
 
 // An output that failed is not delivered, but the report on it is.
-Status deliver(Workspace& space, ExitCode verdict, bool passed_on, const report::Report& report) {
-  const std::string text = !space.report      ? std::string()
-                           : report.recording ? report::to_html(report)
-                                              : report::to_json(report);
+Status deliver(const RunConfig& config, Workspace& space, ExitCode verdict, bool passed_on,
+               const report::Report& report) {
+  const std::string text = !space.report             ? std::string()
+                           : is_html(*config.report) ? report::to_html(report)
+                                                     : report::to_json(report);
   if (passed_on) {
     note_result();
   }
@@ -104,7 +105,7 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   add_setting_warnings(space->settings, report->warnings);
   console.warnings(report->warnings);
   const ExitCode verdict = exit_code_of(config, passed_on, *report, console);
-  return deliver(*space, verdict, passed_on, *report).map([&] {
+  return deliver(config, *space, verdict, passed_on, *report).map([&] {
     return PrintOutcome{verdict, std::move(*report)};
   });
 }

@@ -165,7 +165,7 @@ Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   job.settings = space.settings;
   job.engine = config.engine;
   job.workers = config.workers;
-  job.record = config.report && is_html(*config.report);
+  job.all_shapers = config.report.has_value();
   return job;
 }
 

@@ -202,13 +202,52 @@ double Settings::max_extrude_only_accel_mm_s2() const {
                                                         default_extrude_ratio(extruder));
 }
 
+double Settings::most_of_motor() const {
+  if (printer.firmware != Firmware::klipper) {
+    return 1.0;
+  }
+  double most = 0.0;
+  const Motors motors(kinematics.type, printer.firmware);
+  for (const auto& row : motors.rows()) {
+    most = std::max(most, std::hypot(row[0], row[1]));
+  }
+  return most;
+}
+
+double Settings::motor_max_velocity_mm_s() const {
+  const auto [x, y, z, e] = axis_max_velocity_mm_s();
+  return printer.firmware == Firmware::klipper ? most_of_motor() * limits.max_velocity_mm_s
+                                               : std::min(x, y);
+}
+
+double Settings::motor_max_accel_mm_s2() const {
+  const auto [x, y, z, e] = axis_max_accel_mm_s2();
+  return printer.firmware == Firmware::klipper ? most_of_motor() * limits.max_accel_mm_s2
+                                               : std::min(x, y);
+}
+
+std::string_view Settings::motor_max_accel_key() const {
+  if (printer.firmware != Firmware::klipper) {
+    const auto [x, y, z, e] = axis_max_accel_mm_s2();
+    const AxisOptions& set = limits.axis_max_accel_mm_s2;
+    if (set[0] && x <= y) {
+      return "limits.max_x_accel_mm_s2";
+    }
+    if (set[1] && y <= x) {
+      return "limits.max_y_accel_mm_s2";
+    }
+  }
+  return "limits.max_accel_mm_s2";
+}
+
 double Settings::base_max_velocity_mm_s() const {
   return base.max_velocity_mm_s.value_or(2.0 * limits.max_velocity_mm_s);
 }
 
 double Settings::base_accel_times_asked() const {
-  constexpr double kTimes = 4.0;
-  return base.max_accel_mm_s2 ? 0.0 : kTimes;
+  // Twice this would make the error smaller by 0.2 µm at most (docs/theory.md, Limits).
+  constexpr double kTimes = 2.0;
+  return base.max_accel_mm_s2 ? 0.0 : kTimes * most_of_motor();
 }
 
 double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {

@@ -264,23 +264,9 @@ Status check_kinematics(const Draft& draft) {
   return {};
 }
 
-// The most that the plan may ask of a motor, relative to the limits. Klipper limits what the tool
-// does, the other firmwares what the motors do.
-double most_of_motor(const Settings& s) {
-  if (s.printer.firmware != Firmware::klipper) {
-    return 1.0;
-  }
-  double most = 0.0;
-  const Motors motors(s.kinematics.type, s.printer.firmware);
-  for (const auto& row : motors.rows()) {
-    most = std::max(most, std::hypot(row[0], row[1]));
-  }
-  return most;
-}
-
 Status check_base(const Draft& draft) {
   const Settings& s = draft.settings;
-  const double most = most_of_motor(s);
+  const double most = s.most_of_motor();
   // `most` is 1 or √2.
   const std::string_view times = most > 1.0 ? "√2 × " : "";
   if (s.base_max_velocity_mm_s() < most * s.limits.max_velocity_mm_s) {

@@ -37,6 +37,8 @@ constexpr std::size_t kWindowsAtOnce = 8;
 // The trajectory of a run or part is held as a whole, 48 bytes per node. A run or part with more
 // nodes is kept. Only a single move can make a part so long.
 constexpr std::size_t kMaxRunNodes = 8'000'000;
+// A plan may come out above a limit by rounding.
+constexpr double kRounding = 1.0 + 1e-6;
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kShortPatience{2};
 
@@ -98,7 +100,7 @@ class Compensator {
             streams.input, job.input_name, rules_.verify, streams.slots, [this] { wake(); },
             streams.stop_input),
         recorder_(recorder_for(job, rules_.verify)),
-        verifier_(rules_.verify, observation_of(recorder_.get(), rules_.verify), job.input_name,
+        verifier_(rules_.verify, observation_of(*recorder_, rules_.verify), job.input_name,
                   job.output_name, streams.slots),
         pool_(std::max(job.workers, 1U), streams.slots) {}
 
@@ -202,7 +204,7 @@ class Compensator {
         job->failure = known->reason;
       } else if (piece.cut_off) {
         job->failure = "too many lines without motion stand in a row in the middle of the motion";
-      } else if (accel > job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2)) {
+      } else if (accel > kRounding * job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2)) {
         job->failure = fmt::format(
             "the plan itself accelerates a motor by {:.0f} mm/s², more than base.max_accel_mm_s2, "
             "{:.0f}; raise that if the motors can",
@@ -415,7 +417,7 @@ class Compensator {
     if (!verified) {
       return tl::unexpected(verified.error());
     }
-    add_verification(*verified, recorder_.get(), *report_);
+    add_verification(*verified, *recorder_, *report_);
     blamed_ = std::move(verified->blamed_runs);
     for (verify::BlamedRun& run : blamed_) {
       run.reason = fmt::format("when it was verified: {}", run.reason);
@@ -461,7 +463,7 @@ class Compensator {
       compensate::make_banded_engine();  // for solve_in_process()
   // Last, so that threads end before what they use.
   PieceThread pieces_;
-  std::unique_ptr<record::Recorder> recorder_;  // null if the job asks for no recording
+  std::unique_ptr<record::Recorder> recorder_;
   VerifyThread verifier_;
   TaskPool pool_;
 };

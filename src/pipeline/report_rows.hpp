@@ -20,15 +20,15 @@ namespace unflex::pipeline {
 // What the work since `begin` has cost this process and its children.
 void add_performance(std::chrono::steady_clock::time_point begin, report::Report& report);
 
-// Gathers data for an HTML report; null if the job does not ask for one.
+// Gathers where the nozzle strays most, and what input shapers would do.
 [[nodiscard]] std::unique_ptr<record::Recorder> recorder_for(const Job& job,
                                                              const verify::Rules& rules);
-// What else a verification is to measure: for the report, and for the recorder if there is one.
-[[nodiscard]] verify::Observation observation_of(record::Recorder* recorder,
+// What else a verification is to measure.
+[[nodiscard]] verify::Observation observation_of(record::Recorder& recorder,
                                                  const verify::Rules& rules);
 
 // Puts the figures of a verification, and what was recorded meanwhile, into the report.
-void add_verification(const verify::VerifyReport& verified, record::Recorder* recorder,
+void add_verification(const verify::VerifyReport& verified, record::Recorder& recorder,
                       report::Report& report);
 
 // Verifies the job's output against its input and puts the figures into the report.

@@ -137,6 +137,7 @@ class WallWatcher final : public verify::Observer {
   void hold(double) override {}
   void advanced(const verify::ReferencePath&, double) override {}
   [[nodiscard]] double memory_s() const override { return 0.0; }
+  [[nodiscard]] bool asks_for_unshaped() const override { return false; }
 
   void step(verify::NozzleId nozzle, const verify::NozzleStep& step) override {
     if (nozzle.base != verify::NozzleBase::emitted || nozzle.model != 1 || !step.extruding) {

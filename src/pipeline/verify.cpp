@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "own_output.hpp"
+#include "printer_facts.hpp"
 #include "report_rows.hpp"
 #include "stage_options.hpp"
 #include "unflex/gcode/line.hpp"
@@ -36,37 +37,6 @@ report::Spread spread(const verify::Deviation& deviation) {
 
 report::DeviationRows rows(const verify::Deviation& deviation) {
   return {row(deviation.extruding), row(deviation.all)};
-}
-
-// "MZV 48"
-std::string shaper_text(std::string type, double freq_hz) {
-  if (!(freq_hz > 0.0)) {
-    return "none";
-  }
-  std::ranges::transform(type, type.begin(), [](char c) {
-    return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
-  });
-  return fmt::format("{} {:.4g}", type, freq_hz);
-}
-
-// The shaper that the printer's configuration has, whatever the print sets.
-std::optional<record::PrinterShaper> printer_shaper(const verify::Rules& rules) {
-  gcode::Shaper shaper;
-  shaper.freq_x_hz = rules.interpreter.shaper_freq_x_hz;
-  shaper.freq_y_hz = rules.interpreter.shaper_freq_y_hz;
-  planner::Shaping shaping = planner::shaping(rules.fixed, shaper);
-  if (!shaping.acts()) {
-    return std::nullopt;
-  }
-  const planner::InstalledShaper& installed = rules.fixed.shaper;
-  std::string name = shaper_text(installed.type_x, shaper.freq_x_hz);
-  if (const std::string y = shaper_text(installed.type_y, shaper.freq_y_hz); y != name) {
-    const bool differs_in_hz_only =
-        installed.type_x == installed.type_y && !shaping.x.empty() && !shaping.y.empty();
-    name += "/" + (differs_in_hz_only ? fmt::format("{:.4g}", shaper.freq_y_hz) : y);
-  }
-  return record::PrinterShaper{"printer's " + name + " Hz", std::move(shaping.x),
-                               std::move(shaping.y)};
 }
 
 double cpu_s(int who) {
@@ -105,31 +75,38 @@ report::Report new_report(std::string command, const Job& job) {
     report.printer.push_back(
         {std::move(setting.key), std::move(setting.value), std::move(setting.origin)});
   }
+  report.facts = printer_facts(job.settings);
   return report;
 }
 
 std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rules& rules) {
-  if (!job.record) {
-    return nullptr;
-  }
+  static constexpr std::array kOfSummary = {dynamics::ShaperKind::zv};
   record::Options options;
   options.nozzle = rules.nozzle;
-  options.printer_shaper = printer_shaper(rules);
+  std::optional<record::PrinterShaper> own = printer_shaper(rules);
+  if (job.all_shapers) {
+    if (own) {
+      own->name = "printer's " + own->name;
+    }
+    options.printer_shaper = std::move(own);
+  } else if (own) {
+    // It acts on the sliced file as that is played. The summary tells of no other.
+    options.shapers = {};
+  } else {
+    options.shapers = kOfSummary;
+  }
   return std::make_unique<record::Recorder>(options);
 }
 
-verify::Observation observation_of(record::Recorder* recorder, const verify::Rules& rules) {
-  verify::Observation observation{verify::detuned(rules.nozzle),
-                                  recorder != nullptr ? &recorder->observer() : nullptr};
+verify::Observation observation_of(record::Recorder& recorder, const verify::Rules& rules) {
+  verify::Observation observation{verify::detuned(rules.nozzle), &recorder.observer()};
   observation.detuned.insert(observation.detuned.end(), rules.plants.begin(), rules.plants.end());
   return observation;
 }
 
-void add_verification(const verify::VerifyReport& verified, record::Recorder* recorder,
+void add_verification(const verify::VerifyReport& verified, record::Recorder& recorder,
                       report::Report& report) {
-  if (recorder != nullptr) {
-    report.recording = recorder->finish(verified);
-  }
+  report.recording = recorder.finish(verified);
   report.uncompensated = rows(verified.uncompensated);
   if (verified.unshaped) {
     report.unshaped = rows(*verified.unshaped);
@@ -151,6 +128,7 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder* re
   report.emitted_time_s = verified.emitted_time_s;
   report.base_max_velocity_mm_s = verified.base_max_velocity_mm_s;
   report.base_max_accel_mm_s2 = verified.base_max_accel_mm_s2;
+  report.base_max_step_mm_s = verified.base_max_step_mm_s;
   report.output_lines = verified.output_lines;
   report.output_bytes = verified.output_bytes;
   report.max_lines_per_s = verified.max_lines_per_s;
@@ -198,11 +176,11 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   const std::unique_ptr<record::Recorder> recorder = recorder_for(job, rules);
   const Result<verify::VerifyReport> result =
       verify::verify(input, job.input_name, output, job.output_name, rules, progress,
-                     observation_of(recorder.get(), rules));
+                     observation_of(*recorder, rules));
   if (!result) {
     return tl::unexpected(result.error());
   }
-  add_verification(*result, recorder.get(), report);
+  add_verification(*result, *recorder, report);
   return {};
 }
 

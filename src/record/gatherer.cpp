@@ -49,7 +49,7 @@ Recorder::Gatherer::Gatherer(const Options& options, std::size_t machines)
     : store_(options.paths_bytes),
       versions_{Version(half_width_s(options.nozzle), options.places),
                 Version(half_width_s(options.nozzle), options.places)},
-      bench_(options.nozzle, options.printer_shaper, machines) {}
+      bench_(options.nozzle, options.shapers, options.printer_shaper, machines) {}
 
 void Recorder::Gatherer::line(const gcode::Line& line) {
   features_.read(line.content(), line.number);
@@ -175,11 +175,26 @@ std::size_t Recorder::Gatherer::layer_of(const verify::PathPiece& piece, std::si
     begins = layers_begun > 0 ? layers_begun != layers_begun_
                               : rise_mm > (level ? kSameZ_mm : kSpiralLayer_mm);
   }
+  if (layers_begun > 0 && layers_begun_ == 0) {
+    leave_start();
+  }
   if (begins && layers_.size() < kMostLayers) {
     layers_.push_back({z_mm, segment.line, {}});
   }
   layers_begun_ = layers_begun;
   return layers_.size() - 1;
+}
+
+// What was laid before the first layer is not the print: lines that prime the nozzle.
+void Recorder::Gatherer::leave_start() {
+  start_layers_ = layers_.size();
+  for (Version& version : versions_) {
+    version.worst.clear();
+    for (const Scene& scene : scenes_) {
+      version.ring.cancel(scene.id);
+    }
+  }
+  scenes_.clear();
 }
 
 void Recorder::Gatherer::close_chunk(int number, double to_mm) {
@@ -215,7 +230,7 @@ void Recorder::Gatherer::propose(int number) {
   Version& version = versions_[number];
   const PlaceCandidate candidate = std::exchange(version.block, {});
   version.block_s = 0.0;
-  if (candidate.contour2_mm2 <= 0.0) {
+  if (candidate.contour2_mm2 <= 0.0 || candidate.layer < start_layers_) {
     return;
   }
   const std::size_t id = next_id_++;
@@ -346,6 +361,7 @@ report::Recording Recorder::Gatherer::finish() {
 
   report::Recording recording;
   std::vector<std::size_t> ends;
+  recording.start_layers = start_layers_;
   recording.paths = store_.encode(layers_.size(), ends);
   for (std::size_t i = 0; i < layers_.size(); ++i) {
     recording.layers.push_back({layers_[i].z_mm,

@@ -29,6 +29,7 @@ class Recorder::Gatherer final : public verify::Observer {
   void hold(double duration_s) override;
   void advanced(const verify::ReferencePath& sliced, double time_s) override;
   [[nodiscard]] double memory_s() const override { return bench_.memory_s(); }
+  [[nodiscard]] bool asks_for_unshaped() const override { return !bench_.is_empty(); }
 
   [[nodiscard]] report::Recording finish();
 
@@ -79,6 +80,7 @@ class Recorder::Gatherer final : public verify::Observer {
   void measured_step(int number, const verify::NozzleStep& step);
   void move_along(Version& version, const verify::NozzleStep& step) const;
   void enter(int number, std::size_t piece);
+  void leave_start();
   void close_chunk(int number, double to_mm);
   void append_moves(const Version& version, std::size_t until);
   [[nodiscard]] std::size_t layer_of(const verify::PathPiece& piece, std::size_t layers_begun);
@@ -92,6 +94,7 @@ class Recorder::Gatherer final : public verify::Observer {
   std::vector<std::array<Sums, 2>> feature_sums_;
   std::vector<Layer> layers_;
   std::size_t layers_begun_ = 0;
+  std::size_t start_layers_ = 0;  // layers before the first that the slicer names
   LayerStore store_;
   PathCells cells_;
   std::size_t section_first_ = 0;  // first move of the section

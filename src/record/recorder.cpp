@@ -55,13 +55,13 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
       "as sliced",
       spreads(verified.uncompensated, [](const auto& other) { return other.uncompensated; }), true,
       rms_of(verified.uncompensated_corners)};
+  const bool has_unshaped = verified.unshaped && gatherer_->asks_for_unshaped();
   std::vector<report::Contender> contenders = {
-      verified.unshaped
-          ? report::Contender{"as sliced",
-                              spreads(*verified.unshaped,
-                                      [](const auto& other) { return *other.unshaped; }),
-                              true, std::nullopt}
-          : played,
+      has_unshaped ? report::Contender{"as sliced",
+                                       spreads(*verified.unshaped,
+                                               [](const auto& other) { return *other.unshaped; }),
+                                       true, std::nullopt}
+                   : played,
       {"unflex", spreads(verified.compensated, [](const auto& other) { return other.compensated; }),
        true, rms_of(verified.compensated_corners)}};
   for (report::Contender& shaper : recording.contenders) {
@@ -71,7 +71,7 @@ report::Recording Recorder::finish(const verify::VerifyReport& verified) {
     }
     contenders.push_back(std::move(shaper));
   }
-  if (verified.unshaped) {
+  if (has_unshaped) {
     // Where the printer's own shaper is known, its curve is there already.
     played.name = "as sliced, shaper on";
     played.drawn = !options_.printer_shaper;

@@ -66,13 +66,14 @@ PrinterShaper without_common_delay(const PrinterShaper& shaper) {
 }  // namespace
 
 ShaperBench::ShaperBench(const verify::NozzleModel& model,
+                         std::span<const dynamics::ShaperKind> kinds,
                          const std::optional<PrinterShaper>& printer_shaper, std::size_t machines)
     : interval_s_(std::clamp(1.0 / (kPerPeriod * std::max(model.x.main_hz(), model.y.main_hz())),
                              5e-4, 2e-3)),
       last_add_s_(machines, -1.0),
       last_(machines),
       near_(verify::reach_s(model)) {
-  for (const dynamics::ShaperKind kind : dynamics::kShaperKinds) {
+  for (const dynamics::ShaperKind kind : kinds) {
     Shaper shaper{std::string(dynamics::name(kind)),
                   is_drawn(kind),
                   {},
@@ -87,6 +88,7 @@ ShaperBench::ShaperBench(const verify::NozzleModel& model,
   if (printer_shaper) {
     const PrinterShaper own = without_common_delay(*printer_shaper);
     Shaper shaper{own.name, true, {}, verify::CornerGauge(verify::reach_s(model))};
+    shaper.printers_own = true;
     install(shaper, own.x, own.y, machines);
     shapers_.push_back(std::move(shaper));
   }
@@ -124,13 +126,18 @@ void ShaperBench::add(std::size_t machine, double time_s,
   last_[machine] = unshaped;
 }
 
-double ShaperBench::memory_s() const { return lookahead_s_ + 2.0 * kMargin * interval_s_; }
+double ShaperBench::memory_s() const {
+  return is_empty() ? 0.0 : lookahead_s_ + 2.0 * kMargin * interval_s_;
+}
 
 bool ShaperBench::is_sampled(double time_s) const {
   return static_cast<std::size_t>(time_s / kBlock_s) % stride_ == 0;
 }
 
 void ShaperBench::advance(const verify::ReferencePath& path, double time_s) {
+  if (is_empty()) {
+    return;
+  }
   if (!begun_) {
     begun_ = true;
     near_.begin(path);
@@ -237,7 +244,7 @@ void ShaperBench::look_at_corners(Shaper& shaper, const dynamics::NozzleMotionXY
 std::vector<report::Contender> ShaperBench::contenders() const {
   std::vector<report::Contender> result;
   for (const Shaper& shaper : shapers_) {
-    report::Contender contender{shaper.name, {}, shaper.drawn, std::nullopt};
+    report::Contender contender{shaper.name, {}, shaper.drawn, std::nullopt, shaper.printers_own};
     const verify::CornerStats corners = shaper.corners.stats();
     if (corners.count > 0) {
       contender.corner_rms_mm = corners.rms_mm;

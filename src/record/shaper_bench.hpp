@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,10 @@ namespace unflex::record {
 class ShaperBench {
  public:
   // `model` is the printer of the settings; `machines` is the number of machines.
-  ShaperBench(const verify::NozzleModel& model, const std::optional<PrinterShaper>& printer_shaper,
-              std::size_t machines);
+  ShaperBench(const verify::NozzleModel& model, std::span<const dynamics::ShaperKind> kinds,
+              const std::optional<PrinterShaper>& printer_shaper, std::size_t machines);
+
+  [[nodiscard]] bool is_empty() const { return shapers_.empty(); }
 
   // The state of a machine's nozzle without a shaper. Times must increase.
   void add(std::size_t machine, double time_s, const dynamics::NozzleMotionXY& unshaped);
@@ -50,6 +53,7 @@ class ShaperBench {
     verify::CornerGauge corners;
     double last_s = -1.0;
     dynamics::NozzleMotionXY last = {};
+    bool printers_own = false;
   };
 
   void install(Shaper& shaper, const dynamics::ShaperPulses& x, const dynamics::ShaperPulses& y,

@@ -30,6 +30,8 @@ class WorstPlaces {
   // Adds the candidate under the number id, if it is among the worst.
   Change add(const PlaceCandidate& candidate, std::size_t id);
 
+  void clear() { places_.clear(); }
+
   struct Kept {
     std::size_t id;
     PlaceCandidate candidate;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "answers.hpp"
 #include "assets.hpp"
 #include "unflex/core/base64.hpp"
 #include "unflex/report/format.hpp"
@@ -110,6 +111,7 @@ Json contenders_json(const std::vector<Contender>& contenders) {
         {{"name", contender.name},
          {"spreads", spreads},
          {"drawn", contender.drawn},
+         {"printers", contender.printers_own},
          {"corners", contender.corner_rms_mm ? Json(rounded(*contender.corner_rms_mm * 1e3, 1e-3))
                                              : Json(nullptr)}});
   }
@@ -153,12 +155,12 @@ Json facts_json(const Report& r) {
   add("Print time", fmt::format("{} as sliced, {} compensated", duration_text(r.reference_time_s),
                                 duration_text(r.emitted_time_s)));
   if (!r.solver_engine.empty()) {
-    add("Runs", fmt::format("{} of {} compensated, {} keep their original moves",
-                            r.runs_compensated, r.runs_total, r.runs_fallback));
+    add("Stretches of motion", fmt::format("{} of {} compensated, {} stay as sliced",
+                                           r.runs_compensated, r.runs_total, r.runs_fallback));
     add("Extruded path",
         fmt::format("{} of {:.0f} mm compensated", share_text(r.extruded_path.compensated_share()),
                     r.extruded_path.total_mm));
-    add("Solver", fmt::format("{}, {} windows, {} iterations", r.solver_engine, r.windows_total,
+    add("Solver", fmt::format("{}, {} parts, {} iterations", r.solver_engine, r.windows_total,
                               r.solver_iterations));
   }
   for (std::size_t i = 0; i < std::min(r.unknown_commands.size(), kMostListed); ++i) {
@@ -194,17 +196,15 @@ Json facts_json(const Report& r) {
                     micrometres_text(corners.max_mm), micrometres_text(left.max_mm),
                     corners.max_line, left.max_line));
   }
-  add("Base", fmt::format("at most {:.0f} mm/s and {:.0f} mm/s²", r.base_max_velocity_mm_s,
-                          r.base_max_accel_mm_s2));
   add("Output", fmt::format("{} lines, {:.1f} MB, at most {:.0f} lines/s", r.output_lines,
                             static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s));
   add("Filament",
       fmt::format("{:.2f} mm in, {:.2f} mm out", r.input_extrusion_mm, r.output_extrusion_mm));
-  add("Filament off the nozzle", fmt::format("{} → {} µm RMS, {} → {} µm at most",
-                                             micrometres_text(r.uncompensated_lag.rms_mm),
-                                             micrometres_text(r.compensated_lag.rms_mm),
-                                             micrometres_text(r.uncompensated_lag.max_mm),
-                                             micrometres_text(r.compensated_lag.max_mm)));
+  add("Filament laid ahead of the nozzle or behind",
+      fmt::format(
+          "{} → {} µm RMS, {} → {} µm at most", micrometres_text(r.uncompensated_lag.rms_mm),
+          micrometres_text(r.compensated_lag.rms_mm), micrometres_text(r.uncompensated_lag.max_mm),
+          micrometres_text(r.compensated_lag.max_mm)));
   add("Written by", fmt::format("unflex {}", r.version));
   return facts;
 }
@@ -217,6 +217,7 @@ Json data_json(const Report& r) {
   }
   return {{"deviation", {row_json(r.uncompensated.extruding), row_json(r.compensated.extruding)}},
           {"layers", layers_json(recording.layers)},
+          {"start_layers", recording.start_layers},
           {"layer_step", recording.paths.layer_step},
           {"tolerance_mm", recording.paths.tolerance_mm},
           {"frame",
@@ -247,16 +248,6 @@ std::string um_text(double mm) {
   return fmt::format("{:.{}f} µm", value, digits);
 }
 
-std::string time_sentence(const Report& r) {
-  const double longer_s = r.emitted_time_s - r.reference_time_s;
-  const std::string time = duration_text(r.emitted_time_s);
-  if (std::abs(longer_s) < 0.5) {
-    return fmt::format("and the print takes as long as before, {}", time);
-  }
-  return fmt::format("and the print takes {} {} ({})", duration_text(std::abs(longer_s)),
-                     longer_s > 0.0 ? "longer" : "less", time);
-}
-
 std::string key_figure(std::string_view name, std::string_view explanation,
                        const std::string& before, const std::string& after,
                        const std::string& note) {
@@ -274,7 +265,90 @@ std::string times_less(double before, double after) {
   return fmt::format("{:.{}f}× less", factor, factor >= 9.95 ? 0 : 1);
 }
 
-std::string hero(const Report& r) {
+// One of the three answers: its question, what it says in short, and lines below that.
+std::string answer(std::string_view question, const std::string& short_answer,
+                   const std::vector<std::string>& lines) {
+  std::string html = fmt::format("<div class=\"answer\"><h2>{}</h2>\n<p class=\"short\">{}</p>\n",
+                                 question, short_answer);
+  for (const std::string& line : lines) {
+    html += fmt::format("<p>{}</p>\n", line);
+  }
+  return html + "</div>\n";
+}
+
+std::string change(double from_mm, double to_mm) {
+  return fmt::format(R"(<b class="before">{}</b> → <b class="after">{}</b>)",
+                     micrometres_text(from_mm), um_text(to_mm));
+}
+
+std::string better_answer(const Report& r) {
+  const Better found = better(r);
+  std::vector<std::string> lines = {
+      escape_html(fmt::format("{}, {}.", times_text(found.times()), found.now))};
+  if (found.off) {
+    lines.push_back(fmt::format("{} if the frequencies are 5 % off.",
+                                change(found.off->now_mm, found.off->compensated_mm)));
+  }
+  if (found.exact.zv_mm) {
+    lines.push_back(fmt::format(
+        "A ZV shaper would leave {}{}.", um_text(*found.exact.zv_mm),
+        found.off && found.off->zv_mm
+            ? fmt::format(", {} if they are 5 % off", micrometres_text(*found.off->zv_mm))
+            : std::string{}));
+  }
+  return answer(term("Better?", kTypical),
+                change(found.exact.now_mm, found.exact.compensated_mm) + " off the path", lines);
+}
+
+std::string worst_answer(const Report& r) {
+  const Worst found = worst(r);
+  std::vector<std::string> lines;
+  std::string headline = "nowhere";
+  if (found.compensated) {
+    headline = fmt::format("<b class=\"after\">{}</b>", um_text(found.compensated->after_mm));
+    lines.push_back(fmt::format("In <a href=\"#worst\">{}</a>.",
+                                escape_html(place_text(*r.recording, *found.compensated))));
+  }
+  if (found.now) {
+    lines.push_back(fmt::format("Now <b class=\"before\">{}</b> in {}.",
+                                um_text(found.now->before_mm),
+                                escape_html(place_text(*r.recording, *found.now))));
+  }
+  if (found.start) {
+    lines.push_back(fmt::format("Before the first layer {}.",
+                                change(found.start->before.max_mm, found.start->after.max_mm)));
+  }
+  return answer(term("Where is it worst?",
+                     "The greatest distance of the nozzle from the sliced path while filament is "
+                     "laid. Lines that prime the nozzle before the first layer are left out."),
+                headline, lines);
+}
+
+std::string safe_answer(const Report& r) {
+  const Safe found = safe(r);
+  std::vector<std::string> lines;
+  for (const std::string& reason : found.reasons) {
+    lines.push_back(escape_html(reason));
+  }
+  return answer("Is it safe?",
+                found.is_safe
+                    ? "<b class=\"after\">yes</b>, every rule is kept"
+                    : "<b class=\"before\">no</b>, <a href=\"#remarks\">do not print it</a>",
+                lines);
+}
+
+std::string made_for(const Report& r) {
+  std::string html =
+      fmt::format("<p class=\"made-for\">Made for {}.", escape_html(made_for_text(r)));
+  if (!r.warnings.empty()) {
+    html += fmt::format(" <a href=\"#remarks\">{} {}</a>, the first: {}", r.warnings.size(),
+                        r.warnings.size() == 1 ? "warning" : "warnings",
+                        escape_html(r.warnings.front().substr(0, kLongestText)));
+  }
+  return html + "</p>\n";
+}
+
+std::string key_figures(const Report& r) {
   const DeviationRow& before = r.uncompensated.extruding;
   const DeviationRow& after = r.compensated.extruding;
   const auto figure = [](std::string_view name, std::string_view explanation, double from_mm,
@@ -284,42 +358,28 @@ std::string hero(const Report& r) {
   };
   const double change =
       r.reference_time_s > 0.0 ? 100.0 * (r.emitted_time_s / r.reference_time_s - 1.0) : 0.0;
-  const std::string typical = term("on average", kTypical);
-  std::string html = fmt::format(
-      R"(<section class="card hero" aria-label="Result"><p class="gain">{}, the nozzle strays <b class="before">{}</b> from its path {}, and <b class="before">{}</b> at worst; compensated, it is <b class="after">{}</b> and <b class="after">{}</b>, {}.</p>
-)",
-      r.unshaped ? "As sliced, under the printer's own input shaper" : "As sliced",
-      um_text(before.contour_rms_mm), typical, um_text(before.contour_max_mm),
-      um_text(after.contour_rms_mm), um_text(after.contour_max_mm), escape_html(time_sentence(r)));
-  if (r.violation_count > 0) {
-    html += fmt::format(
-        R"(<p class="alert">The compensated file breaks {} {}; do not print it. They are listed <a href="#remarks">below</a>.</p>
-)",
-        r.violation_count, r.violation_count == 1 ? "rule" : "rules");
-  }
-  html += R"(<dl class="key-figures">)";
-  html += figure("Typical deviation", kTypical, before.contour_rms_mm, after.contour_rms_mm);
+  std::string html = R"(<dl class="key-figures">)";
   html += figure("99 % of the time below",
                  "Only during one hundredth of the extruding time is the nozzle further from its "
                  "path than this.",
                  before.contour_p99_mm, after.contour_p99_mm);
-  html += figure("Largest",
-                 "The greatest distance of the nozzle from the sliced path anywhere in the print "
-                 "while filament is laid.",
-                 before.contour_max_mm, after.contour_max_mm);
-  const CornerRow& corners = r.uncompensated_corners;
-  if (corners.count > 0) {
+  if (r.uncompensated_corners.count > 0) {
     html += figure("Typical corner",
                    "How far the nozzle passes from the corners of the path: the root mean square "
                    "over all places where an extruding path turns by more than 20°.",
-                   corners.rms_mm, r.compensated_corners.rms_mm);
+                   r.uncompensated_corners.rms_mm, r.compensated_corners.rms_mm);
   }
   html +=
       key_figure("Print time", "As the firmware's planner makes it, heating and macros excluded.",
                  duration_text(r.reference_time_s), duration_text(r.emitted_time_s),
                  fmt::format("{:+.2f} %", change));
-  html += "</dl></section>\n";
-  return html;
+  return html + "</dl>";
+}
+
+std::string hero(const Report& r) {
+  return "<section class=\"card hero\" aria-label=\"Result\">\n<div class=\"answers\">\n" +
+         better_answer(r) + worst_answer(r) + safe_answer(r) + "</div>\n" + made_for(r) +
+         key_figures(r) + "</section>\n";
 }
 
 std::string file_name(const std::string& path) {

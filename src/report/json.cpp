@@ -1,5 +1,6 @@
 // The keys are documented in docs/report.md; a test holds the two together.
 
+#include "answers.hpp"
 #include "unflex/report/json_parts.hpp"
 
 namespace unflex::report {
@@ -82,6 +83,74 @@ Json budget_json(const LineBudget& budget) {
           {"cost_max_mm", budget.cost_max_mm}};
 }
 
+Json comparison_json(const std::optional<Comparison>& comparison) {
+  if (!comparison) {
+    return nullptr;
+  }
+  return {{"now_rms_mm", comparison->now_mm},
+          {"compensated_rms_mm", comparison->compensated_mm},
+          {"zv_rms_mm", comparison->zv_mm ? Json(*comparison->zv_mm) : Json(nullptr)}};
+}
+
+Json place_json(const Report& r, const std::optional<Place>& place, double Place::*error_mm) {
+  if (!place) {
+    return nullptr;
+  }
+  const Recording& recording = *r.recording;
+  const bool named = place->feature < recording.features.size();
+  return {{"contour_max_mm", (*place).*error_mm},
+          {"line", place->line},
+          {"layer",
+           place->layer < recording.start_layers ? 0 : place->layer - recording.start_layers + 1},
+          {"feature", named ? recording.features[place->feature].name : std::string{}},
+          {"x_mm", place->x_mm},
+          {"y_mm", place->y_mm},
+          {"z_mm", place->z_mm}};
+}
+
+Json shapers_json(const Report& r) {
+  Json array = Json::array();
+  if (!r.recording) {
+    return array;
+  }
+  for (const Contender& contender : r.recording->contenders) {
+    Json errors = Json::array();
+    for (std::size_t i = 0; i < contender.spreads.size(); ++i) {
+      errors.push_back({{"frequency_error", r.recording->frequency_errors[i]},
+                        {"contour_rms_mm", contender.spreads[i].rms_mm},
+                        {"contour_max_mm", contender.spreads[i].max_mm}});
+    }
+    array.push_back({{"name", contender.name},
+                     {"corner_rms_mm",
+                      contender.corner_rms_mm ? Json(*contender.corner_rms_mm) : Json(nullptr)},
+                     {"errors", std::move(errors)}});
+  }
+  return array;
+}
+
+// What the summary says first.
+void add_answers(const Report& r, Json& json) {
+  const Better first = better(r);
+  const Worst second = worst(r);
+  const Safe third = safe(r);
+  json["answers"] = {
+      {"better",
+       {{"now", first.now},
+        {"exact", comparison_json(first.exact)},
+        {"off_by_5_percent", comparison_json(first.off)}}},
+      {"worst",
+       {{"now", place_json(r, second.now, &Place::before_mm)},
+        {"compensated", place_json(r, second.compensated, &Place::after_mm)}}},
+      {"start_now_max_mm", second.start ? Json(second.start->before.max_mm) : Json(nullptr)},
+      {"start_compensated_max_mm", second.start ? Json(second.start->after.max_mm) : Json(nullptr)},
+      {"safe",
+       {{"is_safe", third.is_safe},
+        {"times_own_accel", third.times_own_accel},
+        {"reasons", third.reasons}}},
+      {"made_for", made_for_text(r)}};
+  json["contenders"] = shapers_json(r);
+}
+
 void add_motion(const Report& r, Json& json) {
   json["print_time_s"] = {{"reference", r.reference_time_s}, {"emitted", r.emitted_time_s}};
   json["freq_error"] = r.freq_error;
@@ -98,7 +167,11 @@ void add_motion(const Report& r, Json& json) {
                           {"nominal_rms_mm", r.robustness->nominal_rms_mm}};
   }
   json["base"] = {{"max_velocity_mm_s", r.base_max_velocity_mm_s},
-                  {"max_accel_mm_s2", r.base_max_accel_mm_s2}};
+                  {"max_accel_mm_s2", r.base_max_accel_mm_s2},
+                  {"max_step_mm_s", r.base_max_step_mm_s},
+                  {"own_max_velocity_mm_s", r.facts.motor_max_velocity_mm_s},
+                  {"own_max_accel_mm_s2", r.facts.motor_max_accel_mm_s2},
+                  {"own_max_accel_origin", r.facts.motor_max_accel_origin}};
 }
 
 void add_work(const Report& r, Json& json) {
@@ -195,6 +268,7 @@ std::string to_json(const Report& report) {
   json["output"] = report.output;
   json["firmware"] = report.firmware;
   json["printer"] = settings_json(report.printer);
+  add_answers(report, json);
   add_motion(report, json);
   add_work(report, json);
   add_output(report, json);

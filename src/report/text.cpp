@@ -5,6 +5,7 @@
 #include <iterator>
 #include <string_view>
 
+#include "answers.hpp"
 #include "unflex/report/format.hpp"
 
 namespace unflex::report {
@@ -18,6 +19,83 @@ using Sink = std::back_insert_iterator<std::string>;
 
 std::string change_text(double from_mm, double to_mm) {
   return fmt::format("{} → {}", micrometres_text(from_mm), micrometres_text(to_mm));
+}
+
+// The first line with its title, the others below it.
+void write_answer(Sink out, std::string_view title, const std::vector<std::string>& lines) {
+  for (const std::string& line : lines) {
+    fmt::format_to(out, "{:<14}{}\n", title, line);
+    title = "";
+  }
+}
+
+std::string zv_text(const Better& answer) {
+  std::string text =
+      fmt::format("A ZV shaper would leave {} µm", micrometres_text(*answer.exact.zv_mm));
+  if (answer.off && answer.off->zv_mm) {
+    text += fmt::format(", {} if they are 5 % off", micrometres_text(*answer.off->zv_mm));
+  }
+  return text;
+}
+
+void write_better(Sink out, const Report& r) {
+  const Better answer = better(r);
+  std::vector<std::string> lines = {
+      fmt::format("{} µm RMS from the path: {} ({})",
+                  change_text(answer.exact.now_mm, answer.exact.compensated_mm),
+                  times_text(answer.times()), answer.now)};
+  if (answer.off) {
+    lines.push_back(fmt::format("{} if the frequencies are 5 % off",
+                                change_text(answer.off->now_mm, answer.off->compensated_mm)));
+  }
+  if (answer.exact.zv_mm) {
+    lines.push_back(zv_text(answer));
+  }
+  write_answer(out, "Better?", lines);
+}
+
+void write_worst(Sink out, const Report& r) {
+  const Worst answer = worst(r);
+  std::vector<std::string> lines;
+  if (answer.compensated) {
+    lines.push_back(fmt::format("{} µm in {}", micrometres_text(answer.compensated->after_mm),
+                                place_text(*r.recording, *answer.compensated)));
+  }
+  if (answer.now) {
+    lines.push_back(fmt::format("Now {} µm in {}", micrometres_text(answer.now->before_mm),
+                                place_text(*r.recording, *answer.now)));
+  }
+  if (answer.start) {
+    lines.push_back(
+        fmt::format("Before the first layer {} µm at most",
+                    change_text(answer.start->before.max_mm, answer.start->after.max_mm)));
+  }
+  write_answer(out, "Where worst?", lines);
+}
+
+void write_safe(Sink out, const Safe& answer) {
+  std::vector<std::string> lines = {answer.is_safe ? "Yes, every rule is kept."
+                                                   : "NO, do not print it."};
+  lines.insert(lines.end(), answer.reasons.begin(), answer.reasons.end());
+  write_answer(out, "Safe?", lines);
+}
+
+void write_answers(Sink out, const Report& r) {
+  const Safe answer = safe(r);
+  if (!answer.is_safe) {
+    write_safe(out, answer);
+  }
+  write_better(out, r);
+  write_worst(out, r);
+  if (answer.is_safe) {
+    write_safe(out, answer);
+  }
+  write_answer(out, "Made for", {made_for_text(r)});
+  if (!r.warnings.empty()) {
+    write_answer(out, "Warnings",
+                 {fmt::format("{}, the first: {}", r.warnings.size(), r.warnings.front())});
+  }
+  fmt::format_to(out, "\n");
 }
 
 void write_deviation(Sink out, std::string_view moves, const DeviationRow& before,
@@ -88,15 +166,13 @@ void write_times(Sink out, const Report& r) {
                             : 0.0;
   fmt::format_to(out, "print time    {} planned, {} emitted ({:+.2f} %)\n",
                  duration_text(r.reference_time_s), duration_text(r.emitted_time_s), change);
-  fmt::format_to(out, "base          at most {:.0f} mm/s and {:.0f} mm/s²\n",
-                 r.base_max_velocity_mm_s, r.base_max_accel_mm_s2);
 }
 
 void write_runs(Sink out, const Report& r) {
   if (r.runs_total == 0 && r.windows_total == 0) {
     return;
   }
-  fmt::format_to(out, "runs          {} of {} compensated, {} fell back to their original moves\n",
+  fmt::format_to(out, "runs          {} of {} stretches of motion compensated, {} stay as sliced\n",
                  r.runs_compensated, r.runs_total, r.runs_fallback);
   const std::size_t listed = std::min(r.fallbacks.size(), kListedFallbacks);
   for (std::size_t i = 0; i < listed; ++i) {
@@ -111,7 +187,7 @@ void write_runs(Sink out, const Report& r) {
   for (const auto& [reason, count] : r.kept_moves) {
     fmt::format_to(out, "              {} other moves stay as they are: {}\n", count, reason);
   }
-  fmt::format_to(out, "solver        {}, {} windows, {} iterations\n", r.solver_engine,
+  fmt::format_to(out, "solver        {}, {} parts, {} iterations\n", r.solver_engine,
                  r.windows_total, r.solver_iterations);
 }
 
@@ -131,7 +207,7 @@ void write_output(Sink out, const Report& r) {
                  static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s);
   if (!r.solver_engine.empty()) {
     const LineBudget& budget = r.line_budget;
-    fmt::format_to(out, "lines         cost {} µm RMS, {} µm at most; ",
+    fmt::format_to(out, "lines         so few cost {} µm RMS, {} µm at most; ",
                    micrometres_text(budget.cost_rms_mm), micrometres_text(budget.cost_max_mm));
     if (budget.places_above == 0) {
       fmt::format_to(out, "never more than {:.0f} per second\n", budget.max_lines_per_s);
@@ -143,7 +219,7 @@ void write_output(Sink out, const Report& r) {
   fmt::format_to(out, "filament      {:.2f} mm in, {:.2f} mm out\n", r.input_extrusion_mm,
                  r.output_extrusion_mm);
   fmt::format_to(
-      out, "              off the nozzle by {} → {} µm RMS, {} → {} µm at most\n",
+      out, "              laid {} → {} µm RMS ahead of the nozzle or behind, {} → {} µm at most\n",
       micrometres_text(r.uncompensated_lag.rms_mm), micrometres_text(r.compensated_lag.rms_mm),
       micrometres_text(r.uncompensated_lag.max_mm), micrometres_text(r.compensated_lag.max_mm));
   fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",
@@ -158,6 +234,19 @@ std::string micrometres_text(double mm) {
     return fmt::format("{:.0f}", um);
   }
   return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
+}
+
+std::string times_text(double times) {
+  constexpr double kLittle = 1.05;
+  if (!(times > 0.0)) {
+    return "no error is left";
+  }
+  if (times < kLittle && times > 1.0 / kLittle) {
+    return "as much as now";
+  }
+  const double factor = times > 1.0 ? times : 1.0 / times;
+  return fmt::format("{:.{}f} times {} than now", factor, factor >= 9.95 ? 0 : 1,
+                     times > 1.0 ? "less" : "MORE");
 }
 
 std::string unknown_text(const std::vector<UnknownCommand>& commands) {
@@ -208,7 +297,8 @@ std::string to_text(const Report& report) {
   std::string text;
   const Sink out = std::back_inserter(text);
   fmt::format_to(out, "{} → {}\n", report.input, report.output);
-  fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "contour, µm", "max", "p99", "RMS");
+  write_answers(out, report);
+  fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "off path, µm", "max", "p99", "RMS");
   write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
   write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
   write_corners(out, report.uncompensated_corners, report.compensated_corners);
@@ -217,7 +307,7 @@ std::string to_text(const Report& report) {
   write_plants(out, report.plants);
   if (report.robustness) {
     fmt::format_to(
-        out, "robustness    {} µm RMS of the base as optimised, {} for the nominal axes alone\n",
+        out, "band          where the frequencies are exact it costs {} instead of {} µm RMS\n",
         micrometres_text(report.robustness->rms_mm),
         micrometres_text(report.robustness->nominal_rms_mm));
   }
@@ -233,9 +323,6 @@ std::string to_text(const Report& report) {
         "SET_INPUT_SHAPER {}\n              with the frequencies of its configuration, or "
         "give printer.input_shaper_freq_x_hz and _y_hz\n",
         report.shaper_left_off);
-  }
-  if (report.violation_count > 0) {
-    fmt::format_to(out, "violations    {}\n", report.violation_count);
   }
   return text;
 }

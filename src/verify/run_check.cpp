@@ -124,7 +124,9 @@ void BaseCheck::change_of_velocity(const PerMotor& velocity, double duration_s, 
   const auto uncertainty = [](double move_s) { return move_s > 0.0 ? kRounding_mm / move_s : 0.0; };
   const double uncertain = (uncertainty(last_duration_s_) + uncertainty(duration_s)) / between_s;
   for (std::size_t motor = 0; motor < velocity.size(); ++motor) {
-    const double accel = std::abs(velocity[motor] - last_velocity_[motor]) / between_s;
+    const double step = std::abs(velocity[motor] - last_velocity_[motor]);
+    max_step_ = std::max(max_step_, step);
+    const double accel = step / between_s;
     max_accel_ = std::max(max_accel_, accel);
     accel_.offer(accel - motors_.uncertainty(motor) * uncertain, line);
   }

@@ -61,6 +61,7 @@ class BaseCheck {
   [[nodiscard]] double accel_limit_mm_s2() const;
   [[nodiscard]] double max_velocity_mm_s() const { return max_velocity_; }
   [[nodiscard]] double max_accel_mm_s2() const { return max_accel_; }
+  [[nodiscard]] double max_step_mm_s() const { return max_step_; }
   [[nodiscard]] double median_duration_s() const;
 
  private:
@@ -93,6 +94,7 @@ class BaseCheck {
   double asked_accel_ = 0.0;  // by the run's plan
   double max_velocity_ = 0.0;
   double max_accel_ = 0.0;
+  double max_step_ = 0.0;
   LogHistogram durations_s_;  // every move counts as one
 };
 

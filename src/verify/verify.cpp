@@ -237,7 +237,7 @@ void Verifier::shape_sliced() {
   if (shaping.acts() && !unshaped_) {
     unshaped_ = original_;
     unshaped_->watch_as(NozzleBase::unshaped);
-    if (observer_ == nullptr) {
+    if (observer_ == nullptr || !observer_->asks_for_unshaped()) {
       unshaped_->drop_detuned();
     }
     original_.watch_as(NozzleBase::shaped);
@@ -430,6 +430,7 @@ VerifyReport Verifier::report() {
   report.compensated_corners = emitted_.main().corners();
   report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
   report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
+  report.base_max_step_mm_s = base_.max_step_mm_s();
   report.worst_run_drift_s = emitted_.main().worst_lag_s();
   report.max_lines_per_s = std::max(max_lines_per_s_, rate_.max_per_s());
   report.segment_ms_median = 1e3 * base_.median_duration_s();

@@ -80,7 +80,8 @@ TEST_F(SmallPrint, IsShownOnAPageWhenItIsVerified) {
   const Outcome outcome =
       run({"verify", "out.gcode", "--against", "in.gcode", "--report", "r.html", "-q"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(read_file(path("r.html")), HasSubstr("As sliced, the nozzle strays"));
+  EXPECT_THAT(read_file(path("r.html")),
+              HasSubstr("<b class=\"after\">yes</b>, every rule is kept"));
 }
 
 TEST_F(SmallPrint, KeepsThePermissionsOfWhatItReplaces) {

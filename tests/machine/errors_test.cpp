@@ -224,7 +224,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "printer.toml:2: base.max_velocity_mm_s is 100, but must be at least "
                 "limits.max_velocity_mm_s, 300"},
         Mistake{"EmittedAccelerationTooLow",
-                "[limits]\nmax_accel_mm_s2 = 60000\n",
+                "[limits]\nmax_accel_mm_s2 = 120000\n",
                 {},
                 "printer.toml:2: emit.accel_mm_s2 is 1000000, but must be at least 1200000 (5 × "
                 "base.max_accel_mm_s2); raise it or lower base.max_accel_mm_s2"},

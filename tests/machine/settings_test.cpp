@@ -220,18 +220,38 @@ TEST(UnsetKeys, FollowTheKeysTheyDependOn) {
       "[limits]\nmax_velocity_mm_s = 100\nmax_accel_mm_s2 = 2000\n"
       "[dynamics.x]\nfreq_hz = 30\n");
   EXPECT_DOUBLE_EQ(s.base_max_velocity_mm_s(), 200.0);
-  EXPECT_DOUBLE_EQ(s.base_max_accel_mm_s2(), 8000.0);
+  EXPECT_DOUBLE_EQ(s.base_max_accel_mm_s2(), 4000.0);
+}
+
+// A motor that moves X and Y is asked √2 times as much where the tool moves askew.
+TEST(MotorLimits, AreThoseOfThePrinter) {
+  const Settings cartesian = read("[limits]\nmax_accel_mm_s2 = 7000\n");
+  EXPECT_DOUBLE_EQ(cartesian.motor_max_accel_mm_s2(), 7000.0);
+  EXPECT_DOUBLE_EQ(cartesian.base_max_accel_mm_s2(), 14000.0);
+  EXPECT_EQ(cartesian.motor_max_accel_key(), "limits.max_accel_mm_s2");
+  const Settings corexy =
+      read("[limits]\nmax_accel_mm_s2 = 7000\n[kinematics]\ntype = \"corexy\"\n");
+  EXPECT_NEAR(corexy.motor_max_accel_mm_s2(), 7000.0 * std::sqrt(2.0), 1e-9);
+  EXPECT_NEAR(corexy.base_max_accel_mm_s2(), 2.0 * corexy.motor_max_accel_mm_s2(), 1e-9);
+  EXPECT_NEAR(corexy.motor_max_velocity_mm_s(), 300.0 * std::sqrt(2.0), 1e-9);
+  // Marlin limits motors.
+  const Settings marlin = read(
+      "[printer]\nfirmware = \"marlin\"\n[limits]\nmax_accel_mm_s2 = 3000\n"
+      "max_y_accel_mm_s2 = 2500\n[kinematics]\ntype = \"corexy\"\n");
+  EXPECT_DOUBLE_EQ(marlin.motor_max_accel_mm_s2(), 2500.0);
+  EXPECT_EQ(marlin.motor_max_accel_key(), "limits.max_y_accel_mm_s2");
+  EXPECT_DOUBLE_EQ(marlin.base_max_accel_mm_s2(), 6000.0);
 }
 
 TEST(BaseAccel, FollowsWhatThePrintAsksForWhileItsKeyIsUnset) {
   const Settings klipper = read("");
-  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(3000.0), 20000.0);
-  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(12000.0), 48000.0);
-  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(1e5), 2e5) << "a fifth of emit.accel_mm_s2";
-  EXPECT_DOUBLE_EQ(read("", {"emit.accel_mm_s2=150000"}).base_max_accel_mm_s2(12000.0), 30000.0);
+  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(3000.0), 10000.0);
+  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(12000.0), 24000.0);
+  EXPECT_DOUBLE_EQ(klipper.base_max_accel_mm_s2(2e5), 2e5) << "a fifth of emit.accel_mm_s2";
+  EXPECT_DOUBLE_EQ(read("", {"emit.accel_mm_s2=150000"}).base_max_accel_mm_s2(24000.0), 30000.0);
   const Settings rrf = read("", {"printer.firmware=rrf"});
-  EXPECT_DOUBLE_EQ(rrf.base_max_accel_mm_s2(1e5), 4e5);
-  EXPECT_DOUBLE_EQ(rrf.emit_accel_mm_s2(1e5), 2e6);
+  EXPECT_DOUBLE_EQ(rrf.base_max_accel_mm_s2(1e5), 2e5);
+  EXPECT_DOUBLE_EQ(rrf.emit_accel_mm_s2(1e5), 1e6);
   const Settings given = read("[base]\nmax_accel_mm_s2 = 20000\n");
   EXPECT_DOUBLE_EQ(given.base_max_accel_mm_s2(12000.0), 20000.0);
   EXPECT_DOUBLE_EQ(given.base_accel_times_asked(), 0.0);
@@ -306,10 +326,9 @@ TEST(ToToml, ReadsBackAsTheSameSettings) {
 }
 
 TEST(ToToml, ShowsWhatHoldsForUnsetKeys) {
-  EXPECT_THAT(
-      to_toml(read("")),
-      HasSubstr(
-          "# max_accel_mm_s2 = 20000  (unset: 4 × limits.max_accel_mm_s2, or the plan's if more)"));
+  EXPECT_THAT(to_toml(read("")), HasSubstr("# max_accel_mm_s2 = 10000  (unset: 2 × "
+                                           "limits.max_accel_mm_s2 (2√2 × for a Klipper on which "
+                                           "a motor moves X and Y), or the plan's if more)"));
 }
 
 TEST(Rows, HoldOneRowPerOriginInTheSameOrder) {
@@ -331,7 +350,7 @@ TEST(Rows, HoldTheValueInForce) {
     values[row.key] = row.value;
   }
   EXPECT_EQ(values["limits.max_accel_mm_s2"], "3000");
-  EXPECT_EQ(values["base.max_accel_mm_s2"], "12000");
+  EXPECT_EQ(values["base.max_accel_mm_s2"], "6000");
   EXPECT_EQ(values["printer.travel_x_mm"], "[0, 9.5]");
   EXPECT_EQ(values["printer.travel_y_mm"], "");
 }

@@ -342,22 +342,22 @@ std::string square_at(std::string_view accel) {
 }
 
 TEST_F(Texts, MayAccelerateByWhatThePrintAsksFor) {
-  constexpr double kByDefault_mm_s2 = 20000.0;
+  constexpr double kByDefault_mm_s2 = 10000.0;
   static_cast<void>(compensated(square_at("M204 S6000"), 1, {"emit.max_speed_step_mm_s=100"}));
   EXPECT_GT(report_.base_max_accel_mm_s2, kByDefault_mm_s2);
-  EXPECT_LE(report_.base_max_accel_mm_s2, 24000.0);
+  EXPECT_LE(report_.base_max_accel_mm_s2, 12000.0);
   EXPECT_THAT(report_.warnings, ::testing::IsEmpty());
   static_cast<void>(compensated(square_at("M204 S6000"), 1,
-                                {"emit.max_speed_step_mm_s=100", "base.max_accel_mm_s2=20000"}));
+                                {"emit.max_speed_step_mm_s=100", "base.max_accel_mm_s2=10000"}));
   EXPECT_LE(report_.base_max_accel_mm_s2, kByDefault_mm_s2);
 }
 
 TEST_F(Texts, MayAccelerateByWhatThePrintAsksForOnRepRapFirmware) {
   const std::string output = compensated(square_at("M201 X6000 Y6000"), 1,
                                          {"printer.firmware=rrf", "limits.max_accel_mm_s2=2000"});
-  EXPECT_THAT(output, HasSubstr("\nM201 X120000 Y120000 E120000\n"));
-  EXPECT_GT(report_.base_max_accel_mm_s2, 8000.0);
-  EXPECT_LE(report_.base_max_accel_mm_s2, 24000.0);
+  EXPECT_THAT(output, HasSubstr("\nM201 X60000 Y60000 E60000\n"));
+  EXPECT_GT(report_.base_max_accel_mm_s2, 4000.0);
+  EXPECT_LE(report_.base_max_accel_mm_s2, 12000.0);
 }
 
 TEST_F(Texts, TellWhereLinesDoNotLetTheBaseAccelerateEnough) {
@@ -381,7 +381,8 @@ TEST_F(Texts, StopTheNozzleBeforeTheyDraw) {
   const std::string layer = "G1 X100 Y100 E2 F3000\nG1 X100 Y60 E2\nG1 X60 Y60 E2\n";
   const std::string hop = "G0 X61 Y62 Z0.6 F9000\n";
   const std::string output =
-      compensated("G90\nM83\nG1 X60 Y60 Z0.4 F6000\nG4 P500\n" + layer + hop + layer);
+      compensated("G90\nM83\nG1 X60 Y60 Z0.4 F6000\nG4 P500\n" + layer + hop + layer, 1,
+                  {"base.max_accel_mm_s2=20000"});
   EXPECT_THAT(output, HasSubstr("\n" + hop + "G4 P0\n;unflex run LEAD_IN=0.011111\n"));
   EXPECT_EQ(output.find("LEAD_IN"), output.rfind("LEAD_IN"));
   EXPECT_LT(report_.compensated.extruding.contour_max_mm, 6e-3);

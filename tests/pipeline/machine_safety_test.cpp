@@ -153,7 +153,9 @@ TEST_P(Emitted, WithoutTheLimitsRestored) {
   const std::size_t end = line_like(";unflex end");
   Lines bad = good_;
   // What stands between the run's end and the next line of the sliced file.
-  const std::string wanted = GetParam() == Firmware::klipper ? "SET_VELOCITY_LIMIT" : "M204";
+  const std::string wanted = GetParam() == Firmware::klipper  ? "SET_VELOCITY_LIMIT"
+                             : GetParam() == Firmware::marlin ? "M204"
+                                                              : "M201";
   const std::size_t restoring = line_like(wanted, end);
   bad.erase(bad.begin() + static_cast<std::ptrdiff_t>(restoring));
   EXPECT_THAT(found_in(bad), HasSubstr("limits not restored: "));

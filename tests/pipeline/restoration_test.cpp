@@ -347,8 +347,9 @@ const Printer kMarlin = {
     .name = "Marlin",
     .firmware = Firmware::marlin,
     .own = kMarlinLimits,
+    // On moves of 3 mm with jerk a motor needs that much to do better than the sliced file.
     .settings = {"printer.firmware=marlin", "printer.input_shaper_freq_x_hz=40",
-                 "printer.input_shaper_freq_y_hz=38"},
+                 "printer.input_shaper_freq_y_hz=38", "base.max_accel_mm_s2=20000"},
     .points = kMarlinPoints,
     .changes = {"M204 S1500", "M204 P800 T1200 R900", "M201 X2000 Y1800", "M201 Z150 E4000",
                 "M203 X150 Y140 Z8 E20", "M205 J0.02", "M205 S0.5 T1 B10000", "M205 X8 Y7",

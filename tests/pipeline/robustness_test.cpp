@@ -41,7 +41,7 @@ report::Report compensated(const std::string& text, std::vector<std::string> ove
   overrides.insert(overrides.begin(), "limits.max_accel_mm_s2=10000");
   const JobFolder folder(text, overrides);
   Job job = folder.job(2);
-  job.record = true;
+  job.all_shapers = true;
   SilentProgress progress;
   Result<report::Report> report = compensate(job, progress);
   EXPECT_TRUE(report.has_value()) << to_string(report.error());

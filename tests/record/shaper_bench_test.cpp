@@ -32,7 +32,7 @@ verify::NozzleModel model(double error = 0.0) {
 struct Benched {
   explicit Benched(const std::vector<double>& errors,
                    const std::optional<PrinterShaper>& printer_shaper = std::nullopt)
-      : bench(model(), printer_shaper, errors.size()) {
+      : bench(model(), dynamics::kShaperKinds, printer_shaper, errors.size()) {
     const std::vector<planner::PlannedMove> moves = corner();
     std::size_t taken = 0;
     verify::ReferencePath path([&](planner::PlannedMove& move) {
@@ -141,14 +141,14 @@ TEST(ShaperBench, MeasuresThePrintersOwnShaperAsAnyOther) {
 
 TEST(ShaperBench, SaysNothingOfShapersThatTheDampingForbids) {
   const dynamics::FlexibleAxis stiff = dynamics::from_frequency(kFreq_hz, 1.0);
-  ShaperBench bench({stiff, stiff}, std::nullopt, 2);
+  ShaperBench bench({stiff, stiff}, dynamics::kShaperKinds, std::nullopt, 2);
   for (const report::Contender& contender : bench.contenders()) {
     EXPECT_TRUE(contender.spreads.empty()) << contender.name;
   }
 }
 
 TEST(ShaperBench, MeasuresALongPrintOnlyNowAndThen) {
-  ShaperBench bench(model(), std::nullopt, 1);
+  ShaperBench bench(model(), dynamics::kShaperKinds, std::nullopt, 1);
   constexpr double kLong_s = 400.0;
   planner::PlannedMove move;
   move.segment = planner::testing::segment({}, {kLong_s, 0.0, 0.0, 100.0}, 1.0);

@@ -21,8 +21,8 @@ inline void collect_keys(const nlohmann::json& node, const std::string& path,
     return;
   }
   const std::set<std::string> open = {
-      "deviation", "deviation.*",     "printer", "kept_moves", "extruded_path.kept_mm",
-      "commands",  "limits_in_print", "dynamics"};
+      "deviation", "deviation.*",     "printer",  "kept_moves",   "extruded_path.kept_mm",
+      "commands",  "limits_in_print", "dynamics", "answers.worst"};
   for (const auto& [name, value] : node.items()) {
     const std::string part = open.contains(path) ? "*" : name;
     collect_keys(value, path.empty() ? part : path + "." + part, keys);

@@ -21,8 +21,12 @@ TEST(JsonReport, HasEveryValueUnderItsKey) {
   EXPECT_EQ(json["output"], "out.gcode");
   EXPECT_EQ(json["firmware"], "klipper");
   EXPECT_EQ(json["print_time_s"], (nlohmann::json{{"reference", 3600.0}, {"emitted", 3618.0}}));
-  EXPECT_EQ(json["base"],
-            (nlohmann::json{{"max_velocity_mm_s", 123.0}, {"max_accel_mm_s2", 19999.0}}));
+  EXPECT_EQ(json["base"], (nlohmann::json{{"max_velocity_mm_s", 123.0},
+                                          {"max_accel_mm_s2", 19999.0},
+                                          {"max_step_mm_s", 27.5},
+                                          {"own_max_velocity_mm_s", 300.0},
+                                          {"own_max_accel_mm_s2", 8000.0},
+                                          {"own_max_accel_origin", "--set"}}));
   EXPECT_EQ(json["windows"], (nlohmann::json{{"total", 1000}, {"solved", 994}, {"fallback", 6}}));
   EXPECT_EQ(json["runs"], (nlohmann::json{{"total", 900}, {"compensated", 895}, {"fallback", 5}}));
   EXPECT_EQ(json["kept_moves"], (nlohmann::json{{"Z move", 12}}));
@@ -52,6 +56,42 @@ TEST(JsonReport, HasEveryValueUnderItsKey) {
   EXPECT_EQ(json["violation_count"], 3);
   EXPECT_EQ(json["violations"], nlohmann::json::array({"out.gcode:7: outside the travel"}));
   EXPECT_EQ(json["warnings"], nlohmann::json::array({"cube.gcode:1: warning: no G28"}));
+}
+
+TEST(JsonReport, AnswersWhatTheSummaryAnswers) {
+  Report report = sample_report();
+  const nlohmann::json answers = parsed(report)["answers"];
+  EXPECT_EQ(answers["better"]["now"], "under the printer's own input shaper, MZV 45 Hz");
+  EXPECT_EQ(answers["better"]["exact"],
+            (nlohmann::json{
+                {"now_rms_mm", 0.2}, {"compensated_rms_mm", 0.003125}, {"zv_rms_mm", nullptr}}));
+  EXPECT_EQ(answers["better"]["off_by_5_percent"]["compensated_rms_mm"], 0.0061);
+  EXPECT_EQ(answers["worst"]["compensated"]["line"], 41);
+  EXPECT_EQ(answers["worst"]["compensated"]["layer"], 1);
+  EXPECT_EQ(answers["worst"]["now"]["contour_max_mm"], 0.8);
+  EXPECT_EQ(answers["worst"]["now"]["feature"], "Perimeter");
+  EXPECT_EQ(answers["start_now_max_mm"], 0.9);
+  EXPECT_EQ(answers["safe"]["is_safe"], false);
+  EXPECT_NEAR(answers["safe"]["times_own_accel"].get<double>(), 19999.0 / 8000.0, 1e-12);
+
+  // Without a shaper of its own the print is compared with ZV as well.
+  report.unshaped = std::nullopt;
+  report.facts.shaper.clear();
+  const nlohmann::json better = parsed(report)["answers"]["better"];
+  EXPECT_EQ(better["now"], "without an input shaper");
+  EXPECT_EQ(better["exact"]["zv_rms_mm"], 0.004);
+  EXPECT_EQ(better["off_by_5_percent"]["zv_rms_mm"], 0.009);
+}
+
+TEST(JsonReport, TellsOfEachShaper) {
+  const nlohmann::json contenders = parsed(sample_report())["contenders"];
+  ASSERT_EQ(contenders.size(), 4U);
+  EXPECT_EQ(contenders[2]["name"], "ZV");
+  EXPECT_EQ(contenders[2]["errors"][0],
+            (nlohmann::json{
+                {"frequency_error", -0.05}, {"contour_rms_mm", 0.008}, {"contour_max_mm", 0.03}}));
+  EXPECT_EQ(contenders[2]["corner_rms_mm"], nullptr);
+  EXPECT_EQ(contenders[3]["errors"], nlohmann::json::array());
 }
 
 TEST(JsonReport, TellsTheFourDeviationsApart) {

@@ -15,6 +15,37 @@ inline DeviationRow sample_row(double scale) {
           .contour_max_line = 17};
 }
 
+// A line that primes the nozzle, and two layers.
+inline Recording sample_recording() {
+  Recording recording;
+  recording.layers = {{0.2, 12, {{0.9, 0.5}, {0.05, 0.01}}, 0},
+                      {0.2, 40, {{0.7, 0.2}, {0.012, 0.004}}, 0},
+                      {0.4, 90, {{0.8, 0.2}, {0.010, 0.003}}, 0}};
+  recording.start_layers = 1;
+  recording.features = {{"", 1.0, {}}, {"Perimeter", 9.0, {}}};
+  Place place;
+  place.line = 95;
+  place.layer = 2;
+  place.feature = 1;
+  place.x_mm = 20.04;
+  place.y_mm = 30.0;
+  place.before_mm = 0.8;
+  recording.worst_before = {place};
+  place.line = 41;
+  place.layer = 1;
+  place.feature = 0;
+  place.y_mm = -2.26;
+  place.after_mm = 0.012;
+  recording.worst_after = {place};
+  recording.frequency_errors = {-0.05, 0.0, 0.05};
+  recording.contenders = {
+      {"as sliced", {{0.9, 0.23}, {0.8, 0.2}, {0.7, 0.15}}, true, 0.06},
+      {"unflex", {{0.02, 0.005}, {0.0125, 0.003}, {0.02, 0.0061}}, true, 0.0005},
+      {"ZV", {{0.03, 0.008}, {0.02, 0.004}, {0.04, 0.009}}, true, std::nullopt},
+      {"EI", {}, true, std::nullopt}};
+  return recording;
+}
+
 inline Report sample_report() {
   Report r;
   r.command = "compensate";
@@ -27,6 +58,15 @@ inline Report sample_report() {
                {"printer.travel_y_mm", "", "default"},
                {"limits.max_accel_mm_s2", "5000", "--set"},
                {"solve.jerk_weight", "1e-07", "default"}};
+  r.facts = {{{"X", "45 Hz, ζ 0.06", "printer.toml:7"}, {"Y", "38.5 Hz, ζ 0.1", "--set"}},
+             "MZV 45 Hz",
+             false,
+             300.0,
+             8000.0,
+             "--set",
+             "X 0 to 250, Y 0 to 210 mm",
+             "Klipper from its own storage",
+             1000.0};
   r.reference_time_s = 3600.0;
   r.emitted_time_s = 3618.0;
   r.uncompensated = {.extruding = sample_row(0.8), .all = sample_row(1.6)};
@@ -40,6 +80,7 @@ inline Report sample_report() {
   r.robustness = {0.003, 0.0005};
   r.base_max_velocity_mm_s = 123.0;
   r.base_max_accel_mm_s2 = 19999.0;
+  r.base_max_step_mm_s = 27.5;
   r.runs_total = 900;
   r.runs_compensated = 895;
   r.runs_fallback = 5;
@@ -71,6 +112,7 @@ inline Report sample_report() {
   r.violations = {"out.gcode:7: outside the travel"};
   r.violation_count = 3;
   r.warnings = {"cube.gcode:1: warning: no G28"};
+  r.recording = sample_recording();
   return r;
 }
 

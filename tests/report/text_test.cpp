@@ -16,7 +16,28 @@ TEST(Summary, IsExactlyThis) {
   EXPECT_EQ(
       to_text(sample_report()),
       "cube.gcode → out.gcode\n"
-      "  contour, µm     max                 p99                 RMS\n"
+      "Safe?         NO, do not print it.\n"
+      "              3 rules are broken, the first: out.gcode:7: outside the travel\n"
+      "              Motors are asked for at most 123 mm/s and 19999 mm/s²: 2.5 times the "
+      "printer's "
+      "own limit of 8000 mm/s² (--set).\n"
+      "              Their speed changes by at most 27.5 mm/s from line to line.\n"
+      "              The travel was checked: X 0 to 250, Y 0 to 210 mm.\n"
+      "              At most 890 lines come in a second; Klipper from its own storage takes 1000.\n"
+      "              87.5 % of the extruded path is compensated; the rest stays as sliced, most of "
+      "it "
+      "because of: run left as sliced.\n"
+      "Better?       200 → 3.12 µm RMS from the path: 64 times less than now (under the printer's "
+      "own input shaper, MZV 45 Hz)\n"
+      "              150 → 6.10 if the frequencies are 5 % off\n"
+      "Where worst?  12.0 µm in line 41, layer 1, at X20.0 Y-2.3\n"
+      "              Now 800 µm in line 95, layer 2, Perimeter, at X20.0 Y30.0\n"
+      "              Before the first layer 900 → 50.0 µm at most\n"
+      "Made for      X 45 Hz, ζ 0.06 (printer.toml:7); Y 38.5 Hz, ζ 0.1 (--set); frequencies up to "
+      "10 % off\n"
+      "Warnings      1, the first: cube.gcode:1: warning: no G28\n"
+      "\n"
+      "  off path, µm    max                 p99                 RMS\n"
       "  extruding       800 → 12.5          400 → 6.25          200 → 3.12\n"
       "  all moves       1600 → 25.0         800 → 12.5          400 → 6.25\n"
       "  321 corners     120 → 15.0          110 → 2.50          60.0 → 0.50\n"
@@ -26,15 +47,14 @@ TEST(Summary, IsExactlyThis) {
       "225 "
       "RMS\n"
       "plants        4.00 to 9.00 µm RMS if the axes are as one of 2 plants, 150 to 180 before\n"
-      "robustness    3.00 µm RMS of the base as optimised, 0.50 for the nominal axes alone\n"
+      "band          where the frequencies are exact it costs 3.00 instead of 0.50 µm RMS\n"
       "print time    1h 00m 00s planned, 1h 00m 18s emitted (+0.50 %)\n"
-      "base          at most 123 mm/s and 19999 mm/s²\n"
-      "runs          895 of 900 compensated, 5 fell back to their original moves\n"
+      "runs          895 of 900 stretches of motion compensated, 5 stay as sliced\n"
       "              lines 10-20: no solution\n"
       "              lines 30-44: worse than the original\n"
       "              and 3 more, listed by --report\n"
       "              12 other moves stay as they are: Z move\n"
-      "solver        ipopt 3.11.9, 1000 windows, 4242 iterations\n"
+      "solver        ipopt 3.11.9, 1000 parts, 4242 iterations\n"
       "path          87.5 % of 8000 mm extruded are compensated\n"
       "              900.0 mm stay as they are: run left as sliced\n"
       "              100.0 mm stay as they are: start unknown\n"
@@ -43,12 +63,45 @@ TEST(Summary, IsExactlyThis) {
       "              MY_MACRO, 1×, first in line 90: 0 moves behind it stay as they are, 0.0 mm of "
       "them extruded\n"
       "output        123456 lines, 4.5 MB, 890 lines/s at peak\n"
-      "lines         cost 0.50 µm RMS, 7.50 µm at most; more than 850 per second in 2 places, "
+      "lines         so few cost 0.50 µm RMS, 7.50 µm at most; more than 850 per second in 2 "
+      "places, "
       "the first at line 70\n"
       "filament      1234.50 mm in, 1234.75 mm out\n"
-      "              off the nozzle by 60.0 → 4.50 µm RMS, 500 → 35.0 µm at most\n"
-      "speed         40 s of print per second, 1m 30s in all, 64 MB\n"
-      "violations    3\n");
+      "              laid 60.0 → 4.50 µm RMS ahead of the nozzle or behind, 500 → 35.0 µm at most\n"
+      "speed         40 s of print per second, 1m 30s in all, 64 MB\n");
+}
+
+TEST(Summary, ComparesWithZvWhereThePrinterHasNoShaper) {
+  Report report = sample_report();
+  report.unshaped = std::nullopt;
+  report.facts.shaper.clear();
+  report.violations.clear();
+  report.violation_count = 0;
+  const std::string text = to_text(report);
+  EXPECT_THAT(text,
+              HasSubstr("cube.gcode → out.gcode\nBetter?       200 → 3.12 µm RMS from the path: "
+                        "64 times less than now (without an input shaper)\n"));
+  EXPECT_THAT(text, HasSubstr("A ZV shaper would leave 4.00 µm, 9.00 if they are 5 % off\n"));
+  EXPECT_THAT(text, HasSubstr("Safe?         Yes, every rule is kept.\n"));
+}
+
+TEST(Summary, SaysWhereThePrintIsWorseThanNow) {
+  Report report = sample_report();
+  report.compensated.extruding.contour_rms_mm = 0.5;
+  EXPECT_THAT(to_text(report), HasSubstr("2.5 times MORE than now"));
+  report.compensated = report.uncompensated;
+  EXPECT_THAT(to_text(report), HasSubstr("as much as now"));
+}
+
+TEST(Summary, SaysWhereMotorsKeepThePrintersOwnLimits) {
+  Report report = sample_report();
+  report.facts.motor_max_accel_mm_s2 = 20000.0;
+  report.facts.travel.clear();
+  EXPECT_THAT(to_text(report),
+              HasSubstr("19999 mm/s², within the printer's own limit of 20000 mm/s²"));
+  EXPECT_THAT(to_text(report), HasSubstr("travel is not known and not checked"));
+  report.facts.motor_max_velocity_mm_s = 100.0;
+  EXPECT_THAT(to_text(report), HasSubstr("and above its 100 mm/s"));
 }
 
 TEST(Summary, DoesNotSpeakOfRunsWhereNothingWasSolved) {

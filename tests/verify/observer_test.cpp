@@ -47,6 +47,7 @@ class Sums final : public Observer {
     advanced_s = time_s;
   }
   [[nodiscard]] double memory_s() const override { return 0.05; }
+  [[nodiscard]] bool asks_for_unshaped() const override { return true; }
 
   struct Nozzle {
     double extruding_s = 0.0;

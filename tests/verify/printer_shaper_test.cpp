@@ -69,6 +69,7 @@ class Middle final : public Observer {
   void hold(double /*duration_s*/) override {}
   void advanced(const ReferencePath& /*sliced*/, double /*time_s*/) override {}
   [[nodiscard]] double memory_s() const override { return 0.0; }
+  [[nodiscard]] bool asks_for_unshaped() const override { return true; }
 
   std::map<NozzleBase, Errors> errors;
 

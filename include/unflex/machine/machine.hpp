@@ -173,8 +173,9 @@ struct KinematicsSettings {
 // What each motor can do.
 struct BaseSettings {
   std::optional<double> max_velocity_mm_s;  // unset: 2 · limits.max_velocity_mm_s
-  std::optional<double> max_accel_mm_s2;    // unset: 4 · limits.max_accel_mm_s2
-  double max_jerk_mm_s3 = 0.0;              // 0: not limited
+  std::optional<double>
+      max_accel_mm_s2;          // unset: 2 · Settings::most_of_motor() · limits.max_accel_mm_s2
+  double max_jerk_mm_s3 = 0.0;  // 0: not limited
 };
 
 struct SolveSettings {
@@ -272,6 +273,13 @@ struct Settings {
   [[nodiscard]] double max_extrude_cross_section_mm2() const;
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;
+  // The most that the plan may ask of a motor of X and Y, relative to the limits. Klipper limits
+  // what the tool does, the other firmwares what the motors do.
+  [[nodiscard]] double most_of_motor() const;
+  // What such a motor may do by the printer's own limits, and the key that sets its acceleration.
+  [[nodiscard]] double motor_max_velocity_mm_s() const;
+  [[nodiscard]] double motor_max_accel_mm_s2() const;
+  [[nodiscard]] std::string_view motor_max_accel_key() const;
   [[nodiscard]] double base_max_velocity_mm_s() const;
   // What a motor may do in a run whose plan accelerates X or Y by up to `asked_mm_s2`. A print may
   // set more than the printer's own limit.

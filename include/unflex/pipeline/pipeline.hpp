@@ -37,7 +37,8 @@ struct Job {
   std::string output_name;
   machine::Settings settings;
   EngineChoice engine = EngineChoice::automatic;
-  bool record = false;   // gather what an HTML report shows
+  // Measure the print with all input shapers, as reports show them, not only with ZV.
+  bool all_shapers = false;
   unsigned workers = 1;  // threads or solver processes that compute at once
 };
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "unflex/dynamics/shapers.hpp"
@@ -24,6 +25,8 @@ struct PrinterShaper {
 struct Options {
   verify::NozzleModel nozzle;                     // Rules::nozzle of the verification
   std::optional<PrinterShaper> printer_shaper{};  // nullopt if it has none or none is known
+  // What else the print is measured with.
+  std::span<const dynamics::ShaperKind> shapers = dynamics::kShaperKinds;
   std::size_t paths_bytes = 1'500'000;
   std::size_t places = 12;  // number of worst places, for each of before and after
 };

@@ -11,6 +11,9 @@ namespace unflex::report {
 // Three figures, so that 1234 µm and 0.05 µm fit the same column; without the unit.
 [[nodiscard]] std::string micrometres_text(double mm);
 
+// "21 times less than now", of an error that was so many times as large; 0: none is left.
+[[nodiscard]] std::string times_text(double times);
+
 // "0.90 to 3.10": the least and the greatest RMS of the plants, µm, without the unit.
 [[nodiscard]] std::string range_text(const std::vector<PlantDeviation>& plants,
                                      Spread PlantDeviation::*which);

@@ -90,13 +90,18 @@ struct Contender {
   // How far the nozzle passes from sharp corners if the frequencies are those of the settings;
   // unset if there are no corners, or if it is not known.
   std::optional<double> corner_rms_mm = std::nullopt;
+  bool printers_own = false;  // the shaper that the printer has now
 };
 
 struct Recording {
   std::vector<LayerRow> layers;
+  // So many of them come before the first layer that the slicer names: lines that prime the nozzle.
+  // 0 if it names none.
+  std::size_t start_layers = 0;
   LayerPaths paths;
   std::vector<FeatureRow> features;
-  std::vector<Place> worst_before, worst_after;  // the worst first
+  // The worst first, without those of the start.
+  std::vector<Place> worst_before, worst_after;
   std::vector<HistogramCell> histogram;
   std::vector<double> frequency_errors;  // 0.05: the true ones are 5 % above
   // First the sliced file without a shaper, then the compensated one, then the shapers.

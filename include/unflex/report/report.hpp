@@ -115,6 +115,26 @@ struct Setting {
   std::string origin;
 };
 
+// What the result was computed for, and what it is compared with.
+struct PrinterFacts {
+  struct Axis {
+    std::string name;    // "X"
+    std::string model;   // "45 Hz, ζ 0.06"
+    std::string origin;  // where the frequency is from: "printer.toml:7", "--set"
+  };
+  std::vector<Axis> axes;
+  // The printer's own input shaper: "MZV 45 Hz"; empty if its configuration has none.
+  std::string shaper;
+  bool shaper_unknown = false;  // it may have one that no source tells of
+  // What a motor of X or Y may do by the printer's own limits, and where the second is from.
+  double motor_max_velocity_mm_s = 0.0;
+  double motor_max_accel_mm_s2 = 0.0;
+  std::string motor_max_accel_origin;
+  std::string travel;        // "X 0 to 235, Y 0 to 235 mm"; empty if it is not known
+  std::string lines_source;  // what reads the lines: "Klipper from its own storage"
+  double max_lines_per_s = 0.0;
+};
+
 struct Report {
   std::string command;  // "compensate", "verify"
   std::string version;
@@ -122,6 +142,7 @@ struct Report {
   std::string output;
   std::string firmware;
   std::vector<Setting> printer;  // every setting in force
+  PrinterFacts facts;
 
   double reference_time_s = 0.0;
   double emitted_time_s = 0.0;
@@ -139,8 +160,11 @@ struct Report {
   std::vector<PlantDeviation> plants;    // in the order of the settings
   std::optional<Robustness> robustness;  // set if the base is to suit more models than one
 
+  // What the compensated runs ask of a motor of X or Y at most, and its largest change of speed
+  // from one line to the next.
   double base_max_velocity_mm_s = 0.0;
   double base_max_accel_mm_s2 = 0.0;
+  double base_max_step_mm_s = 0.0;
 
   std::size_t runs_total = 0;  // stretches between stops that could be compensated
   std::size_t runs_compensated = 0;
@@ -193,7 +217,7 @@ struct Report {
   std::size_t violation_count = 0;
   std::vector<std::string> warnings;
 
-  std::optional<Recording> recording;  // set if it was asked for; only in HTML
+  std::optional<Recording> recording;  // where the nozzle strays most, and what shapers would do
 };
 
 // The report as JSON with the keys of docs/report.md, two spaces of indentation, final newline.

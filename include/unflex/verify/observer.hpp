@@ -68,6 +68,9 @@ class Observer {
   virtual void advanced(const ReferencePath& sliced, double time_s) = 0;
   // For how long a piece of the sliced path is still needed after its time, s.
   [[nodiscard]] virtual double memory_s() const = 0;
+  // Whether it asks what the sliced file would do without the printer's own shaper if the
+  // frequencies were others.
+  [[nodiscard]] virtual bool asks_for_unshaped() const = 0;
 
  protected:
   Observer() = default;

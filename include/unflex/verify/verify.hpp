@@ -73,7 +73,7 @@ struct BlamedRun {
 // Deviations of a further nozzle (Observation::detuned) on the two bases.
 struct Detuned {
   Deviation uncompensated;
-  // As VerifyReport::unshaped. Only if an observer watches.
+  // As VerifyReport::unshaped. Only if an observer asks for it.
   std::optional<Deviation> unshaped;
   Deviation compensated;
 };
@@ -104,6 +104,7 @@ struct VerifyReport {
   // Largest change of mean velocity between neighbouring moves, divided by the time between their
   // middles. Motors and runs as for base_max_velocity_mm_s.
   double base_max_accel_mm_s2 = 0.0;
+  double base_max_step_mm_s = 0.0;  // that change itself, which a motor takes at once
   double input_extrusion_mm = 0.0;  // net filament
   double output_extrusion_mm = 0.0;
   // Largest filament error of one move or one run of the input. What the output's lines cannot

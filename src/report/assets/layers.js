@@ -189,6 +189,14 @@ const layerView = (data, onLayer) => {
         );
       }
     ticks.append(make("span", {style: "left: 100%"}, micrometres(top)));
+    // From the right, so that the end of the scale keeps its label.
+    const between = 4;
+    let next = Infinity;
+    for (const tick of [...ticks.children].reverse()) {
+      const box = tick.getBoundingClientRect();
+      if (box.right + between > next) tick.remove();
+      else next = box.left;
+    }
   };
 
   const fitScale = () => {
@@ -349,6 +357,7 @@ const layerView = (data, onLayer) => {
     const now = size(canvases[0]).width;
     if (width) state.scale *= now / width;
     width = now;
+    drawScale();
     redraw();
   }).observe(canvases[0]);
   unflex.theme(() => {

@@ -5,6 +5,11 @@ const unflexReport = (() => {
   const featureName = index => (data.features[index] && data.features[index].name) || "not named";
   const rows = data.layers;
 
+  // As the slicer counts them. What comes before its first layer primes the nozzle.
+  const layers = rows.length - data.start_layers;
+  const layerText = index =>
+    index < data.start_layers ? "before the first layer" : `layer ${index - data.start_layers + 1}`;
+  const capital = text => text[0].toUpperCase() + text.slice(1);
   const slider = byId("layer"),
     layerName = byId("layer-name");
   slider.max = Math.max(rows.length - 1, 0);
@@ -17,8 +22,8 @@ const unflexReport = (() => {
     }
     const shown = view ? view.shownLayer() : index;
     layerName.textContent =
-      `Layer ${index + 1} of ${rows.length}, Z ${+Number(row[0]).toFixed(3)} mm, from line ${row[1]}` +
-      (shown === index ? "" : ` (drawn: layer ${shown + 1})`);
+      `${capital(layerText(index))}${index < data.start_layers ? "" : ` of ${layers}`}, Z ${+Number(row[0]).toFixed(3)} mm, from line ${row[1]}` +
+      (shown === index ? "" : ` (drawn: ${layerText(shown)})`);
     slider.setAttribute("aria-valuetext", layerName.textContent);
     [
       ["before", 3],
@@ -28,7 +33,7 @@ const unflexReport = (() => {
         `up to ${micrometres(row[k])}, typically ${micrometres(row[k + 1])}`;
       byId("view-" + name).setAttribute(
         "aria-label",
-        `Layer ${index + 1} ${name} compensation: up to ${micrometres(row[k])}, typically ${micrometres(row[k + 1])} off the path`,
+        `${capital(layerText(index))}, ${name} compensation: up to ${micrometres(row[k])}, typically ${micrometres(row[k + 1])} off the path`,
       );
     });
     drawStrip();
@@ -101,7 +106,7 @@ const unflexReport = (() => {
   const look = (place, button) => {
     buttons.forEach(each => each.setAttribute("aria-current", String(each === button)));
     byId("moment-note").textContent =
-      `Line ${place.line}, ${featureName(place.feature)}, layer ${place.layer + 1}, X ${place.at[0]} Y ${place.at[1]} Z ${place.at[2]}: ${micrometres(place.um[0])} before, ${micrometres(place.um[1])} after. Time counts from when the plan is there.`;
+      `Line ${place.line}, ${featureName(place.feature)}, ${layerText(place.layer)}, X ${place.at[0]} Y ${place.at[1]} Z ${place.at[2]}: ${micrometres(place.um[0])} before, ${micrometres(place.um[1])} after. Time counts from when the plan is there.`;
     showMoment(place);
   };
   const choose = (place, button) => {
@@ -131,7 +136,7 @@ const unflexReport = (() => {
           make(
             "span",
             {class: "what"},
-            `line ${place.line} · layer ${place.layer + 1} · ${featureName(place.feature)}`,
+            `line ${place.line} · ${layerText(place.layer)} · ${featureName(place.feature)}`,
           ),
         );
         button.addEventListener("click", () => choose(place, button));
@@ -285,7 +290,7 @@ const unflexReport = (() => {
         ...data.contenders.map((contender, i) =>
           make(
             "tr",
-            i === 1 ? {class: "own"} : {},
+            i === 1 ? {class: "own"} : contender.printers ? {class: "printers"} : {},
             make("th", {scope: "row", style: "font-weight: inherit"}, contender.name),
             ...(contender.spreads.length
               ? [
@@ -350,8 +355,9 @@ const unflexReport = (() => {
   rivals();
   const weight = (row, i) => (row[2] - (i ? rows[i - 1][2] : 0)) * row[4] ** 2;
   const telling = rows.reduce(
-    (best, row, i) => (weight(row, i) > weight(rows[best], best) ? i : best),
-    0,
+    (best, row, i) =>
+      i >= data.start_layers && weight(row, i) > weight(rows[best], best) ? i : best,
+    Math.min(data.start_layers, rows.length - 1),
   );
   view.setLayer(telling);
   view.draw();

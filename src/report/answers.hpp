@@ -1,0 +1,53 @@
+// What a user asks first: is it better than what the printer does now, where is it worst, and is it
+// safe to print?
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unflex/report/report.hpp"
+
+namespace unflex::report {
+
+// Contour error while filament is laid, RMS.
+struct Comparison {
+  double now_mm = 0.0;  // the sliced file as this printer plays it
+  double compensated_mm = 0.0;
+  std::optional<double> zv_mm;  // under a ZV shaper, if that was measured
+};
+
+// Where the printer's own shaper acts, it is what the file is compared with, and ZV is left out.
+struct Better {
+  std::string now;  // "without an input shaper"
+  Comparison exact;
+  std::optional<Comparison> off;  // the worse of both if the frequencies are 5 % off
+  // How many times smaller the error is than now; 0 if nothing is left of it.
+  [[nodiscard]] double times() const;
+};
+[[nodiscard]] Better better(const Report& report);
+
+struct Worst {
+  std::optional<Place> compensated;
+  std::optional<Place> now;
+  // Largest before the first layer that the slicer names; nullopt if nothing is laid there.
+  std::optional<BeforeAfter> start;
+};
+[[nodiscard]] Worst worst(const Report& report);
+
+// "layer 12" as the slicer counts, from 1 on.
+[[nodiscard]] std::string layer_text(const Recording& recording, std::size_t layer);
+// "line 812, layer 12, External perimeter, at X100.2 Y98.1"
+[[nodiscard]] std::string place_text(const Recording& recording, const Place& place);
+
+struct Safe {
+  bool is_safe = true;               // no rule is broken
+  double times_own_accel = 0.0;      // what motors are asked for, over the printer's own limit
+  std::vector<std::string> reasons;  // a sentence each
+};
+[[nodiscard]] Safe safe(const Report& report);
+
+// "X 45 Hz, ζ 0.06 (printer.toml:7), Y 45 Hz, ζ 0.06 (--set), both up to 10 % off"
+[[nodiscard]] std::string made_for_text(const Report& report);
+
+}  // namespace unflex::report
