@@ -1,17 +1,20 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <initializer_list>
+#include <iterator>
+#include <optional>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include "command_checks.hpp"
 #include "console.hpp"
 #include "unflex/app/run_config.hpp"
 #include "unflex/core/number.hpp"
+#include "unflex/core/suggestion.hpp"
 
 namespace unflex::app {
 namespace {
@@ -24,6 +27,36 @@ CLI::Validator positive() {
             const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
             return good && value > 0.0 ? std::string{}
                                        : fmt::format("'{}' is not a number above 0", text);
+          },
+          ""};
+}
+
+// A whole number from 1 to `most`. CLI::Range would show its own words in the help.
+CLI::Validator counting_number(unsigned most) {
+  return {[most](std::string& text) {
+            const std::optional<double> value = parse_number(text);
+            const bool good = value && *value >= 1.0 && *value <= static_cast<double>(most) &&
+                              *value == std::floor(*value);
+            return good ? std::string{}
+                        : fmt::format("'{}' is not a whole number from 1 to {}", text, most);
+          },
+          ""};
+}
+
+// One of some words, in small or capital letters. CLI::Transformer would show the numbers behind
+// them in the help, and take these too.
+template <class T>
+CLI::Validator word_for(std::vector<std::pair<std::string_view, T>> choices) {
+  return {[choices = std::move(choices)](std::string& text) {
+            std::string words;
+            for (const auto& [word, value] : choices) {
+              if (CLI::detail::to_lower(text) == word) {
+                text = fmt::format("{}", static_cast<int>(value));
+                return std::string{};
+              }
+              words += fmt::format("{}{}", words.empty() ? "" : ", ", word);
+            }
+            return fmt::format("'{}' is none of {}", text, words);
           },
           ""};
 }
@@ -68,18 +101,17 @@ void add_max_deviation(CLI::App& command, RunConfig& config) {
 void add_engine(CLI::App& command, RunConfig& config, const char* help) {
   command.add_option("--engine", config.engine, help)
       ->type_name("auto|banded|ipopt")
-      ->transform(CLI::Transformer(
-          std::map<std::string, pipeline::EngineChoice>{{"auto", pipeline::EngineChoice::automatic},
-                                                        {"banded", pipeline::EngineChoice::banded},
-                                                        {"ipopt", pipeline::EngineChoice::ipopt}}));
+      ->transform(word_for<pipeline::EngineChoice>({{"auto", pipeline::EngineChoice::automatic},
+                                                    {"banded", pipeline::EngineChoice::banded},
+                                                    {"ipopt", pipeline::EngineChoice::ipopt}}));
 }
 
 void add_jobs(CLI::App& command, RunConfig& config) {
   command
       .add_option("-j,--jobs", config.workers,
-                  "How many to compute at once, all processors by default")
+                  "How many to compute at once, 1 to 256, all processors by default")
       ->type_name("N")
-      ->check(CLI::Range(1U, kMaxWorkers));
+      ->check(counting_number(kMaxWorkers));
 }
 
 void add_compensate(CLI::App& program, RunConfig& config) {
@@ -252,9 +284,8 @@ void add_identify(CLI::App& program, RunConfig& config) {
       ->add_option("CSV", identify.records,
                    "Records of Klipper, Shake&Tune or RepRapFirmware, any number of them")
       ->type_name("");
-  const CLI::Transformer letters(
-      std::map<std::string, identify::Axis>{{"x", identify::Axis::x}, {"y", identify::Axis::y}},
-      CLI::ignore_case);
+  const CLI::Validator letters =
+      word_for<identify::Axis>({{"x", identify::Axis::x}, {"y", identify::Axis::y}});
   command->add_option("--axis", identify.axis, "The axis they are of, if their names do not tell")
       ->type_name("x|y")
       ->transform(letters);
@@ -352,37 +383,84 @@ void add_tune(CLI::App& program, RunConfig& config) {
   command->callback([&config] { config.command = Command::tune; });
 }
 
-// The library's messages start with a capital and may have several lines.
+// The words of the command that was chosen, as for its help, and what it is to the library.
+struct Chosen {
+  std::string words = "unflex";
+  const CLI::App* app;
+};
+
+Chosen chosen_of(const CLI::App& program) {
+  Chosen chosen{.app = &program};
+  for (;;) {
+    const std::vector<const CLI::App*> below =
+        chosen.app->get_subcommands([](const CLI::App* command) { return command->parsed(); });
+    if (below.empty()) {
+      return chosen;
+    }
+    chosen.app = below.front();
+    chosen.words += " " + chosen.app->get_name();
+  }
+}
+
+// "unknown option '--ouput', did you mean '--output'?", or nothing if no such option was given.
+std::optional<std::string> unknown_option(const CLI::App& command) {
+  for (const std::string& word : command.remaining()) {
+    if (word == "--") {
+      break;
+    }
+    if (word.size() < 2 || word.front() != '-') {
+      continue;
+    }
+    const std::string name = word.substr(0, word.find('='));
+    std::vector<std::string> known;
+    for (const CLI::Option* option : command.get_options()) {
+      for (const std::string& long_name : option->get_lnames()) {
+        known.push_back("--" + long_name);
+      }
+    }
+    // A single letter is near every other.
+    return fmt::format(
+        "unknown option '{}'{}", one_line(name),
+        name.size() > 2 ? suggestion(name, {known.begin(), known.end()}) : std::string{});
+  }
+  return std::nullopt;
+}
+
+// The library's messages start with a capital and may have several lines. What it says of a
+// misspelt option is an unexpected argument, or that the option meant is missing.
 std::string parser_message(const CLI::App& program, const CLI::Error& error) {
+  const Chosen chosen = chosen_of(program);
   std::string message = one_line(error.what());
   const auto is_lower = [](char c) { return c >= 'a' && c <= 'z'; };
   if (message.size() > 1 && (is_lower(message[1]) || message[1] == ' ')) {
     message.front() = static_cast<char>(std::tolower(static_cast<unsigned char>(message.front())));
   }
-  std::string command = "unflex";
-  for (const CLI::App* app = &program; app != nullptr;) {
-    const std::vector<const CLI::App*> chosen =
-        app->get_subcommands([](const CLI::App* below) { return below->parsed(); });
-    app = chosen.empty() ? nullptr : chosen.front();
-    command += app == nullptr ? "" : " " + app->get_name();
-  }
-  return fmt::format("{}; run '{} --help'", message, command);
+  message = unknown_option(*chosen.app).value_or(message);
+  return fmt::format("{}{} run '{} --help'", message, message.ends_with('?') ? "" : ";",
+                     chosen.words);
 }
 
 // The library would call an unknown command an unexpected argument, or a missing command.
 Status check_command(const CLI::App& program, const std::vector<std::string>& arguments) {
-  if (arguments.empty() || arguments.front().starts_with("-")) {
-    return {};
-  }
-  std::string known;
-  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
-    if (command->get_name() == arguments.front()) {
+  const CLI::App* above = &program;
+  for (const std::string& word : arguments) {
+    const std::vector<const CLI::App*> commands =
+        above->get_subcommands([](const CLI::App*) { return true; });
+    if (commands.empty() || word.starts_with("-")) {
       return {};
     }
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", command->get_name());
+    const auto found = std::ranges::find(commands, word, &CLI::App::get_name);
+    if (found == commands.end()) {
+      std::vector<std::string> names;
+      std::ranges::transform(commands, std::back_inserter(names), &CLI::App::get_name);
+      const std::string near = suggestion(word, {names.begin(), names.end()});
+      return fail(ErrorKind::usage,
+                  fmt::format("unknown command '{}'{} there are {}", one_line(word),
+                              near.empty() ? ";" : near, fmt::join(names, ", ")));
+    }
+    above = *found;
   }
-  return fail(ErrorKind::usage, fmt::format("unknown command '{}'; there are {}",
-                                            one_line(arguments.front()), known));
+  return {};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "files.hpp"
 
@@ -13,6 +14,10 @@ namespace {
 // At most so many lines of a kind are shown, and so many kinds.
 constexpr std::size_t kMaxAlike = 3;
 constexpr std::size_t kMaxKinds = 10;
+
+constexpr std::string_view kRed = "\033[1;31m";
+constexpr std::string_view kYellow = "\033[1;33m";
+constexpr std::string_view kPlain = "\033[0m";
 
 // What is left of the line without its place, numbers and quoted text.
 std::string kind_of(std::string_view line) {
@@ -50,6 +55,26 @@ std::string error_text(const Error& error) {
   return one_line(placed ? to_string(error) : fmt::format("unflex: {}", error.message));
 }
 
+std::string coloured_line(std::string_view line) {
+  constexpr std::string_view kWord = "warning:";
+  const std::size_t behind = line.find(": warning: ");
+  const bool leads = line.starts_with(kWord);
+  if (!leads && behind == std::string_view::npos) {
+    return std::string(line);
+  }
+  const std::size_t at = leads ? 0 : behind + 2;
+  return fmt::format("{}{}{}{}{}", line.substr(0, at), kYellow, kWord, kPlain,
+                     line.substr(at + kWord.size()));
+}
+
+std::string coloured_error(const Error& error) {
+  const std::string text = error_text(error);
+  // A message may have colons of its own, and so may the name of a file. So its end is counted.
+  const std::size_t message = one_line(error.message).size();
+  const std::size_t place = text.size() - std::min(text.size(), message);
+  return fmt::format("{}{}{}{}", kRed, text.substr(0, place), kPlain, text.substr(place));
+}
+
 std::vector<std::string> summarised(const std::vector<std::string>& lines, std::size_t total,
                                     std::string_view what) {
   std::vector<std::string> kinds;  // in the order of their first line
@@ -82,9 +107,18 @@ std::vector<std::string> summarised(const std::vector<std::string>& lines, std::
 }
 
 void Console::line(std::string_view text) {
-  kept_.push_back(one_line(text));
+  const std::string line = one_line(text);
+  say(line, coloured_ ? coloured_line(line) : line);
+}
+
+void Console::error(const Error& error) {
+  say(error_text(error), coloured_ ? coloured_error(error) : error_text(error));
+}
+
+void Console::say(std::string line, const std::string& shown) {
+  kept_.push_back(std::move(line));
   if (fd_ >= 0) {
-    static_cast<void>(write_all(fd_, kept_.back() + "\n"));
+    static_cast<void>(write_all(fd_, shown + "\n"));
   }
 }
 

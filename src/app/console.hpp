@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "terminal.hpp"
 #include "unflex/core/error.hpp"
 
 namespace unflex::app {
@@ -17,6 +18,12 @@ namespace unflex::app {
 
 // "file:line: message", or "unflex: message" for an error without a place.
 [[nodiscard]] std::string error_text(const Error& error);
+
+// The line for a terminal, with the word "warning" in colour if there is one.
+[[nodiscard]] std::string coloured_line(std::string_view line);
+
+// The error's text for a terminal, with the place it is at in colour, or the program's name.
+[[nodiscard]] std::string coloured_error(const Error& error);
 
 // Lines of one kind differ only in place, numbers and quoted text. Gives the first few lines of
 // each kind and how many more there are, then how many of `total` are left. `what` names the lines,
@@ -29,10 +36,11 @@ namespace unflex::app {
 class Console {
  public:
   // fd: where messages go, −1 to keep them only. What cannot be written there is lost.
-  explicit Console(int fd = STDERR_FILENO) : fd_(fd) {}
+  // A terminal gets colours, unless the user does not want any.
+  explicit Console(int fd = STDERR_FILENO) : fd_(fd), coloured_(can_colour(fd)) {}
 
   void line(std::string_view text);
-  void error(const Error& error) { line(error_text(error)); }
+  void error(const Error& error);
   // Shows the lines, summarised.
   void lines(const std::vector<std::string>& lines, std::size_t total, std::string_view what);
   void warnings(const std::vector<std::string>& all) {
@@ -45,7 +53,11 @@ class Console {
   [[nodiscard]] const std::vector<std::string>& kept() const { return kept_; }
 
  private:
+  // Keeps the line and shows it as `shown`, which may have colours.
+  void say(std::string line, const std::string& shown);
+
   int fd_;
+  bool coloured_;
   std::vector<std::string> kept_;
 };
 

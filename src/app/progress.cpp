@@ -6,10 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <optional>
 
 #include "files.hpp"
 #include "signals.hpp"
+#include "terminal.hpp"
 
 namespace unflex::app {
 namespace {
@@ -43,19 +44,28 @@ void ProgressBar::update(std::string_view stage, double fraction) {
   }
   last_drawn_ = now;
   drawn_ = true;
-  static_cast<void>(
-      write_all(fd_, fmt::format("{}{}", kClearLine, bar_text(stage, fraction, columns_of(fd_)))));
+  const std::optional<TimeLeft::Seconds> left = time_left_.update(stage, fraction, now);
+  static_cast<void>(write_all(
+      fd_,
+      fmt::format("{}{}", kClearLine,
+                  bar_text(stage, fraction, left ? time_left_text(*left) : "", columns_of(fd_)))));
 }
 
-std::string bar_text(std::string_view stage, double fraction, std::size_t columns) {
+std::string bar_text(std::string_view stage, double fraction, std::string_view left,
+                     std::size_t columns) {
   // The last column stays free: a cursor beyond it would wrap.
   const std::size_t room = std::min(columns, kMostColumns) - std::min<std::size_t>(columns, 1);
   if (!(fraction >= 0.0)) {
     return std::string(stage.substr(0, room));
   }
   const double part = std::min(fraction, 1.0);
-  const std::string percent = fmt::format(" {:3.0f} %", std::floor(100.0 * part));
-  const std::size_t taken = stage.size() + percent.size() + 3;
+  std::string percent = fmt::format(" {:3.0f} %", std::floor(100.0 * part));
+  std::size_t taken = stage.size() + percent.size() + 3;
+  const std::string behind = left.empty() ? "" : fmt::format(", {}", left);
+  if (room >= taken + behind.size() + kLeastBar) {
+    percent += behind;
+    taken += behind.size();
+  }
   if (room < taken + kLeastBar) {
     return fmt::format("{}{}", stage, percent).substr(0, room);
   }
@@ -66,9 +76,7 @@ std::string bar_text(std::string_view stage, double fraction, std::size_t column
 }
 
 std::unique_ptr<Progress> make_progress(bool quiet) {
-  const char* const terminal = std::getenv("TERM");
-  const bool dumb = terminal != nullptr && std::string_view(terminal) == "dumb";
-  if (!quiet && !dumb && ::isatty(STDERR_FILENO) == 1) {
+  if (!quiet && can_redraw(STDERR_FILENO)) {
     return std::make_unique<ProgressBar>(STDERR_FILENO);
   }
   return std::make_unique<SignalledProgress>();

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "time_left.hpp"
 #include "unflex/core/progress.hpp"
 
 namespace unflex::app {
@@ -35,11 +36,14 @@ class ProgressBar final : public SignalledProgress {
   int fd_;
   Clock clock_;
   std::chrono::steady_clock::time_point last_drawn_{};
+  TimeLeft time_left_;
   bool drawn_ = false;
 };
 
-// The bar's text for a terminal of `columns`, without control characters.
-[[nodiscard]] std::string bar_text(std::string_view stage, double fraction, std::size_t columns);
+// The bar's text for a terminal of `columns`, without control characters. left: the time left, as
+// text, or empty; it gives way where there is no room.
+[[nodiscard]] std::string bar_text(std::string_view stage, double fraction, std::string_view left,
+                                   std::size_t columns);
 
 // A bar if stderr is a terminal that can show one and `quiet` is not set.
 [[nodiscard]] std::unique_ptr<Progress> make_progress(bool quiet);

@@ -12,6 +12,7 @@ using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 RunConfig read(const std::vector<std::string>& arguments) {
   const Result<CommandLine> line = parse_command_line(arguments);
@@ -80,6 +81,69 @@ TEST(CommandLine, HelpAndVersionAreTexts) {
 std::string refusal(const std::vector<std::string>& arguments) {
   const Result<CommandLine> line = parse_command_line(arguments);
   return line ? "no error" : line.error().message;
+}
+
+TEST(CommandLine, SuggestsTheOptionThatWasMeant) {
+  EXPECT_EQ(refusal({"compensate", "x.gcode", "--ouput", "y"}),
+            "unknown option '--ouput', did you mean '--output'? run 'unflex compensate --help'");
+  EXPECT_EQ(refusal({"printer", "init", "--form=printer.cfg", "-o", "y"}),
+            "unknown option '--form', did you mean '--from'? run 'unflex printer init --help'");
+  // Not that --against is missing.
+  EXPECT_THAT(refusal({"verify", "out.gcode", "--agianst", "in.gcode"}),
+              HasSubstr("did you mean '--against'?"));
+  EXPECT_EQ(refusal({"inspect", "x.gcode", "-Q"}),
+            "unknown option '-Q'; run 'unflex inspect --help'");
+  EXPECT_EQ(refusal({"--versoin"}),
+            "unknown option '--versoin', did you mean '--version'? run 'unflex --help'");
+  EXPECT_EQ(refusal({"inspect", "a", "--", "--strct"}),
+            "the following argument was not expected: --strct; run 'unflex inspect --help'");
+}
+
+TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
+  EXPECT_THAT(refusal({"compenstae", "x.gcode"}),
+              StartsWith("unknown command 'compenstae', did you mean 'compensate'? there are "));
+  EXPECT_THAT(refusal({"printer", "int"}),
+              StartsWith("unknown command 'int', did you mean 'init'? there are init, "));
+  EXPECT_THAT(refusal({"frobnicate"}), StartsWith("unknown command 'frobnicate'; there are "));
+}
+
+TEST(CommandLine, TellsWhatAnOptionTakes) {
+  EXPECT_THAT(refusal({"compensate", "a", "-o", "b", "--engine", "1"}),
+              StartsWith("--engine: '1' is none of auto, banded, ipopt;"));
+  EXPECT_EQ(read({"compensate", "a", "-o", "b", "--engine", "ipopt"}).engine,
+            pipeline::EngineChoice::ipopt);
+  EXPECT_EQ(read({"identify", "a.csv", "--axis", "Y"}).identify.axis, identify::Axis::y);
+  for (const char* jobs : {"0", "257", "1.5", "many"}) {
+    EXPECT_EQ(refusal({"compensate", "a", "-o", "b", "-j", jobs}),
+              std::string("--jobs: '") + jobs +
+                  "' is not a whole number from 1 to 256; run 'unflex compensate --help'");
+  }
+  EXPECT_EQ(read({"compensate", "a", "-o", "b", "-j", "256"}).workers, 256U);
+}
+
+TEST(CommandLine, HelpHasNoNoiseOfTheLibrary) {
+  const std::vector<std::vector<std::string>> commands = {{"compensate"},
+                                                          {"batch"},
+                                                          {"verify"},
+                                                          {"inspect"},
+                                                          {"study"},
+                                                          {"tune"},
+                                                          {"identify"},
+                                                          {"printer", "init"},
+                                                          {"printer"},
+                                                          {},
+                                                          {"printer", "macros"},
+                                                          {"printer", "line-test"}};
+  for (std::vector<std::string> command : commands) {
+    command.emplace_back("--help");
+    const std::string help = parse_command_line(command)->text;
+    for (const char* noise : {"{", "->", " in [", "UINT", "FLOAT", "TEXT", "ENUM"}) {
+      EXPECT_THAT(help, Not(HasSubstr(noise)));
+    }
+  }
+  const std::string help = parse_command_line({"compensate", "--help"})->text;
+  EXPECT_THAT(help, HasSubstr("--engine auto|banded|ipopt  What solves"));
+  EXPECT_THAT(help, HasSubstr("1 to 256"));
 }
 
 TEST(CommandLine, OffersAPageWhereThereIsOne) {
