@@ -20,6 +20,7 @@ _unflex_options() {
     printer) echo '-h --help' ;;
     'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer macros') echo '-h --help -o --output --printer --set -q --quiet' ;;
+    'printer keys') echo '-h --help' ;;
     'printer init') echo '-h --help --from --record -o --output --set -q --quiet' ;;
   esac
 }
@@ -27,12 +28,12 @@ _unflex_options() {
 _unflex_commands() {
   case $1 in
     '') echo 'compensate batch verify inspect study identify tune printer' ;;
-    printer) echo 'init line-test macros' ;;
+    printer) echo 'init line-test macros keys' ;;
   esac
 }
 
-# Prints what may follow a word: `files PATTERN`, `folders`, `words WORD...`, `any` for values that
-# cannot be guessed, or nothing if the word takes no value. If no file matches, all files are
+# Prints what may follow a word: `files PATTERN`, `folders`, `words WORD...`, `keys`, `any` for values
+# that cannot be guessed, or nothing if the word takes no value. If no file matches, all files are
 # offered.
 _unflex_value() {
   local print='*.@(gcode|gco|g|bgcode|gcode.gz)' printer='*.@(toml|cfg|g|txt)'
@@ -52,12 +53,32 @@ _unflex_value() {
     *:--axis | *:--make-test) echo 'words x y' ;;
     *:--machines) echo 'folders' ;;
     *:--case) echo 'words ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' ;;
-    *:--set | *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
+    *:--set) echo 'keys' ;;
+    *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
       *:--wave-spacing-mm | *:--speed-mm-s | *:--decay | *:--read | *:--nozzle-temp | \
       *:--bed-temp) echo 'any' ;;
     compensate: | verify: | inspect: | study: | tune:) echo "files $print" ;;
     identify:) echo 'files *.csv' ;;
   esac
+}
+
+# Keys for --set, each with its equals sign.
+_unflex_keys() {
+  local line
+  unflex printer keys 2>/dev/null | while IFS= read -r line; do
+    [[ $line == ' '* ]] || echo "${line%% *}="
+  done
+}
+
+# The words that a key may be, if it is one of words.
+_unflex_words_of() {
+  local key=$1 line
+  unflex printer keys 2>/dev/null | while IFS= read -r line; do
+    case $line in
+      "$key  true, false") echo 'true false' ;;
+      "$key  \""*\"*) line=${line#"$key  "}; line=${line//[\",]/}; echo "${line%%  *}" ;;
+    esac
+  done
 }
 
 # Folders, and files that match the pattern; all files if none matches.
@@ -75,11 +96,19 @@ _unflex_files() {
 
 _unflex() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command= word kind
-  # Bash splits --engine=ipopt into three words.
+  local before=$((COMP_CWORD - 1)) key=
+  # Bash splits --engine=ipopt into three words, and so it does KEY=VALUE.
   if [[ $current == = ]]; then
     current=
+    key=$previous before=$((COMP_CWORD - 2))
   elif [[ $previous == = ]]; then
     previous=${COMP_WORDS[COMP_CWORD - 2]}
+    key=$previous before=$((COMP_CWORD - 3))
+  fi
+  if [[ $key == -* || $before -lt 1 ]]; then
+    key=
+  elif [[ ${COMP_WORDS[before]} == = ]]; then
+    ((--before))
   fi
   for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
     if [[ " $(_unflex_commands "$command") " == *" $word "* ]]; then
@@ -88,7 +117,9 @@ _unflex() {
   done
   COMPREPLY=()
   kind=
-  if [[ $previous == -* ]]; then
+  if [[ -n $key && ${COMP_WORDS[before]} == --set ]]; then
+    kind="words $(_unflex_words_of "$key")"
+  elif [[ $previous == -* ]]; then
     kind=$(_unflex_value "$command" "$previous")
   fi
   if [[ -z $kind && $current == -* ]]; then
@@ -102,6 +133,9 @@ _unflex() {
     folders)
       mapfile -t COMPREPLY < <(compgen -d -- "$current")
       compopt -o filenames 2>/dev/null ;;
+    keys)
+      mapfile -t COMPREPLY < <(compgen -W "$(_unflex_keys)" -- "$current")
+      compopt -o nospace 2>/dev/null ;;
     files\ *) _unflex_files "$current" "${kind#files }" ;;
     words\ *) mapfile -t COMPREPLY < <(compgen -W "${kind#words }" -- "$current") ;;
   esac

@@ -7,7 +7,7 @@ function __unflex_command
     for word in $words[2..]
         if test -z "$command"; and contains -- $word $__unflex_commands
             set command $word
-        else if test "$command" = printer; and contains -- $word init line-test macros
+        else if test "$command" = printer; and contains -- $word init line-test macros keys
             set command "printer $word"
         end
     end
@@ -24,6 +24,19 @@ function __unflex_files
     set -l ends (string escape --style=regex -- $argv | string join '|')
     set -l all (__fish_complete_path (commandline -ct))
     string match --regex -- "^[^\t]*(?:$ends|/)(?:\t.*)?\$" $all; or printf '%s\n' $all
+end
+
+# Keys for --set, each with its equals sign; behind that the words that the key may be. The program
+# tells of a key in lines that begin with a space.
+function __unflex_settings
+    set -l lines (unflex printer keys 2>/dev/null)
+    set -l typed (string split --max 1 = -- (commandline -ct | string replace --regex -- '^--set=' ''))
+    if test (count $typed) -lt 2
+        string match --regex --groups-only -- '^(\S+)' $lines | string replace --regex -- '$' =
+        return
+    end
+    set -l of_key (string match --regex -- '^'(string escape --style=regex -- $typed[1])'  .*' $lines)
+    string match --all --regex -- '"[^"]+"|true|false' $of_key | string trim --chars '"' | string replace --regex -- '^' $typed[1]=
 end
 
 set -g __unflex_commands compensate batch verify inspect study identify tune printer
@@ -45,6 +58,7 @@ complete -c unflex -n '__unflex_in ""' -a tune -d 'Find the resonances by printi
 complete -c unflex -n '__unflex_in ""' -a printer -d 'Printer files'
 complete -c unflex -n '__unflex_in printer' -a init -d 'Write a printer file from what already describes the printer'
 complete -c unflex -n '__unflex_in printer' -a line-test -d 'Write G-code that shows how many lines per second the printer takes'
+complete -c unflex -n '__unflex_in printer' -a keys -d 'List the keys that a printer file and --set take'
 complete -c unflex -n '__unflex_in printer' -a macros -d 'Write macros by which a pause waits for the end of a compensated run'
 
 complete -c unflex -n "__unflex_in $prints" -a $gcode
@@ -92,7 +106,7 @@ complete -c unflex -n '__unflex_in "printer line-test"' -s o -l output -x -a $gc
 complete -c unflex -n '__unflex_in "printer macros"' -s o -l output -x -a '(__unflex_files .cfg)' -d 'Where to write, - for stdout'
 
 complete -c unflex -n "__unflex_in $prints batch identify tune 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
-complete -c unflex -n "__unflex_in $prints batch identify tune 'printer init' 'printer line-test' 'printer macros'" -l set -x -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n "__unflex_in $prints batch identify tune 'printer init' 'printer line-test' 'printer macros'" -l set -x -a '(__unflex_settings)' -d 'Override a key of the printer file, KEY=VALUE'
 complete -c unflex -n '__unflex_in inspect' -l report -x -a '(__unflex_files .json)' -d 'Write a report, - for stdout'
 complete -c unflex -n '__unflex_in compensate verify study identify' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
 complete -c unflex -n "__unflex_in $prints batch identify tune 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'

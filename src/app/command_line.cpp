@@ -238,6 +238,9 @@ void add_printer(CLI::App& program, RunConfig& config) {
   lines->add_flag("-q,--quiet", config.quiet, "No summary");
   lines->callback([&config] { config.command = Command::line_test; });
   add_printer_macros(*printer, config);
+  CLI::App* const keys = printer->add_subcommand(
+      "keys", "List the keys that a printer file and --set take, and what each may be");
+  keys->callback([&config] { config.command = Command::printer_keys; });
 }
 
 // Options for a resonance that shows in a print: spacing, speed and decay of its waves.

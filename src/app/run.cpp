@@ -17,6 +17,7 @@
 #include "machines.hpp"
 #include "print_run.hpp"
 #include "printer_init.hpp"
+#include "printer_keys.hpp"
 #include "printer_line_test.hpp"
 #include "printer_macros.hpp"
 #include "results.hpp"
@@ -135,6 +136,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return run_inspect(config, console);
     case Command::printer_init:
       return run_printer_init(config, console);
+    case Command::printer_keys:
+      return run_printer_keys();
     case Command::line_test:
       return run_line_test(config, console);
     case Command::printer_macros:

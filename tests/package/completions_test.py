@@ -22,10 +22,19 @@ PRINTERS = {"printer.toml", "printer.cfg", "config.g", "m503.txt", "prints/"}
 
 
 def lines_of(command, folder, **environment):
+    # The completions ask the program for the keys of --set.
+    path = os.path.dirname(os.path.abspath(UNFLEX)) + os.pathsep + os.environ["PATH"]
     run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True,
-                         timeout=120, env={**os.environ, **environment})
+                         timeout=120, env={**os.environ, "PATH": path, **environment})
     assert run.stderr == "", run.stderr
     return run.stdout.splitlines()
+
+
+def keys():
+    """The keys that the program has, with what each may be."""
+    text = subprocess.run([UNFLEX, "printer", "keys"], check=True, capture_output=True,
+                          text=True).stdout
+    return dict((line + "  ").split("  ", 1) for line in text.splitlines() if line[0] != " ")
 
 
 class Completion:
@@ -90,6 +99,22 @@ class Completion:
     def test_files_of_any_name_are_offered_where_no_other_matches(self):
         self.assertEqual(self.candidates("unflex inspect pict"), ["picture.png"])
 
+    def test_keys_are_those_of_the_program(self):
+        known = {key + "=" for key in keys()}
+        self.assertGreater(len(known), 90)
+        for command in ["compensate", "batch", "printer init", "identify"]:
+            self.assertEqual(set(self.candidates(f"unflex {command} --set ")), known, command)
+        self.assertEqual(set(self.candidates("unflex inspect --set dynamics.x.")),
+                         {key for key in known if key.startswith("dynamics.x.")})
+
+    def test_words_of_a_key_are_offered(self):
+        for key, words in [("printer.firmware", ["klipper", "marlin", "rrf"]),
+                           ("emit.checkpoints", ["true", "false"]),
+                           ("limits.max_accel_mm_s2", []), ("printer.version", [])]:
+            self.assertEqual(set(self.values(key, "")), set(words), key)
+        self.assertEqual(self.values("printer.firmware", "ma"), ["marlin"])
+        self.assertNotIn("in", self.values("second.shaper", ""))
+
     def test_numbers_are_left_to_the_user(self):
         self.assertEqual(self.candidates("unflex compensate --max-deviation "), [])
 
@@ -100,6 +125,10 @@ class Bash(Completion, unittest.TestCase):
     def candidates(self, line):
         words = shlex.split(line) + ([""] if line.endswith(" ") else [])
         return self.complete(words)
+
+    def values(self, key, begun):
+        """What is offered behind `--set key=`."""
+        return self.complete(["unflex", "compensate", "--set", key, "=", *([begun] if begun else [])])
 
     def complete(self, words):
         script = ('source "$1/unflex.bash" && shift && COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) &&'
@@ -113,6 +142,18 @@ class Bash(Completion, unittest.TestCase):
         self.assertEqual(self.complete(["unflex", "compensate", "--engine", "=", "ip"]), ["ipopt"])
         self.assertEqual(self.complete(["unflex", "compensate", "--engine", "="]),
                          ["auto", "banded", "ipopt"])
+
+    def test_keys_and_words_behind_an_equals_sign_are_completed(self):
+        self.assertEqual(self.complete(["unflex", "inspect", "--set", "=", "printer.firmw"]),
+                         ["printer.firmware="])
+        self.assertEqual(self.complete(["unflex", "inspect", "--set", "=", "printer.firmware", "=", "r"]),
+                         ["rrf"])
+
+    def test_no_space_follows_a_key(self):
+        script = ('source "$1/unflex.bash"; compopt() { echo "compopt $*"; };'
+                  " COMP_WORDS=(unflex inspect --set emit.peri) COMP_CWORD=3; _unflex")
+        self.assertEqual(lines_of(["bash", "--norc", "-c", script, "bash", COMPLETIONS],
+                                  self.folder), ["compopt -o nospace"])
 
     def test_names_with_spaces_stay_whole(self):
         with open(os.path.join(self.folder, "a print.gcode"), "w", encoding="utf-8"):
@@ -135,6 +176,10 @@ class Zsh(Completion, unittest.TestCase):
     def options(self, line):
         return set(self.candidates(line))
 
+    def values(self, key, begun):
+        """What is offered behind `--set key=`."""
+        return self.candidates(f"unflex compensate --set {key}={begun}")
+
     def test_zsh_reads_the_file_without_complaint(self):
         lines_of(["zsh", "-n", os.path.join(COMPLETIONS, "_unflex")], self.folder)
 
@@ -149,6 +194,11 @@ class Fish(Completion, unittest.TestCase):
                          HOME=self.folder, XDG_CONFIG_HOME=os.path.join(self.folder, ".config"),
                          XDG_DATA_HOME=os.path.join(self.folder, ".local"))
         return [candidate.split("\t")[0] for candidate in found]
+
+    def values(self, key, begun):
+        """What is offered behind `--set key=`."""
+        found = self.candidates(f"unflex compensate --set {key}={begun}")
+        return [candidate.removeprefix(key + "=") for candidate in found]
 
     def options(self, line):
         # fish offers long options only after two dashes.

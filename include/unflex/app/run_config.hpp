@@ -20,6 +20,7 @@ enum class Command {
   verify,
   inspect,
   printer_init,
+  printer_keys,
   printer_macros,
   line_test,
   identify,
