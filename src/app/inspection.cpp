@@ -72,24 +72,20 @@ void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
   fmt::format_to(out, "accelerations {:.0f} to {:.0f} mm/s² in force during moves\n",
                  i.lowest_accel_mm_s2, i.highest_accel_mm_s2);
   fmt::format_to(out, "printer       {}, {} mm/s, {} mm/s², corners {} mm/s\n",
-                 to_string(s.printer.firmware), s.limits.max_velocity_mm_s,
-                 s.limits.max_accel_mm_s2, s.limits.square_corner_velocity_mm_s);
+                 to_string(s.printer.firmware), readable(s.limits.max_velocity_mm_s),
+                 readable(s.limits.max_accel_mm_s2),
+                 readable(s.limits.square_corner_velocity_mm_s));
   fmt::format_to(out, "dynamics      X {}; Y {}\n", s.dynamics_x.description(),
                  s.dynamics_y.description());
-}
-
-// Fewer digits for values that follow from other keys. The report has all digits.
-std::string short_value(const std::string& value) {
-  const std::optional<double> number = parse_number(value);
-  return value.empty() ? "-" : number ? fmt::format("{:.6g}", *number) : value;
 }
 
 // Every key, its value in force when the print starts, and where the value is from.
 void write_settings(Sink out, const machine::Settings& settings) {
   fmt::format_to(out, "settings\n");
   for (const machine::SettingRow& row : machine::rows(settings)) {
-    fmt::format_to(out, "  {:<{}} {:<{}} {}\n", row.key, kKeyColumns, short_value(row.value),
-                   kValueColumns, row.origin);
+    fmt::format_to(out, "  {:<{}} {:<{}} {}\n", row.key, kKeyColumns,
+                   row.value.empty() ? "-" : report::setting_text(row.value), kValueColumns,
+                   row.origin);
   }
 }
 
@@ -98,7 +94,7 @@ void write_limits_in_print(Sink out, const Inspection& i, const std::string& inp
     fmt::format_to(out, "set by the print itself\n");
   }
   for (const auto& [key, limit] : i.limits) {
-    fmt::format_to(out, "  {:<{}} {:<{}.6g} {}:{}{}\n", key, kKeyColumns, limit.first_value,
+    fmt::format_to(out, "  {:<{}} {:<{}} {}:{}{}\n", key, kKeyColumns, readable(limit.first_value),
                    kValueColumns, input, limit.first_line,
                    limit.times > 1 ? fmt::format(", the first of {} times", limit.times) : "");
   }

@@ -1,5 +1,7 @@
 #include "unflex/core/number.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -122,6 +124,22 @@ std::int64_t to_scaled(double value, int decimals) {
 
 double power_of_ten(int decimals) {
   return static_cast<double>(kPowersOfTen[static_cast<std::size_t>(decimals)]);
+}
+
+std::string readable(double value) {
+  constexpr int kDigits = 5;
+  constexpr int kMostDecimals = 9;
+  constexpr double kLeast = 1e-4;
+  constexpr double kMost = 1e9;  // so that it fits the integers of to_scaled()
+  const double size = std::abs(value);
+  if (!(size < kMost) || (size > 0.0 && size < kLeast)) {
+    return fmt::format("{:.{}g}", value, kDigits);
+  }
+  const int before = size > 0.0 ? to_int(std::floor(std::log10(size))) + 1 : 1;
+  const int decimals = std::clamp(kDigits - before, 0, kMostDecimals);
+  std::string text;
+  append_scaled(text, to_scaled(value, decimals), decimals);
+  return text;
 }
 
 }  // namespace unflex

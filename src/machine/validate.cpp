@@ -11,6 +11,7 @@
 
 #include "key_table.hpp"
 #include "toml_reader.hpp"
+#include "unflex/core/number.hpp"
 #include "unflex/machine/recommend.hpp"
 
 namespace unflex::machine {
@@ -30,8 +31,8 @@ double typed(double value, double (*round)(double)) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
   return round(value / unit) * unit;
 }
-std::string at_most(double value) { return fmt::format("{:.3g}", typed(value, std::floor)); }
-std::string at_least(double value) { return fmt::format("{:.3g}", typed(value, std::ceil)); }
+std::string at_most(double value) { return readable(typed(value, std::floor)); }
+std::string at_least(double value) { return readable(typed(value, std::ceil)); }
 
 // An error at the first of the keys that was given anywhere. If all are defaults, it has no place.
 tl::unexpected<Error> conflict(const Draft& draft, std::initializer_list<std::string_view> keys,
@@ -201,7 +202,7 @@ Status check_printer(const Draft& draft) {
   if (s.printer.unretract_extra_length_mm < least_extra_mm) {
     return conflict(draft, {"printer.unretract_extra_length_mm"},
                     fmt::format("printer.unretract_extra_length_mm is {}, but must be at least {}",
-                                s.printer.unretract_extra_length_mm, least_extra_mm));
+                                s.printer.unretract_extra_length_mm, readable(least_extra_mm)));
   }
   if (s.extruder.filament_diameter_mm < s.extruder.nozzle_diameter_mm) {
     return conflict(draft, {"extruder.filament_diameter_mm", "extruder.nozzle_diameter_mm"},
@@ -273,13 +274,15 @@ Status check_base(const Draft& draft) {
     return conflict(draft, {"base.max_velocity_mm_s", "limits.max_velocity_mm_s"},
                     fmt::format("base.max_velocity_mm_s is {}, but must be at least {}"
                                 "limits.max_velocity_mm_s, {}",
-                                s.base_max_velocity_mm_s(), times, s.limits.max_velocity_mm_s));
+                                readable(s.base_max_velocity_mm_s()), times,
+                                readable(s.limits.max_velocity_mm_s)));
   }
   if (s.base_max_accel_mm_s2() < most * s.limits.max_accel_mm_s2) {
-    return conflict(draft, {"base.max_accel_mm_s2", "limits.max_accel_mm_s2"},
-                    fmt::format("base.max_accel_mm_s2 is {}, but must be at least {}"
-                                "limits.max_accel_mm_s2, {}; 2 to 10 times that is usual",
-                                s.base_max_accel_mm_s2(), times, s.limits.max_accel_mm_s2));
+    return conflict(
+        draft, {"base.max_accel_mm_s2", "limits.max_accel_mm_s2"},
+        fmt::format("base.max_accel_mm_s2 is {}, but must be at least {}"
+                    "limits.max_accel_mm_s2, {}; 2 to 10 times that is usual",
+                    readable(s.base_max_accel_mm_s2()), times, readable(s.limits.max_accel_mm_s2)));
   }
   return {};
 }
@@ -288,10 +291,11 @@ Status check_emission(const Draft& draft) {
   const Settings& s = draft.settings;
   const double least_accel = kEmitAccelFactor * s.base_max_accel_mm_s2();
   if (s.emit_accel_mm_s2() < least_accel) {
-    return conflict(draft, {"emit.accel_mm_s2", "base.max_accel_mm_s2", "limits.max_accel_mm_s2"},
-                    fmt::format("emit.accel_mm_s2 is {}, but must be at least {} ({} × "
-                                "base.max_accel_mm_s2); raise it or lower base.max_accel_mm_s2",
-                                s.emit_accel_mm_s2(), least_accel, kEmitAccelFactor));
+    return conflict(
+        draft, {"emit.accel_mm_s2", "base.max_accel_mm_s2", "limits.max_accel_mm_s2"},
+        fmt::format("emit.accel_mm_s2 is {}, but must be at least {} ({} × "
+                    "base.max_accel_mm_s2); raise it or lower base.max_accel_mm_s2",
+                    readable(s.emit_accel_mm_s2()), readable(least_accel), kEmitAccelFactor));
   }
   // On the other firmwares lines end on whole steps, too coarse for this key.
   if (s.printer.firmware == Firmware::klipper && place_of(draft, "emit.max_speed_step_mm_s") &&
@@ -302,7 +306,7 @@ Status check_emission(const Draft& draft) {
                     "limits.max_accel_mm_s2, {}, needs in lines of {:.3g} ms; raise it, "
                     "or emit.max_lines_per_s if that makes lines so long",
                     s.emit.max_speed_step_mm_s, at_least(s.least_speed_step_mm_s()),
-                    s.limits.max_accel_mm_s2, 1e3 * s.min_line_s()));
+                    readable(s.limits.max_accel_mm_s2), 1e3 * s.min_line_s()));
   }
   if (s.emit.square_corner_velocity_mm_s < s.limits.square_corner_velocity_mm_s) {
     return conflict(
@@ -374,7 +378,7 @@ Status check_grid(const Draft& draft) {
     return conflict(draft, {"emit.period_ms", "dynamics.x.freq_hz", "dynamics.y.freq_hz"},
                     fmt::format("emit.period_ms is {}, too long for a resonance at {:.4g} Hz; "
                                 "at most {}, better {}",
-                                s.period_ms(), fastest_freq_hz(s), at_most(longest_ms),
+                                readable(s.period_ms()), fastest_freq_hz(s), at_most(longest_ms),
                                 at_most(s.good_period_ms())));
   }
   if (s.solve.overlap_s > s.solve.window_s) {
@@ -409,7 +413,7 @@ std::vector<std::string> recommendations(const Settings& settings) {
   if (settings.period_ms() > good_ms) {
     remarks.push_back(
         fmt::format("emit.period_ms is {}; at {:.4g} Hz {} or less follows the path better",
-                    settings.period_ms(), fastest_freq_hz(settings), at_most(good_ms)));
+                    readable(settings.period_ms()), fastest_freq_hz(settings), at_most(good_ms)));
   }
   const double least_lines_per_s = 2.0 * fastest_freq_hz(settings);
   if (settings.emit.max_lines_per_s && *settings.emit.max_lines_per_s < least_lines_per_s) {

@@ -213,7 +213,7 @@ Json data_json(const Report& r) {
   const Recording& recording = *r.recording;
   Json settings = Json::array();
   for (const Setting& setting : r.printer) {
-    settings.push_back({setting.key, setting.value, setting.origin});
+    settings.push_back({setting.key, setting_text(setting.value), setting.origin});
   }
   return {{"deviation", {row_json(r.uncompensated.extruding), row_json(r.compensated.extruding)}},
           {"layers", layers_json(recording.layers)},

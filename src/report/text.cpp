@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <string_view>
 
 #include "answers.hpp"
+#include "unflex/core/number.hpp"
 #include "unflex/report/format.hpp"
 
 namespace unflex::report {
@@ -279,6 +281,24 @@ std::string range_text(const std::vector<PlantDeviation>& plants, Spread PlantDe
 std::string share_text(double share) {
   constexpr double kTenths = 1000.0;
   return fmt::format("{:.1f} %", share < 1.0 ? std::floor(share * kTenths) / 10.0 : 100.0);
+}
+
+std::string setting_text(std::string_view value) {
+  constexpr std::string_view kOfNumbers = "0123456789.+-e";
+  // Numbers stand behind these: [-4.5, 235], {freq_hz = 45, gain = 1}.
+  constexpr std::string_view kBefore = "[, ";
+  std::string text;
+  bool quoted = false;
+  for (std::size_t at = 0; at < value.size();) {
+    quoted = quoted != (value[at] == '"');
+    const bool begins = !quoted && (at == 0 || kBefore.find(value[at - 1]) != kBefore.npos);
+    const std::size_t end = std::min(value.find_first_not_of(kOfNumbers, at), value.size());
+    const std::string_view word = value.substr(at, begins ? end - at : 0);
+    const std::optional<double> number = parse_number(word);
+    text += number ? readable(*number) : std::string(1, value[at]);
+    at += number ? word.size() : 1;
+  }
+  return text;
 }
 
 std::string duration_text(double seconds) {

@@ -123,5 +123,19 @@ TEST(Numbers, SurviveTheRoundTripThroughText) {
   }
 }
 
+TEST(Readable, HasFiveDigitsAndAllBeforeThePoint) {
+  EXPECT_EQ(readable(583.3333333333334), "583.33");
+  EXPECT_EQ(readable(27239.12345), "27239");
+  EXPECT_EQ(readable(1234567.8), "1234568");
+  EXPECT_EQ(readable(1e6), "1000000");
+  EXPECT_EQ(readable(-0.23611111), "-0.23611");
+  EXPECT_EQ(readable(0.25), "0.25");
+  EXPECT_EQ(readable(0.000123456), "0.000123456");
+  EXPECT_EQ(readable(-0.0), "0");
+  EXPECT_EQ(readable(9.9999999), "10");
+  EXPECT_EQ(readable(1.5e-7), "1.5e-07");
+  EXPECT_EQ(readable(2e12), "2e+12");
+}
+
 }  // namespace
 }  // namespace unflex

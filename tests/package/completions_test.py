@@ -144,8 +144,8 @@ class Bash(Completion, unittest.TestCase):
                          ["auto", "banded", "ipopt"])
 
     def test_keys_and_words_behind_an_equals_sign_are_completed(self):
-        self.assertEqual(self.complete(["unflex", "inspect", "--set", "=", "printer.firmw"]),
-                         ["printer.firmware="])
+        self.assertEqual(self.complete(["unflex", "inspect", "--set", "=", "printer.firmware_r"]),
+                         ["printer.firmware_retraction="])
         self.assertEqual(self.complete(["unflex", "inspect", "--set", "=", "printer.firmware", "=", "r"]),
                          ["rrf"])
 

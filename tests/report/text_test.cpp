@@ -164,5 +164,15 @@ TEST(Durations, AreReadable) {
   EXPECT_EQ(duration_text(3725.4), "1h 02m 05s");
 }
 
+TEST(SettingText, HasReadableNumbersAndLeavesTextsAlone) {
+  EXPECT_EQ(setting_text("583.3333333333334"), "583.33");
+  EXPECT_EQ(setting_text("[-4.512345678, 235]"), "[-4.5123, 235]");
+  EXPECT_EQ(setting_text("[{freq_hz = 45.123456789, damping_ratio = 0.05, gain = -0.2}]"),
+            "[{freq_hz = 45.123, damping_ratio = 0.05, gain = -0.2}]");
+  EXPECT_EQ(setting_text("\"v0.13.0-700, 3.123456789\""), "\"v0.13.0-700, 3.123456789\"");
+  EXPECT_EQ(setting_text("true"), "true");
+  EXPECT_EQ(setting_text(""), "");
+}
+
 }  // namespace
 }  // namespace unflex::report

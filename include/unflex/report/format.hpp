@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "unflex/report/report.hpp"
@@ -20,6 +21,9 @@ namespace unflex::report {
 
 // 0.9876 → "98.7 %". Only a share of 1 is "100.0 %".
 [[nodiscard]] std::string share_text(double share);
+
+// A setting's value as people read it: its numbers are readable(), texts stay as they are.
+[[nodiscard]] std::string setting_text(std::string_view value);
 
 // The first few unknown commands, as lines of a summary.
 [[nodiscard]] std::string unknown_text(const std::vector<UnknownCommand>& commands);
