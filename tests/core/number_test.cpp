@@ -130,7 +130,7 @@ TEST(Readable, HasFiveDigitsAndAllBeforeThePoint) {
   EXPECT_EQ(readable(1e6), "1000000");
   EXPECT_EQ(readable(-0.23611111), "-0.23611");
   EXPECT_EQ(readable(0.25), "0.25");
-  EXPECT_EQ(readable(0.000123456), "0.000123456");
+  EXPECT_EQ(readable(0.000123456), "0.00012346");
   EXPECT_EQ(readable(-0.0), "0");
   EXPECT_EQ(readable(9.9999999), "10");
   EXPECT_EQ(readable(1.5e-7), "1.5e-07");
