@@ -56,6 +56,7 @@ struct Reading {
   std::vector<Assignment> assignments;  // if a key occurs twice, the later wins
   std::vector<Note> notes;
   std::vector<Diagnostic> guesses;  // Settings::guesses
+  std::string maybe_elsewhere;      // Draft::maybe_elsewhere
 
   void add(std::string key, Value value, SourcePlace place) {
     assignments.push_back({std::move(key), std::move(value), std::move(place)});

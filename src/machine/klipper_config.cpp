@@ -87,21 +87,23 @@ Status parse_line(Parser& parser, std::string_view line, std::size_t number) {
   return {};
 }
 
-// The files that a pattern names, sorted. An error if a name without wildcards leads to no file.
-Result<std::vector<std::string>> included_files(std::string_view pattern,
-                                                const SourcePlace& place) {
-  const std::string path = (fs::path(place.file).parent_path() / pattern).string();
+// The files that a pattern names, sorted.
+std::vector<std::string> included_files(const std::string& pattern) {
   glob_t found{};
-  const int error = ::glob(path.c_str(), GLOB_NOSORT, nullptr, &found);
+  static_cast<void>(::glob(pattern.c_str(), GLOB_NOSORT, nullptr, &found));
   std::vector<std::string> files(found.gl_pathv, found.gl_pathv + found.gl_pathc);
   ::globfree(&found);
   std::sort(files.begin(), files.end());
-  // Only a pattern with wildcards may match nothing.
-  if (files.empty() && (error != GLOB_NOMATCH || path.find_first_of("*?[") == std::string::npos)) {
-    return fail(ErrorKind::usage, place,
-                fmt::format("the included file {} does not exist or cannot be read", path));
-  }
   return files;
+}
+
+void note_missing(const std::string& path, const SourcePlace& place, KlipperConfig& config) {
+  config.missing.push_back({.place = place, .path = path});
+  config.notes.push_back(
+      {place, fmt::format("the included file {} is missing, and unflex does without what it says; "
+                          "copy it from the printer to that place if it says more than macros, or "
+                          "take the line out",
+                          path)});
 }
 
 Status parse_file(std::string_view text, const std::string& file, KlipperConfig& config,
@@ -109,12 +111,20 @@ Status parse_file(std::string_view text, const std::string& file, KlipperConfig&
 
 Status include(std::string_view pattern, const SourcePlace& place, KlipperConfig& config,
                std::vector<fs::path>& open_files) {
-  const Result<std::vector<std::string>> files = included_files(pattern, place);
-  if (!files) {
-    return tl::unexpected(files.error());
+  const std::string path = (fs::path(place.file).parent_path() / pattern).string();
+  const std::vector<std::string> files = included_files(path);
+  if (files.empty() && path.find_first_of("*?[") != std::string::npos) {
+    config.missing.push_back({.place = place, .path = path, .is_allowed = true});
+  } else if (files.empty()) {
+    note_missing(path, place, config);
   }
-  for (const std::string& file : *files) {
+  for (const std::string& file : files) {
     std::error_code ignored;
+    // Mainsail and Fluidd put links here, which lead nowhere once they are copied.
+    if (!fs::exists(file, ignored)) {
+      note_missing(file, place, config);
+      continue;
+    }
     if (std::ranges::find(open_files, fs::weakly_canonical(file, ignored)) != open_files.end()) {
       return fail(ErrorKind::usage, place, fmt::format("{} includes itself", file));
     }

@@ -22,17 +22,26 @@ struct KlipperSection {
   [[nodiscard]] const KlipperOption* find(const std::string& option) const;
 };
 
+// An [include] that leads to no file.
+struct MissingInclude {
+  SourcePlace place;
+  std::string path;         // what is included, from where we are
+  bool is_allowed = false;  // a pattern, which to Klipper may match nothing
+};
+
 struct KlipperConfig {
   std::map<std::string, KlipperSection> sections;
   std::vector<Diagnostic> notes;
+  std::vector<MissingInclude> missing;
 
   [[nodiscard]] const KlipperSection* find(const std::string& section) const;
 };
 
 // Reads the text of `file`, follows its [include]s, whose patterns are relative to the file they
-// stand in, and adds what SAVE_CONFIG has saved at its end and the rest does not say. Errors, of
-// kind usage, are a line that is no option, an include that does not exist or cannot be read, and
-// a file that includes itself.
+// stand in, and adds what SAVE_CONFIG has saved at its end and the rest does not say. Klipper
+// refuses an include that is not there. Here a note tells of it, since people copy printer.cfg
+// alone. Errors, of kind usage, are a line that is no option, an included file that cannot be read,
+// and a file that includes itself.
 [[nodiscard]] Result<KlipperConfig> parse_klipper_config(std::string_view text,
                                                          const std::string& file);
 

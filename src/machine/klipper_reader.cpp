@@ -1,6 +1,7 @@
 #include "klipper_reader.hpp"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -72,10 +73,30 @@ std::optional<double> number_of(std::string_view text) {
   return whole ? std::optional(value) : std::nullopt;
 }
 
+// "; it may be in a.cfg (printer.cfg:3), …" if includes lead to no file, else "".
+std::string maybe_elsewhere(const std::vector<MissingInclude>& missing) {
+  std::vector<std::string> names;
+  for (const MissingInclude& include : missing) {
+    names.push_back(
+        fmt::format("{} ({}:{})", include.path, include.place.file, include.place.line));
+  }
+  const bool several = names.size() > 1;
+  return names.empty()
+             ? ""
+             : fmt::format(
+                   "; it may be in {}, which {} included but not there: copy {} "
+                   "from the printer to that place",
+                   fmt::join(names, " or "), several ? "are" : "is", several ? "them" : "it");
+}
+
 class Reader {
  public:
   Reader(const KlipperConfig& config, std::string file)
-      : config_(&config), file_(std::move(file)) {}
+      : config_(&config),
+        file_(std::move(file)),
+        is_whole_(std::ranges::all_of(config.missing, &MissingInclude::is_allowed)) {
+    reading_.maybe_elsewhere = maybe_elsewhere(config.missing);
+  }
 
   Result<Reading> read() {
     if (const Status usable = kinematics(); !usable) {
@@ -135,9 +156,10 @@ class Reader {
     for (const std::string_view required : {"kinematics", "max_velocity", "max_accel"}) {
       if (option("printer", required) == nullptr) {
         return fail(ErrorKind::usage, {file_, 0},
-                    fmt::format("{} in [printer] is missing; give the printer's whole "
-                                "configuration, with what it includes",
-                                required));
+                    fmt::format("{} in [printer] is missing{}", required,
+                                config_->missing.empty() ? "; give the printer's whole "
+                                                           "configuration, with what it includes"
+                                                         : reading_.maybe_elsewhere));
       }
     }
     const KlipperOption& given = *option("printer", "kinematics");
@@ -154,11 +176,13 @@ class Reader {
     return own_carriages();
   }
 
-  // generic_cartesian: whether each stepper moves one carriage.
+  // generic_cartesian: whether each stepper moves one carriage, as far as steppers are there.
   [[nodiscard]] Status own_carriages() const {
+    bool any = false;
     for (const auto& [name, section] : config_->sections) {
       const KlipperOption* const moves =
           name.starts_with("stepper ") ? section.find("carriages") : nullptr;
+      any = any || moves != nullptr;
       if (moves != nullptr && moves->text.find_first_of("+-*") != std::string::npos) {
         return fail(ErrorKind::usage, moves->place,
                     fmt::format("[{}] moves several carriages, '{}', which unflex does not "
@@ -167,6 +191,12 @@ class Reader {
                                 "one)",
                                 name, moves->text));
       }
+    }
+    const KlipperOption& given = *option("printer", "kinematics");
+    if (!any && !config_->missing.empty() && given.text == "generic_cartesian") {
+      return fail(ErrorKind::usage, given.place,
+                  fmt::format("the steppers of this {} and their carriages are missing{}",
+                              given.text, reading_.maybe_elsewhere));
     }
     return {};
   }
@@ -211,8 +241,10 @@ class Reader {
 
   void firmware_retraction() {
     const KlipperSection* const section = config_->find("firmware_retraction");
-    reading_.add("printer.firmware_retraction", section != nullptr,
-                 section == nullptr ? SourcePlace{file_, 0} : section->place);
+    if (section != nullptr || is_whole_) {
+      reading_.add("printer.firmware_retraction", section != nullptr,
+                   section == nullptr ? SourcePlace{file_, 0} : section->place);
+    }
   }
 
   // generic_cartesian names carriages instead of steppers.
@@ -294,7 +326,9 @@ class Reader {
     const std::string damping = "damping_ratio_" + axis;
     const double freq_hz = number("input_shaper", frequency).value_or(0.0);
     const SourcePlace at = place("input_shaper", frequency);
-    reading_.add("printer.input_shaper_freq_" + axis + "_hz", freq_hz, at);
+    if (config_->find("input_shaper") != nullptr || is_whole_) {
+      reading_.add("printer.input_shaper_freq_" + axis + "_hz", freq_hz, at);
+    }
     const std::string type = shaper_type(axis);
     if (freq_hz > 0.0) {
       const auto ratio = number("input_shaper", damping);
@@ -309,6 +343,7 @@ class Reader {
 
   const KlipperConfig* config_;
   std::string file_;
+  bool is_whole_;  // no include is missing that Klipper would need
   Reading reading_;
   std::optional<Error> failure_;
 };

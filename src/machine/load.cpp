@@ -71,6 +71,7 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
   draft.printer_file = name;
   const auto store = [&](Reading reading) {
     recognise_firmware(text, name, reading);
+    draft.maybe_elsewhere = reading.maybe_elsewhere;
     return apply(reading, draft);
   };
   switch (source_kind(text)) {
@@ -125,9 +126,9 @@ void note_unknown_resonances(Draft& draft) {
       {{draft.printer_file, 0},
        fmt::format("the resonance along {} is not given, and {} Hz is assumed, a guess that "
                    "compensate refuses; find it with unflex identify or unflex tune, take it from "
-                   "the printer's "
-                   "own configuration with unflex printer init, or give {}",
-                   fmt::join(axes, " and "), AxisDynamics{}.freq_hz, fmt::join(overrides, " "))});
+                   "the printer's own configuration with unflex printer init, or give {}{}",
+                   fmt::join(axes, " and "), AxisDynamics{}.freq_hz, fmt::join(overrides, " "),
+                   draft.maybe_elsewhere)});
 }
 
 // Printers swing between some 20 and 120 Hz. What is far from that is mostly in another unit.

@@ -50,6 +50,64 @@ TEST_F(PrinterFile, GivesTheSameBytesAsPrinterCfgAsTomlAndByOverrides) {
   EXPECT_EQ(compensated(overrides), from_cfg);
 }
 
+// People copy printer.cfg alone from the printer.
+TEST_F(PrinterFile, MayBeAPrinterCfgWithoutWhatItIncludes) {
+  const std::string text =
+      "[printer]\nkinematics: corexy\nmax_velocity: 250\nmax_accel: 1500\n"
+      "[input_shaper]\nshaper_freq_x: 40\nshaper_freq_y: 50\n"
+      "[stepper_x]\nposition_max: 235\n[stepper_y]\nposition_max: 235\n";
+  write_file(path("whole.cfg"), text);
+  write_file(path("printer.cfg"), "[include mainsail.cfg]\n[include macros/*.cfg]\n" + text);
+  const std::string warning =
+      "printer.cfg:1: warning: the included file mainsail.cfg is missing, and unflex does without "
+      "what it says; copy it from the printer to that place if it says more than macros, or take "
+      "the line out\n";
+
+  const Outcome made = run({"printer", "init", "--from", "printer.cfg", "-o", "printer.toml"});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.err, HasSubstr(warning));
+  EXPECT_THAT(made.err, ::testing::Not(HasSubstr("macros/")));
+  const Outcome from_cfg =
+      run({"compensate", "in.gcode", "-o", "out.gcode", "-q", "--printer", "printer.cfg"});
+  EXPECT_EQ(from_cfg.exit_code, 0) << from_cfg.err;
+  EXPECT_THAT(from_cfg.err, HasSubstr(warning));
+  EXPECT_EQ(read_file(path("out.gcode")), compensated({"--printer", "printer.toml"}));
+  EXPECT_EQ(read_file(path("out.gcode")), compensated({"--printer", "whole.cfg"}));
+  EXPECT_EQ(
+      run({"compensate", "in.gcode", "-o", "strict.gcode", "--strict", "--printer", "printer.cfg"})
+          .exit_code,
+      2);
+  EXPECT_FALSE(std::filesystem::exists(path("strict.gcode")));
+}
+
+TEST_F(PrinterFile, ThatLacksALimitNamesTheIncludeThatMayHaveIt) {
+  write_file(path("printer.cfg"),
+             "[printer]\nkinematics: corexy\nmax_velocity: 250\n[include limits.cfg]\n");
+  const std::string error =
+      "printer.cfg: max_accel in [printer] is missing; it may be in limits.cfg (printer.cfg:4), "
+      "which is included but not there: copy it from the printer to that place\n";
+  const Outcome made = run({"printer", "init", "--from", "printer.cfg", "-o", "printer.toml"});
+  EXPECT_EQ(made.exit_code, 1);
+  EXPECT_EQ(made.err, error);
+  const Outcome compensated =
+      run({"compensate", "in.gcode", "-o", "out.gcode", "--printer", "printer.cfg"});
+  EXPECT_EQ(compensated.exit_code, 1);
+  EXPECT_EQ(compensated.err, error);
+  EXPECT_FALSE(std::filesystem::exists(path("out.gcode")));
+}
+
+TEST_F(PrinterFile, WithoutResonancesNamesTheIncludeThatMayHaveThem) {
+  write_file(path("printer.cfg"),
+             "[printer]\nkinematics: corexy\nmax_velocity: 250\nmax_accel: 1500\n"
+             "[include shaper.cfg]\n");
+  const Outcome outcome =
+      run({"compensate", "in.gcode", "-o", "out.gcode", "--printer", "printer.cfg"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, StartsWith("printer.cfg: the resonance along X and Y is not given"));
+  EXPECT_THAT(outcome.err, HasSubstr("; it may be in shaper.cfg (printer.cfg:5), which is included "
+                                     "but not there"));
+}
+
 TEST_F(PrinterFile, MayComeFromAPipe) {
   const std::string config =
       "[limits]\nmax_accel_mm_s2 = 1500\n[dynamics]\nx.freq_hz = 45\ny.freq_hz = 45\n";

@@ -138,9 +138,75 @@ TEST_F(KlipperFiles, ThatIncludeThemselvesAreRefused) {
   EXPECT_THAT(failure(file), HasSubstr("b.cfg:1: "));
 }
 
-TEST_F(KlipperFiles, ThatIncludeWhatIsNotThereAreRefused) {
-  EXPECT_THAT(failure(write("a.cfg", std::string(kWhole) + "[include no.cfg]\n")),
-              ::testing::ContainsRegex("a.cfg:8: the included file .*no.cfg does not exist"));
+TEST_F(KlipperFiles, DoWithoutIncludesThatAreMissing) {
+  const Settings s = good(write("a.cfg", std::string(kWhole) + "[include no.cfg]\n"));
+  EXPECT_EQ(told(s, "limits.max_accel_mm_s2"), "1000 a.cfg:4");
+  EXPECT_EQ(told(s, "dynamics.x.damping_ratio"), "0.1 a.cfg:6");
+  ASSERT_THAT(s.notes, SizeIs(3));
+  EXPECT_THAT(to_string(s.notes[2]),
+              ::testing::ContainsRegex("a.cfg:8: warning: the included file .*/no.cfg is missing, "
+                                       "and unflex does without what it says; copy it from the "
+                                       "printer to that place"));
+}
+
+// Klipper takes such a pattern for an empty set.
+TEST_F(KlipperFiles, MayHavePatternsThatMatchNothing) {
+  for (const std::string pattern : {"macros/*.cfg", "no?.cfg", "no[ab].cfg"}) {
+    const Settings s =
+        good(write("a.cfg", std::string(kWhole) + "[include " + pattern + "]\n[extruder]\n"));
+    EXPECT_THAT(s.notes, SizeIs(2)) << pattern;
+    EXPECT_EQ(told(s, "printer.firmware_retraction"), "false a.cfg") << pattern;
+  }
+}
+
+TEST_F(KlipperFiles, DoWithoutLinksThatLeadNowhere) {
+  const std::string file =
+      write("a.cfg", std::string(kWhole) + "[include mainsail.cfg]\n[include main*.cfg]\n");
+  std::filesystem::create_symlink("/nowhere/mainsail.cfg",
+                                  std::filesystem::path(file).parent_path() / "mainsail.cfg");
+  const Settings s = good(file);
+  ASSERT_THAT(s.notes, SizeIs(4));
+  EXPECT_THAT(to_string(s.notes[2]), HasSubstr("a.cfg:8: warning: the included file "));
+  EXPECT_THAT(to_string(s.notes[3]), HasSubstr("a.cfg:9: warning: the included file "));
+}
+
+TEST_F(KlipperFiles, SayWhereWhatTheyNeedMayBe) {
+  const std::string one =
+      failure(write("a.cfg", "[include speeds.cfg]\n[printer]\nkinematics: corexy\n"));
+  EXPECT_THAT(one,
+              ::testing::ContainsRegex(
+                  "a.cfg: max_velocity in \\[printer\\] is missing; it may be in .*/speeds.cfg "
+                  "\\(.*/a.cfg:1\\), which is included but not there: copy it from"));
+  const std::string two =
+      failure(write("b.cfg", "[include p.cfg]\n[mcu]\nserial: x\n[include m/*.cfg]\n"));
+  EXPECT_THAT(two, ::testing::ContainsRegex("b.cfg: kinematics in \\[printer\\] is missing; it may "
+                                            "be in .*/p.cfg \\(.*/b.cfg:1\\) or .*/m/\\*.cfg "
+                                            "\\(.*/b.cfg:4\\), which are included but not there"));
+}
+
+TEST_F(KlipperFiles, SayWhereTheSteppersOfCarriagesMayBe) {
+  std::string text = kWhole;
+  text.replace(text.find("cartesian"), 9, "generic_cartesian");
+  text += "[include steppers.cfg]\n";
+  EXPECT_THAT(failure(write("a.cfg", text)),
+              ::testing::ContainsRegex("a.cfg:2: the steppers of this generic_cartesian and their "
+                                       "carriages are missing; it may be in .*/steppers.cfg"));
+  good(write("b.cfg", text + "[stepper a]\ncarriages: x\n"));
+}
+
+// Without what is missing nobody knows whether there is a shaper, or where it is.
+TEST_F(KlipperFiles, LeaveOpenWhatAMissingIncludeMaySay) {
+  const std::string text = "[printer]\nkinematics: corexy\nmax_velocity: 200\nmax_accel: 1000\n";
+  const Settings s = good(write("a.cfg", text + "[include shaper.cfg]\n"));
+  EXPECT_FALSE(s.printer.input_shaper_freq_x_hz);
+  EXPECT_FALSE(s.printer.input_shaper_freq_y_hz);
+  EXPECT_THAT(told(s, "printer.firmware_retraction"), EndsWith("default"));
+  ASSERT_THAT(s.guesses, SizeIs(1));
+  EXPECT_THAT(s.guesses[0].message, ::testing::ContainsRegex("; it may be in .*/shaper.cfg \\("));
+  const Settings whole = good(write("b.cfg", text));
+  EXPECT_EQ(whole.printer.input_shaper_freq_x_hz, 0.0);
+  ASSERT_THAT(whole.guesses, SizeIs(1));
+  EXPECT_THAT(whole.guesses[0].message, ::testing::Not(HasSubstr("it may be in")));
 }
 
 TEST_F(KlipperFiles, IgnoreWhatWasSavedOnceSomeoneHasWrittenBelow) {
