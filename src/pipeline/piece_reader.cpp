@@ -41,7 +41,6 @@ constexpr std::size_t kMostMoves = 100'000;
 constexpr double kAround_s = 0.3;
 // After so many new borders, the reader looks whether the run is long enough to be split.
 constexpr std::size_t kBordersPerLook = 8;
-constexpr double kOnTheEdge_mm = 1e-3;
 
 // The change of velocity from the previous move to this one.
 double turn_before(const std::vector<planner::PlannedMove>& moves, std::size_t move) {
@@ -116,6 +115,9 @@ Result<bool> PieceReader::next(Piece& piece) {
       return tl::unexpected(verify::endless_move(*move, lines_.name()));
     }
     warn_of_long_moves(piece.moves);
+  }
+  if (more && !*more) {
+    warn_of_travel();
   }
   return more;
 }
@@ -202,7 +204,6 @@ void PieceReader::read_line(gcode::Event& event) {
   for (std::string& warning : event.warnings) {
     warn(event.line.number, std::move(warning));
   }
-  warn_of_travel(event);
   if (event.kind != gcode::EventKind::move) {
     planner_->apply(*event.limits);
   }
@@ -214,6 +215,7 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
     line = std::move(*approached_);
     approached_.reset();
     read_line(event);
+    travel_.add(event);
     return true;
   }
   const Result<bool> more = lines_.next(line);
@@ -237,6 +239,7 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
     return true;
   }
   read_line(event);
+  travel_.add(event);
   if (Status mode = extrusion_mode_.add(event, interpreter_.state(), lines_.name()); !mode) {
     return tl::unexpected(mode.error());
   }
@@ -254,21 +257,14 @@ void PieceReader::warn(std::size_t line, std::string message) {
   warnings_.back().message = fmt::format("{} more warnings are not listed", unlisted_warnings_);
 }
 
-// Warns of a move out of the travel. The printer refuses it or cuts it off; unflex does not correct
-// it.
-void PieceReader::warn_of_travel(const gcode::Event& event) {
-  const auto outside = [](double at, double min, double max, bool min_assumed) {
-    return at > max + kOnTheEdge_mm || (at < min - kOnTheEdge_mm && !min_assumed);
-  };
-  for (const gcode::Segment& segment : event.segments) {
-    const double x = segment.end_mm[gcode::X];
-    const double y = segment.end_mm[gcode::Y];
-    if (outside(x, travel_.x_min_mm, travel_.x_max_mm, travel_.x_min_assumed) ||
-        outside(y, travel_.y_min_mm, travel_.y_max_mm, travel_.y_min_assumed)) {
-      warn(segment.line,
-           fmt::format("the move leads out of the printer's travel, to X{:.4g} Y{:.4g}", x, y));
-      return;
-    }
+// Warns of the moves that leave the travel, once, at the first one's place among the warnings.
+void PieceReader::warn_of_travel() {
+  if (std::optional<Diagnostic> warning =
+          std::exchange(travel_, TravelCheck({})).warning(lines_.name())) {
+    const auto later = std::ranges::find_if(warnings_, [&](const Diagnostic& other) {
+      return other.place.line > warning->place.line || other.place.line == 0;
+    });
+    warnings_.insert(later, std::move(*warning));
   }
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "extrusion_mode.hpp"
+#include "travel_check.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/emit/run.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -64,6 +65,7 @@ class PieceReader {
   [[nodiscard]] Result<bool> next(Piece& piece);
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
+  // The one about moves that leave the travel comes once next() has returned false.
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
 
@@ -74,7 +76,7 @@ class PieceReader {
   Result<bool> read_event(gcode::Event& event);
   void read_line(gcode::Event& event);
   void warn(std::size_t line, std::string message);
-  void warn_of_travel(const gcode::Event& event);
+  void warn_of_travel();
   void warn_of_long_moves(const std::vector<planner::PlannedMove>& moves);
   void append(gcode::Event&& event);
   void append_between();
@@ -88,7 +90,7 @@ class PieceReader {
   std::optional<gcode::Line> approached_;  // line that comes after its approach
   std::unique_ptr<planner::Planner> planner_;
   Firmware firmware_;
-  verify::TravelLimits travel_;
+  TravelCheck travel_;
   // A place before a move where a run that turns out to be long may be split.
   struct Border {
     std::size_t event = 0;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -231,9 +232,12 @@ INSTANTIATE_TEST_SUITE_P(
             passes()),
         Bad{"OutOfTheTravel",
             among("G1 X500 E.2\nG1 X100 E.2"),
-            warns(":11: warning: the move leads out of the printer's travel, to X500 Y100"),
-            warns(":11: warning: the move leads out of the printer's travel, to X500 Y100"),
-            warns(":11: warning: the move leads out of the printer's travel, to X500 Y100"),
+            warns(":11: warning: 1 move leaves the printer's travel of X0..250 Y0..210, "
+                  "first in line 11, as far as X500: "),
+            warns(":11: warning: 1 move leaves the printer's travel of X0..250 Y0..210, "
+                  "first in line 11, as far as X500: "),
+            warns(":11: warning: 1 move leaves the printer's travel of X0..250 Y0..210, "
+                  "first in line 11, as far as X500: "),
             {},
             true}),
     [](const auto& tested) { return tested.param.name; });
@@ -346,6 +350,76 @@ TEST_F(Strict, MakesErrorsOfInspectsWarnings) {
   EXPECT_THAT(strict.err, HasSubstr("in.gcode:11: a motion word has no number"));
   EXPECT_THAT(strict.err, Not(HasSubstr("warning")));
   EXPECT_EQ(names(), std::vector<std::string>{"in.gcode"});
+}
+
+// A print that was sliced for a larger bed.
+class OffTheBed : public ProgramTest {
+ protected:
+  OffTheBed() {
+    write_file(path("in.gcode"),
+               squares(5) + "G1 X1.1.2\nG1 X50.25 Y20 F3000\nG1 X20\nG1 Y-4 E0.1\nG1 E-1\n");
+  }
+
+  std::vector<std::string> with_travel(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.end(), {"--quiet", "--set", "printer.travel_x_mm=[0, 30]", "--set",
+                                       "printer.travel_y_mm=[0, 30.5]"});
+    return arguments;
+  }
+
+  const std::string about_ =
+      "17 moves leave the printer's travel of X0..30 Y0..30.5, first in line 5, as far as X50.25 "
+      "Y40: the printer refuses such moves or cuts them off; slice for this printer's bed, or "
+      "correct printer.travel_x_mm and printer.travel_y_mm if they are wrong";
+};
+
+TEST_F(OffTheBed, BringsOneWarning) {
+  for (const std::string workers : {"1", "3"}) {
+    const Outcome done = run(with_travel(
+        {"compensate", "in.gcode", "-o", "out.gcode", "--report", "r.json", "-j", workers}));
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+    EXPECT_THAT(done.err, HasSubstr("in.gcode:5: warning: " + about_ + "\n"));
+    const auto warnings = nlohmann::json::parse(read_file(path("r.json")))["warnings"];
+    // In the order of the file's lines.
+    EXPECT_EQ(warnings[0], "in.gcode:5: warning: " + about_) << warnings.dump();
+    EXPECT_THAT(warnings[1], HasSubstr("'X1.1.2'"));
+    EXPECT_EQ(std::ranges::count_if(warnings,
+                                    [](const std::string& text) {
+                                      return text.find("the printer's travel") != std::string::npos;
+                                    }),
+              1);
+  }
+  EXPECT_THAT(run(with_travel({"inspect", "in.gcode"})).err,
+              HasSubstr("in.gcode:5: warning: " + about_ + "\n"));
+}
+
+TEST_F(OffTheBed, IsAnErrorWhenStrict) {
+  const Outcome strict =
+      run(with_travel({"compensate", "in.gcode", "-o", "out.gcode", "--strict"}));
+  EXPECT_EQ(strict.exit_code, 2);
+  EXPECT_THAT(strict.err, HasSubstr("in.gcode:5: " + about_ + "\n"));
+  EXPECT_EQ(names(), std::vector<std::string>{"in.gcode"});
+}
+
+TEST_F(OffTheBed, IsToldThoughThereAreTooManyWarnings) {
+  std::string lines;
+  for (int i = 0; i < 1500; ++i) {
+    lines += "G1 X1.1.2\n";
+  }
+  write_file(path("in.gcode"), among(lines + "G1 X110.002\nG1 X100"));
+  const Outcome outcome =
+      run({"inspect", "in.gcode", "--quiet", "--set", "printer.travel_x_mm=[0, 110]"});
+  EXPECT_THAT(outcome.err,
+              HasSubstr("in.gcode:1511: warning: 1 move leaves the printer's "
+                        "travel of X0..110, first in line 1511, as far as X110.002: "));
+  EXPECT_THAT(outcome.err, HasSubstr("in.gcode: warning: 500 more warnings are not listed\n"));
+}
+
+TEST_F(OffTheBed, IsMeasuredAgainstAKnownTravelOnly) {
+  const Outcome outcome =
+      run({"inspect", "in.gcode", "--quiet", "--set", "printer.travel_x_mm=[0, 30]"});
+  EXPECT_THAT(outcome.err,
+              HasSubstr("warning: 11 moves leave the printer's travel of X0..30, first "
+                        "in line 5, as far as X50.25: "));
 }
 
 TEST_F(Strict, TellsOfAStreamThatItMustNotBePrinted) {
