@@ -14,6 +14,7 @@
 #include "report_rows.hpp"
 #include "retime.hpp"
 #include "unflex/core/errno_text.hpp"
+#include "unflex/report/format.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -111,6 +112,23 @@ bool warn_of_no_run(const Job& job, report::Report& report) {
   return true;
 }
 
+// Where much stays as sliced, it is played without the printer's own shaper, and the whole may be
+// worse than the sliced file.
+void warn_of_no_gain(const Job& job, report::Report& report) {
+  constexpr double kWorse = 1.05;
+  constexpr double kWorse_mm = 2e-4;
+  const double now_mm = report.uncompensated.extruding.contour_rms_mm;
+  const double compensated_mm = report.compensated.extruding.contour_rms_mm;
+  if (compensated_mm <= kWorse * now_mm + kWorse_mm) {
+    return;
+  }
+  report.warnings.push_back(to_string(Diagnostic{
+      {job.input_name, 0},
+      fmt::format("the nozzle would stray further from the path than now, {} instead of {} µm RMS: "
+                  "print the sliced file, or mend what keeps its motion as sliced",
+                  report::micrometres_text(compensated_mm), report::micrometres_text(now_mm))}));
+}
+
 // Whether the output can be written once more.
 bool can_repeat(const Job& job) { return job.input_fd < 0 && job.output_fd < 0; }
 
@@ -149,6 +167,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       std::ranges::move(remarks(report.extruded_path, report.unknown_commands, job.input_name),
                         std::back_inserter(report.warnings));
     }
+    warn_of_no_gain(job, report);
     add_performance(begin, report);
     return report;
   }

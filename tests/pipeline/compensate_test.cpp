@@ -367,6 +367,28 @@ TEST_F(Texts, TellWhereLinesDoNotLetTheBaseAccelerateEnough) {
   EXPECT_THAT(report_.warnings.front(), HasSubstr("emit.max_speed_step_mm_s"));
 }
 
+// What stays as sliced is played without the printer's own shaper.
+TEST_F(Texts, SayWhenTheNozzleStraysFurtherThanNow) {
+  const std::string square =
+      "G1 X20 Y20 F9000\nG1 X60 Y20 E1\nG1 X60 Y60 E1\nG1 X20 Y60 E1\nG1 X20 Y20 E1\n";
+  const std::string start = "G90\nM83\nG1 X20 Y20 Z0.4 F6000\nG4 P500\n";
+  const std::vector<std::string> shaped = {"printer.input_shaper_freq_x_hz=45",
+                                           "printer.input_shaper_freq_y_hz=45"};
+  static_cast<void>(compensated(start + square, 1, shaped));
+  EXPECT_THAT(report_.warnings, ::testing::IsEmpty());
+  // Motors slower than the plan: no run of the second half can be compensated.
+  std::vector<std::string> slow = shaped;
+  slow.emplace_back("base.max_accel_mm_s2=5000");
+  std::string text = start + square + "M204 S20000\n";
+  for (int i = 0; i < 4; ++i) {
+    text += "G4 P500\n" + square;
+  }
+  static_cast<void>(compensated(text, 1, slow));
+  EXPECT_THAT(
+      report_.warnings,
+      ::testing::Contains(HasSubstr("the nozzle would stray further from the path than now")));
+}
+
 // The sliced file has no pause behind a travel from an unknown place.
 TEST_F(Texts, TellHowLongTheSlicedFileItselfTakes) {
   const std::string output = compensated(
