@@ -383,6 +383,7 @@ TEST_F(Texts, SayWhenTheNozzleStraysFurtherThanNow) {
   for (int i = 0; i < 4; ++i) {
     text += "G4 P500\n" + square;
   }
+  fallbacks_ = 4;
   static_cast<void>(compensated(text, 1, slow));
   EXPECT_THAT(
       report_.warnings,
