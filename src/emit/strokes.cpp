@@ -76,9 +76,20 @@ gcode::Position end_of_moves(const Run& run) {
   return run.moves->back().segment.end_mm;
 }
 
-// Where the run's lines end.
+// Whether the firmware has skipped the run's last move, as Marlin does with one of a few steps. It
+// makes that way with its next move.
+bool skips_last_move(const Run& run, const Grid& grid) {
+  constexpr double kRounding = 1.25;  // steps
+  const gcode::Position end = end_of_moves(run);
+  const gcode::Position& machine = run.moves->back().segment.end_mm;
+  return !run.until_s && (std::abs(end[X] - machine[X]) > kRounding * grid.x.step_mm ||
+                          std::abs(end[Y] - machine[Y]) > kRounding * grid.y.step_mm);
+}
+
+// Where the run's lines take the machine.
 gcode::Position end_of_lines(const Run& run, const Timetable& table, const Grid& grid) {
-  gcode::Position end = end_of_moves(run);
+  gcode::Position end =
+      skips_last_move(run, grid) ? run.moves->back().segment.end_mm : end_of_moves(run);
   if (run.until_s) {
     end[X] = grid.x.nearest(run.base->x_at(*run.until_s).position_mm);
     end[Y] = grid.y.nearest(run.base->y_at(*run.until_s).position_mm);
@@ -394,6 +405,17 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     climb_in_time({0.0, start[X], start[Y], start[Z]}, ends.out_mm_s.value_or(VelocityXY{}), grid,
                   options, result);
     level_flow(start, most_flow_step_mm_s(options.fixed), std::span(result).first(laying));
+    if (skips_last_move(run, grid)) {
+      // The text ends where the file does, by a line that the firmware skips as well.
+      const gcode::Position file_end = end_of_moves(run);
+      Stroke rest = result.back();
+      rest.x_mm = file_end[X];
+      rest.y_mm = file_end[Y];
+      rest.z_mm = file_end[Z];
+      rest.e_mm = file_end[gcode::E] - file_start_e_mm;
+      rest.is_skipped = true;
+      result.push_back(rest);
+    }
     time_strokes(run, grid, options, result);
   }
   return result;
@@ -401,8 +423,19 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
 
 void time_strokes(const Run& run, const Grid& grid, const EmitOptions& options,
                   std::vector<Stroke>& strokes) {
+  // What the firmware skips takes no time.
+  std::optional<Stroke> skipped;
+  if (!strokes.empty() && strokes.back().is_skipped) {
+    skipped = strokes.back();
+    strokes.pop_back();
+  }
   set_speeds(start_position(run, grid), passing(run), options, grid.speed_factor / 60.0, run.late_s,
              strokes);
+  if (skipped) {
+    skipped->speed_mm_s = strokes.back().speed_mm_s;
+    skipped->feed_decimals = strokes.back().feed_decimals;
+    strokes.push_back(*skipped);
+  }
 }
 
 }  // namespace unflex::emit

@@ -21,6 +21,7 @@ struct Stroke {
   double speed_mm_s = 0.0;  // after M220
   int feed_decimals = 0;    // digits F needs
   std::size_t events = 0;   // how many of the run's events stand before the stroke, in all
+  bool is_skipped = false;  // the firmware leaves its way to the next move
 };
 
 // What a run is written in: places, and speeds as F before M220.
@@ -35,8 +36,9 @@ struct Grid {
 [[nodiscard]] std::array<double, 2> start_of_lines(const Run& run, const Grid& grid);
 
 // The strokes of a run. Positions lie on the grid, but a run's last one is exactly where the last
-// move ends. A stroke that would have no length after rounding is merged into its successor; at the
-// ends of the run it is dropped. Empty when nothing is left.
+// move ends. Where the firmware skips that move, so does the last stroke (is_skipped). A stroke
+// that would have no length after rounding is merged into its successor; at the ends of the run it
+// is dropped. Empty when nothing is left.
 [[nodiscard]] std::vector<Stroke> strokes(const Run& run, const Grid& grid,
                                           const EmitOptions& options);
 

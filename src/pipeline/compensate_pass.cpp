@@ -70,7 +70,7 @@ std::string text_of(const Piece& piece) {
 verify::Rules rules_of_pass(const Job& job, bool last) {
   verify::Rules rules = verify_rules(job.settings);
   if (job.output_fd >= 0 || last) {
-    rules.leeway = {2.2, 5e-3, 30e-3};
+    rules.leeway = {2.2, 5e-3, 30e-3, rules.leeway.chance_mm};
   }
   return rules;
 }

@@ -14,17 +14,8 @@ namespace {
 // No print shows a difference below these.
 constexpr double kNothingRms_mm = 0.5e-3;
 constexpr double kNothing_mm = 3e-3;
-// If the firmware rounds to steps, a single place may by chance be off by this share of a step.
-constexpr double kShareOfStep = 0.1;
 // The share of an error that coarse time steps may miss.
 constexpr double kSampling = 2e-4;
-
-double chance_mm(const planner::FirmwareConfig& config) {
-  return config.firmware == Firmware::klipper
-             ? 0.0
-             : kShareOfStep /
-                   std::min(config.steps_per_mm[gcode::X], config.steps_per_mm[gcode::Y]);
-}
 
 }  // namespace
 
@@ -144,7 +135,7 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
   const auto no_worse = [](double a, double b, double nothing) {
     return a <= std::max((1.0 + kSampling) * b, nothing);
   };
-  const double chance = chance_mm(rules.fixed);
+  const double chance = rules.leeway.chance_mm;
   const dynamics::NozzleXY as_planned = at_end_of(last, rules.nozzle);
   const double swing_before_mm = verify::apart_mm(before.end, as_planned, rules.nozzle);
   const double swing_after_mm = verify::apart_mm(after.end, as_planned, rules.nozzle);

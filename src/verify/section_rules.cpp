@@ -144,7 +144,7 @@ void SectionRules::check_nozzle(const Meter& kept, const Meter& emitted) {
   const RunError before = error_of(kept);
   const RunError after = error_of(emitted);
   if (after.rms_mm > std::max(leeway.times * before.rms_mm, leeway.rms_mm) ||
-      after.max_mm > std::max(leeway.times * before.max_mm, leeway.max_mm)) {
+      after.max_mm > std::max(leeway.times * before.max_mm + leeway.chance_mm, leeway.max_mm)) {
     violations_->in_output(
         first_line_,
         fmt::format(

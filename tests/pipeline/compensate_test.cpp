@@ -367,6 +367,24 @@ TEST_F(Texts, TellWhereLinesDoNotLetTheBaseAccelerateEnough) {
   EXPECT_THAT(report_.warnings.front(), HasSubstr("emit.max_speed_step_mm_s"));
 }
 
+// Marlin skips a move of less than six steps and makes it with its next one. So the run's lines
+// take the machine to where it is then, and the text to where the file is.
+TEST_F(Texts, EndWhereMarlinSkipsTheLastMove) {
+  const std::string output = compensated(
+      "G90\nM83\nG1 X60 Y60 Z0.4 F6000\nG4 P500\nM204 P1000\nG1 X100 Y60 E2 F1800\n"
+      "G1 X100 Y100 E2\nG1 X60 Y100 E2\nG1 X60 Y60.2 E2\nG1 X60.02 Y60.14 E.003\n"
+      "G1 E-1 F1800\nG1 X62 Y64 F6000\n",
+      1, {"printer.firmware=marlin", "base.max_accel_mm_s2=20000"});
+  EXPECT_LT(report_.compensated.extruding.contour_rms_mm, 0.5e-3);
+  EXPECT_LT(report_.compensated.extruding.contour_max_mm, 12e-3);
+  const std::size_t end = output.find(";unflex end");
+  const std::size_t last = output.rfind("G1 X60.02 Y60.14 E.003", end);
+  ASSERT_NE(last, std::string::npos);
+  // The line before it ends where the sliced file's last long move does.
+  const std::size_t before = output.rfind("G1 ", last - 1);
+  EXPECT_THAT(output.substr(before, last - before), HasSubstr(" Y60.2 "));
+}
+
 // What stays as sliced is played without the printer's own shaper.
 TEST_F(Texts, SayWhenTheNozzleStraysFurtherThanNow) {
   const std::string square =

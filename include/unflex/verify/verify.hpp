@@ -36,6 +36,8 @@ struct Leeway {
   double times = 1.02;
   double rms_mm = 0.5e-3;
   double max_mm = 3e-3;
+  // Where the firmware rounds to steps, a single place may by chance be off by so much more.
+  double chance_mm = 0.0;
 };
 
 struct Rules {
