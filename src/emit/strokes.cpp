@@ -153,20 +153,44 @@ bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const Line
          rules.max_speed_step_mm_s;
 }
 
-// Across a drawn path errors count most; along it they only shift time. Where nothing is drawn,
-// errors matter only by what they leave behind for later.
+// Whether a drawn path turns between a move and the next so much that what shoots over the corner
+// is off the path.
+bool turns_sharply(const Run& run, std::size_t move) {
+  constexpr double kCosine = 0.94;  // of 20°
+  if (move + 1 >= run.moves->size()) {
+    return false;
+  }
+  const gcode::Position& before = (*run.moves)[move].direction;
+  const gcode::Position& after = (*run.moves)[move + 1].direction;
+  return before[X] * after[X] + before[Y] * after[Y] <
+         kCosine * std::hypot(before[X], before[Y]) * std::hypot(after[X], after[Y]);
+}
+
+// Whether t is near a sharp corner.
+bool is_at_corner(const Run& run, const Timetable& table, std::size_t move, double t) {
+  constexpr double kReach_s = 8e-3;
+  return (t < table.start_s(move) + kReach_s && move > 0 && turns_sharply(run, move - 1)) ||
+         (t > table.start_s(move + 1) - kReach_s && turns_sharply(run, move));
+}
+
+// Across a drawn path errors count most; along it they only shift time, though at a sharp corner
+// they lead off the path. Where nothing is drawn, errors matter only by what they leave behind for
+// later.
 ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
   constexpr double kAlong = 0.001;
+  constexpr double kAlongAtCorner = 0.03;
   constexpr double kTravel = 0.02;
-  const gcode::Segment& segment = (*run.moves)[table.move_at(t)].segment;
+  const std::size_t move = table.move_at(t);
+  const gcode::Segment& segment = (*run.moves)[move].segment;
   if (!segment.extruding() || t > table.start_s(table.moves())) {
     return {kTravel, 0.0, kTravel};
   }
   const double length = segment.length_xy_mm();
   const double nx = -segment.delta(Y) / length;
   const double ny = segment.delta(X) / length;
-  constexpr double kAcross = 1.0 - kAlong;
-  return {kAlong + kAcross * nx * nx, kAcross * nx * ny, kAlong + kAcross * ny * ny};
+  const double along = is_at_corner(run, table, move, t) ? kAlongAtCorner : kAlong;
+  const double across = 1.0 - along;
+  return {along + across * nx * nx, across * nx * ny, along + across * ny * ny};
 }
 
 // The largest changes of speed of each axis. If motors move both axes, each axis gets what the base
