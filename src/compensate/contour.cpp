@@ -73,15 +73,6 @@ Place nearest(const std::vector<Edge>& edges, std::size_t first, std::size_t las
   return found;
 }
 
-// Whether the path bends by more than 20° between the directions.
-bool is_sharp(const gcode::Position& before, const gcode::Position& after) {
-  constexpr double kCosine = 0.9397;
-  const double lengths =
-      std::hypot(before[gcode::X], before[gcode::Y]) * std::hypot(after[gcode::X], after[gcode::Y]);
-  return before[gcode::X] * after[gcode::X] + before[gcode::Y] * after[gcode::Y] <
-         kCosine * lengths;
-}
-
 class Aiming {
  public:
   explicit Aiming(RunWindow& window)
@@ -268,7 +259,7 @@ std::vector<PathVertex> path_of(const Course& course, double origin_s, double pe
       }
       time_s += move.duration_s();
       const bool is_flat = move.direction[gcode::X] != 0.0 || move.direction[gcode::Y] != 0.0;
-      if (is_flat && direction != nullptr && is_sharp(*direction, move.direction)) {
+      if (is_flat && direction != nullptr && planner::turns_sharply(*direction, move.direction)) {
         path.back().is_sharp = true;
       }
       direction = is_flat ? &move.direction : direction;

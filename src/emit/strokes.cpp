@@ -153,24 +153,16 @@ bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const Line
          rules.max_speed_step_mm_s;
 }
 
-// Whether a drawn path turns between a move and the next so much that what shoots over the corner
-// is off the path.
-bool turns_sharply(const Run& run, std::size_t move) {
-  constexpr double kCosine = 0.94;  // of 20°
-  if (move + 1 >= run.moves->size()) {
-    return false;
-  }
-  const gcode::Position& before = (*run.moves)[move].direction;
-  const gcode::Position& after = (*run.moves)[move + 1].direction;
-  return before[X] * after[X] + before[Y] * after[Y] <
-         kCosine * std::hypot(before[X], before[Y]) * std::hypot(after[X], after[Y]);
-}
-
 // Whether t is near a sharp corner.
 bool is_at_corner(const Run& run, const Timetable& table, std::size_t move, double t) {
   constexpr double kReach_s = 8e-3;
-  return (t < table.start_s(move) + kReach_s && move > 0 && turns_sharply(run, move - 1)) ||
-         (t > table.start_s(move + 1) - kReach_s && turns_sharply(run, move));
+  const std::vector<planner::PlannedMove>& moves = *run.moves;
+  const auto turns_behind = [&](std::size_t i) {
+    return i + 1 < moves.size() &&
+           planner::turns_sharply(moves[i].direction, moves[i + 1].direction);
+  };
+  return (t < table.start_s(move) + kReach_s && move > 0 && turns_behind(move - 1)) ||
+         (t > table.start_s(move + 1) - kReach_s && turns_behind(move));
 }
 
 // Across a drawn path errors count most; along it they only shift time, though at a sharp corner

@@ -110,4 +110,12 @@ double asked_accel_mm_s2(const PlannedMove& move) {
   return move.accel_s + move.decel_s > 0.0 ? share * move.accel_mm_s2 : 0.0;
 }
 
+bool turns_sharply(const gcode::Position& before, const gcode::Position& after) {
+  constexpr double kCosine = 0.9397;
+  const double lengths =
+      std::hypot(before[gcode::X], before[gcode::Y]) * std::hypot(after[gcode::X], after[gcode::Y]);
+  return before[gcode::X] * after[gcode::X] + before[gcode::Y] * after[gcode::Y] <
+         kCosine * lengths;
+}
+
 }  // namespace unflex::planner

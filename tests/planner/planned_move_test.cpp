@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "planner/plan_helpers.hpp"
@@ -147,6 +148,20 @@ TEST(PlannedMove, HasItsVelocityAsTheSlopeOfItsDistance) {
     const double slope = (move.distance_mm(t + dt) - move.distance_mm(t - dt)) / (2.0 * dt);
     EXPECT_NEAR(slope, move.velocity_mm_s(t), 1e-6);
   }
+}
+
+TEST(Corners, AreSharpFromTwentyDegreesOn) {
+  const auto direction = [](double degrees) {
+    const double angle = degrees * std::numbers::pi / 180.0;
+    return gcode::Position{std::cos(angle), std::sin(angle), 0.0, 0.0};
+  };
+  for (const double from : {0.0, 77.0, 200.0}) {
+    EXPECT_FALSE(turns_sharply(direction(from), direction(from + 19.9)));
+    EXPECT_TRUE(turns_sharply(direction(from), direction(from + 20.1)));
+    EXPECT_TRUE(turns_sharply(direction(from), direction(from - 179.0)));
+  }
+  // The share of X and Y in the direction does not count.
+  EXPECT_TRUE(turns_sharply({0.1, 0.0, 0.99, 0.0}, {0.0, 0.1, 0.99, 0.0}));
 }
 
 }  // namespace

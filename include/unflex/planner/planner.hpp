@@ -147,6 +147,10 @@ struct PlannedMove {
 // The acceleration that the plan asks of X or Y in the move, whichever is larger.
 [[nodiscard]] double asked_accel_mm_s2(const PlannedMove& move);
 
+// Whether the path turns in X and Y by more than 20° between moves in these directions. Beyond such
+// a corner an error along the first move leads off the path.
+[[nodiscard]] bool turns_sharply(const gcode::Position& before, const gcode::Position& after);
+
 // How long the firmware takes for the first step out of a standstill, with limits as high as those
 // of a run. 0: none.
 //
