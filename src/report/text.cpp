@@ -209,7 +209,7 @@ void write_output(Sink out, const Report& r) {
                  static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s);
   if (!r.solver_engine.empty()) {
     const LineBudget& budget = r.line_budget;
-    fmt::format_to(out, "lines         so few cost {} µm RMS, {} µm at most; ",
+    fmt::format_to(out, "lines         having few costs {} µm RMS, {} µm at most; ",
                    micrometres_text(budget.cost_rms_mm), micrometres_text(budget.cost_max_mm));
     if (budget.places_above == 0) {
       fmt::format_to(out, "never more than {:.0f} per second\n", budget.max_lines_per_s);
@@ -327,7 +327,8 @@ std::string to_text(const Report& report) {
   write_plants(out, report.plants);
   if (report.robustness) {
     fmt::format_to(
-        out, "band          where the frequencies are exact it costs {} instead of {} µm RMS\n",
+        out,
+        "band          suiting it leaves {} instead of {} µm RMS where the frequencies are exact\n",
         micrometres_text(report.robustness->rms_mm),
         micrometres_text(report.robustness->nominal_rms_mm));
   }

@@ -82,6 +82,29 @@ TEST(Recorder, ChangesNothingOfTheVerification) {
   EXPECT_GT(with.uncompensated.extruding.contour_max_mm, 0.0);
 }
 
+TEST(Recorder, LeavesOutWhatPrimesTheNozzle) {
+  const std::string prime =
+      "G28\nG90\nM83\nM204 S12000\nG1 Z0.3 F600\nG1 X5 Y5 F6000\nG1 X60 Y5 E5 F9000\n"
+      "G1 X60 Y8 E.2\nG1 E-1 F1800\n";
+  const auto recorded = [](const std::string& input) {
+    return Recorded(input, verify::testing::PlainEmitter().emit(input)).recording;
+  };
+  const Recording with = recorded(prime + print(2));
+  EXPECT_EQ(with.start_layers, 1U);
+  ASSERT_THAT(with.layers, SizeIs(3));
+  ASSERT_FALSE(with.worst_before.empty());
+  EXPECT_GT(with.layers[0].spread.before.max_mm, with.worst_before[0].before_mm);
+  for (const auto* places : {&with.worst_before, &with.worst_after}) {
+    for (const report::Place& place : *places) {
+      EXPECT_GE(place.layer, 1U);
+    }
+  }
+  // Without the slicer's marks nobody knows where the print begins.
+  const Recording without = recorded(prime + print(2, false));
+  EXPECT_EQ(without.start_layers, 0U);
+  EXPECT_EQ(without.worst_before[0].layer, 0U);
+}
+
 TEST(Recorder, AgreesWithTheVerification) {
   const std::string input = print(4);
   const Recorded recorded(input, verify::testing::PlainEmitter().emit(input));
