@@ -494,11 +494,9 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
   rules.base_accel_times_plan = settings.base_accel_times_asked();
   rules.max_lines_per_s = settings.max_lines_per_s();
-  if (settings.printer.firmware != Firmware::klipper) {
+  if (grid_mm(settings) > kGridMm) {
     constexpr double kShareOfStep = 0.1;
-    const std::array<double, 4> steps_per_mm = settings.steps_per_mm();
-    rules.leeway.chance_mm =
-        kShareOfStep / std::min(steps_per_mm[gcode::X], steps_per_mm[gcode::Y]);
+    rules.leeway.chance_mm = kShareOfStep * grid_mm(settings);
   }
   return rules;
 }

@@ -122,10 +122,13 @@ Worst worst(const Report& report) {
   return result;
 }
 
+std::size_t slicers_layer(const Recording& recording, std::size_t layer) {
+  return layer < recording.start_layers ? 0 : layer - recording.start_layers + 1;
+}
+
 std::string layer_text(const Recording& recording, std::size_t layer) {
-  return layer < recording.start_layers
-             ? "before the first layer"
-             : fmt::format("layer {}", layer - recording.start_layers + 1);
+  const std::size_t number = slicers_layer(recording, layer);
+  return number == 0 ? "before the first layer" : fmt::format("layer {}", number);
 }
 
 std::string place_text(const Recording& recording, const Place& place) {

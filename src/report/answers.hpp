@@ -35,7 +35,10 @@ struct Worst {
 };
 [[nodiscard]] Worst worst(const Report& report);
 
-// "layer 12" as the slicer counts, from 1 on.
+// As the slicer counts, from 1 on; 0 before its first layer.
+[[nodiscard]] std::size_t slicers_layer(const Recording& recording, std::size_t layer);
+
+// "layer 12", as slicers_layer() counts.
 [[nodiscard]] std::string layer_text(const Recording& recording, std::size_t layer);
 // "line 812, layer 12, External perimeter, at X100.2 Y98.1"
 [[nodiscard]] std::string place_text(const Recording& recording, const Place& place);

@@ -100,8 +100,7 @@ Json place_json(const Report& r, const std::optional<Place>& place, double Place
   const bool named = place->feature < recording.features.size();
   return {{"contour_max_mm", (*place).*error_mm},
           {"line", place->line},
-          {"layer",
-           place->layer < recording.start_layers ? 0 : place->layer - recording.start_layers + 1},
+          {"layer", slicers_layer(recording, place->layer)},
           {"feature", named ? recording.features[place->feature].name : std::string{}},
           {"x_mm", place->x_mm},
           {"y_mm", place->y_mm},

@@ -173,8 +173,8 @@ struct KinematicsSettings {
 // What each motor can do.
 struct BaseSettings {
   std::optional<double> max_velocity_mm_s;  // unset: 2 · limits.max_velocity_mm_s
-  std::optional<double>
-      max_accel_mm_s2;          // unset: 2 · Settings::most_of_motor() · limits.max_accel_mm_s2
+  // Unset: 2 · Settings::most_of_motor() · limits.max_accel_mm_s2.
+  std::optional<double> max_accel_mm_s2;
   double max_jerk_mm_s3 = 0.0;  // 0: not limited
 };
 
