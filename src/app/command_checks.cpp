@@ -44,7 +44,8 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  if (config.command == Command::inspect && !name.ends_with(".json")) {
+  const bool json_alone = config.command == Command::inspect || !config.tolerances_um.empty();
+  if (json_alone && !name.ends_with(".json")) {
     return usage(fmt::format("--report {}: the name must end in .json", name));
   }
   if (!name.ends_with(".json") && !is_html(name)) {
@@ -54,6 +55,29 @@ Status check_report(const RunConfig& config) {
   return config.command == Command::compensate
              ? Status{}
              : check_has_name("--report", name, {".json", ".html"});
+}
+
+Status check_study(const RunConfig& config) {
+  const bool has_print = !config.input.empty();
+  if (has_print && !config.cases.empty()) {
+    return usage("--case is of the corner; a print has none");
+  }
+  if (!has_print && !config.machines.empty()) {
+    return usage("--machines needs a print to judge them by");
+  }
+  if (!has_print && !config.tolerances_um.empty()) {
+    return usage("--at-tolerance needs a print whose time it is");
+  }
+  if (!config.machines.empty() && !config.tolerances_um.empty()) {
+    return usage("give either --machines or --at-tolerance, not both");
+  }
+  if (config.at_all_times && config.tolerances_um.empty()) {
+    return usage("--at-all-times says how strictly --at-tolerance is meant; give that too");
+  }
+  if (!has_print && (config.printer_file || !config.overrides.empty())) {
+    return usage("--printer and --set are of a print; the corner's cases have their own settings");
+  }
+  return {};
 }
 
 Status check_test(const RunConfig& config) {
@@ -165,15 +189,10 @@ Status complete(RunConfig& config) {
       config.output == kStandardStream) {
     return usage("only one of OUT and --against can be stdin");
   }
-  if (config.command == Command::study && !config.input.empty() && !config.cases.empty()) {
-    return usage("--case is of the corner; a print has none");
-  }
-  if (config.command == Command::study && config.input.empty() && !config.machines.empty()) {
-    return usage("--machines needs a print to judge them by");
-  }
-  if (config.command == Command::study && config.input.empty() &&
-      (config.printer_file || !config.overrides.empty())) {
-    return usage("--printer and --set are of a print; the corner's cases have their own settings");
+  if (config.command == Command::study) {
+    if (Status checked = check_study(config); !checked) {
+      return checked;
+    }
   }
   if (config.command == Command::identify) {
     if (Status checked = config.identify.make_test ? check_test(config) : check_records(config);

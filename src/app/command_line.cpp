@@ -191,6 +191,15 @@ void add_study(CLI::App& program, RunConfig& config) {
       ->add_option("--machines", config.machines,
                    "With IN: judge unflex and shapers on the machines whose records are in DIR")
       ->type_name("DIR");
+  command
+      ->add_option("--at-tolerance", config.tolerances_um,
+                   "With IN: the least print time within contour errors, as 10,20,50")
+      ->type_name("UM")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(positive());
+  command->add_flag("--at-all-times", config.at_all_times,
+                    "With --at-tolerance: let no moment exceed it, not even a thousandth");
   add_common_options(*command, config);
   add_engine(*command, config, "What solves for unflex: banded (auto), or ipopt");
   add_jobs(*command, config);

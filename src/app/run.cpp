@@ -25,8 +25,10 @@
 #include "tune.hpp"
 #include "unflex/core/caught.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "unflex/pipeline/study_fastest.hpp"
 #include "unflex/pipeline/study_print.hpp"
 #include "unflex/report/report.hpp"
+#include "unflex/study/fastest.hpp"
 #include "unflex/study/study.hpp"
 #include "workspace.hpp"
 
@@ -120,6 +122,42 @@ Result<ExitCode> run_study(const RunConfig& config, Console& console) {
       .map([] { return ExitCode::done; });
 }
 
+// study --at-tolerance
+Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
+  const auto start = std::chrono::steady_clock::now();
+  Result<Workspace> space = open_workspace(config);
+  if (!space) {
+    return tl::unexpected(space.error());
+  }
+  const Result<pipeline::Job> job = job_of(config, *space);
+  if (!job) {
+    return tl::unexpected(job.error());
+  }
+  std::vector<double> tolerances_mm;
+  for (const double tolerance_um : config.tolerances_um) {
+    tolerances_mm.push_back(1e-3 * tolerance_um);
+  }
+  study::ToleranceRule rule;
+  rule.largest_times = config.at_all_times ? 1.0 : rule.largest_times;
+  Result<study::FastestOutcome> outcome = with_progress(config, [&](Progress& progress) {
+    return pipeline::study_fastest(*job, tolerances_mm, rule, progress);
+  });
+  if (const Status unchanged = check_inputs(*space); !unchanged) {
+    return tl::unexpected(unchanged.error());
+  }
+  if (!outcome) {
+    return tl::unexpected(outcome.error());
+  }
+  outcome->version = version();
+  outcome->printer = settings_in_force(space->settings);
+  add_setting_warnings(space->settings, outcome->warnings);
+  outcome->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  console.warnings(outcome->warnings);
+  return write_report(space->report, study::to_json(*outcome))
+      .and_then([&] { return print_summary(config, study::to_text(*outcome), console); })
+      .map([] { return ExitCode::done; });
+}
+
 // A descriptor 0, 1 or 2 that was closed would be given to the next file opened, and messages
 // would land in it. /dev/null is opened the wrong way round, so that using it is still an error.
 void reserve_standard_descriptors() {
@@ -145,6 +183,9 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
     case Command::identify:
       return run_identify(config, console);
     case Command::study:
+      if (!config.tolerances_um.empty()) {
+        return run_fastest(config, console);
+      }
       return config.machines.empty() ? run_study(config, console) : run_machines(config, console);
     case Command::batch:
       return run_batch(config, console);

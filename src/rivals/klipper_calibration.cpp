@@ -75,20 +75,33 @@ double vibration_of(const ShaperPulses& pulses, const Bins& bins) {
   return worst;
 }
 
+// How far a shaper leads off the path: a right angle, which is taken at kCalibrationCorner_mm_s,
+// and a reversal. Both are linear in the acceleration.
+struct Smoothing {
+  double corner_mm = 0.0;
+  double corner_per_accel_s2 = 0.0;
+  double reversal_per_accel_s2 = 0.0;
+};
+
 // The pulses' mean time is 0.
-double smoothing_of(const ShaperPulses& pulses) {
-  constexpr double kHalfAccel = 2500.0;
-  constexpr double kCornerVelocity = 5.0;
-  double right_angle = 0.0;
-  double reversal = 0.0;
+Smoothing smoothing_of(const ShaperPulses& pulses) {
+  Smoothing sum;
   for (const dynamics::Pulse& pulse : pulses) {
     const double t = pulse.time_s;
     if (t >= 0.0) {
-      right_angle += pulse.weight * (kCornerVelocity + kHalfAccel * t) * t;
+      sum.corner_mm += std::numbers::sqrt2 * pulse.weight * kCalibrationCorner_mm_s * t;
+      sum.corner_per_accel_s2 += std::numbers::sqrt2 * pulse.weight * 0.5 * t * t;
     }
-    reversal += pulse.weight * kHalfAccel * t * t;
+    sum.reversal_per_accel_s2 += pulse.weight * 0.5 * t * t;
   }
-  return std::max(std::numbers::sqrt2 * right_angle, reversal);
+  return sum;
+}
+
+double smoothing_mm(const ShaperPulses& pulses) {
+  constexpr double kAccel_mm_s2 = 5000.0;
+  const Smoothing of = smoothing_of(pulses);
+  return std::max(of.corner_mm + kAccel_mm_s2 * of.corner_per_accel_s2,
+                  kAccel_mm_s2 * of.reversal_per_accel_s2);
 }
 
 // At all frequencies, the lowest first.
@@ -100,7 +113,7 @@ std::vector<FittedShaper> tried(const Candidate& candidate, const Bins& bins) {
     FittedShaper one{.kind = candidate.kind, .freq_hz = candidate.least_hz + k * kStep_hz};
     const ShaperPulses pulses = one.pulses();
     one.vibration = vibration_of(pulses, bins);
-    one.smoothing_mm = smoothing_of(pulses);
+    one.smoothing_mm = smoothing_mm(pulses);
     const double v = one.vibration;
     one.score = one.smoothing_mm * (std::pow(v, 1.5) + 0.2 * v + 0.01);
     results.push_back(one);
@@ -126,6 +139,13 @@ FittedShaper selected(const std::vector<FittedShaper>& results) {
 
 ShaperPulses FittedShaper::pulses() const {
   return *dynamics::shaper_pulses(kind, freq_hz, kDampingRatio);
+}
+
+double advised_accel_mm_s2(const ShaperPulses& pulses) {
+  constexpr double kMostSmoothing_mm = 0.12;  // TARGET_SMOOTHING
+  const Smoothing of = smoothing_of(pulses);
+  return std::max(0.0, std::min((kMostSmoothing_mm - of.corner_mm) / of.corner_per_accel_s2,
+                                kMostSmoothing_mm / of.reversal_per_accel_s2));
 }
 
 const FittedShaper& KlipperCalibration::of(ShaperKind kind) const {

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "built_shaper.hpp"
 #include "unflex/compensate/second_stage.hpp"
 #include "unflex/dynamics/shapers.hpp"
 #include "unflex/rivals/filtered_spline.hpp"
@@ -24,31 +25,10 @@ using Moves = std::vector<planner::PlannedMove>;
 constexpr double kKnotsPerPeriod = 10.0;
 constexpr double kSplineEndKnots = 5.0;
 
-// The shaper of an axis, built for the axis's damping, or for the largest one that the shaper is
-// defined for.
-struct BuiltShaper {
-  dynamics::ShaperPulses pulses;
-  std::string remark;
-};
-
-Result<BuiltShaper> build(dynamics::ShaperKind kind, const dynamics::FlexibleAxis& axis) {
-  const double damping_ratio = axis.main_damping_ratio();
-  if (damping_ratio >= 1.0) {
-    return fail(ErrorKind::input, "undefined at ζ = 1: without vibration there is no period");
-  }
-  const double most = dynamics::max_damping_ratio(kind);
-  const double zeta = std::min(damping_ratio, most);
-  BuiltShaper built{*dynamics::shaper_pulses(kind, axis.main_hz(), zeta), {}};
-  if (zeta < damping_ratio) {
-    built.remark = fmt::format("built for ζ = {}, the most it is defined for", most);
-  }
-  return built;
-}
-
 Result<BaseMotion> shaped_base(dynamics::ShaperKind kind, const Moves& plan,
                                const compensate::Setup& setup) {
-  const Result<BuiltShaper> x = build(kind, setup.x.axis);
-  const Result<BuiltShaper> y = build(kind, setup.y.axis);
+  const Result<BuiltShaper> x = built_shaper(kind, setup.x.axis);
+  const Result<BuiltShaper> y = built_shaper(kind, setup.y.axis);
   if (!x || !y) {
     return tl::unexpected(x ? y.error() : x.error());
   }

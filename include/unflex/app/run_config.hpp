@@ -91,6 +91,9 @@ struct RunConfig {
   TuneConfig tune;
   std::vector<std::string> cases;  // study: names, none for all
   std::string machines;            // study: folder of records; empty: none
+  // study: tolerances that the print is to keep, µm, and whether it shall at all times
+  std::vector<double> tolerances_um;
+  bool at_all_times = false;
 };
 
 // The command line understood: either work to do, or a text to print instead (--help, --version).

@@ -35,6 +35,13 @@ struct KlipperCalibration {
   [[nodiscard]] const FittedShaper& of(dynamics::ShaperKind kind) const;
 };
 
+// The corner speed that the calibration assumes.
+inline constexpr double kCalibrationCorner_mm_s = 5.0;
+
+// The most acceleration that the calibration advises with a shaper: at it the shaper cuts a corner
+// by 0.12 mm (find_shaper_max_accel). 0 if it does so at any.
+[[nodiscard]] double advised_accel_mm_s2(const dynamics::ShaperPulses& pulses);
+
 // `density`: sum over the sensor's columns at k · step_hz, acceleration² per Hz. nullopt if there
 // is no motion in it.
 [[nodiscard]] std::optional<KlipperCalibration> klipper_calibration(

@@ -1,0 +1,22 @@
+// How fast a print may go within a tolerance.
+#pragma once
+
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/study/fastest.hpp"
+
+namespace unflex::pipeline {
+
+// Searches the least print time of `job.input` for each tolerance, on the nozzle of the job's
+// settings. Speeds are those of the file, up to the velocity limit of settings and file; what the
+// file says of acceleration and corners is obeyed for the plan as sliced alone. The whole path is
+// in memory meanwhile.
+[[nodiscard]] Result<study::FastestOutcome> study_fastest(const Job& job,
+                                                          const std::vector<double>& tolerances_mm,
+                                                          const study::ToleranceRule& rule,
+                                                          Progress& progress);
+
+}  // namespace unflex::pipeline

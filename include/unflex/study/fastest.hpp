@@ -1,0 +1,127 @@
+// How fast a print may go: the least print time at which the nozzle of each contender still keeps a
+// tolerance. Acceleration and square corner velocity are chosen from a grid and hold for the whole
+// print, planned by Klipper's rules.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/report/report.hpp"
+#include "unflex/study/bench.hpp"
+
+namespace unflex::study {
+
+// Limits of Klipper's planner that hold for a whole print.
+struct PlanLimits {
+  double accel_mm_s2 = 0.0;
+  double corner_mm_s = 0.0;  // square_corner_velocity
+
+  friend bool operator==(const PlanLimits&, const PlanLimits&) = default;
+};
+
+// The grid that limits are chosen from.
+inline constexpr std::array kGridAccels_mm_s2 = {1000.0,  1400.0,  2000.0,  2800.0,
+                                                 4000.0,  5600.0,  8000.0,  11200.0,
+                                                 16000.0, 20000.0, 28000.0, 40000.0};
+inline constexpr std::array kGridCorners_mm_s = {1.0,  2.0,  3.0,  5.0,  7.0,
+                                                 10.0, 14.0, 20.0, 28.0, 40.0};
+
+// Distances of the nozzle from the path while filament is laid.
+struct PathErrors {
+  double p999_mm = 0.0;  // 99.9 % of the time it is at most this
+  double max_mm = 0.0;
+};
+
+// What it means that a motion keeps a tolerance. This is the only place that says so.
+struct ToleranceRule {
+  // The errors are within the tolerance for this share of the extruding time …
+  static constexpr double kShareWithin = 0.999;
+  // … and at most so many times as large in the rest of it; 1: within the tolerance at all times.
+  double largest_times = 1.1;
+
+  [[nodiscard]] bool keeps(const PathErrors& errors, double tolerance_mm) const {
+    return errors.p999_mm <= tolerance_mm && errors.max_mm <= largest_times * tolerance_mm;
+  }
+};
+
+// A motion of the whole print: how long it takes, how far the nozzle strays.
+struct TimedMotion {
+  std::optional<PlanLimits> limits;  // nullopt: the motion does not come from such limits
+  double time_s = 0.0;
+  PathErrors errors;
+};
+
+// A way to move the base, with the fastest motions that it is found to allow.
+struct FastestOfContender {
+  std::string name;
+  std::vector<std::optional<TimedMotion>> at;  // one for each tolerance; nullopt: none keeps it
+  std::optional<TimedMotion> advised;          // with the acceleration that Klipper advises
+};
+
+struct FastestOutcome {
+  std::string version;
+  std::string input;
+  std::vector<report::Setting> printer;
+  std::string description;  // the axes
+  std::vector<double> tolerances_mm;
+  ToleranceRule rule;
+  TimedMotion as_sliced;  // without a shaper, with the limits of settings and file
+  std::vector<FastestOfContender> contenders;
+  std::vector<std::string> warnings;
+  double wall_s = 0.0;
+};
+
+// A stretch of the print's path from one stop of the machine to the next.
+using Stretch = std::vector<gcode::Segment>;
+using StretchPlan = std::vector<planner::PlannedMove>;
+
+// The print, as it is planned anew for each point of the grid.
+struct PrintPath {
+  std::vector<Stretch> stretches;
+  double dwell_s = 0.0;            // pauses between them
+  planner::FirmwareConfig config;  // what the limits do not say
+};
+
+struct FastestSetup {
+  Nozzle nozzle;  // shapers are tuned to its main modes
+  std::vector<double> tolerances_mm;
+  ToleranceRule rule;
+  unsigned workers = 1;  // threads; the result does not depend on them
+};
+
+// A point of the grid and the print's time there.
+struct Candidate {
+  PlanLimits limits;
+  double time_s = 0.0;
+};
+
+// The errors with these limits. nullopt, as soon as that is certain, if they break the tolerance.
+using Measure =
+    std::function<std::optional<PathErrors>(const PlanLimits& limits, double tolerance_mm)>;
+
+// The fastest candidate that keeps each tolerance. No candidate is measured twice, and none after
+// all tolerances have theirs.
+[[nodiscard]] std::vector<std::optional<TimedMotion>> fastest(
+    std::vector<Candidate> candidates, const std::vector<double>& tolerances_mm,
+    const ToleranceRule& rule, const Measure& measure);
+
+// Finds the fastest motions without a shaper and with ZV, MZV and EI, and measures the plan as it
+// was sliced. Each stretch begins with the nozzle at rest. A contender whose shaper is not defined
+// for the nozzle is left out, with a warning. An error of kind internal if it is cancelled.
+[[nodiscard]] Result<FastestOutcome> study_fastest(const PrintPath& path,
+                                                   const std::vector<StretchPlan>& as_sliced,
+                                                   const FastestSetup& setup, Progress& progress);
+
+[[nodiscard]] std::string to_text(const FastestOutcome& outcome);
+// The keys are those of docs/report.md.
+[[nodiscard]] std::string to_json(const FastestOutcome& outcome);
+
+}  // namespace unflex::study
