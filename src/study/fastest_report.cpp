@@ -27,13 +27,13 @@ std::string rule_text(const ToleranceRule& rule) {
 }
 
 void write_heading(Sink out, std::string_view first) {
-  fmt::format_to(out, "\n{:<16}{:<12}{:>11}{:>9}{:>9}{:>11}{:>11}\n", first, "", "time, s", "mm/s²",
+  fmt::format_to(out, "\n{:<18}{:<12}{:>11}{:>9}{:>9}{:>11}{:>11}\n", first, "", "time, s", "mm/s²",
                  "corner", "99.9 %, µm", "max, µm");
 }
 
 void write_row(Sink out, std::string_view first, std::string_view name,
                const std::optional<TimedMotion>& motion) {
-  fmt::format_to(out, "  {:<14}{:<12}", first, name);
+  fmt::format_to(out, "  {:<16}{:<12}", first, name);
   if (!motion) {
     fmt::format_to(out, "{:>11}\n", "—");
     return;

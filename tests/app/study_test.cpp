@@ -107,6 +107,47 @@ TEST_F(Study, JudgesOnTheMachinesOfAFolder) {
   EXPECT_GT(contenders[5]["corner_max_mm"], from_corners(5));
 }
 
+TEST_F(Study, FindsTheLeastTimeWithinTolerances) {
+  // The slicer's own accelerations and corners have no part in it, its speeds have.
+  write_file(path("in.gcode"), small_print());
+  write_file(path("limited.gcode"),
+             "M204 S700\nSET_VELOCITY_LIMIT ACCEL=800 "
+             "SQUARE_CORNER_VELOCITY=1\n" +
+                 small_print());
+  write_file(path("slow.gcode"), "SET_VELOCITY_LIMIT VELOCITY=20\n" + small_print());
+  const auto study = [&](const std::string& input) {
+    const Outcome outcome = run({"study", input, "--at-tolerance", "100,20", "-j", "2", "--set",
+                                 "printer.firmware=klipper", "--report", "-"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out);
+  };
+  const auto free = study("in.gcode");
+  const auto limited = study("limited.gcode");
+  const auto slow = study("slow.gcode");
+  EXPECT_EQ(free["tolerances"], limited["tolerances"]);
+  EXPECT_EQ(free["advised"], limited["advised"]);
+  EXPECT_LT(free["as_sliced"]["time_s"], limited["as_sliced"]["time_s"]);
+  ASSERT_EQ(free["tolerances"].size(), 2U);
+  const auto zv = [](const nlohmann::json& json, std::size_t number) {
+    return json["tolerances"][number]["contenders"][1];
+  };
+  EXPECT_EQ(zv(free, 1)["name"], "ZV");
+  EXPECT_EQ(free["tolerances"][1]["tolerance_mm"], 0.02);
+  EXPECT_LE(zv(free, 1)["contour_max_mm"], 0.022);
+  EXPECT_LT(zv(free, 0)["time_s"], zv(free, 1)["time_s"]);
+  EXPECT_LT(zv(free, 1)["time_s"], zv(slow, 1)["time_s"]);
+  const Outcome text = run({"study", "in.gcode", "--at-tolerance", "20", "--at-all-times"});
+  EXPECT_THAT(text.out, HasSubstr("within the tolerance at all times"));
+  EXPECT_THAT(text.out, HasSubstr("\n  20 µm           no shaper"));
+}
+
+TEST_F(Study, FindsNoTimeOfAPrintWithoutFilament) {
+  write_file(path("in.gcode"), "G28\nG1 X20 Y20 F6000\nG1 X40\n");
+  const Outcome outcome = run({"study", "in.gcode", "--at-tolerance", "20"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err, "in.gcode: lays no filament; give a sliced print\n");
+}
+
 TEST_F(Study, SaysWhatIsWrongWithTheMachines) {
   EXPECT_THAT(run({"study", "--machines", "machines"}).err, HasSubstr("needs a print"));
   write_file(path("in.gcode"), small_print());

@@ -114,6 +114,19 @@ TEST(KlipperCalibration, GivesKlippersOwnFigures) {
   }
 }
 
+// As find_shaper_max_accel finds it by bisection.
+TEST(KlipperCalibration, AdvisesAnAcceleration) {
+  const auto advised = [](ShaperKind kind, double freq_hz, double damping_ratio) {
+    return advised_accel_mm_s2(*dynamics::shaper_pulses(kind, freq_hz, damping_ratio));
+  };
+  EXPECT_NEAR(advised(ShaperKind::zv, 45.0, 0.1), 7891.70438, 1e-4);
+  EXPECT_NEAR(advised(ShaperKind::zv, 25.0, 0.1), 2118.00705, 1e-4);
+  EXPECT_NEAR(advised(ShaperKind::mzv, 45.0, 0.1), 5965.50953, 1e-4);
+  EXPECT_NEAR(advised(ShaperKind::mzv, 30.0, 0.06), 2632.56221, 1e-4);
+  // At 5 mm/s it cuts more than that at any acceleration.
+  EXPECT_EQ(advised(ShaperKind::zv, 1.0, 0.1), 0.0);
+}
+
 TEST(KlipperCalibration, NeedsMotion) {
   EXPECT_FALSE(klipper_calibration(1.5625, std::vector<double>(128, 0.0)));
   EXPECT_FALSE(klipper_calibration(1.5625, {}));

@@ -12,7 +12,6 @@
 
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
-#include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/report/report.hpp"
 #include "unflex/study/bench.hpp"
@@ -27,12 +26,14 @@ struct PlanLimits {
   friend bool operator==(const PlanLimits&, const PlanLimits&) = default;
 };
 
-// The grid that limits are chosen from.
-inline constexpr std::array kGridAccels_mm_s2 = {1000.0,  1400.0,  2000.0,  2800.0,
-                                                 4000.0,  5600.0,  8000.0,  11200.0,
-                                                 16000.0, 20000.0, 28000.0, 40000.0};
-inline constexpr std::array kGridCorners_mm_s = {1.0,  2.0,  3.0,  5.0,  7.0,
-                                                 10.0, 14.0, 20.0, 28.0, 40.0};
+// The grid that limits are chosen from: preferred numbers, ten to a decade.
+inline constexpr std::array kGridAccels_mm_s2 = {
+    250.0,   320.0,   400.0,   500.0,   630.0,   800.0,   1000.0, 1250.0,
+    1600.0,  2000.0,  2500.0,  3200.0,  4000.0,  5000.0,  6300.0, 8000.0,
+    10000.0, 12500.0, 16000.0, 20000.0, 25000.0, 32000.0, 40000.0};
+inline constexpr std::array kGridCorners_mm_s = {0.5,  0.63, 0.8,  1.0,  1.25, 1.6, 2.0,
+                                                 2.5,  3.2,  4.0,  5.0,  6.3,  8.0, 10.0,
+                                                 12.5, 16.0, 20.0, 25.0, 32.0, 40.0};
 
 // Distances of the nozzle from the path while filament is laid.
 struct PathErrors {
