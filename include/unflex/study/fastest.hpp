@@ -43,9 +43,9 @@ struct PathErrors {
 
 // What it means that a motion keeps a tolerance. This is the only place that says so.
 struct ToleranceRule {
-  // The errors are within the tolerance for this share of the extruding time …
+  // The errors are within the tolerance for this share of the extruding time.
   static constexpr double kShareWithin = 0.999;
-  // … and at most so many times as large in the rest of it; 1: within the tolerance at all times.
+  // In the rest of it they are at most so many times as large; 1: within it at all times.
   double largest_times = 1.1;
 
   [[nodiscard]] bool keeps(const PathErrors& errors, double tolerance_mm) const {
