@@ -10,7 +10,7 @@ _unflex_options() {
     batch) echo "-h --help -o --output $print --summary --max-deviation --engine -j --jobs" ;;
     verify) echo "-h --help --against --strict $print --max-deviation" ;;
     inspect) echo "-h --help --strict $print" ;;
-    study) echo "-h --help --case --machines --at-tolerance --at-all-times $print --engine -j --jobs" ;;
+    study) echo "-h --help --case --machines --at-tolerance --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
     identify)
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
            '--second --make-test -o --output --printer --set --report -q --quiet' ;;
@@ -56,7 +56,7 @@ _unflex_value() {
     *:--set) echo 'keys' ;;
     *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
       *:--wave-spacing-mm | *:--speed-mm-s | *:--decay | *:--read | *:--nozzle-temp | \
-      *:--bed-temp | *:--at-tolerance) echo 'any' ;;
+      *:--bed-temp | *:--at-tolerance | *:--accel | *:--keep-rms) echo 'any' ;;
     compensate: | verify: | inspect: | study: | tune:) echo "files $print" ;;
     identify:) echo 'files *.csv' ;;
   esac

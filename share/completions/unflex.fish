@@ -80,6 +80,9 @@ complete -c unflex -n '__unflex_in compensate batch study tune' -s j -l jobs -x 
 complete -c unflex -n '__unflex_in study' -l machines -x -a '(__fish_complete_directories (commandline -ct))' -d 'Folder of resonance records of real machines'
 complete -c unflex -n '__unflex_in study' -l at-tolerance -x -d 'The least print time within contour errors, as 10,20,50'
 complete -c unflex -n '__unflex_in study' -l at-all-times -d 'Let no moment exceed the tolerance'
+complete -c unflex -n '__unflex_in study' -l accel -x -d 'Compensate at these accelerations, as 2500,5000'
+complete -c unflex -n '__unflex_in study' -l scale-m204 -d 'Scale accelerations of the print as well'
+complete -c unflex -n '__unflex_in study' -l keep-rms -x -d 'Name the fastest within this RMS error'
 complete -c unflex -n '__unflex_in study' -l case -x -a 'ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' -d 'Only this case of the corner'
 
 complete -c unflex -n '__unflex_in identify' -l axis -x -a 'x y' -d 'The axis the records are of'

@@ -44,7 +44,8 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  const bool json_alone = config.command == Command::inspect || !config.tolerances_um.empty();
+  const bool json_alone = config.command == Command::inspect || !config.tolerances_um.empty() ||
+                          !config.accels_mm_s2.empty();
   if (json_alone && !name.ends_with(".json")) {
     return usage(fmt::format("--report {}: the name must end in .json", name));
   }
@@ -68,8 +69,16 @@ Status check_study(const RunConfig& config) {
   if (!has_print && !config.tolerances_um.empty()) {
     return usage("--at-tolerance needs a print whose time it is");
   }
-  if (!config.machines.empty() && !config.tolerances_um.empty()) {
-    return usage("give either --machines or --at-tolerance, not both");
+  if (!has_print && !config.accels_mm_s2.empty()) {
+    return usage("--accel needs a print to compensate");
+  }
+  const int studies = (config.machines.empty() ? 0 : 1) + (config.tolerances_um.empty() ? 0 : 1) +
+                      (config.accels_mm_s2.empty() ? 0 : 1);
+  if (studies > 1) {
+    return usage("give one of --machines, --at-tolerance and --accel");
+  }
+  if (config.accels_mm_s2.empty() && (config.scale_m204 || config.keep_rms_um)) {
+    return usage("--scale-m204 and --keep-rms go with --accel");
   }
   if (config.at_all_times && config.tolerances_um.empty()) {
     return usage("--at-all-times says how strictly --at-tolerance is meant; give that too");

@@ -200,6 +200,20 @@ void add_study(CLI::App& program, RunConfig& config) {
       ->check(positive());
   command->add_flag("--at-all-times", config.at_all_times,
                     "With --at-tolerance: let no moment exceed it, not even a thousandth");
+  command
+      ->add_option("--accel", config.accels_mm_s2,
+                   "With IN: compensate it at these accelerations, as 2500,5000,10000")
+      ->type_name("MM/S2")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(positive());
+  command->add_flag("--scale-m204", config.scale_m204,
+                    "With --accel: scale what the print itself sets of acceleration as well");
+  command
+      ->add_option("--keep-rms", config.keep_rms_um,
+                   "With --accel: name the fastest whose RMS error is at most this")
+      ->type_name("UM")
+      ->check(positive());
   add_common_options(*command, config);
   add_engine(*command, config, "What solves for unflex: banded (auto), or ipopt");
   add_jobs(*command, config);

@@ -25,9 +25,11 @@
 #include "tune.hpp"
 #include "unflex/core/caught.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "unflex/pipeline/study_accels.hpp"
 #include "unflex/pipeline/study_fastest.hpp"
 #include "unflex/pipeline/study_print.hpp"
 #include "unflex/report/report.hpp"
+#include "unflex/study/accels.hpp"
 #include "unflex/study/fastest.hpp"
 #include "unflex/study/study.hpp"
 #include "workspace.hpp"
@@ -122,8 +124,9 @@ Result<ExitCode> run_study(const RunConfig& config, Console& console) {
       .map([] { return ExitCode::done; });
 }
 
-// study --at-tolerance
-Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
+// A study of a print that reports as text and JSON.
+template <class Study>
+Result<ExitCode> run_print_study(const RunConfig& config, Console& console, const Study& work) {
   const auto start = std::chrono::steady_clock::now();
   Result<Workspace> space = open_workspace(config);
   if (!space) {
@@ -133,15 +136,7 @@ Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
   if (!job) {
     return tl::unexpected(job.error());
   }
-  std::vector<double> tolerances_mm;
-  for (const double tolerance_um : config.tolerances_um) {
-    tolerances_mm.push_back(1e-3 * tolerance_um);
-  }
-  study::ToleranceRule rule;
-  rule.largest_times = config.at_all_times ? 1.0 : rule.largest_times;
-  Result<study::FastestOutcome> outcome = with_progress(config, [&](Progress& progress) {
-    return pipeline::study_fastest(*job, tolerances_mm, rule, progress);
-  });
+  auto outcome = with_progress(config, [&](Progress& progress) { return work(*job, progress); });
   if (const Status unchanged = check_inputs(*space); !unchanged) {
     return tl::unexpected(unchanged.error());
   }
@@ -156,6 +151,30 @@ Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
   return write_report(space->report, study::to_json(*outcome))
       .and_then([&] { return print_summary(config, study::to_text(*outcome), console); })
       .map([] { return ExitCode::done; });
+}
+
+// study --at-tolerance
+Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
+  std::vector<double> tolerances_mm;
+  for (const double tolerance_um : config.tolerances_um) {
+    tolerances_mm.push_back(1e-3 * tolerance_um);
+  }
+  study::ToleranceRule rule;
+  rule.largest_times = config.at_all_times ? 1.0 : rule.largest_times;
+  return run_print_study(config, console, [&](const pipeline::Job& job, Progress& progress) {
+    return pipeline::study_fastest(job, tolerances_mm, rule, progress);
+  });
+}
+
+// study --accel
+Result<ExitCode> run_accels(const RunConfig& config, Console& console) {
+  return run_print_study(config, console, [&](const pipeline::Job& job, Progress& progress) {
+    auto outcome = pipeline::study_accels(job, config.accels_mm_s2, config.scale_m204, progress);
+    if (outcome && config.keep_rms_um) {
+      outcome->keep_rms_mm = 1e-3 * *config.keep_rms_um;
+    }
+    return outcome;
+  });
 }
 
 // A descriptor 0, 1 or 2 that was closed would be given to the next file opened, and messages
@@ -185,6 +204,9 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
     case Command::study:
       if (!config.tolerances_um.empty()) {
         return run_fastest(config, console);
+      }
+      if (!config.accels_mm_s2.empty()) {
+        return run_accels(config, console);
       }
       return config.machines.empty() ? run_study(config, console) : run_machines(config, console);
     case Command::batch:

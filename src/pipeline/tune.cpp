@@ -1,8 +1,6 @@
 #include "unflex/pipeline/tune.hpp"
 
 #include <fmt/core.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -11,6 +9,7 @@
 #include <limits>
 #include <sstream>
 
+#include "memory_file.hpp"
 #include "stage_options.hpp"
 #include "unflex/core/errno_text.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
@@ -19,25 +18,6 @@
 
 namespace unflex::pipeline {
 namespace {
-
-// A file in memory, by a name that others can open.
-class MemoryFile {
- public:
-  MemoryFile() : fd_(::memfd_create("unflex-tune", MFD_CLOEXEC)) {}
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-  ~MemoryFile() {
-    if (fd_ >= 0) {
-      ::close(fd_);
-    }
-  }
-
-  [[nodiscard]] bool is_open() const { return fd_ >= 0; }
-  [[nodiscard]] std::string name() const { return fmt::format("/proc/self/fd/{}", fd_); }
-
- private:
-  int fd_;
-};
 
 machine::Settings settings_of_band(const machine::Settings& settings,
                                    const tune::TowerSettings& tower, std::size_t band) {

@@ -148,6 +148,42 @@ TEST_F(Study, FindsNoTimeOfAPrintWithoutFilament) {
   EXPECT_EQ(outcome.err, "in.gcode: lays no filament; give a sliced print\n");
 }
 
+TEST_F(Study, CompensatesThePrintAtSeveralAccelerations) {
+  write_file(path("in.gcode"), "M204 S2500\n" + small_print());
+  const auto study = [&](std::vector<std::string> options) {
+    std::vector<std::string> arguments = {"study",    "in.gcode",
+                                          "--accel",  "2500,10000",
+                                          "-j",       "2",
+                                          "--set",    "printer.firmware=klipper",
+                                          "--set",    "dynamics.freq_error=0",
+                                          "--report", "-"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out);
+  };
+  // The print's own M204 holds unless it is scaled: 2500 of 5000 becomes 1250 and 5000.
+  const auto kept = study({});
+  const auto scaled = study({"--scale-m204", "--keep-rms", "100"});
+  ASSERT_EQ(kept["accels"].size(), 2U);
+  EXPECT_EQ(kept["accels"][0]["max_accel_mm_s2"], 2500);
+  const auto sliced_s = [](const nlohmann::json& json, std::size_t number) {
+    return json["accels"][number]["sliced_time_s"].get<double>();
+  };
+  // Moves in Z and of filament alone gain something in either.
+  EXPECT_GT(sliced_s(scaled, 0) - sliced_s(scaled, 1),
+            2.0 * (sliced_s(kept, 0) - sliced_s(kept, 1)));
+  EXPECT_GT(sliced_s(scaled, 0), sliced_s(kept, 0));
+  EXPECT_LT(sliced_s(scaled, 1), sliced_s(kept, 1));
+  EXPECT_LT(scaled["accels"][1]["time_s"], scaled["accels"][0]["time_s"]);
+  EXPECT_EQ(scaled["kept_max_accel_mm_s2"], 10000);
+  for (const auto& at : scaled["accels"]) {
+    EXPECT_LT(at["compensated"]["contour_rms_mm"].get<double>(),
+              0.2 * at["sliced"]["contour_rms_mm"].get<double>());
+  }
+  EXPECT_THAT(run({"study", "in.gcode", "--accel", "5000"}).out, HasSubstr("compensated, µm"));
+}
+
 TEST_F(Study, SaysWhatIsWrongWithTheMachines) {
   EXPECT_THAT(run({"study", "--machines", "machines"}).err, HasSubstr("needs a print"));
   write_file(path("in.gcode"), small_print());

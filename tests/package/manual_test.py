@@ -9,7 +9,7 @@ import unittest
 import program_help
 
 UNFLEX, MANUAL = sys.argv[1:3]
-OPTION = r"(?<![\w-])--?[a-z][a-z-]*"
+OPTION = r"(?<![\w-])--?[a-z][a-z0-9-]*"
 HELP = {"-h", "--help", "--version"}
 
 

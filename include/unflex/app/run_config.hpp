@@ -94,6 +94,11 @@ struct RunConfig {
   // study: tolerances that the print is to keep, µm, and whether it shall at all times
   std::vector<double> tolerances_um;
   bool at_all_times = false;
+  // study: accelerations to compensate the print at, whether the print's own ones are scaled, and
+  // the RMS to keep
+  std::vector<double> accels_mm_s2;
+  bool scale_m204 = false;
+  std::optional<double> keep_rms_um;
 };
 
 // The command line understood: either work to do, or a text to print instead (--help, --version).
