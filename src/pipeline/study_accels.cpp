@@ -72,6 +72,12 @@ Result<study::AccelsOutcome> study_accels(const Job& job, const std::vector<doub
     if (!report) {
       return tl::unexpected(report.error());
     }
+    if (report->violation_count > 0) {
+      return fail(
+          ErrorKind::internal,
+          fmt::format("at {:g} mm/s² the output breaks a rule, which is a fault of unflex: {}",
+                      accel_mm_s2, report->violations.front()));
+    }
     outcome.accels.push_back({accel_mm_s2, report->reference_time_s, report->emitted_time_s,
                               report->uncompensated.extruding, report->compensated.extruding});
     for (const std::string& warning : report->warnings) {
