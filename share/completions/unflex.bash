@@ -6,9 +6,9 @@ _unflex_options() {
   case $1 in
     '') echo '-h --help --version' ;;
     compensate)
-      echo "-h --help -o --output --in-place --log --strict $print --max-deviation --engine -j --jobs" ;;
-    batch) echo "-h --help -o --output $print --summary --max-deviation --engine -j --jobs" ;;
-    verify) echo "-h --help --against --strict $print --max-deviation" ;;
+      echo "-h --help -o --output --in-place --log --strict $print --faster --max-deviation --engine -j --jobs" ;;
+    batch) echo "-h --help -o --output $print --summary --faster --max-deviation --engine -j --jobs" ;;
+    verify) echo "-h --help --against --strict $print --faster --max-deviation" ;;
     inspect) echo "-h --help --strict $print" ;;
     study) echo "-h --help --case --machines --at-tolerance --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
     identify)

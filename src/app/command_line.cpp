@@ -98,6 +98,23 @@ void add_max_deviation(CLI::App& command, RunConfig& config) {
       ->check(positive());
 }
 
+// A flag that takes a value behind an equals sign alone, since the input's name may follow it.
+void add_faster(CLI::App& command, RunConfig& config) {
+  command
+      .add_flag("--faster", config.faster_um,
+                "As fast as keeps the nozzle this near the path, 20 by default")
+      ->type_name("[=UM]");
+}
+
+// --faster is short for a key.
+void take_faster(RunConfig& config) {
+  if (!config.faster_um.empty()) {
+    // Without a value a flag is "true".
+    config.overrides.push_back("timing.tolerance_um=" +
+                               (config.faster_um == "true" ? "20" : config.faster_um));
+  }
+}
+
 void add_engine(CLI::App& command, RunConfig& config, const char* help) {
   command.add_option("--engine", config.engine, help)
       ->type_name("auto|banded|ipopt")
@@ -126,11 +143,15 @@ void add_compensate(CLI::App& program, RunConfig& config) {
       ->type_name("FILE");
   add_common_options(*command, config);
   add_strict(*command, config);
+  add_faster(*command, config);
   add_max_deviation(*command, config);
   add_engine(*command, config,
              "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
   add_jobs(*command, config);
-  command->callback([&config] { config.command = Command::compensate; });
+  command->callback([&config] {
+    config.command = Command::compensate;
+    take_faster(config);
+  });
 }
 
 void add_batch(CLI::App& program, RunConfig& config) {
@@ -148,11 +169,15 @@ void add_batch(CLI::App& program, RunConfig& config) {
                    "Write what became of each print, FILE.json, or FILE.xml for JUnit")
       ->type_name("FILE");
   command->add_flag("-q,--quiet", config.quiet, "No table and no progress");
+  add_faster(*command, config);
   add_max_deviation(*command, config);
   add_engine(*command, config,
              "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
   add_jobs(*command, config);
-  command->callback([&config] { config.command = Command::batch; });
+  command->callback([&config] {
+    config.command = Command::batch;
+    take_faster(config);
+  });
 }
 
 void add_verify(CLI::App& program, RunConfig& config) {
@@ -166,8 +191,12 @@ void add_verify(CLI::App& program, RunConfig& config) {
       ->required();
   add_common_options(*command, config);
   add_strict(*command, config);
+  add_faster(*command, config);
   add_max_deviation(*command, config);
-  command->callback([&config] { config.command = Command::verify; });
+  command->callback([&config] {
+    config.command = Command::verify;
+    take_faster(config);
+  });
 }
 
 void add_inspect(CLI::App& program, RunConfig& config) {

@@ -101,6 +101,21 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
   return window;
 }
 
+// Raises the weights around the end of a run. first_sample: where they begin.
+void weigh_end(const Course& course, const Setup& setup, const NodeGrid& grid,
+               std::size_t first_sample, std::vector<double>& weight) {
+  constexpr double kAroundEnd_s = 3e-3;
+  const double end_s =
+      (course.before.empty() ? setup.lead_in_s : static_cast<double>(grid.first) * grid.period_s) +
+      planner::duration_s(course.moves);
+  for (std::size_t i = 0; i < weight.size(); ++i) {
+    const double t = 0.5 * static_cast<double>(first_sample + i) * grid.period_s;
+    if (std::abs(t - end_s) <= kAroundEnd_s) {
+      weight[i] = std::max(weight[i], setup.end_weight);
+    }
+  }
+}
+
 }  // namespace
 
 Plant AxisWindow::model(std::size_t i) const {
@@ -267,6 +282,9 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
     x.push_back(sample.x_mm);
     y.push_back(sample.y_mm);
     weight.push_back(sample.weight);
+  }
+  if (course.after.empty()) {
+    weigh_end(course, setup, grid, first_sample, weight);
   }
   std::vector<PathVertex> path;
   if (setup.contour) {

@@ -259,8 +259,9 @@ void Emitter::enter_run(const Run& run, std::string& out) {
     move_waits_ = false;
   }
   write_checkpoint(" RUN=1", out);
-  write(run.lead_in_s > 0.0 ? fmt::format("{}{}{:.6f}", kRunMark, kLeadInWord, run.lead_in_s)
-                            : std::string(kRunMark),
+  write(fmt::format("{}{}{}", kRunMark,
+                    run.lead_in_s > 0.0 ? fmt::format("{}{:.6f}", kLeadInWord, run.lead_in_s) : "",
+                    options_.has_free_timing ? kFreeTimingWord : ""),
         out);
 }
 

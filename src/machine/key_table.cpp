@@ -54,6 +54,7 @@ using M = MassSpringDamper;
 using B = BaseSettings;
 using O = SolveSettings;
 using T = EmitSettings;
+using F = TimingSettings;
 using V = VerifySettings;
 
 constexpr std::string_view kNotLimited = "not limited";
@@ -433,11 +434,19 @@ constexpr std::array kKeys = {
         Bounds{.min = 1e-4, .max = 1.0}, "",
         "Weight of the nozzle's error along the path, if that across it has 1. 1: the nozzle is to "
         "be in its place at the time",
-        "0.01 where the base suits several models, otherwise 1", &derived<&S::along_weight>},
+        "0.01 where the base suits several models and the timing is as sliced, otherwise 1",
+        &derived<&S::along_weight>},
     Key{"solve.jerk_weight", &setting<&S::solve, &O::jerk_weight>,
         Bounds{.min = 0.0, .max = 1e6, .min_open = true}, "",
         "Weight of the base's jerk against the nozzle's error",
         "15 where solve.along_weight is below 1, otherwise 1.5", &derived<&S::jerk_weight>},
+
+    Key{"timing.tolerance_um", &setting<&S::timing, &F::tolerance_um>,
+        Bounds{.min = 0.0, .max = 1000.0}, "µm",
+        "How far the nozzle may stray from the path while filament is laid, for a print as fast as "
+        "that allows; 0: the timing stays as sliced"},
+    Key{"timing.max_speed_mm_s", &setting<&S::timing, &F::max_speed_mm_s>, kPositive, "mm/s",
+        "Speed of travel in a print with free timing", "the slicer's F"},
 
     Key{"emit.period_ms", &setting<&S::emit, &T::period_ms>, Bounds{.min = 0.05, .max = 50.0}, "ms",
         "Node period: time between two points of the base's motion",

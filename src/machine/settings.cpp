@@ -316,7 +316,7 @@ bool Settings::has_several_models() const {
 
 double Settings::along_weight() const {
   constexpr double kRobust = 0.01;
-  return solve.along_weight.value_or(has_several_models() ? kRobust : 1.0);
+  return solve.along_weight.value_or(has_several_models() && !is_timing_free() ? kRobust : 1.0);
 }
 
 double Settings::jerk_weight() const {

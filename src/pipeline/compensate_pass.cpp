@@ -199,6 +199,7 @@ class Compensator {
       job->first_stage = first_stage(*job, rules_.verify.nozzle);
       job->grid = compensate::node_grid(job->course(), job->setup);
       const std::size_t nodes = job->grid.count;
+      job->is_timed = true;
       const double accel = largest_motor_accel(piece.moves, rules_.verify.fixed.motors());
       if (const verify::BlamedRun* const known = blamed_before(piece)) {
         job->failure = known->reason;
@@ -210,18 +211,18 @@ class Compensator {
             "{:.0f}; raise that if the motors can",
             accel, job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2));
       } else if (nodes <= kMaxRunNodes) {
-        job->spans = compensate::mesh(job->course(), job->grid, job->setup);
+        job->is_timed = !job_.settings.is_timing_free();
       } else {
         job->failure = fmt::format("{:.0f} s of motion without a stop are too long to be handled",
                                    static_cast<double>(nodes) * job->setup.period_s);
       }
-      job->results.resize(job->spans.size());
-      job->missing = 2 * job->spans.size();
-      job->prepared = job->spans.empty();
-      report_->windows_total += compensate::windows_to_solve(job->spans);
-      nodes_queued_ += nodes_of(*job);
-      if (checks_) {
-        gaps_.choose(*job);
+      job->prepared = !job->failure.empty();
+      job->queued_nodes = job->prepared ? 0 : nodes;
+      nodes_queued_ += job->queued_nodes;
+      if (!job->prepared && job->is_timed) {
+        lay_out(job);
+      } else if (!job->prepared) {
+        time_in_thread(job);
       }
     } else {
       static_cast<void>(nozzle_.follow(piece));
@@ -237,6 +238,23 @@ class Compensator {
     }
     lines_queued_ += job->piece.events.size();
     queue_.push_back(std::move(job));
+  }
+
+  // The timing of a run is known, so its windows are.
+  void lay_out(const std::shared_ptr<RunJob>& job) {
+    pipeline::lay_out(*job);
+    report_->windows_total += compensate::windows_to_solve(job->spans);
+    if (checks_) {
+      gaps_.choose(*job);
+    }
+  }
+
+  void time_in_thread(const std::shared_ptr<RunJob>& job) {
+    job->bounds = move_bounds(job->piece, job_.settings);
+    pool_.submit([this, job] {
+      choose_timing(*job, *divider_);
+      wake();
+    });
   }
 
   // Tells once that the base cannot follow what the print asks as well as the motors could.
@@ -268,10 +286,6 @@ class Compensator {
     return found == kept_.end() ? nullptr : &*found;
   }
 
-  static std::size_t nodes_of(const RunJob& job) {
-    return job.spans.empty() ? 0 : job.spans.back().last + 1;
-  }
-
   // Gives the solvers what they can take, in the order of the file.
   void feed() {
     for (std::size_t piece = 0; piece < queue_.size(); ++piece) {
@@ -280,6 +294,12 @@ class Compensator {
         return;
       }
       RunJob& job = *queue_[piece];
+      if (!job.is_timed && !job.prepared) {
+        return;
+      }
+      if (job.spans.empty() && !job.prepared) {
+        lay_out(queue_[piece]);
+      }
       while (job.submitted < job.spans.size()) {
         const std::size_t count = std::min(kWindowsAtOnce, job.spans.size() - job.submitted);
         if (engine_) {
@@ -336,7 +356,7 @@ class Compensator {
     std::unique_lock lock(mutex_);
     // The verifier does not tell when it has caught up, so look again soon.
     news_.wait_for(lock, verifier_.is_behind() ? kShortPatience : kPatience, [this] {
-      return can_write() || (has_room() && !all_read_ && pieces_.has_news());
+      return can_write() || can_feed() || (has_room() && !all_read_ && pieces_.has_news());
     });
   }
 
@@ -344,6 +364,16 @@ class Compensator {
   [[nodiscard]] bool can_write() const {
     return !queue_.empty() && queue_.front()->prepared &&
            (queue_.size() > 1 || all_read_ || rules_.emit.lines.burst_lines == 0);
+  }
+
+  // Whether the timing of a run has been chosen whose windows are not laid out yet.
+  [[nodiscard]] bool can_feed() const {
+    for (const std::shared_ptr<RunJob>& job : queue_) {
+      if (!job->prepared && job->spans.empty()) {
+        return job->is_timed;
+      }
+    }
+    return false;
   }
 
   void place(WorkerPool::Done done) {
@@ -365,7 +395,7 @@ class Compensator {
     }
     put(text_of(job.piece), std::move(*text));
     report_->solver_iterations += job.iterations;
-    nodes_queued_ -= nodes_of(job);
+    nodes_queued_ -= job.queued_nodes;
     lines_queued_ -= job.piece.events.size();
     gaps_.take(job);
     if (!engine_) {

@@ -16,20 +16,24 @@ constexpr double kNothingRms_mm = 0.5e-3;
 constexpr double kNothing_mm = 3e-3;
 // The share of an error that coarse time steps may miss.
 constexpr double kSampling = 2e-4;
+// Where the timing is free, how far the nozzle may stray relative to the tolerance.
+constexpr double kTimesTolerance = 1.1;
 
 }  // namespace
 
-verify::RunDeviation deviation_of(const Piece& run, const std::vector<planner::PlannedMove>& base,
+verify::RunDeviation deviation_of(const Piece& run,
+                                  const std::vector<planner::PlannedMove>& reference_moves,
+                                  const std::vector<planner::PlannedMove>& base,
                                   const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
                                   double lead_in_s) {
   const verify::NozzleModel model = verify::coarse(rules.nozzle);
   if (run.begins_run() && run.ends_run()) {
-    return verify::measure(run.moves, base, nozzle, model, lead_in_s);
+    return verify::measure(reference_moves, base, nozzle, model, lead_in_s);
   }
   // The base may be a little ahead of the plan or behind it, so the reference includes the moves
   // around the part.
   std::vector<planner::PlannedMove> reference = run.before;
-  reference.insert(reference.end(), run.moves.begin(), run.moves.end());
+  reference.insert(reference.end(), reference_moves.begin(), reference_moves.end());
   reference.insert(reference.end(), run.after.begin(), run.after.end());
   return verify::measure(reference, base, nozzle, model,
                          lead_in_s - planner::duration_s(run.before), !run.ends_run());
@@ -139,6 +143,10 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
   const dynamics::NozzleXY as_planned = at_end_of(last, rules.nozzle);
   const double swing_before_mm = verify::apart_mm(before.end, as_planned, rules.nozzle);
   const double swing_after_mm = verify::apart_mm(after.end, as_planned, rules.nozzle);
+  if (rules.tolerance_mm > 0.0 && swing_after_mm <= rules.tolerance_mm &&
+      after.extruding.stats().contour_max_mm <= kTimesTolerance * rules.tolerance_mm) {
+    return std::nullopt;
+  }
   if (before.extruding.stats().duration_s > 0.0) {
     const verify::RunError b = error_of(before.extruding.stats(), swing_before_mm, rules.nozzle);
     const verify::RunError a = error_of(after.extruding.stats(), swing_after_mm, rules.nozzle);
@@ -179,10 +187,11 @@ bool is_bearable(const verify::RunDeviation& before, const verify::RunDeviation&
 
 }  // namespace
 
-Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_view text,
-              gcode::Interpreter printer, const planner::Limits& printer_limits,
-              const dynamics::NozzleXY& nozzle, const verify::Rules& rules, double lead_in_s,
-              verify::LineRate rate, double max_lines_per_s, const InMotion& in_motion) {
+Verdict judge(const Piece& run, const std::vector<planner::PlannedMove>& reference,
+              const verify::RunDeviation& before, std::string_view text, gcode::Interpreter printer,
+              const planner::Limits& printer_limits, const dynamics::NozzleXY& nozzle,
+              const verify::Rules& rules, double lead_in_s, verify::LineRate rate,
+              double max_lines_per_s, const InMotion& in_motion) {
   Verdict verdict;
   Replayed replayed = replay(run, text, std::move(printer), printer_limits, rules.fixed, in_motion);
   verdict.replayed = std::move(replayed.moves);
@@ -211,10 +220,10 @@ Verdict judge(const Piece& run, const verify::RunDeviation& before, std::string_
     verdict.wait_s = planner::wait_s(verdict.replayed.front(), rules.fixed);
   }
   const verify::RunDeviation after =
-      deviation_of(run, verdict.replayed, nozzle, rules, lead_in_s + verdict.wait_s);
+      deviation_of(run, reference, verdict.replayed, nozzle, rules, lead_in_s + verdict.wait_s);
   verdict.nozzle = after.end;
   verdict.rate = std::move(rate);
-  std::optional<std::string> objection = worse(before, after, run.moves.back(), rules);
+  std::optional<std::string> objection = worse(before, after, reference.back(), rules);
   verdict.worse = objection.has_value();
   if (!(in_motion.may_be_worse && is_bearable(before, after))) {
     verdict.objection = std::move(objection);

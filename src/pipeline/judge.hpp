@@ -15,10 +15,11 @@
 
 namespace unflex::pipeline {
 
-// How the nozzle strays from the run while the base makes the moves `base`. With the run's own
-// moves as `base`, this is the deviation without compensation. It is sampled as finely as the
-// nozzle's ringing needs, more coarsely than in a verification.
+// How the nozzle strays from the run, in the timing of `reference`, while the base makes the moves
+// `base`. With the run's own moves as both, this is the deviation without compensation. It is
+// sampled as finely as the nozzle's ringing needs, more coarsely than in a verification.
 [[nodiscard]] verify::RunDeviation deviation_of(const Piece& run,
+                                                const std::vector<planner::PlannedMove>& reference,
                                                 const std::vector<planner::PlannedMove>& base,
                                                 const dynamics::NozzleXY& nozzle,
                                                 const verify::Rules& rules, double lead_in_s);
@@ -45,10 +46,11 @@ struct Verdict {
 // Replays the text of a compensated run as the printer would, in the state the printer is in before
 // the run. Objects if the run breaks a hard rule, has more lines per second than allowed, or
 // deviates more than its original moves (`before`). rate: has counted the lines before the run.
-[[nodiscard]] Verdict judge(const Piece& run, const verify::RunDeviation& before,
-                            std::string_view text, gcode::Interpreter printer,
-                            const planner::Limits& printer_limits, const dynamics::NozzleXY& nozzle,
-                            const verify::Rules& rules, double lead_in_s, verify::LineRate rate,
-                            double max_lines_per_s, const InMotion& in_motion);
+[[nodiscard]] Verdict judge(const Piece& run, const std::vector<planner::PlannedMove>& reference,
+                            const verify::RunDeviation& before, std::string_view text,
+                            gcode::Interpreter printer, const planner::Limits& printer_limits,
+                            const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
+                            double lead_in_s, verify::LineRate rate, double max_lines_per_s,
+                            const InMotion& in_motion);
 
 }  // namespace unflex::pipeline

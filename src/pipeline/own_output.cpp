@@ -9,8 +9,11 @@ namespace {
 
 // One of the marks, or the line that names the version: ";unflex 1.2.3: …".
 bool is_own_comment(std::string_view content) {
-  if (content == kRunMark || content == kRunEndMark ||
-      (content.starts_with(kRunMark) && content.substr(kRunMark.size()).starts_with(kLeadInWord))) {
+  const auto is_run = [&] {
+    const std::string_view words = content.substr(kRunMark.size());
+    return words.empty() || words.starts_with(kLeadInWord) || words == kFreeTimingWord;
+  };
+  if (content == kRunEndMark || (content.starts_with(kRunMark) && is_run())) {
     return true;
   }
   if (!content.starts_with(kOwnMark)) {

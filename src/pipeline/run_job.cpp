@@ -4,6 +4,7 @@
 
 #include <exception>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -83,7 +84,7 @@ void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
     return;
   }
   if (const std::optional<dynamics::BaseTrajectory> nominal = nominal_base(job)) {
-    const std::vector<planner::PlannedMove>& plan = job.piece.moves;
+    const std::vector<planner::PlannedMove>& plan = job.reference();
     job.robust = path_error(plan, job.lead_in_s(), job.base, job.nozzle, model);
     job.nominal = path_error(plan, job.lead_in_s(), *nominal, job.nozzle, model);
   }
@@ -131,13 +132,26 @@ std::vector<double> even_lines_before_s(const emit::LineRules& rules) {
   return begins_s;
 }
 
+// How many pieces the moves of each event have become.
+std::vector<std::size_t> counts_of(const std::vector<std::size_t>& moves,
+                                   const std::vector<std::size_t>& pieces) {
+  std::vector<std::size_t> counts;
+  auto next = pieces.begin();
+  for (const std::size_t count : moves) {
+    const auto end = next + static_cast<std::ptrdiff_t>(count);
+    counts.push_back(std::accumulate(next, end, std::size_t{0}));
+    next = end;
+  }
+  return counts;
+}
+
 }  // namespace
 
 emit::Run RunJob::run(double tolerance_share, double limits_share,
                       std::vector<double> lines_before_s) const {
   emit::Run run{.events = &piece.events,
-                .move_counts = &piece.move_counts,
-                .moves = &piece.moves,
+                .move_counts = retimed.empty() ? &piece.move_counts : &retimed_counts,
+                .moves = &reference(),
                 .base = &base,
                 .lead_in_s = lead_in_s(),
                 .tolerance_share = tolerance_share,
@@ -171,6 +185,28 @@ std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t fir
   return compensate::windows(job.course(), job.spans, first, count, job.first_stage, job.setup);
 }
 
+void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept {
+  try {
+    std::optional<timing::Timed> timed =
+        timing::faster(job.course(), job.setup, job.first_stage, job.bounds, engine);
+    if (timed) {
+      job.retimed_counts = counts_of(job.piece.move_counts, timed->pieces);
+      job.retimed = std::move(timed->moves);
+    }
+  } catch (const std::exception&) {
+    // Out of memory, mostly. The timing stays as sliced.
+    job.retimed.clear();
+  }
+  job.is_timed = true;
+}
+
+void lay_out(RunJob& job) {
+  job.grid = compensate::node_grid(job.course(), job.setup);
+  job.spans = compensate::mesh(job.course(), job.grid, job.setup);
+  job.results.resize(job.spans.size());
+  job.missing = 2 * job.spans.size();
+}
+
 void solve_windows(RunJob& job, std::size_t first, std::size_t count,
                    const compensate::Engine& engine) noexcept try {
   std::vector<compensate::RunWindow> windows = windows_of(job, first, count);
@@ -202,7 +238,8 @@ void make_lines(RunJob& job, const RunRules& rules) noexcept {
       measure_robustness(job, rules.verify.nozzle);
       job.plan = emit::plan_run(job.run(1.0, 1.0, even_lines_before_s(rules.emit.lines)),
                                 job.piece.start, rules.emit);
-      job.before = deviation_of(job.piece, job.piece.moves, job.nozzle, rules.verify, 0.0);
+      job.before =
+          deviation_of(job.piece, job.piece.moves, job.piece.moves, job.nozzle, rules.verify, 0.0);
     }
   } catch (const std::exception& exception) {
     job.failure = exception.what();

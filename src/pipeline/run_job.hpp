@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/emit/emit_options.hpp"
 #include "unflex/emit/run.hpp"
+#include "unflex/timing/timing.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
@@ -45,10 +47,17 @@ struct RunJob {
   dynamics::NozzleXY first_stage;  // the same as a state of the setup's axes
   compensate::Setup setup;
   emit::RunAccel accel;
+  // Only if the timing is free: what each move may do, and the moves in their new timing. Empty:
+  // the timing stays as sliced.
+  std::vector<timing::MoveBounds> bounds;
+  std::vector<planner::PlannedMove> retimed;
+  std::vector<std::size_t> retimed_counts;  // as Piece::move_counts
+  std::atomic<bool> is_timed = false;
   compensate::NodeGrid grid;
   std::vector<compensate::WindowSpan> spans;
   std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
   std::vector<Probe> probes;
+  std::size_t queued_nodes = 0;          // nodes as sliced, while the piece is in the queue
   std::size_t submitted = 0;             // windows given to the solvers
   int lines_after = 0;                   // Run::lines_after, counted in the sliced lines
   std::atomic<std::size_t> missing = 0;  // axes of windows not yet solved
@@ -67,7 +76,11 @@ struct RunJob {
 
   // What the nozzle is to follow.
   [[nodiscard]] compensate::Course course() const {
-    return {piece.before, piece.moves, piece.after};
+    return {piece.before, reference(), piece.after};
+  }
+  // The run's moves in the timing in which they are compensated.
+  [[nodiscard]] const std::vector<planner::PlannedMove>& reference() const {
+    return retimed.empty() ? piece.moves : retimed;
   }
   // How long before the plan the base begins.
   [[nodiscard]] double lead_in_s() const {
@@ -90,6 +103,12 @@ struct RunRules {
 };
 
 [[nodiscard]] AxisResult axis_result(Result<compensate::AxisSolution> solution);
+
+// Chooses the timing of the run. Throws nothing.
+void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept;
+
+// Divides the run, in the timing that it has, into windows.
+void lay_out(RunJob& job);
 
 // The job's nozzle, which swings with all the modes of the model, as a state of the axes that the
 // windows are for.

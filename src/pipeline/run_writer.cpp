@@ -206,7 +206,8 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   // The sliced moves would start with the true nozzle. If an earlier run was kept, that nozzle is
   // not the expected one, and the deviation has to be measured again.
   before_ = verify::apart_mm(run_nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
-                ? deviation_of(job.piece, job.piece.moves, run_nozzle_, rules_->verify, 0.0)
+                ? deviation_of(job.piece, job.piece.moves, job.piece.moves, run_nozzle_,
+                               rules_->verify, 0.0)
                 : job.before;
   const bool counts_steps = rules_->emit.lines.burst_lines > 0;
   std::optional<std::string> objection = "planned for another start";
@@ -252,8 +253,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   text.clear();
   trial.run(job.run(), plan, text);
   Verdict verdict =
-      judge(piece, before_, text, emitter_.printer(), emitter_.printer_limits(), run_nozzle_,
-            rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
+      judge(piece, job.reference(), before_, text, emitter_.printer(), emitter_.printer_limits(),
+            run_nozzle_, rules_->verify, job.lead_in_s(), line_rate_, max_lines_per_s_,
             {piece.begins_run() ? kept_lines_ : last_lines_, !piece.ends_run(), may_be_worse,
              machine_mm_});
   if (verdict.objection) {
@@ -268,11 +269,11 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   }
   sliced_s_ += planner::duration_s(piece.moves);
   written_s_ += planner::duration_s(verdict.replayed) + switching_s_;
-  cost_.add(piece.moves, job.lead_in_s(), job.base, verdict.replayed, verdict.wait_s, run_nozzle_,
-            rules_->verify.nozzle);
+  cost_.add(job.reference(), job.lead_in_s(), job.base, verdict.replayed, verdict.wait_s,
+            run_nozzle_, rules_->verify.nozzle);
   robust_.add(job.robust);
   nominal_.add(job.nominal);
-  late_s_ += planner::duration_s(verdict.replayed) - planner::duration_s(piece.moves) -
+  late_s_ += planner::duration_s(verdict.replayed) - planner::duration_s(job.reference()) -
              job.lead_in_s() - verdict.wait_s;
   last_lines_ = piece.ends_run() ? std::vector<gcode::Segment>() : last_lines(verdict.replayed);
   kept_lines_.clear();

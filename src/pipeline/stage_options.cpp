@@ -390,6 +390,11 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
                                settings.solve.overlap_s, settings.solve.window_s);
   setup.travel_weight = settings.solve.travel_weight;
   setup.jerk_weight = settings.jerk_weight();
+  if (settings.is_timing_free()) {
+    // A run that ends as soon as it can has little time to bring the nozzle to rest.
+    constexpr double kEndWeight = 10.0;
+    setup.end_weight = kEndWeight;
+  }
   if (settings.along_weight() < 1.0) {
     // A motion that is free along the path takes longer to settle than one that is not.
     constexpr double kLeastOverlap_s = 0.2;
@@ -432,9 +437,27 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
   return result;
 }
 
+std::vector<timing::MoveBounds> move_bounds(const Piece& run, const machine::Settings& settings) {
+  const planner::FirmwareConfig config = firmware_config(settings);
+  const planner::Limits limits = planner_limits(settings);
+  std::vector<timing::MoveBounds> bounds;
+  for (const planner::PlannedMove& move : run.moves) {
+    const gcode::Segment& segment = move.segment;
+    timing::MoveBounds own = timing::bounds_by_axes(move, limits, config);
+    own.speed_mm_s =
+        std::min(own.speed_mm_s, segment.extruding()
+                                     ? segment.feed_mm_s
+                                     : settings.timing.max_speed_mm_s.value_or(segment.feed_mm_s));
+    own.tolerance_mm = settings.timing.tolerance_um * 1e-3;
+    bounds.push_back(own);
+  }
+  return bounds;
+}
+
 emit::EmitOptions emit_options(const machine::Settings& settings, std::string version) {
   emit::EmitOptions options;
   options.interpreter = interpreter_options(settings);
+  options.has_free_timing = settings.is_timing_free();
   options.printer_limits = planner_limits(settings);
   options.fixed = firmware_config(settings);
   options.run_limits = run_limits(options.printer_limits, settings);
@@ -494,6 +517,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
   rules.base_accel_times_plan = settings.base_accel_times_asked();
   rules.max_lines_per_s = settings.max_lines_per_s();
+  rules.tolerance_mm = settings.timing.tolerance_um * 1e-3;
   if (grid_mm(settings) > kGridMm) {
     constexpr double kShareOfStep = 0.1;
     rules.leeway.chance_mm = kShareOfStep * grid_mm(settings);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "piece_reader.hpp"
 #include "unflex/compensate/run.hpp"
@@ -11,6 +12,7 @@
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/machine/machine.hpp"
 #include "unflex/planner/planner.hpp"
+#include "unflex/timing/timing.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
@@ -46,6 +48,9 @@ struct RunSetup {
                                  const machine::Settings& settings);
 [[nodiscard]] emit::EmitOptions emit_options(const machine::Settings& settings,
                                              std::string version);
+// What each move of the run may do if its timing is free.
+[[nodiscard]] std::vector<timing::MoveBounds> move_bounds(const Piece& run,
+                                                          const machine::Settings& settings);
 [[nodiscard]] verify::Rules verify_rules(const machine::Settings& settings);
 
 }  // namespace unflex::pipeline

@@ -145,7 +145,7 @@ void ShaperBench::advance(const verify::ReferencePath& path, double time_s) {
   piece_ = std::max(piece_, path.first());
   for (followed_ = std::max(followed_, path.first()); followed_ < path.end(); ++followed_) {
     for (Shaper& shaper : shapers_) {
-      shaper.corners.follow(path[followed_].move, path[followed_].start_s);
+      shaper.corners.follow(path[followed_].move, path[followed_].start_s, path[followed_].end_s);
     }
   }
   for (const double until_s = time_s - lookahead_s_ - kMargin * interval_s_; next_s_ <= until_s;

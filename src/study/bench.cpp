@@ -98,7 +98,7 @@ Straying straying(const BaseMotion& base, const std::vector<planner::PlannedMove
   verify::CornerGauge corners(reach_s(hung));
   double move_start_s = 0.0;
   for (const planner::PlannedMove& move : plan) {
-    corners.follow(move, move_start_s);
+    corners.follow(move, move_start_s, move_start_s + move.duration_s());
     move_start_s += move.duration_s();
   }
   Straying result;

@@ -72,7 +72,7 @@ RunStraying straying_of(const Machine& machine, double shift, const BaseMotion& 
   verify::CornerGauge corners(reach_s(machine));
   double end_s = 0.0;
   for (const planner::PlannedMove& move : run.plan) {
-    corners.follow(move, end_s);
+    corners.follow(move, end_s, end_s + move.duration_s());
     end_s += move.duration_s();
   }
   RunStraying result;

@@ -35,7 +35,7 @@ CornerStats CornerAccumulator::stats() const {
   return stats;
 }
 
-void CornerGauge::follow(const planner::PlannedMove& move, double start_s) {
+void CornerGauge::follow(const planner::PlannedMove& move, double start_s, double end_s) {
   const gcode::Segment& segment = move.segment;
   const double length_mm = segment.length_xy_mm();
   if (!(length_mm > 0.0)) {
@@ -58,8 +58,8 @@ void CornerGauge::follow(const planner::PlannedMove& move, double start_s) {
     end_mm_ = segment.end_mm;
     direction_x_ = x;
     direction_y_ = y;
-    corners_.push_back({start_s + move.duration_s() - reach_s_, kNever, end_mm_[gcode::X],
-                        end_mm_[gcode::Y], kNever, segment.line, false});
+    corners_.push_back({end_s - reach_s_, kNever, end_mm_[gcode::X], end_mm_[gcode::Y], kNever,
+                        segment.line, false});
   }
   find_next();
 }

@@ -60,11 +60,11 @@ RunDeviation measure(const std::vector<planner::PlannedMove>& reference,
                      const std::vector<planner::PlannedMove>& base, NozzleXY start,
                      const NozzleModel& model, double lead_in_s, bool goes_on) {
   std::size_t taken = 0;
-  ReferencePath path([&](planner::PlannedMove& move) {
+  ReferencePath path([&](ReferenceMove& next) {
     if (taken == reference.size()) {
       return false;
     }
-    move = reference[taken++];
+    next.move = reference[taken++];
     return true;
   });
   path.begin_section(lead_in_s);

@@ -194,6 +194,9 @@ double Meter::next_reference_change() {
     return std::numeric_limits<double>::infinity();
   }
   const PathPiece& piece = (*path_)[current_];
+  if (!piece.timing.empty()) {
+    return piece.start_s + piece.timing[piece.passage_after(time_s_ + kSameTime_s)].time_s;
+  }
   double change_s = piece.start_s;
   for (const planner::Phase& phase : piece.move.phases()) {
     if (change_s > time_s_ + kSameTime_s) {
@@ -212,7 +215,7 @@ void Meter::take_corners() {
   corner_piece_ = std::max(corner_piece_, path_->first());
   while (corner_piece_ < path_->end() && (*path_)[corner_piece_].section <= corner_section_) {
     const PathPiece& piece = (*path_)[corner_piece_++];
-    corners_->follow(piece.move, piece.start_s + corner_shift_s_);
+    corners_->follow(piece.move, piece.start_s + corner_shift_s_, piece.end_s + corner_shift_s_);
   }
 }
 
@@ -292,18 +295,29 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
   const planner::PlannedMove& move = piece.move;
   const double local_s = time_s_ - piece.start_s;
   const double middle_s = local_s + 0.5 * duration_s;
-  double acceleration = 0.0;
-  double phase_end_s = 0.0;
-  for (const planner::Phase& phase : move.phases()) {
-    phase_end_s += phase.duration_s;
-    acceleration = phase.accel_mm_s2;
-    if (middle_s < phase_end_s) {
-      break;
-    }
-  }
   const double share_xy = move.length_mm > 0.0 ? piece.length_xy_mm / move.length_mm : 0.0;
-  const double covered = move.distance_mm(local_s) * share_xy;
-  const double speed = move.velocity_mm_s(local_s) * share_xy;
+  double acceleration = 0.0;
+  double covered = 0.0;
+  double speed = 0.0;
+  if (piece.timing.empty()) {
+    double phase_end_s = 0.0;
+    for (const planner::Phase& phase : move.phases()) {
+      phase_end_s += phase.duration_s;
+      acceleration = phase.accel_mm_s2;
+      if (middle_s < phase_end_s) {
+        break;
+      }
+    }
+    covered = move.distance_mm(local_s) * share_xy;
+    speed = move.velocity_mm_s(local_s) * share_xy;
+  } else {
+    const std::size_t after = piece.passage_after(piece.start_s + middle_s);
+    const Passage& from = piece.timing[after - 1];
+    const Passage& to = piece.timing[after];
+    const double lasts_s = to.time_s - from.time_s;
+    covered = piece.covered_xy_mm(time_s_);
+    speed = lasts_s > 0.0 ? (to.covered_mm - from.covered_mm) / lasts_s * share_xy : 0.0;
+  }
   const auto along = [&](double start_mm, double direction) {
     return dynamics::BaseSegment{start_mm + direction * covered, direction * speed,
                                  direction * acceleration * share_xy};

@@ -1,5 +1,6 @@
 #include "unflex/verify/reference_path.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -19,7 +20,25 @@ planner::PlannedMove resting(double x_mm, double y_mm, double duration_s) {
   return move;
 }
 
+std::size_t PathPiece::passage_after(double t) const {
+  const auto after = std::upper_bound(
+      timing.begin() + 1, timing.end() - 1, t - start_s,
+      [](double time_s, const Passage& passage) { return time_s < passage.time_s; });
+  return static_cast<std::size_t>(after - timing.begin());
+}
+
 double PathPiece::covered_xy_mm(double t) const {
+  if (!timing.empty() && move.length_mm > 0.0) {
+    const std::size_t after = passage_after(t);
+    const Passage& from = timing[after - 1];
+    const Passage& to = timing[after];
+    const double share =
+        to.time_s > from.time_s
+            ? std::clamp((t - start_s - from.time_s) / (to.time_s - from.time_s), 0.0, 1.0)
+            : 1.0;
+    return (from.covered_mm + share * (to.covered_mm - from.covered_mm)) / move.length_mm *
+           length_xy_mm;
+  }
   return move.length_mm > 0.0 ? move.distance_mm(t - start_s) / move.length_mm * length_xy_mm : 0.0;
 }
 
@@ -32,10 +51,10 @@ void ReferencePath::begin_section(double lead_in_s) {
 
 void ReferencePath::extend_to(double t) {
   while (!section_complete_ && end_s_ <= t) {
-    planner::PlannedMove move;
-    if (source_(move)) {
-      const bool measured = move.segment.length_xy_mm() > 0.0;
-      append(std::move(move), measured);
+    ReferenceMove reference;
+    if (source_(reference)) {
+      const bool measured = reference.move.segment.length_xy_mm() > 0.0;
+      append(std::move(reference), measured);
     } else {
       section_complete_ = true;
     }
@@ -43,15 +62,17 @@ void ReferencePath::extend_to(double t) {
 }
 
 void ReferencePath::hold(double x_mm, double y_mm, double duration_s) {
-  append(resting(x_mm, y_mm, duration_s), true);
+  append({resting(x_mm, y_mm, duration_s), {}}, true);
 }
 
-void ReferencePath::append(planner::PlannedMove move, bool measured) {
+void ReferencePath::append(ReferenceMove reference, bool measured) {
+  const double duration_s = reference.duration_s();
+  planner::PlannedMove& move = reference.move;
   PathPiece piece;
   piece.measured = measured;
   piece.section = section_;
   piece.start_s = end_s_;
-  piece.end_s = end_s_ + move.duration_s();
+  piece.end_s = end_s_ + duration_s;
   piece.x_mm = move.segment.start_mm[gcode::X];
   piece.y_mm = move.segment.start_mm[gcode::Y];
   piece.length_xy_mm = move.segment.length_xy_mm();
@@ -65,6 +86,7 @@ void ReferencePath::append(planner::PlannedMove move, bool measured) {
     filament_mm_ += move.segment.delta(gcode::E);
   }
   piece.move = std::move(move);
+  piece.timing = std::move(reference.timing);
   end_s_ = piece.end_s;
   pieces_.push_back(std::move(piece));
 }

@@ -38,6 +38,7 @@ planner::Filters filters_of(const gcode::ModalState& state) {
 // What the line that announces a run says of its lead-in.
 double lead_in_s(std::string_view mark) {
   mark.remove_prefix(kRunMark.size());
+  mark = mark.substr(0, mark.find(kFreeTimingWord));
   return mark.starts_with(kLeadInWord)
              ? std::max(0.0, parse_number(mark.substr(kLeadInWord.size())).value_or(0.0))
              : 0.0;
@@ -260,6 +261,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   Section run;
   run.compensated = section.may_be_added && ended.compensated && !ended.regime.has_value();
   run.lead_in_s = run.compensated ? ended.lead_in_s : 0.0;
+  run.has_free_timing = run.compensated && ended.has_free_timing;
   in_compensated_run_ = run.compensated;
 
   push_section(std::move(section));
@@ -271,6 +273,7 @@ void Replay::place(gcode::Line line, const Regime& before, bool motion) {
   if (is_emitted() && line.content().starts_with(kRunMark)) {
     sections_.back().compensated = true;
     sections_.back().lead_in_s = lead_in_s(line.content());
+    sections_.back().has_free_timing = line.content().ends_with(kFreeTimingWord);
     in_compensated_run_ = true;
   } else if (line.content().starts_with(kRunEndMark)) {
     in_compensated_run_ = false;

@@ -50,9 +50,11 @@ struct Section {
   bool is_approach = false;
   // barrier: its form is one that unflex adds, so the sliced file may not have this barrier.
   bool may_be_added = false;
-  // run: announced as compensated, and how long before its plan the base begins.
+  // run: announced as compensated, how long before its plan the base begins, and whether it need
+  // not last as long as that plan.
   bool compensated = false;
   double lead_in_s = 0.0;
+  bool has_free_timing = false;
 };
 
 // A line that is no section, and where the machine is when it comes.

@@ -27,13 +27,16 @@ double speed_mm_s(const planner::PlannedMove& move) {
   return move.duration_s() > 0.0 ? move.segment.length_xy_mm() / move.duration_s() : 0.0;
 }
 
-// How far the base may be from the path at a speed.
-double largest_offset_mm(const Rules& rules, double max_accel_mm_s2, double v_mm_s) {
-  return kRounding_mm + std::hypot(rules.nozzle.x.largest_lag_mm(max_accel_mm_s2, v_mm_s),
-                                   rules.nozzle.y.largest_lag_mm(max_accel_mm_s2, v_mm_s));
-}
-
 }  // namespace
+
+double SectionRules::largest_offset_mm(double max_accel_mm_s2, double v_mm_s) const {
+  // Where the timing is free, the spring may throw the nozzle round a corner faster than the base
+  // could.
+  constexpr double kTimesInFreeTiming = 2.5;
+  return kRounding_mm + (has_free_timing_ ? kTimesInFreeTiming : 1.0) *
+                            std::hypot(rules_->nozzle.x.largest_lag_mm(max_accel_mm_s2, v_mm_s),
+                                       rules_->nozzle.y.largest_lag_mm(max_accel_mm_s2, v_mm_s));
+}
 
 void SectionRules::Breach::offer(double a_value, double limit, std::size_t a_line) {
   if (line == 0 && a_value > limit) {
@@ -42,8 +45,9 @@ void SectionRules::Breach::offer(double a_value, double limit, std::size_t a_lin
   }
 }
 
-void SectionRules::begin(const LineRate& rate_before, bool ringing) {
+void SectionRules::begin(const LineRate& rate_before, bool ringing, bool has_free_timing) {
   ringing_ = ringing;
+  has_free_timing_ = has_free_timing;
   densest_ = 0.0;
   sliced_rate_ = rate_before;
   sliced_rate_.forget();
@@ -62,8 +66,7 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
   last_line_ = line;
   const double offset_mm = meter.base_offset_mm();
   const double v_mm_s = speed_mm_s(move);
-  const double over_mm =
-      offset_mm - largest_offset_mm(*rules_, rules_->base_max_accel_mm_s2, v_mm_s);
+  const double over_mm = offset_mm - largest_offset_mm(rules_->base_max_accel_mm_s2, v_mm_s);
   if (over_mm > offset_.over_mm) {
     offset_ = {over_mm, offset_mm, v_mm_s, line};
   }
@@ -95,7 +98,7 @@ void SectionRules::end(const LineRate& rate, const Meter& kept, const Meter& emi
     check_swing(kept, emitted);
   }
   check_filament();
-  if (offset_.value_mm > largest_offset_mm(*rules_, base_max_accel_mm_s2, offset_.speed_mm_s)) {
+  if (offset_.value_mm > largest_offset_mm(base_max_accel_mm_s2, offset_.speed_mm_s)) {
     violations_->in_output(
         offset_.line,
         fmt::format("the base is {:.3f} mm away from the sliced path", offset_.value_mm));
@@ -141,10 +144,14 @@ void SectionRules::check_nozzle(const Meter& kept, const Meter& emitted) {
                      error.duration_s(), meter.swing_mm(), rules_->nozzle);
   };
   const Leeway& leeway = rules_->leeway;
+  // Where the timing is free, the nozzle may use the tolerance.
+  constexpr double kTimesTolerance = 1.1;
+  const double tolerance_mm = has_free_timing_ ? rules_->tolerance_mm : 0.0;
   const RunError before = error_of(kept);
   const RunError after = error_of(emitted);
-  if (after.rms_mm > std::max(leeway.times * before.rms_mm, leeway.rms_mm) ||
-      after.max_mm > std::max(leeway.times * before.max_mm + leeway.chance_mm, leeway.max_mm)) {
+  if (after.rms_mm > std::max({leeway.times * before.rms_mm, leeway.rms_mm, tolerance_mm}) ||
+      after.max_mm > std::max({leeway.times * before.max_mm + leeway.chance_mm, leeway.max_mm,
+                               kTimesTolerance * tolerance_mm})) {
     violations_->in_output(
         first_line_,
         fmt::format(

@@ -22,7 +22,7 @@ class SectionRules {
       : rules_(&rules), violations_(&violations) {}
 
   // ringing: kept motion just before the run has set the nozzle swinging.
-  void begin(const LineRate& rate_before, bool ringing);
+  void begin(const LineRate& rate_before, bool ringing, bool has_free_timing);
   // A sliced move of the run, planned by itself from rest to rest.
   void add_sliced(const planner::PlannedMove& move) { sliced_rate_.add(move); }
   // A move of the emitted run, after it has been played. late: the plan had ended when it began.
@@ -39,6 +39,8 @@ class SectionRules {
     std::size_t line = 0;
     void offer(double a_value, double limit, std::size_t a_line);
   };
+  // How far the base may be from the path at a speed.
+  [[nodiscard]] double largest_offset_mm(double max_accel_mm_s2, double v_mm_s) const;
   void check_rate(const LineRate& rate);
   void check_nozzle(const Meter& kept, const Meter& emitted);
   void check_swing(const Meter& kept, const Meter& emitted);
@@ -48,6 +50,7 @@ class SectionRules {
   Violations* violations_;
   LineRate sliced_rate_;
   bool ringing_ = false;
+  bool has_free_timing_ = false;
   double densest_ = 0.0;  // most filament per path, mm/mm
   std::size_t first_line_ = 0;
   std::size_t last_line_ = 0;

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <istream>
 #include <optional>
 #include <string>
 
 #include "filament_ledger.hpp"
+#include "filament_timing.hpp"
 #include "line_check.hpp"
 #include "nozzles.hpp"
 #include "replay.hpp"
@@ -26,7 +28,8 @@ namespace unflex::verify {
 // `path_`. `unshaped_` is that nozzle without the shaper. `emitted_` is the nozzle
 // of the emitted file. In compensated runs, which begin and end at rest, it is measured against the
 // plan of the run by itself, `run_path_`: where the sliced file passes from one section into the
-// next at speed, that plan takes some ms longer.
+// next at speed, that plan takes some ms longer. Where the timing of a run is free, `run_path_` has
+// the timing of the filament in the emitted file.
 // How long a file's machine has stood still for lines that switch its filters.
 class Switching {
  public:
@@ -59,6 +62,10 @@ class Verifier {
  private:
   bool next_input_move(planner::PlannedMove& move);
   bool next_resting_move(planner::PlannedMove& move);
+  bool next_reference_move(ReferenceMove& move);
+  bool next_sliced_move(std::deque<planner::PlannedMove>& own, planner::PlannedMove& move);
+  bool next_output_move(planner::PlannedMove& move);
+  bool next_output_move_ahead(planner::PlannedMove& move);
   bool ends_here(const planner::PlannedMove& move, const Replay& file);
   void begin_section(bool compensated);
   void play_run();
@@ -79,6 +86,9 @@ class Verifier {
   void end_section();
   void let_original_follow(double until_s);
   void let_kept_follow(double until_s);
+  [[nodiscard]] bool has_free_timing() const { return kept_path_ == &resting_path_; }
+  void let_original_follow_moves();
+  [[nodiscard]] double kept_end_s();
   void finish_reference();
   [[nodiscard]] double filament_tolerance_mm() const;
   void check_run(bool compensated);
@@ -100,12 +110,21 @@ class Verifier {
   LineCheck lines_;
   ReferencePath path_;
   ReferencePath run_path_;
-  double run_lead_in_s_ = 0.0;            // how long before run_path_ the emitted run starts
-  ReferencePath* emitted_path_ = &path_;  // what emitted_ is measured against
+  // In runs whose timing is free: the plan of the run as sliced.
+  ReferencePath resting_path_;
+  double run_lead_in_s_ = 0.0;             // how long before run_path_ the emitted run starts
+  ReferencePath* emitted_path_ = &path_;   // what emitted_ is measured against
+  ReferencePath* kept_path_ = &run_path_;  // what kept_ is measured against
+  // Where the timing is free, the sliced moves come at the pace of the emitted ones. Both are read
+  // ahead, and each sliced move is asked for by two paths.
+  FilamentTiming filament_timing_;
+  std::deque<planner::PlannedMove> output_ahead_;
+  std::deque<planner::PlannedMove> sliced_for_timing_;
+  std::deque<planner::PlannedMove> sliced_for_kept_;
   Nozzles original_;
   std::optional<Nozzles> unshaped_;  // from the first motion on that a shaper changes
   // The nozzle if the sliced moves of a compensated run were kept. It starts from the state of
-  // emitted_ and is measured against run_path_.
+  // emitted_ and is measured against the plan of the run by itself.
   Meter kept_;
   Nozzles emitted_;
   gcode::Shaper original_shaper_;  // shaper that acts on original_
@@ -125,7 +144,10 @@ class Verifier {
   std::optional<Error> failure_;   // an endless move
   std::size_t section_first_ = 0;  // first piece of the path in this section
   std::size_t original_next_ = 0;  // piece that original_ plays next
-  std::size_t kept_next_ = 0;      // piece of run_path_ that kept_ plays next
+  std::size_t kept_next_ = 0;      // piece of kept_path_ that kept_ plays next
+  std::size_t kept_first_ = 0;     // the first of them in this section
+  std::size_t run_first_ = 0;      // first piece of run_path_ in this section
+  std::size_t run_next_ = 0;       // first piece of run_path_ that emitted_ has not passed
   std::size_t moves_ = 0;
   VerifyReport totals_;
 };

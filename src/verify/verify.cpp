@@ -67,8 +67,13 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       output_(output, output_name, rules.interpreter, rules.limits, rules.fixed,
               ReplayedFile::emitted),
       lines_(input_, output_, violations_),
-      path_([this](planner::PlannedMove& move) { return next_input_move(move); }),
-      run_path_([this](planner::PlannedMove& move) { return next_resting_move(move); }),
+      path_([this](ReferenceMove& next) { return next_input_move(next.move); }),
+      run_path_([this](ReferenceMove& next) { return next_reference_move(next); }),
+      resting_path_(
+          [this](ReferenceMove& next) { return next_sliced_move(sliced_for_kept_, next.move); }),
+      filament_timing_(
+          [this](planner::PlannedMove& move) { return next_sliced_move(sliced_for_timing_, move); },
+          [this](planner::PlannedMove& move) { return next_output_move_ahead(move); }),
       original_(rules.nozzle, observation, NozzleBase::sliced),
       kept_(coarse(rules.nozzle)),
       emitted_(rules.nozzle, observation, NozzleBase::emitted),
@@ -131,6 +136,43 @@ bool Verifier::next_resting_move(planner::PlannedMove& move) {
   return true;
 }
 
+// The next move of run_path_.
+bool Verifier::next_reference_move(ReferenceMove& move) {
+  return has_free_timing() ? filament_timing_.next(move) : next_resting_move(move.move);
+}
+
+// The next sliced move of a run whose timing is free, for one of the two that ask for it.
+bool Verifier::next_sliced_move(std::deque<planner::PlannedMove>& own, planner::PlannedMove& move) {
+  if (own.empty()) {
+    if (!next_resting_move(move)) {
+      return false;
+    }
+    sliced_for_timing_.push_back(move);
+    sliced_for_kept_.push_back(std::move(move));
+  }
+  move = std::move(own.front());
+  own.pop_front();
+  return true;
+}
+
+bool Verifier::next_output_move(planner::PlannedMove& move) {
+  if (output_ahead_.empty()) {
+    return output_.next(move);
+  }
+  move = std::move(output_ahead_.front());
+  output_ahead_.pop_front();
+  return true;
+}
+
+// For filament_timing_, before the move is played.
+bool Verifier::next_output_move_ahead(planner::PlannedMove& move) {
+  if (!output_.next(move)) {
+    return false;
+  }
+  output_ahead_.push_back(move);
+  return true;
+}
+
 // Whether the verification ends here because the move is endless.
 bool Verifier::ends_here(const planner::PlannedMove& move, const Replay& file) {
   if (is_endless(move)) {
@@ -143,7 +185,8 @@ void Verifier::begin_section(bool compensated) {
   max_lines_per_s_ = std::max(max_lines_per_s_, rate_.max_per_s());
   rate_.forget();
   base_.begin_run();
-  rules_of_run_.begin(rate_, since_kept_motion_s_ < kRingsFor_s);
+  rules_of_run_.begin(rate_, since_kept_motion_s_ < kRingsFor_s,
+                      compensated && output_.section().has_free_timing);
   path_.begin_section();
   shape_sliced();
   for_sliced([&](Nozzles& nozzles) { nozzles.begin_section(path_); });
@@ -153,19 +196,33 @@ void Verifier::begin_section(bool compensated) {
     violations_.begin_run();
     // A long rest, so that the path of the previous run does not count as near.
     run_path_.rest(kApart_s);
-    run_lead_in_s_ = output_.section().lead_in_s + planner::wait_s(output_.front(), rules_.fixed);
+    kept_path_ = output_.section().has_free_timing ? &resting_path_ : &run_path_;
+    run_lead_in_s_ = 0.0;
+    if (has_free_timing()) {
+      filament_timing_.begin(filament_tolerance_mm());
+      output_ahead_.clear();
+      sliced_for_timing_.clear();
+      sliced_for_kept_.clear();
+      resting_path_.rest(kApart_s);
+    } else {
+      run_lead_in_s_ = output_.section().lead_in_s + planner::wait_s(output_.front(), rules_.fixed);
+    }
     run_path_.begin_section(run_lead_in_s_);
+    run_first_ = run_next_ = run_path_.end();
   }
   emitted_path_ = compensated ? &run_path_ : &path_;
   shape_emitted();
   emitted_.begin_section(*emitted_path_);
   if (compensated) {
     const Meter& emitted = emitted_.main();
-    kept_.begin_section(run_path_);
+    if (has_free_timing()) {
+      resting_path_.begin_section();
+    }
+    kept_.begin_section(*kept_path_);
     kept_.set_state(emitted.nozzle(), emitted.base_x_mm(), emitted.base_y_mm());
     // The kept moves would begin at once, without a lead-in.
     kept_.skip(run_lead_in_s_);
-    kept_next_ = run_path_.end();
+    kept_next_ = kept_first_ = kept_path_->end();
   }
   if (observer_ != nullptr) {
     observer_->section(path_, *emitted_path_);
@@ -254,7 +311,7 @@ void Verifier::shape_emitted() {
 void Verifier::play_run_moves(bool compensated) {
   planner::PlannedMove move;
   for (;;) {
-    if (output_.next(move)) {
+    if (next_output_move(move)) {
       if (ends_here(move, output_)) {
         return;
       }
@@ -306,9 +363,28 @@ void Verifier::play(const planner::PlannedMove& move) {
     too_much_line_ = move.segment.line;
   }
   // The original advances in its section as far as the emitted nozzle has in its own.
-  const double elapsed_s = emitted_.plan_time_s() - emitted_path_->section_start_s();
-  path_.extend_to(path_.section_start_s() + elapsed_s);
-  let_original_follow(path_.section_start_s() + elapsed_s);
+  if (compensated && has_free_timing()) {
+    let_original_follow_moves();
+  } else {
+    const double elapsed_s = emitted_.plan_time_s() - emitted_path_->section_start_s();
+    path_.extend_to(path_.section_start_s() + elapsed_s);
+    let_original_follow(path_.section_start_s() + elapsed_s);
+  }
+}
+
+// Where the two are not on one clock, the original advances up to the move that the emitted nozzle
+// has passed.
+void Verifier::let_original_follow_moves() {
+  while (run_next_ < run_path_.end() && run_path_[run_next_].end_s <= emitted_.plan_time_s()) {
+    ++run_next_;
+  }
+  const std::size_t passed = run_next_ - run_first_;
+  while (path_.end() - section_first_ < passed && !path_.section_complete()) {
+    path_.extend_to(path_.end_s());
+  }
+  const std::size_t known = std::min(path_.end() - section_first_, passed);
+  let_original_follow(known > 0 ? path_[section_first_ + known - 1].end_s
+                                : path_.section_start_s());
 }
 
 void Verifier::let_original_follow(double until_s) {
@@ -327,17 +403,32 @@ void Verifier::let_original_follow(double until_s) {
     input_.skip_resting();
   } else {
     path_.discard_before(needed_s - original_.main().reach_s());
-    let_kept_follow(emitted_.plan_time_s());
-    run_path_.discard_before(std::min(kept_.time_s(), emitted_.main().time_s()) -
-                             emitted_.main().reach_s());
+    let_kept_follow(has_free_timing() ? kept_end_s() : emitted_.plan_time_s());
+    if (has_free_timing()) {
+      run_path_.discard_before(emitted_.main().time_s() - emitted_.main().reach_s());
+      resting_path_.discard_before(kept_.time_s() - kept_.reach_s());
+    } else {
+      run_path_.discard_before(std::min(kept_.time_s(), emitted_.main().time_s()) -
+                               emitted_.main().reach_s());
+    }
   }
 }
 
 void Verifier::let_kept_follow(double until_s) {
-  while (kept_next_ < run_path_.end() && run_path_[kept_next_].end_s <= until_s) {
-    const planner::PlannedMove move = run_path_[kept_next_++].move;
+  while (kept_next_ < kept_path_->end() && (*kept_path_)[kept_next_].end_s <= until_s) {
+    const planner::PlannedMove move = (*kept_path_)[kept_next_++].move;
     kept_.play(move);
   }
+}
+
+// Until when kept_ makes the moves that the emitted nozzle has passed.
+double Verifier::kept_end_s() {
+  const std::size_t passed = run_next_ - run_first_;
+  while (resting_path_.end() - kept_first_ < passed && !resting_path_.section_complete()) {
+    resting_path_.extend_to(resting_path_.end_s());
+  }
+  const std::size_t known = std::min(resting_path_.end() - kept_first_, passed);
+  return known > 0 ? resting_path_[kept_first_ + known - 1].end_s : resting_path_.section_start_s();
 }
 
 void Verifier::end_section() {
@@ -346,6 +437,9 @@ void Verifier::end_section() {
   }
   emitted_.wait_for_reference();
   if (emitted_path_ == &run_path_) {
+    while (!kept_path_->section_complete()) {
+      kept_path_->extend_to(kept_path_->end_s());
+    }
     let_kept_follow(std::numeric_limits<double>::infinity());
   }
   finish_reference();

@@ -47,8 +47,9 @@ struct Corner {
   [[nodiscard]] std::optional<std::string> objection_to(const std::string& text,
                                                         double max_lines_per_s = 1000.0) const {
     const dynamics::NozzleXY nozzle = at_rest({0.0, 0.0, 0.2, 0.0}, rules().nozzle);
-    return pipeline::judge(run, deviation_of(run, run.moves, nozzle, rules(), 0.0), text, printer,
-                           {}, nozzle, rules(), 0.0, {}, max_lines_per_s, {})
+    return pipeline::judge(run, run.moves,
+                           deviation_of(run, run.moves, run.moves, nozzle, rules(), 0.0), text,
+                           printer, {}, nozzle, rules(), 0.0, {}, max_lines_per_s, {})
         .objection;
   }
 
@@ -95,8 +96,9 @@ TEST(Judge, TakesOnlyWhatIsOffThePlanAsSwingWhereAPartEnds) {
   dynamics::NozzleXY swinging = still;
   swinging.y.add(rules().nozzle.y.riding(0.02));
   const Verdict verdict =
-      judge(part, deviation_of(part, part.moves, swinging, rules(), 0.0), "G1 X10 E0.5 F6030\n",
-            printer, {}, still, rules(), 0.0, {}, 1000.0, {.lines_before = {}, .goes_on = true});
+      judge(part, part.moves, deviation_of(part, part.moves, part.moves, swinging, rules(), 0.0),
+            "G1 X10 E0.5 F6030\n", printer, {}, still, rules(), 0.0, {}, 1000.0,
+            {.lines_before = {}, .goes_on = true});
   EXPECT_EQ(verdict.objection, std::nullopt);
 }
 

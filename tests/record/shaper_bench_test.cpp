@@ -35,11 +35,11 @@ struct Benched {
       : bench(model(), dynamics::kShaperKinds, printer_shaper, errors.size()) {
     const std::vector<planner::PlannedMove> moves = corner();
     std::size_t taken = 0;
-    verify::ReferencePath path([&](planner::PlannedMove& move) {
+    verify::ReferencePath path([&](verify::ReferenceMove& next) {
       if (taken == moves.size()) {
         return false;
       }
-      move = moves[taken++];
+      next.move = moves[taken++];
       return true;
     });
     path.begin_section();
@@ -157,8 +157,8 @@ TEST(ShaperBench, MeasuresALongPrintOnlyNowAndThen) {
   move.cruise_v_mm_s = 1.0;
   move.cruise_s = kLong_s;
   bool given = false;
-  verify::ReferencePath path([&](planner::PlannedMove& next) {
-    next = move;
+  verify::ReferencePath path([&](verify::ReferenceMove& next) {
+    next.move = move;
     return !std::exchange(given, true);
   });
   path.begin_section();

@@ -28,7 +28,7 @@ CornerGauge gauge_on(const std::vector<Point>& points) {
   CornerGauge gauge(kReach_s);
   double start_s = 0.0;
   for (const planner::PlannedMove& move : plan_path(points, slow_corners())) {
-    gauge.follow(move, start_s);
+    gauge.follow(move, start_s, start_s + move.duration_s());
     start_s += move.duration_s();
   }
   return gauge;

@@ -38,11 +38,11 @@ class Lag : public ::testing::Test {
 
   std::vector<planner::PlannedMove> moves_;
   std::size_t taken_ = 0;
-  ReferencePath path_{[this](planner::PlannedMove& move) {
+  ReferencePath path_{[this](ReferenceMove& next) {
     if (taken_ == moves_.size()) {
       return false;
     }
-    move = moves_[taken_++];
+    next.move = moves_[taken_++];
     return true;
   }};
 };

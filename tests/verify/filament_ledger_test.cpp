@@ -21,9 +21,9 @@ class Ledger : public ::testing::Test {
   void play(const std::vector<planner::PlannedMove>& reference,
             const std::vector<planner::PlannedMove>& emitted) {
     std::size_t taken = 0;
-    ReferencePath path([&](planner::PlannedMove& move) {
+    ReferencePath path([&](ReferenceMove& next) {
       if (taken == reference.size()) return false;
-      move = reference[taken++];
+      next.move = reference[taken++];
       return true;
     });
     path.begin_section();

@@ -17,11 +17,11 @@ ReferencePath hairpin(std::vector<planner::PlannedMove>& moves, std::size_t& tak
       {{0.0, 0.0, 100.0}, {50.0, 0.0, 100.0, 1.0}, {50.0, 1.0, 100.0, 0.1}, {0.0, 1.0, 100.0, 1.0}},
       limits);
   taken = 0;
-  ReferencePath path([&](planner::PlannedMove& move) {
+  ReferencePath path([&](ReferenceMove& next) {
     if (taken == moves.size()) {
       return false;
     }
-    move = moves[taken++];
+    next.move = moves[taken++];
     return true;
   });
   path.begin_section();

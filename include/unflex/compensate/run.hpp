@@ -60,6 +60,7 @@ struct Setup {
   double window_s = 2.0;           // core of a window where a run needs several
   double overlap_s = 0.06;         // pre-roll and post-roll of such windows
   double travel_weight = 0.1;      // w where nothing is extruded; 1 where something is
+  double end_weight = 0.0;         // least w around the end of a run
   double jerk_weight = 1.5;        // ρ / (h⁶ (ωh)⁴)
   std::optional<Contour> contour;  // unset: the nozzle shall be where r is at the time
 

@@ -9,9 +9,11 @@ namespace unflex {
 // Begins every comment line that unflex writes.
 inline constexpr std::string_view kOwnMark = ";unflex";
 // Stands before the first line and behind the last line of each compensated run. If the base moves
-// before the plan does, kLeadInWord and a time in s follow the first.
+// before the plan does, kLeadInWord and a time in s follow the first. If the run need not last as
+// long as sliced, kFreeTimingWord ends it.
 inline constexpr std::string_view kRunMark = ";unflex run";
 inline constexpr std::string_view kLeadInWord = " LEAD_IN=";
+inline constexpr std::string_view kFreeTimingWord = " TIMING=free";
 inline constexpr std::string_view kRunEndMark = ";unflex end";
 
 // The macro that a run calls where it begins and where it has ended.

@@ -17,6 +17,8 @@ struct EmitOptions {
   double line_accel_mm_s2 = 1e6;  // acceleration of a line inside a run
   LineRules lines;
   std::string version;  // for the comment at the first run
+  // Runs need not last as long as sliced.
+  bool has_free_timing = false;
   // Klipper: UNFLEX_CHECKPOINT is called where a run begins and ends and where the printer's own
   // shaper is back, so that a pause inside the run takes effect at its end (docs/pausing.md).
   bool checkpoints = false;

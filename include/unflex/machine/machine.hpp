@@ -185,10 +185,16 @@ struct SolveSettings {
   std::optional<double> tail_ms;  // the base may settle this much longer; unset: max(8ζ/ω, 2 ms)
   double travel_weight = 0.1;     // weight of the error where nothing is extruded
   // Weight of the error along the path, if that across it has 1. Unset: 0.01 where the base is to
-  // suit several models of an axis, otherwise 1.
+  // suit several models of an axis and the timing is as sliced, otherwise 1.
   std::optional<double> along_weight;
   // Regularisation (docs/theory.md). Unset: 1.5, or 15 where along_weight is below 1.
   std::optional<double> jerk_weight;
+};
+
+// As fast as a tolerance of the nozzle allows, instead of as sliced (docs/timing.md).
+struct TimingSettings {
+  double tolerance_um = 0.0;             // 0: the timing stays as sliced
+  std::optional<double> max_speed_mm_s;  // of travel; unset: the slicer's F
 };
 
 struct EmitSettings {
@@ -236,6 +242,7 @@ struct Settings {
   KinematicsSettings kinematics;
   BaseSettings base;
   SolveSettings solve;
+  TimingSettings timing;
   EmitSettings emit;
   VerifySettings verify;
   // Where each key in force came from ("limits.max_accel_mm_s2" → "printer.toml:7", "--set",
@@ -249,6 +256,9 @@ struct Settings {
   std::vector<Diagnostic> guesses;
   // Why no print is compensated for this printer, and the way out (docs/compatibility.md).
   std::optional<Diagnostic> refusal;
+
+  // Whether the timing is chosen by a tolerance, and not as sliced.
+  [[nodiscard]] bool is_timing_free() const { return timing.tolerance_um > 0.0; }
 
   // The values behind unset options, by the firmware's own formulas and defaults.
   [[nodiscard]] std::array<double, 4> axis_max_velocity_mm_s() const;

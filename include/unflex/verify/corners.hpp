@@ -45,9 +45,9 @@ class CornerGauge {
  public:
   explicit CornerGauge(double reach_s) : reach_s_(reach_s) {}
 
-  // The next move of the path begins at start_s. Moves come in their order, each before the nozzle
-  // is within reach of its end.
-  void follow(const planner::PlannedMove& move, double start_s);
+  // The next move of the path, and when the reference passes it. Moves come in their order, each
+  // before the nozzle is within reach of its end.
+  void follow(const planner::PlannedMove& move, double start_s, double end_s);
   // The nozzle is here at time_s. It has come straight from the last place, so samples must be
   // close. Times must not decrease.
   void sample(double time_s, double x_mm, double y_mm) {

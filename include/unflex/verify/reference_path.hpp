@@ -15,8 +15,26 @@ namespace unflex::verify {
 // A move of this duration that stands still.
 [[nodiscard]] planner::PlannedMove resting(double x_mm, double y_mm, double duration_s);
 
-// Hands out the next planned move of a section; false at the section's end.
-using MoveSource = std::function<bool(planner::PlannedMove&)>;
+// When the reference has covered how much of a move.
+struct Passage {
+  double time_s = 0.0;      // since the move began
+  double covered_mm = 0.0;  // of its length
+};
+
+// A move of the path, and the timing in which the reference passes it.
+struct ReferenceMove {
+  planner::PlannedMove move;
+  // From the move's beginning to its end, at even speed between two passages. Empty: as the move
+  // itself has it.
+  std::vector<Passage> timing;
+
+  [[nodiscard]] double duration_s() const {
+    return timing.empty() ? move.duration_s() : timing.back().time_s;
+  }
+};
+
+// Hands out the next move of a section; false at the section's end.
+using MoveSource = std::function<bool(ReferenceMove&)>;
 
 struct PathPiece {
   double start_s = 0.0;
@@ -31,9 +49,12 @@ struct PathPiece {
   double filament_mm = 0.0;  // filament that extruding pieces have laid before this one
   std::size_t section = 0;   // number of its section
   planner::PlannedMove move;
+  std::vector<Passage> timing;  // as in ReferenceMove
 
   // Length of the XY path the move has covered at time t, in [0, length_xy_mm].
   [[nodiscard]] double covered_xy_mm(double t) const;
+  // The part of `timing`, which is not empty, that is passed at time t: it ends with this passage.
+  [[nodiscard]] std::size_t passage_after(double t) const;
 };
 
 class ReferencePath {
@@ -72,7 +93,7 @@ class ReferencePath {
   void discard_before(double t);
 
  private:
-  void append(planner::PlannedMove move, bool measured);
+  void append(ReferenceMove reference, bool measured);
 
   MoveSource source_;
   std::vector<PathPiece> pieces_;

@@ -53,6 +53,8 @@ struct Rules {
   double base_accel_times_plan = 0.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
   Leeway leeway;
+  // What the nozzle may stray in a run whose timing is not as sliced. 0: all runs are as sliced.
+  double tolerance_mm = 0.0;
   // The emitted file has an Interpreter::approach wherever unflex would write one. A file that
   // unflex has not written has none.
   bool approaches = true;

@@ -1,0 +1,61 @@
+// As fast as a tolerance of the nozzle allows: the timing of a run chosen anew, along the path as
+// it was sliced.
+//
+//   F   the slicer's feed, which stays        e   contour error of the nozzle
+//
+// Method: local scaling. The run is planned with limits of its own on every piece of the path, and
+// compensate::solve() finds the base for that plan as for any other. Where the nozzle then strays
+// more than the tolerance or runs ahead of F, the plan becomes slower; where there is room, it
+// becomes faster; and so on.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "unflex/compensate/axis_window.hpp"
+#include "unflex/compensate/run.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::timing {
+
+// What a move may do, along its path.
+struct MoveBounds {
+  double speed_mm_s = std::numeric_limits<double>::infinity();
+  double accel_mm_s2 = std::numeric_limits<double>::infinity();
+  // Where it begins and ends.
+  double start_speed_mm_s = std::numeric_limits<double>::infinity();
+  double end_speed_mm_s = std::numeric_limits<double>::infinity();
+  // Largest e for each model that the axes may have, where filament is laid, and the largest swing
+  // at the end of a run.
+  double tolerance_mm = std::numeric_limits<double>::infinity();
+};
+
+// Largest e of travel: it should not leave the way that the slicer has found between walls.
+inline constexpr double kTravelTolerance_mm = 0.2;
+
+// What the firmware's limits of axes let a move do, those of acceleration in X and Y and of corners
+// aside. limits: those of the printer, not of the print.
+[[nodiscard]] MoveBounds bounds_by_axes(const planner::PlannedMove& move,
+                                        const planner::Limits& limits,
+                                        const planner::FirmwareConfig& config);
+
+// A run's path in a new timing.
+struct Timed {
+  std::vector<planner::PlannedMove> moves;  // each move in one piece or several
+  std::vector<std::size_t> pieces;          // how many, for each move of the path
+};
+
+// The moves of the course in the least time that the bounds allow, one for each of its moves. A
+// part of a longer run keeps its timing where it meets its neighbours. nullopt: no timing was found
+// that is faster and keeps the bounds.
+[[nodiscard]] std::optional<Timed> faster(const compensate::Course& course,
+                                          const compensate::Setup& setup,
+                                          const dynamics::NozzleXY& nozzle,
+                                          std::span<const MoveBounds> bounds,
+                                          const compensate::Engine& engine);
+
+}  // namespace unflex::timing

@@ -1,0 +1,18 @@
+// Trapezoids along a path under limits of its own at every vertex and on every move.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "unflex/planner/planner.hpp"
+#include "unflex/timing/timing.hpp"
+
+namespace unflex::timing {
+
+// vertex_speeds_mm_s: one more than moves; the first and the last are the speeds at the ends of the
+// path.
+[[nodiscard]] std::vector<planner::PlannedMove> bounded_plan(
+    std::span<const planner::PlannedMove> path, std::span<const MoveBounds> bounds,
+    std::span<const double> vertex_speeds_mm_s);
+
+}  // namespace unflex::timing

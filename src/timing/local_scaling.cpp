@@ -1,0 +1,343 @@
+// Notation:
+//   u   largest speed at a vertex      V, a   largest speed and acceleration on a piece
+//   g   error relative to the tolerance, the largest near a place
+//   A   limit of the base's acceleration, per axis or per motor
+//
+//   u ← u g^{−α}     a ← a g^{−β}     V ← V F/v where the nozzle runs ahead of F
+//
+// The exponents become smaller from round to round. In the last rounds limits are lowered only,
+// until the nozzle keeps the tolerance everywhere.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "bounded_plan.hpp"
+#include "nozzle_measure.hpp"
+#include "pieces.hpp"
+#include "unflex/timing/timing.hpp"
+
+namespace unflex::timing {
+namespace {
+
+using gcode::X;
+using gcode::Y;
+
+constexpr int kRounds = 12;
+constexpr int kRepairs = 10;
+constexpr double kAlpha = 0.4;
+constexpr double kBeta = 0.2;
+constexpr double kCooling = 0.9;  // of both, from round to round
+// The last rounds are in more of a hurry, and reach further from round to round.
+constexpr double kAlphaOfRepairs = 0.8;
+constexpr double kBetaOfRepairs = 0.5;
+constexpr double kWider = 0.25;
+// What a limit may change by in a round.
+constexpr double kLeastFactor = 0.6;
+constexpr double kMostFactor = 1.3;
+constexpr double kLeastSpeedFactor = 0.8;
+constexpr double kMostSpeedFactor = 1.05;
+constexpr double kLeastSpeed_mm_s = 1.0;
+// The share of the tolerance that is aimed at, and what counts as kept.
+constexpr double kAim = 0.97;
+constexpr double kKept = 1.05;
+// The nozzle's speed relative to F, likewise.
+constexpr double kAimOfFeed = 1.015;
+constexpr double kKeptFeed = 1.025;
+// A larger swing in the end counts as this.
+constexpr double kMostLeft = 4.0;
+// How far in time an error depends on a limit, and the shortest pieces; in 1/ω.
+constexpr double kErrorReach = 2.3;
+constexpr double kSpeedReach = 1.1;
+constexpr double kEndReach = 3.4;
+constexpr double kPieces[] = {1.1, 2.3};
+// A round that makes the run shorter by less than this is the last.
+constexpr double kGain = 1e-3;
+
+// The speed at which a corner is passed on a circle that strays from it by the tolerance, and on
+// the circle that touches the shorter move in its middle (as in klippy/toolhead.py, calc_junction).
+double first_speed(const planner::PlannedMove& before, const planner::PlannedMove& after,
+                   double accel_mm_s2, double tolerance_mm) {
+  constexpr double kStraight = 0.999999;
+  const double cosine =
+      -(before.direction[X] * after.direction[X] + before.direction[Y] * after.direction[Y]);
+  const double sine = std::sqrt(std::max(0.5 * (1.0 - cosine), 0.0));  // of half the angle
+  if (sine > kStraight) {
+    return planner::kNoLimit;
+  }
+  const double tangent = sine / std::sqrt(1.0 - sine * sine);
+  const double by_tolerance = tolerance_mm * sine / (1.0 - sine);
+  const double by_length = 0.5 * std::min(before.length_mm, after.length_mm) * tangent;
+  return std::sqrt(accel_mm_s2 * std::min(by_tolerance, by_length));
+}
+
+// g^{−exponent}, within what a limit may change by.
+double scale(double g, double exponent) {
+  constexpr double kLeastError = 1e-3;
+  return std::clamp(std::pow(std::max(g, kLeastError), -exponent), kLeastFactor, kMostFactor);
+}
+
+class LocalScaling {
+ public:
+  LocalScaling(const compensate::Course& course, const compensate::Setup& setup,
+               const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
+               const compensate::Engine& engine)
+      : course_(course),
+        setup_(setup),
+        nozzle_(nozzle),
+        engine_(engine),
+        models_(models_of(setup)),
+        omega_rad_s_(std::min(setup.x.axis.slowest_rad_s(), setup.y.axis.slowest_rad_s())) {
+    std::vector<double> ends_s;
+    for (const double piece : kPieces) {
+      ends_s.push_back(piece / omega_rad_s_);
+    }
+    std::vector<MoveBounds> allowed(bounds.begin(), bounds.end());
+    keep_seams(course.moves, allowed);
+    pieces_ = in_pieces(course.moves, allowed, ends_s);
+    const std::vector<bool> of_moves = std::exchange(is_kept_, {});
+    for (std::size_t i = 0; i < of_moves.size(); ++i) {
+      is_kept_.insert(is_kept_.end(), pieces_.counts[i], of_moves[i]);
+    }
+    limit_accel();
+    bounds_ = pieces_.bounds;
+    limit_vertices();
+  }
+
+  std::optional<Timed> find() {
+    std::optional<Timed> best;
+    double least_s = planner::duration_s(course_.moves);
+    course_.moves = pieces_.moves;
+    for (int round = 0; round < kRounds + kRepairs; ++round) {
+      const bool repairs = round + 1 >= kRounds;
+      const std::vector<planner::PlannedMove> plan =
+          bounded_plan(pieces_.moves, bounds_, vertex_mm_s_);
+      const std::optional<NozzleMeasure> measured = try_plan(plan);
+      if (measured && keeps(*measured)) {
+        const double gain_s = least_s - planner::duration_s(plan);
+        if (gain_s > 0.0) {
+          least_s -= gain_s;
+          best = Timed{plan, pieces_.counts};
+        }
+        if (repairs || (best && gain_s < kGain * least_s)) {
+          break;
+        }
+      }
+      if (measured) {
+        rescale(plan, *measured, round, repairs);
+      } else {
+        slow_down();
+      }
+    }
+    if (best) {
+      join_even(best->moves, best->pieces);
+    }
+    return best;
+  }
+
+ private:
+  // Where a part of a run meets its neighbours, which are solved by themselves, it keeps its
+  // timing.
+  void keep_seams(std::span<const planner::PlannedMove> path, std::vector<MoveBounds>& bounds) {
+    constexpr double kSeam_s = 0.3;
+    is_kept_.assign(path.size(), false);
+    double time_s = 0.0;
+    for (std::size_t i = 0; !course_.before.empty() && i < path.size() && time_s < kSeam_s; ++i) {
+      is_kept_[i] = true;
+      time_s += path[i].duration_s();
+    }
+    time_s = 0.0;
+    for (std::size_t i = path.size(); !course_.after.empty() && i-- > 0 && time_s < kSeam_s;) {
+      is_kept_[i] = true;
+      time_s += path[i].duration_s();
+    }
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      if (is_kept_[i]) {
+        bounds[i].speed_mm_s = path[i].cruise_v_mm_s;
+        bounds[i].accel_mm_s2 = path[i].accel_mm_s2;
+        bounds[i].start_speed_mm_s = path[i].start_v_mm_s;
+        bounds[i].end_speed_mm_s = path[i].end_v_mm_s;
+      }
+    }
+  }
+
+  void limit_accel() {
+    const double limit = setup_.x.limits.max_accel_mm_s2;
+    for (std::size_t i = 0; i < pieces_.moves.size(); ++i) {
+      const gcode::Position& direction = pieces_.moves[i].direction;
+      const double x = std::abs(direction[X]);
+      const double y = std::abs(direction[Y]);
+      double& accel = pieces_.bounds[i].accel_mm_s2;
+      accel = std::min(accel, limit / (setup_.shares_motors ? x + y : std::max(x, y)));
+    }
+  }
+
+  void limit_vertices() {
+    const std::vector<planner::PlannedMove>& moves = pieces_.moves;
+    vertex_mm_s_.assign(moves.size() + 1, 0.0);
+    if (!course_.before.empty()) {
+      vertex_mm_s_.front() = moves.front().start_v_mm_s;
+    }
+    if (!course_.after.empty()) {
+      vertex_mm_s_.back() = moves.back().end_v_mm_s;
+    }
+    for (std::size_t i = 1; i < moves.size(); ++i) {
+      vertex_mm_s_[i] =
+          std::min(pieces_.bounds[i - 1].end_speed_mm_s, pieces_.bounds[i].start_speed_mm_s);
+      if (!is_kept_[i - 1] || !is_kept_[i]) {
+        const bool travels = !moves[i - 1].segment.extruding() && !moves[i].segment.extruding();
+        const double tolerance_mm =
+            travels ? kTravelTolerance_mm
+                    : std::min(pieces_.bounds[i - 1].tolerance_mm, pieces_.bounds[i].tolerance_mm);
+        const double speed_mm_s = first_speed(moves[i - 1], moves[i],
+                                              0.5 * setup_.x.limits.max_accel_mm_s2, tolerance_mm);
+        vertex_mm_s_[i] = std::min(vertex_mm_s_[i], std::max(speed_mm_s, kLeastSpeed_mm_s));
+      }
+    }
+  }
+
+  [[nodiscard]] static bool keeps(const NozzleMeasure& measured) {
+    return std::ranges::max(measured.error) <= kKept &&
+           std::ranges::max(measured.speed) <= kKeptFeed && measured.left <= kKept;
+  }
+
+  // Finds the base for the plan and measures the nozzle. nullopt: the engine found none.
+  [[nodiscard]] std::optional<NozzleMeasure> try_plan(
+      const std::vector<planner::PlannedMove>& plan) {
+    compensate::Course course = course_;
+    course.moves = plan;
+    const compensate::NodeGrid grid = compensate::node_grid(course, setup_);
+    const std::vector<compensate::WindowSpan> spans = compensate::mesh(course, grid, setup_);
+    std::vector<compensate::RunWindow> windows =
+        compensate::windows(course, spans, nozzle_, setup_);
+    std::vector<dynamics::AxisTrajectory> x;
+    std::vector<dynamics::AxisTrajectory> y;
+    for (std::size_t i = 0; i < windows.size(); ++i) {
+      auto [of_x, of_y] = compensate::solve(engine_, spans[i], windows[i]);
+      if (!of_x || !of_y) {
+        return std::nullopt;
+      }
+      x.push_back(std::move(of_x->base));
+      y.push_back(std::move(of_y->base));
+    }
+    period_s_ = grid.period_s;
+    starts_s_ = {course.before.empty() ? setup_.lead_in_s
+                                       : static_cast<double>(grid.first) * grid.period_s};
+    for (const planner::PlannedMove& move : plan) {
+      starts_s_.push_back(starts_s_.back() + move.duration_s());
+    }
+    const dynamics::BaseTrajectory base{grid.period_s, compensate::join(spans, x),
+                                        compensate::join(spans, y)};
+    NozzleMeasure measured = measure(plan, pieces_.bounds, starts_s_, base, models_,
+                                     course.before.empty() ? &nozzle_ : nullptr);
+    if (!course.after.empty()) {
+      measured.left = 0.0;
+    }
+    return measured;
+  }
+
+  // The largest values near each piece and near each vertex.
+  struct Near {
+    std::vector<double> piece;
+    std::vector<double> vertex;
+  };
+
+  [[nodiscard]] Near largest_near(const std::vector<double>& of_nodes, double reach_s) const {
+    const std::size_t count = pieces_.moves.size();
+    Near near{std::vector<double>(count, 0.0), std::vector<double>(count + 1, 0.0)};
+    std::size_t first = 0;
+    for (std::size_t k = 0; k < of_nodes.size(); ++k) {
+      const double t = static_cast<double>(k) * period_s_;
+      while (first + 1 < count && starts_s_[first + 1] < t - reach_s) {
+        ++first;
+      }
+      for (std::size_t i = first; i < count && starts_s_[i] <= t + reach_s; ++i) {
+        near.piece[i] = std::max(near.piece[i], of_nodes[k]);
+        if (starts_s_[i] >= t - reach_s) {
+          near.vertex[i] = std::max(near.vertex[i], of_nodes[k]);
+        }
+      }
+    }
+    return near;
+  }
+
+  void rescale(const std::vector<planner::PlannedMove>& plan, const NozzleMeasure& measured,
+               int round, bool repairs) {
+    const double cooled = std::pow(kCooling, round);
+    const double alpha = repairs ? kAlphaOfRepairs : kAlpha * cooled;
+    const double beta = repairs ? kBetaOfRepairs : kBeta * cooled;
+    const double most = repairs ? 1.0 : kMostFactor;
+    const double reach = kErrorReach * (1.0 + kWider * std::max(round + 1 - kRounds, 0));
+    const Near error = largest_near(measured.error, reach / omega_rad_s_);
+    const Near speed = largest_near(measured.speed, kSpeedReach / omega_rad_s_);
+    const double left = std::min(measured.left, kMostLeft);
+    for (std::size_t i = 1; i < plan.size(); ++i) {
+      const double g = error.vertex[i] / kAim;
+      const double v = plan[i].start_v_mm_s;
+      const bool is_bound = v > 0.97 * vertex_mm_s_[i];
+      if (!is_kept_[i - 1] && !is_kept_[i] && (g > 1.0 || is_bound)) {
+        vertex_mm_s_[i] = std::max(std::min(vertex_mm_s_[i], g > 1.0 ? v : planner::kNoLimit) *
+                                       std::min(scale(g, alpha), most),
+                                   kLeastSpeed_mm_s);
+      }
+    }
+    for (std::size_t i = 0; i < plan.size(); ++i) {
+      if (is_kept_[i]) {
+        continue;
+      }
+      const bool is_near_end = starts_s_.back() - starts_s_[i + 1] < kEndReach / omega_rad_s_;
+      const double g = std::max(error.piece[i], is_near_end ? left : 0.0) / kAim;
+      MoveBounds& own = bounds_[i];
+      const MoveBounds& allowed = pieces_.bounds[i];
+      if (plan[i].accel_s + plan[i].decel_s > 0.0) {
+        own.accel_mm_s2 =
+            std::min(allowed.accel_mm_s2, own.accel_mm_s2 * std::min(scale(g, beta), most));
+      }
+      const double ahead = speed.piece[i] / kAimOfFeed;
+      if (repairs && g > 1.0) {
+        own.speed_mm_s = std::max(plan[i].cruise_v_mm_s * scale(g, alpha), kLeastSpeed_mm_s);
+      }
+      if (ahead > 1.0) {
+        own.speed_mm_s = std::max(plan[i].cruise_v_mm_s * std::max(1.0 / ahead, kLeastSpeedFactor),
+                                  kLeastSpeed_mm_s);
+      } else if (!repairs && plan[i].cruise_v_mm_s > 0.99 * own.speed_mm_s) {
+        own.speed_mm_s =
+            std::min(allowed.speed_mm_s, own.speed_mm_s * std::min(1.0 / ahead, kMostSpeedFactor));
+      }
+    }
+  }
+
+  // The engine finds no base for so quick a plan.
+  void slow_down() {
+    constexpr double kSlower = 0.7;
+    for (std::size_t i = 0; i < bounds_.size(); ++i) {
+      if (!is_kept_[i]) {
+        bounds_[i].accel_mm_s2 *= kSlower;
+        vertex_mm_s_[i] *= kSlower;
+      }
+    }
+  }
+
+  compensate::Course course_;
+  const compensate::Setup& setup_;
+  const dynamics::NozzleXY& nozzle_;
+  const compensate::Engine& engine_;
+  std::vector<AxesModel> models_;
+  double omega_rad_s_;
+  std::vector<bool> is_kept_;  // of each piece
+  Pieces pieces_;              // with what each may do
+  std::vector<MoveBounds> bounds_;
+  std::vector<double> vertex_mm_s_;
+  double period_s_ = 0.0;         // of the last plan's nodes
+  std::vector<double> starts_s_;  // of the last plan's pieces, and the end of the last one
+};
+
+}  // namespace
+
+std::optional<Timed> faster(const compensate::Course& course, const compensate::Setup& setup,
+                            const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
+                            const compensate::Engine& engine) {
+  return LocalScaling(course, setup, nozzle, bounds, engine).find();
+}
+
+}  // namespace unflex::timing

@@ -1,0 +1,48 @@
+// What the nozzle makes of a run when the base is given.
+//
+//   e   contour error, the distance from the nozzle to the part of the path that the plan passes
+//       within a reach of the time
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "unflex/compensate/run.hpp"
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/timing/timing.hpp"
+
+namespace unflex::timing {
+
+// Models of both axes.
+struct AxesModel {
+  dynamics::FlexibleAxis x;
+  dynamics::FlexibleAxis y;
+};
+
+// All that a tolerance is to hold for: the axes as given, and as they are at the edges of what they
+// may be.
+[[nodiscard]] std::vector<AxesModel> models_of(const compensate::Setup& setup);
+
+struct NozzleMeasure {
+  // The largest values of all models around each node.
+  std::vector<double> error;  // e relative to the tolerance
+  std::vector<double> speed;  // the nozzle's speed relative to F, where it lays filament
+  // How far the nozzle swings in the end, relative to what it may: half the tolerance for the first
+  // model, since the next run begins with that swing, and all of it for the others.
+  double left = 0.0;
+};
+
+// plan: what the base was found for, whose pieces have these bounds, beginning at starts_s[0],
+// which also has the end of the last one. nozzle: where the run begins; unset for a part that
+// begins in motion.
+[[nodiscard]] NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
+                                    std::span<const MoveBounds> bounds,
+                                    std::span<const double> starts_s,
+                                    const dynamics::BaseTrajectory& base,
+                                    const std::vector<AxesModel>& models,
+                                    const dynamics::NozzleXY* nozzle);
+
+}  // namespace unflex::timing
