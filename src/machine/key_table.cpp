@@ -288,6 +288,10 @@ constexpr std::array kKeys = {
         "Klipper: [extruder] max_extrude_only_accel",
         "limits.max_accel_mm_s2 × 4 × nozzle_diameter_mm² / filament area",
         &derived<&S::max_extrude_only_accel_mm_s2>},
+    Key{"extruder.max_flow_mm3_s", &setting<&S::extruder, &E::max_flow_mm3_s>, kPositive, "mm³/s",
+        "Largest volume of filament that the hotend melts per second; a warning tells where the "
+        "output asks for more, and more than the sliced file",
+        "not limited"},
     Key{"extruder.instantaneous_corner_velocity_mm_s",
         &setting<&S::extruder, &E::instantaneous_corner_velocity_mm_s>, kNotNegative, "mm/s",
         "Klipper: [extruder] instantaneous_corner_velocity"},

@@ -518,6 +518,9 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.base_accel_times_plan = settings.base_accel_times_asked();
   rules.max_lines_per_s = settings.max_lines_per_s();
   rules.tolerance_mm = settings.timing.tolerance_um * 1e-3;
+  rules.filament_area_mm2 = std::numbers::pi / 4.0 * settings.extruder.filament_diameter_mm *
+                            settings.extruder.filament_diameter_mm;
+  rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);
   if (grid_mm(settings) > kGridMm) {
     constexpr double kShareOfStep = 0.1;
     rules.leeway.chance_mm = kShareOfStep * grid_mm(settings);

@@ -31,6 +31,21 @@ report::CornerRow row(const verify::CornerStats& stats) {
   return {stats.count, stats.rms_mm, stats.p99_mm, stats.max_mm, stats.max_line};
 }
 
+report::FlowRow row(const verify::FlowStats& stats) {
+  return {stats.max_mm3_s, stats.max_line, stats.max_change_mm3_s2, stats.max_change_line};
+}
+
+// Tells where the hotend may not melt what the output lays.
+std::string too_much_text(const verify::TooMuchFlow& flow, double max_flow_mm3_s,
+                          const std::string& output) {
+  return to_string(Diagnostic{
+      {output, flow.line},
+      fmt::format("the hotend is asked for {:.1f} mm³/s here, {:.1f} as sliced, and "
+                  "extruder.max_flow_mm3_s is {:.1f}; let it print slower, or raise that if the "
+                  "hotend melts more",
+                  flow.flow_mm3_s, flow.sliced_mm3_s, max_flow_mm3_s)});
+}
+
 report::Spread spread(const verify::Deviation& deviation) {
   return {deviation.extruding.contour_max_mm, deviation.extruding.contour_rms_mm};
 }
@@ -71,6 +86,7 @@ report::Report new_report(std::string command, const Job& job) {
   report.output = job.output_name;
   report.firmware = to_string(job.settings.printer.firmware);
   report.freq_error = job.settings.freq_error();
+  report.max_flow_mm3_s = job.settings.extruder.max_flow_mm3_s;
   for (machine::SettingRow& setting : machine::rows(job.settings)) {
     report.printer.push_back(
         {std::move(setting.key), std::move(setting.value), std::move(setting.origin)});
@@ -142,6 +158,12 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
   };
   report.uncompensated_lag = lag(verified.uncompensated_lag);
   report.compensated_lag = lag(verified.compensated_lag);
+  report.uncompensated_flow = row(verified.uncompensated_flow);
+  report.compensated_flow = row(verified.compensated_flow);
+  if (verified.too_much_flow && report.max_flow_mm3_s) {
+    report.warnings.push_back(
+        too_much_text(*verified.too_much_flow, *report.max_flow_mm3_s, report.output));
+  }
   report.runs_compensated = verified.runs;
   report.violation_count = verified.violation_count;
   for (const verify::Violation& violation : verified.violations) {

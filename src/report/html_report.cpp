@@ -205,6 +205,16 @@ Json facts_json(const Report& r) {
           "{} → {} µm RMS, {} → {} µm at most", micrometres_text(r.uncompensated_lag.rms_mm),
           micrometres_text(r.compensated_lag.rms_mm), micrometres_text(r.uncompensated_lag.max_mm),
           micrometres_text(r.compensated_lag.max_mm)));
+  const FlowRow& flow = r.uncompensated_flow;
+  const FlowRow& asked = r.compensated_flow;
+  add("Flow of filament",
+      fmt::format(
+          "{:.1f} → {:.1f} mm³/s at most, as sliced in line {}, compensated in line {} of "
+          "the output; it changes by {:.0f} → {:.0f} mm³/s² at most, in lines {} and {}{}",
+          flow.max_mm3_s, asked.max_mm3_s, flow.max_line, asked.max_line, flow.max_change_mm3_s2,
+          asked.max_change_mm3_s2, flow.max_change_line, asked.max_change_line,
+          r.max_flow_mm3_s ? fmt::format("; the hotend melts {:.1f} mm³/s", *r.max_flow_mm3_s)
+                           : std::string{}));
   add("Written by", fmt::format("unflex {}", r.version));
   return facts;
 }

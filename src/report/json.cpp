@@ -32,6 +32,13 @@ Json corners_json(const CornerRow& row) {
           {"max_line", row.max_line}};
 }
 
+Json flow_json(const FlowRow& row) {
+  return {{"max_mm3_s", row.max_mm3_s},
+          {"max_line", row.max_line},
+          {"max_change_mm3_s2", row.max_change_mm3_s2},
+          {"max_change_line", row.max_change_line}};
+}
+
 Json spread_json(const Spread& s) {
   return {{"contour_max_mm", s.max_mm}, {"contour_rms_mm", s.rms_mm}};
 }
@@ -215,6 +222,8 @@ void add_output(const Report& r, Json& json) {
                        {"uncompensated_lag_rms_mm", r.uncompensated_lag.rms_mm},
                        {"uncompensated_lag_max_mm", r.uncompensated_lag.max_mm},
                        {"uncompensated_lag_max_line", r.uncompensated_lag.max_line}};
+  json["flow"] = {{"uncompensated", flow_json(r.uncompensated_flow)},
+                  {"compensated", flow_json(r.compensated_flow)}};
   json["performance"] = {{"wall_s", r.wall_s},
                          {"cpu_s", r.cpu_s},
                          {"print_s_per_wall_s", r.print_s_per_wall_s},

@@ -204,6 +204,19 @@ void write_path(Sink out, const Report& r) {
   }
 }
 
+// Most prints ask for as much as before, and then nobody needs to know.
+void write_flow(Sink out, const Report& r) {
+  constexpr double kAsBefore = 1.02;
+  const FlowRow& before = r.uncompensated_flow;
+  const FlowRow& after = r.compensated_flow;
+  if (!r.max_flow_mm3_s && after.max_mm3_s <= kAsBefore * before.max_mm3_s) {
+    return;
+  }
+  fmt::format_to(
+      out, "flow          {:.1f} → {:.1f} mm³/s at most{}\n", before.max_mm3_s, after.max_mm3_s,
+      r.max_flow_mm3_s ? fmt::format("; the hotend melts {:.1f}", *r.max_flow_mm3_s) : "");
+}
+
 void write_output(Sink out, const Report& r) {
   fmt::format_to(out, "output        {} lines, {:.1f} MB, {:.0f} lines/s at peak\n", r.output_lines,
                  static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s);
@@ -224,6 +237,7 @@ void write_output(Sink out, const Report& r) {
       out, "              laid {} → {} µm RMS ahead of the nozzle or behind, {} → {} µm at most\n",
       micrometres_text(r.uncompensated_lag.rms_mm), micrometres_text(r.compensated_lag.rms_mm),
       micrometres_text(r.uncompensated_lag.max_mm), micrometres_text(r.compensated_lag.max_mm));
+  write_flow(out, r);
   fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",
                  r.print_s_per_wall_s, duration_text(r.wall_s), r.peak_rss_mb);
 }

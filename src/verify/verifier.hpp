@@ -9,6 +9,7 @@
 
 #include "filament_ledger.hpp"
 #include "filament_timing.hpp"
+#include "flow_gauge.hpp"
 #include "line_check.hpp"
 #include "nozzles.hpp"
 #include "replay.hpp"
@@ -92,6 +93,7 @@ class Verifier {
   void finish_reference();
   [[nodiscard]] double filament_tolerance_mm() const;
   void check_run(bool compensated);
+  void check_flow();
   bool sections_agree();
   void check_regime(const Section& input, const Section& output);
   void play_kept_line();
@@ -132,6 +134,8 @@ class Verifier {
   Switching input_switching_;
   Switching output_switching_;
   FilamentLedger filament_;
+  FlowGauge input_flow_;
+  FlowGauge output_flow_;
   BaseCheck base_;
   SectionRules rules_of_run_;
   Excursion input_excursion_;

@@ -71,6 +71,17 @@ void Verifier::check_run(bool compensated) {
   }
 }
 
+void Verifier::check_flow() {
+  constexpr double kMore = 1.01;
+  const FlowStats& flow = output_flow_.section();
+  const double sliced_mm3_s = input_flow_.section().max_mm3_s;
+  if (flow.max_mm3_s <= kMore * std::max(rules_.max_flow_mm3_s, sliced_mm3_s) ||
+      (totals_.too_much_flow && flow.max_mm3_s <= totals_.too_much_flow->flow_mm3_s)) {
+    return;
+  }
+  totals_.too_much_flow = {flow.max_mm3_s, sliced_mm3_s, flow.max_line};
+}
+
 bool Verifier::sections_agree() {
   const Section& input = input_.section();
   const Section& output = output_.section();

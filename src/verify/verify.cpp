@@ -77,6 +77,8 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       original_(rules.nozzle, observation, NozzleBase::sliced),
       kept_(coarse(rules.nozzle)),
       emitted_(rules.nozzle, observation, NozzleBase::emitted),
+      input_flow_(rules.filament_area_mm2),
+      output_flow_(rules.filament_area_mm2),
       base_(rules_, violations_),
       rules_of_run_(rules_, violations_),
       input_excursion_(rules_.travel),
@@ -121,6 +123,7 @@ bool Verifier::next_input_move(planner::PlannedMove& move) {
   input_switching_.move();
   totals_.reference_time_s += move.duration_s();
   totals_.input_extrusion_mm += move.segment.delta(gcode::E);
+  input_flow_.play(move);
   input_excursion_.add(move.segment);
   too_much_in_input_ = too_much_in_input_ || move.segment.too_much_filament;
   return true;
@@ -228,6 +231,8 @@ void Verifier::begin_section(bool compensated) {
     observer_->section(path_, *emitted_path_);
   }
   filament_.begin_run(*emitted_path_);
+  input_flow_.begin_section();
+  output_flow_.begin_section();
   section_first_ = path_.end();
   original_next_ = path_.end();
   input_excursion_.clear();
@@ -280,6 +285,7 @@ void Verifier::skip_added_barriers() {
 void Verifier::join_over_barrier() {
   const double switching_s = output_switching_.stop(output_.following().switching_s);
   emitted_.hold(switching_s);
+  output_flow_.rest(switching_s);
   totals_.emitted_time_s += switching_s;
   since_kept_motion_s_ += switching_s;
   output_.join_over_barrier();
@@ -358,6 +364,7 @@ void Verifier::play(const planner::PlannedMove& move) {
   }
   totals_.emitted_time_s += move.duration_s();
   totals_.output_extrusion_mm += move.segment.delta(gcode::E);
+  output_flow_.play(move);
   output_excursion_.add(move.segment);
   if (too_much_line_ == 0 && move.segment.too_much_filament) {
     too_much_line_ = move.segment.line;
@@ -443,6 +450,7 @@ void Verifier::end_section() {
     let_kept_follow(std::numeric_limits<double>::infinity());
   }
   finish_reference();
+  check_flow();
 }
 
 void Verifier::finish_reference() {
@@ -466,6 +474,7 @@ void Verifier::play_kept_line() {
       output_.section().dwell_s + output_switching_.stop(output_.section().switching_s);
   if (input_s > 0.0) {
     path_.rest(input_s);
+    input_flow_.rest(input_s);
     for_sliced([&](Nozzles& nozzles) { nozzles.hold(input_s); });
     if (observer_ != nullptr) {
       observer_->hold(input_s);
@@ -473,6 +482,7 @@ void Verifier::play_kept_line() {
   }
   if (output_s > 0.0) {
     emitted_.hold(output_s);
+    output_flow_.rest(output_s);
     since_kept_motion_s_ += output_s;
   }
   // The sliced file has no pause before it draws.
@@ -491,6 +501,9 @@ void Verifier::hold() {
   };
   for_sliced(rest);
   rest(emitted_);
+  // The last flow ends, whatever hold_s is.
+  input_flow_.rest(2.0 * FlowGauge::kMean_s);
+  output_flow_.rest(2.0 * FlowGauge::kMean_s);
 }
 
 void Verifier::compare_lines(bool complete) {
@@ -522,6 +535,8 @@ VerifyReport Verifier::report() {
   report.compensated_lag = emitted_.main().filament_lag();
   report.uncompensated_corners = original_.main().corners();
   report.compensated_corners = emitted_.main().corners();
+  report.uncompensated_flow = input_flow_.stats();
+  report.compensated_flow = output_flow_.stats();
   report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
   report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
   report.base_max_step_mm_s = base_.max_step_mm_s();

@@ -408,6 +408,26 @@ TEST_F(Texts, SayWhenTheNozzleStraysFurtherThanNow) {
       ::testing::Contains(HasSubstr("the nozzle would stray further from the path than now")));
 }
 
+// compensate leaves the flow as it was, so an output that asks for more is written by hand.
+TEST_F(Texts, TellWhereTheHotendIsAskedForMoreThanItMelts) {
+  const std::string start = "G90\nM83\nG1 X10 Y10 Z0.4 F6000\nG4 P500\n";
+  const JobFolder folder(start + "G1 X110 E5 F6000\n", {"extruder.max_flow_mm3_s=20"});
+  SilentProgress progress;
+  const Result<report::Report> compensated = compensate(folder.job(), progress);
+  ASSERT_TRUE(compensated.has_value());
+  EXPECT_THAT(compensated->warnings, ::testing::IsEmpty());
+  EXPECT_EQ(compensated->max_flow_mm3_s, 20.0);
+  EXPECT_NEAR(compensated->compensated_flow.max_mm3_s, 12.03, 0.3);
+  folder.set_output(start + "G1 X110 E5 F12000\n");
+  const Result<report::Report> verified = verify(folder.job(), progress);
+  ASSERT_TRUE(verified.has_value());
+  EXPECT_THAT(verified->warnings,
+              ::testing::ElementsAre(
+                  "out.gcode:5: warning: the hotend is asked for 24.1 mm³/s here, 12.0 as sliced, "
+                  "and extruder.max_flow_mm3_s is 20.0; let it print slower, or raise that if the "
+                  "hotend melts more"));
+}
+
 // The sliced file has no pause behind a travel from an unknown place.
 TEST_F(Texts, TellHowLongTheSlicedFileItselfTakes) {
   const std::string output = compensated(

@@ -88,6 +88,16 @@ TEST(HtmlReport, SaysHowFarTheNozzlePassesFromCorners) {
   EXPECT_THAT(to_html(report), Not(HasSubstr("Typical corner")));
 }
 
+TEST(HtmlReport, SaysWhatTheHotendIsAskedFor) {
+  Report report = recorded_report();
+  const std::string asked =
+      "10.5 → 12.4 mm³/s at most, as sliced in line 710, compensated in line 811 of the output; it "
+      "changes by 400 → 500 mm³/s² at most, in lines 711 and 812";
+  EXPECT_THAT(to_html(report), HasSubstr(asked + "; the hotend melts 15.0 mm³/s\""));
+  report.max_flow_mm3_s = std::nullopt;
+  EXPECT_THAT(to_html(report), HasSubstr(asked + "\""));
+}
+
 TEST(HtmlReport, SaysWhenRulesAreBroken) {
   Report report = recorded_report();
   EXPECT_THAT(to_html(report), HasSubstr("do not print it</a>"));

@@ -115,6 +115,18 @@ TEST(JsonReport, SaysHowFarTheNozzlePassesFromCorners) {
   EXPECT_EQ(corners["compensated"]["max_line"], 43);
 }
 
+TEST(JsonReport, SaysWhatTheHotendIsAskedFor) {
+  const nlohmann::json flow = parsed(sample_report())["flow"];
+  EXPECT_EQ(flow["uncompensated"], (nlohmann::json{{"max_mm3_s", 10.5},
+                                                   {"max_line", 710},
+                                                   {"max_change_mm3_s2", 400.0},
+                                                   {"max_change_line", 711}}));
+  EXPECT_EQ(flow["compensated"], (nlohmann::json{{"max_mm3_s", 12.4},
+                                                 {"max_line", 811},
+                                                 {"max_change_mm3_s2", 500.0},
+                                                 {"max_change_line", 812}}));
+}
+
 TEST(JsonReport, SaysHowRobustTheOutputIs) {
   const nlohmann::json json = parsed(sample_report());
   EXPECT_EQ(json["freq_error"], 0.1);

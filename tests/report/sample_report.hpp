@@ -105,6 +105,9 @@ inline Report sample_report() {
   r.worst_move_extrusion_error_mm = 0.00001;
   r.uncompensated_lag = {0.06, 0.5, 700};
   r.compensated_lag = {0.0045, 0.035, 801};
+  r.uncompensated_flow = {10.5, 710, 400.0, 711};
+  r.compensated_flow = {12.4, 811, 500.0, 812};
+  r.max_flow_mm3_s = 15.0;
   r.wall_s = 90.0;
   r.cpu_s = 170.0;
   r.print_s_per_wall_s = 40.0;

@@ -69,6 +69,7 @@ TEST(Summary, IsExactlyThis) {
       "the first at line 70\n"
       "filament      1234.50 mm in, 1234.75 mm out\n"
       "              laid 60.0 → 4.50 µm RMS ahead of the nozzle or behind, 500 → 35.0 µm at most\n"
+      "flow          10.5 → 12.4 mm³/s at most; the hotend melts 15.0\n"
       "speed         40 s of print per second, 1m 30s in all, 64 MB\n");
 }
 
@@ -125,6 +126,17 @@ TEST(Summary, DoesNotSpeakOfCornersWhereThereAreNone) {
   Report report = sample_report();
   report.uncompensated_corners = report.compensated_corners = {};
   EXPECT_THAT(to_text(report), Not(HasSubstr("corners")));
+}
+
+TEST(Summary, SpeaksOfTheFlowOnlyWhereItRisesOrIsLimited) {
+  Report report = sample_report();
+  report.max_flow_mm3_s = std::nullopt;
+  EXPECT_THAT(to_text(report), HasSubstr("flow          10.5 → 12.4 mm³/s at most\n"));
+  report.compensated_flow.max_mm3_s = 10.7;
+  EXPECT_THAT(to_text(report), Not(HasSubstr("flow")));
+  report.max_flow_mm3_s = 15.0;
+  EXPECT_THAT(to_text(report),
+              HasSubstr("flow          10.5 → 10.7 mm³/s at most; the hotend melts 15.0\n"));
 }
 
 TEST(Summary, SaysThatTheBudgetOfLinesHolds) {

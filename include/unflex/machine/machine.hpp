@@ -109,6 +109,7 @@ struct ExtruderSettings {
   std::optional<double> max_extrude_cross_section_mm2;   // unset: 4 · nozzle², as in Klipper
   std::optional<double> max_extrude_only_velocity_mm_s;  // unset: Klipper's formula
   std::optional<double> max_extrude_only_accel_mm_s2;    // unset: Klipper's formula
+  std::optional<double> max_flow_mm3_s;                  // unset: not limited
   double instantaneous_corner_velocity_mm_s = 1.0;
   // Klipper's [extruder], if the print does not set it. It decides how long a switch of the shaper
   // takes.

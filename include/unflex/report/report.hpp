@@ -57,6 +57,15 @@ struct PlantDeviation {
   Spread compensated;
 };
 
+// Volume of filament per second as a mean over 20 ms, and its change over 20 ms divided by that
+// time. The lines are those of the file that the row is of.
+struct FlowRow {
+  double max_mm3_s = 0.0;
+  std::size_t max_line = 0;
+  double max_change_mm3_s2 = 0.0;
+  std::size_t max_change_line = 0;
+};
+
 // A run that kept its original moves, and why.
 struct Fallback {
   std::size_t first_line = 0;
@@ -207,6 +216,9 @@ struct Report {
   };
   FilamentLag uncompensated_lag;
   FilamentLag compensated_lag;
+  FlowRow uncompensated_flow;
+  FlowRow compensated_flow;
+  std::optional<double> max_flow_mm3_s;  // what the hotend melts, if the settings say so
 
   double wall_s = 0.0;
   double cpu_s = 0.0;

@@ -52,6 +52,9 @@ struct Rules {
   double base_max_accel_mm_s2 = 20000.0;
   double base_accel_times_plan = 0.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
+  double filament_area_mm2 = 2.405281875467;  // cross-section; here of 1.75 mm
+  // What the hotend melts. It breaks no rule to ask for more (VerifyReport::too_much_flow).
+  double max_flow_mm3_s = std::numeric_limits<double>::infinity();
   Leeway leeway;
   // What the nozzle may stray in a run whose timing is not as sliced. 0: all runs are as sliced.
   double tolerance_mm = 0.0;
@@ -90,6 +93,25 @@ struct LagStats {
   std::size_t max_line = 0;  // line of the sliced file with the largest lag
 };
 
+// Volume of filament per second in moves of X and Y, as a mean over 20 ms, and how fast it changes:
+// by how much it is another one 20 ms later, divided by that time. The lines are those of the file
+// that is measured: the one that is played at the end of the mean, and the one in the middle of the
+// change.
+struct FlowStats {
+  double max_mm3_s = 0.0;
+  std::size_t max_line = 0;
+  double max_change_mm3_s2 = 0.0;
+  std::size_t max_change_line = 0;
+};
+
+// A place where the output asks for more flow than Rules::max_flow_mm3_s and than the sliced file
+// does in the same section, by more than 1 % each.
+struct TooMuchFlow {
+  double flow_mm3_s = 0.0;
+  double sliced_mm3_s = 0.0;
+  std::size_t line = 0;  // of the output
+};
+
 struct VerifyReport {
   // The input as this printer plays it, its own shaper included. Measured against the firmware's
   // plan of the input.
@@ -119,6 +141,9 @@ struct VerifyReport {
   // How far the nozzle passes from the corners of the sliced path.
   CornerStats uncompensated_corners;
   CornerStats compensated_corners;
+  FlowStats uncompensated_flow;
+  FlowStats compensated_flow;
+  std::optional<TooMuchFlow> too_much_flow;  // where the flow is largest
   // Longest lag or lead of the nozzle against the plan of its run, averaged over 0.1 s.
   double worst_run_drift_s = 0.0;
   double max_lines_per_s = 0.0;    // most lines begun in any 100 ms of the output, × 10
