@@ -123,6 +123,17 @@ double NozzleProgress::progress_mm(double t) const {
   return progress_mm_[k] + (at - static_cast<double>(k)) * (progress_mm_[k + 1] - progress_mm_[k]);
 }
 
+double NozzleProgress::begin_s(std::size_t i) const {
+  const auto after = std::lower_bound(progress_mm_.begin(), progress_mm_.end(), path_mm_[i]);
+  const auto k = static_cast<std::size_t>(after - progress_mm_.begin());
+  if (k == 0 || after == progress_mm_.end()) {
+    return period_s_ * static_cast<double>(std::min(k, progress_mm_.size() - 1));
+  }
+  const double share =
+      (path_mm_[i] - progress_mm_[k - 1]) / (progress_mm_[k] - progress_mm_[k - 1]);
+  return period_s_ * (static_cast<double>(k - 1) + share);
+}
+
 double NozzleProgress::filament_mm(double t) const {
   const double at = progress_mm(t);
   const auto after = std::upper_bound(path_mm_.begin(), path_mm_.end() - 1, at);

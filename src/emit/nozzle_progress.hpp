@@ -23,6 +23,8 @@ class NozzleProgress {
 
   // Q(s_n(t)), mm, from 0 on. As the nozzle never goes back, it is monotone where Q is.
   [[nodiscard]] double filament_mm(double t) const;
+  // When the nozzle reaches the beginning of move i.
+  [[nodiscard]] double begin_s(std::size_t i) const;
   // Whether the nozzle has left the run's first move behind.
   [[nodiscard]] bool past_first_move(double t) const;
 

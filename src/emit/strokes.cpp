@@ -29,7 +29,8 @@ constexpr double kCoarse_mm = 1e-3;
 // Moments at which a line should end, in order: where other lines stand between moves, where
 // filament per mm changes, and where the motion begins and ends.
 std::vector<double> wanted_times(const Run& run, const Timetable& table,
-                                 const std::vector<double>& event_times_s) {
+                                 const std::vector<double>& event_times_s,
+                                 const NozzleProgress& nozzle, bool has_free_timing) {
   std::vector<double> wanted;
   for (std::size_t i = 0; i < event_times_s.size(); ++i) {
     if ((*run.events)[i].kind != gcode::EventKind::move) {
@@ -38,7 +39,8 @@ std::vector<double> wanted_times(const Run& run, const Timetable& table,
   }
   for (std::size_t i = 1; i < table.moves(); ++i) {
     if (table.filament_changes(i)) {
-      wanted.push_back(table.start_s(i));
+      // Where the timing is free, the nozzle may pass some ms earlier or later than the plan.
+      wanted.push_back(has_free_timing ? nozzle.begin_s(i) : table.start_s(i));
     }
   }
   wanted.push_back(table.start_s(0));
@@ -357,14 +359,14 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   rules.tolerance_mm *= run.tolerance_share;
   rules.burst_lines = static_cast<int>(run.limits_share * rules.burst_lines);
   rules.max_accel_mm_s2 *= run.limits_share;
+  const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle_x, rules.nozzle_y);
   const Polygon vertices =
-      polygon(run, table, wanted_times(run, table, event_times_s), grid, rules);
+      polygon(run, table, wanted_times(run, table, event_times_s, nozzle, options.has_free_timing),
+              grid, rules);
   const std::vector<double>& times = vertices.times_s;
   if (times.empty()) {
     return {};
   }
-
-  const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle_x, rules.nozzle_y);
   const gcode::Position start = start_position(run, grid);
   const gcode::Position end = end_of_lines(run, table, grid);
   std::vector<Stroke> result;

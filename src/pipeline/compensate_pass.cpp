@@ -201,8 +201,11 @@ class Compensator {
       const std::size_t nodes = job->grid.count;
       job->is_timed = true;
       const double accel = largest_motor_accel(piece.moves, rules_.verify.fixed.motors());
-      if (const verify::BlamedRun* const known = blamed_before(piece)) {
-        job->failure = known->reason;
+      const std::vector<std::string> reasons = blamed_before(piece);
+      // A run of free timing gets another chance in the timing as sliced.
+      const std::size_t chances = job_.settings.is_timing_free() ? 2 : 1;
+      if (reasons.size() >= chances) {
+        job->failure = reasons.back();
       } else if (piece.cut_off) {
         job->failure = "too many lines without motion stand in a row in the middle of the motion";
       } else if (accel > kRounding * job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2)) {
@@ -211,7 +214,8 @@ class Compensator {
             "{:.0f}; raise that if the motors can",
             accel, job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2));
       } else if (nodes <= kMaxRunNodes) {
-        job->is_timed = !job_.settings.is_timing_free();
+        job->is_timed = !job_.settings.is_timing_free() || !reasons.empty();
+        job->slow_reason = reasons.empty() ? "" : reasons.back();
       } else {
         job->failure = fmt::format("{:.0f} s of motion without a stop are too long to be handled",
                                    static_cast<double>(nodes) * job->setup.period_s);
@@ -276,14 +280,17 @@ class Compensator {
                     setup.asked_accel_mm_s2, setup.accel_by_lines_mm_s2)}));
   }
 
-  // What an earlier pass blamed the run for; nullptr: nothing.
-  [[nodiscard]] const verify::BlamedRun* blamed_before(const Piece& piece) const {
+  // What earlier passes blamed the run for.
+  [[nodiscard]] std::vector<std::string> blamed_before(const Piece& piece) const {
     const std::size_t first = piece.moves.front().segment.line;
     const std::size_t last = piece.moves.back().segment.line;
-    const auto found = std::ranges::find_if(kept_, [&](const verify::BlamedRun& run) {
-      return run.first_line <= last && first <= run.last_line;
-    });
-    return found == kept_.end() ? nullptr : &*found;
+    std::vector<std::string> reasons;
+    for (const verify::BlamedRun& run : kept_) {
+      if (run.first_line <= last && first <= run.last_line) {
+        reasons.push_back(run.reason);
+      }
+    }
+    return reasons;
   }
 
   // Gives the solvers what they can take, in the order of the file.

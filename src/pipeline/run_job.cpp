@@ -192,10 +192,13 @@ void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept {
     if (timed) {
       job.retimed_counts = counts_of(job.piece.move_counts, timed->pieces);
       job.retimed = std::move(timed->moves);
+    } else {
+      job.slow_reason = "no faster timing was found that keeps the tolerance";
     }
-  } catch (const std::exception&) {
-    // Out of memory, mostly. The timing stays as sliced.
+  } catch (const std::exception& exception) {
+    // Out of memory, mostly.
     job.retimed.clear();
+    job.slow_reason = exception.what();
   }
   job.is_timed = true;
 }
@@ -227,6 +230,21 @@ void solve_windows(RunJob& job, std::size_t first, std::size_t count,
 } catch (const std::exception& exception) {
   // Out of memory, mostly.
   job.results[first][0].failure = exception.what();
+}
+
+std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules) {
+  auto sliced = std::make_unique<RunJob>();
+  sliced->piece = job.piece;
+  sliced->nozzle = job.nozzle;
+  sliced->first_stage = job.first_stage;
+  sliced->setup = job.setup;
+  sliced->accel = job.accel;
+  sliced->lines_after = job.lines_after;
+  lay_out(*sliced);
+  const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
+  solve_windows(*sliced, 0, sliced->spans.size(), *engine);
+  make_lines(*sliced, rules);
+  return sliced;
 }
 
 void make_lines(RunJob& job, const RunRules& rules) noexcept {

@@ -52,6 +52,7 @@ struct RunJob {
   std::vector<timing::MoveBounds> bounds;
   std::vector<planner::PlannedMove> retimed;
   std::vector<std::size_t> retimed_counts;  // as Piece::move_counts
+  std::string slow_reason;                  // why the timing stays as sliced
   std::atomic<bool> is_timed = false;
   compensate::NodeGrid grid;
   std::vector<compensate::WindowSpan> spans;
@@ -109,6 +110,9 @@ void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept;
 
 // Divides the run, in the timing that it has, into windows.
 void lay_out(RunJob& job);
+
+// The run of `job` once more, compensated in its timing as sliced, with its lines.
+[[nodiscard]] std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules);
 
 // The job's nozzle, which swings with all the modes of the model, as a state of the axes that the
 // windows are for.

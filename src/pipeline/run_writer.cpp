@@ -80,7 +80,7 @@ Result<std::string> RunWriter::write(const RunJob& job) {
   switching_s_ = at_run.begin_run(piece);
   run_nozzle_ = at_run.nozzle();
   std::optional<std::string> failure =
-      run_stands_ ? "the run's beginning stands as it is" : write_run(job, text);
+      run_stands_ ? "the run's beginning stands as it is" : write_in_time(job, text);
   const bool in_motion = !last_lines_.empty();
   const bool begins_long_run = piece.begins_run() && !piece.ends_run();
   if (failure && (in_motion || begins_long_run)) {
@@ -198,6 +198,20 @@ bool RunWriter::fits(const RunJob& job) const {
   return same_place && job.plan.start == emitter_.run_start();
 }
 
+// Writes the run in the timing chosen for it, or else in that as sliced. Returns why its original
+// lines must stand, if so.
+std::optional<std::string> RunWriter::write_in_time(const RunJob& job, std::string& text) {
+  std::optional<std::string> objection = write_run(job, text);
+  if (objection && !job.retimed.empty()) {
+    note_slow(job, std::move(*objection));
+    return write_run(*as_sliced(job, *rules_), text);
+  }
+  if (!objection && !job.slow_reason.empty()) {
+    note_slow(job, job.slow_reason);
+  }
+  return objection;
+}
+
 // Writes the run as compensated text, or returns why its original lines must stand.
 std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& text) {
   if (!job.failure.empty()) {
@@ -288,6 +302,15 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   report_->runs_compensated += piece.begins_run() ? 1 : 0;
   report_->windows_solved += compensate::windows_to_solve(job.spans);
   return std::nullopt;
+}
+
+void RunWriter::note_slow(const RunJob& job, std::string reason) {
+  report::FreeTiming& timing = report_->free_timing;
+  ++timing.pieces_as_sliced;
+  if (timing.as_sliced.size() < kMostListed) {
+    timing.as_sliced.push_back({job.piece.events.front().line.number,
+                                job.piece.events.back().line.number, std::move(reason)});
+  }
 }
 
 void RunWriter::note_fallback(const RunJob& job, std::string reason) {

@@ -46,10 +46,12 @@ class RunWriter {
   [[nodiscard]] emit::RunPlan in_time(const RunJob& job) const;
   [[nodiscard]] std::optional<gcode::Segment> kept_before(const Piece& piece) const;
   [[nodiscard]] bool fits(const RunJob& job) const;
+  std::optional<std::string> write_in_time(const RunJob& job, std::string& text);
   std::optional<std::string> write_run(const RunJob& job, std::string& text);
   std::optional<std::string> insist(const RunJob& job, std::string& text);
   std::optional<std::string> try_run(const RunJob& job, const emit::RunPlan& plan,
                                      bool may_be_worse, std::string& text);
+  void note_slow(const RunJob& job, std::string reason);
   void note_fallback(const RunJob& job, std::string reason);
 
   const RunRules* rules_;

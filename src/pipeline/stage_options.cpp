@@ -18,6 +18,9 @@ namespace {
 // that far below the limit, so that the text keeps it.
 constexpr double kGridMm = 1e-4;
 constexpr double kAccelShare = 0.98;
+// Where the timing is free the base is at its limit most of the time, so the largest of many errors
+// counts.
+constexpr double kAccelShareOfFreeTiming = 0.93;
 // The time over which lines are counted, and the shortest line relative to the even pace.
 constexpr double kBurst_s = 0.1;
 constexpr double kShortest = 0.4;
@@ -77,7 +80,8 @@ double planned_base_accel(const machine::Settings& settings, double asked_mm_s2)
       std::min(settings.base_max_accel_mm_s2(asked_mm_s2), accel_by_lines(settings));
   const double axes =
       shares_motors(settings) ? 2.0 : 1.0;  // number of axes whose rounding a motor gets
-  return kAccelShare * limit -
+  const double share = settings.is_timing_free() ? kAccelShareOfFreeTiming : kAccelShare;
+  return share * limit -
          std::min(2.0 * axes * grid_mm(settings) / (shortest_s * shortest_s), 0.2 * limit);
 }
 

@@ -87,6 +87,7 @@ report::Report new_report(std::string command, const Job& job) {
   report.firmware = to_string(job.settings.printer.firmware);
   report.freq_error = job.settings.freq_error();
   report.max_flow_mm3_s = job.settings.extruder.max_flow_mm3_s;
+  report.free_timing.tolerance_mm = job.settings.timing.tolerance_um * 1e-3;
   for (machine::SettingRow& setting : machine::rows(job.settings)) {
     report.printer.push_back(
         {std::move(setting.key), std::move(setting.value), std::move(setting.origin)});
@@ -158,6 +159,10 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
   };
   report.uncompensated_lag = lag(verified.uncompensated_lag);
   report.compensated_lag = lag(verified.compensated_lag);
+  report.free_timing.contour_p999_mm = verified.compensated.extruding.contour_p999_mm;
+  report.free_timing.speed_p999 = verified.compensated_feed.p999;
+  report.free_timing.speed_max = verified.compensated_feed.max;
+  report.free_timing.speed_max_line = verified.compensated_feed.max_line;
   report.uncompensated_flow = row(verified.uncompensated_flow);
   report.compensated_flow = row(verified.compensated_flow);
   if (verified.too_much_flow && report.max_flow_mm3_s) {

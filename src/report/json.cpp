@@ -180,6 +180,20 @@ void add_motion(const Report& r, Json& json) {
                   {"own_max_accel_origin", r.facts.motor_max_accel_origin}};
 }
 
+void add_timing(const Report& r, Json& json) {
+  const FreeTiming& timing = r.free_timing;
+  json["timing"] = nullptr;
+  if (timing.tolerance_mm > 0.0) {
+    json["timing"] = {{"tolerance_mm", timing.tolerance_mm},
+                      {"contour_p999_mm", timing.contour_p999_mm},
+                      {"speed_of_feed_p999", timing.speed_p999},
+                      {"speed_of_feed_max", timing.speed_max},
+                      {"speed_of_feed_max_line", timing.speed_max_line},
+                      {"pieces_as_sliced", timing.pieces_as_sliced},
+                      {"as_sliced", fallbacks_json(timing.as_sliced)}};
+  }
+}
+
 void add_work(const Report& r, Json& json) {
   if (r.solver_engine.empty()) {
     // Nothing was solved: an existing file was verified. How it was made is not known.
@@ -278,6 +292,7 @@ std::string to_json(const Report& report) {
   json["printer"] = settings_json(report.printer);
   add_answers(report, json);
   add_motion(report, json);
+  add_timing(report, json);
   add_work(report, json);
   add_output(report, json);
   return dump(json);

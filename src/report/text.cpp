@@ -170,6 +170,23 @@ void write_times(Sink out, const Report& r) {
                  duration_text(r.reference_time_s), duration_text(r.emitted_time_s), change);
 }
 
+void write_timing(Sink out, const Report& r) {
+  const FreeTiming& timing = r.free_timing;
+  if (timing.tolerance_mm <= 0.0) {
+    return;
+  }
+  fmt::format_to(out,
+                 "timing        as fast as {:.4g} µm allow: 99.9 % of the time within {} µm, the "
+                 "nozzle at {:.3f} F at most\n",
+                 timing.tolerance_mm * 1e3, micrometres_text(timing.contour_p999_mm),
+                 timing.speed_max);
+  if (timing.pieces_as_sliced > 0) {
+    fmt::format_to(
+        out, "              {} {} the slicer's timing\n", timing.pieces_as_sliced,
+        timing.pieces_as_sliced == 1 ? "stretch of motion keeps" : "stretches of motion keep");
+  }
+}
+
 void write_runs(Sink out, const Report& r) {
   if (r.runs_total == 0 && r.windows_total == 0) {
     return;
@@ -347,6 +364,7 @@ std::string to_text(const Report& report) {
         micrometres_text(report.robustness->nominal_rms_mm));
   }
   write_times(out, report);
+  write_timing(out, report);
   write_runs(out, report);
   write_path(out, report);
   text += unknown_text(report.unknown_commands);

@@ -24,7 +24,7 @@ using gcode::X;
 using gcode::Y;
 
 constexpr int kRounds = 12;
-constexpr int kRepairs = 10;
+constexpr int kRepairs = 20;
 constexpr double kAlpha = 0.4;
 constexpr double kBeta = 0.2;
 constexpr double kCooling = 0.9;  // of both, from round to round

@@ -14,6 +14,12 @@ using gcode::Y;
 // period. So we look several times per node.
 constexpr int kLooks = 4;
 constexpr double kBetweenLooks[] = {0.25, 0.5, 0.75};
+// The share of the distance along the path that counts, as where filament is laid
+// (emit/nozzle_progress.cpp).
+constexpr double kTowardsReference = 0.01;
+// Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
+// There the nozzle may stray so many times the tolerance.
+constexpr double kBeside = 1.5;
 // How far from its time the path counts as near.
 constexpr double kReach_s = 31e-3;
 
@@ -27,34 +33,13 @@ dynamics::BaseSegment segment_of(const dynamics::AxisTrajectory& base, std::size
           base.accel_mm_s2[node] + (look + 0.5) / kLooks * change};
 }
 
-struct Nearest {
-  double distance_mm = 0.0;
+// Where a nozzle is on the path.
+struct Place {
+  double error_mm = 0.0;  // distance to the nearest place, wherever that is
+  // The place up to which filament is laid.
+  double progress_mm = 0.0;
   std::size_t piece = 0;
 };
-
-Nearest nearest(std::span<const planner::PlannedMove> plan, std::size_t first, std::size_t end,
-                double x_mm, double y_mm) {
-  double least = std::numeric_limits<double>::infinity();
-  std::size_t at = first;
-  for (std::size_t i = first; i < end; ++i) {
-    const gcode::Segment& segment = plan[i].segment;
-    const double dx = plan[i].direction[X];
-    const double dy = plan[i].direction[Y];
-    const double px = x_mm - segment.start_mm[X];
-    const double py = y_mm - segment.start_mm[Y];
-    const double flat2 = dx * dx + dy * dy;
-    const double along =
-        flat2 > 0.0 ? std::clamp((px * dx + py * dy) / flat2, 0.0, plan[i].length_mm) : 0.0;
-    const double across_x = px - along * dx;
-    const double across_y = py - along * dy;
-    const double distance2 = across_x * across_x + across_y * across_y;
-    if (distance2 < least) {
-      least = distance2;
-      at = i;
-    }
-  }
-  return {std::sqrt(least), at};
-}
 
 double swing_mm(const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
                 double base_mm) {
@@ -66,7 +51,11 @@ class Walk {
  public:
   Walk(std::span<const planner::PlannedMove> plan, std::span<const MoveBounds> bounds,
        std::span<const double> starts_s, const dynamics::BaseTrajectory& base)
-      : plan_(plan), bounds_(bounds), starts_s_(starts_s), base_(base) {}
+      : plan_(plan), bounds_(bounds), starts_s_(starts_s), base_(base), from_mm_{0.0} {
+    for (const planner::PlannedMove& move : plan) {
+      from_mm_.push_back(from_mm_.back() + move.length_mm);
+    }
+  }
 
   // may_be_left: the swing in the end that counts as 1, relative to the tolerance.
   void add(const AxesModel& model, dynamics::NozzleXY nozzle, double may_be_left,
@@ -78,7 +67,8 @@ class Walk {
     std::size_t first = 0;  // pieces within reach
     std::size_t end = 0;
     dynamics::NozzleMotionXY last = nozzle.motion();
-    std::size_t last_piece = 0;
+    Place furthest;
+    std::vector<AtNode> nodes(base_.nodes());
     for (std::size_t node = 0; node + 1 < base_.nodes(); ++node) {
       for (int look = 0; look < kLooks; ++look) {
         map_x.advance(segment_of(base_.x, node, look, h), nozzle.x);
@@ -97,38 +87,97 @@ class Walk {
           ++end;
         }
         const dynamics::NozzleMotionXY at = nozzle.motion();
-        const Nearest place = nearest(plan_, first, end, at.x.position, at.y.position);
         const double speed_mm_s = std::hypot(at.x.velocity, at.y.velocity);
-        note(place, now, speed_mm_s, node + 1, result);
-        if (place.piece != last_piece) {
-          // The error is largest where the nearest piece changes.
+        const double reference_mm = from_mm_[now] + plan_[now].distance_mm(t - starts_s_[now]);
+        const auto look_at = [&](double x_mm, double y_mm) {
+          Place found = place(first, end, x_mm, y_mm, reference_mm);
+          // Filament is never laid backwards.
+          if (found.progress_mm < furthest.progress_mm) {
+            found.progress_mm = furthest.progress_mm;
+            found.piece = furthest.piece;
+          }
+          furthest = found;
+          note(found, speed_mm_s, nodes[node + 1]);
+        };
+        const std::size_t last_piece = furthest.piece;
+        const Place ahead = place(first, end, at.x.position, at.y.position, reference_mm);
+        if (ahead.piece != last_piece) {
+          // The error may be largest where the piece changes.
           for (const double share : kBetweenLooks) {
-            const double x_mm = last.x.position + share * (at.x.position - last.x.position);
-            const double y_mm = last.y.position + share * (at.y.position - last.y.position);
-            note(nearest(plan_, first, end, x_mm, y_mm), now, speed_mm_s, node + 1, result);
+            look_at(last.x.position + share * (at.x.position - last.x.position),
+                    last.y.position + share * (at.y.position - last.y.position));
           }
         }
-        last_piece = place.piece;
+        look_at(at.x.position, at.y.position);
         last = at;
       }
     }
+    add(nodes, result);
     const double left_mm = std::hypot(swing_mm(model.x, nozzle.x, base_.x.position_mm.back()),
                                       swing_mm(model.y, nozzle.y, base_.y.position_mm.back()));
     result.left = std::max(result.left, left_mm / (may_be_left * bounds_.back().tolerance_mm));
   }
 
  private:
-  void note(const Nearest& place, std::size_t now, double speed_mm_s, std::size_t node,
-            NozzleMeasure& result) const {
-    const bool lays = plan_[place.piece].segment.extruding();
-    const double tolerance_mm =
-        lays || plan_[now].segment.extruding()
-            ? std::min(bounds_[place.piece].tolerance_mm, bounds_[now].tolerance_mm)
-            : kTravelTolerance_mm;
-    result.error[node] = std::max(result.error[node], place.distance_mm / tolerance_mm);
-    if (lays) {
-      result.speed[node] =
-          std::max(result.speed[node], speed_mm_s / plan_[place.piece].segment.feed_mm_s);
+  // A place on some of the pieces. Filament is laid up to the nearest one. Where the path comes
+  // back to itself, as travel does along what was just laid, that is the one nearer to the
+  // reference.
+  [[nodiscard]] Place place(std::size_t first, std::size_t end, double x_mm, double y_mm,
+                            double reference_mm) const {
+    double nearest2 = std::numeric_limits<double>::infinity();
+    double least = std::numeric_limits<double>::infinity();
+    Place found;
+    for (std::size_t i = first; i < end; ++i) {
+      const gcode::Segment& segment = plan_[i].segment;
+      const double dx = plan_[i].direction[X];
+      const double dy = plan_[i].direction[Y];
+      const double px = x_mm - segment.start_mm[X];
+      const double py = y_mm - segment.start_mm[Y];
+      const double flat2 = dx * dx + dy * dy;
+      const double along =
+          flat2 > 0.0 ? std::clamp((px * dx + py * dy) / flat2, 0.0, plan_[i].length_mm) : 0.0;
+      const double across_x = px - along * dx;
+      const double across_y = py - along * dy;
+      const double distance2 = across_x * across_x + across_y * across_y;
+      const double ahead_mm = from_mm_[i] + along - reference_mm;
+      const double cost = distance2 + kTowardsReference * ahead_mm * ahead_mm;
+      nearest2 = std::min(nearest2, distance2);
+      if (cost < least) {
+        least = cost;
+        found.progress_mm = from_mm_[i] + along;
+        found.piece = i;
+      }
+    }
+    found.error_mm = std::sqrt(nearest2);
+    return found;
+  }
+
+  // A nozzle at a node.
+  struct AtNode {
+    double error_mm = 0.0;
+    double speed_mm_s = 0.0;
+    // Those of the pieces on which it lays filament.
+    double tolerance_mm = std::numeric_limits<double>::infinity();
+    double feed_mm_s = std::numeric_limits<double>::infinity();
+  };
+
+  void note(const Place& at, double speed_mm_s, AtNode& node) const {
+    node.error_mm = std::max(node.error_mm, at.error_mm);
+    node.speed_mm_s = std::max(node.speed_mm_s, speed_mm_s);
+    if (const gcode::Segment& segment = plan_[at.piece].segment; segment.extruding()) {
+      node.tolerance_mm = std::min(node.tolerance_mm, bounds_[at.piece].tolerance_mm);
+      node.feed_mm_s = std::min(node.feed_mm_s, segment.feed_mm_s);
+    }
+  }
+
+  static void add(const std::vector<AtNode>& nodes, NozzleMeasure& result) {
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      double tolerance_mm = std::min(nodes[k].tolerance_mm, kTravelTolerance_mm);
+      for (const std::size_t beside : {k > 0 ? k - 1 : 0, std::min(k + 1, nodes.size() - 1)}) {
+        tolerance_mm = std::min(tolerance_mm, kBeside * nodes[beside].tolerance_mm);
+      }
+      result.error[k] = std::max(result.error[k], nodes[k].error_mm / tolerance_mm);
+      result.speed[k] = std::max(result.speed[k], nodes[k].speed_mm_s / nodes[k].feed_mm_s);
     }
   }
 
@@ -136,6 +185,7 @@ class Walk {
   std::span<const MoveBounds> bounds_;
   std::span<const double> starts_s_;
   const dynamics::BaseTrajectory& base_;
+  std::vector<double> from_mm_;  // length of the path before each piece
 };
 
 }  // namespace

@@ -16,6 +16,7 @@ DeviationStats DeviationAccumulator::stats() const {
   }
   stats.contour_max_mm = std::sqrt(contour2_max_);
   stats.contour_p99_mm = std::min(stats.contour_max_mm, contour_s_.quantile(0.99));
+  stats.contour_p999_mm = std::min(stats.contour_max_mm, contour_s_.quantile(0.999));
   stats.contour_rms_mm = std::sqrt(sum_contour2_ / weight_s_);
   stats.tracking_max_mm = std::sqrt(tracking2_max_);
   stats.tracking_rms_mm = std::sqrt(sum_tracking2_ / weight_s_);

@@ -342,6 +342,11 @@ Meter::Sample Meter::sample(const ReferencePhase& reference, bool laying, double
   if (laying) {
     extruding_.add(contour2, tracking2, h, line);
     section_error_.add(contour2, h, line);
+    if (follow_feed_ && (*path_)[nearest].extruding) {
+      const double v_x = nozzle_.x.velocity();
+      const double v_y = nozzle_.y.velocity();
+      feed_.add(v_x * v_x + v_y * v_y, (*path_)[nearest].move.segment.feed_mm_s, h, line);
+    }
   }
   if (follow_lag_) {
     const double v_x = reference.x.velocity;

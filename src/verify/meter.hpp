@@ -1,6 +1,7 @@
 // Hangs the nozzle on a base that is moved, and measures it against the reference.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -37,6 +38,29 @@ class LagEstimate {
   double worst_s_ = 0.0;
   double last_h_ = 0.0;  // h of the last sample
   double keep_ = 1.0;    // share of the memory that stays after last_h_
+};
+
+// How fast the nozzle goes relative to F.
+class FeedGauge {
+ public:
+  // v2: the square of the nozzle's speed.
+  void add(double v2_mm2_s2, double feed_mm_s, double weight_s, std::size_t line) {
+    const double ratio2 = v2_mm2_s2 / (feed_mm_s * feed_mm_s);
+    ratio_s_.add_square(ratio2, weight_s);
+    if (ratio2 > ratio2_max_) {
+      ratio2_max_ = ratio2;
+      line_ = line;
+    }
+  }
+  [[nodiscard]] FeedStats stats() const {
+    const double max = std::sqrt(ratio2_max_);
+    return {std::min(max, ratio_s_.quantile(0.999)), max, line_};
+  }
+
+ private:
+  LogHistogram ratio_s_;  // time per cell
+  double ratio2_max_ = 0.0;
+  std::size_t line_ = 0;
 };
 
 // The contour error of a nozzle in one section.
@@ -107,6 +131,10 @@ class Meter {
   void follow_corners() { corners_.emplace(near_.reach_s()); }
   [[nodiscard]] CornerStats corners() const { return corners_ ? corners_->stats() : CornerStats{}; }
 
+  // Also measures how fast the nozzle goes relative to F.
+  void follow_feed(bool on) { follow_feed_ = on; }
+  [[nodiscard]] FeedStats feed() const { return feed_.stats(); }
+
   void follow_lag(bool on);
   [[nodiscard]] double worst_lag_s() const { return lag_.worst_s(); }
   [[nodiscard]] double lag_s() const { return lag_.present_s(); }
@@ -175,6 +203,8 @@ class Meter {
   std::size_t corner_section_ = 0;
   // What corners_ adds to the clock, which jumps where one path takes another's place.
   double corner_shift_s_ = 0.0;
+  FeedGauge feed_;
+  bool follow_feed_ = false;
   LagEstimate lag_;
   bool follow_lag_ = false;
   bool waiting_ = false;

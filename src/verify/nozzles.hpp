@@ -46,6 +46,7 @@ class Nozzles {
   // The machine stands still for duration_s. Motion that the shaper has delayed is played first.
   void hold(double duration_s);
   void follow_lag(bool on) { main_.follow_lag(on); }
+  void follow_feed(bool on) { main_.follow_feed(on); }
 
  private:
   template <class Action>

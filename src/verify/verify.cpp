@@ -261,6 +261,7 @@ void Verifier::play_run() {
     }
   }
   emitted_.follow_lag(compensated);
+  emitted_.follow_feed(compensated && output_.section().has_free_timing);
   totals_.runs += compensated ? 1 : 0;
   play_run_moves(compensated);
   emitted_.follow_lag(false);
@@ -533,6 +534,7 @@ VerifyReport Verifier::report() {
   }
   report.uncompensated_lag = original_.main().filament_lag();
   report.compensated_lag = emitted_.main().filament_lag();
+  report.compensated_feed = emitted_.main().feed();
   report.uncompensated_corners = original_.main().corners();
   report.compensated_corners = emitted_.main().corners();
   report.uncompensated_flow = input_flow_.stats();

@@ -87,6 +87,13 @@ inline Report sample_report() {
   r.windows_total = 1000;
   r.windows_solved = 994;
   r.windows_fallback = 6;
+  r.free_timing = {.tolerance_mm = 0.02,
+                   .pieces_as_sliced = 1,
+                   .as_sliced = {{50, 60, "base acceleration above the limit"}},
+                   .contour_p999_mm = 0.0188,
+                   .speed_p999 = 1.012,
+                   .speed_max = 1.019,
+                   .speed_max_line = 77};
   r.fallbacks = {{10, 20, "no solution"}, {30, 44, "worse than the original"}};
   r.kept_moves = {{"Z move", 12}};
   r.extruded_path = {8000.0, 7000.0, {{"run left as sliced", 900.0}, {"start unknown", 100.0}}};

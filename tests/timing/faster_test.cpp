@@ -40,16 +40,17 @@ std::vector<MoveBounds> bounds_of(const Moves& moves) {
   return bounds;
 }
 
-// A tour of corners of all angles, some close together.
-Moves tour(unsigned seed, double feed_mm_s, std::size_t corners = 12) {
+// A tour of corners of all angles, some close together, at a constant F.
+Moves tour(unsigned seed, double feed_mm_s, bool travels = false) {
+  constexpr std::size_t kCorners = 12;
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> place(0.0, 15.0);
   std::uniform_real_distribution<double> near(-0.5, 0.5);
   std::vector<Point> points = {{5.0, 5.0}};
-  for (std::size_t i = 0; i < corners; ++i) {
+  for (std::size_t i = 0; i < kCorners; ++i) {
     points.push_back(
         i % 3 == 2 ? Point{points.back().x_mm + near(random), points.back().y_mm + near(random)}
-                   : Point{place(random), place(random), i % 4 != 3});
+                   : Point{place(random), place(random), !travels || i % 4 != 3});
   }
   return plan(points, planner_limits(feed_mm_s, 2000.0, 5.0));
 }
@@ -57,10 +58,11 @@ Moves tour(unsigned seed, double feed_mm_s, std::size_t corners = 12) {
 // What a nozzle of these axes does on the base that is found for the moves.
 struct Drawn {
   double duration_s = 0.0;
-  double largest_error_mm = 0.0;  // while filament is laid
-  double fastest = 0.0;           // relative to F, likewise
-  double swing_mm = 0.0;          // in the end
-  double accel_mm_s2 = 0.0;       // of the base
+  double largest_error_mm = 0.0;   // while filament is laid
+  double largest_travel_mm = 0.0;  // at any time
+  double fastest = 0.0;            // relative to F, likewise
+  double swing_mm = 0.0;           // in the end
+  double accel_mm_s2 = 0.0;        // of the base
 };
 
 double distance_mm(const planner::PlannedMove& move, double x_mm, double y_mm) {
@@ -109,6 +111,7 @@ Drawn draw(const Moves& moves, const compensate::Setup& of, const dynamics::Flex
       }
       start_s += move.duration_s();
     }
+    drawn.largest_travel_mm = std::max(drawn.largest_travel_mm, least_mm);
     if (on != nullptr && on->segment.extruding()) {
       drawn.largest_error_mm = std::max(drawn.largest_error_mm, least_mm);
       drawn.fastest =
@@ -144,8 +147,19 @@ TEST(Faster, KeepsToleranceFeedAndMotorsInLessTime) {
   }
 }
 
+TEST(Faster, LeavesTheWayOfTravelByLittle) {
+  for (unsigned seed = 11; seed <= 16; ++seed) {
+    const Moves moves = tour(seed, 150.0, true);
+    const auto result = timed(moves, setup(), bounds_of(moves));
+    ASSERT_TRUE(result.has_value()) << seed;
+    const Drawn drawn = draw(result->moves, setup(), setup().x.axis);
+    EXPECT_LT(drawn.duration_s, 0.9 * planner::duration_s(moves)) << seed;
+    EXPECT_LT(drawn.largest_travel_mm, 1.1 * kTravelTolerance_mm) << seed;
+  }
+}
+
 TEST(Faster, GoesTheWholePathWithItsFilament) {
-  const Moves moves = tour(7, 100.0);
+  const Moves moves = tour(7, 100.0, true);
   const auto result = timed(moves, setup(), bounds_of(moves));
   ASSERT_TRUE(result.has_value());
   ASSERT_EQ(result->pieces.size(), moves.size());

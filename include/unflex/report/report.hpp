@@ -73,6 +73,19 @@ struct Fallback {
   std::string reason;
 };
 
+// What became of the timing, where it is chosen by a tolerance of the nozzle.
+struct FreeTiming {
+  double tolerance_mm = 0.0;         // 0: the timing is as sliced
+  std::size_t pieces_as_sliced = 0;  // runs, or parts of long ones, that keep their timing
+  std::vector<Fallback> as_sliced;   // at most 1000 of them
+  // While filament is laid: the contour error that 99.9 % of the time are within, and the nozzle's
+  // speed relative to F.
+  double contour_p999_mm = 0.0;
+  double speed_p999 = 0.0;
+  double speed_max = 0.0;
+  std::size_t speed_max_line = 0;  // of the input
+};
+
 // A stretch of the input whose lines, kept or rewritten, are more than the budget.
 struct AboveBudget {
   std::size_t first_line = 0;
@@ -184,6 +197,8 @@ struct Report {
   std::vector<Fallback> fallbacks;   // at most 1000 are listed
   std::map<std::string, std::size_t>
       kept_moves;  // reason → moves outside runs ("wipe", "Z move" …)
+
+  FreeTiming free_timing;
 
   ExtrudedPath extruded_path;
   std::vector<UnknownCommand> unknown_commands;  // by their first lines

@@ -138,6 +138,8 @@ struct VerifyReport {
   double worst_move_extrusion_error_mm = 0.0;
   LagStats uncompensated_lag;
   LagStats compensated_lag;
+  // How fast the nozzle goes in runs whose timing is free.
+  FeedStats compensated_feed;
   // How far the nozzle passes from the corners of the sliced path.
   CornerStats uncompensated_corners;
   CornerStats compensated_corners;
