@@ -33,7 +33,7 @@ const char* name_of(RowKind kind) {
 
 template <class Form>
 Result<AxisSolution> solve_by(Form& form, InteriorPoint& interior_point, const ScaledWindow& scaled,
-                              bool strict) {
+                              bool strict, const Precision& precision) {
   form.assign(scaled);
   if (!form.factor({}) || !step_without_limits(form, scaled.nodes)) {
     return fail(ErrorKind::internal, "the window's program cannot be solved even without limits");
@@ -45,7 +45,7 @@ Result<AxisSolution> solve_by(Form& form, InteriorPoint& interior_point, const S
     if (active != ActiveLimits{}) {
       form.restore();
       const InteriorPoint::Outcome outcome =
-          interior_point.solve(form, scaled.nodes, row_bounds(scaled, active), strict);
+          interior_point.solve(form, scaled.nodes, row_bounds(scaled, active), strict, precision);
       iterations = outcome.iterations;
       if (!outcome.converged) {
         return fail(
@@ -101,7 +101,8 @@ class Workspaces {
 
 class BandedEngine final : public Engine {
  public:
-  explicit BandedEngine(BandedForm form) : form_(form) {}
+  explicit BandedEngine(BandedForm form, Precision precision = {})
+      : form_(form), precision_(precision) {}
 
   Result<AxisSolution> solve(const AxisWindow& window) const override {
     std::unique_ptr<Workspace> workspace = workspaces_.take();
@@ -120,16 +121,17 @@ class BandedEngine final : public Engine {
         form_ == BandedForm::flat || (form_ == BandedForm::fitting && FlatForm::suits(scaled));
     if (is_flat && FlatForm::takes(window)) {
       // If the flat form runs out of digits, the stage form has some left.
-      Result<AxisSolution> solution =
-          solve_by(work.flat, work.interior_point, scaled, form_ == BandedForm::fitting);
+      Result<AxisSolution> solution = solve_by(work.flat, work.interior_point, scaled,
+                                               form_ == BandedForm::fitting, precision_);
       if (solution || form_ == BandedForm::flat) {
         return solution;
       }
     }
-    return solve_by(work.stages, work.interior_point, scaled, false);
+    return solve_by(work.stages, work.interior_point, scaled, false, precision_);
   }
 
   BandedForm form_;
+  Precision precision_;
   mutable Workspaces workspaces_;
 };
 
@@ -140,5 +142,9 @@ std::unique_ptr<Engine> make_banded_engine(BandedForm form) {
 }
 
 std::unique_ptr<Engine> make_banded_engine() { return make_banded_engine(BandedForm::fitting); }
+
+std::unique_ptr<Engine> make_rough_engine() {
+  return std::make_unique<BandedEngine>(BandedForm::fitting, kRough);
+}
 
 }  // namespace unflex::compensate

@@ -19,7 +19,7 @@ template <class Form>
     form.solve({});
     const double cost = std::max(form.half_cost(), kIdleHalfCost * static_cast<double>(nodes));
     form.advance(1.0);
-    if (form.decrement() <= kGapShare * cost) {
+    if (form.decrement() <= Precision{}.gap_share * cost) {
       return true;
     }
     form.evaluate({});

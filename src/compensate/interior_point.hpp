@@ -22,6 +22,20 @@
 
 namespace unflex::compensate {
 
+// When a solution counts as found.
+struct Precision {
+  // The largest sλ summed over all sides, and the largest decrement left, as shares of the cost.
+  double gap_share = 1e-8;
+  // A narrower limit of both, scaled, if rounding allows it within kMostPolish more iterations:
+  // where the cost is large, even a small share of it can move a base that hardly moves the nozzle.
+  double gap = 1e-7;
+  // The largest residual, as a share of the kind's scale.
+  double feasibility = 1e-8;
+};
+
+// For who solves again and again on the way to something else.
+inline constexpr Precision kRough{1e-4, 1e30, 1e-4};
+
 class InteriorPoint {
  public:
   struct Outcome {
@@ -37,7 +51,8 @@ class InteriorPoint {
   // solution that misses the narrower of the two tolerances counts as not converged.
   template <class Form>
   [[nodiscard]] Outcome solve(Form& form, std::size_t nodes,
-                              const PerKind<std::optional<RowBounds>>& bounds, bool strict);
+                              const PerKind<std::optional<RowBounds>>& bounds, bool strict,
+                              const Precision& precision);
 
  private:
   // One side of all rows of a kind.
@@ -85,14 +100,7 @@ class InteriorPoint {
   std::size_t sides_ = 0;  // number of s
 };
 
-// The largest sλ summed over all sides, and the largest decrement left, as shares of the cost.
-inline constexpr double kGapShare = 1e-8;
-// A narrower limit of both, scaled, if rounding allows it within kMostPolish more iterations: where
-// the cost is large, even a small share of it can move a base that hardly moves the nozzle.
-inline constexpr double kGap = 1e-7;
 inline constexpr int kMostPolish = 2;
-// The largest residual, as a share of the kind's scale.
-inline constexpr double kFeasibility = 1e-8;
 // A half cost per node below this is of no interest.
 inline constexpr double kIdleHalfCost = 1e-8;
 inline constexpr int kMaxIterations = 200;
@@ -100,7 +108,7 @@ inline constexpr int kMaxIterations = 200;
 template <class Form>
 InteriorPoint::Outcome InteriorPoint::solve(Form& form, std::size_t nodes,
                                             const PerKind<std::optional<RowBounds>>& bounds,
-                                            bool strict) {
+                                            bool strict, const Precision& precision) {
   PerKind<bool> kinds{};
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     kinds[i] = rows_[i].active = bounds[i].has_value();
@@ -113,14 +121,14 @@ InteriorPoint::Outcome InteriorPoint::solve(Form& form, std::size_t nodes,
   for (;; ++iterations) {
     linearise(values_of(form));
     const double cost = std::max(form.half_cost(), kIdleHalfCost * count);
-    bool good = gap_ <= kGapShare * cost && residual_ <= kFeasibility;
+    bool good = gap_ <= precision.gap_share * cost && residual_ <= precision.feasibility;
     if (good) {
       // The gradient of the Lagrangian, measured by what a step could still gain.
       pull();
       form.solve(forces());
-      good = form.decrement() <= kGapShare * cost;
-      if (good &&
-          (std::max(gap_, form.decrement()) <= kGap || (!strict && polished++ == kMostPolish))) {
+      good = form.decrement() <= precision.gap_share * cost;
+      if (good && (std::max(gap_, form.decrement()) <= precision.gap ||
+                   (!strict && polished++ == kMostPolish))) {
         return {true, iterations};
       }
       linearise(values_of(form));

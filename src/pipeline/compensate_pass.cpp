@@ -256,7 +256,7 @@ class Compensator {
   void time_in_thread(const std::shared_ptr<RunJob>& job) {
     job->bounds = move_bounds(job->piece, job_.settings);
     pool_.submit([this, job] {
-      choose_timing(*job, *divider_);
+      choose_timing(*job, *timer_);
       wake();
     });
   }
@@ -498,6 +498,8 @@ class Compensator {
   std::unique_ptr<compensate::Engine> engine_;  // used in threads; null: the processes solve
   std::unique_ptr<compensate::Engine> divider_ =
       compensate::make_banded_engine();  // for solve_in_process()
+  // For choose_timing().
+  std::unique_ptr<compensate::Engine> timer_ = compensate::make_rough_engine();
   // Last, so that threads end before what they use.
   PieceThread pieces_;
   std::unique_ptr<record::Recorder> recorder_;

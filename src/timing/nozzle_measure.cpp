@@ -20,8 +20,6 @@ constexpr double kTowardsReference = 0.01;
 // Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
 // There the nozzle may stray so many times the tolerance.
 constexpr double kBeside = 1.5;
-// How far from its time the path counts as near.
-constexpr double kReach_s = 31e-3;
 
 // The base between a node and the next, a look further. Its acceleration is linear there, and the
 // mean over the time to the next look serves the nozzle.
@@ -54,6 +52,9 @@ class Walk {
       : plan_(plan), bounds_(bounds), starts_s_(starts_s), base_(base), from_mm_{0.0} {
     for (const planner::PlannedMove& move : plan) {
       from_mm_.push_back(from_mm_.back() + move.length_mm);
+      const double flat2 =
+          move.direction[X] * move.direction[X] + move.direction[Y] * move.direction[Y];
+      inverse_flat2_.push_back(flat2 > 0.0 ? 1.0 / flat2 : 0.0);
     }
   }
 
@@ -63,9 +64,7 @@ class Walk {
     const double h = base_.period_s;
     const dynamics::ExactMap map_x(model.x, h / kLooks);
     const dynamics::ExactMap map_y(model.y, h / kLooks);
-    std::size_t now = 0;    // the piece that the plan is on
-    std::size_t first = 0;  // pieces within reach
-    std::size_t end = 0;
+    std::size_t now = 0;  // the piece that the plan is on
     dynamics::NozzleMotionXY last = nozzle.motion();
     Place furthest;
     std::vector<AtNode> nodes(base_.nodes());
@@ -80,17 +79,12 @@ class Walk {
         while (now + 1 < plan_.size() && starts_s_[now + 1] <= t) {
           ++now;
         }
-        while (starts_s_[first + 1] < t - kReach_s) {
-          ++first;
-        }
-        while (end < plan_.size() && starts_s_[end] <= t + kReach_s) {
-          ++end;
-        }
         const dynamics::NozzleMotionXY at = nozzle.motion();
-        const double speed_mm_s = std::hypot(at.x.velocity, at.y.velocity);
+        const double speed_mm_s =
+            std::sqrt(at.x.velocity * at.x.velocity + at.y.velocity * at.y.velocity);
         const double reference_mm = from_mm_[now] + plan_[now].distance_mm(t - starts_s_[now]);
         const auto look_at = [&](double x_mm, double y_mm) {
-          Place found = place(first, end, x_mm, y_mm, reference_mm);
+          Place found = place(now, x_mm, y_mm, reference_mm);
           // Filament is never laid backwards.
           if (found.progress_mm < furthest.progress_mm) {
             found.progress_mm = furthest.progress_mm;
@@ -100,7 +94,7 @@ class Walk {
           note(found, speed_mm_s, nodes[node + 1]);
         };
         const std::size_t last_piece = furthest.piece;
-        const Place ahead = place(first, end, at.x.position, at.y.position, reference_mm);
+        const Place ahead = place(now, at.x.position, at.y.position, reference_mm);
         if (ahead.piece != last_piece) {
           // The error may be largest where the piece changes.
           for (const double share : kBetweenLooks) {
@@ -119,23 +113,20 @@ class Walk {
   }
 
  private:
-  // A place on some of the pieces. Filament is laid up to the nearest one. Where the path comes
-  // back to itself, as travel does along what was just laid, that is the one nearer to the
-  // reference.
-  [[nodiscard]] Place place(std::size_t first, std::size_t end, double x_mm, double y_mm,
-                            double reference_mm) const {
+  // Filament is laid up to the nearest place. Where the path comes back to itself, as travel does
+  // along what was just laid, that is the one nearer to the reference, which is on the piece `now`.
+  [[nodiscard]] Place place(std::size_t now, double x_mm, double y_mm, double reference_mm) const {
     double nearest2 = std::numeric_limits<double>::infinity();
     double least = std::numeric_limits<double>::infinity();
     Place found;
-    for (std::size_t i = first; i < end; ++i) {
+    const auto look_at = [&](std::size_t i) {
       const gcode::Segment& segment = plan_[i].segment;
       const double dx = plan_[i].direction[X];
       const double dy = plan_[i].direction[Y];
       const double px = x_mm - segment.start_mm[X];
       const double py = y_mm - segment.start_mm[Y];
-      const double flat2 = dx * dx + dy * dy;
       const double along =
-          flat2 > 0.0 ? std::clamp((px * dx + py * dy) / flat2, 0.0, plan_[i].length_mm) : 0.0;
+          std::clamp((px * dx + py * dy) * inverse_flat2_[i], 0.0, plan_[i].length_mm);
       const double across_x = px - along * dx;
       const double across_y = py - along * dy;
       const double distance2 = across_x * across_x + across_y * across_y;
@@ -147,6 +138,17 @@ class Walk {
         found.progress_mm = from_mm_[i] + along;
         found.piece = i;
       }
+    };
+    // Farther away along the path, that distance alone would cost more.
+    const auto reaches = [&](double away_mm) {
+      return kTowardsReference * away_mm * away_mm <= least;
+    };
+    look_at(now);
+    for (std::size_t i = now; i > 0 && reaches(reference_mm - from_mm_[i]);) {
+      look_at(--i);
+    }
+    for (std::size_t i = now + 1; i < plan_.size() && reaches(from_mm_[i] - reference_mm); ++i) {
+      look_at(i);
     }
     found.error_mm = std::sqrt(nearest2);
     return found;
@@ -185,7 +187,8 @@ class Walk {
   std::span<const MoveBounds> bounds_;
   std::span<const double> starts_s_;
   const dynamics::BaseTrajectory& base_;
-  std::vector<double> from_mm_;  // length of the path before each piece
+  std::vector<double> from_mm_;        // length of the path before each piece
+  std::vector<double> inverse_flat2_;  // 1 / (d_x² + d_y²) of its direction; 0 if it is upright
 };
 
 }  // namespace

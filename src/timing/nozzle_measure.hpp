@@ -1,7 +1,6 @@
 // What the nozzle makes of a run when the base is given.
 //
-//   e   contour error, the distance from the nozzle to the part of the path that the plan passes
-//       within a reach of the time
+//   e   contour error, the distance from the nozzle to the path around the reference
 #pragma once
 
 #include <cstddef>
