@@ -116,11 +116,6 @@ class LocalScaling {
       const std::vector<planner::PlannedMove> plan =
           bounded_plan(pieces_.moves, bounds_, vertex_mm_s_);
       const std::optional<NozzleMeasure> measured = try_plan(plan);
-      std::fprintf(stderr, "line %zu round %d %.4f s (%.4f) error %.3f speed %.3f left %.3f\n",
-                   course_.moves.front().segment.line, round, planner::duration_s(plan), least_s,
-                   measured ? std::ranges::max(measured->error) : -1.0,
-                   measured ? std::ranges::max(measured->speed) : -1.0,
-                   measured ? measured->left : -1.0);
       if (measured && keeps(*measured)) {
         const double gain_s = least_s - planner::duration_s(plan);
         if (gain_s > 0.0) {
