@@ -9,8 +9,6 @@ namespace {
 
 // A place between two passages may be off by so much if it is left out.
 constexpr double kSamePlace_mm = 1e-4;
-// For so much of the path filament may be missing where travel begins.
-constexpr double kLeftBehind_mm = 0.5;
 
 // Adds a passage, and drops the one before it where the speed does not change.
 void add(std::vector<Passage>& timing, Passage passage) {
@@ -32,8 +30,9 @@ void add(std::vector<Passage>& timing, Passage passage) {
 
 }  // namespace
 
-void FilamentTiming::begin(double tolerance_mm) {
+void FilamentTiming::begin(double tolerance_mm, double left_behind_mm) {
   tolerance_mm_ = tolerance_mm;
+  left_behind_mm_ = left_behind_mm;
   next_sliced_.reset();
   timed_.clear();
   lines_.clear();
@@ -108,13 +107,13 @@ void FilamentTiming::time_by_filament(Kind kind) {
     return std::clamp(sign * (at.filament_mm - from_mm) / all_mm, 0.0, 1.0);
   };
   double reached = share_at(now_);
-  const double enough = 1.0 - std::min(tolerance_mm_ / all_mm, 1.0);
+  const auto is_enough = [&](const Moment& at) {
+    return sign * (at.filament_mm - sliced_filament_mm_) >= -tolerance_mm_;
+  };
   // Before travel the last filament may be left to the next move that lays some.
   read_sliced();
-  const double before_travel = next_sliced_ && kind_of(*next_sliced_) == Kind::travels
-                                   ? 1.0 - kLeftBehind_mm / timed.move.length_mm
-                                   : 1.0;
-  for (std::size_t i = 0; reached < enough; ++i) {
+  const bool is_before_travel = next_sliced_ && kind_of(*next_sliced_) == Kind::travels;
+  for (std::size_t i = 0; !is_enough(now_); ++i) {
     if (i == lines_.size() && !pull()) {
       // The file ends too early. The rest is passed as sliced.
       now_ = pulled_;
@@ -126,7 +125,8 @@ void FilamentTiming::time_by_filament(Kind kind) {
     if (end.time_s <= now_.time_s) {
       continue;
     }
-    if (line.move.segment.delta(gcode::E) == 0.0 && reached >= before_travel) {
+    if (is_before_travel && line.move.segment.delta(gcode::E) == 0.0 &&
+        (1.0 - reached) * all_mm <= left_behind_mm_) {
       break;
     }
     if (share_at(end) >= 1.0) {

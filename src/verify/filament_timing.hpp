@@ -30,8 +30,8 @@ class FilamentTiming {
       : sliced_source_(std::move(sliced)), emitted_source_(std::move(emitted)) {}
 
   // A run begins. What is known of the last one is forgotten. tolerance_mm: by how much filament
-  // may be rounded.
-  void begin(double tolerance_mm);
+  // may be rounded. left_behind_mm: how much of it may be missing where travel begins.
+  void begin(double tolerance_mm, double left_behind_mm);
   // The next sliced move, with its timing; false at the end of the run. What the emitted file never
   // reaches is passed as sliced.
   [[nodiscard]] bool next(ReferenceMove& move);
@@ -66,6 +66,7 @@ class FilamentTiming {
   Moves sliced_source_;
   Moves emitted_source_;
   double tolerance_mm_ = 0.0;
+  double left_behind_mm_ = 0.0;
   std::optional<planner::PlannedMove> next_sliced_;
   std::deque<ReferenceMove> timed_;  // to be handed out
   std::deque<Line> lines_;           // of the emitted file, the first one holds `now_`

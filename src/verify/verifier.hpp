@@ -69,6 +69,7 @@ class Verifier {
   bool next_output_move_ahead(planner::PlannedMove& move);
   bool ends_here(const planner::PlannedMove& move, const Replay& file);
   void begin_section(bool compensated);
+  void begin_filament_timing();
   void play_run();
   void skip_added_barriers();
   void join_over_barrier();

@@ -202,7 +202,7 @@ void Verifier::begin_section(bool compensated) {
     kept_path_ = output_.section().has_free_timing ? &resting_path_ : &run_path_;
     run_lead_in_s_ = 0.0;
     if (has_free_timing()) {
-      filament_timing_.begin(filament_tolerance_mm());
+      begin_filament_timing();
       output_ahead_.clear();
       sliced_for_timing_.clear();
       sliced_for_kept_.clear();
@@ -242,6 +242,18 @@ void Verifier::begin_section(bool compensated) {
   if (compensated) {
     // Both nozzles begin with the same swing. If it were sampled only later, it might seem smaller.
     kept_.look();
+  }
+}
+
+void Verifier::begin_filament_timing() {
+
+  constexpr double kLeftBehind_mm = 0.01;
+  constexpr double kRoundedSteps = 1.5;
+  if (rules_.fixed.firmware == Firmware::klipper) {
+    filament_timing_.begin(filament_tolerance_mm(), kLeftBehind_mm);
+  } else {
+    const double rounded_mm = kRoundedSteps / rules_.fixed.steps_per_mm[gcode::E];
+    filament_timing_.begin(rounded_mm, rounded_mm);
   }
 }
 
