@@ -1,8 +1,5 @@
-// What slicers say in comments about the lines that follow: kind of feature, new layer.
-//
-//   ;TYPE:External perimeter    PrusaSlicer, SuperSlicer, OrcaSlicer, Cura, ideaMaker
-//   ; FEATURE: Outer wall       Bambu Studio        ; feature outer perimeter   Simplify3D
-//   ;LAYER_CHANGE  ; CHANGE_LAYER  ;LAYER:12  ; layer 12, Z = 2.4
+// What slicers say in comments about the lines that follow: kind of feature (gcode/feature.hpp),
+// new layer (gcode/layer_mark.hpp).
 #pragma once
 
 #include <cstddef>
