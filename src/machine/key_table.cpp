@@ -289,8 +289,9 @@ constexpr std::array kKeys = {
         "limits.max_accel_mm_s2 × 4 × nozzle_diameter_mm² / filament area",
         &derived<&S::max_extrude_only_accel_mm_s2>},
     Key{"extruder.max_flow_mm3_s", &setting<&S::extruder, &E::max_flow_mm3_s>, kPositive, "mm³/s",
-        "Largest volume of filament that the hotend melts per second; a warning tells where the "
-        "output asks for more, and more than the sliced file",
+        "Largest volume of filament that the hotend melts per second; a free timing keeps it, and "
+        "a "
+        "warning tells where the output asks for more, and more than the sliced file",
         "not limited"},
     Key{"extruder.instantaneous_corner_velocity_mm_s",
         &setting<&S::extruder, &E::instantaneous_corner_velocity_mm_s>, kNotNegative, "mm/s",
@@ -451,6 +452,9 @@ constexpr std::array kKeys = {
         "that allows; 0: the timing stays as sliced"},
     Key{"timing.max_speed_mm_s", &setting<&S::timing, &F::max_speed_mm_s>, kPositive, "mm/s",
         "Speed of travel in a print with free timing", "the slicer's F"},
+    Key{"timing.keep_accel_limits", &setting<&S::timing, &F::keep_accel_limits>, kAny, "",
+        "Whether the accelerations that the print sets (M204, SET_VELOCITY_LIMIT) limit a free "
+        "timing as well"},
 
     Key{"emit.period_ms", &setting<&S::emit, &T::period_ms>, Bounds{.min = 0.05, .max = 50.0}, "ms",
         "Node period: time between two points of the base's motion",

@@ -32,6 +32,23 @@ double grid_mm(const machine::Settings& settings) {
              : kGridMm;
 }
 
+double filament_area_mm2(const machine::ExtruderSettings& extruder) {
+  return std::numbers::pi / 4.0 * extruder.filament_diameter_mm * extruder.filament_diameter_mm;
+}
+
+// The speed at which the move takes as much filament as the hotend melts, with some room, as the
+// nozzle may be 2 % ahead for a moment.
+double speed_by_flow(const planner::PlannedMove& move, const machine::ExtruderSettings& extruder) {
+  constexpr double kRoom = 0.98;
+  constexpr double kLeast_mm_s = 1.0;
+  if (!extruder.max_flow_mm3_s || !move.segment.extruding()) {
+    return planner::kNoLimit;
+  }
+  return std::max(
+      kRoom * *extruder.max_flow_mm3_s / (move.direction[gcode::E] * filament_area_mm2(extruder)),
+      kLeast_mm_s);
+}
+
 static_assert(machine::kMostModes == dynamics::kMostModes);
 
 dynamics::FlexibleAxis axis(const std::vector<machine::ModeSettings>& settings,
@@ -452,6 +469,11 @@ std::vector<timing::MoveBounds> move_bounds(const Piece& run, const machine::Set
         std::min(own.speed_mm_s, segment.extruding()
                                      ? segment.feed_mm_s
                                      : settings.timing.max_speed_mm_s.value_or(segment.feed_mm_s));
+    own.nozzle_speed_mm_s = speed_by_flow(move, settings.extruder);
+    own.speed_mm_s = std::min(own.speed_mm_s, own.nozzle_speed_mm_s);
+    if (settings.timing.keep_accel_limits && move.accel_mm_s2 > 0.0) {
+      own.accel_mm_s2 = std::min(own.accel_mm_s2, move.accel_mm_s2);
+    }
     own.tolerance_mm = settings.timing.tolerance_um * 1e-3;
     bounds.push_back(own);
   }
@@ -522,8 +544,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.base_accel_times_plan = settings.base_accel_times_asked();
   rules.max_lines_per_s = settings.max_lines_per_s();
   rules.tolerance_mm = settings.timing.tolerance_um * 1e-3;
-  rules.filament_area_mm2 = std::numbers::pi / 4.0 * settings.extruder.filament_diameter_mm *
-                            settings.extruder.filament_diameter_mm;
+  rules.filament_area_mm2 = filament_area_mm2(settings.extruder);
   rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);
   if (grid_mm(settings) > kGridMm) {
     constexpr double kShareOfStep = 0.1;

@@ -168,7 +168,8 @@ class Walk {
     node.speed_mm_s = std::max(node.speed_mm_s, speed_mm_s);
     if (const gcode::Segment& segment = plan_[at.piece].segment; segment.extruding()) {
       node.tolerance_mm = std::min(node.tolerance_mm, bounds_[at.piece].tolerance_mm);
-      node.feed_mm_s = std::min(node.feed_mm_s, segment.feed_mm_s);
+      node.feed_mm_s =
+          std::min({node.feed_mm_s, segment.feed_mm_s, bounds_[at.piece].nozzle_speed_mm_s});
     }
   }
 

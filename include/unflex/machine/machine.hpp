@@ -196,6 +196,7 @@ struct SolveSettings {
 struct TimingSettings {
   double tolerance_um = 0.0;             // 0: the timing stays as sliced
   std::optional<double> max_speed_mm_s;  // of travel; unset: the slicer's F
+  bool keep_accel_limits = false;        // those of the plan as sliced
 };
 
 struct EmitSettings {

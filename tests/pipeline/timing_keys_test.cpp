@@ -1,0 +1,100 @@
+// What the keys of [timing] make of a small print.
+
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "jobs.hpp"
+#include "stage_options.hpp"
+#include "unflex/core/progress.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+using testing::JobFolder;
+
+report::Report compensated(const std::string& text, std::vector<std::string> overrides,
+                           unsigned workers = 1) {
+  overrides.insert(overrides.end(), {"timing.tolerance_um=20", "dynamics.freq_error=0"});
+  const JobFolder folder(text, overrides);
+  SilentProgress progress;
+  const Result<report::Report> report = compensate(folder.job(workers), progress);
+  EXPECT_TRUE(report.has_value()) << to_string(report.error());
+  EXPECT_EQ(report->runs_total, report->runs_compensated) << testing::complaints(*report);
+  EXPECT_TRUE(report->violations.empty()) << testing::complaints(*report);
+  return *report;
+}
+
+const std::string kStart = "G90\nM83\nG1 X100 Y100 Z0.4 F6000\nG4 P500\n";
+
+// Sides of a zigzag, with 0.05 mm of filament per mm.
+std::string zigzag(int sides, double side_mm) {
+  std::string text;
+  for (int i = 0; i < sides; ++i) {
+    text += fmt::format("G1 X{} Y{} E{}\n", 100.0 + (i % 2 == 0 ? side_mm : 0.0),
+                        100.0 + 0.5 * (i + 1), 0.05 * side_mm);
+  }
+  return text;
+}
+
+// One move as sliced, with what it is bound by.
+timing::MoveBounds bounds_of(const planner::PlannedMove& move,
+                             const std::vector<std::string>& overrides) {
+  Piece piece;
+  piece.is_run = true;
+  piece.moves = {move};
+  return move_bounds(piece, testing::settings(overrides)).front();
+}
+
+planner::PlannedMove line(double e_per_mm) {
+  planner::PlannedMove move;
+  move.segment.end_mm = {10.0, 0.0, 0.0, 10.0 * e_per_mm};
+  move.segment.feed_mm_s = 100.0;
+  move.direction = {1.0, 0.0, 0.0, e_per_mm};
+  move.length_mm = 10.0;
+  move.start_v_mm_s = 5.0;
+  move.cruise_v_mm_s = 60.0;
+  move.end_v_mm_s = 7.0;
+  move.accel_mm_s2 = 1500.0;
+  return move;
+}
+
+TEST(MoveBounds, HaveTheAccelerationAsSlicedIfAsked) {
+  EXPECT_EQ(bounds_of(line(0.05), {}).accel_mm_s2, planner::kNoLimit);
+  EXPECT_EQ(bounds_of(line(0.05), {"timing.keep_accel_limits=true"}).accel_mm_s2, 1500.0);
+}
+
+TEST(MoveBounds, HaveTheSpeedAtWhichTheHotendMeltsTheFilament) {
+  const std::vector<std::string> keys = {"extruder.max_flow_mm3_s=6",
+                                         "extruder.filament_diameter_mm=2"};
+  EXPECT_EQ(bounds_of(line(0.05), {}).speed_mm_s, 100.0);
+  // 0.98 · 6 mm³/s over π mm² · 0.05
+  EXPECT_NEAR(bounds_of(line(0.05), keys).speed_mm_s, 37.433, 1e-3);
+  EXPECT_EQ(bounds_of(line(0.01), keys).speed_mm_s, 100.0);
+  EXPECT_EQ(bounds_of(line(0.0), keys).speed_mm_s, 100.0);
+  EXPECT_EQ(bounds_of(line(10.0), keys).speed_mm_s, 1.0);
+}
+
+TEST(TimingKeys, KeepTheAccelerationsOfThePrint) {
+  const std::string text = kStart + "M204 S500\n" + zigzag(10, 20.0);
+  const report::Report free = compensated(text, {});
+  const report::Report kept = compensated(text, {"timing.keep_accel_limits=true"});
+  EXPECT_LT(kept.emitted_time_s, kept.reference_time_s - 0.1);
+  // From rest to rest, 20 mm take 2 √(20 / 500) = 0.4 s at 500 mm/s², ten sides 4 s. At 100 mm/s
+  // they take 2 s.
+  EXPECT_GT(kept.emitted_time_s, free.emitted_time_s + 0.5);
+}
+
+TEST(TimingKeys, KeepTheFlowThatTheHotendMelts) {
+  const std::string text = kStart + "M204 S500\n" + zigzag(20, 20.0);
+  EXPECT_GT(compensated(text, {}).compensated_flow.max_mm3_s, 10.0);
+  const report::Report kept = compensated(text, {"extruder.max_flow_mm3_s=7"});
+  EXPECT_LT(kept.emitted_time_s, kept.reference_time_s - 0.1);
+  EXPECT_LT(kept.compensated_flow.max_mm3_s, 7.0 * 1.01);
+  EXPECT_TRUE(kept.warnings.empty()) << kept.warnings.front();
+}
+
+}  // namespace
+}  // namespace unflex::pipeline
