@@ -455,6 +455,12 @@ constexpr std::array kKeys = {
     Key{"timing.keep_accel_limits", &setting<&S::timing, &F::keep_accel_limits>, kAny, "",
         "Whether the accelerations that the print sets (M204, SET_VELOCITY_LIMIT) limit a free "
         "timing as well"},
+    Key{"timing.outer_wall_tolerance_um", &setting<&S::timing, &F::outer_wall_tolerance_um>,
+        Bounds{.min = 0.0, .max = 1000.0, .min_open = true}, "µm",
+        "As tolerance_um, of outer walls", "timing.tolerance_um"},
+    Key{"timing.features", &setting<&S::timing, &F::features>, kAny, "",
+        "What gets a free timing, with commas between: outer_wall, inner_wall, infill, "
+        "solid_infill, top, bridge, support, skirt, travel, other; or all"},
 
     Key{"emit.period_ms", &setting<&S::emit, &T::period_ms>, Bounds{.min = 0.05, .max = 50.0}, "ms",
         "Node period: time between two points of the base's motion",

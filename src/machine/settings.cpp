@@ -314,6 +314,44 @@ bool Settings::has_several_models() const {
          dynamics_error.damping > 0.0;
 }
 
+std::vector<std::string_view> TimingSettings::feature_words() const {
+  std::vector<std::string_view> words;
+  std::string_view rest = features;
+  for (;;) {
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    std::string_view word = rest.substr(0, comma);
+    while (word.starts_with(' ')) {
+      word.remove_prefix(1);
+    }
+    while (word.ends_with(' ')) {
+      word.remove_suffix(1);
+    }
+    words.push_back(word);
+    if (comma == rest.size()) {
+      return words;
+    }
+    rest.remove_prefix(comma + 1);
+  }
+}
+
+double TimingSettings::tolerance_of_um(gcode::FeatureKind kind) const {
+  return kind == gcode::FeatureKind::outer_wall ? outer_wall_tolerance_um.value_or(tolerance_um)
+                                                : tolerance_um;
+}
+
+bool TimingSettings::is_free(gcode::FeatureKind kind) const {
+  return features == kAllFeatures ||
+         std::ranges::any_of(feature_words(), [&](std::string_view word) {
+           return gcode::feature_by_word(word) == kind;
+         });
+}
+
+double Settings::largest_tolerance_um() const {
+  return is_timing_free()
+             ? std::max(timing.tolerance_um, timing.outer_wall_tolerance_um.value_or(0.0))
+             : 0.0;
+}
+
 double Settings::along_weight() const {
   constexpr double kRobust = 0.01;
   return solve.along_weight.value_or(has_several_models() && !is_timing_free() ? kRobust : 1.0);

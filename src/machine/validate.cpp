@@ -1,6 +1,7 @@
 #include "validate.hpp"
 
 #include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +13,7 @@
 #include "key_table.hpp"
 #include "toml_reader.hpp"
 #include "unflex/core/number.hpp"
+#include "unflex/gcode/feature.hpp"
 #include "unflex/machine/recommend.hpp"
 
 namespace unflex::machine {
@@ -367,6 +369,21 @@ Status check_second(const Draft& draft) {
   return check(s.dynamics_y, "y", s.second.y_freq_hz);
 }
 
+Status check_timing(const Draft& draft) {
+  if (draft.settings.timing.features == kAllFeatures) {
+    return {};
+  }
+  for (const std::string_view word : draft.settings.timing.feature_words()) {
+    if (!gcode::feature_by_word(word)) {
+      return conflict(draft, {"timing.features"},
+                      fmt::format("timing.features has \"{}\" in it, but must be \"{}\" or some of "
+                                  "{}, with commas between",
+                                  word, kAllFeatures, fmt::join(gcode::kFeatureWords, ", ")));
+    }
+  }
+  return {};
+}
+
 double fastest_freq_hz(const Settings& settings) {
   return std::max(settings.dynamics_x.fastest_hz(), settings.dynamics_y.fastest_hz());
 }
@@ -399,7 +416,7 @@ Status resolve_dynamics(Draft& draft) {
 
 Status check_consistency(const Draft& draft) {
   for (auto* check : {check_printer, check_shaper, check_kinematics, check_base, check_emission,
-                      check_second, check_grid}) {
+                      check_second, check_timing, check_grid}) {
     if (Status checked = check(draft); !checked) {
       return checked;
     }

@@ -226,6 +226,9 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
     return tl::unexpected(sliced.error());
   }
   any_command_ = any_command_ || looks_like_command(line.content());
+  if (const std::optional<std::string_view> name = gcode::feature_name(line.content())) {
+    feature_ = gcode::feature_by_name(*name);
+  }
   // For Marlin a carriage return ends the line, and the interpreter warns.
   if (firmware_ != Firmware::marlin && line.has_bare_return()) {
     warn(line.number,
@@ -286,6 +289,7 @@ void PieceReader::append(gcode::Event&& event) {
     open_.from_mm = machine_mm_;
     open_.events.reserve(kUsualEvents);
     open_.move_counts.reserve(kUsualEvents);
+    open_.features.reserve(kUsualEvents);
   }
   append_between();
   if (!open_.is_run || open_.events.empty()) {
@@ -312,12 +316,14 @@ void PieceReader::append(gcode::Event&& event) {
   }
   open_.events.push_back(std::move(event));
   open_.move_counts.push_back(count);
+  open_.features.push_back(feature_);
 }
 
 void PieceReader::append_between() {
   for (gcode::Event& event : between_) {
     open_.events.push_back(std::move(event));
     open_.move_counts.push_back(0);
+    open_.features.push_back(feature_);
   }
   between_.clear();
 }
@@ -393,6 +399,7 @@ bool PieceReader::split(Piece& piece) {
   rest.start = std::move(border.start);
   rest.events = split_off(open_.events, border.event);
   rest.move_counts = split_off(open_.move_counts, border.event);
+  rest.features = split_off(open_.features, border.event);
   rest.moves = split_off(open_.moves, border.move);
   const auto before = planner::last_moves(open_.moves, kAround_s);
   rest.before.assign(before.begin(), before.end());

@@ -14,6 +14,7 @@
 #include "travel_check.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/emit/run.hpp"
+#include "unflex/gcode/feature.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/planner/planner.hpp"
@@ -28,6 +29,8 @@ struct Piece {
   bool is_run = false;
   std::vector<gcode::Event> events;
   std::vector<std::size_t> move_counts;  // for each event, how many of `moves` it became
+  // For each event with moves, what the slicer says that it lays.
+  std::vector<gcode::FeatureKind> features;
   std::vector<planner::PlannedMove> moves;
   emit::RunStart start;  // only for runs and parts
   // Pressure advance that the file has set when a run begins, or when what is between two runs
@@ -111,6 +114,7 @@ class PieceReader {
   std::size_t still_lines_ = 0;  // lines without motion in the open run and after it
   std::vector<Diagnostic> warnings_;
   std::size_t unlisted_warnings_ = 0;
+  gcode::FeatureKind feature_ = gcode::FeatureKind::other;  // that the slicer named last
   bool any_command_ = false;
   ExtrusionModeCheck extrusion_mode_;
 };

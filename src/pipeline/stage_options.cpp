@@ -49,6 +49,30 @@ double speed_by_flow(const planner::PlannedMove& move, const machine::ExtruderSe
       kLeast_mm_s);
 }
 
+timing::MoveBounds free_bounds(const planner::PlannedMove& move, const machine::Settings& settings,
+                               const planner::Limits& limits,
+                               const planner::FirmwareConfig& config) {
+  const gcode::Segment& segment = move.segment;
+  timing::MoveBounds bounds = timing::bounds_by_axes(move, limits, config);
+  bounds.nozzle_speed_mm_s = speed_by_flow(move, settings.extruder);
+  const double feed_mm_s = segment.extruding()
+                               ? segment.feed_mm_s
+                               : settings.timing.max_speed_mm_s.value_or(segment.feed_mm_s);
+  bounds.speed_mm_s = std::min({bounds.speed_mm_s, feed_mm_s, bounds.nozzle_speed_mm_s});
+  if (settings.timing.keep_accel_limits && move.accel_mm_s2 > 0.0) {
+    bounds.accel_mm_s2 = std::min(bounds.accel_mm_s2, move.accel_mm_s2);
+  }
+  return bounds;
+}
+
+// The move is no faster anywhere than it was sliced.
+timing::MoveBounds bounds_as_sliced(const planner::PlannedMove& move) {
+  return {.speed_mm_s = move.cruise_v_mm_s,
+          .accel_mm_s2 = move.accel_mm_s2 > 0.0 ? move.accel_mm_s2 : planner::kNoLimit,
+          .start_speed_mm_s = move.start_v_mm_s,
+          .end_speed_mm_s = move.end_v_mm_s};
+}
+
 static_assert(machine::kMostModes == dynamics::kMostModes);
 
 dynamics::FlexibleAxis axis(const std::vector<machine::ModeSettings>& settings,
@@ -462,20 +486,17 @@ std::vector<timing::MoveBounds> move_bounds(const Piece& run, const machine::Set
   const planner::FirmwareConfig config = firmware_config(settings);
   const planner::Limits limits = planner_limits(settings);
   std::vector<timing::MoveBounds> bounds;
-  for (const planner::PlannedMove& move : run.moves) {
-    const gcode::Segment& segment = move.segment;
-    timing::MoveBounds own = timing::bounds_by_axes(move, limits, config);
-    own.speed_mm_s =
-        std::min(own.speed_mm_s, segment.extruding()
-                                     ? segment.feed_mm_s
-                                     : settings.timing.max_speed_mm_s.value_or(segment.feed_mm_s));
-    own.nozzle_speed_mm_s = speed_by_flow(move, settings.extruder);
-    own.speed_mm_s = std::min(own.speed_mm_s, own.nozzle_speed_mm_s);
-    if (settings.timing.keep_accel_limits && move.accel_mm_s2 > 0.0) {
-      own.accel_mm_s2 = std::min(own.accel_mm_s2, move.accel_mm_s2);
+  for (std::size_t event = 0; event < run.move_counts.size(); ++event) {
+    for (std::size_t count = run.move_counts[event]; count > 0; --count) {
+      const planner::PlannedMove& move = run.moves[bounds.size()];
+      const gcode::FeatureKind kind =
+          move.segment.extruding() ? run.features[event] : gcode::FeatureKind::travel;
+      timing::MoveBounds own = settings.timing.is_free(kind)
+                                   ? free_bounds(move, settings, limits, config)
+                                   : bounds_as_sliced(move);
+      own.tolerance_mm = settings.timing.tolerance_of_um(kind) * 1e-3;
+      bounds.push_back(own);
     }
-    own.tolerance_mm = settings.timing.tolerance_um * 1e-3;
-    bounds.push_back(own);
   }
   return bounds;
 }
@@ -543,7 +564,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
   rules.base_accel_times_plan = settings.base_accel_times_asked();
   rules.max_lines_per_s = settings.max_lines_per_s();
-  rules.tolerance_mm = settings.timing.tolerance_um * 1e-3;
+  rules.tolerance_mm = settings.largest_tolerance_um() * 1e-3;
   rules.filament_area_mm2 = filament_area_mm2(settings.extruder);
   rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);
   if (grid_mm(settings) > kGridMm) {

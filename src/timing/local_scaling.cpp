@@ -187,7 +187,7 @@ class LocalScaling {
     for (std::size_t i = 1; i < moves.size(); ++i) {
       vertex_mm_s_[i] =
           std::min(pieces_.bounds[i - 1].end_speed_mm_s, pieces_.bounds[i].start_speed_mm_s);
-      if (!is_kept_[i - 1] || !is_kept_[i]) {
+      if (!is_given(i) && (!is_kept_[i - 1] || !is_kept_[i])) {
         const bool travels = !moves[i - 1].segment.extruding() && !moves[i].segment.extruding();
         const double tolerance_mm =
             travels ? kTravelTolerance_mm
@@ -197,6 +197,12 @@ class LocalScaling {
         vertex_mm_s_[i] = std::min(vertex_mm_s_[i], std::max(speed_mm_s, kLeastSpeed_mm_s));
       }
     }
+  }
+
+  // Whether the moves on both sides of the vertex are to pass it as fast as sliced.
+  [[nodiscard]] bool is_given(std::size_t vertex) const {
+    return std::isfinite(pieces_.bounds[vertex - 1].end_speed_mm_s) &&
+           std::isfinite(pieces_.bounds[vertex].start_speed_mm_s);
   }
 
   [[nodiscard]] static bool keeps(const NozzleMeasure& measured) {
@@ -279,9 +285,11 @@ class LocalScaling {
       const double v = plan[i].start_v_mm_s;
       const bool is_bound = v > 0.97 * vertex_mm_s_[i];
       if (!is_kept_[i - 1] && !is_kept_[i] && (g > 1.0 || is_bound)) {
-        vertex_mm_s_[i] = std::max(std::min(vertex_mm_s_[i], g > 1.0 ? v : planner::kNoLimit) *
-                                       std::min(scale(g, alpha), most),
-                                   kLeastSpeed_mm_s);
+        vertex_mm_s_[i] = std::min(
+            std::max(std::min(vertex_mm_s_[i], g > 1.0 ? v : planner::kNoLimit) *
+                         std::min(scale(g, alpha), most),
+                     kLeastSpeed_mm_s),
+            std::min(pieces_.bounds[i - 1].end_speed_mm_s, pieces_.bounds[i].start_speed_mm_s));
       }
     }
     for (std::size_t i = 0; i < plan.size(); ++i) {

@@ -258,6 +258,13 @@ INSTANTIATE_TEST_SUITE_P(
                 "[solve]\nwindow_s = 1\noverlap_s = 2\n",
                 {},
                 "printer.toml:3: solve.overlap_s must not exceed solve.window_s"},
+        Mistake{
+            "TimingOfAnUnknownFeature",
+            "[timing]\nfeatures = \"infill, walls\"\n",
+            {},
+            "printer.toml:2: timing.features has \"walls\" in it, but must be \"all\" or some of "
+            "outer_wall, inner_wall, infill, solid_infill, top, bridge, support, skirt, travel, "
+            "other, with commas between"},
         Mistake{"NoFlowAtAll",
                 "[extruder]\nmax_flow_mm3_s = 0\n",
                 {},

@@ -41,10 +41,13 @@ std::string zigzag(int sides, double side_mm) {
 
 // One move as sliced, with what it is bound by.
 timing::MoveBounds bounds_of(const planner::PlannedMove& move,
-                             const std::vector<std::string>& overrides) {
+                             const std::vector<std::string>& overrides,
+                             gcode::FeatureKind kind = gcode::FeatureKind::other) {
   Piece piece;
   piece.is_run = true;
   piece.moves = {move};
+  piece.move_counts = {1};
+  piece.features = {kind};
   return move_bounds(piece, testing::settings(overrides)).front();
 }
 
@@ -77,6 +80,25 @@ TEST(MoveBounds, HaveTheSpeedAtWhichTheHotendMeltsTheFilament) {
   EXPECT_EQ(bounds_of(line(10.0), keys).speed_mm_s, 1.0);
 }
 
+TEST(MoveBounds, HaveTheToleranceOfTheirFeature) {
+  const std::vector<std::string> keys = {"timing.tolerance_um=40",
+                                         "timing.outer_wall_tolerance_um=10"};
+  EXPECT_EQ(bounds_of(line(0.05), keys, gcode::FeatureKind::outer_wall).tolerance_mm, 10e-3);
+  EXPECT_EQ(bounds_of(line(0.05), keys, gcode::FeatureKind::infill).tolerance_mm, 40e-3);
+  EXPECT_EQ(bounds_of(line(0.0), keys, gcode::FeatureKind::outer_wall).tolerance_mm, 40e-3);
+}
+
+TEST(MoveBounds, AreTheSpeedsAsSlicedOfWhatIsNotFree) {
+  const std::vector<std::string> keys = {"timing.features=infill, travel"};
+  const timing::MoveBounds wall = bounds_of(line(0.05), keys, gcode::FeatureKind::outer_wall);
+  EXPECT_EQ(wall.speed_mm_s, 60.0);
+  EXPECT_EQ(wall.accel_mm_s2, 1500.0);
+  EXPECT_EQ(wall.start_speed_mm_s, 5.0);
+  EXPECT_EQ(wall.end_speed_mm_s, 7.0);
+  EXPECT_EQ(bounds_of(line(0.05), keys, gcode::FeatureKind::infill).speed_mm_s, 100.0);
+  EXPECT_EQ(bounds_of(line(0.0), keys, gcode::FeatureKind::outer_wall).speed_mm_s, 100.0);
+}
+
 TEST(TimingKeys, KeepTheAccelerationsOfThePrint) {
   const std::string text = kStart + "M204 S500\n" + zigzag(10, 20.0);
   const report::Report free = compensated(text, {});
@@ -94,6 +116,37 @@ TEST(TimingKeys, KeepTheFlowThatTheHotendMelts) {
   EXPECT_LT(kept.emitted_time_s, kept.reference_time_s - 0.1);
   EXPECT_LT(kept.compensated_flow.max_mm3_s, 7.0 * 1.01);
   EXPECT_TRUE(kept.warnings.empty()) << kept.warnings.front();
+}
+
+// Stairs, whose corners a tolerance decides over.
+std::string stairs(int steps) {
+  std::string text;
+  for (int i = 1; i <= steps; ++i) {
+    text += fmt::format("G1 X{} E0.15\nG1 Y{} E0.15\n", 100 + 3 * i, 100 + 3 * i);
+  }
+  return text;
+}
+
+// The same as an outer wall and as an infill.
+std::string two_features() {
+  return kStart + "M204 S500\n;TYPE:External perimeter\n" + stairs(10) +
+         "G1 X100 Y100 F6000\nG4 P500\n;TYPE:Internal infill\n" + stairs(10);
+}
+
+TEST(TimingKeys, GiveOuterWallsATolerance) {
+  const report::Report even = compensated(two_features(), {});
+  const report::Report finer = compensated(two_features(), {"timing.outer_wall_tolerance_um=5"});
+  const report::Report coarser = compensated(two_features(), {"timing.outer_wall_tolerance_um=80"});
+  EXPECT_GT(finer.emitted_time_s, even.emitted_time_s + 0.05);
+  EXPECT_LT(coarser.emitted_time_s, even.emitted_time_s - 0.05);
+}
+
+TEST(TimingKeys, LeaveFeaturesAsSliced) {
+  const report::Report all = compensated(two_features(), {});
+  const double gain_s = all.reference_time_s - all.emitted_time_s;
+  const report::Report infill = compensated(two_features(), {"timing.features=infill"});
+  // Each of the zigzags gains as much as the other.
+  EXPECT_NEAR(infill.reference_time_s - infill.emitted_time_s, 0.5 * gain_s, 0.1 * gain_s);
 }
 
 }  // namespace

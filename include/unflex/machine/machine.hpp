@@ -14,6 +14,7 @@
 #include "unflex/core/error.hpp"
 #include "unflex/core/firmware.hpp"
 #include "unflex/core/kinematics.hpp"
+#include "unflex/gcode/feature.hpp"
 #include "unflex/machine/print_text.hpp"
 
 namespace unflex::machine {
@@ -192,11 +193,21 @@ struct SolveSettings {
   std::optional<double> jerk_weight;
 };
 
+inline constexpr std::string_view kAllFeatures = "all";
+
 // As fast as a tolerance of the nozzle allows, instead of as sliced (docs/timing.md).
 struct TimingSettings {
-  double tolerance_um = 0.0;             // 0: the timing stays as sliced
-  std::optional<double> max_speed_mm_s;  // of travel; unset: the slicer's F
-  bool keep_accel_limits = false;        // those of the plan as sliced
+  double tolerance_um = 0.0;                      // 0: the timing stays as sliced
+  std::optional<double> max_speed_mm_s;           // of travel; unset: the slicer's F
+  bool keep_accel_limits = false;                 // those of the plan as sliced
+  std::optional<double> outer_wall_tolerance_um;  // unset: tolerance_um
+  // Kinds whose timing is free: kAllFeatures, or gcode::kFeatureWords with commas.
+  std::string features{kAllFeatures};
+
+  [[nodiscard]] std::vector<std::string_view> feature_words() const;
+  [[nodiscard]] double tolerance_of_um(gcode::FeatureKind kind) const;
+  // Whether moves of the kind get another timing than sliced.
+  [[nodiscard]] bool is_free(gcode::FeatureKind kind) const;
 };
 
 struct EmitSettings {
@@ -261,6 +272,8 @@ struct Settings {
 
   // Whether the timing is chosen by a tolerance, and not as sliced.
   [[nodiscard]] bool is_timing_free() const { return timing.tolerance_um > 0.0; }
+  // How far the nozzle may stray wherever it is allowed most; 0: the timing is as sliced.
+  [[nodiscard]] double largest_tolerance_um() const;
 
   // The values behind unset options, by the firmware's own formulas and defaults.
   [[nodiscard]] std::array<double, 4> axis_max_velocity_mm_s() const;
