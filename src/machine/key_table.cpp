@@ -461,6 +461,10 @@ constexpr std::array kKeys = {
     Key{"timing.features", &setting<&S::timing, &F::features>, kAny, "",
         "What gets a free timing, with commas between: outer_wall, inner_wall, infill, "
         "solid_infill, top, bridge, support, skirt, travel, other; or all"},
+    Key{"timing.min_layer_s", &setting<&S::timing, &F::min_layer_s>,
+        Bounds{.min = 0.0, .max = 600.0}, "s",
+        "No layer becomes shorter than this, so that it cools, unless it was sliced so; 0: any "
+        "may"},
 
     Key{"emit.period_ms", &setting<&S::emit, &T::period_ms>, Bounds{.min = 0.05, .max = 50.0}, "ms",
         "Node period: time between two points of the base's motion",

@@ -14,6 +14,7 @@
 
 #include "gap_check.hpp"
 #include "input_bytes.hpp"
+#include "layer_times.hpp"
 #include "nozzle_motion.hpp"
 #include "piece_thread.hpp"
 #include "report_rows.hpp"
@@ -94,6 +95,7 @@ class Compensator {
         writer_(rules_, job.input_name, job.settings.max_lines_per_s(), report),
         nozzle_(rules_.verify.nozzle, rules_.verify.fixed,
                 gcode::Interpreter(rules_.emit.interpreter).state().input_shaper()),
+        layers_(job.settings.is_timing_free() ? job.settings.timing.min_layer_s : 0.0),
         input_bytes_(input_bytes(job)),
         engine_(engines.threaded ? engines.threaded() : nullptr),
         pieces_(
@@ -159,11 +161,11 @@ class Compensator {
   [[nodiscard]] bool is_done() const { return all_read_ && queue_.empty(); }
 
   // Whether more should be read. If only one run waits, there is always room: what follows it must
-  // be known, however long the run is.
+  // be known, however long the run is. So it must where a layer may be too short.
   [[nodiscard]] bool has_room() {
     const bool is_little =
         nodes_queued_ <= kNodesAhead * std::max(job_.workers, 1U) && lines_queued_ <= kLinesAhead;
-    return (is_little || queue_.size() <= 1) && !verifier_.is_behind();
+    return (is_little || queue_.size() <= 1 || layers_.needs_more()) && !verifier_.is_behind();
   }
 
   // Takes the next piece, or notes the end of the input. False if neither has come.
@@ -176,6 +178,7 @@ class Compensator {
     }
     if (!all_read_ && pieces_.at_end()) {
       all_read_ = true;
+      layers_.end();
       return true;
     }
     return false;
@@ -240,6 +243,7 @@ class Compensator {
       // not counted, the run is being worked on already and must not be changed.
       queue_.back()->lines_after = verify::LineRate::first_lines(piece.moves);
     }
+    layers_.add(job);
     lines_queued_ += job->piece.events.size();
     queue_.push_back(std::move(job));
   }
@@ -295,16 +299,18 @@ class Compensator {
 
   // Gives the solvers what they can take, in the order of the file.
   void feed() {
+    layers_.settle();
     for (std::size_t piece = 0; piece < queue_.size(); ++piece) {
       // If lines are counted, the last run in the queue waits until what follows is known.
       if (!all_read_ && piece + 1 == queue_.size() && rules_.emit.lines.burst_lines > 0) {
         return;
       }
       RunJob& job = *queue_[piece];
-      if (!job.is_timed && !job.prepared) {
+      if (!job.prepared && (!job.is_timed || !job.stretch)) {
         return;
       }
       if (job.spans.empty() && !job.prepared) {
+        stretch(job);
         lay_out(queue_[piece]);
       }
       while (job.submitted < job.spans.size()) {
@@ -373,11 +379,11 @@ class Compensator {
            (queue_.size() > 1 || all_read_ || rules_.emit.lines.burst_lines == 0);
   }
 
-  // Whether the timing of a run has been chosen whose windows are not laid out yet.
+  // Whether the timing of a run is known whose windows are not laid out yet.
   [[nodiscard]] bool can_feed() const {
     for (const std::shared_ptr<RunJob>& job : queue_) {
       if (!job->prepared && job->spans.empty()) {
-        return job->is_timed;
+        return job->is_timed && (job->stretch || layers_.can_settle());
       }
     }
     return false;
@@ -484,6 +490,7 @@ class Compensator {
   // The nozzle after the last piece read, as if every run so far were compensated. Kept motion
   // leaves a swing, with which the next run starts.
   NozzleFollower nozzle_;
+  LayerTimes layers_;
   std::deque<std::shared_ptr<RunJob>> queue_;
   std::size_t nodes_queued_ = 0;
   std::size_t lines_queued_ = 0;

@@ -10,6 +10,7 @@
 
 #include "judge.hpp"
 #include "unflex/emit/emitter.hpp"
+#include "unflex/timing/stretched.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -201,6 +202,18 @@ void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept {
     job.slow_reason = exception.what();
   }
   job.is_timed = true;
+}
+
+void stretch(RunJob& job) {
+  if (*job.stretch <= 1.0) {
+    return;
+  }
+  if (job.retimed.empty()) {
+    job.retimed_counts = job.piece.move_counts;
+  }
+  job.retimed = timing::stretched(job.reference(), *job.stretch);
+  job.piece.before = timing::stretched(job.piece.before, *job.stretch);
+  job.piece.after = timing::stretched(job.piece.after, *job.stretch);
 }
 
 void lay_out(RunJob& job) {

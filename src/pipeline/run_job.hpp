@@ -54,6 +54,9 @@ struct RunJob {
   std::vector<std::size_t> retimed_counts;  // as Piece::move_counts
   std::string slow_reason;                  // why the timing stays as sliced
   std::atomic<bool> is_timed = false;
+  // By how much the new timing is stretched so that the layer lasts long enough; unset: not known
+  // yet.
+  std::optional<double> stretch;
   compensate::NodeGrid grid;
   std::vector<compensate::WindowSpan> spans;
   std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
@@ -107,6 +110,9 @@ struct RunRules {
 
 // Chooses the timing of the run. Throws nothing.
 void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept;
+
+// Stretches the timing of the run, which is `stretch` times as long then.
+void stretch(RunJob& job);
 
 // Divides the run, in the timing that it has, into windows.
 void lay_out(RunJob& job);

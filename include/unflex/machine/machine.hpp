@@ -203,6 +203,7 @@ struct TimingSettings {
   std::optional<double> outer_wall_tolerance_um;  // unset: tolerance_um
   // Kinds whose timing is free: kAllFeatures, or gcode::kFeatureWords with commas.
   std::string features{kAllFeatures};
+  double min_layer_s = 0.0;  // a layer is made no shorter; 0: as short as it comes out
 
   [[nodiscard]] std::vector<std::string_view> feature_words() const;
   [[nodiscard]] double tolerance_of_um(gcode::FeatureKind kind) const;
