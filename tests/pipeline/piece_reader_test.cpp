@@ -82,6 +82,23 @@ class Reading {
 
 constexpr const char* kKnown = "G90\nM83\nG1 X0 Y0 Z0.2 F6000\n";
 
+TEST(Features, AreThoseThatTheSlicerNamedLast) {
+  const Reading reading(
+      "G1 X10 Y10 Z1 F6000\nG4 P1\nG1 X20 E1\n;TYPE:External perimeter\nG1 X30 E1.5\n"
+      "G1 X31\n; FEATURE: Sparse infill\nG1 X40 E2\n");
+  std::vector<gcode::FeatureKind> kinds;
+  for (const Piece& piece : reading.pieces) {
+    ASSERT_EQ(piece.features.size(), piece.events.size());
+    for (std::size_t i = 0; i < piece.events.size(); ++i) {
+      if (piece.is_run && piece.move_counts[i] > 0) {
+        kinds.push_back(piece.features[i]);
+      }
+    }
+  }
+  using enum gcode::FeatureKind;
+  EXPECT_THAT(kinds, ElementsAre(other, outer_wall, outer_wall, infill));
+}
+
 TEST(PieceReader, CutsRunsAtEverythingThatStopsOrMayNotBeRewritten) {
   const Reading reading(std::string(kKnown) +
                         "G1 X5 E1\n"
