@@ -8,10 +8,10 @@
 #include <string>
 
 #include "filament_ledger.hpp"
-#include "filament_timing.hpp"
 #include "flow_gauge.hpp"
 #include "line_check.hpp"
 #include "nozzles.hpp"
+#include "progress_timing.hpp"
 #include "replay.hpp"
 #include "run_check.hpp"
 #include "section_rules.hpp"
@@ -69,7 +69,6 @@ class Verifier {
   bool next_output_move_ahead(planner::PlannedMove& move);
   bool ends_here(const planner::PlannedMove& move, const Replay& file);
   void begin_section(bool compensated);
-  void begin_filament_timing();
   void play_run();
   void skip_added_barriers();
   void join_over_barrier();
@@ -93,6 +92,7 @@ class Verifier {
   [[nodiscard]] double kept_end_s();
   void finish_reference();
   [[nodiscard]] double filament_tolerance_mm() const;
+  [[nodiscard]] double owed_filament_mm() const;
   void check_run(bool compensated);
   void check_flow();
   bool sections_agree();
@@ -120,7 +120,7 @@ class Verifier {
   ReferencePath* kept_path_ = &run_path_;  // what kept_ is measured against
   // Where the timing is free, the sliced moves come at the pace of the emitted ones. Both are read
   // ahead, and each sliced move is asked for by two paths.
-  FilamentTiming filament_timing_;
+  ProgressTiming progress_timing_;
   std::deque<planner::PlannedMove> output_ahead_;
   std::deque<planner::PlannedMove> sliced_for_timing_;
   std::deque<planner::PlannedMove> sliced_for_kept_;

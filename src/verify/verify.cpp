@@ -71,7 +71,7 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       run_path_([this](ReferenceMove& next) { return next_reference_move(next); }),
       resting_path_(
           [this](ReferenceMove& next) { return next_sliced_move(sliced_for_kept_, next.move); }),
-      filament_timing_(
+      progress_timing_(
           [this](planner::PlannedMove& move) { return next_sliced_move(sliced_for_timing_, move); },
           [this](planner::PlannedMove& move) { return next_output_move_ahead(move); }),
       original_(rules.nozzle, observation, NozzleBase::sliced),
@@ -141,7 +141,7 @@ bool Verifier::next_resting_move(planner::PlannedMove& move) {
 
 // The next move of run_path_.
 bool Verifier::next_reference_move(ReferenceMove& move) {
-  return has_free_timing() ? filament_timing_.next(move) : next_resting_move(move.move);
+  return has_free_timing() ? progress_timing_.next(move) : next_resting_move(move.move);
 }
 
 // The next sliced move of a run whose timing is free, for one of the two that ask for it.
@@ -167,7 +167,7 @@ bool Verifier::next_output_move(planner::PlannedMove& move) {
   return true;
 }
 
-// For filament_timing_, before the move is played.
+// For progress_timing_, before the move is played.
 bool Verifier::next_output_move_ahead(planner::PlannedMove& move) {
   if (!output_.next(move)) {
     return false;
@@ -202,7 +202,7 @@ void Verifier::begin_section(bool compensated) {
     kept_path_ = output_.section().has_free_timing ? &resting_path_ : &run_path_;
     run_lead_in_s_ = 0.0;
     if (has_free_timing()) {
-      begin_filament_timing();
+      progress_timing_.begin(owed_filament_mm());
       output_ahead_.clear();
       sliced_for_timing_.clear();
       sliced_for_kept_.clear();
@@ -245,16 +245,13 @@ void Verifier::begin_section(bool compensated) {
   }
 }
 
-void Verifier::begin_filament_timing() {
-
-  constexpr double kLeftBehind_mm = 0.01;
-  constexpr double kRoundedSteps = 1.5;
-  if (rules_.fixed.firmware == Firmware::klipper) {
-    filament_timing_.begin(filament_tolerance_mm(), kLeftBehind_mm);
-  } else {
-    const double rounded_mm = kRoundedSteps / rules_.fixed.steps_per_mm[gcode::E];
-    filament_timing_.begin(rounded_mm, rounded_mm);
-  }
+// By how much the filament of a run of free timing may be off in the end: a firmware that lays it
+// in steps may owe some.
+double Verifier::owed_filament_mm() const {
+  constexpr double kOwedSteps = 1.5;
+  return rules_.fixed.firmware == Firmware::klipper
+             ? filament_tolerance_mm()
+             : kOwedSteps / rules_.fixed.steps_per_mm[gcode::E];
 }
 
 void Verifier::play_run() {
@@ -373,7 +370,8 @@ void Verifier::play(const planner::PlannedMove& move) {
   emitted_.play(move);
   filament_.play(move, start_s);
   if (compensated) {
-    rules_of_run_.add(move, emitted_.main(), late, filament_tolerance_mm());
+    rules_of_run_.add(move, emitted_.main(), late,
+                      has_free_timing() ? owed_filament_mm() : filament_tolerance_mm());
   }
   totals_.emitted_time_s += move.duration_s();
   totals_.output_extrusion_mm += move.segment.delta(gcode::E);

@@ -127,7 +127,7 @@ std::string stairs(int steps) {
   return text;
 }
 
-// The same as an outer wall and as an infill.
+// One path as an outer wall and as an infill.
 std::string two_features() {
   return kStart + "M204 S500\n;TYPE:External perimeter\n" + stairs(10) +
          "G1 X100 Y100 F6000\nG4 P500\n;TYPE:Internal infill\n" + stairs(10);
