@@ -66,6 +66,11 @@ std::string text_of(const Piece& piece) {
   return text;
 }
 
+machine::Settings as_sliced(machine::Settings settings) {
+  settings.timing.tolerance_um = 0.0;
+  return settings;
+}
+
 // A stream cannot be written again with a run kept, and no pass follows the last one. There a run
 // may be worse by more before it counts as a violation.
 verify::Rules rules_of_pass(const Job& job, bool last) {
@@ -85,8 +90,8 @@ class Compensator {
       : job_(job),
         kept_(kept),
         checks_(engines.threaded && engines.second),
-        rules_{compensate_setup(job.settings), emit_options(job.settings, UNFLEX_VERSION),
-               rules_of_pass(job, streams.last)},
+        rules_{compensate_setup(job.settings), compensate_setup(as_sliced(job.settings)),
+               emit_options(job.settings, UNFLEX_VERSION), rules_of_pass(job, streams.last)},
         processes_(&streams.processes),
         output_(&streams.output),
         progress_(&progress),
@@ -218,7 +223,13 @@ class Compensator {
             accel, job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2));
       } else if (nodes <= kMaxRunNodes) {
         job->is_timed = !job_.settings.is_timing_free() || !reasons.empty();
-        job->slow_reason = reasons.empty() ? "" : reasons.back();
+        if (job_.settings.is_timing_free() && piece.begins_run() && piece.ends_run()) {
+          job->sliced_setup =
+              setup_for(rules_.sliced_setup, piece, job->nozzle, job_.settings).setup;
+        }
+        if (!reasons.empty()) {
+          keep_timing(*job, reasons.back());
+        }
       } else {
         job->failure = fmt::format("{:.0f} s of motion without a stop are too long to be handled",
                                    static_cast<double>(nodes) * job->setup.period_s);

@@ -186,6 +186,13 @@ std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t fir
   return compensate::windows(job.course(), job.spans, first, count, job.first_stage, job.setup);
 }
 
+void keep_timing(RunJob& job, std::string reason) {
+  job.slow_reason = std::move(reason);
+  if (job.sliced_setup) {
+    job.setup = *job.sliced_setup;
+  }
+}
+
 void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept {
   try {
     std::optional<timing::Timed> timed =
@@ -194,12 +201,12 @@ void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept {
       job.retimed_counts = counts_of(job.piece.move_counts, timed->pieces);
       job.retimed = std::move(timed->moves);
     } else {
-      job.slow_reason = "no faster timing was found that keeps the tolerance";
+      keep_timing(job, "no faster timing was found that keeps the tolerance");
     }
   } catch (const std::exception& exception) {
     // Out of memory, mostly.
     job.retimed.clear();
-    job.slow_reason = exception.what();
+    keep_timing(job, exception.what());
   }
   job.is_timed = true;
 }
@@ -250,7 +257,7 @@ std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules) {
   sliced->piece = job.piece;
   sliced->nozzle = job.nozzle;
   sliced->first_stage = job.first_stage;
-  sliced->setup = job.setup;
+  sliced->setup = job.sliced_setup.value_or(job.setup);
   sliced->accel = job.accel;
   sliced->lines_after = job.lines_after;
   lay_out(*sliced);

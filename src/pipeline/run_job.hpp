@@ -46,6 +46,9 @@ struct RunJob {
   dynamics::NozzleXY nozzle;       // at its begin, if every run before is compensated
   dynamics::NozzleXY first_stage;  // the same as a state of the setup's axes
   compensate::Setup setup;
+  // Only if the timing is free: the setup if it stays as sliced all the same. Parts of a run have
+  // one setup, since they meet in motion.
+  std::optional<compensate::Setup> sliced_setup;
   emit::RunAccel accel;
   // Only if the timing is free: what each move may do, and the moves in their new timing. Empty:
   // the timing stays as sliced.
@@ -102,11 +105,15 @@ struct RunJob {
 // How runs are worked on.
 struct RunRules {
   compensate::Setup setup;
+  compensate::Setup sliced_setup;  // for runs that keep their timing where it is free
   emit::EmitOptions emit;
   verify::Rules verify;
 };
 
 [[nodiscard]] AxisResult axis_result(Result<compensate::AxisSolution> solution);
+
+// The run keeps its timing as sliced.
+void keep_timing(RunJob& job, std::string reason);
 
 // Chooses the timing of the run. Throws nothing.
 void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept;

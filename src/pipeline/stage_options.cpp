@@ -190,6 +190,7 @@ std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
   }
   for (compensate::Plant& edge : band) {
     edge.share = left * (1.0 - kMiddleShare) / (edge.axis.main_hz() * periods);
+    edge.is_edge = true;
     result.push_back(edge);
   }
   return result;

@@ -115,6 +115,9 @@ class LocalScaling {
       const bool repairs = round + 1 >= kRounds;
       const std::vector<planner::PlannedMove> plan =
           bounded_plan(pieces_.moves, bounds_, vertex_mm_s_);
+      if (repairs && planner::duration_s(plan) >= least_s) {
+        break;  // it becomes only slower
+      }
       const std::optional<NozzleMeasure> measured = try_plan(plan);
       if (measured && keeps(*measured)) {
         const double gain_s = least_s - planner::duration_s(plan);

@@ -17,6 +17,9 @@ constexpr double kBetweenLooks[] = {0.25, 0.5, 0.75};
 // The share of the distance along the path that counts, as where filament is laid
 // (emit/nozzle_progress.cpp).
 constexpr double kTowardsReference = 0.01;
+// How many tolerances the nozzle may stray at the edges of the band of frequencies. The nozzle of a
+// shaper strays 1.6 times as far where the frequency is 5 % off.
+constexpr double kTimesAtEdge = 2.0;
 // Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
 // There the nozzle may stray so many times the tolerance.
 constexpr double kBeside = 1.5;
@@ -106,7 +109,7 @@ class Walk {
         last = at;
       }
     }
-    add(nodes, result);
+    add(nodes, model.times_tolerance, result);
     const double left_mm = std::hypot(swing_mm(model.x, nozzle.x, base_.x.position_mm.back()),
                                       swing_mm(model.y, nozzle.y, base_.y.position_mm.back()));
     result.left = std::max(result.left, left_mm / (may_be_left * bounds_.back().tolerance_mm));
@@ -173,11 +176,12 @@ class Walk {
     }
   }
 
-  static void add(const std::vector<AtNode>& nodes, NozzleMeasure& result) {
+  static void add(const std::vector<AtNode>& nodes, double times_tolerance, NozzleMeasure& result) {
     for (std::size_t k = 0; k < nodes.size(); ++k) {
-      double tolerance_mm = std::min(nodes[k].tolerance_mm, kTravelTolerance_mm);
+      double tolerance_mm = std::min(times_tolerance * nodes[k].tolerance_mm, kTravelTolerance_mm);
       for (const std::size_t beside : {k > 0 ? k - 1 : 0, std::min(k + 1, nodes.size() - 1)}) {
-        tolerance_mm = std::min(tolerance_mm, kBeside * nodes[beside].tolerance_mm);
+        tolerance_mm =
+            std::min(tolerance_mm, kBeside * times_tolerance * nodes[beside].tolerance_mm);
       }
       result.error[k] = std::max(result.error[k], nodes[k].error_mm / tolerance_mm);
       result.speed[k] = std::max(result.speed[k], nodes[k].speed_mm_s / nodes[k].feed_mm_s);
@@ -197,20 +201,26 @@ class Walk {
 std::vector<AxesModel> models_of(const compensate::Setup& setup) {
   // Models of hardly any share only keep the base from moving more than it must.
   constexpr double kLeastShare = 0.05;
+  struct Model {
+    dynamics::FlexibleAxis axis;
+    double times_tolerance = 1.0;
+  };
   const auto of = [](const compensate::AxisSetup& axis) {
-    std::vector<dynamics::FlexibleAxis> models = {axis.axis};
+    std::vector<Model> models = {{axis.axis}};
     for (const compensate::Plant& plant : axis.plants) {
       if (plant.share >= kLeastShare) {
-        models.push_back(plant.axis);
+        models.push_back({plant.axis, plant.is_edge ? kTimesAtEdge : 1.0});
       }
     }
     return models;
   };
-  const std::vector<dynamics::FlexibleAxis> x = of(setup.x);
-  const std::vector<dynamics::FlexibleAxis> y = of(setup.y);
+  const std::vector<Model> x = of(setup.x);
+  const std::vector<Model> y = of(setup.y);
   std::vector<AxesModel> models;
   for (std::size_t i = 0; i < std::max(x.size(), y.size()); ++i) {
-    models.push_back({x[i < x.size() ? i : 0], y[i < y.size() ? i : 0]});
+    const Model& of_x = x[i < x.size() ? i : 0];
+    const Model& of_y = y[i < y.size() ? i : 0];
+    models.push_back({of_x.axis, of_y.axis, std::max(of_x.times_tolerance, of_y.times_tolerance)});
   }
   return models;
 }

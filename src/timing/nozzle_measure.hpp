@@ -19,6 +19,7 @@ namespace unflex::timing {
 struct AxesModel {
   dynamics::FlexibleAxis x;
   dynamics::FlexibleAxis y;
+  double times_tolerance = 1.0;  // how many tolerances its nozzle may stray
 };
 
 // All that a tolerance is to hold for: the axes as given, and as they are at the edges of what they

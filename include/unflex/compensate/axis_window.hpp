@@ -41,6 +41,8 @@ struct BaseLimits {
 struct Plant {
   dynamics::FlexibleAxis axis;
   double share = 0.0;  // α
+  // An edge of a band of frequencies around a model, and not a model of its own.
+  bool is_edge = false;
 };
 
 struct AxisWindow {
