@@ -33,8 +33,8 @@ class Writer : public ::testing::Test {
  protected:
   explicit Writer(double max_lines_per_s = 1000.0)
       : settings_(testing::settings()),
-        rules_{compensate_setup(settings_), emit_options(settings_, "test"),
-               verify_rules(settings_)},
+        rules_{compensate_setup(settings_), compensate_setup(settings_),
+               emit_options(settings_, "test"), verify_rules(settings_)},
         writer_(rules_, "in.gcode", max_lines_per_s, report_) {}
 
   // The pieces of a text, ready to be written.
