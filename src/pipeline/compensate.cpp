@@ -117,6 +117,10 @@ bool warn_of_no_run(const Job& job, report::Report& report) {
 void warn_of_no_gain(const Job& job, report::Report& report) {
   constexpr double kWorse = 1.05;
   constexpr double kWorse_mm = 2e-4;
+  const report::FreeTiming& timing = report.free_timing;
+  if (timing.tolerance_mm > 0.0 && timing.contour_p999_mm <= kWorse * timing.tolerance_mm) {
+    return;  // it was to be faster, and is as exact as it was to be
+  }
   const double now_mm = report.uncompensated.extruding.contour_rms_mm;
   const double compensated_mm = report.compensated.extruding.contour_rms_mm;
   if (compensated_mm <= kWorse * now_mm + kWorse_mm) {

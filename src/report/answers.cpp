@@ -105,6 +105,17 @@ Better better(const Report& report) {
   return result;
 }
 
+std::string faster_text(const Report& report) {
+  if (report.free_timing.tolerance_mm <= 0.0 || report.reference_time_s <= 0.0) {
+    return {};
+  }
+  const double change = 1.0 - report.emitted_time_s / report.reference_time_s;
+  return fmt::format("{} → {} to print, {:.0f} % {}; the nozzle may stray {:.4g} µm",
+                     duration_text(report.reference_time_s), duration_text(report.emitted_time_s),
+                     100.0 * std::abs(change), change >= 0.0 ? "less" : "more",
+                     report.free_timing.tolerance_mm * 1e3);
+}
+
 Worst worst(const Report& report) {
   Worst result;
   if (!report.recording) {

@@ -306,6 +306,9 @@ std::string better_answer(const Report& r) {
             ? fmt::format(", {} if they are 5 % off", micrometres_text(*found.off->zv_mm))
             : std::string{}));
   }
+  if (const std::string faster = faster_text(r); !faster.empty()) {
+    lines.insert(lines.begin(), escape_html(faster) + ".");
+  }
   return answer(term("Better?", kTypical),
                 change(found.exact.now_mm, found.exact.compensated_mm) + " off the path", lines);
 }

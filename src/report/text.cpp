@@ -53,6 +53,9 @@ void write_better(Sink out, const Report& r) {
   if (answer.exact.zv_mm) {
     lines.push_back(zv_text(answer));
   }
+  if (std::string faster = faster_text(r); !faster.empty()) {
+    lines.push_back(std::move(faster));
+  }
   write_answer(out, "Better?", lines);
 }
 

@@ -30,6 +30,7 @@ TEST(Summary, IsExactlyThis) {
       "Better?       200 → 3.12 µm RMS from the path: 64 times less than now (under the printer's "
       "own input shaper, MZV 45 Hz)\n"
       "              150 → 6.10 if the frequencies are 5 % off\n"
+      "              1h 00m 00s → 1h 00m 18s to print, 0 % more; the nozzle may stray 20 µm\n"
       "Where worst?  12.0 µm in line 41, layer 1, at X20.0 Y-2.3\n"
       "              Now 800 µm in line 95, layer 2, Perimeter, at X20.0 Y30.0\n"
       "              Before the first layer 900 → 50.0 µm at most\n"
