@@ -102,6 +102,9 @@ class LocalScaling {
     limit_accel();
     bounds_ = pieces_.bounds;
     limit_vertices();
+    if (models_.size() > 1) {
+      allow_as_sliced(allowed);
+    }
   }
 
   std::optional<Timed> find() {
@@ -118,7 +121,7 @@ class LocalScaling {
       if (repairs && planner::duration_s(plan) >= least_s) {
         break;  // it becomes only slower
       }
-      const std::optional<NozzleMeasure> measured = try_plan(plan);
+      const std::optional<NozzleMeasure> measured = try_plan(plan, pieces_.bounds);
       if (measured && keeps(*measured)) {
         const double gain_s = least_s - planner::duration_s(plan);
         if (gain_s > 0.0) {
@@ -208,14 +211,14 @@ class LocalScaling {
            std::isfinite(pieces_.bounds[vertex].start_speed_mm_s);
   }
 
-  [[nodiscard]] static bool keeps(const NozzleMeasure& measured) {
+  [[nodiscard]] bool keeps(const NozzleMeasure& measured) const {
     return std::ranges::max(measured.error) <= kKept &&
-           std::ranges::max(measured.speed) <= kKeptFeed && measured.left <= kKept;
+           std::ranges::max(measured.speed) <= kKeptFeed && left_of(measured) <= kKept;
   }
 
   // Finds the base for the plan and measures the nozzle. nullopt: the engine found none.
-  [[nodiscard]] std::optional<NozzleMeasure> try_plan(
-      const std::vector<planner::PlannedMove>& plan) {
+  [[nodiscard]] std::optional<NozzleMeasure> try_plan(std::span<const planner::PlannedMove> plan,
+                                                      std::span<const MoveBounds> bounds) {
     compensate::Course course = course_;
     course.moves = plan;
     const compensate::NodeGrid grid = compensate::node_grid(course, setup_);
@@ -240,12 +243,39 @@ class LocalScaling {
     }
     const dynamics::BaseTrajectory base{grid.period_s, compensate::join(spans, x),
                                         compensate::join(spans, y)};
-    NozzleMeasure measured = measure(plan, pieces_.bounds, starts_s_, base, models_,
+    NozzleMeasure measured = measure(plan, bounds, starts_s_, base, models_, allowances_,
                                      course.before.empty() ? &nozzle_ : nullptr);
     if (!course.after.empty()) {
-      measured.left = 0.0;
+      measured.left.assign(models_.size(), 0.0);
     }
     return measured;
+  }
+
+  // Where the axes may be several things, the nozzle of one may stray more than its tolerance even
+  // in the timing as sliced. There it may stray as far as that.
+  void allow_as_sliced(std::span<const MoveBounds> bounds) {
+    constexpr double kSampling = 1.02;
+    const std::optional<NozzleMeasure> sliced = try_plan(course_.moves, bounds);
+    if (!sliced) {
+      return;
+    }
+    allowances_.resize(models_.size());
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      for (std::size_t i = 0; i < pieces_.counts.size(); ++i) {
+        allowances_[m].insert(allowances_[m].end(), pieces_.counts[i],
+                              std::max(kSampling * sliced->of_pieces[m][i], 1.0));
+      }
+      left_allowed_.push_back(std::max(kSampling * sliced->left[m], 1.0));
+    }
+  }
+
+  // The largest swing in the end, relative to what is allowed.
+  [[nodiscard]] double left_of(const NozzleMeasure& measured) const {
+    double left = 0.0;
+    for (std::size_t m = 0; m < measured.left.size(); ++m) {
+      left = std::max(left, measured.left[m] / (left_allowed_.empty() ? 1.0 : left_allowed_[m]));
+    }
+    return left;
   }
 
   // The largest values near each piece and near each vertex.
@@ -282,7 +312,7 @@ class LocalScaling {
     const double reach = kErrorReach * (1.0 + kWider * std::max(round + 1 - kRounds, 0));
     const Near error = largest_near(measured.error, reach / omega_rad_s_);
     const Near speed = largest_near(measured.speed, kSpeedReach / omega_rad_s_);
-    const double left = std::min(measured.left, kMostLeft);
+    const double left = std::min(left_of(measured), kMostLeft);
     for (std::size_t i = 1; i < plan.size(); ++i) {
       const double g = error.vertex[i] / kAim;
       const double v = plan[i].start_v_mm_s;
@@ -339,7 +369,9 @@ class LocalScaling {
   std::vector<AxesModel> models_;
   double omega_rad_s_;
   std::vector<bool> is_kept_;  // of each piece
-  Pieces pieces_;              // with what each may do
+  Allowances allowances_;
+  std::vector<double> left_allowed_;  // for each model; empty: 1
+  Pieces pieces_;                     // with what each may do
   std::vector<MoveBounds> bounds_;
   std::vector<double> vertex_mm_s_;
   double period_s_ = 0.0;         // of the last plan's nodes

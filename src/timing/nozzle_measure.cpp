@@ -62,8 +62,9 @@ class Walk {
   }
 
   // may_be_left: the swing in the end that counts as 1, relative to the tolerance.
+  // allowance: for each piece; empty: 1.
   void add(const AxesModel& model, dynamics::NozzleXY nozzle, double may_be_left,
-           NozzleMeasure& result) const {
+           const std::vector<double>& allowance, NozzleMeasure& result) const {
     const double h = base_.period_s;
     const dynamics::ExactMap map_x(model.x, h / kLooks);
     const dynamics::ExactMap map_y(model.y, h / kLooks);
@@ -71,6 +72,7 @@ class Walk {
     dynamics::NozzleMotionXY last = nozzle.motion();
     Place furthest;
     std::vector<AtNode> nodes(base_.nodes());
+    std::vector<double>& of_pieces = result.of_pieces.emplace_back(plan_.size(), 0.0);
     for (std::size_t node = 0; node + 1 < base_.nodes(); ++node) {
       for (int look = 0; look < kLooks; ++look) {
         map_x.advance(segment_of(base_.x, node, look, h), nozzle.x);
@@ -94,7 +96,9 @@ class Walk {
             found.piece = furthest.piece;
           }
           furthest = found;
-          note(found, speed_mm_s, nodes[node + 1]);
+          note(found, speed_mm_s, allowance, nodes[node + 1]);
+          const double tolerance_mm = model.times_tolerance * bounds_[found.piece].tolerance_mm;
+          of_pieces[found.piece] = std::max(of_pieces[found.piece], found.error_mm / tolerance_mm);
         };
         const std::size_t last_piece = furthest.piece;
         const Place ahead = place(now, at.x.position, at.y.position, reference_mm);
@@ -112,7 +116,7 @@ class Walk {
     add(nodes, model.times_tolerance, result);
     const double left_mm = std::hypot(swing_mm(model.x, nozzle.x, base_.x.position_mm.back()),
                                       swing_mm(model.y, nozzle.y, base_.y.position_mm.back()));
-    result.left = std::max(result.left, left_mm / (may_be_left * bounds_.back().tolerance_mm));
+    result.left.push_back(left_mm / (may_be_left * bounds_.back().tolerance_mm));
   }
 
  private:
@@ -166,11 +170,13 @@ class Walk {
     double feed_mm_s = std::numeric_limits<double>::infinity();
   };
 
-  void note(const Place& at, double speed_mm_s, AtNode& node) const {
+  void note(const Place& at, double speed_mm_s, const std::vector<double>& allowance,
+            AtNode& node) const {
     node.error_mm = std::max(node.error_mm, at.error_mm);
     node.speed_mm_s = std::max(node.speed_mm_s, speed_mm_s);
     if (const gcode::Segment& segment = plan_[at.piece].segment; segment.extruding()) {
-      node.tolerance_mm = std::min(node.tolerance_mm, bounds_[at.piece].tolerance_mm);
+      const double times = allowance.empty() ? 1.0 : allowance[at.piece];
+      node.tolerance_mm = std::min(node.tolerance_mm, times * bounds_[at.piece].tolerance_mm);
       node.feed_mm_s =
           std::min({node.feed_mm_s, segment.feed_mm_s, bounds_[at.piece].nozzle_speed_mm_s});
     }
@@ -228,14 +234,15 @@ std::vector<AxesModel> models_of(const compensate::Setup& setup) {
 NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
                       std::span<const MoveBounds> bounds, std::span<const double> starts_s,
                       const dynamics::BaseTrajectory& base, const std::vector<AxesModel>& models,
-                      const dynamics::NozzleXY* nozzle) {
+                      const Allowances& allowances, const dynamics::NozzleXY* nozzle) {
   NozzleMeasure result;
   result.error.assign(base.nodes(), 0.0);
   result.speed.assign(base.nodes(), 0.0);
   const Walk walk(plan, bounds, starts_s, base);
   const dynamics::AxisMotion x = base.x_at(0.0);
   const dynamics::AxisMotion y = base.y_at(0.0);
-  for (const AxesModel& model : models) {
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const AxesModel& model = models[m];
     dynamics::NozzleXY start{model.x.riding(x.position_mm, x.velocity_mm_s),
                              model.y.riding(y.position_mm, y.velocity_mm_s)};
     if (nozzle != nullptr) {
@@ -243,7 +250,8 @@ NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
                model.y.swinging_as(models.front().y, nozzle->y, y.position_mm)};
     }
     constexpr double kByFirst = 0.5;
-    walk.add(model, start, &model == &models.front() ? kByFirst : 1.0, result);
+    walk.add(model, start, m == 0 ? kByFirst : 1.0,
+             allowances.empty() ? std::vector<double>{} : allowances[m], result);
   }
   return result;
 }

@@ -26,13 +26,19 @@ struct AxesModel {
 // may be.
 [[nodiscard]] std::vector<AxesModel> models_of(const compensate::Setup& setup);
 
+// How many times its tolerance each model's nozzle may stray on each piece. Empty: once.
+using Allowances = std::vector<std::vector<double>>;
+
 struct NozzleMeasure {
+  // For each model and piece, the largest e relative to the tolerance, whatever is allowed.
+  std::vector<std::vector<double>> of_pieces;
   // The largest values of all models around each node.
-  std::vector<double> error;  // e relative to the tolerance
+  std::vector<double> error;  // e relative to the tolerance and its allowance
   std::vector<double> speed;  // the nozzle's speed relative to F, where it lays filament
-  // How far the nozzle swings in the end, relative to what it may: half the tolerance for the first
-  // model, since the next run begins with that swing, and all of it for the others.
-  double left = 0.0;
+  // For each model, how far the nozzle swings in the end, relative to what it may: half the
+  // tolerance for the first one, since the next run begins with that swing, and all of it for the
+  // others.
+  std::vector<double> left;
 };
 
 // plan: what the base was found for, whose pieces have these bounds, beginning at starts_s[0],
@@ -43,6 +49,6 @@ struct NozzleMeasure {
                                     std::span<const double> starts_s,
                                     const dynamics::BaseTrajectory& base,
                                     const std::vector<AxesModel>& models,
-                                    const dynamics::NozzleXY* nozzle);
+                                    const Allowances& allowances, const dynamics::NozzleXY* nozzle);
 
 }  // namespace unflex::timing
