@@ -111,7 +111,7 @@ class LocalScaling {
     std::optional<Timed> best;
     // Where F is slow, the nozzle may run ahead of it in the timing as sliced. So one that is
     // hardly slower is better.
-    constexpr double kHardlySlower = 1.03;
+    constexpr double kHardlySlower = 1.01;
     double least_s = kHardlySlower * planner::duration_s(course_.moves);
     course_.moves = pieces_.moves;
     for (int round = 0; round < kRounds + kRepairs; ++round) {
