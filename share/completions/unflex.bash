@@ -10,7 +10,7 @@ _unflex_options() {
     batch) echo "-h --help -o --output $print --summary --faster --max-deviation --engine -j --jobs" ;;
     verify) echo "-h --help --against --strict $print --faster --max-deviation" ;;
     inspect) echo "-h --help --strict $print" ;;
-    study) echo "-h --help --case --machines --at-tolerance --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
+    study) echo "-h --help --case --machines --faster --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
     identify)
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
            '--second --make-test -o --output --printer --set --report -q --quiet' ;;
@@ -48,6 +48,7 @@ _unflex_value() {
     *:--record) echo 'files *.csv' ;;
     tune:--report) echo 'files *.html' ;;
     inspect:--report) echo 'files *.json' ;;
+    study:--report) echo 'files *.@(json|html|svg)' ;;
     *:--report) echo 'files *.@(json|html)' ;;
     study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;
     *:--axis | *:--make-test) echo 'words x y' ;;
@@ -56,7 +57,7 @@ _unflex_value() {
     *:--set) echo 'keys' ;;
     *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
       *:--wave-spacing-mm | *:--speed-mm-s | *:--decay | *:--read | *:--nozzle-temp | \
-      *:--bed-temp | *:--at-tolerance | *:--accel | *:--keep-rms) echo 'any' ;;
+      *:--bed-temp | *:--accel | *:--keep-rms) echo 'any' ;;
     compensate: | verify: | inspect: | study: | tune:) echo "files $print" ;;
     identify:) echo 'files *.csv' ;;
   esac

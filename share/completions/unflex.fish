@@ -79,7 +79,7 @@ complete -c unflex -n '__unflex_in compensate batch verify' -l max-deviation -x 
 complete -c unflex -n '__unflex_in compensate batch study' -l engine -x -a 'auto banded ipopt' -d 'What solves'
 complete -c unflex -n '__unflex_in compensate batch study tune' -s j -l jobs -x -d 'How many to compute at once'
 complete -c unflex -n '__unflex_in study' -l machines -x -a '(__fish_complete_directories (commandline -ct))' -d 'Folder of resonance records of real machines'
-complete -c unflex -n '__unflex_in study' -l at-tolerance -x -d 'The least print time within contour errors, as 10,20,50'
+complete -c unflex -n '__unflex_in study' -l faster -d 'The least print time within contour errors; =µm, as =10,20,50'
 complete -c unflex -n '__unflex_in study' -l at-all-times -d 'Let no moment exceed the tolerance'
 complete -c unflex -n '__unflex_in study' -l accel -x -d 'Compensate at these accelerations, as 2500,5000'
 complete -c unflex -n '__unflex_in study' -l scale-m204 -d 'Scale accelerations of the print as well'

@@ -44,10 +44,12 @@ Status check_report(const RunConfig& config) {
     const bool taken = config.command == Command::compensate && config.output == kStandardStream;
     return taken ? Status(usage("the output and the report cannot both go to stdout")) : Status{};
   }
-  const bool json_alone = config.command == Command::inspect || !config.tolerances_um.empty() ||
-                          !config.accels_mm_s2.empty();
+  const bool json_alone = config.command == Command::inspect || !config.accels_mm_s2.empty();
   if (json_alone && !name.ends_with(".json")) {
     return usage(fmt::format("--report {}: the name must end in .json", name));
+  }
+  if (!config.tolerances_um.empty() && name.ends_with(".svg")) {
+    return check_has_name("--report", name, {".svg"});
   }
   if (!name.ends_with(".json") && !is_html(name)) {
     return usage(fmt::format("--report {}: the name must end in .json or .html", name));
@@ -67,7 +69,7 @@ Status check_study(const RunConfig& config) {
     return usage("--machines needs a print to judge them by");
   }
   if (!has_print && !config.tolerances_um.empty()) {
-    return usage("--at-tolerance needs a print whose time it is");
+    return usage("--faster needs a print whose time it is");
   }
   if (!has_print && !config.accels_mm_s2.empty()) {
     return usage("--accel needs a print to compensate");
@@ -75,13 +77,13 @@ Status check_study(const RunConfig& config) {
   const int studies = (config.machines.empty() ? 0 : 1) + (config.tolerances_um.empty() ? 0 : 1) +
                       (config.accels_mm_s2.empty() ? 0 : 1);
   if (studies > 1) {
-    return usage("give one of --machines, --at-tolerance and --accel");
+    return usage("give one of --machines, --faster and --accel");
   }
   if (config.accels_mm_s2.empty() && (config.scale_m204 || config.keep_rms_um)) {
     return usage("--scale-m204 and --keep-rms go with --accel");
   }
   if (config.at_all_times && config.tolerances_um.empty()) {
-    return usage("--at-all-times says how strictly --at-tolerance is meant; give that too");
+    return usage("--at-all-times says how strictly --faster is meant; give that too");
   }
   if (!has_print && (config.printer_file || !config.overrides.empty())) {
     return usage("--printer and --set are of a print; the corner's cases have their own settings");

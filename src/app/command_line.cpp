@@ -20,6 +20,7 @@ namespace unflex::app {
 namespace {
 
 constexpr unsigned kMaxWorkers = 256;
+constexpr double kMostTolerance_um = 1000.0;  // as of timing.tolerance_um
 
 CLI::Validator positive() {
   return {[](std::string& text) {
@@ -112,6 +113,28 @@ void take_faster(RunConfig& config) {
     // Without a value a flag is "true".
     config.overrides.push_back("timing.tolerance_um=" +
                                (config.faster_um == "true" ? "20" : config.faster_um));
+  }
+}
+
+// The tolerances of study --faster.
+void take_tolerances(RunConfig& config) {
+  if (config.faster_um.empty()) {
+    return;
+  }
+  // Without a value a flag is "true".
+  std::string_view rest = config.faster_um == "true" ? "5,10,20,50,100" : config.faster_um;
+  for (bool more = true; more;) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view word = rest.substr(0, comma);
+    const std::optional<double> value = parse_number(word);
+    if (!value || !std::isfinite(*value) || *value <= 0.0 || *value > kMostTolerance_um) {
+      throw CLI::ValidationError(
+          "--faster",
+          fmt::format("'{}' is not a number above 0, and up to {:g}", word, kMostTolerance_um));
+    }
+    config.tolerances_um.push_back(*value);
+    more = comma != std::string_view::npos;
+    rest.remove_prefix(more ? comma + 1 : rest.size());
   }
 }
 
@@ -221,14 +244,11 @@ void add_study(CLI::App& program, RunConfig& config) {
                    "With IN: judge unflex and shapers on the machines whose records are in DIR")
       ->type_name("DIR");
   command
-      ->add_option("--at-tolerance", config.tolerances_um,
-                   "With IN: the least print time within contour errors, as 10,20,50")
-      ->type_name("UM")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(positive());
+      ->add_flag("--faster", config.faster_um,
+                 "With IN: the least print time within contour errors, 5,10,20,50,100 by default")
+      ->type_name("[=UM]");
   command->add_flag("--at-all-times", config.at_all_times,
-                    "With --at-tolerance: let no moment exceed it, not even a thousandth");
+                    "With --faster: let no moment exceed it, not even a thousandth");
   command
       ->add_option("--accel", config.accels_mm_s2,
                    "With IN: compensate it at these accelerations, as 2500,5000,10000")
@@ -246,7 +266,10 @@ void add_study(CLI::App& program, RunConfig& config) {
   add_common_options(*command, config);
   add_engine(*command, config, "What solves for unflex: banded (auto), or ipopt");
   add_jobs(*command, config);
-  command->callback([&config] { config.command = Command::study; });
+  command->callback([&config] {
+    config.command = Command::study;
+    take_tolerances(config);
+  });
 }
 
 void add_printer_macros(CLI::App& printer, RunConfig& config) {

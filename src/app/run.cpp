@@ -124,14 +124,17 @@ Result<ExitCode> run_study(const RunConfig& config, Console& console) {
       .map([] { return ExitCode::done; });
 }
 
-// A study of a print that reports as text and JSON.
-template <class Study>
-Result<ExitCode> run_print_study(const RunConfig& config, Console& console, const Study& work) {
+// A study of a print. `report_of` makes the text of its report.
+template <class Study, class Report>
+Result<ExitCode> run_print_study(const RunConfig& config, Console& console,
+                                 machine::Settings (*settings_for)(machine::Settings),
+                                 const Study& work, const Report& report_of) {
   const auto start = std::chrono::steady_clock::now();
   Result<Workspace> space = open_workspace(config);
   if (!space) {
     return tl::unexpected(space.error());
   }
+  space->settings = settings_for(std::move(space->settings));
   const Result<pipeline::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
@@ -148,12 +151,12 @@ Result<ExitCode> run_print_study(const RunConfig& config, Console& console, cons
   add_setting_warnings(space->settings, outcome->warnings);
   outcome->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   console.warnings(outcome->warnings);
-  return write_report(space->report, study::to_json(*outcome))
+  return write_report(space->report, report_of(*outcome))
       .and_then([&] { return print_summary(config, study::to_text(*outcome), console); })
       .map([] { return ExitCode::done; });
 }
 
-// study --at-tolerance
+// study --faster
 Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
   std::vector<double> tolerances_mm;
   for (const double tolerance_um : config.tolerances_um) {
@@ -161,20 +164,32 @@ Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
   }
   study::ToleranceRule rule;
   rule.largest_times = config.at_all_times ? 1.0 : rule.largest_times;
-  return run_print_study(config, console, [&](const pipeline::Job& job, Progress& progress) {
-    return pipeline::study_fastest(job, tolerances_mm, rule, progress);
-  });
+  return run_print_study(
+      config, console, pipeline::settings_of_fastest,
+      [&](const pipeline::Job& job, Progress& progress) {
+        return pipeline::study_fastest(job, tolerances_mm, rule, progress);
+      },
+      [&](const study::FastestOutcome& outcome) {
+        const std::string_view name = config.report ? *config.report : std::string_view{};
+        return is_html(name)            ? study::to_html(outcome)
+               : name.ends_with(".svg") ? study::to_svg(outcome)
+                                        : study::to_json(outcome);
+      });
 }
 
 // study --accel
 Result<ExitCode> run_accels(const RunConfig& config, Console& console) {
-  return run_print_study(config, console, [&](const pipeline::Job& job, Progress& progress) {
-    auto outcome = pipeline::study_accels(job, config.accels_mm_s2, config.scale_m204, progress);
-    if (outcome && config.keep_rms_um) {
-      outcome->keep_rms_mm = 1e-3 * *config.keep_rms_um;
-    }
-    return outcome;
-  });
+  return run_print_study(
+      config, console, [](machine::Settings settings) { return settings; },
+      [&](const pipeline::Job& job, Progress& progress) {
+        auto outcome =
+            pipeline::study_accels(job, config.accels_mm_s2, config.scale_m204, progress);
+        if (outcome && config.keep_rms_um) {
+          outcome->keep_rms_mm = 1e-3 * *config.keep_rms_um;
+        }
+        return outcome;
+      },
+      [](const study::AccelsOutcome& outcome) { return study::to_json(outcome); });
 }
 
 // A descriptor 0, 1 or 2 that was closed would be given to the next file opened, and messages

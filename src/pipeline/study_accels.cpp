@@ -6,29 +6,14 @@
 #include <cerrno>
 #include <fstream>
 #include <string>
+#include <utility>
 
+#include "in_memory.hpp"
 #include "memory_file.hpp"
 #include "unflex/core/errno_text.hpp"
 
 namespace unflex::pipeline {
 namespace {
-
-// Progress of one acceleration among all.
-class PartProgress final : public Progress {
- public:
-  PartProgress(Progress& all, std::size_t part, std::size_t parts)
-      : all_(&all), part_(part), parts_(parts) {}
-  void update(std::string_view, double fraction) override {
-    all_->update("studying", (static_cast<double>(part_) + std::max(0.0, fraction)) /
-                                 static_cast<double>(parts_));
-  }
-  [[nodiscard]] bool cancelled() const override { return all_->cancelled(); }
-
- private:
-  Progress* all_;
-  std::size_t part_;
-  std::size_t parts_;
-};
 
 Status scale_accels(const Job& job, double ratio, const std::string& to) {
   std::ifstream input(job.input, std::ios::binary);
@@ -51,14 +36,11 @@ Result<study::AccelsOutcome> study_accels(const Job& job, const std::vector<doub
   outcome.scaled = scale;
   for (const double accel_mm_s2 : accels_mm_s2) {
     const MemoryFile input;
-    const MemoryFile output;
-    if (!input.is_open() || !output.is_open()) {
+    if (!input.is_open()) {
       return fail(ErrorKind::internal,
                   fmt::format("no memory for the print: {}", errno_text(errno)));
     }
     Job at = job;
-    at.output = output.name();
-    at.output_name = job.input_name;
     at.settings.limits.max_accel_mm_s2 = accel_mm_s2;
     if (scale) {
       const double ratio = accel_mm_s2 / job.settings.limits.max_accel_mm_s2;
@@ -68,15 +50,10 @@ Result<study::AccelsOutcome> study_accels(const Job& job, const std::vector<doub
       at.input = input.name();
     }
     PartProgress part(progress, outcome.accels.size(), accels_mm_s2.size());
-    const Result<report::Report> report = compensate(at, part);
+    const Result<report::Report> report =
+        compensate_in_memory(std::move(at), fmt::format("{:g} mm/s²", accel_mm_s2), part);
     if (!report) {
       return tl::unexpected(report.error());
-    }
-    if (report->violation_count > 0) {
-      return fail(
-          ErrorKind::internal,
-          fmt::format("at {:g} mm/s² the output breaks a rule, which is a fault of unflex: {}",
-                      accel_mm_s2, report->violations.front()));
     }
     outcome.accels.push_back({accel_mm_s2, report->reference_time_s, report->emitted_time_s,
                               report->uncompensated.extruding, report->compensated.extruding});

@@ -5,6 +5,7 @@
 
 namespace unflex::report::assets {
 
+extern const std::string_view colours_css;
 extern const std::string_view page_css;
 extern const std::string_view page_js;
 

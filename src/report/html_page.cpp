@@ -102,6 +102,7 @@ std::string html_page(const Page& page) {
 <link rel="icon" href="data:,">
 <title>{title}</title>
 <style>
+{colours}
 {frame_style}{style}</style>
 </head>
 <body>
@@ -116,6 +117,7 @@ std::string html_page(const Page& page) {
 </html>
 )",
                      fmt::arg("policy", kPolicy), fmt::arg("title", title),
+                     fmt::arg("colours", assets::colours_css),
                      fmt::arg("frame_style", assets::page_css), fmt::arg("style", page.style),
                      fmt::arg("body", page.body), fmt::arg("frame_script", assets::page_js),
                      fmt::arg("script", page.script));

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "assets.hpp"
 #include "unflex/report/html_page.hpp"
 
 namespace unflex::report {
@@ -143,25 +144,52 @@ double tick_step(const PlotRange& range, double wanted) {
   return nearest;
 }
 
-std::vector<double> ticks(const PlotRange& range, double wanted) {
+struct Tick {
+  double at = 0.0;
+  std::string text;
+};
+
+std::vector<Tick> linear_ticks(const PlotRange& range, double wanted) {
   const double step = tick_step(range, wanted);
-  std::vector<double> result;
+  // As many decimals as the step between ticks needs.
+  const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
+  std::vector<Tick> result;
   for (double number = std::ceil(range.from / step - 1e-9); number * step <= range.to + 1e-9 * step;
        number += 1.0) {
-    result.push_back(number * step + 0.0);
+    std::string text = fmt::format("{:.{}f}", number * step + 0.0, decimals);
+    if (text.starts_with('-')) {
+      text.replace(0, 1, "−");
+    }
+    result.push_back({number * step + 0.0, std::move(text)});
   }
   return result;
 }
 
-// The value with as many decimals as the step between ticks needs.
-std::string tick_text(double value, const PlotRange& range, double wanted) {
-  const int decimals =
-      std::max(0, -static_cast<int>(std::floor(std::log10(tick_step(range, wanted)) + 1e-9)));
-  std::string text = fmt::format("{:.{}f}", value, decimals);
-  if (text.starts_with('-')) {
-    text.replace(0, 1, "−");
+// 1, 2 and 5 times the powers of ten whose logarithms are in the range.
+std::vector<Tick> logarithmic_ticks(const PlotRange& range) {
+  std::vector<Tick> result;
+  for (double power = std::floor(range.from); power <= range.to; power += 1.0) {
+    for (const double multiple : {1.0, 2.0, 5.0}) {
+      const double at = power + std::log10(multiple);
+      if (at >= range.from && at <= range.to) {
+        result.push_back({at, fmt::format("{:g}", multiple * std::pow(10.0, power))});
+      }
+    }
   }
-  return text;
+  return result;
+}
+
+// The plot with logarithms for x.
+Plot in_logarithms(Plot plot) {
+  if (plot.x) {
+    plot.x = PlotRange{std::log10(plot.x->from), std::log10(plot.x->to)};
+  }
+  for (PlotCurve& curve : plot.curves) {
+    for (PlotPoint& point : curve.points) {
+      point.x = std::log10(point.x);
+    }
+  }
+  return plot;
 }
 
 constexpr double kTicksX = 5.5;
@@ -171,15 +199,18 @@ void write_axes(Sink out, const Plot& plot, const Frame& frame) {
   const double bottom = kTop + frame.height();
   const double right = kLeft + frame.width();
   std::string grid;
-  for (const double tick : ticks(frame.x_range(), kTicksX)) {
-    fmt::format_to(std::back_inserter(grid), "M{:.1f} {:.1f}V{:.1f}", frame.x(tick), kTop, bottom);
+  for (const Tick& tick :
+       plot.log_x ? logarithmic_ticks(frame.x_range()) : linear_ticks(frame.x_range(), kTicksX)) {
+    fmt::format_to(std::back_inserter(grid), "M{:.1f} {:.1f}V{:.1f}", frame.x(tick.at), kTop,
+                   bottom);
     fmt::format_to(out, R"(<text x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)",
-                   frame.x(tick), bottom + 15.0, tick_text(tick, frame.x_range(), kTicksX));
+                   frame.x(tick.at), bottom + 15.0, tick.text);
   }
-  for (const double tick : ticks(frame.y_range(), kTicksY)) {
-    fmt::format_to(std::back_inserter(grid), "M{:.1f} {:.1f}H{:.1f}", kLeft, frame.y(tick), right);
+  for (const Tick& tick : linear_ticks(frame.y_range(), kTicksY)) {
+    fmt::format_to(std::back_inserter(grid), "M{:.1f} {:.1f}H{:.1f}", kLeft, frame.y(tick.at),
+                   right);
     fmt::format_to(out, R"(<text x="{:.1f}" y="{:.1f}" text-anchor="end">{}</text>)", kLeft - 5.0,
-                   frame.y(tick) + 4.0, tick_text(tick, frame.y_range(), kTicksY));
+                   frame.y(tick.at) + 4.0, tick.text);
   }
   fmt::format_to(out, R"x(<path d="{}" stroke="var(--line)" fill="none"/>)x", grid);
   fmt::format_to(out, R"(<text x="{:.1f}" y="{}" text-anchor="middle">{}</text>)",
@@ -219,16 +250,11 @@ void write_curve(Sink out, const PlotCurve& curve, const Frame& frame) {
                  path, curve.colour, curve.width_px, dashes(curve.stroke));
 }
 
-}  // namespace
-
-std::string svg_plot(const Plot& plot) {
+// Axes and curves. The clipping is that of an inner viewport, since a clip path would need an
+// identifier that is unique in the page.
+void write_plot(Sink out, const Plot& asked) {
+  const Plot plot = asked.log_x ? in_logarithms(asked) : asked;
   const Frame frame(plot);
-  std::string svg;
-  const Sink out = std::back_inserter(svg);
-  // An inner viewport clips the curves. A clip path would need an identifier that is unique in the
-  // page.
-  fmt::format_to(out, R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">)",
-                 plot.width_px, plot.height_px, escape_html(plot.title));
   write_axes(out, plot, frame);
   fmt::format_to(out,
                  R"(<svg x="{0}" y="{1}" width="{2:.1f}" height="{3:.1f}" )"
@@ -237,7 +263,53 @@ std::string svg_plot(const Plot& plot) {
   for (const PlotCurve& curve : plot.curves) {
     write_curve(out, curve, frame);
   }
-  fmt::format_to(out, "</svg></svg>\n");
+  fmt::format_to(out, "</svg>");
+}
+
+}  // namespace
+
+std::string svg_plot(const Plot& plot) {
+  std::string svg;
+  const Sink out = std::back_inserter(svg);
+  fmt::format_to(out, R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">)",
+                 plot.width_px, plot.height_px, escape_html(plot.title));
+  write_plot(out, plot);
+  fmt::format_to(out, "</svg>\n");
+  return svg;
+}
+
+std::string svg_picture(const Plot& plot) {
+  constexpr int kRow_px = 20;
+  constexpr int kColumns = 3;
+  const auto labelled = [](const PlotCurve& curve) { return !curve.label.empty(); };
+  const auto labels = static_cast<int>(std::ranges::count_if(plot.curves, labelled));
+  const int legend_px = 8 + kRow_px * ((labels + kColumns - 1) / kColumns);
+  std::string svg;
+  const Sink out = std::back_inserter(svg);
+  fmt::format_to(out,
+                 R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" )"
+                 R"(height="{1}" font-family="system-ui, sans-serif" font-size="12">)"
+                 "\n<title>{2}</title>\n<style>\n{3}text {{ fill: var(--muted); }}\n</style>\n"
+                 R"x(<rect width="{0}" height="{1}" rx="6" fill="var(--surface)"/>)x",
+                 plot.width_px, plot.height_px + legend_px, escape_html(plot.title),
+                 assets::colours_css);
+  int number = 0;
+  for (const PlotCurve& curve : plot.curves) {
+    if (labelled(curve)) {
+      const int x = static_cast<int>(kLeft) +
+                    (plot.width_px - static_cast<int>(kLeft)) * (number % kColumns) / kColumns;
+      const int y = kRow_px / 2 + 4 + kRow_px * (number / kColumns);
+      fmt::format_to(out,
+                     R"x(<path d="M{} {}h26" stroke="var({})" stroke-width="{}"{}/>)x"
+                     R"(<text x="{}" y="{}">{}</text>)",
+                     x, y, curve.colour, curve.width_px, dashes(curve.stroke), x + 32, y + 4,
+                     escape_html(curve.label));
+      ++number;
+    }
+  }
+  fmt::format_to(out, R"x(<g transform="translate(0 {})">)x", legend_px);
+  write_plot(out, plot);
+  fmt::format_to(out, "</g>\n</svg>\n");
   return svg;
 }
 

@@ -184,6 +184,34 @@ PlanLimits advised_limits(const AxisShapers& shapers) {
 
 }  // namespace
 
+std::optional<double> FastestOutcome::unflex_saves(std::size_t tolerance) const {
+  std::optional<double> unflex_s;
+  std::optional<double> rival_s;
+  for (const FastestOfContender& contender : contenders) {
+    if (const std::optional<TimedMotion>& motion = contender.at[tolerance]) {
+      std::optional<double>& least_s = contender.name == kUnflex ? unflex_s : rival_s;
+      least_s = std::min(motion->time_s, least_s.value_or(motion->time_s));
+    }
+  }
+  return unflex_s && rival_s ? std::optional(1.0 - *unflex_s / *rival_s) : std::nullopt;
+}
+
+double time_at_feed_s(const PrintPath& path, const std::vector<StretchPlan>& as_sliced) {
+  double time_s = path.dwell_s;
+  for (const Stretch& stretch : path.stretches) {
+    for (const gcode::Segment& segment : stretch) {
+      const double length_mm = segment.length_mm();
+      time_s += length_mm > 0.0 ? length_mm / segment.feed_mm_s : 0.0;
+    }
+  }
+  for (const StretchPlan& plan : as_sliced) {
+    for (const planner::PlannedMove& move : plan) {
+      time_s += move.kinematic ? 0.0 : move.duration_s();
+    }
+  }
+  return time_s;
+}
+
 std::vector<std::optional<TimedMotion>> fastest(std::vector<Candidate> candidates,
                                                 const std::vector<double>& tolerances_mm,
                                                 const ToleranceRule& rule, const Measure& measure) {
@@ -215,6 +243,7 @@ Result<FastestOutcome> study_fastest(const PrintPath& path,
   FastestOutcome outcome;
   outcome.tolerances_mm = setup.tolerances_mm;
   outcome.rule = setup.rule;
+  outcome.at_feed_s = time_at_feed_s(path, as_sliced);
   std::vector<AxisShapers> shapers = {{}};
   outcome.contenders.push_back({"no shaper", {}, {}});
   for (const ShaperKind kind : kShapers) {

@@ -49,6 +49,32 @@ TEST(SvgPlot, TakesItsColoursFromThePage) {
   EXPECT_THAT(svg, Not(HasSubstr("#")));
 }
 
+TEST(SvgPlot, MayBeLogarithmicInX) {
+  PlotCurve line{"", "--after", Stroke::solid, 1.0, {{5.0, 0.0}, {50.0, 1.0}, {500.0, 2.0}}};
+  Plot plot = plot_of(line);
+  plot.log_x = true;
+  plot.x = PlotRange{5.0, 500.0};
+  const std::string svg = svg_plot(plot);
+  for (const char* tick : {">5<", ">10<", ">20<", ">50<", ">100<", ">200<", ">500<"}) {
+    EXPECT_THAT(svg, HasSubstr(tick));
+  }
+  EXPECT_THAT(svg, Not(HasSubstr(">150<")));
+  // Equal ratios are equal distances, so the middle point is on the line and left out.
+  EXPECT_EQ(points_in(svg), 2U);
+}
+
+TEST(SvgPicture, BringsItsColoursAndItsLegend) {
+  const std::string svg = svg_picture(plot_of(sine(50)));
+  EXPECT_THAT(svg, ::testing::StartsWith("<svg xmlns=\"http://www.w3.org/2000/svg\""));
+  EXPECT_THAT(svg, HasSubstr("<title>A &lt;plot&gt;</title>"));
+  EXPECT_THAT(svg, HasSubstr("prefers-color-scheme: dark"));
+  EXPECT_THAT(svg, HasSubstr("--after: #"));
+  EXPECT_THAT(svg, HasSubstr(">sine</text>"));
+  const std::string plot = svg_plot(plot_of(sine(50)));
+  const std::size_t inside = plot.find('>') + 1;
+  EXPECT_THAT(svg, HasSubstr(plot.substr(inside, plot.rfind("</svg>") - inside)));
+}
+
 TEST(SvgPlot, LeavesOutPointsThatNobodyCouldSee) {
   const std::size_t few = points_in(svg_plot(plot_of(sine(20000))));
   EXPECT_LT(few, 120U);

@@ -237,9 +237,9 @@ TEST(FastestReport, IsDocumentedAndNamesEachContender) {
   outcome.printer.push_back({"limits.max_accel_mm_s2", "5000", "default"});
   std::set<std::string> keys;
   report::collect_keys(nlohmann::json::parse(to_json(outcome)), "", keys);
-  EXPECT_EQ(report::documented_keys(std::string(test_paths::kDocs) + "/report.md",
-                                    "study --at-tolerance"),
-            keys);
+  EXPECT_EQ(
+      report::documented_keys(std::string(test_paths::kDocs) + "/report.md", "study --faster"),
+      keys);
   const auto json = nlohmann::json::parse(to_json(outcome));
   EXPECT_EQ(json["tolerances"][1]["contenders"][2]["found"], false);
   EXPECT_FALSE(json["tolerances"][1]["contenders"][2].contains("time_s"));
@@ -252,16 +252,74 @@ TEST(FastestReport, IsDocumentedAndNamesEachContender) {
   EXPECT_THAT(to_text(outcome), HasSubstr("within the tolerance at all times"));
 }
 
-// A contender that does not plan by limits of the grid.
-TEST(FastestReport, TakesATimeFromElsewhere) {
-  FastestOutcome outcome = studied(zigzag(), setup({0.02}));
-  outcome.contenders.push_back({"other", {TimedMotion{std::nullopt, 1.25, {0.01, 0.02}}}, {}});
-  EXPECT_THAT(to_text(outcome),
-              HasSubstr("other              1.25                         10.0       20.0\n"));
+TEST(Fastest, IsBoundByTheSpeedsOfTheFile) {
+  PrintPath path = path_of({{30.0, 0.0}, {30.0, 40.0, false}});
+  path.dwell_s = 0.5;
+  planner::PlannedMove filament;
+  filament.kinematic = false;
+  filament.cruise_s = 0.25;
+  planner::PlannedMove travel;
+  travel.cruise_s = 9.0;
+  // The stretch is there twice.
+  EXPECT_NEAR(time_at_feed_s(path, {{filament, travel}}), 2.0 * 0.7 + 0.5 + 0.25, 1e-12);
+}
+
+// unflex, which does not plan by limits of the grid, and is not always within the tolerance.
+FastestOutcome with_unflex() {
+  FastestOutcome outcome = studied(zigzag(), setup({0.02, 0.01}));
+  outcome.input = "<print>.gcode";
+  outcome.contenders.push_back(
+      {std::string(kUnflex), {TimedMotion{std::nullopt, 1.25, {0.01, 0.02}}, std::nullopt}, {}});
+  return outcome;
+}
+
+TEST(FastestReport, HoldsUnflexAgainstTheBestOther) {
+  const FastestOutcome outcome = with_unflex();
+  const double zv_s = outcome.contenders[1].at[0]->time_s;
+  EXPECT_NEAR(outcome.unflex_saves(0).value(), 1.0 - 1.25 / zv_s, 1e-12);
+  EXPECT_FALSE(outcome.unflex_saves(1));
+  const std::string text = to_text(outcome);
+  EXPECT_THAT(text, HasSubstr("print time, s          20 µm     10 µm\n"));
+  EXPECT_THAT(text, HasSubstr("  unflex                1.25         —\n  always at F "));
+  EXPECT_THAT(text, HasSubstr("unflex             1.25                         10.0       20.0\n"));
+  EXPECT_THAT(text, HasSubstr("all made for the exact frequencies"));
   const auto json = nlohmann::json::parse(to_json(outcome));
-  const auto& other = json["tolerances"][0]["contenders"][4];
-  EXPECT_EQ(other["time_s"], 1.25);
-  EXPECT_FALSE(other.contains("max_accel_mm_s2"));
+  const auto& unflex = json["tolerances"][0]["contenders"][4];
+  EXPECT_EQ(unflex["time_s"], 1.25);
+  EXPECT_FALSE(unflex.contains("max_accel_mm_s2"));
+  EXPECT_EQ(json["tolerances"][0]["unflex_saves"], *outcome.unflex_saves(0));
+  EXPECT_TRUE(json["tolerances"][1]["unflex_saves"].is_null());
+  EXPECT_EQ(json["always_at_f"]["time_s"], outcome.at_feed_s);
+}
+
+TEST(FastestReport, SaysForWhichFrequenciesUnflexIsMade) {
+  FastestOutcome outcome = with_unflex();
+  outcome.freq_error = 0.1;
+  EXPECT_THAT(to_text(outcome), HasSubstr("but unflex for up to 10 % off"));
+}
+
+TEST(FastestReport, TellsMinutesApart) {
+  FastestOutcome outcome = with_unflex();
+  outcome.at_feed_s = 61.96;
+  EXPECT_THAT(to_text(outcome), HasSubstr("always at F         1:02.0    1:02.0\n"));
+}
+
+TEST(FastestReport, IsAPageWithATableAndOnePicture) {
+  const FastestOutcome outcome = with_unflex();
+  const std::string page = to_html(outcome);
+  EXPECT_THAT(page, ::testing::StartsWith("<!DOCTYPE html>"));
+  EXPECT_THAT(page, HasSubstr("&lt;print&gt;.gcode"));
+  EXPECT_THAT(page, Not(HasSubstr("<print>")));
+  EXPECT_THAT(page, HasSubstr("<th>20 µm</th><th>10 µm</th>"));
+  EXPECT_THAT(page, HasSubstr("<tr class=\"unflex\"><th scope=\"row\">unflex</th><td>1.25</td>"
+                              "<td class=\"none\">—</td></tr>"));
+  const std::size_t plot = page.find("<svg class=\"plot\"");
+  ASSERT_NE(plot, std::string::npos);
+  EXPECT_EQ(page.find("<svg class=\"plot\"", plot + 1), std::string::npos);
+  // A line in the legend for each contender, and one for length over F.
+  for (const char* label : {"no shaper", "ZV", "MZV", "EI", "unflex", "length / F"}) {
+    EXPECT_THAT(page, HasSubstr("</svg> " + std::string(label) + "</span>"));
+  }
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ struct Plot {
   // What is shown; unset: all curves, with some room.
   std::optional<PlotRange> x = std::nullopt;
   std::optional<PlotRange> y = std::nullopt;
+  bool log_x = false;        // logarithmic in x, whose values and range are above 0
   bool equal_scale = false;  // one unit is as long in y as in x; widens the smaller range
   std::vector<PlotCurve> curves = {};
 };
@@ -47,5 +48,8 @@ struct Plot {
 
 // The labelled curves of a plot as <div class="legend">.
 [[nodiscard]] std::string svg_legend(const Plot& plot);
+
+// The plot with its legend as the text of an SVG file, light or dark as the viewer's system.
+[[nodiscard]] std::string svg_picture(const Plot& plot);
 
 }  // namespace unflex::report

@@ -1,6 +1,6 @@
 // How fast a print may go: the least print time at which the nozzle of each contender still keeps a
-// tolerance. Acceleration and square corner velocity are chosen from a grid and hold for the whole
-// print, planned by Klipper's rules.
+// tolerance. For shapers, acceleration and square corner velocity are chosen from a grid and hold
+// for the whole print, planned by Klipper's rules. unflex chooses a timing of its own.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "unflex/core/error.hpp"
@@ -60,6 +61,9 @@ struct TimedMotion {
   PathErrors errors;
 };
 
+// What unflex is called among the contenders.
+inline constexpr std::string_view kUnflex = "unflex";
+
 // A way to move the base, with the fastest motions that it is found to allow.
 struct FastestOfContender {
   std::string name;
@@ -72,12 +76,19 @@ struct FastestOutcome {
   std::string input;
   std::vector<report::Setting> printer;
   std::string description;  // the axes
+  // The share that frequencies may be off for unflex. Shapers are made for exact ones.
+  double freq_error = 0.0;
   std::vector<double> tolerances_mm;
   ToleranceRule rule;
-  TimedMotion as_sliced;  // without a shaper, with the limits of settings and file
+  TimedMotion as_sliced;   // without a shaper, with the limits of settings and file
+  double at_feed_s = 0.0;  // the print's time if the nozzle were always at F
   std::vector<FastestOfContender> contenders;
   std::vector<std::string> warnings;
   double wall_s = 0.0;
+
+  // By what share of the time of the best other contender unflex is faster. nullopt: one of the two
+  // does not keep the tolerance.
+  [[nodiscard]] std::optional<double> unflex_saves(std::size_t tolerance) const;
 };
 
 // A stretch of the print's path from one stop of the machine to the next.
@@ -121,8 +132,16 @@ using Measure =
                                                    const std::vector<StretchPlan>& as_sliced,
                                                    const FastestSetup& setup, Progress& progress);
 
+// The time if each move had its F throughout: no timing that keeps F takes less. Pauses count, and
+// moves of filament alone as planned.
+[[nodiscard]] double time_at_feed_s(const PrintPath& path,
+                                    const std::vector<StretchPlan>& as_sliced);
+
 [[nodiscard]] std::string to_text(const FastestOutcome& outcome);
 // The keys are those of docs/report.md.
 [[nodiscard]] std::string to_json(const FastestOutcome& outcome);
+// A page with table and picture, and the picture alone as the text of an SVG file.
+[[nodiscard]] std::string to_html(const FastestOutcome& outcome);
+[[nodiscard]] std::string to_svg(const FastestOutcome& outcome);
 
 }  // namespace unflex::study

@@ -1,0 +1,34 @@
+#include "in_memory.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "memory_file.hpp"
+#include "unflex/core/errno_text.hpp"
+
+namespace unflex::pipeline {
+
+void PartProgress::update(std::string_view /*phase*/, double fraction) {
+  all_->update("studying", (static_cast<double>(part_) + std::max(0.0, fraction)) /
+                               static_cast<double>(parts_));
+}
+
+Result<report::Report> compensate_in_memory(Job job, std::string_view at, Progress& progress) {
+  const MemoryFile output;
+  if (!output.is_open()) {
+    return fail(ErrorKind::internal, fmt::format("no memory for the print: {}", errno_text(errno)));
+  }
+  job.output = output.name();
+  job.output_name = job.input_name;
+  Result<report::Report> report = compensate(job, progress);
+  if (report && report->violation_count > 0) {
+    return fail(ErrorKind::internal,
+                fmt::format("at {} the output breaks a rule, which is a fault of unflex: {}", at,
+                            report->violations.front()));
+  }
+  return report;
+}
+
+}  // namespace unflex::pipeline
