@@ -124,7 +124,7 @@ Result<study::FastestOfContender> unflex_of(const Job& job,
       warn(fmt::format("keeps {} of {} runs as they were sliced", kept, report->runs_total));
     }
     if (const std::size_t kept = report->free_timing.pieces_as_sliced; kept > 0) {
-      warn(fmt::format("keeps the timing of {} stretches as sliced", kept));
+      warn(fmt::format("keeps the timing of {} stretch{} as sliced", kept, kept == 1 ? "" : "es"));
     }
     for (const std::string& warning : report->warnings) {
       if (std::ranges::find(warnings, warning) == warnings.end()) {
