@@ -101,7 +101,12 @@ std::string time_text(double time_s) {
 
 std::string saving_text(const FastestOutcome& outcome, std::size_t tolerance) {
   const std::optional<double> share = outcome.unflex_saves(tolerance);
-  return share ? fmt::format("{:.0f} %", 100.0 * *share) : "—";
+  if (!share) {
+    return "—";
+  }
+  // Two figures.
+  const double percent = 100.0 * *share;
+  return fmt::format("{:.{}f} %", percent, std::abs(percent) < 9.95 ? 1 : 0);
 }
 
 std::string to_text(const FastestOutcome& outcome) {

@@ -282,6 +282,7 @@ TEST(FastestReport, HoldsUnflexAgainstTheBestOther) {
   EXPECT_THAT(text, HasSubstr("print time, s          20 µm     10 µm\n"));
   EXPECT_THAT(text, HasSubstr("  unflex                1.25         —\n  always at F "));
   EXPECT_THAT(text, HasSubstr("unflex             1.25                         10.0       20.0\n"));
+  EXPECT_THAT(text, HasSubstr("  unflex saves          50 %         —\n"));
   EXPECT_THAT(text, HasSubstr("all made for the exact frequencies"));
   const auto json = nlohmann::json::parse(to_json(outcome));
   const auto& unflex = json["tolerances"][0]["contenders"][4];
