@@ -64,7 +64,7 @@ class Walk {
   // may_be_left: the swing in the end that counts as 1, relative to the tolerance.
   // allowance: for each piece; empty: 1.
   void add(const AxesModel& model, dynamics::NozzleXY nozzle, double may_be_left,
-           const std::vector<double>& allowance, NozzleMeasure& result) const {
+           std::span<const double> allowance, NozzleMeasure& result) const {
     const double h = base_.period_s;
     const dynamics::ExactMap map_x(model.x, h / kLooks);
     const dynamics::ExactMap map_y(model.y, h / kLooks);
@@ -88,8 +88,7 @@ class Walk {
         const double speed_mm_s =
             std::sqrt(at.x.velocity * at.x.velocity + at.y.velocity * at.y.velocity);
         const double reference_mm = from_mm_[now] + plan_[now].distance_mm(t - starts_s_[now]);
-        const auto look_at = [&](double x_mm, double y_mm) {
-          Place found = place(now, x_mm, y_mm, reference_mm);
+        const auto take = [&](Place found) {
           // Filament is never laid backwards.
           if (found.progress_mm < furthest.progress_mm) {
             found.progress_mm = furthest.progress_mm;
@@ -105,11 +104,11 @@ class Walk {
         if (ahead.piece != last_piece) {
           // The error may be largest where the piece changes.
           for (const double share : kBetweenLooks) {
-            look_at(last.x.position + share * (at.x.position - last.x.position),
-                    last.y.position + share * (at.y.position - last.y.position));
+            take(place(now, last.x.position + share * (at.x.position - last.x.position),
+                       last.y.position + share * (at.y.position - last.y.position), reference_mm));
           }
         }
-        look_at(at.x.position, at.y.position);
+        take(ahead);
         last = at;
       }
     }
@@ -170,7 +169,7 @@ class Walk {
     double feed_mm_s = std::numeric_limits<double>::infinity();
   };
 
-  void note(const Place& at, double speed_mm_s, const std::vector<double>& allowance,
+  void note(const Place& at, double speed_mm_s, std::span<const double> allowance,
             AtNode& node) const {
     node.error_mm = std::max(node.error_mm, at.error_mm);
     node.speed_mm_s = std::max(node.speed_mm_s, speed_mm_s);
@@ -251,7 +250,7 @@ NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
     }
     constexpr double kByFirst = 0.5;
     walk.add(model, start, m == 0 ? kByFirst : 1.0,
-             allowances.empty() ? std::vector<double>{} : allowances[m], result);
+             allowances.empty() ? std::span<const double>{} : allowances[m], result);
   }
   return result;
 }

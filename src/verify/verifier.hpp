@@ -29,8 +29,8 @@ namespace unflex::verify {
 // `path_`. `unshaped_` is that nozzle without the shaper. `emitted_` is the nozzle
 // of the emitted file. In compensated runs, which begin and end at rest, it is measured against the
 // plan of the run by itself, `run_path_`: where the sliced file passes from one section into the
-// next at speed, that plan takes some ms longer. Where the timing of a run is free, `run_path_` has
-// the timing of the filament in the emitted file.
+// next at speed, that plan takes some ms longer. Where the timing of a run is free, `run_path_` is
+// passed as the emitted file gets on (ProgressTiming).
 // How long a file's machine has stood still for lines that switch its filters.
 class Switching {
  public:
@@ -89,7 +89,7 @@ class Verifier {
   void let_kept_follow(double until_s);
   [[nodiscard]] bool has_free_timing() const { return kept_path_ == &resting_path_; }
   void let_original_follow_moves();
-  [[nodiscard]] double kept_end_s();
+  [[nodiscard]] double end_of_passed_s(ReferencePath& path, std::size_t first) const;
   void finish_reference();
   [[nodiscard]] double filament_tolerance_mm() const;
   [[nodiscard]] double owed_filament_mm() const;

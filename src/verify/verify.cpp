@@ -396,13 +396,18 @@ void Verifier::let_original_follow_moves() {
   while (run_next_ < run_path_.end() && run_path_[run_next_].end_s <= emitted_.plan_time_s()) {
     ++run_next_;
   }
+  let_original_follow(end_of_passed_s(path_, section_first_));
+}
+
+// When the last move ends that the emitted nozzle has passed, on another path of the section, whose
+// first piece is given.
+double Verifier::end_of_passed_s(ReferencePath& path, std::size_t first) const {
   const std::size_t passed = run_next_ - run_first_;
-  while (path_.end() - section_first_ < passed && !path_.section_complete()) {
-    path_.extend_to(path_.end_s());
+  while (path.end() - first < passed && !path.section_complete()) {
+    path.extend_to(path.end_s());
   }
-  const std::size_t known = std::min(path_.end() - section_first_, passed);
-  let_original_follow(known > 0 ? path_[section_first_ + known - 1].end_s
-                                : path_.section_start_s());
+  const std::size_t known = std::min(path.end() - first, passed);
+  return known > 0 ? path[first + known - 1].end_s : path.section_start_s();
 }
 
 void Verifier::let_original_follow(double until_s) {
@@ -421,7 +426,8 @@ void Verifier::let_original_follow(double until_s) {
     input_.skip_resting();
   } else {
     path_.discard_before(needed_s - original_.main().reach_s());
-    let_kept_follow(has_free_timing() ? kept_end_s() : emitted_.plan_time_s());
+    let_kept_follow(has_free_timing() ? end_of_passed_s(resting_path_, kept_first_)
+                                      : emitted_.plan_time_s());
     if (has_free_timing()) {
       run_path_.discard_before(emitted_.main().time_s() - emitted_.main().reach_s());
       resting_path_.discard_before(kept_.time_s() - kept_.reach_s());
@@ -437,16 +443,6 @@ void Verifier::let_kept_follow(double until_s) {
     const planner::PlannedMove move = (*kept_path_)[kept_next_++].move;
     kept_.play(move);
   }
-}
-
-// Until when kept_ makes the moves that the emitted nozzle has passed.
-double Verifier::kept_end_s() {
-  const std::size_t passed = run_next_ - run_first_;
-  while (resting_path_.end() - kept_first_ < passed && !resting_path_.section_complete()) {
-    resting_path_.extend_to(resting_path_.end_s());
-  }
-  const std::size_t known = std::min(resting_path_.end() - kept_first_, passed);
-  return known > 0 ? resting_path_[kept_first_ + known - 1].end_s : resting_path_.section_start_s();
 }
 
 void Verifier::end_section() {

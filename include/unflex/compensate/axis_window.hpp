@@ -117,8 +117,9 @@ class Engine {
 // unflex's own. Any number of threads may solve at once, with one engine or several.
 [[nodiscard]] std::unique_ptr<Engine> make_banded_engine();
 
-// As make_banded_engine(), in half the time, for who solves again and again on the way to something
-// else: limits may be exceeded by a ten-thousandth, and the cost is as much above the optimum.
+// As make_banded_engine(), but sooner content, for who solves again and again on the way to
+// something else: limits may be exceeded by a ten-thousandth, and the cost is as much above the
+// optimum.
 [[nodiscard]] std::unique_ptr<Engine> make_rough_engine();
 
 }  // namespace unflex::compensate

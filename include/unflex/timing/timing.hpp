@@ -51,9 +51,10 @@ struct Timed {
   std::vector<std::size_t> pieces;          // how many, for each move of the path
 };
 
-// The moves of the course in the least time that the bounds allow, one for each of its moves. A
-// part of a longer run keeps its timing where it meets its neighbours. nullopt: no timing was found
-// that is faster and keeps the bounds.
+// The moves of the course in less time, within the bounds, of which there is one for each move. A
+// part of a longer run keeps its timing where it meets its neighbours. Where the axes may be
+// several things and the nozzle of one strays further as sliced, it may stray as far. nullopt: no
+// such timing was found.
 [[nodiscard]] std::optional<Timed> faster(const compensate::Course& course,
                                           const compensate::Setup& setup,
                                           const dynamics::NozzleXY& nozzle,
