@@ -105,9 +105,7 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
 void weigh_end(const Course& course, const Setup& setup, const NodeGrid& grid,
                std::size_t first_sample, std::vector<double>& weight) {
   constexpr double kAroundEnd_s = 3e-3;
-  const double end_s =
-      (course.before.empty() ? setup.lead_in_s : static_cast<double>(grid.first) * grid.period_s) +
-      planner::duration_s(course.moves);
+  const double end_s = origin_s(course, grid, setup) + planner::duration_s(course.moves);
   for (std::size_t i = 0; i < weight.size(); ++i) {
     const double t = 0.5 * static_cast<double>(first_sample + i) * grid.period_s;
     if (std::abs(t - end_s) <= kAroundEnd_s) {
@@ -133,6 +131,10 @@ dynamics::NozzleState AxisWindow::in_model(std::size_t i, const dynamics::Nozzle
                                            double base_mm) const {
   const dynamics::FlexibleAxis& other = i > 0 ? plants[i - 1].axis : axis;
   return other.swinging_as(axis, nozzle, base_mm);
+}
+
+double origin_s(const Course& course, const NodeGrid& grid, const Setup& setup) {
+  return course.before.empty() ? setup.lead_in_s : static_cast<double>(grid.first) * grid.period_s;
 }
 
 NodeGrid node_grid(const Course& course, const Setup& setup) {
@@ -275,8 +277,7 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
   std::vector<double> y;
   std::vector<double> weight;
   const bool from_rest = course.before.empty();
-  Reference reference(
-      course, from_rest ? setup.lead_in_s : static_cast<double>(grid.first) * grid.period_s, setup);
+  Reference reference(course, origin_s(course, grid, setup), setup);
   for (std::size_t i = first_sample; i <= last_sample; ++i) {
     const Reference::Sample sample = reference.at(0.5 * static_cast<double>(i) * grid.period_s);
     x.push_back(sample.x_mm);
@@ -288,9 +289,7 @@ std::vector<RunWindow> windows(const Course& course, const std::vector<WindowSpa
   }
   std::vector<PathVertex> path;
   if (setup.contour) {
-    path = path_of(course,
-                   from_rest ? setup.lead_in_s : static_cast<double>(grid.first) * grid.period_s,
-                   grid.period_s);
+    path = path_of(course, origin_s(course, grid, setup), grid.period_s);
   }
   std::vector<RunWindow> result;
   for (std::size_t w = first; w < first + count; ++w) {

@@ -65,16 +65,6 @@ constexpr std::array kNames = {
     Name{"brim", Kind::skirt},
 };
 
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && is_blank(text.front())) {
-    text.remove_prefix(1);
-  }
-  while (!text.empty() && is_blank(text.back())) {
-    text.remove_suffix(1);
-  }
-  return text;
-}
-
 // Slicers differ in capitals and in what joins words.
 char folded(char c) {
   if (c == '-' || c == '_') {

@@ -5,18 +5,7 @@
 #include "characters.hpp"
 
 namespace unflex::gcode {
-namespace {
-
-std::string_view trimmed(std::string_view text) {
-  const auto* const begin = std::find_if_not(text.begin(), text.end(), is_blank);
-  text.remove_prefix(static_cast<std::size_t>(begin - text.begin()));
-  while (!text.empty() && is_blank(text.back())) {
-    text.remove_suffix(1);
-  }
-  return text;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 bool begins_layer(std::string_view line) {
   if (!line.starts_with(';')) {

@@ -16,8 +16,6 @@ constexpr double kNothingRms_mm = 0.5e-3;
 constexpr double kNothing_mm = 3e-3;
 // The share of an error that coarse time steps may miss.
 constexpr double kSampling = 2e-4;
-// Where the timing is free, how far the nozzle may stray relative to the tolerance.
-constexpr double kTimesTolerance = 1.1;
 
 }  // namespace
 
@@ -144,7 +142,7 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
   const double swing_before_mm = verify::apart_mm(before.end, as_planned, rules.nozzle);
   const double swing_after_mm = verify::apart_mm(after.end, as_planned, rules.nozzle);
   if (rules.tolerance_mm > 0.0 && swing_after_mm <= rules.tolerance_mm &&
-      after.extruding.stats().contour_max_mm <= kTimesTolerance * rules.tolerance_mm) {
+      after.extruding.stats().contour_max_mm <= verify::kTimesTolerance * rules.tolerance_mm) {
     return std::nullopt;
   }
   if (before.extruding.stats().duration_s > 0.0) {

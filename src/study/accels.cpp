@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "report_parts.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/json_parts.hpp"
@@ -117,12 +118,7 @@ std::string to_text(const AccelsOutcome& outcome) {
 }
 
 std::string to_json(const AccelsOutcome& outcome) {
-  Json json;
-  json["schema_version"] = report::kSchemaVersion;
-  json["command"] = "study";
-  json["version"] = outcome.version;
-  json["input"] = outcome.input;
-  json["printer"] = report::settings_json(outcome.printer);
+  Json json = head_json(outcome);
   json["scaled"] = outcome.scaled;
   json["accels"] = Json::array();
   for (const AtAccel& one : outcome.accels) {

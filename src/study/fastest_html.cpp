@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "fastest_words.hpp"
+#include "report_parts.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/svg_plot.hpp"
@@ -120,30 +121,6 @@ void write_times(Sink out, const FastestOutcome& outcome) {
                  report::svg_legend(plot), report::svg_plot(plot));
 }
 
-void write_warnings(Sink out, const FastestOutcome& outcome) {
-  if (outcome.warnings.empty()) {
-    return;
-  }
-  fmt::format_to(out, "<section class=\"card\"><h2>Warnings</h2><ul>\n");
-  for (const std::string& warning : outcome.warnings) {
-    fmt::format_to(out, "<li>{}</li>\n", escape_html(warning));
-  }
-  fmt::format_to(out, "</ul></section>\n");
-}
-
-void write_settings(Sink out, const FastestOutcome& outcome) {
-  fmt::format_to(out,
-                 "<section class=\"card\"><h2>How it was made</h2><dl class=\"facts\">"
-                 "<dt>unflex</dt><dd>{}</dd>",
-                 escape_html(outcome.version));
-  for (const report::Setting& setting : outcome.printer) {
-    fmt::format_to(out, "<dt>{}</dt><dd>{} <span class=\"note\">{}</span></dd>\n",
-                   escape_html(setting.key), escape_html(setting.value),
-                   escape_html(setting.origin));
-  }
-  fmt::format_to(out, "</dl></section>\n");
-}
-
 }  // namespace
 
 std::string to_html(const FastestOutcome& outcome) {
@@ -151,8 +128,8 @@ std::string to_html(const FastestOutcome& outcome) {
   const Sink out = std::back_inserter(body);
   write_lead(out, outcome);
   write_times(out, outcome);
-  write_warnings(out, outcome);
-  write_settings(out, outcome);
+  write_warnings(out, outcome.warnings);
+  write_settings(out, {{"unflex", outcome.version}}, outcome.printer);
   return report::html_page({.title = "How fast, " + outcome.input,
                             .style = std::string(kStyle),
                             .body = std::move(body),

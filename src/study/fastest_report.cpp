@@ -7,6 +7,7 @@
 #include <string>
 
 #include "fastest_words.hpp"
+#include "report_parts.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/json_parts.hpp"
 #include "unflex/rivals/klipper_calibration.hpp"
@@ -140,12 +141,7 @@ std::string to_text(const FastestOutcome& outcome) {
 }
 
 std::string to_json(const FastestOutcome& outcome) {
-  Json json;
-  json["schema_version"] = report::kSchemaVersion;
-  json["command"] = "study";
-  json["version"] = outcome.version;
-  json["input"] = outcome.input;
-  json["printer"] = report::settings_json(outcome.printer);
+  Json json = head_json(outcome);
   json["rule"] = {{"share_within", ToleranceRule::kShareWithin},
                   {"largest_times", outcome.rule.largest_times}};
   json["freq_error"] = outcome.freq_error;

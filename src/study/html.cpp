@@ -7,6 +7,7 @@
 
 #include "html_assets.hpp"
 #include "html_figures.hpp"
+#include "report_parts.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/svg_plot.hpp"
@@ -264,30 +265,6 @@ void write_chains(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "</tbody></table></div></section>\n");
 }
 
-void write_warnings(Sink out, const Outcome& outcome) {
-  if (outcome.warnings.empty()) {
-    return;
-  }
-  fmt::format_to(out, "<section class=\"card\"><h2>Warnings</h2><ul>\n");
-  for (const std::string& warning : outcome.warnings) {
-    fmt::format_to(out, "<li>{}</li>\n", escape_html(warning));
-  }
-  fmt::format_to(out, "</ul></section>\n");
-}
-
-void write_settings(Sink out, const Outcome& outcome) {
-  fmt::format_to(out,
-                 "<section class=\"card\"><h2>How it was made</h2><dl class=\"facts\">"
-                 "<dt>unflex</dt><dd>{}</dd><dt>engine</dt><dd>{}</dd>",
-                 escape_html(outcome.version), escape_html(outcome.engine));
-  for (const report::Setting& setting : outcome.printer) {
-    fmt::format_to(out, "<dt>{}</dt><dd>{} <span class=\"note\">{}</span></dd>\n",
-                   escape_html(setting.key), escape_html(setting.value),
-                   escape_html(setting.origin));
-  }
-  fmt::format_to(out, "</dl></section>\n");
-}
-
 }  // namespace
 
 std::string to_html(const Outcome& outcome) {
@@ -299,8 +276,8 @@ std::string to_html(const Outcome& outcome) {
   write_depth(out, outcome.cases.front());
   write_figures(out, outcome);
   write_chains(out, outcome);
-  write_warnings(out, outcome);
-  write_settings(out, outcome);
+  write_warnings(out, outcome.warnings);
+  write_settings(out, {{"unflex", outcome.version}, {"engine", outcome.engine}}, outcome.printer);
   return report::html_page(
       {.title = outcome.input.empty() ? "Study of the thesis' corner" : "Study of " + outcome.input,
        .style = std::string(kStyle),

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <string>
 
+#include "report_parts.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/json_parts.hpp"
@@ -109,12 +110,7 @@ std::string to_text(const MachinesOutcome& outcome) {
 }
 
 std::string to_json(const MachinesOutcome& outcome) {
-  Json json;
-  json["schema_version"] = report::kSchemaVersion;
-  json["command"] = "study";
-  json["version"] = outcome.version;
-  json["input"] = outcome.input;
-  json["printer"] = report::settings_json(outcome.printer);
+  Json json = head_json(outcome);
   json["machines"] = Json::array();
   for (const MachineResult& machine : outcome.machines) {
     Json contenders = Json::array();

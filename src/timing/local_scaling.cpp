@@ -236,8 +236,7 @@ class LocalScaling {
       y.push_back(std::move(of_y->base));
     }
     period_s_ = grid.period_s;
-    starts_s_ = {course.before.empty() ? setup_.lead_in_s
-                                       : static_cast<double>(grid.first) * grid.period_s};
+    starts_s_ = {compensate::origin_s(course, grid, setup_)};
     for (const planner::PlannedMove& move : plan) {
       starts_s_.push_back(starts_s_.back() + move.duration_s());
     }

@@ -145,7 +145,6 @@ void SectionRules::check_nozzle(const Meter& kept, const Meter& emitted) {
   };
   const Leeway& leeway = rules_->leeway;
   // Where the timing is free, the nozzle may use the tolerance.
-  constexpr double kTimesTolerance = 1.1;
   const double tolerance_mm = has_free_timing_ ? rules_->tolerance_mm : 0.0;
   const RunError before = error_of(kept);
   const RunError after = error_of(emitted);

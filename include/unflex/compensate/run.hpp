@@ -93,6 +93,9 @@ struct NodeGrid {
 
 [[nodiscard]] NodeGrid node_grid(const Course& course, const Setup& setup);
 
+// When the course's own moves begin, from the first node on.
+[[nodiscard]] double origin_s(const Course& course, const NodeGrid& grid, const Setup& setup);
+
 // One window of a run: nodes first … last are solved, core_first … core_last are used.
 struct WindowSpan {
   std::size_t first = 0;

@@ -40,6 +40,9 @@ struct Leeway {
   double chance_mm = 0.0;
 };
 
+// Where the timing is free, the nozzle may stray so many times the tolerance at its worst.
+inline constexpr double kTimesTolerance = 1.1;
+
 struct Rules {
   gcode::InterpreterOptions interpreter;
   planner::Limits limits;
