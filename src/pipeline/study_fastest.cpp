@@ -100,7 +100,7 @@ Result<study::FastestOfContender> unflex_of(const Job& job,
                                             std::vector<std::string>& warnings) {
   study::FastestOfContender unflex{std::string(study::kUnflex), {}, {}};
   for (const double tolerance_mm : tolerances_mm) {
-    // The grid takes about as long as all of these together.
+    // The grid counts as much as all of these together.
     PartProgress part(progress, unflex.at.size(), 2 * tolerances_mm.size());
     const Result<report::Report> report = within(job, tolerance_mm, rule, part);
     if (!report) {
