@@ -15,6 +15,7 @@
 #include "unflex/app/run_config.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/core/suggestion.hpp"
+#include "unflex/machine/machine.hpp"
 
 namespace unflex::app {
 namespace {
@@ -107,8 +108,19 @@ void add_faster(CLI::App& command, RunConfig& config) {
       ->type_name("[=UM]");
 }
 
-// --faster is short for a key.
+void add_timing(CLI::App& command, RunConfig& config) {
+  command
+      .add_option("--timing", config.timing_method,
+                  "How --faster finds the timing: scaled, or optimal, a little faster and later")
+      ->type_name("scaled|optimal")
+      ->check(CLI::IsMember({std::string(machine::kScaled), std::string(machine::kOptimal)}));
+}
+
+// --faster and --timing are short for keys.
 void take_faster(RunConfig& config) {
+  if (!config.timing_method.empty()) {
+    config.overrides.push_back("timing.method=" + config.timing_method);
+  }
   if (!config.faster_um.empty()) {
     // Without a value a flag is "true".
     config.overrides.push_back("timing.tolerance_um=" +
@@ -167,6 +179,7 @@ void add_compensate(CLI::App& program, RunConfig& config) {
   add_common_options(*command, config);
   add_strict(*command, config);
   add_faster(*command, config);
+  add_timing(*command, config);
   add_max_deviation(*command, config);
   add_engine(*command, config,
              "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
@@ -193,6 +206,7 @@ void add_batch(CLI::App& program, RunConfig& config) {
       ->type_name("FILE");
   command->add_flag("-q,--quiet", config.quiet, "No table and no progress");
   add_faster(*command, config);
+  add_timing(*command, config);
   add_max_deviation(*command, config);
   add_engine(*command, config,
              "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");

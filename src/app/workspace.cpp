@@ -99,6 +99,9 @@ Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
   print->variables = config.slicer_settings;
   Result<machine::Settings> settings = machine::load(
       {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
+  if (settings && !config.timing_method.empty() && !settings->is_timing_free()) {
+    return fail(ErrorKind::usage, "--timing says how --faster finds the timing; give that too");
+  }
   if (config.command == Command::compensate) {
     return settings.and_then(without_guess);
   }

@@ -67,6 +67,7 @@ constexpr std::array<std::string_view, 11> kShaperTypes = {
 // The variants that variants.cpp knows, besides "auto" and "mainline".
 constexpr std::array<std::string_view, 7> kVariants = {
     "auto", "mainline", "kalico", "kalico_limited", "kalico_smooth", "prusa_buddy", "snapmaker_j1"};
+constexpr std::array<std::string_view, 2> kTimingMethods = {kScaled, kOptimal};
 constexpr std::array<std::string_view, 5> kSecondShapers = {"zv", "mzv", "zvd", "ei", "none"};
 constexpr std::array<std::string_view, 4> kTransports = {"auto", "card", "serial", "sbc"};
 
@@ -450,6 +451,14 @@ constexpr std::array kKeys = {
         Bounds{.min = 0.0, .max = 1000.0}, "µm",
         "How far the nozzle may stray from the path while filament is laid, for a print as fast as "
         "that allows; 0: the timing stays as sliced"},
+    Key{"timing.method",
+        &setting<&S::timing, &F::method>,
+        kAny,
+        "",
+        "How such a timing is found: scaled, quickly; or optimal, which prints a little faster",
+        {},
+        nullptr,
+        kTimingMethods},
     Key{"timing.max_speed_mm_s", &setting<&S::timing, &F::max_speed_mm_s>, kPositive, "mm/s",
         "Speed of travel in a print with free timing", "the slicer's F"},
     Key{"timing.keep_accel_limits", &setting<&S::timing, &F::keep_accel_limits>, kAny, "",

@@ -271,7 +271,7 @@ class Compensator {
   void time_in_thread(const std::shared_ptr<RunJob>& job) {
     job->bounds = move_bounds(job->piece, job_.settings);
     pool_.submit([this, job] {
-      choose_timing(*job, *timer_);
+      choose_timing(*job, {job_.settings.timing.is_optimal(), timer_.get()});
       wake();
     });
   }
@@ -320,9 +320,12 @@ class Compensator {
       if (!job.prepared && (!job.is_timed || !job.stretch)) {
         return;
       }
-      if (job.spans.empty() && !job.prepared) {
+      if (!job.is_laid_out && !job.prepared) {
         stretch(job);
         lay_out(queue_[piece]);
+        if (job.has_base()) {
+          make_lines_in_thread(queue_[piece]);
+        }
       }
       while (job.submitted < job.spans.size()) {
         const std::size_t count = std::min(kWindowsAtOnce, job.spans.size() - job.submitted);
@@ -393,7 +396,7 @@ class Compensator {
   // Whether the timing of a run is known whose windows are not laid out yet.
   [[nodiscard]] bool can_feed() const {
     for (const std::shared_ptr<RunJob>& job : queue_) {
-      if (!job->prepared && job->spans.empty()) {
+      if (!job->prepared && !job->is_laid_out) {
         return job->is_timed && (job->stretch || layers_.can_settle());
       }
     }
@@ -405,11 +408,15 @@ class Compensator {
     RunJob& job = *ticket.job;
     job.results[ticket.window][ticket.axis] = axis_result(std::move(done.solution));
     if (--job.missing == 0) {
-      pool_.submit([this, job = ticket.job] {
-        make_lines(*job, rules_);
-        wake();
-      });
+      make_lines_in_thread(ticket.job);
     }
+  }
+
+  void make_lines_in_thread(const std::shared_ptr<RunJob>& job) {
+    pool_.submit([this, job] {
+      make_lines(*job, rules_);
+      wake();
+    });
   }
 
   Status write(RunJob& job) {
@@ -516,7 +523,7 @@ class Compensator {
   std::unique_ptr<compensate::Engine> engine_;  // used in threads; null: the processes solve
   std::unique_ptr<compensate::Engine> divider_ =
       compensate::make_banded_engine();  // for solve_in_process()
-  // For choose_timing().
+  // For TimingChoice.
   std::unique_ptr<compensate::Engine> timer_ = compensate::make_rough_engine();
   // Last, so that threads end before what they use.
   PieceThread pieces_;

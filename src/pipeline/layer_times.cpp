@@ -17,7 +17,7 @@ double sliced_s(const RunJob& job) {
 }
 
 double timed_s(const RunJob& job) {
-  return job.retimed.empty() ? sliced_s(job) : planner::duration_s(job.retimed);
+  return job.retimed ? planner::duration_s(job.retimed->moves) : sliced_s(job);
 }
 
 // For each job, whether its run is stretched: some part of it has a new timing and none is kept,
@@ -33,7 +33,7 @@ std::vector<bool> stretched_of(const std::vector<std::shared_ptr<RunJob>>& jobs)
     bool any_new = false;
     bool any_kept = false;
     for (std::size_t i = first; i < end; ++i) {
-      any_new = any_new || !jobs[i]->retimed.empty();
+      any_new = any_new || jobs[i]->retimed;
       any_kept = any_kept || !jobs[i]->failure.empty();
     }
     std::fill(result.begin() + static_cast<std::ptrdiff_t>(first),

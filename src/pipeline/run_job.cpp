@@ -151,7 +151,7 @@ std::vector<std::size_t> counts_of(const std::vector<std::size_t>& moves,
 emit::Run RunJob::run(double tolerance_share, double limits_share,
                       std::vector<double> lines_before_s) const {
   emit::Run run{.events = &piece.events,
-                .move_counts = retimed.empty() ? &piece.move_counts : &retimed_counts,
+                .move_counts = retimed ? &retimed->move_counts : &piece.move_counts,
                 .moves = &reference(),
                 .base = &base,
                 .lead_in_s = lead_in_s(),
@@ -193,19 +193,31 @@ void keep_timing(RunJob& job, std::string reason) {
   }
 }
 
-void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept {
+void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
   try {
-    std::optional<timing::Timed> timed =
-        timing::faster(job.course(), job.setup, job.first_stage, job.bounds, engine);
+    std::optional<timing::Timed> timed;
+    if (choice.is_optimal) {
+      tl::expected<timing::Timed, std::string> optimal =
+          timing::optimal(job.course(), job.setup, job.first_stage, job.bounds);
+      if (optimal) {
+        timed = std::move(*optimal);
+      } else {
+        job.scaled_reason = std::move(optimal.error());
+      }
+    }
+    if (!timed) {
+      timed = timing::faster(job.course(), job.setup, job.first_stage, job.bounds, *choice.engine);
+    }
     if (timed) {
-      job.retimed_counts = counts_of(job.piece.move_counts, timed->pieces);
-      job.retimed = std::move(timed->moves);
+      job.retimed =
+          NewTiming{std::move(timed->moves), counts_of(job.piece.move_counts, timed->pieces),
+                    std::move(timed->base)};
     } else {
       keep_timing(job, "no faster timing was found that keeps the tolerance");
     }
   } catch (const std::exception& exception) {
     // Out of memory, mostly.
-    job.retimed.clear();
+    job.retimed.reset();
     keep_timing(job, exception.what());
   }
   job.is_timed = true;
@@ -215,16 +227,21 @@ void stretch(RunJob& job) {
   if (*job.stretch <= 1.0) {
     return;
   }
-  if (job.retimed.empty()) {
-    job.retimed_counts = job.piece.move_counts;
+  if (!job.retimed) {
+    job.retimed = NewTiming{job.piece.moves, job.piece.move_counts};
   }
-  job.retimed = timing::stretched(job.reference(), *job.stretch);
+  job.retimed->moves = timing::stretched(job.retimed->moves, *job.stretch);
+  job.retimed->base.reset();
   job.piece.before = timing::stretched(job.piece.before, *job.stretch);
   job.piece.after = timing::stretched(job.piece.after, *job.stretch);
 }
 
 void lay_out(RunJob& job) {
+  job.is_laid_out = true;
   job.grid = compensate::node_grid(job.course(), job.setup);
+  if (job.has_base()) {
+    return;
+  }
   job.spans = compensate::mesh(job.course(), job.grid, job.setup);
   job.results.resize(job.spans.size());
   job.missing = 2 * job.spans.size();
@@ -252,28 +269,59 @@ void solve_windows(RunJob& job, std::size_t first, std::size_t count,
   job.results[first][0].failure = exception.what();
 }
 
-std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules) {
-  auto sliced = std::make_unique<RunJob>();
-  sliced->piece = job.piece;
-  sliced->nozzle = job.nozzle;
-  sliced->first_stage = job.first_stage;
-  sliced->setup = job.sliced_setup.value_or(job.setup);
-  sliced->accel = job.accel;
-  sliced->lines_after = job.lines_after;
-  lay_out(*sliced);
+namespace {
+
+// The run of `job` as it was before its timing was chosen.
+std::unique_ptr<RunJob> untimed(const RunJob& job, const compensate::Setup& setup) {
+  auto run = std::make_unique<RunJob>();
+  run->piece = job.piece;
+  run->nozzle = job.nozzle;
+  run->first_stage = job.first_stage;
+  run->setup = setup;
+  run->sliced_setup = job.sliced_setup;
+  run->bounds = job.bounds;
+  run->accel = job.accel;
+  run->lines_after = job.lines_after;
+  return run;
+}
+
+void solve_all(RunJob& job, const RunRules& rules) {
+  lay_out(job);
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
-  solve_windows(*sliced, 0, sliced->spans.size(), *engine);
-  make_lines(*sliced, rules);
-  return sliced;
+  solve_windows(job, 0, job.spans.size(), *engine);
+  make_lines(job, rules);
+}
+
+}  // namespace
+
+std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules) {
+  std::unique_ptr<RunJob> run = untimed(job, job.setup);
+  const std::unique_ptr<compensate::Engine> engine = compensate::make_rough_engine();
+  choose_timing(*run, {.is_optimal = false, .engine = engine.get()});
+  run->stretch = job.stretch;
+  stretch(*run);
+  solve_all(*run, rules);
+  return run;
+}
+
+std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules) {
+  std::unique_ptr<RunJob> run = untimed(job, job.sliced_setup.value_or(job.setup));
+  solve_all(*run, rules);
+  return run;
 }
 
 void make_lines(RunJob& job, const RunRules& rules) noexcept {
   try {
     job.failure = failure_of(job);
     if (job.failure.empty()) {
-      dynamics::AxisTrajectory x = joined(job, 0);
-      job.base = both_stages(job, std::move(x), joined(job, 1));
-      measure_robustness(job, rules.verify.nozzle);
+      if (job.has_base()) {
+        dynamics::BaseTrajectory& base = *job.retimed->base;
+        job.base = both_stages(job, std::move(base.x), std::move(base.y));
+      } else {
+        dynamics::AxisTrajectory x = joined(job, 0);
+        job.base = both_stages(job, std::move(x), joined(job, 1));
+        measure_robustness(job, rules.verify.nozzle);
+      }
       job.plan = emit::plan_run(job.run(1.0, 1.0, even_lines_before_s(rules.emit.lines)),
                                 job.piece.start, rules.emit);
       job.before =

@@ -40,6 +40,14 @@ struct Probe {
   compensate::AxisSolution solution;
 };
 
+// A run in another timing than sliced.
+struct NewTiming {
+  std::vector<planner::PlannedMove> moves;
+  std::vector<std::size_t> move_counts;  // as Piece::move_counts
+  // The base of the first stage that was found with it; unset: the windows are to be solved.
+  std::optional<dynamics::BaseTrajectory> base = {};
+};
+
 struct RunJob {
   Piece piece;
   // What follows is only used for runs and parts of runs.
@@ -50,16 +58,16 @@ struct RunJob {
   // one setup, since they meet in motion.
   std::optional<compensate::Setup> sliced_setup;
   emit::RunAccel accel;
-  // Only if the timing is free: what each move may do, and the moves in their new timing. Empty:
-  // the timing stays as sliced.
+  // Only if the timing is free: what each move may do, and the new timing, if there is one.
   std::vector<timing::MoveBounds> bounds;
-  std::vector<planner::PlannedMove> retimed;
-  std::vector<std::size_t> retimed_counts;  // as Piece::move_counts
-  std::string slow_reason;                  // why the timing stays as sliced
+  std::optional<NewTiming> retimed;
+  std::string scaled_reason;  // why the timing is not the optimal one, where that is asked for
+  std::string slow_reason;    // why the timing stays as sliced
   std::atomic<bool> is_timed = false;
   // By how much the new timing is stretched so that the layer lasts long enough; unset: not known
   // yet.
   std::optional<double> stretch;
+  bool is_laid_out = false;  // whether the windows are known, or the base is
   compensate::NodeGrid grid;
   std::vector<compensate::WindowSpan> spans;
   std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
@@ -87,8 +95,9 @@ struct RunJob {
   }
   // The run's moves in the timing in which they are compensated.
   [[nodiscard]] const std::vector<planner::PlannedMove>& reference() const {
-    return retimed.empty() ? piece.moves : retimed;
+    return retimed ? retimed->moves : piece.moves;
   }
+  [[nodiscard]] bool has_base() const { return retimed && retimed->base; }
   // How long before the plan the base begins.
   [[nodiscard]] double lead_in_s() const {
     return piece.begins_run() ? setup.lead_in_s + shaping_s() : 0.0;
@@ -115,14 +124,23 @@ struct RunRules {
 // The run keeps its timing as sliced.
 void keep_timing(RunJob& job, std::string reason);
 
+// How the timing of runs is chosen where it is free.
+struct TimingChoice {
+  bool is_optimal = false;
+  const compensate::Engine* engine = nullptr;  // for timing::faster()
+};
+
 // Chooses the timing of the run. Throws nothing.
-void choose_timing(RunJob& job, const compensate::Engine& engine) noexcept;
+void choose_timing(RunJob& job, const TimingChoice& choice) noexcept;
 
 // Stretches the timing of the run, which is `stretch` times as long then.
 void stretch(RunJob& job);
 
-// Divides the run, in the timing that it has, into windows.
+// Divides the run, in the timing that it has, into windows. Where its base is known it has none.
 void lay_out(RunJob& job);
+
+// The run of `job`, whose timing is optimal, once more in a scaled timing, with its lines.
+[[nodiscard]] std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules);
 
 // The run of `job` once more, compensated in its timing as sliced, with its lines.
 [[nodiscard]] std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules);

@@ -202,12 +202,24 @@ bool RunWriter::fits(const RunJob& job) const {
 // lines must stand, if so.
 std::optional<std::string> RunWriter::write_in_time(const RunJob& job, std::string& text) {
   std::optional<std::string> objection = write_run(job, text);
-  if (objection && !job.retimed.empty()) {
+  if (!objection) {
+    if (!job.slow_reason.empty()) {
+      note_slow(job, job.slow_reason);
+    } else if (!job.scaled_reason.empty()) {
+      note_scaled(job, job.scaled_reason);
+    }
+    return objection;
+  }
+  if (job.has_base()) {
+    const std::unique_ptr<RunJob> slower = scaled(job, *rules_);
+    if (slower->retimed && !write_run(*slower, text)) {
+      note_scaled(job, std::move(*objection));
+      return std::nullopt;
+    }
+  }
+  if (job.retimed) {
     note_slow(job, std::move(*objection));
     return write_run(*as_sliced(job, *rules_), text);
-  }
-  if (!objection && !job.slow_reason.empty()) {
-    note_slow(job, job.slow_reason);
   }
   return objection;
 }
@@ -304,12 +316,22 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   return std::nullopt;
 }
 
+void RunWriter::note_scaled(const RunJob& job, std::string reason) {
+  note_stretch(job, std::move(reason), report_->free_timing.pieces_scaled,
+               report_->free_timing.scaled);
+}
+
 void RunWriter::note_slow(const RunJob& job, std::string reason) {
-  report::FreeTiming& timing = report_->free_timing;
-  ++timing.pieces_as_sliced;
-  if (timing.as_sliced.size() < kMostListed) {
-    timing.as_sliced.push_back({job.piece.events.front().line.number,
-                                job.piece.events.back().line.number, std::move(reason)});
+  note_stretch(job, std::move(reason), report_->free_timing.pieces_as_sliced,
+               report_->free_timing.as_sliced);
+}
+
+void RunWriter::note_stretch(const RunJob& job, std::string reason, std::size_t& count,
+                             std::vector<report::Fallback>& list) {
+  ++count;
+  if (list.size() < kMostListed) {
+    list.push_back({job.piece.events.front().line.number, job.piece.events.back().line.number,
+                    std::move(reason)});
   }
 }
 

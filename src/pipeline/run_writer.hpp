@@ -51,7 +51,11 @@ class RunWriter {
   std::optional<std::string> insist(const RunJob& job, std::string& text);
   std::optional<std::string> try_run(const RunJob& job, const emit::RunPlan& plan,
                                      bool may_be_worse, std::string& text);
+  // That the timing of the run is not the optimal one, or that it is the slicer's.
+  void note_scaled(const RunJob& job, std::string reason);
   void note_slow(const RunJob& job, std::string reason);
+  static void note_stretch(const RunJob& job, std::string reason, std::size_t& count,
+                           std::vector<report::Fallback>& list);
   void note_fallback(const RunJob& job, std::string reason);
 
   const RunRules* rules_;

@@ -190,7 +190,9 @@ void add_timing(const Report& r, Json& json) {
                       {"speed_of_feed_max", timing.speed_max},
                       {"speed_of_feed_max_line", timing.speed_max_line},
                       {"pieces_as_sliced", timing.pieces_as_sliced},
-                      {"as_sliced", fallbacks_json(timing.as_sliced)}};
+                      {"as_sliced", fallbacks_json(timing.as_sliced)},
+                      {"pieces_scaled", timing.pieces_scaled},
+                      {"scaled", fallbacks_json(timing.scaled)}};
   }
 }
 

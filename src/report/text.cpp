@@ -183,6 +183,12 @@ void write_timing(Sink out, const Report& r) {
                  "nozzle at {:.3f} F at most\n",
                  timing.tolerance_mm * 1e3, micrometres_text(timing.contour_p999_mm),
                  timing.speed_max);
+  if (timing.pieces_scaled > 0) {
+    fmt::format_to(
+        out, "              {} {} no optimal timing, and a scaled one instead\n",
+        timing.pieces_scaled,
+        timing.pieces_scaled == 1 ? "stretch of motion has" : "stretches of motion have");
+  }
   if (timing.pieces_as_sliced > 0) {
     fmt::format_to(
         out, "              {} {} the slicer's timing\n", timing.pieces_as_sliced,

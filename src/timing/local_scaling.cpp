@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "bounded_plan.hpp"
+#include "corner_speed.hpp"
 #include "nozzle_measure.hpp"
 #include "pieces.hpp"
 #include "unflex/timing/timing.hpp"
@@ -53,23 +54,6 @@ constexpr double kEndReach = 3.4;
 constexpr double kPieces[] = {1.1, 2.3};
 // A round that makes the run shorter by less than this is the last.
 constexpr double kGain = 1e-3;
-
-// The speed at which a corner is passed on a circle that strays from it by the tolerance, and on
-// the circle that touches the shorter move in its middle (as in klippy/toolhead.py, calc_junction).
-double first_speed(const planner::PlannedMove& before, const planner::PlannedMove& after,
-                   double accel_mm_s2, double tolerance_mm) {
-  constexpr double kStraight = 0.999999;
-  const double cosine =
-      -(before.direction[X] * after.direction[X] + before.direction[Y] * after.direction[Y]);
-  const double sine = std::sqrt(std::max(0.5 * (1.0 - cosine), 0.0));  // of half the angle
-  if (sine > kStraight) {
-    return planner::kNoLimit;
-  }
-  const double tangent = sine / std::sqrt(1.0 - sine * sine);
-  const double by_tolerance = tolerance_mm * sine / (1.0 - sine);
-  const double by_length = 0.5 * std::min(before.length_mm, after.length_mm) * tangent;
-  return std::sqrt(accel_mm_s2 * std::min(by_tolerance, by_length));
-}
 
 // g^{−exponent}, within what a limit may change by.
 double scale(double g, double exponent) {
@@ -198,8 +182,8 @@ class LocalScaling {
         const double tolerance_mm =
             travels ? kTravelTolerance_mm
                     : std::min(pieces_.bounds[i - 1].tolerance_mm, pieces_.bounds[i].tolerance_mm);
-        const double speed_mm_s = first_speed(moves[i - 1], moves[i],
-                                              0.5 * setup_.x.limits.max_accel_mm_s2, tolerance_mm);
+        const double speed_mm_s = corner_speed_mm_s(
+            moves[i - 1], moves[i], 0.5 * setup_.x.limits.max_accel_mm_s2, tolerance_mm);
         vertex_mm_s_[i] = std::min(vertex_mm_s_[i], std::max(speed_mm_s, kLeastSpeed_mm_s));
       }
     }

@@ -17,9 +17,6 @@ constexpr double kBetweenLooks[] = {0.25, 0.5, 0.75};
 // The share of the distance along the path that counts, as where filament is laid
 // (emit/nozzle_progress.cpp).
 constexpr double kTowardsReference = 0.01;
-// How many tolerances the nozzle may stray at the edges of the band of frequencies. The nozzle of a
-// shaper strays 1.6 times as far where the frequency is 5 % off.
-constexpr double kTimesAtEdge = 2.0;
 // Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
 // There the nozzle may stray so many times the tolerance.
 constexpr double kBeside = 1.5;
@@ -204,8 +201,6 @@ class Walk {
 }  // namespace
 
 std::vector<AxesModel> models_of(const compensate::Setup& setup) {
-  // Models of hardly any share only keep the base from moving more than it must.
-  constexpr double kLeastShare = 0.05;
   struct Model {
     dynamics::FlexibleAxis axis;
     double times_tolerance = 1.0;

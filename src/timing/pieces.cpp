@@ -6,23 +6,6 @@
 namespace unflex::timing {
 namespace {
 
-// The move from one share of its length to another.
-planner::PlannedMove part_of(const planner::PlannedMove& move, double from, double to) {
-  planner::PlannedMove part = move;
-  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z, gcode::E}) {
-    const double start_mm = move.segment.start_mm[axis];
-    const double delta_mm = move.segment.delta(axis);
-    if (from > 0.0) {
-      part.segment.start_mm[axis] = start_mm + from * delta_mm;
-    }
-    if (to < 1.0) {
-      part.segment.end_mm[axis] = start_mm + to * delta_mm;
-    }
-  }
-  part.length_mm = move.length_mm * (to - from);
-  return part;
-}
-
 // Where the move is cut, as shares of its length: 0, …, 1.
 std::vector<double> cuts(double length_mm, double speed_mm_s, std::span<const double> ends_s) {
   std::vector<double> shares = {0.0};
@@ -50,6 +33,22 @@ bool is_even(const planner::PlannedMove& move, double speed_mm_s) {
 }
 
 }  // namespace
+
+planner::PlannedMove part_of(const planner::PlannedMove& move, double from, double to) {
+  planner::PlannedMove part = move;
+  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z, gcode::E}) {
+    const double start_mm = move.segment.start_mm[axis];
+    const double delta_mm = move.segment.delta(axis);
+    if (from > 0.0) {
+      part.segment.start_mm[axis] = start_mm + from * delta_mm;
+    }
+    if (to < 1.0) {
+      part.segment.end_mm[axis] = start_mm + to * delta_mm;
+    }
+  }
+  part.length_mm = move.length_mm * (to - from);
+  return part;
+}
 
 Pieces in_pieces(std::span<const planner::PlannedMove> path, std::span<const MoveBounds> bounds,
                  std::span<const double> ends_s) {

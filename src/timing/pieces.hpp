@@ -16,6 +16,10 @@ struct Pieces {
   std::vector<std::size_t> counts;  // how many pieces each move of the path has
 };
 
+// The move from one share of its length to another; its timing is not that of the part.
+[[nodiscard]] planner::PlannedMove part_of(const planner::PlannedMove& move, double from,
+                                           double to);
+
 // Cuts short pieces off both ends of a long move, as the timing differs near vertices alone. They
 // take so long at the speed of the slower neighbour.
 [[nodiscard]] Pieces in_pieces(std::span<const planner::PlannedMove> path,

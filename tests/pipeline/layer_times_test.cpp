@@ -28,7 +28,7 @@ std::shared_ptr<RunJob> job(bool is_run, double sliced_s, const std::string& com
 void set_time(RunJob& job, double new_s) {
   planner::PlannedMove move;
   move.cruise_s = new_s;
-  job.retimed = {move};
+  job.retimed = NewTiming{{move}, {1}};
   job.is_timed = true;
 }
 
@@ -113,7 +113,7 @@ TEST(LayerTimes, StretchAllPartsOfARunOrNone) {
   EXPECT_NEAR(*end->stretch, 1.5, 1e-12);
   EXPECT_FALSE(next->stretch);
   stretch(*end);
-  EXPECT_NEAR(planner::duration_s(end->retimed), 45.0, 1e-12);
+  EXPECT_NEAR(planner::duration_s(end->retimed->moves), 45.0, 1e-12);
   EXPECT_NEAR(planner::duration_s(end->piece.before), 45.0, 1e-12);
 }
 

@@ -90,6 +90,8 @@ inline Report sample_report() {
   r.free_timing = {.tolerance_mm = 0.02,
                    .pieces_as_sliced = 1,
                    .as_sliced = {{50, 60, "base acceleration above the limit"}},
+                   .pieces_scaled = 2,
+                   .scaled = {{40, 49, "it is a part of a long motion"}},
                    .contour_p999_mm = 0.0188,
                    .speed_p999 = 1.012,
                    .speed_max = 1.019,

@@ -54,6 +54,7 @@ TEST(Summary, IsExactlyThis) {
       "timing        as fast as 20 µm allow: 99.9 % of the time within 18.8 µm, the nozzle at "
       "1.019 F "
       "at most\n"
+      "              2 stretches of motion have no optimal timing, and a scaled one instead\n"
       "              1 stretch of motion keeps the slicer's timing\n"
       "runs          895 of 900 stretches of motion compensated, 5 stay as sliced\n"
       "              lines 10-20: no solution\n"

@@ -72,7 +72,8 @@ struct RunConfig {
   // compensate, printer init, printer macros, printer line-test, batch, tune: -o, or the input with
   // --in-place; verify: OUT
   std::string output;
-  std::string faster_um;  // value of --faster, of study a list; empty: not given
+  std::string timing_method;  // value of --timing; empty: not given
+  std::string faster_um;      // value of --faster, of study a list; empty: not given
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"

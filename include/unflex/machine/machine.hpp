@@ -196,8 +196,13 @@ struct SolveSettings {
 inline constexpr std::string_view kAllFeatures = "all";
 
 // As fast as a tolerance of the nozzle allows, instead of as sliced (docs/timing.md).
+// How a free timing is found (unflex/timing/timing.hpp).
+inline constexpr std::string_view kScaled = "scaled";
+inline constexpr std::string_view kOptimal = "optimal";
+
 struct TimingSettings {
   double tolerance_um = 0.0;                      // 0: the timing stays as sliced
+  std::string method{kScaled};                    // or kOptimal
   std::optional<double> max_speed_mm_s;           // of travel; unset: the slicer's F
   bool keep_accel_limits = false;                 // those of the plan as sliced
   std::optional<double> outer_wall_tolerance_um;  // unset: tolerance_um
@@ -205,6 +210,7 @@ struct TimingSettings {
   std::string features{kAllFeatures};
   double min_layer_s = 0.0;  // a layer is made no shorter; 0: as short as it comes out
 
+  [[nodiscard]] bool is_optimal() const { return method == kOptimal; }
   [[nodiscard]] std::vector<std::string_view> feature_words() const;
   [[nodiscard]] double tolerance_of_um(gcode::FeatureKind kind) const;
   // Whether moves of the kind get another timing than sliced.

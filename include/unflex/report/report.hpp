@@ -78,6 +78,9 @@ struct FreeTiming {
   double tolerance_mm = 0.0;         // 0: the timing is as sliced
   std::size_t pieces_as_sliced = 0;  // runs, or parts of long ones, that keep their timing
   std::vector<Fallback> as_sliced;   // at most 1000 of them
+  // Likewise those whose timing is scaled, where the optimal one is asked for.
+  std::size_t pieces_scaled = 0;
+  std::vector<Fallback> scaled;
   // While filament is laid: the contour error that 99.9 % of the time are within, and the nozzle's
   // speed relative to F.
   double contour_p999_mm = 0.0;

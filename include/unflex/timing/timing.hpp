@@ -13,10 +13,13 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
+#include <tl/expected.hpp>
 #include <vector>
 
 #include "unflex/compensate/axis_window.hpp"
 #include "unflex/compensate/run.hpp"
+#include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/planner.hpp"
 
@@ -49,6 +52,8 @@ inline constexpr double kTravelTolerance_mm = 0.2;
 struct Timed {
   std::vector<planner::PlannedMove> moves;  // each move in one piece or several
   std::vector<std::size_t> pieces;          // how many, for each move of the path
+  // The base that goes with it, on compensate::node_grid(); unset: to be solved for.
+  std::optional<dynamics::BaseTrajectory> base = {};
 };
 
 // The moves of the course in less time, within the bounds, of which there is one for each move. A
@@ -60,5 +65,13 @@ struct Timed {
                                           const dynamics::NozzleXY& nozzle,
                                           std::span<const MoveBounds> bounds,
                                           const compensate::Engine& engine);
+
+// As faster(), by a program in which path and time are found together; the base comes with it. For
+// whole runs of axes with one mode, or of such in a band of frequencies. The error tells why there
+// is no such timing.
+[[nodiscard]] tl::expected<Timed, std::string> optimal(const compensate::Course& course,
+                                                       const compensate::Setup& setup,
+                                                       const dynamics::NozzleXY& nozzle,
+                                                       std::span<const MoveBounds> bounds);
 
 }  // namespace unflex::timing

@@ -1,0 +1,109 @@
+// A quadratic program in a band, whose rows may be broken at a price.
+//
+//   min ½ δᵀHδ + qᵀδ + Σ ρ s    s.t.  l − s ≤ g·δ + v ≤ u + s,  s ≥ 0
+//
+//   δ   unknowns          g, v   gradient and value of a row, over W unknowns that stand together
+//   l, u   bounds         ρ, s   price of a row, and by how much it is broken
+//
+// It always has a solution. Where ρ is above what a row's multiplier would be, the row holds.
+//
+// Method: a primal-dual interior point with Mehrotra's predictor and corrector (S. J. Wright,
+// "Primal-Dual Interior-Point Methods", SIAM 1997, chapter 10). A side of a row has the room
+// w = ±(bound − g·δ − v) + s, with multiplier λ, and s has the multiplier μ = ρ − λ:
+//
+//   λw = τ    μs = τ    Δλ = D (±g·Δδ + (τ − λw)/λ − (τ − μs)/μ),   D = 1/(w/λ + s/μ)
+//
+// which leaves a system in δ alone, with the matrix H + Σ D g gᵀ of half-bandwidth W − 1.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace unflex::timing {
+
+template <int W>
+class ElasticProgram {
+ public:
+  using Gradient = Eigen::Matrix<double, W, 1>;
+
+  // Begins a program of so many unknowns, without any term.
+  void reset(std::size_t unknowns);
+  // Adds ½ weight (g·δ + v)². first: the first of the unknowns.
+  void add_square(std::size_t first, const Gradient& g, double v, double weight);
+  // Adds ½ weight δ² of every unknown.
+  void add_damping(double weight);
+  void add_linear(std::size_t unknown, double slope) { linear_[unknown] += slope; }
+  // The unknown stays 0.
+  void fix(std::size_t unknown);
+  // Adds a row. A bound may be infinite, but not both.
+  void add_row(std::size_t first, const Gradient& g, double v, double lower, double upper,
+               double price);
+
+  // The value of a row, by its number, at the solution.
+  [[nodiscard]] double value_at_solution(std::size_t row) const;
+  [[nodiscard]] std::size_t rows() const { return values_.size(); }
+
+  // δ with a cost of at most `gap` above the least one per unknown; nullopt if it is not found.
+  // Adds the steps that it took to `iterations`.
+  [[nodiscard]] std::optional<std::span<const double>> solve(double gap, int& iterations);
+
+ private:
+  // One bound of a row, seen so that it is an upper one.
+  struct Side {
+    std::size_t row = 0;
+    double sign = 1.0;
+    double room = 0.0;        // w
+    double multiplier = 0.0;  // λ
+    double breach = 0.0;      // s
+    double slack = 0.0;       // μ
+    // Steps, and the predictor's products of them.
+    double room_step = 0.0;
+    double multiplier_step = 0.0;
+    double breach_step = 0.0;
+    double room_product = 0.0;
+    double breach_product = 0.0;
+    [[nodiscard]] double stiffness() const {  // D
+      return 1.0 / (room / multiplier + breach / slack);
+    }
+  };
+
+  void start();
+  // Builds the matrix and the gradient of the Lagrangian. Returns the gradient's largest entry.
+  double linearise();
+  [[nodiscard]] bool factor();
+  void back_substitute(std::vector<double>& x) const;
+  // The step for the target τ. Returns how much of it can be gone.
+  double step_towards(double target, bool corrects);
+  [[nodiscard]] double gap() const;
+  [[nodiscard]] double gap_after(double length) const;
+  void advance(double length);
+
+  [[nodiscard]] auto at(std::vector<double>& x, std::size_t row) const {
+    return Eigen::Map<Gradient>(x.data() + first_[row]);
+  }
+
+  std::size_t size_ = 0;
+  // Column i holds rows i … i + W − 1.
+  std::vector<double> hessian_;
+  std::vector<double> linear_;
+  std::vector<std::size_t> fixed_;
+  std::vector<Gradient> gradients_;
+  std::vector<std::size_t> first_;
+  std::vector<double> values_;
+  std::vector<double> prices_;
+  std::vector<double> lower_;
+  std::vector<double> upper_;
+  std::vector<Side> sides_;
+  std::vector<double> factor_;
+  std::vector<double> delta_;
+  std::vector<double> lagrangian_;
+  std::vector<double> step_;
+};
+
+extern template class ElasticProgram<18>;
+extern template class ElasticProgram<24>;
+
+}  // namespace unflex::timing

@@ -1,0 +1,242 @@
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "nozzle_measure.hpp"
+#include "pieces.hpp"
+#include "section_motion.hpp"
+#include "sections.hpp"
+#include "timed_moves.hpp"
+#include "unflex/timing/timing.hpp"
+
+namespace unflex::timing {
+namespace {
+
+using gcode::X;
+using gcode::Y;
+
+// How long before and after it even motion is settled, in 1/ω.
+constexpr double kSettling = 9.0;
+// What counts as kept.
+constexpr double kKept = 1.05;
+constexpr double kKeptFeed = 1.025;
+
+// What the models of the axes ask of the sections. nullopt: more than sections know.
+std::optional<SectionRules> rules_of(const compensate::Setup& setup) {
+  SectionRules rules;
+  rules.max_accel_mm_s2 = setup.x.limits.max_accel_mm_s2;
+  rules.shares_motors = setup.shares_motors;
+  if (setup.x.axis.mode_count() != 1 || setup.y.axis.mode_count() != 1) {
+    return std::nullopt;
+  }
+  rules.limits_x = setup.x.limits;
+  rules.limits_y = setup.y.limits;
+  rules.x = setup.x.axis.main();
+  rules.y = setup.y.axis.main();
+  for (const compensate::AxisSetup* const axis : {&setup.x, &setup.y}) {
+    for (const compensate::Plant& plant : axis->plants) {
+      if (plant.share < kLeastShare) {
+        continue;
+      }
+      if (!plant.is_edge || plant.axis.mode_count() != 1) {
+        return std::nullopt;
+      }
+      const double off = std::abs(plant.axis.main_rad_s() / axis->axis.main_rad_s() - 1.0);
+      rules.band = std::max(rules.band, off);
+    }
+  }
+  rules.times_tolerance = kTimesAtEdge;
+  return rules;
+}
+
+bool is_at_rest(const dynamics::NozzleXY& nozzle, const gcode::Position& at_mm,
+                const compensate::Setup& setup) {
+  constexpr double kNothing_mm = 1e-4;
+  const dynamics::FlexibleAxis::Gap x = setup.x.axis.gap(nozzle.x, setup.x.axis.riding(at_mm[X]));
+  const dynamics::FlexibleAxis::Gap y = setup.y.axis.gap(nozzle.y, setup.y.axis.riding(at_mm[Y]));
+  return std::max({x.place_mm, x.speed_mm, y.place_mm, y.speed_mm}) <= kNothing_mm;
+}
+
+// A part of the run in its new timing.
+struct TimedPart {
+  double begin_s = 0.0;
+  std::unique_ptr<SectionMotion> motion;  // null: there is no section before the pause
+  const Pause* pause = nullptr;
+
+  [[nodiscard]] double pause_begin_s() const {
+    return begin_s + (motion ? motion->duration_s() : 0.0);
+  }
+};
+
+std::vector<Progress> progress_of(const Section& section, const SectionMotion& motion,
+                                  double begin_s) {
+  constexpr double kNothing_mm = 1e-7;
+  std::vector<Progress> result;
+  for (const Passage& passage : motion.passages()) {
+    const Leg& leg = section.legs[passage.leg];
+    const double share = passage.along_mm / leg.move.length_mm;
+    const Progress at{begin_s + passage.time_s, leg.from_mm + share * (leg.to_mm - leg.from_mm)};
+    if (result.empty() || at.path_mm > result.back().path_mm + kNothing_mm) {
+      result.push_back(at);
+    }
+  }
+  result.front().path_mm = section.legs.front().from_mm;
+  result.back() = {begin_s + motion.duration_s(), section.legs.back().to_mm};
+  for (std::size_t i = 1; i + 1 < result.size(); ++i) {
+    result[i].speed_mm_s = (result[i + 1].path_mm - result[i - 1].path_mm) /
+                           (result[i + 1].time_s - result[i - 1].time_s);
+  }
+  const auto even_mm_s = [](const Leg& leg) {
+    return leg.feed_mm_s * (leg.to_mm - leg.from_mm) / leg.move.length_mm;
+  };
+  if (section.starts_even) {
+    result.front().speed_mm_s = even_mm_s(section.legs.front());
+  }
+  if (section.ends_even) {
+    result.back().speed_mm_s = even_mm_s(section.legs.back());
+  }
+  return result;
+}
+
+SectionMotion::OfAxis even(const SectionMotion::OfAxis& from, double speed_mm_s, double t) {
+  return {from.position_mm + speed_mm_s * t, speed_mm_s};
+}
+
+SectionMotion::Base base_at(const std::vector<TimedPart>& parts, const gcode::Position& start_mm,
+                            double t) {
+  std::size_t i = 0;
+  while (i + 1 < parts.size() && t >= parts[i + 1].begin_s) {
+    ++i;
+  }
+  const TimedPart& part = parts[i];
+  if (t <= 0.0 || !part.motion) {
+    return {{start_mm[X]}, {start_mm[Y]}};
+  }
+  if (t < part.pause_begin_s()) {
+    return part.motion->base(t - part.begin_s);
+  }
+  const SectionMotion::Base from = part.motion->base(part.motion->duration_s());
+  const double since_s = t - part.pause_begin_s();
+  return {even(from.x, part.pause->x_mm_s, since_s), even(from.y, part.pause->y_mm_s, since_s)};
+}
+
+// The smoothest motion through these places, at rest at both ends: b̈ is linear between nodes. By
+// the cubic spline's equations b̈_{k−1} + 4 b̈_k + b̈_{k+1} = 6 (b_{k−1} − 2 b_k + b_{k+1})/h².
+dynamics::AxisTrajectory through(std::vector<double> places_mm, double h) {
+  const std::size_t count = places_mm.size();
+  std::vector<double> accel(count, 0.0);
+  std::vector<double> share(count, 0.0);
+  for (std::size_t k = 1; k + 1 < count; ++k) {
+    const double bend = 6.0 * (places_mm[k - 1] - 2.0 * places_mm[k] + places_mm[k + 1]) / (h * h);
+    share[k] = 1.0 / (4.0 - share[k - 1]);
+    accel[k] = share[k] * (bend - accel[k - 1]);
+  }
+  for (std::size_t k = count - 1; k-- > 1;) {
+    accel[k] -= share[k] * accel[k + 1];
+  }
+  std::vector<double> velocity(count, 0.0);
+  for (std::size_t k = 0; k + 1 < count; ++k) {
+    velocity[k] = (places_mm[k + 1] - places_mm[k]) / h - h * (2.0 * accel[k] + accel[k + 1]) / 6.0;
+  }
+  velocity.back() = 0.0;
+  return {std::move(places_mm), std::move(velocity), std::move(accel)};
+}
+
+// All sections and pauses of a run.
+struct Motion {
+  std::vector<TimedPart> parts;
+  std::vector<Progress> progress;
+};
+
+// nullopt: for one of the sections nothing was found.
+std::optional<Motion> fastest(const std::vector<SectionedPart>& sectioned,
+                              const SectionRules& rules) {
+  Motion result;
+  double time_s = 0.0;
+  for (const SectionedPart& part : sectioned) {
+    TimedPart& own = result.parts.emplace_back(TimedPart{time_s, nullptr, &part.pause});
+    if (!part.section.legs.empty()) {
+      own.motion = fastest_motion(part.section, rules);
+      if (!own.motion) {
+        return std::nullopt;
+      }
+      const std::vector<Progress> progress = progress_of(part.section, *own.motion, time_s);
+      result.progress.insert(result.progress.end(), progress.begin(), progress.end());
+    }
+    time_s = own.pause_begin_s() + part.pause.duration_s;
+  }
+  return result;
+}
+
+dynamics::BaseTrajectory base_on(const compensate::NodeGrid& grid,
+                                 const std::vector<TimedPart>& parts,
+                                 const gcode::Position& start_mm, const compensate::Setup& setup) {
+  std::vector<double> x_mm;
+  std::vector<double> y_mm;
+  for (std::size_t k = 0; k < grid.count; ++k) {
+    const double t = static_cast<double>(k) * grid.period_s - setup.lead_in_s;
+    const SectionMotion::Base at = base_at(parts, start_mm, t);
+    x_mm.push_back(at.x.position_mm);
+    y_mm.push_back(at.y.position_mm);
+  }
+  return {grid.period_s, through(std::move(x_mm), grid.period_s),
+          through(std::move(y_mm), grid.period_s)};
+}
+
+// Whether each model's nozzle keeps what it is allowed when the base moves so.
+bool is_kept(const Timed& timed, std::span<const MoveBounds> bounds, const compensate::Setup& setup,
+             const dynamics::NozzleXY& nozzle) {
+  std::vector<MoveBounds> of_pieces;
+  for (std::size_t i = 0; i < timed.pieces.size(); ++i) {
+    of_pieces.insert(of_pieces.end(), timed.pieces[i], bounds[i]);
+  }
+  std::vector<double> starts_s = {setup.lead_in_s};
+  for (const planner::PlannedMove& move : timed.moves) {
+    starts_s.push_back(starts_s.back() + move.duration_s());
+  }
+  const NozzleMeasure measured =
+      measure(timed.moves, of_pieces, starts_s, *timed.base, models_of(setup), {}, &nozzle);
+  return std::ranges::max(measured.error) <= kKept &&
+         std::ranges::max(measured.speed) <= kKeptFeed && std::ranges::max(measured.left) <= kKept;
+}
+
+}  // namespace
+
+tl::expected<Timed, std::string> optimal(const compensate::Course& course,
+                                         const compensate::Setup& setup,
+                                         const dynamics::NozzleXY& nozzle,
+                                         std::span<const MoveBounds> bounds) {
+  const std::optional<SectionRules> rules = rules_of(setup);
+  if (!rules) {
+    return tl::unexpected<std::string>("the axes have several modes or plants");
+  }
+  if (!course.before.empty() || !course.after.empty()) {
+    return tl::unexpected<std::string>("it is a part of a long motion");
+  }
+  const double slowest_rad_s = std::min(rules->x.omega_rad_s, rules->y.omega_rad_s);
+  auto parts = sections(course.moves, bounds, setup, kSettling / slowest_rad_s);
+  if (!parts) {
+    return tl::unexpected<std::string>("accelerations along the path are limited");
+  }
+  const gcode::Position& start_mm = course.moves.front().segment.start_mm;
+  if (Section& first = parts->front().section;
+      !first.legs.empty() && !is_at_rest(nozzle, start_mm, setup)) {
+    first.nozzle = nozzle.motion();
+  }
+  const std::optional<Motion> motion = fastest(*parts, *rules);
+  if (!motion) {
+    return tl::unexpected<std::string>("no motion was found that keeps the limits");
+  }
+  Timed result = timed_moves(course.moves, bounds, motion->progress);
+  compensate::Course retimed = course;
+  retimed.moves = result.moves;
+  result.base = base_on(compensate::node_grid(retimed, setup), motion->parts, start_mm, setup);
+  if (!is_kept(result, bounds, setup, nozzle)) {
+    return tl::unexpected<std::string>(
+        "the nozzle would stray further than the tolerance, or run ahead of F");
+  }
+  join_even(result.moves, result.pieces);
+  return result;
+}
+
+}  // namespace unflex::timing

@@ -1,0 +1,631 @@
+// Notation:
+//   u, h          place among the nodes, and node period (section_nodes.hpp)
+//   X, Y, T (u)   flat outputs (flat_output.hpp) and time, splines of degree D
+//   p, b, e       nozzle, base, contour error of the nozzle
+//   n, P          normal of a leg, and a place on it
+//   A, F          limit of b̈, and of ṗ
+//
+//   min  T(N) − T(0) + r₂ T″² + r₃ (T‴² + T⁗²) + small squares of e and b̈
+//   s.t. |b̈| ≤ A,   |n·(p − P)| ≤ tolerance,   |ṗ| ≤ F
+//
+// Method: sequential quadratic programs. Each is linear in the steps of the control points, and
+// trusts them only as far as T′ changes by a share that grows where the last step came out as
+// foreseen, and shrinks where it did not.
+//
+// The path in time is the same however u is spread over it, so the squares of T‴ and T⁗ keep nodes
+// evenly spread.
+#include "section_motion.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "elastic_program.hpp"
+#include "section_nodes.hpp"
+#include "section_spline.hpp"
+
+namespace unflex::timing {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// ωh. The matrix for z is too badly conditioned below 0.4.
+constexpr double kNodePeriod = 0.45;
+constexpr int kRounds = 12;
+// Weights of the squares.
+constexpr double kBend = 1.0;      // r₂
+constexpr double kTwist = 1000.0;  // r₃
+constexpr double kOfError = 4e-3;
+constexpr double kOfAccel = 1e-2;
+constexpr double kOfStep = 1e-6;
+constexpr double kOfEvenClock = 1e5;
+// ρ, in node periods for a row that is broken by all of its bound.
+constexpr double kPrice = 30.0;
+constexpr double kTimesForTrust = 100.0;
+// T′ at least.
+constexpr double kLeastClock = 0.3;
+// Nodes below this share of F have no row for it.
+constexpr double kNearFeed = 0.3;
+constexpr double kFacet_rad = 0.3;
+// What T′ may change by in a round: at first, where a step came out otherwise, and where it did
+// not.
+constexpr double kFirstTrust = 0.3;
+constexpr double kFirstTrustOfBand = 0.12;
+constexpr double kLeastTrust = 1e-3;
+constexpr double kShrink = 0.5;
+constexpr double kGrow = 1.6;
+constexpr double kCooling = 0.75;
+constexpr double kCoolingOfBand = 0.85;
+constexpr std::size_t kReach = 8;  // nodes
+// A step is right where nothing comes out otherwise by more, relative to what is allowed.
+constexpr double kRight = 0.1;
+
+// Values relative to what is allowed, or factors of what is allowed.
+struct Excess {
+  double accel = 0.0;
+  double error = 0.0;
+  double feed = 0.0;
+
+  void include(const Excess& other) {
+    accel = std::max(accel, other.accel);
+    error = std::max(error, other.error);
+    feed = std::max(feed, other.feed);
+  }
+  [[nodiscard]] bool is_within(const Excess& limits) const {
+    return accel <= limits.accel && error <= limits.error && feed <= limits.feed;
+  }
+};
+constexpr Excess kAim{0.985, 1.0, 1.0};
+// What counts as kept, what rows are tightened for, and by how much at most.
+constexpr Excess kKept{1.025, 1.03, 1.015};
+constexpr Excess kTightenAbove{1.01, 1.0, 1.013};
+constexpr Excess kTightest{0.8, 0.6, 0.95};
+// A round that gains less is the last.
+constexpr double kGain = 3e-4;
+
+template <int D>
+class Program {
+ public:
+  using Spline = SectionSpline<D>;
+  using Shares = typename Spline::Shares;
+  using Values = typename Spline::Values;
+  using Place = typename Spline::Place;
+  using Rows = ElasticProgram<Spline::kWidth>;
+  using Gradient = typename Spline::Gradient;
+
+  Program(const Section& section, const SectionRules& rules)
+      : section_(section),
+        legs_(section.legs),
+        rules_(rules),
+        nodes_(section, kNodePeriod / std::max(rules.x.omega_rad_s, rules.y.omega_rad_s)),
+        spline_(section, rules, nodes_),
+        trust_(nodes_.periods() + 1, D == 5 ? kFirstTrust : kFirstTrustOfBand),
+        factors_(nodes_.periods(), kAim) {
+    for (const SectionNodes::Pin& pin : nodes_.pins()) {
+      pin_shares_.push_back(spline_shares<D>(pin.x));
+    }
+  }
+
+  // False: nothing was found that keeps the rules.
+  [[nodiscard]] bool solve() {
+    // The matrix is badly conditioned, so what is left of the residual is solved for again.
+    for (int i = 0; i < 3; ++i) {
+      if (!step(true)) {
+        return false;
+      }
+    }
+    double largest_trust = trust_.front();
+    double last = duration();
+    double least = kInfinity;
+    std::vector<double> best;
+    for (int round = 0; round < kRounds; ++round) {
+      if (!step(false)) {
+        return false;
+      }
+      const Excess excess = measure();
+      const double gain = last - duration();
+      last = duration();
+      if (excess.is_within(kKept) && last < least) {
+        least = last;
+        best = spline_.points();
+        if (gain < kGain * last) {
+          break;
+        }
+      }
+      largest_trust *= D == 5 ? kCooling : kCoolingOfBand;
+      adapt(largest_trust, round);
+    }
+    if (best.empty()) {
+      return false;
+    }
+    spline_.points() = std::move(best);
+    return true;
+  }
+
+  [[nodiscard]] const Spline& spline() const { return spline_; }
+  [[nodiscard]] const SectionNodes& nodes() const { return nodes_; }
+
+ private:
+  // In node periods.
+  [[nodiscard]] double duration() const {
+    return spline_.clock(nodes_.periods() - 1, at_end_) - spline_.clock(0, at_node_);
+  }
+
+  // A row, so that it can be seen how well the program has foreseen it.
+  struct Foreseen {
+    std::size_t row = 0;
+    std::size_t k = 0;
+    const Shares* shares = nullptr;
+    bool is_base = false;  // b̈; the nozzle's place otherwise
+    Vector n;
+    double scale = 1.0;
+    double offset = 0.0;
+  };
+
+  // By how much the last step has come out otherwise than foreseen, per period.
+  void compare() {
+    surprise_.assign(nodes_.periods(), 0.0);
+    for (const Foreseen& row : foreseen_) {
+      const Place at = spline_.place(row.k, *row.shares);
+      const Vector value = row.is_base
+                               ? Spline::apply(spline_.x().base_accel, spline_.y().base_accel, at)
+                               : Spline::apply(spline_.x().nozzle, spline_.y().nozzle, at);
+      const double now = row.scale * (row.n.x * value.x + row.n.y * value.y) - row.offset;
+      surprise_[row.k] =
+          std::max(surprise_[row.k], std::abs(now - program_.value_at_solution(row.row)));
+    }
+  }
+
+  // What rows are about: u, and what is there.
+  struct At {
+    std::size_t k = 0;
+    double x = 0.0;
+    const Shares* shares = nullptr;
+    Place place;
+    std::size_t leg = 0;
+  };
+
+  [[nodiscard]] At at(std::size_t k, double x, const Shares& shares) const {
+    At result{k, x, &shares, spline_.place(k, shares)};
+    result.leg = nodes_.nearest_leg(k, x, spline_.nozzle_mm(result.place));
+    return result;
+  }
+
+  void add_row(const At& at, const Gradient& g, double v, double lower) {
+    if (!is_plain_) {
+      program_.add_row(Spline::kPerPoint * at.k, g, v, lower, 1.0, kPrice);
+    }
+  }
+
+  void add_square(const At& at, const Gradient& g, double v, double weight) {
+    program_.add_square(Spline::kPerPoint * at.k, g, v, 2.0 * weight);
+  }
+
+  void watch(const At& at, bool is_base, Vector n, double scale, double offset) {
+    if (!is_plain_) {
+      foreseen_.push_back({program_.rows() - 1, at.k, at.shares, is_base, n, scale, offset});
+    }
+  }
+
+  void fix_ends() {
+    const std::size_t periods = nodes_.periods();
+    const auto fix = [&](std::size_t point, int coordinate) {
+      program_.fix(Spline::kPerPoint * point + coordinate);
+    };
+    for (int j = 0; j < D; ++j) {
+      for (const int axis : {0, 1}) {
+        fix(j, axis);
+        fix(periods + j, axis);
+      }
+    }
+    const std::size_t fixed_times =
+        is_plain_ ? periods + D : (section_.starts_even || section_.nozzle ? D : 1);
+    for (std::size_t j = 0; j < fixed_times; ++j) {
+      fix(j, 2);
+    }
+    if (is_plain_ || !section_.ends_even) {
+      return;
+    }
+    // Time goes evenly over the last period.
+    const std::size_t first = Spline::kPerPoint * (periods - 1);
+    for (int j = 1; j < D; ++j) {
+      const int before = Spline::kPerPoint * j + 2;
+      const int after = before + Spline::kPerPoint;
+      Gradient g = Gradient::Zero();
+      g[before] = -1.0;
+      g[after] = 1.0;
+      const std::vector<double>& points = spline_.points();
+      program_.add_square(first, g, points[first + after] - points[first + before] - 1.0,
+                          kOfEvenClock);
+    }
+  }
+
+  // The gradient of a derivative of T.
+  static Gradient of_clock(const Shares& shares, int derivative, double scale) {
+    Gradient g = Gradient::Zero();
+    for (int i = 0; i <= D; ++i) {
+      g[Spline::kPerPoint * i + 2] = scale * shares[derivative][i];
+    }
+    return g;
+  }
+
+  void add_clock(std::size_t k, const Shares& shares, double trust) {
+    const std::size_t first = Spline::kPerPoint * k;
+    for (const int derivative : {2, 3, 4}) {
+      program_.add_square(first, of_clock(shares, derivative, 1.0),
+                          spline_.clock(k, shares, derivative),
+                          2.0 * (derivative == 2 ? kBend : kTwist));
+    }
+    constexpr double kLeastChange = 1e-3;
+    const double rate = spline_.clock(k, shares, 1);
+    const double most = trust * rate;
+    const double most_down = std::min(most, std::max(rate - kLeastClock, kLeastChange));
+    program_.add_row(first, of_clock(shares, 1, 1.0 / most), 0.0, -most_down / most, 1.0,
+                     kTimesForTrust * kPrice);
+  }
+
+  void add_accel(const At& at, bool has_square) {
+    const double h = nodes_.period_s();
+    const double scale = 1.0 / (factors_[at.k].accel * rules_.max_accel_mm_s2 * h * h);
+    constexpr Vector kAxes[] = {{1.0, 0.0}, {0.0, 1.0}};
+    constexpr Vector kMotors[] = {{1.0, 1.0}, {1.0, -1.0}};
+    Gradient g;
+    for (const Vector n : rules_.shares_motors ? kMotors : kAxes) {
+      const double v = spline_.linearise(at.place, *at.shares, n, spline_.x().base_accel,
+                                         spline_.y().base_accel, scale, g);
+      if (has_square) {
+        add_square(at, g, v, kOfAccel);
+      }
+      add_row(at, g, v, -1.0);
+      watch(at, true, n, scale, 0.0);
+    }
+  }
+
+  // The base stays where it may be.
+  void add_reach(const At& at) {
+    constexpr double kNear_mm = 1.0;
+    constexpr double kScale_mm = 0.05;
+    constexpr double kRoom_mm = 2e-3;
+    const Vector base = Spline::apply(spline_.x().base, spline_.y().base, at.place);
+    Gradient g;
+    const auto add = [&](Vector n, const compensate::BaseLimits& limits, double base_mm) {
+      const double below_mm = base_mm - limits.min_position_mm;
+      const double above_mm = limits.max_position_mm - base_mm;
+      if (!is_plain_ && std::min(below_mm, above_mm) < kNear_mm) {
+        static_cast<void>(spline_.linearise(at.place, *at.shares, n, spline_.x().base,
+                                            spline_.y().base, 1.0 / kScale_mm, g));
+        program_.add_row(Spline::kPerPoint * at.k, g, 0.0, (kRoom_mm - below_mm) / kScale_mm,
+                         (above_mm - kRoom_mm) / kScale_mm, kPrice);
+      }
+    };
+    add({1.0, 0.0}, rules_.limits_x, spline_.origin().x + base.x);
+    add({0.0, 1.0}, rules_.limits_y, spline_.origin().y + base.y);
+  }
+
+  // n·(p − place) is not above the tolerance, also at the edges of the band; nor below minus the
+  // tolerance, if there is a lower bound.
+  void add_strip(const At& at, Vector n, Vector place, double tolerance_mm, bool has_square,
+                 double lower = -1.0) {
+    const Vector origin = spline_.origin();
+    const double offset = n.x * (place.x - origin.x) + n.y * (place.y - origin.y);
+    Gradient g;
+    for (const double times : {0.0, -1.0, 1.0}) {
+      if (D == 5 && times != 0.0) {
+        break;
+      }
+      Values of_x = spline_.x().nozzle;
+      Values of_y = spline_.y().nozzle;
+      for (int i = 0; i < D; ++i) {
+        of_x[i] += times * rules_.band * spline_.x().sensitivity[i];
+        of_y[i] += times * rules_.band * spline_.y().sensitivity[i];
+      }
+      const double scale = 1.0 / (tolerance_mm * (times == 0.0 ? 1.0 : rules_.times_tolerance));
+      const double v =
+          spline_.linearise(at.place, *at.shares, n, of_x, of_y, scale, g) - scale * offset;
+      if (has_square) {
+        add_square(at, g, v, is_plain_ ? 1.0 : kOfError);
+      }
+      add_row(at, g, v, lower);
+      if (times == 0.0) {
+        watch(at, false, n, scale, scale * offset);
+      }
+    }
+  }
+
+  [[nodiscard]] double tolerance_mm(const At& at, std::size_t leg) const {
+    return factors_[at.k].error * nodes_.tolerance_mm(leg, at.k, at.x);
+  }
+
+  void add_contour(const At& at, bool has_square) {
+    const Vector d = direction_of(legs_[at.leg]);
+    add_strip(at, {-d.y, d.x}, start_of(legs_[at.leg]), tolerance_mm(at, at.leg), has_square);
+    add_caps(at);
+  }
+
+  // How many tolerances beyond the end of a leg the nozzle is about one tolerance away from the
+  // next.
+  [[nodiscard]] double beyond(std::size_t vertex) const {
+    constexpr double kLeastSine = 0.1;
+    constexpr double kTimesSine = 2.0;
+    const Vector a = direction_of(legs_[vertex - 1]);
+    const Vector b = direction_of(legs_[vertex]);
+    const double cosine = a.x * b.x + a.y * b.y;
+    return cosine <= 0.0 ? 1.0 : kTimesSine / std::max(std::abs(a.x * b.y - a.y * b.x), kLeastSine);
+  }
+
+  // The nozzle does not pass the ends of a leg at vertices, where the path turns.
+  void add_caps(const At& at) {
+    const bool has_start = nodes_.is_near_vertex(at.leg, at.k, at.x);
+    const bool has_end = nodes_.is_near_vertex(at.leg + 1, at.k, at.x);
+    const Vector d = direction_of(legs_[at.leg]);
+    const Vector start = start_of(legs_[at.leg]);
+    if (has_start) {
+      add_strip(at, {-d.x, -d.y}, start, beyond(at.leg) * tolerance_mm(at, at.leg), false,
+                -kInfinity);
+    }
+    if (has_end) {
+      add_strip(at, d, start_of(legs_[at.leg + 1]), beyond(at.leg + 1) * tolerance_mm(at, at.leg),
+                false, -kInfinity);
+    }
+  }
+
+  void add_feed(const At& at, double feed_mm_s) {
+    const Vector velocity =
+        Spline::apply(spline_.x().nozzle_speed, spline_.y().nozzle_speed, at.place);
+    const double feed = factors_[at.k].feed * nodes_.period_s() * feed_mm_s;
+    if (std::hypot(velocity.x, velocity.y) < kNearFeed * feed) {
+      return;
+    }
+    // A direction that stays from round to round: around one that does not, the nozzle would swing
+    // from round to round to where no facet is near.
+    double direction = std::atan2(velocity.y, velocity.x);
+    const Vector d = direction_of(legs_[at.leg]);
+    if (velocity.x * d.x + velocity.y * d.y >
+        std::cos(kFacet_rad) * std::hypot(velocity.x, velocity.y)) {
+      direction = std::atan2(d.y, d.x);
+    }
+    Gradient g;
+    for (const double facet : {0.0, -kFacet_rad, kFacet_rad}) {
+      const Vector n{std::cos(direction + facet), std::sin(direction + facet)};
+      const double v = spline_.linearise(at.place, *at.shares, n, spline_.x().nozzle_speed,
+                                         spline_.y().nozzle_speed, 1.0 / feed, g);
+      add_row(at, g, v, -kInfinity);
+    }
+  }
+
+  // The nozzle passes a bound vertex: it is within the tolerances of both legs, and not yet or no
+  // longer far along them.
+  void add_pin(const SectionNodes::Pin& pin, const Shares& shares) {
+    const At at{pin.k, pin.x, &shares, spline_.place(pin.k, shares), pin.vertex};
+    const Leg& before = legs_[pin.vertex - 1];
+    const Leg& after = legs_[pin.vertex];
+    const Vector a = direction_of(before);
+    const Vector b = direction_of(after);
+    const Vector corner = start_of(after);
+    const double of_before = tolerance_mm(at, pin.vertex - 1);
+    const double of_after = tolerance_mm(at, pin.vertex);
+    add_strip(at, {-a.y, a.x}, corner, of_before, true);
+    add_strip(at, {-b.y, b.x}, corner, of_after, true);
+    Vector through{a.x + b.x, a.y + b.y};
+    const double length = std::hypot(through.x, through.y);
+    constexpr double kTurnsBack = 1e-6;
+    through = length > kTurnsBack ? Vector{through.x / length, through.y / length} : a;
+    add_strip(at, through, corner, std::min(of_before, of_after), false);
+    add_feed(at, std::min({before.feed_mm_s, after.feed_mm_s, after.entry_mm_s}));
+  }
+
+  // One program: least squares in the timing as it is, or the next step of all.
+  [[nodiscard]] bool step(bool is_plain) {
+    is_plain_ = is_plain;
+    std::vector<double>& points = spline_.points();
+    program_.reset(points.size());
+    foreseen_.clear();
+    fix_ends();
+    const std::size_t periods = nodes_.periods();
+    std::size_t next_pin = 0;
+    for (std::size_t k = 0; k < periods; ++k) {
+      if (!is_plain) {
+        add_clock(k, at_node_, trust_[k]);
+      }
+      for (const bool is_node : {true, false}) {
+        const At here = at(k, is_node ? 0.0 : 0.5, is_node ? at_node_ : at_middle_);
+        add_accel(here, is_node);
+        add_reach(here);
+        add_contour(here, is_node);
+        add_feed(here, nodes_.feed_mm_s(here.leg, k, here.x));
+      }
+      for (; next_pin < nodes_.pins().size() && nodes_.pins()[next_pin].k == k; ++next_pin) {
+        add_pin(nodes_.pins()[next_pin], pin_shares_[next_pin]);
+      }
+    }
+    if (!is_plain) {
+      add_clock(periods - 1, at_end_, trust_[periods]);
+    }
+    for (int i = 0; i <= D; ++i) {
+      program_.add_linear(Spline::kPerPoint * i + 2, -at_node_[0][i]);
+      program_.add_linear(Spline::kPerPoint * (periods - 1 + i) + 2, at_end_[0][i]);
+    }
+    program_.add_damping(kOfStep);
+    constexpr double kGap = 1e-4;
+    const std::optional<std::span<const double>> step = program_.solve(kGap, iterations_);
+    if (!step) {
+      return false;
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      points[i] += (*step)[i];
+    }
+    compare();
+    return true;
+  }
+
+  // Looks also between the places that rows are for. Returns the largest values.
+  Excess measure() {
+    constexpr int kLooks = 4;
+    static const std::array<Shares, kLooks> kShares = [] {
+      std::array<Shares, kLooks> shares{};
+      for (int i = 0; i < kLooks; ++i) {
+        shares[i] = spline_shares<D>(static_cast<double>(i) / kLooks);
+      }
+      return shares;
+    }();
+    Excess worst;
+    excess_.assign(nodes_.periods(), {});
+    const double h = nodes_.period_s();
+    for (std::size_t k = 0; k < nodes_.periods(); ++k) {
+      for (int look = 0; look < kLooks; ++look) {
+        const At here = at(k, static_cast<double>(look) / kLooks, kShares[look]);
+        const Vector accel =
+            Spline::apply(spline_.x().base_accel, spline_.y().base_accel, here.place);
+        const double a = rules_.shares_motors ? std::abs(accel.x) + std::abs(accel.y)
+                                              : std::max(std::abs(accel.x), std::abs(accel.y));
+        const Vector speed =
+            Spline::apply(spline_.x().nozzle_speed, spline_.y().nozzle_speed, here.place);
+        excess_[k].include({a / (rules_.max_accel_mm_s2 * h * h), error(here),
+                            std::hypot(speed.x, speed.y) / (h * legs_[here.leg].feed_mm_s)});
+      }
+      worst.include(excess_[k]);
+    }
+    return worst;
+  }
+
+  // e relative to the tolerance, the largest of the axes as given and at the edges of the band.
+  [[nodiscard]] double error(const At& at) const {
+    const Vector p = spline_.nozzle_mm(at.place);
+    const double tolerance = nodes_.tolerance_mm(at.leg, at.k, at.x);
+    double e = nodes_.error_mm(at.k, at.x, p) / tolerance;
+    if (D == 7) {
+      const Vector off = Spline::apply(spline_.x().sensitivity, spline_.y().sensitivity, at.place);
+      for (const double band : {-rules_.band, rules_.band}) {
+        const double at_edge =
+            nodes_.error_mm(at.k, at.x, {p.x + band * off.x, p.y + band * off.y});
+        e = std::max(e, at_edge / (rules_.times_tolerance * tolerance));
+      }
+    }
+    return e;
+  }
+
+  // Fits trust and factors to what the last round has shown.
+  void adapt(double largest_trust, int round) {
+    const std::size_t periods = nodes_.periods();
+    for (std::size_t k = 0; k <= periods; ++k) {
+      double surprise = 0.0;
+      for (std::size_t i = k > kReach ? k - kReach : 0; i <= std::min(k + kReach, periods - 1);
+           ++i) {
+        surprise = std::max(surprise, surprise_[i]);
+      }
+      trust_[k] = std::clamp(trust_[k] * (surprise <= kRight ? kGrow : kShrink), kLeastTrust,
+                             largest_trust);
+    }
+    constexpr int kFirstRoughRounds = 2;
+    constexpr double kMostTightening = 1.3;
+    const auto tighten = [&](double& factor, double excess, double allowed, double tightest) {
+      if (excess > allowed && excess < kMostTightening) {
+        factor = std::max(factor / excess, tightest);
+      }
+    };
+    for (std::size_t k = 0; round >= kFirstRoughRounds && k < periods; ++k) {
+      Excess near = excess_[k];
+      near.include(excess_[k > 0 ? k - 1 : 0]);
+      near.include(excess_[std::min(k + 1, periods - 1)]);
+      tighten(factors_[k].accel, near.accel, kTightenAbove.accel, kTightest.accel);
+      tighten(factors_[k].error, near.error, kTightenAbove.error, kTightest.error);
+      tighten(factors_[k].feed, near.feed, kTightenAbove.feed, kTightest.feed);
+    }
+  }
+
+  const Section& section_;
+  const std::vector<Leg>& legs_;
+  SectionRules rules_;
+  SectionNodes nodes_;
+  Spline spline_;
+  Shares at_node_ = spline_shares<D>(0.0);
+  Shares at_middle_ = spline_shares<D>(0.5);
+  Shares at_end_ = spline_shares<D>(1.0);
+  std::vector<Shares> pin_shares_;
+
+  std::vector<double> trust_;     // at the nodes
+  std::vector<Excess> factors_;   // of what is allowed, per period
+  std::vector<Excess> excess_;    // after the last step, per period
+  std::vector<double> surprise_;  // likewise
+  std::vector<Foreseen> foreseen_;
+  bool is_plain_ = false;
+  int iterations_ = 0;
+  Rows program_;
+};
+
+template <int D>
+class SplineMotion : public SectionMotion {
+ public:
+  SplineMotion(const SectionSpline<D>& spline, const SectionNodes& nodes)
+      : spline_(spline), nodes_(nodes) {
+    for (std::size_t k = 0; k < spline_.periods(); ++k) {
+      times_.push_back(clock(k, 0.0));
+    }
+    times_.push_back(clock(spline_.periods() - 1, 1.0));
+  }
+
+  [[nodiscard]] double duration_s() const override {
+    return (times_.back() - times_.front()) * spline_.period_s();
+  }
+
+  [[nodiscard]] Base base(double t) const override {
+    const double wanted =
+        std::clamp(times_.front() + t / spline_.period_s(), times_.front(), times_.back());
+    const auto next = std::upper_bound(times_.begin() + 1, times_.end() - 1, wanted);
+    const auto k = static_cast<std::size_t>(next - times_.begin()) - 1;
+    constexpr int kNewtonSteps = 4;
+    double x = (wanted - times_[k]) / (times_[k + 1] - times_[k]);
+    for (int i = 0; i < kNewtonSteps; ++i) {
+      x = std::clamp(x - (clock(k, x) - wanted) / clock(k, x, 1), 0.0, 1.0);
+    }
+    using Spline = SectionSpline<D>;
+    const auto at = spline_.place(k, spline_shares<D>(x));
+    const double h = spline_.period_s();
+    const Vector place = Spline::apply(spline_.x().base, spline_.y().base, at);
+    const Vector speed = Spline::apply(spline_.x().base_speed, spline_.y().base_speed, at);
+    return {{spline_.origin().x + place.x, speed.x / h},
+            {spline_.origin().y + place.y, speed.y / h}};
+  }
+
+  [[nodiscard]] std::vector<Passage> passages() const override {
+    std::vector<Passage> result;
+    const auto add = [&](std::size_t k, double x) {
+      const Vector p = spline_.nozzle_mm(spline_.place(k, spline_shares<D>(x)));
+      const std::size_t leg = nodes_.nearest_leg(k, x, p);
+      result.push_back(
+          {(clock(k, x) - times_.front()) * spline_.period_s(), leg, nodes_.along_mm(leg, p)});
+    };
+    for (std::size_t k = 0; k < spline_.periods(); ++k) {
+      add(k, 0.0);
+      add(k, 0.5);
+    }
+    add(spline_.periods() - 1, 1.0);
+    return result;
+  }
+
+ private:
+  [[nodiscard]] double clock(std::size_t k, double x, int derivative = 0) const {
+    return spline_.clock(k, spline_shares<D>(x), derivative);
+  }
+
+  SectionSpline<D> spline_;
+  SectionNodes nodes_;
+  std::vector<double> times_;  // T at the nodes
+};
+
+template <int D>
+std::unique_ptr<SectionMotion> motion(const Section& section, const SectionRules& rules) {
+  Program<D> program(section, rules);
+  return program.solve() ? std::make_unique<SplineMotion<D>>(program.spline(), program.nodes())
+                         : nullptr;
+}
+
+}  // namespace
+
+std::unique_ptr<SectionMotion> fastest_motion(const Section& section, const SectionRules& rules) {
+  return rules.band > 0.0 ? motion<7>(section, rules) : motion<5>(section, rules);
+}
+
+}  // namespace unflex::timing

@@ -1,0 +1,61 @@
+// The fastest motion along a section.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "sections.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+
+namespace unflex::timing {
+
+// What the motion is to keep.
+struct SectionRules {
+  dynamics::Mode x;
+  dynamics::Mode y;
+  // Where the base may be.
+  compensate::BaseLimits limits_x;
+  compensate::BaseLimits limits_y;
+  // The nozzle of an axis whose frequency is off by so much may stray so many tolerances. 0: the
+  // axes are known exactly.
+  double band = 0.0;
+  double times_tolerance = 2.0;
+  double max_accel_mm_s2 = 0.0;  // of the base, per axis
+  bool shares_motors = false;    // of |ẍ ± ÿ| instead
+};
+
+// When the nozzle is where.
+struct Passage {
+  double time_s = 0.0;
+  std::size_t leg = 0;
+  double along_mm = 0.0;
+};
+
+class SectionMotion {
+ public:
+  SectionMotion() = default;
+  SectionMotion(const SectionMotion&) = delete;
+  SectionMotion& operator=(const SectionMotion&) = delete;
+  virtual ~SectionMotion() = default;
+
+  [[nodiscard]] virtual double duration_s() const = 0;
+  // Place and speed of the base, t from 0 to duration_s().
+  struct OfAxis {
+    double position_mm = 0.0;
+    double velocity_mm_s = 0.0;
+  };
+  struct Base {
+    OfAxis x;
+    OfAxis y;
+  };
+  [[nodiscard]] virtual Base base(double t) const = 0;
+  // In the order of time, from the first leg's beginning to the last one's end.
+  [[nodiscard]] virtual std::vector<Passage> passages() const = 0;
+};
+
+// nullptr: none was found that keeps the rules.
+[[nodiscard]] std::unique_ptr<SectionMotion> fastest_motion(const Section& section,
+                                                            const SectionRules& rules);
+
+}  // namespace unflex::timing

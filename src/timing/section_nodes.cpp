@@ -1,0 +1,179 @@
+#include "section_nodes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace unflex::timing {
+namespace {
+
+using gcode::X;
+using gcode::Y;
+
+constexpr std::size_t kFewestPeriods = 18;
+// A path that turns by more has a bound vertex.
+constexpr double kTurn_rad = 0.0873;
+// How near travel has to be to filament for its limits to count, in node periods.
+constexpr double kBesideTolerance = 2.5;
+constexpr double kBesideFeed = 1.0;
+constexpr double kNearVertex = 2.5;
+
+double u_of(const SectionNodes::Pin& pin) { return static_cast<double>(pin.k) + pin.x; }
+
+}  // namespace
+
+Vector start_of(const Leg& leg) {
+  return {leg.move.segment.start_mm[X], leg.move.segment.start_mm[Y]};
+}
+
+Vector direction_of(const Leg& leg) { return {leg.move.direction[X], leg.move.direction[Y]}; }
+
+SectionNodes::SectionNodes(const Section& section, double node_s) : legs_(section.legs) {
+  std::vector<double> begins_s = {0.0};
+  for (const Leg& leg : legs_) {
+    begins_s.push_back(begins_s.back() + leg.move.duration_s());
+  }
+  const double duration_s = begins_s.back();
+  periods_ = std::max(kFewestPeriods, static_cast<std::size_t>(std::lround(duration_s / node_s)));
+  // A short section is begun more slowly.
+  period_s_ = duration_s / static_cast<double>(periods_);
+  std::size_t leg = 0;
+  for (std::size_t node = 0; node <= periods_; ++node) {
+    const double t = static_cast<double>(node) * period_s_;
+    while (leg + 1 < legs_.size() && t >= begins_s[leg + 1]) {
+      ++leg;
+    }
+    const gcode::Position at = legs_[leg].move.position_mm(t - begins_s[leg]);
+    places_.push_back({at[X], at[Y]});
+  }
+  for (double& begin : begins_s) {
+    begin /= period_s_;
+  }
+  bind(begins_s);
+  period_s_ = std::max(period_s_, periods_ == kFewestPeriods ? node_s : 0.0);
+}
+
+void SectionNodes::bind(const std::vector<double>& begins) {
+  double turned_rad = 0.0;
+  for (std::size_t i = 1; i < legs_.size(); ++i) {
+    const Vector a = direction_of(legs_[i - 1]);
+    const Vector b = direction_of(legs_[i]);
+    turned_rad += std::abs(std::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y));
+    const bool is_border = legs_[i - 1].lays_filament != legs_[i].lays_filament ||
+                           legs_[i - 1].feed_mm_s != legs_[i].feed_mm_s ||
+                           legs_[i - 1].tolerance_mm != legs_[i].tolerance_mm ||
+                           std::isfinite(legs_[i].entry_mm_s);
+    if (is_border || turned_rad > kTurn_rad) {
+      turned_rad = 0.0;
+      const auto k = std::min(static_cast<std::size_t>(begins[i]), periods_ - 1);
+      pins_.push_back({i, k, begins[i] - static_cast<double>(k)});
+    }
+  }
+  std::size_t next = 0;
+  for (std::size_t k = 0; k <= periods_; ++k) {
+    while (next < pins_.size() && pins_[next].k < k) {
+      ++next;
+    }
+    first_pin_.push_back(next);
+  }
+}
+
+SectionNodes::Range SectionNodes::legs(std::size_t k, double x) const {
+  std::size_t next = first_pin_[k];
+  while (next < pins_.size() && pins_[next].k == k && pins_[next].x <= x) {
+    ++next;
+  }
+  return {next > 0 ? pins_[next - 1].vertex : 0,
+          next < pins_.size() ? pins_[next].vertex - 1 : legs_.size() - 1};
+}
+
+double SectionNodes::along_mm(std::size_t leg, Vector nozzle) const {
+  const Vector s = start_of(legs_[leg]);
+  const Vector d = direction_of(legs_[leg]);
+  return std::clamp((nozzle.x - s.x) * d.x + (nozzle.y - s.y) * d.y, 0.0,
+                    legs_[leg].move.length_mm);
+}
+
+double SectionNodes::distance_mm(std::size_t leg, Vector nozzle) const {
+  const double along = along_mm(leg, nozzle);
+  const Vector s = start_of(legs_[leg]);
+  const Vector d = direction_of(legs_[leg]);
+  return std::hypot(nozzle.x - s.x - along * d.x, nozzle.y - s.y - along * d.y);
+}
+
+std::size_t SectionNodes::nearest_leg(std::size_t k, double x, Vector nozzle) const {
+  const Range range = legs(k, x);
+  std::size_t nearest = range.first;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t leg = range.first; leg <= range.last; ++leg) {
+    const double distance = distance_mm(leg, nozzle);
+    if (distance < least) {
+      least = distance;
+      nearest = leg;
+    }
+  }
+  return nearest;
+}
+
+double SectionNodes::error_mm(std::size_t k, double x, Vector nozzle) const {
+  Range range = legs(k, x);
+  // Near a bound vertex the nozzle may be nearer to the leg behind it.
+  if (range.first > 0 && is_near_vertex(range.first, k, x)) {
+    --range.first;
+  }
+  if (range.last + 1 < legs_.size() && is_near_vertex(range.last + 1, k, x)) {
+    ++range.last;
+  }
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t leg = range.first; leg <= range.last; ++leg) {
+    least = std::min(least, distance_mm(leg, nozzle));
+  }
+  return least;
+}
+
+bool SectionNodes::is_near_vertex(std::size_t vertex, std::size_t k, double x) const {
+  const auto pin = std::ranges::lower_bound(pins_, vertex, {}, &Pin::vertex);
+  return pin != pins_.end() && pin->vertex == vertex &&
+         std::abs(u_of(*pin) - static_cast<double>(k) - x) <= kNearVertex;
+}
+
+double SectionNodes::tolerance_mm(std::size_t leg, std::size_t k, double x) const {
+  double tolerance = legs_[leg].tolerance_mm;
+  if (legs_[leg].lays_filament) {
+    return tolerance;
+  }
+  const double u = static_cast<double>(k) + x;
+  constexpr std::size_t kReach = 3;
+  for (std::size_t i = first_pin_[k > kReach ? k - kReach : 0];
+       i < pins_.size() && u_of(pins_[i]) <= u + kBesideTolerance; ++i) {
+    if (u_of(pins_[i]) >= u - kBesideTolerance) {
+      for (const std::size_t beside : {pins_[i].vertex - 1, pins_[i].vertex}) {
+        if (legs_[beside].lays_filament) {
+          tolerance = std::min(tolerance, legs_[beside].tolerance_mm);
+        }
+      }
+    }
+  }
+  return tolerance;
+}
+
+double SectionNodes::feed_mm_s(std::size_t leg, std::size_t k, double x) const {
+  double feed = legs_[leg].feed_mm_s;
+  if (legs_[leg].lays_filament) {
+    return feed;
+  }
+  const double u = static_cast<double>(k) + x;
+  for (std::size_t i = first_pin_[k > 0 ? k - 1 : 0];
+       i < pins_.size() && u_of(pins_[i]) <= u + kBesideFeed; ++i) {
+    if (u_of(pins_[i]) >= u - kBesideFeed) {
+      for (const std::size_t beside : {pins_[i].vertex - 1, pins_[i].vertex}) {
+        if (legs_[beside].lays_filament) {
+          feed = std::min(feed, legs_[beside].feed_mm_s);
+        }
+      }
+    }
+  }
+  return feed;
+}
+
+}  // namespace unflex::timing

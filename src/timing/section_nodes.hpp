@@ -1,0 +1,78 @@
+// Nodes along a section, and which part of its path belongs to which.
+//
+//   u   place among nodes, k + x: between node k and the next, 0 ≤ x ≤ 1
+//
+// A first plan passes the nodes evenly. Its vertices are bound to the u at which it passes them, so
+// that a motion which comes from it by small steps finds its way. Between such vertices a place on
+// the motion belongs to the leg that it is nearest to.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "sections.hpp"
+
+namespace unflex::timing {
+
+struct Vector {
+  double x = 0.0;
+  double y = 0.0;
+};
+
+[[nodiscard]] Vector start_of(const Leg& leg);
+[[nodiscard]] Vector direction_of(const Leg& leg);
+
+class SectionNodes {
+ public:
+  // node_s: time from node to node, nearly. The section must outlive this.
+  SectionNodes(const Section& section, double node_s);
+
+  // Node periods, one less than nodes.
+  [[nodiscard]] std::size_t periods() const { return periods_; }
+  [[nodiscard]] double period_s() const { return period_s_; }
+  // Where the first plan is at a node.
+  [[nodiscard]] Vector place(std::size_t node) const { return places_[node]; }
+
+  // A vertex that is bound.
+  struct Pin {
+    std::size_t vertex = 0;  // the leg that begins there
+    std::size_t k = 0;
+    double x = 0.0;
+  };
+  [[nodiscard]] std::span<const Pin> pins() const { return pins_; }
+
+  // The leg at u that the nozzle is nearest to.
+  [[nodiscard]] std::size_t nearest_leg(std::size_t k, double x, Vector nozzle) const;
+  // How far along a leg the nozzle is; its ends are the farthest.
+  [[nodiscard]] double along_mm(std::size_t leg, Vector nozzle) const;
+  // How far the nozzle is from the path around u.
+  [[nodiscard]] double error_mm(std::size_t k, double x, Vector nozzle) const;
+
+  // What the nozzle may do on a leg, at u. Beside filament travel keeps to what filament asks for,
+  // since lines do not end exactly where filament does.
+  [[nodiscard]] double tolerance_mm(std::size_t leg, std::size_t k, double x) const;
+  [[nodiscard]] double feed_mm_s(std::size_t leg, std::size_t k, double x) const;
+  // Whether a bound vertex at which the leg begins or ends is near. number: that of the leg that
+  // begins there.
+  [[nodiscard]] bool is_near_vertex(std::size_t vertex, std::size_t k, double x) const;
+
+ private:
+  struct Range {
+    std::size_t first = 0;
+    std::size_t last = 0;
+  };
+  // The legs between the bound vertices around u.
+  [[nodiscard]] Range legs(std::size_t k, double x) const;
+  [[nodiscard]] double distance_mm(std::size_t leg, Vector nozzle) const;
+  void bind(const std::vector<double>& begins);
+
+  std::span<const Leg> legs_;
+  std::size_t periods_ = 0;
+  double period_s_ = 0.0;
+  std::vector<Vector> places_;
+  std::vector<Pin> pins_;
+  std::vector<std::size_t> first_pin_;  // that comes after node k
+};
+
+}  // namespace unflex::timing

@@ -1,0 +1,66 @@
+// The path of a run as legs, and the sections of it that can be timed by themselves.
+//
+// Where the nozzle moves evenly at F for long, nothing is left to choose, and what comes before has
+// no say in what comes after. So a run is cut there, and where it rests.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "unflex/compensate/run.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/timing/timing.hpp"
+
+namespace unflex::timing {
+
+// A straight part of the path, in X and Y: one move, several that hardly differ from one, or a part
+// of them.
+struct Leg {
+  planner::PlannedMove move;  // in the timing of a first plan
+  double feed_mm_s = 0.0;     // F
+  double tolerance_mm = 0.0;
+  bool lays_filament = false;
+  double entry_mm_s = planner::kNoLimit;  // largest speed at its beginning
+  // How far along the path, in X and Y alone, it begins and ends.
+  double from_mm = 0.0;
+  double to_mm = 0.0;
+};
+
+// Legs between two calm places.
+struct Section {
+  std::vector<Leg> legs;
+  // Whether the nozzle moves evenly there; it rests otherwise.
+  bool starts_even = false;
+  bool ends_even = false;
+  // How the nozzle swings at the beginning, if it does, while the base rests.
+  std::optional<dynamics::NozzleMotionXY> nozzle;
+};
+
+// What comes after a section: even motion or rest, for some time.
+struct Pause {
+  double duration_s = 0.0;
+  double x_mm_s = 0.0;
+  double y_mm_s = 0.0;
+};
+
+struct SectionedPart {
+  Section section;  // without legs where a run begins with a pause
+  Pause pause;
+};
+
+// Whether the move has no length in X and Y. The base rests meanwhile.
+[[nodiscard]] bool is_upright(const planner::PlannedMove& move);
+
+// An upright move within its bounds.
+[[nodiscard]] planner::PlannedMove from_rest_to_rest(const planner::PlannedMove& move,
+                                                     const MoveBounds& bounds);
+
+// The path in sections. settling_s: how long before and after it even motion is settled. nullopt:
+// there are limits of acceleration along the path, which sections do not know.
+[[nodiscard]] std::optional<std::vector<SectionedPart>> sections(
+    std::span<const planner::PlannedMove> path, std::span<const MoveBounds> bounds,
+    const compensate::Setup& setup, double settling_s);
+
+}  // namespace unflex::timing
