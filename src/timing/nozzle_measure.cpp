@@ -186,7 +186,9 @@ class Walk {
             std::min(tolerance_mm, kBeside * times_tolerance * nodes[beside].tolerance_mm);
       }
       result.error[k] = std::max(result.error[k], nodes[k].error_mm / tolerance_mm);
-      result.speed[k] = std::max(result.speed[k], nodes[k].speed_mm_s / nodes[k].feed_mm_s);
+      if (times_tolerance == 1.0) {
+        result.speed[k] = std::max(result.speed[k], nodes[k].speed_mm_s / nodes[k].feed_mm_s);
+      }
     }
   }
 

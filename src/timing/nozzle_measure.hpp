@@ -41,7 +41,9 @@ struct NozzleMeasure {
   std::vector<std::vector<double>> of_pieces;
   // The largest values of all models around each node.
   std::vector<double> error;  // e relative to the tolerance and its allowance
-  std::vector<double> speed;  // the nozzle's speed relative to F, where it lays filament
+  // The nozzle's speed relative to F, where it lays filament; at the edges of a band it may be
+  // more.
+  std::vector<double> speed;
   // For each model, how far the nozzle swings in the end, relative to what it may: half the
   // tolerance for the first one, since the next run begins with that swing, and all of it for the
   // others.

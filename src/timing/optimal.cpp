@@ -17,6 +17,8 @@ using gcode::Y;
 
 // How long before and after it even motion is settled, in 1/ω.
 constexpr double kSettling = 9.0;
+// A first plan that is too quick may lead nowhere, so a slower one comes after it.
+constexpr double kAccelShares[] = {0.5, 0.15};
 // What counts as kept.
 constexpr double kKept = 1.05;
 constexpr double kKeptFeed = 1.025;
@@ -33,17 +35,32 @@ std::optional<SectionRules> rules_of(const compensate::Setup& setup) {
   rules.limits_y = setup.y.limits;
   rules.x = setup.x.axis.main();
   rules.y = setup.y.axis.main();
-  for (const compensate::AxisSetup* const axis : {&setup.x, &setup.y}) {
-    for (const compensate::Plant& plant : axis->plants) {
-      if (plant.share < kLeastShare) {
-        continue;
+  const auto edges_of = [](const compensate::AxisSetup& axis) {
+    std::vector<dynamics::FlexibleAxis> edges;
+    for (const compensate::Plant& plant : axis.plants) {
+      if (plant.share >= kLeastShare && plant.is_edge) {
+        edges.push_back(plant.axis);
       }
-      if (!plant.is_edge || plant.axis.mode_count() != 1) {
-        return std::nullopt;
-      }
-      const double off = std::abs(plant.axis.main_rad_s() / axis->axis.main_rad_s() - 1.0);
-      rules.band = std::max(rules.band, off);
     }
+    return edges;
+  };
+  const auto knows = [](const compensate::AxisSetup& axis) {
+    return std::ranges::all_of(axis.plants, [](const compensate::Plant& plant) {
+      return plant.share < kLeastShare || (plant.is_edge && plant.axis.mode_count() == 1);
+    });
+  };
+  if (!knows(setup.x) || !knows(setup.y)) {
+    return std::nullopt;
+  }
+  const std::vector<dynamics::FlexibleAxis> x = edges_of(setup.x);
+  const std::vector<dynamics::FlexibleAxis> y = edges_of(setup.y);
+  // Paired as in models_of().
+  for (std::size_t i = 0; i < std::max(x.size(), y.size()); ++i) {
+    SectionEdge& edge = rules.edges.emplace_back();
+    edge.x = i < x.size() ? x[i] : setup.x.axis;
+    edge.y = i < y.size() ? y[i] : setup.y.axis;
+    edge.off_x = edge.x.main_rad_s() / rules.x.omega_rad_s - 1.0;
+    edge.off_y = edge.y.main_rad_s() / rules.y.omega_rad_s - 1.0;
   }
   rules.times_tolerance = kTimesAtEdge;
   return rules;
@@ -148,20 +165,37 @@ struct Motion {
   std::vector<Progress> progress;
 };
 
+// The nozzles at the edges after a pause, in which they swing on.
+std::vector<dynamics::NozzleXY> after(const Pause& pause, const SectionMotion& motion,
+                                      const SectionRules& rules) {
+  std::vector<dynamics::NozzleXY> nozzles = motion.edge_nozzles();
+  const SectionMotion::Base base = motion.base(motion.duration_s());
+  const dynamics::BaseSegment x{base.x.position_mm, pause.x_mm_s};
+  const dynamics::BaseSegment y{base.y.position_mm, pause.y_mm_s};
+  for (std::size_t i = 0; i < nozzles.size(); ++i) {
+    const SectionEdge& edge = rules.edges[i];
+    nozzles[i].x = dynamics::exact_step(edge.x, nozzles[i].x, x, pause.duration_s);
+    nozzles[i].y = dynamics::exact_step(edge.y, nozzles[i].y, y, pause.duration_s);
+  }
+  return nozzles;
+}
+
 // nullopt: for one of the sections nothing was found.
-std::optional<Motion> fastest(const std::vector<SectionedPart>& sectioned,
-                              const SectionRules& rules) {
+std::optional<Motion> fastest(std::vector<SectionedPart>& sectioned, const SectionRules& rules) {
   Motion result;
   double time_s = 0.0;
-  for (const SectionedPart& part : sectioned) {
+  std::vector<dynamics::NozzleXY> edge_nozzles;
+  for (SectionedPart& part : sectioned) {
     TimedPart& own = result.parts.emplace_back(TimedPart{time_s, nullptr, &part.pause});
     if (!part.section.legs.empty()) {
+      part.section.edge_nozzles = std::move(edge_nozzles);
       own.motion = fastest_motion(part.section, rules);
       if (!own.motion) {
         return std::nullopt;
       }
       const std::vector<Progress> progress = progress_of(part.section, *own.motion, time_s);
       result.progress.insert(result.progress.end(), progress.begin(), progress.end());
+      edge_nozzles = after(part.pause, *own.motion, rules);
     }
     time_s = own.pause_begin_s() + part.pause.duration_s;
   }
@@ -200,21 +234,14 @@ bool is_kept(const Timed& timed, std::span<const MoveBounds> bounds, const compe
          std::ranges::max(measured.speed) <= kKeptFeed && std::ranges::max(measured.left) <= kKept;
 }
 
-}  // namespace
-
-tl::expected<Timed, std::string> optimal(const compensate::Course& course,
-                                         const compensate::Setup& setup,
-                                         const dynamics::NozzleXY& nozzle,
-                                         std::span<const MoveBounds> bounds) {
-  const std::optional<SectionRules> rules = rules_of(setup);
-  if (!rules) {
-    return tl::unexpected<std::string>("the axes have several modes or plants");
-  }
-  if (!course.before.empty() || !course.after.empty()) {
-    return tl::unexpected<std::string>("it is a part of a long motion");
-  }
-  const double slowest_rad_s = std::min(rules->x.omega_rad_s, rules->y.omega_rad_s);
-  auto parts = sections(course.moves, bounds, setup, kSettling / slowest_rad_s);
+// The search begins with a plan of so much of the base's acceleration.
+tl::expected<Timed, std::string> optimal_from(double accel_share, const compensate::Course& course,
+                                              const compensate::Setup& setup,
+                                              const SectionRules& rules,
+                                              const dynamics::NozzleXY& nozzle,
+                                              std::span<const MoveBounds> bounds) {
+  const double slowest_rad_s = std::min(rules.x.omega_rad_s, rules.y.omega_rad_s);
+  auto parts = sections(course.moves, bounds, setup, kSettling / slowest_rad_s, accel_share);
   if (!parts) {
     return tl::unexpected<std::string>("accelerations along the path are limited");
   }
@@ -223,7 +250,7 @@ tl::expected<Timed, std::string> optimal(const compensate::Course& course,
       !first.legs.empty() && !is_at_rest(nozzle, start_mm, setup)) {
     first.nozzle = nozzle.motion();
   }
-  const std::optional<Motion> motion = fastest(*parts, *rules);
+  const std::optional<Motion> motion = fastest(*parts, rules);
   if (!motion) {
     return tl::unexpected<std::string>("no motion was found that keeps the limits");
   }
@@ -237,6 +264,31 @@ tl::expected<Timed, std::string> optimal(const compensate::Course& course,
   }
   join_even(result.moves, result.pieces);
   return result;
+}
+
+}  // namespace
+
+tl::expected<Timed, std::string> optimal(const compensate::Course& course,
+                                         const compensate::Setup& setup,
+                                         const dynamics::NozzleXY& nozzle,
+                                         std::span<const MoveBounds> bounds) {
+  const std::optional<SectionRules> rules = rules_of(setup);
+  if (!rules) {
+    return tl::unexpected<std::string>("the axes have several modes or plants");
+  }
+  if (!course.before.empty() || !course.after.empty()) {
+    return tl::unexpected<std::string>("it is a part of a long motion");
+  }
+  std::string reason;
+  for (const double accel_share : kAccelShares) {
+    tl::expected<Timed, std::string> found =
+        optimal_from(accel_share, course, setup, *rules, nozzle, bounds);
+    if (found) {
+      return found;
+    }
+    reason = std::move(found.error());
+  }
+  return tl::unexpected(reason);
 }
 
 }  // namespace unflex::timing

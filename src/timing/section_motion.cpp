@@ -23,6 +23,7 @@
 #include <optional>
 #include <span>
 
+#include "edge_nozzles.hpp"
 #include "elastic_program.hpp"
 #include "section_nodes.hpp"
 #include "section_spline.hpp"
@@ -82,6 +83,8 @@ constexpr Excess kAim{0.985, 1.0, 1.0};
 constexpr Excess kKept{1.025, 1.03, 1.015};
 constexpr Excess kTightenAbove{1.01, 1.0, 1.013};
 constexpr Excess kTightest{0.8, 0.6, 0.95};
+// The base keeps so far away from the limits of its place.
+constexpr double kRoom_mm = 3e-3;
 // A round that gains less is the last.
 constexpr double kGain = 3e-4;
 
@@ -101,6 +104,7 @@ class Program {
         rules_(rules),
         nodes_(section, kNodePeriod / std::max(rules.x.omega_rad_s, rules.y.omega_rad_s)),
         spline_(section, rules, nodes_),
+        edges_(section, rules),
         trust_(nodes_.periods() + 1, D == 5 ? kFirstTrust : kFirstTrustOfBand),
         factors_(nodes_.periods(), kAim) {
     for (const SectionNodes::Pin& pin : nodes_.pins()) {
@@ -141,11 +145,15 @@ class Program {
       return false;
     }
     spline_.points() = std::move(best);
+    edges_.follow(spline_);
     return true;
   }
 
   [[nodiscard]] const Spline& spline() const { return spline_; }
   [[nodiscard]] const SectionNodes& nodes() const { return nodes_; }
+  [[nodiscard]] const std::vector<dynamics::NozzleXY>& edge_nozzles() const {
+    return edges_.ends();
+  }
 
  private:
   // In node periods.
@@ -287,7 +295,7 @@ class Program {
   void add_reach(const At& at) {
     constexpr double kNear_mm = 1.0;
     constexpr double kScale_mm = 0.05;
-    constexpr double kRoom_mm = 2e-3;
+    constexpr double kTimesForReach = 3.0;
     const Vector base = Spline::apply(spline_.x().base, spline_.y().base, at.place);
     Gradient g;
     const auto add = [&](Vector n, const compensate::BaseLimits& limits, double base_mm) {
@@ -297,7 +305,7 @@ class Program {
         static_cast<void>(spline_.linearise(at.place, *at.shares, n, spline_.x().base,
                                             spline_.y().base, 1.0 / kScale_mm, g));
         program_.add_row(Spline::kPerPoint * at.k, g, 0.0, (kRoom_mm - below_mm) / kScale_mm,
-                         (above_mm - kRoom_mm) / kScale_mm, kPrice);
+                         (above_mm - kRoom_mm) / kScale_mm, kTimesForReach * kPrice);
       }
     };
     add({1.0, 0.0}, rules_.limits_x, spline_.origin().x + base.x);
@@ -310,28 +318,28 @@ class Program {
                  double lower = -1.0) {
     const Vector origin = spline_.origin();
     const double offset = n.x * (place.x - origin.x) + n.y * (place.y - origin.y);
-    Gradient g;
-    for (const double times : {0.0, -1.0, 1.0}) {
-      if (D == 5 && times != 0.0) {
-        break;
-      }
-      Values of_x = spline_.x().nozzle;
-      Values of_y = spline_.y().nozzle;
-      for (int i = 0; i < D; ++i) {
-        of_x[i] += times * rules_.band * spline_.x().sensitivity[i];
-        of_y[i] += times * rules_.band * spline_.y().sensitivity[i];
-      }
-      const double scale = 1.0 / (tolerance_mm * (times == 0.0 ? 1.0 : rules_.times_tolerance));
-      const double v =
-          spline_.linearise(at.place, *at.shares, n, of_x, of_y, scale, g) - scale * offset;
+    const auto add = [&](const Values& of_x, const Values& of_y, double allowed_mm, Vector left) {
+      const double scale = 1.0 / allowed_mm;
+      Gradient g;
+      const double v = spline_.linearise(at.place, *at.shares, n, of_x, of_y, scale, g) +
+                       scale * (n.x * left.x + n.y * left.y - offset);
       if (has_square) {
         add_square(at, g, v, is_plain_ ? 1.0 : kOfError);
       }
       add_row(at, g, v, lower);
-      if (times == 0.0) {
-        watch(at, false, n, scale, scale * offset);
-      }
+      return scale;
+    };
+    const double scale = add(spline_.x().nozzle, spline_.y().nozzle, tolerance_mm, {});
+    watch(at, false, n, scale, scale * offset);
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      add(edges_.nozzle_x(i, spline_), edges_.nozzle_y(i, spline_), at_edge_mm(tolerance_mm),
+          edges_.left(i, at.k, at.x));
     }
+  }
+
+  // How far the nozzles at the edges may stray.
+  [[nodiscard]] double at_edge_mm(double tolerance_mm) const {
+    return std::min(rules_.times_tolerance * tolerance_mm, kTravelTolerance_mm);
   }
 
   [[nodiscard]] double tolerance_mm(const At& at, std::size_t leg) const {
@@ -457,6 +465,7 @@ class Program {
       points[i] += (*step)[i];
     }
     compare();
+    edges_.follow(spline_);
     return true;
   }
 
@@ -495,13 +504,14 @@ class Program {
     const Vector p = spline_.nozzle_mm(at.place);
     const double tolerance = nodes_.tolerance_mm(at.leg, at.k, at.x);
     double e = nodes_.error_mm(at.k, at.x, p) / tolerance;
-    if (D == 7) {
-      const Vector off = Spline::apply(spline_.x().sensitivity, spline_.y().sensitivity, at.place);
-      for (const double band : {-rules_.band, rules_.band}) {
-        const double at_edge =
-            nodes_.error_mm(at.k, at.x, {p.x + band * off.x, p.y + band * off.y});
-        e = std::max(e, at_edge / (rules_.times_tolerance * tolerance));
-      }
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      const Vector of_edge =
+          Spline::apply(edges_.nozzle_x(i, spline_), edges_.nozzle_y(i, spline_), at.place);
+      const Vector left = edges_.left(i, at.k, at.x);
+      const Vector origin = spline_.origin();
+      const double at_edge = nodes_.error_mm(
+          at.k, at.x, {origin.x + of_edge.x + left.x, origin.y + of_edge.y + left.y});
+      e = std::max(e, at_edge / at_edge_mm(tolerance));
     }
     return e;
   }
@@ -540,6 +550,7 @@ class Program {
   SectionRules rules_;
   SectionNodes nodes_;
   Spline spline_;
+  EdgeNozzles<D> edges_;
   Shares at_node_ = spline_shares<D>(0.0);
   Shares at_middle_ = spline_shares<D>(0.5);
   Shares at_end_ = spline_shares<D>(1.0);
@@ -558,8 +569,8 @@ class Program {
 template <int D>
 class SplineMotion : public SectionMotion {
  public:
-  SplineMotion(const SectionSpline<D>& spline, const SectionNodes& nodes)
-      : spline_(spline), nodes_(nodes) {
+  explicit SplineMotion(const Program<D>& program)
+      : spline_(program.spline()), nodes_(program.nodes()), edge_nozzles_(program.edge_nozzles()) {
     for (std::size_t k = 0; k < spline_.periods(); ++k) {
       times_.push_back(clock(k, 0.0));
     }
@@ -589,6 +600,10 @@ class SplineMotion : public SectionMotion {
             {spline_.origin().y + place.y, speed.y / h}};
   }
 
+  [[nodiscard]] std::vector<dynamics::NozzleXY> edge_nozzles() const override {
+    return edge_nozzles_;
+  }
+
   [[nodiscard]] std::vector<Passage> passages() const override {
     std::vector<Passage> result;
     const auto add = [&](std::size_t k, double x) {
@@ -612,20 +627,20 @@ class SplineMotion : public SectionMotion {
 
   SectionSpline<D> spline_;
   SectionNodes nodes_;
+  std::vector<dynamics::NozzleXY> edge_nozzles_;
   std::vector<double> times_;  // T at the nodes
 };
 
 template <int D>
 std::unique_ptr<SectionMotion> motion(const Section& section, const SectionRules& rules) {
   Program<D> program(section, rules);
-  return program.solve() ? std::make_unique<SplineMotion<D>>(program.spline(), program.nodes())
-                         : nullptr;
+  return program.solve() ? std::make_unique<SplineMotion<D>>(program) : nullptr;
 }
 
 }  // namespace
 
 std::unique_ptr<SectionMotion> fastest_motion(const Section& section, const SectionRules& rules) {
-  return rules.band > 0.0 ? motion<7>(section, rules) : motion<5>(section, rules);
+  return !rules.edges.empty() ? motion<7>(section, rules) : motion<5>(section, rules);
 }
 
 }  // namespace unflex::timing

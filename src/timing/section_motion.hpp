@@ -10,6 +10,14 @@
 
 namespace unflex::timing {
 
+// Axes that the machine may have instead, whose frequencies are a little different.
+struct SectionEdge {
+  dynamics::FlexibleAxis x;
+  dynamics::FlexibleAxis y;
+  double off_x = 0.0;  // ω relative to that of the axis as given, less 1
+  double off_y = 0.0;
+};
+
 // What the motion is to keep.
 struct SectionRules {
   dynamics::Mode x;
@@ -17,9 +25,8 @@ struct SectionRules {
   // Where the base may be.
   compensate::BaseLimits limits_x;
   compensate::BaseLimits limits_y;
-  // The nozzle of an axis whose frequency is off by so much may stray so many tolerances. 0: the
-  // axes are known exactly.
-  double band = 0.0;
+  // Their nozzles may stray so many tolerances, but no more than travel.
+  std::vector<SectionEdge> edges;
   double times_tolerance = 2.0;
   double max_accel_mm_s2 = 0.0;  // of the base, per axis
   bool shares_motors = false;    // of |ẍ ± ÿ| instead
@@ -50,6 +57,8 @@ class SectionMotion {
     OfAxis y;
   };
   [[nodiscard]] virtual Base base(double t) const = 0;
+  // The nozzles of SectionRules::edges at the end.
+  [[nodiscard]] virtual std::vector<dynamics::NozzleXY> edge_nozzles() const = 0;
   // In the order of time, from the first leg's beginning to the last one's end.
   [[nodiscard]] virtual std::vector<Passage> passages() const = 0;
 };

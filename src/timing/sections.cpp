@@ -95,9 +95,9 @@ std::vector<Leg> joined(const std::vector<Leg>& legs) {
   return result;
 }
 
-// A first plan: half the acceleration that the base has, and corners on circles.
-void plan(std::vector<Leg>& legs, const compensate::Setup& setup) {
-  const double accel_mm_s2 = 0.5 * setup.x.limits.max_accel_mm_s2;
+// A first plan, with corners on circles.
+void plan(std::vector<Leg>& legs, const compensate::Setup& setup, double accel_share) {
+  const double accel_mm_s2 = accel_share * setup.x.limits.max_accel_mm_s2;
   std::vector<planner::PlannedMove> path;
   std::vector<MoveBounds> bounds;
   std::vector<double> vertex_mm_s = {0.0};
@@ -178,7 +178,7 @@ planner::PlannedMove from_rest_to_rest(const planner::PlannedMove& move, const M
 std::optional<std::vector<SectionedPart>> sections(std::span<const planner::PlannedMove> path,
                                                    std::span<const MoveBounds> bounds,
                                                    const compensate::Setup& setup,
-                                                   double settling_s) {
+                                                   double settling_s, double accel_share) {
   // What limits acceleration along the path more than the base does.
   constexpr double kTimesBase = 2.0;
   std::vector<SectionedPart> parts;
@@ -187,7 +187,7 @@ std::optional<std::vector<SectionedPart>> sections(std::span<const planner::Plan
   const auto rest = [&](double duration_s) {
     if (!legs.empty()) {
       legs = joined(legs);
-      plan(legs, setup);
+      plan(legs, setup, accel_share);
       cut(legs, settling_s, parts);
       legs.clear();
     } else if (parts.empty()) {

@@ -36,6 +36,9 @@ struct Section {
   bool ends_even = false;
   // How the nozzle swings at the beginning, if it does, while the base rests.
   std::optional<dynamics::NozzleMotionXY> nozzle;
+  // The nozzles of SectionRules::edges at the beginning. Empty: they are where they would be
+  // without an earlier motion.
+  std::vector<dynamics::NozzleXY> edge_nozzles;
 };
 
 // What comes after a section: even motion or rest, for some time.
@@ -57,10 +60,11 @@ struct SectionedPart {
 [[nodiscard]] planner::PlannedMove from_rest_to_rest(const planner::PlannedMove& move,
                                                      const MoveBounds& bounds);
 
-// The path in sections. settling_s: how long before and after it even motion is settled. nullopt:
-// there are limits of acceleration along the path, which sections do not know.
+// The path in sections. settling_s: how long before and after it even motion is settled.
+// accel_share: how much of the base's acceleration the first plan has. nullopt: there are limits of
+// acceleration along the path, which sections do not know.
 [[nodiscard]] std::optional<std::vector<SectionedPart>> sections(
     std::span<const planner::PlannedMove> path, std::span<const MoveBounds> bounds,
-    const compensate::Setup& setup, double settling_s);
+    const compensate::Setup& setup, double settling_s, double accel_share);
 
 }  // namespace unflex::timing

@@ -457,7 +457,7 @@ Section section_of(const std::vector<Point>& points) {
   // No leg goes evenly for so long that the path would be cut.
   constexpr double kSettling = 9.0;
   auto parts = sections(moves, bounds, compensate::testing::setup_for(axis(), kAccel_mm_s2),
-                        kSettling / omega_rad_s());
+                        kSettling / omega_rad_s(), 0.5);
   if (!parts || parts->size() != 1 || parts->front().section.legs.size() + 1 != points.size()) {
     ADD_FAILURE() << "the path is not one section of its legs";
     return {};
