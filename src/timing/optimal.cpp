@@ -137,25 +137,29 @@ SectionMotion::Base base_at(const std::vector<TimedPart>& parts, const gcode::Po
   return {even(from.x, part.pause->x_mm_s, since_s), even(from.y, part.pause->y_mm_s, since_s)};
 }
 
-// The smoothest motion through these places, at rest at both ends: b̈ is linear between nodes. By
-// the cubic spline's equations b̈_{k−1} + 4 b̈_k + b̈_{k+1} = 6 (b_{k−1} − 2 b_k + b_{k+1})/h².
+// The smoothest motion through these places that has no speed at both ends: b̈ is linear between
+// nodes. By the clamped cubic spline's equations b̈_{k−1} + 4 b̈_k + b̈_{k+1} = 6 (b_{k−1} − 2 b_k +
+// b_{k+1})/h², and 2 b̈_0 + b̈_1 = 6 (b_1 − b_0)/h², likewise at the end.
 dynamics::AxisTrajectory through(std::vector<double> places_mm, double h) {
-  const std::size_t count = places_mm.size();
-  std::vector<double> accel(count, 0.0);
-  std::vector<double> share(count, 0.0);
-  for (std::size_t k = 1; k + 1 < count; ++k) {
-    const double bend = 6.0 * (places_mm[k - 1] - 2.0 * places_mm[k] + places_mm[k + 1]) / (h * h);
-    share[k] = 1.0 / (4.0 - share[k - 1]);
+  const std::size_t last = places_mm.size() - 1;
+  const auto chord = [&](std::size_t k) { return (places_mm[k + 1] - places_mm[k]) / h; };
+  std::vector<double> accel(last + 1, 0.0);
+  std::vector<double> share(last + 1, 0.0);
+  share[0] = 0.5;
+  accel[0] = 3.0 * chord(0) / h;
+  for (std::size_t k = 1; k <= last; ++k) {
+    const double own = k < last ? 4.0 : 2.0;
+    const double bend = 6.0 / h * ((k < last ? chord(k) : 0.0) - chord(k - 1));
+    share[k] = 1.0 / (own - share[k - 1]);
     accel[k] = share[k] * (bend - accel[k - 1]);
   }
-  for (std::size_t k = count - 1; k-- > 1;) {
+  for (std::size_t k = last; k-- > 0;) {
     accel[k] -= share[k] * accel[k + 1];
   }
-  std::vector<double> velocity(count, 0.0);
-  for (std::size_t k = 0; k + 1 < count; ++k) {
-    velocity[k] = (places_mm[k + 1] - places_mm[k]) / h - h * (2.0 * accel[k] + accel[k + 1]) / 6.0;
+  std::vector<double> velocity(last + 1, 0.0);
+  for (std::size_t k = 0; k < last; ++k) {
+    velocity[k] = chord(k) - h * (2.0 * accel[k] + accel[k + 1]) / 6.0;
   }
-  velocity.back() = 0.0;
   return {std::move(places_mm), std::move(velocity), std::move(accel)};
 }
 

@@ -16,6 +16,7 @@
 // evenly spread.
 #include "section_motion.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -110,6 +111,7 @@ class Program {
     for (const SectionNodes::Pin& pin : nodes_.pins()) {
       pin_shares_.push_back(spline_shares<D>(pin.x));
     }
+    set_jump();
   }
 
   // False: nothing was found that keeps the rules.
@@ -161,6 +163,62 @@ class Program {
     return spline_.clock(nodes_.periods() - 1, at_end_) - spline_.clock(0, at_node_);
   }
 
+  // Where the base rests at an end, b̈ may jump there, and nothing below it. So the D control points
+  // of that end have one freedom per axis, in these shares.
+  void set_jump() {
+    using Square = Eigen::Matrix<double, D, D>;
+    using Column = Eigen::Matrix<double, D, 1>;
+    Square spline;
+    for (int i = 0; i < D; ++i) {
+      for (int j = 0; j < D; ++j) {
+        spline(i, j) = at_node_[i][j];
+      }
+    }
+    const Column shares = spline.fullPivLu().solve(Column::Unit(D - 1));
+    for (int j = 0; j < D; ++j) {
+      jump_[j] = shares[j];
+    }
+  }
+  [[nodiscard]] bool jumps_at_start() const { return !section_.starts_even && !section_.nozzle; }
+  [[nodiscard]] bool jumps_at_end() const { return !section_.ends_even; }
+
+  // The last point of the beginning, and the first one of the end, stand for the others there.
+  Gradient folded(std::size_t k, const Gradient& g) const {
+    Gradient result = g;
+    const auto fold = [&](std::size_t point, std::size_t onto, double share) {
+      for (const int axis : {0, 1}) {
+        double& own = result[static_cast<long>(Spline::kPerPoint * (point - k)) + axis];
+        result[static_cast<long>(Spline::kPerPoint * (onto - k)) + axis] += share * own;
+        own = 0.0;
+      }
+    };
+    for (std::size_t j = k; jumps_at_start() && j + 1 < D; ++j) {
+      fold(j, D - 1, jump_[j] / jump_[D - 1]);
+    }
+    for (std::size_t j = 1; jumps_at_end() && nodes_.periods() + j <= k + D; ++j) {
+      fold(nodes_.periods() + j, nodes_.periods(), jump_[j] / jump_[0]);
+    }
+    return result;
+  }
+
+  // Takes the step of the control points.
+  void take(std::span<const double> step) {
+    std::vector<double>& points = spline_.points();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      points[i] += step[i];
+    }
+    const std::size_t end = Spline::kPerPoint * nodes_.periods();
+    for (const int axis : {0, 1}) {
+      for (int j = 0; jumps_at_start() && j + 1 < D; ++j) {
+        points[Spline::kPerPoint * j + axis] +=
+            jump_[j] / jump_[D - 1] * step[Spline::kPerPoint * (D - 1) + axis];
+      }
+      for (int j = 1; jumps_at_end() && j < D; ++j) {
+        points[end + Spline::kPerPoint * j + axis] += jump_[j] / jump_[0] * step[end + axis];
+      }
+    }
+  }
+
   // A row, so that it can be seen how well the program has foreseen it.
   struct Foreseen {
     std::size_t row = 0;
@@ -203,12 +261,12 @@ class Program {
 
   void add_row(const At& at, const Gradient& g, double v, double lower) {
     if (!is_plain_) {
-      program_.add_row(Spline::kPerPoint * at.k, g, v, lower, 1.0, kPrice);
+      program_.add_row(Spline::kPerPoint * at.k, folded(at.k, g), v, lower, 1.0, kPrice);
     }
   }
 
   void add_square(const At& at, const Gradient& g, double v, double weight) {
-    program_.add_square(Spline::kPerPoint * at.k, g, v, 2.0 * weight);
+    program_.add_square(Spline::kPerPoint * at.k, folded(at.k, g), v, 2.0 * weight);
   }
 
   void watch(const At& at, bool is_base, Vector n, double scale, double offset) {
@@ -224,8 +282,12 @@ class Program {
     };
     for (int j = 0; j < D; ++j) {
       for (const int axis : {0, 1}) {
-        fix(j, axis);
-        fix(periods + j, axis);
+        if (j + 1 < D || !jumps_at_start()) {
+          fix(j, axis);
+        }
+        if (j > 0 || !jumps_at_end()) {
+          fix(periods + j, axis);
+        }
       }
     }
     const std::size_t fixed_times =
@@ -304,8 +366,9 @@ class Program {
       if (!is_plain_ && std::min(below_mm, above_mm) < kNear_mm) {
         static_cast<void>(spline_.linearise(at.place, *at.shares, n, spline_.x().base,
                                             spline_.y().base, 1.0 / kScale_mm, g));
-        program_.add_row(Spline::kPerPoint * at.k, g, 0.0, (kRoom_mm - below_mm) / kScale_mm,
-                         (above_mm - kRoom_mm) / kScale_mm, kTimesForReach * kPrice);
+        program_.add_row(Spline::kPerPoint * at.k, folded(at.k, g), 0.0,
+                         (kRoom_mm - below_mm) / kScale_mm, (above_mm - kRoom_mm) / kScale_mm,
+                         kTimesForReach * kPrice);
       }
     };
     add({1.0, 0.0}, rules_.limits_x, spline_.origin().x + base.x);
@@ -427,8 +490,7 @@ class Program {
   // One program: least squares in the timing as it is, or the next step of all.
   [[nodiscard]] bool step(bool is_plain) {
     is_plain_ = is_plain;
-    std::vector<double>& points = spline_.points();
-    program_.reset(points.size());
+    program_.reset(spline_.points().size());
     foreseen_.clear();
     fix_ends();
     const std::size_t periods = nodes_.periods();
@@ -451,6 +513,7 @@ class Program {
     if (!is_plain) {
       add_clock(periods - 1, at_end_, trust_[periods]);
     }
+    add_accel(at(periods - 1, 1.0, at_end_), true);
     for (int i = 0; i <= D; ++i) {
       program_.add_linear(Spline::kPerPoint * i + 2, -at_node_[0][i]);
       program_.add_linear(Spline::kPerPoint * (periods - 1 + i) + 2, at_end_[0][i]);
@@ -461,9 +524,7 @@ class Program {
     if (!step) {
       return false;
     }
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      points[i] += (*step)[i];
-    }
+    take(*step);
     compare();
     edges_.follow(spline_);
     return true;
@@ -472,9 +533,9 @@ class Program {
   // Looks also between the places that rows are for. Returns the largest values.
   Excess measure() {
     constexpr int kLooks = 4;
-    static const std::array<Shares, kLooks> kShares = [] {
-      std::array<Shares, kLooks> shares{};
-      for (int i = 0; i < kLooks; ++i) {
+    static const std::array<Shares, kLooks + 1> kShares = [] {
+      std::array<Shares, kLooks + 1> shares{};
+      for (int i = 0; i <= kLooks; ++i) {
         shares[i] = spline_shares<D>(static_cast<double>(i) / kLooks);
       }
       return shares;
@@ -483,7 +544,7 @@ class Program {
     excess_.assign(nodes_.periods(), {});
     const double h = nodes_.period_s();
     for (std::size_t k = 0; k < nodes_.periods(); ++k) {
-      for (int look = 0; look < kLooks; ++look) {
+      for (int look = 0; look < kLooks + (k + 1 == nodes_.periods() ? 1 : 0); ++look) {
         const At here = at(k, static_cast<double>(look) / kLooks, kShares[look]);
         const Vector accel =
             Spline::apply(spline_.x().base_accel, spline_.y().base_accel, here.place);
@@ -554,6 +615,7 @@ class Program {
   Shares at_node_ = spline_shares<D>(0.0);
   Shares at_middle_ = spline_shares<D>(0.5);
   Shares at_end_ = spline_shares<D>(1.0);
+  Values jump_{};
   std::vector<Shares> pin_shares_;
 
   std::vector<double> trust_;     // at the nodes
