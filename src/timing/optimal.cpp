@@ -157,7 +157,7 @@ dynamics::AxisTrajectory through(std::vector<double> places_mm, double h) {
     accel[k] -= share[k] * accel[k + 1];
   }
   std::vector<double> velocity(last + 1, 0.0);
-  for (std::size_t k = 0; k < last; ++k) {
+  for (std::size_t k = 1; k < last; ++k) {
     velocity[k] = chord(k) - h * (2.0 * accel[k] + accel[k + 1]) / 6.0;
   }
   return {std::move(places_mm), std::move(velocity), std::move(accel)};
@@ -257,6 +257,9 @@ tl::expected<Timed, std::string> optimal_from(double accel_share, const compensa
   const std::optional<Motion> motion = fastest(*parts, rules);
   if (!motion) {
     return tl::unexpected<std::string>("no motion was found that keeps the limits");
+  }
+  if (motion->progress.empty()) {
+    return tl::unexpected<std::string>("nothing moves in X or Y");
   }
   Timed result = timed_moves(course.moves, bounds, motion->progress);
   compensate::Course retimed = course;

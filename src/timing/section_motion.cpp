@@ -479,11 +479,19 @@ class Program {
     const double of_after = tolerance_mm(at, pin.vertex);
     add_strip(at, {-a.y, a.x}, corner, of_before, true);
     add_strip(at, {-b.y, b.x}, corner, of_after, true);
-    Vector through{a.x + b.x, a.y + b.y};
+    // Where the path goes straight on or turns back, both strips are almost one. A third one
+    // crosses them, which is wide where a turn is sharp, since the nozzle cuts that short by more.
+    // Where all of a leg is gone back, its end counts as any place on it.
+    constexpr double kTimesBack = 3.0;
+    constexpr double kAllBack = 1e-6;
+    const bool turns_back = a.x * b.x + a.y * b.y < 0.0;
+    const double times =
+        turns_back && std::hypot(a.x + b.x, a.y + b.y) > kAllBack ? kTimesBack : 1.0;
+    const double side = turns_back ? -1.0 : 1.0;
+    Vector through{a.x + side * b.x, a.y + side * b.y};
     const double length = std::hypot(through.x, through.y);
-    constexpr double kTurnsBack = 1e-6;
-    through = length > kTurnsBack ? Vector{through.x / length, through.y / length} : a;
-    add_strip(at, through, corner, std::min(of_before, of_after), false);
+    through = {through.x / length, through.y / length};
+    add_strip(at, through, corner, times * std::min(of_before, of_after), false);
     add_feed(at, std::min({before.feed_mm_s, after.feed_mm_s, after.entry_mm_s}));
   }
 

@@ -60,7 +60,7 @@ void SectionNodes::bind(const std::vector<double>& begins) {
     const Vector b = direction_of(legs_[i]);
     turned_rad += std::abs(std::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y));
     const bool is_border = legs_[i - 1].lays_filament != legs_[i].lays_filament ||
-                           legs_[i - 1].feed_mm_s != legs_[i].feed_mm_s ||
+                           !have_same_feed(legs_[i - 1], legs_[i]) ||
                            legs_[i - 1].tolerance_mm != legs_[i].tolerance_mm ||
                            std::isfinite(legs_[i].entry_mm_s);
     if (is_border || turned_rad > kTurn_rad) {

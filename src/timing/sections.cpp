@@ -52,7 +52,7 @@ Leg leg_of(const planner::PlannedMove& move, const MoveBounds& bounds) {
 }
 
 bool are_alike(const Leg& a, const Leg& b) {
-  return a.lays_filament == b.lays_filament && a.feed_mm_s == b.feed_mm_s &&
+  return a.lays_filament == b.lays_filament && have_same_feed(a, b) &&
          a.tolerance_mm == b.tolerance_mm && !std::isfinite(b.entry_mm_s);
 }
 
@@ -164,6 +164,12 @@ void cut(const std::vector<Leg>& legs, double settling_s, std::vector<SectionedP
 }
 
 }  // namespace
+
+bool have_same_feed(const Leg& a, const Leg& b) {
+  constexpr double kNothing = 1e-6;
+  return a.feed_mm_s == b.feed_mm_s ||
+         std::abs(a.feed_mm_s - b.feed_mm_s) <= kNothing * std::min(a.feed_mm_s, b.feed_mm_s);
+}
 
 bool is_upright(const planner::PlannedMove& move) {
   constexpr double kNothing_mm = 1e-9;

@@ -28,6 +28,9 @@ struct Leg {
   double to_mm = 0.0;
 };
 
+// Whether F is the same, apart from rounding and from what a slight slope takes from it.
+[[nodiscard]] bool have_same_feed(const Leg& a, const Leg& b);
+
 // Legs between two calm places.
 struct Section {
   std::vector<Leg> legs;

@@ -43,7 +43,9 @@ Timed timed_moves(std::span<const planner::PlannedMove> path, std::span<const Mo
   Timed result;
   std::size_t next = 1;
   double path_mm = 0.0;
+  // Upright moves may come before the first progress.
   Progress at = progress.front();
+  at.time_s = 0.0;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const planner::PlannedMove& move = path[i];
     if (is_upright(move)) {
@@ -58,15 +60,14 @@ Timed timed_moves(std::span<const planner::PlannedMove> path, std::span<const Mo
     const std::size_t first = result.moves.size();
     double from = 0.0;
     constexpr double kNothing = 1e-6;
-    const auto add = [&](const Progress& to) {
-      const double share = (to.path_mm - path_mm) / length_mm;
-      result.moves.push_back(piece_between(move, from, std::min(share, 1.0), at, to));
+    const auto add = [&](const Progress& to, double share) {
+      result.moves.push_back(piece_between(move, from, share, at, to));
       from = share;
       at = to;
     };
     while (next + 1 < progress.size() && progress[next].path_mm < end_mm - kNothing) {
       if (progress[next].path_mm > at.path_mm + kNothing) {
-        add(progress[next]);
+        add(progress[next], (progress[next].path_mm - path_mm) / length_mm);
       }
       ++next;
     }
@@ -79,7 +80,7 @@ Timed timed_moves(std::span<const planner::PlannedMove> path, std::span<const Mo
       ++next;
     }
     end.path_mm = end_mm;
-    add(end);
+    add(end, 1.0);
     result.pieces.push_back(result.moves.size() - first);
     path_mm = end_mm;
   }
