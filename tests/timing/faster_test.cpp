@@ -1,131 +1,28 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 #include <numeric>
 #include <optional>
-#include <random>
 #include <vector>
 
-#include "../compensate/playback.hpp"
+#include "tours.hpp"
 #include "unflex/timing/timing.hpp"
 
 namespace unflex::timing {
 namespace {
 
 using compensate::testing::at_rest;
-using compensate::testing::kSubsteps;
 using compensate::testing::plan;
 using compensate::testing::planner_limits;
 using compensate::testing::Point;
-using Moves = std::vector<planner::PlannedMove>;
-
-constexpr double kTolerance_mm = 20e-3;
-constexpr double kMotors_mm_s2 = 20000.0;
-
-compensate::Setup setup() {
-  compensate::Setup result =
-      compensate::testing::setup_for(dynamics::from_frequency(45.0, 0.06), kMotors_mm_s2);
-  result.end_weight = 10.0;
-  return result;
-}
-
-std::vector<MoveBounds> bounds_of(const Moves& moves) {
-  std::vector<MoveBounds> bounds;
-  for (const planner::PlannedMove& move : moves) {
-    bounds.push_back({.speed_mm_s = move.segment.feed_mm_s, .tolerance_mm = kTolerance_mm});
-  }
-  return bounds;
-}
-
-// A tour of corners of all angles, some close together, at a constant F.
-Moves tour(unsigned seed, double feed_mm_s, bool travels = false) {
-  constexpr std::size_t kCorners = 12;
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> place(0.0, 15.0);
-  std::uniform_real_distribution<double> near(-0.5, 0.5);
-  std::vector<Point> points = {{5.0, 5.0}};
-  for (std::size_t i = 0; i < kCorners; ++i) {
-    points.push_back(
-        i % 3 == 2 ? Point{points.back().x_mm + near(random), points.back().y_mm + near(random)}
-                   : Point{place(random), place(random), !travels || i % 4 != 3});
-  }
-  return plan(points, planner_limits(feed_mm_s, 2000.0, 5.0));
-}
-
-// What a nozzle of these axes does on the base that is found for the moves.
-struct Drawn {
-  double duration_s = 0.0;
-  double largest_error_mm = 0.0;   // while filament is laid
-  double largest_travel_mm = 0.0;  // at any time
-  double fastest = 0.0;            // relative to F, likewise
-  double swing_mm = 0.0;           // in the end
-  double accel_mm_s2 = 0.0;        // of the base
-};
-
-double distance_mm(const planner::PlannedMove& move, double x_mm, double y_mm) {
-  const double px = x_mm - move.segment.start_mm[gcode::X];
-  const double py = y_mm - move.segment.start_mm[gcode::Y];
-  const double along = std::clamp(px * move.direction[gcode::X] + py * move.direction[gcode::Y],
-                                  0.0, move.length_mm);
-  return std::hypot(px - along * move.direction[gcode::X], py - along * move.direction[gcode::Y]);
-}
-
-Drawn draw(const Moves& moves, const compensate::Setup& of, const dynamics::FlexibleAxis& axis) {
-  const std::vector<compensate::WindowSpan> spans = mesh(moves, node_grid(moves, of), of);
-  std::vector<compensate::RunWindow> windows =
-      compensate::windows(moves, spans, at_rest(moves), of);
-  const auto engine = compensate::make_banded_engine();
-  std::array<std::vector<dynamics::AxisTrajectory>, 2> solved;
-  for (std::size_t i = 0; i < spans.size(); ++i) {
-    compensate::AxisSolutions solutions = compensate::solve(*engine, spans[i], windows[i]);
-    solved[0].push_back(solutions[0]->base);
-    solved[1].push_back(solutions[1]->base);
-  }
-  const dynamics::AxisTrajectory x = compensate::join(spans, solved[0]);
-  const dynamics::AxisTrajectory y = compensate::join(spans, solved[1]);
-  Drawn drawn;
-  drawn.duration_s = planner::duration_s(moves);
-  for (const dynamics::AxisTrajectory* base : {&x, &y}) {
-    for (const double accel : base->accel_mm_s2) {
-      drawn.accel_mm_s2 = std::max(drawn.accel_mm_s2, std::abs(accel));
-    }
-  }
-  const auto nozzle_x = compensate::testing::play(axis, x, of.period_s, at_rest(moves).x);
-  const auto nozzle_y = compensate::testing::play(axis, y, of.period_s, at_rest(moves).y);
-  constexpr double kReach_s = 31e-3;
-  for (std::size_t i = 0; i < nozzle_x.size(); ++i) {
-    const double t = static_cast<double>(i) * of.period_s / kSubsteps;
-    double least_mm = std::numeric_limits<double>::infinity();
-    const planner::PlannedMove* on = nullptr;
-    double start_s = 0.0;
-    for (const planner::PlannedMove& move : moves) {
-      if (start_s - kReach_s <= t && t <= start_s + move.duration_s() + kReach_s) {
-        const double away_mm = distance_mm(move, nozzle_x[i].position(), nozzle_y[i].position());
-        if (away_mm < least_mm) {
-          least_mm = away_mm;
-          on = &move;
-        }
-      }
-      start_s += move.duration_s();
-    }
-    drawn.largest_travel_mm = std::max(drawn.largest_travel_mm, least_mm);
-    if (on != nullptr && on->segment.extruding()) {
-      drawn.largest_error_mm = std::max(drawn.largest_error_mm, least_mm);
-      drawn.fastest =
-          std::max(drawn.fastest, std::hypot(nozzle_x[i].velocity(), nozzle_y[i].velocity()) /
-                                      on->segment.feed_mm_s);
-    }
-  }
-  const gcode::Position& end = moves.back().segment.end_mm;
-  const auto gap_x = axis.gap(nozzle_x.back(), axis.riding(end[gcode::X]));
-  const auto gap_y = axis.gap(nozzle_y.back(), axis.riding(end[gcode::Y]));
-  drawn.swing_mm =
-      std::hypot(gap_x.place_mm, gap_x.speed_mm, std::hypot(gap_y.place_mm, gap_y.speed_mm));
-  return drawn;
-}
+using testing::bounds_of;
+using testing::draw;
+using testing::Drawn;
+using testing::kMotors_mm_s2;
+using testing::kTolerance_mm;
+using testing::Moves;
+using testing::setup;
+using testing::tour;
 
 std::optional<Timed> timed(const Moves& moves, const compensate::Setup& of,
                            const std::vector<MoveBounds>& bounds) {
