@@ -17,8 +17,9 @@ using gcode::Y;
 
 // How long before and after it even motion is settled, in 1/ω.
 constexpr double kSettling = 9.0;
-// A first plan that is too quick may lead nowhere, so a slower one comes after it.
-constexpr double kAccelShares[] = {0.5, 0.15};
+// Travel that wanders may come too near to what is laid next, and a first plan that is too quick
+// may lead nowhere. So others come after it.
+constexpr FirstPlan kFirstPlans[] = {{0.5, 0.2}, {0.5, 0.05}, {0.15, 0.05}};
 // What counts as kept.
 constexpr double kKept = 1.05;
 constexpr double kKeptFeed = 1.025;
@@ -238,21 +239,21 @@ bool is_kept(const Timed& timed, std::span<const MoveBounds> bounds, const compe
          std::ranges::max(measured.speed) <= kKeptFeed && std::ranges::max(measured.left) <= kKept;
 }
 
-// The search begins with a plan of so much of the base's acceleration.
-tl::expected<Timed, std::string> optimal_from(double accel_share, const compensate::Course& course,
+tl::expected<Timed, std::string> optimal_from(const FirstPlan& first,
+                                              const compensate::Course& course,
                                               const compensate::Setup& setup,
                                               const SectionRules& rules,
                                               const dynamics::NozzleXY& nozzle,
                                               std::span<const MoveBounds> bounds) {
   const double slowest_rad_s = std::min(rules.x.omega_rad_s, rules.y.omega_rad_s);
-  auto parts = sections(course.moves, bounds, setup, kSettling / slowest_rad_s, accel_share);
+  auto parts = sections(course.moves, bounds, setup, kSettling / slowest_rad_s, first);
   if (!parts) {
     return tl::unexpected<std::string>("accelerations along the path are limited");
   }
   const gcode::Position& start_mm = course.moves.front().segment.start_mm;
-  if (Section& first = parts->front().section;
-      !first.legs.empty() && !is_at_rest(nozzle, start_mm, setup)) {
-    first.nozzle = nozzle.motion();
+  if (Section& section = parts->front().section;
+      !section.legs.empty() && !is_at_rest(nozzle, start_mm, setup)) {
+    section.nozzle = nozzle.motion();
   }
   const std::optional<Motion> motion = fastest(*parts, rules);
   if (!motion) {
@@ -287,9 +288,9 @@ tl::expected<Timed, std::string> optimal(const compensate::Course& course,
     return tl::unexpected<std::string>("it is a part of a long motion");
   }
   std::string reason;
-  for (const double accel_share : kAccelShares) {
+  for (const FirstPlan& first : kFirstPlans) {
     tl::expected<Timed, std::string> found =
-        optimal_from(accel_share, course, setup, *rules, nozzle, bounds);
+        optimal_from(first, course, setup, *rules, nozzle, bounds);
     if (found) {
       return found;
     }

@@ -37,8 +37,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNodePeriod = 0.45;
 constexpr int kRounds = 12;
 // Weights of the squares.
-constexpr double kBend = 1.0;      // r₂
-constexpr double kTwist = 1000.0;  // r₃
+constexpr double kBend = 1.0;     // r₂
+constexpr double kTwist = 300.0;  // r₃
+constexpr double kTwistOfBand = 1000.0;
 constexpr double kOfError = 4e-3;
 constexpr double kOfAccel = 1e-2;
 constexpr double kOfStep = 1e-6;
@@ -58,7 +59,7 @@ constexpr double kFirstTrustOfBand = 0.12;
 constexpr double kLeastTrust = 1e-3;
 constexpr double kShrink = 0.5;
 constexpr double kGrow = 1.6;
-constexpr double kCooling = 0.75;
+constexpr double kCooling = 0.85;
 constexpr double kCoolingOfBand = 0.85;
 constexpr std::size_t kReach = 8;  // nodes
 // A step is right where nothing comes out otherwise by more, relative to what is allowed.
@@ -86,6 +87,9 @@ constexpr Excess kTightenAbove{1.01, 1.0, 1.013};
 constexpr Excess kTightest{0.8, 0.6, 0.95};
 // The base keeps so far away from the limits of its place.
 constexpr double kRoom_mm = 3e-3;
+// Travel beside filament has the tolerance of filament for so many node periods in the end, and for
+// more (SectionNodes::kBeside) in rows, as these look less often.
+constexpr double kBesideInTheEnd = 2.0;
 // A round that gains less is the last.
 constexpr double kGain = 3e-4;
 
@@ -326,7 +330,9 @@ class Program {
     for (const int derivative : {2, 3, 4}) {
       program_.add_square(first, of_clock(shares, derivative, 1.0),
                           spline_.clock(k, shares, derivative),
-                          2.0 * (derivative == 2 ? kBend : kTwist));
+                          2.0 * (derivative == 2 ? kBend
+                                 : D == 5        ? kTwist
+                                                 : kTwistOfBand));
     }
     constexpr double kLeastChange = 1e-3;
     const double rate = spline_.clock(k, shares, 1);
@@ -571,7 +577,7 @@ class Program {
   // e relative to the tolerance, the largest of the axes as given and at the edges of the band.
   [[nodiscard]] double error(const At& at) const {
     const Vector p = spline_.nozzle_mm(at.place);
-    const double tolerance = nodes_.tolerance_mm(at.leg, at.k, at.x);
+    const double tolerance = nodes_.tolerance_mm(at.leg, at.k, at.x, kBesideInTheEnd);
     double e = nodes_.error_mm(at.k, at.x, p) / tolerance;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       const Vector of_edge =

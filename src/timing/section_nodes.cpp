@@ -14,8 +14,7 @@ constexpr std::size_t kFewestPeriods = 18;
 // A path that turns by more has a bound vertex.
 constexpr double kTurn_rad = 0.0873;
 // How near travel has to be to filament for its limits to count, in node periods.
-constexpr double kBesideTolerance = 2.5;
-constexpr double kBesideFeed = 1.0;
+constexpr double kBesideFeed = 1.5;
 constexpr double kNearVertex = 2.5;
 
 double u_of(const SectionNodes::Pin& pin) { return static_cast<double>(pin.k) + pin.x; }
@@ -137,7 +136,7 @@ bool SectionNodes::is_near_vertex(std::size_t vertex, std::size_t k, double x) c
          std::abs(u_of(*pin) - static_cast<double>(k) - x) <= kNearVertex;
 }
 
-double SectionNodes::tolerance_mm(std::size_t leg, std::size_t k, double x) const {
+double SectionNodes::tolerance_mm(std::size_t leg, std::size_t k, double x, double beside) const {
   double tolerance = legs_[leg].tolerance_mm;
   if (legs_[leg].lays_filament) {
     return tolerance;
@@ -145,11 +144,11 @@ double SectionNodes::tolerance_mm(std::size_t leg, std::size_t k, double x) cons
   const double u = static_cast<double>(k) + x;
   constexpr std::size_t kReach = 3;
   for (std::size_t i = first_pin_[k > kReach ? k - kReach : 0];
-       i < pins_.size() && u_of(pins_[i]) <= u + kBesideTolerance; ++i) {
-    if (u_of(pins_[i]) >= u - kBesideTolerance) {
-      for (const std::size_t beside : {pins_[i].vertex - 1, pins_[i].vertex}) {
-        if (legs_[beside].lays_filament) {
-          tolerance = std::min(tolerance, legs_[beside].tolerance_mm);
+       i < pins_.size() && u_of(pins_[i]) <= u + beside; ++i) {
+    if (u_of(pins_[i]) >= u - beside) {
+      for (const std::size_t other : {pins_[i].vertex - 1, pins_[i].vertex}) {
+        if (legs_[other].lays_filament) {
+          tolerance = std::min(tolerance, legs_[other].tolerance_mm);
         }
       }
     }
@@ -163,7 +162,7 @@ double SectionNodes::feed_mm_s(std::size_t leg, std::size_t k, double x) const {
     return feed;
   }
   const double u = static_cast<double>(k) + x;
-  for (std::size_t i = first_pin_[k > 0 ? k - 1 : 0];
+  for (std::size_t i = first_pin_[k > 2 ? k - 2 : 0];
        i < pins_.size() && u_of(pins_[i]) <= u + kBesideFeed; ++i) {
     if (u_of(pins_[i]) >= u - kBesideFeed) {
       for (const std::size_t beside : {pins_[i].vertex - 1, pins_[i].vertex}) {

@@ -34,6 +34,8 @@ class SectionNodes {
   // Where the first plan is at a node.
   [[nodiscard]] Vector place(std::size_t node) const { return places_[node]; }
 
+  static constexpr double kBeside = 2.5;
+
   // A vertex that is bound.
   struct Pin {
     std::size_t vertex = 0;  // the leg that begins there
@@ -51,7 +53,9 @@ class SectionNodes {
 
   // What the nozzle may do on a leg, at u. Beside filament travel keeps to what filament asks for,
   // since lines do not end exactly where filament does.
-  [[nodiscard]] double tolerance_mm(std::size_t leg, std::size_t k, double x) const;
+  // beside: how near that is, in node periods.
+  [[nodiscard]] double tolerance_mm(std::size_t leg, std::size_t k, double x,
+                                    double beside = kBeside) const;
   [[nodiscard]] double feed_mm_s(std::size_t leg, std::size_t k, double x) const;
   // Whether a bound vertex at which the leg begins or ends is near. number: that of the leg that
   // begins there.

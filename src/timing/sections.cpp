@@ -36,7 +36,7 @@ planner::PlannedMove straight(const gcode::Position& from, const gcode::Position
   return move;
 }
 
-Leg leg_of(const planner::PlannedMove& move, const MoveBounds& bounds) {
+Leg leg_of(const planner::PlannedMove& move, const MoveBounds& bounds, double travel_tolerance_mm) {
   Leg leg;
   leg.move = straight(move.segment.start_mm, move.segment.end_mm);
   leg.lays_filament = move.segment.extruding();
@@ -46,7 +46,7 @@ Leg leg_of(const planner::PlannedMove& move, const MoveBounds& bounds) {
   }
   leg.feed_mm_s *= flat_share(move);
   leg.tolerance_mm =
-      leg.lays_filament ? std::min(bounds.tolerance_mm, kTravelTolerance_mm) : kTravelTolerance_mm;
+      leg.lays_filament ? std::min(bounds.tolerance_mm, kTravelTolerance_mm) : travel_tolerance_mm;
   leg.entry_mm_s = bounds.start_speed_mm_s * flat_share(move);
   return leg;
 }
@@ -184,7 +184,7 @@ planner::PlannedMove from_rest_to_rest(const planner::PlannedMove& move, const M
 std::optional<std::vector<SectionedPart>> sections(std::span<const planner::PlannedMove> path,
                                                    std::span<const MoveBounds> bounds,
                                                    const compensate::Setup& setup,
-                                                   double settling_s, double accel_share) {
+                                                   double settling_s, const FirstPlan& first) {
   // What limits acceleration along the path more than the base does.
   constexpr double kTimesBase = 2.0;
   std::vector<SectionedPart> parts;
@@ -193,7 +193,7 @@ std::optional<std::vector<SectionedPart>> sections(std::span<const planner::Plan
   const auto rest = [&](double duration_s) {
     if (!legs.empty()) {
       legs = joined(legs);
-      plan(legs, setup, accel_share);
+      plan(legs, setup, first.accel_share);
       cut(legs, settling_s, parts);
       legs.clear();
     } else if (parts.empty()) {
@@ -209,7 +209,7 @@ std::optional<std::vector<SectionedPart>> sections(std::span<const planner::Plan
     if (bounds[i].accel_mm_s2 < kTimesBase * setup.x.limits.max_accel_mm_s2) {
       return std::nullopt;
     }
-    Leg& leg = legs.emplace_back(leg_of(path[i], bounds[i]));
+    Leg& leg = legs.emplace_back(leg_of(path[i], bounds[i], first.travel_tolerance_mm));
     leg.from_mm = path_mm;
     path_mm += leg.move.length_mm;
     leg.to_mm = path_mm;

@@ -63,11 +63,16 @@ struct SectionedPart {
 [[nodiscard]] planner::PlannedMove from_rest_to_rest(const planner::PlannedMove& move,
                                                      const MoveBounds& bounds);
 
-// The path in sections. settling_s: how long before and after it even motion is settled.
-// accel_share: how much of the base's acceleration the first plan has. nullopt: there are limits of
-// acceleration along the path, which sections do not know.
+// How the search for a motion begins, and how far it may go.
+struct FirstPlan {
+  double accel_share = 0.5;                          // of the base's acceleration
+  double travel_tolerance_mm = kTravelTolerance_mm;  // at most kTravelTolerance_mm
+};
+
+// The path in sections. settling_s: how long before and after it even motion is settled. nullopt:
+// there are limits of acceleration along the path, which sections do not know.
 [[nodiscard]] std::optional<std::vector<SectionedPart>> sections(
     std::span<const planner::PlannedMove> path, std::span<const MoveBounds> bounds,
-    const compensate::Setup& setup, double settling_s, double accel_share);
+    const compensate::Setup& setup, double settling_s, const FirstPlan& first = {});
 
 }  // namespace unflex::timing

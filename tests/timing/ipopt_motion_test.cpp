@@ -140,8 +140,6 @@ struct Task {
   double accel_mm = 0.0;  // A
   double feed_mm = 0.0;   // F
   double tolerance_mm = 0.0;
-  // b̈ is 0 at both ends; it may jump there otherwise.
-  bool ends_are_smooth = true;
 
   [[nodiscard]] std::size_t legs() const { return vertices_mm.size() - 1; }
   [[nodiscard]] double length_mm(std::size_t leg) const {
@@ -304,7 +302,7 @@ class MotionProgram final : public nlp::Problem {
         if (k == 0 || k + 1 == nodes_) {
           const Vector& end = k == 0 ? task_.vertices_mm.front() : task_.vertices_mm.back();
           for (int i = 0; i < kPerAxis; ++i) {
-            if (i == kA && !task_.ends_are_smooth) {
+            if (i == kA) {
               continue;
             }
             const double place = i == kP || i == kB ? (axis == 0 ? end.x : end.y) : 0.0;
@@ -457,7 +455,7 @@ Section section_of(const std::vector<Point>& points) {
   // No leg goes evenly for so long that the path would be cut.
   constexpr double kSettling = 9.0;
   auto parts = sections(moves, bounds, compensate::testing::setup_for(axis(), kAccel_mm_s2),
-                        kSettling / omega_rad_s(), 0.5);
+                        kSettling / omega_rad_s());
   if (!parts || parts->size() != 1 || parts->front().section.legs.size() + 1 != points.size()) {
     ADD_FAILURE() << "the path is not one section of its legs";
     return {};
@@ -660,9 +658,9 @@ std::vector<Point> many_legs() {
   return points;
 }
 
-// Measured: 1.0106, 1.0140 and 1.0078.
-Path corner() { return {"corner", {{0.0, 0.0}, {5.0, 0.0}, {5.0, 5.0}}, 1.011}; }
-Path bay() { return {"bay", {{0.0, 0.0}, {4.0, 0.0}, {4.0, 1.0}, {0.0, 1.0}}, 1.0145}; }
+// Measured: 1.0072, 1.0075 and 1.0072.
+Path corner() { return {"corner", {{0.0, 0.0}, {5.0, 0.0}, {5.0, 5.0}}, 1.008}; }
+Path bay() { return {"bay", {{0.0, 0.0}, {4.0, 0.0}, {4.0, 1.0}, {0.0, 1.0}}, 1.008}; }
 std::vector<Path> paths() { return {corner(), bay(), {"many legs", many_legs(), 1.008}}; }
 
 // The node period of fastest_motion(), nearly.
@@ -723,8 +721,8 @@ TEST(MotionProgram, HasExactDerivatives) {
 }
 
 TEST(FastestMotion, TakesAsLongAsThatOfIpoptOnNodesAsFarApart) {
-  // Both ways. Measured: 0.06 % less, 0.12 % more and 0.18 % more.
-  constexpr double kShare = 3e-3;
+  // Both ways. Measured: 0.50, 0.43 and 0.48 % more.
+  constexpr double kShare = 5e-3;
   for (const Path& path : paths()) {
     const Checked checked(path);
     ASSERT_TRUE(checked.motion) << path.name;
@@ -733,7 +731,7 @@ TEST(FastestMotion, TakesAsLongAsThatOfIpoptOnNodesAsFarApart) {
   }
 }
 
-TEST(FastestMotion, TakesAPercentLongerThanThatOfIpoptOnFineNodes) {
+TEST(FastestMotion, TakesLittleLongerThanThatOfIpoptOnFineNodes) {
   // What it may gain where it breaks limits by the little that it may.
   constexpr double kLeast = 0.995;
   for (const Path& path : paths()) {
@@ -748,23 +746,6 @@ TEST(FastestMotion, TakesAPercentLongerThanThatOfIpoptOnFineNodes) {
     EXPECT_LT(best.largest.error, 1.01) << path.name;
     EXPECT_LT(best.largest.feed, 1.001) << path.name;
     EXPECT_LT(best.largest.left, 0.01) << path.name;
-  }
-}
-
-TEST(FastestMotion, LosesMostWhereItLeavesRestAndComesToRest) {
-  // b̈ grows from 0 in the first period, and goes back to 0 in the last: half a period is lost at
-  // each end, whatever the path. If b̈ may jump there, nodes as far apart cost 0.2 to 0.35 %.
-  for (const Path& path : paths()) {
-    const Checked checked(path);
-    ASSERT_TRUE(checked.motion) << path.name;
-    const Nodes coarse = nodes_of(*checked.motion, checked.task, coarse_s());
-    const Nodes fine = nodes_of(*checked.motion, checked.task, kFine_s);
-    Task jumping = checked.task;
-    jumping.ends_are_smooth = false;
-    const double smooth_s = by_ipopt(checked.task, coarse).duration_s;
-    const double jumping_s = by_ipopt(jumping, coarse).duration_s;
-    EXPECT_NEAR((smooth_s - jumping_s) / coarse_s(), 1.0, 0.1) << path.name;
-    EXPECT_NEAR(jumping_s / by_ipopt(jumping, fine).duration_s, 1.0, 4e-3) << path.name;
   }
 }
 

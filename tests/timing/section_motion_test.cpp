@@ -18,7 +18,6 @@ using compensate::testing::plan;
 using compensate::testing::planner_limits;
 using testing::bounds_of;
 using testing::distance_mm;
-using testing::kAccelShare;
 using testing::kMotors_mm_s2;
 using testing::kTolerance_mm;
 using testing::Moves;
@@ -285,7 +284,7 @@ TEST(SectionMotion, BeginsWithANozzleThatSwings) {
 // Each axis lags behind by its own damping.
 TEST(SectionMotion, IsOnThePathWhereItEndsEvenOnUnequalAxes) {
   const Moves moves = plan({{0.0, 0.0}, {30.0, 30.0}}, planner_limits(kFeed_mm_s, 2000.0, 5.0));
-  const auto parts = sections(moves, bounds_of(moves), setup(), 0.03, kAccelShare);
+  const auto parts = sections(moves, bounds_of(moves), setup(), 0.03);
   ASSERT_EQ(parts->size(), 2U);
   SectionRules unequal = rules();
   unequal.y = {.omega_rad_s = 350.0, .zeta = 0.2};

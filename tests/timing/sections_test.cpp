@@ -14,7 +14,6 @@ namespace {
 using compensate::testing::plan;
 using compensate::testing::planner_limits;
 using testing::bounds_of;
-using testing::kAccelShare;
 using testing::kLiftBounds;
 using testing::kTolerance_mm;
 using testing::lift;
@@ -38,7 +37,7 @@ double duration_s(const Section& section) {
 
 TEST(Sections, CutALongLineWhereItIsEven) {
   const Moves moves = straight(100.0);
-  const auto parts = sections(moves, bounds_of(moves), setup(), kSettling_s, kAccelShare);
+  const auto parts = sections(moves, bounds_of(moves), setup(), kSettling_s);
   ASSERT_TRUE(parts.has_value());
   ASSERT_EQ(parts->size(), 2U);
   const SectionedPart& first = parts->front();
@@ -75,7 +74,7 @@ TEST(Sections, CutALongLineWhereItIsEven) {
 
 TEST(Sections, LeaveALineWholeThatIsNotEvenForLong) {
   const Moves moves = straight(5.0);
-  const auto parts = sections(moves, bounds_of(moves), setup(), kSettling_s, kAccelShare);
+  const auto parts = sections(moves, bounds_of(moves), setup(), kSettling_s);
   ASSERT_TRUE(parts.has_value());
   ASSERT_EQ(parts->size(), 1U);
   EXPECT_FALSE(parts->front().section.ends_even);
@@ -93,7 +92,7 @@ TEST(Sections, HaveAPauseWhereAMoveIsUpright) {
   // 2 √(L/a)
   const double lift_s = from_rest_to_rest(up, kLiftBounds).duration_s();
   EXPECT_NEAR(lift_s, 2.0 * std::sqrt(0.4 / 100.0), 1e-12);
-  const auto parts = sections(moves, bounds, setup(), kSettling_s, kAccelShare);
+  const auto parts = sections(moves, bounds, setup(), kSettling_s);
   ASSERT_TRUE(parts.has_value());
   ASSERT_EQ(parts->size(), 2U);
   EXPECT_NEAR(parts->front().pause.duration_s, 2.0 * lift_s, 1e-12);
@@ -114,7 +113,7 @@ TEST(Sections, BeginWithAPauseWhereTheFirstMoveIsUpright) {
   moves.insert(moves.begin(), lift(moves[0].segment.start_mm, 0.4));
   std::vector<MoveBounds> bounds = bounds_of(moves);
   bounds[0] = kLiftBounds;
-  const auto parts = sections(moves, bounds, setup(), kSettling_s, kAccelShare);
+  const auto parts = sections(moves, bounds, setup(), kSettling_s);
   ASSERT_TRUE(parts.has_value());
   ASSERT_EQ(parts->size(), 2U);
   EXPECT_TRUE(parts->front().section.legs.empty());
@@ -126,17 +125,17 @@ TEST(Sections, KnowNoLimitsOfAccelerationAlongThePath) {
   const Moves moves = straight(20.0);
   std::vector<MoveBounds> bounds = bounds_of(moves);
   bounds[0].accel_mm_s2 = 2000.0;
-  EXPECT_FALSE(sections(moves, bounds, setup(), kSettling_s, kAccelShare).has_value());
+  EXPECT_FALSE(sections(moves, bounds, setup(), kSettling_s).has_value());
   // The base by itself does not reach this one.
   bounds[0].accel_mm_s2 = 1e6;
-  EXPECT_TRUE(sections(moves, bounds, setup(), kSettling_s, kAccelShare).has_value());
+  EXPECT_TRUE(sections(moves, bounds, setup(), kSettling_s).has_value());
 }
 
 TEST(Sections, JoinMovesOnOneLine) {
   const Moves moves = plan({{0.0, 0.0}, {1.0, 0.0}, {2.0, 1e-3}, {4.0, 0.0}, {4.0, 3.0}},
                            planner_limits(100.0, 2000.0, 5.0));
   std::vector<MoveBounds> bounds = bounds_of(moves);
-  const auto joined = sections(moves, bounds, setup(), 100.0, kAccelShare);
+  const auto joined = sections(moves, bounds, setup(), 100.0);
   ASSERT_TRUE(joined.has_value());
   const std::vector<Leg>& legs = joined->front().section.legs;
   ASSERT_EQ(legs.size(), 2U);
@@ -146,10 +145,10 @@ TEST(Sections, JoinMovesOnOneLine) {
   EXPECT_NEAR(legs[0].to_mm, moves[0].length_mm + moves[1].length_mm + moves[2].length_mm, 1e-12);
   // What they may do tells them apart.
   bounds[1].speed_mm_s = 99.0;
-  EXPECT_EQ(sections(moves, bounds, setup(), 100.0, kAccelShare)->front().section.legs.size(), 4U);
+  EXPECT_EQ(sections(moves, bounds, setup(), 100.0)->front().section.legs.size(), 4U);
   bounds[1].speed_mm_s = 100.0;
   bounds[1].tolerance_mm = 0.5 * kTolerance_mm;
-  EXPECT_EQ(sections(moves, bounds, setup(), 100.0, kAccelShare)->front().section.legs.size(), 4U);
+  EXPECT_EQ(sections(moves, bounds, setup(), 100.0)->front().section.legs.size(), 4U);
 }
 
 // A direction's length is 1 only nearly, and moves of a spiral have a slope.
@@ -161,9 +160,7 @@ TEST(Sections, JoinMovesOnOneLineInAnyDirection) {
       points.push_back({at_mm * std::cos(angle), at_mm * std::sin(angle)});
     }
     const Moves moves = plan(points, planner_limits(100.0, 2000.0, 5.0));
-    EXPECT_EQ(
-        sections(moves, bounds_of(moves), setup(), 100.0, kAccelShare)->front().section.legs.size(),
-        1U)
+    EXPECT_EQ(sections(moves, bounds_of(moves), setup(), 100.0)->front().section.legs.size(), 1U)
         << angle;
   }
 }
@@ -184,21 +181,17 @@ TEST(Sections, TellFeedsApart) {
 TEST(Sections, DoNotJoinMovesThatTurn) {
   const Moves bent =
       plan({{0.0, 0.0}, {2.0, 0.02}, {4.0, 0.0}}, planner_limits(100.0, 2000.0, 5.0));
-  EXPECT_EQ(
-      sections(bent, bounds_of(bent), setup(), 100.0, kAccelShare)->front().section.legs.size(),
-      2U);
+  EXPECT_EQ(sections(bent, bounds_of(bent), setup(), 100.0)->front().section.legs.size(), 2U);
   // Nor such that come back on the same line.
   const Moves back = plan({{0.0, 0.0}, {2.0, 0.0}, {0.0, 0.0}}, planner_limits(100.0, 2000.0, 5.0));
-  EXPECT_EQ(
-      sections(back, bounds_of(back), setup(), 100.0, kAccelShare)->front().section.legs.size(),
-      2U);
+  EXPECT_EQ(sections(back, bounds_of(back), setup(), 100.0)->front().section.legs.size(), 2U);
 }
 
 TEST(Sections, CoverThePathWithoutGaps) {
   bool has_even_pause = false;
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const Moves moves = tour(seed, 50.0, true);
-    const auto parts = sections(moves, bounds_of(moves), setup(), kSettling_s, kAccelShare);
+    const auto parts = sections(moves, bounds_of(moves), setup(), kSettling_s);
     ASSERT_TRUE(parts.has_value());
     double at_mm = 0.0;
     double even_mm_s = 0.0;

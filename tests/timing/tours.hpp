@@ -19,7 +19,6 @@ using Moves = std::vector<planner::PlannedMove>;
 
 inline constexpr double kTolerance_mm = 20e-3;
 // Of the motors, in a first plan.
-inline constexpr double kAccelShare = 0.5;
 inline constexpr double kMotors_mm_s2 = 20000.0;
 
 inline compensate::Setup setup() {
@@ -163,7 +162,7 @@ inline Section section_along(const std::vector<compensate::testing::Point>& poin
   constexpr double kNeverSettles_s = 100.0;
   const Moves moves = compensate::testing::plan(
       points, compensate::testing::planner_limits(feed_mm_s, 2000.0, 5.0));
-  return sections(moves, bounds_of(moves), setup(), kNeverSettles_s, kAccelShare)->front().section;
+  return sections(moves, bounds_of(moves), setup(), kNeverSettles_s)->front().section;
 }
 
 }  // namespace unflex::timing::testing
