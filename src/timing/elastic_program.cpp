@@ -1,7 +1,9 @@
 #include "elastic_program.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <type_traits>
 
 namespace unflex::timing {
 namespace {
@@ -14,6 +16,72 @@ constexpr double kOfTheWay = 0.99;
 // What a fixed unknown weighs.
 constexpr double kFixed = 1e12;
 constexpr double kStationary = 1e-2;
+// What a row that is less stiff adds to the matrix does not matter.
+constexpr double kStiff = 1e-6;
+
+// Wider registers where the processor has them. Multiplications and additions are not fused and
+// sums keep their order, so the result is the same without.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define UNFLEX_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define UNFLEX_WIDE
+#endif
+#define UNFLEX_INLINE [[gnu::always_inline]] inline
+
+template <int W>
+using Width = std::integral_constant<int, W>;
+
+// W × W, by columns. Above the diagonal it means nothing.
+template <int W>
+using Block = std::array<double, W * W>;
+
+// block += f g gᵀ
+template <int W>
+UNFLEX_INLINE void add_square_to(const double* __restrict g, double f, double* __restrict block) {
+  constexpr int kLanes = 4;
+  for (int i = 0; i < W; ++i) {
+    const double scaled = f * g[i];
+    for (int j = i / kLanes * kLanes; j < W; ++j) {
+      block[i * W + j] += scaled * g[j];
+    }
+  }
+}
+
+// L D Lᵀ in a band: column i holds what is at the diagonal and below.
+template <int W>
+UNFLEX_INLINE bool factor_columns(double* columns, std::size_t size) {
+  for (std::size_t i = 0; i < size; ++i) {
+    double* const column = columns + i * W;
+    if (!(column[0] > 0.0)) {
+      return false;
+    }
+    const double inverse = 1.0 / column[0];
+    for (int j = 1; j < W; ++j) {
+      const double share = column[j] * inverse;
+      double* __restrict const other = columns + (i + j) * W;
+      for (int k = j; k < W; ++k) {
+        other[k - j] -= share * column[k];
+      }
+    }
+    for (int j = 1; j < W; ++j) {
+      column[j] *= inverse;
+    }
+  }
+  return true;
+}
+
+UNFLEX_WIDE void add_square_to(Width<18> /*width*/, const double* g, double f, double* block) {
+  add_square_to<18>(g, f, block);
+}
+UNFLEX_WIDE void add_square_to(Width<24> /*width*/, const double* g, double f, double* block) {
+  add_square_to<24>(g, f, block);
+}
+UNFLEX_WIDE bool factor_columns(Width<18> /*width*/, double* columns, std::size_t size) {
+  return factor_columns<18>(columns, size);
+}
+UNFLEX_WIDE bool factor_columns(Width<24> /*width*/, double* columns, std::size_t size) {
+  return factor_columns<24>(columns, size);
+}
 
 }  // namespace
 
@@ -110,63 +178,60 @@ double ElasticProgram<W>::linearise() {
   // Columns beyond the last one keep the loops of factor() even.
   factor_.assign((size_ + W) * W, 0.0);
   std::copy(hessian_.begin(), hessian_.end(), factor_.begin());
+  step_.assign(size_, 0.0);
   // Rows whose unknowns begin at the same place stand together, and so does their sum.
-  Eigen::Matrix<double, W, W> block;
+  Block<W> block{};
   std::size_t side = 0;
   for (std::size_t row = 0; row < first_.size();) {
     const std::size_t first = first_[row];
-    block.setZero();
+    block = {};
     for (; row < first_.size() && first_[row] == first; ++row) {
       double stiffness = 0.0;
       double multiplier = 0.0;
+      double force = 0.0;
       for (; side < sides_.size() && sides_[side].row == row; ++side) {
-        stiffness += sides_[side].stiffness();
-        multiplier += sides_[side].sign * sides_[side].multiplier;
+        Side& own = sides_[side];
+        own.stiffness = 1.0 / (own.room / own.multiplier + own.breach / own.slack);
+        stiffness += own.stiffness;
+        multiplier += own.sign * own.multiplier;
+        force += own.sign * own.stiffness * (own.breach - own.room);
       }
       const Gradient& g = gradients_[row];
       at(lagrangian_, row) += multiplier * g;
-      for (int i = 0; i < W; ++i) {
-        block.col(i) += (stiffness * g[i]) * g;
+      at(step_, row) -= force * g;
+      if (stiffness > kStiff) {
+        add_square_to(Width<W>{}, g.data(), stiffness, block.data());
       }
     }
     for (int i = 0; i < W; ++i) {
       double* const column = &factor_[(first + i) * W];
       for (int j = i; j < W; ++j) {
-        column[j - i] += block(j, i);
+        column[j - i] += block[i * W + j];
       }
     }
   }
-  double largest = 0.0;
+  hold_fixed(lagrangian_);
   for (const std::size_t i : fixed_) {
-    lagrangian_[i] = 0.0;
     factor_[i * W] += kFixed;
   }
-  for (const double value : lagrangian_) {
-    largest = std::max(largest, std::abs(value));
+  double largest = 0.0;
+  for (std::size_t i = 0; i < size_; ++i) {
+    largest = std::max(largest, std::abs(lagrangian_[i]));
+    step_[i] -= lagrangian_[i];
   }
   return largest;
 }
 
 template <int W>
-bool ElasticProgram<W>::factor() {
-  for (std::size_t i = 0; i < size_; ++i) {
-    double* const column = &factor_[i * W];
-    if (!(column[0] > 0.0)) {
-      return false;
-    }
-    const double inverse = 1.0 / column[0];
-    for (int j = 1; j < W; ++j) {
-      const double share = column[j] * inverse;
-      double* const other = &factor_[(i + j) * W];
-      for (int k = j; k < W; ++k) {
-        other[k - j] -= share * column[k];
-      }
-    }
-    for (int j = 1; j < W; ++j) {
-      column[j] *= inverse;
-    }
+void ElasticProgram<W>::hold_fixed(std::vector<double>& x) const {
+  for (const std::size_t i : fixed_) {
+    x[i] = 0.0;
   }
-  return true;
+}
+
+template <int W>
+bool ElasticProgram<W>::factor() {
+  return factor_columns(Width<W>{}, factor_.data(), size_);
 }
 
 template <int W>
@@ -190,63 +255,73 @@ void ElasticProgram<W>::back_substitute(std::vector<double>& x) const {
 }
 
 template <int W>
-double ElasticProgram<W>::step_towards(double target, bool corrects) {
-  for (std::size_t i = 0; i < size_; ++i) {
-    step_[i] = -lagrangian_[i];
+void ElasticProgram<W>::move(double target, double along, Side& side, double& length) {
+  const double room = (target - side.room_product) / side.multiplier - side.room;
+  const double breach = (target - side.breach_product) / side.slack - side.breach;
+  side.multiplier_step = side.stiffness * (side.sign * along + room - breach);
+  side.breach_step = breach + side.breach / side.slack * side.multiplier_step;
+  side.room_step = side.breach_step - side.sign * along;
+  if (side.room_step < 0.0) {
+    length = std::min(length, -side.room / side.room_step);
   }
-  // The force of a side: (τ − λw − …)/λ − (τ − μs − …)/μ.
-  const auto force = [&](const Side& side) {
-    const double room = target - side.multiplier * side.room - (corrects ? side.room_product : 0.0);
-    const double breach =
-        target - side.slack * side.breach - (corrects ? side.breach_product : 0.0);
-    return std::pair(room / side.multiplier, breach / side.slack);
-  };
+  if (side.breach_step < 0.0) {
+    length = std::min(length, -side.breach / side.breach_step);
+  }
+  if (side.multiplier_step < 0.0) {
+    length = std::min(length, -side.multiplier / side.multiplier_step);
+  } else if (side.multiplier_step > 0.0) {
+    length = std::min(length, side.slack / side.multiplier_step);
+  }
+}
+
+template <int W>
+double ElasticProgram<W>::predict() {
+  hold_fixed(step_);
+  back_substitute(step_);
+  corrector_.assign(size_, 0.0);
+  of_target_.assign(size_, 0.0);
+  double length = 1.0 / kOfTheWay;
   for (std::size_t i = 0; i < sides_.size();) {
     const std::size_t row = sides_[i].row;
-    double net = 0.0;
+    const Gradient& g = gradients_[row];
+    const double along = g.dot(at(step_, row));
+    double force = 0.0;
+    double of_target = 0.0;
     for (; i < sides_.size() && sides_[i].row == row; ++i) {
-      const auto [room, breach] = force(sides_[i]);
-      net += sides_[i].sign * sides_[i].stiffness() * (room - breach);
+      Side& side = sides_[i];
+      side.room_product = side.breach_product = 0.0;
+      move(0.0, along, side, length);
+      side.room_product = side.multiplier_step * side.room_step;
+      side.breach_product = -side.multiplier_step * side.breach_step;
+      const double signed_stiffness = side.sign * side.stiffness;
+      const double by_multiplier = 1.0 / side.multiplier;
+      const double by_slack = 1.0 / side.slack;
+      force += signed_stiffness * (side.breach - side.room - side.room_product * by_multiplier +
+                                   side.breach_product * by_slack);
+      of_target += signed_stiffness * (by_multiplier - by_slack);
     }
-    at(step_, row) -= net * gradients_[row];
+    at(corrector_, row) -= force * g;
+    at(of_target_, row) -= of_target * g;
   }
-  for (const std::size_t i : fixed_) {
-    step_[i] = 0.0;
+  return kOfTheWay * length;
+}
+
+template <int W>
+double ElasticProgram<W>::correct(double target) {
+  for (std::size_t i = 0; i < size_; ++i) {
+    step_[i] = corrector_[i] + target * of_target_[i] - lagrangian_[i];
   }
+  hold_fixed(step_);
   back_substitute(step_);
   double length = 1.0 / kOfTheWay;
   for (std::size_t i = 0; i < sides_.size();) {
     const std::size_t row = sides_[i].row;
     const double along = gradients_[row].dot(at(step_, row));
     for (; i < sides_.size() && sides_[i].row == row; ++i) {
-      Side& side = sides_[i];
-      const auto [room, breach] = force(side);
-      side.multiplier_step = side.stiffness() * (side.sign * along + room - breach);
-      side.breach_step = breach + side.breach / side.slack * side.multiplier_step;
-      side.room_step = side.breach_step - side.sign * along;
-      if (side.room_step < 0.0) {
-        length = std::min(length, -side.room / side.room_step);
-      }
-      if (side.breach_step < 0.0) {
-        length = std::min(length, -side.breach / side.breach_step);
-      }
-      if (side.multiplier_step < 0.0) {
-        length = std::min(length, -side.multiplier / side.multiplier_step);
-      } else if (side.multiplier_step > 0.0) {
-        length = std::min(length, side.slack / side.multiplier_step);
-      }
-      if (!corrects) {
-        side.room_product = side.multiplier_step * side.room_step;
-        side.breach_product = -side.multiplier_step * side.breach_step;
-      }
+      move(target, along, sides_[i], length);
     }
   }
   return kOfTheWay * length;
-}
-
-template <int W>
-double ElasticProgram<W>::gap() const {
-  return gap_after(0.0);
 }
 
 template <int W>
@@ -277,11 +352,10 @@ template <int W>
 std::optional<std::span<const double>> ElasticProgram<W>::solve(double gap_per_unknown,
                                                                 int& iterations) {
   start();
-  step_.assign(size_, 0.0);
   const double enough = gap_per_unknown * static_cast<double>(size_);
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     const double largest = linearise();
-    const double now = gap();
+    const double now = gap_after(0.0);
     if (now <= enough && largest <= kStationary && (iteration > 0 || !sides_.empty())) {
       return delta_;
     }
@@ -289,15 +363,14 @@ std::optional<std::span<const double>> ElasticProgram<W>::solve(double gap_per_u
       return std::nullopt;
     }
     ++iterations;
+    const double foreseen = predict();
     if (sides_.empty()) {
-      step_towards(0.0, false);
       advance(1.0);
       return delta_;
     }
-    const double foreseen = step_towards(0.0, false);
     const double left = gap_after(foreseen) / now;
     const double target = left * left * left * now / (2.0 * static_cast<double>(sides_.size()));
-    advance(step_towards(target, true));
+    advance(correct(target));
   }
   return std::nullopt;
 }

@@ -59,27 +59,31 @@ class ElasticProgram {
     double multiplier = 0.0;  // λ
     double breach = 0.0;      // s
     double slack = 0.0;       // μ
-    // Steps, and the predictor's products of them.
+    double stiffness = 0.0;   // D
+    // Of w, λ and s.
     double room_step = 0.0;
     double multiplier_step = 0.0;
     double breach_step = 0.0;
+    // What the predictor foresees of Δλ Δw and of −Δλ Δs.
     double room_product = 0.0;
     double breach_product = 0.0;
-    [[nodiscard]] double stiffness() const {  // D
-      return 1.0 / (room / multiplier + breach / slack);
-    }
   };
 
   void start();
-  // Builds the matrix and the gradient of the Lagrangian. Returns the gradient's largest entry.
+  // Builds the matrix, the gradient of the Lagrangian, and the forces of the predictor. Returns the
+  // gradient's largest entry.
   double linearise();
   [[nodiscard]] bool factor();
   void back_substitute(std::vector<double>& x) const;
-  // The step for the target τ. Returns how much of it can be gone.
-  double step_towards(double target, bool corrects);
-  [[nodiscard]] double gap() const;
+  // The step towards τ = 0, and the forces of the corrector. Returns how much of it can be gone.
+  double predict();
+  // The step towards τ. Returns how much of it can be gone.
+  double correct(double target);
+  // Sets the steps of a side whose row moves by `along`, and shortens `length` to what they allow.
+  static void move(double target, double along, Side& side, double& length);
   [[nodiscard]] double gap_after(double length) const;
   void advance(double length);
+  void hold_fixed(std::vector<double>& x) const;
 
   [[nodiscard]] auto at(std::vector<double>& x, std::size_t row) const {
     return Eigen::Map<Gradient>(x.data() + first_[row]);
@@ -101,6 +105,9 @@ class ElasticProgram {
   std::vector<double> delta_;
   std::vector<double> lagrangian_;
   std::vector<double> step_;
+  // Forces of the corrector: those without τ, and those of τ = 1.
+  std::vector<double> corrector_;
+  std::vector<double> of_target_;
 };
 
 extern template class ElasticProgram<18>;

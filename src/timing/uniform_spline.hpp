@@ -31,12 +31,34 @@ constexpr double cardinal_spline(int degree, int derivative, double t) {
          degree;
 }
 
+// [i][m]: the share of control point k + i is Σ_m [i][m] x^m, by Taylor's formula.
+template <int D>
+inline constexpr auto kSplinePieces = [] {
+  std::array<std::array<double, D + 1>, D + 1> pieces{};
+  for (int i = 0; i <= D; ++i) {
+    double factorial = 1.0;
+    for (int m = 0; m <= D; ++m) {
+      factorial *= m > 0 ? m : 1;
+      pieces[i][m] = cardinal_spline(D, m, D - i) / factorial;
+    }
+  }
+  return pieces;
+}();
+
 template <int D>
 constexpr SplineShares<D> spline_shares(double x) {
   SplineShares<D> shares{};
-  for (int j = 0; j < D; ++j) {
-    for (int i = 0; i <= D; ++i) {
-      shares[j][i] = cardinal_spline(D, j, x + D - i);
+  for (int i = 0; i <= D; ++i) {
+    std::array<double, D + 1> terms = kSplinePieces<D>[i];  // of the j-th derivative
+    for (int j = 0; j < D; ++j) {
+      double value = 0.0;
+      for (int m = D - j; m >= 0; --m) {
+        value = value * x + terms[m];
+      }
+      shares[j][i] = value;
+      for (int m = 0; m < D - j; ++m) {
+        terms[m] = (m + 1) * terms[m + 1];
+      }
     }
   }
   return shares;
