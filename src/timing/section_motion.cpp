@@ -91,7 +91,7 @@ constexpr double kRoom_mm = 3e-3;
 // more (SectionNodes::kBeside) in rows, as these look less often.
 constexpr double kBesideInTheEnd = 2.0;
 // A round that gains less is the last.
-constexpr double kGain = 3e-4;
+constexpr double kGain = 1e-3;
 
 template <int D>
 class Program {
