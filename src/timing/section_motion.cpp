@@ -35,7 +35,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // ωh. The matrix for z is too badly conditioned below 0.4.
 constexpr double kNodePeriod = 0.45;
-constexpr int kRounds = 12;
+constexpr int kRounds = 18;
 // Weights of the squares.
 constexpr double kBend = 1.0;     // r₂
 constexpr double kTwist = 300.0;  // r₃

@@ -39,10 +39,12 @@ void expect_as_told(const std::string& row, const std::vector<double>& told,
   }
 }
 
-study::FastestOutcome how_fast(const std::string& print, const std::vector<double>& tolerances_mm) {
-  const JobFolder folder(print, {"dynamics.x.freq_hz=45", "dynamics.x.damping_ratio=0.06",
-                                 "dynamics.y.freq_hz=45", "dynamics.y.damping_ratio=0.06",
-                                 "printer.firmware=klipper", "base.max_accel_mm_s2=20000"});
+study::FastestOutcome how_fast(const std::string& print, const std::vector<double>& tolerances_mm,
+                               const std::string& method) {
+  const JobFolder folder(
+      print, {"timing.method=" + method, "dynamics.x.freq_hz=45", "dynamics.x.damping_ratio=0.06",
+              "dynamics.y.freq_hz=45", "dynamics.y.damping_ratio=0.06", "printer.firmware=klipper",
+              "base.max_accel_mm_s2=20000"});
   Job job = folder.job(2);
   job.settings = settings_of_fastest(job.settings);
   SilentProgress progress;
@@ -53,7 +55,8 @@ study::FastestOutcome how_fast(const std::string& print, const std::vector<doubl
 
 // "Ten layers at 60 mm/s take 20:18.9 min within 20 µm, 20:20.0 with ZV, and 20:05.6 always at F."
 TEST(HowFast, OfSlowWallsIsAsTheReadmeSays) {
-  const study::FastestOutcome outcome = how_fast(container::ten_layers("wallring"), {0.02});
+  const study::FastestOutcome outcome =
+      how_fast(container::ten_layers("wallring"), {0.02}, "scaled");
   EXPECT_NEAR(outcome.contenders[4].at[0].value().time_s, 1218.9, 1.0);
   EXPECT_NEAR(outcome.contenders[1].at[0].value().time_s, 1220.0, 1.0);
   EXPECT_NEAR(outcome.at_feed_s, 1205.6, 1.0);
@@ -62,7 +65,7 @@ TEST(HowFast, OfSlowWallsIsAsTheReadmeSays) {
 TEST(HowFast, IsAsTheReadmeSays) {
   const study::FastestOutcome outcome =
       how_fast(read_file(std::filesystem::path(test_paths::kData) / "study_fasttower.gcode"),
-               {0.005, 0.01, 0.02, 0.05, 0.1});
+               {0.005, 0.01, 0.02, 0.05, 0.1}, "optimal");
   const std::string page = read_file(std::filesystem::path(test_paths::kDocs) / ".." / "README.md");
   ASSERT_EQ(outcome.contenders.size(), 5U);
   for (const study::FastestOfContender& contender : outcome.contenders) {
