@@ -6,8 +6,8 @@ _unflex_options() {
   case $1 in
     '') echo '-h --help --version' ;;
     compensate)
-      echo "-h --help -o --output --in-place --log --strict $print --faster --max-deviation --engine -j --jobs" ;;
-    batch) echo "-h --help -o --output $print --summary --faster --max-deviation --engine -j --jobs" ;;
+      echo "-h --help -o --output --in-place --log --strict $print --faster --timing --max-deviation --engine -j --jobs" ;;
+    batch) echo "-h --help -o --output $print --summary --faster --timing --max-deviation --engine -j --jobs" ;;
     verify) echo "-h --help --against --strict $print --faster --max-deviation" ;;
     inspect) echo "-h --help --strict $print" ;;
     study) echo "-h --help --case --machines --faster --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
@@ -50,6 +50,7 @@ _unflex_value() {
     inspect:--report) echo 'files *.json' ;;
     study:--report) echo 'files *.@(json|html|svg)' ;;
     *:--report) echo 'files *.@(json|html)' ;;
+    compensate:--timing | batch:--timing) echo 'words scaled optimal' ;;
     study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;
     *:--axis | *:--make-test) echo 'words x y' ;;
     *:--machines) echo 'folders' ;;

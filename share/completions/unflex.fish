@@ -75,6 +75,7 @@ complete -c unflex -n '__unflex_in batch' -l summary -x -a '(__unflex_files .jso
 complete -c unflex -n '__unflex_in verify' -l against -x -a $gcode -d 'The sliced G-code it was made from'
 complete -c unflex -n '__unflex_in compensate verify inspect' -l strict -d 'Take warnings for errors'
 complete -c unflex -n '__unflex_in compensate batch verify' -l faster -d 'As fast as keeps the nozzle near the path; =µm'
+complete -c unflex -n '__unflex_in compensate batch' -l timing -x -a 'scaled optimal' -d 'How --faster finds the timing'
 complete -c unflex -n '__unflex_in compensate batch verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'
 complete -c unflex -n '__unflex_in compensate batch study' -l engine -x -a 'auto banded ipopt' -d 'What solves'
 complete -c unflex -n '__unflex_in compensate batch study tune' -s j -l jobs -x -d 'How many to compute at once'

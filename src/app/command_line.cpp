@@ -113,13 +113,16 @@ void add_timing(CLI::App& command, RunConfig& config) {
       .add_option("--timing", config.timing_method,
                   "How --faster finds the timing: scaled, or optimal, a little faster and later")
       ->type_name("scaled|optimal")
-      ->check(CLI::IsMember({std::string(machine::kScaled), std::string(machine::kOptimal)}));
+      ->transform(word_for<TimingMethod>(
+          {{machine::kScaled, TimingMethod::scaled}, {machine::kOptimal, TimingMethod::optimal}}));
 }
 
 // --faster and --timing are short for keys.
 void take_faster(RunConfig& config) {
-  if (!config.timing_method.empty()) {
-    config.overrides.push_back("timing.method=" + config.timing_method);
+  if (config.timing_method != TimingMethod::as_set) {
+    const bool is_optimal = config.timing_method == TimingMethod::optimal;
+    config.overrides.push_back(
+        fmt::format("timing.method={}", is_optimal ? machine::kOptimal : machine::kScaled));
   }
   if (!config.faster_um.empty()) {
     // Without a value a flag is "true".

@@ -99,7 +99,7 @@ Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
   print->variables = config.slicer_settings;
   Result<machine::Settings> settings = machine::load(
       {.print = &*print, .printer_file = config.printer_file, .overrides = config.overrides});
-  if (settings && !config.timing_method.empty() && !settings->is_timing_free()) {
+  if (settings && config.timing_method != TimingMethod::as_set && !settings->is_timing_free()) {
     return fail(ErrorKind::usage, "--timing says how --faster finds the timing; give that too");
   }
   if (config.command == Command::compensate) {

@@ -60,7 +60,7 @@ class ElasticProgram {
     double breach = 0.0;      // s
     double slack = 0.0;       // μ
     double stiffness = 0.0;   // D
-    // Of w, λ and s.
+    // Changes of w, λ and s.
     double room_step = 0.0;
     double multiplier_step = 0.0;
     double breach_step = 0.0;

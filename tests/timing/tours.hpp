@@ -18,7 +18,7 @@ namespace unflex::timing::testing {
 using Moves = std::vector<planner::PlannedMove>;
 
 inline constexpr double kTolerance_mm = 20e-3;
-// Of the motors, in a first plan.
+// What the motors of these tests do.
 inline constexpr double kMotors_mm_s2 = 20000.0;
 
 inline compensate::Setup setup() {

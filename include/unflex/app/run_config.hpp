@@ -63,6 +63,9 @@ struct TuneConfig {
   double bed_temp_c = 0.0;
 };
 
+// timing.method, if the command line has it.
+enum class TimingMethod { as_set, scaled, optimal };
+
 struct RunConfig {
   Command command = Command::compensate;
   // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
@@ -72,8 +75,8 @@ struct RunConfig {
   // compensate, printer init, printer macros, printer line-test, batch, tune: -o, or the input with
   // --in-place; verify: OUT
   std::string output;
-  std::string timing_method;  // value of --timing; empty: not given
-  std::string faster_um;      // value of --faster, of study a list; empty: not given
+  TimingMethod timing_method = TimingMethod::as_set;  // value of --timing
+  std::string faster_um;  // value of --faster, of study a list; empty: not given
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"
