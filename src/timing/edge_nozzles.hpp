@@ -42,7 +42,7 @@ class EdgeNozzles {
       return {};
     }
     const double look = x * kLooks;
-    const auto first = std::min(static_cast<std::size_t>(look), kLooks - 1);
+    const auto first = std::min(static_cast<std::size_t>(look), std::size_t{kLooks} - 1);
     const double share = look - static_cast<double>(first);
     const Vector& a = left_[i][kLooks * k + first];
     const Vector& b = left_[i][kLooks * k + first + 1];
@@ -58,8 +58,6 @@ class EdgeNozzles {
   }
 
  private:
-  static constexpr std::size_t kLooks = 4;
-
   static Derivatives<D> shifted(const FlatOutput<D>& flat, double off) {
     Derivatives<D> factors = flat.nozzle;
     for (int i = 0; i < D; ++i) {
@@ -89,13 +87,6 @@ class EdgeNozzles {
 
   dynamics::NozzleXY follow(const SectionSpline<D>& spline, std::size_t i) {
     const SectionEdge& edge = edges_[i];
-    static const std::array<SplineShares<D>, kLooks + 1> kShares = [] {
-      std::array<SplineShares<D>, kLooks + 1> shares{};
-      for (std::size_t look = 0; look <= kLooks; ++look) {
-        shares[look] = spline_shares<D>(static_cast<double>(look) / kLooks);
-      }
-      return shares;
-    }();
     dynamics::NozzleXY nozzle;
     const Vector origin = spline.origin();
     Base last;
@@ -103,7 +94,7 @@ class EdgeNozzles {
     const Derivatives<D> of_y = shifted(spline.y(), edge.off_y);
     for (std::size_t look = 0; look <= kLooks * spline.periods(); ++look) {
       const std::size_t k = std::min(look / kLooks, spline.periods() - 1);
-      const SplineShares<D>& shares = kShares[look - kLooks * k];
+      const SplineShares<D>& shares = kSharesAtLooks<D>[look - kLooks * k];
       const auto at = spline.place(k, shares);
       const Base now = base_at(spline, k, shares, at);
       const Vector foreseen = SectionSpline<D>::apply(of_x, of_y, at);

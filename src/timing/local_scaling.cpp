@@ -39,12 +39,10 @@ constexpr double kMostFactor = 1.3;
 constexpr double kLeastSpeedFactor = 0.8;
 constexpr double kMostSpeedFactor = 1.05;
 constexpr double kLeastSpeed_mm_s = 1.0;
-// The share of the tolerance that is aimed at, and what counts as kept.
+// The share of the tolerance that is aimed at.
 constexpr double kAim = 0.97;
-constexpr double kKept = 1.05;
 // The nozzle's speed relative to F, likewise.
 constexpr double kAimOfFeed = 1.015;
-constexpr double kKeptFeed = 1.025;
 // A larger swing in the end counts as this.
 constexpr double kMostLeft = 4.0;
 // How far in time an error depends on a limit, and the shortest pieces; in 1/ω.

@@ -36,6 +36,10 @@ struct AxesModel {
 // How many times its tolerance each model's nozzle may stray on each piece. Empty: once.
 using Allowances = std::vector<std::vector<double>>;
 
+// What counts as kept, of an error relative to the tolerance and of a speed relative to F.
+inline constexpr double kKept = 1.05;
+inline constexpr double kKeptFeed = 1.025;
+
 struct NozzleMeasure {
   // For each model and piece, the largest e relative to the tolerance, whatever is allowed.
   std::vector<std::vector<double>> of_pieces;

@@ -19,10 +19,7 @@ using gcode::Y;
 constexpr double kSettling = 9.0;
 // Travel that wanders may come too near to what is laid next, and a first plan that is too quick
 // may lead nowhere. So others come after it.
-constexpr FirstPlan kFirstPlans[] = {{0.5, 0.2}, {0.5, 0.05}, {0.15, 0.05}};
-// What counts as kept.
-constexpr double kKept = 1.05;
-constexpr double kKeptFeed = 1.025;
+constexpr FirstPlan kFirstPlans[] = {{0.5, kTravelTolerance_mm}, {0.5, 0.05}, {0.15, 0.05}};
 
 // What the models of the axes ask of the sections. nullopt: more than sections know.
 std::optional<SectionRules> rules_of(const compensate::Setup& setup) {

@@ -60,7 +60,6 @@ constexpr double kLeastTrust = 1e-3;
 constexpr double kShrink = 0.5;
 constexpr double kGrow = 1.6;
 constexpr double kCooling = 0.85;
-constexpr double kCoolingOfBand = 0.85;
 constexpr std::size_t kReach = 8;  // nodes
 // A step is right where nothing comes out otherwise by more, relative to what is allowed.
 constexpr double kRight = 0.1;
@@ -144,7 +143,7 @@ class Program {
           break;
         }
       }
-      largest_trust *= D == 5 ? kCooling : kCoolingOfBand;
+      largest_trust *= kCooling;
       adapt(largest_trust, round);
     }
     if (best.empty()) {
@@ -170,15 +169,8 @@ class Program {
   // Where the base rests at an end, b̈ may jump there, and nothing below it. So the D control points
   // of that end have one freedom per axis, in these shares.
   void set_jump() {
-    using Square = Eigen::Matrix<double, D, D>;
-    using Column = Eigen::Matrix<double, D, 1>;
-    Square spline;
-    for (int i = 0; i < D; ++i) {
-      for (int j = 0; j < D; ++j) {
-        spline(i, j) = at_node_[i][j];
-      }
-    }
-    const Column shares = spline.fullPivLu().solve(Column::Unit(D - 1));
+    const Eigen::Matrix<double, D, 1> shares =
+        Spline::end_matrix().fullPivLu().solve(Eigen::Matrix<double, D, 1>::Unit(D - 1));
     for (int j = 0; j < D; ++j) {
       jump_[j] = shares[j];
     }
@@ -546,20 +538,12 @@ class Program {
 
   // Looks also between the places that rows are for. Returns the largest values.
   Excess measure() {
-    constexpr int kLooks = 4;
-    static const std::array<Shares, kLooks + 1> kShares = [] {
-      std::array<Shares, kLooks + 1> shares{};
-      for (int i = 0; i <= kLooks; ++i) {
-        shares[i] = spline_shares<D>(static_cast<double>(i) / kLooks);
-      }
-      return shares;
-    }();
     Excess worst;
     excess_.assign(nodes_.periods(), {});
     const double h = nodes_.period_s();
     for (std::size_t k = 0; k < nodes_.periods(); ++k) {
       for (int look = 0; look < kLooks + (k + 1 == nodes_.periods() ? 1 : 0); ++look) {
-        const At here = at(k, static_cast<double>(look) / kLooks, kShares[look]);
+        const At here = at(k, static_cast<double>(look) / kLooks, kSharesAtLooks<D>[look]);
         const Vector accel =
             Spline::apply(spline_.x().base_accel, spline_.y().base_accel, here.place);
         const double a = rules_.shares_motors ? std::abs(accel.x) + std::abs(accel.y)

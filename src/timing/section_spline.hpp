@@ -50,6 +50,18 @@ class SectionSpline {
     }
   }
 
+  // What makes the derivatives by u at an end of the D control points there.
+  static Eigen::Matrix<double, D, D> end_matrix() {
+    const Shares shares = spline_shares<D>(0.0);
+    Eigen::Matrix<double, D, D> matrix;
+    for (int i = 0; i < D; ++i) {
+      for (int j = 0; j < D; ++j) {
+        matrix(i, j) = shares[i][j];
+      }
+    }
+    return matrix;
+  }
+
   [[nodiscard]] const FlatOutput<D>& x() const { return x_; }
   [[nodiscard]] const FlatOutput<D>& y() const { return y_; }
   [[nodiscard]] Vector origin() const { return origin_; }
@@ -164,20 +176,17 @@ class SectionSpline {
                             flat.base_accel,
                             flat.sensitivity,
                             once_more<D>(flat.sensitivity)};
-    const Shares shares = spline_shares<D>(0.0);
     Square state;
-    Square spline;
     for (int i = 0; i < D; ++i) {
       for (int j = 0; j < D; ++j) {
         state(i, j) = known[i][j];
-        spline(i, j) = shares[i][j];
       }
     }
     Column values = Column::Zero();
     values[0] = nozzle.position - base_mm;
     values[1] = nozzle.velocity * period_s_;
     const Column derivatives = state.fullPivLu().solve(values);
-    const Column points = spline.fullPivLu().solve(derivatives);
+    const Column points = end_matrix().fullPivLu().solve(derivatives);
     for (int j = 0; j < D; ++j) {
       points_[kPerPoint * j + axis] = points[j];
     }

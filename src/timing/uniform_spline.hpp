@@ -64,4 +64,15 @@ constexpr SplineShares<D> spline_shares(double x) {
   return shares;
 }
 
+// Shares at kLooks places of a period, and at its end.
+inline constexpr int kLooks = 4;
+template <int D>
+inline constexpr auto kSharesAtLooks = [] {
+  std::array<SplineShares<D>, kLooks + 1> shares{};
+  for (int look = 0; look <= kLooks; ++look) {
+    shares[look] = spline_shares<D>(static_cast<double>(look) / kLooks);
+  }
+  return shares;
+}();
+
 }  // namespace unflex::timing
