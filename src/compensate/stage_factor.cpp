@@ -3,17 +3,10 @@
 #include <cmath>
 
 #include "stage_form.hpp"
+#include "unflex/core/wide_registers.hpp"
 
 namespace unflex::compensate {
 namespace {
-
-// Wider registers where the processor has them. Multiplications and additions are not fused and
-// sums keep their order, so the result is the same without.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define UNFLEX_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define UNFLEX_WIDE
-#endif
 
 // Upper triangles of n × n: to += f a + g b.
 UNFLEX_WIDE void add_squares(std::size_t n, double f, const double* a, double g, const double* b,

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <type_traits>
 
+#include "unflex/core/wide_registers.hpp"
+
 namespace unflex::timing {
 namespace {
 
@@ -19,13 +21,6 @@ constexpr double kStationary = 1e-2;
 // What a row that is less stiff adds to the matrix does not matter.
 constexpr double kStiff = 1e-6;
 
-// Wider registers where the processor has them. Multiplications and additions are not fused and
-// sums keep their order, so the result is the same without.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define UNFLEX_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define UNFLEX_WIDE
-#endif
 #define UNFLEX_INLINE [[gnu::always_inline]] inline
 
 template <int W>
