@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "dialect.hpp"
 #include "unflex/core/number.hpp"
@@ -82,23 +83,47 @@ int feed_decimals(double feed_mm_min, double duration_s) {
 }
 
 // Tells when the firmware, by its own plan, will have done the lines it has been given. wait_s: how
-// long it rests before the first line, which does not count.
+// long it rests before the first line, which does not count. holds_last: the last line may still
+// change, so the firmware gets it with the next one.
 class FirmwareClock {
  public:
-  FirmwareClock(std::unique_ptr<planner::Planner> firmware, double start_s, double wait_s)
-      : firmware_(std::move(firmware)), final_s_(start_s), wait_s_(wait_s) {}
+  FirmwareClock(std::unique_ptr<planner::Planner> firmware, double start_s, double wait_s,
+                bool holds_last)
+      : firmware_(std::move(firmware)),
+        final_s_(start_s),
+        wait_s_(wait_s),
+        holds_last_(holds_last) {}
 
   // Lines are numbered from 0. expected_s: duration that is assumed for the line until the plan has
   // it.
   void add(const gcode::Segment& line, double expected_s) {
-    firmware_->add(line);
+    give_last();
+    last_ = line;
     durations_s_.push_back(expected_s);
     expected_s_ += expected_s;
+    if (!holds_last_) {
+      give_last();
+    }
     take();
   }
+  // The last line that was added has another speed. For a clock that holds it.
+  void change_last(double speed_mm_s) {
+    if (!last_ || last_->feed_mm_s == speed_mm_s) {
+      return;
+    }
+    double& duration_s = durations_s_.back();
+    expected_s_ -= duration_s;
+    duration_s *= last_->feed_mm_s / speed_mm_s;
+    expected_s_ += duration_s;
+    last_->feed_mm_s = speed_mm_s;
+  }
   // A line that does not belong to the run.
-  void pass(const gcode::Segment& line) { firmware_->add(line); }
+  void pass(const gcode::Segment& line) {
+    give_last();
+    firmware_->add(line);
+  }
   void finish() {
+    give_last();
     firmware_->stop();
     take();
   }
@@ -107,6 +132,13 @@ class FirmwareClock {
   [[nodiscard]] double duration_s(std::size_t line) const { return durations_s_[line]; }
 
  private:
+  void give_last() {
+    if (last_) {
+      firmware_->add(*last_);
+      last_.reset();
+    }
+  }
+
   void take() {
     moves_.clear();
     firmware_->take(moves_);
@@ -125,6 +157,8 @@ class FirmwareClock {
   std::vector<double> durations_s_;  // of the planned lines, then of the expected ones
   double final_s_;
   double wait_s_;
+  bool holds_last_;
+  std::optional<gcode::Segment> last_;  // not given to the firmware yet
   double expected_s_ = 0.0;
 };
 
@@ -214,7 +248,7 @@ class SpeedSolver {
   // Rounding and the firmware change the time that lines take. The next lines make up for that.
   void round_to_feeds(double late_s) {
     FirmwareClock clock(planner::make_planner(options_->run_limits, options_->fixed), late_s,
-                        wait_s());
+                        wait_s(), leaves_out_ramps());
     gcode::Segment line;
     line.end_mm = start_mm_;
     for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
@@ -227,6 +261,9 @@ class SpeedSolver {
       const double way_mm = correction_[i] * (distance_mm_[i] - lead.mm + ramps_mm(i));
       const double feed = way_mm / (due_s - lead.s) / mm_s_per_feed_;
       set_speed(i, feed * mm_s_per_feed_);
+      if (i > 0) {
+        clock.change_last(speed_mm_s_[i - 1]);  // which may depend on this one
+      }
       const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm,
                                   start_mm_[gcode::E] + stroke.e_mm};
       line = {line.end_mm, to, stroke.speed_mm_s, i, true};
@@ -251,6 +288,8 @@ class SpeedSolver {
                                   kMostCorrection);
     }
   }
+
+  [[nodiscard]] bool leaves_out_ramps() const { return options_->fixed.firmware == Firmware::rrf; }
 
   // RepRapFirmware leaves out a line's ramp up from the faster of its two ends, and so goes no
   // faster than that end, if the ramp would take less than ten step clocks and gain less than 10 %
@@ -315,7 +354,7 @@ class SpeedSolver {
   // The speed nearest to v that the firmware can be told and will take.
   void set_speed(std::size_t i, double v) {
     Stroke& stroke = (*strokes_)[i];
-    if (i > 0 && options_->fixed.firmware == Firmware::rrf) {
+    if (i > 0 && leaves_out_ramps()) {
       v = with_its_ramps(i, v);
       if (v == speed_mm_s_[i - 1]) {
         go_on_as_before(i);

@@ -1,8 +1,11 @@
 // RepRapFirmware's own plan of a run's lines.
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <random>
 #include <string>
 #include <string_view>
@@ -132,6 +135,31 @@ TEST(RrfRun, HasNoLineSlowerThanItSays) {
     ++looked_at;
   }
   EXPECT_GT(looked_at, 1000U);
+}
+
+// A slow circle with waves, as a vase is printed: the lines are a few steps long, so their speeds
+// change much.
+TEST(RrfRun, OfShortLinesIsOnTime) {
+  EmitOptions how = rrf_options();
+  std::string input = "G28\nG90\nM83\nG1 X30 Y20 Z0.2 F6000\nM204 P1500 T1500\nG4 P1\n";
+  for (int i = 1; i <= 1500; ++i) {
+    const double angle = 0.03 * i;
+    const double radius_mm = 10.0 + 0.7 * std::sin(9.0 * angle);
+    input += fmt::format("G1 X{:.3f} Y{:.3f} E.02 F600\n", 20.0 + radius_mm * std::cos(angle),
+                         20.0 + radius_mm * std::sin(angle));
+  }
+  const std::string text = testing::emit(input + "G4 P1\n", how).text;
+  const std::vector<planner::PlannedMove> sliced = plan_of(input + "G4 P1\n", how);
+  const std::vector<planner::PlannedMove> emitted = plan_of(text, how);
+  std::vector<double> apart_mm;
+  for (double t = 0.5; t < planner::duration_s(sliced); t += 0.05) {
+    const std::array<double, 2> a = testing::plan_at(sliced, t);
+    const std::array<double, 2> b = testing::plan_at(emitted, t);
+    apart_mm.push_back(std::hypot(a[0] - b[0], a[1] - b[1]));
+  }
+  // A step, and a millisecond at 10 mm/s.
+  std::ranges::sort(apart_mm);
+  EXPECT_LT(apart_mm[apart_mm.size() * 9 / 10], 0.0125 + 0.01);
 }
 
 // Filament alone before and behind runs, limits of the file's own inside them.
