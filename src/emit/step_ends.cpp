@@ -53,7 +53,7 @@ class Chooser {
     }
     const StepEnd end{{static_cast<std::int64_t>(to[0]), static_cast<std::int64_t>(to[1])}, extra};
     for (const StepEnd& other : found_) {
-      if (other.at == end.at) {
+      if (are_same(other.at, end.at)) {
         return;
       }
     }

@@ -14,6 +14,11 @@ namespace unflex::emit {
 
 using Place = std::array<std::int64_t, 2>;  // in steps
 
+// As a == b, which calls a function for so few bytes.
+[[nodiscard]] inline bool are_same(const Place& a, const Place& b) {
+  return a[0] == b[0] && a[1] == b[1];
+}
+
 // The nearest whole number, for |x| < 2^51. At the size of kNoFraction a double has no digits after
 // the point, so adding it rounds x.
 [[nodiscard]] inline double nearest_whole(double x) {

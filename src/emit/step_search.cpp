@@ -408,7 +408,8 @@ class Search {
     if (line.total >= most_to_keep()) {
       return;
     }
-    const auto same = std::ranges::find(kept_, line.to, &Choice<kModes>::to);
+    const auto same = std::ranges::find_if(
+        kept_, [&](const Choice<kModes>& kept) { return are_same(kept.to, line.to); });
     if (same != kept_.end()) {
       if (same->total <= line.total) {
         return;
