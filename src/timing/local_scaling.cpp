@@ -5,8 +5,8 @@
 //
 //   u ← u g^{−α}     a ← a g^{−β}     V ← V F/v where the nozzle runs ahead of F
 //
-// The exponents become smaller from round to round. In the last rounds limits are lowered only,
-// until the nozzle keeps the tolerance everywhere.
+// The exponents become smaller from round to round. Once the plan's time hardly changes, limits are
+// lowered only, until the nozzle keeps the tolerance everywhere.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -24,12 +24,14 @@ namespace {
 using gcode::X;
 using gcode::Y;
 
+// Rounds in which limits may rise, at least and at most, and those in which they are lowered only.
+constexpr int kLeastRounds = 3;
 constexpr int kRounds = 10;
 constexpr int kRepairs = 20;
 constexpr double kAlpha = 0.45;
 constexpr double kBeta = 0.2;
 constexpr double kCooling = 0.87;  // of both, from round to round
-// The last rounds are in more of a hurry, and reach further from round to round.
+// The repairs are in more of a hurry, and reach further from round to round.
 constexpr double kAlphaOfRepairs = 0.8;
 constexpr double kBetaOfRepairs = 0.5;
 constexpr double kWider = 0.25;
@@ -50,7 +52,7 @@ constexpr double kErrorReach = 2.3;
 constexpr double kSpeedReach = 1.1;
 constexpr double kEndReach = 3.4;
 constexpr double kPieces[] = {1.1, 2.3};
-// A round that makes the run shorter by less than this is the last.
+// A round that changes the run's time by less than this share is the last of its kind.
 constexpr double kGain = 1e-3;
 
 // g^{−exponent}, within what a limit may change by.
@@ -96,16 +98,23 @@ class LocalScaling {
     constexpr double kHardlySlower = 1.01;
     double least_s = kHardlySlower * planner::duration_s(course_.moves);
     course_.moves = pieces_.moves;
-    for (int round = 0; round < kRounds + kRepairs; ++round) {
-      const bool repairs = round + 1 >= kRounds;
+    bool repairs = false;
+    int repaired = 0;
+    double last_s = 0.0;
+    for (int round = 0; repaired < kRepairs; ++round) {
       const std::vector<planner::PlannedMove> plan =
           bounded_plan(pieces_.moves, bounds_, vertex_mm_s_);
-      if (repairs && planner::duration_s(plan) >= least_s) {
+      const double plan_s = planner::duration_s(plan);
+      repairs = repairs || round + 1 >= kRounds ||
+                (round >= kLeastRounds && std::abs(plan_s - last_s) < kGain * plan_s);
+      repaired += repairs ? 1 : 0;
+      last_s = plan_s;
+      if (repairs && plan_s >= least_s) {
         break;  // it becomes only slower
       }
       const std::optional<NozzleMeasure> measured = try_plan(plan, pieces_.bounds);
       if (measured && keeps(*measured)) {
-        const double gain_s = least_s - planner::duration_s(plan);
+        const double gain_s = least_s - plan_s;
         if (gain_s > 0.0) {
           least_s -= gain_s;
           best = Timed{plan, pieces_.counts};
@@ -115,7 +124,7 @@ class LocalScaling {
         }
       }
       if (measured) {
-        rescale(plan, *measured, round, repairs);
+        rescale(plan, *measured, round, repaired);
       } else {
         slow_down();
       }
@@ -285,12 +294,13 @@ class LocalScaling {
   }
 
   void rescale(const std::vector<planner::PlannedMove>& plan, const NozzleMeasure& measured,
-               int round, bool repairs) {
+               int round, int repaired) {
+    const bool repairs = repaired > 0;
     const double cooled = std::pow(kCooling, round);
     const double alpha = repairs ? kAlphaOfRepairs : kAlpha * cooled;
     const double beta = repairs ? kBetaOfRepairs : kBeta * cooled;
     const double most = repairs ? 1.0 : kMostFactor;
-    const double reach = kErrorReach * (1.0 + kWider * std::max(round + 1 - kRounds, 0));
+    const double reach = kErrorReach * (1.0 + kWider * std::max(repaired - 1, 0));
     const Near error = largest_near(measured.error, reach / omega_rad_s_);
     const Near speed = largest_near(measured.speed, kSpeedReach / omega_rad_s_);
     const double left = std::min(left_of(measured), kMostLeft);
