@@ -52,7 +52,7 @@ using Square = Eigen::Matrix<double, kSize, kSize>;
 // be the base's own.
 constexpr double kAtEnd = 1e3;
 // ADMM: the most rounds, the change at which it ends, and ρ as a share of what u costs without it.
-constexpr int kMostRounds = 60;
+constexpr int kMostRounds = 200;
 constexpr double kSettled_mm_s = 0.02;
 constexpr double kPull = 0.3;
 // A change of speed may exceed its bounds by this share of their width: ADMM ends a little outside,
