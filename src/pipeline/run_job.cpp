@@ -209,6 +209,10 @@ void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
       timed = timing::faster(job.course(), job.setup, job.first_stage, job.bounds, *choice.engine);
     }
     if (timed) {
+      if (timed->plants) {
+        job.setup.x.plants = std::move(timed->plants->x);
+        job.setup.y.plants = std::move(timed->plants->y);
+      }
       job.retimed =
           NewTiming{std::move(timed->moves), counts_of(job.piece.move_counts, timed->pieces),
                     std::move(timed->base)};

@@ -210,7 +210,7 @@ std::vector<AxesModel> models_of(const compensate::Setup& setup) {
   const auto of = [](const compensate::AxisSetup& axis) {
     std::vector<Model> models = {{axis.axis}};
     for (const compensate::Plant& plant : axis.plants) {
-      if (plant.share >= kLeastShare) {
+      if (is_model(plant)) {
         models.push_back({plant.axis, plant.is_edge ? kTimesAtEdge : 1.0});
       }
     }

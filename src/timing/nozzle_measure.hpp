@@ -22,6 +22,10 @@ inline constexpr double kTimesAtEdge = 2.0;
 // Models of less share only keep the base from moving more than it must.
 inline constexpr double kLeastShare = 0.05;
 
+[[nodiscard]] inline bool is_model(const compensate::Plant& plant) {
+  return plant.share >= kLeastShare;
+}
+
 // Models of both axes.
 struct AxesModel {
   dynamics::FlexibleAxis x;

@@ -30,6 +30,15 @@ std::optional<Timed> timed(const Moves& moves, const compensate::Setup& of,
   return faster(moves, of, at_rest(moves), bounds, *engine);
 }
 
+// The setup that the base of a timing is to be found for.
+compensate::Setup with_plants_of(const Timed& result, compensate::Setup of) {
+  if (result.plants) {
+    of.x.plants = result.plants->x;
+    of.y.plants = result.plants->y;
+  }
+  return of;
+}
+
 TEST(Faster, KeepsToleranceFeedAndMotorsInLessTime) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     const Moves moves = tour(seed, 40.0 * seed);
@@ -96,13 +105,40 @@ TEST(Faster, KeepsTheToleranceForAllThatTheAxesMayBe) {
   const auto exact = timed(moves, setup(), bounds_of(moves));
   ASSERT_TRUE(robust.has_value() && exact.has_value());
   EXPECT_GT(planner::duration_s(robust->moves), planner::duration_s(exact->moves));
+  const compensate::Setup found = with_plants_of(*robust, band);
   double worst_exact_mm = 0.0;
   for (const double factor : {0.95, 1.0, 1.05}) {
     const dynamics::FlexibleAxis axis = band.x.axis.detuned(factor);
-    EXPECT_LT(draw(robust->moves, band, axis).largest_error_mm, 1.1 * kTolerance_mm) << factor;
+    EXPECT_LT(draw(robust->moves, found, axis).largest_error_mm, 1.1 * kTolerance_mm) << factor;
     worst_exact_mm = std::max(worst_exact_mm, draw(exact->moves, setup(), axis).largest_error_mm);
   }
   EXPECT_GT(worst_exact_mm, 2.0 * kTolerance_mm);
+}
+
+// Squared errors are least where the rare plant strays far, but the largest error counts.
+TEST(Faster, GivesMoreShareToThePlantThatStraysFurthest) {
+  constexpr double kRare = 0.06;
+  compensate::Setup likely = setup();
+  for (compensate::AxisSetup* const axis : {&likely.x, &likely.y}) {
+    axis->plants = {{likely.x.axis.detuned(0.94), kRare}, {likely.x.axis.detuned(1.01), kRare}};
+  }
+  const Moves moves = tour(10, 150.0);
+  const auto result = timed(moves, likely, bounds_of(moves));
+  ASSERT_TRUE(result.has_value() && result->plants.has_value());
+  for (const std::vector<compensate::Plant>* const plants :
+       {&result->plants->x, &result->plants->y}) {
+    ASSERT_FALSE(plants->empty());
+    EXPECT_EQ(plants->front().axis.main_rad_s(), likely.x.plants.front().axis.main_rad_s());
+    EXPECT_GT(plants->front().share, 2.0 * kRare);
+    double sum = 0.0;
+    for (const compensate::Plant& plant : *plants) {
+      sum += plant.share;
+    }
+    EXPECT_LT(sum, 1.0);
+  }
+  const Drawn drawn =
+      draw(result->moves, with_plants_of(*result, likely), likely.x.plants.front().axis);
+  EXPECT_LT(drawn.largest_error_mm, 1.1 * kTolerance_mm);
 }
 
 TEST(Faster, LeavesAPartAsItIsWhereItMeetsItsNeighbours) {

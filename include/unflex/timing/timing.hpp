@@ -48,12 +48,20 @@ inline constexpr double kTravelTolerance_mm = 0.2;
                                         const planner::Limits& limits,
                                         const planner::FirmwareConfig& config);
 
+// AxisSetup::plants of both axes.
+struct Plants {
+  std::vector<compensate::Plant> x;
+  std::vector<compensate::Plant> y;
+};
+
 // A run's path in a new timing.
 struct Timed {
   std::vector<planner::PlannedMove> moves;  // each move in one piece or several
   std::vector<std::size_t> pieces;          // how many, for each move of the path
   // The base that goes with it, on compensate::node_grid(); unset: to be solved for.
   std::optional<dynamics::BaseTrajectory> base = {};
+  // What the base is to suit besides the axes as given; unset: as in the setup.
+  std::optional<Plants> plants = {};
 };
 
 // The moves of the course in less time, within the bounds, of which there is one for each move. A
