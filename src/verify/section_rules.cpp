@@ -12,8 +12,10 @@ namespace {
 constexpr double kOneLine_per_s = 10.0;
 // Allowance for rounding to steps and for how far the nozzle strays.
 constexpr double kRounding_mm = 0.05;
-// Filament that a line in the tail may lay in any case.
+// Filament that a line in the tail may lay in any case. Where the timing is free, a nozzle that
+// turns round in the end may have passed all of the path while some way of its base is left.
 constexpr double kLate_mm = 5e-4;
+constexpr double kLateInFreeTiming_mm = 2e-3;
 // Shorter lines do not tell how much filament is laid per path.
 constexpr double kShort_mm = 0.2;
 // A line may lay this much more per path than the densest one, since lengths are rounded.
@@ -79,7 +81,9 @@ void SectionRules::add(const planner::PlannedMove& move, Meter& meter, bool late
     // If the run's clock is late, some of its path is still to go.
     const double to_go_mm = meter.to_path_end_mm(move.segment.start_mm);
     filament_in_tail_.offer(filament_mm,
-                            kLate_mm + filament_tolerance_mm + kDenser * densest_ * to_go_mm, line);
+                            (has_free_timing_ ? kLateInFreeTiming_mm : kLate_mm) +
+                                filament_tolerance_mm + kDenser * densest_ * to_go_mm,
+                            line);
     const double swing_mm = meter.swing_mm();
     if (swing_mm > swing_in_tail_mm_) {
       swing_in_tail_mm_ = swing_mm;
