@@ -78,12 +78,23 @@ struct Excess {
   [[nodiscard]] bool is_within(const Excess& limits) const {
     return accel <= limits.accel && error <= limits.error && feed <= limits.feed;
   }
+  [[nodiscard]] double largest() const { return std::max({accel, error, feed}); }
 };
 constexpr Excess kAim{0.985, 1.0, 1.0};
 // What counts as kept, what rows are tightened for, and by how much at most.
 constexpr Excess kKept{1.025, 1.03, 1.015};
 constexpr Excess kTightenAbove{1.01, 1.0, 1.013};
 constexpr Excess kTightest{0.8, 0.6, 0.95};
+// Rows that are broken by more are not tightened: that comes from elsewhere.
+constexpr double kMostTightening = 1.3;
+constexpr double kStuck = 0.01;
+// Rows below this share of what is allowed are left out, but for the first round.
+constexpr double kFarBelow = 0.2;
+// The gap per unknown at which a program counts as solved: while the next one differs by more, and
+// in the end.
+constexpr double kRoughGap = 1e-2;
+constexpr double kFineGap = 1e-4;
+constexpr int kFineRounds = 2;
 // The base keeps so far away from the limits of its place.
 constexpr double kRoom_mm = 3e-3;
 // Travel beside filament has the tolerance of filament for so many node periods in the end, and for
@@ -129,20 +140,30 @@ class Program {
     double last = duration();
     double least = kInfinity;
     std::vector<double> best;
+    double last_broken = 0.0;
     for (int round = 0; round < kRounds; ++round) {
+      round_ = round;
       if (!step(false)) {
         return false;
       }
       const Excess excess = measure();
       const double gain = last - duration();
       last = duration();
+      bool is_settled = false;
       if (excess.is_within(kKept) && last < least) {
         least = last;
         best = spline_.points();
-        if (gain < kGain * last) {
-          break;
-        }
+        is_settled = gain < kGain * last;
       }
+      if (fine_rounds_ > 0 && (is_settled || fine_rounds_ == kFineRounds)) {
+        break;
+      }
+      fine_rounds_ += is_settled || fine_rounds_ > 0 ? 1 : 0;
+      const double broken = excess.largest();
+      if (broken > kMostTightening && std::abs(broken - last_broken) < kStuck * broken) {
+        break;  // what is broken by so much does not come right any more
+      }
+      last_broken = broken;
       largest_trust *= kCooling;
       adapt(largest_trust, round);
     }
@@ -255,10 +276,15 @@ class Program {
     return result;
   }
 
-  void add_row(const At& at, const Gradient& g, double v, double lower) {
-    if (!is_plain_) {
-      program_.add_row(Spline::kPerPoint * at.k, folded(at.k, g), v, lower, 1.0, kPrice);
+  // Adds the row, unless it is far from its bounds; the next rounds will see if it comes near them.
+  // Returns whether it does.
+  bool add_row(const At& at, const Gradient& g, double v, double lower) {
+    const bool is_near = round_ == 0 || v > kFarBelow || (std::isfinite(lower) && v < -kFarBelow);
+    if (is_plain_ || !is_near) {
+      return false;
     }
+    program_.add_row(Spline::kPerPoint * at.k, folded(at.k, g), v, lower, 1.0, kPrice);
+    return true;
   }
 
   void add_square(const At& at, const Gradient& g, double v, double weight) {
@@ -266,9 +292,7 @@ class Program {
   }
 
   void watch(const At& at, bool is_base, Vector n, double scale, double offset) {
-    if (!is_plain_) {
-      foreseen_.push_back({program_.rows() - 1, at.k, at.shares, is_base, n, scale, offset});
-    }
+    foreseen_.push_back({program_.rows() - 1, at.k, at.shares, is_base, n, scale, offset});
   }
 
   void fix_ends() {
@@ -346,8 +370,9 @@ class Program {
       if (has_square) {
         add_square(at, g, v, kOfAccel);
       }
-      add_row(at, g, v, -1.0);
-      watch(at, true, n, scale, 0.0);
+      if (add_row(at, g, v, -1.0)) {
+        watch(at, true, n, scale, 0.0);
+      }
     }
   }
 
@@ -387,11 +412,12 @@ class Program {
       if (has_square) {
         add_square(at, g, v, is_plain_ ? 1.0 : kOfError);
       }
-      add_row(at, g, v, lower);
-      return scale;
+      return std::pair{add_row(at, g, v, lower), scale};
     };
-    const double scale = add(spline_.x().nozzle, spline_.y().nozzle, tolerance_mm, {});
-    watch(at, false, n, scale, scale * offset);
+    const auto [adds, scale] = add(spline_.x().nozzle, spline_.y().nozzle, tolerance_mm, {});
+    if (adds) {
+      watch(at, false, n, scale, scale * offset);
+    }
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       add(edges_.nozzle_x(i, spline_), edges_.nozzle_y(i, spline_), at_edge_mm(tolerance_mm),
           edges_.left(i, at.k, at.x));
@@ -525,8 +551,8 @@ class Program {
       program_.add_linear(Spline::kPerPoint * (periods - 1 + i) + 2, at_end_[0][i]);
     }
     program_.add_damping(kOfStep);
-    constexpr double kGap = 1e-4;
-    const std::optional<std::span<const double>> step = program_.solve(kGap, iterations_);
+    const std::optional<std::span<const double>> step =
+        program_.solve(is_plain || fine_rounds_ > 0 ? kFineGap : kRoughGap, iterations_);
     if (!step) {
       return false;
     }
@@ -588,7 +614,6 @@ class Program {
                              largest_trust);
     }
     constexpr int kFirstRoughRounds = 2;
-    constexpr double kMostTightening = 1.3;
     const auto tighten = [&](double& factor, double excess, double allowed, double tightest) {
       if (excess > allowed && excess < kMostTightening) {
         factor = std::max(factor / excess, tightest);
@@ -622,6 +647,8 @@ class Program {
   std::vector<double> surprise_;  // likewise
   std::vector<Foreseen> foreseen_;
   bool is_plain_ = false;
+  int round_ = 0;
+  int fine_rounds_ = 0;
   int iterations_ = 0;
   Rows program_;
 };
