@@ -204,6 +204,13 @@ std::optional<Motion> fastest(std::vector<SectionedPart>& sectioned, const Secti
   return result;
 }
 
+// The programs break their rows by a hair here and there. The limits of the base's place are hard.
+double within_by_a_hair(double base_mm, const compensate::BaseLimits& limits) {
+  constexpr double kHair_mm = 1e-3;
+  const double nearest_mm = std::clamp(base_mm, limits.min_position_mm, limits.max_position_mm);
+  return std::abs(nearest_mm - base_mm) <= kHair_mm ? nearest_mm : base_mm;
+}
+
 dynamics::BaseTrajectory base_on(const compensate::NodeGrid& grid,
                                  const std::vector<TimedPart>& parts,
                                  const gcode::Position& start_mm, const compensate::Setup& setup) {
@@ -212,8 +219,8 @@ dynamics::BaseTrajectory base_on(const compensate::NodeGrid& grid,
   for (std::size_t k = 0; k < grid.count; ++k) {
     const double t = static_cast<double>(k) * grid.period_s - setup.lead_in_s;
     const SectionMotion::Base at = base_at(parts, start_mm, t);
-    x_mm.push_back(at.x.position_mm);
-    y_mm.push_back(at.y.position_mm);
+    x_mm.push_back(within_by_a_hair(at.x.position_mm, setup.x.limits));
+    y_mm.push_back(within_by_a_hair(at.y.position_mm, setup.y.limits));
   }
   return {grid.period_s, through(std::move(x_mm), grid.period_s),
           through(std::move(y_mm), grid.period_s)};

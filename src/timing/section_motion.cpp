@@ -379,7 +379,7 @@ class Program {
   // The base stays where it may be.
   void add_reach(const At& at) {
     constexpr double kNear_mm = 1.0;
-    constexpr double kScale_mm = 0.05;
+    constexpr double kScale_mm = 0.02;
     constexpr double kTimesForReach = 3.0;
     const Vector base = Spline::apply(spline_.x().base, spline_.y().base, at.place);
     Gradient g;
