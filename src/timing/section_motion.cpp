@@ -88,8 +88,6 @@ constexpr Excess kTightest{0.8, 0.6, 0.95};
 // Rows that are broken by more are not tightened: that comes from elsewhere.
 constexpr double kMostTightening = 1.3;
 constexpr double kStuck = 0.01;
-// Rows below this share of what is allowed are left out, but for the first round.
-constexpr double kFarBelow = 0.2;
 // The gap per unknown at which a program counts as solved: while the next one differs by more, and
 // in the end.
 constexpr double kRoughGap = 1e-2;
@@ -142,7 +140,6 @@ class Program {
     std::vector<double> best;
     double last_broken = 0.0;
     for (int round = 0; round < kRounds; ++round) {
-      round_ = round;
       if (!step(false)) {
         return false;
       }
@@ -276,15 +273,10 @@ class Program {
     return result;
   }
 
-  // Adds the row, unless it is far from its bounds; the next rounds will see if it comes near them.
-  // Returns whether it does.
-  bool add_row(const At& at, const Gradient& g, double v, double lower) {
-    const bool is_near = round_ == 0 || v > kFarBelow || (std::isfinite(lower) && v < -kFarBelow);
-    if (is_plain_ || !is_near) {
-      return false;
+  void add_row(const At& at, const Gradient& g, double v, double lower) {
+    if (!is_plain_) {
+      program_.add_row(Spline::kPerPoint * at.k, folded(at.k, g), v, lower, 1.0, kPrice);
     }
-    program_.add_row(Spline::kPerPoint * at.k, folded(at.k, g), v, lower, 1.0, kPrice);
-    return true;
   }
 
   void add_square(const At& at, const Gradient& g, double v, double weight) {
@@ -292,7 +284,9 @@ class Program {
   }
 
   void watch(const At& at, bool is_base, Vector n, double scale, double offset) {
-    foreseen_.push_back({program_.rows() - 1, at.k, at.shares, is_base, n, scale, offset});
+    if (!is_plain_) {
+      foreseen_.push_back({program_.rows() - 1, at.k, at.shares, is_base, n, scale, offset});
+    }
   }
 
   void fix_ends() {
@@ -370,9 +364,8 @@ class Program {
       if (has_square) {
         add_square(at, g, v, kOfAccel);
       }
-      if (add_row(at, g, v, -1.0)) {
-        watch(at, true, n, scale, 0.0);
-      }
+      add_row(at, g, v, -1.0);
+      watch(at, true, n, scale, 0.0);
     }
   }
 
@@ -412,12 +405,11 @@ class Program {
       if (has_square) {
         add_square(at, g, v, is_plain_ ? 1.0 : kOfError);
       }
-      return std::pair{add_row(at, g, v, lower), scale};
+      add_row(at, g, v, lower);
+      return scale;
     };
-    const auto [adds, scale] = add(spline_.x().nozzle, spline_.y().nozzle, tolerance_mm, {});
-    if (adds) {
-      watch(at, false, n, scale, scale * offset);
-    }
+    const double scale = add(spline_.x().nozzle, spline_.y().nozzle, tolerance_mm, {});
+    watch(at, false, n, scale, scale * offset);
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       add(edges_.nozzle_x(i, spline_), edges_.nozzle_y(i, spline_), at_edge_mm(tolerance_mm),
           edges_.left(i, at.k, at.x));
@@ -647,7 +639,6 @@ class Program {
   std::vector<double> surprise_;  // likewise
   std::vector<Foreseen> foreseen_;
   bool is_plain_ = false;
-  int round_ = 0;
   int fine_rounds_ = 0;
   int iterations_ = 0;
   Rows program_;
