@@ -14,6 +14,7 @@
 
 #include "bounded_plan.hpp"
 #include "corner_speed.hpp"
+#include "model_shares.hpp"
 #include "nozzle_measure.hpp"
 #include "pieces.hpp"
 #include "unflex/timing/timing.hpp"
@@ -128,7 +129,7 @@ class LocalScaling {
       if (measured) {
         rescale(plan, *measured, round, repaired);
         if (!repairs && course_.before.empty() && course_.after.empty()) {
-          share_out(*measured);
+          shares_.follow(*measured, pieces_.moves, allowances_, setup_);
         }
       } else {
         slow_down();
@@ -350,75 +351,6 @@ class LocalScaling {
     }
   }
 
-  // The engine squares the errors of the models, each with its share; but what counts here is the
-  // largest error. So models whose nozzles stray further than the others get more.
-  void share_out(const NozzleMeasure& measured) {
-    if (models_.size() > 1) {
-      // Errors of an axis lead off what goes along the other one.
-      x_factors_ = new_factors(measured, Y, std::move(x_factors_));
-      y_factors_ = new_factors(measured, X, std::move(y_factors_));
-      setup_.x.plants = with_shares(given_x_, x_factors_);
-      setup_.y.plants = with_shares(given_y_, y_factors_);
-    }
-  }
-
-  // factors: those of the models' shares so far.
-  [[nodiscard]] std::vector<double> new_factors(const NozzleMeasure& measured, gcode::Axis along,
-                                                std::vector<double> factors) const {
-    constexpr double kLarge = 4.0;  // the power mean of errors that is compared
-    constexpr double kResponse = 1.5;
-    constexpr double kMostOfShare = 50.0;
-    constexpr double kNothing = 1e-6;
-    std::vector<double> errors;
-    double mean = 0.0;
-    for (std::size_t m = 0; m < models_.size(); ++m) {
-      double sum = 0.0;
-      for (std::size_t i = 0; i < pieces_.moves.size(); ++i) {
-        if (pieces_.moves[i].segment.extruding()) {
-          const double allowed = allowances_.empty() ? 1.0 : allowances_[m][i];
-          sum += std::pow(
-              std::abs(pieces_.moves[i].direction[along]) * measured.of_pieces[m][i] / allowed,
-              kLarge);
-        }
-      }
-      errors.push_back(std::pow(sum, 1.0 / kLarge) + kNothing);
-      mean += errors.back() / static_cast<double>(models_.size());
-    }
-    factors.resize(models_.size(), 1.0);
-    for (std::size_t m = 0; m < models_.size(); ++m) {
-      factors[m] = std::clamp(factors[m] * std::pow(errors[m] / mean, kResponse),
-                              1.0 / kMostOfShare, kMostOfShare);
-    }
-    return factors;
-  }
-
-  // The plants in their new shares. Those of hardly any share are left out, since each costs time.
-  [[nodiscard]] static std::vector<compensate::Plant> with_shares(
-      const std::vector<compensate::Plant>& given, const std::vector<double>& factors) {
-    constexpr double kHardlyAny = 0.02;
-    double own = 1.0;  // the share of the axis as given
-    std::size_t m = 1;
-    std::vector<compensate::Plant> plants;
-    double sum = 0.0;
-    for (compensate::Plant plant : given) {
-      own -= plant.share;
-      plant.share *= is_model(plant) ? factors[m++] : 1.0;
-      sum += plant.share;
-      plants.push_back(std::move(plant));
-    }
-    sum += own * factors.front();
-    std::erase_if(plants,
-                  [&](const compensate::Plant& plant) { return plant.share < kHardlyAny * sum; });
-    sum = own * factors.front();
-    for (const compensate::Plant& plant : plants) {
-      sum += plant.share;
-    }
-    for (compensate::Plant& plant : plants) {
-      plant.share /= sum;
-    }
-    return plants;
-  }
-
   // The engine finds no base for so quick a plan.
   void slow_down() {
     constexpr double kSlower = 0.7;
@@ -435,11 +367,7 @@ class LocalScaling {
   const dynamics::NozzleXY& nozzle_;
   const compensate::Engine& engine_;
   std::vector<AxesModel> models_;
-  // What the axes may be besides, as given, and the factors of all models' shares.
-  std::vector<compensate::Plant> given_x_ = setup_.x.plants;
-  std::vector<compensate::Plant> given_y_ = setup_.y.plants;
-  std::vector<double> x_factors_;
-  std::vector<double> y_factors_;
+  ModelShares shares_{setup_};
   double omega_rad_s_;
   std::vector<bool> is_kept_;  // of each piece
   Allowances allowances_;

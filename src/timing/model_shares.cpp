@@ -1,0 +1,94 @@
+#include "model_shares.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+#include <utility>
+
+namespace unflex::timing {
+namespace {
+
+using gcode::X;
+using gcode::Y;
+
+// The power mean of the errors on the pieces is what is compared.
+constexpr double kPower = 4.0;
+// A model of twice the mean error gets so many powers of 2 more.
+constexpr double kResponse = 1.5;
+// The most and, inversely, the least that a share is multiplied by.
+constexpr double kMost = 50.0;
+constexpr double kHardlyAny = 0.02;
+constexpr double kNothing = 1e-6;
+
+// Each model's error on what goes along that axis, where errors of the other one lead off the path.
+std::vector<double> errors_along(gcode::Axis along, const NozzleMeasure& measured,
+                                 std::span<const planner::PlannedMove> pieces,
+                                 const Allowances& allowances) {
+  std::vector<double> errors;
+  for (std::size_t m = 0; m < measured.of_pieces.size(); ++m) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      if (pieces[i].segment.extruding()) {
+        const double allowed = allowances.empty() ? 1.0 : allowances[m][i];
+        sum += std::pow(std::abs(pieces[i].direction[along]) * measured.of_pieces[m][i] / allowed,
+                        kPower);
+      }
+    }
+    errors.push_back(std::pow(sum, 1.0 / kPower) + kNothing);
+  }
+  return errors;
+}
+
+}  // namespace
+
+ModelShares::ModelShares(const compensate::Setup& setup)
+    : x_{setup.x.plants, {}}, y_{setup.y.plants, {}} {}
+
+void ModelShares::follow(const NozzleMeasure& measured,
+                         std::span<const planner::PlannedMove> pieces, const Allowances& allowances,
+                         compensate::Setup& setup) {
+  if (measured.of_pieces.size() < 2) {
+    return;
+  }
+  adapt(errors_along(Y, measured, pieces, allowances), x_.factors);
+  adapt(errors_along(X, measured, pieces, allowances), y_.factors);
+  setup.x.plants = plants_of(x_);
+  setup.y.plants = plants_of(y_);
+}
+
+void ModelShares::adapt(const std::vector<double>& errors, std::vector<double>& factors) {
+  const double mean =
+      std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+  factors.resize(errors.size(), 1.0);
+  for (std::size_t m = 0; m < errors.size(); ++m) {
+    factors[m] = std::clamp(factors[m] * std::pow(errors[m] / mean, kResponse), 1.0 / kMost, kMost);
+  }
+}
+
+std::vector<compensate::Plant> ModelShares::plants_of(const OfAxis& axis) {
+  double own = 1.0;  // the share of the axis as given
+  double of_plants = 0.0;
+  std::size_t m = 1;
+  std::vector<compensate::Plant> plants;
+  for (compensate::Plant plant : axis.given) {
+    own -= plant.share;
+    plant.share *= is_model(plant) ? axis.factors[m++] : 1.0;
+    of_plants += plant.share;
+    plants.push_back(std::move(plant));
+  }
+  own *= axis.factors.front();
+  std::erase_if(plants, [&](const compensate::Plant& plant) {
+    return plant.share < kHardlyAny * (own + of_plants);
+  });
+  double sum = own;
+  for (const compensate::Plant& plant : plants) {
+    sum += plant.share;
+  }
+  for (compensate::Plant& plant : plants) {
+    plant.share /= sum;
+  }
+  return plants;
+}
+
+}  // namespace unflex::timing
