@@ -36,7 +36,7 @@ std::optional<SectionRules> rules_of(const compensate::Setup& setup) {
   const auto edges_of = [](const compensate::AxisSetup& axis) {
     std::vector<dynamics::FlexibleAxis> edges;
     for (const compensate::Plant& plant : axis.plants) {
-      if (plant.share >= kLeastShare && plant.is_edge) {
+      if (is_model(plant) && plant.is_edge) {
         edges.push_back(plant.axis);
       }
     }
@@ -44,7 +44,7 @@ std::optional<SectionRules> rules_of(const compensate::Setup& setup) {
   };
   const auto knows = [](const compensate::AxisSetup& axis) {
     return std::ranges::all_of(axis.plants, [](const compensate::Plant& plant) {
-      return plant.share < kLeastShare || (plant.is_edge && plant.axis.mode_count() == 1);
+      return !is_model(plant) || (plant.is_edge && plant.axis.mode_count() == 1);
     });
   };
   if (!knows(setup.x) || !knows(setup.y)) {

@@ -85,12 +85,14 @@ constexpr Excess kAim{0.985, 1.0, 1.0};
 constexpr Excess kKept{1.025, 1.03, 1.015};
 constexpr Excess kTightenAbove{1.01, 1.0, 1.013};
 constexpr Excess kTightest{0.8, 0.6, 0.95};
-// Rows that are broken by more are not tightened: that comes from elsewhere.
+// Rows that are broken by more are not tightened, since the reason is elsewhere. If they are broken
+// as much as a round ago, but for this share, the search ends.
 constexpr double kMostTightening = 1.3;
 constexpr double kStuck = 0.01;
-// The gap per unknown at which a program counts as solved: while the next one differs by more, and
-// in the end.
-constexpr double kRoughGap = 1e-2;
+// The gap per unknown at which a program counts as solved: rough as long as the next program is
+// another one, fine for the last few.
+constexpr double kRoughGap = 1e-3;
+constexpr double kRoughGapOfBand = 1e-2;
 constexpr double kFineGap = 1e-4;
 constexpr int kFineRounds = 2;
 // The base keeps so far away from the limits of its place.
@@ -543,8 +545,9 @@ class Program {
       program_.add_linear(Spline::kPerPoint * (periods - 1 + i) + 2, at_end_[0][i]);
     }
     program_.add_damping(kOfStep);
+    const double rough_gap = D == 5 ? kRoughGap : kRoughGapOfBand;
     const std::optional<std::span<const double>> step =
-        program_.solve(is_plain || fine_rounds_ > 0 ? kFineGap : kRoughGap, iterations_);
+        program_.solve(is_plain || fine_rounds_ > 0 ? kFineGap : rough_gap, iterations_);
     if (!step) {
       return false;
     }

@@ -140,7 +140,7 @@ TEST(RrfRun, HasNoLineSlowerThanItSays) {
 // A slow circle with waves, as a vase is printed: the lines are a few steps long, so their speeds
 // change much.
 TEST(RrfRun, OfShortLinesIsOnTime) {
-  EmitOptions how = rrf_options();
+  const EmitOptions how = rrf_options();
   std::string input = "G28\nG90\nM83\nG1 X30 Y20 Z0.2 F6000\nM204 P1500 T1500\nG4 P1\n";
   for (int i = 1; i <= 1500; ++i) {
     const double angle = 0.03 * i;

@@ -127,7 +127,7 @@ TEST(SectionMotion, UsesWhatTheRulesAllow) {
   const Followed followed = follow(section, *motion);
   EXPECT_GT(followed.error_mm, 0.9 * kTolerance_mm);
   EXPECT_GT(followed.speed_mm_s, 0.98 * kFeed_mm_s);
-  EXPECT_GT(followed.accel_x_mm_s2, 0.85 * kMotors_mm_s2);
+  EXPECT_GT(followed.accel_x_mm_s2, 0.9 * kMotors_mm_s2);
   // Less than a plan that stops at the corner takes with a shaper of two pulses.
   const double half_period_s = 0.5 / setup().x.axis.main_hz();
   EXPECT_LT(motion->duration_s(),
