@@ -195,18 +195,21 @@ void keep_timing(RunJob& job, std::string reason) {
 
 void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
   try {
-    std::optional<timing::Timed> timed;
+    std::optional<timing::Timed> timed =
+        timing::faster(job.course(), job.setup, job.first_stage, job.bounds, *choice.engine);
     if (choice.is_optimal) {
       tl::expected<timing::Timed, std::string> optimal =
           timing::optimal(job.course(), job.setup, job.first_stage, job.bounds);
-      if (optimal) {
-        timed = std::move(*optimal);
-      } else {
+      // Its search ends at a motion that is the shortest among those near it, so the other may be
+      // shorter.
+      if (!optimal) {
         job.scaled_reason = std::move(optimal.error());
+      } else if (timed &&
+                 planner::duration_s(timed->moves) <= planner::duration_s(optimal->moves)) {
+        job.scaled_reason = "the scaled timing takes less time than the optimal one that was found";
+      } else {
+        timed = std::move(*optimal);
       }
-    }
-    if (!timed) {
-      timed = timing::faster(job.course(), job.setup, job.first_stage, job.bounds, *choice.engine);
     }
     if (timed) {
       if (timed->plants) {

@@ -4,7 +4,9 @@
 // distance, d, is small, and is taken from the last motion found.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -35,6 +37,21 @@ class EdgeNozzles {
 
   // The nozzles at the end of the motion.
   [[nodiscard]] const std::vector<dynamics::NozzleXY>& ends() const { return ends_; }
+
+  // How far they swing if the base rests there from then on.
+  [[nodiscard]] double largest_swing_mm(Vector base_mm) const {
+    double largest = 0.0;
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      const auto swing = [](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
+                            double of_base_mm) {
+        const dynamics::FlexibleAxis::Gap gap = axis.gap(nozzle, axis.riding(of_base_mm));
+        return std::hypot(gap.place_mm, gap.speed_mm);
+      };
+      largest = std::max(largest, std::hypot(swing(edges_[i].x, ends_[i].x, base_mm.x),
+                                             swing(edges_[i].y, ends_[i].y, base_mm.y)));
+    }
+    return largest;
+  }
 
   // d of nozzle i at u; 0 before follow().
   [[nodiscard]] Vector left(std::size_t i, std::size_t k, double x) const {

@@ -52,17 +52,21 @@ constexpr double kLeastClock = 0.3;
 // Nodes below this share of F have no row for it.
 constexpr double kNearFeed = 0.3;
 constexpr double kFacet_rad = 0.3;
-// What T′ may change by in a round: at first, where a step came out otherwise, and where it did
-// not.
+constexpr double kAlong_rad = 0.1;
+// What T′ may change by in a round: at first, and at least. Where a step came out otherwise, the
+// next one is to come out so by this share of what is allowed. As the second order is what comes
+// out otherwise, that goes with the square of the step.
 constexpr double kFirstTrust = 0.3;
 constexpr double kFirstTrustOfBand = 0.12;
 constexpr double kLeastTrust = 1e-3;
-constexpr double kShrink = 0.5;
+constexpr double kSurprise = 0.15;
+constexpr double kShrink = 0.25;
 constexpr double kGrow = 1.6;
 constexpr double kCooling = 0.85;
 constexpr std::size_t kReach = 8;  // nodes
-// A step is right where nothing comes out otherwise by more, relative to what is allowed.
-constexpr double kRight = 0.1;
+// Where more is broken, T′ may grow by this at least, as slower motion breaks less.
+constexpr double kBroken = 1.1;
+constexpr double kTrustToSlow = 0.1;
 
 // Values relative to what is allowed, or factors of what is allowed.
 struct Excess {
@@ -85,12 +89,21 @@ constexpr Excess kAim{0.985, 1.0, 1.0};
 constexpr Excess kKept{1.025, 1.03, 1.015};
 constexpr Excess kTightenAbove{1.01, 1.0, 1.013};
 constexpr Excess kTightest{0.8, 0.6, 0.95};
-// Rows that are broken by more are not tightened, since the reason is elsewhere. If they are broken
-// as much as a round ago, but for this share, the search ends.
+// Rows that are broken by more are not tightened, since the reason is elsewhere. If after some
+// rounds they are broken as much as a round ago, but for this share, the search ends.
 constexpr double kMostTightening = 1.3;
 constexpr double kStuck = 0.01;
-// The gap per unknown at which a program counts as solved: rough as long as the next program is
-// another one, fine for the last few.
+constexpr int kRoundsToSettle = 4;
+// How the nozzles at the edges of a band swing in the end cannot be chosen there, where the base
+// and its clock are given. Less acceleration over these nodes makes less of it.
+constexpr std::size_t kGivenPeriods = 3;
+constexpr std::size_t kNodesBeforeEnd = 80;
+constexpr double kTightestBeforeEnd = 0.25;
+constexpr double kTighter = 0.5;
+constexpr double kLooser = 1.1;
+// The gap per unknown at which a program counts as solved: very rough as long as much is broken,
+// and rough as long as the next program is another one.
+constexpr double kFirstGap = 0.05;
 constexpr double kRoughGap = 1e-3;
 constexpr double kRoughGapOfBand = 1e-2;
 constexpr double kFineGap = 1e-4;
@@ -102,6 +115,8 @@ constexpr double kRoom_mm = 3e-3;
 constexpr double kBesideInTheEnd = 2.0;
 // A round that gains less is the last.
 constexpr double kGain = 1e-3;
+// So are as many without a gain.
+constexpr int kIdleRounds = 2;
 
 template <int D>
 class Program {
@@ -139,6 +154,8 @@ class Program {
     double largest_trust = trust_.front();
     double last = duration();
     double least = kInfinity;
+    double least_before = kInfinity;  // when it was last better by a gain
+    int idle_rounds = 0;
     std::vector<double> best;
     double last_broken = 0.0;
     for (int round = 0; round < kRounds; ++round) {
@@ -149,17 +166,24 @@ class Program {
       const double gain = last - duration();
       last = duration();
       bool is_settled = false;
-      if (excess.is_within(kKept) && last < least) {
+      if (excess.is_within(kKept) && end_excess_ <= kKept.error && last < least) {
         least = last;
         best = spline_.points();
         is_settled = gain < kGain * last;
+      }
+      if (least < (1.0 - kGain) * least_before) {
+        least_before = least;
+        idle_rounds = 0;
+      } else if (!best.empty()) {
+        is_settled = is_settled || ++idle_rounds >= kIdleRounds;
       }
       if (fine_rounds_ > 0 && (is_settled || fine_rounds_ == kFineRounds)) {
         break;
       }
       fine_rounds_ += is_settled || fine_rounds_ > 0 ? 1 : 0;
       const double broken = excess.largest();
-      if (broken > kMostTightening && std::abs(broken - last_broken) < kStuck * broken) {
+      if (round >= kRoundsToSettle && broken > kMostTightening &&
+          std::abs(broken - last_broken) < kStuck * broken) {
         break;  // what is broken by so much does not come right any more
       }
       last_broken = broken;
@@ -350,13 +374,17 @@ class Program {
     const double rate = spline_.clock(k, shares, 1);
     const double most = trust * rate;
     const double most_down = std::min(most, std::max(rate - kLeastClock, kLeastChange));
-    program_.add_row(first, of_clock(shares, 1, 1.0 / most), 0.0, -most_down / most, 1.0,
+    const double most_up =
+        largest_near(k, broken_) > kBroken ? std::max(most, kTrustToSlow * rate) : most;
+    program_.add_row(first, of_clock(shares, 1, 1.0 / most), 0.0, -most_down / most, most_up / most,
                      kTimesForTrust * kPrice);
   }
 
   void add_accel(const At& at, bool has_square) {
     const double h = nodes_.period_s();
-    const double scale = 1.0 / (factors_[at.k].accel * rules_.max_accel_mm_s2 * h * h);
+    const bool is_before_end = at.k + kNodesBeforeEnd >= nodes_.periods();
+    const double factor = (is_before_end ? end_factor_ : 1.0) * factors_[at.k].accel;
+    const double scale = 1.0 / (factor * rules_.max_accel_mm_s2 * h * h);
     constexpr Vector kAxes[] = {{1.0, 0.0}, {0.0, 1.0}};
     constexpr Vector kMotors[] = {{1.0, 1.0}, {1.0, -1.0}};
     Gradient g;
@@ -471,12 +499,20 @@ class Program {
     // from round to round to where no facet is near.
     double direction = std::atan2(velocity.y, velocity.x);
     const Vector d = direction_of(legs_[at.leg]);
-    if (velocity.x * d.x + velocity.y * d.y >
-        std::cos(kFacet_rad) * std::hypot(velocity.x, velocity.y)) {
+    const double speed = std::hypot(velocity.x, velocity.y);
+    const double along = velocity.x * d.x + velocity.y * d.y;
+    if (along > std::cos(kFacet_rad) * speed) {
       direction = std::atan2(d.y, d.x);
     }
+    // One facet is enough there.
+    const bool is_along = along > std::cos(kAlong_rad) * speed &&
+                          !nodes_.is_near_vertex(at.leg, at.k, at.x) &&
+                          !nodes_.is_near_vertex(at.leg + 1, at.k, at.x);
     Gradient g;
     for (const double facet : {0.0, -kFacet_rad, kFacet_rad}) {
+      if (facet != 0.0 && is_along) {
+        continue;
+      }
       const Vector n{std::cos(direction + facet), std::sin(direction + facet)};
       const double v = spline_.linearise(at.place, *at.shares, n, spline_.x().nozzle_speed,
                                          spline_.y().nozzle_speed, 1.0 / feed, g);
@@ -513,6 +549,17 @@ class Program {
     add_feed(at, std::min({before.feed_mm_s, after.feed_mm_s, after.entry_mm_s}));
   }
 
+  // The gap at which the next program counts as solved.
+  [[nodiscard]] double gap() const {
+    if (is_plain_ || fine_rounds_ > 0) {
+      return kFineGap;
+    }
+    if (broken_.empty() || std::ranges::max(broken_) > kMostTightening) {
+      return kFirstGap;
+    }
+    return D == 5 ? kRoughGap : kRoughGapOfBand;
+  }
+
   // One program: least squares in the timing as it is, or the next step of all.
   [[nodiscard]] bool step(bool is_plain) {
     is_plain_ = is_plain;
@@ -545,9 +592,7 @@ class Program {
       program_.add_linear(Spline::kPerPoint * (periods - 1 + i) + 2, at_end_[0][i]);
     }
     program_.add_damping(kOfStep);
-    const double rough_gap = D == 5 ? kRoughGap : kRoughGapOfBand;
-    const std::optional<std::span<const double>> step =
-        program_.solve(is_plain || fine_rounds_ > 0 ? kFineGap : rough_gap, iterations_);
+    const std::optional<std::span<const double>> step = program_.solve(gap(), iterations_);
     if (!step) {
       return false;
     }
@@ -561,6 +606,7 @@ class Program {
   Excess measure() {
     Excess worst;
     excess_.assign(nodes_.periods(), {});
+    broken_.assign(nodes_.periods(), 0.0);
     const double h = nodes_.period_s();
     for (std::size_t k = 0; k < nodes_.periods(); ++k) {
       for (int look = 0; look < kLooks + (k + 1 == nodes_.periods() ? 1 : 0); ++look) {
@@ -575,7 +621,9 @@ class Program {
                             std::hypot(speed.x, speed.y) / (h * legs_[here.leg].feed_mm_s)});
       }
       worst.include(excess_[k]);
+      broken_[k] = excess_[k].largest();
     }
+    end_excess_ = excess_at_end();
     return worst;
   }
 
@@ -596,17 +644,44 @@ class Program {
     return e;
   }
 
+  // How far the nozzles at the edges of a band stray where the base and its clock are given, and
+  // how far they swing after it, relative to what they may.
+  [[nodiscard]] double excess_at_end() const {
+    if (edges_.size() == 0) {
+      return 0.0;
+    }
+    double excess = 0.0;
+    for (std::size_t k = nodes_.periods() - kGivenPeriods; k < nodes_.periods(); ++k) {
+      excess = std::max(excess, excess_[k].error);
+    }
+    if (section_.swing_tolerance_mm) {
+      const Place end = spline_.place(nodes_.periods() - 1, at_end_);
+      const Vector origin = spline_.origin();
+      const Vector base = Spline::apply(spline_.x().base, spline_.y().base, end);
+      excess = std::max(excess, edges_.largest_swing_mm({origin.x + base.x, origin.y + base.y}) /
+                                    *section_.swing_tolerance_mm);
+    }
+    return excess;
+  }
+
+  // The largest value around a node.
+  [[nodiscard]] static double largest_near(std::size_t node,
+                                           const std::vector<double>& of_periods) {
+    double largest = 0.0;
+    const std::size_t end = std::min(node + kReach + 1, of_periods.size());
+    for (std::size_t k = node > kReach ? node - kReach : 0; k < end; ++k) {
+      largest = std::max(largest, of_periods[k]);
+    }
+    return largest;
+  }
+
   // Fits trust and factors to what the last round has shown.
   void adapt(double largest_trust, int round) {
     const std::size_t periods = nodes_.periods();
     for (std::size_t k = 0; k <= periods; ++k) {
-      double surprise = 0.0;
-      for (std::size_t i = k > kReach ? k - kReach : 0; i <= std::min(k + kReach, periods - 1);
-           ++i) {
-        surprise = std::max(surprise, surprise_[i]);
-      }
-      trust_[k] = std::clamp(trust_[k] * (surprise <= kRight ? kGrow : kShrink), kLeastTrust,
-                             largest_trust);
+      const double surprise = largest_near(k, surprise_);
+      const double factor = std::clamp(std::sqrt(kSurprise / surprise), kShrink, kGrow);
+      trust_[k] = std::clamp(trust_[k] * factor, kLeastTrust, largest_trust);
     }
     constexpr int kFirstRoughRounds = 2;
     const auto tighten = [&](double& factor, double excess, double allowed, double tightest) {
@@ -622,6 +697,10 @@ class Program {
       tighten(factors_[k].error, near.error, kTightenAbove.error, kTightest.error);
       tighten(factors_[k].feed, near.feed, kTightenAbove.feed, kTightest.feed);
     }
+    if (end_excess_ > 1.0 || end_factor_ < 1.0) {
+      const double times = std::clamp(1.0 / std::sqrt(end_excess_), kTighter, kLooser);
+      end_factor_ = std::clamp(end_factor_ * times, kTightestBeforeEnd, 1.0);
+    }
   }
 
   const Section& section_;
@@ -636,9 +715,12 @@ class Program {
   Values jump_{};
   std::vector<Shares> pin_shares_;
 
-  std::vector<double> trust_;     // at the nodes
-  std::vector<Excess> factors_;   // of what is allowed, per period
-  std::vector<Excess> excess_;    // after the last step, per period
+  std::vector<double> trust_;    // at the nodes
+  std::vector<Excess> factors_;  // of what is allowed, per period
+  std::vector<Excess> excess_;   // after the last step, per period
+  std::vector<double> broken_;   // the largest of it
+  double end_excess_ = 0.0;
+  double end_factor_ = 1.0;       // of the base's acceleration before the end
   std::vector<double> surprise_;  // likewise
   std::vector<Foreseen> foreseen_;
   bool is_plain_ = false;

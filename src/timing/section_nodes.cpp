@@ -137,7 +137,7 @@ bool SectionNodes::is_near_vertex(std::size_t vertex, std::size_t k, double x) c
 }
 
 double SectionNodes::tolerance_mm(std::size_t leg, std::size_t k, double x, double beside) const {
-  double tolerance = legs_[leg].tolerance_mm;
+  double tolerance = legs_[leg].tolerance_mm - legs_[leg].bulge_mm;
   if (legs_[leg].lays_filament) {
     return tolerance;
   }

@@ -12,8 +12,9 @@ namespace {
 using gcode::X;
 using gcode::Y;
 
-// How far the vertices of moves may be from a leg that stands for them.
+// How far the vertices of moves may be from a leg that stands for them, and that in tolerances.
 constexpr double kStraight_mm = 2e-3;
+constexpr double kStraight = 0.1;
 constexpr std::size_t kMostMovesOfLeg = 50;
 constexpr double kLeastSpeed_mm_s = 1.0;
 // Even motion that lasts less is not worth a cut.
@@ -78,15 +79,15 @@ std::vector<Leg> joined(const std::vector<Leg>& legs) {
       }
       const planner::PlannedMove longer =
           straight(leg.move.segment.start_mm, legs[next].move.segment.end_mm);
-      const bool is_straight =
-          std::all_of(legs.begin() + static_cast<std::ptrdiff_t>(i),
-                      legs.begin() + static_cast<std::ptrdiff_t>(next), [&](const Leg& part) {
-                        return distance_mm(longer, part.move.segment.end_mm) <= kStraight_mm;
-                      });
-      if (!is_straight) {
+      double bulge_mm = 0.0;
+      for (std::size_t part = i; part < next; ++part) {
+        bulge_mm = std::max(bulge_mm, distance_mm(longer, legs[part].move.segment.end_mm));
+      }
+      if (bulge_mm > std::min(kStraight_mm, kStraight * leg.tolerance_mm)) {
         break;
       }
       leg.move = longer;
+      leg.bulge_mm = bulge_mm;
       leg.to_mm = legs[next].to_mm;
     }
     result.push_back(leg);
@@ -219,6 +220,7 @@ std::optional<std::vector<SectionedPart>> sections(std::span<const planner::Plan
     }
   }
   rest(0.0);
+  parts.back().section.swing_tolerance_mm = bounds.back().tolerance_mm;
   return parts;
 }
 

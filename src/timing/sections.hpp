@@ -21,6 +21,7 @@ struct Leg {
   planner::PlannedMove move;  // in the timing of a first plan
   double feed_mm_s = 0.0;     // F
   double tolerance_mm = 0.0;
+  double bulge_mm = 0.0;  // how far the moves that it stands for are from it
   bool lays_filament = false;
   double entry_mm_s = planner::kNoLimit;  // largest speed at its beginning
   // How far along the path, in X and Y alone, it begins and ends.
@@ -42,6 +43,8 @@ struct Section {
   // The nozzles of SectionRules::edges at the beginning. Empty: they are where they would be
   // without an earlier motion.
   std::vector<dynamics::NozzleXY> edge_nozzles;
+  // How far the nozzles at the edges may swing after it. Unset: another section follows.
+  std::optional<double> swing_tolerance_mm;
 };
 
 // What comes after a section: even motion or rest, for some time.

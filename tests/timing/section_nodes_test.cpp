@@ -127,6 +127,15 @@ TEST(SectionNodes, BindAnArcEveryFewDegrees) {
   }
 }
 
+TEST(SectionNodes, LeaveOfTheToleranceWhatALegIsAwayFromItsMoves) {
+  Section section = section_along({{0.0, 0.0}, {10.0, 0.0}, {10.0, 10.0}}, 100.0);
+  const double tolerance_mm = section.legs[1].tolerance_mm;
+  section.legs[1].bulge_mm = 1e-3;
+  const SectionNodes nodes(section, kNode_s);
+  EXPECT_EQ(nodes.tolerance_mm(0, 3, 0.0), tolerance_mm);
+  EXPECT_NEAR(nodes.tolerance_mm(1, nodes.periods() - 3, 0.0), tolerance_mm - 1e-3, 1e-12);
+}
+
 TEST(SectionNodes, LetTravelBesideFilamentDoWhatFilamentMay) {
   const Moves moves = plan({{0.0, 0.0}, {10.0, 0.0}, {20.0, 0.0, false}, {30.0, 0.0}},
                            planner_limits(100.0, 2000.0, 5.0));

@@ -151,6 +151,31 @@ TEST(Sections, JoinMovesOnOneLine) {
   EXPECT_EQ(sections(moves, bounds, setup(), 100.0)->front().section.legs.size(), 4U);
 }
 
+TEST(Sections, KnowHowFarMovesAreFromALegThatStandsForThem) {
+  const Moves moves =
+      plan({{0.0, 0.0}, {1.0, 0.0}, {2.0, 1.5e-3}, {4.0, 0.0}}, planner_limits(100.0, 2000.0, 5.0));
+  std::vector<MoveBounds> bounds = bounds_of(moves);
+  const Section section = sections(moves, bounds, setup(), 100.0)->front().section;
+  ASSERT_EQ(section.legs.size(), 1U);
+  EXPECT_NEAR(section.legs[0].bulge_mm, 1.5e-3, 1e-9);
+  // Where the tolerance is small, that is too far.
+  for (MoveBounds& own : bounds) {
+    own.tolerance_mm = 0.5 * kTolerance_mm;
+  }
+  EXPECT_GT(sections(moves, bounds, setup(), 100.0)->front().section.legs.size(), 1U);
+}
+
+TEST(Sections, TellTheLastOneHowFarNozzlesMaySwing) {
+  Moves moves = plan({{0.0, 0.0}, {3.0, 0.0}, {3.0, 4.0}}, planner_limits(100.0, 2000.0, 5.0));
+  moves.insert(moves.begin() + 1, lift(moves[0].segment.end_mm, 0.4));
+  std::vector<MoveBounds> bounds = bounds_of(moves);
+  bounds[1] = kLiftBounds;
+  const auto parts = sections(moves, bounds, setup(), kSettling_s);
+  ASSERT_EQ(parts->size(), 2U);
+  EXPECT_FALSE(parts->front().section.swing_tolerance_mm);
+  EXPECT_EQ(parts->back().section.swing_tolerance_mm, kTolerance_mm);
+}
+
 // A direction's length is 1 only nearly, and moves of a spiral have a slope.
 TEST(Sections, JoinMovesOnOneLineInAnyDirection) {
   for (int i = 1; i < 20; ++i) {
