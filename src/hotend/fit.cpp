@@ -15,9 +15,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "fit_errors.hpp"
 #include "fit_model.hpp"
 
 namespace unflex::hotend {
@@ -195,31 +195,13 @@ double variance_of(const Eigen::VectorXd& values) {
   return (values.array() - values.mean()).square().mean();
 }
 
-// Covariance of p and the linear unknowns. What is left goes together from sample to sample, which
-// makes the data worth (1 − ρ)/(1 + ρ) as many, ρ being the correlation of neighbours.
-Eigen::MatrixXd covariance_of(const Search& search, const Solution& solution) {
-  constexpr double kMostCorrelated = 0.98;
+PlantFit fit_of(const Log& log, const Search& search, const Solution& solution,
+                const Beginning& beginning, const FitOptions& options,
+                const Eigen::VectorXd& temperature_c) {
   const Eigen::MatrixXd jacobian = search.jacobian(solution);
-  const Eigen::Index count = solution.residual.size();
-  const double neighbours =
-      solution.residual.head(count - 1).dot(solution.residual.tail(count - 1)) /
-      std::max(solution.sum, 1e-300);
-  const double correlation = std::clamp(neighbours, 0.0, kMostCorrelated);
-  const double variance = solution.sum / static_cast<double>(count - jacobian.cols()) *
-                          (1.0 + correlation) / (1.0 - correlation);
-  const Eigen::VectorXd scale = jacobian.colwise().norm().cwiseMax(1e-12);
-  const Eigen::MatrixXd scaled = jacobian * scale.cwiseInverse().asDiagonal();
-  Eigen::MatrixXd normal = scaled.transpose() * scaled;
-  normal.diagonal().array() += 1e-13;
-  const Eigen::MatrixXd inverse =
-      normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
-  return variance *
-         (scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal());
-}
-
-PlantFit fit_of(const Search& search, const Solution& solution, const Beginning& beginning,
-                const FitOptions& options, const Eigen::VectorXd& temperature_c) {
-  const Eigen::MatrixXd covariance = covariance_of(search, solution);
+  const Eigen::MatrixXd covariance =
+      covariance_of_noise(jacobian, solution.residual) +
+      covariance_of_power(jacobian, log, lags_of(solution.p), solution.linear[0]);
   const auto error = [&](Eigen::Index i) { return std::sqrt(std::max(0.0, covariance(i, i))); };
   const Lags lags = lags_of(solution.p);
   const Eigen::Index last = solution.linear.size() - 1;
@@ -268,7 +250,7 @@ Result<PlantFit> fit_plant(const Log& log, const FitOptions& options) {
                              (beginning.at_rest ? 0.0 : 2.0 * std::log(count) + kWorth);
     if (!best || criterion < least) {
       least = criterion;
-      best = fit_of(search, solution, beginning, options, temperature_c);
+      best = fit_of(log, search, solution, beginning, options, temperature_c);
     }
   }
   if (!(best->gain_c.value > 0.0)) {

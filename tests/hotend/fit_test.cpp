@@ -174,6 +174,23 @@ TEST(Fit, KnowsHowSureItIs) {
   EXPECT_LT(chi / (3.0 * kSeeds), 2.0);
 }
 
+// Power that moves between the rows is part of what is not known.
+TEST(Fit, KnowsHowSureItIsOfAHostsLog) {
+  double chi = 0.0;
+  double chi_of_dead_time = 0.0;
+  constexpr unsigned kSeeds = 16;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    const Result<PlantFit> fit = fit_plant(as_klipper(seed, 200.0, 400.0, 1.0));
+    ASSERT_TRUE(fit);
+    chi += std::pow((fit->gain_c.value - 2.0) / fit->gain_c.error, 2) +
+           std::pow((fit->time_constant_s.value - 300.0) / fit->time_constant_s.error, 2);
+    chi_of_dead_time += std::pow((fit->dead_time_s.value - 5.0) / fit->dead_time_s.error, 2);
+  }
+  EXPECT_GT(chi / (2.0 * kSeeds), 0.2);
+  EXPECT_LT(chi / (2.0 * kSeeds), 2.0);
+  EXPECT_LT(chi_of_dead_time / kSeeds, 1.5);
+}
+
 TEST(Fit, SaysWhatTheModelDoesNotExplain) {
   const Power step = [](double time_s) { return time_s < 10.0 ? 0.0 : 80.0; };
   Log log = open_loop(1, step, 600.0, 1.0);
