@@ -26,7 +26,7 @@ struct NumberedLine {
 // The number at the beginning of the text, whatever follows.
 [[nodiscard]] std::optional<double> leading_number(std::string_view text);
 
-// Of what a host has logged, the stretch that tells most: see parse_log().
+// The stretch of what a host has logged that tells most: see parse_log().
 [[nodiscard]] std::vector<Sample> best_stretch(const std::vector<Sample>& samples);
 
 [[nodiscard]] Result<Log> parse_klipper(const std::vector<NumberedLine>& lines,
