@@ -19,6 +19,7 @@
 
 #include "fit_errors.hpp"
 #include "fit_model.hpp"
+#include "jumps.hpp"
 
 namespace unflex::hotend {
 namespace {
@@ -46,11 +47,31 @@ Lags lags_of(const Eigen::Vector3d& p) { return {std::exp(p[0]), std::exp(p[1]),
 
 class Search {
  public:
-  Search(const FitModel& model, Eigen::VectorXd data, Beginning beginning, bool with_ambient)
-      : model_(model), data_(std::move(data)), beginning_(beginning), with_ambient_(with_ambient) {}
+  Search(const Log& log, const FitModel& model, Eigen::VectorXd data, Beginning beginning,
+         bool with_ambient)
+      : log_(log),
+        model_(model),
+        data_(std::move(data)),
+        beginning_(beginning),
+        with_ambient_(with_ambient) {}
 
+  // Columns of the linear unknowns, those of jumps last. A row for each jump follows the data's.
   [[nodiscard]] Eigen::MatrixXd columns(const Eigen::Vector3d& p) const {
-    return model_.columns(lags_of(p), beginning_, with_ambient_);
+    const Eigen::MatrixXd plain = model_.columns(lags_of(p), beginning_, with_ambient_);
+    if (jumps_.empty()) {
+      return plain;
+    }
+    const Eigen::Index count = weights_.size();
+    Eigen::MatrixXd all = Eigen::MatrixXd::Zero(plain.rows() + count, plain.cols() + count);
+    all.topLeftCorner(plain.rows(), plain.cols()) = plain;
+    all.topRightCorner(plain.rows(), count) = columns_of(jumps_, log_, lags_of(p));
+    all.bottomRightCorner(count, count) = weights_.asDiagonal();
+    return all;
+  }
+
+  // How many linear unknowns are not of jumps.
+  [[nodiscard]] Eigen::Index plain_unknowns() const {
+    return 1 + (beginning_.at_rest ? 0 : 2) + (with_ambient_ ? 1 : 0);
   }
 
   [[nodiscard]] Solution at(const Eigen::Vector3d& p) const {
@@ -63,7 +84,26 @@ class Search {
     return solution;
   }
 
-  [[nodiscard]] Solution best() const {
+  [[nodiscard]] Solution best() {
+    Solution solution = best_of_grid();
+    jumps_ = jumps_of(log_);
+    if (jumps_.empty() || solution.linear[0] <= 0.0) {
+      jumps_.clear();
+      return solution;
+    }
+    const double noise_c = std::sqrt(solution.sum / static_cast<double>(data_.size()));
+    weights_.resize(static_cast<Eigen::Index>(jumps_.size()));
+    for (std::size_t j = 0; j < jumps_.size(); ++j) {
+      weights_[static_cast<Eigen::Index>(j)] =
+          noise_c * std::sqrt(12.0) / (solution.linear[0] * std::abs(jumps_[j].power));
+    }
+    data_.conservativeResizeLike(Eigen::VectorXd::Zero(data_.size() + weights_.size()));
+    solution = at(solution.p);
+    refine(solution);
+    return solution;
+  }
+
+  [[nodiscard]] Solution best_of_grid() const {
     std::vector<Solution> found = grid();
     constexpr std::size_t kTried = 3;
     const auto by_sum = [](const Solution& s) { return s.sum; };
@@ -145,10 +185,13 @@ class Search {
     }
   }
 
+  const Log& log_;
   const FitModel& model_;
-  Eigen::VectorXd data_;
+  Eigen::VectorXd data_;  // zeros for the jumps behind it
   Beginning beginning_;
   bool with_ambient_;
+  std::vector<Jump> jumps_;
+  Eigen::VectorXd weights_;  // of the jumps' expectations
 };
 
 // The hotend as it may have begun: at rest only if it is cold.
@@ -191,6 +234,11 @@ Status check(const Log& log) {
   return {};
 }
 
+// Of what is left of the data alone.
+double variance_left(const Solution& solution, Eigen::Index count) {
+  return solution.residual.head(count).squaredNorm() / static_cast<double>(count);
+}
+
 double variance_of(const Eigen::VectorXd& values) {
   return (values.array() - values.mean()).square().mean();
 }
@@ -204,7 +252,7 @@ PlantFit fit_of(const Log& log, const Search& search, const Solution& solution,
       covariance_of_power(jacobian, log, lags_of(solution.p), solution.linear[0]);
   const auto error = [&](Eigen::Index i) { return std::sqrt(std::max(0.0, covariance(i, i))); };
   const Lags lags = lags_of(solution.p);
-  const Eigen::Index last = solution.linear.size() - 1;
+  const Eigen::Index last = search.plain_unknowns() - 1;
   PlantFit fit;
   fit.gain_c = {solution.linear[0], error(3)};
   fit.time_constant_s = {lags.time_constant_s, lags.time_constant_s * error(0)};
@@ -219,9 +267,9 @@ PlantFit fit_of(const Log& log, const Search& search, const Solution& solution,
                .ambient_c = fit.ambient_c.value,
                .full_power = kFullPower};
   fit.started_at_rest = beginning.at_rest;
-  fit.noise_c = std::sqrt(solution.sum / static_cast<double>(solution.residual.size()));
+  fit.noise_c = std::sqrt(variance_left(solution, temperature_c.size()));
   fit.unexplained = fit.noise_c / std::sqrt(variance_of(temperature_c));
-  const Eigen::VectorXd fitted_c = temperature_c - solution.residual;
+  const Eigen::VectorXd fitted_c = temperature_c - solution.residual.head(temperature_c.size());
   fit.fitted_c.assign(fitted_c.begin(), fitted_c.end());
   return fit;
 }
@@ -239,15 +287,19 @@ Result<PlantFit> fit_plant(const Log& log, const FitOptions& options) {
   }
   // A beginning with two unknowns more must be worth them, by Schwarz' criterion and some doubt.
   constexpr double kWorth = 12.0;
-  const auto count = static_cast<double>(model.size());
+  std::optional<double> worth_of_data;  // how many independent ones they are worth
   std::optional<PlantFit> best;
   double least = 0.0;
   for (const Beginning& beginning : beginnings(log, options)) {
-    const Search search(model, temperature_c.array() - options.ambient_c.value_or(0.0), beginning,
-                        !options.ambient_c);
+    Search search(log, model, temperature_c.array() - options.ambient_c.value_or(0.0), beginning,
+                  !options.ambient_c);
     const Solution solution = search.best();
-    const double criterion = count * std::log(std::max(solution.sum / count, 1e-12)) +
-                             (beginning.at_rest ? 0.0 : 2.0 * std::log(count) + kWorth);
+    if (!worth_of_data) {
+      worth_of_data = independent(solution.residual.head(model.size()));
+    }
+    const auto count = static_cast<double>(model.size());
+    const double criterion = *worth_of_data * std::log(std::max(solution.sum / count, 1e-12)) +
+                             (beginning.at_rest ? 0.0 : 2.0 * std::log(*worth_of_data) + kWorth);
     if (!best || criterion < least) {
       least = criterion;
       best = fit_of(log, search, solution, beginning, options, temperature_c);

@@ -14,6 +14,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "jumps.hpp"
+
 namespace unflex::hotend {
 namespace {
 
@@ -68,17 +70,21 @@ class FadingSum {
 
 }  // namespace
 
-Eigen::MatrixXd covariance_of_noise(const Eigen::MatrixXd& jacobian,
-                                    const Eigen::VectorXd& residual) {
+double independent(const Eigen::VectorXd& residual) {
   constexpr double kMostCorrelated = 0.98;
   constexpr double kLeastSum = 1e-300;
   const Eigen::Index count = residual.size();
-  const double sum = residual.squaredNorm();
-  const double neighbours =
-      residual.head(count - 1).dot(residual.tail(count - 1)) / std::max(sum, kLeastSum);
+  const double neighbours = residual.head(count - 1).dot(residual.tail(count - 1)) /
+                            std::max(residual.squaredNorm(), kLeastSum);
   const double correlation = std::clamp(neighbours, 0.0, kMostCorrelated);
-  return sum / static_cast<double>(count - jacobian.cols()) * (1.0 + correlation) /
-         (1.0 - correlation) * inverse_normal(jacobian);
+  return static_cast<double>(count) * (1.0 - correlation) / (1.0 + correlation);
+}
+
+Eigen::MatrixXd covariance_of_noise(const Eigen::MatrixXd& jacobian,
+                                    const Eigen::VectorXd& residual) {
+  const auto count = static_cast<double>(residual.size());
+  const double variance = residual.squaredNorm() / (count - static_cast<double>(jacobian.cols()));
+  return variance * count / independent(residual) * inverse_normal(jacobian);
 }
 
 Eigen::MatrixXd covariance_of_power(const Eigen::MatrixXd& jacobian, const Log& log,
@@ -97,7 +103,8 @@ Eigen::MatrixXd covariance_of_power(const Eigen::MatrixXd& jacobian, const Log& 
     const double felt_s = 0.5 * (from.time_s + to.time_s) + lags.dead_time_s;
     const Eigen::VectorXd moved = gain_c * (to.time_s - from.time_s) / apart_s *
                                   (block.back_to(felt_s) - sensor.back_to(felt_s));
-    const double uncertain = 0.5 * (to.power - from.power);
+    const double change = to.power - from.power;
+    const double uncertain = is_jump(change) ? 0.0 : 0.5 * change;
     covariance += uncertain * uncertain * moved * moved.transpose();
   }
   return covariance;

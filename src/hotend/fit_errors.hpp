@@ -8,9 +8,11 @@
 
 namespace unflex::hotend {
 
-// What is left goes together from sample to sample, which makes the data worth (1 − ρ)/(1 + ρ) as
-// many, ρ being the correlation of neighbours. Covariance of the unknowns by their Jacobian, data ×
-// unknowns.
+// What is left goes together from sample to sample, which makes n data worth n (1 − ρ)/(1 + ρ), ρ
+// being the correlation of neighbours.
+[[nodiscard]] double independent(const Eigen::VectorXd& residual);
+
+// Covariance of the unknowns by their Jacobian, data × unknowns, and by what is left.
 [[nodiscard]] Eigen::MatrixXd covariance_of_noise(const Eigen::MatrixXd& jacobian,
                                                   const Eigen::VectorXd& residual);
 

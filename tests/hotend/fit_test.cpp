@@ -101,11 +101,13 @@ TEST(Fit, FindsThePlantWhenTheLogBeginsHot) {
 }
 
 // Heats as Klipper does: a reading and a new power every 0.3 s, its derivative smoothed, and a line
-// of the log each second, with a digit of the temperature and three of the power. The noise is that
-// of readings, which the controller has to live with.
-Log as_klipper(unsigned seed, double target_c, double duration_s, double line_s) {
+// of the log each second, with a digit of the temperature and three of the power. The log has the
+// noise, and the controller's readings have it too if it feels it.
+enum class Feels { nothing, noise };
+Log as_klipper(unsigned seed, double target_c, double duration_s, double line_s, Feels feels) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise_c(0.0, kNoise_c);
+  const double on_s = 4.0 + std::uniform_real_distribution<double>(0.0, 2.0)(random);
   constexpr double kReading_s = 0.3;
   constexpr double kSmooth_s = 1.0;
   const Gains gains = *hotend::gains(Rule::simc_pid, kReference);
@@ -118,10 +120,11 @@ Log as_klipper(unsigned seed, double target_c, double duration_s, double line_s)
   double power = 0.0;
   double next_line_s = 0.0;
   for (double time_s = 0.0; time_s < duration_s; time_s += kReading_s) {
-    const double shown_c = simulation.temperature_c() + noise_c(random);
+    const double logged_c = simulation.temperature_c() + noise_c(random);
+    const double shown_c = feels == Feels::noise ? logged_c : simulation.temperature_c();
     slope_c_s += (-(shown_c - last_c) / kReading_s - slope_c_s) / (1.0 + kSmooth_s / kReading_s);
     last_c = shown_c;
-    const double error_c = (time_s < 5.0 ? 0.0 : target_c) - shown_c;
+    const double error_c = (time_s < on_s ? 0.0 : target_c) - shown_c;
     const double sum = integral + error_c * kReading_s;
     const double wanted = gains.p * error_c + gains.i * sum + gains.d * slope_c_s;
     power = std::clamp(wanted, 0.0, kFullPower);
@@ -129,7 +132,7 @@ Log as_klipper(unsigned seed, double target_c, double duration_s, double line_s)
       integral = sum;
     }
     if (time_s >= next_line_s) {
-      log.samples.push_back({time_s, std::round(10.0 * shown_c) / 10.0,
+      log.samples.push_back({time_s, std::round(10.0 * logged_c) / 10.0,
                              std::round(1000.0 * power / kFullPower) / 1000.0 * kFullPower});
       next_line_s += line_s;
     }
@@ -139,23 +142,25 @@ Log as_klipper(unsigned seed, double target_c, double duration_s, double line_s)
 }
 
 TEST(Fit, FindsThePlantInAHeatingThatKlipperLogs) {
-  for (unsigned seed = 1; seed <= 6; ++seed) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(seed);
-    expect_reference(fit_plant(as_klipper(seed, 200.0, 600.0, 1.0)));
-    expect_reference(fit_plant(as_klipper(seed, 150.0, 300.0, 1.0)));
+    expect_reference(fit_plant(as_klipper(seed, 200.0, 600.0, 1.0, Feels::nothing)));
+    expect_reference(fit_plant(as_klipper(seed, 150.0, 300.0, 1.0, Feels::nothing)));
   }
 }
 
-// OctoPrint asks every other second. Readings as noisy as these move the power so much in between
-// that only the sum of both delays is known.
-TEST(Fit, FindsMostOfThePlantInAHeatingThatIsAskedForSeldom) {
-  for (unsigned seed = 1; seed <= 6; ++seed) {
+// Power that follows noisy readings moves between the rows of a log. What it does there is not
+// known, so that the two delays are hard to tell apart.
+TEST(Fit, FindsMostOfThePlantInAHeatingByNoisyReadings) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(seed);
-    const Result<PlantFit> fit = fit_plant(as_klipper(seed, 220.0, 600.0, 2.0));
-    ASSERT_TRUE(fit);
-    EXPECT_NEAR(fit->plant.gain_c, 2.0, 0.06);
-    EXPECT_NEAR(fit->plant.time_constant_s, 300.0, 9.0);
-    EXPECT_NEAR(fit->plant.dead_time_s + fit->plant.sensor_lag_s, 7.5, 0.8);
+    for (const double line_s : {1.0, 2.0}) {
+      const Result<PlantFit> fit = fit_plant(as_klipper(seed, 200.0, 600.0, line_s, Feels::noise));
+      ASSERT_TRUE(fit);
+      EXPECT_NEAR(fit->plant.gain_c, 2.0, 0.06);
+      EXPECT_NEAR(fit->plant.time_constant_s, 300.0, 9.0);
+      EXPECT_NEAR(fit->plant.dead_time_s + fit->plant.sensor_lag_s, 7.5, line_s);
+    }
   }
 }
 
@@ -180,7 +185,7 @@ TEST(Fit, KnowsHowSureItIsOfAHostsLog) {
   double chi_of_dead_time = 0.0;
   constexpr unsigned kSeeds = 16;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
-    const Result<PlantFit> fit = fit_plant(as_klipper(seed, 200.0, 400.0, 1.0));
+    const Result<PlantFit> fit = fit_plant(as_klipper(seed, 200.0, 400.0, 1.0, Feels::noise));
     ASSERT_TRUE(fit);
     chi += std::pow((fit->gain_c.value - 2.0) / fit->gain_c.error, 2) +
            std::pow((fit->time_constant_s.value - 300.0) / fit->time_constant_s.error, 2);
