@@ -234,7 +234,7 @@ Status check(const Log& log) {
   return {};
 }
 
-// Of what is left of the data alone.
+// The mean square of what is left, without the rows of jumps.
 double variance_left(const Solution& solution, Eigen::Index count) {
   return solution.residual.head(count).squaredNorm() / static_cast<double>(count);
 }
