@@ -20,9 +20,9 @@
 // defects and of one row for each jerk. With the sides 1 and 2 its weight is W √(s₁/d₁ + s₂/d₂),
 // and it wants the jerk j − (s₁ + c₁ − s₂ − c₂)/(s₁/d₁ + s₂/d₂).
 //
-// After each step the rows with s > t are taken as active. The least-squares point of the defects
-// and these rows is the least point of the whole sum if it keeps every row on its side, because the
-// sum is convex and its gradient is zero there.
+// When a step changes no side, the rows with s > t are taken as active. The least-squares point
+// of the defects and these rows is the least point of the whole sum if it keeps every row on its
+// side, because the sum is convex and its gradient is zero there.
 #include "unflex/rivals/thesis_method.hpp"
 
 #include <Eigen/QR>
@@ -39,7 +39,7 @@ namespace {
 // In units of its limit, a jerk may lie by this much on the wrong side, which is rounding.
 constexpr double kSideTolerance = 1e-9;
 // A step of the interior point aims at this share of the present mean of s t.
-constexpr double kCentring = 0.1;
+constexpr double kCentring = 0.02;
 // A step goes this share of the way on which all s and t stay positive.
 constexpr double kToBoundary = 0.99;
 
@@ -200,6 +200,8 @@ class LeastSquares {
     if (keeps(sides, base)) {
       return base;
     }
+    // Rows that want no jerk at all leave jerks that are not far beyond the limits.
+    base = least_point({Eigen::ArrayXd::Constant(sides.size(), weight_), sides});
     Eigen::ArrayXd jerk = jerks(base);
     Limit upper(1.0, jerk);
     Limit lower(-1.0, jerk);
@@ -228,7 +230,11 @@ class LeastSquares {
       base.go(step, next);
       jerk += step * change;
       gradient *= 1.0 - step;
-      sides = (upper.s > upper.t).cast<double>() - (lower.s > lower.t).cast<double>();
+      const Eigen::ArrayXd before = std::exchange(
+          sides, (upper.s > upper.t).cast<double>() - (lower.s > lower.t).cast<double>());
+      if ((sides != before).any()) {
+        continue;
+      }
       Base candidate = least_point(active(sides));
       if (keeps(sides, candidate)) {
         return candidate;
