@@ -2,16 +2,46 @@
 // velocities. So least squares need no large matrix. From the end of the plan on, v_{k+1} is
 // eliminated by an orthogonal transformation of the rows that contain it (G. H. Golub & C. F. Van
 // Loan, "Matrix Computations", 4th ed., section 5.3). This leaves rows in (b_k, v_{k−1}, v_k)
-// alone.
+// alone, and in the end none, because v_0 = v_{−1} = 0.
+//
+// The jerk rows make the sum of squares a convex function that is quadratic piece by piece: a row
+// is zero, or it is affine where the jerk is beyond a limit. The least point is found by a
+// primal-dual interior point (S. J. Wright, "Primal-Dual Interior-Point Methods", SIAM 1997,
+// chapters 1 and 5). With W the row's weight and the jerk j in units of its limit, there are for
+// either side of a row
+//
+//   u      j − 1 or −j − 1
+//   s      how far j is beyond the limit, s ≥ 0; W²s is the limit's multiplier
+//   t      s − u, t ≥ 0, how far j is within it
+//   μ      s t, to be 0; a step aims at less than its present mean
+//   c, d   (μ − s t)/d, s + t
+//
+// Linearised, Δs = c + (s/d) Δu and Δt = c − (t/d) Δu. So a step is a least-squares problem of the
+// defects and of one row for each jerk. With the sides 1 and 2 its weight is W √(s₁/d₁ + s₂/d₂),
+// and it wants the jerk j − (s₁ + c₁ − s₂ − c₂)/(s₁/d₁ + s₂/d₂).
+//
+// When a step changes no side, the rows with s > t are taken as active. The least-squares point
+// of the defects and these rows is the least point of the whole sum if it keeps every row on its
+// side, because the sum is convex and its gradient is zero there.
 #include "unflex/rivals/thesis_method.hpp"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <utility>
 #include <vector>
 
 namespace unflex::rivals {
 namespace {
+
+// In units of its limit, a jerk may lie by this much on the wrong side, which is rounding.
+constexpr double kSideTolerance = 1e-9;
+// A step of the interior point aims at this share of the present mean of s t.
+constexpr double kCentring = 0.02;
+// A step goes this share of the way on which all s and t stay positive.
+constexpr double kToBoundary = 0.99;
 
 // A linear form in v_{k+1}, b_k, v_{k−1}, v_k and 1.
 using Form = Eigen::Matrix<double, 1, 5>;
@@ -68,75 +98,210 @@ Defects defects(const Nodes& nodes, const dynamics::FlexibleAxis& axis, std::siz
           slope_rate * one - 0.25 * (f1 + f2) - f_middle};
 }
 
-// The path of parabolas with these velocities at the nodes, from the base's position at the first
-// node on.
-AxisPath path_of(const Nodes& nodes, const std::vector<double>& velocity) {
+// The base at the nodes.
+struct Base {
+  std::vector<double> position;
+  std::vector<double> velocity;
+
+  // The value of a form of the interval that begins at node k.
+  [[nodiscard]] double value(const Form& form, std::size_t k) const {
+    return rest(form, k) + form(kNext) * velocity[k + 1];
+  }
+  // The value without v_{k+1}.
+  [[nodiscard]] double rest(const Form& form, std::size_t k) const {
+    return form(kBase) * position[k] + form(kBefore) * (k > 0 ? velocity[k - 1] : 0.0) +
+           form(kNow) * velocity[k] + form(kConstant);
+  }
+  // Goes a share of the way to another base.
+  void go(double share, const Base& to) {
+    for (std::size_t k = 0; k < velocity.size(); ++k) {
+      position[k] += share * (to.position[k] - position[k]);
+      velocity[k] += share * (to.velocity[k] - velocity[k]);
+    }
+  }
+};
+
+// Solves each form, which is to be zero, for v_{k+1}, starting from the base at rest at the plan's
+// begin.
+Base substitute(const Nodes& nodes, const std::vector<Form>& forms) {
+  Base base{{nodes.nozzle.front().position}, {0.0}};
+  for (std::size_t k = 0; k < forms.size(); ++k) {
+    base.velocity.push_back(-base.rest(forms[k], k) / forms[k](kNext));
+    base.position.push_back(base.position[k] +
+                            0.5 * nodes.h * (base.velocity[k] + base.velocity[k + 1]));
+  }
+  return base;
+}
+
+// The path of parabolas from node to node.
+AxisPath path_of(const Nodes& nodes, const Base& base) {
   AxisPath path;
-  double position = nodes.nozzle.front().position;
   for (std::size_t k = 0; k + 1 < nodes.count(); ++k) {
     path.push_back({static_cast<double>(k) * nodes.h,
-                    {position, velocity[k], (velocity[k + 1] - velocity[k]) / nodes.h}});
-    position += 0.5 * nodes.h * (velocity[k] + velocity[k + 1]);
+                    {base.position[k], base.velocity[k],
+                     (base.velocity[k + 1] - base.velocity[k]) / nodes.h}});
   }
-  path.push_back({static_cast<double>(nodes.count() - 1) * nodes.h, {position, 0.0, 0.0}});
+  path.push_back(
+      {static_cast<double>(nodes.count() - 1) * nodes.h, {base.position.back(), 0.0, 0.0}});
   return path;
 }
 
-// Solves each form, which is to be zero, for v_{k+1}, starting from v_0 and the base's first
-// position.
-std::vector<double> substitute(const Nodes& nodes, const std::vector<Form>& forms,
-                               double first_velocity) {
-  std::vector<double> velocity = {first_velocity};
-  double base = nodes.nozzle.front().position;
-  for (std::size_t k = 0; k < forms.size(); ++k) {
-    const Form& form = forms[k];
-    const double before = k > 0 ? velocity[k - 1] : 0.0;
-    const double rest =
-        form(kBase) * base + form(kBefore) * before + form(kNow) * velocity[k] + form(kConstant);
-    velocity.push_back(-rest / form(kNext));
-    base += 0.5 * nodes.h * (velocity[k] + velocity[k + 1]);
+// The rows weight · (jerk − wanted).
+struct JerkRows {
+  Eigen::ArrayXd weight;
+  Eigen::ArrayXd wanted;
+};
+
+// The limit of all jerks on one side.
+struct Limit {
+  double sign;  // u = sign · jerk − 1
+  Eigen::ArrayXd s;
+  Eigen::ArrayXd t;
+
+  // Begins with the same product s t everywhere, that of the largest jerk's size.
+  Limit(double side, const Eigen::ArrayXd& jerk) : sign(side) {
+    const double product = jerk.square().maxCoeff();
+    const Eigen::ArrayXd u = sign * jerk - 1.0;
+    const Eigen::ArrayXd larger = 0.5 * (u.abs() + (u.square() + 4.0 * product).sqrt());
+    s = (u > 0.0).select(larger, product / larger);
+    t = (u > 0.0).select(product / larger, larger);
   }
-  return velocity;
+
+  [[nodiscard]] Eigen::ArrayXd share() const { return s / (s + t); }
+  [[nodiscard]] Eigen::ArrayXd centring(double aim) const { return (aim - s * t) / (s + t); }
+  [[nodiscard]] Eigen::ArrayXd change_of_s(double aim, const Eigen::ArrayXd& jerk_change) const {
+    return centring(aim) + sign * share() * jerk_change;
+  }
+  [[nodiscard]] Eigen::ArrayXd change_of_t(double aim, const Eigen::ArrayXd& jerk_change) const {
+    return centring(aim) - sign * t / (s + t) * jerk_change;
+  }
+};
+
+// The largest share of the change that leaves no value negative.
+double way_to_boundary(const Eigen::ArrayXd& values, const Eigen::ArrayXd& change) {
+  const double fastest = (-change / values).maxCoeff();
+  return fastest > 0.0 ? 1.0 / fastest : std::numeric_limits<double>::infinity();
 }
+
+class LeastSquares {
+ public:
+  LeastSquares(const Nodes& nodes, const dynamics::FlexibleAxis& axis, double max_accel)
+      : nodes_(nodes),
+        weight_(kJerkWeight * max_accel / nodes.h),
+        jerk_((unit(kBefore) - 2.0 * unit(kNow) + unit(kNext)) / (nodes.h * max_accel)) {
+    for (std::size_t k = 0; k + 1 < nodes_.count(); ++k) {
+      defects_.push_back(defects(nodes_, axis, k));
+    }
+  }
+
+  [[nodiscard]] Base solve() const {
+    Eigen::ArrayXd sides = Eigen::ArrayXd::Zero(static_cast<Eigen::Index>(defects_.size()));
+    Base base = least_point(active(sides));
+    if (keeps(sides, base)) {
+      return base;
+    }
+    // Rows that want no jerk at all leave jerks that are not far beyond the limits.
+    base = least_point({Eigen::ArrayXd::Constant(sides.size(), weight_), sides});
+    Eigen::ArrayXd jerk = jerks(base);
+    Limit upper(1.0, jerk);
+    Limit lower(-1.0, jerk);
+    double gradient = 1.0;  // as a share of the first
+    while (true) {
+      const double product = 0.5 * (upper.s * upper.t + lower.s * lower.t).mean();
+      if (std::max(std::sqrt(product), gradient) <= kSideTolerance) {
+        return base;
+      }
+      const double aim = kCentring * product;
+      const Eigen::ArrayXd share = upper.share() + lower.share();
+      const Eigen::ArrayXd force = upper.s + upper.centring(aim) - lower.s - lower.centring(aim);
+      const Base next = least_point({weight_ * share.sqrt(), jerk - force / share});
+      const Eigen::ArrayXd change = jerks(next) - jerk;
+      double step = 1.0;
+      for (const Limit* limit : {&upper, &lower}) {
+        step = std::min({step,
+                         kToBoundary * way_to_boundary(limit->s, limit->change_of_s(aim, change)),
+                         kToBoundary * way_to_boundary(limit->t, limit->change_of_t(aim, change))});
+      }
+      for (Limit* limit : {&upper, &lower}) {
+        const Eigen::ArrayXd change_of_s = limit->change_of_s(aim, change);
+        limit->t += step * limit->change_of_t(aim, change);
+        limit->s += step * change_of_s;
+      }
+      base.go(step, next);
+      jerk += step * change;
+      gradient *= 1.0 - step;
+      const Eigen::ArrayXd before = std::exchange(
+          sides, (upper.s > upper.t).cast<double>() - (lower.s > lower.t).cast<double>());
+      if ((sides != before).any()) {
+        continue;
+      }
+      Base candidate = least_point(active(sides));
+      if (keeps(sides, candidate)) {
+        return candidate;
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] Eigen::ArrayXd jerks(const Base& base) const {
+    Eigen::ArrayXd result(static_cast<Eigen::Index>(defects_.size()));
+    for (std::size_t k = 0; k < defects_.size(); ++k) {
+      result(static_cast<Eigen::Index>(k)) = base.value(jerk_, k);
+    }
+    return result;
+  }
+
+  // The rows of the jerks that are beyond a limit, on the side 1 or −1.
+  [[nodiscard]] JerkRows active(const Eigen::ArrayXd& sides) const {
+    return {weight_ * sides.abs(), sides};
+  }
+
+  [[nodiscard]] bool keeps(const Eigen::ArrayXd& sides, const Base& base) const {
+    const Eigen::ArrayXd jerk = jerks(base);
+    return (sides == 0.0)
+        .select(jerk.abs() <= 1.0 + kSideTolerance, sides * jerk >= 1.0 - kSideTolerance)
+        .all();
+  }
+
+  // The least-squares point of the defects and these rows.
+  [[nodiscard]] Base least_point(const JerkRows& jerk_rows) const {
+    using Rows = Eigen::Matrix<double, 6, 5>;
+    std::vector<Form> forms(defects_.size());
+    // The rows that later intervals leave for (b_{k+1}, v_k, v_{k+1}).
+    Eigen::Matrix<double, 3, 5> later = Eigen::Matrix<double, 3, 5>::Zero();
+    for (std::size_t k = defects_.size(); k-- > 0;) {
+      const auto row = static_cast<Eigen::Index>(k);
+      Rows rows;
+      rows.row(0) = defects_[k].position;
+      rows.row(1) = defects_[k].velocity;
+      rows.row(2) = jerk_rows.weight(row) * (jerk_ - jerk_rows.wanted(row) * unit(kConstant));
+      for (int i = 0; i < 3; ++i) {
+        const Form form = later.row(i);
+        rows.row(3 + i) =
+            form(kBase) * (unit(kBase) + 0.5 * nodes_.h * (unit(kNow) + unit(kNext))) +
+            form(kBefore) * unit(kNow) + form(kNow) * unit(kNext) +
+            form(kConstant) * unit(kConstant);
+      }
+      const Rows triangle =
+          Eigen::HouseholderQR<Rows>(rows).matrixQR().triangularView<Eigen::Upper>();
+      forms[k] = triangle.row(0);
+      later = triangle.middleRows<3>(1);
+    }
+    return substitute(nodes_, forms);
+  }
+
+  const Nodes& nodes_;
+  double weight_;  // of a row of the jerk in units of its limit
+  Form jerk_;      // in these units
+  std::vector<Defects> defects_;
+};
 
 }  // namespace
 
 AxisPath thesis_least_squares(const AxisPath& reference, const dynamics::FlexibleAxis& axis,
-                              double period_s) {
-  using Rows = Eigen::Matrix<double, 6, 5>;
+                              double period_s, double max_accel_mm_s2) {
   const Nodes nodes = sample(reference, period_s);
-  std::vector<Form> forms(nodes.count() - 1);
-  // The rows that later intervals leave for (b_{k+1}, v_k, v_{k+1}).
-  Eigen::Matrix<double, 3, 5> later = Eigen::Matrix<double, 3, 5>::Zero();
-  for (std::size_t k = nodes.count() - 1; k-- > 0;) {
-    Rows rows = Rows::Zero();
-    const Defects of_interval = defects(nodes, axis, k);
-    rows.row(0) = of_interval.position;
-    rows.row(1) = of_interval.velocity;
-    if (k > 0) {
-      rows.row(2) =
-          kJerkWeight / (nodes.h * nodes.h) * (unit(kBefore) - 2.0 * unit(kNow) + unit(kNext));
-    }
-    for (int i = 0; i < 3; ++i) {
-      const Form form = later.row(i);
-      rows.row(3 + i) = form(kBase) * (unit(kBase) + 0.5 * nodes.h * (unit(kNow) + unit(kNext))) +
-                        form(kBefore) * unit(kNow) + form(kNow) * unit(kNext) +
-                        form(kConstant) * unit(kConstant);
-    }
-    const Rows triangle =
-        Eigen::HouseholderQR<Rows>(rows).matrixQR().triangularView<Eigen::Upper>();
-    forms[k] = triangle.row(0);
-    later = triangle.middleRows<3>(1);
-  }
-  // Only v_0 is left: in the row of the start, and in the rows that are left of the whole plan.
-  double square = kStartWeight * kStartWeight;
-  double product = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    const double rest = later(i, kBase) * nodes.nozzle.front().position + later(i, kConstant);
-    square += later(i, kNow) * later(i, kNow);
-    product += later(i, kNow) * rest;
-  }
-  return path_of(nodes, substitute(nodes, forms, -product / square));
+  return path_of(nodes, LeastSquares(nodes, axis, max_accel_mm_s2).solve());
 }
 
 AxisPath thesis_velocity_defects(const AxisPath& reference, const dynamics::FlexibleAxis& axis,
@@ -146,7 +311,7 @@ AxisPath thesis_velocity_defects(const AxisPath& reference, const dynamics::Flex
   for (std::size_t k = 0; k + 1 < nodes.count(); ++k) {
     forms.push_back(defects(nodes, axis, k).velocity);
   }
-  return path_of(nodes, substitute(nodes, forms, 0.0));
+  return path_of(nodes, substitute(nodes, forms));
 }
 
 }  // namespace unflex::rivals

@@ -136,11 +136,6 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
   if (const auto kind = shaper_of(method)) {
     return shaped_base(*kind, run.plan, setup.unflex);
   }
-  const auto thesis = [&](auto solve) {
-    return both_axes(run.plan, setup.unflex, [&](const auto& reference, const auto& axis) {
-      return solve(reference, axis, setup.thesis_period_s);
-    });
-  };
   switch (method) {
     case Method::s_curve:
       return BaseMotion{
@@ -156,9 +151,14 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
     case Method::filtered_spline:
       return both_axes(run.plan, setup.unflex, &spline);
     case Method::thesis_least_squares:
-      return thesis(&rivals::thesis_least_squares);
+      return both_axes(run.plan, setup.unflex, [&](const auto& reference, const auto& axis) {
+        return rivals::thesis_least_squares(reference, axis, setup.thesis_period_s,
+                                            setup.plan_accel_mm_s2);
+      });
     case Method::thesis_velocity_defects:
-      return thesis(&rivals::thesis_velocity_defects);
+      return both_axes(run.plan, setup.unflex, [&](const auto& reference, const auto& axis) {
+        return rivals::thesis_velocity_defects(reference, axis, setup.thesis_period_s);
+      });
     case Method::unflex_2x:
       return limited_base(2.0, run.plan, setup, engine);
     case Method::unflex_4x:

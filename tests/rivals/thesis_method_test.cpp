@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -25,88 +27,141 @@ Sampled sampled(const AxisPath& reference, double h) {
   return result;
 }
 
-// All equations as they stand in the header, as residuals of the velocities, without any chain.
+constexpr double kStartWeight = 1e9;
+
+// All equations of an axis as they stand in the header, as residuals of the base's positions,
+// without any chain.
 Eigen::VectorXd residuals(const Sampled& plan, const dynamics::FlexibleAxis& axis,
-                          const Eigen::VectorXd& v, bool velocity_defects_alone) {
+                          const Eigen::VectorXd& b, double max_accel) {
   const double h = plan.h;
   const double w2 = axis.main().omega_rad_s * axis.main().omega_rad_s;
   const double c = 2.0 * axis.main().zeta * axis.main().omega_rad_s;
-  const auto n = static_cast<int>(plan.p.size());
-  std::vector<double> b = {plan.p[0].position};
-  for (int k = 0; k + 1 < n; ++k) {
-    b.push_back(b.back() + h * (v(k) + v(k + 1)) / 2.0);
-  }
-  std::vector<double> rows;
-  for (int k = 0; k + 1 < n; ++k) {
+  std::vector<double> rows = {kStartWeight * (b(0) - plan.p[0].position)};
+  double v1 = 0.0;
+  double a1 = 0.0;
+  for (int k = 0; k + 1 < b.size(); ++k) {
+    const double a2 = 2.0 * ((b(k + 1) - b(k)) / h - v1) / h;
+    const double v2 = v1 + a2 * h;
     const auto i = static_cast<std::size_t>(k);
     const auto [p1, q1] = plan.p[i];
     const auto [p2, q2] = plan.p[i + 1];
-    const double f1 = w2 * (b[i] - p1) + c * (v(k) - q1);
-    const double f2 = w2 * (b[i + 1] - p2) + c * (v(k + 1) - q2);
+    const double f1 = w2 * (b(k) - p1) + c * (v1 - q1);
+    const double f2 = w2 * (b(k + 1) - p2) + c * (v2 - q2);
     const double qc = (q1 + q2) / 2.0 + h * (f1 - f2) / 8.0;
     const double pc = (p1 + p2) / 2.0 + h * (q1 - q2) / 8.0;
-    const double fc = w2 * ((b[i] + b[i + 1]) / 2.0 - pc) + c * ((v(k) + v(k + 1)) / 2.0 - qc);
+    const double fc = w2 * ((b(k) + b(k + 1)) / 2.0 - pc) + c * ((v1 + v2) / 2.0 - qc);
     rows.push_back(-3.0 * (q1 - q2) / (2.0 * h) - (f1 + f2) / 4.0 - fc);
-    if (!velocity_defects_alone) {
-      rows.push_back(-3.0 * (p1 - p2) / (2.0 * h) - (q1 + q2) / 4.0 - qc);
-    }
-  }
-  for (int k = 1; k + 1 < n && !velocity_defects_alone; ++k) {
-    rows.push_back(kJerkWeight * (v(k - 1) - 2.0 * v(k) + v(k + 1)) / (h * h));
-  }
-  if (!velocity_defects_alone) {
-    rows.push_back(kStartWeight * v(0));
+    rows.push_back(-3.0 * (p1 - p2) / (2.0 * h) - (q1 + q2) / 4.0 - qc);
+    rows.push_back(kJerkWeight * std::max(0.0, std::abs(a2 - a1) / h - max_accel / h));
+    v1 = v2;
+    a1 = a2;
   }
   return Eigen::Map<Eigen::VectorXd>(rows.data(), static_cast<Eigen::Index>(rows.size()));
 }
 
-Eigen::VectorXd velocities(const AxisPath& path) {
-  Eigen::VectorXd v(static_cast<Eigen::Index>(path.size()));
-  for (Eigen::Index k = 0; k + 1 < v.size(); ++k) {
-    v(k) = path[static_cast<std::size_t>(k)].motion.velocity;
+Eigen::VectorXd positions(const AxisPath& path) {
+  Eigen::VectorXd b(static_cast<Eigen::Index>(path.size()));
+  for (Eigen::Index k = 0; k < b.size(); ++k) {
+    b(k) = path[static_cast<std::size_t>(k)].motion.position;
   }
-  const Parabola& last = path[path.size() - 2];
-  v(v.size() - 1) =
-      last.motion.velocity + last.motion.acceleration * (path.back().start_s - last.start_s);
-  return v;
+  return b;
 }
 
+struct PrinterCase {
+  double omega_rad_s;
+  double zeta;
+  double accel_mm_s2;
+  double velocity_mm_s;
+  double period_s;
+};
+
+// ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B.
+constexpr std::array<PrinterCase, 11> kCases = {{{100.0, 0.5, 5000.0, 100.0, 5e-3},
+                                                 {50.0, 0.5, 5000.0, 100.0, 5e-3},
+                                                 {200.0, 0.5, 5000.0, 100.0, 5e-3},
+                                                 {100.0, 0.0, 5000.0, 100.0, 5e-3},
+                                                 {100.0, 1.0, 5000.0, 100.0, 5e-3},
+                                                 {100.0, 0.5, 1000.0, 100.0, 5e-3},
+                                                 {100.0, 0.5, 10000.0, 100.0, 5e-3},
+                                                 {100.0, 0.5, 5000.0, 50.0, 5e-3},
+                                                 {100.0, 0.5, 5000.0, 200.0, 5e-3},
+                                                 {100.0, 0.5, 5000.0, 100.0, 10e-3},
+                                                 {100.0, 0.5, 5000.0, 100.0, 1e-3}}};
+
+// The sum of squares is convex, and a point from which a Gauss–Newton step does not move is its
+// least one.
 TEST(ThesisMethod, IsTheLeastSquaresPointOfAllItsEquations) {
-  for (const auto& [omega, zeta, h] :
-       {std::tuple{100.0, 0.5, 5e-3}, {50.0, 0.5, 5e-3}, {100.0, 0.0, 5e-3}, {100.0, 1.0, 1e-2}}) {
-    const dynamics::FlexibleAxis axis{omega, zeta};
-    const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::Y);
-    const Sampled plan = sampled(reference, h);
-    const auto n = static_cast<Eigen::Index>(plan.p.size());
-    // The equations are affine: their matrix from the residuals of unit vectors.
-    const Eigen::VectorXd rest = residuals(plan, axis, Eigen::VectorXd::Zero(n), false);
-    Eigen::MatrixXd matrix(rest.size(), n);
-    for (Eigen::Index k = 0; k < n; ++k) {
-      matrix.col(k) = residuals(plan, axis, Eigen::VectorXd::Unit(n, k), false) - rest;
+  constexpr double kDifferenceMm = 1e-6;
+  for (std::size_t i = 0; i < kCases.size(); ++i) {
+    const PrinterCase& of = kCases[i];
+    const dynamics::FlexibleAxis axis{of.omega_rad_s, of.zeta};
+    const auto corner = testing::corner_plan(of.velocity_mm_s, of.accel_mm_s2);
+    for (const gcode::Axis letter : {gcode::X, gcode::Y}) {
+      const AxisPath reference = reference_path(corner, letter);
+      const Sampled plan = sampled(reference, of.period_s);
+      const Eigen::VectorXd found =
+          positions(thesis_least_squares(reference, axis, of.period_s, of.accel_mm_s2));
+      ASSERT_EQ(found.size(), static_cast<Eigen::Index>(plan.p.size()));
+      const Eigen::VectorXd rows = residuals(plan, axis, found, of.accel_mm_s2);
+      // Away from the rows' bends the quotient is exact.
+      Eigen::MatrixXd jacobian(rows.size(), found.size());
+      for (Eigen::Index k = 0; k < found.size(); ++k) {
+        const Eigen::VectorXd moved =
+            found + kDifferenceMm * Eigen::VectorXd::Unit(found.size(), k);
+        jacobian.col(k) = (residuals(plan, axis, moved, of.accel_mm_s2) - rows) / kDifferenceMm;
+      }
+      const Eigen::VectorXd step = jacobian.householderQr().solve(rows);
+      EXPECT_LT(step.cwiseAbs().maxCoeff(), 1e-8) << i;
+      EXPECT_GT(rows.norm(), 1.0) << "no solution of all of them";
     }
-    const Eigen::VectorXd expected = matrix.householderQr().solve(-rest);
-    const Eigen::VectorXd found = velocities(thesis_least_squares(reference, axis, h));
-    ASSERT_EQ(found.size(), n);
-    EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-6) << omega << ' ' << zeta;
-    EXPECT_GT(residuals(plan, axis, found, false).norm(), 1.0) << "no solution of all of them";
   }
 }
 
-// 2 · 49 unknowns against 2 · (48 + 48 + 47 + 1) equations, and the base's start in either axis,
-// which holds by construction.
-TEST(ThesisMethod, HasThreeTimesAsManyEquationsAsUnknowns) {
+TEST(ThesisMethod, HasTheNodesOfTheThesis) {
+  constexpr std::array<std::size_t, 11> kNodes = {49, 49, 49, 49, 49, 81, 45, 85, 37, 25, 241};
+  for (std::size_t i = 0; i < kCases.size(); ++i) {
+    const PrinterCase& of = kCases[i];
+    const AxisPath base = thesis_least_squares(
+        reference_path(testing::corner_plan(of.velocity_mm_s, of.accel_mm_s2), gcode::X),
+        {of.omega_rad_s, of.zeta}, of.period_s, of.accel_mm_s2);
+    EXPECT_EQ(base.size(), kNodes[i]) << i;
+  }
+}
+
+TEST(ThesisMethod, Has98UnknownsAgainst290Rows) {
+  const auto corner = testing::corner_plan(100.0, 5000.0);
+  Eigen::Index unknowns = 0;
+  Eigen::Index rows = 0;
+  for (const gcode::Axis letter : {gcode::X, gcode::Y}) {
+    const Sampled plan = sampled(reference_path(corner, letter), 5e-3);
+    const Eigen::VectorXd b = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(plan.p.size()));
+    unknowns += b.size();
+    rows += residuals(plan, {100.0, 0.5}, b, 5000.0).size();
+  }
+  EXPECT_EQ(unknowns, 98);
+  EXPECT_EQ(rows, 290);
+}
+
+// The jerk rows are one-sided: below the limit they ask for nothing.
+TEST(ThesisMethod, IgnoresAJerkBelowItsLimit) {
+  const dynamics::FlexibleAxis axis{100.0, 0.5};
   const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const Sampled plan = sampled(reference, 5e-3);
-  ASSERT_EQ(plan.p.size(), 49U);
-  EXPECT_EQ(residuals(plan, {100.0, 0.5}, Eigen::VectorXd::Zero(49), false).size(), 144);
+  const auto base = [&](double max_accel) {
+    return positions(thesis_least_squares(reference, axis, 5e-3, max_accel));
+  };
+  EXPECT_EQ(base(1e6), base(2e6));
+  EXPECT_GT((base(1e6) - base(5000.0)).cwiseAbs().maxCoeff(), 1e-4);
 }
 
 TEST(ThesisMethod, MeetsTheVelocityDefectsWhereTheyStandAlone) {
   const dynamics::FlexibleAxis axis{100.0, 0.5};
   const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const Eigen::VectorXd v = velocities(thesis_velocity_defects(reference, axis, 5e-3));
-  EXPECT_EQ(v(0), 0.0);
-  EXPECT_LT(residuals(sampled(reference, 5e-3), axis, v, true).cwiseAbs().maxCoeff(), 1e-7);
+  const AxisPath base = thesis_velocity_defects(reference, axis, 5e-3);
+  EXPECT_EQ(base.front().motion.velocity, 0.0);
+  const Eigen::VectorXd rows = residuals(sampled(reference, 5e-3), axis, positions(base), 5000.0);
+  for (Eigen::Index row = 1; row < rows.size(); row += 3) {
+    EXPECT_LT(std::abs(rows(row)), 1e-7) << row;
+  }
 }
 
 // After a jump of the plan's acceleration, the nozzle's acceleration f in the equations alternates

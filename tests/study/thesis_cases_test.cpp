@@ -16,6 +16,10 @@ using Figures = std::array<double, 11>;
 // ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B; contour error at its greatest within the motion, µm.
 constexpr Figures kUncompensated = {464, 1130, 144, 1881, 316, 100, 525, 262, 623, 464, 464};
 constexpr Figures kThesis = {9.0, 10.2, 10.1, 110.8, 8.2, 2.0, 14.4, 7.3, 10.6, 37.0, 0.6};
+// The least-squares point of the equations in the thesis' appendix B.
+constexpr Figures kAppendixB = {9.01,  10.25, 10.13, 110.76, 8.19, 2.01,
+                                14.45, 7.28,  10.64, 36.96,  0.60};
+constexpr Figures kThesisGap = {429, 1252, 116, 536, 307, 98, 632, 316, 480, 425, 432};
 constexpr Figures kZv = {111, 284, 30, 57, 0, 24, 142, 71, 118, 111, 111};
 constexpr std::array<double, 9> kUnflex4x = {0.4, 1.3, 0.2, 1.7, 0.2, 0.1, 0.7, 0.4, 0.4};
 
@@ -49,22 +53,34 @@ TEST_F(ThesisCases, StrayAsTheThesisFoundWithoutCompensation) {
 }
 
 TEST_F(ThesisCases, StrayAsTheThesisFoundWithItsMethod) {
+  constexpr double kHalfDigitUm = 0.05;
+  // The thesis looks at the nozzle every 0.1 ms, which in case 1A misses 5 nm of the peak.
+  constexpr double kThesisStep_s = 1e-4;
+  const auto engine = compensate::make_banded_engine();
   for (std::size_t i = 0; i < kThesis.size(); ++i) {
-    const double share = case_name(i) == "5B" ? 0.15 : 0.05;
-    EXPECT_NEAR(max_um(i, Method::thesis_least_squares), kThesis[i], share * kThesis[i])
+    const Case& of = thesis_cases()[i];
+    BenchSetup setup = corner_setup(of);
+    setup.step_s = kThesisStep_s;
+    const BenchResult found = try_all({corner(of, of.accel_mm_s2), {}}, setup, *engine);
+    const auto method = static_cast<std::size_t>(Method::thesis_least_squares);
+    EXPECT_NEAR(1e3 * found[method].straying[0].max_mm, kThesis[i], kHalfDigitUm) << case_name(i);
+  }
+}
+
+TEST_F(ThesisCases, StrayAsTheEquationsOfAppendixBSay) {
+  constexpr double kHalfDigitUm = 0.005;
+  for (std::size_t i = 0; i < kAppendixB.size(); ++i) {
+    EXPECT_NEAR(max_um(i, Method::thesis_least_squares), kAppendixB[i], kHalfDigitUm)
         << case_name(i);
   }
 }
 
 TEST_F(ThesisCases, EndShortOfTheTargetWithTheThesisMethod) {
-  double worst = 0.0;
   for (std::size_t i = 0; i < results_.size(); ++i) {
-    const MethodResult& thesis = result(i, Method::thesis_least_squares);
-    EXPECT_GT(thesis.end_gap_mm, 0.09) << case_name(i);
-    worst = std::max(worst, thesis.end_gap_mm);
+    EXPECT_NEAR(1e3 * result(i, Method::thesis_least_squares).end_gap_mm, kThesisGap[i], 0.5)
+        << case_name(i);
     EXPECT_LT(result(i, Method::unflex_4x).end_gap_mm, 1e-9) << case_name(i);
   }
-  EXPECT_NEAR(worst, 1.25, 0.02);
 }
 
 TEST_F(ThesisCases, StrayLessWithTheVelocityDefectsAloneButJaggedly) {

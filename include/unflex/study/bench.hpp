@@ -54,9 +54,10 @@ struct Nozzle {
 };
 
 struct BenchSetup {
-  compensate::Setup unflex;          // its acceleration limits are set per method
-  std::optional<Nozzle> two_stage;   // the axes with what rings behind them, if anything does
-  double plan_accel_mm_s2 = 5000.0;  // unflex_2x, 4x, 10x allow multiples of it
+  compensate::Setup unflex;         // its acceleration limits are set per method
+  std::optional<Nozzle> two_stage;  // the axes with what rings behind them, if anything does
+  // unflex_2x, 4x, 10x allow multiples of it; thesis_least_squares has its limit of jerk from it.
+  double plan_accel_mm_s2 = 5000.0;
   double thesis_period_s = 5e-3;
   int parts = 10;             // parabolas per node interval of unflex' base
   double step_s = 5e-5;       // between the samples at which the nozzle is measured
