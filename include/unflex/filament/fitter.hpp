@@ -1,0 +1,78 @@
+// A print whose E suits a filament that is not a full cylinder.
+//
+// Slicers compute E for a full section of the diameter they are told. Where the section holds less,
+// moves that print are to push more of it; how far filament is drawn back and brought forward again
+// is a length, and stays.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/filament/profile.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/gcode/line.hpp"
+
+namespace unflex::filament {
+
+struct FitterOptions {
+  gcode::InterpreterOptions interpreter;
+  double sliced_area_mm2 = 0.0;  // the section that the print was sliced for
+  Profile profile{1.0};          // the section that there is
+  double start_mm = 0.0;         // where the print begins on the filament
+};
+
+struct Totals {
+  std::size_t changed_lines = 0;
+  // Filament of moves that print, as sliced and as written.
+  double sliced_mm = 0.0;
+  double fitted_mm = 0.0;
+  double material_mm3 = 0.0;  // what they lay
+  // The largest and the least factor of E.
+  double most = 0.0;
+  double least = 0.0;
+  double end_mm = 0.0;  // where the print ends on the filament
+};
+
+class Fitter {
+ public:
+  Fitter(FitterOptions options, std::string name);
+
+  // Appends what stands for the line, in the order of the file: the line itself, or with another E;
+  // before some a line that tells the printer what the file takes E to be. Errors are of kind
+  // input: the line was fitted before, Klipper would refuse it, or its E cannot be replaced.
+  [[nodiscard]] Status fit(const gcode::Line& line, std::string& text);
+
+  [[nodiscard]] const Totals& totals() const { return totals_; }
+  [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
+
+  // A comment for the end of a file, by which a fitted file is known again.
+  [[nodiscard]] std::string mark() const;
+
+ private:
+  [[nodiscard]] Status fit_move(const gcode::Event& event, const gcode::ModalState& before,
+                                std::string& text);
+  // The filament that a move that prints needs.
+  [[nodiscard]] double needed_mm(double sliced_mm, const gcode::ModalState& before) const;
+  void tell_reading(const gcode::ModalState& state, const gcode::Line& line, std::string& text);
+  [[nodiscard]] Status check(std::string_view written, const gcode::Event& sliced);
+  [[nodiscard]] tl::unexpected<Error> wrong(const gcode::Line& line, std::string what) const;
+
+  FitterOptions options_;
+  std::string name_;
+  gcode::Interpreter sliced_;
+  gcode::Interpreter written_;
+  gcode::Event event_;
+  Totals totals_;
+  std::vector<Diagnostic> warnings_;
+  double at_mm_;  // along the filament
+  // In the unit of E's words: what E reads in the printer less what it reads in the file, and what
+  // rounding has left of it.
+  double ahead_ = 0.0;
+  double left_ = 0.0;
+  bool told_of_volume_ = false;
+};
+
+}  // namespace unflex::filament
