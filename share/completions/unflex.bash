@@ -10,6 +10,7 @@ _unflex_options() {
     batch) echo "-h --help -o --output $print --summary --faster --timing --max-deviation --engine -j --jobs" ;;
     verify) echo "-h --help --against --strict $print --faster --max-deviation" ;;
     inspect) echo "-h --help --strict $print" ;;
+    filament) echo '-h --help -o --output --in-place --strict --printer --set --filament-start-mm -q --quiet' ;;
     study) echo "-h --help --case --machines --faster --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
     identify)
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
@@ -27,7 +28,7 @@ _unflex_options() {
 
 _unflex_commands() {
   case $1 in
-    '') echo 'compensate batch verify inspect study identify tune printer' ;;
+    '') echo 'compensate batch verify inspect filament study identify tune printer' ;;
     printer) echo 'init line-test macros keys' ;;
   esac
 }
@@ -58,8 +59,8 @@ _unflex_value() {
     *:--set) echo 'keys' ;;
     *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
       *:--wave-spacing-mm | *:--speed-mm-s | *:--decay | *:--read | *:--nozzle-temp | \
-      *:--bed-temp | *:--accel | *:--keep-rms) echo 'any' ;;
-    compensate: | verify: | inspect: | study: | tune:) echo "files $print" ;;
+      *:--bed-temp | *:--accel | *:--keep-rms | *:--filament-start-mm) echo 'any' ;;
+    compensate: | verify: | inspect: | filament: | study: | tune:) echo "files $print" ;;
     identify:) echo 'files *.csv' ;;
   esac
 }

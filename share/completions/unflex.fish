@@ -39,10 +39,10 @@ function __unflex_settings
     string match --all --regex -- '"[^"]+"|true|false' $of_key | string trim --chars '"' | string replace --regex -- '^' $typed[1]=
 end
 
-set -g __unflex_commands compensate batch verify inspect study identify tune printer
+set -g __unflex_commands compensate batch verify inspect filament study identify tune printer
 set -l gcode '(__unflex_files .gcode .gco .g .bgcode .gcode.gz)'
 set -l printer '(__unflex_files .toml .cfg .g .txt)'
-set -l prints compensate verify inspect study
+set -l prints compensate verify inspect filament study
 
 complete -c unflex -f
 complete -c unflex -s h -l help -d 'Print the options and exit'
@@ -52,6 +52,7 @@ complete -c unflex -n '__unflex_in ""' -a compensate -d 'Write G-code whose moti
 complete -c unflex -n '__unflex_in ""' -a batch -d 'Compensate all prints of a folder, those alone that have changed'
 complete -c unflex -n '__unflex_in ""' -a verify -d 'Measure how far the nozzle strays when a compensated file is printed'
 complete -c unflex -n '__unflex_in ""' -a inspect -d 'Show what is understood of a G-code file'
+complete -c unflex -n '__unflex_in ""' -a filament -d 'Fit the E of a print to a filament that is not a full cylinder'
 complete -c unflex -n '__unflex_in ""' -a study -d 'Measure all ways to move the base against each other'
 complete -c unflex -n '__unflex_in ""' -a identify -d 'Find the resonances in records of accelerometers or a ringing tower'
 complete -c unflex -n '__unflex_in ""' -a tune -d 'Find the resonances by printing towers and looking at their walls'
@@ -65,15 +66,16 @@ complete -c unflex -n "__unflex_in $prints" -a $gcode
 complete -c unflex -n '__unflex_in identify' -a '(__unflex_files .csv)'
 complete -c unflex -n '__unflex_in tune' -a $gcode
 
-complete -c unflex -n '__unflex_in compensate' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
-complete -c unflex -n '__unflex_in compensate' -l in-place -d 'Replace the input'
+complete -c unflex -n '__unflex_in compensate filament' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
+complete -c unflex -n '__unflex_in compensate filament' -l in-place -d 'Replace the input'
 complete -c unflex -n '__unflex_in compensate' -l log -r -F -d 'Add what is said and the summary to a file'
 complete -c unflex -n '__unflex_in batch' -a '(__fish_complete_directories (commandline -ct))'
 complete -c unflex -n '__unflex_in batch' -s o -l output -x -a '(__fish_complete_directories (commandline -ct))' -d 'The folder to write to'
 complete -c unflex -n '__unflex_in batch' -l report -x -a '(__fish_complete_directories (commandline -ct))' -d 'A page for each print, in this folder'
 complete -c unflex -n '__unflex_in batch' -l summary -x -a '(__unflex_files .json .xml)' -d 'Write what became of each print'
 complete -c unflex -n '__unflex_in verify' -l against -x -a $gcode -d 'The sliced G-code it was made from'
-complete -c unflex -n '__unflex_in compensate verify inspect' -l strict -d 'Take warnings for errors'
+complete -c unflex -n '__unflex_in filament' -l filament-start-mm -x -d "Where on the filament's profile the print begins, mm"
+complete -c unflex -n '__unflex_in compensate verify inspect filament' -l strict -d 'Take warnings for errors'
 complete -c unflex -n '__unflex_in compensate batch verify' -l faster -d 'As fast as keeps the nozzle near the path; =µm'
 complete -c unflex -n '__unflex_in compensate batch' -l timing -x -a 'scaled optimal' -d 'How --faster finds the timing'
 complete -c unflex -n '__unflex_in compensate batch verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'

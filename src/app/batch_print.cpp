@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "console.hpp"
+#include "filament.hpp"
 #include "files.hpp"
 #include "print_run.hpp"
 #include "results.hpp"
@@ -67,6 +68,13 @@ Result<std::string> hash_of_settings(const RunConfig& config) {
   std::string text = fmt::format("engine={}\n", name_of(config.engine));
   for (const machine::SettingRow& row : machine::rows(*settings)) {
     text += fmt::format("{}={}\n", row.key, row.value);
+  }
+  if (const auto profile = filament_profile(config, *settings)) {
+    const Result<std::string> hash = hash_of_file(profile->string());
+    if (!hash) {
+      return hash;
+    }
+    text += *hash;
   }
   return sha256(text);
 }

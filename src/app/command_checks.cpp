@@ -188,7 +188,7 @@ Status check_batch(const RunConfig& config) {
 }  // namespace
 
 Status complete(RunConfig& config) {
-  if (config.command == Command::compensate) {
+  if (writes_print(config.command)) {
     if (Status checked = check_output(config); !checked) {
       return checked;
     }

@@ -131,6 +131,14 @@ void take_faster(RunConfig& config) {
   }
 }
 
+// --filament-start-mm is short for a key.
+void take_filament_start(RunConfig& config) {
+  if (config.filament_start_mm) {
+    config.overrides.push_back(
+        fmt::format("extruder.filament_start_mm={}", *config.filament_start_mm));
+  }
+}
+
 // The tolerances of study --faster.
 void take_tolerances(RunConfig& config) {
   if (config.faster_um.empty()) {
@@ -246,6 +254,26 @@ void add_inspect(CLI::App& program, RunConfig& config) {
   add_common_options(*command, config, "Write a report, FILE.json, or to stdout with -");
   add_strict(*command, config);
   command->callback([&config] { config.command = Command::inspect; });
+}
+
+void add_filament(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "filament", "Fit the E of a print to a filament that is not a full cylinder");
+  command->add_option("IN", config.input, "Sliced G-code, - for stdin")->type_name("")->required();
+  command->add_option("-o,--output", config.output, "Where to write, - for stdout")
+      ->type_name("OUT");
+  command->add_flag("--in-place", config.in_place, "Replace IN");
+  add_settings(*command, config);
+  command
+      ->add_option("--filament-start-mm", config.filament_start_mm,
+                   "Where on the filament's profile the print begins")
+      ->type_name("MM");
+  command->add_flag("-q,--quiet", config.quiet, "No summary");
+  add_strict(*command, config);
+  command->callback([&config] {
+    config.command = Command::filament;
+    take_filament_start(config);
+  });
 }
 
 void add_study(CLI::App& program, RunConfig& config) {
@@ -575,6 +603,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   add_batch(program, config);
   add_verify(program, config);
   add_inspect(program, config);
+  add_filament(program, config);
   add_printer(program, config);
   add_identify(program, config);
   add_tune(program, config);

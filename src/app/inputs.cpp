@@ -177,7 +177,7 @@ Status Input::make_seekable() {
   return is_stream_ || kind_ != container::Kind::text ? copy_text() : Status{};
 }
 
-Status Input::copy_text() {
+Status Input::replace_text(const std::function<Status(const Write&)>& make) {
   const std::filesystem::path directory = temporary_directory();
   tl::expected<TemporaryFile, int> copy = TemporaryFile::create(directory);
   if (!copy) {
@@ -186,25 +186,15 @@ Status Input::copy_text() {
   }
   // Without a name, nothing is left of the copy, whatever happens.
   copy->unlink();
-  const std::unique_ptr<container::Unpacker> unpacker = container::make_unpacker(kind_, name_);
-  TextReader reader(unpacker.get(), std::exchange(head_, {}), [this] { return read_block(); });
-  for (;;) {
-    const Result<std::string> piece = reader.next();
-    if (!piece) {
-      return tl::unexpected(piece.error());
-    }
-    if (piece->empty()) {
-      break;
-    }
-    const int error = ending_signal() != 0 ? EINTR : write_all(copy->fd(), *piece);
-    if (error != 0) {
-      return fail(
-          ErrorKind::internal, {name_, 0},
-          fmt::format("cannot be kept in {}: {}", directory.string(), temporary_error_text(error)));
-    }
-  }
-  if (unpacker && unpacker->metadata() != nullptr) {
-    metadata_ = *unpacker->metadata();
+  const Status made = make([&](std::string_view text) -> Status {
+    const int error = ending_signal() != 0 ? EINTR : write_all(copy->fd(), text);
+    return error == 0 ? Status{}
+                      : Status(fail(ErrorKind::internal, {name_, 0},
+                                    fmt::format("cannot be kept in {}: {}", directory.string(),
+                                                temporary_error_text(error))));
+  });
+  if (!made) {
+    return made;
   }
   FileDescriptor kept(::fcntl(copy->fd(), F_DUPFD_CLOEXEC, 3));
   if (!kept.valid()) {
@@ -213,6 +203,29 @@ Status Input::copy_text() {
   fd_ = std::move(kept);
   is_copied_ = true;
   return {};
+}
+
+Status Input::copy_text() {
+  const std::unique_ptr<container::Unpacker> unpacker = container::make_unpacker(kind_, name_);
+  TextReader reader(unpacker.get(), std::exchange(head_, {}), [this] { return read_block(); });
+  const Status copied = replace_text([&](const Write& write) -> Status {
+    for (;;) {
+      const Result<std::string> piece = reader.next();
+      if (!piece) {
+        return tl::unexpected(piece.error());
+      }
+      if (piece->empty()) {
+        return {};
+      }
+      if (Status written = write(*piece); !written) {
+        return written;
+      }
+    }
+  });
+  if (copied && unpacker && unpacker->metadata() != nullptr) {
+    metadata_ = *unpacker->metadata();
+  }
+  return copied;
 }
 
 std::filesystem::path Input::path() const {

@@ -5,8 +5,10 @@
 
 #include <ctime>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "files.hpp"
 #include "unflex/container/container.hpp"
@@ -39,6 +41,11 @@ class Input {
   // Copies like make_seekable(), except text and gzip in a stream, which can be read once as they
   // come.
   [[nodiscard]] Status make_readable();
+
+  // Puts another text in the place of the input's: what `make` writes with the function that it is
+  // given, to a temporary file without a name.
+  using Write = std::function<Status(std::string_view)>;
+  [[nodiscard]] Status replace_text(const std::function<Status(const Write&)>& make);
 
   // What the input is packed in, and what a binary file says beside its G-code. Both are known once
   // the input was made readable or seekable.

@@ -73,6 +73,17 @@ Status deliver(const RunConfig& config, Workspace& space, ExitCode verdict, bool
   return wanted ? deliver_output(space, text) : write_report(space.report, text);
 }
 
+void note_filament(const Workspace& space, report::Report& report) {
+  if (!space.fitted) {
+    return;
+  }
+  const filament::Totals& totals = space.fitted->totals;
+  report.fitted_filament = {totals.sliced_mm, totals.fitted_mm, totals.material_mm3,
+                            totals.least,     totals.most,      totals.end_mm};
+  report.warnings.insert(report.warnings.begin(), space.fitted->warnings.begin(),
+                         space.fitted->warnings.end());
+}
+
 }  // namespace
 
 Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
@@ -99,6 +110,7 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!report) {
     return tl::unexpected(report.error());
   }
+  note_filament(*space, *report);
   if (Status accepted = accept(config, report->warnings, passed_on, console); !accepted) {
     return tl::unexpected(accepted.error());
   }

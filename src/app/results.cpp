@@ -87,9 +87,8 @@ Status print_summary(const RunConfig& config, std::string_view text, Console& co
   if (config.quiet) {
     return {};
   }
-  const bool stdout_taken =
-      config.report == kStandardStream ||
-      (config.command == Command::compensate && config.output == kStandardStream);
+  const bool stdout_taken = config.report == kStandardStream ||
+                            (writes_print(config.command) && config.output == kStandardStream);
   if (stdout_taken) {
     if (::isatty(STDERR_FILENO) == 1) {
       static_cast<void>(write_all(STDERR_FILENO, text));

@@ -9,6 +9,7 @@
 
 #include "batch.hpp"
 #include "console.hpp"
+#include "filament.hpp"
 #include "files.hpp"
 #include "hook.hpp"
 #include "identify.hpp"
@@ -228,6 +229,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return run_batch(config, console);
     case Command::tune:
       return run_tune(config, console);
+    case Command::filament:
+      return run_filament(config, console);
     case Command::compensate:
     case Command::verify:
       break;

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "filament.hpp"
 #include "files.hpp"
 #include "results.hpp"
 
@@ -16,7 +17,7 @@ namespace {
 // Checks that no two names lead to one file: the result would destroy what it was made from. So
 // would a stream that is redirected to such a file.
 Status check_distinct(const RunConfig& config) {
-  const bool compensates = config.command == Command::compensate;
+  const bool compensates = writes_print(config.command);
   const std::string input = name_of_file(config.input, STDIN_FILENO);
   const std::string output =
       name_of_file(config.output, compensates ? STDOUT_FILENO : STDIN_FILENO);
@@ -41,7 +42,7 @@ Status check_distinct(const RunConfig& config) {
 }
 
 Status open_outputs(const RunConfig& config, Workspace& space) {
-  if (config.command == Command::compensate) {
+  if (writes_print(config.command)) {
     Result<Output> output = Output::open(config.output);
     if (!output) {
       return tl::unexpected(output.error());
@@ -60,7 +61,7 @@ Status open_outputs(const RunConfig& config, Workspace& space) {
 
 // Copies what is read more than once.
 Status spool(const RunConfig& config, Workspace& space) {
-  if (config.command == Command::compensate) {
+  if (writes_print(config.command)) {
     return space.input.make_readable();
   }
   if (Status copied = space.input.make_seekable(); !copied) {
@@ -116,7 +117,7 @@ Result<Workspace> open_workspace(const RunConfig& config) {
   if (config.in_place) {
     input->call(config.print_name);
   }
-  Workspace space{{}, std::move(*input), {}, {}, {}};
+  Workspace space{{}, std::move(*input), {}, {}, {}, {}};
   if (config.command == Command::verify) {
     Result<Input> compensated = Input::open(config.output);
     if (!compensated) {
@@ -130,7 +131,11 @@ Result<Workspace> open_workspace(const RunConfig& config) {
           .and_then([&] { return spool(config, space); })
           .and_then([&] { return check_kinds(config, space); })
           .and_then([&] { return load_settings(config, space.input); })
-          .map([&](machine::Settings settings) { space.settings = std::move(settings); });
+          .map([&](machine::Settings settings) { space.settings = std::move(settings); })
+          .and_then([&] { return fit_to_filament(config, space.settings, space.input); })
+          .map([&](std::optional<pipeline::FittedPrint> fitted) {
+            space.fitted = std::move(fitted);
+          });
   if (!ready) {
     // If the print has changed meanwhile, that explains what went wrong.
     const Status unchanged = space.input.check_unchanged();
@@ -144,14 +149,18 @@ Status check_inputs(const Workspace& space) {
       [&] { return space.compensated ? space.compensated->check_unchanged() : Status{}; });
 }
 
+void pack_output(const RunConfig& config, Workspace& space) {
+  const std::optional<container::Metadata>& origin = space.input.metadata();
+  space.output->pack_as(output_kind(config, space), origin ? &*origin : nullptr);
+}
+
 Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   pipeline::Job job;
   job.input = space.input.path();
   job.input_name = space.input.name();
-  job.output_name = config.command == Command::compensate ? config.print_name : config.output;
+  job.output_name = writes_print(config.command) ? config.print_name : config.output;
   if (space.output) {
-    const std::optional<container::Metadata>& origin = space.input.metadata();
-    space.output->pack_as(output_kind(config, space), origin ? &*origin : nullptr);
+    pack_output(config, space);
     job.output = space.output->path();
     job.input_fd_kind = space.input.kind();
     job.output_fd_kind = space.output->kind();

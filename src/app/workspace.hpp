@@ -8,6 +8,7 @@
 #include "unflex/app/run_config.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/pipeline/filament.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::app {
@@ -15,8 +16,9 @@ namespace unflex::app {
 struct Workspace {
   machine::Settings settings;
   Input input;
-  std::optional<Input> compensated;  // only for verify
-  std::optional<Output> output;      // only for compensate
+  std::optional<pipeline::FittedPrint> fitted;  // where the input is fitted to its filament
+  std::optional<Input> compensated;             // only for verify
+  std::optional<Output> output;                 // only for compensate
   std::optional<Output> report;
 };
 
@@ -28,6 +30,9 @@ struct Workspace {
 
 // An error if a print was changed meanwhile, since that explains whatever else went wrong.
 [[nodiscard]] Status check_inputs(const Workspace& space);
+
+// Has the output packed like the input, or as its name says.
+void pack_output(const RunConfig& config, Workspace& space);
 
 // The job for the pipeline.
 [[nodiscard]] Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space);

@@ -206,6 +206,11 @@ Status check_printer(const Draft& draft) {
                     fmt::format("printer.unretract_extra_length_mm is {}, but must be at least {}",
                                 s.printer.unretract_extra_length_mm, readable(least_extra_mm)));
   }
+  if (s.extruder.filament_area_mm2 && !s.extruder.filament_profile.empty()) {
+    return conflict(draft, {"extruder.filament_area_mm2", "extruder.filament_profile"},
+                    "extruder.filament_area_mm2 and extruder.filament_profile both say what the "
+                    "filament holds; give one of them");
+  }
   if (s.extruder.filament_diameter_mm < s.extruder.nozzle_diameter_mm) {
     return conflict(draft, {"extruder.filament_diameter_mm", "extruder.nozzle_diameter_mm"},
                     "extruder.filament_diameter_mm must not be below nozzle_diameter_mm");

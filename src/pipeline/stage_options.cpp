@@ -33,7 +33,8 @@ double grid_mm(const machine::Settings& settings) {
 }
 
 double filament_area_mm2(const machine::ExtruderSettings& extruder) {
-  return std::numbers::pi / 4.0 * extruder.filament_diameter_mm * extruder.filament_diameter_mm;
+  return extruder.filament_area_mm2.value_or(
+      std::numbers::pi / 4.0 * extruder.filament_diameter_mm * extruder.filament_diameter_mm);
 }
 
 // The speed at which the move takes as much filament as the hotend melts, with some room, as the

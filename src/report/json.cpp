@@ -238,6 +238,14 @@ void add_output(const Report& r, Json& json) {
                        {"uncompensated_lag_rms_mm", r.uncompensated_lag.rms_mm},
                        {"uncompensated_lag_max_mm", r.uncompensated_lag.max_mm},
                        {"uncompensated_lag_max_line", r.uncompensated_lag.max_line}};
+  json["fitted_filament"] = nullptr;
+  if (r.fitted_filament) {
+    const Report::FittedFilament& fitted = *r.fitted_filament;
+    json["fitted_filament"] = {
+        {"sliced_mm", fitted.sliced_mm},       {"fitted_mm", fitted.fitted_mm},
+        {"material_mm3", fitted.material_mm3}, {"least_factor", fitted.least_factor},
+        {"most_factor", fitted.most_factor},   {"end_mm", fitted.end_mm}};
+  }
   json["flow"] = {{"uncompensated", flow_json(r.uncompensated_flow)},
                   {"compensated", flow_json(r.compensated_flow)}};
   json["performance"] = {{"wall_s", r.wall_s},

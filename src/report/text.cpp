@@ -263,6 +263,13 @@ void write_output(Sink out, const Report& r) {
       out, "              laid {} → {} µm RMS ahead of the nozzle or behind, {} → {} µm at most\n",
       micrometres_text(r.uncompensated_lag.rms_mm), micrometres_text(r.compensated_lag.rms_mm),
       micrometres_text(r.uncompensated_lag.max_mm), micrometres_text(r.compensated_lag.max_mm));
+  if (r.fitted_filament) {
+    const Report::FittedFilament& fitted = *r.fitted_filament;
+    fmt::format_to(out,
+                   "              fitted before: {:.2f} mm of moves that print became {:.2f}, "
+                   "{:.1f} mm³ of material\n",
+                   fitted.sliced_mm, fitted.fitted_mm, fitted.material_mm3);
+  }
   write_flow(out, r);
   fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",
                  r.print_s_per_wall_s, duration_text(r.wall_s), r.peak_rss_mb);

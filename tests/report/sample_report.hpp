@@ -114,6 +114,7 @@ inline Report sample_report() {
   r.worst_move_extrusion_error_mm = 0.00001;
   r.uncompensated_lag = {0.06, 0.5, 700};
   r.compensated_lag = {0.0045, 0.035, 801};
+  r.fitted_filament = {100.0, 110.5, 240.5, 1.1, 1.12, 108.5};
   r.uncompensated_flow = {10.5, 710, 400.0, 711};
   r.compensated_flow = {12.4, 811, 500.0, 812};
   r.max_flow_mm3_s = 15.0;

@@ -26,8 +26,14 @@ enum class Command {
   identify,
   study,
   batch,
-  tune
+  tune,
+  filament
 };
+
+// Whether the command reads a print and writes another one.
+[[nodiscard]] constexpr bool writes_print(Command command) {
+  return command == Command::compensate || command == Command::filament;
+}
 
 // The codes the program exits with, see docs/cli.md.
 enum class ExitCode : int {
@@ -76,7 +82,8 @@ struct RunConfig {
   // --in-place; verify: OUT
   std::string output;
   TimingMethod timing_method = TimingMethod::as_set;  // value of --timing
-  std::string faster_um;  // value of --faster, of study a list; empty: not given
+  std::string faster_um;                    // value of --faster, of study a list; empty: not given
+  std::optional<double> filament_start_mm;  // value of --filament-start-mm
   bool in_place = false;
   std::optional<std::string> printer_file;
   std::vector<std::string> overrides;  // "key=value"

@@ -45,6 +45,9 @@ class Fitter {
   // input: the line was fitted before, Klipper would refuse it, or its E cannot be replaced.
   [[nodiscard]] Status fit(const gcode::Line& line, std::string& text);
 
+  // What the last line meant in the sliced file, and the state after it.
+  [[nodiscard]] const gcode::Event& event() const { return event_; }
+  [[nodiscard]] const gcode::ModalState& state() const { return sliced_.state(); }
   [[nodiscard]] const Totals& totals() const { return totals_; }
   [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
 

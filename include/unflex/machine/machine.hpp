@@ -106,7 +106,10 @@ struct LimitSettings {
 
 struct ExtruderSettings {
   double nozzle_diameter_mm = 0.4;
-  double filament_diameter_mm = 1.75;
+  double filament_diameter_mm = 1.75;       // that the print is sliced for
+  std::optional<double> filament_area_mm2;  // section that is material; unset: of that diameter
+  std::string filament_profile;             // table of it along the spool; empty: none
+  double filament_start_mm = 0.0;           // where on the spool the print begins
   std::optional<double> max_extrude_cross_section_mm2;   // unset: 4 · nozzle², as in Klipper
   std::optional<double> max_extrude_only_velocity_mm_s;  // unset: Klipper's formula
   std::optional<double> max_extrude_only_accel_mm_s2;    // unset: Klipper's formula
@@ -116,6 +119,11 @@ struct ExtruderSettings {
   // takes.
   double pressure_advance_s = 0.0;
   double pressure_advance_smooth_s = 0.04;
+
+  // Whether moves that print need another length of filament than they were sliced with.
+  [[nodiscard]] bool fits_filament() const {
+    return filament_area_mm2.has_value() || !filament_profile.empty();
+  }
 };
 
 // The most modes that an axis can have.

@@ -234,6 +234,17 @@ struct Report {
   };
   FilamentLag uncompensated_lag;
   FilamentLag compensated_lag;
+  // What became of the print's filament, where it was fitted to one that is not a full cylinder
+  // before all else.
+  struct FittedFilament {
+    double sliced_mm = 0.0;  // of moves that print
+    double fitted_mm = 0.0;
+    double material_mm3 = 0.0;
+    double least_factor = 1.0;
+    double most_factor = 1.0;
+    double end_mm = 0.0;  // where the print ends on the filament
+  };
+  std::optional<FittedFilament> fitted_filament;
   FlowRow uncompensated_flow;
   FlowRow compensated_flow;
   std::optional<double> max_flow_mm3_s;  // what the hotend melts, if the settings say so

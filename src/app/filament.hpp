@@ -1,0 +1,29 @@
+// Prints whose E is fitted to a filament that is not a full cylinder.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "console.hpp"
+#include "inputs.hpp"
+#include "unflex/app/run_config.hpp"
+#include "unflex/core/error.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/pipeline/filament.hpp"
+
+namespace unflex::app {
+
+// The profile's file, if the settings name one. A name in the printer file counts from that file's
+// folder.
+[[nodiscard]] std::optional<std::filesystem::path> filament_profile(
+    const RunConfig& config, const machine::Settings& settings);
+
+// Fits the input, if the settings ask for that. nullopt: they do not. Errors are also those of the
+// profile.
+[[nodiscard]] Result<std::optional<pipeline::FittedPrint>> fit_to_filament(
+    const RunConfig& config, const machine::Settings& settings, Input& input);
+
+// unflex filament
+[[nodiscard]] Result<ExitCode> run_filament(const RunConfig& config, Console& console);
+
+}  // namespace unflex::app

@@ -1,0 +1,59 @@
+#include "unflex/pipeline/filament.hpp"
+
+#include <fstream>
+#include <utility>
+
+#include "extrusion_mode.hpp"
+#include "stage_options.hpp"
+#include "unflex/gcode/line.hpp"
+
+namespace unflex::pipeline {
+
+Result<FittedPrint> fit_filament(const std::filesystem::path& print, const std::string& name,
+                                 const machine::Settings& settings,
+                                 const filament::Profile& profile,
+                                 const std::function<Status(std::string_view)>& write) {
+  constexpr std::size_t kBlock = 1U << 16U;
+  std::ifstream stream(print, std::ios::binary);
+  if (!stream) {
+    return fail(ErrorKind::input, {name, 0}, "cannot be read");
+  }
+  gcode::LineReader reader(stream, name);
+  filament::Fitter fitter(
+      {.interpreter = interpreter_options(settings),
+       .sliced_area_mm2 = filament::area_of_diameter_mm2(settings.extruder.filament_diameter_mm),
+       .profile = profile,
+       .start_mm = settings.extruder.filament_start_mm},
+      name);
+  ExtrusionModeCheck mode;
+  std::string text;
+  gcode::Line line;
+  for (;;) {
+    const Result<bool> more = reader.next(line);
+    if (!more) {
+      return tl::unexpected(more.error());
+    }
+    if (!*more || text.size() > kBlock) {
+      if (Status written = write(text); !written) {
+        return tl::unexpected(written.error());
+      }
+      text.clear();
+    }
+    if (!*more) {
+      break;
+    }
+    const Status fitted = fitter.fit(line, text).and_then([&] {
+      return mode.add(fitter.event(), fitter.state(), name);
+    });
+    if (!fitted) {
+      return tl::unexpected(fitted.error());
+    }
+  }
+  FittedPrint result{fitter.totals(), {}, fitter.mark()};
+  for (const Diagnostic& warning : fitter.warnings()) {
+    result.warnings.push_back(to_string(warning));
+  }
+  return result;
+}
+
+}  // namespace unflex::pipeline
