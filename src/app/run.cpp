@@ -11,6 +11,7 @@
 #include "console.hpp"
 #include "files.hpp"
 #include "hook.hpp"
+#include "hotend.hpp"
 #include "identify.hpp"
 #include "inspection.hpp"
 #include "log.hpp"
@@ -228,6 +229,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return run_batch(config, console);
     case Command::tune:
       return run_tune(config, console);
+    case Command::hotend:
+      return run_hotend(config, console);
     case Command::compensate:
     case Command::verify:
       break;
