@@ -18,6 +18,9 @@ _unflex_options() {
     tune)
       echo '-h --help --read -o --output --like --nozzle-temp --bed-temp --printer --set --report' \
            '-j --jobs -q --quiet' ;;
+    hotend)
+      echo '-h --help --power --heater --ambient --ku --pu --rule --target --flow --heater-watts' \
+           '--printer --set --report -q --quiet' ;;
     printer) echo '-h --help' ;;
     'printer line-test') echo '-h --help -o --output --printer --set -q --quiet' ;;
     'printer macros') echo '-h --help -o --output --printer --set -q --quiet' ;;
@@ -28,7 +31,7 @@ _unflex_options() {
 
 _unflex_commands() {
   case $1 in
-    '') echo 'compensate batch verify inspect filament study identify tune printer' ;;
+    '') echo 'compensate batch verify inspect filament study identify tune hotend printer' ;;
     printer) echo 'init line-test macros keys' ;;
   esac
 }
@@ -53,15 +56,19 @@ _unflex_value() {
     *:--report) echo 'files *.@(json|html)' ;;
     compensate:--timing | batch:--timing) echo 'words scaled optimal' ;;
     study:--engine | compensate:--engine | batch:--engine) echo 'words auto banded ipopt' ;;
+    hotend:--rule) echo 'words simc simc-pi zn zn-pi cc tl' ;;
+    hotend:--heater) echo 'words extruder extruder1 heater_bed' ;;
     *:--axis | *:--make-test) echo 'words x y' ;;
     *:--machines) echo 'folders' ;;
     *:--case) echo 'words ref 1A 1B 2A 2B 3A 3B 4A 4B 5A 5B' ;;
     *:--set) echo 'keys' ;;
     *:--max-deviation | *:-j | *:--jobs | *:--freq-start | *:--freq-end | \
       *:--wave-spacing-mm | *:--speed-mm-s | *:--decay | *:--read | *:--nozzle-temp | \
-      *:--bed-temp | *:--accel | *:--keep-rms | *:--filament-start-mm) echo 'any' ;;
+      *:--bed-temp | *:--accel | *:--keep-rms | *:--power | *:--ambient | *:--ku | *:--pu | \
+      *:--target | *:--flow | *:--heater-watts | *:--filament-start-mm) echo 'any' ;;
     compensate: | verify: | inspect: | filament: | study: | tune:) echo "files $print" ;;
     identify:) echo 'files *.csv' ;;
+    hotend:) echo 'files *.@(csv|log|txt)' ;;
   esac
 }
 

@@ -39,7 +39,7 @@ function __unflex_settings
     string match --all --regex -- '"[^"]+"|true|false' $of_key | string trim --chars '"' | string replace --regex -- '^' $typed[1]=
 end
 
-set -g __unflex_commands compensate batch verify inspect filament study identify tune printer
+set -g __unflex_commands compensate batch verify inspect filament study identify tune hotend printer
 set -l gcode '(__unflex_files .gcode .gco .g .bgcode .gcode.gz)'
 set -l printer '(__unflex_files .toml .cfg .g .txt)'
 set -l prints compensate verify inspect filament study
@@ -56,6 +56,7 @@ complete -c unflex -n '__unflex_in ""' -a filament -d 'Fit the E of a print to a
 complete -c unflex -n '__unflex_in ""' -a study -d 'Measure all ways to move the base against each other'
 complete -c unflex -n '__unflex_in ""' -a identify -d 'Find the resonances in records of accelerometers or a ringing tower'
 complete -c unflex -n '__unflex_in ""' -a tune -d 'Find the resonances by printing towers and looking at their walls'
+complete -c unflex -n '__unflex_in ""' -a hotend -d 'Find the gains that hold the temperature, from a log of a heating'
 complete -c unflex -n '__unflex_in ""' -a printer -d 'Printer files'
 complete -c unflex -n '__unflex_in printer' -a init -d 'Write a printer file from what already describes the printer'
 complete -c unflex -n '__unflex_in printer' -a line-test -d 'Write G-code that shows how many lines per second the printer takes'
@@ -65,6 +66,7 @@ complete -c unflex -n '__unflex_in printer' -a macros -d 'Write macros by which 
 complete -c unflex -n "__unflex_in $prints" -a $gcode
 complete -c unflex -n '__unflex_in identify' -a '(__unflex_files .csv)'
 complete -c unflex -n '__unflex_in tune' -a $gcode
+complete -c unflex -n '__unflex_in hotend' -a '(__unflex_files .csv .log .txt)'
 
 complete -c unflex -n '__unflex_in compensate filament' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
 complete -c unflex -n '__unflex_in compensate filament' -l in-place -d 'Replace the input'
@@ -107,6 +109,16 @@ complete -c unflex -n '__unflex_in tune' -l nozzle-temp -x -d 'Without --like: d
 complete -c unflex -n '__unflex_in tune' -l bed-temp -x -d 'Without --like: degrees Celsius'
 complete -c unflex -n '__unflex_in tune' -l report -x -a '(__unflex_files .html)' -d 'Write a page with pictures of the walls'
 
+complete -c unflex -n '__unflex_in hotend' -l power -x -d 'What means full power in the log'
+complete -c unflex -n '__unflex_in hotend' -l heater -x -a 'extruder extruder1 heater_bed' -d "The heater's section in printer.cfg"
+complete -c unflex -n '__unflex_in hotend' -l ambient -x -d 'Temperature without power, degrees Celsius'
+complete -c unflex -n '__unflex_in hotend' -l ku -x -d 'From a test: gain at which the temperature keeps swinging'
+complete -c unflex -n '__unflex_in hotend' -l pu -x -d 'From a test: period of that swing, s'
+complete -c unflex -n '__unflex_in hotend' -l rule -x -a 'simc simc-pi zn zn-pi cc tl' -d 'The rule that chooses the gains'
+complete -c unflex -n '__unflex_in hotend' -l target -x -d 'Where the simulated step goes, degrees Celsius'
+complete -c unflex -n '__unflex_in hotend' -l flow -x -d 'Filament that melts, mm³/s'
+complete -c unflex -n '__unflex_in hotend' -l heater-watts -x -d 'What the heater gives at full power, W'
+
 complete -c unflex -n '__unflex_in "printer init"' -l from -x -a $printer -d 'What describes the printer'
 complete -c unflex -n '__unflex_in "printer init"' -l record -x -a '(__unflex_files .csv)' -d 'A record of a resonance; repeatable'
 complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unflex_files .toml)' -d 'Where to write, - for stdout'
@@ -114,8 +126,8 @@ complete -c unflex -n '__unflex_in "printer init"' -s o -l output -x -a '(__unfl
 complete -c unflex -n '__unflex_in "printer line-test"' -s o -l output -x -a $gcode -d 'Where to write, - for stdout'
 complete -c unflex -n '__unflex_in "printer macros"' -s o -l output -x -a '(__unflex_files .cfg)' -d 'Where to write, - for stdout'
 
-complete -c unflex -n "__unflex_in $prints batch identify tune 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
-complete -c unflex -n "__unflex_in $prints batch identify tune 'printer init' 'printer line-test' 'printer macros'" -l set -x -a '(__unflex_settings)' -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
+complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer init' 'printer line-test' 'printer macros'" -l set -x -a '(__unflex_settings)' -d 'Override a key of the printer file, KEY=VALUE'
 complete -c unflex -n '__unflex_in inspect' -l report -x -a '(__unflex_files .json)' -d 'Write a report, - for stdout'
-complete -c unflex -n '__unflex_in compensate verify study identify' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
-complete -c unflex -n "__unflex_in $prints batch identify tune 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'
+complete -c unflex -n '__unflex_in compensate verify study identify hotend' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
+complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'

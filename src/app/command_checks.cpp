@@ -169,6 +169,37 @@ Status check_tune(const RunConfig& config) {
   return config.report ? check_has_name("--report", *config.report, {".html"}) : Status{};
 }
 
+Status check_hotend(const RunConfig& config) {
+  const HotendConfig& hotend = config.hotend;
+  const bool has_log = !config.input.empty();
+  const bool has_test = hotend.ultimate_gain || hotend.ultimate_period_s;
+  const bool has_printer = config.printer_file || !config.overrides.empty();
+  if (hotend.ultimate_gain.has_value() != hotend.ultimate_period_s.has_value()) {
+    return usage("--ku and --pu are the gain and the period of one test; give both");
+  }
+  const int sources = (has_log ? 1 : 0) + (has_test ? 1 : 0) + (has_printer ? 1 : 0);
+  if (sources == 0) {
+    return usage(
+        "what to tune by? give a log, --ku and --pu of a test, or --printer with a model in its "
+        "[hotend]");
+  }
+  if (sources > 1) {
+    return usage("give one of a log, --ku with --pu, and --printer or --set");
+  }
+  if (!has_log && (hotend.full_power || hotend.heater || hotend.ambient_c)) {
+    return usage("--power, --heater and --ambient are of a log; give that too");
+  }
+  if (has_test && (hotend.target_c || hotend.flow_mm3_s || hotend.heater_w)) {
+    return usage(
+        "a test gives no model to simulate by; --target, --flow and --heater-watts need a log or "
+        "--printer");
+  }
+  if (has_log && hotend.flow_mm3_s && !hotend.heater_w) {
+    return usage("--flow takes heat; say with --heater-watts what the heater gives at full power");
+  }
+  return {};
+}
+
 Status check_batch(const RunConfig& config) {
   for (const std::string& folder : {config.input, config.output, config.report.value_or(".")}) {
     if (folder == kStandardStream) {
@@ -208,6 +239,11 @@ Status complete(RunConfig& config) {
   if (config.command == Command::identify) {
     if (Status checked = config.identify.make_test ? check_test(config) : check_records(config);
         !checked) {
+      return checked;
+    }
+  }
+  if (config.command == Command::hotend) {
+    if (Status checked = check_hotend(config); !checked) {
       return checked;
     }
   }

@@ -22,6 +22,8 @@ namespace {
 
 constexpr unsigned kMaxWorkers = 256;
 constexpr double kMostTolerance_um = 1000.0;  // as of timing.tolerance_um
+constexpr double kWarmestRoom_c = 150.0;      // as of hotend.ambient_c
+constexpr double kHottest_c = 1000.0;
 
 CLI::Validator positive() {
   return {[](std::string& text) {
@@ -29,6 +31,19 @@ CLI::Validator positive() {
             const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
             return good && value > 0.0 ? std::string{}
                                        : fmt::format("'{}' is not a number above 0", text);
+          },
+          ""};
+}
+
+// A temperature in °C, up to `most`.
+CLI::Validator temperature(double most) {
+  return {[most](std::string& text) {
+            constexpr double kLeast_c = -50.0;
+            const std::optional<double> value = parse_number(text);
+            return value && *value >= kLeast_c && *value <= most
+                       ? std::string{}
+                       : fmt::format("'{}' is not a temperature from {} to {} °C", text, kLeast_c,
+                                     most);
           },
           ""};
 }
@@ -506,6 +521,71 @@ void add_tune(CLI::App& program, RunConfig& config) {
   command->callback([&config] { config.command = Command::tune; });
 }
 
+void add_hotend(CLI::App& program, RunConfig& config) {
+  CLI::App* const command = program.add_subcommand(
+      "hotend", "Find the gains that hold the nozzle's temperature, from a log of a heating");
+  HotendConfig& hotend = config.hotend;
+  command
+      ->add_option("LOG", config.input,
+                   "klippy.log, a serial log, or a table of time, temperature and power")
+      ->type_name("");
+  command
+      ->add_option("--power", hotend.full_power,
+                   "What means full power in LOG; by default 255 in a table, 1 in klippy.log, 127 "
+                   "in a serial log")
+      ->type_name("FULL")
+      ->check(positive());
+  command
+      ->add_option("--heater", hotend.heater,
+                   "The heater's section in printer.cfg, extruder by default")
+      ->type_name("NAME");
+  command
+      ->add_option("--ambient", hotend.ambient_c,
+                   "Temperature of the hotend without power; without it, found in LOG")
+      ->type_name("C")
+      ->check(temperature(kWarmestRoom_c));
+  command
+      ->add_option("--ku", hotend.ultimate_gain,
+                   "From a test: the gain at which the temperature keeps swinging, counts of 255 "
+                   "per degree")
+      ->type_name("GAIN")
+      ->check(positive());
+  command->add_option("--pu", hotend.ultimate_period_s, "From a test: the period of that swing")
+      ->type_name("S")
+      ->check(positive());
+  command
+      ->add_option("--rule", hotend.rule,
+                   "The rule that chooses the gains: simc by default, tl for --ku and --pu")
+      ->type_name("simc|simc-pi|zn|zn-pi|cc|tl")
+      ->transform(word_for<hotend::Rule>({{"simc", hotend::Rule::simc_pid},
+                                          {"simc-pi", hotend::Rule::simc_pi},
+                                          {"zn", hotend::Rule::zn_pid},
+                                          {"zn-pi", hotend::Rule::zn_pi},
+                                          {"cc", hotend::Rule::cohen_coon},
+                                          {"tl", hotend::Rule::tyreus_luyben}}));
+  command->add_option("--target", hotend.target_c, "Where the simulated step goes, 210 by default")
+      ->type_name("C")
+      ->check(temperature(kHottest_c));
+  command
+      ->add_option("--flow", hotend.flow_mm3_s,
+                   "Filament that melts, for the simulated load; 10 by default")
+      ->type_name("MM3_S")
+      ->check(positive());
+  command
+      ->add_option("--heater-watts", hotend.heater_w,
+                   "What the heater gives at full power, for the load")
+      ->type_name("W")
+      ->check(positive());
+  add_settings(*command, config);
+  command
+      ->add_option("--report", config.report,
+                   "Write a report, FILE.json or FILE.html, or - for stdout")
+      ->type_name("FILE");
+  command->add_flag("-q,--quiet", config.quiet,
+                    "Print the lines to paste alone: the model of LOG, or else the gains");
+  command->callback([&config] { config.command = Command::hotend; });
+}
+
 // The words of the command that was chosen, as for its help, and what it is to the library.
 struct Chosen {
   std::string words = "unflex";
@@ -607,6 +687,7 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   add_printer(program, config);
   add_identify(program, config);
   add_tune(program, config);
+  add_hotend(program, config);
   add_study(program, config);
   program.footer(
       "Exit codes: 0 done, 1 usage or configuration, 2 bad input, 3 deviation above\n"

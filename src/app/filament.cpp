@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "results.hpp"
+#include "unflex/filament/profile.hpp"
 #include "workspace.hpp"
 
 namespace unflex::app {

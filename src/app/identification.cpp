@@ -7,6 +7,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "sparkline.hpp"
 #include "unflex/app/run_config.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/json_parts.hpp"
@@ -22,11 +23,8 @@ using identify::ModeEstimate;
 using identify::ModeOfAxis;
 using report::Json;
 
-// The value with digits down to a tenth of its interval; more would tell nothing.
 std::string number_text(double value, const Estimate& estimate) {
-  const double width = std::max(estimate.high - estimate.low, 1e-9 * std::abs(value));
-  const int decimals = std::clamp(static_cast<int>(std::ceil(1.0 - std::log10(width))), 0, 5);
-  return fmt::format("{:.{}f}", value, decimals);
+  return app::number_text(value, estimate.high - estimate.low);
 }
 
 std::string estimate_text(const Estimate& e) { return number_text(e.value, e); }
@@ -74,24 +72,6 @@ std::vector<double> heights(const Curve& curve, const std::vector<double>& value
     result.push_back(curve.is_spectrum ? std::sqrt(std::max(value, 0.0)) : value);
   }
   return result;
-}
-
-std::string sparkline(const std::vector<double>& values, double least, double most) {
-  constexpr std::array<std::string_view, 8> kBlocks = {"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
-  constexpr std::size_t kColumns = 64;
-  const std::size_t columns = std::min(kColumns, values.size());
-  std::string line;
-  for (std::size_t column = 0; column < columns; ++column) {
-    const std::size_t from = column * values.size() / columns;
-    const std::size_t to = std::max(from + 1, (column + 1) * values.size() / columns);
-    double sum = 0.0;
-    for (std::size_t i = from; i < to; ++i) {
-      sum += values[i];
-    }
-    const double share = (sum / static_cast<double>(to - from) - least) / (most - least);
-    line += kBlocks[static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * 7.0 + 0.5)];
-  }
-  return line;
 }
 
 // A curve of a record's picture.

@@ -12,6 +12,7 @@
 #include "filament.hpp"
 #include "files.hpp"
 #include "hook.hpp"
+#include "hotend.hpp"
 #include "identify.hpp"
 #include "inspection.hpp"
 #include "log.hpp"
@@ -231,6 +232,8 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
       return run_tune(config, console);
     case Command::filament:
       return run_filament(config, console);
+    case Command::hotend:
+      return run_hotend(config, console);
     case Command::compensate:
     case Command::verify:
       break;

@@ -46,6 +46,7 @@ using S = Settings;
 using P = PrinterSettings;
 using L = LimitSettings;
 using E = ExtruderSettings;
+using H = HotendSettings;
 using D = AxisDynamics;
 using N = SecondSettings;
 using K = KinematicsSettings;
@@ -59,6 +60,7 @@ using V = VerifySettings;
 
 constexpr std::string_view kNotLimited = "not limited";
 constexpr std::string_view kOtherForm = "not used";
+constexpr std::string_view kNotKnown = "not known";
 // Klipper's shaper_defs.py and RepRapFirmware's AxisShaper.h. Not "custom", whose impulses are no
 // key: such a shaper has to be set by the file's own M593.
 constexpr std::array<std::string_view, 11> kShaperTypes = {
@@ -311,6 +313,19 @@ constexpr std::array kKeys = {
     Key{"extruder.pressure_advance_smooth_s", &setting<&S::extruder, &E::pressure_advance_smooth_s>,
         Bounds{.min = 0.0, .max = 0.2, .min_open = true}, "s",
         "Klipper: [extruder] pressure_advance_smooth_time"},
+
+    Key{"hotend.gain_c", &setting<&S::hotend, &H::gain_c>, kPositive, "°C",
+        "Rise of temperature for each count of power, of which 255 are full power", kNotKnown},
+    Key{"hotend.time_constant_s", &setting<&S::hotend, &H::time_constant_s>, kPositive, "s",
+        "Time in which the block comes within 37 % of a new temperature", kNotKnown},
+    Key{"hotend.sensor_lag_s", &setting<&S::hotend, &H::sensor_lag_s>, kNotNegative, "s",
+        "Time by which the sensor lags behind the block"},
+    Key{"hotend.dead_time_s", &setting<&S::hotend, &H::dead_time_s>, kPositive, "s",
+        "Time in which a change of power does not show at all", kNotKnown},
+    Key{"hotend.ambient_c", &setting<&S::hotend, &H::ambient_c>, Bounds{.min = -50.0, .max = 150.0},
+        "°C", "Temperature of the hotend without power"},
+    Key{"hotend.heater_w", &setting<&S::hotend, &H::heater_w>, kPositive, "W",
+        "What the heater gives at full power, for the load of melting filament", kNotKnown},
 
     Key{"dynamics.x.freq_hz", &setting<&S::dynamics_x, &D::freq_hz>,
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along X"},

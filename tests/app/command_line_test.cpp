@@ -128,6 +128,7 @@ TEST(CommandLine, HelpHasNoNoiseOfTheLibrary) {
                                                           {"inspect"},
                                                           {"study"},
                                                           {"tune"},
+                                                          {"hotend"},
                                                           {"identify"},
                                                           {"printer", "init"},
                                                           {"printer"},
@@ -161,15 +162,16 @@ TEST(CommandLine, TakesAnEndingForTheNameOfAReportWhereItStandsForOne) {
   const std::vector<std::string> inspect = {"inspect", "in.gcode", "--report"};
   const std::vector<std::string> study = {"study", "--report"};
   const std::vector<std::string> identify = {"identify", "a.csv", "--report"};
+  const std::vector<std::string> hotend = {"hotend", "a.csv", "--report"};
   const std::vector<std::string> batch = {"batch", "prints", "-o", "made", "--summary"};
-  for (std::vector<std::string> arguments : {verify, inspect, study, identify, batch}) {
+  for (std::vector<std::string> arguments : {verify, inspect, study, identify, hotend, batch}) {
     arguments.emplace_back(".json");
     EXPECT_THAT(refusal(arguments),
                 EndsWith(" .json: is an ending without a name; give it one, as report.json"));
     arguments.back() = "folder/.json";
     EXPECT_EQ(refusal(arguments), "no error");
   }
-  for (std::vector<std::string> arguments : {verify, study, identify}) {
+  for (std::vector<std::string> arguments : {verify, study, identify, hotend}) {
     arguments.emplace_back(".html");
     EXPECT_THAT(refusal(arguments), EndsWith("as report.html"));
   }

@@ -78,6 +78,8 @@ class Completion:
         self.assertEqual(set(self.candidates("unflex study --engine ")),
                          {"auto", "banded", "ipopt"})
         self.assertEqual(set(self.candidates("unflex identify --axis ")), {"x", "y"})
+        self.assertEqual(set(self.candidates("unflex hotend --rule ")),
+                         {"simc", "simc-pi", "zn", "zn-pi", "cc", "tl"})
         self.assertIn("5B", self.candidates("unflex study --case "))
 
     def test_files_are_offered_by_what_is_in_them(self):
@@ -92,6 +94,7 @@ class Completion:
                          {"report.json", "report.html", "prints/"})
         self.assertEqual(self.files("unflex inspect --report "), {"report.json", "prints/"})
         self.assertEqual(self.files("unflex identify "), {"sweep.csv", "prints/"})
+        self.assertEqual(self.files("unflex hotend "), {"sweep.csv", "m503.txt", "prints/"})
         self.assertEqual(self.files("unflex batch "), {"prints/"})
         self.assertEqual(self.files("unflex batch prints -o "), {"prints/"})
         self.assertEqual(self.files("unflex batch prints --summary "), {"report.json", "prints/"})

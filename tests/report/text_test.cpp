@@ -75,6 +75,8 @@ TEST(Summary, IsExactlyThis) {
       "the first at line 70\n"
       "filament      1234.50 mm in, 1234.75 mm out\n"
       "              laid 60.0 → 4.50 µm RMS ahead of the nozzle or behind, 500 → 35.0 µm at most\n"
+      "              fitted before: 100.00 mm of moves that print became 110.50, 240.5 mm³ of "
+      "material\n"
       "flow          10.5 → 12.4 mm³/s at most; the hotend melts 15.0\n"
       "speed         40 s of print per second, 1m 30s in all, 64 MB\n");
 }

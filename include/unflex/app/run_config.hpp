@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/hotend/rules.hpp"
 #include "unflex/identify/axis_model.hpp"
 #include "unflex/machine/print_text.hpp"
 #include "unflex/pipeline/pipeline.hpp"
@@ -27,7 +28,8 @@ enum class Command {
   study,
   batch,
   tune,
-  filament
+  filament,
+  hotend
 };
 
 // Whether the command reads a print and writes another one.
@@ -69,6 +71,19 @@ struct TuneConfig {
   double bed_temp_c = 0.0;
 };
 
+// What `hotend` works on, besides a log (RunConfig::input) or a printer's model.
+struct HotendConfig {
+  std::optional<double> full_power;  // what means full power in the log
+  std::optional<std::string> heater;
+  std::optional<double> ambient_c;
+  std::optional<double> ultimate_gain;  // --ku, counts per °C
+  std::optional<double> ultimate_period_s;
+  std::optional<hotend::Rule> rule;
+  std::optional<double> target_c;
+  std::optional<double> flow_mm3_s;
+  std::optional<double> heater_w;
+};
+
 // timing.method, if the command line has it.
 enum class TimingMethod { as_set, scaled, optimal };
 
@@ -76,7 +91,7 @@ struct RunConfig {
   Command command = Command::compensate;
   // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
   // empty for the thesis' cases; batch: the folder of the prints; tune: the tower that was printed,
-  // empty for the first
+  // empty for the first; hotend: the log, empty where there is none
   std::string input;
   // compensate, printer init, printer macros, printer line-test, batch, tune: -o, or the input with
   // --in-place; verify: OUT
@@ -101,6 +116,7 @@ struct RunConfig {
   bool strict = false;  // compensate, verify, inspect: warnings are errors
   IdentifyConfig identify;
   TuneConfig tune;
+  HotendConfig hotend;
   std::vector<std::string> cases;  // study: names, none for all
   std::string machines;            // study: folder of records; empty: none
   // study: tolerances that the print is to keep, µm, and whether it shall at all times

@@ -19,7 +19,7 @@ namespace unflex::filament {
 // A(s): linear between places that were measured, and as at the first and the last one beyond.
 class Profile {
  public:
-  // The same section everywhere. area_mm2 > 0.
+  // One section everywhere. area_mm2 > 0.
   explicit Profile(double area_mm2);
 
   // Reads a table: a line with the names mm and area_mm2 or diameter_mm, then a line for each

@@ -126,6 +126,17 @@ struct ExtruderSettings {
   }
 };
 
+// The hotend as two lags behind a dead time (unflex/hotend/plant.hpp). `unflex hotend` finds it and
+// tunes by it.
+struct HotendSettings {
+  std::optional<double> gain_c;  // for each count of power
+  std::optional<double> time_constant_s;
+  double sensor_lag_s = 0.0;
+  std::optional<double> dead_time_s;
+  double ambient_c = 25.0;
+  std::optional<double> heater_w;  // at full power
+};
+
 // The most modes that an axis can have.
 inline constexpr std::size_t kMostModes = 3;
 
@@ -263,6 +274,7 @@ struct Settings {
   PrinterSettings printer;
   LimitSettings limits;
   ExtruderSettings extruder;
+  HotendSettings hotend;
   AxisDynamics dynamics_x;
   AxisDynamics dynamics_y;
   DynamicsError dynamics_error;
