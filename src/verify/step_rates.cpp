@@ -68,7 +68,7 @@ void StepGauge::play(const planner::PlannedMove& move) {
   if (!is_known_ || duration_s <= 0.0) {
     return;
   }
-  // Marlin may begin or end a line faster than it cruises.
+  // A line is nowhere faster than at one of these three.
   const double v = std::max({move.start_v_mm_s, move.cruise_v_mm_s, move.end_v_mm_s});
   std::array<double, kStepMotors> hz{};
   std::array<double, kStepMotors> certain_hz{};
