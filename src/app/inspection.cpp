@@ -119,6 +119,7 @@ std::string inspection_text(const Inspection& inspection, const std::string& inp
   write_counts(out, inspection);
   write_time(out, inspection);
   text += report::unknown_text(inspection.unknown_commands);
+  text += report::step_rates_text(inspection.step_rates, /*has_output=*/false);
   write_limits(out, inspection, settings);
   write_settings(out, settings);
   write_limits_in_print(out, inspection, input);
@@ -146,6 +147,7 @@ std::string inspection_json(const Inspection& i, const std::string& input,
   json["kept_moves"] = Json(i.kept_moves);
   json["extruded_path"] = report::path_json(i.extruded_path);
   json["unknown_commands"] = report::unknown_json(i.unknown_commands);
+  json["step_rates"] = report::step_rates_json(i.step_rates, /*has_output=*/false);
   json["extrusion"] = {{"input_mm", i.filament_mm}};
   json["extent_mm"] = {{"x_min", i.x_min_mm},
                        {"x_max", i.x_max_mm},

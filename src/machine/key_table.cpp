@@ -71,6 +71,10 @@ constexpr std::array<std::string_view, 7> kVariants = {
     "auto", "mainline", "kalico", "kalico_limited", "kalico_smooth", "prusa_buddy", "snapmaker_j1"};
 constexpr std::array<std::string_view, 2> kTimingMethods = {kScaled, kOptimal};
 constexpr std::array<std::string_view, 5> kSecondShapers = {"zv", "mzv", "zvd", "ei", "none"};
+// The presets that step_limits.cpp knows.
+constexpr std::array<std::string_view, 4> kDrivers = {"", "a4988", "drv8825", "tmc2209"};
+constexpr std::array<std::string_view, 6> kMcus = {"",          "avr_16mhz", "lpc1768",
+                                                   "stm32f103", "stm32f4",   "sam3x"};
 constexpr std::array<std::string_view, 4> kTransports = {"auto", "card", "serial", "sbc"};
 
 constexpr std::array kKeys = {
@@ -138,13 +142,35 @@ constexpr std::array kKeys = {
     Key{"printer.linear_advance_s", &setting<&S::printer, &P::linear_advance_s>, kNotNegative, "s",
         "Marlin: M900 K; 0 where LIN_ADVANCE is not built in"},
     Key{"printer.x_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 0>, kPositive, "1/mm",
-        "Marlin, RRF: M92 X", "80", &derived_of_axis<&S::steps_per_mm, 0>},
+        "Marlin, RRF: M92 X; Klipper: of [stepper_x]", "80", &derived_of_axis<&S::steps_per_mm, 0>},
     Key{"printer.y_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 1>, kPositive, "1/mm",
-        "Marlin, RRF: M92 Y", "80", &derived_of_axis<&S::steps_per_mm, 1>},
+        "Marlin, RRF: M92 Y; Klipper: of [stepper_y]", "80", &derived_of_axis<&S::steps_per_mm, 1>},
     Key{"printer.z_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 2>, kPositive, "1/mm",
-        "Marlin, RRF: M92 Z", "Marlin 400, RRF 800", &derived_of_axis<&S::steps_per_mm, 2>},
+        "Marlin, RRF: M92 Z; Klipper: of [stepper_z]", "Marlin 400, RRF 800",
+        &derived_of_axis<&S::steps_per_mm, 2>},
     Key{"printer.e_steps_per_mm", &of_axis<&S::printer, &P::steps_per_mm, 3>, kPositive, "1/mm",
-        "Marlin, RRF: M92 E", "Marlin 500, RRF 420", &derived_of_axis<&S::steps_per_mm, 3>},
+        "Marlin, RRF: M92 E; Klipper: of [extruder]", "Marlin 500, RRF 420",
+        &derived_of_axis<&S::steps_per_mm, 3>},
+    Key{"printer.max_step_rate_hz", &setting<&S::printer, &P::max_step_rate_hz>, kNotNegative, "Hz",
+        "Steps per second that each motor can be made to do; 0: no limit"},
+    Key{"printer.max_total_step_rate_hz", &setting<&S::printer, &P::max_total_step_rate_hz>,
+        kNotNegative, "Hz", "Steps per second of all motors together; 0: no limit"},
+    Key{"printer.driver",
+        &setting<&S::printer, &P::driver>,
+        kAny,
+        "",
+        "The motors' driver, whose shortest pulse limits each motor",
+        {},
+        nullptr,
+        kDrivers},
+    Key{"printer.mcu",
+        &setting<&S::printer, &P::mcu>,
+        kAny,
+        "",
+        "The board's processor, which limits one motor and several together",
+        {},
+        nullptr,
+        kMcus},
     Key{"printer.classic_jerk", &setting<&S::printer, &P::classic_jerk>, kAny, "",
         "Marlin: CLASSIC_JERK instead of junction deviation"},
     Key{"printer.min_steps_per_segment", &setting<&S::printer, &P::min_steps_per_segment>,
@@ -437,7 +463,7 @@ constexpr std::array kKeys = {
         "Which motors move which axes. base.* limits are those of motors"},
 
     Key{"base.max_velocity_mm_s", &setting<&S::base, &B::max_velocity_mm_s>, kPositive, "mm/s",
-        "Speed a motor can do", "2 × limits.max_velocity_mm_s",
+        "Speed a motor can do", "2 × limits.max_velocity_mm_s, or less by printer.max_step_rate_hz",
         &derived<&S::base_max_velocity_mm_s>},
     Key{"base.max_accel_mm_s2", &setting<&S::base, &B::max_accel_mm_s2>, kPositive, "mm/s²",
         "Acceleration a motor can do",

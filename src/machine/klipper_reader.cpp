@@ -73,6 +73,33 @@ std::optional<double> number_of(std::string_view text) {
   return whole ? std::optional(value) : std::nullopt;
 }
 
+// "57:11, 2:1": the product of the ratios.
+std::optional<double> gear_ratio(std::string_view text) {
+  const auto trimmed = [](std::string_view word) {
+    const std::size_t first = std::min(word.find_first_not_of(' '), word.size());
+    return word.substr(first, word.find_last_not_of(' ') + 1 - first);
+  };
+  double product = 1.0;
+  for (;;) {
+    const std::size_t comma = std::min(text.find(','), text.size());
+    const std::string_view gear = text.substr(0, comma);
+    const std::size_t colon = gear.find(':');
+    if (colon == std::string_view::npos) {
+      return std::nullopt;
+    }
+    const std::optional<double> driven = number_of(trimmed(gear.substr(0, colon)));
+    const std::optional<double> driving = number_of(trimmed(gear.substr(colon + 1)));
+    if (!driven || !driving) {
+      return std::nullopt;
+    }
+    product *= *driven / *driving;
+    if (comma == text.size()) {
+      return product;
+    }
+    text.remove_prefix(comma + 1);
+  }
+}
+
 // "; it may be in a.cfg (printer.cfg:3), …" if includes lead to no file, else "".
 std::string maybe_elsewhere(const std::vector<MissingInclude>& missing) {
   std::vector<std::string> names;
@@ -115,6 +142,10 @@ class Reader {
     travel("y");
     input_shaper("x");
     input_shaper("y");
+    steps_per_mm("stepper_x", "printer.x_steps_per_mm");
+    steps_per_mm("stepper_y", "printer.y_steps_per_mm");
+    steps_per_mm("stepper_z", "printer.z_steps_per_mm");
+    steps_per_mm("extruder", "printer.e_steps_per_mm");
     if (failure_) {
       return tl::unexpected(*failure_);
     }
@@ -264,6 +295,31 @@ class Reader {
     if (max) {
       const double min = number(rail, "position_min").value_or(0.0);
       reading_.add("printer.travel_" + axis + "_mm", Range{min, *max}, place(rail, "position_max"));
+    }
+  }
+
+  // Klipper's stepper.py, parse_step_distance. What cannot be read is left out, because these
+  // numbers decide over nothing but the check of step rates.
+  void steps_per_mm(std::string_view section, std::string_view key) {
+    constexpr double kFullSteps = 200.0;
+    const KlipperOption* const distance = option(section, "rotation_distance");
+    const KlipperOption* const microsteps = option(section, "microsteps");
+    if (distance == nullptr || microsteps == nullptr) {
+      return;
+    }
+    const KlipperOption* const full_steps = option(section, "full_steps_per_rotation");
+    const KlipperOption* const gears = option(section, "gear_ratio");
+    const std::optional<double> rotation_mm = number_of(distance->text);
+    const std::optional<double> per_step = number_of(microsteps->text);
+    const std::optional<double> steps =
+        full_steps != nullptr ? number_of(full_steps->text) : kFullSteps;
+    const std::optional<double> ratio = gears != nullptr ? gear_ratio(gears->text) : 1.0;
+    if (!rotation_mm || !per_step || !steps || !ratio) {
+      return;
+    }
+    const double value = *steps * *per_step * *ratio / *rotation_mm;
+    if (value > 0.0 && std::isfinite(value)) {
+      reading_.add(std::string(key), value, distance->place);
     }
   }
 

@@ -241,7 +241,18 @@ std::string_view Settings::motor_max_accel_key() const {
 }
 
 double Settings::base_max_velocity_mm_s() const {
-  return base.max_velocity_mm_s.value_or(2.0 * limits.max_velocity_mm_s);
+  if (base.max_velocity_mm_s) {
+    return *base.max_velocity_mm_s;
+  }
+  double most_mm_s = 2.0 * limits.max_velocity_mm_s;
+  const Motors motors(kinematics.type, printer.firmware);
+  for (std::size_t i = 0; i < Motors::kCount; ++i) {
+    if (motors.moves_xy(i) && printer.steps_per_mm[i]) {
+      most_mm_s = std::min(most_mm_s, step_limits().max_hz / *printer.steps_per_mm[i]);
+    }
+  }
+  // The base has to do what the plan may ask, and runs that make too many steps stay as sliced.
+  return std::max(most_mm_s, most_of_motor() * limits.max_velocity_mm_s);
 }
 
 double Settings::base_accel_times_asked() const {

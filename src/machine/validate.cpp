@@ -444,6 +444,12 @@ std::vector<std::string> recommendations(const Settings& settings) {
         "that runs stay as sliced; give {} or more, as many as unflex printer line-test shows",
         *settings.emit.max_lines_per_s, fastest_freq_hz(settings), at_least(least_lines_per_s)));
   }
+  const AxisOptions& steps = settings.printer.steps_per_mm;
+  if (settings.step_limits().is_any() && !(steps[0] && steps[1])) {
+    remarks.emplace_back(
+        "a limit of step rates is given, but not the steps of both X and Y, so that it is not "
+        "checked for all motors; give printer.x_steps_per_mm and printer.y_steps_per_mm");
+  }
   return remarks;
 }
 

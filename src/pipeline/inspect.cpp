@@ -14,6 +14,7 @@
 #include "piece_reader.hpp"
 #include "piece_thread.hpp"
 #include "stage_options.hpp"
+#include "step_rates.hpp"
 #include "unflex/compensate/run.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
@@ -67,6 +68,7 @@ class Inspector {
         firmware_(settings.printer.firmware),
         path_(firmware_),
         planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))),
+        steps_(firmware_config(settings), step_rules(settings)),
         absolute_e_(!settings.printer.relative_extrusion) {
     result_->x_min_mm = result_->y_min_mm = std::numeric_limits<double>::infinity();
     result_->x_max_mm = result_->y_max_mm = -std::numeric_limits<double>::infinity();
@@ -87,7 +89,8 @@ class Inspector {
     }
   }
 
-  void finish() {
+  // input_name: for messages.
+  void finish(const std::string& input_name) {
     gcode::Event end;
     end.kind = gcode::EventKind::barrier;
     plan(end);
@@ -100,6 +103,8 @@ class Inspector {
     if (linear_moves_ > 0) {
       result_->commands["G1"] += linear_moves_;
     }
+    add_step_rates(steps_.largest(), nullptr, result_->step_rates);
+    warn_of_sliced_steps(steps_.breaches(), input_name, result_->warnings);
     result_->extruded_path = path_.path();
     result_->unknown_commands = path_.unknown_commands();
     result_->absolute_e = extruded_absolute_ >= 0;
@@ -180,6 +185,7 @@ class Inspector {
     const gcode::Segment& segment = move.segment;
     result_->filament_mm += segment.delta(gcode::E);
     result_->reference_time_s += move.duration_s();
+    steps_.play(move);
     if (!move.kinematic) {
       ++result_->extrude_only_moves;
       return;
@@ -203,6 +209,7 @@ class Inspector {
   Firmware firmware_;
   ExtrudedPath path_;
   std::unique_ptr<planner::Planner> planner_;
+  verify::StepGauge steps_;
   std::vector<planner::PlannedMove> planned_;
   std::string slicers_;
   std::size_t linear_moves_ = 0;
@@ -236,7 +243,8 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
   if (pieces.error()) {
     return tl::unexpected(*pieces.error());
   }
-  inspector.finish();
+  add_step_limits(job.settings, result.step_rates);
+  inspector.finish(job.input_name);
   for (const Diagnostic& warning : pieces.warnings()) {
     result.warnings.push_back(to_string(warning));
   }

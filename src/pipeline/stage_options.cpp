@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "step_rates.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
@@ -566,6 +567,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
   rules.base_accel_times_plan = settings.base_accel_times_asked();
   rules.max_lines_per_s = settings.max_lines_per_s();
+  rules.steps = step_rules(settings);
   rules.tolerance_mm = settings.largest_tolerance_um() * 1e-3;
   rules.filament_area_mm2 = filament_area_mm2(settings.extruder);
   rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);

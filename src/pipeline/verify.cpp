@@ -15,6 +15,7 @@
 #include "printer_facts.hpp"
 #include "report_rows.hpp"
 #include "stage_options.hpp"
+#include "step_rates.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 #include "unflex/planner/printer_shaper.hpp"
@@ -93,6 +94,7 @@ report::Report new_report(std::string command, const Job& job) {
         {std::move(setting.key), std::move(setting.value), std::move(setting.origin)});
   }
   report.facts = printer_facts(job.settings);
+  add_step_limits(job.settings, report.step_rates);
   return report;
 }
 
@@ -169,6 +171,8 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
     report.warnings.push_back(
         too_much_text(*verified.too_much_flow, *report.max_flow_mm3_s, report.output));
   }
+  add_step_rates(verified.sliced_steps, &verified.emitted_steps, report.step_rates);
+  warn_of_sliced_steps(verified.sliced_step_breaches, report.input, report.warnings);
   report.runs_compensated = verified.runs;
   report.violation_count = verified.violation_count;
   for (const verify::Violation& violation : verified.violations) {

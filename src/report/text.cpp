@@ -271,6 +271,7 @@ void write_output(Sink out, const Report& r) {
                    fitted.sliced_mm, fitted.fitted_mm, fitted.material_mm3);
   }
   write_flow(out, r);
+  fmt::format_to(out, "{}", step_rates_text(r.step_rates, /*has_output=*/true));
   fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",
                  r.print_s_per_wall_s, duration_text(r.wall_s), r.peak_rss_mb);
 }

@@ -170,8 +170,10 @@ std::optional<std::string> broken_rule(const std::vector<planner::PlannedMove>& 
     too_much_before = too_much_before || move.segment.too_much_filament;
   }
   Excursion excursion(rules.travel);
+  StepGauge steps(rules.fixed, rules.steps);
   for (const planner::PlannedMove& move : base) {
     check.add(move);
+    steps.play(move);
     excursion.add(move.segment);
     if (move.segment.too_much_filament && !too_much_before) {
       return "so much filament is too much for so short a way";
@@ -180,6 +182,10 @@ std::optional<std::string> broken_rule(const std::vector<planner::PlannedMove>& 
   check.end_run();
   if (const Excursion::Side* const side = excursion.worse_than(allowed)) {
     return fmt::format("the base would leave the travel by {:.4f} mm", side->beyond_mm);
+  }
+  const std::vector<StepBreach> breaches = steps.breaches();
+  if (!breaches.empty()) {
+    return breaches.front().message;
   }
   const std::vector<Violation> found = violations.take();
   return found.empty() ? std::nullopt : std::optional(found.front().message);

@@ -19,6 +19,7 @@
 #include "unflex/core/progress.hpp"
 #include "unflex/verify/line_rate.hpp"
 #include "unflex/verify/reference_path.hpp"
+#include "unflex/verify/step_rates.hpp"
 #include "unflex/verify/verify.hpp"
 #include "violations.hpp"
 
@@ -137,6 +138,9 @@ class Verifier {
   FilamentLedger filament_;
   FlowGauge input_flow_;
   FlowGauge output_flow_;
+  StepGauge input_steps_;
+  StepGauge output_steps_;
+  StepGauge run_steps_;  // of the compensated run
   BaseCheck base_;
   SectionRules rules_of_run_;
   Excursion input_excursion_;

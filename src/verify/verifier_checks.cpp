@@ -63,6 +63,9 @@ void Verifier::check_run(bool compensated) {
                 std::abs(difference_mm)});
   if (compensated) {
     base_.end_run();
+    for (StepBreach& breach : run_steps_.breaches()) {
+      violations_.in_output(breach.line, std::move(breach.message));
+    }
     rules_of_run_.end(rate_, kept_, emitted_.main(), base_.accel_limit_mm_s2());
     if (path_.end() == section_first_) {
       violations_.in_output(output_.following().line.number,

@@ -79,6 +79,9 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       emitted_(rules.nozzle, observation, NozzleBase::emitted),
       input_flow_(rules.filament_area_mm2),
       output_flow_(rules.filament_area_mm2),
+      input_steps_(rules.fixed, rules.steps),
+      output_steps_(rules.fixed, rules.steps),
+      run_steps_(rules.fixed, rules.steps),
       base_(rules_, violations_),
       rules_of_run_(rules_, violations_),
       input_excursion_(rules_.travel),
@@ -124,6 +127,7 @@ bool Verifier::next_input_move(planner::PlannedMove& move) {
   totals_.reference_time_s += move.duration_s();
   totals_.input_extrusion_mm += move.segment.delta(gcode::E);
   input_flow_.play(move);
+  input_steps_.play(move);
   input_excursion_.add(move.segment);
   too_much_in_input_ = too_much_in_input_ || move.segment.too_much_filament;
   return true;
@@ -188,6 +192,7 @@ void Verifier::begin_section(bool compensated) {
   max_lines_per_s_ = std::max(max_lines_per_s_, rate_.max_per_s());
   rate_.forget();
   base_.begin_run();
+  run_steps_.clear();
   rules_of_run_.begin(rate_, since_kept_motion_s_ < kRingsFor_s,
                       compensated && output_.section().has_free_timing);
   path_.begin_section();
@@ -334,6 +339,7 @@ void Verifier::play_run_moves(bool compensated) {
       play(move);
       if (compensated) {
         base_.add(move);
+        run_steps_.play(move);
       }
       if (++moves_ % kMovesPerUpdate == 0) {
         compare_lines(false);
@@ -376,6 +382,7 @@ void Verifier::play(const planner::PlannedMove& move) {
   totals_.emitted_time_s += move.duration_s();
   totals_.output_extrusion_mm += move.segment.delta(gcode::E);
   output_flow_.play(move);
+  output_steps_.play(move);
   output_excursion_.add(move.segment);
   if (too_much_line_ == 0 && move.segment.too_much_filament) {
     too_much_line_ = move.segment.line;
@@ -545,6 +552,9 @@ VerifyReport Verifier::report() {
   report.compensated_corners = emitted_.main().corners();
   report.uncompensated_flow = input_flow_.stats();
   report.compensated_flow = output_flow_.stats();
+  report.sliced_steps = input_steps_.largest();
+  report.emitted_steps = output_steps_.largest();
+  report.sliced_step_breaches = input_steps_.breaches();
   report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
   report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
   report.base_max_step_mm_s = base_.max_step_mm_s();

@@ -41,6 +41,8 @@ pipeline::Inspection sample() {
   i.lowest_accel_mm_s2 = 500.0;
   i.highest_accel_mm_s2 = 1500.0;
   i.limits = {{"limits.print_accel_mm_s2", {1250.0, 7, 3}}};
+  i.step_rates.motors = {{"X", 80.0, 24000.0, 30}};
+  i.step_rates.total = {"", 0.0, 24000.0, 30};
   i.warnings = {"in.gcode:3: warning: something"};
   return i;
 }
@@ -54,6 +56,7 @@ TEST(InspectionText, ShowsWhatWasUnderstood) {
   EXPECT_THAT(text, HasSubstr("200 moves stay as they are: Z move"));
   EXPECT_THAT(text, HasSubstr("98.7 % of 8000 mm extruded can be compensated\n"));
   EXPECT_THAT(text, HasSubstr("\nunknown       M1234, 40×, first in line 12: 7 moves"));
+  EXPECT_THAT(text, HasSubstr("\nstep rates    X 24.0 (line 30) kHz at most\n"));
   EXPECT_THAT(text, HasSubstr("500 to 1500 mm/s²"));
   EXPECT_THAT(text, HasSubstr("X 45 Hz, ζ 0.06"));
 }

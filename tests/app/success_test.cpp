@@ -1,5 +1,6 @@
 // A small print through the whole program.
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -14,6 +15,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 class SmallPrint : public ProgramTest {
@@ -43,6 +45,60 @@ TEST_F(SmallPrint, IsCompensatedFromFileToFile) {
   EXPECT_EQ(json["printer"]["limits.max_accel_mm_s2"]["value"], 5000);
   EXPECT_LT(json["deviation"]["compensated"]["extruding"]["contour_rms_mm"].get<double>(),
             json["deviation"]["uncompensated"]["extruding"]["contour_rms_mm"].get<double>() / 15);
+}
+
+const std::vector<std::string> kSteps = {"--set", "printer.x_steps_per_mm=80", "--set",
+                                         "printer.y_steps_per_mm=80"};
+
+std::vector<std::string> with_steps(std::vector<std::string> arguments, double max_hz) {
+  arguments.insert(arguments.end(), kSteps.begin(), kSteps.end());
+  arguments.insert(arguments.end(), {"--set", fmt::format("printer.max_step_rate_hz={}", max_hz)});
+  return arguments;
+}
+
+TEST_F(SmallPrint, TellsTheStepRatesOfMotors) {
+  const std::vector<std::string> inspect = {"inspect", "in.gcode", "--report", "i.json"};
+  EXPECT_THAT(run(with_steps(inspect, 0.0)).out, HasSubstr("\nstep rates    X "));
+  const auto inspected = nlohmann::json::parse(read_file(path("i.json")))["step_rates"];
+  EXPECT_EQ(inspected["motors"][0]["motor"], "X");
+  EXPECT_TRUE(inspected["max_hz"].is_null());
+  const double sliced_hz = inspected["motors"][0]["sliced_hz"];
+  EXPECT_GT(sliced_hz, 0.0);
+  EXPECT_THAT(run({"inspect", "in.gcode"}).out, Not(HasSubstr("step rates")));
+
+  const Outcome free =
+      run(with_steps({"compensate", "in.gcode", "-o", "out.gcode", "--report", "r.json"}, 0.0));
+  EXPECT_EQ(free.exit_code, 0) << free.err;
+  EXPECT_THAT(free.out, HasSubstr("\nstep rates    X "));
+  const auto rates = nlohmann::json::parse(read_file(path("r.json")))["step_rates"];
+  EXPECT_EQ(rates["motors"][0]["sliced_hz"], sliced_hz);
+  EXPECT_EQ(read_file(path("out.gcode")), compensated());
+
+  // What was sliced keeps this limit, and the output does not.
+  const double emitted_hz = rates["motors"][0]["emitted_hz"];
+  ASSERT_GT(emitted_hz, 1.02 * sliced_hz);
+  const double between_hz = 0.5 * (sliced_hz + emitted_hz);
+  const Outcome broken =
+      run(with_steps({"verify", "out.gcode", "--against", "in.gcode"}, between_hz));
+  EXPECT_EQ(broken.exit_code, 3);
+  EXPECT_THAT(broken.err, ::testing::ContainsRegex("out.gcode:[0-9]+: motor X makes [0-9]+ steps"));
+  EXPECT_THAT(broken.err, Not(HasSubstr("warning")));
+  const Outcome kept = run(
+      with_steps({"compensate", "in.gcode", "-o", "kept.gcode", "--report", "k.json"}, between_hz));
+  EXPECT_EQ(kept.exit_code, 0) << kept.err;
+  const auto limited = nlohmann::json::parse(read_file(path("k.json")));
+  EXPECT_EQ(limited["violation_count"], 0);
+  EXPECT_LE(limited["step_rates"]["motors"][0]["emitted_hz"], between_hz * 1.002);
+}
+
+TEST_F(SmallPrint, IsWarnedOfWhereItWasSlicedForTooManySteps) {
+  const Outcome outcome = run(with_steps({"compensate", "in.gcode", "-o", "out.gcode"}, 100.0));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err,
+              ::testing::ContainsRegex("in.gcode:[0-9]+: warning: as sliced, motor X"));
+  const Outcome inspected = run(with_steps({"inspect", "in.gcode"}, 100.0));
+  EXPECT_EQ(inspected.exit_code, 0);
+  EXPECT_THAT(inspected.err, HasSubstr("warning: as sliced, motor X"));
 }
 
 TEST_F(SmallPrint, GivesTheSameBytesFromFileAndPipeAndForAnyNumberOfWorkers) {

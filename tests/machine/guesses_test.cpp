@@ -144,5 +144,13 @@ TEST(LineBudget, ThatIsTooLowIsNamed) {
   EXPECT_THAT(recommendations(read("", {"emit.max_lines_per_s=90"})), IsEmpty());
 }
 
+TEST(StepLimits, OfMotorsWhoseStepsAreNotKnownAreNamed) {
+  EXPECT_THAT(recommendations(read("", {"printer.driver=\"a4988\"", "printer.x_steps_per_mm=80"})),
+              ElementsAre(StartsWith("a limit of step rates is given, but not the steps of both")));
+  EXPECT_THAT(recommendations(read("", {"printer.driver=\"a4988\"", "printer.x_steps_per_mm=80",
+                                        "printer.y_steps_per_mm=80"})),
+              IsEmpty());
+}
+
 }  // namespace
 }  // namespace unflex::machine

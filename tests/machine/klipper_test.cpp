@@ -32,6 +32,20 @@ class KlipperFiles : public PrinterFiles {
   }
 };
 
+TEST_F(KlipperFiles, TellTheStepsOfMotors) {
+  const Settings s = good(write(
+      "printer.cfg",
+      std::string(kWhole) +
+          "[stepper_x]\nrotation_distance: 40\nmicrosteps: 16\n"
+          "[stepper_y]\nrotation_distance: 40\nmicrosteps: 32\nfull_steps_per_rotation: 400\n"
+          "[stepper_z]\nrotation_distance: 8\n"
+          "[extruder]\nrotation_distance: 22.6789511\nmicrosteps: 16\ngear_ratio: 50:10, 2 : 1\n"));
+  EXPECT_DOUBLE_EQ(s.printer.steps_per_mm[0].value_or(0.0), 80.0);
+  EXPECT_DOUBLE_EQ(s.printer.steps_per_mm[1].value_or(0.0), 320.0);
+  EXPECT_FALSE(s.printer.steps_per_mm[2]);
+  EXPECT_NEAR(s.printer.steps_per_mm[3].value_or(0.0), 1411.0, 0.1);
+}
+
 TEST_F(KlipperFiles, AreReadWithTheirIncludesAndWhatWasSaved) {
   const Settings s = good(fixture("printer.cfg"));
   EXPECT_EQ(told(s, "printer.firmware"), "\"klipper\" printer.cfg:8");

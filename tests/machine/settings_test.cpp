@@ -223,6 +223,43 @@ TEST(UnsetKeys, FollowTheKeysTheyDependOn) {
   EXPECT_DOUBLE_EQ(s.base_max_accel_mm_s2(), 4000.0);
 }
 
+StepLimits limits_of(const std::string& keys) { return read("[printer]\n" + keys).step_limits(); }
+
+TEST(StepLimits, AreThoseOfBoardsAndDrivers) {
+  EXPECT_FALSE(limits_of("").is_any());
+  EXPECT_DOUBLE_EQ(limits_of("driver = \"a4988\"\n").max_hz, 500e3);
+  EXPECT_NEAR(limits_of("driver = \"drv8825\"\n").max_hz, 263158.0, 0.5);
+  EXPECT_NEAR(limits_of("driver = \"tmc2209\"\n").max_hz, 5e6, 1e-3);
+  const StepLimits avr = limits_of("mcu = \"avr_16mhz\"\n");
+  EXPECT_DOUBLE_EQ(avr.max_hz, 156.9e3);
+  EXPECT_DOUBLE_EQ(avr.max_shared_hz, 98.8e3);
+  EXPECT_TRUE(std::isinf(avr.max_total_hz));
+  EXPECT_DOUBLE_EQ(limits_of("mcu = \"lpc1768\"\n").max_hz, 1.923e6);
+  EXPECT_DOUBLE_EQ(limits_of("mcu = \"stm32f103\"\n").max_shared_hz, 818e3);
+  EXPECT_DOUBLE_EQ(limits_of("mcu = \"stm32f4\"\n").max_hz, 3.652e6);
+  EXPECT_DOUBLE_EQ(limits_of("mcu = \"sam3x\"\n").max_shared_hz, 981e3);
+}
+
+TEST(StepLimits, CountWhereTheyAreSmallest) {
+  const std::string all = "driver = \"drv8825\"\nmcu = \"stm32f4\"\n";
+  EXPECT_NEAR(limits_of(all).max_hz, 263158.0, 0.5);
+  EXPECT_DOUBLE_EQ(limits_of(all + "max_step_rate_hz = 40000\n").max_hz, 40e3);
+  EXPECT_DOUBLE_EQ(limits_of(all + "max_total_step_rate_hz = 90000\n").max_total_hz, 90e3);
+  EXPECT_DOUBLE_EQ(limits_of(all + "max_total_step_rate_hz = 90000\n").max_shared_hz, 90e3);
+}
+
+TEST(StepLimits, BoundTheSpeedOfTheBase) {
+  const auto speed = [](const std::string& keys) {
+    return read("[limits]\nmax_velocity_mm_s = 200\n[printer]\n" + keys).base_max_velocity_mm_s();
+  };
+  const std::string steps = "x_steps_per_mm = 100\ny_steps_per_mm = 160\n";
+  EXPECT_DOUBLE_EQ(speed(steps), 400.0);
+  EXPECT_DOUBLE_EQ(speed("max_step_rate_hz = 48000\n"), 400.0);
+  EXPECT_DOUBLE_EQ(speed(steps + "max_step_rate_hz = 48000\n"), 300.0);
+  // The plan itself may ask for that much.
+  EXPECT_DOUBLE_EQ(speed(steps + "max_step_rate_hz = 16000\n"), 200.0);
+}
+
 // A motor that moves X and Y is asked √2 times as much where the tool moves askew.
 TEST(MotorLimits, AreThoseOfThePrinter) {
   const Settings cartesian = read("[limits]\nmax_accel_mm_s2 = 7000\n");

@@ -118,6 +118,9 @@ inline Report sample_report() {
   r.uncompensated_flow = {10.5, 710, 400.0, 711};
   r.compensated_flow = {12.4, 811, 500.0, 812};
   r.max_flow_mm3_s = 15.0;
+  r.step_rates = {{{"X", 80.0, 24000.0, 30, 31200.0, 812}, {"E", 500.0, 1250.0, 40, 1300.0, 0}},
+                  {"", 0.0, 25000.0, 30, 32000.0, 812},
+                  50000.0};
   r.wall_s = 90.0;
   r.cpu_s = 170.0;
   r.print_s_per_wall_s = 40.0;

@@ -78,6 +78,7 @@ TEST(Summary, IsExactlyThis) {
       "              fitted before: 100.00 mm of moves that print became 110.50, 240.5 mm³ of "
       "material\n"
       "flow          10.5 → 12.4 mm³/s at most; the hotend melts 15.0\n"
+      "step rates    X 24.0 → 31.2 (line 812), E 1.2 → 1.3 kHz at most; 50.0 allowed\n"
       "speed         40 s of print per second, 1m 30s in all, 64 MB\n");
 }
 
@@ -145,6 +146,12 @@ TEST(Summary, SpeaksOfTheFlowOnlyWhereItRisesOrIsLimited) {
   report.max_flow_mm3_s = 15.0;
   EXPECT_THAT(to_text(report),
               HasSubstr("flow          10.5 → 10.7 mm³/s at most; the hotend melts 15.0\n"));
+}
+
+TEST(Summary, IsSilentAboutStepRatesWhereNoStepsAreKnown) {
+  Report report = sample_report();
+  report.step_rates.motors.clear();
+  EXPECT_THAT(to_text(report), Not(HasSubstr("step rates")));
 }
 
 TEST(Summary, SaysThatTheBudgetOfLinesHolds) {

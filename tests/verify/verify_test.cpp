@@ -12,6 +12,7 @@ namespace unflex::verify {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using testing::PlainEmitter;
 using testing::verify_text;
 using testing::violations_of;
@@ -292,6 +293,33 @@ TEST_F(Emitted, TooMuchVelocityIsFound) {
   Rules rules = on_a_bed();
   rules.base_max_velocity_mm_s = 55.0;
   EXPECT_THAT(violations_of(verify_text(kPrint, good_, rules)), HasSubstr("base velocity"));
+}
+
+// The plain emitter keeps the plan's speeds.
+TEST_F(Emitted, TooManyStepsAreFound) {
+  Rules rules = on_a_bed();
+  rules.steps.steps_per_mm = {80.0, 80.0, 400.0, 0.0};
+  const VerifyReport free = verify_text(kPrint, good_, rules);
+  EXPECT_EQ(violations_of(free), "");
+  const double most_hz = free.emitted_steps.motors[0].hz;
+  EXPECT_GT(most_hz, 0.0);
+  EXPECT_NEAR(free.sliced_steps.motors[0].hz, most_hz, 0.02 * most_hz);
+  EXPECT_THAT(free.sliced_step_breaches, IsEmpty());
+  rules.steps.max_hz = 0.9 * most_hz;
+  const VerifyReport limited = verify_text(kPrint, good_, rules);
+  EXPECT_THAT(violations_of(limited), HasSubstr("motor X makes "));
+  EXPECT_GT(limited.violations.front().place.line, 0U);
+  ASSERT_FALSE(limited.sliced_step_breaches.empty());
+  EXPECT_EQ(limited.sliced_step_breaches.front().line, limited.sliced_steps.motors[0].line);
+}
+
+TEST_F(Emitted, TooManyStepsOfTheSlicedFileBreakNoRule) {
+  Rules rules = on_a_bed();
+  rules.steps.steps_per_mm = {80.0, 80.0, 400.0, 0.0};
+  rules.steps.max_hz = 100.0;
+  const VerifyReport report = verify_text(kPrint, kPrint, rules);
+  EXPECT_EQ(violations_of(report), "");
+  EXPECT_FALSE(report.sliced_step_breaches.empty());
 }
 
 TEST_F(Emitted, ALineThreeTimesAsFastAsItsNeighboursIsFound) {

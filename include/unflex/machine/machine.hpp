@@ -47,7 +47,13 @@ struct PrinterSettings {
   std::optional<double> unretract_speed_mm_s;
   double retract_z_hop_mm = 0.0;   // Marlin and RepRapFirmware
   double arc_resolution_mm = 1.0;  // [gcode_arcs] resolution
-  AxisOptions steps_per_mm;        // Marlin and RepRapFirmware; unset: the firmware's default
+  // Unset: the firmware's default for Marlin and RepRapFirmware, not known for Klipper.
+  AxisOptions steps_per_mm;
+  // What the board and the drivers can do; 0 and "": no limit.
+  double max_step_rate_hz = 0.0;        // of each motor
+  double max_total_step_rate_hz = 0.0;  // of all motors together
+  std::string driver;
+  std::string mcu;
   // Marlin.
   bool classic_jerk = false;                 // CLASSIC_JERK instead of junction deviation
   double min_steps_per_segment = 6.0;        // MIN_STEPS_PER_SEGMENT, a whole number
@@ -77,6 +83,16 @@ struct PrinterSettings {
   // Unset: the firmware's default.
   std::optional<double> input_shaper_damping_ratio_x;
   std::optional<double> input_shaper_damping_ratio_y;
+};
+
+// Steps per second that the printer's board and drivers can make; infinity where nothing limits
+// them.
+struct StepLimits {
+  double max_hz;         // of each motor
+  double max_total_hz;   // of all motors together
+  double max_shared_hz;  // of all motors together, while more than one moves
+
+  [[nodiscard]] bool is_any() const;
 };
 
 // What the firmware knows as M201, M203 and so on is named by what it limits; docs/configuration.md
@@ -310,6 +326,9 @@ struct Settings {
   [[nodiscard]] std::array<double, 4> print_jerk_mm_s() const;
   [[nodiscard]] bool has_print_jerk() const;
   [[nodiscard]] std::array<double, 4> steps_per_mm() const;
+  // The smallest of the limits that printer.max_step_rate_hz, max_total_step_rate_hz, driver and
+  // mcu set.
+  [[nodiscard]] StepLimits step_limits() const;
   [[nodiscard]] double queue_length() const;
   [[nodiscard]] double retract_length_mm() const;
   [[nodiscard]] double retract_speed_mm_s() const;

@@ -82,6 +82,7 @@ struct Inspection {
   double x_min_mm = 0.0, x_max_mm = 0.0, y_min_mm = 0.0, y_max_mm = 0.0, z_max_mm = 0.0;
   bool absolute_e = false;                                     // M82 in force for most extrusions
   double lowest_accel_mm_s2 = 0.0, highest_accel_mm_s2 = 0.0;  // in force during moves
+  report::StepRates step_rates;                                // without emitted lines
   std::map<std::string, LimitInPrint> limits;                  // by key: "limits.max_accel_mm_s2"
   std::vector<std::string> warnings;
 };

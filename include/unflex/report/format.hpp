@@ -28,6 +28,10 @@ namespace unflex::report {
 // The first few unknown commands, as lines of a summary.
 [[nodiscard]] std::string unknown_text(const std::vector<UnknownCommand>& commands);
 
+// The rates of the motors as a line of a summary; empty where no steps per mm are known.
+// has_output: whether there are emitted lines.
+[[nodiscard]] std::string step_rates_text(const StepRates& rates, bool has_output);
+
 // 3725.4 → "1h 02m 05s"; below a minute with tenths, "5.3s".
 [[nodiscard]] std::string duration_text(double seconds);
 

@@ -26,4 +26,8 @@ inline constexpr int kSchemaVersion = 1;
 // [{"command": "M1234", "count": 3, …}, …]
 [[nodiscard]] Json unknown_json(const std::vector<UnknownCommand>& commands);
 
+// {"motors": [{"motor": "X", "sliced_hz": …}], "total": …, "max_hz": …}; null where no steps per mm
+// are known. has_output: whether there are emitted lines.
+[[nodiscard]] Json step_rates_json(const StepRates& rates, bool has_output);
+
 }  // namespace unflex::report

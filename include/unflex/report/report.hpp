@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -115,6 +116,24 @@ struct UnknownCommand {
   std::size_t first_line = 0;
   std::size_t moves_kept = 0;  // moves after it that were kept, because their start is not known
   double kept_mm = 0.0;        // extruded path of moves_kept
+};
+
+// Steps per second, at most.
+struct StepRates {
+  struct Row {
+    std::string motor;  // "X", "A"
+    double steps_per_mm = 0.0;
+    double sliced_hz = 0.0;
+    std::size_t sliced_line = 0;  // of the input
+    double emitted_hz = 0.0;
+    std::size_t emitted_line = 0;  // of the output
+  };
+  std::vector<Row> motors;  // those whose steps per mm are known
+  Row total;                // of all of them together, without a name
+  // What is allowed; infinity: not limited.
+  double max_hz = std::numeric_limits<double>::infinity();
+  double max_total_hz = std::numeric_limits<double>::infinity();
+  double max_shared_hz = std::numeric_limits<double>::infinity();  // while more than one moves
 };
 
 struct LineBudget {
@@ -247,6 +266,7 @@ struct Report {
   std::optional<FittedFilament> fitted_filament;
   FlowRow uncompensated_flow;
   FlowRow compensated_flow;
+  StepRates step_rates;
   std::optional<double> max_flow_mm3_s;  // what the hotend melts, if the settings say so
 
   double wall_s = 0.0;

@@ -15,6 +15,7 @@
 #include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/observer.hpp"
+#include "unflex/verify/step_rates.hpp"
 
 namespace unflex::verify {
 
@@ -55,6 +56,9 @@ struct Rules {
   double base_max_accel_mm_s2 = 20000.0;
   double base_accel_times_plan = 0.0;
   double max_lines_per_s = std::numeric_limits<double>::infinity();
+  // What a compensated run may ask of the motors. Sliced motion that asks for more breaks no rule
+  // (VerifyReport::sliced_step_breaches).
+  StepRules steps;
   double filament_area_mm2 = 2.405281875467;  // cross-section; here of 1.75 mm
   // What the hotend melts. It breaks no rule to ask for more (VerifyReport::too_much_flow).
   double max_flow_mm3_s = std::numeric_limits<double>::infinity();
@@ -149,6 +153,9 @@ struct VerifyReport {
   FlowStats uncompensated_flow;
   FlowStats compensated_flow;
   std::optional<TooMuchFlow> too_much_flow;  // where the flow is largest
+  StepRates sliced_steps;                    // lines of the sliced file
+  StepRates emitted_steps;                   // lines of the output
+  std::vector<StepBreach> sliced_step_breaches;
   // Longest lag or lead of the nozzle against the plan of its run, averaged over 0.1 s.
   double worst_run_drift_s = 0.0;
   double max_lines_per_s = 0.0;    // most lines begun in any 100 ms of the output, × 10
@@ -162,9 +169,9 @@ struct VerifyReport {
 };
 
 // The first hard rule that is broken by `base`, the replayed moves of one compensated run; nullopt
-// if none is. The rules: velocity and acceleration of the base; the travel, unless `reference` (the
-// run's own plan) goes as far; no filament that the firmware refuses. before: the last replayed
-// move before `base`, if `base` is a part of a run.
+// if none is. The rules: velocity, acceleration and steps of the base; the travel, unless
+// `reference` (the run's own plan) goes as far; no filament that the firmware refuses. before: the
+// last replayed move before `base`, if `base` is a part of a run.
 [[nodiscard]] std::optional<std::string> broken_rule(
     const std::vector<planner::PlannedMove>& reference,
     const std::vector<planner::PlannedMove>& base, const Rules& rules,
@@ -174,6 +181,7 @@ struct VerifyReport {
 // error but a report with violations: a line lost, changed or moved; filament not conserved; a
 // position outside the travel (and further out than the input itself goes); base velocity or
 // acceleration above its limit (by more than 0.1 % and than the rounding of coordinates explains);
+// more steps per second in a compensated run than its motors may make;
 // more lines per second than the budget and than the sliced file has there; a base further from
 // the path than the machine bends; filament laid after the plan of a run has ended; a nozzle that
 // strays more than in the sliced file; a move the firmware refuses (extrusion ratio); limits, modes
