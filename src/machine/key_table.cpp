@@ -307,7 +307,7 @@ constexpr std::array kKeys = {
         Bounds{.min = 0.1, .max = 20.0}, "mm²",
         "Section of the filament that is material, where it is not a full cylinder; E is fitted to "
         "it",
-        "a full section of filament_diameter_mm"},
+        "a full section of filament_diameter_mm", &derived<&S::filament_area_mm2>},
     Key{"extruder.filament_profile", &setting<&S::extruder, &E::filament_profile>, kAny, "",
         "Table of that section along the spool: columns mm and area_mm2 or diameter_mm"},
     Key{"extruder.filament_start_mm", &setting<&S::extruder, &E::filament_start_mm>, kAny, "mm",

@@ -187,6 +187,11 @@ double Settings::least_speed_step_mm_s() const {
   return kLeastHeadroom * limits.max_accel_mm_s2 * min_line_s() / kSpeedStepShare;
 }
 
+double Settings::filament_area_mm2() const {
+  return extruder.filament_area_mm2.value_or(
+      std::numbers::pi / 4.0 * extruder.filament_diameter_mm * extruder.filament_diameter_mm);
+}
+
 double Settings::max_extrude_cross_section_mm2() const {
   return extruder.max_extrude_cross_section_mm2.value_or(4.0 * extruder.nozzle_diameter_mm *
                                                          extruder.nozzle_diameter_mm);

@@ -33,21 +33,17 @@ double grid_mm(const machine::Settings& settings) {
              : kGridMm;
 }
 
-double filament_area_mm2(const machine::ExtruderSettings& extruder) {
-  return extruder.filament_area_mm2.value_or(
-      std::numbers::pi / 4.0 * extruder.filament_diameter_mm * extruder.filament_diameter_mm);
-}
-
 // The speed at which the move takes as much filament as the hotend melts, with some room, as the
 // nozzle may be 2 % ahead for a moment.
-double speed_by_flow(const planner::PlannedMove& move, const machine::ExtruderSettings& extruder) {
+double speed_by_flow(const planner::PlannedMove& move, const machine::Settings& settings) {
   constexpr double kRoom = 0.98;
   constexpr double kLeast_mm_s = 1.0;
-  if (!extruder.max_flow_mm3_s || !move.segment.extruding()) {
+  const std::optional<double> max_flow_mm3_s = settings.extruder.max_flow_mm3_s;
+  if (!max_flow_mm3_s || !move.segment.extruding()) {
     return planner::kNoLimit;
   }
   return std::max(
-      kRoom * *extruder.max_flow_mm3_s / (move.direction[gcode::E] * filament_area_mm2(extruder)),
+      kRoom * *max_flow_mm3_s / (move.direction[gcode::E] * settings.filament_area_mm2()),
       kLeast_mm_s);
 }
 
@@ -56,7 +52,7 @@ timing::MoveBounds free_bounds(const planner::PlannedMove& move, const machine::
                                const planner::FirmwareConfig& config) {
   const gcode::Segment& segment = move.segment;
   timing::MoveBounds bounds = timing::bounds_by_axes(move, limits, config);
-  bounds.nozzle_speed_mm_s = speed_by_flow(move, settings.extruder);
+  bounds.nozzle_speed_mm_s = speed_by_flow(move, settings);
   const double feed_mm_s = segment.extruding()
                                ? segment.feed_mm_s
                                : settings.timing.max_speed_mm_s.value_or(segment.feed_mm_s);
@@ -569,7 +565,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.max_lines_per_s = settings.max_lines_per_s();
   rules.steps = step_rules(settings);
   rules.tolerance_mm = settings.largest_tolerance_um() * 1e-3;
-  rules.filament_area_mm2 = filament_area_mm2(settings.extruder);
+  rules.filament_area_mm2 = settings.filament_area_mm2();
   rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);
   if (grid_mm(settings) > kGridMm) {
     constexpr double kShareOfStep = 0.1;

@@ -341,6 +341,7 @@ struct Settings {
   [[nodiscard]] double min_line_s() const;
   // The emit.max_speed_step_mm_s below which the base could not accelerate enough.
   [[nodiscard]] double least_speed_step_mm_s() const;
+  [[nodiscard]] double filament_area_mm2() const;
   [[nodiscard]] double max_extrude_cross_section_mm2() const;
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;
