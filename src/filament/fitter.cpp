@@ -65,6 +65,11 @@ int checksum_of(std::string_view text) {
   return sum;
 }
 
+bool is_move(const gcode::Command& command) {
+  return command.kind == gcode::CommandKind::traditional && command.letter == 'G' &&
+         command.number <= 3;
+}
+
 // Whether the line labels an object, which a printer may leave out. Its E goes on all the same.
 bool is_label(const gcode::Command& command) {
   return command.name.starts_with("EXCLUDE_OBJECT") || command.is('M', 486) ||
@@ -77,6 +82,11 @@ double filament_of(const gcode::Event& event) {
     sum_mm += segment.delta(E);
   }
   return sum_mm;
+}
+
+// What E reads, in the unit of its words.
+double reading_of(const gcode::ModalState& state) {
+  return (state.position_mm[E] - state.base_mm[E]) / state.filament_per_e_mm();
 }
 
 bool has_too_much(const gcode::Event& event) {
@@ -132,15 +142,16 @@ Status Fitter::fit(const gcode::Line& line, std::string& text) {
       (may_read_e || begins_to_read_e)) {
     tell_reading(before, line, text);
   }
-  if (moves && command.value('E')) {
+  // A line whose E is what it was before moves nothing, and still tells a place.
+  const bool has_place = event_.kind == gcode::EventKind::passive && is_move(command);
+  if ((moves || has_place) && command.value('E')) {
     if (Status fitted = fit_move(event_, before, text); !fitted) {
       return fitted;
     }
   } else {
     at_mm_ += filament_of(event_);
     text += line.text;
-    if (event_.kind == gcode::EventKind::barrier && command.letter == 'G' && command.number <= 3 &&
-        command.has('E')) {
+    if (event_.kind == gcode::EventKind::barrier && is_move(command) && command.has('E')) {
       warnings_.push_back({{name_, line.number}, "is not understood, so its E stays as sliced"});
     }
     // A line that says what E reads says it to the printer too.
@@ -154,9 +165,8 @@ Status Fitter::fit(const gcode::Line& line, std::string& text) {
 
 void Fitter::tell_reading(const gcode::ModalState& state, const gcode::Line& line,
                           std::string& text) {
-  const double reading = (state.position_mm[E] - state.base_mm[E]) / state.filament_per_e_mm();
   const std::string_view ending = std::string_view(line.text).substr(line.content().size());
-  text += fmt::format("G92 E{}{}", number_text(reading), ending.empty() ? "\n" : ending);
+  text += fmt::format("G92 E{}{}", number_text(reading_of(state)), ending.empty() ? "\n" : ending);
   ahead_ = 0.0;
 }
 
@@ -171,24 +181,25 @@ Status Fitter::fit_move(const gcode::Event& event, const gcode::ModalState& befo
   const gcode::Line& line = event.line;
   const double sliced_mm = filament_of(event);
   const bool prints = std::ranges::any_of(event.segments, &gcode::Segment::extruding);
-  const double per_e = before.filament_per_e_mm();
-  const double sliced = sliced_mm / per_e;
-  const double needed = prints ? needed_mm(sliced_mm, before) / per_e : sliced;
   const double word = *gcode::parse(line.content()).value('E');
-  const bool is_absolute = before.e_is_absolute();
-  const double from = is_absolute ? word - sliced + ahead_ : 0.0;
-  const double wanted = from + needed + (prints ? left_ : 0.0);
+  const double reading = before.e_is_absolute() ? reading_of(before) : 0.0;
+  // M221 does not hold for all moves on all firmwares, so the word tells how far E goes.
+  const double sliced = word - reading;
+  const double factor = prints ? needed_mm(sliced_mm, before) / sliced_mm : 1.0;
+  const double from = before.e_is_absolute() ? reading + ahead_ : 0.0;
+  const double wanted = from + factor * sliced + (prints ? left_ : 0.0);
   const double written = rounded(wanted);
+  const double written_mm =
+      std::abs(sliced) > kNothing ? sliced_mm * ((written - from) / sliced) : 0.0;
   if (prints) {
     left_ = wanted - written;
-    const double factor = needed / sliced;
     totals_.most = totals_.sliced_mm > 0.0 ? std::max(totals_.most, factor) : factor;
     totals_.least = totals_.sliced_mm > 0.0 ? std::min(totals_.least, factor) : factor;
     totals_.sliced_mm += sliced_mm;
-    totals_.fitted_mm += (written - from) * per_e;
-    totals_.material_mm3 += options_.profile.volume_mm3(at_mm_, at_mm_ + (written - from) * per_e);
+    totals_.fitted_mm += written_mm;
+    totals_.material_mm3 += options_.profile.volume_mm3(at_mm_, at_mm_ + written_mm);
   }
-  at_mm_ += (written - from) * per_e;
+  at_mm_ += written_mm;
   ahead_ += written - from - sliced;
   if (std::abs(written - word) < kNothing) {
     text += line.text;

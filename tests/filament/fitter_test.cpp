@@ -112,6 +112,24 @@ TEST(FilamentFitter, KeepsAbsoluteFilamentGoing) {
             "G1 X40 E3.31458\nG92 E0\nG1 X50 E1.10486\n");
 }
 
+TEST(FilamentFitter, KeepsAPlaceOfFilamentThatDoesNotMove) {
+  EXPECT_EQ(fit("M82\nG92 E0\nG1 X10 E1\nG1 X10 E1 ; infill\nG1 F3000 E1\nG1 E0.5\n").text,
+            "M82\nG92 E0\nG1 X10 E1.10486\nG1 X10 E1.10486 ; infill\nG1 F3000 E1.10486\n"
+            "G1 E0.60486\n");
+}
+
+// RepRapFirmware multiplies by M221 what is laid, and not what is drawn back.
+TEST(FilamentFitter, LeavesLengthsAloneWhateverTheFlow) {
+  for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
+    EXPECT_EQ(fit("M83\nM221 S95\nG1 X10 E1\nG1 E-.8\nG1 E.8\nG1 X20 E1\n", hollow(firmware)).text,
+              "M83\nM221 S95\nG1 X10 E1.10486\nG1 E-.8\nG1 E.8\nG1 X20 E1.10486\n");
+    EXPECT_EQ(
+        fit("M82\nM221 S95\nG92 E0\nG1 X10 E1\nG1 E.2\nG1 E1\nG1 X20 E2\n", hollow(firmware)).text,
+        "M82\nM221 S95\nG92 E0\nG1 X10 E1.10486\nG1 E0.30486\nG1 E1.10486\n"
+        "G1 X20 E2.20972\n");
+  }
+}
+
 TEST(FilamentFitter, TellsThePrinterWhatTheFileTakesEToBeBeforeAMacro) {
   EXPECT_EQ(fit("M82\nG92 E0\nG1 X10 E1\nMY_MACRO\nG1 X20 E2\n").text,
             "M82\nG92 E0\nG1 X10 E1.10486\nG92 E1\nMY_MACRO\nG1 X20 E2.10486\n");
