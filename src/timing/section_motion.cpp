@@ -27,6 +27,7 @@
 #include "edge_nozzles.hpp"
 #include "elastic_program.hpp"
 #include "section_nodes.hpp"
+#include "section_rounds.hpp"
 #include "section_spline.hpp"
 
 namespace unflex::timing {
@@ -53,54 +54,8 @@ constexpr double kLeastClock = 0.3;
 constexpr double kNearFeed = 0.3;
 constexpr double kFacet_rad = 0.3;
 constexpr double kAlong_rad = 0.1;
-// What T′ may change by in a round: at first, and at least. Where a step came out otherwise, the
-// next one is to come out so by this share of what is allowed. As the second order is what comes
-// out otherwise, that goes with the square of the step.
-constexpr double kFirstTrust = 0.3;
-constexpr double kFirstTrustOfBand = 0.12;
-constexpr double kLeastTrust = 1e-3;
-constexpr double kSurprise = 0.15;
-constexpr double kShrink = 0.25;
-constexpr double kGrow = 1.6;
-constexpr double kCooling = 0.85;
-constexpr std::size_t kReach = 8;  // nodes
-// Where more is broken, T′ may grow by this at least, as slower motion breaks less.
-constexpr double kBroken = 1.1;
-constexpr double kTrustToSlow = 0.1;
-
-// Values relative to what is allowed, or factors of what is allowed.
-struct Excess {
-  double accel = 0.0;
-  double error = 0.0;
-  double feed = 0.0;
-
-  void include(const Excess& other) {
-    accel = std::max(accel, other.accel);
-    error = std::max(error, other.error);
-    feed = std::max(feed, other.feed);
-  }
-  [[nodiscard]] bool is_within(const Excess& limits) const {
-    return accel <= limits.accel && error <= limits.error && feed <= limits.feed;
-  }
-  [[nodiscard]] double largest() const { return std::max({accel, error, feed}); }
-};
-constexpr Excess kAim{0.985, 1.0, 1.0};
-// What counts as kept, what rows are tightened for, and by how much at most.
-constexpr Excess kKept{1.025, 1.03, 1.015};
-constexpr Excess kTightenAbove{1.01, 1.0, 1.013};
-constexpr Excess kTightest{0.8, 0.6, 0.95};
-// Rows that are broken by more are not tightened, since the reason is elsewhere. If after some
-// rounds they are broken as much as a round ago, but for this share, the search ends.
-constexpr double kMostTightening = 1.3;
-constexpr double kStuck = 0.01;
-constexpr int kRoundsToSettle = 4;
-// How the nozzles at the edges of a band swing in the end cannot be chosen there, where the base
-// and its clock are given. Less acceleration over these nodes makes less of it.
+// The last periods of a section, in which its end gives the base and its clock.
 constexpr std::size_t kGivenPeriods = 3;
-constexpr std::size_t kNodesBeforeEnd = 80;
-constexpr double kTightestBeforeEnd = 0.25;
-constexpr double kTighter = 0.5;
-constexpr double kLooser = 1.1;
 // The gap per unknown at which a program counts as solved: very rough as long as much is broken,
 // and rough as long as the next program is another one.
 constexpr double kFirstGap = 0.05;
@@ -135,8 +90,7 @@ class Program {
         nodes_(section, kNodePeriod / std::max(rules.x.omega_rad_s, rules.y.omega_rad_s)),
         spline_(section, rules, nodes_),
         edges_(section, rules),
-        trust_(nodes_.periods() + 1, D == 5 ? kFirstTrust : kFirstTrustOfBand),
-        factors_(nodes_.periods(), kAim) {
+        rounds_(nodes_.periods(), D != 5) {
     for (const SectionNodes::Pin& pin : nodes_.pins()) {
       pin_shares_.push_back(spline_shares<D>(pin.x));
     }
@@ -151,22 +105,20 @@ class Program {
         return false;
       }
     }
-    double largest_trust = trust_.front();
     double last = duration();
     double least = kInfinity;
     double least_before = kInfinity;  // when it was last better by a gain
     int idle_rounds = 0;
     std::vector<double> best;
-    double last_broken = 0.0;
     for (int round = 0; round < kRounds; ++round) {
       if (!step(false)) {
         return false;
       }
-      const Excess excess = measure();
+      measure();
       const double gain = last - duration();
       last = duration();
       bool is_settled = false;
-      if (excess.is_within(kKept) && end_excess_ <= kKept.error && last < least) {
+      if (rounds_.is_kept() && last < least) {
         least = last;
         best = spline_.points();
         is_settled = gain < kGain * last;
@@ -181,14 +133,10 @@ class Program {
         break;
       }
       fine_rounds_ += is_settled || fine_rounds_ > 0 ? 1 : 0;
-      const double broken = excess.largest();
-      if (round >= kRoundsToSettle && broken > kMostTightening &&
-          std::abs(broken - last_broken) < kStuck * broken) {
-        break;  // what is broken by so much does not come right any more
+      if (rounds_.is_stuck(round)) {
+        break;
       }
-      last_broken = broken;
-      largest_trust *= kCooling;
-      adapt(largest_trust, round);
+      rounds_.adapt(surprise_, round);
     }
     if (best.empty()) {
       return false;
@@ -361,7 +309,7 @@ class Program {
     return g;
   }
 
-  void add_clock(std::size_t k, const Shares& shares, double trust) {
+  void add_clock(std::size_t k, const Shares& shares, std::size_t node) {
     const std::size_t first = Spline::kPerPoint * k;
     for (const int derivative : {2, 3, 4}) {
       program_.add_square(first, of_clock(shares, derivative, 1.0),
@@ -372,19 +320,16 @@ class Program {
     }
     constexpr double kLeastChange = 1e-3;
     const double rate = spline_.clock(k, shares, 1);
-    const double most = trust * rate;
+    const double most = rounds_.trust(node) * rate;
     const double most_down = std::min(most, std::max(rate - kLeastClock, kLeastChange));
-    const double most_up =
-        largest_near(k, broken_) > kBroken ? std::max(most, kTrustToSlow * rate) : most;
+    const double most_up = rounds_.trust_to_slow(node) * rate;
     program_.add_row(first, of_clock(shares, 1, 1.0 / most), 0.0, -most_down / most, most_up / most,
                      kTimesForTrust * kPrice);
   }
 
   void add_accel(const At& at, bool has_square) {
     const double h = nodes_.period_s();
-    const bool is_before_end = at.k + kNodesBeforeEnd >= nodes_.periods();
-    const double factor = (is_before_end ? end_factor_ : 1.0) * factors_[at.k].accel;
-    const double scale = 1.0 / (factor * rules_.max_accel_mm_s2 * h * h);
+    const double scale = 1.0 / (rounds_.factors(at.k).accel * rules_.max_accel_mm_s2 * h * h);
     constexpr Vector kAxes[] = {{1.0, 0.0}, {0.0, 1.0}};
     constexpr Vector kMotors[] = {{1.0, 1.0}, {1.0, -1.0}};
     Gradient g;
@@ -452,7 +397,7 @@ class Program {
   }
 
   [[nodiscard]] double tolerance_mm(const At& at, std::size_t leg) const {
-    return factors_[at.k].error * nodes_.tolerance_mm(leg, at.k, at.x);
+    return rounds_.factors(at.k).error * nodes_.tolerance_mm(leg, at.k, at.x);
   }
 
   void add_contour(const At& at, bool has_square) {
@@ -491,7 +436,7 @@ class Program {
   void add_feed(const At& at, double feed_mm_s) {
     const Vector velocity =
         Spline::apply(spline_.x().nozzle_speed, spline_.y().nozzle_speed, at.place);
-    const double feed = factors_[at.k].feed * nodes_.period_s() * feed_mm_s;
+    const double feed = rounds_.factors(at.k).feed * nodes_.period_s() * feed_mm_s;
     if (std::hypot(velocity.x, velocity.y) < kNearFeed * feed) {
       return;
     }
@@ -554,7 +499,7 @@ class Program {
     if (is_plain_ || fine_rounds_ > 0) {
       return kFineGap;
     }
-    if (broken_.empty() || std::ranges::max(broken_) > kMostTightening) {
+    if (rounds_.is_far()) {
       return kFirstGap;
     }
     return D == 5 ? kRoughGap : kRoughGapOfBand;
@@ -570,7 +515,7 @@ class Program {
     std::size_t next_pin = 0;
     for (std::size_t k = 0; k < periods; ++k) {
       if (!is_plain) {
-        add_clock(k, at_node_, trust_[k]);
+        add_clock(k, at_node_, k);
       }
       for (const bool is_node : {true, false}) {
         const At here = at(k, is_node ? 0.0 : 0.5, is_node ? at_node_ : at_middle_);
@@ -584,7 +529,7 @@ class Program {
       }
     }
     if (!is_plain) {
-      add_clock(periods - 1, at_end_, trust_[periods]);
+      add_clock(periods - 1, at_end_, periods);
     }
     add_accel(at(periods - 1, 1.0, at_end_), true);
     for (int i = 0; i <= D; ++i) {
@@ -602,11 +547,9 @@ class Program {
     return true;
   }
 
-  // Looks also between the places that rows are for. Returns the largest values.
-  Excess measure() {
-    Excess worst;
-    excess_.assign(nodes_.periods(), {});
-    broken_.assign(nodes_.periods(), 0.0);
+  // Looks also between the places that rows are for.
+  void measure() {
+    std::vector<Excess> excess(nodes_.periods());
     const double h = nodes_.period_s();
     for (std::size_t k = 0; k < nodes_.periods(); ++k) {
       for (int look = 0; look < kLooks + (k + 1 == nodes_.periods() ? 1 : 0); ++look) {
@@ -617,14 +560,12 @@ class Program {
                                               : std::max(std::abs(accel.x), std::abs(accel.y));
         const Vector speed =
             Spline::apply(spline_.x().nozzle_speed, spline_.y().nozzle_speed, here.place);
-        excess_[k].include({a / (rules_.max_accel_mm_s2 * h * h), error(here),
-                            std::hypot(speed.x, speed.y) / (h * legs_[here.leg].feed_mm_s)});
+        excess[k].include({a / (rules_.max_accel_mm_s2 * h * h), error(here),
+                           std::hypot(speed.x, speed.y) / (h * legs_[here.leg].feed_mm_s)});
       }
-      worst.include(excess_[k]);
-      broken_[k] = excess_[k].largest();
     }
-    end_excess_ = excess_at_end();
-    return worst;
+    const double of_end = excess_at_end(excess);
+    rounds_.show(std::move(excess), of_end);
   }
 
   // e relative to the tolerance, the largest of the axes as given and at the edges of the band.
@@ -646,13 +587,13 @@ class Program {
 
   // How far the nozzles at the edges of a band stray where the base and its clock are given, and
   // how far they swing after it, relative to what they may.
-  [[nodiscard]] double excess_at_end() const {
+  [[nodiscard]] double excess_at_end(const std::vector<Excess>& of_periods) const {
     if (edges_.size() == 0) {
       return 0.0;
     }
     double excess = 0.0;
     for (std::size_t k = nodes_.periods() - kGivenPeriods; k < nodes_.periods(); ++k) {
-      excess = std::max(excess, excess_[k].error);
+      excess = std::max(excess, of_periods[k].error);
     }
     if (section_.swing_tolerance_mm) {
       const Place end = spline_.place(nodes_.periods() - 1, at_end_);
@@ -662,45 +603,6 @@ class Program {
                                     *section_.swing_tolerance_mm);
     }
     return excess;
-  }
-
-  // The largest value around a node.
-  [[nodiscard]] static double largest_near(std::size_t node,
-                                           const std::vector<double>& of_periods) {
-    double largest = 0.0;
-    const std::size_t end = std::min(node + kReach + 1, of_periods.size());
-    for (std::size_t k = node > kReach ? node - kReach : 0; k < end; ++k) {
-      largest = std::max(largest, of_periods[k]);
-    }
-    return largest;
-  }
-
-  // Fits trust and factors to what the last round has shown.
-  void adapt(double largest_trust, int round) {
-    const std::size_t periods = nodes_.periods();
-    for (std::size_t k = 0; k <= periods; ++k) {
-      const double surprise = largest_near(k, surprise_);
-      const double factor = std::clamp(std::sqrt(kSurprise / surprise), kShrink, kGrow);
-      trust_[k] = std::clamp(trust_[k] * factor, kLeastTrust, largest_trust);
-    }
-    constexpr int kFirstRoughRounds = 2;
-    const auto tighten = [&](double& factor, double excess, double allowed, double tightest) {
-      if (excess > allowed && excess < kMostTightening) {
-        factor = std::max(factor / excess, tightest);
-      }
-    };
-    for (std::size_t k = 0; round >= kFirstRoughRounds && k < periods; ++k) {
-      Excess near = excess_[k];
-      near.include(excess_[k > 0 ? k - 1 : 0]);
-      near.include(excess_[std::min(k + 1, periods - 1)]);
-      tighten(factors_[k].accel, near.accel, kTightenAbove.accel, kTightest.accel);
-      tighten(factors_[k].error, near.error, kTightenAbove.error, kTightest.error);
-      tighten(factors_[k].feed, near.feed, kTightenAbove.feed, kTightest.feed);
-    }
-    if (end_excess_ > 1.0 || end_factor_ < 1.0) {
-      const double times = std::clamp(1.0 / std::sqrt(end_excess_), kTighter, kLooser);
-      end_factor_ = std::clamp(end_factor_ * times, kTightestBeforeEnd, 1.0);
-    }
   }
 
   const Section& section_;
@@ -715,13 +617,8 @@ class Program {
   Values jump_{};
   std::vector<Shares> pin_shares_;
 
-  std::vector<double> trust_;    // at the nodes
-  std::vector<Excess> factors_;  // of what is allowed, per period
-  std::vector<Excess> excess_;   // after the last step, per period
-  std::vector<double> broken_;   // the largest of it
-  double end_excess_ = 0.0;
-  double end_factor_ = 1.0;       // of the base's acceleration before the end
-  std::vector<double> surprise_;  // likewise
+  SectionRounds rounds_;
+  std::vector<double> surprise_;  // of the last step, per period
   std::vector<Foreseen> foreseen_;
   bool is_plain_ = false;
   int fine_rounds_ = 0;
