@@ -200,6 +200,14 @@ Json facts_json(const Report& r) {
                             static_cast<double>(r.output_bytes) * 1e-6, r.max_lines_per_s));
   add("Filament",
       fmt::format("{:.2f} mm in, {:.2f} mm out", r.input_extrusion_mm, r.output_extrusion_mm));
+  if (r.fitted_filament) {
+    const Report::FittedFilament& fitted = *r.fitted_filament;
+    add("Filament fitted before",
+        fmt::format("{:.2f} mm of moves that print became {:.2f} mm, E × {:.5f} to {:.5f}, {:.1f} "
+                    "mm³ of material; the print ends at {:.1f} mm of the filament",
+                    fitted.sliced_mm, fitted.fitted_mm, fitted.least_factor, fitted.most_factor,
+                    fitted.material_mm3, fitted.end_mm));
+  }
   add("Filament laid ahead of the nozzle or behind",
       fmt::format(
           "{} → {} µm RMS, {} → {} µm at most", micrometres_text(r.uncompensated_lag.rms_mm),
@@ -215,6 +223,9 @@ Json facts_json(const Report& r) {
           asked.max_change_mm3_s2, flow.max_change_line, asked.max_change_line,
           r.max_flow_mm3_s ? fmt::format("; the hotend melts {:.1f} mm³/s", *r.max_flow_mm3_s)
                            : std::string{}));
+  if (!r.step_rates.motors.empty()) {
+    add("Step rates", step_rates_list(r.step_rates, /*has_output=*/true));
+  }
   add("Written by", fmt::format("unflex {}", r.version));
   return facts;
 }

@@ -37,11 +37,8 @@ Json step_rates_json(const StepRates& rates, bool has_output) {
           {"max_shared_hz", rates.max_shared_hz}};
 }
 
-std::string step_rates_text(const StepRates& rates, bool has_output) {
-  if (rates.motors.empty()) {
-    return {};
-  }
-  std::string text = "step rates    ";
+std::string step_rates_list(const StepRates& rates, bool has_output) {
+  std::string text;
   for (const StepRates::Row& row : rates.motors) {
     text += fmt::format("{}{} {:.1f}", &row == &rates.motors.front() ? "" : ", ", row.motor,
                         kKilo * row.sliced_hz);
@@ -53,7 +50,13 @@ std::string step_rates_text(const StepRates& rates, bool has_output) {
   text += rates.max_hz < std::numeric_limits<double>::infinity()
               ? fmt::format("; {:.1f} allowed", kKilo * rates.max_hz)
               : "";
-  return text + "\n";
+  return text;
+}
+
+std::string step_rates_text(const StepRates& rates, bool has_output) {
+  return rates.motors.empty()
+             ? std::string{}
+             : fmt::format("step rates    {}\n", step_rates_list(rates, has_output));
 }
 
 }  // namespace unflex::report

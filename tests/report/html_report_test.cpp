@@ -98,6 +98,18 @@ TEST(HtmlReport, SaysWhatTheHotendIsAskedFor) {
   EXPECT_THAT(to_html(report), HasSubstr(asked + "\""));
 }
 
+TEST(HtmlReport, SaysWhatBecameOfFilamentAndHowFastMotorsStep) {
+  Report report = recorded_report();
+  EXPECT_THAT(to_html(report),
+              HasSubstr("100.00 mm of moves that print became 110.50 mm, E × 1.10000 to 1.12000, "
+                        "240.5 mm³ of material; the print ends at 108.5 mm of the filament"));
+  EXPECT_THAT(to_html(report), HasSubstr(" kHz at most"));
+  report.fitted_filament = std::nullopt;
+  report.step_rates = {};
+  EXPECT_THAT(to_html(report), Not(HasSubstr("of moves that print became")));
+  EXPECT_THAT(to_html(report), Not(HasSubstr("kHz at most")));
+}
+
 TEST(HtmlReport, SaysWhenRulesAreBroken) {
   Report report = recorded_report();
   EXPECT_THAT(to_html(report), HasSubstr("do not print it</a>"));

@@ -31,6 +31,8 @@ namespace unflex::report {
 // The rates of the motors as a line of a summary; empty where no steps per mm are known.
 // has_output: whether there are emitted lines.
 [[nodiscard]] std::string step_rates_text(const StepRates& rates, bool has_output);
+// As that, without the line's name and its ending.
+[[nodiscard]] std::string step_rates_list(const StepRates& rates, bool has_output);
 
 // 3725.4 → "1h 02m 05s"; below a minute with tenths, "5.3s".
 [[nodiscard]] std::string duration_text(double seconds);
