@@ -192,13 +192,17 @@ void add_jobs(CLI::App& command, RunConfig& config) {
       ->check(counting_number(kMaxWorkers));
 }
 
+void add_print_and_output(CLI::App& command, RunConfig& config) {
+  command.add_option("IN", config.input, "Sliced G-code, - for stdin")->type_name("")->required();
+  command.add_option("-o,--output", config.output, "Where to write, - for stdout")
+      ->type_name("OUT");
+  command.add_flag("--in-place", config.in_place, "Replace IN");
+}
+
 void add_compensate(CLI::App& program, RunConfig& config) {
   CLI::App* const command = program.add_subcommand(
       "compensate", "Write G-code whose motion makes the nozzle draw the sliced path");
-  command->add_option("IN", config.input, "Sliced G-code, - for stdin")->type_name("")->required();
-  command->add_option("-o,--output", config.output, "Where to write, - for stdout")
-      ->type_name("OUT");
-  command->add_flag("--in-place", config.in_place, "Replace IN");
+  add_print_and_output(*command, config);
   command
       ->add_option("--log", config.log, "Add what is said and the summary to FILE, with the time")
       ->type_name("FILE");
@@ -274,10 +278,7 @@ void add_inspect(CLI::App& program, RunConfig& config) {
 void add_filament(CLI::App& program, RunConfig& config) {
   CLI::App* const command = program.add_subcommand(
       "filament", "Fit the E of a print to a filament that is not a full cylinder");
-  command->add_option("IN", config.input, "Sliced G-code, - for stdin")->type_name("")->required();
-  command->add_option("-o,--output", config.output, "Where to write, - for stdout")
-      ->type_name("OUT");
-  command->add_flag("--in-place", config.in_place, "Replace IN");
+  add_print_and_output(*command, config);
   add_settings(*command, config);
   command
       ->add_option("--filament-start-mm", config.filament_start_mm,

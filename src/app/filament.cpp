@@ -18,8 +18,7 @@ namespace {
 Result<filament::Profile> profile_of(const RunConfig& config, const machine::Settings& settings) {
   const std::optional<std::filesystem::path> path = filament_profile(config, settings);
   if (!path) {
-    return filament::Profile(settings.extruder.filament_area_mm2.value_or(
-        filament::area_of_diameter_mm2(settings.extruder.filament_diameter_mm)));
+    return filament::Profile(settings.filament_area_mm2());
   }
   std::ifstream table(*path);
   if (!table || std::filesystem::is_directory(*path)) {
@@ -72,7 +71,8 @@ Result<std::optional<pipeline::FittedPrint>> fit_to_filament(const RunConfig& co
   const Status fitted = input.make_seekable().and_then([&] {
     const std::filesystem::path sliced = input.path();
     return input.replace_text([&](const Input::Write& write) {
-      return pipeline::fit_filament(sliced, input.name(), settings, *profile, write)
+      return pipeline::fit_filament(sliced, input.name(), settings, *profile,
+                                    config.command == Command::filament, write)
           .map([&](pipeline::FittedPrint print) { result = std::move(print); });
     });
   });
@@ -99,17 +99,11 @@ Result<ExitCode> run_filament(const RunConfig& config, Console& console) {
   std::ifstream text(space->input.path(), std::ios::binary);
   Status written;
   std::string block(1U << 16U, '\0');
-  char last = '\n';
   while (written &&
          (text.read(block.data(), static_cast<std::streamsize>(block.size())), text.gcount() > 0)) {
-    const std::string_view part(block.data(), static_cast<std::size_t>(text.gcount()));
-    last = part.back();
-    written = space->output->write(part);
+    written = space->output->write({block.data(), static_cast<std::size_t>(text.gcount())});
   }
-  return written
-      .and_then(
-          [&] { return space->output->write((last == '\n' ? "" : "\n") + space->fitted->mark); })
-      .and_then([&] { return space->output->seal(); })
+  return written.and_then([&] { return space->output->seal(); })
       .and_then([&] { return check_inputs(*space); })
       .and_then([&] { return space->output->commit(); })
       .and_then([&] { return print_summary(config, summary(*space->fitted), console); })

@@ -61,7 +61,7 @@ Slicer read_slicer() {
 }
 
 Result<RunConfig> with_slicer(RunConfig config, const Slicer& slicer) {
-  if (config.command != Command::compensate) {
+  if (!writes_print(config.command)) {
     return config;
   }
   config.print_name = config.in_place ? slicer.output_name.value_or(config.output) : config.output;

@@ -113,6 +113,16 @@ void append_scaled(std::string& out, std::int64_t scaled, int decimals) {
   out.append(cursor, end);
 }
 
+std::optional<double> parse_real(std::string_view text) {
+  if (text.starts_with('+')) {
+    text.remove_prefix(1);
+  }
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_whole = error == std::errc{} && end == text.data() + text.size();
+  return is_whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
 int to_int(double value) {
   using Limits = std::numeric_limits<int>;
   return static_cast<int>(std::clamp<double>(value, Limits::min(), Limits::max()));

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "unflex/core/number.hpp"
+#include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/command.hpp"
 
 namespace unflex::filament {
@@ -19,7 +20,6 @@ using gcode::E;
 constexpr int kDecimals = 5;
 // Less is not seen in what is written.
 constexpr double kNothing = 1e-9;
-constexpr std::string_view kMark = "; unflex filament:";
 
 std::string number_text(double value) {
   std::string text;
@@ -109,12 +109,12 @@ tl::unexpected<Error> Fitter::wrong(const gcode::Line& line, std::string what) c
 }
 
 std::string Fitter::mark() const {
-  return fmt::format("{} {} mm of moves that print became {} mm\n", kMark,
+  return fmt::format("{} {} mm of moves that print became {} mm\n", kFilamentMark,
                      number_text(totals_.sliced_mm), number_text(totals_.fitted_mm));
 }
 
 Status Fitter::fit(const gcode::Line& line, std::string& text) {
-  if (line.content().starts_with(kMark)) {
+  if (line.content().starts_with(kFilamentMark)) {
     return wrong(line,
                  "says that the print was fitted to its filament before; take the sliced "
                  "file, or extruder.filament_area_mm2 and filament_profile out of the "
@@ -145,7 +145,7 @@ Status Fitter::fit(const gcode::Line& line, std::string& text) {
   // A line whose E is what it was before moves nothing, and still tells a place.
   const bool has_place = event_.kind == gcode::EventKind::passive && is_move(command);
   if ((moves || has_place) && command.value('E')) {
-    if (Status fitted = fit_move(event_, before, text); !fitted) {
+    if (Status fitted = fit_move(command, before, text); !fitted) {
       return fitted;
     }
   } else {
@@ -176,12 +176,12 @@ double Fitter::needed_mm(double sliced_mm, const gcode::ModalState& before) cons
   return options_.profile.length_mm(at_mm_, sliced_mm * area_mm2);
 }
 
-Status Fitter::fit_move(const gcode::Event& event, const gcode::ModalState& before,
+Status Fitter::fit_move(const gcode::Command& command, const gcode::ModalState& before,
                         std::string& text) {
-  const gcode::Line& line = event.line;
-  const double sliced_mm = filament_of(event);
-  const bool prints = std::ranges::any_of(event.segments, &gcode::Segment::extruding);
-  const double word = *gcode::parse(line.content()).value('E');
+  const gcode::Line& line = event_.line;
+  const double sliced_mm = filament_of(event_);
+  const bool prints = std::ranges::any_of(event_.segments, &gcode::Segment::extruding);
+  const double word = *command.value('E');
   const double reading = before.e_is_absolute() ? reading_of(before) : 0.0;
   // M221 does not hold for all moves on all firmwares, so the word tells how far E goes.
   const double sliced = word - reading;
@@ -213,7 +213,7 @@ Status Fitter::fit_move(const gcode::Event& event, const gcode::ModalState& befo
   std::string changed(content.substr(0, place->first));
   changed += number_text(written);
   const std::size_t star = content.find('*', place->second);
-  if (gcode::parse(content).checksum && star != std::string_view::npos) {
+  if (command.checksum && star != std::string_view::npos) {
     changed += content.substr(place->second, star - place->second);
     changed += fmt::format("*{}", checksum_of(changed));
   } else {

@@ -1,23 +1,12 @@
 // Character classes of G-code; ASCII whatever the locale.
 #pragma once
 
-#include <string_view>
+#include "unflex/core/text.hpp"
 
 namespace unflex::gcode {
 
 constexpr bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f' || c == '\n';
-}
-
-// Without blanks at both ends.
-constexpr std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && is_blank(text.front())) {
-    text.remove_prefix(1);
-  }
-  while (!text.empty() && is_blank(text.back())) {
-    text.remove_suffix(1);
-  }
-  return text;
 }
 
 constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }

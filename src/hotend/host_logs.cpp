@@ -7,6 +7,7 @@
 #include <string>
 
 #include "lines.hpp"
+#include "unflex/core/text.hpp"
 
 namespace unflex::hotend {
 namespace {

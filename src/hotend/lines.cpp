@@ -4,15 +4,9 @@
 #include <charconv>
 #include <cmath>
 
-namespace unflex::hotend {
+#include "unflex/core/text.hpp"
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  return first == std::string_view::npos
-             ? std::string_view{}
-             : text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
+namespace unflex::hotend {
 
 std::vector<NumberedLine> lines_of(std::string_view text) {
   std::vector<NumberedLine> lines;
@@ -27,17 +21,6 @@ std::vector<NumberedLine> lines_of(std::string_view text) {
 
 namespace {
 
-std::optional<double> read_number(std::string_view text, bool whole) {
-  if (text.starts_with('+')) {
-    text.remove_prefix(1);
-  }
-  double value = 0.0;
-  const char* const last = text.data() + text.size();
-  const auto [end, error] = std::from_chars(text.data(), last, value);
-  const bool fits = error == std::errc{} && (end == last || !whole) && std::isfinite(value);
-  return fits ? std::optional(value) : std::nullopt;
-}
-
 double range_c(const std::vector<Sample>& samples, std::size_t first, std::size_t end) {
   const auto from = samples.begin() + static_cast<std::ptrdiff_t>(first);
   const auto to = samples.begin() + static_cast<std::ptrdiff_t>(end);
@@ -48,9 +31,15 @@ double range_c(const std::vector<Sample>& samples, std::size_t first, std::size_
 
 }  // namespace
 
-std::optional<double> number_of(std::string_view text) { return read_number(text, true); }
-
-std::optional<double> leading_number(std::string_view text) { return read_number(text, false); }
+std::optional<double> leading_number(std::string_view text) {
+  if (text.starts_with('+')) {
+    text.remove_prefix(1);
+  }
+  double value = 0.0;
+  const std::from_chars_result read =
+      std::from_chars(text.data(), text.data() + text.size(), value);
+  return read.ec == std::errc{} && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
 
 std::vector<Sample> best_stretch(const std::vector<Sample>& samples) {
   constexpr double kGap_s = 20.0;

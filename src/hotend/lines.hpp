@@ -18,11 +18,6 @@ struct NumberedLine {
 
 [[nodiscard]] std::vector<NumberedLine> lines_of(std::string_view text);
 
-[[nodiscard]] std::string_view trimmed(std::string_view text);
-
-// The whole text as a finite number, also with an exponent.
-[[nodiscard]] std::optional<double> number_of(std::string_view text);
-
 // The number at the beginning of the text, whatever follows.
 [[nodiscard]] std::optional<double> leading_number(std::string_view text);
 

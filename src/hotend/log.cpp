@@ -8,6 +8,8 @@
 #include <initializer_list>
 
 #include "lines.hpp"
+#include "unflex/core/number.hpp"
+#include "unflex/core/text.hpp"
 
 namespace unflex::hotend {
 namespace {
@@ -110,7 +112,7 @@ Result<Sample> row_of(const NumberedLine& line, const std::string& file, const H
   for (std::size_t column = 0; column < kColumns.size(); ++column) {
     const std::size_t place = header.places[column];
     const std::optional<double> value =
-        place < cells.size() ? number_of(cells[place]) : std::nullopt;
+        place < cells.size() ? parse_real(cells[place]) : std::nullopt;
     if (!value) {
       return fail(ErrorKind::input, {file, line.number},
                   fmt::format("has no number for {}; give one in each row", kColumns[column]));

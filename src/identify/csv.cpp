@@ -1,23 +1,16 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "samples.hpp"
 #include "stdata.hpp"
+#include "unflex/core/number.hpp"
+#include "unflex/core/text.hpp"
 #include "unflex/identify/record.hpp"
 
 namespace unflex::identify {
 namespace {
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  return first == std::string_view::npos
-             ? std::string_view{}
-             : text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
 
 std::vector<std::string_view> cells_of(std::string_view line) {
   std::vector<std::string_view> cells;
@@ -31,16 +24,6 @@ std::vector<std::string_view> cells_of(std::string_view line) {
   }
 }
 
-std::optional<double> number_of(std::string_view text) {
-  if (text.starts_with('+')) {
-    text.remove_prefix(1);
-  }
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool whole = error == std::errc{} && end == text.data() + text.size();
-  return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
-}
-
 struct Table {
   std::vector<std::string> header;
   std::vector<Row> rows;
@@ -51,7 +34,7 @@ struct Table {
 std::optional<Row> row_of(std::string_view line, std::size_t columns) {
   Row row;
   for (const std::string_view cell : cells_of(line)) {
-    const std::optional<double> value = row.size() < columns ? number_of(cell) : 0.0;
+    const std::optional<double> value = row.size() < columns ? parse_real(cell) : 0.0;
     if (!value) {
       return std::nullopt;
     }
@@ -156,7 +139,7 @@ class Parser {
     const std::string_view last = table.last_line;
     const std::size_t comma = last.find(',');
     const std::optional<double> rate =
-        last.empty() ? std::nullopt : number_of(trimmed(last.substr(5, comma - 5)));
+        last.empty() ? std::nullopt : parse_real(trimmed(last.substr(5, comma - 5)));
     if (!rate || *rate <= 0.0) {
       return fail(ErrorKind::input, {file_, 0},
                   "ends without the line 'Rate ..., overflows ...' that M956 writes; the recording "

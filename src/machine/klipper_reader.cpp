@@ -11,6 +11,7 @@
 
 #include "klipper_config.hpp"
 #include "klipper_shaper.hpp"
+#include "unflex/core/text.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -75,10 +76,6 @@ std::optional<double> number_of(std::string_view text) {
 
 // "57:11, 2:1": the product of the ratios.
 std::optional<double> gear_ratio(std::string_view text) {
-  const auto trimmed = [](std::string_view word) {
-    const std::size_t first = std::min(word.find_first_not_of(' '), word.size());
-    return word.substr(first, word.find_last_not_of(' ') + 1 - first);
-  };
   double product = 1.0;
   for (;;) {
     const std::size_t comma = std::min(text.find(','), text.size());

@@ -4,16 +4,9 @@
 #include <string>
 #include <string_view>
 
-namespace unflex::machine {
+#include "unflex/core/text.hpp"
 
-inline std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\n\v\f";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) {
-    return {};
-  }
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
+namespace unflex::machine {
 
 inline std::string lower(std::string_view text) {
   std::string result(text);

@@ -11,7 +11,7 @@ namespace unflex::pipeline {
 
 Result<FittedPrint> fit_filament(const std::filesystem::path& print, const std::string& name,
                                  const machine::Settings& settings,
-                                 const filament::Profile& profile,
+                                 const filament::Profile& profile, bool is_marked,
                                  const std::function<Status(std::string_view)>& write) {
   constexpr std::size_t kBlock = 1U << 16U;
   std::ifstream stream(print, std::ios::binary);
@@ -33,6 +33,10 @@ Result<FittedPrint> fit_filament(const std::filesystem::path& print, const std::
     if (!more) {
       return tl::unexpected(more.error());
     }
+    if (!*more && is_marked) {
+      text += text.empty() || text.ends_with('\n') ? "" : "\n";
+      text += fitter.mark();
+    }
     if (!*more || text.size() > kBlock) {
       if (Status written = write(text); !written) {
         return tl::unexpected(written.error());
@@ -49,7 +53,7 @@ Result<FittedPrint> fit_filament(const std::filesystem::path& print, const std::
       return tl::unexpected(fitted.error());
     }
   }
-  FittedPrint result{fitter.totals(), {}, fitter.mark()};
+  FittedPrint result{fitter.totals(), {}};
   for (const Diagnostic& warning : fitter.warnings()) {
     result.warnings.push_back(to_string(warning));
   }

@@ -200,8 +200,7 @@ void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
     if (choice.is_optimal) {
       tl::expected<timing::Timed, std::string> optimal =
           timing::optimal(job.course(), job.setup, job.first_stage, job.bounds);
-      // Its search ends at a motion that is the shortest among those near it, so the other may be
-      // shorter.
+      // The optimal motion is the shortest among those near it, so the scaled one may be shorter.
       if (!optimal) {
         job.scaled_reason = std::move(optimal.error());
       } else if (timed &&

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "nozzle_measure.hpp"
 #include "section_motion.hpp"
 #include "section_nodes.hpp"
 #include "section_spline.hpp"
@@ -42,13 +43,8 @@ class EdgeNozzles {
   [[nodiscard]] double largest_swing_mm(Vector base_mm) const {
     double largest = 0.0;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
-      const auto swing = [](const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
-                            double of_base_mm) {
-        const dynamics::FlexibleAxis::Gap gap = axis.gap(nozzle, axis.riding(of_base_mm));
-        return std::hypot(gap.place_mm, gap.speed_mm);
-      };
-      largest = std::max(largest, std::hypot(swing(edges_[i].x, ends_[i].x, base_mm.x),
-                                             swing(edges_[i].y, ends_[i].y, base_mm.y)));
+      largest = std::max(largest, std::hypot(swing_mm(edges_[i].x, ends_[i].x, base_mm.x),
+                                             swing_mm(edges_[i].y, ends_[i].y, base_mm.y)));
     }
     return largest;
   }

@@ -39,12 +39,6 @@ struct Place {
   std::size_t piece = 0;
 };
 
-double swing_mm(const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
-                double base_mm) {
-  const dynamics::FlexibleAxis::Gap gap = axis.gap(nozzle, axis.riding(base_mm));
-  return std::hypot(gap.place_mm, gap.speed_mm);
-}
-
 class Walk {
  public:
   Walk(std::span<const planner::PlannedMove> plan, std::span<const MoveBounds> bounds,
@@ -201,6 +195,12 @@ class Walk {
 };
 
 }  // namespace
+
+double swing_mm(const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
+                double base_mm) {
+  const dynamics::FlexibleAxis::Gap gap = axis.gap(nozzle, axis.riding(base_mm));
+  return std::hypot(gap.place_mm, gap.speed_mm);
+}
 
 std::vector<AxesModel> models_of(const compensate::Setup& setup) {
   struct Model {

@@ -37,6 +37,10 @@ struct AxesModel {
 // may be.
 [[nodiscard]] std::vector<AxesModel> models_of(const compensate::Setup& setup);
 
+// How far the nozzle of an axis swings while the base rests there.
+[[nodiscard]] double swing_mm(const dynamics::FlexibleAxis& axis,
+                              const dynamics::NozzleState& nozzle, double base_mm);
+
 // How many times its tolerance each model's nozzle may stray on each piece. Empty: once.
 using Allowances = std::vector<std::vector<double>>;
 

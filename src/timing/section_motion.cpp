@@ -68,9 +68,8 @@ constexpr double kRoom_mm = 3e-3;
 // Travel beside filament has the tolerance of filament for so many node periods in the end, and for
 // more (SectionNodes::kBeside) in rows, as these look less often.
 constexpr double kBesideInTheEnd = 2.0;
-// A round that gains less is the last.
+// A round that gains less settles the search, and so do several without a gain.
 constexpr double kGain = 1e-3;
-// So are as many without a gain.
 constexpr int kIdleRounds = 2;
 
 template <int D>

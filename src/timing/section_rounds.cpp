@@ -6,9 +6,9 @@
 namespace unflex::timing {
 namespace {
 
-// What T′ may change by in a round: at first, and at least. Where a step came out otherwise, the
-// next one is to come out so by this share of what is allowed. As the second order is what comes
-// out otherwise, that goes with the square of the step.
+// What T′ may change by in a round: at first, and at least. The program does not foresee the second
+// order, which goes with the square of a step. The next step is made so long that this surprise is
+// that share of what is allowed.
 constexpr double kFirstTrust = 0.3;
 constexpr double kFirstTrustOfBand = 0.12;
 constexpr double kLeastTrust = 1e-3;
@@ -87,6 +87,7 @@ bool SectionRounds::is_stuck(int round) const {
 }
 
 double SectionRounds::trust_to_slow(std::size_t node) const {
+  // The last node belongs to the last period.
   return largest_near(std::min(node, factors_.size() - 1), broken_) > kBroken
              ? std::max(trust_[node], kTrustToSlow)
              : trust_[node];

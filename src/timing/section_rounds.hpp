@@ -35,14 +35,14 @@ class SectionRounds {
   // The largest of all periods, as shown.
   [[nodiscard]] const Excess& worst() const { return worst_; }
   [[nodiscard]] bool is_kept() const;
-  // Whether a round is still to come close to what is allowed.
+  // Whether no round has come close to what is allowed yet, or the last one has gone far from it.
   [[nodiscard]] bool is_far() const;
   // Whether as much is broken as a round ago, so that it does not come right any more. Counts
   // rounds from 0.
   [[nodiscard]] bool is_stuck(int round) const;
 
-  // Fits trust and factors to what was shown. surprise: by how much what each period came to is
-  // otherwise than foreseen, relative to what is allowed.
+  // Fits trust and factors to what was shown. surprise: how far each period's values are from what
+  // the program had foreseen, relative to what is allowed.
   void adapt(const std::vector<double>& surprise, int round);
 
   // What T′ may change by at a node, relative to itself, and by how much it may grow.

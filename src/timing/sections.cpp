@@ -12,7 +12,8 @@ namespace {
 using gcode::X;
 using gcode::Y;
 
-// How far the vertices of moves may be from a leg that stands for them, and that in tolerances.
+// How far the vertices of moves may be from a leg that stands for them: in mm, and as a share of
+// the tolerance.
 constexpr double kStraight_mm = 2e-3;
 constexpr double kStraight = 0.1;
 constexpr std::size_t kMostMovesOfLeg = 50;

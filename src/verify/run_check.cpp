@@ -5,14 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rounding.hpp"
+
 namespace unflex::verify {
-namespace {
-
-// Emitted coordinates have four decimals.
-constexpr double kRounding_mm = 1e-4;
-constexpr double kLimitTolerance = 1e-3;
-
-}  // namespace
 
 void Excursion::add(const gcode::Segment& segment) {
   if (segment.start_known) {

@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rounding.hpp"
+
 namespace unflex::verify {
 namespace {
 
 constexpr std::size_t kFilament = Motors::kCount;
-// Emitted coordinates have four decimals.
-constexpr double kRounding_mm = 1e-4;
-constexpr double kLimitTolerance = 1e-3;
 // A motor that is slower than this stands still.
 constexpr double kMoves_hz = 1.0;
 

@@ -37,6 +37,9 @@ TEST_F(Filament, IsFittedToItsSection) {
   EXPECT_EQ(again.exit_code, 2);
   EXPECT_THAT(again.err, StartsWith("out.gcode:7: says that the print was fitted"));
   EXPECT_FALSE(std::filesystem::exists(path("twice.gcode")));
+  // In place the file has its name as well.
+  EXPECT_THAT(run({"filament", "out.gcode", "--in-place", "--set", kHollow}).err,
+              StartsWith("out.gcode:7: says that the print was fitted"));
 }
 
 TEST_F(Filament, GoesThroughAPipe) {

@@ -12,6 +12,9 @@ namespace unflex {
 // "-.8", "3.". Exponents, "inf", "nan", hexadecimal, and anything left over give nullopt.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text);
 
+// Reads the whole of `text` as a finite number as programs write it, with an exponent or without.
+[[nodiscard]] std::optional<double> parse_real(std::string_view text);
+
 // Rounds towards zero. A value that no int can hold becomes the nearest int. value must not be NaN.
 [[nodiscard]] int to_int(double value);
 

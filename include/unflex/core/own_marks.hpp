@@ -6,7 +6,7 @@
 
 namespace unflex {
 
-// Begins every comment line that unflex writes.
+// Begins every comment line that unflex writes, but for kFilamentMark.
 inline constexpr std::string_view kOwnMark = ";unflex";
 // Stands before the first line and behind the last line of each compensated run. If the base moves
 // before the plan does, kLeadInWord and a time in s follow the first. If the run need not last as
@@ -15,6 +15,10 @@ inline constexpr std::string_view kRunMark = ";unflex run";
 inline constexpr std::string_view kLeadInWord = " LEAD_IN=";
 inline constexpr std::string_view kFreeTimingWord = " TIMING=free";
 inline constexpr std::string_view kRunEndMark = ";unflex end";
+
+// Begins the last line of a print that was fitted to its filament. It does not begin with kOwnMark,
+// since such a print may still be compensated.
+inline constexpr std::string_view kFilamentMark = "; unflex filament:";
 
 // The macro that a run calls where it begins and where it has ended.
 inline constexpr std::string_view kCheckpointMacro = "UNFLEX_CHECKPOINT";

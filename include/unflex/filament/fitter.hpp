@@ -12,6 +12,7 @@
 
 #include "unflex/core/error.hpp"
 #include "unflex/filament/profile.hpp"
+#include "unflex/gcode/command.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/gcode/line.hpp"
 
@@ -40,8 +41,9 @@ class Fitter {
  public:
   Fitter(FitterOptions options, std::string name);
 
-  // Appends what stands for the line, in the order of the file: the line itself, or with another E;
-  // before some a line that tells the printer what the file takes E to be. Errors are of kind
+  // Appends what replaces the line: the line itself, or the line with another E. Before some lines
+  // comes a G92, so that E reads in the printer what the file expects. Lines come in the order of
+  // the file. Errors are of kind
   // input: the line was fitted before, Klipper would refuse it, or its E cannot be replaced.
   [[nodiscard]] Status fit(const gcode::Line& line, std::string& text);
 
@@ -55,7 +57,7 @@ class Fitter {
   [[nodiscard]] std::string mark() const;
 
  private:
-  [[nodiscard]] Status fit_move(const gcode::Event& event, const gcode::ModalState& before,
+  [[nodiscard]] Status fit_move(const gcode::Command& command, const gcode::ModalState& before,
                                 std::string& text);
   // The filament that a move that prints needs.
   [[nodiscard]] double needed_mm(double sliced_mm, const gcode::ModalState& before) const;

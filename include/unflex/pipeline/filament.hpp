@@ -16,13 +16,14 @@ namespace unflex::pipeline {
 struct FittedPrint {
   filament::Totals totals;
   std::vector<std::string> warnings;
-  std::string mark;  // a comment by which the text is known again, for its end
 };
 
 // Reads the print and writes it block by block, as the settings' filament asks for. name: what
-// messages call the print. Errors are those of filament::Fitter::fit(), of reading and of `write`.
+// messages call the print. is_marked: the text ends with a comment by which it is known again.
+// Errors are those of filament::Fitter::fit(), of reading and of `write`.
 [[nodiscard]] Result<FittedPrint> fit_filament(
     const std::filesystem::path& print, const std::string& name, const machine::Settings& settings,
-    const filament::Profile& profile, const std::function<Status(std::string_view)>& write);
+    const filament::Profile& profile, bool is_marked,
+    const std::function<Status(std::string_view)>& write);
 
 }  // namespace unflex::pipeline

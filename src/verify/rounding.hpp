@@ -1,0 +1,11 @@
+// What rounding explains of a value above its limit.
+#pragma once
+
+namespace unflex::verify {
+
+// Emitted coordinates have four decimals.
+inline constexpr double kRounding_mm = 1e-4;
+// A limit is broken by what is above it by more than this share.
+inline constexpr double kLimitTolerance = 1e-3;
+
+}  // namespace unflex::verify
