@@ -11,11 +11,12 @@
 #include "outputs.hpp"
 #include "results.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/pipeline/temperature.hpp"
 
 namespace unflex::app {
 namespace {
 
-using hotend::Plant;
+
 using hotend::Rule;
 
 constexpr std::array kRules = {Rule::simc_pid, Rule::simc_pi,    Rule::zn_pid,
@@ -96,11 +97,7 @@ Status read_printer(const RunConfig& config, HotendTuning& tuning) {
                               key));
     }
   }
-  tuning.plant = Plant{.gain_c = *model.gain_c,
-                       .time_constant_s = *model.time_constant_s,
-                       .sensor_lag_s = model.sensor_lag_s,
-                       .dead_time_s = *model.dead_time_s,
-                       .ambient_c = model.ambient_c};
+  tuning.plant = pipeline::hotend_plant(model);
   if (!tuning.heater_w) {
     tuning.heater_w = model.heater_w;
   }
@@ -109,7 +106,7 @@ Status read_printer(const RunConfig& config, HotendTuning& tuning) {
 
 // Whether the heater can bring the plant to the target, and what filament takes there.
 Status set_target(const RunConfig& config, HotendTuning& tuning) {
-  const Plant& plant = *tuning.plant;
+  const hotend::Plant& plant = *tuning.plant;
   tuning.target_c = config.hotend.target_c.value_or(kUsualTarget_c);
   const double hottest_c = plant.ambient_c + plant.gain_c * plant.full_power;
   if (tuning.target_c <= plant.ambient_c || tuning.target_c >= hottest_c) {

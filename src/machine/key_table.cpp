@@ -70,6 +70,7 @@ constexpr std::array<std::string_view, 11> kShaperTypes = {
 constexpr std::array<std::string_view, 7> kVariants = {
     "auto", "mainline", "kalico", "kalico_limited", "kalico_smooth", "prusa_buddy", "snapmaker_j1"};
 constexpr std::array<std::string_view, 2> kTimingMethods = {kScaled, kOptimal};
+constexpr std::array<std::string_view, 2> kAheadWhen = {"heating", "both"};
 constexpr std::array<std::string_view, 5> kSecondShapers = {"zv", "mzv", "zvd", "ei", "none"};
 // The presets that step_limits.cpp knows.
 constexpr std::array<std::string_view, 4> kDrivers = {"", "a4988", "drv8825", "tmc2209"};
@@ -352,6 +353,19 @@ constexpr std::array kKeys = {
         "°C", "Temperature of the hotend without power"},
     Key{"hotend.heater_w", &setting<&S::hotend, &H::heater_w>, kPositive, "W",
         "What the heater gives at full power, for the load of melting filament", kNotKnown},
+    Key{"hotend.band_c", &setting<&S::hotend, &H::band_c>, kPositive, "°C",
+        "How far the temperature may be from its target while filament is laid"},
+    Key{"hotend.ahead", &setting<&S::hotend, &H::ahead>, kAny, "",
+        "Whether changes of temperature within the print are asked for so early that the hotend "
+        "has followed when they are due"},
+    Key{"hotend.ahead_when",
+        &setting<&S::hotend, &H::ahead_when>,
+        kAny,
+        "",
+        "Which of them: those to a higher temperature, or both",
+        {},
+        nullptr,
+        kAheadWhen},
 
     Key{"dynamics.x.freq_hz", &setting<&S::dynamics_x, &D::freq_hz>,
         Bounds{.min = 1.0, .max = 1000.0}, "Hz", "Natural frequency of the nozzle along X"},

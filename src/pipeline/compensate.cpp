@@ -13,6 +13,8 @@
 #include "fd_stream.hpp"
 #include "report_rows.hpp"
 #include "retime.hpp"
+#include "rewrite_lines.hpp"
+#include "unflex/pipeline/temperature.hpp"
 #include "unflex/core/errno_text.hpp"
 #include "unflex/report/format.hpp"
 
@@ -133,6 +135,19 @@ void warn_of_no_gain(const Job& job, report::Report& report) {
                   report::micrometres_text(compensated_mm), report::micrometres_text(now_mm))}));
 }
 
+// A stream has gone by before it is known what comes, so its hotend is not followed.
+Status follow_hotend(const Job& job, Progress& progress, report::Report& report) {
+  if (job.input_fd < 0 && job.output_fd < 0) {
+    return follow_temperature(job, OutputMay::change, progress, report);
+  }
+  if (job.settings.hotend.ahead) {
+    report.warnings.push_back(to_string(Diagnostic{
+        {job.input_name, 0},
+        "hotend.ahead does nothing in a stream; give a file to read and one to write"}));
+  }
+  return {};
+}
+
 // Whether the output can be written once more.
 bool can_repeat(const Job& job) { return job.input_fd < 0 && job.output_fd < 0; }
 
@@ -165,6 +180,11 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       if (Status status = retime(job.output, job.output_name, factor); !status) {
         return tl::unexpected(status.error());
       }
+    }
+    if (Status status = follow_hotend(job, progress, report); !status) {
+      return tl::unexpected(status.error());
+    }
+    if (job.output_fd < 0) {
       report.output_bytes = std::filesystem::file_size(job.output);
     }
     if (!warn_of_no_run(job, report)) {

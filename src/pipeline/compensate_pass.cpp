@@ -19,6 +19,7 @@
 #include "piece_thread.hpp"
 #include "report_rows.hpp"
 #include "retime.hpp"
+#include "rewrite_lines.hpp"
 #include "run_writer.hpp"
 #include "stage_options.hpp"
 #include "task_pool.hpp"

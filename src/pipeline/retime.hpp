@@ -16,7 +16,4 @@ namespace unflex::pipeline {
 // is what the error calls it.
 [[nodiscard]] Status retime(const std::string& path, const std::string& name, double factor);
 
-// The error if a file cannot be written any further.
-[[nodiscard]] tl::unexpected<Error> output_failed(const std::string& name);
-
 }  // namespace unflex::pipeline

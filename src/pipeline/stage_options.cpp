@@ -566,6 +566,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.steps = step_rules(settings);
   rules.tolerance_mm = settings.largest_tolerance_um() * 1e-3;
   rules.filament_area_mm2 = settings.filament_area_mm2();
+  rules.may_ask_ahead = settings.hotend.ahead;
   rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);
   if (grid_mm(settings) > kGridMm) {
     constexpr double kShareOfStep = 0.1;

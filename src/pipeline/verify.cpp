@@ -18,6 +18,7 @@
 #include "step_rates.hpp"
 #include "unflex/gcode/line.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "unflex/pipeline/temperature.hpp"
 #include "unflex/planner/printer_shaper.hpp"
 
 namespace unflex::pipeline {
@@ -218,7 +219,10 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
 Result<report::Report> verify(const Job& job, Progress& progress) {
   const auto begin = std::chrono::steady_clock::now();
   report::Report report = new_report("verify", job);
-  if (Status status = add_verification(job, progress, report); !status) {
+  const Status status = add_verification(job, progress, report).and_then([&] {
+    return follow_temperature(job, OutputMay::stay, progress, report);
+  });
+  if (!status) {
     return tl::unexpected(status.error());
   }
   add_performance(begin, report);

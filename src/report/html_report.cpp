@@ -9,6 +9,7 @@
 
 #include "answers.hpp"
 #include "assets.hpp"
+#include "temperature_figure.hpp"
 #include "unflex/core/base64.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
@@ -418,6 +419,7 @@ std::string to_html(const Report& report) {
   page.style = assets::report_css;
   page.body = hero(report);
   page.body += assets::report_html;
+  page.body += report.temperature ? temperature_card(*report.temperature) : std::string{};
   page.body += embedded_json("data", data_json(report));
   page.body += fmt::format("<script type=\"application/octet-stream\" id=\"paths\">{}</script>\n",
                            to_base64(report.recording->paths.bytes));

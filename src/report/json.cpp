@@ -249,6 +249,7 @@ void add_output(const Report& r, Json& json) {
   json["flow"] = {{"uncompensated", flow_json(r.uncompensated_flow)},
                   {"compensated", flow_json(r.compensated_flow)}};
   json["step_rates"] = step_rates_json(r.step_rates, /*has_output=*/true);
+  json["temperature"] = temperature_json(r.temperature);
   json["performance"] = {{"wall_s", r.wall_s},
                          {"cpu_s", r.cpu_s},
                          {"print_s_per_wall_s", r.print_s_per_wall_s},

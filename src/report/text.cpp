@@ -272,6 +272,7 @@ void write_output(Sink out, const Report& r) {
   }
   write_flow(out, r);
   fmt::format_to(out, "{}", step_rates_text(r.step_rates, /*has_output=*/true));
+  fmt::format_to(out, "{}", temperature_text(r.temperature));
   fmt::format_to(out, "speed         {:.0f} s of print per second, {} in all, {:.0f} MB\n",
                  r.print_s_per_wall_s, duration_text(r.wall_s), r.peak_rss_mb);
 }

@@ -49,13 +49,19 @@ void LineCheck::compare(bool complete, double place_tolerance_mm) {
   for (;;) {
     const PlacedLine* const input = front(*input_);
     const PlacedLine* const output = front(*output_);
-    if (input != nullptr && output != nullptr) {
+    const bool is_here = output != nullptr ? input != nullptr && same_line(input->line, output->line)
+                                           : !complete;
+    if (input != nullptr && !is_here && ahead_.is_awaited(input->line)) {
+      ahead_.arrive();
+      input_->lines().pop_front();
+    } else if (input != nullptr && output != nullptr) {
       compare(*input, *output);
     } else if (complete && input != nullptr) {
       lost(*input);
       input_->lines().pop_front();
     } else if (complete && output != nullptr) {
-      if (!is_known_addition(output->line.content(), input_->firmware())) {
+      if (!is_known_addition(output->line.content(), input_->firmware()) &&
+          !ahead_.takes(output->line)) {
         unknown(*output);
       }
       output_->lines().pop_front();
@@ -75,7 +81,8 @@ void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
     input_->lines().pop_front();
     output_->lines().pop_front();
   } else {
-    if (!is_known_addition(output.line.content(), input_->firmware())) {
+    if (!is_known_addition(output.line.content(), input_->firmware()) &&
+        !ahead_.takes(output.line)) {
       resynchronise(output);
     }
     output_->lines().pop_front();
@@ -87,7 +94,22 @@ bool LineCheck::at_same_place(const PlacedLine& input, const PlacedLine& output)
   return std::hypot(input.x_mm - output.x_mm, input.y_mm - output.y_mm) <= tolerance;
 }
 
+void LineCheck::pass(const Section& input, const Section& output) {
+  if (input.kind != SectionKind::end) {
+    pass(input.line, input.moves_by_itself, output.line.number);
+  } else if (std::optional<std::string> wrong = ahead_.end()) {
+    violations_->in_output(output.line.number, std::move(*wrong));
+  }
+}
+
+void LineCheck::pass(const gcode::Line& line, bool loses_place, std::size_t output_line) {
+  if (std::optional<std::string> wrong = ahead_.pass(line, loses_place)) {
+    violations_->in_output(output_line, std::move(*wrong));
+  }
+}
+
 void LineCheck::match(const PlacedLine& input, const PlacedLine& output) {
+  pass(input.line, /*loses_place=*/false, output.line.number);
   if (!at_same_place(input, output)) {
     violations_->in_output(
         output.line.number,

@@ -3,6 +3,7 @@
 // lines are ignored.
 #pragma once
 
+#include "ahead_check.hpp"
 #include "replay.hpp"
 #include "violations.hpp"
 
@@ -14,13 +15,19 @@ namespace unflex::verify {
 
 class LineCheck {
  public:
-  LineCheck(Replay& input, Replay& output, Violations& violations)
-      : input_(&input), output_(&output), violations_(&violations) {}
+  LineCheck(Replay& input, Replay& output, Violations& violations, bool may_ask_ahead)
+      : input_(&input),
+        output_(&output),
+        violations_(&violations),
+        ahead_(input.firmware(), may_ask_ahead) {}
 
   // Compares and removes what both files have read of the current run. complete: both have read
   // all of it, so that what is left over on one side is an error. In a compensated run a line may
   // stand that far from its place.
   void compare(bool complete, double place_tolerance_mm);
+
+  // A section that both files have.
+  void pass(const Section& input, const Section& output);
 
  private:
   [[nodiscard]] PlacedLine* front(Replay& file) const;
@@ -30,11 +37,13 @@ class LineCheck {
   void resynchronise(const PlacedLine& output);
   void lost(const PlacedLine& input);
   void unknown(const PlacedLine& output);
+  void pass(const gcode::Line& line, bool loses_place, std::size_t output_line);
 
   Replay* input_;
   Replay* output_;
   double place_tolerance_mm_ = 0.0;
   Violations* violations_;
+  AheadCheck ahead_;
 };
 
 }  // namespace unflex::verify

@@ -101,6 +101,7 @@ bool Verifier::sections_agree() {
             name(output), name(input), input.line.number));
     return false;
   }
+  lines_.pass(input, output);
   check_regime(input, output);
   return true;
 }

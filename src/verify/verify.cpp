@@ -66,7 +66,7 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
              rules.approaches ? ReplayedFile::sliced_with_approaches : ReplayedFile::sliced),
       output_(output, output_name, rules.interpreter, rules.limits, rules.fixed,
               ReplayedFile::emitted),
-      lines_(input_, output_, violations_),
+      lines_(input_, output_, violations_, rules.may_ask_ahead),
       path_([this](ReferenceMove& next) { return next_input_move(next.move); }),
       run_path_([this](ReferenceMove& next) { return next_reference_move(next); }),
       resting_path_(

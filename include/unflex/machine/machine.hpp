@@ -142,8 +142,8 @@ struct ExtruderSettings {
   }
 };
 
-// The hotend as two lags behind a dead time (unflex/hotend/plant.hpp). `unflex hotend` finds it and
-// tunes by it.
+// The hotend as two lags behind a dead time (unflex/hotend/plant.hpp), and what is done with it.
+// `unflex hotend` finds it and tunes by it.
 struct HotendSettings {
   std::optional<double> gain_c;  // for each count of power
   std::optional<double> time_constant_s;
@@ -151,6 +151,13 @@ struct HotendSettings {
   std::optional<double> dead_time_s;
   double ambient_c = 25.0;
   std::optional<double> heater_w;  // at full power
+  // How far the temperature may be from its target while filament is laid.
+  double band_c = 5.0;
+  // Changes of temperature that the print does not wait for are asked for early enough.
+  bool ahead = false;
+  std::string ahead_when = "heating";  // or "both"
+
+  [[nodiscard]] bool has_model() const { return gain_c && time_constant_s && dead_time_s; }
 };
 
 // The most modes that an axis can have.

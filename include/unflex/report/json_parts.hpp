@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,5 +30,8 @@ inline constexpr int kSchemaVersion = 1;
 // {"motors": [{"motor": "X", "sliced_hz": …}], "total": …, "max_hz": …}; null where no steps per mm
 // are known. has_output: whether there are emitted lines.
 [[nodiscard]] Json step_rates_json(const StepRates& rates, bool has_output);
+
+// {"band_c": 5, "sliced": {"colder_s": …}, …}; null without a model of the hotend.
+[[nodiscard]] Json temperature_json(const std::optional<Temperature>& temperature);
 
 }  // namespace unflex::report

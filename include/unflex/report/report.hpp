@@ -10,6 +10,7 @@
 
 #include "unflex/core/error.hpp"
 #include "unflex/report/recording.hpp"
+#include "unflex/report/temperature.hpp"
 
 namespace unflex::report {
 
@@ -267,6 +268,7 @@ struct Report {
   FlowRow uncompensated_flow;
   FlowRow compensated_flow;
   StepRates step_rates;
+  std::optional<Temperature> temperature;  // if the settings have a model of the hotend
   std::optional<double> max_flow_mm3_s;  // what the hotend melts, if the settings say so
 
   double wall_s = 0.0;

@@ -62,6 +62,8 @@ struct Rules {
   double filament_area_mm2 = 2.405281875467;  // cross-section; here of 1.75 mm
   // What the hotend melts. It breaks no rule to ask for more (VerifyReport::too_much_flow).
   double max_flow_mm3_s = std::numeric_limits<double>::infinity();
+  // Whether the output may ask for a temperature earlier than the sliced file.
+  bool may_ask_ahead = false;
   Leeway leeway;
   // What the nozzle may stray in a run whose timing is not as sliced. 0: all runs are as sliced.
   double tolerance_mm = 0.0;

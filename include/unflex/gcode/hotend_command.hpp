@@ -1,0 +1,36 @@
+// What a line asks of the hotend.
+//   Klipper  kinematics/extruder.py (M104, M109, ACTIVATE_EXTRUDER), extras/heaters.py
+//            (SET_HEATER_TEMPERATURE, TURN_OFF_HEATERS, TEMPERATURE_WAIT);
+//   Marlin   gcode/temp/M104_M109.cpp;
+//   RepRapFirmware  GCodes/GCodes2.cpp, GCodes3.cpp: M104, M109, M116, M568, G10.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "unflex/core/firmware.hpp"
+#include "unflex/gcode/command.hpp"
+
+namespace unflex::gcode {
+
+struct HotendCommand {
+  std::optional<double> target_c;  // 0: off; none: the target stays
+  std::optional<int> tool;         // none: the tool in use
+  bool waits = false;              // until the target is reached from below …
+  bool waits_cooling = false;      // … and also from above
+};
+
+// nullopt if the line asks nothing of a hotend, or nothing that the firmware understands.
+[[nodiscard]] std::optional<HotendCommand> hotend_command(const Command& command,
+                                                          Firmware firmware);
+
+// The tool that the line selects. Below 0: none. A macro may select one as well.
+[[nodiscard]] std::optional<int> selected_tool(const Command& command, Firmware firmware);
+
+// Whether the line may hold the print up for long: a pause, a change of filament.
+[[nodiscard]] bool pauses_print(const Command& command);
+
+// A line that sets the target and does not wait, with a line ending.
+[[nodiscard]] std::string set_hotend_line(double target_c, std::optional<int> tool);
+
+}  // namespace unflex::gcode

@@ -1,0 +1,29 @@
+// The hotend's temperature along a print, and changes of it asked for ahead.
+#pragma once
+
+#include <optional>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/hotend/plant.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/report/report.hpp"
+
+namespace unflex::pipeline {
+
+// The hotend of the settings, if they have a model.
+[[nodiscard]] std::optional<hotend::Plant> hotend_plant(const machine::HotendSettings& settings);
+
+enum class OutputMay {
+  stay,    // it is only looked at
+  change,  // changes of temperature may be put ahead
+};
+
+// Simulates the hotend along input and output and tells of it in the report, if there is a model.
+// Where settings and `may` want that, the output's changes of temperature are put ahead, and the
+// lines of the output that the report tells of follow. Fails if a file cannot be read or written.
+[[nodiscard]] Status follow_temperature(const Job& job, OutputMay may, Progress& progress,
+                                        report::Report& report);
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,26 @@
+// A print's text as its hotend meets it: what is laid when, and what is asked of the hotend.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/hotend/along_print.hpp"
+#include "unflex/machine/machine.hpp"
+
+namespace unflex::pipeline {
+
+struct PrintCourse {
+  hotend::Course course;
+  std::vector<hotend::Command> commands;  // of the tool in use, in the order of the text
+};
+
+// Plans the text by the firmware's rules. Errors: it cannot be read; the user has cancelled.
+[[nodiscard]] Result<PrintCourse> print_course(const std::filesystem::path& text,
+                                               const std::string& name,
+                                               const machine::Settings& settings,
+                                               Progress& progress);
+
+}  // namespace unflex::pipeline

@@ -1,0 +1,25 @@
+// Changes lines of a file in place.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "unflex/core/error.hpp"
+
+namespace unflex::pipeline {
+
+// Appends what is to stand in the place of a text of whole lines. The file's last line may be
+// without its line ending.
+using LineChange = std::function<void(std::string_view text, std::string& out)>;
+
+// Hands the file's text to `change`, block by block in order, and writes what it makes of it over
+// the text. What the text grows by is held in memory. Fails if the file cannot be read or written;
+// `name` is what the error calls it.
+[[nodiscard]] Status rewrite_lines(const std::string& path, const std::string& name,
+                                   const LineChange& change);
+
+// The error if a file cannot be written any further.
+[[nodiscard]] tl::unexpected<Error> output_failed(const std::string& name);
+
+}  // namespace unflex::pipeline
