@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "rrf_heaters.hpp"
 #include "text_lines.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/command.hpp"
@@ -440,7 +441,7 @@ void rrf_shaper(CommandReader& reader, const SourcePlace& place) {
 }
 
 Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t number,
-                     std::array<Travel, 2>& travel) {
+                     std::array<Travel, 2>& travel, RrfHeaters& heaters) {
   const gcode::Command original = gcode::parse(line);
   const SourcePlace place{reader.file(), number};
   if (original.kind == gcode::CommandKind::none) {
@@ -454,6 +455,7 @@ Status read_rrf_line(CommandReader& reader, std::string_view line, std::size_t n
   if (is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 566, 593})) {
     reader.take(text, command, place);
   }
+  heaters.read(command, place);
   switch (command.number) {
     case 82:
     case 83:
@@ -500,10 +502,11 @@ Result<Reading> read_marlin_dump(std::string_view text, const std::string& file)
 Result<Reading> read_rrf_config(std::string_view text, const std::string& file) {
   CommandReader reader(Firmware::rrf, file);
   std::array<Travel, 2> travel;
+  RrfHeaters heaters;
   Status status;
   for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
     if (status) {
-      status = read_rrf_line(reader, line, number, travel);
+      status = read_rrf_line(reader, line, number, travel, heaters);
     }
   });
   if (!status) {
@@ -512,6 +515,7 @@ Result<Reading> read_rrf_config(std::string_view text, const std::string& file) 
   for (std::size_t axis = 0; axis < travel.size(); ++axis) {
     add_travel(reader, travel[axis], kAxes[axis]);
   }
+  heaters.add_to(reader.reading);
   reader.finish();
   return std::move(reader.reading);
 }

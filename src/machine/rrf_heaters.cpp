@@ -1,0 +1,51 @@
+#include "rrf_heaters.hpp"
+
+#include <cmath>
+#include <optional>
+
+#include "unflex/core/number.hpp"
+
+namespace unflex::machine {
+namespace {
+
+constexpr double kFullPower = 255.0;
+// The power law of losses becomes linear at a temperature as prints have it, above the ambient one.
+constexpr double kWorking_c = 185.0;
+constexpr double kUsualExponent = 1.35;  // FOPDT.h, DefaultHotEndHeaterCoolingRateExponent
+
+}  // namespace
+
+void RrfHeaters::read(const gcode::Command& command, const SourcePlace& place) {
+  if (command.is('M', 563) && command.value('P') == 0.0 && command.value('H')) {
+    heater_ = to_int(*command.value('H'));
+  }
+  const std::optional<double> dead_time_s = command.value('D');
+  if (!command.is('M', 307) || !command.value('H') || !(dead_time_s.value_or(0.0) > 0.0)) {
+    return;
+  }
+  double rate_c_s = command.value('R').value_or(0.0);
+  double time_constant_s = command.value('C').value_or(0.0);
+  if (const double cooling_c_s = command.value('K').value_or(0.0); cooling_c_s > 0.0) {
+    const double exponent = command.value('E').value_or(kUsualExponent);
+    time_constant_s = kWorking_c / (cooling_c_s * std::pow(kWorking_c / 100.0, exponent));
+  } else if (const double gain_c = command.value('A').value_or(0.0); time_constant_s > 0.0) {
+    rate_c_s = gain_c / time_constant_s;  // until version 3.3
+  }
+  const double gain_c = rate_c_s * time_constant_s / kFullPower;
+  if (gain_c > 0.0 && time_constant_s > 0.0) {
+    models_[to_int(*command.value('H'))] = {gain_c, time_constant_s, *dead_time_s, place};
+  }
+}
+
+void RrfHeaters::add_to(Reading& reading) const {
+  const auto model = models_.find(heater_);
+  if (model == models_.end()) {
+    return;
+  }
+  const auto& [gain_c, time_constant_s, dead_time_s, place] = model->second;
+  reading.add("hotend.gain_c", gain_c, place);
+  reading.add("hotend.time_constant_s", time_constant_s, place);
+  reading.add("hotend.dead_time_s", dead_time_s, place);
+}
+
+}  // namespace unflex::machine
