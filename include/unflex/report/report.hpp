@@ -67,6 +67,13 @@ struct FlowRow {
   std::size_t max_change_line = 0;
 };
 
+// Where the output lays filament at the most different rate from the sliced file, as means over 10
+// ms of laying.
+struct FlowDifferenceRow {
+  double relative = 0.0;  // by how much the output lays more, relative to the sliced file
+  std::size_t line = 0;   // of the input
+};
+
 // A run that kept its original moves, and why.
 struct Fallback {
   std::size_t first_line = 0;
@@ -266,6 +273,7 @@ struct Report {
   std::optional<FittedFilament> fitted_filament;
   FlowRow uncompensated_flow;
   FlowRow compensated_flow;
+  std::optional<FlowDifferenceRow> flow_difference;  // nullopt if nothing was compared
   StepRates step_rates;
   std::optional<double> max_flow_mm3_s;  // what the hotend melts, if the settings say so
 
