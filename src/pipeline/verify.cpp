@@ -168,8 +168,9 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
   report.uncompensated_flow = row(verified.uncompensated_flow);
   report.compensated_flow = row(verified.compensated_flow);
   if (verified.flow_difference) {
-    report.flow_difference = report::FlowDifferenceRow{verified.flow_difference->relative,
-                                                       verified.flow_difference->line};
+    report.flow_difference =
+        report::FlowDifferenceRow{verified.flow_difference->relative,
+                                  verified.flow_difference->line, verified.flow_difference->p99};
   }
   if (verified.too_much_flow && report.max_flow_mm3_s) {
     report.warnings.push_back(

@@ -290,9 +290,10 @@ std::string micrometres_text(double mm) {
 }
 
 std::string flow_difference_text(const FlowDifferenceRow& difference) {
-  return fmt::format("at most {:.1f} % {} than as sliced over 10 ms, near line {}",
-                     100.0 * std::abs(difference.relative),
-                     difference.relative < 0.0 ? "less" : "more", difference.line);
+  return fmt::format(
+      "at most {:.1f} % {} than as sliced over 10 ms, near line {}; {:.1f} for 99 % of the time",
+      100.0 * std::abs(difference.relative), difference.relative < 0.0 ? "less" : "more",
+      difference.line, 100.0 * difference.p99);
 }
 
 std::string times_text(double times) {

@@ -52,6 +52,14 @@ void FlowDifferenceGauge::end_run() {
   begin_run(0.0);
 }
 
+std::optional<FlowDifference> FlowDifferenceGauge::stats() const {
+  std::optional<FlowDifference> stats = largest_;
+  if (stats) {
+    stats->p99 = std::min(std::abs(stats->relative), relative_s_.quantile(0.99));
+  }
+  return stats;
+}
+
 void FlowDifferenceGauge::append(const planner::PlannedMove& move, std::deque<Phase>& phases) {
   const double filament_mm = move.segment.delta(gcode::E);
   const double per_mm = move.direction[gcode::E];
@@ -143,6 +151,10 @@ void FlowDifferenceGauge::go_on(const Rate& sliced, const Rate& difference, doub
   sliced_mm_ += s.integral(duration_s);
   difference_mm_ += d.integral(duration_s);
   look_at(sliced_mm_, difference_mm_, duration_s);
+  if (sliced_mm_ > 0.0) {
+    const double relative = difference_mm_ / sliced_mm_;
+    relative_s_.add_square(relative * relative, duration_s);
+  }
   back.left_s -= duration_s;
   back.sliced = back.sliced.after(duration_s);
   back.difference = back.difference.after(duration_s);
@@ -159,7 +171,7 @@ void FlowDifferenceGauge::look_at(double sliced_mm, double difference_mm, double
   const double relative = difference_mm / sliced_mm;
   if (!largest_ ||
       std::abs(relative) > std::abs(largest_->relative) * (1.0 + kRounding) + kRounding) {
-    largest_ = {relative, line_in_middle(later_s)};
+    largest_ = {relative, line_in_middle(later_s), 0.0};
   }
 }
 

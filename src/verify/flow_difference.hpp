@@ -23,6 +23,7 @@
 #include <optional>
 
 #include "unflex/planner/planner.hpp"
+#include "unflex/verify/log_histogram.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::verify {
@@ -43,7 +44,7 @@ class FlowDifferenceGauge {
   void end_run();
 
   // Of all runs so far; nullopt if no window was compared.
-  [[nodiscard]] const std::optional<FlowDifference>& largest() const { return largest_; }
+  [[nodiscard]] std::optional<FlowDifference> stats() const;
 
  private:
   // A quantity that is linear in time.
@@ -84,6 +85,7 @@ class FlowDifferenceGauge {
   double sliced_mm_ = 0.0;      // S
   double difference_mm_ = 0.0;  // D
   std::optional<FlowDifference> largest_;
+  LogHistogram relative_s_;  // time per cell of |D/S|
 };
 
 }  // namespace unflex::verify

@@ -566,7 +566,7 @@ VerifyReport Verifier::report() {
   report.compensated_corners = emitted_.main().corners();
   report.uncompensated_flow = input_flow_.stats();
   report.compensated_flow = output_flow_.stats();
-  report.flow_difference = flow_difference_.largest();
+  report.flow_difference = flow_difference_.stats();
   report.sliced_steps = input_steps_.largest();
   report.emitted_steps = output_steps_.largest();
   report.sliced_step_breaches = input_steps_.breaches();

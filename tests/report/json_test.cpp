@@ -127,6 +127,7 @@ TEST(JsonReport, SaysWhatTheHotendIsAskedFor) {
                                                  {"max_change_line", 812}}));
   EXPECT_EQ(flow["largest_difference"], -0.125);
   EXPECT_EQ(flow["largest_difference_line"], 813);
+  EXPECT_EQ(flow["difference_p99"], 0.0625);
 }
 
 TEST(JsonReport, HasNoDifferenceOfFlowsThatWereNotCompared) {
@@ -135,6 +136,7 @@ TEST(JsonReport, HasNoDifferenceOfFlowsThatWereNotCompared) {
   const nlohmann::json flow = parsed(report)["flow"];
   EXPECT_TRUE(flow.at("largest_difference").is_null());
   EXPECT_TRUE(flow.at("largest_difference_line").is_null());
+  EXPECT_TRUE(flow.at("difference_p99").is_null());
 }
 
 TEST(JsonReport, SaysHowRobustTheOutputIs) {

@@ -67,8 +67,8 @@ class TwoFiles : public ::testing::Test {
 
   [[nodiscard]] FlowDifference largest() {
     gauge_.end_run();
-    EXPECT_TRUE(gauge_.largest());
-    return gauge_.largest().value_or(FlowDifference{});
+    EXPECT_TRUE(gauge_.stats());
+    return gauge_.stats().value_or(FlowDifference{});
   }
 
   FlowDifferenceGauge gauge_;
@@ -82,7 +82,7 @@ TEST_F(TwoFiles, AreNotComparedWhereNothingIsLaid) {
   sliced(feed(2.0, 1.0));
   written(move(2.0, 2.0, 1.0));
   gauge_.end_run();
-  EXPECT_FALSE(gauge_.largest());
+  EXPECT_FALSE(gauge_.stats());
 }
 
 TEST_F(TwoFiles, AreNotComparedInLessThanAWindow) {
@@ -94,7 +94,7 @@ TEST_F(TwoFiles, AreNotComparedInLessThanAWindow) {
     written(travel(1e-4));
   }
   gauge_.end_run();
-  EXPECT_FALSE(gauge_.largest());
+  EXPECT_FALSE(gauge_.stats());
 }
 
 TEST_F(TwoFiles, OfOneConstantRateDoNotDifferHoweverTheirLinesLie) {
@@ -130,9 +130,9 @@ TEST_F(TwoFiles, DifferByTheirMeansAndSayWhichOneLaysMore) {
       gauge.play_written(line == 7 ? move(rate_mm_s, rate_mm_s, 0.004) : each);
     }
     gauge.end_run();
-    ASSERT_TRUE(gauge.largest());
-    EXPECT_NEAR(gauge.largest()->relative, (rate_mm_s - 2.0) / 2.0 * 0.4, 1e-9);
-    EXPECT_NEAR(static_cast<double>(gauge.largest()->line), 7.0, 1.0);
+    ASSERT_TRUE(gauge.stats());
+    EXPECT_NEAR(gauge.stats()->relative, (rate_mm_s - 2.0) / 2.0 * 0.4, 1e-9);
+    EXPECT_NEAR(static_cast<double>(gauge.stats()->line), 7.0, 1.0);
   }
 }
 
@@ -228,6 +228,22 @@ TEST_F(TwoFiles, DifferWhereTheWrittenOneEndsTooEarly) {
   EXPECT_NEAR(largest().relative, -0.3, 1e-9);
 }
 
+// For 99.5 % of the time nothing differs, or for 98 %.
+TEST_F(TwoFiles, HaveAQuantileOverTime) {
+  for (const double burst_s : {0.01, 0.2}) {
+    FlowDifferenceGauge gauge;
+    gauge.begin_run(0.0);
+    gauge.play_sliced(move(2.0, 2.0, 10.0));
+    gauge.play_written(move(2.0, 2.0, 5.0));
+    gauge.play_written(move(3.0, 3.0, burst_s));
+    gauge.play_written(move(2.0, 2.0, 5.0 - burst_s));
+    gauge.end_run();
+    ASSERT_TRUE(gauge.stats());
+    EXPECT_NEAR(gauge.stats()->relative, 0.5, 1e-9);
+    EXPECT_NEAR(gauge.stats()->p99, burst_s < 0.1 ? 0.0 : 0.5, 0.005);
+  }
+}
+
 TEST_F(TwoFiles, StartAfreshInEachRun) {
   gauge_.begin_run(0.0);
   sliced(move(2.0, 2.0, 0.1));
@@ -319,8 +335,8 @@ TEST_F(RandomFiles, DifferAlikeInWhateverOrderTheyAreRead) {
       }
     }
     gauge.end_run();
-    ASSERT_TRUE(gauge.largest());
-    found.push_back(*gauge.largest());
+    ASSERT_TRUE(gauge.stats());
+    found.push_back(*gauge.stats());
   }
   for (const FlowDifference& each : found) {
     EXPECT_EQ(each.relative, found.front().relative);

@@ -67,11 +67,12 @@ struct FlowRow {
   std::size_t max_change_line = 0;
 };
 
-// Where the output lays filament at the most different rate from the sliced file, as means over 10
-// ms of laying.
+// How much the output's rate of filament differs from the sliced file's, as means over 10 ms of
+// laying.
 struct FlowDifferenceRow {
-  double relative = 0.0;  // by how much the output lays more, relative to the sliced file
-  std::size_t line = 0;   // of the input
+  double relative = 0.0;  // by how much the output lays more, where the two differ most
+  std::size_t line = 0;   // of the input, there
+  double p99 = 0.0;       // what it stays within, either way, for 99 % of the time
 };
 
 // A run that kept its original moves, and why.

@@ -111,11 +111,13 @@ struct FlowStats {
   std::size_t max_change_line = 0;
 };
 
-// Where the output lays filament at the most different rate from the sliced file, by the means of
-// both over 10 ms in which the sliced file lays filament all the time.
+// How much the output's rate of filament differs from the sliced file's at the same time, by the
+// means of both over 10 ms in which the sliced file lays filament all the time.
 struct FlowDifference {
-  double relative = 0.0;  // by how much the output lays more, relative to the sliced file
-  std::size_t line = 0;   // of the sliced file, in the middle of the 10 ms
+  // By how much the output lays more, relative to the sliced file, where the two differ most.
+  double relative = 0.0;
+  std::size_t line = 0;  // of the sliced file, in the middle of these 10 ms
+  double p99 = 0.0;      // what it stays within, either way, for 99 % of the time
 };
 
 // A place where the output asks for more flow than Rules::max_flow_mm3_s and than the sliced file
