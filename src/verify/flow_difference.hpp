@@ -43,7 +43,7 @@ class FlowDifferenceGauge {
   // the rest of it.
   void end_run();
 
-  // Of all runs so far; nullopt if no window was compared.
+  // Covers all runs so far; nullopt if no window was compared.
   [[nodiscard]] std::optional<FlowDifference> stats() const;
 
  private:
