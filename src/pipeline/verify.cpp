@@ -168,6 +168,11 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
   report.free_timing.speed_max_line = verified.compensated_feed.max_line;
   report.uncompensated_flow = row(verified.uncompensated_flow);
   report.compensated_flow = row(verified.compensated_flow);
+  if (verified.flow_difference) {
+    report.flow_difference =
+        report::FlowDifferenceRow{verified.flow_difference->relative,
+                                  verified.flow_difference->line, verified.flow_difference->p99};
+  }
   if (verified.too_much_flow && report.max_flow_mm3_s) {
     report.warnings.push_back(
         too_much_text(*verified.too_much_flow, *report.max_flow_mm3_s, report.output));

@@ -224,6 +224,9 @@ Json facts_json(const Report& r) {
           asked.max_change_mm3_s2, flow.max_change_line, asked.max_change_line,
           r.max_flow_mm3_s ? fmt::format("; the hotend melts {:.1f} mm³/s", *r.max_flow_mm3_s)
                            : std::string{}));
+  if (r.flow_difference) {
+    add("Rate of filament beside the sliced file", flow_difference_text(*r.flow_difference));
+  }
   if (!r.step_rates.motors.empty()) {
     add("Step rates", step_rates_list(r.step_rates, /*has_output=*/true));
   }

@@ -247,7 +247,15 @@ void add_output(const Report& r, Json& json) {
         {"most_factor", fitted.most_factor},   {"end_mm", fitted.end_mm}};
   }
   json["flow"] = {{"uncompensated", flow_json(r.uncompensated_flow)},
-                  {"compensated", flow_json(r.compensated_flow)}};
+                  {"compensated", flow_json(r.compensated_flow)},
+                  {"largest_difference", nullptr},
+                  {"largest_difference_line", nullptr},
+                  {"difference_p99", nullptr}};
+  if (r.flow_difference) {
+    json["flow"]["largest_difference"] = r.flow_difference->relative;
+    json["flow"]["largest_difference_line"] = r.flow_difference->line;
+    json["flow"]["difference_p99"] = r.flow_difference->p99;
+  }
   json["step_rates"] = step_rates_json(r.step_rates, /*has_output=*/true);
   json["temperature"] = temperature_json(r.temperature);
   json["performance"] = {{"wall_s", r.wall_s},

@@ -263,6 +263,9 @@ void write_output(Sink out, const Report& r) {
       out, "              laid {} → {} µm RMS ahead of the nozzle or behind, {} → {} µm at most\n",
       micrometres_text(r.uncompensated_lag.rms_mm), micrometres_text(r.compensated_lag.rms_mm),
       micrometres_text(r.uncompensated_lag.max_mm), micrometres_text(r.compensated_lag.max_mm));
+  if (r.flow_difference) {
+    fmt::format_to(out, "              {}\n", flow_difference_text(*r.flow_difference));
+  }
   if (r.fitted_filament) {
     const Report::FittedFilament& fitted = *r.fitted_filament;
     fmt::format_to(out,
@@ -285,6 +288,13 @@ std::string micrometres_text(double mm) {
     return fmt::format("{:.0f}", um);
   }
   return um >= 10.0 ? fmt::format("{:.1f}", um) : fmt::format("{:.2f}", um);
+}
+
+std::string flow_difference_text(const FlowDifferenceRow& difference) {
+  return fmt::format(
+      "at most {:.1f} % {} than as sliced over 10 ms, near line {}; {:.1f} for 99 % of the time",
+      100.0 * std::abs(difference.relative), difference.relative < 0.0 ? "less" : "more",
+      difference.line, 100.0 * difference.p99);
 }
 
 std::string times_text(double times) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "filament_ledger.hpp"
+#include "flow_difference.hpp"
 #include "flow_gauge.hpp"
 #include "line_check.hpp"
 #include "nozzles.hpp"
@@ -138,6 +139,7 @@ class Verifier {
   FilamentLedger filament_;
   FlowGauge input_flow_;
   FlowGauge output_flow_;
+  FlowDifferenceGauge flow_difference_;  // of compensated runs in the timing as sliced
   StepGauge input_steps_;
   StepGauge output_steps_;
   StepGauge run_steps_;  // of the compensated run

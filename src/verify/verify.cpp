@@ -145,7 +145,14 @@ bool Verifier::next_resting_move(planner::PlannedMove& move) {
 
 // The next move of run_path_.
 bool Verifier::next_reference_move(ReferenceMove& move) {
-  return has_free_timing() ? progress_timing_.next(move) : next_resting_move(move.move);
+  if (has_free_timing()) {
+    return progress_timing_.next(move);
+  }
+  if (!next_resting_move(move.move)) {
+    return false;
+  }
+  flow_difference_.play_sliced(move.move);
+  return true;
 }
 
 // The next sliced move of a run whose timing is free, for one of the two that ask for it.
@@ -214,6 +221,7 @@ void Verifier::begin_section(bool compensated) {
       resting_path_.rest(kApart_s);
     } else {
       run_lead_in_s_ = output_.section().lead_in_s + planner::wait_s(output_.front(), rules_.fixed);
+      flow_difference_.begin_run(run_lead_in_s_);
     }
     run_path_.begin_section(run_lead_in_s_);
     run_first_ = run_next_ = run_path_.end();
@@ -382,6 +390,9 @@ void Verifier::play(const planner::PlannedMove& move) {
   totals_.emitted_time_s += move.duration_s();
   totals_.output_extrusion_mm += move.segment.delta(gcode::E);
   output_flow_.play(move);
+  if (compensated && !has_free_timing()) {
+    flow_difference_.play_written(move);
+  }
   output_steps_.play(move);
   output_excursion_.add(move.segment);
   if (too_much_line_ == 0 && move.segment.too_much_filament) {
@@ -462,6 +473,9 @@ void Verifier::end_section() {
       kept_path_->extend_to(kept_path_->end_s());
     }
     let_kept_follow(std::numeric_limits<double>::infinity());
+    if (!has_free_timing()) {
+      flow_difference_.end_run();
+    }
   }
   finish_reference();
   check_flow();
@@ -552,6 +566,7 @@ VerifyReport Verifier::report() {
   report.compensated_corners = emitted_.main().corners();
   report.uncompensated_flow = input_flow_.stats();
   report.compensated_flow = output_flow_.stats();
+  report.flow_difference = flow_difference_.stats();
   report.sliced_steps = input_steps_.largest();
   report.emitted_steps = output_steps_.largest();
   report.sliced_step_breaches = input_steps_.breaches();

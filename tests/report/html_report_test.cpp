@@ -98,6 +98,13 @@ TEST(HtmlReport, SaysWhatTheHotendIsAskedFor) {
   EXPECT_THAT(to_html(report), HasSubstr(asked + "\""));
 }
 
+TEST(HtmlReport, SaysWhetherTheFilamentComesFasterThanAsSliced) {
+  Report report = recorded_report();
+  EXPECT_THAT(to_html(report), HasSubstr("at most 12.5 % less than as sliced over 10 ms"));
+  report.flow_difference = std::nullopt;
+  EXPECT_THAT(to_html(report), Not(HasSubstr("Rate of filament")));
+}
+
 TEST(HtmlReport, SaysWhatBecameOfFilamentAndHowFastMotorsStep) {
   Report report = recorded_report();
   EXPECT_THAT(to_html(report),

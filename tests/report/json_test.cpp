@@ -125,6 +125,18 @@ TEST(JsonReport, SaysWhatTheHotendIsAskedFor) {
                                                  {"max_line", 811},
                                                  {"max_change_mm3_s2", 500.0},
                                                  {"max_change_line", 812}}));
+  EXPECT_EQ(flow["largest_difference"], -0.125);
+  EXPECT_EQ(flow["largest_difference_line"], 813);
+  EXPECT_EQ(flow["difference_p99"], 0.0625);
+}
+
+TEST(JsonReport, HasNoDifferenceOfFlowsThatWereNotCompared) {
+  Report report = sample_report();
+  report.flow_difference = std::nullopt;
+  const nlohmann::json flow = parsed(report)["flow"];
+  EXPECT_TRUE(flow.at("largest_difference").is_null());
+  EXPECT_TRUE(flow.at("largest_difference_line").is_null());
+  EXPECT_TRUE(flow.at("difference_p99").is_null());
 }
 
 TEST(JsonReport, SaysHowRobustTheOutputIs) {

@@ -117,6 +117,7 @@ inline Report sample_report() {
   r.fitted_filament = {100.0, 110.5, 240.5, 1.1, 1.12, 108.5};
   r.uncompensated_flow = {10.5, 710, 400.0, 711};
   r.compensated_flow = {12.4, 811, 500.0, 812};
+  r.flow_difference = FlowDifferenceRow{-0.125, 813, 0.0625};
   r.max_flow_mm3_s = 15.0;
   r.step_rates = {{{"X", 80.0, 24000.0, 30, 31200.0, 812}, {"E", 500.0, 1250.0, 40, 1300.0, 0}},
                   {"", 0.0, 25000.0, 30, 32000.0, 812},

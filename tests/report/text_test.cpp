@@ -75,6 +75,8 @@ TEST(Summary, IsExactlyThis) {
       "the first at line 70\n"
       "filament      1234.50 mm in, 1234.75 mm out\n"
       "              laid 60.0 → 4.50 µm RMS ahead of the nozzle or behind, 500 → 35.0 µm at most\n"
+      "              at most 12.5 % less than as sliced over 10 ms, near line 813; 6.2 for 99 % of "
+      "the time\n"
       "              fitted before: 100.00 mm of moves that print became 110.50, 240.5 mm³ of "
       "material\n"
       "flow          10.5 → 12.4 mm³/s at most; the hotend melts 15.0\n"
@@ -135,6 +137,14 @@ TEST(Summary, DoesNotSpeakOfCornersWhereThereAreNone) {
   Report report = sample_report();
   report.uncompensated_corners = report.compensated_corners = {};
   EXPECT_THAT(to_text(report), Not(HasSubstr("corners")));
+}
+
+TEST(Summary, SaysWhetherTheFilamentComesFasterThanAsSliced) {
+  Report report = sample_report();
+  report.flow_difference->relative = 0.031;
+  EXPECT_THAT(to_text(report), HasSubstr("at most 3.1 % more than as sliced over 10 ms, near "));
+  report.flow_difference = std::nullopt;
+  EXPECT_THAT(to_text(report), Not(HasSubstr("as sliced over")));
 }
 
 TEST(Summary, SpeaksOfTheFlowOnlyWhereItRisesOrIsLimited) {

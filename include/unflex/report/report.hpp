@@ -68,6 +68,14 @@ struct FlowRow {
   std::size_t max_change_line = 0;
 };
 
+// How much the output's rate of filament differs from the sliced file's, as means over 10 ms of
+// laying.
+struct FlowDifferenceRow {
+  double relative = 0.0;  // by how much the output lays more, where the two differ most
+  std::size_t line = 0;   // of the input, there
+  double p99 = 0.0;       // what it stays within, either way, for 99 % of the time
+};
+
 // A run that kept its original moves, and why.
 struct Fallback {
   std::size_t first_line = 0;
@@ -267,6 +275,7 @@ struct Report {
   std::optional<FittedFilament> fitted_filament;
   FlowRow uncompensated_flow;
   FlowRow compensated_flow;
+  std::optional<FlowDifferenceRow> flow_difference;  // nullopt if nothing was compared
   StepRates step_rates;
   std::optional<Temperature> temperature;  // if the settings have a model of the hotend
   std::optional<double> max_flow_mm3_s;  // what the hotend melts, if the settings say so

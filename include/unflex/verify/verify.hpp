@@ -113,6 +113,15 @@ struct FlowStats {
   std::size_t max_change_line = 0;
 };
 
+// How much the output's rate of filament differs from the sliced file's at the same time, by the
+// means of both over 10 ms in which the sliced file lays filament all the time.
+struct FlowDifference {
+  // By how much the output lays more, relative to the sliced file, where the two differ most.
+  double relative = 0.0;
+  std::size_t line = 0;  // of the sliced file, in the middle of these 10 ms
+  double p99 = 0.0;      // what it stays within, either way, for 99 % of the time
+};
+
 // A place where the output asks for more flow than Rules::max_flow_mm3_s and than the sliced file
 // does in the same section, by more than 1 % each.
 struct TooMuchFlow {
@@ -155,8 +164,11 @@ struct VerifyReport {
   FlowStats uncompensated_flow;
   FlowStats compensated_flow;
   std::optional<TooMuchFlow> too_much_flow;  // where the flow is largest
-  StepRates sliced_steps;                    // lines of the sliced file
-  StepRates emitted_steps;                   // lines of the output
+  // Compensated runs in the timing as sliced, each against its own plan as in `compensated`.
+  // nullopt if none lays filament for 10 ms.
+  std::optional<FlowDifference> flow_difference;
+  StepRates sliced_steps;   // lines of the sliced file
+  StepRates emitted_steps;  // lines of the output
   std::vector<StepBreach> sliced_step_breaches;
   // Longest lag or lead of the nozzle against the plan of its run, averaged over 0.1 s.
   double worst_run_drift_s = 0.0;
