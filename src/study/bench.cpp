@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "contour.hpp"
 #include "gauge.hpp"
@@ -52,7 +54,9 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
   if (!base && base.error().kind == ErrorKind::internal) {
     // No solution: `compensate` would keep such a run as it is.
     result.failed_runs = 1;
+    std::string reason = "uncompensated, as there is no solution: " + base.error().message;
     base = base_by(Method::uncompensated, run, setup, engine);
+    base->remark = std::move(reason);
   }
   if (!base) {
     result.remark = base.error().message;

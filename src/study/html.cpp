@@ -141,7 +141,8 @@ report::Plot sensitivity_plot(const CaseResult& result) {
                             Shown{Method::mzv, "--series-4", Stroke::dashed},
                             Shown{Method::zvd, "--series-5", Stroke::dotted},
                             Shown{Method::thesis_least_squares, "--series-6", Stroke::dashed},
-                            Shown{Method::unflex_4x, "--after", Stroke::solid}}) {
+                            Shown{Method::unflex_4x, "--after", Stroke::solid},
+                            Shown{Method::unflex_band_4x, "--after", Stroke::dotted}}) {
     const MethodResult& method = by(result, line.method);
     if (!method.used) {
       continue;

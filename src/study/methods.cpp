@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "built_shaper.hpp"
 #include "unflex/compensate/second_stage.hpp"
@@ -52,9 +53,8 @@ rivals::AxisPath spline(const rivals::AxisPath& reference, const dynamics::Flexi
                                  {knot_s, kSplineEndKnots * knot_s, kSplineEndKnots * knot_s});
 }
 
-Result<BaseMotion> limited_base(double multiple, const Moves& plan, const BenchSetup& bench,
-                                const compensate::Engine& engine) {
-  compensate::Setup setup = bench.unflex;
+Result<BaseMotion> limited_base(double multiple, compensate::Setup setup, const Moves& plan,
+                                const BenchSetup& bench, const compensate::Engine& engine) {
   setup.x.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   return unflex_base(setup, plan, bench.parts, engine);
@@ -124,6 +124,8 @@ std::string_view name(Method method) {
       return "unflex 4×";
     case Method::unflex_10x:
       return "unflex 10×";
+    case Method::unflex_band_4x:
+      return "unflex 4×, ±10 %";
     case Method::first_stage_4x:
       return "unflex 4×, first stage";
     default:
@@ -160,16 +162,18 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
         return rivals::thesis_velocity_defects(reference, axis, setup.thesis_period_s);
       });
     case Method::unflex_2x:
-      return limited_base(2.0, run.plan, setup, engine);
+      return limited_base(2.0, setup.unflex, run.plan, setup, engine);
     case Method::unflex_4x:
-      return limited_base(4.0, run.plan, setup, engine);
+      return limited_base(4.0, setup.unflex, run.plan, setup, engine);
     case Method::unflex_10x:
-      return limited_base(10.0, run.plan, setup, engine);
+      return limited_base(10.0, setup.unflex, run.plan, setup, engine);
+    case Method::unflex_band_4x:
+      return limited_base(4.0, setup.unflex_band, run.plan, setup, engine);
     case Method::first_stage_4x: {
-      BenchSetup first = setup;
-      first.unflex.x.pulses.clear();
-      first.unflex.y.pulses.clear();
-      return limited_base(4.0, run.plan, first, engine);
+      compensate::Setup first = setup.unflex;
+      first.x.pulses.clear();
+      first.y.pulses.clear();
+      return limited_base(4.0, std::move(first), run.plan, setup, engine);
     }
     default:
       return both_axes(run.plan, setup.unflex,

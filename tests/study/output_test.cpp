@@ -88,8 +88,8 @@ TEST(StudyJson, SaysWhyAMethodIsNotUsed) {
 TEST(StudyHtml, HasFiveFiguresForEveryMethodThatIsUsed) {
   const std::string html = to_html(outcome());
   // 2B has no shapers; one more plot shows the sensitivity.
-  EXPECT_EQ(count(html, "<div data-figures="), 15U + 9U);
-  EXPECT_EQ(count(html, "<svg class=\"plot\""), 5U * (15U + 9U) + 1U);
+  EXPECT_EQ(count(html, "<div data-figures="), 16U + 10U);
+  EXPECT_EQ(count(html, "<svg class=\"plot\""), 5U * (16U + 10U) + 1U);
   EXPECT_EQ(count(html, "<div data-figures=\"ref 13\">"), 1U);  // shown at first
   EXPECT_THAT(html, Not(HasSubstr("nan")));
   EXPECT_THAT(html, Not(HasSubstr("http://")));
