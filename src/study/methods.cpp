@@ -34,20 +34,23 @@ Result<BaseMotion> shaped_base(dynamics::ShaperKind kind, const Moves& plan,
     return tl::unexpected(x ? y.error() : x.error());
   }
   return BaseMotion{rivals::shaped(rivals::reference_path(plan, gcode::X), x->pulses),
-                    rivals::shaped(rivals::reference_path(plan, gcode::Y), y->pulses), 0,
+                    rivals::shaped(rivals::reference_path(plan, gcode::Y), y->pulses),
+                    {},
+                    0,
                     x->remark.empty() ? y->remark : x->remark};
 }
 
-// Makes the base of both axes by a function of an axis's reference and dynamics.
+// Makes the base of both axes by a function of an axis's reference and dynamics that solves
+// something.
 template <class Make>
 BaseMotion both_axes(const Moves& plan, const compensate::Setup& setup, const Make& make) {
-  return {make(rivals::reference_path(plan, gcode::X), setup.x.axis),
-          make(rivals::reference_path(plan, gcode::Y), setup.y.axis),
-          0,
-          {}};
+  rivals::SolvedPath x = make(rivals::reference_path(plan, gcode::X), setup.x.axis);
+  rivals::SolvedPath y = make(rivals::reference_path(plan, gcode::Y), setup.y.axis);
+  x.size.add(y.size);
+  return {std::move(x.path), std::move(y.path), x.size, x.iterations + y.iterations};
 }
 
-rivals::AxisPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
+rivals::SolvedPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
   const double knot_s = 2.0 * std::numbers::pi / axis.main_rad_s() / kKnotsPerPeriod;
   return rivals::filtered_spline(reference, axis,
                                  {knot_s, kSplineEndKnots * knot_s, kSplineEndKnots * knot_s});
@@ -86,7 +89,10 @@ Result<BaseMotion> unflex_base(const compensate::Setup& setup, const Moves& plan
     if (!of_x || !of_y) {
       return tl::unexpected(of_x ? of_y.error() : of_x.error());
     }
-    result.iterations += of_x->iterations + of_y->iterations;
+    for (const compensate::AxisSolution* const of : {&*of_x, &*of_y}) {
+      result.size.add(of->size);
+      result.iterations += of->iterations;
+    }
     x.push_back(std::move(of_x->base));
     y.push_back(std::move(of_y->base));
   }
@@ -140,16 +146,13 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
   }
   switch (method) {
     case Method::s_curve:
-      return BaseMotion{
-          rivals::s_curve(run.plan, gcode::X), rivals::s_curve(run.plan, gcode::Y), 0, {}};
+      return BaseMotion{rivals::s_curve(run.plan, gcode::X), rivals::s_curve(run.plan, gcode::Y)};
     case Method::slow_s_curve:
       if (run.slow_plan.empty()) {
         return fail(ErrorKind::input, "needs a plan of its own");
       }
       return BaseMotion{rivals::s_curve(run.slow_plan, gcode::X),
-                        rivals::s_curve(run.slow_plan, gcode::Y),
-                        0,
-                        {}};
+                        rivals::s_curve(run.slow_plan, gcode::Y)};
     case Method::filtered_spline:
       return both_axes(run.plan, setup.unflex, &spline);
     case Method::thesis_least_squares:
@@ -176,8 +179,8 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
       return limited_base(4.0, std::move(first), run.plan, setup, engine);
     }
     default:
-      return both_axes(run.plan, setup.unflex,
-                       [](const auto& reference, const auto& /*axis*/) { return reference; });
+      return BaseMotion{rivals::reference_path(run.plan, gcode::X),
+                        rivals::reference_path(run.plan, gcode::Y)};
   }
 }
 

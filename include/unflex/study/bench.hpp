@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unflex/compensate/run.hpp"
+#include "unflex/core/problem_size.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/rivals/axis_path.hpp"
 #include "unflex/verify/corners.hpp"
@@ -89,8 +90,9 @@ struct Run {
 struct BaseMotion {
   rivals::AxisPath x;
   rivals::AxisPath y;
-  int iterations = 0;  // iterations of unflex' engine
-  std::string remark;
+  ProblemSize size = {};  // of both axes
+  int iterations = 0;     // systems of equations solved for both axes
+  std::string remark = {};
 };
 
 // How far the nozzle passes from corners of the path (unflex/verify/corners.hpp), over several
@@ -135,7 +137,9 @@ struct MethodResult {
   rivals::PeakMotion base_peak;  // of the axis with the larger one
   double end_gap_mm = 0.0;  // distance from the target at which the base comes to rest, larger axis
   double longer_s = 0.0;    // how much later than the plan the base comes to rest
+  ProblemSize size;         // of both axes; as BaseMotion
   int iterations = 0;
+  double base_s = 0.0;          // wall time in which the base was made
   std::size_t failed_runs = 0;  // runs without a solution; measured uncompensated
   Trace trace;                  // at the exact frequency; empty unless asked for
 };
