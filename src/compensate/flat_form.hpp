@@ -78,6 +78,9 @@ class FlatForm {
   void save() { saved_ = c_; }
   void restore() { c_ = saved_; }
 
+  // There are no equations between the unknowns.
+  [[nodiscard]] ProblemSize size() const { return {last_ - first_ + 1, 0}; }
+
   void write(dynamics::AxisTrajectory& base);
   // p of the only model at the nodes.
   void write_nozzles(std::vector<std::vector<double>>& nozzles_mm);

@@ -34,6 +34,7 @@ template <class Form>
   solution.iterations = 1;
   solution.objective =
       2.0 * form.half_cost() * scaled.unit[0] * scaled.unit[0] * scaled.window->period_s;
+  solution.size = form.size();
   form.write(solution.base);
   return solution;
 }

@@ -44,6 +44,8 @@ class IpoptEngine final : public Engine {
     }
     AxisSolution result;
     result.iterations = solution->iterations;
+    result.size = {program->variable_bounds().lower.size(),
+                   program->constraint_bounds().lower.size()};
     result.objective = solution->objective * kLengthUnitMm * kLengthUnitMm * window.period_s;
     result.base.position_mm.resize(n);
     result.base.velocity_mm_s.resize(n);

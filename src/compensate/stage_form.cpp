@@ -314,6 +314,12 @@ void StageForm::split_rows(const std::vector<double>& states, const Padded& inpu
   }
 }
 
+ProblemSize StageForm::size() const {
+  const std::size_t at_end = window_->end_base ? 2 : 0;
+  const std::size_t at_start = size_ - static_cast<std::size_t>(start_basis_.cols());
+  return {nodes_ * size_ + nodes_ - 1, (nodes_ - 1) * size_ + at_start + at_end};
+}
+
 bool StageForm::prescribed(std::size_t k) const {
   return window_->end_base.has_value() && k + 3 >= nodes_;
 }

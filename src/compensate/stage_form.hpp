@@ -74,6 +74,9 @@ class StageForm {
   void save();
   void restore();
 
+  // States and inputs, the steps from node to node, and what is given at the ends.
+  [[nodiscard]] ProblemSize size() const;
+
   void write(dynamics::AxisTrajectory& base) const;
   // p of each model at the nodes.
   void write_nozzles(std::vector<std::vector<double>>& nozzles_mm) const;

@@ -258,11 +258,12 @@ FlexibleAxis FlexibleAxis::followed_by(double omega_rad_s, double zeta) const {
   return axis;
 }
 
-FlexibleAxis FlexibleAxis::detuned(double factor) const {
+FlexibleAxis FlexibleAxis::detuned(double freq_factor, double damping_factor) const {
   FlexibleAxis axis = *this;
   for (Mode& mode : axis.modes_) {
-    mode.omega_rad_s *= factor;
-    mode.lead_s /= factor;
+    mode.omega_rad_s *= freq_factor;
+    mode.zeta *= damping_factor;
+    mode.lead_s /= freq_factor;
   }
   return axis;
 }

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <optional>
 #include <utility>
 
 #include "step_rates.hpp"
+#include "unflex/compensate/band.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
@@ -73,22 +75,17 @@ timing::MoveBounds bounds_as_sliced(const planner::PlannedMove& move) {
 
 static_assert(machine::kMostModes == dynamics::kMostModes);
 
-dynamics::FlexibleAxis axis(const std::vector<machine::ModeSettings>& settings,
-                            double freq_factor = 1.0, double damping_factor = 1.0) {
+dynamics::FlexibleAxis axis(const std::vector<machine::ModeSettings>& settings) {
   std::vector<dynamics::Mode> modes;
   for (const machine::ModeSettings& mode : settings) {
-    modes.push_back({2.0 * std::numbers::pi * mode.freq_hz * freq_factor,
-                     mode.damping_ratio * damping_factor, mode.gain});
+    modes.push_back({2.0 * std::numbers::pi * mode.freq_hz, mode.damping_ratio, mode.gain});
   }
   return dynamics::FlexibleAxis(modes);
 }
 
-// The axis with its frequencies and damping ratios times these factors.
-dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics, double freq_factor = 1.0,
-                            double damping_factor = 1.0) {
-  return dynamics.modes.empty() ? dynamics::from_frequency(dynamics.freq_hz * freq_factor,
-                                                           dynamics.damping_ratio * damping_factor)
-                                : axis(dynamics.modes, freq_factor, damping_factor);
+dynamics::FlexibleAxis axis(const machine::AxisDynamics& dynamics) {
+  return dynamics.modes.empty() ? dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio)
+                                : axis(dynamics.modes);
 }
 
 // The axis with the second mode behind it, if there is one.
@@ -126,71 +123,25 @@ double planned_base_accel(const machine::Settings& settings, double asked_mm_s2)
 
 // The longest pause for a swing to die away.
 constexpr double kLongestCalm_s = 0.5;
-// The weight of the middle of the band of an axis; its edges have the rest.
-constexpr double kMiddleShare = 1.0 / 3.0;
-
-// The edges of the band that the axis may be in; empty if there is no such band.
-std::vector<compensate::Plant> edges(const machine::AxisDynamics& dynamics,
-                                     const machine::Settings& settings) {
-  const double freq_error = settings.freq_error();
-  const double damping_error = settings.dynamics_error.damping;
-  std::vector<compensate::Plant> result;
-  if (freq_error <= 0.0 && damping_error <= 0.0) {
-    return result;
-  }
-  const auto add = [&](double freq_factor, double damping_factor) {
-    result.push_back({axis(dynamics, freq_factor, damping_factor)});
-  };
-  for (const double sign : {-1.0, 1.0}) {
-    if (freq_error > 0.0 && damping_error > 0.0) {
-      add(1.0 + sign * freq_error, 1.0 - damping_error);
-      add(1.0 + sign * freq_error, 1.0 + damping_error);
-    } else {
-      add(1.0 + sign * freq_error, 1.0 + sign * damping_error);
-    }
-  }
-  return result;
-}
-
-// Most axes have a second mode that whoever gives one frequency does not know. A base that suits
-// this one, too, does not move at such frequencies more than it must.
-compensate::Plant with_unknown_mode(const machine::AxisDynamics& dynamics) {
-  constexpr double kTimesFaster = 2.4;
-  constexpr double kGain = 0.2;
-  constexpr double kShare = 0.04;
-  const std::vector<machine::ModeSettings> modes = {
-      {dynamics.freq_hz, dynamics.damping_ratio, 1.0 - kGain},
-      {kTimesFaster * dynamics.freq_hz, dynamics.damping_ratio, kGain}};
-  return {axis(modes), kShare};
-}
 
 // All models that the axis may have besides the one it is given as: the plants of the settings or
 // a mode that nobody knows of, and the edges of the band around that one, which share with it what
 // the others leave.
 std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
                                       const machine::Settings& settings) {
+  const compensate::Band band{settings.freq_error(), settings.dynamics_error.damping};
+  const dynamics::FlexibleAxis given = axis(dynamics);
   std::vector<compensate::Plant> result;
   double left = 1.0;
   for (const machine::PlantSettings& plant : dynamics.plants) {
     result.push_back({axis(plant.modes), plant.share});
     left -= plant.share;
   }
-  std::vector<compensate::Plant> band = edges(dynamics, settings);
-  if (!band.empty() && dynamics.plants.empty() && dynamics.modes.empty()) {
-    result.push_back(with_unknown_mode(dynamics));
+  if (!band.is_exact() && dynamics.plants.empty() && dynamics.modes.empty()) {
+    result.push_back(compensate::with_unknown_mode(given));
     left -= result.back().share;
   }
-  // The slower an axis, the farther it strays for the same error of its frequency. With shares as
-  // 1/ω both edges come out nearly alike.
-  double periods = 0.0;
-  for (const compensate::Plant& edge : band) {
-    periods += 1.0 / edge.axis.main_hz();
-  }
-  for (compensate::Plant& edge : band) {
-    edge.share = left * (1.0 - kMiddleShare) / (edge.axis.main_hz() * periods);
-    edge.is_edge = true;
-    result.push_back(edge);
-  }
+  std::ranges::copy(compensate::edges(given, band, left), std::back_inserter(result));
   return result;
 }
 

@@ -11,6 +11,9 @@ namespace {
 study::BenchSetup bench_setup(const machine::Settings& settings) {
   study::BenchSetup setup;
   setup.unflex = compensate_setup(settings);
+  machine::Settings in_band = settings;
+  in_band.dynamics_error.freq = study::kBandError;
+  setup.unflex_band = compensate_setup(in_band);
   if (settings.second.x_freq_hz > 0.0 || settings.second.y_freq_hz > 0.0) {
     setup.two_stage = study::Nozzle{nozzle_x(settings), nozzle_y(settings)};
   }

@@ -141,8 +141,8 @@ AxisPath spline_path(const BasisTable& table, const std::vector<double>& coeffic
 
 }  // namespace
 
-AxisPath filtered_spline(const AxisPath& reference, const dynamics::FlexibleAxis& axis,
-                         const SplineOptions& options) {
+SolvedPath filtered_spline(const AxisPath& reference, const dynamics::FlexibleAxis& axis,
+                           const SplineOptions& options) {
   const double knot_s = options.knot_s;
   const double length_s = options.lead_in_s + end_s(reference) + options.tail_s;
   // The last knot is at the end of the tail.
@@ -166,12 +166,14 @@ AxisPath filtered_spline(const AxisPath& reference, const dynamics::FlexibleAxis
     preview.settle(j, last - first);
   }
   std::vector<double> coefficients;
+  int windows = 0;
   while (coefficients.size() < free) {
     const std::size_t number = coefficients.size();
     const bool final = free - number <= kWindow;
     const std::size_t count = final ? free - number : kWindow;
     const std::size_t end = final ? total * kSamples : (number + kWindow) * kSamples;
     const Eigen::VectorXd solution = preview.solve(number, count, end);
+    ++windows;
     for (std::size_t j = 0; j < (final ? count : kKept); ++j) {
       const double value = solution(static_cast<Eigen::Index>(j));
       preview.settle(number + j, value);
@@ -179,7 +181,9 @@ AxisPath filtered_spline(const AxisPath& reference, const dynamics::FlexibleAxis
     }
   }
   coefficients.resize(total, last);
-  return spline_path(table, coefficients, first, -options.lead_in_s, knot_s);
+  return {spline_path(table, coefficients, first, -options.lead_in_s, knot_s),
+          {free, total * kSamples},
+          windows};
 }
 
 }  // namespace unflex::rivals

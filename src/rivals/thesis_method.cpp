@@ -194,7 +194,10 @@ class LeastSquares {
     }
   }
 
-  [[nodiscard]] Base solve() const {
+  // How many least-squares problems solve() has solved.
+  [[nodiscard]] int iterations() const { return iterations_; }
+
+  [[nodiscard]] Base solve() {
     Eigen::ArrayXd sides = Eigen::ArrayXd::Zero(static_cast<Eigen::Index>(defects_.size()));
     Base base = least_point(active(sides));
     if (keeps(sides, base)) {
@@ -264,7 +267,8 @@ class LeastSquares {
   }
 
   // The least-squares point of the defects and these rows.
-  [[nodiscard]] Base least_point(const JerkRows& jerk_rows) const {
+  [[nodiscard]] Base least_point(const JerkRows& jerk_rows) {
+    ++iterations_;
     using Rows = Eigen::Matrix<double, 6, 5>;
     std::vector<Form> forms(defects_.size());
     // The rows that later intervals leave for (b_{k+1}, v_k, v_{k+1}).
@@ -294,24 +298,31 @@ class LeastSquares {
   double weight_;  // of a row of the jerk in units of its limit
   Form jerk_;      // in these units
   std::vector<Defects> defects_;
+  int iterations_ = 0;
 };
 
 }  // namespace
 
-AxisPath thesis_least_squares(const AxisPath& reference, const dynamics::FlexibleAxis& axis,
-                              double period_s, double max_accel_mm_s2) {
+SolvedPath thesis_least_squares(const AxisPath& reference, const dynamics::FlexibleAxis& axis,
+                                double period_s, double max_accel_mm_s2) {
   const Nodes nodes = sample(reference, period_s);
-  return path_of(nodes, LeastSquares(nodes, axis, max_accel_mm_s2).solve());
+  LeastSquares least_squares(nodes, axis, max_accel_mm_s2);
+  const Base base = least_squares.solve();
+  // Two defects and a jerk for each interval, and the start.
+  return {path_of(nodes, base),
+          {nodes.count(), 3 * (nodes.count() - 1) + 1},
+          least_squares.iterations()};
 }
 
-AxisPath thesis_velocity_defects(const AxisPath& reference, const dynamics::FlexibleAxis& axis,
-                                 double period_s) {
+SolvedPath thesis_velocity_defects(const AxisPath& reference, const dynamics::FlexibleAxis& axis,
+                                   double period_s) {
   const Nodes nodes = sample(reference, period_s);
   std::vector<Form> forms;
   for (std::size_t k = 0; k + 1 < nodes.count(); ++k) {
     forms.push_back(defects(nodes, axis, k).velocity);
   }
-  return path_of(nodes, substitute(nodes, forms));
+  // A defect for each interval, and the start.
+  return {path_of(nodes, substitute(nodes, forms)), {nodes.count(), nodes.count()}, 1};
 }
 
 }  // namespace unflex::rivals

@@ -1,7 +1,10 @@
 #include "unflex/study/bench.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "contour.hpp"
 #include "gauge.hpp"
@@ -48,11 +51,15 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
                      const compensate::Engine& engine) {
   MethodResult result;
   result.method = method;
+  const auto start = std::chrono::steady_clock::now();
   Result<BaseMotion> base = base_by(method, run, setup, engine);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   if (!base && base.error().kind == ErrorKind::internal) {
     // No solution: `compensate` would keep such a run as it is.
     result.failed_runs = 1;
+    std::string reason = "uncompensated, as there is no solution: " + base.error().message;
     base = base_by(Method::uncompensated, run, setup, engine);
+    base->remark = std::move(reason);
   }
   if (!base) {
     result.remark = base.error().message;
@@ -60,7 +67,9 @@ MethodResult try_one(Method method, const Run& run, const BenchSetup& setup,
   }
   result.used = true;
   result.remark = base->remark;
+  result.size = base->size;
   result.iterations = base->iterations;
+  result.base_s = took.count();
   const auto& plan = method == Method::slow_s_curve ? run.slow_plan : run.plan;
   for (std::size_t i = 0; i < kFrequencyErrors.size(); ++i) {
     result.straying[i] = straying(*base, plan, setup, kFrequencyErrors[i]);
@@ -173,7 +182,9 @@ void merge(BenchResult& into, const BenchResult& run) {
     sum.base_peak.accel_mm_s2 = std::max(sum.base_peak.accel_mm_s2, more.base_peak.accel_mm_s2);
     sum.end_gap_mm = std::max(sum.end_gap_mm, more.end_gap_mm);
     sum.longer_s += more.longer_s;
+    sum.size.add(more.size);
     sum.iterations += more.iterations;
+    sum.base_s += more.base_s;
     sum.failed_runs += more.failed_runs;
   }
 }

@@ -119,9 +119,7 @@ Result<std::vector<ChainStep>> coarse_to_fine(const Run& run, const BenchSetup& 
     }
     const BaseMotion base{
         rivals::through_nodes(cold->x.base, -setup.unflex.lead_in_s, period_s, kParts),
-        rivals::through_nodes(cold->y.base, -setup.unflex.lead_in_s, period_s, kParts),
-        0,
-        {}};
+        rivals::through_nodes(cold->y.base, -setup.unflex.lead_in_s, period_s, kParts)};
     step.contour_max_mm = straying(base, run.plan, setup, 0.0).max_mm;
     chain.push_back(step);
     coarse = *cold;

@@ -141,7 +141,8 @@ report::Plot sensitivity_plot(const CaseResult& result) {
                             Shown{Method::mzv, "--series-4", Stroke::dashed},
                             Shown{Method::zvd, "--series-5", Stroke::dotted},
                             Shown{Method::thesis_least_squares, "--series-6", Stroke::dashed},
-                            Shown{Method::unflex_4x, "--after", Stroke::solid}}) {
+                            Shown{Method::unflex_4x, "--after", Stroke::solid},
+                            Shown{Method::unflex_band_4x, "--after", Stroke::dotted}}) {
     const MethodResult& method = by(result, line.method);
     if (!method.used) {
       continue;
@@ -240,6 +241,35 @@ void write_figures(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "</section>\n");
 }
 
+// What the methods that solve something solve, and how long it takes.
+void write_problems(Sink out, const Outcome& outcome) {
+  fmt::format_to(out,
+                 "<section class=\"card\"><h2>How large the problem is</h2><p>{} of both axes, "
+                 "systems of equations solved, and milliseconds in which the base was made. "
+                 "Methods that solve nothing are left out.</p><div class=\"scroll\"><table "
+                 "class=\"data\"><thead><tr><th>method</th>",
+                 report::term("Unknowns/equations",
+                              "The banded engine leaves out all equations where the axis is one "
+                              "model of one mode; limits of the base are not counted"));
+  for (const CaseResult& result : outcome.cases) {
+    fmt::format_to(out, "<th scope=\"col\">{}</th>", report::term(result.name, result.description));
+  }
+  fmt::format_to(out, "</tr></thead><tbody>\n");
+  for (std::size_t i = 0; i < outcome.cases.front().methods.size(); ++i) {
+    if (outcome.cases.front().methods[i].size.unknowns == 0) {
+      continue;
+    }
+    write_row_start(out, static_cast<Method>(i));
+    for (const CaseResult& result : outcome.cases) {
+      const MethodResult& method = result.methods[i];
+      fmt::format_to(out, "<td>{}/{}<br>{}<br>{} ms</td>", method.size.unknowns,
+                     method.size.equations, method.iterations, milliseconds_text(method.base_s));
+    }
+    fmt::format_to(out, "</tr>\n");
+  }
+  fmt::format_to(out, "</tbody></table></div></section>\n");
+}
+
 void write_chains(Sink out, const Outcome& outcome) {
   if (outcome.chains.empty()) {
     return;
@@ -275,6 +305,7 @@ std::string to_html(const Outcome& outcome) {
   write_gaps(out, outcome);
   write_depth(out, outcome.cases.front());
   write_figures(out, outcome);
+  write_problems(out, outcome);
   write_chains(out, outcome);
   write_warnings(out, outcome.warnings);
   write_settings(out, {{"unflex", outcome.version}, {"engine", outcome.engine}}, outcome.printer);

@@ -31,6 +31,9 @@ Json method_json(const MethodResult& method) {
                   {"max_accel_mm_s2", method.base_peak.accel_mm_s2},
                   {"end_gap_mm", method.end_gap_mm}};
   json["longer_s"] = method.longer_s;
+  const bool solves = method.size.unknowns > 0;
+  json["unknowns"] = solves ? Json(method.size.unknowns) : Json(nullptr);
+  json["equations"] = solves ? Json(method.size.equations) : Json(nullptr);
   json["iterations"] = method.iterations;
   json["failed_runs"] = method.failed_runs;
   return json;
@@ -63,6 +66,14 @@ Json chain_json(const ChainResult& chain) {
 
 // All that differs from one run of the program to the next.
 Json performance_json(const Outcome& outcome) {
+  Json cases = Json::array();
+  for (const CaseResult& result : outcome.cases) {
+    Json base_ms = Json::array();
+    for (const MethodResult& method : result.methods) {
+      base_ms.push_back(method.used ? Json(method.base_s * 1e3) : Json(nullptr));
+    }
+    cases.push_back({{"case", result.name}, {"base_ms", base_ms}});
+  }
   Json chains = Json::array();
   for (const ChainResult& chain : outcome.chains) {
     Json cold = Json::array();
@@ -73,7 +84,7 @@ Json performance_json(const Outcome& outcome) {
     }
     chains.push_back({{"cold_ms", cold}, {"warm_ms", warm}});
   }
-  return {{"wall_s", outcome.wall_s}, {"coarse_to_fine", chains}};
+  return {{"wall_s", outcome.wall_s}, {"cases", cases}, {"coarse_to_fine", chains}};
 }
 
 }  // namespace

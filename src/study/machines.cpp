@@ -191,9 +191,7 @@ void MachineBench::add(const std::vector<Run>& runs) {
     for (std::size_t c = 0; c < kContenderCount; ++c) {
       const auto contender = static_cast<Contender>(c);
       BaseMotion base{shaped(contender, machine_.x.shapers, x),
-                      shaped(contender, machine_.y.shapers, y),
-                      0,
-                      {}};
+                      shaped(contender, machine_.y.shapers, y)};
       if (contender == Contender::unflex) {
         Result<BaseMotion> solved = unflex_base(machine_.unflex, run.plan, kPrintParts, *engine);
         results[i].failed = !solved;

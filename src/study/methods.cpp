@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "built_shaper.hpp"
 #include "unflex/compensate/second_stage.hpp"
@@ -33,28 +34,30 @@ Result<BaseMotion> shaped_base(dynamics::ShaperKind kind, const Moves& plan,
     return tl::unexpected(x ? y.error() : x.error());
   }
   return BaseMotion{rivals::shaped(rivals::reference_path(plan, gcode::X), x->pulses),
-                    rivals::shaped(rivals::reference_path(plan, gcode::Y), y->pulses), 0,
+                    rivals::shaped(rivals::reference_path(plan, gcode::Y), y->pulses),
+                    {},
+                    0,
                     x->remark.empty() ? y->remark : x->remark};
 }
 
-// Makes the base of both axes by a function of an axis's reference and dynamics.
+// Makes the base of both axes by a function of an axis's reference and dynamics that solves
+// something.
 template <class Make>
 BaseMotion both_axes(const Moves& plan, const compensate::Setup& setup, const Make& make) {
-  return {make(rivals::reference_path(plan, gcode::X), setup.x.axis),
-          make(rivals::reference_path(plan, gcode::Y), setup.y.axis),
-          0,
-          {}};
+  rivals::SolvedPath x = make(rivals::reference_path(plan, gcode::X), setup.x.axis);
+  rivals::SolvedPath y = make(rivals::reference_path(plan, gcode::Y), setup.y.axis);
+  x.size.add(y.size);
+  return {std::move(x.path), std::move(y.path), x.size, x.iterations + y.iterations};
 }
 
-rivals::AxisPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
+rivals::SolvedPath spline(const rivals::AxisPath& reference, const dynamics::FlexibleAxis& axis) {
   const double knot_s = 2.0 * std::numbers::pi / axis.main_rad_s() / kKnotsPerPeriod;
   return rivals::filtered_spline(reference, axis,
                                  {knot_s, kSplineEndKnots * knot_s, kSplineEndKnots * knot_s});
 }
 
-Result<BaseMotion> limited_base(double multiple, const Moves& plan, const BenchSetup& bench,
-                                const compensate::Engine& engine) {
-  compensate::Setup setup = bench.unflex;
+Result<BaseMotion> limited_base(double multiple, compensate::Setup setup, const Moves& plan,
+                                const BenchSetup& bench, const compensate::Engine& engine) {
   setup.x.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   setup.y.limits.max_accel_mm_s2 = multiple * bench.plan_accel_mm_s2;
   return unflex_base(setup, plan, bench.parts, engine);
@@ -86,7 +89,10 @@ Result<BaseMotion> unflex_base(const compensate::Setup& setup, const Moves& plan
     if (!of_x || !of_y) {
       return tl::unexpected(of_x ? of_y.error() : of_x.error());
     }
-    result.iterations += of_x->iterations + of_y->iterations;
+    for (const compensate::AxisSolution* const of : {&*of_x, &*of_y}) {
+      result.size.add(of->size);
+      result.iterations += of->iterations;
+    }
     x.push_back(std::move(of_x->base));
     y.push_back(std::move(of_y->base));
   }
@@ -124,6 +130,8 @@ std::string_view name(Method method) {
       return "unflex 4×";
     case Method::unflex_10x:
       return "unflex 10×";
+    case Method::unflex_band_4x:
+      return "unflex 4×, ±10 %";
     case Method::first_stage_4x:
       return "unflex 4×, first stage";
     default:
@@ -138,16 +146,13 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
   }
   switch (method) {
     case Method::s_curve:
-      return BaseMotion{
-          rivals::s_curve(run.plan, gcode::X), rivals::s_curve(run.plan, gcode::Y), 0, {}};
+      return BaseMotion{rivals::s_curve(run.plan, gcode::X), rivals::s_curve(run.plan, gcode::Y)};
     case Method::slow_s_curve:
       if (run.slow_plan.empty()) {
         return fail(ErrorKind::input, "needs a plan of its own");
       }
       return BaseMotion{rivals::s_curve(run.slow_plan, gcode::X),
-                        rivals::s_curve(run.slow_plan, gcode::Y),
-                        0,
-                        {}};
+                        rivals::s_curve(run.slow_plan, gcode::Y)};
     case Method::filtered_spline:
       return both_axes(run.plan, setup.unflex, &spline);
     case Method::thesis_least_squares:
@@ -160,20 +165,22 @@ Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setu
         return rivals::thesis_velocity_defects(reference, axis, setup.thesis_period_s);
       });
     case Method::unflex_2x:
-      return limited_base(2.0, run.plan, setup, engine);
+      return limited_base(2.0, setup.unflex, run.plan, setup, engine);
     case Method::unflex_4x:
-      return limited_base(4.0, run.plan, setup, engine);
+      return limited_base(4.0, setup.unflex, run.plan, setup, engine);
     case Method::unflex_10x:
-      return limited_base(10.0, run.plan, setup, engine);
+      return limited_base(10.0, setup.unflex, run.plan, setup, engine);
+    case Method::unflex_band_4x:
+      return limited_base(4.0, setup.unflex_band, run.plan, setup, engine);
     case Method::first_stage_4x: {
-      BenchSetup first = setup;
-      first.unflex.x.pulses.clear();
-      first.unflex.y.pulses.clear();
-      return limited_base(4.0, run.plan, first, engine);
+      compensate::Setup first = setup.unflex;
+      first.x.pulses.clear();
+      first.y.pulses.clear();
+      return limited_base(4.0, std::move(first), run.plan, setup, engine);
     }
     default:
-      return both_axes(run.plan, setup.unflex,
-                       [](const auto& reference, const auto& /*axis*/) { return reference; });
+      return BaseMotion{rivals::reference_path(run.plan, gcode::X),
+                        rivals::reference_path(run.plan, gcode::Y)};
   }
 }
 

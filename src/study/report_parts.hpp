@@ -27,6 +27,12 @@ template <class Outcome>
   return json;
 }
 
+// Few digits, as a time differs from one run of the program to the next.
+[[nodiscard]] inline std::string milliseconds_text(double time_s) {
+  const double ms = time_s * 1e3;
+  return fmt::format("{:.{}f}", ms, ms < 9.995 ? 2 : 0);
+}
+
 inline void write_warnings(std::back_insert_iterator<std::string> out,
                            const std::vector<std::string>& warnings) {
   if (warnings.empty()) {

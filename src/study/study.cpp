@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "tasks.hpp"
+#include "unflex/compensate/band.hpp"
 
 namespace unflex::study {
 namespace {
@@ -99,6 +100,19 @@ Result<std::vector<ChainResult>> chains(const std::vector<Case>& cases,
   return result;
 }
 
+// As `compensate` makes it, if all that it is told of the axis is one frequency that may be off:
+// the band, a mode that nobody knows of, and freedom along the path.
+compensate::Setup in_band(compensate::Setup setup) {
+  for (compensate::AxisSetup* const of : {&setup.x, &setup.y}) {
+    const compensate::Plant unknown = compensate::with_unknown_mode(of->axis);
+    of->plants = compensate::edges(of->axis, {.freq_error = kBandError}, 1.0 - unknown.share);
+    of->plants.insert(of->plants.begin(), unknown);
+  }
+  setup.contour = compensate::Contour{.tracking_jerk_weight = setup.jerk_weight,
+                                      .pairs = compensate::pairs_of(setup.x, setup.y)};
+  return setup;
+}
+
 }  // namespace
 
 BenchSetup corner_setup(const Case& of) {
@@ -108,6 +122,7 @@ BenchSetup corner_setup(const Case& of) {
   setup.unflex.tail_s =
       std::max(8.0 * of.axis.main_damping_ratio() / of.axis.main_rad_s(), kLeastTail_s);
   setup.unflex.jerk_weight = kJerkWeight;
+  setup.unflex_band = in_band(setup.unflex);
   setup.plan_accel_mm_s2 = of.accel_mm_s2;
   setup.thesis_period_s = of.period_s;
   setup.hold_s = kHold_s;

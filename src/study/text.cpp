@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <iterator>
 #include <string>
+#include <string_view>
 
+#include "report_parts.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/study/study.hpp"
 
@@ -84,6 +86,42 @@ void write_case(Sink out, const CaseResult& result) {
   }
 }
 
+// A table of what the methods that solve something need for it, a text per case.
+template <class Cell>
+void write_needs(Sink out, const Outcome& outcome, std::string_view title, const Cell& cell) {
+  std::size_t width = 6;
+  for (const CaseResult& result : outcome.cases) {
+    for (const MethodResult& method : result.methods) {
+      width = std::max(width, cell(method).size());
+    }
+  }
+  width += 2;
+  fmt::format_to(out, "\n{:<28}", title);
+  for (const CaseResult& result : outcome.cases) {
+    fmt::format_to(out, "{:>{}}", result.name, width);
+  }
+  for (std::size_t i = 0; i < outcome.cases.front().methods.size(); ++i) {
+    if (outcome.cases.front().methods[i].size.unknowns == 0) {
+      continue;
+    }
+    fmt::format_to(out, "\n  {:<26}", name(static_cast<Method>(i)));
+    for (const CaseResult& result : outcome.cases) {
+      fmt::format_to(out, "{:>{}}", cell(result.methods[i]), width);
+    }
+  }
+  fmt::format_to(out, "\n");
+}
+
+void write_problems(Sink out, const Outcome& outcome) {
+  write_needs(out, outcome, "unknowns/equations", [](const MethodResult& method) {
+    return fmt::format("{}/{}", method.size.unknowns, method.size.equations);
+  });
+  write_needs(out, outcome, "systems solved",
+              [](const MethodResult& method) { return fmt::format("{}", method.iterations); });
+  write_needs(out, outcome, "base made in, ms",
+              [](const MethodResult& method) { return milliseconds_text(method.base_s); });
+}
+
 void write_chains(Sink out, const Outcome& outcome) {
   if (outcome.chains.empty()) {
     return;
@@ -118,6 +156,9 @@ std::string to_text(const Outcome& outcome) {
         "largest\n"
         "  after: contour error after the plan's end; gap: how far from its target the "
         "base rests\n");
+  }
+  if (!outcome.cases.empty()) {
+    write_problems(out, outcome);
   }
   write_chains(out, outcome);
   fmt::format_to(out, "\n{} in all\n", report::duration_text(outcome.wall_s));

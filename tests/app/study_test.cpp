@@ -47,6 +47,31 @@ TEST_F(Study, OfThePrintUsesThePrintersSettings) {
   EXPECT_LT(rms(1), rms(0) / 3.0);
 }
 
+// The last row is made for a band, whatever the settings say of it; the others are made for the
+// settings.
+TEST_F(Study, OfThePrintHasARowForABandOfFrequencies) {
+  write_file(path("in.gcode"), small_print());
+  const auto methods = [&](const std::string& error) {
+    const Outcome outcome = run(
+        {"study", "in.gcode", "-j", "2", "--set", "dynamics.freq_error=" + error, "--report", "-"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out)["cases"][0]["methods"];
+  };
+  const auto exact = methods("0");
+  const auto band = methods("0.1");
+  ASSERT_EQ(exact.size(), 16U);
+  ASSERT_EQ(exact[15]["method"], "unflex 4×, ±10 %");
+  EXPECT_EQ(exact[15]["deviation"], band[15]["deviation"]);
+  EXPECT_EQ(band[13]["deviation"], band[15]["deviation"]);
+  EXPECT_NE(exact[13]["deviation"], exact[15]["deviation"]);
+  const auto rms = [&](std::size_t number, std::size_t error) {
+    return exact[number]["deviation"][error]["contour_rms_mm"].get<double>();
+  };
+  EXPECT_LT(rms(13, 0), rms(15, 0));
+  EXPECT_GT(rms(13, 1), rms(15, 1));
+  EXPECT_GT(rms(13, 4), rms(15, 4));
+}
+
 TEST_F(Study, OfThePrintFromStdinIsThatOfTheFile) {
   write_file(path("in.gcode"), small_print());
   const Outcome file = run({"study", "in.gcode", "-j", "1", "--report", "-"});

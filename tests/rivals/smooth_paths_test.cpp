@@ -74,7 +74,7 @@ double tracking_error(const AxisPath& path, const AxisPath& reference,
 TEST(FilteredSpline, BeginsAndEndsAtRestWithinItsLeadInAndTail) {
   const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
   const SplineOptions given = options(kAxis.main().omega_rad_s);
-  const AxisPath path = filtered_spline(reference, kAxis, given);
+  const AxisPath path = filtered_spline(reference, kAxis, given).path;
   EXPECT_NEAR(path.front().start_s, -given.lead_in_s, 1e-12);
   EXPECT_EQ(path.front().motion.position, 0.0);
   EXPECT_NEAR(path.front().motion.velocity, 0.0, 1e-9);
@@ -87,7 +87,7 @@ TEST(FilteredSpline, BeginsAndEndsAtRestWithinItsLeadInAndTail) {
 
 TEST(FilteredSpline, BringsTheNozzleMuchCloserToTheReference) {
   const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const AxisPath path = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s));
+  const AxisPath path = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s)).path;
   EXPECT_GT(tracking_error(reference, reference, kAxis), 0.1);
   EXPECT_LT(tracking_error(path, reference, kAxis), 0.002);
 }
@@ -96,9 +96,9 @@ TEST(FilteredSpline, BringsTheNozzleMuchCloserToTheReference) {
 // knots in windows of 60.
 TEST(FilteredSpline, LosesNothingByItsLimitedPreview) {
   AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const AxisPath alone = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s));
+  const AxisPath alone = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s)).path;
   reference.push_back({1.0, {10.0, 0.0, 0.0}});
-  const AxisPath amid = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s));
+  const AxisPath amid = filtered_spline(reference, kAxis, options(kAxis.main().omega_rad_s)).path;
   EXPECT_GT(amid.size(), 2 * alone.size());
   PathCursor a(alone);
   PathCursor b(amid);

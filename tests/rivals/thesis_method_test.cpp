@@ -100,7 +100,7 @@ TEST(ThesisMethod, IsTheLeastSquaresPointOfAllItsEquations) {
       const AxisPath reference = reference_path(corner, letter);
       const Sampled plan = sampled(reference, of.period_s);
       const Eigen::VectorXd found =
-          positions(thesis_least_squares(reference, axis, of.period_s, of.accel_mm_s2));
+          positions(thesis_least_squares(reference, axis, of.period_s, of.accel_mm_s2).path);
       ASSERT_EQ(found.size(), static_cast<Eigen::Index>(plan.p.size()));
       const Eigen::VectorXd rows = residuals(plan, axis, found, of.accel_mm_s2);
       // Away from the rows' bends the quotient is exact.
@@ -121,10 +121,13 @@ TEST(ThesisMethod, HasTheNodesOfTheThesis) {
   constexpr std::array<std::size_t, 11> kNodes = {49, 49, 49, 49, 49, 81, 45, 85, 37, 25, 241};
   for (std::size_t i = 0; i < kCases.size(); ++i) {
     const PrinterCase& of = kCases[i];
-    const AxisPath base = thesis_least_squares(
+    const SolvedPath base = thesis_least_squares(
         reference_path(testing::corner_plan(of.velocity_mm_s, of.accel_mm_s2), gcode::X),
         {of.omega_rad_s, of.zeta}, of.period_s, of.accel_mm_s2);
-    EXPECT_EQ(base.size(), kNodes[i]) << i;
+    EXPECT_EQ(base.path.size(), kNodes[i]) << i;
+    EXPECT_EQ(base.size.unknowns, kNodes[i]) << i;
+    EXPECT_EQ(base.size.equations, 3 * kNodes[i] - 2) << i;
+    EXPECT_GT(base.iterations, 1) << i;
   }
 }
 
@@ -132,14 +135,19 @@ TEST(ThesisMethod, Has98UnknownsAgainst290Rows) {
   const auto corner = testing::corner_plan(100.0, 5000.0);
   Eigen::Index unknowns = 0;
   Eigen::Index rows = 0;
+  ProblemSize told;
   for (const gcode::Axis letter : {gcode::X, gcode::Y}) {
-    const Sampled plan = sampled(reference_path(corner, letter), 5e-3);
+    const AxisPath reference = reference_path(corner, letter);
+    told.add(thesis_least_squares(reference, {100.0, 0.5}, 5e-3, 5000.0).size);
+    const Sampled plan = sampled(reference, 5e-3);
     const Eigen::VectorXd b = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(plan.p.size()));
     unknowns += b.size();
     rows += residuals(plan, {100.0, 0.5}, b, 5000.0).size();
   }
   EXPECT_EQ(unknowns, 98);
   EXPECT_EQ(rows, 290);
+  EXPECT_EQ(told.unknowns, 98U);
+  EXPECT_EQ(told.equations, 290U);
 }
 
 // The jerk rows are one-sided: below the limit they ask for nothing.
@@ -147,8 +155,9 @@ TEST(ThesisMethod, IgnoresAJerkBelowItsLimit) {
   const dynamics::FlexibleAxis axis{100.0, 0.5};
   const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
   const auto base = [&](double max_accel) {
-    return positions(thesis_least_squares(reference, axis, 5e-3, max_accel));
+    return positions(thesis_least_squares(reference, axis, 5e-3, max_accel).path);
   };
+  EXPECT_EQ(thesis_least_squares(reference, axis, 5e-3, 1e6).iterations, 1);
   EXPECT_EQ(base(1e6), base(2e6));
   EXPECT_GT((base(1e6) - base(5000.0)).cwiseAbs().maxCoeff(), 1e-4);
 }
@@ -156,7 +165,7 @@ TEST(ThesisMethod, IgnoresAJerkBelowItsLimit) {
 TEST(ThesisMethod, MeetsTheVelocityDefectsWhereTheyStandAlone) {
   const dynamics::FlexibleAxis axis{100.0, 0.5};
   const AxisPath reference = reference_path(testing::corner_plan(100.0, 5000.0), gcode::X);
-  const AxisPath base = thesis_velocity_defects(reference, axis, 5e-3);
+  const AxisPath base = thesis_velocity_defects(reference, axis, 5e-3).path;
   EXPECT_EQ(base.front().motion.velocity, 0.0);
   const Eigen::VectorXd rows = residuals(sampled(reference, 5e-3), axis, positions(base), 5000.0);
   for (Eigen::Index row = 1; row < rows.size(); row += 3) {
@@ -173,7 +182,7 @@ TEST(ThesisMethod, RingsFromNodeToNodeWithThePoleOfItsDefect) {
   constexpr double kAccel = 100.0;
   const AxisPath plan = {
       {0.0, {0.0, 0.0, 0.0}}, {0.02, {0.0, 0.0, kAccel}}, {0.2, {1.62, 18.0, 0.0}}};
-  const AxisPath base = thesis_velocity_defects(plan, {kOmega, kZeta}, kPeriod);
+  const AxisPath base = thesis_velocity_defects(plan, {kOmega, kZeta}, kPeriod).path;
   PathCursor cursor(plan);
   const double settled = kAccel * (1.0 - std::pow(kOmega * kPeriod, 2) / 12.0);
   std::vector<double> off;

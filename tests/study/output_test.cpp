@@ -45,6 +45,33 @@ TEST(StudyText, HasARowForEveryMethodAndAColumnForEveryCase) {
                               "  uncompensated                  464     316\n"
                               "  ZV                             112       —\n"));
   EXPECT_THAT(text, HasSubstr("1 ms: 16 ("));
+  EXPECT_THAT(text, HasSubstr("unknowns/equations                  ref         2B\n"
+                              "  filtered B-spline              88/500     88/500\n"
+                              "  thesis, all equations          98/290     98/290\n"));
+  EXPECT_THAT(text, HasSubstr("base made in, ms                 ref      2B\n"
+                              "  filtered B-spline         "));
+}
+
+TEST(StudyJson, SaysHowLargeTheProblemIsWhereThereIsOne) {
+  const auto json = nlohmann::json::parse(to_json(outcome()));
+  const auto& methods = json["cases"][0]["methods"];
+  const auto& base_ms = json["performance"]["cases"][0]["base_ms"];
+  ASSERT_EQ(methods.size(), kMethodCount);
+  ASSERT_EQ(base_ms.size(), kMethodCount);
+  for (std::size_t i = 0; i < kMethodCount; ++i) {
+    const bool solves = static_cast<Method>(i) >= Method::filtered_spline;
+    EXPECT_EQ(methods[i]["unknowns"].is_number(), solves) << methods[i]["method"];
+    EXPECT_EQ(methods[i]["equations"].is_number(), solves) << methods[i]["method"];
+    EXPECT_EQ(methods[i]["iterations"] > 0, solves) << methods[i]["method"];
+    EXPECT_GT(base_ms[i], 0.0) << methods[i]["method"];
+  }
+  EXPECT_EQ(json["performance"]["cases"][1]["case"], "2B");
+  EXPECT_EQ(json["performance"]["cases"][1]["base_ms"][1], nullptr) << "ZV is not used";
+}
+
+TEST(StudyHtml, SaysHowLargeTheProblemIs) {
+  const std::string html = to_html(outcome());
+  EXPECT_THAT(html, HasSubstr("<th scope=\"row\">thesis, all equations</th><td>98/290<br>"));
 }
 
 TEST(StudyJson, IsDocumentedKeyByKey) {
@@ -88,8 +115,8 @@ TEST(StudyJson, SaysWhyAMethodIsNotUsed) {
 TEST(StudyHtml, HasFiveFiguresForEveryMethodThatIsUsed) {
   const std::string html = to_html(outcome());
   // 2B has no shapers; one more plot shows the sensitivity.
-  EXPECT_EQ(count(html, "<div data-figures="), 15U + 9U);
-  EXPECT_EQ(count(html, "<svg class=\"plot\""), 5U * (15U + 9U) + 1U);
+  EXPECT_EQ(count(html, "<div data-figures="), 16U + 10U);
+  EXPECT_EQ(count(html, "<svg class=\"plot\""), 5U * (16U + 10U) + 1U);
   EXPECT_EQ(count(html, "<div data-figures=\"ref 13\">"), 1U);  // shown at first
   EXPECT_THAT(html, Not(HasSubstr("nan")));
   EXPECT_THAT(html, Not(HasSubstr("http://")));

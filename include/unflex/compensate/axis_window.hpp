@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/core/problem_size.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 
@@ -95,6 +96,8 @@ struct AxisSolution {
   dynamics::AxisTrajectory base;
   double objective = 0.0;  // mm²·s
   int iterations = 0;
+  // As the engine puts it; not passed on from worker processes.
+  ProblemSize size = {};
 };
 
 // A solver of axis windows.

@@ -132,8 +132,8 @@ class FlexibleAxis {
   // partial fractions of the product of both transfer functions. The axis must have room for a mode
   // more, and none like it.
   [[nodiscard]] FlexibleAxis followed_by(double omega_rad_s, double zeta) const;
-  // The axis with all frequencies times this factor.
-  [[nodiscard]] FlexibleAxis detuned(double factor) const;
+  // The axis with all frequencies and all damping ratios times these factors.
+  [[nodiscard]] FlexibleAxis detuned(double freq_factor, double damping_factor = 1.0) const;
 
   // The nozzle that goes along with a base in even motion, as after a long time.
   [[nodiscard]] NozzleState riding(double position_mm, double velocity_mm_s = 0.0) const;

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "unflex/core/problem_size.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/dynamics/shapers.hpp"
@@ -24,6 +25,13 @@ struct Parabola {
 // In order of time and not empty. Before the first parabola the axis rests where that one begins.
 // The last parabola lasts for ever.
 using AxisPath = std::vector<Parabola>;
+
+// The path that a method found by solving something.
+struct SolvedPath {
+  AxisPath path;
+  ProblemSize size;
+  int iterations = 0;  // systems of equations solved on the way
+};
 
 // r(t) of a plan that starts at rest at time 0 and ends at rest.
 [[nodiscard]] AxisPath reference_path(const std::vector<planner::PlannedMove>& moves,

@@ -27,8 +27,9 @@ struct SplineOptions {
   double tail_s = 0.0;     // the base may still move for this long after the reference
 };
 
-[[nodiscard]] AxisPath filtered_spline(const AxisPath& reference,
-                                       const dynamics::FlexibleAxis& axis,
-                                       const SplineOptions& options);
+// Its unknowns are the coefficients that are free, its equations the samples.
+[[nodiscard]] SolvedPath filtered_spline(const AxisPath& reference,
+                                         const dynamics::FlexibleAxis& axis,
+                                         const SplineOptions& options);
 
 }  // namespace unflex::rivals

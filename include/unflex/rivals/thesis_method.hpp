@@ -31,13 +31,14 @@ inline constexpr double kJerkWeight = 1e-4;
 // The least-squares point of all equations. An interior-point code stops there, because the
 // equations have no solution. It is unique, because the sum of their squares is strictly convex.
 // The effort of a step is linear in the length of the plan. max_accel_mm_s2 is a_max, above 0.
-[[nodiscard]] AxisPath thesis_least_squares(const AxisPath& reference,
-                                            const dynamics::FlexibleAxis& axis, double period_s,
-                                            double max_accel_mm_s2);
+[[nodiscard]] SolvedPath thesis_least_squares(const AxisPath& reference,
+                                              const dynamics::FlexibleAxis& axis, double period_s,
+                                              double max_accel_mm_s2);
 
 // The consistent half of the equations, which are the velocity defects alone. They determine v node
 // by node, from v = 0 on.
-[[nodiscard]] AxisPath thesis_velocity_defects(const AxisPath& reference,
-                                               const dynamics::FlexibleAxis& axis, double period_s);
+[[nodiscard]] SolvedPath thesis_velocity_defects(const AxisPath& reference,
+                                                 const dynamics::FlexibleAxis& axis,
+                                                 double period_s);
 
 }  // namespace unflex::rivals

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unflex/compensate/run.hpp"
+#include "unflex/core/problem_size.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/rivals/axis_path.hpp"
 #include "unflex/verify/corners.hpp"
@@ -32,16 +33,20 @@ enum class Method {
   unflex_2x,
   unflex_4x,
   unflex_10x,
+  unflex_band_4x,  // for frequencies that may be off by kBandError
   // unflex 4× without its second stage; tried only where there is one.
   first_stage_4x,
 };
-inline constexpr std::size_t kMethodCount = 15;  // without first_stage_4x
+inline constexpr std::size_t kMethodCount = 16;  // without first_stage_4x
 
 // "uncompensated", "ZV", "unflex 4×" …
 [[nodiscard]] std::string_view name(Method method);
 
 // Relative errors of the true natural frequency against the one that the base was made for.
 inline constexpr std::array<double, 5> kFrequencyErrors = {0.0, -0.10, -0.05, 0.05, 0.10};
+
+// By which share of itself the frequency may be off for unflex_band_4x, either way.
+inline constexpr double kBandError = 0.1;
 
 // BenchSetup::step_s and parts for prints, which are long.
 inline constexpr double kPrintStep_s = 2e-4;
@@ -54,9 +59,12 @@ struct Nozzle {
 };
 
 struct BenchSetup {
-  compensate::Setup unflex;         // its acceleration limits are set per method
+  // The acceleration limits of both are set per method.
+  compensate::Setup unflex;
+  compensate::Setup unflex_band;    // of unflex_band_4x
   std::optional<Nozzle> two_stage;  // the axes with what rings behind them, if anything does
-  // unflex_2x, 4x, 10x allow multiples of it; thesis_least_squares has its limit of jerk from it.
+  // unflex by its methods allows multiples of it; thesis_least_squares has its limit of jerk from
+  // it.
   double plan_accel_mm_s2 = 5000.0;
   double thesis_period_s = 5e-3;
   int parts = 10;             // parabolas per node interval of unflex' base
@@ -82,8 +90,9 @@ struct Run {
 struct BaseMotion {
   rivals::AxisPath x;
   rivals::AxisPath y;
-  int iterations = 0;  // iterations of unflex' engine
-  std::string remark;
+  ProblemSize size = {};  // of both axes
+  int iterations = 0;     // systems of equations solved for both axes
+  std::string remark = {};
 };
 
 // How far the nozzle passes from corners of the path (unflex/verify/corners.hpp), over several
@@ -128,7 +137,9 @@ struct MethodResult {
   rivals::PeakMotion base_peak;  // of the axis with the larger one
   double end_gap_mm = 0.0;  // distance from the target at which the base comes to rest, larger axis
   double longer_s = 0.0;    // how much later than the plan the base comes to rest
+  ProblemSize size;         // of both axes; as BaseMotion
   int iterations = 0;
+  double base_s = 0.0;          // wall time in which the base was made
   std::size_t failed_runs = 0;  // runs without a solution; measured uncompensated
   Trace trace;                  // at the exact frequency; empty unless asked for
 };
