@@ -29,10 +29,10 @@ bool is_indented(std::string_view content) {
 
 // The temperature that a macro is told to print at, by the names that macros of many printers have.
 std::optional<double> temperature_for_macro(const gcode::Command& command) {
-  constexpr std::array kNames = {"EXTRUDER",      "EXTRUDER_TEMP", "EXTRUDER_TEMPERATURE",
-                                 "HOTEND",        "HOTEND_TEMP",   "HOTEND_TEMPERATURE",
-                                 "NOZZLE",        "NOZZLE_TEMP",   "NOZZLE_TEMPERATURE",
-                                 "TOOL_TEMP",     "PRINT_TEMP",    "T_EXTRUDER"};
+  constexpr std::array kNames = {"EXTRUDER",  "EXTRUDER_TEMP", "EXTRUDER_TEMPERATURE",
+                                 "HOTEND",    "HOTEND_TEMP",   "HOTEND_TEMPERATURE",
+                                 "NOZZLE",    "NOZZLE_TEMP",   "NOZZLE_TEMPERATURE",
+                                 "TOOL_TEMP", "PRINT_TEMP",    "T_EXTRUDER"};
   constexpr double kLeast_c = 150.0;
   for (const char* const name : kNames) {
     const auto value = parse_number(command.parameter(name).value_or(""));
@@ -47,8 +47,7 @@ class CourseMaker {
  public:
   explicit CourseMaker(const machine::Settings& settings)
       : firmware_(settings.printer.firmware),
-        filament_area_mm2_(
-            filament::area_of_diameter_mm2(settings.extruder.filament_diameter_mm)),
+        filament_area_mm2_(filament::area_of_diameter_mm2(settings.extruder.filament_diameter_mm)),
         interpreter_(interpreter_options(settings)),
         planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))) {}
 

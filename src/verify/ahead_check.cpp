@@ -41,8 +41,7 @@ std::optional<std::string> AheadCheck::pass(const gcode::Line& line, bool loses_
     arrive();  // it was added, so that this one waits less
     return std::nullopt;
   }
-  return asked || tool || loses_place || gcode::pauses_print(parsed) ? never_asked()
-                                                                     : std::nullopt;
+  return asked || tool || loses_place || gcode::pauses_print(parsed) ? never_asked() : std::nullopt;
 }
 
 std::optional<std::string> AheadCheck::end() { return awaited_ ? never_asked() : std::nullopt; }

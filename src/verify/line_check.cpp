@@ -49,8 +49,8 @@ void LineCheck::compare(bool complete, double place_tolerance_mm) {
   for (;;) {
     const PlacedLine* const input = front(*input_);
     const PlacedLine* const output = front(*output_);
-    const bool is_here = output != nullptr ? input != nullptr && same_line(input->line, output->line)
-                                           : !complete;
+    const bool is_here =
+        output != nullptr ? input != nullptr && same_line(input->line, output->line) : !complete;
     if (input != nullptr && !is_here && ahead_.is_awaited(input->line)) {
       ahead_.arrive();
       input_->lines().pop_front();

@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "reading.hpp"
 
 namespace unflex::machine {
@@ -164,6 +166,31 @@ TEST(RrfConfig, IsRead) {
   EXPECT_EQ(told(s, "printer.unretract_speed_mm_s"), "20 config.g:13");
   EXPECT_EQ(told(s, "printer.retract_z_hop_mm"), "0.2 config.g:13");
   EXPECT_THAT(s.notes, IsEmpty());
+}
+
+// The heater of the first tool, and 210 °C as the temperature at which losses are taken.
+TEST(RrfConfig, HasTheModelOfTheHotend) {
+  const std::string start = "M550 P\"x\"\nM593 P\"zvd\" F40\n";
+  const std::string bed = "M307 H0 R0.4 K0.25 D3 E1.35 S1.00\n";
+  const std::string hotend = "M307 H1 R1.693 K0.268:0.1 D6.39 E1.35 S1.00 V24\n";
+  const Settings now = read(start + bed + hotend, "config.g");
+  ASSERT_TRUE(now.hotend.has_model());
+  // K u_max = R τ, τ = ΔT / (K (ΔT/100)^E)
+  const double time_constant_s = 185.0 / (0.268 * std::pow(1.85, 1.35));
+  EXPECT_NEAR(*now.hotend.time_constant_s, time_constant_s, 1e-9);
+  EXPECT_NEAR(*now.hotend.gain_c, 1.693 * time_constant_s / 255.0, 1e-9);
+  EXPECT_NEAR(*now.hotend.dead_time_s, 6.39, 1e-9);
+  EXPECT_EQ(now.hotend.sensor_lag_s, 0.0);
+  const Settings before_3_4 = read(start + "M307 H1 A340 C140 D5.5\n", "config.g");
+  EXPECT_NEAR(*before_3_4.hotend.gain_c, 340.0 / 255.0, 1e-9);
+  EXPECT_NEAR(*before_3_4.hotend.time_constant_s, 140.0, 1e-9);
+  const Settings other =
+      read(start + "M307 H2 A340 C140 D5.5\n" + hotend + "M563 P0 D0 H2 F0\n", "config.g");
+  EXPECT_NEAR(*other.hotend.time_constant_s, 140.0, 1e-9);
+  for (const std::string_view none : {"M307 H0 A340 C140 D5.5\n", "M307 H1 A340\n", "M307 H1\n",
+                                      "M307 H1 R2 K0.3\n", "M307 H1 D5.5\n"}) {
+    EXPECT_FALSE(read(start + std::string(none), "config.g").hotend.has_model()) << none;
+  }
 }
 
 // RepRapFirmware's speeds are in mm/min, so the numbers are sixty times those of Marlin.

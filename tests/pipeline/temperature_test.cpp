@@ -26,13 +26,12 @@ using testing::JobFolder;
 
 // The reference of tests/hotend, and the axes.
 std::vector<std::string> with_model(Firmware firmware, const std::vector<std::string>& more = {}) {
-  std::vector<std::string> overrides = {
-      fmt::format("printer.firmware={}", to_string(firmware)),
-      "dynamics.freq_error=0",
-      "hotend.gain_c=2",
-      "hotend.time_constant_s=300",
-      "hotend.sensor_lag_s=2.5",
-      "hotend.dead_time_s=5"};
+  std::vector<std::string> overrides = {fmt::format("printer.firmware={}", to_string(firmware)),
+                                        "dynamics.freq_error=0",
+                                        "hotend.gain_c=2",
+                                        "hotend.time_constant_s=300",
+                                        "hotend.sensor_lag_s=2.5",
+                                        "hotend.dead_time_s=5"};
   overrides.insert(overrides.end(), more.begin(), more.end());
   return overrides;
 }
@@ -175,10 +174,9 @@ class AskedAhead : public ::testing::Test {
   }
 
   // The sliced file with the line taken out, if it is there, and put behind the first move.
-  static std::string violations(const std::string& sliced, const std::string& ahead,
-                                bool takes_out, const std::string& allowed = "true") {
-    const JobFolder folder(sliced,
-                           with_model(Firmware::klipper, {"hotend.ahead=" + allowed}));
+  static std::string violations(const std::string& sliced, const std::string& ahead, bool takes_out,
+                                const std::string& allowed = "true") {
+    const JobFolder folder(sliced, with_model(Firmware::klipper, {"hotend.ahead=" + allowed}));
     std::string output = sliced;
     if (takes_out) {
       output.erase(output.find(ahead), ahead.size());
@@ -245,7 +243,8 @@ constexpr std::string_view kStart = "G28\nG90\nM83\nG1 X10 Y10 F6000\nM204 S1000
 
 TEST(PrintCourse, KnowsWhenCommandsCome) {
   const std::string print = fmt::format(
-      "{}G1 X60 E1 F3000\nM104 S210\nG1 X10 E1\nG4 P2000\nG1 X60 E1\nM104 S220\nG1 X10 E1\n", kStart);
+      "{}G1 X60 E1 F3000\nM104 S210\nG1 X10 E1\nG4 P2000\nG1 X60 E1\nM104 S220\nG1 X10 E1\n",
+      kStart);
   const PrintCourse course = course_of(print, Firmware::klipper);
   ASSERT_EQ(course.commands.size(), 2U);
   const hotend::Command& first = course.commands[0];
