@@ -1,0 +1,60 @@
+// What options of several commands share.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "unflex/app/run_config.hpp"
+
+namespace unflex::app {
+
+inline constexpr unsigned kMaxWorkers = 256;
+
+// A number above 0.
+[[nodiscard]] CLI::Validator positive();
+
+// A temperature in °C, up to `most`.
+[[nodiscard]] CLI::Validator temperature(double most);
+
+// A whole number from 1 to `most`. CLI::Range would show its own words in the help.
+[[nodiscard]] CLI::Validator counting_number(unsigned most);
+
+// One of some words, in small or capital letters. CLI::Transformer would show the numbers behind
+// them in the help, and take these too.
+template <class T>
+[[nodiscard]] CLI::Validator word_for(std::vector<std::pair<std::string_view, T>> choices) {
+  return {[choices = std::move(choices)](std::string& text) {
+            std::string words;
+            for (const auto& [word, value] : choices) {
+              if (CLI::detail::to_lower(text) == word) {
+                text = fmt::format("{}", static_cast<int>(value));
+                return std::string{};
+              }
+              words += fmt::format("{}{}", words.empty() ? "" : ", ", word);
+            }
+            return fmt::format("'{}' is none of {}", text, words);
+          },
+          ""};
+}
+
+// --set.
+void add_overrides(CLI::App& command, RunConfig& config);
+
+// --printer and --set.
+void add_settings(CLI::App& command, RunConfig& config);
+
+inline constexpr const char* kReportOrPage =
+    "Write a report, FILE.json or FILE.html, or JSON to stdout with -";
+
+// --printer, --set, --report and -q.
+void add_common_options(CLI::App& command, RunConfig& config, const char* report = kReportOrPage);
+
+// -j.
+void add_jobs(CLI::App& command, RunConfig& config);
+
+}  // namespace unflex::app
