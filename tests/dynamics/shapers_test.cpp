@@ -108,7 +108,7 @@ INSTANTIATE_TEST_SUITE_P(Recordings, KlippersPulses,
                                                      {0.039833897384, 0.131311871665},
                                                      {0.062984399259, 0.061040035609}}}));
 
-// The same for parameters: init_shaper() of commit 84104bb, called with the type as text.
+// With parameters, as init_shaper() of commit 84104bb returns them, called with the type as text.
 INSTANTIATE_TEST_SUITE_P(Generalised, KlippersPulses,
                          ::testing::Values(Recorded{mzv_form("mzv(n=4,t=0.9)").value(),
                                                     45.0,
