@@ -32,12 +32,33 @@ ShaperPulses repeated_zv(int repeats, double freq_hz, double zeta) {
   return pulses;
 }
 
-// Three pulses over three quarters of the period. Without damping they stand at 0°, 135° and 270°
-// of the vibration and add up to nothing with the weights 1, √2, 1.
-ShaperPulses mzv(double freq_hz, double zeta) {
+// Klipper wants n − 1 zeros evenly spaced in frequency, the first at the vibration's, 1/T_d, and
+// solves for the weights (shaper_defs.py, get_mzv_coeffs). On the unit circle of z = e^{iθ}, θ the
+// angle from pulse to pulse, these are all the angles from θ₀ = 2πt/(n − 1) to 2π − θ₀ in n − 2
+// equal steps of 2β. Their product Π (1 − z e^{−iθ}) is that of the q-binomial theorem with q =
+// e^{2iβ}, so that the weights have a closed form:
+//
+//   w_k = w_{k−1} sin((n − k) β)/sin(k β)     β = π (n − 1 − 2t)/((n − 1)(n − 2))
+//
+// Three pulses over 0.75 get the weights 1, √2, 1. They are symmetric; the second half is the
+// mirror of the first, because at t = ½ the ratio of its last is 0/0.
+ShaperPulses mzv(const MzvForm& form, double freq_hz, double zeta) {
+  const int n = form.pulses;
+  const double beta = std::numbers::pi * (n - 1 - 2.0 * form.duration) / ((n - 1.0) * (n - 2.0));
+  std::vector<double> weights(static_cast<std::size_t>(n), 1.0);
+  for (int k = 1; k < n; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    weights[at] = 2 * k <= n - 1 ? weights[at - 1] * std::sin((n - k) * beta) / std::sin(k * beta)
+                                 : weights[static_cast<std::size_t>(n - 1 - k)];
+  }
+  const double spacing = form.duration / (n - 1);
   const double period = damped_period(freq_hz, zeta);
-  const double k = decay(zeta, 0.375);
-  return {{0.0, 1.0}, {0.375 * period, std::numbers::sqrt2 * k}, {0.75 * period, k * k}};
+  ShaperPulses pulses;
+  for (int k = 0; k < n; ++k) {
+    pulses.push_back(
+        {k * spacing * period, weights[static_cast<std::size_t>(k)] * decay(zeta, k * spacing)});
+  }
+  return pulses;
 }
 
 ShaperPulses ei(double freq_hz, double zeta) {
@@ -89,12 +110,12 @@ ShaperPulses fitted(const std::array<FittedPulse, N>& fits, double freq_hz, doub
 }
 
 // The weights need not add up to 1 yet. The times begin at 0.
-ShaperPulses raw_pulses(ShaperKind kind, double freq_hz, double zeta) {
-  switch (kind) {
+ShaperPulses raw_pulses(const Shaper& shaper, double freq_hz, double zeta) {
+  switch (shaper.kind) {
     case ShaperKind::zv:
       return repeated_zv(1, freq_hz, zeta);
     case ShaperKind::mzv:
-      return mzv(freq_hz, zeta);
+      return mzv(shaper.form, freq_hz, zeta);
     case ShaperKind::zvd:
       return repeated_zv(2, freq_hz, zeta);
     case ShaperKind::zvdd:
@@ -148,11 +169,21 @@ double max_damping_ratio(ShaperKind kind) {
   }
 }
 
-std::optional<ShaperPulses> shaper_pulses(ShaperKind kind, double freq_hz, double damping_ratio) {
-  if (damping_ratio > max_damping_ratio(kind)) {
+// shaper_defs.py, get_mzv_coeffs; more than ten pulses do not fit into chelper/kin_shaper.c. Below
+// half a period weights would be negative, and close to the upper end sin β is 0.
+bool MzvForm::is_defined() const {
+  constexpr int kMostPulses = 10;
+  constexpr double kLeastBelowTheEnd = 1e-6;
+  return pulses >= 3 && pulses <= kMostPulses && duration >= 0.5 &&
+         2.0 * duration + 1.0 < pulses - kLeastBelowTheEnd;
+}
+
+std::optional<ShaperPulses> shaper_pulses(const Shaper& shaper, double freq_hz,
+                                          double damping_ratio) {
+  if (damping_ratio > max_damping_ratio(shaper.kind) || !shaper.form.is_defined()) {
     return std::nullopt;
   }
-  ShaperPulses pulses = raw_pulses(kind, freq_hz, damping_ratio);
+  ShaperPulses pulses = raw_pulses(shaper, freq_hz, damping_ratio);
   double sum = 0.0;
   double moment_s = 0.0;
   for (const Pulse& pulse : pulses) {

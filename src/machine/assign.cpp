@@ -85,7 +85,11 @@ std::string store(const Value& value, const Key& key, std::string& target) {
     target = *text;
     return {};
   }
-  if (text == nullptr || std::ranges::find(key.words, *text) == key.words.end()) {
+  const auto is_allowed = [&](std::string_view given) {
+    return std::ranges::find(key.words, given) != key.words.end() ||
+           (key.or_text != nullptr && key.or_text(given));
+  };
+  if (text == nullptr || !is_allowed(*text)) {
     return fmt::format("{} must be one of {}, not {}", key.name, range_text(key), value.kind);
   }
   target = *text;

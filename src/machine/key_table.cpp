@@ -3,6 +3,8 @@
 #include <array>
 #include <limits>
 
+#include "unflex/dynamics/shapers.hpp"
+
 namespace unflex::machine {
 namespace {
 
@@ -65,6 +67,7 @@ constexpr std::string_view kNotKnown = "not known";
 // key: such a shaper has to be set by the file's own M593.
 constexpr std::array<std::string_view, 11> kShaperTypes = {
     "auto", "zv", "mzv", "zvd", "zvdd", "zvddd", "ei", "2hump_ei", "3hump_ei", "ei2", "ei3"};
+bool is_mzv(std::string_view text) { return dynamics::mzv_form(text).has_value(); }
 
 // The variants that variants.cpp knows, besides "auto" and "mainline".
 constexpr std::array<std::string_view, 7> kVariants = {
@@ -200,11 +203,13 @@ constexpr std::array kKeys = {
         &setting<&S::printer, &P::input_shaper_type>,
         kAny,
         "",
-        "Type of the printer's own shaper as the firmware spells it; auto: Klipper mzv, Marlin zv, "
-        "RRF zvd",
+        "Type of the printer's own shaper as the firmware spells it, Klipper's mzv(n=4,t=0.9) too; "
+        "auto: Klipper mzv, Marlin zv, RRF zvd",
         {},
         nullptr,
-        kShaperTypes},
+        kShaperTypes,
+        false,
+        &is_mzv},
     Key{"printer.input_shaper_type_y",
         &setting<&S::printer, &P::input_shaper_type_y>,
         kAny,
@@ -212,7 +217,9 @@ constexpr std::array kKeys = {
         "Klipper: type of the printer's own shaper along Y; auto: as along X",
         {},
         nullptr,
-        kShaperTypes},
+        kShaperTypes,
+        false,
+        &is_mzv},
     Key{"printer.input_shaper_damping_ratio_x",
         &setting<&S::printer, &P::input_shaper_damping_ratio_x>,
         Bounds{.min = 0.0, .max = 1.0, .max_open = true}, "",

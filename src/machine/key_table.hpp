@@ -44,6 +44,8 @@ struct Key {
   std::span<const std::string_view> words = {};
   // The key is another form of other keys: its value is converted into theirs and not kept.
   bool converted = false;
+  // Whether a key with words may also be this text, which is none of the words.
+  bool (*or_text)(std::string_view) = nullptr;
 };
 
 [[nodiscard]] std::span<const Key> key_table();

@@ -12,6 +12,7 @@
 #include "klipper_config.hpp"
 #include "klipper_shaper.hpp"
 #include "unflex/core/text.hpp"
+#include "unflex/dynamics/shapers.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -320,7 +321,7 @@ class Reader {
     }
   }
 
-  // Types that Klipper has (shaper_defs.py). Newer ones may carry parameters, "mzv(n=4,t=0.9)".
+  // Types that Klipper has (shaper_defs.py); mzv may carry parameters, "mzv(n=4,t=0.9)".
   // Returns the type as it is written, "mzv" if none is.
   std::string shaper_type(const std::string& axis) {
     constexpr std::array<std::string_view, 6> kTypes = {"zv", "mzv",      "zvd",
@@ -335,7 +336,7 @@ class Reader {
     const SourcePlace at = type != nullptr ? type->place : section->place;
     const std::string key =
         axis == "x" ? "printer.input_shaper_type" : "printer.input_shaper_type_y";
-    if (std::ranges::find(kTypes, text) != kTypes.end()) {
+    if (std::ranges::find(kTypes, text) != kTypes.end() || dynamics::mzv_form(text)) {
       reading_.add(key, std::string(text), at);
     } else {
       reading_.note(at,

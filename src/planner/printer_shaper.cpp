@@ -29,7 +29,7 @@ constexpr std::array<std::pair<std::string_view, ShaperKind>, 10> kKinds = {
      {"zvdd", ShaperKind::zvdd},
      {"zvddd", ShaperKind::zvddd}}};
 
-ShaperKind kind_of(std::string type, Firmware firmware) {
+dynamics::Shaper shaper_of(std::string type, Firmware firmware) {
   std::ranges::transform(type, type.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
@@ -37,6 +37,9 @@ ShaperKind kind_of(std::string type, Firmware firmware) {
     if (name == type) {
       return kind;
     }
+  }
+  if (const auto form = dynamics::mzv_form(type)) {
+    return *form;
   }
   switch (firmware) {
     case Firmware::marlin:
@@ -54,9 +57,9 @@ ShaperPulses pulses(Firmware firmware, double freq_hz, const std::string& type,
   if (!(freq_hz > 0.0)) {
     return {};
   }
-  const ShaperKind kind = kind_of(type, firmware);
+  const dynamics::Shaper shaper = shaper_of(type, firmware);
   ShaperPulses pulses = *dynamics::shaper_pulses(
-      kind, freq_hz, std::min(damping_ratio, dynamics::max_damping_ratio(kind)));
+      shaper, freq_hz, std::min(damping_ratio, dynamics::max_damping_ratio(shaper.kind)));
   if (firmware != Firmware::klipper) {
     const double first_s = pulses.front().time_s;
     for (dynamics::Pulse& pulse : pulses) {

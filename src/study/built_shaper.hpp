@@ -16,7 +16,7 @@ struct BuiltShaper {
 };
 
 // An error of kind input where there is no vibration to shape.
-[[nodiscard]] Result<BuiltShaper> built_shaper(dynamics::ShaperKind kind,
+[[nodiscard]] Result<BuiltShaper> built_shaper(const dynamics::Shaper& shaper,
                                                const dynamics::FlexibleAxis& axis);
 
 }  // namespace unflex::study

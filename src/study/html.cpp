@@ -8,6 +8,7 @@
 #include "html_assets.hpp"
 #include "html_figures.hpp"
 #include "report_parts.hpp"
+#include "step.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/svg_plot.hpp"
@@ -295,6 +296,28 @@ void write_chains(Sink out, const Outcome& outcome) {
   fmt::format_to(out, "</tbody></table></div></section>\n");
 }
 
+void write_steps(Sink out) {
+  fmt::format_to(
+      out,
+      "<section class=\"card\"><h2>A step and a staircase</h2><p>The base jumps by 1 mm at "
+      "once, or as shapers have it in steps of their pulses' weights; ω {} rad/s. Base "
+      "dotted.</p>{}<div class=\"scroll\"><table class=\"data\"><thead><tr><th>shaper, ζ"
+      "</th><th>overshoot</th><th>within 5 % after</th><th>{}</th><th>10 % off</th></tr>"
+      "</thead><tbody>\n",
+      kStepOmega_rad_s, step_figures(),
+      report::term("left", "Amplitude of the swing that the last pulse leaves"));
+  for (const StepRow& row : step_table()) {
+    fmt::format_to(
+        out,
+        "<tr><th scope=\"row\">{}, {}</th><td>{:.1f} %</td><td>{}</td><td>{:.1f} %</td>"
+        "<td>{:.1f} %</td></tr>\n",
+        row.shaper, row.zeta, 100.0 * row.overshoot,
+        row.settled_s ? fmt::format("{:.1f} ms", 1e3 * *row.settled_s) : std::string("—"),
+        100.0 * row.left, 100.0 * row.left_off);
+  }
+  fmt::format_to(out, "</tbody></table></div></section>\n");
+}
+
 }  // namespace
 
 std::string to_html(const Outcome& outcome) {
@@ -307,6 +330,9 @@ std::string to_html(const Outcome& outcome) {
   write_figures(out, outcome);
   write_problems(out, outcome);
   write_chains(out, outcome);
+  if (outcome.input.empty()) {
+    write_steps(out);
+  }
   write_warnings(out, outcome.warnings);
   write_settings(out, {{"unflex", outcome.version}, {"engine", outcome.engine}}, outcome.printer);
   return report::html_page(

@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <string_view>
 
+#include "step.hpp"
 #include "unflex/report/svg_plot.hpp"
 
 namespace unflex::study {
@@ -92,7 +94,48 @@ std::string figure(std::string_view caption, const Plot& plot) {
                      report::svg_plot(plot));
 }
 
+// Every base is a thin staircase in the colour of its nozzle.
+Plot step_plot(double zeta) {
+  constexpr double kShown_s = 0.15;
+  constexpr std::size_t kSamples = 300;
+  struct Look {
+    std::string_view colour;
+    Stroke stroke;
+  };
+  constexpr std::array<Look, 4> kLooks = {{{"--before", Stroke::dashed},
+                                           {"--series-3", Stroke::solid},
+                                           {"--series-4", Stroke::dashed},
+                                           {"--series-5", Stroke::solid}}};
+  Plot plot{.title = fmt::format("Nozzle after a step of the base, ζ {}", zeta),
+            .x_label = "t, ms",
+            .y_label = "mm"};
+  const std::vector<NamedStaircase> all = staircases(zeta);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::string colour(kLooks[i].colour);
+    PlotCurve nozzle{std::string(all[i].shaper), colour, kLooks[i].stroke, 2.0, {}};
+    PlotCurve base{"", colour, Stroke::dotted, 1.0, {{0.0, 0.0}}};
+    for (std::size_t k = 0; k <= kSamples; ++k) {
+      const double t = kShown_s * static_cast<double>(k) / static_cast<double>(kSamples);
+      nozzle.points.push_back({1e3 * t, all[i].staircase.nozzle(t).position});
+      const double base_mm = all[i].staircase.base_mm(t);
+      base.points.push_back({1e3 * t, base.points.back().y});
+      base.points.push_back({1e3 * t, base_mm});
+    }
+    plot.curves.push_back(std::move(nozzle));
+    plot.curves.push_back(std::move(base));
+  }
+  return plot;
+}
+
 }  // namespace
+
+std::string step_figures() {
+  std::string html = report::svg_legend(step_plot(kStepZetas.front())) + "<div class=\"plots\">\n";
+  for (const double zeta : kStepZetas) {
+    html += figure(fmt::format("ζ {}", zeta), step_plot(zeta));
+  }
+  return html + "</div>\n";
+}
 
 std::string figures(const CaseResult& result, const MethodResult& method) {
   const std::vector<Track> list = tracks(result, method);

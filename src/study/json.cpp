@@ -1,5 +1,6 @@
 // The keys are documented in docs/study.md; a test holds the two together.
 
+#include "step.hpp"
 #include "unflex/report/json_parts.hpp"
 #include "unflex/study/study.hpp"
 
@@ -64,6 +65,19 @@ Json chain_json(const ChainResult& chain) {
   return {{"case", chain.case_name}, {"engine", chain.engine}, {"steps", steps}};
 }
 
+Json steps_json() {
+  Json steps = Json::array();
+  for (const StepRow& row : step_table()) {
+    steps.push_back({{"zeta", row.zeta},
+                     {"shaper", row.shaper},
+                     {"overshoot", row.overshoot},
+                     {"settled_s", row.settled_s ? Json(*row.settled_s) : Json(nullptr)},
+                     {"left", row.left},
+                     {"left_off", row.left_off}});
+  }
+  return steps;
+}
+
 // All that differs from one run of the program to the next.
 Json performance_json(const Outcome& outcome) {
   Json cases = Json::array();
@@ -105,6 +119,7 @@ std::string to_json(const Outcome& outcome) {
   for (const ChainResult& chain : outcome.chains) {
     json["coarse_to_fine"].push_back(chain_json(chain));
   }
+  json["steps"] = outcome.input.empty() ? steps_json() : Json::array();
   json["warnings"] = outcome.warnings;
   json["performance"] = performance_json(outcome);
   return report::dump(json);

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -26,10 +27,10 @@ using Moves = std::vector<planner::PlannedMove>;
 constexpr double kKnotsPerPeriod = 10.0;
 constexpr double kSplineEndKnots = 5.0;
 
-Result<BaseMotion> shaped_base(dynamics::ShaperKind kind, const Moves& plan,
+Result<BaseMotion> shaped_base(const dynamics::Shaper& shaper, const Moves& plan,
                                const compensate::Setup& setup) {
-  const Result<BuiltShaper> x = built_shaper(kind, setup.x.axis);
-  const Result<BuiltShaper> y = built_shaper(kind, setup.y.axis);
+  const Result<BuiltShaper> x = built_shaper(shaper, setup.x.axis);
+  const Result<BuiltShaper> y = built_shaper(shaper, setup.y.axis);
   if (!x || !y) {
     return tl::unexpected(x ? y.error() : x.error());
   }
@@ -63,12 +64,35 @@ Result<BaseMotion> limited_base(double multiple, compensate::Setup setup, const 
   return unflex_base(setup, plan, bench.parts, engine);
 }
 
-std::optional<dynamics::ShaperKind> shaper_of(Method method) {
+struct MzvMethod {
+  Method method;
+  std::string_view name;
+  dynamics::MzvForm form;
+};
+
+// The examples of Klipper's documentation that are not close to plain MZV: of
+// docs/Config_Reference.md the first, of docs/Resonance_Compensation.md the others.
+constexpr std::array<MzvMethod, 3> kMzvMethods = {
+    {{Method::mzv_4_pulses, "MZV(n=4,t=0.9)", {4, 0.9}},
+     {Method::mzv_5_pulses, "MZV(n=5,t=1.1)", {5, 1.1}},
+     {Method::mzv_6_pulses, "MZV(n=6,t=1.0)", {6, 1.0}}}};
+
+struct ShaperMethod {
+  dynamics::Shaper shaper;
+  std::string_view name;
+};
+
+std::optional<ShaperMethod> shaper_of(Method method) {
+  const auto* const form = std::ranges::find(kMzvMethods, method, &MzvMethod::method);
+  if (form != kMzvMethods.end()) {
+    return ShaperMethod{form->form, form->name};
+  }
   const int number = static_cast<int>(method) - static_cast<int>(Method::zv);
   if (number < 0 || number >= static_cast<int>(dynamics::kShaperKinds.size())) {
     return std::nullopt;
   }
-  return dynamics::kShaperKinds[static_cast<std::size_t>(number)];
+  const dynamics::ShaperKind kind = dynamics::kShaperKinds[static_cast<std::size_t>(number)];
+  return ShaperMethod{kind, dynamics::name(kind)};
 }
 
 }  // namespace
@@ -110,8 +134,8 @@ Result<BaseMotion> unflex_base(const compensate::Setup& setup, const Moves& plan
 }
 
 std::string_view name(Method method) {
-  if (const auto kind = shaper_of(method)) {
-    return dynamics::name(*kind);
+  if (const auto of = shaper_of(method)) {
+    return of->name;
   }
   switch (method) {
     case Method::s_curve:
@@ -141,8 +165,8 @@ std::string_view name(Method method) {
 
 Result<BaseMotion> base_by(Method method, const Run& run, const BenchSetup& setup,
                            const compensate::Engine& engine) {
-  if (const auto kind = shaper_of(method)) {
-    return shaped_base(*kind, run.plan, setup.unflex);
+  if (const auto of = shaper_of(method)) {
+    return shaped_base(of->shaper, run.plan, setup.unflex);
   }
   switch (method) {
     case Method::s_curve:

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "report_parts.hpp"
+#include "step.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/study/study.hpp"
 
@@ -140,6 +141,20 @@ void write_chains(Sink out, const Outcome& outcome) {
   }
 }
 
+void write_steps(Sink out) {
+  fmt::format_to(
+      out,
+      "\nA step of the base of 1 mm, ω {} rad/s: overshoot, ms until within 5 % for good, "
+      "swing left by the last pulse,\nand the same with the frequency 10 % off\n",
+      kStepOmega_rad_s);
+  for (const StepRow& row : step_table()) {
+    fmt::format_to(out, "  ζ {:<4}{:<6}{:>7.1f} %{:>8}{:>9.1f} %{:>8.1f} %\n", row.zeta, row.shaper,
+                   100.0 * row.overshoot,
+                   row.settled_s ? fmt::format("{:.1f}", 1e3 * *row.settled_s) : std::string(kNone),
+                   100.0 * row.left, 100.0 * row.left_off);
+  }
+}
+
 }  // namespace
 
 std::string to_text(const Outcome& outcome) {
@@ -161,6 +176,9 @@ std::string to_text(const Outcome& outcome) {
     write_problems(out, outcome);
   }
   write_chains(out, outcome);
+  if (outcome.input.empty()) {
+    write_steps(out);
+  }
   fmt::format_to(out, "\n{} in all\n", report::duration_text(outcome.wall_s));
   return text;
 }

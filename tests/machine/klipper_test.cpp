@@ -100,6 +100,8 @@ TEST_F(KlipperFiles, GiveAResonanceNearAMeasuredOne) {
   EXPECT_DOUBLE_EQ(good(file("3hump_ei", 100.5)).dynamics_x.freq_hz, 50.0);
   const Settings unknown = good(file("mzv(n=4)", 50.0));
   EXPECT_THAT(unknown.guesses, SizeIs(1)) << "nothing to derive from";
+  EXPECT_EQ(unknown.shaper_type_x(), "mzv(n=4)");
+  EXPECT_EQ(good(file("mzv(n=2)", 50.0)).shaper_type_x(), "mzv") << "Klipper refuses it";
 }
 
 TEST_F(KlipperFiles, TellNothingOfTheirShapersOnceBothResonancesAreGiven) {

@@ -319,6 +319,8 @@ TEST(ShaperType, IsTheFirmwaresDefaultUnlessNamed) {
   const Settings named = read("[printer]\ninput_shaper_type = \"ei\"\n");
   EXPECT_EQ(named.shaper_type_x(), "ei");
   EXPECT_EQ(named.shaper_type_y(), "ei");
+  EXPECT_EQ(read("[printer]\ninput_shaper_type = \"mzv(n=4,t=0.9)\"\n").shaper_type_y(),
+            "mzv(n=4,t=0.9)");
   const Settings two = read("[printer]\ninput_shaper_type_y = \"zv\"\n");
   EXPECT_EQ(two.shaper_type_x(), "mzv");
   EXPECT_EQ(two.shaper_type_y(), "zv");

@@ -97,6 +97,19 @@ TEST(Shaping, TakesTypeAndDampingOfTheFileBeforeThoseOfTheConfiguration) {
   EXPECT_NEAR(both.y[1].time_s - both.y[0].time_s, 0.5 * damped_period_s(45.0, 0.2), 1e-12);
 }
 
+TEST(Shaping, OfKlipperHasTheParametersOfItsType) {
+  gcode::Shaper shaper = kOn;
+  shaper.settings.type_y = "MZV(n=5, t=1.1)";
+  FirmwareConfig config = config_of(Firmware::klipper);
+  config.shaper.type_x = "mzv(n=4,t=0.9)";
+  const Shaping both = shaping(config, shaper);
+  ASSERT_EQ(both.x.size(), 4U);
+  ASSERT_EQ(both.y.size(), 5U);
+  const double period_s = damped_period_s(45.0, 0.1);
+  EXPECT_NEAR(both.x.back().time_s - both.x.front().time_s, 0.9 * period_s, 1e-12);
+  EXPECT_NEAR(both.y.back().time_s - both.y.front().time_s, 1.1 * period_s, 1e-12);
+}
+
 TEST(Shaping, TakesTheFirmwaresDefaultForATypeThatItDoesNotKnow) {
   gcode::Shaper shaper = kOn;
   shaper.settings.type_x = "smooth_zv";

@@ -114,10 +114,10 @@ TEST(StudyJson, SaysWhyAMethodIsNotUsed) {
 
 TEST(StudyHtml, HasFiveFiguresForEveryMethodThatIsUsed) {
   const std::string html = to_html(outcome());
-  // 2B has no shapers; one more plot shows the sensitivity.
-  EXPECT_EQ(count(html, "<div data-figures="), 16U + 10U);
-  EXPECT_EQ(count(html, "<svg class=\"plot\""), 5U * (16U + 10U) + 1U);
-  EXPECT_EQ(count(html, "<div data-figures=\"ref 13\">"), 1U);  // shown at first
+  // 2B has no shapers; one more plot shows the sensitivity, and three a step and a staircase.
+  EXPECT_EQ(count(html, "<div data-figures="), 19U + 10U);
+  EXPECT_EQ(count(html, "<svg class=\"plot\""), 5U * (19U + 10U) + 4U);
+  EXPECT_EQ(count(html, "<div data-figures=\"ref 16\">"), 1U);  // shown at first
   EXPECT_THAT(html, Not(HasSubstr("nan")));
   EXPECT_THAT(html, Not(HasSubstr("http://")));
   EXPECT_THAT(html, Not(HasSubstr("https://")));

@@ -11,7 +11,7 @@
 //               generate shaped inputs", J. Mech. Des. 116 (1994) 654–659, here at 5 % vibration
 //   2HUMP_EI, 3HUMP_EI    Singhose, Porter, Tuttle & Singer, "Vibration reduction using multi-hump
 //               input shapers", J. Dyn. Syst. Meas. Control 119 (1997) 320–326
-//   MZV         Klipper's own
+//   MZV         Klipper's own, with two parameters since March 2026; see MzvForm
 //   ZVDD, ZVDDD ZVD with one and two pulses more (binomial weights), as in
 //               RepRapFirmware, Movement/AxisShaper.cpp
 #pragma once
@@ -37,6 +37,32 @@ inline constexpr std::array<ShaperKind, 6> kShaperKinds = {
 // 0.2 for EI, 2HUMP_EI and 3HUMP_EI, which are fits. Klipper refuses them there.
 [[nodiscard]] double max_damping_ratio(ShaperKind kind);
 
+// What Klipper lets one choose of MZV: 3 to 10 pulses, evenly spaced over a time that is given in
+// damped periods. It is at least half a period, where MZV is ZV, and less than (pulses − 1)/2,
+// where it becomes ZV convolved with itself.
+struct MzvForm {
+  int pulses = 3;
+  double duration = 0.75;
+
+  [[nodiscard]] bool is_defined() const;
+  [[nodiscard]] bool operator==(const MzvForm&) const = default;
+};
+
+// The form that Klipper reads from "mzv", "mzv(n=4,t=0.9)", "mzv(4,0.9)" or "mzv(n=4,tau=1.2)".
+// nullopt for any other text, and for forms that are not defined. tau is the duration with ever
+// more pulses for the same zeros: t = tau (n − 1)/(n + 2 tau − 2).
+[[nodiscard]] std::optional<MzvForm> mzv_form(std::string_view text);
+
+// A shaper: its kind, and where that is MZV, its form.
+struct Shaper {
+  ShaperKind kind = ShaperKind::mzv;
+  MzvForm form = {};
+
+  // Either is a shaper by itself.
+  constexpr Shaper(ShaperKind of_kind) : kind(of_kind) {}  // NOLINT(google-explicit-constructor)
+  constexpr Shaper(MzvForm of_mzv) : form(of_mzv) {}       // NOLINT(google-explicit-constructor)
+};
+
 // The reference, delayed by time_s, counts with this weight.
 struct Pulse {
   double time_s = 0.0;
@@ -48,9 +74,9 @@ struct Pulse {
 // pulses therefore lie before 0.
 using ShaperPulses = std::vector<Pulse>;
 
-// The pulses for an axis with this frequency and damping. nullopt above max_damping_ratio();
-// freq_hz must be above zero.
-[[nodiscard]] std::optional<ShaperPulses> shaper_pulses(ShaperKind kind, double freq_hz,
+// The pulses for an axis with this frequency and damping. nullopt above max_damping_ratio() and for
+// a form that is not defined; freq_hz must be above zero.
+[[nodiscard]] std::optional<ShaperPulses> shaper_pulses(const Shaper& shaper, double freq_hz,
                                                         double damping_ratio);
 
 }  // namespace unflex::dynamics

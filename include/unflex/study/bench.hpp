@@ -25,6 +25,9 @@ enum class Method {
   ei,
   two_hump_ei,
   three_hump_ei,
+  mzv_4_pulses,
+  mzv_5_pulses,
+  mzv_6_pulses,
   s_curve,
   slow_s_curve,
   filtered_spline,
@@ -37,7 +40,7 @@ enum class Method {
   // unflex 4× without its second stage; tried only where there is one.
   first_stage_4x,
 };
-inline constexpr std::size_t kMethodCount = 16;  // without first_stage_4x
+inline constexpr std::size_t kMethodCount = 19;  // without first_stage_4x
 
 // "uncompensated", "ZV", "unflex 4×" …
 [[nodiscard]] std::string_view name(Method method);
