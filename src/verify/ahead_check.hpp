@@ -1,7 +1,7 @@
 // Checks lines that ask for a temperature earlier than the sliced file does. This is the only thing
-// that may leave its place or be added without a form of its own, and it must stay harmless: it does
-// not wait, it passes no other command to the hotend, no change of the tool, no pause and nothing
-// that may be any of these, and then the sliced file asks for that same temperature.
+// that may leave its place or be added without a form of its own, and it must stay harmless: it
+// does not wait, it passes no other command to the hotend, no change of the tool, no pause and
+// nothing that may be any of these, and then the sliced file asks for that same temperature.
 #pragma once
 
 #include <optional>
@@ -33,6 +33,7 @@ class AheadCheck {
 
  private:
   [[nodiscard]] std::optional<gcode::HotendCommand> command(const gcode::Line& line) const;
+  [[nodiscard]] bool is_target(std::optional<double> asked_c) const;
   [[nodiscard]] std::optional<std::string> never_asked();
 
   Firmware firmware_;

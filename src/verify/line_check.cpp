@@ -11,6 +11,8 @@
 namespace unflex::verify {
 namespace {
 
+// Of filament, by which both files are rounded.
+constexpr double kLaidTolerance_mm = 0.01;
 // Outside compensated runs the base rests at the rounded end of its path.
 constexpr double kRestTolerance_mm = 1e-4 + 1e-9;
 
@@ -49,8 +51,8 @@ void LineCheck::compare(bool complete, double place_tolerance_mm) {
   for (;;) {
     const PlacedLine* const input = front(*input_);
     const PlacedLine* const output = front(*output_);
-    const bool is_here = output != nullptr ? input != nullptr && same_line(input->line, output->line)
-                                           : !complete;
+    const bool is_here =
+        output != nullptr ? input != nullptr && same_line(input->line, output->line) : !complete;
     if (input != nullptr && !is_here && ahead_.is_awaited(input->line)) {
       ahead_.arrive();
       input_->lines().pop_front();
@@ -76,17 +78,17 @@ void LineCheck::compare(bool complete, double place_tolerance_mm) {
 void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
   const bool same = same_line(input.line, output.line);
   const bool placed = same && at_same_place(input, output);
-  if (placed || (same && !is_known_addition(output.line.content(), input_->firmware()))) {
+  const bool is_addition = is_known_addition(output.line.content(), input_->firmware());
+  const auto is_ahead = [&] {
+    return output.e_mm <= input.e_mm + kLaidTolerance_mm && ahead_.takes(output.line);
+  };
+  if (placed || (same && !is_addition && !is_ahead())) {
     match(input, output);
     input_->lines().pop_front();
-    output_->lines().pop_front();
-  } else {
-    if (!is_known_addition(output.line.content(), input_->firmware()) &&
-        !ahead_.takes(output.line)) {
-      resynchronise(output);
-    }
-    output_->lines().pop_front();
+  } else if (!same && !is_addition && !ahead_.takes(output.line)) {
+    resynchronise(output);
   }
+  output_->lines().pop_front();
 }
 
 bool LineCheck::at_same_place(const PlacedLine& input, const PlacedLine& output) const {

@@ -12,7 +12,9 @@ namespace {
 
 constexpr double kBand_c = 5.0;
 
-Loop loop() { return {.plant = kReference, .control = {.gains = *gains(Rule::simc_pid, kReference)}}; }
+Loop loop() {
+  return {.plant = kReference, .control = {.gains = *gains(Rule::simc_pid, kReference)}};
+}
 
 // A print that lays filament all the time, a line in each step.
 Course steady(double duration_s) {
@@ -73,8 +75,7 @@ TEST(Ahead, IsThatOfTheTable) {
     const std::vector<Ahead> ahead =
         choose_ahead(loop(), course, commands, kBand_c, AheadWhen::both);
     ASSERT_EQ(ahead.size(), 1U);
-    const Along with =
-        along(loop(), course, with_ahead(commands, ahead), wanted, kBand_c);
+    const Along with = along(loop(), course, with_ahead(commands, ahead), wanted, kBand_c);
     EXPECT_NEAR(with.out_of_band_s(), row.out_with_s, kPlaced_s);
     EXPECT_NEAR(with.colder_s, row.cold_with_s, kPlaced_s);
   }

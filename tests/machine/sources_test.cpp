@@ -195,6 +195,43 @@ TEST(RrfConfig, WithExpressionsAsksForTheirKeys) {
   EXPECT_THAT(parse(text, "config.g", given)->notes, IsEmpty());
 }
 
+// M307 as three generations of the firmware have it.
+TEST(RrfConfig, HasTheHotendsModel) {
+  struct Row {
+    std::string line;
+    double gain_c;
+    double time_constant_s;
+    double dead_time_s;
+  };
+  // Since 3.4 losses go by a power, and τ is that of 185 °C above the room.
+  const double tau_s = 185.0 / (0.554 * std::pow(1.85, 1.35));
+  for (const Row& row :
+       {Row{"M307 H1 R2.430 K0.554:0.100 D5.56 E1.35 S1.00 B0 V24.0", 2.43 * tau_s / 255.0, tau_s,
+            5.56},
+        Row{"M307 H1 R2.430 K0.554 D5.56", 2.43 * tau_s / 255.0, tau_s, 5.56},
+        Row{"M307 H1 B0 R2.346 C171.7:114.3 D6.53 S1.00 V24.0", 2.346 * 171.7 / 255.0, 171.7, 6.53},
+        Row{"M307 B0 H1 A340.0 C140.0 D5.5 V24.0", 340.0 / 255.0, 140.0, 5.5}}) {
+    SCOPED_TRACE(row.line);
+    const HotendSettings hotend =
+        read("M550 P\"x\"\nM307 H0 A90 C700 D10\n" + row.line + "\nM593 P\"zvd\" F40\n").hotend;
+    EXPECT_NEAR(hotend.gain_c.value_or(0.0), row.gain_c, 1e-4);
+    EXPECT_NEAR(hotend.time_constant_s.value_or(0.0), row.time_constant_s, 1e-3);
+    EXPECT_NEAR(hotend.dead_time_s.value_or(0.0), row.dead_time_s, 1e-9);
+  }
+  EXPECT_NEAR(tau_s, 145.54, 0.01);
+}
+
+TEST(RrfConfig, HasTheModelOfTheFirstToolsHeater) {
+  const std::string models = "M307 H1 R2 K0.5 D5\nM307 H2 R3 K0.5 D6\n";
+  const std::string end = "M593 P\"zvd\" F40\n";
+  EXPECT_EQ(
+      told(read(models + "M563 P0 D0 H2\nM563 P1 D1 H1\n" + end, "config.g"), "hotend.dead_time_s"),
+      "6 config.g:2");
+  EXPECT_EQ(told(read(models + end, "config.g"), "hotend.dead_time_s"), "5 config.g:1");
+  EXPECT_FALSE(read("M307 H1 R2 K0.5\n" + end, "config.g").hotend.has_model()) << "no dead time";
+  EXPECT_FALSE(read("M307 H1 S0.8\n" + end, "config.g").hotend.has_model());
+}
+
 TEST(RrfConfig, TellsInWhichModeOfFilamentAPrintBegins) {
   const std::string text = "M550 P\"x\"\nM593 P\"zvd\" F40\n";
   EXPECT_FALSE(read(text, "config.g").printer.relative_extrusion);

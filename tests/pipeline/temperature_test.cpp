@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <random>
 #include <sstream>
@@ -26,13 +27,12 @@ using testing::JobFolder;
 
 // The reference of tests/hotend, and the axes.
 std::vector<std::string> with_model(Firmware firmware, const std::vector<std::string>& more = {}) {
-  std::vector<std::string> overrides = {
-      fmt::format("printer.firmware={}", to_string(firmware)),
-      "dynamics.freq_error=0",
-      "hotend.gain_c=2",
-      "hotend.time_constant_s=300",
-      "hotend.sensor_lag_s=2.5",
-      "hotend.dead_time_s=5"};
+  std::vector<std::string> overrides = {fmt::format("printer.firmware={}", to_string(firmware)),
+                                        "dynamics.freq_error=0",
+                                        "hotend.gain_c=2",
+                                        "hotend.time_constant_s=300",
+                                        "hotend.sensor_lag_s=2.5",
+                                        "hotend.dead_time_s=5"};
   overrides.insert(overrides.end(), more.begin(), more.end());
   return overrides;
 }
@@ -175,10 +175,9 @@ class AskedAhead : public ::testing::Test {
   }
 
   // The sliced file with the line taken out, if it is there, and put behind the first move.
-  static std::string violations(const std::string& sliced, const std::string& ahead,
-                                bool takes_out, const std::string& allowed = "true") {
-    const JobFolder folder(sliced,
-                           with_model(Firmware::klipper, {"hotend.ahead=" + allowed}));
+  static std::string violations(const std::string& sliced, const std::string& ahead, bool takes_out,
+                                const std::string& allowed = "true") {
+    const JobFolder folder(sliced, with_model(Firmware::klipper, {"hotend.ahead=" + allowed}));
     std::string output = sliced;
     if (takes_out) {
       output.erase(output.find(ahead), ahead.size());
@@ -195,9 +194,37 @@ TEST_F(AskedAhead, IsNoViolation) {
   EXPECT_EQ(violations(print("M104 S220\n"), "M104 S220\n", true), "");
   EXPECT_EQ(violations(print("M106 S80\nM104 S220\n;a comment\n"), "M104 S220\n", true), "");
   EXPECT_EQ(violations(print("M109 S220\n"), "M104 S220\n", false), "");
+  EXPECT_EQ(violations(print("M109 S220.125\n"), "M104 S220.13\n", false), "");
   EXPECT_EQ(violations(print("SET_HEATER_TEMPERATURE HEATER=extruder TARGET=220\n"),
                        "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=220\n", true),
             "");
+}
+
+// A round of one run, in which no other line stands between the two places.
+TEST(AskedAheadInARun, IsNoViolationUnlessItComesLate) {
+  std::string print = "G28\nG90\nM83\nM109 S200\nG1 X120 Y100 Z0.2 F6000\n";
+  for (int i = 1; i <= 800; ++i) {
+    const double angle = 0.12 * i;
+    print += fmt::format("G1 X{:.3f} Y{:.3f} E0.05 F1800\n", 100.0 + 20.0 * std::cos(angle),
+                         100.0 + 20.0 * std::sin(angle));
+    print += i == 450 ? "M104 S220\n" : "";
+  }
+  print += "M104 S0\n";
+  const JobFolder early(print, with_model(Firmware::klipper, {"hotend.ahead=true"}));
+  const Result<report::Report> made = compensated(early);
+  ASSERT_TRUE(made) << to_string(made.error());
+  ASSERT_EQ(made->temperature->ahead.size(), 1U);
+  const Result<report::Report> checked = verified(early);
+  ASSERT_TRUE(checked) << to_string(checked.error());
+  EXPECT_EQ(testing::complaints(*checked), "");
+  std::string late = early.output();
+  const std::string change = "M104 S220\n";
+  late.erase(late.find(change), change.size());
+  late.insert(late.rfind("\nG1", late.size() - 400) + 1, change);
+  early.set_output(late);
+  const Result<report::Report> spoilt = verified(early);
+  ASSERT_TRUE(spoilt) << to_string(spoilt.error());
+  EXPECT_THAT(testing::complaints(*spoilt), HasSubstr("'M104 S220' moved along the path by"));
 }
 
 TEST_F(AskedAhead, MustBeAllowed) {
@@ -245,7 +272,8 @@ constexpr std::string_view kStart = "G28\nG90\nM83\nG1 X10 Y10 F6000\nM204 S1000
 
 TEST(PrintCourse, KnowsWhenCommandsCome) {
   const std::string print = fmt::format(
-      "{}G1 X60 E1 F3000\nM104 S210\nG1 X10 E1\nG4 P2000\nG1 X60 E1\nM104 S220\nG1 X10 E1\n", kStart);
+      "{}G1 X60 E1 F3000\nM104 S210\nG1 X10 E1\nG4 P2000\nG1 X60 E1\nM104 S220\nG1 X10 E1\n",
+      kStart);
   const PrintCourse course = course_of(print, Firmware::klipper);
   ASSERT_EQ(course.commands.size(), 2U);
   const hotend::Command& first = course.commands[0];
@@ -267,6 +295,16 @@ TEST(PrintCourse, KnowsWhenCommandsCome) {
   }
   EXPECT_NEAR(laid_mm3, 4.0 * area_mm2, 1e-4);
   EXPECT_NEAR(extruding_s, 4.0, 0.05);
+}
+
+// However slow a line or long a pause is, the course ends and holds all filament.
+TEST(PrintCourse, LastsAnHourAtMostForEachLine) {
+  const PrintCourse course = course_of(
+      fmt::format("{}G1 X60 E1 F0.01\nG4 P1000000000\nG1 X10 E1 F3000\nM104 S220\n", kStart),
+      Firmware::klipper);
+  ASSERT_EQ(course.commands.size(), 1U);
+  EXPECT_NEAR(course.commands[0].time_s, 7201.0, 1.0);
+  EXPECT_NEAR(course.commands[0].laid_mm3, 2.0 * 2.405281875467, 1e-6);
 }
 
 TEST(PrintCourse, KnowsWhatStandsInTheWay) {
@@ -297,6 +335,8 @@ TEST(PrintCourse, LeavesLinesThatCannotStandAlone) {
   };
   EXPECT_EQ(text_of("M104 S210 ; hot", Firmware::klipper), "M104 S210 ; hot\n");
   EXPECT_EQ(text_of("M109 S210", Firmware::klipper), "M104 S210\n");
+  EXPECT_EQ(text_of("M104 S210\r", Firmware::klipper), "M104 S210\r\n");
+  EXPECT_EQ(text_of("M109 S210\r", Firmware::klipper), "M104 S210\r\n");
   EXPECT_EQ(text_of("N10 M104 S210", Firmware::marlin), "");
   EXPECT_EQ(text_of("  M104 S210", Firmware::rrf), "");
   EXPECT_EQ(text_of("M116", Firmware::rrf), "");
