@@ -16,7 +16,6 @@
 namespace unflex::app {
 namespace {
 
-
 using hotend::Rule;
 
 constexpr std::array kRules = {Rule::simc_pid, Rule::simc_pi,    Rule::zn_pid,

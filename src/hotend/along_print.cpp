@@ -145,8 +145,8 @@ std::vector<Ahead> candidates(const Plant& plant, const Course& course,
       continue;
     }
     const double band = std::copysign(band_c, change_c);
-    const std::optional<double> lead = lead_s(
-        plant, before_c, to_c, command.wait == Wait::none ? to_c - band : before_c + band);
+    const std::optional<double> lead =
+        lead_s(plant, before_c, to_c, command.wait == Wait::none ? to_c - band : before_c + band);
     if (!lead) {
       continue;
     }

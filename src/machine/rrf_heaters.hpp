@@ -1,4 +1,5 @@
-// The hotend's model in RepRapFirmware's config.g: M307, and M563, which says whose heater is whose.
+// The hotend's model in RepRapFirmware's config.g: M307, and M563, which says whose heater is
+// whose.
 //
 // Notation of unflex/hotend/firmware_words.hpp: dT/dt = R u − K (ΔT/100)^E.
 #pragma once

@@ -14,8 +14,8 @@
 #include "report_rows.hpp"
 #include "retime.hpp"
 #include "rewrite_lines.hpp"
-#include "unflex/pipeline/temperature.hpp"
 #include "unflex/core/errno_text.hpp"
+#include "unflex/pipeline/temperature.hpp"
 #include "unflex/report/format.hpp"
 
 namespace unflex::pipeline {
@@ -141,9 +141,9 @@ Status follow_hotend(const Job& job, Progress& progress, report::Report& report)
     return follow_temperature(job, OutputMay::change, progress, report);
   }
   if (job.settings.hotend.ahead) {
-    report.warnings.push_back(to_string(Diagnostic{
-        {job.input_name, 0},
-        "hotend.ahead does nothing in a stream; give a file to read and one to write"}));
+    report.warnings.push_back(to_string(
+        Diagnostic{{job.input_name, 0},
+                   "hotend.ahead does nothing in a stream; give a file to read and one to write"}));
   }
   return {};
 }

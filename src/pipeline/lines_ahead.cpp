@@ -22,9 +22,8 @@ Status put_ahead(const std::string& path, const std::string& name,
            ++next_to_stand) {
         out += next_to_stand->text;
       }
-      next_to_go = std::find_if(next_to_go, lines.end(), [&](const LineAhead& ahead) {
-        return ahead.from_line >= number;
-      });
+      next_to_go = std::find_if(next_to_go, lines.end(),
+                                [&](const LineAhead& ahead) { return ahead.from_line >= number; });
       if (next_to_go == lines.end() || next_to_go->from_line != number) {
         out += line;
       }

@@ -26,8 +26,7 @@ std::optional<hotend::Loop> loop_of(const machine::HotendSettings& settings) {
   if (!gains) {
     return std::nullopt;
   }
-  return hotend::Loop{
-      .plant = *plant, .control = {.gains = *gains}, .heater_w = settings.heater_w};
+  return hotend::Loop{.plant = *plant, .control = {.gains = *gains}, .heater_w = settings.heater_w};
 }
 
 // What the sliced file wants at each place of the output. A place is known by the filament that is
@@ -54,8 +53,8 @@ report::TemperatureRow row(const hotend::Along& along) {
   return {along.colder_s, along.hotter_s, along.worst_c, along.worst_line, along.waiting_s};
 }
 
-// Of each stretch of steps the one that is furthest from its target, while filament is laid if it
-// is anywhere in the stretch.
+// Takes one step of each stretch: the one that is furthest from its target, among those that lay
+// filament if there are any.
 std::vector<report::Temperature::Moment> thinned(const hotend::Along& along, const Course& course,
                                                  const std::vector<hotend::Target>& wanted) {
   const std::size_t count = along.temperature_c.size();
@@ -110,8 +109,8 @@ void renumber(const std::vector<LineAhead>& lines, report::Report& report) {
   }
   now(report.step_rates.total.emitted_line);
   now(report.temperature->emitted.worst_line);
-  report.output_lines += static_cast<std::size_t>(
-      std::ranges::count(lines, std::size_t{0}, &LineAhead::from_line));
+  report.output_lines +=
+      static_cast<std::size_t>(std::ranges::count(lines, std::size_t{0}, &LineAhead::from_line));
 }
 
 }  // namespace
@@ -162,8 +161,8 @@ Status follow_temperature(const Job& job, OutputMay may, Progress& progress,
       const hotend::Command& command = output->commands[one.command];
       // Both files have the same commands.
       const std::size_t number = std::min(one.command, sliced->commands.size() - 1);
-      result.ahead.push_back({sliced->commands[number].line, command.time_s - one.time_s,
-                              one.from_c, one.to_c});
+      result.ahead.push_back(
+          {sliced->commands[number].line, command.time_s - one.time_s, one.from_c, one.to_c});
     }
     output->commands = hotend::with_ahead(output->commands, ahead);
   }

@@ -43,10 +43,8 @@ Json temperature_json(const std::optional<Temperature>& temperature) {
   }
   Json ahead = Json::array();
   for (const TemperatureAhead& one : temperature->ahead) {
-    ahead.push_back({{"line", one.line},
-                     {"lead_s", one.lead_s},
-                     {"from_c", one.from_c},
-                     {"to_c", one.to_c}});
+    ahead.push_back(
+        {{"line", one.line}, {"lead_s", one.lead_s}, {"from_c", one.from_c}, {"to_c", one.to_c}});
   }
   Json time_s = Json::array();
   Json target_c = Json::array();
@@ -71,7 +69,8 @@ std::string temperature_list(const Temperature& t) {
   if (!t.is_known) {
     return "not known, since no line of the print sets the hotend's";
   }
-  std::string text = fmt::format("while filament is laid {:+.1f} °C off at most", t.emitted.worst_c);
+  std::string text =
+      fmt::format("while filament is laid {:+.1f} °C off at most", t.emitted.worst_c);
   if (t.emitted.worst_line > 0) {
     text += fmt::format(" (line {})", t.emitted.worst_line);
   }
@@ -82,8 +81,9 @@ std::string temperature_list(const Temperature& t) {
     text += t.ahead.empty() ? "" : fmt::format(", as sliced {}", seconds_text(t.sliced));
   }
   if (!t.ahead.empty()) {
-    text += fmt::format("; {} asked for ahead",
-                        t.ahead.size() == 1 ? "1 change" : fmt::format("{} changes", t.ahead.size()));
+    text +=
+        fmt::format("; {} asked for ahead",
+                    t.ahead.size() == 1 ? "1 change" : fmt::format("{} changes", t.ahead.size()));
   }
   return text + waiting_text(t);
 }

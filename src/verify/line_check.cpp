@@ -11,7 +11,7 @@
 namespace unflex::verify {
 namespace {
 
-// Of filament, by which both files are rounded.
+// Both files round filament.
 constexpr double kLaidTolerance_mm = 0.01;
 // Outside compensated runs the base rests at the rounded end of its path.
 constexpr double kRestTolerance_mm = 1e-4 + 1e-9;
@@ -74,7 +74,8 @@ void LineCheck::compare(bool complete, double place_tolerance_mm) {
 }
 
 // Lines of the forms unflex adds may stand in the sliced file as well. Such a line is the sliced
-// file's if it stands where that one does; otherwise it was added.
+// file's if it stands where that one does; otherwise it was added. A line that asks for a
+// temperature ahead may come before its place in the same run: less filament is laid there.
 void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
   const bool same = same_line(input.line, output.line);
   const bool placed = same && at_same_place(input, output);

@@ -398,7 +398,7 @@ TEST_F(BatchTest, EndsSoonWhenAskedAndLeavesNothingHalfDone) {
 
 TEST_F(BatchTest, KilledAndStartedAgainDoesOnlyWhatIsMissing) {
   // The longest print starts first; the short ones are done meanwhile.
-  add("in/long.g", squares(1200));
+  add("in/long.g", squares(400));
   add("in/short.g", squares(20));
   add("in/shorter.g", squares(10));
   {

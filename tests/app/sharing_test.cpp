@@ -43,7 +43,7 @@ class Sharing : public ProgramTest {
 
 TEST_F(Sharing, CompensatesInPlaceOnce) {
   const std::string whole = run({"compensate", "in.gcode", "-o", "-"}).out;
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 8; ++i) {
     write_file(path("in.gcode"), small_print());
     const auto [first, second] = twice({"compensate", "in.gcode", "--in-place", "-q"});
     ASSERT_EQ(read_file(path("in.gcode")), whole);
@@ -61,7 +61,7 @@ TEST_F(Sharing, CompensatesInPlaceOnce) {
 
 TEST_F(Sharing, WritesOneOutputWholeFromTwo) {
   const std::string whole = run({"compensate", "in.gcode", "-o", "-"}).out;
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < 6; ++i) {
     const auto [first, second] = twice({"compensate", "in.gcode", "-o", "new.gcode", "-q"});
     EXPECT_EQ(first.exit_code, 0) << first.err;
     EXPECT_EQ(second.exit_code, 0) << second.err;

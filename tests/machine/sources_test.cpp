@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "reading.hpp"
 
 namespace unflex::machine {
@@ -166,6 +168,31 @@ TEST(RrfConfig, IsRead) {
   EXPECT_THAT(s.notes, IsEmpty());
 }
 
+// The heater of the first tool, and 210 °C as the temperature at which losses are taken.
+TEST(RrfConfig, HasTheModelOfTheHotend) {
+  const std::string start = "M550 P\"x\"\nM593 P\"zvd\" F40\n";
+  const std::string bed = "M307 H0 R0.4 K0.25 D3 E1.35 S1.00\n";
+  const std::string hotend = "M307 H1 R1.693 K0.268:0.1 D6.39 E1.35 S1.00 V24\n";
+  const Settings now = read(start + bed + hotend, "config.g");
+  ASSERT_TRUE(now.hotend.has_model());
+  // K u_max = R τ, τ = ΔT / (K (ΔT/100)^E)
+  const double time_constant_s = 185.0 / (0.268 * std::pow(1.85, 1.35));
+  EXPECT_NEAR(*now.hotend.time_constant_s, time_constant_s, 1e-9);
+  EXPECT_NEAR(*now.hotend.gain_c, 1.693 * time_constant_s / 255.0, 1e-9);
+  EXPECT_NEAR(*now.hotend.dead_time_s, 6.39, 1e-9);
+  EXPECT_EQ(now.hotend.sensor_lag_s, 0.0);
+  const Settings before_3_4 = read(start + "M307 H1 A340 C140 D5.5\n", "config.g");
+  EXPECT_NEAR(*before_3_4.hotend.gain_c, 340.0 / 255.0, 1e-9);
+  EXPECT_NEAR(*before_3_4.hotend.time_constant_s, 140.0, 1e-9);
+  const Settings other =
+      read(start + "M307 H2 A340 C140 D5.5\n" + hotend + "M563 P0 D0 H2 F0\n", "config.g");
+  EXPECT_NEAR(*other.hotend.time_constant_s, 140.0, 1e-9);
+  for (const std::string_view none : {"M307 H0 A340 C140 D5.5\n", "M307 H1 A340\n", "M307 H1\n",
+                                      "M307 H1 R2 K0.3\n", "M307 H1 D5.5\n"}) {
+    EXPECT_FALSE(read(start + std::string(none), "config.g").hotend.has_model()) << none;
+  }
+}
+
 // RepRapFirmware's speeds are in mm/min, so the numbers are sixty times those of Marlin.
 TEST(RrfConfig, OfSpeedsAloneIsKnownByItsWords) {
   for (const std::string text :
@@ -195,41 +222,14 @@ TEST(RrfConfig, WithExpressionsAsksForTheirKeys) {
   EXPECT_THAT(parse(text, "config.g", given)->notes, IsEmpty());
 }
 
-// M307 as three generations of the firmware have it.
-TEST(RrfConfig, HasTheHotendsModel) {
-  struct Row {
-    std::string line;
-    double gain_c;
-    double time_constant_s;
-    double dead_time_s;
-  };
-  // Since 3.4 losses go by a power, and τ is that of 185 °C above the room.
-  const double tau_s = 185.0 / (0.554 * std::pow(1.85, 1.35));
-  for (const Row& row :
-       {Row{"M307 H1 R2.430 K0.554:0.100 D5.56 E1.35 S1.00 B0 V24.0", 2.43 * tau_s / 255.0, tau_s,
-            5.56},
-        Row{"M307 H1 R2.430 K0.554 D5.56", 2.43 * tau_s / 255.0, tau_s, 5.56},
-        Row{"M307 H1 B0 R2.346 C171.7:114.3 D6.53 S1.00 V24.0", 2.346 * 171.7 / 255.0, 171.7, 6.53},
-        Row{"M307 B0 H1 A340.0 C140.0 D5.5 V24.0", 340.0 / 255.0, 140.0, 5.5}}) {
-    SCOPED_TRACE(row.line);
-    const HotendSettings hotend =
-        read("M550 P\"x\"\nM307 H0 A90 C700 D10\n" + row.line + "\nM593 P\"zvd\" F40\n").hotend;
-    EXPECT_NEAR(hotend.gain_c.value_or(0.0), row.gain_c, 1e-4);
-    EXPECT_NEAR(hotend.time_constant_s.value_or(0.0), row.time_constant_s, 1e-3);
-    EXPECT_NEAR(hotend.dead_time_s.value_or(0.0), row.dead_time_s, 1e-9);
-  }
-  EXPECT_NEAR(tau_s, 145.54, 0.01);
-}
-
-TEST(RrfConfig, HasTheModelOfTheFirstToolsHeater) {
-  const std::string models = "M307 H1 R2 K0.5 D5\nM307 H2 R3 K0.5 D6\n";
-  const std::string end = "M593 P\"zvd\" F40\n";
-  EXPECT_EQ(
-      told(read(models + "M563 P0 D0 H2\nM563 P1 D1 H1\n" + end, "config.g"), "hotend.dead_time_s"),
-      "6 config.g:2");
-  EXPECT_EQ(told(read(models + end, "config.g"), "hotend.dead_time_s"), "5 config.g:1");
-  EXPECT_FALSE(read("M307 H1 R2 K0.5\n" + end, "config.g").hotend.has_model()) << "no dead time";
-  EXPECT_FALSE(read("M307 H1 S0.8\n" + end, "config.g").hotend.has_model());
+// Versions 3.2 and 3.3 give a rate and a time constant, with the fan off and on.
+TEST(RrfConfig, HasTheHotendsModelByItsRateAndTimeConstant) {
+  const HotendSettings hotend =
+      read("M550 P\"x\"\nM307 H1 B0 R2.346 C171.7:114.3 D6.53 S1.00 V24.0\nM593 P\"zvd\" F40\n")
+          .hotend;
+  EXPECT_NEAR(hotend.gain_c.value_or(0.0), 2.346 * 171.7 / 255.0, 1e-4);
+  EXPECT_NEAR(hotend.time_constant_s.value_or(0.0), 171.7, 1e-9);
+  EXPECT_NEAR(hotend.dead_time_s.value_or(0.0), 6.53, 1e-9);
 }
 
 TEST(RrfConfig, TellsInWhichModeOfFilamentAPrintBegins) {

@@ -117,6 +117,17 @@ TEST(HtmlReport, SaysWhatBecameOfFilamentAndHowFastMotorsStep) {
   EXPECT_THAT(to_html(report), Not(HasSubstr("kHz at most")));
 }
 
+TEST(HtmlReport, DrawsTheTemperature) {
+  Report report = recorded_report();
+  EXPECT_THAT(to_html(report), HasSubstr("<h2 id=\"temperature-h\">Temperature</h2>"));
+  EXPECT_THAT(to_html(report), HasSubstr("1.3 s too cold and 8.2 s too hot"));
+  EXPECT_THAT(to_html(report), HasSubstr("temperature, °C"));
+  report.temperature->is_known = false;
+  EXPECT_THAT(to_html(report), Not(HasSubstr("temperature, °C")));
+  report.temperature = std::nullopt;
+  EXPECT_THAT(to_html(report), Not(HasSubstr("temperature-h")));
+}
+
 TEST(HtmlReport, SaysWhenRulesAreBroken) {
   Report report = recorded_report();
   EXPECT_THAT(to_html(report), HasSubstr("do not print it</a>"));

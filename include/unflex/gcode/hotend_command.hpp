@@ -16,8 +16,8 @@ namespace unflex::gcode {
 struct HotendCommand {
   std::optional<double> target_c;  // 0: off; none: the target stays
   std::optional<int> tool;         // none: the tool in use
-  bool waits = false;              // until the target is reached from below …
-  bool waits_cooling = false;      // … and also from above
+  bool waits = false;              // until the hotend is no colder than the target
+  bool waits_cooling = false;      // and no hotter
 };
 
 // nullopt if the line asks nothing of a hotend, or nothing that the firmware understands.

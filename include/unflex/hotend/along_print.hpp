@@ -22,9 +22,9 @@ struct Course {
   static constexpr double kStep_s = 0.1;
 
   struct Step {
-    float extruding_s = 0.0F;       // for how much of the step filament is laid
-    float volume_mm3 = 0.0F;        // of that filament
-    std::uint32_t first_line = 0;   // the line of the first move that begins in the step; 0: none
+    float extruding_s = 0.0F;      // for how much of the step filament is laid
+    float volume_mm3 = 0.0F;       // of that filament
+    std::uint32_t first_line = 0;  // the line of the first move that begins in the step; 0: none
   };
   std::vector<Step> steps;
 };
@@ -63,13 +63,13 @@ struct Loop {
 
 struct Along {
   std::optional<double> known_from_s;  // where the simulation begins; none: no target is known
-  double colder_s = 0.0;  // of extrusion further than the band below what is wanted
+  double colder_s = 0.0;               // of extrusion further than the band below what is wanted
   double hotter_s = 0.0;
   double worst_c = 0.0;  // the largest distance from what is wanted while filament is laid; with
                          // its sign
   std::size_t worst_line = 0;
-  double waiting_s = 0.0;              // for temperatures, from the first extrusion on
-  std::vector<float> temperature_c;    // at the end of each step; not a number: not known
+  double waiting_s = 0.0;            // for temperatures, from the first extrusion on
+  std::vector<float> temperature_c;  // at the end of each step; not a number: not known
 
   [[nodiscard]] double out_of_band_s() const { return colder_s + hotter_s; }
 };
@@ -101,10 +101,10 @@ struct Ahead {
 
 enum class AheadWhen { heating, both };
 
-// Chooses the commands that are asked for ahead. Each comes so early that the hotend enters the band
-// around its target when it is due. One that waits comes so early that the hotend leaves the band
-// around the target before it when it is due; it then waits less. What cannot stand so early stays.
-// Filament is never laid out of the band for longer than without.
+// Chooses the commands that are asked for ahead. Each comes so early that the hotend enters the
+// band around its target when it is due. One that waits comes so early that the hotend leaves the
+// band around the target before it when it is due; it then waits less. What cannot stand so early
+// stays. Filament is never laid out of the band for longer than without.
 [[nodiscard]] std::vector<Ahead> choose_ahead(const Loop& loop, const Course& course,
                                               const std::vector<Command>& commands, double band_c,
                                               AheadWhen when);

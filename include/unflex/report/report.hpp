@@ -278,7 +278,7 @@ struct Report {
   std::optional<FlowDifferenceRow> flow_difference;  // nullopt if nothing was compared
   StepRates step_rates;
   std::optional<Temperature> temperature;  // if the settings have a model of the hotend
-  std::optional<double> max_flow_mm3_s;  // what the hotend melts, if the settings say so
+  std::optional<double> max_flow_mm3_s;    // what the hotend melts, if the settings say so
 
   double wall_s = 0.0;
   double cpu_s = 0.0;

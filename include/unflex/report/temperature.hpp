@@ -11,7 +11,7 @@ struct TemperatureRow {
   // Time in which filament is laid further from the target than the band, below and above.
   double colder_s = 0.0;
   double hotter_s = 0.0;
-  double worst_c = 0.0;  // the largest distance from the target meanwhile, with its sign
+  double worst_c = 0.0;        // the largest distance from the target meanwhile, with its sign
   std::size_t worst_line = 0;  // of the file that the row is of
   double waiting_s = 0.0;      // for temperatures, once filament has flowed
 };
