@@ -11,7 +11,7 @@ namespace unflex::gcode {
 namespace {
 
 std::optional<int> integer(std::optional<double> value) {
-  return value ? std::optional(static_cast<int>(*value)) : std::nullopt;
+  return value ? std::optional(to_int(*value)) : std::nullopt;
 }
 
 // "extruder" is tool 0, "extruder1" is tool 1. nullopt for any other heater.
@@ -61,19 +61,34 @@ std::optional<HotendCommand> klipper_command(const Command& command) {
 }
 
 // M109 R waits in both directions, M109 S while it heats.
-std::optional<HotendCommand> set_or_wait(const Command& command) {
+HotendCommand set_or_wait(const Command& command, bool either_way) {
+  return {.target_c = command.value(either_way ? 'R' : 'S'),
+          .tool = integer(command.value('T')),
+          .waits = command.is('M', 109),
+          .waits_cooling = either_way};
+}
+
+// S comes before R. Without either only a preset, I, does anything; its temperature is the
+// printer's own.
+std::optional<HotendCommand> marlin_command(const Command& command) {
   const bool waits = command.is('M', 109);
-  const bool either_way = waits && command.value('R').has_value();
-  HotendCommand result{.target_c = command.value(either_way ? 'R' : 'S'),
-                       .tool = integer(command.value('T')),
-                       .waits = waits,
-                       .waits_cooling = either_way};
-  return waits || result.target_c ? std::optional(result) : std::nullopt;
+  if (!waits && !command.is('M', 104)) {
+    return std::nullopt;
+  }
+  const bool is_preset = command.has('I');
+  const bool either_way = waits && !command.value('S') && (is_preset || command.value('R'));
+  HotendCommand result = set_or_wait(command, either_way);
+  if (is_preset) {
+    result.target_c.reset();
+  }
+  return is_preset || result.target_c ? std::optional(result) : std::nullopt;
 }
 
 std::optional<HotendCommand> rrf_command(const Command& command) {
-  if (command.is('M', 104) || command.is('M', 109)) {
-    return set_or_wait(command);
+  const bool waits = command.is('M', 109);
+  if (waits || command.is('M', 104)) {
+    const HotendCommand result = set_or_wait(command, waits && command.value('R').has_value());
+    return waits || result.target_c ? std::optional(result) : std::nullopt;
   }
   if (command.is('M', 116)) {
     return HotendCommand{.target_c = std::nullopt,
@@ -97,7 +112,7 @@ std::optional<HotendCommand> hotend_command(const Command& command, Firmware fir
     case Firmware::klipper:
       return klipper_command(command);
     case Firmware::marlin:
-      return command.is('M', 104) || command.is('M', 109) ? set_or_wait(command) : std::nullopt;
+      return marlin_command(command);
     case Firmware::rrf:
       return rrf_command(command);
   }
@@ -128,7 +143,7 @@ std::string set_hotend_line(double target_c, std::optional<int> tool) {
   constexpr int kDecimals = 2;
   std::string line = tool ? fmt::format("M104 T{} S", *tool) : "M104 S";
   append_scaled(line, to_scaled(target_c, kDecimals), kDecimals);
-  return line + "\n";
+  return line;
 }
 
 }  // namespace unflex::gcode

@@ -28,8 +28,8 @@ void RrfHeaters::read(const gcode::Command& command, const SourcePlace& place) {
   if (const double cooling_c_s = command.value('K').value_or(0.0); cooling_c_s > 0.0) {
     const double exponent = command.value('E').value_or(kUsualExponent);
     time_constant_s = kWorking_c / (cooling_c_s * std::pow(kWorking_c / 100.0, exponent));
-  } else if (const double gain_c = command.value('A').value_or(0.0); time_constant_s > 0.0) {
-    rate_c_s = gain_c / time_constant_s;  // until version 3.3
+  } else if (rate_c_s <= 0.0 && time_constant_s > 0.0) {
+    rate_c_s = command.value('A').value_or(0.0) / time_constant_s;  // until version 3.1
   }
   const double gain_c = rate_c_s * time_constant_s / kFullPower;
   if (gain_c > 0.0 && time_constant_s > 0.0) {

@@ -444,6 +444,11 @@ std::vector<std::string> recommendations(const Settings& settings) {
         "that runs stay as sliced; give {} or more, as many as unflex printer line-test shows",
         *settings.emit.max_lines_per_s, fastest_freq_hz(settings), at_least(least_lines_per_s)));
   }
+  if (settings.hotend.ahead && !settings.hotend.has_model()) {
+    remarks.emplace_back(
+        "hotend.ahead is true, but does nothing without a model of the hotend; give hotend.gain_c, "
+        "hotend.time_constant_s and hotend.dead_time_s, as unflex hotend finds them in a log");
+  }
   const AxisOptions& steps = settings.printer.steps_per_mm;
   if (settings.step_limits().is_any() && !(steps[0] && steps[1])) {
     remarks.emplace_back(

@@ -21,7 +21,8 @@ namespace {
 
 using hotend::Course;
 
-constexpr double kLongestPause_s = 3600.0;
+// What lasts longer changes no temperature any more.
+constexpr double kLongest_s = 3600.0;
 
 bool is_indented(std::string_view content) {
   return content.starts_with(' ') || content.starts_with('\t');
@@ -67,8 +68,7 @@ class CourseMaker {
     }
     if (event.kind == gcode::EventKind::barrier) {
       stop();
-      // A longer pause changes no temperature any more.
-      now_s_ += std::min(event.dwell_s, kLongestPause_s);
+      now_s_ += std::min(event.dwell_s, kLongest_s);
     } else {
       play();
     }
@@ -122,12 +122,9 @@ class CourseMaker {
     if (!asked.target_c || is_in_block(line) || !stands_alone) {
       return command;
     }
-    if (asked.waits) {
-      command.text = gcode::set_hotend_line(*asked.target_c, asked.tool);
-    } else {
-      command.text = line.text;
-      command.text += line.text.ends_with('\n') ? "" : "\n";
-    }
+    command.text = asked.waits ? gcode::set_hotend_line(*asked.target_c, asked.tool)
+                               : std::string(line.content());
+    command.text += line.text.ends_with("\r\n") ? "\r\n" : "\n";
     return command;
   }
 
@@ -174,9 +171,10 @@ class CourseMaker {
 
   void play(const planner::PlannedMove& move) {
     const double begin_s = now_s_;
-    now_s_ += move.duration_s();
+    const double duration_s = std::min(move.duration_s(), kLongest_s);
+    now_s_ += duration_s;
     const std::size_t line = std::exchange(last_line_, move.segment.line);
-    if (move.duration_s() <= 0.0) {
+    if (duration_s <= 0.0) {
       return;
     }
     const std::size_t first = index(begin_s);
@@ -194,7 +192,7 @@ class CourseMaker {
       const double to_s = std::min(now_s_, static_cast<double>(k + 1) * Course::kStep_s);
       const double share_s = std::max(0.0, to_s - from_s);
       step(k).extruding_s += static_cast<float>(share_s);
-      step(k).volume_mm3 += static_cast<float>(volume_mm3 * share_s / move.duration_s());
+      step(k).volume_mm3 += static_cast<float>(volume_mm3 * share_s / duration_s);
     }
   }
 

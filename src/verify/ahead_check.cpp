@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <cmath>
+
 #include "line_check.hpp"
 
 namespace unflex::verify {
@@ -37,11 +39,17 @@ std::optional<std::string> AheadCheck::pass(const gcode::Line& line, bool loses_
   if (!awaited_) {
     return std::nullopt;
   }
-  if (asked && asked->waits && asked->target_c == target_c_) {
+  if (asked && asked->waits && is_target(asked->target_c)) {
     arrive();  // it was added, so that this one waits less
     return std::nullopt;
   }
   return asked || tool || loses_place || gcode::pauses_print(parsed) ? never_asked() : std::nullopt;
+}
+
+// Lines that are added are rounded.
+bool AheadCheck::is_target(std::optional<double> asked_c) const {
+  constexpr double kRounding_c = 0.005 + 1e-9;
+  return asked_c && std::abs(*asked_c - target_c_) <= kRounding_c;
 }
 
 std::optional<std::string> AheadCheck::end() { return awaited_ ? never_asked() : std::nullopt; }

@@ -33,6 +33,7 @@ class AheadCheck {
 
  private:
   [[nodiscard]] std::optional<gcode::HotendCommand> command(const gcode::Line& line) const;
+  [[nodiscard]] bool is_target(std::optional<double> asked_c) const;
   [[nodiscard]] std::optional<std::string> never_asked();
 
   Firmware firmware_;

@@ -11,6 +11,8 @@
 namespace unflex::verify {
 namespace {
 
+// Both files round filament.
+constexpr double kLaidTolerance_mm = 0.01;
 // Outside compensated runs the base rests at the rounded end of its path.
 constexpr double kRestTolerance_mm = 1e-4 + 1e-9;
 
@@ -72,21 +74,22 @@ void LineCheck::compare(bool complete, double place_tolerance_mm) {
 }
 
 // Lines of the forms unflex adds may stand in the sliced file as well. Such a line is the sliced
-// file's if it stands where that one does; otherwise it was added.
+// file's if it stands where that one does; otherwise it was added. A line that asks for a
+// temperature ahead may come before its place in the same run: less filament is laid there.
 void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
   const bool same = same_line(input.line, output.line);
   const bool placed = same && at_same_place(input, output);
-  if (placed || (same && !is_known_addition(output.line.content(), input_->firmware()))) {
+  const bool is_addition = is_known_addition(output.line.content(), input_->firmware());
+  const auto is_ahead = [&] {
+    return output.e_mm <= input.e_mm + kLaidTolerance_mm && ahead_.takes(output.line);
+  };
+  if (placed || (same && !is_addition && !is_ahead())) {
     match(input, output);
     input_->lines().pop_front();
-    output_->lines().pop_front();
-  } else {
-    if (!is_known_addition(output.line.content(), input_->firmware()) &&
-        !ahead_.takes(output.line)) {
-      resynchronise(output);
-    }
-    output_->lines().pop_front();
+  } else if (!same && !is_addition && !ahead_.takes(output.line)) {
+    resynchronise(output);
   }
+  output_->lines().pop_front();
 }
 
 bool LineCheck::at_same_place(const PlacedLine& input, const PlacedLine& output) const {

@@ -282,6 +282,7 @@ void Replay::place(gcode::Line line, const Regime& before, bool motion) {
   placed.line = std::move(line);
   placed.x_mm = before.modal.position_mm[gcode::X];
   placed.y_mm = before.modal.position_mm[gcode::Y];
+  placed.e_mm = before.modal.position_mm[gcode::E];
   placed.motion = motion;
   placed.section = sections_.back().id;
   lines_.push_back(std::move(placed));

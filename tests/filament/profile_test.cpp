@@ -21,6 +21,15 @@ TEST(FilamentProfile, KnowsTheSectionOfADiameter) {
   EXPECT_NEAR(area_of_diameter_mm2(1.664885), 2.177, 1e-5);
 }
 
+// Filament that is 0.025 mm thinner or thicker, and one that is hollow.
+TEST(FilamentProfile, KnowsHowMuchASectionDiffersFromTheSlicers) {
+  const double sliced_mm2 = area_of_diameter_mm2(1.75);
+  EXPECT_NEAR(100.0 * (area_of_diameter_mm2(1.725) / sliced_mm2 - 1.0), -2.84, 5e-3);
+  EXPECT_NEAR(100.0 * (area_of_diameter_mm2(1.775) / sliced_mm2 - 1.0), 2.88, 5e-3);
+  EXPECT_NEAR(100.0 * Profile(2.177).volume_mm3(0.0, 1.0) / sliced_mm2, 90.51, 5e-3);
+  EXPECT_NEAR(Profile(2.177).length_mm(0.0, sliced_mm2), 1.104861, 5e-7);
+}
+
 TEST(FilamentProfile, IsTheSameEverywhereWithOneSection) {
   const Profile even(2.0);
   EXPECT_EQ(even.area_mm2(-5.0), 2.0);

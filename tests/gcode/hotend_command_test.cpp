@@ -37,6 +37,8 @@ TEST(HotendCommand, IsWhatKlipperDoes) {
   EXPECT_EQ(of("M109 S0"), "0");
   EXPECT_EQ(of("SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210"), "210 tool 0");
   EXPECT_EQ(of("SET_HEATER_TEMPERATURE HEATER=extruder2 TARGET=210"), "210 tool 2");
+  EXPECT_EQ(of("SET_HEATER_TEMPERATURE HEATER=extruder99999999999 TARGET=210"),
+            "210 tool 2147483647");
   EXPECT_EQ(of("SET_HEATER_TEMPERATURE HEATER=extruder"), "0 tool 0");
   EXPECT_EQ(of("SET_HEATER_TEMPERATURE HEATER=heater_bed TARGET=60"), "nothing");
   EXPECT_EQ(of("TEMPERATURE_WAIT SENSOR=extruder MINIMUM=205"), " tool 0 waits");
@@ -57,7 +59,11 @@ TEST(HotendCommand, IsWhatMarlinDoes) {
   EXPECT_EQ(of("M104"), "nothing");
   EXPECT_EQ(of("M109 S210"), "210 waits");
   EXPECT_EQ(of("M109 R210"), "210 waits both ways");
-  EXPECT_EQ(of("M109"), " waits");
+  EXPECT_EQ(of("M109 R200 S210"), "210 waits");
+  EXPECT_EQ(of("M109 S0"), "0 waits");
+  EXPECT_EQ(of("M109"), "nothing");
+  EXPECT_EQ(of("M104 I1"), "");
+  EXPECT_EQ(of("M109 I1"), " waits both ways");
   EXPECT_EQ(of("M568 P0 S210"), "nothing");
 }
 
@@ -94,8 +100,8 @@ TEST(HotendCommand, IsReadBackAsWritten) {
     EXPECT_EQ(meaning(set_hotend_line(215.0, std::nullopt), firmware), "215");
     EXPECT_EQ(meaning(set_hotend_line(215.0, 1), firmware), "215 tool 1");
   }
-  EXPECT_EQ(set_hotend_line(215.5, std::nullopt), "M104 S215.5\n");
-  EXPECT_EQ(set_hotend_line(215.0, 0), "M104 T0 S215\n");
+  EXPECT_EQ(set_hotend_line(215.5, std::nullopt), "M104 S215.5");
+  EXPECT_EQ(set_hotend_line(215.0, 0), "M104 T0 S215");
 }
 
 }  // namespace

@@ -29,6 +29,12 @@ Gains misread() {
   return {.p = by(Rule::zn_pid).p, .i = 2.0 / period_s, .d = period_s / 8.0};
 }
 
+TEST(Gains, OfTheOtherFormIntegrateTooLittle) {
+  EXPECT_NEAR(misread().p, 21.36, 5e-3);
+  EXPECT_NEAR(misread().i, 0.0669, 5e-5);
+  EXPECT_NEAR(misread().d, 3.74, 5e-3);
+}
+
 TEST(StepResponse, IsThatOfTheTable) {
   constexpr double kBand_c = 0.3;
   constexpr double kBand_s = 3.0;
@@ -53,6 +59,48 @@ TEST(StepResponse, IsThatOfTheTable) {
     EXPECT_NEAR(to_220.peak_c, row.peak_of_220_c, kBand_c);
     EXPECT_NEAR(to_220.settled_s.value_or(0.0), row.settled_of_220_s, kBand_s);
   }
+}
+
+// The plant that answers to a published test of a bottle filament's hotend as that hotend did: its
+// gains of the ideal form were put into a parallel controller whose integral winds up.
+class BottleFilament : public ::testing::Test {
+ protected:
+  static constexpr Plant kPlant{
+      .gain_c = 2.28, .time_constant_s = 189.0, .sensor_lag_s = 8.65, .dead_time_s = 2.25};
+
+  static Response to_150(const Gains& gains) {
+    return step_response(kPlant, {.gains = gains, .conditional_integration = false},
+                         kPlant.ambient_c, 150.0, {.duration_s = 3000.0});
+  }
+
+  static double at(const Response& response, double time_s) {
+    return response.temperature_c[static_cast<std::size_t>(std::lround(time_s / 0.05))];
+  }
+};
+
+TEST_F(BottleFilament, OvershootsAndStaysOffWithGainsOfTheOtherForm) {
+  const Response pi = to_150({.p = 15.75, .i = 0.04});
+  const Response pid = to_150({.p = 21.0, .i = 0.0667, .d = 3.75});
+  EXPECT_NEAR(pi.peak_c, 169.0, 0.1);
+  EXPECT_NEAR(pid.peak_c, 172.9, 0.1);
+  // The integral takes (K_p + 1/K)/K_i, 400 s and 320, to forget what it has wound up.
+  for (const Response* response : {&pi, &pid}) {
+    EXPECT_NEAR(at(*response, 670.0), 151.3, 0.05);
+    EXPECT_GT(at(*response, 540.0), 151.5);
+    EXPECT_NEAR(response->temperature_c.back(), 150.0, 0.01);
+  }
+  EXPECT_NEAR((at(pi, 1500.0) - 150.0) / (at(pi, 1100.0) - 150.0), std::exp(-400.0 / 404.7), 0.01);
+}
+
+TEST_F(BottleFilament, HasNoOffsetWithGainsOfTheRightForm) {
+  const Ultimate test{.gain = 35.0, .period_s = 30.0};
+  for (const Rule rule : {Rule::zn_pi, Rule::zn_pid}) {
+    const Response response = to_150(*gains(rule, test));
+    EXPECT_NEAR(response.peak_c, 250.0, 10.0);
+    EXPECT_NEAR(response.temperature_c.back(), 150.0, 0.01);
+  }
+  // A proportional controller of 9 reaches the target at its peak alone, as that hotend did at 150.
+  EXPECT_NEAR(to_150({.p = 9.0}).peak_c, 154.0, 0.5);
 }
 
 TEST(StepResponse, OscillatesSteadilyAtTheUltimateGain) {

@@ -144,6 +144,14 @@ TEST(LineBudget, ThatIsTooLowIsNamed) {
   EXPECT_THAT(recommendations(read("", {"emit.max_lines_per_s=90"})), IsEmpty());
 }
 
+TEST(HotendAhead, WithoutAModelIsNamed) {
+  EXPECT_THAT(recommendations(read("", {"hotend.ahead=true", "hotend.gain_c=2"})),
+              ElementsAre(StartsWith("hotend.ahead is true, but does nothing without a model")));
+  EXPECT_THAT(recommendations(read("", {"hotend.ahead=true", "hotend.gain_c=2",
+                                        "hotend.time_constant_s=300", "hotend.dead_time_s=5"})),
+              IsEmpty());
+}
+
 TEST(StepLimits, OfMotorsWhoseStepsAreNotKnownAreNamed) {
   EXPECT_THAT(recommendations(read("", {"printer.driver=\"a4988\"", "printer.x_steps_per_mm=80"})),
               ElementsAre(StartsWith("a limit of step rates is given, but not the steps of both")));

@@ -230,14 +230,19 @@ TEST(StepLimits, AreThoseOfBoardsAndDrivers) {
   EXPECT_DOUBLE_EQ(limits_of("driver = \"a4988\"\n").max_hz, 500e3);
   EXPECT_NEAR(limits_of("driver = \"drv8825\"\n").max_hz, 263158.0, 0.5);
   EXPECT_NEAR(limits_of("driver = \"tmc2209\"\n").max_hz, 5e6, 1e-3);
-  const StepLimits avr = limits_of("mcu = \"avr_16mhz\"\n");
-  EXPECT_DOUBLE_EQ(avr.max_hz, 156.9e3);
-  EXPECT_DOUBLE_EQ(avr.max_shared_hz, 98.8e3);
-  EXPECT_TRUE(std::isinf(avr.max_total_hz));
-  EXPECT_DOUBLE_EQ(limits_of("mcu = \"lpc1768\"\n").max_hz, 1.923e6);
-  EXPECT_DOUBLE_EQ(limits_of("mcu = \"stm32f103\"\n").max_shared_hz, 818e3);
-  EXPECT_DOUBLE_EQ(limits_of("mcu = \"stm32f4\"\n").max_hz, 3.652e6);
-  EXPECT_DOUBLE_EQ(limits_of("mcu = \"sam3x\"\n").max_shared_hz, 981e3);
+  struct Board {
+    std::string name;
+    double one_hz;
+    double three_hz;
+  };
+  for (const Board& board : {Board{"avr_16mhz", 156.9e3, 98.8e3},
+                             Board{"lpc1768", 1.923e6, 1.351e6}, Board{"stm32f103", 1.180e6, 818e3},
+                             Board{"stm32f4", 3.652e6, 2.459e6}, Board{"sam3x", 1.273e6, 981e3}}) {
+    const StepLimits limits = limits_of("mcu = \"" + board.name + "\"\n");
+    EXPECT_DOUBLE_EQ(limits.max_hz, board.one_hz) << board.name;
+    EXPECT_DOUBLE_EQ(limits.max_shared_hz, board.three_hz) << board.name;
+    EXPECT_TRUE(std::isinf(limits.max_total_hz)) << board.name;
+  }
 }
 
 TEST(StepLimits, CountWhereTheyAreSmallest) {

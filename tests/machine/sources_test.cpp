@@ -222,6 +222,16 @@ TEST(RrfConfig, WithExpressionsAsksForTheirKeys) {
   EXPECT_THAT(parse(text, "config.g", given)->notes, IsEmpty());
 }
 
+// Versions 3.2 and 3.3 give a rate and a time constant, with the fan off and on.
+TEST(RrfConfig, HasTheHotendsModelByItsRateAndTimeConstant) {
+  const HotendSettings hotend =
+      read("M550 P\"x\"\nM307 H1 B0 R2.346 C171.7:114.3 D6.53 S1.00 V24.0\nM593 P\"zvd\" F40\n")
+          .hotend;
+  EXPECT_NEAR(hotend.gain_c.value_or(0.0), 2.346 * 171.7 / 255.0, 1e-4);
+  EXPECT_NEAR(hotend.time_constant_s.value_or(0.0), 171.7, 1e-9);
+  EXPECT_NEAR(hotend.dead_time_s.value_or(0.0), 6.53, 1e-9);
+}
+
 TEST(RrfConfig, TellsInWhichModeOfFilamentAPrintBegins) {
   const std::string text = "M550 P\"x\"\nM593 P\"zvd\" F40\n";
   EXPECT_FALSE(read(text, "config.g").printer.relative_extrusion);

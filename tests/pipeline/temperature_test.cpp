@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <random>
 #include <sstream>
@@ -193,9 +194,37 @@ TEST_F(AskedAhead, IsNoViolation) {
   EXPECT_EQ(violations(print("M104 S220\n"), "M104 S220\n", true), "");
   EXPECT_EQ(violations(print("M106 S80\nM104 S220\n;a comment\n"), "M104 S220\n", true), "");
   EXPECT_EQ(violations(print("M109 S220\n"), "M104 S220\n", false), "");
+  EXPECT_EQ(violations(print("M109 S220.125\n"), "M104 S220.13\n", false), "");
   EXPECT_EQ(violations(print("SET_HEATER_TEMPERATURE HEATER=extruder TARGET=220\n"),
                        "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=220\n", true),
             "");
+}
+
+// A round of one run, in which no other line stands between the two places.
+TEST(AskedAheadInARun, IsNoViolationUnlessItComesLate) {
+  std::string print = "G28\nG90\nM83\nM109 S200\nG1 X120 Y100 Z0.2 F6000\n";
+  for (int i = 1; i <= 800; ++i) {
+    const double angle = 0.12 * i;
+    print += fmt::format("G1 X{:.3f} Y{:.3f} E0.05 F1800\n", 100.0 + 20.0 * std::cos(angle),
+                         100.0 + 20.0 * std::sin(angle));
+    print += i == 450 ? "M104 S220\n" : "";
+  }
+  print += "M104 S0\n";
+  const JobFolder early(print, with_model(Firmware::klipper, {"hotend.ahead=true"}));
+  const Result<report::Report> made = compensated(early);
+  ASSERT_TRUE(made) << to_string(made.error());
+  ASSERT_EQ(made->temperature->ahead.size(), 1U);
+  const Result<report::Report> checked = verified(early);
+  ASSERT_TRUE(checked) << to_string(checked.error());
+  EXPECT_EQ(testing::complaints(*checked), "");
+  std::string late = early.output();
+  const std::string change = "M104 S220\n";
+  late.erase(late.find(change), change.size());
+  late.insert(late.rfind("\nG1", late.size() - 400) + 1, change);
+  early.set_output(late);
+  const Result<report::Report> spoilt = verified(early);
+  ASSERT_TRUE(spoilt) << to_string(spoilt.error());
+  EXPECT_THAT(testing::complaints(*spoilt), HasSubstr("'M104 S220' moved along the path by"));
 }
 
 TEST_F(AskedAhead, MustBeAllowed) {
@@ -268,6 +297,16 @@ TEST(PrintCourse, KnowsWhenCommandsCome) {
   EXPECT_NEAR(extruding_s, 4.0, 0.05);
 }
 
+// However slow a line or long a pause is, the course ends and holds all filament.
+TEST(PrintCourse, LastsAnHourAtMostForEachLine) {
+  const PrintCourse course = course_of(
+      fmt::format("{}G1 X60 E1 F0.01\nG4 P1000000000\nG1 X10 E1 F3000\nM104 S220\n", kStart),
+      Firmware::klipper);
+  ASSERT_EQ(course.commands.size(), 1U);
+  EXPECT_NEAR(course.commands[0].time_s, 7201.0, 1.0);
+  EXPECT_NEAR(course.commands[0].laid_mm3, 2.0 * 2.405281875467, 1e-6);
+}
+
 TEST(PrintCourse, KnowsWhatStandsInTheWay) {
   const auto free_from = [](const std::string& between, Firmware firmware = Firmware::klipper) {
     const std::string print =
@@ -296,6 +335,8 @@ TEST(PrintCourse, LeavesLinesThatCannotStandAlone) {
   };
   EXPECT_EQ(text_of("M104 S210 ; hot", Firmware::klipper), "M104 S210 ; hot\n");
   EXPECT_EQ(text_of("M109 S210", Firmware::klipper), "M104 S210\n");
+  EXPECT_EQ(text_of("M104 S210\r", Firmware::klipper), "M104 S210\r\n");
+  EXPECT_EQ(text_of("M109 S210\r", Firmware::klipper), "M104 S210\r\n");
   EXPECT_EQ(text_of("N10 M104 S210", Firmware::marlin), "");
   EXPECT_EQ(text_of("  M104 S210", Firmware::rrf), "");
   EXPECT_EQ(text_of("M116", Firmware::rrf), "");

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "unflex/verify/verify.hpp"
 
@@ -52,10 +53,11 @@ planner::PlannedMove feed(double e_mm_s) {
 }
 
 TEST(StepRates, AreSpeedTimesStepsPerMm) {
-  for (const double steps_per_mm : {80.0, 160.0, 400.0}) {
+  for (const auto& [steps_per_mm, hz] :
+       {std::pair(80.0, 48000.0), std::pair(160.0, 96000.0), std::pair(400.0, 240000.0)}) {
     StepGauge gauge(machine_of(Kinematics::cartesian), steps(steps_per_mm, steps_per_mm));
     gauge.play(even_move(-600.0, 0.0));
-    EXPECT_DOUBLE_EQ(gauge.largest().motors[0].hz, 600.0 * steps_per_mm);
+    EXPECT_DOUBLE_EQ(gauge.largest().motors[0].hz, hz);
     EXPECT_EQ(gauge.largest().motors[0].line, 7U);
     EXPECT_EQ(gauge.largest().motors[1].hz, 0.0);
     EXPECT_EQ(gauge.largest().motors[1].line, 0U);

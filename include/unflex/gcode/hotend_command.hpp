@@ -30,7 +30,8 @@ struct HotendCommand {
 // Whether the line may hold the print up for long: a pause, a change of filament.
 [[nodiscard]] bool pauses_print(const Command& command);
 
-// A line that sets the target and does not wait, with a line ending.
+// A line that sets the target and does not wait, without a line ending. The target is rounded to
+// 0.01 °C.
 [[nodiscard]] std::string set_hotend_line(double target_c, std::optional<int> tool);
 
 }  // namespace unflex::gcode
