@@ -231,9 +231,18 @@ class ConsoleOnATerminal : public ::testing::Test {
     console.line("x: warning: odd");
     console.error({ErrorKind::usage, {}, "wrong"});
     EXPECT_THAT(console.kept(), ElementsAre("x: warning: odd", "unflex: wrong"));
+    // A terminal may hand them over one by one.
+    constexpr std::ptrdiff_t kLines = 2;
+    std::string text;
     std::array<char, 4096> block{};
-    const ssize_t got = ::read(master_, block.data(), block.size());
-    return {block.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0))};
+    while (std::ranges::count(text, '\n') < kLines) {
+      const ssize_t got = ::read(master_, block.data(), block.size());
+      if (got <= 0) {
+        break;
+      }
+      text.append(block.data(), static_cast<std::size_t>(got));
+    }
+    return text;
   }
 
   int master_ = -1;
