@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -12,7 +13,7 @@
 namespace unflex::app {
 namespace {
 
-constexpr double kWarmestRoom_c = 150.0;  // as of hotend.ambient_c
+constexpr double kWarmestRoom_c = 150.0;  // the bound of hotend.ambient_c
 constexpr double kHottest_c = 1000.0;
 
 // Options for a resonance that shows in a print: spacing, speed and decay of its waves.

@@ -1,4 +1,4 @@
-// The commands that find out about a printer: their options.
+// Adds the commands that find out about a printer, with their options.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -5,7 +5,7 @@
 namespace unflex::compensate {
 namespace {
 
-// The weight of the middle of the band of an axis; its edges have the rest.
+// What the middle of a band has of its share; the edges have the rest.
 constexpr double kMiddleShare = 1.0 / 3.0;
 
 }  // namespace

@@ -44,7 +44,7 @@ struct Given {
     if (tau > 0.0) {
       return {n, tau * (n - 1) / (n + 2.0 * tau - 2.0)};
     }
-    return {n, t > 0.0 ? t : MzvForm{}.duration};
+    return {n, t > 0.0 ? t : MzvForm{}.duration_periods};
   }
 };
 

@@ -44,14 +44,15 @@ ShaperPulses repeated_zv(int repeats, double freq_hz, double zeta) {
 // mirror of the first, because at t = ½ the ratio of its last is 0/0.
 ShaperPulses mzv(const MzvForm& form, double freq_hz, double zeta) {
   const int n = form.pulses;
-  const double beta = std::numbers::pi * (n - 1 - 2.0 * form.duration) / ((n - 1.0) * (n - 2.0));
+  const double beta =
+      std::numbers::pi * (n - 1 - 2.0 * form.duration_periods) / ((n - 1.0) * (n - 2.0));
   std::vector<double> weights(static_cast<std::size_t>(n), 1.0);
   for (int k = 1; k < n; ++k) {
     const auto at = static_cast<std::size_t>(k);
     weights[at] = 2 * k <= n - 1 ? weights[at - 1] * std::sin((n - k) * beta) / std::sin(k * beta)
                                  : weights[static_cast<std::size_t>(n - 1 - k)];
   }
-  const double spacing = form.duration / (n - 1);
+  const double spacing = form.duration_periods / (n - 1);
   const double period = damped_period(freq_hz, zeta);
   ShaperPulses pulses;
   for (int k = 0; k < n; ++k) {
@@ -169,13 +170,14 @@ double max_damping_ratio(ShaperKind kind) {
   }
 }
 
-// shaper_defs.py, get_mzv_coeffs; more than ten pulses do not fit into chelper/kin_shaper.c. Below
-// half a period weights would be negative, and close to the upper end sin β is 0.
+// The lower and upper ends are those of shaper_defs.py, get_mzv_coeffs. More than ten pulses do not
+// fit into chelper/kin_shaper.c. Below half a period weights would be negative, and close to the
+// upper end sin β is 0.
 bool MzvForm::is_defined() const {
   constexpr int kMostPulses = 10;
   constexpr double kLeastBelowTheEnd = 1e-6;
-  return pulses >= 3 && pulses <= kMostPulses && duration >= 0.5 &&
-         2.0 * duration + 1.0 < pulses - kLeastBelowTheEnd;
+  return pulses >= 3 && pulses <= kMostPulses && duration_periods >= 0.5 &&
+         2.0 * duration_periods + 1.0 < pulses - kLeastBelowTheEnd;
 }
 
 std::optional<ShaperPulses> shaper_pulses(const Shaper& shaper, double freq_hz,

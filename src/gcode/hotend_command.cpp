@@ -44,7 +44,8 @@ std::optional<HotendCommand> extended_command(const Command& command) {
   return std::nullopt;
 }
 
-// Klipper takes a missing S for 0. It waits for a target in both directions, and for none at 0.
+// Klipper takes a missing S for 0. Its M109 waits until the hotend is neither colder nor hotter
+// than the target, and at 0 it does not wait.
 std::optional<HotendCommand> klipper_command(const Command& command) {
   if (command.kind == CommandKind::extended) {
     return extended_command(command);
@@ -60,7 +61,7 @@ std::optional<HotendCommand> klipper_command(const Command& command) {
                        .waits_cooling = waits && target_c > 0.0};
 }
 
-// M109 R waits in both directions, M109 S while it heats.
+// M109 R waits while the hotend heats or cools, M109 S only while it heats.
 HotendCommand set_or_wait(const Command& command, bool either_way) {
   return {.target_c = command.value(either_way ? 'R' : 'S'),
           .tool = integer(command.value('T')),

@@ -10,7 +10,7 @@
 namespace unflex::hotend {
 namespace {
 
-// Firmwares end their waiting this near the target: Klipper's PID_SETTLE_DELTA (heaters.py),
+// Firmwares stop waiting this near the target: Klipper's PID_SETTLE_DELTA (heaters.py),
 // Marlin's TEMP_WINDOW, RepRapFirmware's TEMPERATURE_CLOSE_ENOUGH.
 constexpr double kReached_c = 1.0;
 constexpr double kLongestWait_s = 1800.0;
@@ -60,7 +60,7 @@ bool is_reached(const Command& command, double target_c, double temperature_c) {
          (command.wait == Wait::heating || temperature_c <= target_c + kReached_c);
 }
 
-// What is wanted at a time, for times that rise.
+// The target that is wanted in a step, for steps that rise. 0: none.
 class Wanted {
  public:
   explicit Wanted(const std::vector<Target>& targets) : targets_(&targets) {}
@@ -83,7 +83,7 @@ struct Start {
   double target_c = 0.0;
 };
 
-// Where the hotend's temperature is known for the first time.
+// The first step in which the temperature is known, and the target at which the hotend rests there.
 std::optional<Start> start(const Course& course, const std::vector<Command>& commands) {
   const auto first_extrusion = std::ranges::find_if(
       course.steps, [](const Course::Step& step) { return step.extruding_s > 0.0F; });
@@ -98,7 +98,8 @@ std::optional<Start> start(const Course& course, const std::vector<Command>& com
   return known.target_c > 0.0 ? std::optional(known) : std::nullopt;
 }
 
-void judge(const Course::Step& step, double off_c, double band_c, std::size_t line, Along& result) {
+void judge(const Course::Step& step, double off_c, double band_c, std::size_t line,
+           PrintResponse& result) {
   if (!(step.extruding_s > 0.0F)) {
     return;
   }
@@ -110,7 +111,7 @@ void judge(const Course::Step& step, double off_c, double band_c, std::size_t li
   }
 }
 
-// The latest line that begins before a time and no earlier than another one.
+// The latest line that begins before time_s, and not before free_from_s.
 std::optional<Ahead> place_before(const Course& course, double time_s, double free_from_s) {
   if (!(time_s > free_from_s)) {
     return std::nullopt;
@@ -162,9 +163,10 @@ std::vector<Ahead> candidates(const Plant& plant, const Course& course,
 
 }  // namespace
 
-Along along(const Loop& loop, const Course& course, const std::vector<Command>& commands,
-            const std::vector<Target>& wanted, double band_c) {
-  Along result;
+PrintResponse print_response(const Loop& loop, const Course& course,
+                             const std::vector<Command>& commands,
+                             const std::vector<Target>& wanted, double band_c) {
+  PrintResponse result;
   const std::optional<Start> known = start(course, commands);
   if (!known) {
     return result;
@@ -229,7 +231,8 @@ std::vector<Ahead> choose_ahead(const Loop& loop, const Course& course,
                                 AheadWhen when) {
   const std::vector<Target> wanted = targets(commands);
   const auto out_of_band_s = [&](const std::vector<Ahead>& ahead) {
-    return along(loop, course, with_ahead(commands, ahead), wanted, band_c).out_of_band_s();
+    return print_response(loop, course, with_ahead(commands, ahead), wanted, band_c)
+        .out_of_band_s();
   };
   constexpr double kRounding_s = 1e-6;
   const double before_s = out_of_band_s({}) + kRounding_s;

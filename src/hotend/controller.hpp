@@ -1,4 +1,5 @@
-// A controller in parallel form (rules.hpp) as firmwares have it (closed_loop.hpp, Control).
+// A controller of temperature as firmwares have it. Control of closed_loop.hpp says what that is,
+// rules.hpp has the notation of its gains.
 #pragma once
 
 #include <algorithm>
@@ -9,12 +10,14 @@ namespace unflex::hotend {
 
 class Controller {
  public:
-  // held: the power that the integral holds at first. The sum K_i ∫e is kept as a power, so that a
-  // loop without integral can hold what it starts with.
+  // Powers are in counts, full_power is the most. held: the power that the integral gives at first.
+  // The sum K_i ∫e is kept as a power, so that a loop without integral can hold what it starts
+  // with.
   Controller(const Control& control, double sample_s, double full_power, double held)
       : control_(control), sample_s_(sample_s), full_power_(full_power), held_(held) {}
 
-  // The power from this sample on. To be asked every sample_s.
+  // The power from this sample on, 0 … full_power. error_c: target minus temperature. To be called
+  // once every sample_s.
   double power(double error_c) {
     const double slope_c_s = is_first_ ? 0.0 : (error_c - last_c_) / sample_s_;
     is_first_ = false;

@@ -9,7 +9,8 @@ namespace unflex::machine {
 namespace {
 
 constexpr double kFullPower = 255.0;
-// The power law of losses becomes linear at a temperature as prints have it, above the ambient one.
+// Losses follow a power law. The linear model has the same loss at this temperature above the
+// ambient one, which is as prints have it.
 constexpr double kWorking_c = 185.0;
 constexpr double kUsualExponent = 1.35;  // FOPDT.h, DefaultHotEndHeaterCoolingRateExponent
 

@@ -1,7 +1,6 @@
-// The hotend's model in RepRapFirmware's config.g: M307, and M563, which says whose heater is
-// whose.
-//
-// Notation of unflex/hotend/firmware_words.hpp: dT/dt = R u − K (ΔT/100)^E.
+// The hotend's model in RepRapFirmware's config.g: M307 describes a heater, and M563 says which
+// heater a tool has. Notation as in unflex/hotend/firmware_words.hpp:
+//   dT/dt = R u − K (ΔT/100)^E
 #pragma once
 
 #include <map>
@@ -14,9 +13,9 @@ namespace unflex::machine {
 
 class RrfHeaters {
  public:
-  // Any line; others than these two are left alone.
+  // Takes any line in turn, and heeds M307 and M563.
   void read(const gcode::Command& command, const SourcePlace& place);
-  // Adds the model of the first tool's heater, if there is one.
+  // Adds the model of tool 0's heater, if there is one.
   void add_to(Reading& reading) const;
 
  private:
@@ -28,7 +27,7 @@ class RrfHeaters {
   };
 
   std::map<int, Model> models_;  // by heater
-  int heater_ = 1;               // of the first tool
+  int heater_ = 1;               // of tool 0; 1 is usual
 };
 
 }  // namespace unflex::machine

@@ -1,4 +1,4 @@
-// Lines that a finished file has earlier than where they were written.
+// Puts lines of a finished file ahead of their places.
 #pragma once
 
 #include <cstddef>
@@ -15,12 +15,13 @@ struct LineAhead {
   std::string text;             // with its line ending
 };
 
-// Puts the lines where they shall stand. They are numbered as before, and rise in both numbers that
-// are not 0. Every other byte stays. Fails like rewrite_lines().
+// Puts the lines where they shall stand. Every other byte stays. Numbers are those before this
+// change. From one LineAhead to the next before_line rises, and so does from_line where it is not
+// 0. Fails like rewrite_lines().
 [[nodiscard]] Status put_ahead(const std::string& path, const std::string& name,
                                const std::vector<LineAhead>& lines);
 
-// The number that a line has behind put_ahead(). It is none of those that were put ahead.
+// The number that a line has after put_ahead(). The line must be none of those that were put ahead.
 [[nodiscard]] std::size_t number_behind(const std::vector<LineAhead>& lines, std::size_t number);
 
 }  // namespace unflex::pipeline

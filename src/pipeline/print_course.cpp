@@ -21,7 +21,7 @@ namespace {
 
 using hotend::Course;
 
-// What lasts longer changes no temperature any more.
+// A move or a pause counts for no longer: by then the hotend rests, and the course stays short.
 constexpr double kLongest_s = 3600.0;
 
 bool is_indented(std::string_view content) {
@@ -128,9 +128,10 @@ class CourseMaker {
     return command;
   }
 
-  // Macros that begin a print heat the hotend, too.
+  // A macro heats the hotend, too, if it begins the print.
   void watch_macro(const gcode::Line& line) {
-    gcode::parse(line.content(), command_);  // whose views point into the line
+    // The views of command_ point into a line, and that has been moved.
+    gcode::parse(line.content(), command_);
     if (laid_mm3_ > 0.0 || command_.kind != gcode::CommandKind::extended) {
       return;
     }

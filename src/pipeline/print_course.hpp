@@ -1,4 +1,4 @@
-// A print's text as its hotend meets it: what is laid when, and what is asked of the hotend.
+// Reads a print as its hotend meets it: what is laid when, and what is asked of the hotend.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +17,8 @@ struct PrintCourse {
   std::vector<hotend::Command> commands;  // of the tool in use, in the order of the text
 };
 
-// Plans the text by the firmware's rules. Errors: it cannot be read; the user has cancelled.
+// Plans the text by the firmware's rules. `name` is what errors call it. Errors: it cannot be read;
+// the user has cancelled.
 [[nodiscard]] Result<PrintCourse> print_course(const std::filesystem::path& text,
                                                const std::string& name,
                                                const machine::Settings& settings,

@@ -9,8 +9,8 @@
 
 namespace unflex::pipeline {
 
-// Appends what is to stand in the place of a text of whole lines. The file's last line may be
-// without its line ending.
+// Appends to `out` what shall stand in the place of `text`, which is whole lines. Only the file's
+// last line may lack its ending.
 using LineChange = std::function<void(std::string_view text, std::string& out)>;
 
 // Hands the file's text to `change`, block by block in order, and writes what it makes of it over

@@ -29,8 +29,8 @@ std::optional<hotend::Loop> loop_of(const machine::HotendSettings& settings) {
   return hotend::Loop{.plant = *plant, .control = {.gains = *gains}, .heater_w = settings.heater_w};
 }
 
-// What the sliced file wants at each place of the output. A place is known by the filament that is
-// laid before it.
+// The targets of the sliced file, at the times at which the output comes to the same places. A
+// place is known by the filament that is laid before it.
 std::vector<hotend::Target> wanted_in_output(const std::vector<hotend::Command>& sliced,
                                              const Course& output) {
   constexpr double kRounding_mm3 = 1e-3;
@@ -49,15 +49,17 @@ std::vector<hotend::Target> wanted_in_output(const std::vector<hotend::Command>&
   return result;
 }
 
-report::TemperatureRow row(const hotend::Along& along) {
-  return {along.colder_s, along.hotter_s, along.worst_c, along.worst_line, along.waiting_s};
+report::TemperatureRow row(const hotend::PrintResponse& response) {
+  return {response.colder_s, response.hotter_s, response.worst_c, response.worst_line,
+          response.waiting_s};
 }
 
-// Takes one step of each stretch: the one that is furthest from its target, among those that lay
-// filament if there are any.
-std::vector<report::Temperature::Moment> thinned(const hotend::Along& along, const Course& course,
+// Takes the step of each stretch that is furthest from its target, and one that lays filament if
+// there is any.
+std::vector<report::Temperature::Moment> thinned(const hotend::PrintResponse& response,
+                                                 const Course& course,
                                                  const std::vector<hotend::Target>& wanted) {
-  const std::size_t count = along.temperature_c.size();
+  const std::size_t count = response.temperature_c.size();
   const std::size_t stretch = std::max<std::size_t>(1, (count + kMostMoments - 1) / kMostMoments);
   std::vector<report::Temperature::Moment> result;
   double target_c = 0.0;
@@ -70,7 +72,7 @@ std::vector<report::Temperature::Moment> thinned(const hotend::Along& along, con
       for (; next != wanted.end() && next->time_s <= time_s; ++next) {
         target_c = next->target_c;
       }
-      const double temperature_c = along.temperature_c[k];
+      const double temperature_c = response.temperature_c[k];
       if (!std::isfinite(temperature_c)) {
         continue;
       }
@@ -144,8 +146,8 @@ Status follow_temperature(const Job& job, OutputMay may, Progress& progress,
   }
   report::Temperature& result = report.temperature.emplace();
   result.band_c = settings.band_c;
-  const hotend::Along before = hotend::along(*loop, sliced->course, sliced->commands,
-                                             hotend::targets(sliced->commands), settings.band_c);
+  const hotend::PrintResponse before = hotend::print_response(
+      *loop, sliced->course, sliced->commands, hotend::targets(sliced->commands), settings.band_c);
   result.is_known = before.known_from_s.has_value();
   result.sliced = row(before);
   std::vector<LineAhead> lines;
@@ -167,8 +169,8 @@ Status follow_temperature(const Job& job, OutputMay may, Progress& progress,
     output->commands = hotend::with_ahead(output->commands, ahead);
   }
   const std::vector<hotend::Target> wanted = wanted_in_output(sliced->commands, output->course);
-  const hotend::Along after =
-      hotend::along(*loop, output->course, output->commands, wanted, settings.band_c);
+  const hotend::PrintResponse after =
+      hotend::print_response(*loop, output->course, output->commands, wanted, settings.band_c);
   result.emitted = row(after);
   renumber(lines, report);
   result.course = thinned(after, output->course, wanted);

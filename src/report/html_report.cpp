@@ -9,7 +9,7 @@
 
 #include "answers.hpp"
 #include "assets.hpp"
-#include "temperature_figure.hpp"
+#include "temperature_card.hpp"
 #include "unflex/core/base64.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"

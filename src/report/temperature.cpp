@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "temperature_figure.hpp"
+#include "temperature_card.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/json_parts.hpp"

@@ -1,4 +1,4 @@
-// The keys are documented in docs/study.md; a test holds the two together.
+// The keys are documented in docs/report.md; a test holds the two together.
 
 #include "step.hpp"
 #include "unflex/report/json_parts.hpp"

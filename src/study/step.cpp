@@ -15,7 +15,7 @@ constexpr double kWatched_s = 0.63;
 constexpr double kWithin = 0.05;
 constexpr double kFreqError = 0.1;
 
-// A nozzle that still leaves the band so late has not settled.
+// A nozzle that is still off by more than kWithin in the last period has not settled.
 constexpr double kPeriod_s = 2.0 * std::numbers::pi / kStepOmega_rad_s;
 
 }  // namespace

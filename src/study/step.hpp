@@ -1,5 +1,5 @@
-// A step of the base, plain or as the staircase that a shaper makes of it, and what the nozzle
-// does.
+// What the nozzle does after a step of the base, plain or as the staircase that a shaper makes of
+// it.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ namespace unflex::study {
 // Between jumps it moves by dynamics::exact_step.
 class Staircase {
  public:
-  // One mode.
+  // An axis of one mode, and the shaper's pulses, whose weights are the jumps in mm.
   Staircase(double omega_rad_s, double zeta, dynamics::ShaperPulses pulses);
 
   [[nodiscard]] double base_mm(double time_s) const;
@@ -48,17 +48,20 @@ struct StepRow {
 inline constexpr double kStepOmega_rad_s = 100.0;
 inline constexpr std::array<double, 3> kStepZetas = {0.0, 0.1, 0.5};
 
-// The four bases of a damping ratio, with their names.
+// A base of the table, with its name.
 struct NamedStaircase {
   std::string_view shaper;
   Staircase staircase;
 };
+
+// The four bases of the table for a damping ratio. freq_factor: the true frequency over the one
+// that the shapers are made for.
 [[nodiscard]] std::vector<NamedStaircase> staircases(double zeta, double freq_factor = 1.0);
 
 // What the staircase does to the nozzle, looked at every 0.05 ms; without left_off.
 [[nodiscard]] StepRow step_row(const Staircase& staircase);
 
-// All bases by all damping ratios.
+// The rows of all bases and all damping ratios.
 [[nodiscard]] std::vector<StepRow> step_table();
 
 }  // namespace unflex::study

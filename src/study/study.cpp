@@ -100,8 +100,8 @@ Result<std::vector<ChainResult>> chains(const std::vector<Case>& cases,
   return result;
 }
 
-// As `compensate` makes it, if all that it is told of the axis is one frequency that may be off:
-// the band, a mode that nobody knows of, and freedom along the path.
+// The setup as `compensate` makes it for an axis of which only one frequency is given, and that may
+// be off: with the band, a mode that nobody has measured, and freedom along the path.
 compensate::Setup in_band(compensate::Setup setup) {
   for (compensate::AxisSetup* const of : {&setup.x, &setup.y}) {
     const compensate::Plant unknown = compensate::with_unknown_mode(of->axis);

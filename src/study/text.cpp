@@ -87,7 +87,7 @@ void write_case(Sink out, const CaseResult& result) {
   }
 }
 
-// A table of what the methods that solve something need for it, a text per case.
+// A table of what each method needs that solves something, with a cell for each case.
 template <class Cell>
 void write_needs(Sink out, const Outcome& outcome, std::string_view title, const Cell& cell) {
   std::size_t width = 6;

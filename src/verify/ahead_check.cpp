@@ -46,7 +46,7 @@ std::optional<std::string> AheadCheck::pass(const gcode::Line& line, bool loses_
   return asked || tool || loses_place || gcode::pauses_print(parsed) ? never_asked() : std::nullopt;
 }
 
-// Lines that are added are rounded.
+// The temperature of a line that was added is rounded.
 bool AheadCheck::is_target(std::optional<double> asked_c) const {
   constexpr double kRounding_c = 0.005 + 1e-9;
   return asked_c && std::abs(*asked_c - target_c_) <= kRounding_c;

@@ -1,7 +1,8 @@
-// Checks lines that ask for a temperature earlier than the sliced file does. This is the only thing
-// that may leave its place or be added without a form of its own, and it must stay harmless: it
-// does not wait, it passes no other command to the hotend, no change of the tool, no pause and
-// nothing that may be any of these, and then the sliced file asks for that same temperature.
+// Checks lines that ask for a temperature ahead of their place in the sliced file. No other line
+// may leave its place, and no other may be added but in the forms that unflex has for what it adds.
+// Such a line must not wait. It must pass no other command to the hotend, no change of the tool, no
+// pause and nothing that may be any of these. The next temperature that the sliced file asks for
+// must be its own.
 #pragma once
 
 #include <optional>
@@ -15,20 +16,20 @@ namespace unflex::verify {
 
 class AheadCheck {
  public:
-  // allowed: whether such lines may be at all.
+  // allowed: whether any line may be ahead.
   AheadCheck(Firmware firmware, bool allowed) : firmware_(firmware), allowed_(allowed) {}
 
-  // Whether a line of the output that the sliced file does not have here asks ahead. If so, it is
-  // awaited.
+  // Whether a line of the output that the sliced file does not have here asks ahead. If so, the
+  // sliced file's own line is awaited.
   [[nodiscard]] bool takes(const gcode::Line& output);
   // Whether a line of the sliced file that the output does not have here is the one awaited.
   [[nodiscard]] bool is_awaited(const gcode::Line& input) const;
-  // The line that is_awaited() has come.
+  // The awaited line has come.
   void arrive() { awaited_.reset(); }
-  // A line that both files have here. loses_place: it may move the machine or do anything. Returns
-  // what is wrong if the awaited line should have come before.
+  // Passes a line that both files have here. loses_place: it may move the machine or do anything.
+  // Returns what is wrong if the awaited line should have come before it.
   [[nodiscard]] std::optional<std::string> pass(const gcode::Line& line, bool loses_place);
-  // The file has ended.
+  // Both files have ended. Returns what is wrong if a line is still awaited.
   [[nodiscard]] std::optional<std::string> end();
 
  private:

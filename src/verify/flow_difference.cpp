@@ -25,7 +25,7 @@ std::array<double, 2> roots(double a, double b, double c) {
 
 void FlowDifferenceGauge::begin_run(double lead_in_s) {
   sliced_.clear();
-  written_.clear();
+  output_.clear();
   clear_window();
   if (lead_in_s > 0.0) {
     append_rest(lead_in_s, sliced_);
@@ -37,8 +37,8 @@ void FlowDifferenceGauge::play_sliced(const planner::PlannedMove& move) {
   compare();
 }
 
-void FlowDifferenceGauge::play_written(const planner::PlannedMove& move) {
-  append(move, written_);
+void FlowDifferenceGauge::play_output(const planner::PlannedMove& move) {
+  append(move, output_);
   compare();
 }
 
@@ -47,7 +47,7 @@ void FlowDifferenceGauge::end_run() {
   for (const Phase& phase : sliced_) {
     left_s += phase.left_s;
   }
-  append_rest(left_s, written_);
+  append_rest(left_s, output_);
   compare();
   begin_run(0.0);
 }
@@ -82,19 +82,19 @@ void FlowDifferenceGauge::append_rest(double duration_s, std::deque<Phase>& phas
 
 // Takes what is known of both files.
 void FlowDifferenceGauge::compare() {
-  while (!sliced_.empty() && !written_.empty()) {
+  while (!sliced_.empty() && !output_.empty()) {
     Phase& sliced = sliced_.front();
-    Phase& written = written_.front();
-    const double duration_s = std::min(sliced.left_s, written.left_s);
+    Phase& output = output_.front();
+    const double duration_s = std::min(sliced.left_s, output.left_s);
     if (sliced.lays) {
       add({duration_s,
            sliced.rate,
-           {written.rate.value - sliced.rate.value, written.rate.slope - sliced.rate.slope},
+           {output.rate.value - sliced.rate.value, output.rate.slope - sliced.rate.slope},
            sliced.line});
     } else {
       clear_window();
     }
-    for (std::deque<Phase>* const phases : {&sliced_, &written_}) {
+    for (std::deque<Phase>* const phases : {&sliced_, &output_}) {
       Phase& phase = phases->front();
       phase.left_s -= duration_s;
       phase.rate = phase.rate.after(duration_s);

@@ -1,17 +1,17 @@
-// How far the extrusion rate of the written file is from that of the sliced file at the same time.
+// How far the rate of filament in the output is from that in the sliced file at the same time.
 //
 // Notation:
-//   s(t), w(t)   filament per second of the sliced and of the written file, mm/s; both linear in
+//   s(t), o(t)   filament per second of the sliced file and of the output, mm/s; both linear in
 //                time within a phase of a move
 //   τ            10 ms
-//   S(t), D(t)   integrals of s and of w − s over [t − τ, t]
+//   S(t), D(t)   integrals of s and of o − s over [t − τ, t]
 //   D/S          the relative difference of the two mean rates
 //
-// A pressure in the nozzle follows the filament slowly, so single lines of 1 ms say nothing, and
+// The pressure in the nozzle follows the filament slowly, so single lines of 1 ms say nothing, and
 // filament that comes a few ms late does little harm. What counts is a window of τ.
 //
-// A window counts only if the sliced file lays filament throughout: a travel or a rest in it leaves
-// S so small that a difference of nothing would look large.
+// A window counts only if the sliced file lays filament throughout. A travel or a rest in it would
+// make S so small that next to no difference would look large.
 //
 // Two marks go along the phases, one at t and one at t − τ. As long as neither passes into another
 // phase of either file, S and D are parabolas. Then the extremes of D/S are roots of a quadratic
@@ -32,15 +32,15 @@ class FlowDifferenceGauge {
  public:
   static constexpr double kWindow_s = 0.01;
 
-  // A run begins with the first move of the written file. The first one of the sliced file follows
+  // A run begins with the first move of the output. The first one of the sliced file follows
   // lead_in_s later.
   void begin_run(double lead_in_s);
   // The next move of either file, in any order between the two. What is known of only one of them
   // is held, so neither should be far ahead.
   void play_sliced(const planner::PlannedMove& move);
-  void play_written(const planner::PlannedMove& move);
-  // All moves of the run are known. A written file that ends before the sliced one lays nothing for
-  // the rest of it.
+  void play_output(const planner::PlannedMove& move);
+  // All moves of the run are known. If the output ends before the sliced file, it lays nothing for
+  // the rest of that.
   void end_run();
 
   // Covers all runs so far; nullopt if no window was compared.
@@ -63,7 +63,7 @@ class FlowDifferenceGauge {
   };
   // A time in which neither file changes its phase.
   struct Stretch {
-    double left_s = 0.0;  // what is in the window of it, at the front one
+    double left_s = 0.0;  // how long it lasts; of the front one, how much is still in the window
     Rate sliced;
     Rate difference;
     std::size_t line = 0;
@@ -79,7 +79,7 @@ class FlowDifferenceGauge {
   void clear_window();
 
   std::deque<Phase> sliced_;
-  std::deque<Phase> written_;
+  std::deque<Phase> output_;
   std::deque<Stretch> window_;
   double filled_s_ = 0.0;       // how much of the first window is known
   double sliced_mm_ = 0.0;      // S

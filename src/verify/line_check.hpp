@@ -26,7 +26,7 @@ class LineCheck {
   // stand that far from its place.
   void compare(bool complete, double place_tolerance_mm);
 
-  // A section that both files have.
+  // Passes a section that both files have here: what was asked for ahead must not pass all of them.
   void pass(const Section& input, const Section& output);
 
  private:

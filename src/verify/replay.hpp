@@ -62,7 +62,7 @@ struct PlacedLine {
   gcode::Line line;
   double x_mm = 0.0;
   double y_mm = 0.0;
-  double e_mm = 0.0;    // filament that has come out, which only grows within a run
+  double e_mm = 0.0;    // filament that has come out; in a run only a wipe draws it back
   bool motion = false;  // G0 to G3 with an axis or E
   std::size_t section = 0;
 };

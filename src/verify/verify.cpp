@@ -391,7 +391,7 @@ void Verifier::play(const planner::PlannedMove& move) {
   totals_.output_extrusion_mm += move.segment.delta(gcode::E);
   output_flow_.play(move);
   if (compensated && !has_free_timing()) {
-    flow_difference_.play_written(move);
+    flow_difference_.play_output(move);
   }
   output_steps_.play(move);
   output_excursion_.add(move.segment);

@@ -227,7 +227,7 @@ TEST(MzvForm, HasItsZerosWhereKlipperPlacesThem) {
       EXPECT_NEAR(mean_s, 0.0, 1e-15);
     }
     const int n = form.pulses;
-    const double tau = form.duration * (n - 2.0) / (n - 2.0 * form.duration - 1.0);
+    const double tau = form.duration_periods * (n - 2.0) / (n - 2.0 * form.duration_periods - 1.0);
     for (int i = 0; i < n - 1; ++i) {
       EXPECT_NEAR(residual(*shaper_pulses(form, 45.0, 0.0), 45.0 * (1.0 + i / tau), 0.0), 0.0,
                   1e-12)
@@ -270,7 +270,7 @@ TEST(MzvForm, IsReadAsKlipperWritesIt) {
   EXPECT_EQ(mzv_form("mzv(4,0,0.5)"), (MzvForm{4, 0.5}));
   const auto of_tau = mzv_form("mzv(n=5,tau=1.5)");
   ASSERT_TRUE(of_tau.has_value());
-  EXPECT_DOUBLE_EQ(of_tau->duration, 1.5 * 4.0 / 6.0);
+  EXPECT_DOUBLE_EQ(of_tau->duration_periods, 1.5 * 4.0 / 6.0);
 }
 
 TEST(MzvForm, ThatKlipperRefusesIsNone) {

@@ -69,13 +69,14 @@ TEST(Ahead, IsThatOfTheTable) {
     const Course course = steady(400.0);
     const std::vector<Command> commands = {change(0.0, row.from_c), change(200.0, row.to_c)};
     const std::vector<Target> wanted = targets(commands);
-    const Along without = along(loop(), course, commands, wanted, kBand_c);
+    const PrintResponse without = print_response(loop(), course, commands, wanted, kBand_c);
     EXPECT_NEAR(without.out_of_band_s(), row.out_without_s, kSteps_s);
     EXPECT_NEAR(without.colder_s, row.cold_without_s, kSteps_s);
     const std::vector<Ahead> ahead =
         choose_ahead(loop(), course, commands, kBand_c, AheadWhen::both);
     ASSERT_EQ(ahead.size(), 1U);
-    const Along with = along(loop(), course, with_ahead(commands, ahead), wanted, kBand_c);
+    const PrintResponse with =
+        print_response(loop(), course, with_ahead(commands, ahead), wanted, kBand_c);
     EXPECT_NEAR(with.out_of_band_s(), row.out_with_s, kPlaced_s);
     EXPECT_NEAR(with.colder_s, row.cold_with_s, kPlaced_s);
   }
@@ -86,8 +87,8 @@ std::vector<Ahead> chosen(const Course& course, const std::vector<Command>& comm
   return choose_ahead(loop(), course, commands, kBand_c, when);
 }
 
-Along along(const Course& course, const std::vector<Command>& commands) {
-  return along(loop(), course, commands, targets(commands), kBand_c);
+PrintResponse print_response(const Course& course, const std::vector<Command>& commands) {
+  return print_response(loop(), course, commands, targets(commands), kBand_c);
 }
 
 TEST(Ahead, StandsBeforeALineThatBeginsInTime) {
@@ -137,8 +138,8 @@ TEST(Ahead, WaitsLessAndIsNeverHotBefore) {
     EXPECT_EQ(early[1].wait, Wait::none);
     EXPECT_EQ(early[2].wait, wait);
     EXPECT_EQ(early[2].time_s, 200.0);
-    const Along before = along(course, commands);
-    const Along after = along(loop(), course, early, targets(commands), kBand_c);
+    const PrintResponse before = print_response(course, commands);
+    const PrintResponse after = print_response(loop(), course, early, targets(commands), kBand_c);
     EXPECT_EQ(before.out_of_band_s(), 0.0);
     EXPECT_EQ(after.out_of_band_s(), 0.0);
     EXPECT_NEAR(before.waiting_s, 24.0, 4.0);
@@ -162,8 +163,8 @@ TEST(Ahead, NeverLeavesMoreOutOfTheBand) {
     for (const AheadWhen when : {AheadWhen::heating, AheadWhen::both}) {
       const std::vector<Ahead> ahead = chosen(course, commands, when);
       const std::vector<Command> early = with_ahead(commands, ahead);
-      const Along after = along(loop(), course, early, targets(commands), kBand_c);
-      EXPECT_LE(after.out_of_band_s(), along(course, commands).out_of_band_s() + 1e-3);
+      const PrintResponse after = print_response(loop(), course, early, targets(commands), kBand_c);
+      EXPECT_LE(after.out_of_band_s(), print_response(course, commands).out_of_band_s() + 1e-3);
       ASSERT_EQ(early.size(), commands.size());
       for (std::size_t i = 0; i < early.size(); ++i) {
         EXPECT_EQ(early[i].target_c, commands[i].target_c) << "none has passed another one";
@@ -180,19 +181,19 @@ TEST(AlongPrint, BeginsWarmWhereFilamentFirstFlows) {
   for (std::size_t k = 0; k < 300; ++k) {
     course.steps[k].extruding_s = 0.0F;
   }
-  const Along warm = along(course, {change(0.0, 150.0), change(20.0, 210.0)});
+  const PrintResponse warm = print_response(course, {change(0.0, 150.0), change(20.0, 210.0)});
   EXPECT_DOUBLE_EQ(warm.known_from_s.value_or(-1.0), 30.0);
   EXPECT_TRUE(std::isnan(warm.temperature_c[299]));
   EXPECT_NEAR(warm.temperature_c[300], 210.0, 1e-3);
   EXPECT_NEAR(warm.worst_c, 0.0, 1e-3);
-  const Along late = along(course, {change(50.0, 210.0)});
+  const PrintResponse late = print_response(course, {change(50.0, 210.0)});
   EXPECT_DOUBLE_EQ(late.known_from_s.value_or(-1.0), 50.0);
-  EXPECT_FALSE(along(course, {}).known_from_s.has_value());
-  EXPECT_EQ(along(course, {}).temperature_c.size(), 0U);
+  EXPECT_FALSE(print_response(course, {}).known_from_s.has_value());
+  EXPECT_EQ(print_response(course, {}).temperature_c.size(), 0U);
 }
 
 TEST(AlongPrint, CoolsByTheTimeConstantWithoutPower) {
-  const Along off = along(steady(600.0), {change(0.0, 225.0), change(100.0, 0.0)});
+  const PrintResponse off = print_response(steady(600.0), {change(0.0, 225.0), change(100.0, 0.0)});
   const double elapsed_s = 600.0 - 100.0 - kReference.dead_time_s;
   // Behind the sensor's lag, which lets it come later by that much.
   const double expected_c = 200.0 * std::exp(-(elapsed_s - kReference.sensor_lag_s) / 300.0);
@@ -204,7 +205,8 @@ TEST(AlongPrint, SagsUnderTheLoadOfFilament) {
   Loop heated = loop();
   heated.heater_w = 40.0;
   const std::vector<Command> commands = {change(0.0, 220.0)};
-  const Along loaded = along(heated, steady(600.0), commands, targets(commands), kBand_c);
+  const PrintResponse loaded =
+      print_response(heated, steady(600.0), commands, targets(commands), kBand_c);
   const double load =
       load_in_counts(kReference, melting_power_w(10.0, 220.0 - kReference.ambient_c), 40.0);
   const Response expected = load_response(kReference, heated.control, 220.0, load);

@@ -63,7 +63,7 @@ class TwoFiles : public ::testing::Test {
     move.segment.line = ++line_;
     gauge_.play_sliced(move);
   }
-  void written(const planner::PlannedMove& move) { gauge_.play_written(move); }
+  void output(const planner::PlannedMove& move) { gauge_.play_output(move); }
 
   [[nodiscard]] FlowDifference largest() {
     gauge_.end_run();
@@ -78,9 +78,9 @@ class TwoFiles : public ::testing::Test {
 TEST_F(TwoFiles, AreNotComparedWhereNothingIsLaid) {
   gauge_.begin_run(0.0);
   sliced(travel(1.0));
-  written(move(2.0, 2.0, 1.0));
+  output(move(2.0, 2.0, 1.0));
   sliced(feed(2.0, 1.0));
-  written(move(2.0, 2.0, 1.0));
+  output(move(2.0, 2.0, 1.0));
   gauge_.end_run();
   EXPECT_FALSE(gauge_.stats());
 }
@@ -89,9 +89,9 @@ TEST_F(TwoFiles, AreNotComparedInLessThanAWindow) {
   gauge_.begin_run(0.0);
   for (int i = 0; i < 10; ++i) {
     sliced(move(2.0, 2.0, 0.9 * kTau_s));
-    written(move(4.0, 4.0, 0.9 * kTau_s));
+    output(move(4.0, 4.0, 0.9 * kTau_s));
     sliced(travel(1e-4));
-    written(travel(1e-4));
+    output(travel(1e-4));
   }
   gauge_.end_run();
   EXPECT_FALSE(gauge_.stats());
@@ -102,7 +102,7 @@ TEST_F(TwoFiles, OfOneConstantRateDoNotDifferHoweverTheirLinesLie) {
   sliced(move(2.0, 2.0, 0.5));
   sliced(move(2.0, 2.0, 0.5));
   for (int i = 0; i < 700; ++i) {
-    written(move(2.0, 2.0, 1.0 / 700.0));
+    output(move(2.0, 2.0, 1.0 / 700.0));
   }
   EXPECT_NEAR(largest().relative, 0.0, 1e-9);
   EXPECT_EQ(largest().line, 1U);
@@ -112,7 +112,7 @@ TEST_F(TwoFiles, OfTwoConstantRatesDifferByTheirRatioFromTheFirstLineOn) {
   gauge_.begin_run(0.0);
   for (int i = 0; i < 10; ++i) {
     sliced(move(2.0, 2.0, 0.1));
-    written(move(2.5, 2.5, 0.1));
+    output(move(2.5, 2.5, 0.1));
   }
   EXPECT_NEAR(largest().relative, 0.25, 1e-9);
   EXPECT_EQ(largest().line, 1U);
@@ -127,7 +127,7 @@ TEST_F(TwoFiles, DifferByTheirMeansAndSayWhichOneLaysMore) {
       planner::PlannedMove each = move(2.0, 2.0, 0.004);
       each.segment.line = line;
       gauge.play_sliced(each);
-      gauge.play_written(line == 7 ? move(rate_mm_s, rate_mm_s, 0.004) : each);
+      gauge.play_output(line == 7 ? move(rate_mm_s, rate_mm_s, 0.004) : each);
     }
     gauge.end_run();
     ASSERT_TRUE(gauge.stats());
@@ -141,7 +141,7 @@ TEST_F(TwoFiles, NameTheLineInTheMiddleOfTheWindow) {
   gauge_.begin_run(0.0);
   for (std::size_t line = 1; line <= 100; ++line) {
     sliced(move(2.0, 2.0, 0.001));
-    written(line >= 41 && line <= 50 ? move(3.0, 3.0, 0.001) : move(2.0, 2.0, 0.001));
+    output(line >= 41 && line <= 50 ? move(3.0, 3.0, 0.001) : move(2.0, 2.0, 0.001));
   }
   EXPECT_NEAR(largest().relative, 0.5, 1e-9);
   EXPECT_NEAR(static_cast<double>(largest().line), 45.5, 0.6);
@@ -153,8 +153,8 @@ TEST_F(TwoFiles, DifferMostWhenALateStepIsAllInTheWindow) {
   gauge_.begin_run(0.0);
   sliced(move(2.0, 2.0, 0.05));
   sliced(move(6.0, 6.0, 0.05));
-  written(move(2.0, 2.0, 0.053));
-  written(move(6.0, 6.0, 0.047));
+  output(move(2.0, 2.0, 0.053));
+  output(move(6.0, 6.0, 0.047));
   EXPECT_NEAR(largest().relative, -0.003 * 4.0 / (0.007 * 2.0 + 0.003 * 6.0), 1e-9);
   EXPECT_EQ(largest().line, 1U);
 }
@@ -166,8 +166,8 @@ TEST_F(TwoFiles, ThatRampOneAfterTheOtherDifferMostAtTheBeginning) {
   constexpr double kLate_s = 0.002;
   gauge_.begin_run(0.0);
   sliced(move(0.0, 8.0, 1.0));
-  written(travel(kLate_s));
-  written(move(0.0, 8.0, 1.0));
+  output(travel(kLate_s));
+  output(move(0.0, 8.0, 1.0));
   const double expected = (kTau_s - kLate_s) * (kTau_s - kLate_s) / (kTau_s * kTau_s) - 1.0;
   EXPECT_NEAR(largest().relative, expected, 1e-9);
 }
@@ -181,9 +181,9 @@ TEST_F(TwoFiles, ThatFallOneAfterTheOtherDifferMostAtTheEnd) {
   sliced(move(8.0, 8.0, 1.0));
   sliced(move(8.0, 4.0, 1.0));
   sliced(move(4.0, 4.0, 1.0));
-  written(move(8.0, 8.0, 1.0 + kLate_s));
-  written(move(8.0, 4.0, 1.0));
-  written(move(4.0, 4.0, 1.0 - kLate_s));
+  output(move(8.0, 8.0, 1.0 + kLate_s));
+  output(move(8.0, 4.0, 1.0));
+  output(move(4.0, 4.0, 1.0 - kLate_s));
   const double at_end = kSlope_mm_s2 * kLate_s / (4.0 + kSlope_mm_s2 * 0.5 * kTau_s);
   EXPECT_NEAR(largest().relative, at_end, 1e-6);
   EXPECT_GE(largest().relative, at_end - 1e-12);
@@ -194,10 +194,10 @@ TEST_F(TwoFiles, AreOnOneClockThatBeginsWithTheLeadIn) {
   gauge_.begin_run(0.02);
   sliced(move(2.0, 2.0, 0.1));
   sliced(move(4.0, 4.0, 0.1));
-  written(travel(0.02));
-  written(move(2.0, 2.0, 0.1));
-  written(move(4.0, 4.0, 0.1));
-  written(travel(0.02));
+  output(travel(0.02));
+  output(move(2.0, 2.0, 0.1));
+  output(move(4.0, 4.0, 0.1));
+  output(travel(0.02));
   EXPECT_NEAR(largest().relative, 0.0, 1e-9);
 }
 
@@ -206,25 +206,25 @@ TEST_F(TwoFiles, DoNotSeeWhatIsLaidAroundATravel) {
   sliced(move(2.0, 2.0, 0.1));
   sliced(travel(0.001));
   sliced(move(2.0, 2.0, 0.1));
-  written(move(2.0, 2.0, 0.1));
-  written(move(900.0, 900.0, 0.001));
-  written(move(2.0, 2.0, 0.1));
+  output(move(2.0, 2.0, 0.1));
+  output(move(900.0, 900.0, 0.001));
+  output(move(2.0, 2.0, 0.1));
   EXPECT_NEAR(largest().relative, 0.0, 1e-9);
 }
 
 TEST_F(TwoFiles, CountFilamentThatIsFedWhileTheBaseRests) {
   gauge_.begin_run(0.0);
   sliced(move(2.0, 2.0, 0.1));
-  written(move(2.0, 2.0, 0.05));
-  written(feed(0.003, 0.001));
-  written(move(2.0, 2.0, 0.049));
+  output(move(2.0, 2.0, 0.05));
+  output(feed(0.003, 0.001));
+  output(move(2.0, 2.0, 0.049));
   EXPECT_NEAR(largest().relative, 0.05, 1e-9);
 }
 
-TEST_F(TwoFiles, DifferWhereTheWrittenOneEndsTooEarly) {
+TEST_F(TwoFiles, DifferWhereTheOutputEndsTooEarly) {
   gauge_.begin_run(0.0);
   sliced(move(2.0, 2.0, 0.1));
-  written(move(2.0, 2.0, 0.097));
+  output(move(2.0, 2.0, 0.097));
   EXPECT_NEAR(largest().relative, -0.3, 1e-9);
 }
 
@@ -234,9 +234,9 @@ TEST_F(TwoFiles, HaveAQuantileOverTime) {
     FlowDifferenceGauge gauge;
     gauge.begin_run(0.0);
     gauge.play_sliced(move(2.0, 2.0, 10.0));
-    gauge.play_written(move(2.0, 2.0, 5.0));
-    gauge.play_written(move(3.0, 3.0, burst_s));
-    gauge.play_written(move(2.0, 2.0, 5.0 - burst_s));
+    gauge.play_output(move(2.0, 2.0, 5.0));
+    gauge.play_output(move(3.0, 3.0, burst_s));
+    gauge.play_output(move(2.0, 2.0, 5.0 - burst_s));
     gauge.end_run();
     ASSERT_TRUE(gauge.stats());
     EXPECT_NEAR(gauge.stats()->relative, 0.5, 1e-9);
@@ -247,12 +247,12 @@ TEST_F(TwoFiles, HaveAQuantileOverTime) {
 TEST_F(TwoFiles, StartAfreshInEachRun) {
   gauge_.begin_run(0.0);
   sliced(move(2.0, 2.0, 0.1));
-  written(move(2.0, 2.0, 0.1));
-  written(move(90.0, 90.0, 0.1));
+  output(move(2.0, 2.0, 0.1));
+  output(move(90.0, 90.0, 0.1));
   gauge_.end_run();
   gauge_.begin_run(0.0);
   sliced(move(2.0, 2.0, 0.1));
-  written(move(2.2, 2.2, 0.1));
+  output(move(2.2, 2.2, 0.1));
   EXPECT_NEAR(largest().relative, 0.1, 1e-9);
   EXPECT_EQ(largest().line, 2U);
 }
@@ -295,21 +295,21 @@ class RandomFiles : public TwoFiles {
 
 TEST_F(RandomFiles, DifferByWhatASumOverSmallStepsHas) {
   std::vector<double> sliced_mm;
-  std::vector<double> written_mm;
+  std::vector<double> output_mm;
   const auto sliced_moves = moves(3.0, 0.05, sliced_mm);
-  const auto written_moves = moves(3.0, 0.002, written_mm);
+  const auto output_moves = moves(3.0, 0.002, output_mm);
   gauge_.begin_run(0.0);
   for (const planner::PlannedMove& each : sliced_moves) {
     gauge_.play_sliced(each);
   }
-  for (const planner::PlannedMove& each : written_moves) {
-    gauge_.play_written(each);
+  for (const planner::PlannedMove& each : output_moves) {
+    gauge_.play_output(each);
   }
   const auto window = static_cast<std::size_t>(std::llround(kTau_s / kStep_s));
   double expected = 0.0;
-  for (std::size_t n = window; n < std::min(sliced_mm.size(), written_mm.size()); ++n) {
+  for (std::size_t n = window; n < std::min(sliced_mm.size(), output_mm.size()); ++n) {
     const double s = sliced_mm[n] - sliced_mm[n - window];
-    const double w = written_mm[n] - written_mm[n - window];
+    const double w = output_mm[n] - output_mm[n - window];
     expected = std::abs(w / s - 1.0) > std::abs(expected) ? w / s - 1.0 : expected;
   }
   EXPECT_NEAR(largest().relative, expected, 1e-3);
@@ -319,19 +319,19 @@ TEST_F(RandomFiles, DifferByWhatASumOverSmallStepsHas) {
 TEST_F(RandomFiles, DifferAlikeInWhateverOrderTheyAreRead) {
   std::vector<double> laid_mm;
   const auto sliced_moves = moves(1.0, 0.05, laid_mm);
-  const auto written_moves = moves(1.0, 0.002, laid_mm);
+  const auto output_moves = moves(1.0, 0.002, laid_mm);
   std::vector<FlowDifference> found;
   for (const double sliced_share : {0.0, 0.02, 0.1, 0.5, 1.0}) {
     FlowDifferenceGauge gauge;
     gauge.begin_run(0.003);
     std::size_t next_sliced = 0;
-    std::size_t next_written = 0;
-    while (next_sliced < sliced_moves.size() || next_written < written_moves.size()) {
-      if (next_written == written_moves.size() ||
+    std::size_t next_output = 0;
+    while (next_sliced < sliced_moves.size() || next_output < output_moves.size()) {
+      if (next_output == output_moves.size() ||
           (next_sliced < sliced_moves.size() && pick(1.0) < sliced_share)) {
         gauge.play_sliced(sliced_moves[next_sliced++]);
       } else {
-        gauge.play_written(written_moves[next_written++]);
+        gauge.play_output(output_moves[next_output++]);
       }
     }
     gauge.end_run();
@@ -425,7 +425,7 @@ class Laying {
 
 // Looks at both files of a run every 20 µs: where the machine comes from rest, 0.1 ms are too
 // coarse.
-void sample_run(Laying sliced, Laying written, FlowDifference& largest) {
+void sample_run(Laying sliced, Laying output, FlowDifference& largest) {
   constexpr double kSample_s = 2e-5;
   constexpr std::size_t kSamples = 500;  // of the window
   std::vector<double> s_mm;
@@ -434,12 +434,12 @@ void sample_run(Laying sliced, Laying written, FlowDifference& largest) {
   for (double number = 0.0;; number += 1.0) {
     const double time_s = number * kSample_s;
     sliced.go_to(time_s);
-    written.go_to(time_s);
+    output.go_to(time_s);
     if (sliced.ended()) {
       return;
     }
     s_mm.push_back(sliced.laid_mm());
-    w_mm.push_back(written.laid_mm());
+    w_mm.push_back(output.laid_mm());
     lines.push_back(sliced.line());
     const std::size_t n = s_mm.size() - 1;
     if (n < kSamples || sliced.laying_since_s() > time_s - kTau_s) {
@@ -453,36 +453,36 @@ void sample_run(Laying sliced, Laying written, FlowDifference& largest) {
   }
 }
 
-FlowDifference sampled(const std::string& sliced_text, const std::string& written_text) {
+FlowDifference sampled(const std::string& sliced_text, const std::string& output_text) {
   const Rules rules;
   std::istringstream sliced_stream(sliced_text);
-  std::istringstream written_stream(written_text);
+  std::istringstream output_stream(output_text);
   Replay sliced(sliced_stream, "in", rules.interpreter, rules.limits, rules.fixed,
                 ReplayedFile::sliced);
-  Replay written(written_stream, "out", rules.interpreter, rules.limits, rules.fixed,
-                 ReplayedFile::emitted);
+  Replay output(output_stream, "out", rules.interpreter, rules.limits, rules.fixed,
+                ReplayedFile::emitted);
   FlowDifference largest;
   for (;;) {
     std::vector<planner::PlannedMove> sliced_moves;
-    std::vector<planner::PlannedMove> written_moves;
+    std::vector<planner::PlannedMove> output_moves;
     planner::PlannedMove move;
-    while (written.next(move)) {
-      written_moves.push_back(move);
+    while (output.next(move)) {
+      output_moves.push_back(move);
     }
-    const bool compensated = written.section().compensated;
+    const bool compensated = output.section().compensated;
     while (sliced.next_resting(move)) {
       sliced_moves.push_back(move);
     }
     while (sliced.next(move)) {
     }
     if (compensated) {
-      sample_run(Laying(sliced_moves), Laying(written_moves), largest);
+      sample_run(Laying(sliced_moves), Laying(output_moves), largest);
     }
     if (sliced.section().kind == SectionKind::end) {
       return largest;
     }
     sliced.next_section();
-    written.next_section();
+    output.next_section();
   }
 }
 

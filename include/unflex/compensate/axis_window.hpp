@@ -96,7 +96,7 @@ struct AxisSolution {
   dynamics::AxisTrajectory base;
   double objective = 0.0;  // mm²·s
   int iterations = 0;
-  // As the engine puts it; not passed on from worker processes.
+  // How large the problem is as the engine puts it. Worker processes do not pass it on.
   ProblemSize size = {};
 };
 

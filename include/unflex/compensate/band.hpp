@@ -1,5 +1,5 @@
-// The band that an axis is in whose frequencies and damping ratios are known to some share, as
-// plants.
+// Makes plants of a band: of all that an axis may be whose frequencies and damping ratios are not
+// known exactly.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,8 @@
 
 namespace unflex::compensate {
 
-// By which share of itself each may be off, either way. 0: it is exact.
+// By which share of itself each frequency and each damping ratio may be off, either way. 0: it is
+// exact.
 struct Band {
   double freq_error = 0.0;
   double damping_error = 0.0;
@@ -17,12 +18,13 @@ struct Band {
   [[nodiscard]] bool is_exact() const { return freq_error <= 0.0 && damping_error <= 0.0; }
 };
 
-// Most axes have a second mode that whoever gives one frequency does not know. A base that suits
-// this one, too, does not move at such frequencies more than it must. axis: of one mode.
+// The axis with a second mode that nobody has measured, and its share. Most axes have such a mode.
+// A base that suits this plant, too, does not move at such frequencies more than it must. The axis
+// must have one mode.
 [[nodiscard]] Plant with_unknown_mode(const dynamics::FlexibleAxis& axis);
 
-// The edges of the band around the axis; none if it is exact. Their shares and that of the middle,
-// the axis itself, add up to `share`.
+// The edges of the band around the axis: two, or four if both may be off; none if it is exact. The
+// shares of the edges and of the middle, which is the axis itself, add up to `share`.
 [[nodiscard]] std::vector<Plant> edges(const dynamics::FlexibleAxis& axis, const Band& band,
                                        double share);
 

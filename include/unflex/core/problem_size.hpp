@@ -1,15 +1,15 @@
-// How large a problem is that a method solves for a motion.
+// The size of the problem that a method solves to make a base.
 #pragma once
 
 #include <cstddef>
 
 namespace unflex {
 
-// Several problems add up.
+// The sizes of several problems may be added.
 struct ProblemSize {
   std::size_t unknowns = 0;  // 0: there is nothing to solve
-  std::size_t equations =
-      0;  // that they keep, or come near to as least squares; limits not counted
+  // Those that the unknowns keep, or as least squares come near to. Limits do not count.
+  std::size_t equations = 0;
 
   void add(const ProblemSize& other) {
     unknowns += other.unknowns;

@@ -37,28 +37,28 @@ inline constexpr std::array<ShaperKind, 6> kShaperKinds = {
 // 0.2 for EI, 2HUMP_EI and 3HUMP_EI, which are fits. Klipper refuses them there.
 [[nodiscard]] double max_damping_ratio(ShaperKind kind);
 
-// What Klipper lets one choose of MZV: 3 to 10 pulses, evenly spaced over a time that is given in
-// damped periods. It is at least half a period, where MZV is ZV, and less than (pulses − 1)/2,
-// where it becomes ZV convolved with itself.
+// What Klipper lets one choose of MZV: how many pulses, 3 to 10, and over which time they are
+// evenly spaced. The time is at least half a damped period, where MZV is ZV, and less than (pulses
+// − 1)/2 of them, where MZV becomes ZV convolved with itself pulses − 2 times.
 struct MzvForm {
   int pulses = 3;
-  double duration = 0.75;
+  double duration_periods = 0.75;  // from the first pulse to the last, in damped periods
 
   [[nodiscard]] bool is_defined() const;
   [[nodiscard]] bool operator==(const MzvForm&) const = default;
 };
 
 // The form that Klipper reads from "mzv", "mzv(n=4,t=0.9)", "mzv(4,0.9)" or "mzv(n=4,tau=1.2)".
-// nullopt for any other text, and for forms that are not defined. tau is the duration with ever
-// more pulses for the same zeros: t = tau (n − 1)/(n + 2 tau − 2).
+// nullopt for any other text, and for forms that are not defined. tau is the duration that t tends
+// to if n grows and the zeros stay: t = tau (n − 1)/(n + 2 tau − 2).
 [[nodiscard]] std::optional<MzvForm> mzv_form(std::string_view text);
 
-// A shaper: its kind, and where that is MZV, its form.
+// A shaper: its kind, and if that is MZV, its form.
 struct Shaper {
   ShaperKind kind = ShaperKind::mzv;
   MzvForm form = {};
 
-  // Either is a shaper by itself.
+  // A kind or a form says it all, so either may stand where a shaper is wanted.
   constexpr Shaper(ShaperKind of_kind) : kind(of_kind) {}  // NOLINT(google-explicit-constructor)
   constexpr Shaper(MzvForm of_mzv) : form(of_mzv) {}       // NOLINT(google-explicit-constructor)
 };

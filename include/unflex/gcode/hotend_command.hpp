@@ -13,6 +13,7 @@
 
 namespace unflex::gcode {
 
+// What a line asks of the hotend of a tool.
 struct HotendCommand {
   std::optional<double> target_c;  // 0: off; none: the target stays
   std::optional<int> tool;         // none: the tool in use
@@ -24,14 +25,15 @@ struct HotendCommand {
 [[nodiscard]] std::optional<HotendCommand> hotend_command(const Command& command,
                                                           Firmware firmware);
 
-// The tool that the line selects. Below 0: none. A macro may select one as well.
+// The tool that the line selects; below 0: no tool is in use from there on. nullopt if the line
+// selects nothing, or is a macro, which may select anything.
 [[nodiscard]] std::optional<int> selected_tool(const Command& command, Firmware firmware);
 
-// Whether the line may hold the print up for long: a pause, a change of filament.
+// Whether the line may hold the print up for long, as a pause or a change of filament does.
 [[nodiscard]] bool pauses_print(const Command& command);
 
-// A line that sets the target and does not wait, without a line ending. The target is rounded to
-// 0.01 °C.
+// A line that sets the target and does not wait, in words that all three firmwares take; it has no
+// line ending. The target is rounded to 0.01 °C. tool: none is the tool in use.
 [[nodiscard]] std::string set_hotend_line(double target_c, std::optional<int> tool);
 
 }  // namespace unflex::gcode

@@ -17,7 +17,8 @@
 
 namespace unflex::hotend {
 
-// A print in steps of equal duration, as the hotend meets it.
+// A print as the hotend meets it, in steps of equal duration. Waiting for temperatures takes no
+// step.
 struct Course {
   static constexpr double kStep_s = 0.1;
 
@@ -29,64 +30,70 @@ struct Course {
   std::vector<Step> steps;
 };
 
-// How long a command holds up the print.
+// How long the print waits at a command.
 enum class Wait {
   none,
   heating,  // until the hotend is no colder than the target
   settled,  // until it is no colder and no hotter than the target
 };
 
-// A command to the hotend, at its place in a course. Waiting takes no time of the course.
+// A command to the hotend, at its place in a course.
 struct Command {
   std::size_t line = 0;
   double time_s = 0.0;
   std::optional<double> target_c;  // 0: off; none: the command only waits
   Wait wait = Wait::none;
-  // No change may be asked for before this time, since something else stands there: another command
-  // to the hotend, a line that may be one, or the print's first extrusion.
+  // The target must not be asked for before this time, since something stands there that it must
+  // not pass: another command to the hotend, a line that may be one, or the print's first
+  // extrusion.
   double free_from_s = std::numeric_limits<double>::infinity();
   double laid_mm3 = 0.0;  // filament laid before it
-  std::string text = {};  // the line that sets the target ahead of this place; empty: none can
+  std::string text = {};  // the line that sets the target ahead, with its ending; empty: none can
 };
 
-// What holds from a time on.
+// A target, and the time from which it is wanted.
 struct Target {
   double time_s = 0.0;
   double target_c = 0.0;
 };
 
+// The hotend and its controller.
 struct Loop {
   Plant plant;
   Control control;
   std::optional<double> heater_w = {};  // at full power, for the load of melting filament
 };
 
-struct Along {
-  std::optional<double> known_from_s;  // where the simulation begins; none: no target is known
-  double colder_s = 0.0;               // of extrusion further than the band below what is wanted
+// What the hotend does along a course.
+struct PrintResponse {
+  // Where the simulation begins. None: no target is known, and nothing below is set.
+  std::optional<double> known_from_s;
+  // Time in which filament is laid further from the wanted target than the band, below and above.
+  double colder_s = 0.0;
   double hotter_s = 0.0;
-  double worst_c = 0.0;  // the largest distance from what is wanted while filament is laid; with
-                         // its sign
-  std::size_t worst_line = 0;
-  double waiting_s = 0.0;            // for temperatures, from the first extrusion on
+  // The largest distance from the wanted target while filament is laid, below 0 if it is too cold.
+  double worst_c = 0.0;
+  std::size_t worst_line = 0;        // the line of the move that lays it
+  double waiting_s = 0.0;            // for temperatures, from known_from_s on
   std::vector<float> temperature_c;  // at the end of each step; not a number: not known
 
   [[nodiscard]] double out_of_band_s() const { return colder_s + hotter_s; }
 };
 
-// Simulates the hotend along a course. It rests at its target when filament first flows: no print
-// begins with a cold hotend. If the first target comes later, it rests at that from there on.
-// wanted: by rising time; a target of 0 wants nothing.
-[[nodiscard]] Along along(const Loop& loop, const Course& course,
-                          const std::vector<Command>& commands, const std::vector<Target>& wanted,
-                          double band_c);
+// Simulates the hotend along a course. It rests at its target when filament first flows, since no
+// print begins with a cold hotend. If the first target comes later, the simulation begins there,
+// with the hotend at rest. Commands and wanted targets stand by rising time. A target of 0 wants
+// nothing.
+[[nodiscard]] PrintResponse print_response(const Loop& loop, const Course& course,
+                                           const std::vector<Command>& commands,
+                                           const std::vector<Target>& wanted, double band_c);
 
 // The targets that commands set, each where it stands.
 [[nodiscard]] std::vector<Target> targets(const std::vector<Command>& commands);
 
 // How long it takes from asking for T₁ until the hotend passes T, between T₀ and T₁:
-// θ' + τ ln((T∞ − T₀)/(T∞ − T)). nullopt if T is not between them, or if the hotend cannot come
-// there.
+// θ' + τ ln((T∞ − T₀)/(T∞ − T)). nullopt if T is not between them, or if the hotend never comes
+// there. Temperatures in °C.
 [[nodiscard]] std::optional<double> lead_s(const Plant& plant, double from_c, double to_c,
                                            double passes_c);
 
@@ -99,12 +106,14 @@ struct Ahead {
   double to_c = 0.0;
 };
 
+// Which changes are asked for ahead: those to a higher temperature, or those to a lower one, too.
 enum class AheadWhen { heating, both };
 
-// Chooses the commands that are asked for ahead. Each comes so early that the hotend enters the
-// band around its target when it is due. One that waits comes so early that the hotend leaves the
-// band around the target before it when it is due; it then waits less. What cannot stand so early
-// stays. Filament is never laid out of the band for longer than without.
+// Chooses the commands that are asked for ahead. A command that does not wait comes so early that
+// the hotend enters the band around the new target when the command is due. The target of one that
+// waits comes so early that the hotend then leaves the band around the old target, so that the
+// print waits less. A command that cannot stand so early stays. In the simulation filament is never
+// laid outside the band for longer than without.
 [[nodiscard]] std::vector<Ahead> choose_ahead(const Loop& loop, const Course& course,
                                               const std::vector<Command>& commands, double band_c,
                                               AheadWhen when);

@@ -153,8 +153,7 @@ struct HotendSettings {
   std::optional<double> heater_w;  // at full power
   // How far the temperature may be from its target while filament is laid.
   double band_c = 5.0;
-  // Changes of temperature that the print does not wait for are asked for early enough.
-  bool ahead = false;
+  bool ahead = false;                  // changes of temperature are asked for ahead
   std::string ahead_when = "heating";  // or "both"
 
   [[nodiscard]] bool has_model() const { return gain_c && time_constant_s && dead_time_s; }

@@ -15,14 +15,16 @@ namespace unflex::pipeline {
 // The hotend of the settings, if they have a model.
 [[nodiscard]] std::optional<hotend::Plant> hotend_plant(const machine::HotendSettings& settings);
 
+// What may become of the output.
 enum class OutputMay {
   stay,    // it is only looked at
   change,  // changes of temperature may be put ahead
 };
 
 // Simulates the hotend along input and output and tells of it in the report, if there is a model.
-// Where settings and `may` want that, the output's changes of temperature are put ahead, and the
-// lines of the output that the report tells of follow. Fails if a file cannot be read or written.
+// Changes of temperature are put ahead in the output if hotend.ahead and `may` say so. Then the
+// numbers of the output's lines in the report follow. Fails if a file cannot be read or written,
+// and if the user has cancelled.
 [[nodiscard]] Status follow_temperature(const Job& job, OutputMay may, Progress& progress,
                                         report::Report& report);
 

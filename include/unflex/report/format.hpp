@@ -12,8 +12,8 @@ namespace unflex::report {
 // Three figures, so that 1234 µm and 0.05 µm fit the same column; without the unit.
 [[nodiscard]] std::string micrometres_text(double mm);
 
-// "at most 3.1 % more than as sliced over 10 ms, near line 813; 1.2 for 99 % of the time", of the
-// rate of filament.
+// The flow difference: "at most 3.1 % more than as sliced over 10 ms, near line 813; 1.2 for 99 %
+// of the time".
 [[nodiscard]] std::string flow_difference_text(const FlowDifferenceRow& difference);
 
 // "21 times less than now", of an error that was so many times as large; 0: none is left.

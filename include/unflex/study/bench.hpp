@@ -66,7 +66,7 @@ struct BenchSetup {
   compensate::Setup unflex;
   compensate::Setup unflex_band;    // of unflex_band_4x
   std::optional<Nozzle> two_stage;  // the axes with what rings behind them, if anything does
-  // unflex by its methods allows multiples of it; thesis_least_squares has its limit of jerk from
+  // The methods of unflex allow multiples of it. thesis_least_squares has its limit of jerk from
   // it.
   double plan_accel_mm_s2 = 5000.0;
   double thesis_period_s = 5e-3;
@@ -94,7 +94,7 @@ struct BaseMotion {
   rivals::AxisPath x;
   rivals::AxisPath y;
   ProblemSize size = {};  // of both axes
-  int iterations = 0;     // systems of equations solved for both axes
+  int iterations = 0;     // systems of equations solved for both axes; of unflex, of its engine
   std::string remark = {};
 };
 
