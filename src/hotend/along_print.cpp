@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <span>
 #include <utility>
 
 #include "controller.hpp"
@@ -161,6 +163,41 @@ std::vector<Ahead> candidates(const Plant& plant, const Course& course,
   return found;
 }
 
+// Chooses those of some changes with which filament is laid out of the band for no longer than
+// without.
+class Harmless {
+ public:
+  using OutOfBand = std::function<double(const std::vector<Ahead>&)>;
+
+  explicit Harmless(OutOfBand out_of_band_s)
+      : out_of_band_s_(std::move(out_of_band_s)), least_s_(out_of_band_s_({})) {}
+
+  std::vector<Ahead> of(std::span<const Ahead> changes) {
+    add(changes);
+    return std::move(chosen_);
+  }
+
+ private:
+  // Adds all of them if that does no harm, or else what does none of either half. So few harmful
+  // ones among many cost few simulations.
+  void add(std::span<const Ahead> changes) {
+    constexpr double kRounding_s = 1e-6;
+    std::vector<Ahead> with = chosen_;
+    with.insert(with.end(), changes.begin(), changes.end());
+    if (const double now_s = out_of_band_s_(with); now_s <= least_s_ + kRounding_s) {
+      least_s_ = now_s;
+      chosen_ = std::move(with);
+    } else if (changes.size() > 1) {
+      add(changes.first(changes.size() / 2));
+      add(changes.subspan(changes.size() / 2));
+    }
+  }
+
+  OutOfBand out_of_band_s_;
+  double least_s_;
+  std::vector<Ahead> chosen_;
+};
+
 }  // namespace
 
 PrintResponse print_response(const Loop& loop, const Course& course,
@@ -229,29 +266,15 @@ std::optional<double> lead_s(const Plant& plant, double from_c, double to_c, dou
 std::vector<Ahead> choose_ahead(const Loop& loop, const Course& course,
                                 const std::vector<Command>& commands, double band_c,
                                 AheadWhen when) {
-  const std::vector<Target> wanted = targets(commands);
-  const auto out_of_band_s = [&](const std::vector<Ahead>& ahead) {
-    return print_response(loop, course, with_ahead(commands, ahead), wanted, band_c)
-        .out_of_band_s();
-  };
-  constexpr double kRounding_s = 1e-6;
-  const double before_s = out_of_band_s({}) + kRounding_s;
-  std::vector<Ahead> all = candidates(loop.plant, course, commands, band_c, when);
-  if (all.empty() || out_of_band_s(all) <= before_s) {
+  const std::vector<Ahead> all = candidates(loop.plant, course, commands, band_c, when);
+  if (all.empty()) {
     return all;
   }
-  // Some of them do harm. Each is tried with those before it that do none.
-  std::vector<Ahead> chosen;
-  double least_s = before_s;
-  for (const Ahead& one : all) {
-    chosen.push_back(one);
-    if (const double now_s = out_of_band_s(chosen); now_s <= least_s) {
-      least_s = now_s + kRounding_s;
-    } else {
-      chosen.pop_back();
-    }
-  }
-  return chosen;
+  return Harmless([&, wanted = targets(commands)](const std::vector<Ahead>& ahead) {
+           return print_response(loop, course, with_ahead(commands, ahead), wanted, band_c)
+               .out_of_band_s();
+         })
+      .of(all);
 }
 
 std::vector<Command> with_ahead(const std::vector<Command>& commands,

@@ -12,7 +12,6 @@
 
 #include "stage_options.hpp"
 #include "unflex/core/number.hpp"
-#include "unflex/filament/profile.hpp"
 #include "unflex/gcode/hotend_command.hpp"
 #include "unflex/gcode/line.hpp"
 
@@ -48,7 +47,7 @@ class CourseMaker {
  public:
   explicit CourseMaker(const machine::Settings& settings)
       : firmware_(settings.printer.firmware),
-        filament_area_mm2_(filament::area_of_diameter_mm2(settings.extruder.filament_diameter_mm)),
+        filament_area_mm2_(settings.filament_area_mm2()),
         interpreter_(interpreter_options(settings)),
         planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))) {}
 

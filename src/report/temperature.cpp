@@ -1,6 +1,7 @@
 #include "unflex/report/temperature.hpp"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <utility>
 
@@ -25,14 +26,6 @@ bool is_in_band(const TemperatureRow& row) { return row.colder_s <= 0.0 && row.h
 
 std::string seconds_text(const TemperatureRow& row) {
   return fmt::format("{:.1f} s too cold and {:.1f} s too hot", row.colder_s, row.hotter_s);
-}
-
-std::string waiting_text(const Temperature& t) {
-  if (t.sliced.waiting_s <= 0.0 && t.emitted.waiting_s <= 0.0) {
-    return "";
-  }
-  return fmt::format("; the print waits {:.0f} → {:.0f} s for it", t.sliced.waiting_s,
-                     t.emitted.waiting_s);
 }
 
 }  // namespace
@@ -65,31 +58,35 @@ Json temperature_json(const std::optional<Temperature>& temperature) {
             {"temperature_c", std::move(temperature_c)}}}};
 }
 
-std::string temperature_list(const Temperature& t) {
+std::vector<std::string> temperature_list(const Temperature& t) {
   if (!t.is_known) {
-    return "not known, since no line of the print sets the hotend's";
+    return {"not known, since no line of the print sets the hotend's"};
   }
-  std::string text =
-      fmt::format("while filament is laid {:+.1f} °C off at most", t.emitted.worst_c);
-  if (t.emitted.worst_line > 0) {
-    text += fmt::format(" (line {})", t.emitted.worst_line);
-  }
-  if (is_in_band(t.sliced) && is_in_band(t.emitted)) {
-    text += fmt::format(", always within {:.3g}", t.band_c);
-  } else {
-    text += fmt::format("; by more than {:.3g}: {}", t.band_c, seconds_text(t.emitted));
-    text += t.ahead.empty() ? "" : fmt::format(", as sliced {}", seconds_text(t.sliced));
+  const bool always = is_in_band(t.sliced) && is_in_band(t.emitted);
+  std::vector<std::string> list = {
+      fmt::format("{:+.1f} °C off its target at most while filament is laid{}{}", t.emitted.worst_c,
+                  t.emitted.worst_line > 0 ? fmt::format(" (line {})", t.emitted.worst_line) : "",
+                  always ? fmt::format(", always within {:.3g}", t.band_c) : "")};
+  if (!always) {
+    list.push_back(
+        fmt::format("by more than {:.3g} °C: {}{}", t.band_c, seconds_text(t.emitted),
+                    t.ahead.empty() ? "" : fmt::format("; as sliced {}", seconds_text(t.sliced))));
   }
   if (!t.ahead.empty()) {
-    text +=
-        fmt::format("; {} asked for ahead",
-                    t.ahead.size() == 1 ? "1 change" : fmt::format("{} changes", t.ahead.size()));
+    list.push_back(
+        fmt::format("{} asked for ahead",
+                    t.ahead.size() == 1 ? "1 change" : fmt::format("{} changes", t.ahead.size())));
   }
-  return text + waiting_text(t);
+  if (t.sliced.waiting_s > 0.0 || t.emitted.waiting_s > 0.0) {
+    list.push_back(fmt::format("the print waits {:.0f} → {:.0f} s for it", t.sliced.waiting_s,
+                               t.emitted.waiting_s));
+  }
+  return list;
 }
 
 std::string temperature_text(const std::optional<Temperature>& temperature) {
-  return temperature ? fmt::format("temperature   {}\n", temperature_list(*temperature))
+  return temperature ? fmt::format("temperature   {}\n",
+                                   fmt::join(temperature_list(*temperature), "\n              "))
                      : std::string{};
 }
 
@@ -119,7 +116,7 @@ std::string temperature_card(const Temperature& temperature) {
       "<section class=\"card\" aria-labelledby=\"temperature-h\">\n<h2 "
       "id=\"temperature-h\">Temperature</h2>\n<p class=\"note\">By the hotend's model, without the "
       "part fan: {}.</p>\n{}</section>\n",
-      escape_html(temperature_list(temperature)), figure);
+      escape_html(fmt::format("{}", fmt::join(temperature_list(temperature), "; "))), figure);
 }
 
 }  // namespace unflex::report

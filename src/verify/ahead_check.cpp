@@ -32,6 +32,9 @@ bool AheadCheck::is_awaited(const gcode::Line& input) const {
 }
 
 std::optional<std::string> AheadCheck::pass(const gcode::Line& line, bool loses_place) {
+  if (!allowed_) {
+    return std::nullopt;
+  }
   const gcode::Command parsed = gcode::parse(line.content());
   const auto tool = gcode::selected_tool(parsed, firmware_);
   const auto asked = command(line);

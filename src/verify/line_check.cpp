@@ -12,7 +12,7 @@ namespace unflex::verify {
 namespace {
 
 // Both files round filament.
-constexpr double kLaidTolerance_mm = 0.01;
+constexpr double kPushedTolerance_mm = 0.01;
 // Outside compensated runs the base rests at the rounded end of its path.
 constexpr double kRestTolerance_mm = 1e-4 + 1e-9;
 
@@ -82,7 +82,7 @@ void LineCheck::compare(const PlacedLine& input, const PlacedLine& output) {
   const bool placed = same && at_same_place(input, output);
   const bool is_addition = is_known_addition(output.line.content(), input_->firmware());
   const auto is_ahead = [&] {
-    return output.e_mm <= input.e_mm + kLaidTolerance_mm && ahead_.takes(output.line);
+    return output.pushed_mm <= input.pushed_mm + kPushedTolerance_mm && ahead_.takes(output.line);
   };
   if (placed || (same && !is_addition && !is_ahead())) {
     match(input, output);

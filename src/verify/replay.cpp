@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <string_view>
 #include <utility>
 
@@ -185,6 +187,15 @@ void Replay::read_approach(const gcode::Line& line) {
 }
 
 void Replay::read_event(gcode::Event event, const Regime& before) {
+  // Filament is pushed when the line has been read.
+  const double pushed_mm = std::transform_reduce(
+      event.segments.begin(), event.segments.end(), pushed_mm_, std::plus<>(),
+      [](const gcode::Segment& segment) { return std::max(0.0, segment.delta(gcode::E)); });
+  understand(std::move(event), before);
+  pushed_mm_ = pushed_mm;
+}
+
+void Replay::understand(gcode::Event event, const Regime& before) {
   switch (event.kind) {
     case gcode::EventKind::passive: {
       const bool motion = gcode::names_position(event.line.content());
@@ -282,7 +293,7 @@ void Replay::place(gcode::Line line, const Regime& before, bool motion) {
   placed.line = std::move(line);
   placed.x_mm = before.modal.position_mm[gcode::X];
   placed.y_mm = before.modal.position_mm[gcode::Y];
-  placed.e_mm = before.modal.position_mm[gcode::E];
+  placed.pushed_mm = pushed_mm_;
   placed.motion = motion;
   placed.section = sections_.back().id;
   lines_.push_back(std::move(placed));

@@ -62,8 +62,8 @@ struct PlacedLine {
   gcode::Line line;
   double x_mm = 0.0;
   double y_mm = 0.0;
-  double e_mm = 0.0;    // filament that has come out; in a run only a wipe draws it back
-  bool motion = false;  // G0 to G3 with an axis or E
+  double pushed_mm = 0.0;  // filament pushed so far, without what was drawn back
+  bool motion = false;     // G0 to G3 with an axis or E
   std::size_t section = 0;
 };
 
@@ -124,6 +124,7 @@ class Replay {
   void read_line();
   void read_approach(const gcode::Line& line);
   void read_event(gcode::Event event, const Regime& before);
+  void understand(gcode::Event event, const Regime& before);
   void read_run_moves(gcode::Event event, const Regime& before);
   void read_section(SectionKind kind, gcode::Event event, const Regime& before);
   void place(gcode::Line line, const Regime& before, bool motion);
@@ -150,6 +151,7 @@ class Replay {
   bool at_end_ = false;
   std::optional<Error> error_;
   std::size_t lines_read_ = 0;
+  double pushed_mm_ = 0.0;
   std::deque<Section> sections_;  // from the current one to the one being read
   std::deque<PlacedLine> lines_;
 };

@@ -163,6 +163,26 @@ TEST(Temperature, IsNotKnownWhereNothingSetsIt) {
 }
 
 // What verify says of an output in which a change was put ahead by hand.
+// What a wipe draws back hides how much filament has been laid since.
+TEST_P(OfFirmware, ChangesAheadMayPassAWipe) {
+  std::string print = "G28\nG90\nM83\nM109 S200\nG1 X10 Y10 Z0.2 F6000\n";
+  for (int i = 0; i < 60; ++i) {
+    print += fmt::format("G1 X{} Y{} E0.002 F1200\n", i % 2 == 0 ? 30 : 10, 10 + i % 3);
+  }
+  print += "G1 X20 E-0.8 F3000\nG1 X25 E0.01 F1200\nM104 S220\n";
+  for (int i = 0; i < 30; ++i) {
+    print += fmt::format("G1 X{} E0.002 F1200\n", i % 2 == 0 ? 50 : 25);
+  }
+  print += "M104 S0\nM84\n";
+  const JobFolder folder(print, with_model(GetParam(), {"hotend.ahead=true"}));
+  const Result<report::Report> report = compensated(folder);
+  ASSERT_TRUE(report) << to_string(report.error());
+  ASSERT_EQ(report->temperature->ahead.size(), 1U);
+  const Result<report::Report> again = verified(folder);
+  ASSERT_TRUE(again) << to_string(again.error());
+  EXPECT_EQ(again->violation_count, 0U) << testing::complaints(*again);
+}
+
 class AskedAhead : public ::testing::Test {
  protected:
   static std::string print(const std::string& between) {

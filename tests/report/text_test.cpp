@@ -81,10 +81,12 @@ TEST(Summary, IsExactlyThis) {
       "material\n"
       "flow          10.5 → 12.4 mm³/s at most; the hotend melts 15.0\n"
       "step rates    X 24.0 → 31.2 (line 812), E 1.2 → 1.3 kHz at most; 50.0 allowed\n"
-      "temperature   while filament is laid +14.9 °C off at most (line 1410); by more than 5: 1.3 "
-      "s "
-      "too cold and 8.2 s too hot, as sliced 21.3 s too cold and 1.5 s too hot; 1 change asked for "
-      "ahead; the print waits 24 → 12 s for it\n"
+      "temperature   +14.9 °C off its target at most while filament is laid (line 1410)\n"
+      "              by more than 5 °C: 1.3 s too cold and 8.2 s too hot; as sliced 21.3 s too "
+      "cold "
+      "and 1.5 s too hot\n"
+      "              1 change asked for ahead\n"
+      "              the print waits 24 → 12 s for it\n"
       "speed         40 s of print per second, 1m 30s in all, 64 MB\n");
 }
 
@@ -175,8 +177,8 @@ TEST(Summary, TellsOfTheTemperatureWhatIsKnown) {
   report.temperature->ahead.clear();
   EXPECT_THAT(
       to_text(report),
-      HasSubstr("temperature   while filament is laid +0.3 °C off at most (line 18), always "
-                "within 5\n"));
+      HasSubstr("temperature   +0.3 °C off its target at most while filament is laid (line 18), "
+                "always within 5\n"));
   report.temperature->is_known = false;
   EXPECT_THAT(to_text(report), HasSubstr("temperature   not known, since no line"));
   report.temperature = std::nullopt;

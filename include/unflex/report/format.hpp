@@ -40,8 +40,8 @@ namespace unflex::report {
 
 // How far the hotend is off its target, as a line of a summary; empty without a model of it.
 [[nodiscard]] std::string temperature_text(const std::optional<Temperature>& temperature);
-// As that, without the line's name and its ending.
-[[nodiscard]] std::string temperature_list(const Temperature& temperature);
+// As that, thing by thing.
+[[nodiscard]] std::vector<std::string> temperature_list(const Temperature& temperature);
 
 // 3725.4 → "1h 02m 05s"; below a minute with tenths, "5.3s".
 [[nodiscard]] std::string duration_text(double seconds);
