@@ -131,7 +131,8 @@ TEST_F(BatchTest, DoesAgainOnlyWhatChanged) {
 TEST_F(BatchTest, DoesAllAgainForOtherSettings) {
   add("in/a.g");
   add("printer.toml",
-      "[limits]\nmax_accel_mm_s2 = 3000\n[dynamics]\nx.freq_hz = 45\ny.freq_hz = 45\n");
+      "[limits]\nmax_accel_mm_s2 = 3000\n[dynamics]\nx.freq_hz = 45\ny.freq_hz = 45\n"
+      "freq_error = 0\n");
   EXPECT_EQ(states({"--printer", "printer.toml"}).at("a.g"), "done");
   // Equal settings from another source.
   EXPECT_EQ(states({"--set", "limits.max_accel_mm_s2=3000"}).at("a.g"), "unchanged");
