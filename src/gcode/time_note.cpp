@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 namespace unflex::gcode {
 namespace {
@@ -136,17 +137,19 @@ bool contains(std::string_view text, std::string_view lower_case) {
 
 }  // namespace
 
-std::string with_times_scaled(std::string_view line, double factor) {
+std::string with_times_scaled(std::string_view line, const TimeFactors& factors) {
   const std::size_t first = std::min(line.find_first_not_of(" \t"), line.size());
   const std::string_view text = line.substr(first);
   if (starts_with(text, "m73") && text.size() > 3 && !is_digit(text[3]) &&
       text.find('*') == std::string_view::npos) {
-    return m73(line, factor);
+    return m73(line, factors.left);
   }
   if (!text.starts_with(';')) {
     return std::string(line);
   }
-  for (const std::string_view key : {";time:", ";time_elapsed:", ";print.time:"}) {
+  for (const auto& [key, factor] : {std::pair(std::string_view(";time:"), factors.whole),
+                                    std::pair(std::string_view(";time_elapsed:"), factors.gone),
+                                    std::pair(std::string_view(";print.time:"), factors.whole)}) {
     if (starts_with(text, key)) {
       const std::size_t at = first + key.size();
       return scaled(line, factor, number, [&](std::size_t i) { return i == at; });
@@ -154,7 +157,7 @@ std::string with_times_scaled(std::string_view line, double factor) {
   }
   for (const std::string_view key : {"printing time", "total estimated time"}) {
     if (contains(text, key)) {
-      return scaled(line, factor, units, [&](std::size_t i) {
+      return scaled(line, factors.whole, units, [&](std::size_t i) {
         return i > 1 && line[i - 1] == ' ' && (line[i - 2] == '=' || line[i - 2] == ':');
       });
     }
@@ -163,7 +166,16 @@ std::string with_times_scaled(std::string_view line, double factor) {
 }
 
 bool same_but_for_times(std::string_view a, std::string_view b) {
-  return a == b || with_times_scaled(a, 0.0) == with_times_scaled(b, 0.0);
+  const TimeFactors none = TimeFactors::even(0.0);
+  return a == b || with_times_scaled(a, none) == with_times_scaled(b, none);
+}
+
+bool tells_time(std::string_view line) {
+  const std::size_t first = std::min(line.find_first_not_of(" \t"), line.size());
+  const std::string_view text = line.substr(first);
+  // Most lines are others, and need not be written anew.
+  const bool may = text.starts_with(';') ? contains(text, "time") : starts_with(text, "m73");
+  return may && with_times_scaled(line, TimeFactors::even(2.0)) != line;
 }
 
 }  // namespace unflex::gcode

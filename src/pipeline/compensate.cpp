@@ -44,7 +44,7 @@ std::string name_of(const Engines& engines) {
   return engines.second ? fmt::format("{}, checked by {}", name, engines.second()->name()) : name;
 }
 
-PassOutcome failed(tl::unexpected<Error> error) { return {std::move(error), {}}; }
+PassOutcome failed(tl::unexpected<Error> error) { return {std::move(error)}; }
 
 // Opens what the job names and goes over it once.
 PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verify::BlamedRun>& kept,
@@ -176,8 +176,12 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       return tl::unexpected(outcome.status.error());
     }
     if (report.reference_time_s > 0.0 && job.output_fd < 0) {
-      const double factor = report.emitted_time_s / report.reference_time_s;
-      if (Status status = retime(job.output, job.output_name, factor); !status) {
+      if (!job.settings.is_timing_free()) {
+        outcome.time_notes.clear();  // all of the print takes about as much longer
+      }
+      if (Status status = retime(job.output, job.output_name, outcome.time_notes,
+                                 {0, report.reference_time_s, report.emitted_time_s});
+          !status) {
         return tl::unexpected(status.error());
       }
     }

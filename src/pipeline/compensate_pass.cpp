@@ -119,6 +119,7 @@ class Compensator {
       blamed_.push_back(*writer_.blocked());
     }
     outcome.blamed = std::move(blamed_);
+    outcome.time_notes = std::move(time_notes_);
     return outcome;
   }
 
@@ -481,6 +482,7 @@ class Compensator {
     }
     add_verification(*verified, *recorder_, *report_);
     blamed_ = std::move(verified->blamed_runs);
+    time_notes_ = std::move(verified->time_notes);
     for (verify::BlamedRun& run : blamed_) {
       run.reason = fmt::format("when it was verified: {}", run.reason);
     }
@@ -497,6 +499,7 @@ class Compensator {
   const Job& job_;
   const std::vector<verify::BlamedRun>& kept_;
   std::vector<verify::BlamedRun> blamed_;
+  std::vector<verify::TimeNote> time_notes_;
   bool checks_;
   RunRules rules_;
   WorkerPool* processes_;

@@ -30,7 +30,8 @@ struct PassStreams {
 struct PassOutcome {
   Status status;
   // Runs that break rules in the output, and a run in which a part could not be written.
-  std::vector<verify::BlamedRun> blamed;
+  std::vector<verify::BlamedRun> blamed = {};
+  std::vector<verify::TimeNote> time_notes = {};
 };
 
 // kept: runs to be left as sliced.

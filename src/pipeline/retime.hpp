@@ -3,8 +3,11 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/gcode/time_note.hpp"
+#include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
 
@@ -12,8 +15,18 @@ namespace unflex::pipeline {
 // line may be without its line ending.
 [[nodiscard]] std::string scaled_lines(std::string_view text, double factor);
 
-// Corrects a file in place like scaled_lines(). Fails if the file cannot be read or written; `name`
-// is what the error calls it.
-[[nodiscard]] Status retime(const std::string& path, const std::string& name, double factor);
+// A part of the print that is shorter than this says nothing about how much longer it takes.
+inline constexpr double kShortest_s = 10.0;
+
+// How many times as long it takes, for a note and the end of the print. The print must last.
+[[nodiscard]] gcode::TimeFactors factors_at(const verify::TimeNote& note,
+                                            const verify::TimeNote& end);
+
+// Corrects such durations in a file, in place, each by what has been printed before it and what is
+// still to come. A line that is not among the notes, which rise, tells of the whole print. Fails if
+// the file cannot be read or written; `name` is what the error calls it.
+[[nodiscard]] Status retime(const std::string& path, const std::string& name,
+                            const std::vector<verify::TimeNote>& notes,
+                            const verify::TimeNote& end);
 
 }  // namespace unflex::pipeline

@@ -300,8 +300,10 @@ void solve_all(RunJob& job, const RunRules& rules) {
 
 }  // namespace
 
-std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules) {
+std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules, double accel_share) {
   std::unique_ptr<RunJob> run = untimed(job, job.setup);
+  run->setup.x.limits.max_accel_mm_s2 *= accel_share;
+  run->setup.y.limits.max_accel_mm_s2 *= accel_share;
   const std::unique_ptr<compensate::Engine> engine = compensate::make_rough_engine();
   choose_timing(*run, {.is_optimal = false, .engine = engine.get()});
   run->stretch = job.stretch;

@@ -139,8 +139,10 @@ void stretch(RunJob& job);
 // Divides the run, in the timing that it has, into windows. Where its base is known it has none.
 void lay_out(RunJob& job);
 
-// The run of `job`, whose timing is optimal, once more in a scaled timing, with its lines.
-[[nodiscard]] std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules);
+// The run of `job` once more in a scaled timing, with its lines. accel_share: of the acceleration
+// that its motors may have.
+[[nodiscard]] std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules,
+                                             double accel_share);
 
 // The run of `job` once more, compensated in its timing as sliced, with its lines.
 [[nodiscard]] std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules);

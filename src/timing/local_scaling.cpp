@@ -50,11 +50,13 @@ constexpr double kAim = 0.97;
 constexpr double kAimOfFeed = 1.015;
 // A larger swing in the end counts as this.
 constexpr double kMostLeft = 4.0;
-// How far in time an error depends on a limit, and the shortest pieces; in 1/ω.
+// How far in time an error depends on a limit, and how long the pieces at both ends of a move are;
+// in 1/ω. The outer ones reach as far as a swing behind a corner counts, so that it does not slow
+// down the rest of a long line.
 constexpr double kErrorReach = 2.3;
 constexpr double kSpeedReach = 1.1;
 constexpr double kEndReach = 3.4;
-constexpr double kPieces[] = {1.1, 2.3};
+constexpr double kPieces[] = {1.1, 2.3, 5.0};
 // A round that changes the run's time by less than this share is the last of its kind.
 constexpr double kGain = 1e-3;
 

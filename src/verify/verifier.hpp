@@ -16,6 +16,7 @@
 #include "replay.hpp"
 #include "run_check.hpp"
 #include "section_rules.hpp"
+#include "time_notes.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/verify/line_rate.hpp"
@@ -113,6 +114,8 @@ class Verifier {
   Replay input_;
   Replay output_;
   LineCheck lines_;
+  TimeNotes input_notes_;
+  TimeNotes output_notes_;
   ReferencePath path_;
   ReferencePath run_path_;
   // In runs whose timing is free: the plan of the run as sliced.

@@ -86,9 +86,13 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       rules_of_run_(rules_, violations_),
       input_excursion_(rules_.travel),
       output_excursion_(rules_.travel) {
-  if (observer_ != nullptr) {
-    input_.on_line([observer = observer_](const gcode::Line& line) { observer->line(line); });
-  }
+  input_.on_line([this](const gcode::Line& line) {
+    input_notes_.read(line);
+    if (observer_ != nullptr) {
+      observer_->line(line);
+    }
+  });
+  output_.on_line([this](const gcode::Line& line) { output_notes_.read(line); });
 }
 
 Result<VerifyReport> Verifier::verify() {
@@ -124,6 +128,7 @@ bool Verifier::next_input_move(planner::PlannedMove& move) {
     return false;
   }
   input_switching_.move();
+  input_notes_.play(move.segment.line, totals_.reference_time_s);
   totals_.reference_time_s += move.duration_s();
   totals_.input_extrusion_mm += move.segment.delta(gcode::E);
   input_flow_.play(move);
@@ -381,6 +386,7 @@ void Verifier::play(const planner::PlannedMove& move) {
   if (!compensated && move.segment.length_xy_mm() > 0.0) {
     since_kept_motion_s_ = 0.0;
   }
+  output_notes_.play(move.segment.line, totals_.emitted_time_s);
   emitted_.play(move);
   filament_.play(move, start_s);
   if (compensated) {
@@ -581,6 +587,7 @@ VerifyReport Verifier::report() {
   report.violation_count = violations_.count();
   report.violations = violations_.take();
   report.blamed_runs = violations_.take_blamed();
+  report.time_notes = time_notes(input_notes_, output_notes_);
   return report;
 }
 

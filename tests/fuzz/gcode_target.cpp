@@ -116,7 +116,8 @@ void gcode(std::string_view bytes) {
           "the lines are not the text");
   for (const gcode::Event& event : playback.events) {
     const std::string_view content = event.line.content();
-    require(gcode::same_but_for_times(content, gcode::with_times_scaled(content, 1.5)),
+    require(gcode::same_but_for_times(
+                content, gcode::with_times_scaled(content, gcode::TimeFactors::even(1.5))),
             "a line with its times scaled is another line");
   }
   // Segments that are too small to be queued have no move. The line number tells which segment a

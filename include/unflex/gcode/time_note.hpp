@@ -6,12 +6,24 @@
 
 namespace unflex::gcode {
 
-// The line (without its ending) with every duration in it multiplied by `factor`: minutes in M73 R
-// S C D, `;TIME:` and `;TIME_ELAPSED:` (Cura), `; estimated printing time (…) = 1h 2m 3s`
-// (PrusaSlicer, SuperSlicer), `; total estimated time: 2m 3s` (OrcaSlicer, Bambu Studio). Each
-// duration keeps its number of digits. Any other line, and one with a checksum, comes back as it
-// is.
-[[nodiscard]] std::string with_times_scaled(std::string_view line, double factor);
+// How many times as long it takes as the slicer thinks.
+struct TimeFactors {
+  double whole = 1.0;  // the print
+  double gone = 1.0;   // from its beginning to the line
+  double left = 1.0;   // from the line to its end
+
+  static TimeFactors even(double factor) { return {factor, factor, factor}; }
+};
+
+// The line (without its ending) with every duration in it multiplied by its factor: minutes in M73
+// R S C D, which are left, `;TIME_ELAPSED:` (Cura), which is gone, and of the whole print `;TIME:`
+// (Cura), `; estimated printing time (…) = 1h 2m 3s` (PrusaSlicer, SuperSlicer), `; total estimated
+// time: 2m 3s` (OrcaSlicer, Bambu Studio). Each duration keeps its number of digits. Any other
+// line, and one with a checksum, comes back as it is.
+[[nodiscard]] std::string with_times_scaled(std::string_view line, const TimeFactors& factors);
+
+// Whether the line has such a duration above 0.
+[[nodiscard]] bool tells_time(std::string_view line);
 
 // Whether the lines are equal, or differ in nothing but such durations.
 [[nodiscard]] bool same_but_for_times(std::string_view a, std::string_view b);

@@ -130,6 +130,13 @@ struct TooMuchFlow {
   std::size_t line = 0;  // of the output
 };
 
+// A line of the output that tells how long the print takes, and how long it takes up to there.
+struct TimeNote {
+  std::size_t line = 0;
+  double reference_s = 0.0;
+  double emitted_s = 0.0;
+};
+
 struct VerifyReport {
   // The input as this printer plays it, its own shaper included. Measured against the firmware's
   // plan of the input.
@@ -180,6 +187,7 @@ struct VerifyReport {
   std::vector<Violation> violations;   // the first 100 at most
   std::size_t violation_count = 0;     // number of all violations
   std::vector<BlamedRun> blamed_runs;  // in the order of the file
+  std::vector<TimeNote> time_notes;    // likewise
 };
 
 // The first hard rule that is broken by `base`, the replayed moves of one compensated run; nullopt
