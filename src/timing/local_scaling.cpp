@@ -8,6 +8,7 @@
 // The exponents become smaller from round to round. Once the plan's time hardly changes, limits are
 // lowered only, until the nozzle keeps the tolerance everywhere.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -50,13 +51,15 @@ constexpr double kAim = 0.97;
 constexpr double kAimOfFeed = 1.015;
 // A larger swing in the end counts as this.
 constexpr double kMostLeft = 4.0;
-// How far in time an error depends on a limit, and how long the pieces at both ends of a move are;
-// in 1/ω. The outer ones reach as far as a swing behind a corner counts, so that it does not slow
-// down the rest of a long line.
+// How far in time an error depends on a limit, and how long the pieces at both ends of a move are,
+// in 1/ω.
 constexpr double kErrorReach = 2.3;
 constexpr double kSpeedReach = 1.1;
 constexpr double kEndReach = 3.4;
-constexpr double kPieces[] = {1.1, 2.3, 5.0};
+constexpr std::array kPieces = {1.1, 2.3};
+// With a third piece a swing behind a corner does not slow down the rest of a long line. But speeds
+// that change more often make swings of their own.
+constexpr std::array kMorePieces = {1.1, 2.3, 5.0};
 // A round that changes the run's time by less than this share is the last of its kind.
 constexpr double kGain = 1e-3;
 
@@ -70,7 +73,7 @@ class LocalScaling {
  public:
   LocalScaling(const compensate::Course& course, const compensate::Setup& setup,
                const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
-               const compensate::Engine& engine)
+               const compensate::Engine& engine, std::span<const double> ends)
       : course_(course),
         setup_(setup),
         nozzle_(nozzle),
@@ -78,8 +81,8 @@ class LocalScaling {
         models_(models_of(setup)),
         omega_rad_s_(std::min(setup.x.axis.slowest_rad_s(), setup.y.axis.slowest_rad_s())) {
     std::vector<double> ends_s;
-    for (const double piece : kPieces) {
-      ends_s.push_back(piece / omega_rad_s_);
+    for (const double end : ends) {
+      ends_s.push_back(end / omega_rad_s_);
     }
     std::vector<MoveBounds> allowed(bounds.begin(), bounds.end());
     keep_seams(course.moves, allowed);
@@ -381,12 +384,36 @@ class LocalScaling {
   std::vector<double> starts_s_;  // of the last plan's pieces, and the end of the last one
 };
 
+// Whether lines go evenly below their speed for so long that it matters.
+bool is_slow_on_long_lines(const Timed& timed, std::span<const MoveBounds> bounds) {
+  constexpr double kMatters = 0.04;
+  double lost_s = 0.0;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < timed.pieces.size(); ++i) {
+    for (const std::size_t end = next + timed.pieces[i]; next < end; ++next) {
+      const planner::PlannedMove& piece = timed.moves[next];
+      lost_s += piece.cruise_s * std::max(0.0, 1.0 - piece.cruise_v_mm_s / bounds[i].speed_mm_s);
+    }
+  }
+  return lost_s > kMatters * planner::duration_s(timed.moves);
+}
+
 }  // namespace
 
 std::optional<Timed> faster(const compensate::Course& course, const compensate::Setup& setup,
                             const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
                             const compensate::Engine& engine) {
-  return LocalScaling(course, setup, nozzle, bounds, engine).find();
+  const auto find = [&](std::span<const double> ends) {
+    return LocalScaling(course, setup, nozzle, bounds, engine, ends).find();
+  };
+  std::optional<Timed> found = find(kPieces);
+  if (found && is_slow_on_long_lines(*found, bounds)) {
+    std::optional<Timed> other = find(kMorePieces);
+    if (other && planner::duration_s(other->moves) < planner::duration_s(found->moves)) {
+      found = std::move(other);
+    }
+  }
+  return found;
 }
 
 }  // namespace unflex::timing
