@@ -48,8 +48,11 @@ class Reader {
   }
   std::vector<double> values() {
     std::vector<double> items(value<std::size_t>());
-    std::memcpy(items.data(), bytes_.data(), items.size() * sizeof(double));
-    bytes_.remove_prefix(items.size() * sizeof(double));
+    const std::size_t size = items.size() * sizeof(double);
+    if (size > 0) {
+      std::memcpy(items.data(), bytes_.data(), size);
+    }
+    bytes_.remove_prefix(size);
     return items;
   }
   std::string text() {
