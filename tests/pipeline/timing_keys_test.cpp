@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "jobs.hpp"
+#include "paths.hpp"
 #include "stage_options.hpp"
 #include "unflex/core/progress.hpp"
 
@@ -62,6 +64,25 @@ planner::PlannedMove line(double e_per_mm) {
   move.end_v_mm_s = 7.0;
   move.accel_mm_s2 = 1500.0;
   return move;
+}
+
+// Lines that end on whole steps swing about what was optimised, and then a run is tried again for
+// less acceleration. Only what no timing makes faster stays as sliced.
+TEST(FreeTiming, IsNotLostToTheGridOfSteps) {
+  std::string print;
+  std::istringstream star(
+      testing::read_file(std::string(test_paths::kData) + "/pipeline_star.gcode"));
+  constexpr int kLines = 800;
+  std::string line;
+  for (int i = 0; i < kLines && std::getline(star, line); ++i) {
+    print += line + "\n";
+  }
+  const report::Report report =
+      compensated(print, {"printer.firmware=rrf", "limits.max_accel_mm_s2=1500"}, 2);
+  EXPECT_LE(report.free_timing.pieces_as_sliced, 2U);
+  for (const report::Fallback& kept : report.free_timing.as_sliced) {
+    EXPECT_EQ(kept.reason, "no faster timing was found that keeps the tolerance");
+  }
 }
 
 TEST(MoveBounds, HaveTheAccelerationAsSlicedIfAsked) {
