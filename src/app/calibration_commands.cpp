@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kWarmestRoom_c = 150.0;  // the bound of hotend.ambient_c
 constexpr double kHottest_c = 1000.0;
+constexpr const char* kReportOfModel = "Write a report, FILE.json or FILE.html, or - for stdout";
 
 // Options for a resonance that shows in a print: spacing, speed and decay of its waves.
 void add_tower(CLI::App& command, RunConfig& config) {
@@ -109,12 +110,8 @@ void add_identify(CLI::App& program, RunConfig& config) {
       ->transform(letters);
   command->add_option("-o,--output", config.output, "Where --make-test writes, - for stdout")
       ->type_name("OUT");
-  add_settings(*command, config);
-  command
-      ->add_option("--report", config.report,
-                   "Write a report, FILE.json or FILE.html, or - for stdout")
-      ->type_name("FILE");
-  command->add_flag("-q,--quiet", config.quiet, "Print the lines for the printer file alone");
+  add_common_options(*command, config, kReportOfModel,
+                     "Print the lines for the printer file alone");
   command->callback([&config] { config.command = Command::identify; });
 }
 
@@ -157,7 +154,7 @@ void add_tune(CLI::App& program, RunConfig& config) {
                    "Write a page, FILE.html, with pictures of the walls to expect")
       ->type_name("FILE");
   add_jobs(*command, config);
-  command->add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
+  command->add_flag("-q,--quiet", config.quiet, kNoSummary);
   command->callback([&config] { config.command = Command::tune; });
 }
 
@@ -216,13 +213,8 @@ void add_hotend(CLI::App& program, RunConfig& config) {
                    "What the heater gives at full power, for the load")
       ->type_name("W")
       ->check(positive());
-  add_settings(*command, config);
-  command
-      ->add_option("--report", config.report,
-                   "Write a report, FILE.json or FILE.html, or - for stdout")
-      ->type_name("FILE");
-  command->add_flag("-q,--quiet", config.quiet,
-                    "Print the lines to paste alone: the model of LOG, or else the gains");
+  add_common_options(*command, config, kReportOfModel,
+                     "Print the lines to paste alone: the model of LOG, or else the gains");
   command->callback([&config] { config.command = Command::hotend; });
 }
 

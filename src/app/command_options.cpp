@@ -55,10 +55,11 @@ void add_settings(CLI::App& command, RunConfig& config) {
   add_overrides(command, config);
 }
 
-void add_common_options(CLI::App& command, RunConfig& config, const char* report) {
+void add_common_options(CLI::App& command, RunConfig& config, const char* report,
+                        const char* quiet) {
   add_settings(command, config);
   command.add_option("--report", config.report, report)->type_name("FILE");
-  command.add_flag("-q,--quiet", config.quiet, "No summary and no progress bar");
+  command.add_flag("-q,--quiet", config.quiet, quiet);
 }
 
 void add_jobs(CLI::App& command, RunConfig& config) {

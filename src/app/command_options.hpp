@@ -51,8 +51,11 @@ void add_settings(CLI::App& command, RunConfig& config);
 inline constexpr const char* kReportOrPage =
     "Write a report, FILE.json or FILE.html, or JSON to stdout with -";
 
-// --printer, --set, --report and -q.
-void add_common_options(CLI::App& command, RunConfig& config, const char* report = kReportOrPage);
+inline constexpr const char* kNoSummary = "No summary and no progress bar";
+
+// --printer, --set, --report and -q, the last two with what their help says.
+void add_common_options(CLI::App& command, RunConfig& config, const char* report = kReportOrPage,
+                        const char* quiet = kNoSummary);
 
 // -j.
 void add_jobs(CLI::App& command, RunConfig& config);

@@ -5,6 +5,14 @@
 #include <cmath>
 
 namespace unflex::hotend {
+namespace {
+
+// K of a τ, and τ of a K, since K τ = ΔT / (ΔT/100)^E.
+double across_power_law(double value, double rise_c, double exponent) {
+  return rise_c / (value * std::pow(rise_c / 100.0, exponent));
+}
+
+}  // namespace
 
 std::string klipper_words(const Gains& gains, double full_power) {
   const double scale = kFullPower / full_power;
@@ -20,11 +28,14 @@ std::string marlin_words(const Gains& gains, double full_power) {
 
 RrfModel rrf_model(const Plant& plant, double working_c) {
   const OneLag one = plant.one_lag();
-  const double rise_c = working_c - plant.ambient_c;
-  return {
-      .heating_rate_c_s = plant.heating_rate_c_s(),
-      .cooling_rate_c_s = rise_c / (one.time_constant_s * std::pow(rise_c / 100.0, kRrfExponent)),
-      .dead_time_s = one.dead_time_s};
+  return {.heating_rate_c_s = plant.heating_rate_c_s(),
+          .cooling_rate_c_s =
+              across_power_law(one.time_constant_s, working_c - plant.ambient_c, kRrfExponent),
+          .dead_time_s = one.dead_time_s};
+}
+
+double time_constant_s(double cooling_rate_c_s, double rise_c, double exponent) {
+  return across_power_law(cooling_rate_c_s, rise_c, exponent);
 }
 
 std::string rrf_words(const RrfModel& model, int heater) {

@@ -1,18 +1,16 @@
 #include "rrf_heaters.hpp"
 
-#include <cmath>
 #include <optional>
 
 #include "unflex/core/number.hpp"
+#include "unflex/hotend/firmware_words.hpp"
 
 namespace unflex::machine {
 namespace {
 
-constexpr double kFullPower = 255.0;
 // Losses follow a power law. The linear model has the same loss at this temperature above the
 // ambient one, which is as prints have it.
 constexpr double kWorking_c = 185.0;
-constexpr double kUsualExponent = 1.35;  // FOPDT.h, DefaultHotEndHeaterCoolingRateExponent
 
 }  // namespace
 
@@ -27,12 +25,12 @@ void RrfHeaters::read(const gcode::Command& command, const SourcePlace& place) {
   double rate_c_s = command.value('R').value_or(0.0);
   double time_constant_s = command.value('C').value_or(0.0);
   if (const double cooling_c_s = command.value('K').value_or(0.0); cooling_c_s > 0.0) {
-    const double exponent = command.value('E').value_or(kUsualExponent);
-    time_constant_s = kWorking_c / (cooling_c_s * std::pow(kWorking_c / 100.0, exponent));
+    time_constant_s = hotend::time_constant_s(cooling_c_s, kWorking_c,
+                                              command.value('E').value_or(hotend::kRrfExponent));
   } else if (rate_c_s <= 0.0 && time_constant_s > 0.0) {
     rate_c_s = command.value('A').value_or(0.0) / time_constant_s;  // until version 3.1
   }
-  const double gain_c = rate_c_s * time_constant_s / kFullPower;
+  const double gain_c = rate_c_s * time_constant_s / hotend::kFullPower;
   if (gain_c > 0.0 && time_constant_s > 0.0) {
     models_[to_int(*command.value('H'))] = {gain_c, time_constant_s, *dead_time_s, place};
   }

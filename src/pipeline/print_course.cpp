@@ -52,8 +52,11 @@ class CourseMaker {
         planner_(planner::make_planner(planner_limits(settings), firmware_config(settings))) {}
 
   void add(gcode::Line line) {
-    gcode::parse(line.content(), command_);
-    watch(line);
+    // Most lines are such, and ask nothing of a hotend.
+    if (!line.content().starts_with("G1 ")) {
+      gcode::parse(line.content(), command_);
+      watch(line);
+    }
     gcode::Event event = interpreter_.interpret(std::move(line));
     if (event.position_lost) {
       watch_macro(event.line);

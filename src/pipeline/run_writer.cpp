@@ -213,12 +213,12 @@ std::optional<std::string> RunWriter::write_in_time(const RunJob& job, std::stri
     }
     return objection;
   }
-  // The motion may be more than its lines can follow within the limits: what is rounded swings
-  // about what was optimised, and a free timing takes all that the motors give.
+  if (!job.retimed) {
+    return objection;
+  }
+  // Its lines may break a limit: what is rounded swings about what was optimised, and a free timing
+  // takes all that the motors give.
   for (const double share : job.has_base() ? kScaledAfterOptimal : kScaledAgain) {
-    if (!job.retimed) {
-      break;
-    }
     const std::unique_ptr<RunJob> slower = scaled(job, *rules_, share);
     if (slower->retimed && !write_run(*slower, text)) {
       if (job.has_base()) {
@@ -227,11 +227,8 @@ std::optional<std::string> RunWriter::write_in_time(const RunJob& job, std::stri
       return std::nullopt;
     }
   }
-  if (job.retimed) {
-    note_slow(job, std::move(*objection));
-    return write_run(*as_sliced(job, *rules_), text);
-  }
-  return objection;
+  note_slow(job, std::move(*objection));
+  return write_run(*as_sliced(job, *rules_), text);
 }
 
 // Writes the run as compensated text, or returns why its original lines must stand.

@@ -24,10 +24,15 @@ struct RrfModel {
   double cooling_rate_c_s = 0.0;  // K = ΔT / (τ (ΔT/100)^E), so that it is right at the working ΔT
   double dead_time_s = 0.0;       // D
 };
-inline constexpr double kRrfExponent = 1.35;
+inline constexpr double kRrfExponent = 1.35;  // FOPDT.h, DefaultHotEndHeaterCoolingRateExponent
 
 // working_c: the temperature at which the model shall hold, above the plant's ambient.
 [[nodiscard]] RrfModel rrf_model(const Plant& plant, double working_c);
+
+// The time constant of a linear model that loses as much heat at that rise above the ambient
+// temperature: τ = ΔT / (K (ΔT/100)^E). cooling_rate_c_s, K: above 0.
+[[nodiscard]] double time_constant_s(double cooling_rate_c_s, double rise_c,
+                                     double exponent = kRrfExponent);
 
 // "M307 H1 R1.693 K0.267 D6.25 E1.35 S1.00". The firmware chooses its gains by the model.
 [[nodiscard]] std::string rrf_words(const RrfModel& model, int heater = 1);
