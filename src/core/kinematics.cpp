@@ -5,8 +5,12 @@
 namespace unflex {
 namespace {
 
-constexpr std::array kAll = {Kinematics::cartesian, Kinematics::corexy, Kinematics::corexz,
-                             Kinematics::hybrid_corexy, Kinematics::hybrid_corexz};
+constexpr std::array kAll = {Kinematics::cartesian,
+                             Kinematics::corexy,
+                             Kinematics::corexz,
+                             Kinematics::hybrid_corexy,
+                             Kinematics::hybrid_corexy_inverted,
+                             Kinematics::hybrid_corexz};
 
 }  // namespace
 
@@ -20,6 +24,8 @@ std::string_view to_string(Kinematics kinematics) {
       return "corexz";
     case Kinematics::hybrid_corexy:
       return "hybrid_corexy";
+    case Kinematics::hybrid_corexy_inverted:
+      return "hybrid_corexy_inverted";
     case Kinematics::hybrid_corexz:
       return "hybrid_corexz";
   }
@@ -43,6 +49,9 @@ Motors::Motors(Kinematics kinematics, Firmware firmware) {
       break;
     case Kinematics::hybrid_corexy:
       rows_[0] = {1.0, -1.0, 0.0};
+      break;
+    case Kinematics::hybrid_corexy_inverted:
+      rows_[0] = {1.0, 1.0, 0.0};
       break;
     case Kinematics::hybrid_corexz:
       rows_[0] = {1.0, 0.0, -1.0};

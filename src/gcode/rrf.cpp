@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "firmware_commands.hpp"
-#include "rrf_meta.hpp"
+#include "unflex/gcode/rrf_meta.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/interpreter.hpp"
 

@@ -1,4 +1,4 @@
-#include "rrf_meta.hpp"
+#include "unflex/gcode/rrf_meta.hpp"
 
 #include <algorithm>
 #include <array>

@@ -6,7 +6,7 @@
 #include <array>
 
 #include "firmware_commands.hpp"
-#include "rrf_meta.hpp"
+#include "unflex/gcode/rrf_meta.hpp"
 #include "unflex/gcode/command.hpp"
 
 namespace unflex::gcode {

@@ -15,20 +15,14 @@ struct NamedValue;
 
 // What a source may hold for a key. monostate stands for a value that no key takes.
 struct Value {
-  Value(double number) : content(number), kind("a number") {}
-  Value(bool flag) : content(flag), kind("true or false") {}
-  Value(std::string text) : content(text), kind("the text \"" + text + "\"") {}
-  Value(const char* text) : Value(std::string(text)) {}
-  Value(const Range& range)
-      : content(std::vector<Value>{Value(range.min), Value(range.max)}), kind("an array") {}
-  Value(std::vector<Value> list) : content(std::move(list)), kind("an array") {}
+  Value(double number);
+  Value(bool flag);
+  Value(std::string text);
+  Value(const char* text);
+  Value(const Range& range);
+  Value(std::vector<Value> list);
   Value(std::vector<NamedValue> table);
-  [[nodiscard]] static Value other(std::string kind) {
-    Value value(0.0);
-    value.content = std::monostate{};
-    value.kind = std::move(kind);
-    return value;
-  }
+  [[nodiscard]] static Value other(std::string kind);
 
   std::variant<std::monostate, double, bool, std::string, std::vector<Value>,
                std::vector<NamedValue>>
@@ -42,7 +36,21 @@ struct NamedValue {
   Value value;
 };
 
+// Constructors stand here because the variant needs NamedValue to be complete.
+inline Value::Value(double number) : content(number), kind("a number") {}
+inline Value::Value(bool flag) : content(flag), kind("true or false") {}
+inline Value::Value(std::string text) : content(text), kind("the text \"" + text + "\"") {}
+inline Value::Value(const char* text) : Value(std::string(text)) {}
+inline Value::Value(std::vector<Value> list) : content(std::move(list)), kind("an array") {}
+inline Value::Value(const Range& range)
+    : Value(std::vector<Value>{Value(range.min), Value(range.max)}) {}
 inline Value::Value(std::vector<NamedValue> table) : content(std::move(table)), kind("a table") {}
+inline Value Value::other(std::string kind) {
+  Value value(0.0);
+  value.content = std::monostate{};
+  value.kind = std::move(kind);
+  return value;
+}
 
 // A key's value and where it was read.
 struct Assignment {

@@ -70,8 +70,9 @@ constexpr std::array<std::string_view, 11> kShaperTypes = {
 bool is_mzv(std::string_view text) { return dynamics::mzv_form(text).has_value(); }
 
 // The variants that variants.cpp knows, besides "auto" and "mainline".
-constexpr std::array<std::string_view, 7> kVariants = {
-    "auto", "mainline", "kalico", "kalico_limited", "kalico_smooth", "prusa_buddy", "snapmaker_j1"};
+constexpr std::array<std::string_view, 8> kVariants = {
+    "auto",          "mainline",    "kalico",       "kalico_limited",
+    "kalico_smooth", "prusa_buddy", "snapmaker_j1", "marlin_1_0"};
 constexpr std::array<std::string_view, 2> kTimingMethods = {kScaled, kOptimal};
 constexpr std::array<std::string_view, 2> kAheadWhen = {"heating", "both"};
 constexpr std::array<std::string_view, 5> kSecondShapers = {"zv", "mzv", "zvd", "ei", "none"};

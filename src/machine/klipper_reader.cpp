@@ -11,7 +11,7 @@
 
 #include "klipper_config.hpp"
 #include "klipper_shaper.hpp"
-#include "unflex/core/text.hpp"
+#include "text_lines.hpp"
 #include "unflex/dynamics/shapers.hpp"
 
 namespace unflex::machine {
@@ -51,18 +51,27 @@ struct KnownKinematics {
   Kinematics type;
 };
 
-// Kalico's limited_ kinematics move like those without that word (klippy/kinematics).
+// HelgeKeck/klipper_hybrid_corexy has ratos_hybrid_corexy, and for both names a section of its own
+// with the option `inverted`. Kalico's limited_ kinematics move like those without that word
+// (klippy/kinematics).
 constexpr std::array kKinematics = {
     KnownKinematics{"cartesian", Kinematics::cartesian},
     KnownKinematics{"corexy", Kinematics::corexy},
     KnownKinematics{"corexz", Kinematics::corexz},
     KnownKinematics{"hybrid_corexy", Kinematics::hybrid_corexy},
+    KnownKinematics{"ratos_hybrid_corexy", Kinematics::hybrid_corexy},
     KnownKinematics{"hybrid_corexz", Kinematics::hybrid_corexz},
     KnownKinematics{"generic_cartesian", Kinematics::cartesian},
     KnownKinematics{"limited_cartesian", Kinematics::cartesian},
     KnownKinematics{"limited_corexy", Kinematics::corexy},
     KnownKinematics{"limited_corexz", Kinematics::corexz},
 };
+
+// Klipper's getboolean() (Python's configparser).
+bool is_true(std::string_view text) {
+  const std::string value = lower(text);
+  return value == "1" || value == "yes" || value == "true" || value == "on";
+}
 
 // Python's float(), as far as printers use it.
 std::optional<double> number_of(std::string_view text) {
@@ -201,7 +210,13 @@ class Reader {
                       "it is on this machine",
                       given.text));
     }
-    reading_.add("kinematics.type", std::string(to_string(known->type)), given.place);
+    const KlipperOption* const inverted = option(known->name, "inverted");
+    const bool is_inverted = inverted != nullptr && is_true(inverted->text);
+    const bool is_hybrid = known->type == Kinematics::hybrid_corexy;
+    const Kinematics type =
+        is_hybrid && is_inverted ? Kinematics::hybrid_corexy_inverted : known->type;
+    reading_.add("kinematics.type", std::string(to_string(type)),
+                 is_hybrid && is_inverted ? inverted->place : given.place);
     return own_carriages();
   }
 

@@ -7,12 +7,13 @@
 #include <tuple>
 #include <utility>
 
-#include "command_reader.hpp"
 #include "draft.hpp"
 #include "file_text.hpp"
 #include "key_table.hpp"
 #include "key_values.hpp"
 #include "klipper_reader.hpp"
+#include "marlin_dump.hpp"
+#include "rrf_config.hpp"
 #include "slicer_reader.hpp"
 #include "source_kind.hpp"
 #include "toml_reader.hpp"

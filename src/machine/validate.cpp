@@ -263,6 +263,7 @@ Status check_kinematics(const Draft& draft) {
         return refuse("Marlin's MARKFORGED_XY limits by x + y in places and by x - y in others");
       }
       return {};
+    case Kinematics::hybrid_corexy_inverted:
     case Kinematics::hybrid_corexz:
       if (s.printer.firmware != Firmware::klipper) {
         return refuse("Klipper alone has");

@@ -22,6 +22,7 @@ constexpr std::string_view kKalicoLimited = "kalico_limited";
 constexpr std::string_view kKalicoSmooth = "kalico_smooth";
 constexpr std::string_view kBuddy = "prusa_buddy";
 constexpr std::string_view kSnapmakerJ1 = "snapmaker_j1";
+constexpr std::string_view kMarlin10 = "marlin_1_0";
 
 // Printers of Prusa's with a Buddy board, as PrusaSlicer and M862.3 write them, in lower case. The
 // older ones (MK3S, MK2.5) run an 8 bit Marlin of Prusa's own.
@@ -182,6 +183,17 @@ void snapmaker_j1(Draft& draft) {
   }
 }
 
+// Marlin 1.0, Marlin_main.cpp, M204 reads S and T alone, and planner.cpp takes junctions otherwise.
+void marlin_1_0(Draft& draft) {
+  if (draft.settings.printer.variant == kMarlin10) {
+    refuse(draft, first_place(draft, {"printer.variant"}),
+           "this M204 is of Marlin 1.0, which does not know M204 P, with which a run raises the "
+           "acceleration, so that compensated lines would be slowed down and drawn wrong; update "
+           "the printer to Marlin 2, or set printer.variant = \"mainline\" if it runs that "
+           "already");
+  }
+}
+
 void marlin_ft_motion(Draft& draft) {
   const Settings& s = draft.settings;
   if (s.printer.firmware == Firmware::marlin && s.printer.ft_motion) {
@@ -314,8 +326,8 @@ void read_start_code(const PrintText& print, Draft& draft) {
 }
 
 void judge_variant(Draft& draft) {
-  for (auto* row : {klipper_ignores_shaper_off, kalico, prusa_buddy, snapmaker_j1, marlin_ft_motion,
-                    marlin_linear_advance}) {
+  for (auto* row : {klipper_ignores_shaper_off, kalico, prusa_buddy, snapmaker_j1, marlin_1_0,
+                    marlin_ft_motion, marlin_linear_advance}) {
     row(draft);
   }
   if (const std::optional<Diagnostic>& refusal = draft.settings.refusal) {

@@ -13,10 +13,17 @@
 
 namespace unflex {
 
-enum class Kinematics { cartesian, corexy, corexz, hybrid_corexy, hybrid_corexz };
+enum class Kinematics {
+  cartesian,
+  corexy,
+  corexz,
+  hybrid_corexy,
+  hybrid_corexy_inverted,  // the belt of X goes around the other way
+  hybrid_corexz,
+};
 
 // As the configuration spells it, which is Klipper's way: "cartesian", "corexy", "corexz",
-// "hybrid_corexy", "hybrid_corexz".
+// "hybrid_corexy", "hybrid_corexy_inverted", "hybrid_corexz".
 [[nodiscard]] std::string_view to_string(Kinematics kinematics);
 
 // All kinematics, in the order above.
