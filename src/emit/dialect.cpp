@@ -261,7 +261,8 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
                                       const gcode::Shaper& current) {
   std::vector<std::string> lines;
   // What is not known cannot be set.
-  const bool x = !wanted.unknown_x && (current.unknown_x || wanted.freq_x_hz != current.freq_x_hz);
+  const bool x_is_other = firmware == Firmware::rrf || wanted.freq_x_hz != current.freq_x_hz;
+  const bool x = !wanted.unknown_x && (current.unknown_x || x_is_other);
   const bool y = !wanted.unknown_y && (current.unknown_y || wanted.freq_y_hz != current.freq_y_hz);
   switch (firmware) {
     case Firmware::klipper:
@@ -280,7 +281,7 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
       }
       break;
     case Firmware::rrf:
-      if (!same_rrf_shaper(wanted, current)) {
+      if (x && (current.unknown_x || !same_rrf_shaper(wanted, current))) {
         lines.push_back(rrf_shaper(wanted));
       }
       break;
@@ -288,11 +289,24 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
   return lines;
 }
 
-std::string unknown_shaper_words(const gcode::Shaper& wanted, const gcode::Shaper& current) {
+std::string unknown_shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
+                                 const gcode::Shaper& current) {
   const bool x = wanted.unknown_x && !current.unknown_x;
   const bool y = wanted.unknown_y && !current.unknown_y;
-  return fmt::format("{}{}{}", x ? "SHAPER_FREQ_X=..." : "", x && y ? " " : "",
-                     y ? "SHAPER_FREQ_Y=..." : "");
+  if (!x && !y) {
+    return "";
+  }
+  switch (firmware) {
+    case Firmware::klipper:
+      return fmt::format("SET_INPUT_SHAPER{}{}", x ? " SHAPER_FREQ_X=..." : "",
+                         y ? " SHAPER_FREQ_Y=..." : "");
+    case Firmware::marlin:
+      return fmt::format("{}{}{}", x ? "M593 X F..." : "", x && y ? " and " : "",
+                         y ? "M593 Y F..." : "");
+    case Firmware::rrf:
+      break;
+  }
+  return "M593 P\"...\" F...";
 }
 
 }  // namespace unflex::emit

@@ -60,9 +60,10 @@ struct ZLimits {
 [[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                     const gcode::Shaper& current);
 
-// The words to type after the print for those axes whose shaper is off, though the printer may have
-// one that is not known: "SHAPER_FREQ_X=... SHAPER_FREQ_Y=...". Empty if there are none.
-[[nodiscard]] std::string unknown_shaper_words(const gcode::Shaper& wanted,
+// What to type after the print for those axes whose shaper is off, though the printer may have one
+// that is not known: "SET_INPUT_SHAPER SHAPER_FREQ_X=... SHAPER_FREQ_Y=...". Empty if there are
+// none.
+[[nodiscard]] std::string unknown_shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                const gcode::Shaper& current);
 
 }  // namespace unflex::emit

@@ -230,14 +230,15 @@ void Emitter::finish(std::string& out) {
   restore_shaper(out);
   if (const std::string words = shaper_left_off(); !words.empty()) {
     write(fmt::format("{}: the printer's own input shaper is not known and still off; set it again "
-                      "as its configuration has it: SET_INPUT_SHAPER {}",
+                      "as its configuration has it: {}",
                       kOwnMark, words),
           out);
   }
 }
 
 std::string Emitter::shaper_left_off() const {
-  return unknown_shaper_words(input_.state().input_shaper(), printer_.state().input_shaper());
+  return unknown_shaper_lines(options_.fixed.firmware, input_.state().input_shaper(),
+                              printer_.state().input_shaper());
 }
 
 // Before the first line that is not the sliced file's.
@@ -251,7 +252,7 @@ void Emitter::sign(std::string& out) {
 
 void Emitter::enter_run(const Run& run, std::string& out) {
   sign(out);
-  set_shaper({}, out);
+  switch_shaper_off(out);
   if (moving_) {
     // A run begins at rest, but no firmware stops by itself between the move before it and its
     // first line. G4 without a time makes all three firmwares end their motion and go on at once.
@@ -402,13 +403,24 @@ void Emitter::set_limits(const planner::Limits& limits, std::string& out, bool m
 }
 
 void Emitter::restore_shaper(std::string& out) {
-  set_shaper(input_.state().input_shaper(), out);
+  set_shaper(input_.state().input_shaper(), printer_.state().input_shaper(), out);
   tell_shaper(out);
 }
 
-void Emitter::set_shaper(const gcode::Shaper& wanted, std::string& out) {
-  for (const std::string& text :
-       shaper_lines(options_.fixed.firmware, wanted, printer_.state().input_shaper())) {
+// Off, whoever may have switched it on: the printer's configuration, the file, or a macro.
+void Emitter::switch_shaper_off(std::string& out) {
+  const gcode::ModalState& state = printer_.state();
+  gcode::Shaper current = state.input_shaper();
+  if (gcode::may_come_on(options_.fixed.firmware, input_.state().input_shaper())) {
+    current.unknown_x = current.unknown_x || state.shaper_touched_x;
+    current.unknown_y = current.unknown_y || state.shaper_touched_y;
+  }
+  set_shaper({}, current, out);
+}
+
+void Emitter::set_shaper(const gcode::Shaper& wanted, const gcode::Shaper& current,
+                         std::string& out) {
+  for (const std::string& text : shaper_lines(options_.fixed.firmware, wanted, current)) {
     write(text, out);
   }
 }

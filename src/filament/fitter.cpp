@@ -152,7 +152,8 @@ Status Fitter::fit(const gcode::Line& line, std::string& text) {
     at_mm_ += filament_of(event_);
     text += line.text;
     if (event_.kind == gcode::EventKind::barrier && is_move(command) && command.has('E')) {
-      warnings_.push_back({{name_, line.number}, "is not understood, so its E stays as sliced"});
+      warnings_.push_back(
+          {{name_, line.number}, "this line's motion is not understood, so its E stays as sliced"});
     }
     // A line that says what E reads says it to the printer too.
     if (!moves && (command.is('G', 92) || after.e_reading() != before.e_reading())) {

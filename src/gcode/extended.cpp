@@ -160,6 +160,8 @@ void Interpreter::input_shaper(Event& event) {
   };
   state_.shaper_unknown_x = state_.shaper_unknown_x && !freq_x.value;
   state_.shaper_unknown_y = state_.shaper_unknown_y && !freq_y.value;
+  state_.shaper_touched_x = state_.shaper_touched_x && !freq_x.value;
+  state_.shaper_touched_y = state_.shaper_touched_y && !freq_y.value;
   number(freq_x, state_.shaper_freq_x_hz);
   number(freq_y, state_.shaper_freq_y_hz);
   number(damping_x, state_.shaper.damping_ratio_x);

@@ -51,6 +51,11 @@ bool names_further_axis(const Command& command) {
   });
 }
 
+bool is_motion(const Command& command) {
+  return command.kind == CommandKind::traditional && command.letter == 'G' && command.number >= 0 &&
+         command.number <= 3;
+}
+
 }  // namespace
 
 InterpreterOptions default_options(Firmware firmware) {
@@ -71,6 +76,10 @@ InterpreterOptions default_options(Firmware firmware) {
     options.steps_per_mm = {80.0, 80.0, 800.0, 420.0};
   }
   return options;
+}
+
+bool may_come_on(Firmware firmware, const Shaper& own) {
+  return firmware == Firmware::rrf || own.is_on() || own.is_unknown();
 }
 
 double ModalState::filament_factor() const {
@@ -109,6 +118,7 @@ void Event::reset() {
   shaper.reset();
   dwell_s = 0.0;
   position_lost = false;
+  lost_path_mm = 0.0;
   may_set_limits = false;
   warnings.clear();
   added = false;
@@ -125,6 +135,7 @@ void Interpreter::interpret(Event& event) {
   event.reset();
   const std::string_view content = event.line.content();
   parse(content, command_);
+  const std::array<bool, 4> known = state_.known;
   switch (options_.firmware) {
     case Firmware::klipper:
       klipper(event);
@@ -135,6 +146,9 @@ void Interpreter::interpret(Event& event) {
     case Firmware::rrf:
       rrf(event, content);
       break;
+  }
+  if (event.position_lost && is_motion(command_)) {
+    note_lost_motion(event, known);
   }
   // Homing and macros take their time.
   swinging_s_ = event.position_lost ? 0.0 : std::max(swinging_s_ - event.dwell_s, 0.0);

@@ -230,6 +230,30 @@ double Segment::length_xy_mm() const { return length(delta(X), delta(Y), 0.0); }
 
 double Segment::length_mm() const { return length(delta(X), delta(Y), delta(Z)); }
 
+// A line of motion after which the position is not known. Tells which words are to blame, and what
+// path it draws. `known`: which axes were known before it.
+void Interpreter::note_lost_motion(Event& event, const std::array<bool, 4>& known) {
+  std::string letters;
+  for (const Word& word : command_.words) {
+    if (std::string_view("ABCDPSUVW").find(word.letter) != std::string_view::npos) {
+      letters += letters.empty() ? "" : ", ";
+      letters += word.letter;
+    }
+  }
+  if (event.warnings.empty() && !letters.empty()) {
+    event.warnings.push_back(
+        fmt::format("G{} with {}, which unflex does not understand here: passed through unchanged; "
+                    "check the line",
+                    command_.number, letters));
+  }
+  const Target target = read_target(command_, state_, options_.firmware);
+  const Position& from = state_.position_mm;
+  if (target.problem == nullptr && known[X] && known[Y] && target.position_mm[E] > from[E]) {
+    event.lost_path_mm =
+        length(target.position_mm[X] - from[X], target.position_mm[Y] - from[Y], 0.0);
+  }
+}
+
 // RepRapFirmware: relative E words do not change the reading that absolute ones refer to
 // (GCodes.cpp, LoadExtrusionAndFeedrateFromGCode, latestVirtualExtruderPosition).
 void Interpreter::keep_reading_of_e(bool e_absolute, double before_mm) {
@@ -304,7 +328,8 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   if (pieces->empty()) {
     return not_understood(event, "an arc of no angle, which Marlin leaves out");
   }
-  if (const double gap_mm = gap_at_end_mm(arc); gap_mm > kLargestGap_mm) {
+  const bool is_in_place = state_.known[plane.alpha] && state_.known[plane.beta];
+  if (const double gap_mm = gap_at_end_mm(arc); is_in_place && gap_mm > kLargestGap_mm) {
     event.warnings.push_back(
         fmt::format("the arc's end is {:.2f} mm off its circle: the printer goes there straight; "
                     "check the line",

@@ -52,8 +52,8 @@ void Interpreter::firmware_retraction(Event& event, bool retract) {
   target[E] += travel_mm;
   state_.base_mm[E] += travel_mm;
   append_segment(event, target, feed_mm_s * state_.speed_factor, start_of_retraction());
-  if (event.segments.empty()) {
-    event.kind = EventKind::barrier;  // the length is not known here, but the machine stops
+  if (event.segments.empty() && !options_.retract_length_is_told) {
+    event.kind = EventKind::barrier;  // the printer may have a length, and then it stops
   }
 }
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "firmware_commands.hpp"
-#include "unflex/gcode/rrf_meta.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/interpreter.hpp"
+#include "unflex/gcode/rrf_meta.hpp"
 
 namespace unflex::gcode {
 namespace {
@@ -232,9 +232,7 @@ void Interpreter::rrf_g_code(Event& event) {
       return rrf_linear_move(event);
     case 2:
     case 3:
-      return state_.inverse_time || command_.has_any("ABCDPSUVW")
-                 ? lose_position(event)
-                 : arc_move(event, command_.number == 2);
+      return rrf_arc_move(event);
     case 4:
       return rrf_dwell(event);
     case 10:
@@ -352,6 +350,19 @@ void Interpreter::rrf_linear_move(Event& event) {
   linear_move(event);
   state_.speed_factor = speed_factor;
   set_flow_factor(flow_factor);
+}
+
+// GCodes.cpp, DoArcMove: reads the plane's axes, I, J, K, R, E, F and further axes where the
+// machine has them. Other letters count for nothing, such as P, which slicers write behind a lift
+// for Marlin.
+void Interpreter::rrf_arc_move(Event& event) {
+  if (state_.inverse_time) {
+    return not_understood(event, "a move in inverse time mode (G93)");
+  }
+  if (command_.has_any("ABCDUVW")) {
+    return lose_position(event);
+  }
+  arc_move(event, command_.number == 2);
 }
 
 // GCodes2.cpp, HandleGcode: with L, P, R, S or an axis it sets a tool or a workplace.

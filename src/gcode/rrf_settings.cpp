@@ -1,5 +1,7 @@
 // RepRapFirmware's limits, factors and retraction settings. Each function names its source below
 // src/GCodes. None of these commands is in inches.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <optional>
 
@@ -43,6 +45,17 @@ void Interpreter::rrf_max_velocity(Event& event) {
   raise(least, kMinVelocity_mm_s);
   axis_limits(event, scale, 0.0, event.limits.edit().axis_max_velocity_mm_s);
   raise(event.limits.edit().axis_max_velocity_mm_s, kMinVelocity_mm_s);
+  // No printer is limited so on purpose. Marlin's M203 is in mm/s.
+  constexpr double kSlow_mm_s = 10.0;
+  for (const Axis axis : {X, Y}) {
+    const auto& limit_mm_s = event.limits.edit().axis_max_velocity_mm_s[axis];
+    if (limit_mm_s && *limit_mm_s < kSlow_mm_s && event.warnings.empty()) {
+      event.warnings.push_back(
+          fmt::format("M203 is in mm/min on RepRapFirmware, and this limits {} to {:.3g} mm/s; was "
+                      "{:.4g} mm/s meant?",
+                      axis == X ? 'X' : 'Y', *limit_mm_s, *limit_mm_s / scale));
+    }
+  }
 }
 
 // GCodes5.cpp, ConfigureAccelerations.

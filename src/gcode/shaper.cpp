@@ -49,6 +49,10 @@ void Interpreter::marlin_shaper(Event& event) {
     return;
   }
   event.kind = EventKind::barrier;
+  state_.shaper_unknown_x = state_.shaper_unknown_x && !for_x;
+  state_.shaper_unknown_y = state_.shaper_unknown_y && !for_y;
+  state_.shaper_touched_x = state_.shaper_touched_x && !for_x;
+  state_.shaper_touched_y = state_.shaper_touched_y && !for_y;
   state_.shaper_freq_x_hz = for_x ? *freq_hz : state_.shaper_freq_x_hz;
   state_.shaper_freq_y_hz = for_y ? *freq_hz : state_.shaper_freq_y_hz;
   note_shaper(event);
@@ -81,6 +85,8 @@ void Interpreter::rrf_shaper(Event& event) {
   shaper.custom_words = shaper.type_x == "custom" ? std::string(command_.arguments) : "";
   state_.shaper_freq_x_hz = shaper.type_x == "none" ? 0.0 : *shaper.kept_freq_hz;
   state_.shaper_freq_y_hz = state_.shaper_freq_x_hz;
+  state_.shaper_unknown_x = state_.shaper_unknown_y = false;
+  state_.shaper_touched_x = state_.shaper_touched_y = false;
   note_shaper(event);
 }
 

@@ -62,6 +62,7 @@ void Interpreter::lose_position(Event& event) {
   event.position_lost = true;
   state_.known.fill(false);
   assumed_.fill(false);
+  state_.shaper_touched_x = state_.shaper_touched_y = true;
   // Another extruder may be in use, so the next value may stop the machine. The last value known is
   // still the best guess.
   pressure_advance_on_.reset();

@@ -274,6 +274,21 @@ std::string assign(const std::string& name, const Value& value, const SourcePlac
   return std::visit([&](auto member) { return store(value, key, member(draft)); }, key.member);
 }
 
+void Reading::add_shaper_damping(const std::string& axis, double ratio, const SourcePlace& place) {
+  const std::string key = fmt::format("dynamics.{}.damping_ratio", axis);
+  if (is_plausible_damping(ratio)) {
+    add(key, ratio, place);
+    return;
+  }
+  note(
+      place,
+      fmt::format("a damping ratio of {} is one that no printer has ({} to {}), so it is not taken "
+                  "for that of {}; measure it with unflex identify or unflex tune, or give {} "
+                  "with --set",
+                  ratio, kLeastDamping, kMostDamping, axis == "x" ? 'X' : 'Y', key),
+      {key});
+}
+
 Status apply(const Reading& reading, Draft& draft) {
   for (const Assignment& assignment : reading.assignments) {
     std::string wrong = assign(assignment.key, assignment.value, assignment.place, draft);

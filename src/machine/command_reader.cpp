@@ -128,7 +128,7 @@ void CommandReader::shaper(const std::string& axis, double freq_hz,
     reading.add("dynamics." + axis + ".freq_hz", freq_hz, place);
     if (damping_ratio) {
       reading.add("printer.input_shaper_damping_ratio_" + axis, *damping_ratio, place);
-      reading.add("dynamics." + axis + ".damping_ratio", *damping_ratio, place);
+      reading.add_shaper_damping(axis, *damping_ratio, place);
     }
   }
 }

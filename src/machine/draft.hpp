@@ -18,6 +18,14 @@ struct MassSpringDamper {
   std::optional<double> damping_n_s_mm;
 };
 
+// Printers whose damping was measured lie well within these.
+inline constexpr double kLeastDamping = 0.01;
+inline constexpr double kMostDamping = 0.5;
+
+[[nodiscard]] inline bool is_plausible_damping(double ratio) {
+  return ratio >= kLeastDamping && ratio <= kMostDamping;
+}
+
 // A remark for the user, and the keys that it is about. If other places give all of these keys, it
 // is not told.
 struct Note {

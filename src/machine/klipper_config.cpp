@@ -192,6 +192,46 @@ Status add_saved(std::string_view text, std::size_t first_line, const std::strin
   return status;
 }
 
+// Kalico: "${constants.belt}" stands for the option belt of [constants]; other sections do as well
+// (klippy/configfile.py). What refers to something that is not there stays and brings a note.
+constexpr std::string_view kReference = "${";
+constexpr int kMostReferences = 100;  // of one option, since they may go in a circle
+
+const KlipperOption* referred_to(const KlipperConfig& config, std::string_view reference) {
+  const std::size_t point = reference.rfind('.');
+  const KlipperSection* const section =
+      point == std::string_view::npos
+          ? nullptr
+          : config.find(std::string(trimmed(reference.substr(0, point))));
+  return section == nullptr ? nullptr : section->find(lower(trimmed(reference.substr(point + 1))));
+}
+
+void resolve_references(KlipperConfig& config) {
+  for (auto& [name, section] : config.sections) {
+    for (auto& [key, option] : section.options) {
+      // A macro's text is a template, in which such words may mean something else.
+      const bool is_text = name.starts_with("gcode_macro") || key.ends_with("gcode");
+      for (int found = 0; !is_text && found < kMostReferences; ++found) {
+        const std::size_t begin = option.text.rfind(kReference);
+        const std::size_t end = option.text.find('}', std::min(begin, option.text.size()));
+        if (begin == std::string::npos || end == std::string::npos) {
+          break;
+        }
+        const std::string reference =
+            option.text.substr(begin + kReference.size(), end - begin - kReference.size());
+        const KlipperOption* const meant = referred_to(config, reference);
+        if (meant == nullptr) {
+          config.notes.push_back(
+              {option.place,
+               fmt::format("{} refers to ${{{}}}, which is not there", key, reference)});
+          break;
+        }
+        option.text.replace(begin, end + 1 - begin, std::string(meant->text));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 const KlipperOption* KlipperSection::find(const std::string& option) const {
@@ -213,6 +253,7 @@ Result<KlipperConfig> parse_klipper_config(std::string_view text, const std::str
     return tl::unexpected(parsed.error());
   }
   if (saved == std::string_view::npos) {
+    resolve_references(config);
     return config;
   }
   // Skip the header's two lines, which say who writes there.
@@ -224,6 +265,7 @@ Result<KlipperConfig> parse_klipper_config(std::string_view text, const std::str
   if (Status added = add_saved(rest, line, file, config); !added) {
     return tl::unexpected(added.error());
   }
+  resolve_references(config);
   return config;
 }
 

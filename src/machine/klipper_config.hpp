@@ -40,8 +40,8 @@ struct KlipperConfig {
 // Reads the text of `file`, follows its [include]s, whose patterns are relative to the file they
 // stand in, and adds what SAVE_CONFIG has saved at its end and the rest does not say. Klipper
 // refuses an include that is not there. Here a note tells of it, since people copy printer.cfg
-// alone. Errors, of kind usage, are a line that is no option, an included file that cannot be read,
-// and a file that includes itself.
+// alone. References of Kalico's to other options are followed. Errors, of kind usage, are a line
+// that is no option, an included file that cannot be read, and a file that includes itself.
 [[nodiscard]] Result<KlipperConfig> parse_klipper_config(std::string_view text,
                                                          const std::string& file);
 

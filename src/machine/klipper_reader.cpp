@@ -289,6 +289,9 @@ class Reader {
       reading_.add("printer.firmware_retraction", section != nullptr,
                    section == nullptr ? SourcePlace{file_, 0} : section->place);
     }
+    if (section != nullptr && section->find("retract_length") == nullptr) {
+      reading_.add("printer.retract_length_mm", 0.0, section->place);
+    }
   }
 
   // generic_cartesian names carriages instead of steppers.
@@ -405,8 +408,8 @@ class Reader {
                    ratio.value_or(kDefaultDampingRatio),
                    ratio ? place("input_shaper", damping) : at);
       resonance(axis, type, freq_hz, at);
-      reading_.add("dynamics." + axis + ".damping_ratio", ratio.value_or(kDefaultDampingRatio),
-                   ratio ? place("input_shaper", damping) : at);
+      reading_.add_shaper_damping(axis, ratio.value_or(kDefaultDampingRatio),
+                                  ratio ? place("input_shaper", damping) : at);
     }
   }
 

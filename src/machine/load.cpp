@@ -29,6 +29,8 @@ namespace {
 constexpr std::string_view kModes = ".mode";
 constexpr std::string_view kPlants = ".plant";
 
+std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
+
 std::string origin_text(const std::optional<SourcePlace>& place) {
   if (!place) {
     return std::string(kDefaultOrigin);
@@ -149,6 +151,21 @@ void note_odd_frequencies(Draft& draft) {
                          key, freq_hz, kLeast_hz, kMost_hz)});
         break;
       }
+    }
+  }
+}
+
+// A value of the user's own counts all the same.
+void note_odd_dampings(Draft& draft) {
+  for (const AxisFrequency& frequency : kFrequencies) {
+    const std::string key = std::string(section_of(frequency.key)) + ".damping_ratio";
+    const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
+    const double ratio = (draft.settings.*frequency.dynamics).damping_ratio;
+    if (place && !is_plausible_damping(ratio)) {
+      draft.settings.notes.push_back(
+          {*place, fmt::format("{} is {:.4g}, but printers have {} to {}; measure it with unflex "
+                               "identify or unflex tune",
+                               key, ratio, kLeastDamping, kMostDamping)});
     }
   }
 }
@@ -291,6 +308,7 @@ Result<Settings> finish(Draft draft) {
   judge_variant(draft);
   tell_notes(draft);
   note_odd_frequencies(draft);
+  note_odd_dampings(draft);
   note_assumed_kinematics(draft);
   note_slow_z_motor(draft);
   note_unknown_resonances(draft);
@@ -326,8 +344,6 @@ Result<Settings> parse(std::string_view text, const std::string& name,
 }
 
 namespace {
-
-std::string_view section_of(std::string_view key) { return key.substr(0, key.rfind('.')); }
 
 // A file's name may be any bytes. In a comment it must neither end the comment nor hold what TOML
 // refuses.

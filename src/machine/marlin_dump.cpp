@@ -111,6 +111,8 @@ Result<Reading> read_marlin_dump(std::string_view text, const std::string& file)
   CommandReader reader(Firmware::marlin, file);
   // What the dump does not list was not built in.
   reader.reading.add("printer.firmware_retraction", false, {file, 0});
+  reader.reading.add("printer.input_shaper_freq_x_hz", 0.0, {file, 0});
+  reader.reading.add("printer.input_shaper_freq_y_hz", 0.0, {file, 0});
   Status status;
   for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
     if (status) {

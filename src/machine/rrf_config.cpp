@@ -46,6 +46,11 @@ class RrfConfigReader {
   // What has been read, with what follows from all of it.
   Reading finish();
 
+  // A line that may or may not be carried out has one of these words.
+  void doubt(std::string_view line) {
+    const gcode::Command command = gcode::parse(line);
+    may_set_shaper_ = may_set_shaper_ || command.is('M', 593) || command.is('M', 98);
+  }
   void note(const SourcePlace& place, std::string message, std::vector<std::string> keys) {
     reader_.reading.note(place, std::move(message), std::move(keys));
   }
@@ -60,6 +65,7 @@ class RrfConfigReader {
   RrfTravel travel_;
   RrfHeaters heaters_;
   RrfSteps steps_;
+  bool may_set_shaper_ = false;  // there is an M593, or a file that may have one
 };
 
 Status refuse(const SourcePlace& place, std::string message) {
@@ -80,6 +86,7 @@ Status RrfConfigReader::take(std::string_view line, std::size_t number) {
   const bool is_setting = is_one_of(command.number, {92, 200, 201, 203, 204, 205, 207, 566, 593});
   const bool is_taken = !is_setting || reader_.take(text, command, place);
   heaters_.read(command, place);
+  may_set_shaper_ = may_set_shaper_ || command.number == 593 || command.number == 98;
   switch (command.number) {
     case 82:
     case 83:
@@ -117,6 +124,9 @@ Status RrfConfigReader::take(std::string_view line, std::size_t number) {
 }
 
 Reading RrfConfigReader::finish() {
+  if (!may_set_shaper_) {
+    reader_.reading.add("printer.input_shaper_freq_x_hz", 0.0, {file(), 0});
+  }
   travel_.add_to(reader_.reading);
   heaters_.add_to(reader_.reading);
   reader_.finish();
@@ -200,6 +210,7 @@ class Branches {
     const std::size_t indent = gcode::indentation(line);
     if (indent_ && indent > *indent_) {
       if (meta == gcode::MetaCommand::none) {
+        reader.doubt(line);
         // What is refused outside of branches is a machine of some other kind.
         if (!inside_->take(line, number)) {
           keys_.insert("kinematics.type");

@@ -442,13 +442,15 @@ double Settings::shaper_freq_y_hz() const {
       printer.firmware == Firmware::rrf ? shaper_freq_x_hz() : 0.0);
 }
 
-// Input shaping is part of every Klipper, but an option of Marlin's that is off by default.
+// Any printer may have a shaper. On the Snapmaker J1 the command that switches it off does harm
+// (variants.cpp), so there only one that is told of is taken for there.
 bool Settings::shaper_unknown_x() const {
-  return printer.firmware == Firmware::klipper && !printer.input_shaper_freq_x_hz;
+  return !printer.input_shaper_freq_x_hz && printer.variant != "snapmaker_j1";
 }
 
 bool Settings::shaper_unknown_y() const {
-  return printer.firmware == Firmware::klipper && !printer.input_shaper_freq_y_hz;
+  const bool is_as_x = printer.firmware == Firmware::rrf && printer.input_shaper_freq_x_hz;
+  return !printer.input_shaper_freq_y_hz && !is_as_x && printer.variant != "snapmaker_j1";
 }
 
 }  // namespace unflex::machine

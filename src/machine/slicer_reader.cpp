@@ -28,7 +28,9 @@ struct Flavor {
   Firmware firmware;
 };
 
+// Creality OS is Creality's build of Klipper.
 constexpr std::array kFlavors = {Flavor{"klipper", Firmware::klipper},
+                                 Flavor{"creality os", Firmware::klipper},
                                  Flavor{"marlin", Firmware::marlin},
                                  Flavor{"marlin2", Firmware::marlin},
                                  Flavor{"marlinfirmware", Firmware::marlin},

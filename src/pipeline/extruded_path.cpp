@@ -53,6 +53,10 @@ void ExtrudedPath::compensate(const Piece& piece) {
 }
 
 void ExtrudedPath::keep_moves(const Piece& piece, const gcode::Event& event) {
+  if (event.lost_path_mm > 0.0) {
+    path_.total_mm += event.lost_path_mm;
+    path_.kept_mm["line not understood"] += event.lost_path_mm;
+  }
   for (const gcode::Segment& segment : event.segments) {
     const std::string_view reason =
         piece.is_run ? "run left as sliced" : kept_move_reason(segment, firmware_);

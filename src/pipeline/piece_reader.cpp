@@ -23,7 +23,6 @@ constexpr std::size_t kMaxEventsOutsideRuns = 4096;
 // the machine stopped.
 constexpr std::size_t kMostInARow = 20'000;
 constexpr std::size_t kMostInARun = 400'000;
-constexpr std::size_t kMaxWarnings = 1000;
 constexpr std::size_t kMostSpareEvents = 10'000;
 constexpr std::size_t kUsualEvents = 8;
 // Runs up to this long are handled as a whole, so that they can be kept.
@@ -250,24 +249,14 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
 }
 
 void PieceReader::warn(std::size_t line, std::string message) {
-  if (warnings_.size() < kMaxWarnings) {
-    warnings_.push_back({{lines_.name(), line}, std::move(message)});
-    return;
-  }
-  if (unlisted_warnings_++ == 0) {
-    warnings_.emplace_back().place.file = lines_.name();
-  }
-  warnings_.back().message = fmt::format("{} more warnings are not listed", unlisted_warnings_);
+  warnings_.add(line, std::move(message));
 }
 
-// Warns of the moves that leave the travel, once, at the first one's place among the warnings.
+// Warns of the moves that leave the travel, once, at the first one's place.
 void PieceReader::warn_of_travel() {
   if (std::optional<Diagnostic> warning =
           std::exchange(travel_, TravelCheck({})).warning(lines_.name())) {
-    const auto later = std::ranges::find_if(warnings_, [&](const Diagnostic& other) {
-      return other.place.line > warning->place.line || other.place.line == 0;
-    });
-    warnings_.insert(later, std::move(*warning));
+    warn(warning->place.line, std::move(warning->message));
   }
 }
 

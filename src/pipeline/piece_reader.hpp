@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "extrusion_mode.hpp"
+#include "line_warnings.hpp"
 #include "travel_check.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/emit/run.hpp"
@@ -69,7 +70,7 @@ class PieceReader {
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
   // The one about moves that leave the travel comes once next() has returned false.
-  [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
+  [[nodiscard]] std::vector<Diagnostic> warnings() const { return warnings_.list(lines_.name()); }
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
 
  private:
@@ -112,8 +113,7 @@ class PieceReader {
       between_;                  // lines after the open run's last move, perhaps not in the run
   bool after_cut_ = false;       // only lines without motion since a run was cut off
   std::size_t still_lines_ = 0;  // lines without motion in the open run and after it
-  std::vector<Diagnostic> warnings_;
-  std::size_t unlisted_warnings_ = 0;
+  LineWarnings warnings_;
   gcode::FeatureKind feature_ = gcode::FeatureKind::other;  // that the slicer named last
   bool any_command_ = false;
   ExtrusionModeCheck extrusion_mode_;

@@ -293,6 +293,7 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   options.relative_e = settings.printer.relative_extrusion;
   options.firmware_retraction = settings.printer.firmware_retraction;
   options.retract_length_mm = settings.retract_length_mm();
+  options.retract_length_is_told = settings.printer.retract_length_mm.has_value();
   options.retract_speed_mm_s = settings.retract_speed_mm_s();
   options.unretract_extra_length_mm = settings.printer.unretract_extra_length_mm;
   options.unretract_speed_mm_s = settings.unretract_speed_mm_s();

@@ -400,9 +400,9 @@ std::string to_text(const Report& report) {
   if (!report.shaper_left_off.empty()) {
     fmt::format_to(
         out,
-        "input shaper  off after the print, since the printer's own is not known; type "
-        "SET_INPUT_SHAPER {}\n              with the frequencies of its configuration, or "
-        "give printer.input_shaper_freq_x_hz and _y_hz\n",
+        "input shaper  off after the print, since the printer's own is not known; if it has one "
+        "type {}\n              with the frequencies of its configuration, or "
+        "give printer.input_shaper_freq_x_hz and _y_hz (0 if it has none)\n",
         report.shaper_left_off);
   }
   return text;

@@ -281,8 +281,10 @@ void Verifier::play_run() {
   }
   if (compensated) {
     const gcode::ModalState& modal = output_.section().regime->modal;
-    if (modal.shaper_freq_x_hz != 0.0 || modal.shaper_freq_y_hz != 0.0 || modal.shaper_unknown_x ||
-        modal.shaper_unknown_y) {
+    const gcode::Shaper own = gcode::Interpreter(rules_.interpreter).state().input_shaper();
+    const bool is_touched = (modal.shaper_touched_x || modal.shaper_touched_y) &&
+                            gcode::may_come_on(rules_.fixed.firmware, own);
+    if (modal.input_shaper().is_on() || modal.input_shaper().is_unknown() || is_touched) {
       violations_.in_output(output_.section().line.number,
                             "the printer's input shaper is on in a compensated run");
     }

@@ -157,13 +157,21 @@ TEST(ShaperLines, SwitchOffWhatIsNotKnownAndCannotSwitchItOn) {
   EXPECT_THAT(shaper_lines(Firmware::klipper, {}, unknown),
               ElementsAre("SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0"));
   EXPECT_THAT(shaper_lines(Firmware::klipper, unknown, {}), IsEmpty());
-  EXPECT_EQ(unknown_shaper_words(unknown, {}), "SHAPER_FREQ_X=... SHAPER_FREQ_Y=...");
-  EXPECT_EQ(unknown_shaper_words(unknown, unknown), "");
+  EXPECT_EQ(unknown_shaper_lines(Firmware::klipper, unknown, {}),
+            "SET_INPUT_SHAPER SHAPER_FREQ_X=... SHAPER_FREQ_Y=...");
+  EXPECT_EQ(unknown_shaper_lines(Firmware::marlin, unknown, {}), "M593 X F... and M593 Y F...");
+  EXPECT_EQ(unknown_shaper_lines(Firmware::rrf, unknown, {}), "M593 P\"...\" F...");
+  EXPECT_THAT(shaper_lines(Firmware::marlin, {}, unknown), ElementsAre("M593 X F0", "M593 Y F0"));
+  EXPECT_THAT(shaper_lines(Firmware::marlin, unknown, {}), IsEmpty());
+  EXPECT_THAT(shaper_lines(Firmware::rrf, {}, unknown), ElementsAre("M593 P\"none\""));
+  EXPECT_THAT(shaper_lines(Firmware::rrf, unknown, {}), IsEmpty());
+  EXPECT_EQ(unknown_shaper_lines(Firmware::klipper, unknown, unknown), "");
   unknown.unknown_y = false;
   unknown.freq_y_hz = 40.0;
   EXPECT_THAT(shaper_lines(Firmware::klipper, unknown, {}),
               ElementsAre("SET_INPUT_SHAPER SHAPER_FREQ_Y=40"));
-  EXPECT_EQ(unknown_shaper_words(unknown, {}), "SHAPER_FREQ_X=...");
+  EXPECT_EQ(unknown_shaper_lines(Firmware::klipper, unknown, {}),
+            "SET_INPUT_SHAPER SHAPER_FREQ_X=...");
 }
 
 }  // namespace

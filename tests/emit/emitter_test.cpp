@@ -233,12 +233,13 @@ TEST(Emitter, LeavesTheShaperOffOverPausesAndRetractions) {
                   "G1 E1\n", kShaperOn));
 }
 
-TEST(Emitter, LeavesOutTheAxisThatHasNoShaper) {
+// A macro may set the shaper of either axis, so it is switched off for both.
+TEST(Emitter, GivesBackNoShaperToTheAxisThatHasNone) {
   EmitOptions how = options();
   how.interpreter.shaper_freq_x_hz = 0.0;
   how.interpreter.shaper_freq_y_hz = 37.5;
   const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
-  EXPECT_THAT(emit(input, how).text, HasSubstr("\nSET_INPUT_SHAPER SHAPER_FREQ_Y=0\n"));
+  EXPECT_THAT(emit(input, how).text, HasSubstr("\n" + kShaperOff));
   EXPECT_THAT(emit(input, how).text, HasSubstr("\nSET_INPUT_SHAPER SHAPER_FREQ_Y=37.5\n"));
   how.interpreter.shaper_freq_y_hz = 0.0;
   EXPECT_THAT(emit(input, how).text, Not(HasSubstr("SET_INPUT_SHAPER")));
@@ -246,7 +247,7 @@ TEST(Emitter, LeavesOutTheAxisThatHasNoShaper) {
 
 const std::string kStaysOff =
     ";unflex: the printer's own input shaper is not known and still off; set it again as its "
-    "configuration has it: SET_INPUT_SHAPER ";
+    "configuration has it: ";
 
 TEST(Emitter, SaysWhichShaperItCannotGiveBack) {
   EmitOptions how = options();
@@ -255,14 +256,64 @@ TEST(Emitter, SaysWhichShaperItCannotGiveBack) {
   const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
   const std::string text = emit(input, how).text;
   EXPECT_THAT(text, HasSubstr("\n" + kShaperOff));
-  EXPECT_THAT(
-      text, ::testing::EndsWith("\nG4 P1\n" + kStaysOff + "SHAPER_FREQ_X=... SHAPER_FREQ_Y=...\n"));
+  EXPECT_THAT(text, ::testing::EndsWith("\nG4 P1\n" + kStaysOff +
+                                        "SET_INPUT_SHAPER SHAPER_FREQ_X=... SHAPER_FREQ_Y=...\n"));
   // What the file sets is known.
   const std::string set = emit(kHead + "SET_INPUT_SHAPER SHAPER_FREQ_Y=41\nG1 X10 E1\n", how).text;
   EXPECT_THAT(set, ::testing::EndsWith("\nSET_INPUT_SHAPER SHAPER_FREQ_Y=41\n" + kStaysOff +
-                                       "SHAPER_FREQ_X=...\n"));
+                                       "SET_INPUT_SHAPER SHAPER_FREQ_X=...\n"));
   // Without a run nothing was switched off.
   EXPECT_THAT(emit("G28\n", how).text, Not(HasSubstr("SET_INPUT_SHAPER")));
+}
+
+// What follows a line may have switched the shaper on, as tool changers' macros do.
+TEST(Emitter, SwitchesAnUnknownShaperOffAgainBehindAllThatMayHaveSetIt) {
+  EmitOptions how = options();
+  how.interpreter.shaper_freq_x_hz = how.interpreter.shaper_freq_y_hz = 0.0;
+  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = true;
+  for (const std::string line : {"T1\n", "PARK_HEAD\n", "M600\n"}) {
+    EXPECT_THAT(from_first_run(kHead + "G1 X10 E1\n" + line + kHead +
+                                   "G1 X20 E1\n"
+                                   "G4 P1\nG1 X30 E1\n",
+                               how),
+                ElementsAre(";unflex run\n", kRaise, "~", kEnd, kRestore, "G1 F6000\n", line,
+                            "G90\n", "M83\n", "~", kShaperOff, ";unflex run\n", kRaise, "~", kEnd,
+                            kRestore, "G1 F6000\n", "G4 P1\n", ";unflex run\n", kRaise, "~", kEnd,
+                            kRestore, "G1 F6000\n",
+                            kStaysOff + "SET_INPUT_SHAPER SHAPER_FREQ_X=... SHAPER_FREQ_Y=...\n"));
+  }
+}
+
+EmitOptions options_of(Firmware firmware) {
+  EmitOptions how = options();
+  how.fixed.firmware = firmware;
+  how.interpreter = gcode::default_options(firmware);
+  return how;
+}
+
+std::size_t count_of(const std::string& line, const std::string& text) {
+  const std::vector<std::string> lines = lines_of(text);
+  return static_cast<std::size_t>(std::ranges::count(lines, line));
+}
+
+TEST(Emitter, SwitchesTheShapersOfOtherFirmwaresOffThatNobodyHasNamed) {
+  const std::string runs =
+      "G28\n" + kHead + "G1 X10 E1\nG4 P1\nG1 X20 E1\nT1\n" + kHead + "G1 X30 E1\nG1 X40 E1\n";
+  EmitOptions how = options_of(Firmware::marlin);
+  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = true;
+  const std::string marlin = emit(runs, how).text;
+  EXPECT_EQ(count_of("M593 X F0\n", marlin), 2U) << marlin;
+  EXPECT_EQ(count_of("M593 Y F0\n", marlin), 2U);
+  EXPECT_THAT(marlin, ::testing::EndsWith(kStaysOff + "M593 X F... and M593 Y F...\n"));
+  // A Marlin that was built without input shaping knows no M593.
+  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = false;
+  EXPECT_THAT(emit(runs, how).text, Not(HasSubstr("M593")));
+
+  // On RepRapFirmware a tool's macros may switch it on, whatever config.g says.
+  how = options_of(Firmware::rrf);
+  EXPECT_EQ(count_of("M593 P\"none\"\n", emit(runs, how).text), 2U);
+  how.interpreter.shaper_unknown_x = how.interpreter.shaper_unknown_y = true;
+  EXPECT_THAT(emit(runs, how).text, ::testing::EndsWith(kStaysOff + "M593 P\"...\" F...\n"));
 }
 
 TEST(Emitter, WritesRelativeFilamentAndReturnsToAbsolute) {

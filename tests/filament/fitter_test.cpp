@@ -211,7 +211,7 @@ TEST(FilamentFitter, SaysWhichFilamentItCannotFit) {
   EXPECT_EQ(fitted.text, "M83\nG1 X1 (E3) E1\n");
   ASSERT_EQ(fitted.warnings.size(), 1U);
   EXPECT_EQ(to_string(fitted.warnings[0]),
-            "in.gcode:2: warning: is not understood, so its E stays as sliced");
+            "in.gcode:2: warning: this line's motion is not understood, so its E stays as sliced");
 }
 
 TEST(FilamentFitter, NamesALineThatKlipperWouldRefuse) {

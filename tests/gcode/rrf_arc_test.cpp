@@ -81,6 +81,36 @@ TEST(RrfArc, IsReadInRelativeModeAndInOtherPlanes) {
   EXPECT_GT(middle[Z], 0.0);
 }
 
+// DoArcMove does not read them. Slicers write P1 behind a lift, for Marlin.
+TEST(RrfArc, TakesNoNoticeOfLettersThatTheFirmwareDoesNotRead) {
+  const Session plain(rrf());
+  for (const char* words : {" P1", " S1", " P1 S0.5"}) {
+    Session session(rrf());
+    const std::string arc = "G1 X10 Y0 Z1 F12000\nG3 Z1.4 I1.217 J0 F12000";
+    const Event event = session.read(arc + words);
+    EXPECT_EQ(event.kind, EventKind::move) << words;
+    EXPECT_THAT(event.warnings, ::testing::IsEmpty());
+    Session other(rrf());
+    const Event expected = other.read(arc);
+    ASSERT_EQ(event.segments.size(), expected.segments.size());
+    EXPECT_EQ(event.segments.back().end_mm, expected.segments.back().end_mm);
+  }
+}
+
+TEST(RrfArc, WithAFurtherAxisNamesItAndCountsItsPath) {
+  for (const char* letter : {"A", "B", "C", "D", "U", "V", "W"}) {
+    Session session(rrf());
+    const Event event =
+        session.read(std::string("M83\nG1 X10 Y0 Z0\nG3 X-10 I-10 E1 ") + letter + "5");
+    EXPECT_TRUE(event.position_lost) << letter;
+    ASSERT_THAT(event.warnings, SizeIs(1)) << letter;
+    EXPECT_THAT(event.warnings[0], ::testing::HasSubstr(std::string("G3 with ") + letter));
+    EXPECT_DOUBLE_EQ(event.lost_path_mm, 20.0);
+  }
+  Session session(rrf());
+  EXPECT_THAT(session.read("M83\nG1 X10 Y0 Z0\nG1 X20 U5 E1").warnings, SizeIs(1));
+}
+
 TEST(RrfArc, WithoutACentreOrInInverseTimeIsNotRewritten) {
   for (const char* line : {"G2 X5 Y5", "G2 X5 I0", "G2 X10 R5", "G93\nG2 X5 I1 F2"}) {
     Session session(rrf());

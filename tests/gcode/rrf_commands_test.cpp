@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <regex>
+
 #include "interpreting.hpp"
 
 namespace unflex::gcode {
@@ -66,7 +68,9 @@ TEST_P(RrfLosing, LeavesTheMachineAnywhere) {
   const Event event = session_.read(GetParam());
   EXPECT_EQ(event.kind, EventKind::barrier);
   EXPECT_TRUE(event.position_lost);
-  EXPECT_THAT(event.warnings, IsEmpty());
+  // A line of motion names the words that are to blame.
+  const bool blames_words = std::regex_search(GetParam(), std::regex("^G[0-3] .*[ABCDPSUVW][0-9]"));
+  EXPECT_EQ(event.warnings.size(), blames_words ? 1U : 0U);
   EXPECT_FALSE(session_.move("G1 X2").start_known);
 }
 

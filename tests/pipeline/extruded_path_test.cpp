@@ -106,6 +106,21 @@ TEST(UnknownCommands, AreWarnedOfWhereTheyCostExtrudedPath) {
                   ::testing::HasSubstr("the nozzle would stray further from the path than now")));
 }
 
+// A line of motion that is not understood draws as well.
+TEST(LostMotion, IsPartOfTheExtrudedPath) {
+  const JobFolder folder(
+      "G28\nG90\nM83\nG1 X50 Y50 Z0.3 F6000\nG1 X150 Y50 E1 F3600\nG1 X150 Y80 U3 E1\n"
+      "G1 X50 Y80 E1\nG1 X50 Y50 E1\n");
+  SilentProgress progress;
+  const auto report = compensate(folder.job(), progress);
+  ASSERT_TRUE(report) << to_string(report.error());
+  EXPECT_DOUBLE_EQ(report->extruded_path.total_mm, 260.0);
+  EXPECT_DOUBLE_EQ(report->extruded_path.kept_mm.at("line not understood"), 30.0);
+  EXPECT_THAT(report->warnings,
+              ::testing::Contains(::testing::HasSubstr(
+                  "in.gcode:6: warning: G1 with U, which unflex does not understand here")));
+}
+
 TEST(UnknownCommands, AreCountedByInspectToo) {
   const JobFolder folder(squares(4));
   SilentProgress progress;

@@ -49,7 +49,7 @@ class Emitter {
   // To be called after the last line.
   void finish(std::string& out);
 
-  // What to type behind SET_INPUT_SHAPER after the print, since the printer's own shaper is off and
+  // What to type after the print, since the printer's own shaper is off and
   // not known: "SHAPER_FREQ_X=... SHAPER_FREQ_Y=..."; empty if there is nothing to type.
   [[nodiscard]] std::string shaper_left_off() const;
 
@@ -76,7 +76,8 @@ class Emitter {
   void write_feed(double feed_mm_s, std::string& out);
   void restore_shaper(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out, bool may_be_interrupted = false);
-  void set_shaper(const gcode::Shaper& wanted, std::string& out);
+  void switch_shaper_off(std::string& out);
+  void set_shaper(const gcode::Shaper& wanted, const gcode::Shaper& current, std::string& out);
   void write_checkpoint(std::string_view words, std::string& out);
   void tell_shaper(std::string& out);
   [[nodiscard]] std::string words_of_shaper() const;

@@ -96,13 +96,18 @@ struct Shaper {
   double freq_x_hz = 0.0;  // 0: off
   double freq_y_hz = 0.0;
   ShaperSettings settings;
-  // Klipper: the printer's configuration may have a shaper that nobody has told of. The frequency
-  // is 0 meanwhile.
+  // The printer may have a shaper that nobody has told of. The frequency is 0 meanwhile.
   bool unknown_x = false;
   bool unknown_y = false;
 
   [[nodiscard]] bool is_on() const { return freq_x_hz > 0.0 || freq_y_hz > 0.0; }
+  [[nodiscard]] bool is_unknown() const { return unknown_x || unknown_y; }
 };
+
+// Whether a macro or a tool change can switch a shaper on, where `own` is the printer's own.
+// Without [input_shaper] Klipper has no command for it, and a Marlin that was built without one
+// neither. RepRapFirmware always has M593.
+[[nodiscard]] bool may_come_on(Firmware firmware, const Shaper& own);
 
 enum class EventKind {
   passive,  // neither moves nor stops the machine: comments, modes, fans, M73, G1 with F alone …
@@ -126,6 +131,9 @@ struct Event {
   double dwell_s = 0.0;           // barrier: G4's pause
   // barrier: the machine may be anywhere afterwards, in any mode (homing, macro, tool change).
   bool position_lost = false;
+  // barrier: a line of motion that is not understood. Extruded path that it draws as far as its
+  // words tell, mm.
+  double lost_path_mm = 0.0;
   // The line may set limits that are not known here: with Klipper a macro may do so (M205), or
   // ACCEL_TO_DECEL in some of its versions.
   bool may_set_limits = false;
@@ -155,6 +163,8 @@ struct InterpreterOptions {
   // the machine); otherwise they do nothing. RepRapFirmware always has it.
   bool firmware_retraction = true;
   double retract_length_mm = 0.0;
+  // Klipper: somebody has said how long it is, be it 0. Then G10 neither moves nor stops.
+  bool retract_length_is_told = false;
   double retract_speed_mm_s = 20.0;
   double unretract_extra_length_mm = 0.0;
   double unretract_speed_mm_s = 10.0;
@@ -214,6 +224,9 @@ struct ModalState {
   double shaper_freq_y_hz = 0.0;
   bool shaper_unknown_x = false;  // until the file sets it
   bool shaper_unknown_y = false;
+  // A macro, a tool change or the like may have set the shaper since the text has.
+  bool shaper_touched_x = true;
+  bool shaper_touched_y = true;
   ShaperSettings shaper;
   // SET_PRESSURE_ADVANCE ADVANCE, M900 K, M572 S, where the file sets it.
   std::optional<double> pressure_advance_s;
@@ -291,6 +304,7 @@ class Interpreter {
   void restore_state(Event& event);
 
   // What the firmwares share.
+  void note_lost_motion(Event& event, const std::array<bool, 4>& known);
   void other_m_code(Event& event);
   void set_units(bool inches);
   void update_e_unit();
@@ -333,6 +347,7 @@ class Interpreter {
   void rrf_several_commands(Event& event);
   void rrf_g_code(Event& event);
   void rrf_m_code(Event& event);
+  void rrf_arc_move(Event& event);
   void rrf_linear_move(Event& event);
   void rrf_g10(Event& event);
   void rrf_plane(Event& event);
