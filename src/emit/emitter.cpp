@@ -22,12 +22,7 @@ using gcode::Z;
 
 constexpr int kPositionDecimals = 4;
 constexpr int kExactDecimals = 9;  // where a run ends on a finer place than the grid
-constexpr int kFilamentDecimals = 5;
 constexpr double kFeedToleranceMmS = 1e-6;  // F restored with its decimals may be off by this
-
-// Marlin adds what a relative line extrudes to the reading of E in single precision (gcode.cpp,
-// get_destination_from_command). Below this reading a line loses less than 4 nm.
-constexpr double kMostReadingOfE_mm = 64.0;
 
 bool same(double a, double b) { return std::abs(a - b) < 1e-9; }
 
@@ -64,7 +59,7 @@ AxisGrid axis_grid(const planner::FirmwareConfig& config, gcode::Axis axis, doub
 
 Grid grid_of(const RunStart& start, const planner::FirmwareConfig& config) {
   return {axis_grid(config, X, start.zero_mm[X]), axis_grid(config, Y, start.zero_mm[Y]),
-          axis_grid(config, Z, start.zero_mm[Z]), start.speed_factor};
+          axis_grid(config, Z, start.zero_mm[Z]), start.speed_factor, start.zeroes_e};
 }
 
 bool changes(const gcode::Event& event, const planner::Limits& limits) {
@@ -161,8 +156,12 @@ void Emitter::keep(const std::vector<gcode::Event>& events, std::string& out) {
 
 bool moves_by_itself(const gcode::Event& event) { return event.position_lost; }
 
-RunStart run_start(const gcode::ModalState& state, const planner::Limits& limits) {
-  return {{state.base_mm[X], state.base_mm[Y], state.base_mm[Z]}, state.speed_factor, limits};
+RunStart run_start(Firmware firmware, const gcode::ModalState& state,
+                   const planner::Limits& limits) {
+  return {{state.base_mm[X], state.base_mm[Y], state.base_mm[Z]},
+          state.speed_factor,
+          limits,
+          firmware == Firmware::marlin && state.known[E]};
 }
 
 bool RunPlan::empty() const { return strokes == nullptr || strokes->empty(); }
@@ -181,7 +180,11 @@ RunPlan retimed(const RunPlan& plan, const Run& run, const EmitOptions& options)
           std::make_shared<const std::vector<Stroke>>(std::move(strokes))};
 }
 
-RunStart Emitter::run_start() const { return emit::run_start(printer_.state(), input_limits_); }
+RunStart Emitter::run_start() const {
+  RunStart start = emit::run_start(options_.fixed.firmware, printer_.state(), input_limits_);
+  start.zeroes_e = start.zeroes_e && e_is_known();
+  return start;
+}
 
 void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   const double filament_origin = input_.state().position_mm[E];
@@ -211,7 +214,8 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
   for (const Stroke& stroke : *plan.strokes) {
     write_events(stroke.events);
     set_run_modes(run, std::exchange(joins_file, false), out);
-    keep_reading_of_e_small(out);
+    const bool is_first = &stroke == &plan.strokes->front();
+    keep_reading_of_e_within(is_first ? 0.0 : kMostReadingOfE_mm, out);
     write_stroke(stroke, filament_origin, out);
   }
   // The remaining lines belong to the run too, even if its motion is over.
@@ -309,11 +313,12 @@ void Emitter::set_filament_factor(double flow_factor, bool volumetric, std::stri
   }
 }
 
-// Only if the file's own reading of E is known: then it is put back after the run.
-void Emitter::keep_reading_of_e_small(std::string& out) {
+// Only if the file's own reading of E is known: then it is put back after the run. A part begins
+// with a reading of 0, since Marlin rounds what E reads to whole steps, and which line has a step
+// decides how X and Y turn back (planner.cpp, _populate_block).
+void Emitter::keep_reading_of_e_within(double most_mm, std::string& out) {
   const gcode::ModalState& state = printer_.state();
-  if (options_.fixed.firmware == Firmware::marlin && e_is_known() &&
-      std::abs(state.e_reading()) > kMostReadingOfE_mm) {
+  if (run_start().zeroes_e && std::abs(state.e_reading()) > most_mm) {
     write("G92 E0", out);
   }
 }

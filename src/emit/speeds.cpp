@@ -82,6 +82,33 @@ int feed_decimals(double feed_mm_min, double duration_s) {
   return decimals;
 }
 
+// What E reads while the lines are written, as Marlin has it: the sum of their words in single
+// precision (Emitter::write_stroke, keep_reading_of_e_within).
+class ReadingOfE {
+ public:
+  // The reading at both ends of the line that ends with so much filament laid.
+  gcode::ReadingOfE until(double e_mm) {
+    if (std::abs(mm_) > kMostReadingOfE_mm) {
+      mm_ = 0.0;
+      single_ = 0.0F;
+    }
+    const double word_mm =
+        static_cast<double>(to_scaled(e_mm - written_mm_, kFilamentDecimals)) /
+        power_of_ten(kFilamentDecimals);
+    gcode::ReadingOfE reading{.start = single_};
+    written_mm_ += word_mm;
+    mm_ += word_mm;
+    single_ += static_cast<float>(word_mm);
+    reading.end = single_;
+    return reading;
+  }
+
+ private:
+  double written_mm_ = 0.0;
+  double mm_ = 0.0;
+  float single_ = 0.0F;
+};
+
 // Tells when the firmware, by its own plan, will have done the lines it has been given. wait_s: how
 // long it rests before the first line, which does not count. holds_last: the last line may still
 // change, so the firmware gets it with the next one.
@@ -165,12 +192,13 @@ class FirmwareClock {
 class SpeedSolver {
  public:
   SpeedSolver(const gcode::Position& start_mm, const Passing& passing, const EmitOptions& options,
-              double mm_s_per_feed, std::vector<Stroke>& strokes)
+              const Grid& grid, std::vector<Stroke>& strokes)
       : start_mm_(start_mm),
         passing_(passing),
         options_(&options),
         strokes_(&strokes),
-        mm_s_per_feed_(mm_s_per_feed),
+        mm_s_per_feed_(grid.speed_factor / 60.0),
+        zeroes_e_(grid.zeroes_e),
         distance_mm_(strokes.size()),
         accel_mm_s2_(strokes.size(), options.line_accel_mm_s2),
         step_events_(strokes.size(), 0.0),
@@ -251,6 +279,7 @@ class SpeedSolver {
                         wait_s(), leaves_out_ramps());
     gcode::Segment line;
     line.end_mm = start_mm_;
+    ReadingOfE reading;
     for (std::size_t i = 0; i < speed_mm_s_.size(); ++i) {
       Stroke& stroke = (*strokes_)[i];
       const double share = std::min(kMostCatchUp, kCatchUpAccel * options_->lines.max_accel_mm_s2 *
@@ -267,6 +296,9 @@ class SpeedSolver {
       const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm,
                                   start_mm_[gcode::E] + stroke.e_mm};
       line = {line.end_mm, to, stroke.speed_mm_s, i, true};
+      if (zeroes_e_) {
+        line.reading_of_e = reading.until(stroke.e_mm);
+      }
       if (i == 0 && passing_.in_mm_s) {
         clock.pass(passing_line(line, *passing_.in_mm_s, -1.0));
       }
@@ -410,7 +442,8 @@ class SpeedSolver {
   Passing passing_;
   const EmitOptions* options_;
   std::vector<Stroke>* strokes_;
-  double mm_s_per_feed_;
+  double mm_s_per_feed_;  // the speed that F1 means
+  bool zeroes_e_;
   std::vector<double> distance_mm_;
   std::vector<double> accel_mm_s2_;
   std::vector<double> step_events_;  // Marlin: steps of the axis that has most of them
@@ -421,8 +454,8 @@ class SpeedSolver {
 }  // namespace
 
 void set_speeds(const gcode::Position& start_mm, const Passing& passing, const EmitOptions& options,
-                double mm_s_per_feed, double late_s, std::vector<Stroke>& strokes) {
-  SpeedSolver(start_mm, passing, options, mm_s_per_feed, strokes).solve(late_s);
+                const Grid& grid, double late_s, std::vector<Stroke>& strokes) {
+  SpeedSolver(start_mm, passing, options, grid, strokes).solve(late_s);
 }
 
 }  // namespace unflex::emit

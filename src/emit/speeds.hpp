@@ -18,9 +18,9 @@ struct Passing {
 };
 
 // Sets the speeds of the strokes, and the digits of F they need, so that the firmware takes the
-// time that each of them was given. mm_s_per_feed: the speed that F1 means. late_s: how late the
-// first line begins; the lines make up for it.
+// time that each of them was given. late_s: how late the first line begins; the lines make up for
+// it.
 void set_speeds(const gcode::Position& start_mm, const Passing& passing, const EmitOptions& options,
-                double mm_s_per_feed, double late_s, std::vector<Stroke>& strokes);
+                const Grid& grid, double late_s, std::vector<Stroke>& strokes);
 
 }  // namespace unflex::emit

@@ -447,8 +447,7 @@ void time_strokes(const Run& run, const Grid& grid, const EmitOptions& options,
     skipped = strokes.back();
     strokes.pop_back();
   }
-  set_speeds(start_position(run, grid), passing(run), options, grid.speed_factor / 60.0, run.late_s,
-             strokes);
+  set_speeds(start_position(run, grid), passing(run), options, grid, run.late_s, strokes);
   if (skipped) {
     skipped->speed_mm_s = strokes.back().speed_mm_s;
     skipped->feed_decimals = strokes.back().feed_decimals;

@@ -24,12 +24,20 @@ struct Stroke {
   bool is_skipped = false;  // the firmware leaves its way to the next move
 };
 
+// Decimals of E in a line.
+inline constexpr int kFilamentDecimals = 5;
+// Marlin adds what a relative line extrudes to the reading of E in single precision (gcode.cpp,
+// get_destination_from_command). Below this reading a line loses less than 4 nm. Where E reads more,
+// it is set to 0.
+inline constexpr double kMostReadingOfE_mm = 64.0;
+
 // What a run is written in: places, and speeds as F before M220.
 struct Grid {
   AxisGrid x;
   AxisGrid y;
   AxisGrid z;
   double speed_factor = 1.0;  // M220 when the run begins
+  bool zeroes_e = false;      // RunStart::zeroes_e
 };
 
 // The X and Y where the first line of the run begins.

@@ -335,6 +335,9 @@ void Interpreter::set_position(Event& event) {
       const double scale = axis == E ? state_.filament_per_e_mm() : state_.unit_mm;
       const double reading = bare ? 0.0 : *command_.value(kAxisLetters[axis]);
       state_.base_mm[axis] = state_.position_mm[axis] - reading * scale;
+      if (axis == E) {
+        state_.e_reading_single = static_cast<float>(reading * state_.e_unit);
+      }
       // If the place is unknown, all that follows is relative to it. We count as if the machine
       // were still at its last known position.
       state_.base_known[axis] = state_.base_known[axis] && (axis == E || state_.known[axis]);

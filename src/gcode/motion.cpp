@@ -214,6 +214,28 @@ int whole_circles(const Command& command, const MarlinArcs& rules) {
              : 0;
 }
 
+// What E reads at both ends of the segment, in the firmware's single precision.
+ReadingOfE follow_reading_of_e(const Segment& segment, ModalState& state) {
+  // Sums in single precision drift from ours. What differs by more has been set (G10, G11, tools).
+  constexpr double kDrift_mm = 1e-3;
+  constexpr double kDriftShare = 1e-5;
+  const auto reading = [&](const Position& position) {
+    return (position[E] - state.base_mm[E]) / state.filament_factor();
+  };
+  const double start = reading(segment.start_mm);
+  const double end = reading(segment.end_mm);
+  ReadingOfE result;
+  result.start = state.e_reading_single;
+  result.factor = static_cast<float>(state.filament_factor());
+  if (!(std::abs(start - result.start) < kDrift_mm + kDriftShare * std::abs(start))) {
+    result.start = static_cast<float>(start);
+  }
+  result.end = state.e_is_absolute() ? static_cast<float>(end)
+                                     : result.start + static_cast<float>(end - start);
+  state.e_reading_single = result.end;
+  return result;
+}
+
 // What is told of a move that has too much filament.
 std::string too_much_filament(const Segment& segment, Firmware firmware) {
   return fmt::format(
@@ -405,6 +427,9 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
     // Ramps make the motion last longer than this.
     const double least_s = std::max(segment.length_mm(), std::abs(filament_mm)) / feed_mm_s;
     swinging_s_ = std::max(swinging_s_ - least_s, 0.0);
+  }
+  if (options_.firmware == Firmware::marlin) {
+    segment.reading_of_e = follow_reading_of_e(segment, state_);
   }
   state_.position_mm = segment.end_mm;
   event.kind = EventKind::move;

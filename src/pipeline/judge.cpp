@@ -50,6 +50,12 @@ gcode::Segment continued(const gcode::Segment& last) {
   for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::Z, gcode::E}) {
     line.end_mm[axis] += lengths * last.delta(axis);
   }
+  if (line.reading_of_e) {
+    gcode::ReadingOfE& reading = *line.reading_of_e;
+    const float ended = reading.end;
+    reading.end += static_cast<float>(lengths) * (reading.end - reading.start);
+    reading.start = ended;
+  }
   line.line = kNoLine;
   return line;
 }

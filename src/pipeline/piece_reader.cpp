@@ -286,7 +286,7 @@ void PieceReader::append(gcode::Event&& event) {
   }
   if (open_.is_run && open_.events.empty()) {
     // The event is a move, so it has changed nothing of this state.
-    open_.start = emit::run_start(interpreter_.state(), planner_->limits());
+    open_.start = emit::run_start(firmware_, interpreter_.state(), planner_->limits());
     open_.cut_off = after_cut_;
   }
   after_cut_ = after_cut_ && stands_anywhere(event);
@@ -323,7 +323,7 @@ void PieceReader::mark_border(const gcode::Event& event) {
     since_border_s_ = 0.0;
     ++borders_since_look_;
     borders_.push_back({open_.events.size(), open_.moves.size() + planner_->pending(),
-                        emit::run_start(interpreter_.state(), planner_->limits())});
+                        emit::run_start(firmware_, interpreter_.state(), planner_->limits())});
   }
   for (const gcode::Segment& segment : event.segments) {
     since_border_s_ += segment.length_xy_mm() / segment.feed_mm_s;

@@ -33,11 +33,16 @@ struct Travel {
   Vector head_mm{};
 };
 
-Travel travel(const Settings& settings, const Steps& delta) {
+Travel travel(const Settings& settings, const Steps& delta, float e_factor) {
   Travel result;
   for (std::size_t axis = 0; axis < delta.size(); ++axis) {
     result.steps[axis] = magnitude(delta[axis]);
     result.head_mm[axis] = static_cast<float>(delta[axis]) * settings.mm_per_step[axis];
+  }
+  if (e_factor != 1.0F) {
+    const float steps = static_cast<float>(delta[E]) * e_factor;
+    result.steps[E] = to_unsigned(std::abs(steps) + 0.5F);
+    result.head_mm[E] = steps * settings.mm_per_step[E];
   }
   result.distance_mm = result.head_mm;
   for (std::size_t motor = 0; settings.shares_motors && motor < settings.motors.size(); ++motor) {
@@ -167,7 +172,7 @@ Settings make_settings(const Limits& limits, const FirmwareConfig& config) {
 
 bool populate_block(const Settings& settings, const Request& request, std::size_t moves_queued,
                     Previous& previous, Block& block) {
-  const Travel motion = travel(settings, request.delta);
+  const Travel motion = travel(settings, request.delta, request.e_factor);
   block.step_events = *std::ranges::max_element(motion.steps);
   if (block.step_events < settings.min_steps_per_segment) return false;
   block.length_mm = length_mm(settings, motion);

@@ -19,6 +19,7 @@ struct Request {
   Steps delta{};
   float feed_mm_s = 0.0F;
   float curve_radius_mm = 0.0F;
+  float e_factor = 1.0F;  // steps of E per step of its reading
 };
 
 // Fills in all of the block but its move. False, and `previous` untouched, if the block is too

@@ -21,13 +21,22 @@ using enum gcode::Axis;
 // The next segment begins elsewhere if it begins further away than this: homing, an offset, a jump.
 constexpr double kSamePlace_mm = 1e-6;
 
-// X, Y and Z fit the firmware's floats, and its products in floats decide ties. E is counted from
-// the beginning of the file and does not fit.
-std::int64_t to_steps(std::size_t axis, double mm, double steps_per_mm) {
+std::int64_t whole(double steps) {
   constexpr double kMost = 0x1p53;
-  const double steps =
-      axis == E ? mm * steps_per_mm : static_cast<float>(mm) * static_cast<float>(steps_per_mm);
   return marlin::saturated<std::int64_t>(std::clamp(std::round(steps), -kMost, kMost));
+}
+
+// The firmware's products in floats decide ties.
+double product(double mm, double steps_per_mm) {
+  return static_cast<float>(mm) * static_cast<float>(steps_per_mm);
+}
+
+std::optional<float> start_of(const std::optional<gcode::ReadingOfE>& reading) {
+  return reading ? std::optional(reading->start) : std::nullopt;
+}
+
+std::optional<float> end_of(const std::optional<gcode::ReadingOfE>& reading) {
+  return reading ? std::optional(reading->end) : std::nullopt;
 }
 
 }  // namespace
@@ -46,6 +55,7 @@ bool MarlinPlanner::add(const gcode::Segment& segment) {
   }
   follow_jumps(segment);
   asked_mm_ = segment.end_mm;
+  asked_reading_of_e_ = end_of(segment.reading_of_e);
   if (!segment.start_known) {
     start_assumed_ = segment.start_assumed && (start_known_ || start_assumed_);
     start_known_ = false;
@@ -57,9 +67,11 @@ bool MarlinPlanner::add(const gcode::Segment& segment) {
     drop_first();
     run_first();
   }
-  const marlin::Steps target = rounded(segment.end_mm);
-  marlin::Request request{
-      {}, static_cast<float>(segment.feed_mm_s), static_cast<float>(segment.curve_radius_mm)};
+  const marlin::Steps target = rounded(segment.end_mm, end_of(segment.reading_of_e));
+  marlin::Request request{{},
+                          static_cast<float>(segment.feed_mm_s),
+                          static_cast<float>(segment.curve_radius_mm),
+                          segment.reading_of_e ? segment.reading_of_e->factor : 1.0F};
   for (std::size_t axis = 0; axis < target.size(); ++axis) {
     request.delta[axis] = target[axis] - position_[axis];
   }
@@ -100,23 +112,28 @@ std::size_t MarlinPlanner::pending() const {
   return final_.size() + (end_ - first_) - (running_ ? 1 : 0);
 }
 
-marlin::Steps MarlinPlanner::rounded(const gcode::Position& position_mm) const {
+// Without a reading E is counted from the beginning of the file, and does not fit a float.
+marlin::Steps MarlinPlanner::rounded(const gcode::Position& position_mm,
+                                     std::optional<float> reading_of_e) const {
   marlin::Steps result{};
-  for (std::size_t axis = 0; axis < result.size(); ++axis) {
-    result[axis] = to_steps(axis, position_mm[axis], config_.steps_per_mm[axis]);
+  for (const auto axis : {X, Y, Z}) {
+    result[axis] = whole(product(position_mm[axis], config_.steps_per_mm[axis]));
   }
+  result[E] = whole(reading_of_e ? product(*reading_of_e, config_.steps_per_mm[E])
+                                 : position_mm[E] * config_.steps_per_mm[E]);
   return result;
 }
 
 // An axis that does not begin where the segment before ended has been set to another place
-// (set_machine_position_mm).
+// (set_machine_position_mm). So has E where it reads something else (set_e_position_mm).
 void MarlinPlanner::follow_jumps(const gcode::Segment& segment) {
-  const marlin::Steps start = rounded(segment.start_mm);
+  const std::optional<float> reading = start_of(segment.reading_of_e);
+  const marlin::Steps start = rounded(segment.start_mm, reading);
   for (std::size_t axis = 0; axis < start.size(); ++axis) {
-    if (!has_position_ || std::abs(segment.start_mm[axis] - asked_mm_[axis]) > kSamePlace_mm) {
-      position_[axis] = start[axis];
-      if (axis == E) filament_mm_ = segment.start_mm[E];
-    }
+    const bool jumps =
+        !has_position_ || std::abs(segment.start_mm[axis] - asked_mm_[axis]) > kSamePlace_mm;
+    if (jumps || (axis == E && reading != asked_reading_of_e_)) position_[axis] = start[axis];
+    if (jumps && axis == E) filament_mm_ = segment.start_mm[E];
   }
   has_position_ = true;
 }
@@ -139,6 +156,7 @@ void MarlinPlanner::set_move(const gcode::Segment& segment, const marlin::Steps&
     }
     delta[axis] = static_cast<double>(target[axis] - position_[axis]) / steps_per_mm;
   }
+  if (segment.reading_of_e) delta[E] *= segment.reading_of_e->factor;
   const double xyz_mm = std::sqrt(delta[X] * delta[X] + delta[Y] * delta[Y] + delta[Z] * delta[Z]);
   move.kinematic = xyz_mm > 0.0;
   move.length_mm = move.kinematic ? xyz_mm : std::abs(delta[E]);

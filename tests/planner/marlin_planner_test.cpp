@@ -356,6 +356,50 @@ TEST(MarlinPlanner, MovesOfHoursAreNotStretched) {
   }
 }
 
+// X and Y turn back exactly. A step of E in one of the two lines keeps the firmware's vector in X,
+// Y, Z and E from turning back, so that it does not slow down. Which lines have one depends on what
+// E reads: here 0.2 steps a line, from two zeros.
+TEST(MarlinPlanner, ReadingOfEDecidesWhetherLinesThatTurnBackStop) {
+  Limits limits = marlin_limits();
+  limits.print_accel_mm_s2 = limits.travel_accel_mm_s2 = 1e6;
+  limits.axis_max_accel_mm_s2 = {1e6, 1e6, 1e6, 1e6};
+  limits.junction_deviation_mm = 0.3;
+  const auto entry_mm_s = [&](double steps_at_start) {
+    std::vector<gcode::Segment> lines =
+        polyline({{0.2, 0, 0, 0.2 / 93.0}, {0, 0, 0, 0.4 / 93.0}, {0, 1, 0, 0.4 / 93.0}}, 40.0);
+    for (gcode::Segment& line : lines) {
+      const auto reading = [&](const gcode::Position& position) {
+        return static_cast<float>(position[E] + steps_at_start / 93.0);
+      };
+      line.reading_of_e = gcode::ReadingOfE{reading(line.start_mm), reading(line.end_mm)};
+    }
+    return marlin_plan(lines, limits)[1].start_v_mm_s;
+  };
+  EXPECT_LT(entry_mm_s(0.0), 2.0);          // no step
+  EXPECT_NEAR(entry_mm_s(0.2), 40.0, 0.1);  // one in the second line
+  EXPECT_NEAR(entry_mm_s(0.4), 40.0, 0.1);  // one in the first
+}
+
+// G92 E0 drops what was left of a step.
+TEST(MarlinPlanner, WhereEIsSetItIsRoundedAnew) {
+  std::vector<gcode::Segment> lines =
+      polyline({{1, 0, 0, 0.4 / 93.0}, {2, 0, 0, 0.8 / 93.0}, {3, 0, 0, 1.2 / 93.0}}, 40.0);
+  for (gcode::Segment& line : lines) {
+    line.reading_of_e = gcode::ReadingOfE{0.0F, static_cast<float>(0.4 / 93.0)};
+  }
+  for (const PlannedMove& move : marlin_plan(lines)) EXPECT_EQ(move.direction[E], 0.0);
+  lines[1].reading_of_e =
+      gcode::ReadingOfE{static_cast<float>(0.4 / 93.0), static_cast<float>(0.8 / 93.0)};
+  EXPECT_GT(marlin_plan(lines)[1].direction[E], 0.0);
+}
+
+// M221 S50 halves the steps of the reading, not the reading.
+TEST(MarlinPlanner, FlowFactorActsOnWholeSteps) {
+  std::vector<gcode::Segment> lines = polyline({{1, 0, 0, 1.5 / 93.0}}, 40.0);
+  lines[0].reading_of_e = gcode::ReadingOfE{0.0F, static_cast<float>(3.0 / 93.0), 0.5F};
+  EXPECT_NEAR(marlin_plan(lines)[0].direction[E], 1.5 / 93.0, 1e-9);
+}
+
 TEST(MarlinPlanner, LimitsBeyondTheFirmwaresIntegersAreTheirLargest) {
   Limits limits = marlin_limits();
   limits.axis_max_accel_mm_s2 = {1e12, 1e12, 1e12, 1e12};

@@ -67,7 +67,7 @@ class Emitter {
   void set_run_modes(const Run& run, bool joins_file, std::string& out);
   [[nodiscard]] bool e_is_known() const;
   void set_filament_factor(double flow_factor, bool volumetric, std::string& out);
-  void keep_reading_of_e_small(std::string& out);
+  void keep_reading_of_e_within(double most_mm, std::string& out);
   void set_unit(double unit_mm, std::string& out);
   [[nodiscard]] bool move_may_wait() const;
   void wait_for_move(std::string& out);

@@ -20,11 +20,14 @@ struct RunStart {
   std::array<double, 3> zero_mm{};  // machine position of X0 Y0 Z0 (G92)
   double speed_factor = 1.0;        // M220
   planner::Limits limits;           // as the input has them
+  // Marlin: what E reads is known, so it is set to 0 before the first line.
+  bool zeroes_e = false;
 
   friend bool operator==(const RunStart&, const RunStart&) = default;
 };
 
-[[nodiscard]] RunStart run_start(const gcode::ModalState& state, const planner::Limits& limits);
+[[nodiscard]] RunStart run_start(Firmware firmware, const gcode::ModalState& state,
+                                 const planner::Limits& limits);
 
 // Accelerations of a run whose plan asks for more than the printer's own limits; 0: EmitOptions has
 // them.

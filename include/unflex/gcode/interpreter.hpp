@@ -22,6 +22,14 @@ enum Axis : std::size_t { X = 0, Y = 1, Z = 2, E = 3 };
 // X, Y, Z and filament, mm.
 using Position = std::array<double, 4>;
 
+// What E reads where a motion begins and ends, as Marlin keeps it (current_position.e): relative
+// words are added up in single precision.
+struct ReadingOfE {
+  float start = 0.0F;
+  float end = 0.0F;
+  float factor = 1.0F;  // filament per reading: M221, M200
+};
+
 // One straight piece of motion in machine coordinates. A G1 gives one, an arc several.
 struct Segment {
   Position start_mm{};
@@ -41,6 +49,9 @@ struct Segment {
   double curve_radius_mm = 0.0;
   // More filament than this length of path can take. Klipper ends the print here.
   bool too_much_filament = false;
+  // Marlin, where the text says what E reads. Its planner rounds the reading to whole steps, so
+  // that the zero of E (G92) decides in which line a step comes.
+  std::optional<ReadingOfE> reading_of_e = std::nullopt;
 
   [[nodiscard]] double delta(Axis axis) const { return end_mm[axis] - start_mm[axis]; }
   [[nodiscard]] bool moves_xy() const { return delta(X) != 0.0 || delta(Y) != 0.0; }
@@ -216,6 +227,7 @@ struct ModalState {
   bool volumetric = false;             // M200: E is in mm³
   double filament_diameter_mm = 1.75;  // M200 D
   double e_unit = 1.0;                 // unit of E words: unit_mm, or its cube if Marlin reads mm³
+  float e_reading_single = 0.0F;       // Marlin: the reading of E as the firmware has it
   int plane = 17;                      // G17, G18, G19
   bool retracted = false;              // firmware retraction
   double hop_mm = 0.0;                 // how far G10 has lifted Z

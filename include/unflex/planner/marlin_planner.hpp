@@ -7,9 +7,11 @@
 // Rounding. Targets are rounded to whole steps, and the rounding is carried: the start_mm and
 // end_mm of a planned move are where the motors are, not what the file says. A move of fewer than
 // min_steps_per_segment steps on every axis is not queued; its motion is added to the next queued
-// move. E is rounded in this way for the planning. But the E of a planned move is the file's, so
-// that filament can be accounted for. The firmware rounds E anew at each G92 E0, which moves the
-// filament by less than one step (and drops what was too short to be queued).
+// move. E is rounded in this way for the planning, by what it reads (Segment::reading_of_e), since
+// G92 E0 decides which line has a step of E, and whether X and Y may turn back without a stop. But
+// the E of a planned move is the file's, so that filament can be accounted for. The firmware rounds
+// E anew at each G92 E0, which moves the filament by less than one step (and drops what was too
+// short to be queued).
 //
 // Lookahead. The file is taken to be read faster than it is printed. The buffer of N blocks then
 // holds N − 1, including the running one. When a block begins to run, the N − 3 blocks after it are
@@ -37,6 +39,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "unflex/core/kinematics.hpp"
@@ -115,7 +118,8 @@ class MarlinPlanner final : public Planner {
 
  private:
   [[nodiscard]] marlin::Block& block(std::size_t index) { return ring_[index % ring_.size()]; }
-  [[nodiscard]] marlin::Steps rounded(const gcode::Position& position_mm) const;
+  [[nodiscard]] marlin::Steps rounded(const gcode::Position& position_mm,
+                                      std::optional<float> reading_of_e) const;
   void follow_jumps(const gcode::Segment& segment);
   void set_move(const gcode::Segment& segment, const marlin::Steps& target, PlannedMove& move);
   void run_first();
@@ -130,6 +134,7 @@ class MarlinPlanner final : public Planner {
   marlin::Steps position_{};    // steps after the last queued block
   double filament_mm_ = 0.0;    // E of the file after the last queued block
   gcode::Position asked_mm_{};  // end of the last segment given, queued or not
+  std::optional<float> asked_reading_of_e_;
   bool has_position_ = false;   // a segment has been given
   bool start_known_ = true;     // all starts since the last queued block are known
   bool start_assumed_ = false;  // the unknown ones among these starts are all assumed
