@@ -9,7 +9,7 @@ _unflex_options() {
       echo "-h --help -o --output --in-place --log --strict $print --faster --timing --max-deviation --engine -j --jobs" ;;
     batch) echo "-h --help -o --output $print --summary --faster --timing --max-deviation --engine -j --jobs" ;;
     verify) echo "-h --help --against --strict $print --faster --max-deviation" ;;
-    inspect) echo "-h --help --strict $print" ;;
+    inspect) echo "-h --help --all --strict $print" ;;
     filament) echo '-h --help -o --output --in-place --strict --printer --set --filament-start-mm -q --quiet' ;;
     study) echo "-h --help --case --machines --faster --at-all-times --accel --scale-m204 --keep-rms $print --engine -j --jobs" ;;
     identify)

@@ -128,6 +128,7 @@ complete -c unflex -n '__unflex_in "printer macros"' -s o -l output -x -a '(__un
 
 complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer line-test' 'printer macros'" -l printer -x -a $printer -d 'The printer'
 complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer init' 'printer line-test' 'printer macros'" -l set -x -a '(__unflex_settings)' -d 'Override a key of the printer file, KEY=VALUE'
+complete -c unflex -n '__unflex_in inspect' -l all -d 'List the settings at their default, too'
 complete -c unflex -n '__unflex_in inspect' -l report -x -a '(__unflex_files .json)' -d 'Write a report, - for stdout'
 complete -c unflex -n '__unflex_in compensate verify study identify hotend' -l report -x -a '(__unflex_files .json .html)' -d 'Write a report, - for JSON to stdout'
 complete -c unflex -n "__unflex_in $prints batch identify tune hotend 'printer init' 'printer line-test' 'printer macros'" -s q -l quiet -d 'No summary and no progress bar'

@@ -62,6 +62,11 @@ void take_faster(RunConfig& config) {
         fmt::format("timing.method={}", is_optimal ? machine::kOptimal : machine::kScaled));
   }
   if (!config.faster_um.empty()) {
+    if (parse_number(config.faster_um) == 0.0) {
+      throw CLI::ValidationError("--faster",
+                                 "a tolerance above 0 µm is needed; without --faster the timing "
+                                 "stays as sliced");
+    }
     // Without a value a flag is "true".
     config.overrides.push_back("timing.tolerance_um=" +
                                (config.faster_um == "true" ? "20" : config.faster_um));
@@ -186,6 +191,7 @@ void add_inspect(CLI::App& program, RunConfig& config) {
   command->add_option("IN", config.input, "G-code, - for stdin")->type_name("")->required();
   add_common_options(*command, config, "Write a report, FILE.json, or to stdout with -");
   add_strict(*command, config);
+  command->add_flag("--all", config.all_settings, "List the settings at their default, too");
   command->callback([&config] { config.command = Command::inspect; });
 }
 
@@ -350,6 +356,26 @@ std::string parser_message(const CLI::App& program, const CLI::Error& error) {
                      chosen.words);
 }
 
+// What the library would take for a value that is missing, or for the input's name.
+Status check_values(const std::vector<std::string>& arguments) {
+  for (auto word = arguments.begin(); word != arguments.end(); ++word) {
+    if (word->starts_with("--") && word->ends_with('=') && word->find('=') + 1 == word->size()) {
+      return fail(ErrorKind::usage, fmt::format("{0} has no value; write it right behind, as in "
+                                                "{0}VALUE",
+                                                one_line(*word)));
+    }
+    const bool is_last = word + 1 == arguments.end();
+    std::error_code ignored;
+    if (*word == "--faster" && !is_last && parse_number(word[1]) &&
+        !std::filesystem::exists(word[1], ignored)) {
+      return fail(ErrorKind::usage,
+                  fmt::format("--faster takes its tolerance behind an equals sign: --faster={}",
+                              one_line(word[1])));
+    }
+  }
+  return {};
+}
+
 // The library would call an unknown command an unexpected argument, or a missing command.
 Status check_command(const CLI::App& program, const std::vector<std::string>& arguments) {
   const CLI::App* above = &program;
@@ -401,6 +427,9 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
       "--max-deviation or a rule broken, 4 internal. More: docs/cli.md");
   if (Status known = check_command(program, arguments); !known) {
     return tl::unexpected(known.error());
+  }
+  if (Status values = check_values(arguments); !values) {
+    return tl::unexpected(values.error());
   }
   try {
     program.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));

@@ -79,13 +79,22 @@ void write_limits(Sink out, const Inspection& i, const machine::Settings& s) {
                  s.dynamics_y.description());
 }
 
-// Every key, its value in force when the print starts, and where the value is from.
-void write_settings(Sink out, const machine::Settings& settings) {
+// Each key that is not at its default, or every key, with its value in force when the print starts,
+// and where the value is from.
+void write_settings(Sink out, const machine::Settings& settings, bool all) {
   fmt::format_to(out, "settings\n");
+  std::size_t folded = 0;
   for (const machine::SettingRow& row : machine::rows(settings)) {
+    if (!all && row.origin == machine::kDefaultOrigin) {
+      ++folded;
+      continue;
+    }
     fmt::format_to(out, "  {:<{}} {:<{}} {}\n", row.key, kKeyColumns,
                    row.value.empty() ? "-" : report::setting_text(row.value), kValueColumns,
                    row.origin);
+  }
+  if (folded > 0) {
+    fmt::format_to(out, "  {} more are at their default; --all lists them\n", folded);
   }
 }
 
@@ -113,7 +122,7 @@ Json limits_json(const Inspection& i) {
 }  // namespace
 
 std::string inspection_text(const Inspection& inspection, const std::string& input,
-                            const machine::Settings& settings) {
+                            const machine::Settings& settings, bool all_settings) {
   std::string text = input + "\n";
   const Sink out = std::back_inserter(text);
   write_counts(out, inspection);
@@ -121,7 +130,7 @@ std::string inspection_text(const Inspection& inspection, const std::string& inp
   text += report::unknown_text(inspection.unknown_commands);
   text += report::step_rates_text(inspection.step_rates, /*has_output=*/false);
   write_limits(out, inspection, settings);
-  write_settings(out, settings);
+  write_settings(out, settings, all_settings);
   write_limits_in_print(out, inspection, input);
   return text;
 }

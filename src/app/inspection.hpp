@@ -10,9 +10,10 @@
 
 namespace unflex::app {
 
+// all_settings: those at their default, too.
 [[nodiscard]] std::string inspection_text(const pipeline::Inspection& inspection,
                                           const std::string& input,
-                                          const machine::Settings& settings);
+                                          const machine::Settings& settings, bool all_settings);
 
 // The keys are those of docs/report.md.
 [[nodiscard]] std::string inspection_json(const pipeline::Inspection& inspection,

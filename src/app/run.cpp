@@ -62,7 +62,8 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
   }
   console.warnings(inspection->warnings);
   const std::string json = inspection_json(*inspection, config.input, space->settings);
-  const std::string text = inspection_text(*inspection, config.input, space->settings);
+  const std::string text =
+      inspection_text(*inspection, config.input, space->settings, config.all_settings);
   return write_report(space->report, json)
       .and_then([&] { return print_summary(config, text, console); })
       .map([] { return ExitCode::done; });

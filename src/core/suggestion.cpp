@@ -32,12 +32,22 @@ std::string_view last_part(std::string_view name) {
 
 std::string_view section_of(std::string_view name) { return name.substr(0, name.rfind('.')); }
 
-// How unlike a key is to what was typed. The same name in another section and a name without its
-// unit count as one slip.
+// Whether both names begin alike, as "frequency" and "freq_hz" do.
+bool begin_alike(std::string_view one, std::string_view other) {
+  constexpr std::size_t kLetters = 4;
+  return one.size() >= kLetters && other.size() >= kLetters &&
+         one.substr(0, kLetters) == other.substr(0, kLetters);
+}
+
+// How unlike a key is to what was typed. The same name in another section, a name without its unit
+// and one that begins alike in the same section count as one slip.
 std::size_t unlikeness(std::string_view typed, std::string_view key) {
   const std::size_t distance = edit_distance(typed, key);
+  const bool is_in_section = typed.find('.') != std::string_view::npos &&
+                             section_of(key) == section_of(typed) &&
+                             begin_alike(last_part(typed), last_part(key));
   if (last_part(typed) == last_part(key) || key.starts_with(fmt::format("{}_", typed)) ||
-      (section_of(key) == section_of(typed) && typed.starts_with(key))) {
+      is_in_section || (section_of(key) == section_of(typed) && typed.starts_with(key))) {
     return std::min<std::size_t>(distance, 1);
   }
   return distance;

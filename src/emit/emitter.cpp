@@ -21,7 +21,7 @@ using gcode::Y;
 using gcode::Z;
 
 constexpr int kPositionDecimals = 4;
-constexpr int kExactDecimals = 9;  // where a run ends on a finer place than the grid
+constexpr int kExactDecimals = 9;           // where a run ends on a finer place than the grid
 constexpr double kFeedToleranceMmS = 1e-6;  // F restored with its decimals may be off by this
 
 bool same(double a, double b) { return std::abs(a - b) < 1e-9; }

@@ -92,9 +92,8 @@ class ReadingOfE {
       mm_ = 0.0;
       single_ = 0.0F;
     }
-    const double word_mm =
-        static_cast<double>(to_scaled(e_mm - written_mm_, kFilamentDecimals)) /
-        power_of_ten(kFilamentDecimals);
+    const double word_mm = static_cast<double>(to_scaled(e_mm - written_mm_, kFilamentDecimals)) /
+                           power_of_ten(kFilamentDecimals);
     gcode::ReadingOfE reading{.start = single_};
     written_mm_ += word_mm;
     mm_ += word_mm;
@@ -168,7 +167,7 @@ class FirmwareClock {
 
   void take() {
     moves_.clear();
-    firmware_->take(moves_);
+    firmware_->take_played(moves_);
     for (const planner::PlannedMove& move : moves_) {
       if (move.segment.line != kNoStroke) {
         double& duration_s = durations_s_[move.segment.line];

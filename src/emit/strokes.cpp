@@ -155,29 +155,33 @@ bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const Line
          rules.max_speed_step_mm_s;
 }
 
-// Whether t is near a sharp corner.
+// Whether t is near a sharp corner, or near the end of the run, beyond which the path does not go on.
 bool is_at_corner(const Run& run, const Timetable& table, std::size_t move, double t) {
   constexpr double kReach_s = 8e-3;
   const std::vector<planner::PlannedMove>& moves = *run.moves;
   const auto turns_behind = [&](std::size_t i) {
-    return i + 1 < moves.size() &&
-           planner::turns_sharply(moves[i].direction, moves[i + 1].direction);
+    return i + 1 < moves.size() ? planner::turns_sharply(moves[i].direction, moves[i + 1].direction)
+                                : !run.until_s;
   };
   return (t < table.start_s(move) + kReach_s && move > 0 && turns_behind(move - 1)) ||
          (t > table.start_s(move + 1) - kReach_s && turns_behind(move));
 }
 
 // Across a drawn path errors count most; along it they only shift time, though at a sharp corner
-// they lead off the path. Where nothing is drawn, errors matter only by what they leave behind for
-// later.
+// they lead off the path, and so does each error behind its end. Where nothing is drawn, errors
+// matter only by what they leave behind for later.
 ErrorWeight error_weight(const Run& run, const Timetable& table, double t) {
   constexpr double kAlong = 0.001;
   constexpr double kAlongAtCorner = 0.03;
   constexpr double kTravel = 0.02;
+  constexpr double kBehindEnd = 0.3;
   const std::size_t move = table.move_at(t);
   const gcode::Segment& segment = (*run.moves)[move].segment;
-  if (!segment.extruding() || t > table.start_s(table.moves())) {
+  if (!segment.extruding()) {
     return {kTravel, 0.0, kTravel};
+  }
+  if (t > table.start_s(table.moves())) {
+    return {kBehindEnd, 0.0, kBehindEnd};
   }
   const double length = segment.length_xy_mm();
   const double nx = -segment.delta(Y) / length;

@@ -31,6 +31,8 @@ enum class Effect {
 [[nodiscard]] Effect klipper_m_code_effect(int number);
 [[nodiscard]] Effect marlin_m_code_effect(int number);
 [[nodiscard]] Effect rrf_m_code_effect(int number);
+// Whether RepRapFirmware carries the line out only when no move waits in front of its queue.
+[[nodiscard]] bool rrf_waits_for_buffer(const Command& command);
 // What an M-code does that all three firmwares answer with "Unknown command".
 [[nodiscard]] Effect foreign_m_code_effect(int number);
 

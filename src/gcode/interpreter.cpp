@@ -120,6 +120,7 @@ void Event::reset() {
   position_lost = false;
   lost_path_mm = 0.0;
   may_set_limits = false;
+  waits_for_buffer = false;
   warnings.clear();
   added = false;
 }
@@ -145,6 +146,7 @@ void Interpreter::interpret(Event& event) {
       break;
     case Firmware::rrf:
       rrf(event, content);
+      event.waits_for_buffer = rrf_waits_for_buffer(command_);
       break;
   }
   if (event.position_lost && is_motion(command_)) {

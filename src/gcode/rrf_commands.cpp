@@ -41,4 +41,18 @@ Effect rrf_m_code_effect(int number) {
   return own == Effect::unknown ? foreign_m_code_effect(number) : own;
 }
 
+// Moves, retractions and the codes that wait for their turn among the moves: HandleGcode,
+// HandleMcode, and ShouldQueueMCode in GCodeQueue.cpp.
+bool rrf_waits_for_buffer(const Command& command) {
+  constexpr std::array kMoves = {0, 1, 2, 3, 10, 11};
+  constexpr std::array kQueued = {3,   4,   5,   42,  104, 106, 107, 117,
+                                  140, 141, 144, 150, 280, 300, 568};
+  if (command.kind != CommandKind::traditional) {
+    return false;
+  }
+  return command.letter == 'G'
+             ? std::ranges::binary_search(kMoves, command.number)
+             : command.letter == 'M' && std::ranges::binary_search(kQueued, command.number);
+}
+
 }  // namespace unflex::gcode

@@ -8,6 +8,7 @@
 #include "key_table.hpp"
 #include "key_values.hpp"
 #include "suggestion.hpp"
+#include "unflex/core/number.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -272,6 +273,11 @@ std::string assign(const std::string& name, const Value& value, const SourcePlac
   const Key& key = key_table()[*index];
   draft.places[*index] = place;
   return std::visit([&](auto member) { return store(value, key, member(draft)); }, key.member);
+}
+
+double as_written(double value) {
+  constexpr int kDigits = 9;
+  return parse_number(fmt::format("{:.{}g}", value, kDigits)).value_or(value);
 }
 
 void Reading::add_shaper_damping(const std::string& axis, double ratio, const SourcePlace& place) {

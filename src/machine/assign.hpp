@@ -13,6 +13,10 @@ namespace unflex::machine {
 
 struct NamedValue;
 
+// A value that was converted from another unit, without the noise of that: firmwares keep seven
+// digits.
+[[nodiscard]] double as_written(double value);
+
 // What a source may hold for a key. monostate stands for a value that no key takes.
 struct Value {
   Value(double number);

@@ -94,7 +94,7 @@ bool CommandReader::take(const std::string& text, const gcode::Command& command,
       interpreter_.options().firmware == Firmware::rrf && command.number == 205;
   for (const LimitValue& limit : limit_values(*event.limits)) {
     reading.add(is_print_jerk ? "limits.print_jerk_" + limit.key.substr(kJerk.size()) : limit.key,
-                limit.value, place);
+                as_written(limit.value), place);
     remember(limit, place);
     if (command.number == 566 && limit.key.starts_with(kJerk)) {
       reading.forget("limits.print_jerk_" + limit.key.substr(kJerk.size()));
@@ -150,9 +150,9 @@ void CommandReader::not_taken(const std::string& text, const gcode::Command& com
 void CommandReader::remember(const LimitValue& limit, const SourcePlace& place) {
   for (std::size_t axis = 0; axis < velocity_.size(); ++axis) {
     if (limit.key == fmt::format("limits.max_{}_velocity_mm_s", kAxes[axis])) {
-      velocity_[axis] = {limit.value, place};
+      velocity_[axis] = {as_written(limit.value), place};
     } else if (limit.key == fmt::format("limits.max_{}_accel_mm_s2", kAxes[axis])) {
-      accel_[axis] = {limit.value, place};
+      accel_[axis] = {as_written(limit.value), place};
     }
   }
 }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "assign.hpp"
 #include "unflex/machine/keys.hpp"
 
 namespace unflex::machine {
@@ -80,7 +81,7 @@ std::optional<std::string> value_in_force(const Key& key, Draft& draft) {
   std::optional<std::string> own = own_value(key, draft);
   if (!own && key.in_force != nullptr) {
     const double value = key.in_force(draft.settings);
-    return std::isfinite(value) ? std::optional(to_toml_value(value)) : std::nullopt;
+    return std::isfinite(value) ? std::optional(to_toml_value(as_written(value))) : std::nullopt;
   }
   return own;
 }

@@ -191,6 +191,12 @@ class Reader {
   }
 
   Status kinematics() {
+    if (config_->find("printer") == nullptr && config_->missing.empty()) {
+      return fail(
+          ErrorKind::usage, {file_, 0},
+          "has no [printer], so it is a part of Klipper's configuration that says nothing of "
+          "the machine; give printer.cfg, which includes it");
+    }
     for (const std::string_view required : {"kinematics", "max_velocity", "max_accel"}) {
       if (option("printer", required) == nullptr) {
         return fail(ErrorKind::usage, {file_, 0},
@@ -335,7 +341,7 @@ class Reader {
     }
     const double value = *steps * *per_step * *ratio / *rotation_mm;
     if (value > 0.0 && std::isfinite(value)) {
-      reading_.add(std::string(key), value, distance->place);
+      reading_.add(std::string(key), as_written(value), distance->place);
     }
   }
 

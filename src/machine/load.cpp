@@ -94,6 +94,11 @@ Status read_printer(std::string_view text, const std::string& name, Draft& draft
       return fail(ErrorKind::usage, {name, 0},
                   "is a print, not a printer file; what its slicer says of the printer is read "
                   "from the print that is compensated");
+    case SourceKind::record:
+      return fail(
+          ErrorKind::usage, {name, 0},
+          "is a record of an accelerometer, not a printer file; unflex identify finds the "
+          "resonances in it, and unflex printer init --record puts them into a printer file");
     case SourceKind::toml:
       break;
   }
@@ -206,11 +211,17 @@ void note_slow_z_motor(Draft& draft) {
 }
 
 bool is_known(const Note& note, const Draft& draft) {
-  const auto given_by_others = [&](const std::string& key) {
+  const SourcePlace& noted = note.diagnostic.place;
+  const auto has_other_place = [&](std::string_view key) {
     const std::optional<SourcePlace>& place = draft.places[*find_key(key)];
-    const SourcePlace& noted = note.diagnostic.place;
     // A value before the note in the same file is the one that the note calls outdated.
     return place && (place->file != noted.file || place->line > noted.line);
+  };
+  const auto given_by_others = [&](const std::string& key) {
+    // Modes tell of frequency and damping, too.
+    const std::string modes = fmt::format("{}{}", section_of(key), kModes);
+    return has_other_place(key) ||
+           (key.starts_with("dynamics.") && find_key(modes) && has_other_place(modes));
   };
   return !note.keys.empty() && std::ranges::all_of(note.keys, given_by_others);
 }

@@ -312,12 +312,18 @@ std::string AxisDynamics::description() const {
   return text;
 }
 
+// Where lines are long, the last one has to stop the nozzle, too. Measured on Marlin at 200 lines
+// per second: 36 µm behind the end of a wall with 2 ms, 14 µm with one line more, and no less with
+// two.
 double Settings::tail_s() const {
-  constexpr double kShortest = 2e-3;
+  constexpr double kLeast_s = 2e-3;
+  const double shortest_s = printer.firmware == Firmware::klipper
+                                ? kLeast_s
+                                : std::max(kLeast_s, 1.0 / max_lines_per_s());
   if (solve.tail_ms) {
     return *solve.tail_ms * 1e-3;
   }
-  return std::max({kShortest, settling_time_s(dynamics_x), settling_time_s(dynamics_y)});
+  return std::max({shortest_s, settling_time_s(dynamics_x), settling_time_s(dynamics_y)});
 }
 
 double Settings::freq_error() const {

@@ -106,9 +106,21 @@ void look_at(std::string_view line, Traces& traces) {
   look_at_command(content, traces);
 }
 
+// A table of an accelerometer, as Klipper, its tools and RepRapFirmware write it: a head of
+// columns, numbers with commas below it.
+bool is_record(std::string_view text) {
+  const std::string head = lower(text.substr(0, text.find('\n')));
+  const auto has = [&](std::string_view word) { return head.find(word) != std::string::npos; };
+  return head.find(',') != std::string::npos &&
+         ((has("freq") && has("psd")) || has("accel_x") || (has("sample") && has("x")));
+}
+
 }  // namespace
 
 SourceKind source_kind(std::string_view text) {
+  if (is_record(text)) {
+    return SourceKind::record;
+  }
   Traces traces;
   for_each_line(text, 1, [&](std::string_view line, std::size_t) { look_at(line, traces); });
   if (traces.headers > 0 && traces.klipper > 1) {

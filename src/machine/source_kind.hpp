@@ -12,6 +12,7 @@ enum class SourceKind {
   rrf_config,   // config.g
   m115_answer,  // what M115 answers, and nothing else
   print,        // sliced G-code
+  record,       // of an accelerometer: samples, or a spectrum
 };
 
 [[nodiscard]] SourceKind source_kind(std::string_view text);

@@ -166,7 +166,7 @@ class Inspector {
   // through lifts without a stop.
   void plan(const gcode::Event& event) {
     if (event.kind != gcode::EventKind::move) {
-      planner_->apply(*event.limits);
+      planner_->apply(event);
     }
     for (const gcode::Segment& segment : event.segments) {
       planner_->add(segment);
@@ -175,7 +175,7 @@ class Inspector {
       planner_->stop();
     }
     planned_.clear();
-    planner_->take(planned_);
+    planner_->take_played(planned_);
     for (const planner::PlannedMove& move : planned_) {
       add_move(move);
     }

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -35,6 +36,13 @@ verify::RunDeviation deviation_of(const Piece& run,
   reference.insert(reference.end(), run.after.begin(), run.after.end());
   return verify::measure(reference, base, nozzle, model,
                          lead_in_s - planner::duration_s(run.before), !run.ends_run());
+}
+
+verify::RunDeviation deviation_as_sliced(const Piece& run, const dynamics::NozzleXY& nozzle,
+                                         const verify::Rules& rules) {
+  std::vector<planner::PlannedMove> played;
+  std::ranges::transform(run.moves, std::back_inserter(played), planner::as_played);
+  return deviation_of(run, played, played, nozzle, rules, 0.0);
 }
 
 namespace {
@@ -103,7 +111,7 @@ Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter prin
     const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
     const gcode::Event event = printer.interpret({std::string(text.substr(0, end)), ++number});
     text.remove_prefix(end);
-    planner->apply(*event.limits);
+    planner->apply(event);
     if (event.kind == gcode::EventKind::barrier) {
       planner->stop();
     }
@@ -117,7 +125,7 @@ Replayed replay(const Piece& run, std::string_view text, gcode::Interpreter prin
   }
   planner->stop();
   Replayed replayed;
-  planner->take(replayed.moves);
+  planner->take_played(replayed.moves);
   const auto is_around = [](const planner::PlannedMove& move) {
     return move.segment.line == kNoLine;
   };

@@ -16,13 +16,18 @@
 namespace unflex::pipeline {
 
 // How the nozzle strays from the run, in the timing of `reference`, while the base makes the moves
-// `base`. With the run's own moves as both, this is the deviation without compensation. It is
-// sampled as finely as the nozzle's ringing needs, more coarsely than in a verification.
+// `base`. It is sampled as finely as the nozzle's ringing needs, more coarsely than in a
+// verification.
 [[nodiscard]] verify::RunDeviation deviation_of(const Piece& run,
                                                 const std::vector<planner::PlannedMove>& reference,
                                                 const std::vector<planner::PlannedMove>& base,
                                                 const dynamics::NozzleXY& nozzle,
                                                 const verify::Rules& rules, double lead_in_s);
+
+// How the nozzle strays from the run if its sliced moves are carried out.
+[[nodiscard]] verify::RunDeviation deviation_as_sliced(const Piece& run,
+                                                       const dynamics::NozzleXY& nozzle,
+                                                       const verify::Rules& rules);
 
 // What is around the text, if it is a part of a run or the printer passes into it from kept lines.
 struct InMotion {

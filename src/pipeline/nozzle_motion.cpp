@@ -97,7 +97,7 @@ double NozzleFollower::follow(const Piece& piece) {
       stops_s += change(printer_, piece.pressure_advance_s);
     }
     for (std::size_t k = 0; k < piece.move_counts[i]; ++k, ++next) {
-      const planner::PlannedMove& move = piece.moves[next];
+      const planner::PlannedMove move = planner::as_played(piece.moves[next]);
       if (!move.segment.start_known && !move.segment.start_assumed) {
         // The start is not known. All that is known is that the machine starts at rest.
         set(at_rest(move.segment.start_mm, model_), move.segment.start_mm);

@@ -23,6 +23,7 @@ constexpr std::size_t kMaxEventsOutsideRuns = 4096;
 // the machine stopped.
 constexpr std::size_t kMostInARow = 20'000;
 constexpr std::size_t kMostInARun = 400'000;
+constexpr std::size_t kMaxWarnings = 1000;
 constexpr std::size_t kMostSpareEvents = 10'000;
 constexpr std::size_t kUsualEvents = 8;
 // Runs up to this long are handled as a whole, so that they can be kept.
@@ -204,7 +205,7 @@ void PieceReader::read_line(gcode::Event& event) {
     warn(event.line.number, std::move(warning));
   }
   if (event.kind != gcode::EventKind::move) {
-    planner_->apply(*event.limits);
+    planner_->apply(event);
   }
 }
 
@@ -249,14 +250,24 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
 }
 
 void PieceReader::warn(std::size_t line, std::string message) {
-  warnings_.add(line, std::move(message));
+  if (warnings_.size() < kMaxWarnings) {
+    warnings_.push_back({{lines_.name(), line}, std::move(message)});
+    return;
+  }
+  if (unlisted_warnings_++ == 0) {
+    warnings_.emplace_back().place.file = lines_.name();
+  }
+  warnings_.back().message = fmt::format("{} more warnings are not listed", unlisted_warnings_);
 }
 
-// Warns of the moves that leave the travel, once, at the first one's place.
+// Warns of the moves that leave the travel, once, at the first one's place among the warnings.
 void PieceReader::warn_of_travel() {
   if (std::optional<Diagnostic> warning =
           std::exchange(travel_, TravelCheck({})).warning(lines_.name())) {
-    warn(warning->place.line, std::move(warning->message));
+    const auto later = std::ranges::find_if(warnings_, [&](const Diagnostic& other) {
+      return other.place.line > warning->place.line || other.place.line == 0;
+    });
+    warnings_.insert(later, std::move(*warning));
   }
 }
 

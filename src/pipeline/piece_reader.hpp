@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "extrusion_mode.hpp"
-#include "line_warnings.hpp"
 #include "travel_check.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/emit/run.hpp"
@@ -70,7 +69,7 @@ class PieceReader {
 
   [[nodiscard]] std::size_t bytes_read() const { return lines_.bytes_read(); }
   // The one about moves that leave the travel comes once next() has returned false.
-  [[nodiscard]] std::vector<Diagnostic> warnings() const { return warnings_.list(lines_.name()); }
+  [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return warnings_; }
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
 
  private:
@@ -113,7 +112,8 @@ class PieceReader {
       between_;                  // lines after the open run's last move, perhaps not in the run
   bool after_cut_ = false;       // only lines without motion since a run was cut off
   std::size_t still_lines_ = 0;  // lines without motion in the open run and after it
-  LineWarnings warnings_;
+  std::vector<Diagnostic> warnings_;
+  std::size_t unlisted_warnings_ = 0;
   gcode::FeatureKind feature_ = gcode::FeatureKind::other;  // that the slicer named last
   bool any_command_ = false;
   ExtrusionModeCheck extrusion_mode_;

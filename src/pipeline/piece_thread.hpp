@@ -43,7 +43,7 @@ class PieceThread {
   // To be called at the end. Throws what the thread could not handle, such as std::bad_alloc:
   // without memory it could not make an Error of it.
   [[nodiscard]] const std::optional<Error>& error() const;
-  [[nodiscard]] std::vector<Diagnostic> warnings() const { return reader_.warnings(); }
+  [[nodiscard]] const std::vector<Diagnostic>& warnings() const { return reader_.warnings(); }
 
  private:
   void read(const std::function<void()>& wake);

@@ -63,7 +63,7 @@ class CourseMaker {
       awaited_.push_back({event.line.number, std::nullopt});
     }
     if (event.kind != gcode::EventKind::move) {
-      planner_->apply(*event.limits);
+      planner_->apply(event);
     }
     for (const gcode::Segment& segment : event.segments) {
       planner_->add(segment);
@@ -152,7 +152,7 @@ class CourseMaker {
 
   void play() {
     moves_.clear();
-    planner_->take(moves_);
+    planner_->take_played(moves_);
     for (const planner::PlannedMove& move : moves_) {
       take_effect(move.segment.line);
       play(move);

@@ -312,6 +312,14 @@ std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules, double 
   return run;
 }
 
+std::unique_ptr<RunJob> with_reserve(const RunJob& job, const RunRules& rules, double accel_share) {
+  std::unique_ptr<RunJob> run = untimed(job, job.setup);
+  run->setup.x.limits.max_accel_mm_s2 *= accel_share;
+  run->setup.y.limits.max_accel_mm_s2 *= accel_share;
+  solve_all(*run, rules);
+  return run;
+}
+
 std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules) {
   std::unique_ptr<RunJob> run = untimed(job, job.sliced_setup.value_or(job.setup));
   solve_all(*run, rules);
@@ -332,8 +340,7 @@ void make_lines(RunJob& job, const RunRules& rules) noexcept {
       }
       job.plan = emit::plan_run(job.run(1.0, 1.0, even_lines_before_s(rules.emit.lines)),
                                 job.piece.start, rules.emit);
-      job.before =
-          deviation_of(job.piece, job.piece.moves, job.piece.moves, job.nozzle, rules.verify, 0.0);
+      job.before = deviation_as_sliced(job.piece, job.nozzle, rules.verify);
     }
   } catch (const std::exception& exception) {
     job.failure = exception.what();

@@ -144,6 +144,11 @@ void lay_out(RunJob& job);
 [[nodiscard]] std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules,
                                              double accel_share);
 
+// The run of `job` once more, in its timing as sliced, with this share of the acceleration that its
+// motors may have.
+[[nodiscard]] std::unique_ptr<RunJob> with_reserve(const RunJob& job, const RunRules& rules,
+                                                   double accel_share);
+
 // The run of `job` once more, compensated in its timing as sliced, with its lines.
 [[nodiscard]] std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules);
 

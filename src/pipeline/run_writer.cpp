@@ -21,6 +21,8 @@ constexpr double kLowest[] = {0.7, 0.5};
 // Shares of the motors' acceleration for another timing, behind an optimal and behind a scaled one.
 constexpr std::array kScaledAfterOptimal = {1.0, 0.9, 0.8};
 constexpr std::array kScaledAgain = {0.9, 0.8, 0.7};
+// Shares of the motors' acceleration for a base that leaves a reserve to whole steps.
+constexpr std::array kReserves = {0.85, 0.7, 0.55};
 // The lines of this last stretch of a part decide how the printer arrives at the next part.
 constexpr double kLastLines_s = 0.05;
 constexpr double kApart_mm = 1e-3;
@@ -214,7 +216,7 @@ std::optional<std::string> RunWriter::write_in_time(const RunJob& job, std::stri
     return objection;
   }
   if (!job.retimed) {
-    return objection;
+    return write_with_reserve(job, std::move(*objection), text);
   }
   // Its lines may break a limit: what is rounded swings about what was optimised, and a free timing
   // takes all that the motors give.
@@ -231,6 +233,22 @@ std::optional<std::string> RunWriter::write_in_time(const RunJob& job, std::stri
   return write_run(*as_sliced(job, *rules_), text);
 }
 
+// Writes the run with bases that ask less of the motors, since whole steps ask for more than the
+// base does. Returns why its original lines must stand, if so.
+std::optional<std::string> RunWriter::write_with_reserve(const RunJob& job, std::string objection,
+                                                         std::string& text) {
+  const bool counts_steps = rules_->emit.lines.burst_lines > 0;
+  if (!counts_steps || !job.failure.empty()) {
+    return objection;
+  }
+  for (const double share : kReserves) {
+    if (!write_run(*with_reserve(job, *rules_, share), text)) {
+      return std::nullopt;
+    }
+  }
+  return objection;
+}
+
 // Writes the run as compensated text, or returns why its original lines must stand.
 std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& text) {
   if (!job.failure.empty()) {
@@ -239,8 +257,7 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
   // The sliced moves would start with the true nozzle. If an earlier run was kept, that nozzle is
   // not the expected one, and the deviation has to be measured again.
   before_ = verify::apart_mm(run_nozzle_, job.nozzle, rules_->verify.nozzle) > kApart_mm
-                ? deviation_of(job.piece, job.piece.moves, job.piece.moves, run_nozzle_,
-                               rules_->verify, 0.0)
+                ? deviation_as_sliced(job.piece, run_nozzle_, rules_->verify)
                 : job.before;
   const bool counts_steps = rules_->emit.lines.burst_lines > 0;
   std::optional<std::string> objection = "planned for another start";

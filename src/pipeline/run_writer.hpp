@@ -47,6 +47,8 @@ class RunWriter {
   [[nodiscard]] std::optional<gcode::Segment> kept_before(const Piece& piece) const;
   [[nodiscard]] bool fits(const RunJob& job) const;
   std::optional<std::string> write_in_time(const RunJob& job, std::string& text);
+  std::optional<std::string> write_with_reserve(const RunJob& job, std::string objection,
+                                                std::string& text);
   std::optional<std::string> write_run(const RunJob& job, std::string& text);
   std::optional<std::string> insist(const RunJob& job, std::string& text);
   std::optional<std::string> try_run(const RunJob& job, const emit::RunPlan& plan,

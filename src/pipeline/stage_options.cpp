@@ -54,11 +54,14 @@ timing::MoveBounds free_bounds(const planner::PlannedMove& move, const machine::
                                const planner::FirmwareConfig& config) {
   const gcode::Segment& segment = move.segment;
   timing::MoveBounds bounds = timing::bounds_by_axes(move, limits, config);
-  bounds.nozzle_speed_mm_s = speed_by_flow(move, settings);
+  // What the nozzle may run ahead of its limit (timing::kKeptFeed) is left free in travel.
+  constexpr double kOfTravel = 0.985;
   const double feed_mm_s = segment.extruding()
                                ? segment.feed_mm_s
                                : settings.timing.max_speed_mm_s.value_or(segment.feed_mm_s);
-  bounds.speed_mm_s = std::min({bounds.speed_mm_s, feed_mm_s, bounds.nozzle_speed_mm_s});
+  const double by_flow_mm_s = speed_by_flow(move, settings);
+  bounds.nozzle_speed_mm_s = segment.extruding() ? by_flow_mm_s : kOfTravel * feed_mm_s;
+  bounds.speed_mm_s = std::min({bounds.speed_mm_s, feed_mm_s, by_flow_mm_s});
   if (settings.timing.keep_accel_limits && move.accel_mm_s2 > 0.0) {
     bounds.accel_mm_s2 = std::min(bounds.accel_mm_s2, move.accel_mm_s2);
   }

@@ -34,7 +34,7 @@ class PathCollector {
       }
       return;
     }
-    planner_->apply(*event.limits);
+    planner_->apply(event);
     if (event.kind == gcode::EventKind::barrier) {
       path.dwell_s += event.dwell_s;
       stop();

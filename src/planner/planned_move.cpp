@@ -3,7 +3,7 @@
 // Notation:
 //   v_s, v_c, v_e   speeds at the start, in the cruise and at the end      a   acceleration
 //   T_a, T_c, T_d   durations of these three phases                        L   length
-//   T_l             duration of the lead, at v_s
+//   T_l             duration of the lead, at v_s            v_l     where the ramp up begins
 // The decelerating phase is measured from the end of the move, so that both ends are exact.
 #include <algorithm>
 #include <cmath>
@@ -26,9 +26,9 @@ double ramp_distance(double v, double a, double t) { return t * (v + 0.5 * a * t
 
 std::array<Phase, 4> PlannedMove::phases() const {
   return {{{lead_s, start_v_mm_s, 0.0},
-           {accel_s, start_v_mm_s, accel_mm_s2},
+           {accel_s, ramp_v_mm_s(), ramp_up_mm_s2()},
            {cruise_s, cruise_v_mm_s, 0.0},
-           {decel_s, cruise_v_mm_s, -accel_mm_s2}}};
+           {decel_s, cruise_v_mm_s, -ramp_down_mm_s2()}}};
 }
 
 double PlannedMove::distance_mm(double t) const {
@@ -39,12 +39,12 @@ double PlannedMove::distance_mm(double t) const {
   if (t < lead_s) {
     d = start_v_mm_s * t;
   } else if (t < lead_s + accel_s) {
-    d = start_v_mm_s * lead_s + ramp_distance(start_v_mm_s, accel_mm_s2, t - lead_s);
+    d = start_v_mm_s * lead_s + ramp_distance(ramp_v_mm_s(), ramp_up_mm_s2(), t - lead_s);
   } else if (t < lead_s + accel_s + cruise_s) {
-    d = start_v_mm_s * lead_s + 0.5 * (start_v_mm_s + cruise_v_mm_s) * accel_s +
+    d = start_v_mm_s * lead_s + 0.5 * (ramp_v_mm_s() + cruise_v_mm_s) * accel_s +
         cruise_v_mm_s * (t - lead_s - accel_s);
   } else {
-    d = length_mm - ramp_distance(end_v_mm_s, accel_mm_s2, duration - t);
+    d = length_mm - ramp_distance(end_v_mm_s, ramp_down_mm_s2(), duration - t);
   }
   return std::clamp(d, 0.0, length_mm);
 }
@@ -55,10 +55,10 @@ double PlannedMove::velocity_mm_s(double t) const {
   if (t >= duration) return end_v_mm_s;
   if (t < lead_s) return start_v_mm_s;
   if (t < lead_s + accel_s) {
-    return std::min(start_v_mm_s + accel_mm_s2 * (t - lead_s), cruise_v_mm_s);
+    return std::min(ramp_v_mm_s() + ramp_up_mm_s2() * (t - lead_s), cruise_v_mm_s);
   }
   if (t < lead_s + accel_s + cruise_s) return cruise_v_mm_s;
-  return std::min(end_v_mm_s + accel_mm_s2 * (duration - t), cruise_v_mm_s);
+  return std::min(end_v_mm_s + ramp_down_mm_s2() * (duration - t), cruise_v_mm_s);
 }
 
 gcode::Position PlannedMove::position_mm(double t) const {
@@ -92,14 +92,14 @@ double PlannedMove::time_s(double distance_mm) const {
   if (distance_mm >= length_mm) return duration;
   const double lead_d = start_v_mm_s * lead_s;
   if (distance_mm < lead_d) return distance_mm / start_v_mm_s;
-  const double accel_d = 0.5 * (start_v_mm_s + cruise_v_mm_s) * accel_s;
+  const double accel_d = 0.5 * (ramp_v_mm_s() + cruise_v_mm_s) * accel_s;
   if (distance_mm < lead_d + accel_d) {
     return lead_s +
-           std::min(time_to_cover(distance_mm - lead_d, start_v_mm_s, accel_mm_s2), accel_s);
+           std::min(time_to_cover(distance_mm - lead_d, ramp_v_mm_s(), ramp_up_mm_s2()), accel_s);
   }
   const double remaining = length_mm - distance_mm;
   if (remaining < 0.5 * (end_v_mm_s + cruise_v_mm_s) * decel_s) {
-    return duration - std::min(time_to_cover(remaining, end_v_mm_s, accel_mm_s2), decel_s);
+    return duration - std::min(time_to_cover(remaining, end_v_mm_s, ramp_down_mm_s2()), decel_s);
   }
   return lead_s + accel_s + std::min((distance_mm - lead_d - accel_d) / cruise_v_mm_s, cruise_s);
 }

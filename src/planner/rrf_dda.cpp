@@ -38,6 +38,18 @@ float reach(const Vector& direction, const Vector& box) {
   return factor;
 }
 
+// The firmware holds positions of X, Y and Z as floats, and filament as the amount that a move
+// takes.
+Vector travel(const gcode::Segment& segment) {
+  Vector delta{};
+  for (const auto axis : {X, Y, Z}) {
+    delta[axis] =
+        static_cast<float>(segment.end_mm[axis]) - static_cast<float>(segment.start_mm[axis]);
+  }
+  delta[E] = static_cast<float>(segment.delta(E));
+  return delta;
+}
+
 // Length in X, Y and Z; of filament where nothing else moves.
 float travel_mm(const Vector& delta) {
   const float xyz = std::sqrt(squared(delta[X]) + squared(delta[Y]) + squared(delta[Z]));
@@ -138,18 +150,11 @@ Settings make_settings(const Limits& asked, const FirmwareConfig& config) {
   return result;
 }
 
-bool start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda) {
-  // The firmware holds positions of X, Y and Z as floats, and filament as the amount that a move
-  // takes.
-  Vector delta{};
-  for (const auto axis : {X, Y, Z}) {
-    delta[axis] =
-        static_cast<float>(segment.end_mm[axis]) - static_cast<float>(segment.start_mm[axis]);
-  }
-  delta[E] = static_cast<float>(segment.delta(E));
-  dda.length_mm = travel_mm(delta);
-  if (!(dda.length_mm > 0.0F)) return false;
+bool moves(const gcode::Segment& segment) { return travel_mm(travel(segment)) > 0.0F; }
 
+void start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda) {
+  const Vector delta = travel(segment);
+  dda.length_mm = travel_mm(delta);
   const float scale = 1.0F / dda.length_mm;
   for (std::size_t axis = 0; axis < delta.size(); ++axis) dda.direction[axis] = delta[axis] * scale;
   dda.moves_xy = delta[X] != 0.0F || delta[Y] != 0.0F;
@@ -167,7 +172,6 @@ bool start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda
   limit_by_motors(settings, dda);
   dda.start_speed = 0.0F;
   dda.end_speed = 0.0F;
-  return true;
 }
 
 void set_trapezoid(Dda& dda) {

@@ -7,9 +7,12 @@ namespace unflex::planner::rrf {
 
 [[nodiscard]] Settings make_settings(const Limits& limits, const FirmwareConfig& config);
 
-// Direction, length, accelerations and requested speed of a segment, from standstill to standstill
-// (InitStandardMove, up to its lookahead). False if nothing moves.
-[[nodiscard]] bool start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda);
+// Whether the firmware makes a move of the segment (InitStandardMove, 2).
+[[nodiscard]] bool moves(const gcode::Segment& segment);
+
+// Direction, length, accelerations and requested speed of a segment that moves, from standstill to
+// standstill (InitStandardMove, up to its lookahead).
+void start_dda(const Settings& settings, const gcode::Segment& segment, Dda& dda);
 
 // The trapezoid between start_speed and end_speed, and the duration (RecalculateMove).
 void set_trapezoid(Dda& dda);

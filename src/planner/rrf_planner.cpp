@@ -68,13 +68,32 @@ RrfPlanner::RrfPlanner(const Limits& limits, const FirmwareConfig& config)
       clock_hz_(std::llround(config.step_clock_hz)) {}
 
 bool RrfPlanner::add(const gcode::Segment& segment) {
+  // A line without a number is a move of its own.
+  const bool same_line =
+      !buffer_.empty() && segment.line != 0 && buffer_.back().line == segment.line;
+  if (!same_line) empty_buffer();
+  if (!rrf::moves(segment)) return false;
+  buffer_.push_back(segment);
+  while (!buffer_.empty() && can_add()) admit();
+  return true;
+}
+
+void RrfPlanner::empty_buffer() {
+  while (!buffer_.empty()) {
+    wait_for_space();
+    admit();
+  }
+}
+
+void RrfPlanner::admit() {
   if (limits_ != settings_limits_) {
     settings_ = rrf::make_settings(limits_, config_);
     settings_limits_ = limits_;
   }
+  const gcode::Segment segment = std::move(buffer_.front());
+  buffer_.pop_front();
   rrf::Dda dda;
-  if (!rrf::start_dda(settings_, segment, dda)) return false;
-  wait_for_space();
+  rrf::start_dda(settings_, segment, dda);
 
   PlannedMove& move = dda.move;
   move.segment = segment;
@@ -87,11 +106,13 @@ bool RrfPlanner::add(const gcode::Segment& segment) {
   }
   provisional_.push_back(std::move(dda));
   rrf::join_last(settings_, provisional_, frozen_extrudes_);
+  // A full ring begins to move (DDARing::Spin, waitingForSpace).
+  moving_ = moving_ || !can_add();
   while (moving_ && can_freeze()) freeze();
-  return true;
 }
 
 void RrfPlanner::stop() {
+  empty_buffer();
   while (!provisional_.empty()) freeze();
   finish_.clear();
   now_ = 0;
@@ -106,7 +127,9 @@ std::size_t RrfPlanner::take(std::vector<PlannedMove>& out) {
   return count;
 }
 
-std::size_t RrfPlanner::pending() const { return final_.size() + provisional_.size(); }
+std::size_t RrfPlanner::pending() const {
+  return final_.size() + provisional_.size() + buffer_.size();
+}
 
 // Lets time pass until the ring has room.
 void RrfPlanner::wait_for_space() {

@@ -43,7 +43,7 @@ std::vector<planner::PlannedMove> bounded_plan(std::span<const planner::PlannedM
     move.cruise_v_mm_s = std::sqrt(cruise2);
     move.end_v_mm_s = std::sqrt(v2[i + 1]);
     move.accel_mm_s2 = a;
-    move.lead_s = 0.0;
+    move.lead_s = move.leap_mm_s = 0.0;
     move.accel_s = (move.cruise_v_mm_s - move.start_v_mm_s) / a;
     move.decel_s = (move.cruise_v_mm_s - move.end_v_mm_s) / a;
     const double ramps_mm = 0.5 * (move.accel_s * (move.start_v_mm_s + move.cruise_v_mm_s) +

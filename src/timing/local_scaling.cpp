@@ -31,7 +31,7 @@ constexpr int kLeastRounds = 3;
 constexpr int kRounds = 10;
 constexpr int kRepairs = 20;
 constexpr double kMoreError = 0.002;
-constexpr double kMoreSpeed = 0.004;
+constexpr double kMoreSpeed = 0.00002;
 constexpr double kAlpha = 0.45;
 constexpr double kBeta = 0.2;
 constexpr double kCooling = 0.87;  // of both, from round to round
@@ -48,7 +48,7 @@ constexpr double kLeastSpeed_mm_s = 1.0;
 // The share of the tolerance that is aimed at.
 constexpr double kAim = 0.97;
 // The nozzle's speed relative to F, likewise.
-constexpr double kAimOfFeed = 1.015;
+constexpr double kAimOfFeed = 1.014;
 // A larger swing in the end counts as this.
 constexpr double kMostLeft = 4.0;
 // How far in time an error depends on a limit, and how long the pieces at both ends of a move are,

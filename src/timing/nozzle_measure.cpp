@@ -158,6 +158,7 @@ class Walk {
     // Those of the pieces on which it lays filament.
     double tolerance_mm = std::numeric_limits<double>::infinity();
     double feed_mm_s = std::numeric_limits<double>::infinity();
+    double travel_mm_s = std::numeric_limits<double>::infinity();  // on the others
   };
 
   void note(const Place& at, double speed_mm_s, std::span<const double> allowance,
@@ -169,10 +170,12 @@ class Walk {
       node.tolerance_mm = std::min(node.tolerance_mm, times * bounds_[at.piece].tolerance_mm);
       node.feed_mm_s =
           std::min({node.feed_mm_s, segment.feed_mm_s, bounds_[at.piece].nozzle_speed_mm_s});
+    } else {
+      node.travel_mm_s = std::min(node.travel_mm_s, bounds_[at.piece].nozzle_speed_mm_s);
     }
   }
 
-  static void add(const std::vector<AtNode>& nodes, double times_tolerance, NozzleMeasure& result) {
+  void add(const std::vector<AtNode>& nodes, double times_tolerance, NozzleMeasure& result) const {
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       double tolerance_mm = std::min(times_tolerance * nodes[k].tolerance_mm, kTravelTolerance_mm);
       for (const std::size_t beside : {k > 0 ? k - 1 : 0, std::min(k + 1, nodes.size() - 1)}) {
@@ -181,7 +184,11 @@ class Walk {
       }
       result.error[k] = std::max(result.error[k], nodes[k].error_mm / tolerance_mm);
       if (times_tolerance == 1.0) {
-        result.speed[k] = std::max(result.speed[k], nodes[k].speed_mm_s / nodes[k].feed_mm_s);
+        // In travel the base keeps F as well, since its motors are what F is for there.
+        const double of_travel_mm_s = std::max(
+            nodes[k].speed_mm_s, std::hypot(base_.x.velocity_mm_s[k], base_.y.velocity_mm_s[k]));
+        result.speed[k] = std::max({result.speed[k], nodes[k].speed_mm_s / nodes[k].feed_mm_s,
+                                    of_travel_mm_s / nodes[k].travel_mm_s});
       }
     }
   }

@@ -46,15 +46,15 @@ using Allowances = std::vector<std::vector<double>>;
 
 // What counts as kept, of an error relative to the tolerance and of a speed relative to F.
 inline constexpr double kKept = 1.05;
-inline constexpr double kKeptFeed = 1.025;
+inline constexpr double kKeptFeed = 1.0195;
 
 struct NozzleMeasure {
   // For each model and piece, the largest e relative to the tolerance, whatever is allowed.
   std::vector<std::vector<double>> of_pieces;
   // The largest values of all models around each node.
   std::vector<double> error;  // e relative to the tolerance and its allowance
-  // The nozzle's speed relative to F, where it lays filament; at the edges of a band it may be
-  // more.
+  // The nozzle's speed relative to F, and in travel the base's as well; at the edges of a band it
+  // may be more.
   std::vector<double> speed;
   // For each model, how far the nozzle swings in the end, relative to what it may: half the
   // tolerance for the first one, since the next run begins with that swing, and all of it for the

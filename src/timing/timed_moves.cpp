@@ -24,7 +24,7 @@ planner::PlannedMove piece_between(const planner::PlannedMove& move, double from
   piece.start_v_mm_s = sum_mm_s > 0.0 ? factor * begin.speed_mm_s : mean_mm_s;
   piece.end_v_mm_s = sum_mm_s > 0.0 ? factor * end.speed_mm_s : mean_mm_s;
   piece.cruise_v_mm_s = std::max(piece.start_v_mm_s, piece.end_v_mm_s);
-  piece.lead_s = piece.accel_s = piece.cruise_s = piece.decel_s = 0.0;
+  piece.lead_s = piece.leap_mm_s = piece.accel_s = piece.cruise_s = piece.decel_s = 0.0;
   const double change_mm_s = piece.end_v_mm_s - piece.start_v_mm_s;
   piece.accel_mm_s2 = std::abs(change_mm_s) / duration_s;
   constexpr double kEven = 1e-6;

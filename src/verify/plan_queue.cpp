@@ -19,14 +19,21 @@ void PlanQueue::add(const std::vector<gcode::Segment>& segments) {
     }
   }
   if (untaken_ >= kTakeEvery) {
-    planner_->take(planned_);
-    untaken_ = 0;
+    take_planned();
   }
 }
 
 void PlanQueue::stop() {
   planner_->stop();
-  planner_->take(planned_);
+  take_planned();
+}
+
+void PlanQueue::take_planned() {
+  if (motion_ == Motion::played) {
+    planner_->take_played(planned_);
+  } else {
+    planner_->take(planned_);
+  }
   untaken_ = 0;
 }
 

@@ -11,10 +11,13 @@ namespace unflex::verify {
 
 class PlanQueue {
  public:
-  PlanQueue(const planner::Limits& limits, const planner::FirmwareConfig& fixed)
-      : planner_(planner::make_planner(limits, fixed)) {}
+  // What the moves are: as the firmware plans them, or as it carries them out.
+  enum class Motion { planned, played };
 
-  void apply(const gcode::LimitChange& change) { planner_->apply(change); }
+  PlanQueue(const planner::Limits& limits, const planner::FirmwareConfig& fixed, Motion motion)
+      : motion_(motion), planner_(planner::make_planner(limits, fixed)) {}
+
+  void apply(const gcode::Event& event) { planner_->apply(event); }
   [[nodiscard]] const planner::Limits& limits() const { return planner_->limits(); }
   void add(const std::vector<gcode::Segment>& segments);
   void stop();
@@ -39,6 +42,9 @@ class PlanQueue {
  private:
   enum class Item { move, section_end };
 
+  void take_planned();
+
+  Motion motion_;
   std::unique_ptr<planner::Planner> planner_;
   std::deque<Item> items_;  // what comes next, in the order of the file
   std::vector<planner::PlannedMove> planned_;

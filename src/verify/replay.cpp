@@ -89,8 +89,8 @@ Replay::Replay(std::istream& stream, std::string name, const gcode::InterpreterO
                ReplayedFile file)
     : reader_(stream, std::move(name)),
       interpreter_(interpreter),
-      plan_(limits, fixed),
-      resting_plan_(limits, fixed),
+      plan_(limits, fixed, PlanQueue::Motion::played),
+      resting_plan_(limits, fixed, PlanQueue::Motion::planned),
       fixed_(fixed),
       file_(file) {
   sections_.push_back(Section{});
@@ -196,6 +196,10 @@ void Replay::read_event(gcode::Event event, const Regime& before) {
 }
 
 void Replay::understand(gcode::Event event, const Regime& before) {
+  // A move's segments are added below, and wait there.
+  if (event.kind != gcode::EventKind::move || is_nothing(event, before.modal)) {
+    for_each_plan([&](PlanQueue& plan) { plan.apply(event); });
+  }
   switch (event.kind) {
     case gcode::EventKind::passive: {
       const bool motion = gcode::names_position(event.line.content());
@@ -203,7 +207,6 @@ void Replay::understand(gcode::Event event, const Regime& before) {
       break;
     }
     case gcode::EventKind::limits:
-      for_each_plan([&](PlanQueue& plan) { plan.apply(*event.limits); });
       place(std::move(event.line), before, false);
       break;
     case gcode::EventKind::move:

@@ -142,8 +142,8 @@ class Replay {
 
   gcode::LineReader reader_;
   gcode::Interpreter interpreter_;
-  PlanQueue plan_;
-  PlanQueue resting_plan_;
+  PlanQueue plan_;          // as it is carried out
+  PlanQueue resting_plan_;  // as it is planned, which runs follow
   planner::FirmwareConfig fixed_;
   std::function<void(const gcode::Line&)> listener_;
   ReplayedFile file_;

@@ -67,6 +67,7 @@ class Verifier {
   bool next_input_move(planner::PlannedMove& move);
   bool next_resting_move(planner::PlannedMove& move);
   bool next_reference_move(ReferenceMove& move);
+  bool next_kept_move(planner::PlannedMove& move);
   bool next_sliced_move(std::deque<planner::PlannedMove>& own, planner::PlannedMove& move);
   bool next_output_move(planner::PlannedMove& move);
   bool next_output_move_ahead(planner::PlannedMove& move);
@@ -90,7 +91,10 @@ class Verifier {
   void end_section();
   void let_original_follow(double until_s);
   void let_kept_follow(double until_s);
-  [[nodiscard]] bool has_free_timing() const { return kept_path_ == &resting_path_; }
+  [[nodiscard]] bool has_free_timing() const { return has_free_timing_; }
+  // Whether the moves of the run as sliced take other times than those the emitted run follows: its
+  // timing is free, or the firmware does not carry out moves as it plans them (Marlin).
+  [[nodiscard]] bool has_own_clock() const { return kept_path_ == &resting_path_; }
   void let_original_follow_moves();
   [[nodiscard]] double end_of_passed_s(ReferencePath& path, std::size_t first) const;
   void finish_reference();
@@ -118,11 +122,12 @@ class Verifier {
   TimeNotes output_notes_;
   ReferencePath path_;
   ReferencePath run_path_;
-  // In runs whose timing is free: the plan of the run as sliced.
+  // In runs with a clock of their own: the plan of the run as sliced.
   ReferencePath resting_path_;
   double run_lead_in_s_ = 0.0;             // how long before run_path_ the emitted run starts
   ReferencePath* emitted_path_ = &path_;   // what emitted_ is measured against
   ReferencePath* kept_path_ = &run_path_;  // what kept_ is measured against
+  bool has_free_timing_ = false;           // the present run, or the last one
   // Where the timing is free, the sliced moves come at the pace of the emitted ones. Both are read
   // ahead, and each sliced move is asked for by two paths.
   ProgressTiming progress_timing_;

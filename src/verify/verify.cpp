@@ -69,8 +69,7 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       lines_(input_, output_, violations_, rules.may_ask_ahead),
       path_([this](ReferenceMove& next) { return next_input_move(next.move); }),
       run_path_([this](ReferenceMove& next) { return next_reference_move(next); }),
-      resting_path_(
-          [this](ReferenceMove& next) { return next_sliced_move(sliced_for_kept_, next.move); }),
+      resting_path_([this](ReferenceMove& next) { return next_kept_move(next.move); }),
       progress_timing_(
           [this](planner::PlannedMove& move) { return next_sliced_move(sliced_for_timing_, move); },
           [this](planner::PlannedMove& move) { return next_output_move_ahead(move); }),
@@ -153,14 +152,25 @@ bool Verifier::next_reference_move(ReferenceMove& move) {
   if (has_free_timing()) {
     return progress_timing_.next(move);
   }
-  if (!next_resting_move(move.move)) {
+  if (!(has_own_clock() ? next_sliced_move(sliced_for_timing_, move.move)
+                        : next_resting_move(move.move))) {
     return false;
   }
   flow_difference_.play_sliced(move.move);
   return true;
 }
 
-// The next sliced move of a run whose timing is free, for one of the two that ask for it.
+// The next move of resting_path_.
+bool Verifier::next_kept_move(planner::PlannedMove& move) {
+  if (!next_sliced_move(sliced_for_kept_, move)) {
+    return false;
+  }
+  move = planner::as_played(std::move(move));
+  return true;
+}
+
+// The next sliced move of a run that is kept on a clock of its own, for one of the two that ask for
+// it.
 bool Verifier::next_sliced_move(std::deque<planner::PlannedMove>& own, planner::PlannedMove& move) {
   if (own.empty()) {
     if (!next_resting_move(move)) {
@@ -216,14 +226,18 @@ void Verifier::begin_section(bool compensated) {
     violations_.begin_run();
     // A long rest, so that the path of the previous run does not count as near.
     run_path_.rest(kApart_s);
-    kept_path_ = output_.section().has_free_timing ? &resting_path_ : &run_path_;
+    has_free_timing_ = output_.section().has_free_timing;
+    const bool is_played_as_planned = rules_.fixed.firmware != Firmware::marlin;
+    kept_path_ = has_free_timing_ || !is_played_as_planned ? &resting_path_ : &run_path_;
     run_lead_in_s_ = 0.0;
-    if (has_free_timing()) {
-      progress_timing_.begin(owed_filament_mm());
-      output_ahead_.clear();
+    if (has_own_clock()) {
       sliced_for_timing_.clear();
       sliced_for_kept_.clear();
       resting_path_.rest(kApart_s);
+    }
+    if (has_free_timing()) {
+      progress_timing_.begin(owed_filament_mm());
+      output_ahead_.clear();
     } else {
       run_lead_in_s_ = output_.section().lead_in_s + planner::wait_s(output_.front(), rules_.fixed);
       flow_difference_.begin_run(run_lead_in_s_);
@@ -236,13 +250,13 @@ void Verifier::begin_section(bool compensated) {
   emitted_.begin_section(*emitted_path_);
   if (compensated) {
     const Meter& emitted = emitted_.main();
-    if (has_free_timing()) {
+    if (has_own_clock()) {
       resting_path_.begin_section();
     }
     kept_.begin_section(*kept_path_);
     kept_.set_state(emitted.nozzle(), emitted.base_x_mm(), emitted.base_y_mm());
     // The kept moves would begin at once, without a lead-in.
-    kept_.skip(run_lead_in_s_);
+    kept_.skip(has_own_clock() ? 0.0 : run_lead_in_s_);
     kept_next_ = kept_first_ = kept_path_->end();
   }
   if (observer_ != nullptr) {
@@ -282,8 +296,9 @@ void Verifier::play_run() {
   if (compensated) {
     const gcode::ModalState& modal = output_.section().regime->modal;
     const gcode::Shaper own = gcode::Interpreter(rules_.interpreter).state().input_shaper();
-    const bool is_touched = (modal.shaper_touched_x || modal.shaper_touched_y) &&
-                            gcode::may_come_on(rules_.fixed.firmware, own);
+    // A macro may have switched on what nobody has told of.
+    const bool is_touched =
+        (modal.shaper_touched_x && own.unknown_x) || (modal.shaper_touched_y && own.unknown_y);
     if (modal.input_shaper().is_on() || modal.input_shaper().is_unknown() || is_touched) {
       violations_.in_output(output_.section().line.number,
                             "the printer's input shaper is on in a compensated run");
@@ -407,7 +422,7 @@ void Verifier::play(const planner::PlannedMove& move) {
     too_much_line_ = move.segment.line;
   }
   // The original advances in its section as far as the emitted nozzle has in its own.
-  if (compensated && has_free_timing()) {
+  if (compensated && has_own_clock()) {
     let_original_follow_moves();
   } else {
     const double elapsed_s = emitted_.plan_time_s() - emitted_path_->section_start_s();
@@ -452,9 +467,9 @@ void Verifier::let_original_follow(double until_s) {
     input_.skip_resting();
   } else {
     path_.discard_before(needed_s - original_.main().reach_s());
-    let_kept_follow(has_free_timing() ? end_of_passed_s(resting_path_, kept_first_)
-                                      : emitted_.plan_time_s());
-    if (has_free_timing()) {
+    let_kept_follow(has_own_clock() ? end_of_passed_s(resting_path_, kept_first_)
+                                    : emitted_.plan_time_s());
+    if (has_own_clock()) {
       run_path_.discard_before(emitted_.main().time_s() - emitted_.main().reach_s());
       resting_path_.discard_before(kept_.time_s() - kept_.reach_s());
     } else {

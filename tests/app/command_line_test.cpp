@@ -99,6 +99,18 @@ TEST(CommandLine, SuggestsTheOptionThatWasMeant) {
             "the following argument was not expected: --strct; run 'unflex inspect --help'");
 }
 
+TEST(CommandLine, SaysHowAValueIsWritten) {
+  EXPECT_EQ(refusal({"compensate", "--faster", "20", "in.gcode", "-o", "y"}),
+            "--faster takes its tolerance behind an equals sign: --faster=20");
+  EXPECT_EQ(refusal({"compensate", "in.gcode", "--faster", "12.5", "-o", "y"}),
+            "--faster takes its tolerance behind an equals sign: --faster=12.5");
+  EXPECT_EQ(refusal({"compensate", "--faster", "in.gcode", "-o", "y"}), "no error");
+  EXPECT_EQ(refusal({"compensate", "in.gcode", "--output=", "--printer", "p.toml"}),
+            "--output= has no value; write it right behind, as in --output=VALUE");
+  EXPECT_THAT(refusal({"compensate", "in.gcode", "-o", "y", "--faster=0"}),
+              HasSubstr("a tolerance above 0 µm is needed; without --faster the timing stays"));
+}
+
 TEST(CommandLine, SuggestsTheCommandThatWasMeant) {
   EXPECT_THAT(refusal({"compenstae", "x.gcode"}),
               StartsWith("unknown command 'compenstae', did you mean 'compensate'? there are "));

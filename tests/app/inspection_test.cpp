@@ -48,7 +48,7 @@ pipeline::Inspection sample() {
 }
 
 TEST(InspectionText, ShowsWhatWasUnderstood) {
-  const std::string text = inspection_text(sample(), "in.gcode", machine::Settings{});
+  const std::string text = inspection_text(sample(), "in.gcode", machine::Settings{}, true);
   EXPECT_THAT(text, ::testing::StartsWith("in.gcode\ndialect       PrusaSlicer 2.5.0\n"));
   EXPECT_THAT(text, HasSubstr("16835, 15000 extruding, 754 of filament alone, 3 arcs"));
   EXPECT_THAT(text, HasSubstr("print time    41m 28s, 40m 50s of it moving"));
@@ -61,11 +61,23 @@ TEST(InspectionText, ShowsWhatWasUnderstood) {
   EXPECT_THAT(text, HasSubstr("X 45 Hz, ζ 0.06"));
 }
 
+TEST(InspectionText, FoldsWhatIsAtItsDefault) {
+  const auto settings =
+      machine::parse("[limits]\nmax_accel_mm_s2 = 3000\n", "p.toml", {"base.max_accel_mm_s2=9000"});
+  ASSERT_TRUE(settings);
+  const std::string text = inspection_text(sample(), "in.gcode", *settings, false);
+  EXPECT_THAT(text, ::testing::ContainsRegex("\n  limits.max_accel_mm_s2 +3000 +p.toml:2\n"));
+  EXPECT_THAT(text, ::testing::ContainsRegex("\n  base.max_accel_mm_s2 +9000 +--set\n"));
+  EXPECT_THAT(text, ::testing::Not(HasSubstr("base.max_velocity_mm_s")));
+  const std::size_t folded = machine::rows(*settings).size() - 2;
+  EXPECT_THAT(text, HasSubstr(std::to_string(folded) + " more are at their default; --all lists"));
+}
+
 TEST(InspectionText, ShowsEveryValueAndWhereItIsFrom) {
   const auto settings =
       machine::parse("[limits]\nmax_accel_mm_s2 = 3000\n", "p.toml", {"base.max_accel_mm_s2=9000"});
   ASSERT_TRUE(settings);
-  const std::string text = inspection_text(sample(), "in.gcode", *settings);
+  const std::string text = inspection_text(sample(), "in.gcode", *settings, true);
   EXPECT_THAT(text, ::testing::ContainsRegex("\n  limits.max_accel_mm_s2 +3000 +p.toml:2\n"));
   EXPECT_THAT(text, ::testing::ContainsRegex("\n  base.max_accel_mm_s2 +9000 +--set\n"));
   EXPECT_THAT(text, ::testing::ContainsRegex("\n  base.max_velocity_mm_s +600 +default\n"));

@@ -24,6 +24,19 @@ class RrfStopping : public RrfCommand {};
 class RrfLosing : public RrfCommand {};
 class RrfDoubtful : public RrfCommand {};
 
+// GCodes2.cpp, HandleGcode and HandleMcode; GCodeQueue.cpp, ShouldQueueMCode.
+TEST(RrfBuffer, IsAwaitedByMovesAndByWhatIsTiedToItsPlaceAmongThem) {
+  Session session(default_options(Firmware::rrf));
+  for (const char* line : {"G1 F3000", "G1 X1", "G0 Y1", "G2 X2 I1", "G10", "M106 S1", "M104 S200",
+                           "M117 \"hello\"", "M42 P1 S1"}) {
+    EXPECT_TRUE(session.read(line).waits_for_buffer) << line;
+  }
+  for (const char* line : {"", "; G1", "M201 X500", "M203 X600", "M204 P500", "M205 X5", "M566 X60",
+                           "M220 S90", "M83", "G92 E0", "G91", "M73 P1"}) {
+    EXPECT_FALSE(session.read(line).waits_for_buffer) << line;
+  }
+}
+
 TEST_P(RrfPassive, LetsTheMotionGoOn) {
   const Event event = session_.read(GetParam());
   EXPECT_EQ(event.kind, EventKind::passive);

@@ -93,10 +93,15 @@ TEST(ShaperFrequency, IsNeverThatOfTheDynamics) {
   EXPECT_TRUE(s.shaper_unknown_x());
   EXPECT_FALSE(s.shaper_unknown_y());
   EXPECT_EQ(told(s, "printer.input_shaper_freq_x_hz"), " default");
-  EXPECT_THAT(to_toml(s),
-              HasSubstr("# input_shaper_freq_x_hz is unset: Klipper not known, else 0\n"));
+  EXPECT_THAT(to_toml(s), HasSubstr("# input_shaper_freq_x_hz is unset: not known\n"));
   EXPECT_DOUBLE_EQ(s.shaper_freq_y_hz(), 42.0);
-  EXPECT_FALSE(read("", {"printer.firmware=marlin"}).shaper_unknown_x());
+  EXPECT_TRUE(read("", {"printer.firmware=marlin"}).shaper_unknown_x());
+  // RepRapFirmware has one shaper for both axes.
+  const Settings rrf = read("", {"printer.firmware=rrf", "printer.input_shaper_freq_x_hz=0"});
+  EXPECT_FALSE(rrf.shaper_unknown_x() || rrf.shaper_unknown_y());
+  // The command that switches it off does harm there.
+  EXPECT_FALSE(
+      read("", {"printer.firmware=marlin", "printer.variant=snapmaker_j1"}).shaper_unknown_x());
 }
 
 TEST(SpeedStep, IsKeptOrRefused) {
@@ -113,6 +118,23 @@ TEST(M115, AloneIsNotEnough) {
   EXPECT_THAT(refusal(answer), HasSubstr("append what M503 answers"));
   EXPECT_THAT(refusal(answer), HasSubstr("dynamics.x.freq_hz and dynamics.y.freq_hz"));
   EXPECT_EQ(read(answer + "echo:  M92 X80 Y80\necho:  M203 X300 Y300\n").printer.version, "2.1.2");
+}
+
+// Files that are given for the printer by mistake.
+TEST(OtherFiles, AreNamedWithTheWayOut) {
+  for (const char* head : {"freq,psd_x,psd_y,psd_z,psd_xyz\n5.0,1.2e+03,1.1,1.2,1.3\n",
+                           "#time,accel_x,accel_y,accel_z\n0.1,1,2,3\n"}) {
+    EXPECT_THAT(refusal(head), HasSubstr("is a record of an accelerometer, not a printer file"));
+  }
+  EXPECT_THAT(refusal("[virtual_sdcard]\npath: ~/gcodes\n[mcu]\nserial: a\n"
+                      "[gcode_macro PAUSE]\ngcode:\n  BASE_PAUSE\n"),
+              HasSubstr("has no [printer]"));
+}
+
+TEST(Suggestions, FindNamesThatBeginAlike) {
+  const Result<Settings> settings = parse("", "p.toml", {"dynamics.x.frequency=45"});
+  ASSERT_FALSE(settings);
+  EXPECT_THAT(to_string(settings.error()), HasSubstr("did you mean 'dynamics.x.freq_hz'?"));
 }
 
 TEST(RrfKinematics, InAnExpressionAreNotTaken) {

@@ -183,6 +183,14 @@ TEST(RrfMaxVelocity, InMmPerSecondBringsANote) {
   EXPECT_THAT(read(std::string(kRrf) + "M203 X10800 Y10800\n").notes, IsEmpty());
 }
 
+// 84660 mm/min are 1411 mm/s, whose division leaves noise.
+TEST(RrfMaxVelocity, HasTheDigitsThatWereWritten) {
+  EXPECT_EQ(told(read(std::string(kRrf) + "M203 X84660 Y1000\n"), "limits.max_x_velocity_mm_s"),
+            "1411 config.g:3");
+  EXPECT_EQ(told(read(std::string(kRrf) + "M203 X84660 Y1000\n"), "limits.max_y_velocity_mm_s"),
+            "16.6666667 config.g:3");
+}
+
 constexpr const char* kKlipper =
     "[printer]\nkinematics: corexy\nmax_velocity: 300\nmax_accel: 5000\n[input_shaper]\n"
     "shaper_type_x: mzv\nshaper_freq_x: 35\nshaper_type_y: mzv\nshaper_freq_y: 35\n";

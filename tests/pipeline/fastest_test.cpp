@@ -53,11 +53,11 @@ study::FastestOutcome how_fast(const std::string& print, const std::vector<doubl
   return std::move(*outcome);
 }
 
-// "Ten layers at 60 mm/s take 20:17.1 min within 20 µm, 20:20.0 with ZV, and 20:05.6 always at F."
+// "Ten layers at 60 mm/s take 20:21.0 min within 20 µm, 20:20.0 with ZV, and 20:05.6 always at F."
 TEST(HowFast, OfSlowWallsIsAsTheReadmeSays) {
   const study::FastestOutcome outcome =
       how_fast(container::ten_layers("wallring"), {0.02}, "scaled");
-  EXPECT_NEAR(outcome.contenders[4].at[0].value().time_s, 1217.1, 1.0);
+  EXPECT_NEAR(outcome.contenders[4].at[0].value().time_s, 1221.0, 1.0);
   EXPECT_NEAR(outcome.contenders[1].at[0].value().time_s, 1220.0, 1.0);
   EXPECT_NEAR(outcome.at_feed_s, 1205.6, 1.0);
 }

@@ -167,7 +167,9 @@ TEST_P(OtherFirmware, DrawsPiecesOfPrints) {
   EXPECT_EQ(report->violation_count, 0U);
   EXPECT_GT(report->runs_compensated, 0U);
   EXPECT_LE(report->max_lines_per_s, GetParam().max_lines_per_s);
-  EXPECT_LE(report->emitted_time_s, 1.01 * report->reference_time_s);
+  // Where M204 stands between lines, RepRapFirmware takes less time for the sliced file than a plan
+  // in which limits hold from the next line on.
+  EXPECT_LE(report->emitted_time_s, 1.015 * report->reference_time_s);
   // The emitted print may be a little shorter: a run's last line may end before the base would have
   // come to rest.
   EXPECT_GE(report->emitted_time_s, 0.97 * report->reference_time_s);

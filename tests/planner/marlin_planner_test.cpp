@@ -150,6 +150,30 @@ TEST(MarlinPlanner, SingleMoveIsTheTrapezoidUpToOneStep) {
   EXPECT_NEAR(moves[0].decel_s, (v - moves[0].end_v_mm_s) / a, 1e-12);
 }
 
+// The first step out of a standstill takes 1/120 s, which counts as time of acceleration.
+TEST(MarlinPlanner, SingleMoveLeapsBehindItsFirstStepAsItIsPlayed) {
+  const double v = 100.0;
+  const double a = 3000.0;
+  auto moves = marlin_plan(polyline({{50, 0, 0, 0}}, v));
+  ASSERT_EQ(moves.size(), 1U);
+  const double planned_s = moves[0].duration_s();
+  moves[0] = as_played(moves[0]);
+  EXPECT_LT(moves[0].duration_s(), planned_s);
+  EXPECT_DOUBLE_EQ(moves[0].start_v_mm_s, kSlowest_mm_s);
+  EXPECT_DOUBLE_EQ(moves[0].cruise_v_mm_s, v);
+  EXPECT_DOUBLE_EQ(moves[0].lead_s, 1.0 / 120.0);
+  EXPECT_NEAR(moves[0].ramp_v_mm_s(), kSlowest_mm_s + a / 120.0, 0.5);
+  EXPECT_NEAR(moves[0].ramp_up_mm_s2(), a, 0.01 * a);
+  // Braking needs 133.3 steps, of which 133 are done, each at the rate at its beginning.
+  EXPECT_NEAR(moves[0].end_v_mm_s, std::sqrt(v * v - 2.0 * a * 131.5 * kStep_mm), 3.0);
+  EXPECT_NEAR(moves[0].ramp_down_mm_s2(), a, 0.02 * a);
+  // The leap is part of the motion as a function of time and back.
+  const double t = moves[0].lead_s + 0.4 * moves[0].accel_s;
+  EXPECT_NEAR(moves[0].velocity_mm_s(t), 0.6 * moves[0].ramp_v_mm_s() + 0.4 * v, 1e-9);
+  EXPECT_NEAR(moves[0].time_s(moves[0].distance_mm(t)), t, 1e-12);
+  EXPECT_NEAR(moves[0].distance_mm(moves[0].lead_s), kStep_mm, 1e-12);
+}
+
 TEST(MarlinPlanner, CornerIsPassedByJunctionDeviation) {
   Limits limits = marlin_limits();
   limits.junction_deviation_mm = 0.05;

@@ -121,17 +121,38 @@ TEST_P(MarlinProgram, MovesFollowOneAnotherInWholeSteps) {
   }
 }
 
+void expect_ramps_add_up(const PlannedMove& move) {
+  const double accel_mm = move.start_v_mm_s * move.lead_s +
+                          0.5 * (move.ramp_v_mm_s() + move.cruise_v_mm_s) * move.accel_s;
+  const double decel_mm = 0.5 * (move.end_v_mm_s + move.cruise_v_mm_s) * move.decel_s;
+  ASSERT_NEAR(accel_mm + move.cruise_v_mm_s * move.cruise_s + decel_mm, move.length_mm,
+              1e-10 * std::max(1.0, move.length_mm));
+  ASSERT_GE(std::min({move.accel_s, move.cruise_s, move.decel_s}), 0.0);
+}
+
 TEST_P(MarlinProgram, RampsAddUpToTheLength) {
   for (const PlannedMove& move : moves_) {
-    const double accel_mm = move.start_v_mm_s * move.lead_s +
-                            0.5 * (move.start_v_mm_s + move.cruise_v_mm_s) * move.accel_s;
-    const double decel_mm = 0.5 * (move.end_v_mm_s + move.cruise_v_mm_s) * move.decel_s;
-    ASSERT_NEAR(accel_mm + move.cruise_v_mm_s * move.cruise_s + decel_mm, move.length_mm,
-                1e-10 * std::max(1.0, move.length_mm));
-    ASSERT_GE(std::min({move.accel_s, move.cruise_s, move.decel_s}), 0.0);
-    const double rise = move.accel_mm_s2 * move.accel_s;
+    ASSERT_NO_FATAL_FAILURE(expect_ramps_add_up(move));
     if (move.lead_s == 0.0) {
-      ASSERT_NEAR(move.cruise_v_mm_s - move.start_v_mm_s, rise, 1e-9);
+      ASSERT_NEAR(move.cruise_v_mm_s - move.start_v_mm_s, move.accel_mm_s2 * move.accel_s, 1e-9);
+    }
+  }
+}
+
+TEST_P(MarlinProgram, RampsAddUpToTheLengthAsPlayedToo) {
+  for (const PlannedMove& planned : moves_) {
+    const PlannedMove move = as_played(planned);
+    ASSERT_NO_FATAL_FAILURE(expect_ramps_add_up(move));
+    ASSERT_EQ(move.segment.end_mm, planned.segment.end_mm);
+    ASSERT_EQ(as_played(move).duration_s(), move.duration_s());
+    ASSERT_EQ(move.distance_mm(move.duration_s()), move.length_mm);
+    // In many steps a ramp is as steep as planned.
+    const double many_mm = 20.0 * step_mm(move, config_);
+    if (0.5 * (move.ramp_v_mm_s() + move.cruise_v_mm_s) * move.accel_s > many_mm) {
+      ASSERT_NEAR(move.ramp_up_mm_s2(), move.accel_mm_s2, 0.08 * move.accel_mm_s2);
+    }
+    if (0.5 * (move.end_v_mm_s + move.cruise_v_mm_s) * move.decel_s > many_mm) {
+      ASSERT_NEAR(move.ramp_down_mm_s2(), move.accel_mm_s2, 0.08 * move.accel_mm_s2);
     }
   }
 }

@@ -86,6 +86,8 @@ class Run {
     } else if (row.at(0) == "stop") {
       planner_->stop();
     } else {
+      // The table's functions have no buffer in front of the ring.
+      planner_->empty_buffer();
       planner_->apply(change(row));
     }
   }

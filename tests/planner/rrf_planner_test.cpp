@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -245,14 +246,15 @@ TEST(RrfPlanner, NothingIsFinalBeforeTheRingIsFull) {
     planner.add(segment(at, to, 50.0));
     at = to;
   };
-  for (int i = 0; i < 59; ++i) add();
+  // The ring holds 59.
+  for (int i = 0; i < 58; ++i) add();
   EXPECT_EQ(planner.take(moves), 0U);
-  EXPECT_EQ(planner.pending(), 59U);
+  EXPECT_EQ(planner.pending(), 58U);
   add();
   EXPECT_GT(planner.take(moves), 0U);
   planner.stop();
   planner.take(moves);
-  EXPECT_EQ(moves.size(), 60U);
+  EXPECT_EQ(moves.size(), 59U);
   EXPECT_EQ(planner.pending(), 0U);
   EXPECT_EQ(moves.back().end_v_mm_s, 0.0);
 }
@@ -309,6 +311,62 @@ TEST(RrfPlanner, NewJerkCountsForJointsThatAreStillProvisional) {
     planner.take(moves);
     EXPECT_NEAR(moves.at(0).end_v_mm_s, jerk, 1e-4);
   }
+}
+
+gcode::LimitChange print_accel(double mm_s2) {
+  gcode::LimitChange change;
+  change.print_accel_mm_s2 = mm_s2;
+  return change;
+}
+
+// A dense line of 200 moves. Its limits are low from behind the hundredth move on; `between` is
+// called just before that. The number of the first move that they hold for.
+template <class Between>
+std::size_t first_with_new_limits(std::size_t per_line, const Between& between) {
+  RrfPlanner planner(fast_limits(1), rrf_config());
+  for (std::size_t i = 0; i < 200; ++i) {
+    if (i == 100) {
+      between(planner);
+      planner.apply(print_accel(500.0));
+    }
+    const auto at = static_cast<double>(i);
+    gcode::Segment each = segment({at, 0, 0, at}, {at + 1, 0, 0, at + 1}, 50.0);
+    each.line = 1 + i / per_line;
+    planner.add(each);
+  }
+  planner.stop();
+  std::vector<PlannedMove> moves;
+  planner.take(moves);
+  const auto slow = std::ranges::find_if(
+      moves, [](const PlannedMove& move) { return move.accel_mm_s2 < 1000.0; });
+  return static_cast<std::size_t>(slow - moves.begin());
+}
+
+TEST(RrfPlanner, LimitsHoldForTheMoveThatWaitsInFrontOfAFullRing) {
+  EXPECT_EQ(first_with_new_limits(1, [](RrfPlanner&) {}), 99U);
+}
+
+// As a line without motion or a fan's command does.
+TEST(RrfPlanner, LimitsHoldForNoMoveBeforeALineThatNeedsTheBuffer) {
+  gcode::Event line;
+  line.waits_for_buffer = true;
+  EXPECT_EQ(first_with_new_limits(1, [&](RrfPlanner& planner) { planner.apply(line); }), 100U);
+}
+
+TEST(RrfPlanner, LimitsHoldForTheRestOfAnArcThatWaits) {
+  EXPECT_LT(first_with_new_limits(50, [](RrfPlanner&) {}), 99U);
+}
+
+TEST(RrfPlanner, LimitsLeaveAMoveAloneThatFoundRoomInTheRing) {
+  RrfPlanner planner(fast_limits(1), rrf_config());
+  planner.add(segment({0, 0, 0, 0}, {10, 0, 0, 1}, 50.0));
+  planner.apply(print_accel(500.0));
+  planner.add(segment({10, 0, 0, 1}, {20, 0, 0, 2}, 50.0));
+  planner.stop();
+  std::vector<PlannedMove> moves;
+  planner.take(moves);
+  EXPECT_NEAR(moves.at(0).accel_mm_s2, 3000.0, 1.0);
+  EXPECT_NEAR(moves.at(1).accel_mm_s2, 500.0, 1.0);
 }
 
 TEST(RrfPlanner, AMoveAfterAStopBeginsAtAStandstill) {

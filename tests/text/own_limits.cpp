@@ -53,7 +53,8 @@ Printer printer_with(const machine::Settings& settings) {
                   {settings.retract_length_mm(), 0.0},
                   is_klipper ? klipper(settings) : others(settings)};
   printer.limits["shaper X freq"] = printer.limits["shaper freq"] = settings.shaper_freq_x_hz();
-  printer.limits["shaper type"] = shaper_type(settings.shaper_type_x());
+  const bool is_on = settings.shaper_freq_x_hz() > 0.0;
+  printer.limits["shaper type"] = shaper_type(is_on ? settings.shaper_type_x() : "none");
   printer.limits["shaper Y freq"] = settings.shaper_freq_y_hz();
   return printer;
 }

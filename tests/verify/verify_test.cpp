@@ -448,6 +448,25 @@ TEST_F(Shaped, MustBeOffInACompensatedRun) {
   EXPECT_THAT(violations_of(check_shaped(good_)), HasSubstr("shaper is on in a compensated run"));
 }
 
+// Nobody has told of a shaper, so any macro may have switched one on.
+TEST_F(Shaped, MustBeOffAgainBehindAMacro) {
+  const std::string print = std::string(kPrint) + "T1\n" + kPrint;
+  const std::string output = PlainEmitter().emit(print);
+  const std::string off = "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\n";
+  Rules rules = on_a_bed();
+  rules.interpreter.shaper_unknown_x = rules.interpreter.shaper_unknown_y = true;
+  const auto with_off = [&](bool behind_macro) {
+    std::string text = output;
+    text.insert(text.find(";unflex run\n"), off);
+    if (behind_macro) {
+      text.insert(text.find(";unflex run\n", text.find("T1\n")), off);
+    }
+    return violations_of(verify_text(print, text, rules));
+  };
+  EXPECT_THAT(with_off(false), HasSubstr("shaper is on in a compensated run"));
+  EXPECT_EQ(with_off(true), "");
+}
+
 TEST_F(Shaped, MustBeBackOnBeforeAMacro) {
   EXPECT_EQ(violations_of(check_shaped(shaped("SET_INPUT_SHAPER SHAPER_FREQ_X=45\n"))), "");
   EXPECT_THAT(violations_of(check_shaped(shaped(""))), HasSubstr("input shaper is not restored"));

@@ -113,7 +113,8 @@ struct RunConfig {
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
   unsigned workers = 1;
   bool quiet = false;
-  bool strict = false;  // compensate, verify, inspect: warnings are errors
+  bool all_settings = false;  // inspect: those at their default, too
+  bool strict = false;        // compensate, verify, inspect: warnings are errors
   IdentifyConfig identify;
   TuneConfig tune;
   HotendConfig hotend;

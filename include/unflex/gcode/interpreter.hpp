@@ -148,6 +148,8 @@ struct Event {
   // The line may set limits that are not known here: with Klipper a macro may do so (M205), or
   // ACCEL_TO_DECEL in some of its versions.
   bool may_set_limits = false;
+  // RepRapFirmware carries the line out only when no move waits in front of its queue (G1, M106).
+  bool waits_for_buffer = false;
   std::vector<std::string> warnings;  // remarks for the user about this line
   bool added = false;                 // not a line of the file, but an Interpreter::approach
 

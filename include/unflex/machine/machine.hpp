@@ -222,11 +222,12 @@ struct BaseSettings {
 };
 
 struct SolveSettings {
-  double window_s = 2.0;          // core of a window in a run too long for one
-  double overlap_s = 0.06;        // pre-roll and post-roll of such a window
-  double lead_in_ms = 0.0;        // the base may start this much before the plan does
-  std::optional<double> tail_ms;  // the base may settle this much longer; unset: max(8ζ/ω, 2 ms)
-  double travel_weight = 0.1;     // weight of the error where nothing is extruded
+  double window_s = 2.0;    // core of a window in a run too long for one
+  double overlap_s = 0.06;  // pre-roll and post-roll of such a window
+  double lead_in_ms = 0.0;  // the base may start this much before the plan does
+  std::optional<double>
+      tail_ms;  // the base may settle this much longer; unset: see Settings::tail_s()
+  double travel_weight = 0.1;  // weight of the error where nothing is extruded
   // Weight of the error along the path, if that across it has 1. Unset: 0.01 where the base is to
   // suit several models of an axis and the timing is as sliced, otherwise 1.
   std::optional<double> along_weight;

@@ -27,13 +27,12 @@
 // 4a times the length of a step, plus what rounding adds to the rates. (They are rounded up, and to
 // 120 steps/s at least.)
 //
-// Left out: the timing of single steps in the stepper interrupt (block_phase_isr), where each step
-// takes a period of the rate at its beginning. Simulated for 3 200 blocks, this moves a block's end
-// by 0.08 steps in the median and by 2.7 steps at most, counted at the slower of its end rates; the
-// extreme is the first step out of a standstill, 1/120 s = 8.3 ms. In all it was 0.45 % of the
-// time. Left out as well: what is off by default (S_CURVE_ACCELERATION, LIN_ADVANCE,
-// TRAVEL_EXTRA_XYJERK, XY_FREQUENCY_LIMIT, backlash), and the safe exit speed that G2 and G3 hint
-// at: with it the last block known, if it is a piece of an arc, need not end at rest.
+// The stepper interrupt makes the first step at the entry rate and then accelerates from step to
+// step (marlin_trapezoid.cpp has the law).
+//
+// Left out: what is off by default (S_CURVE_ACCELERATION, LIN_ADVANCE, TRAVEL_EXTRA_XYJERK,
+// XY_FREQUENCY_LIMIT, backlash), and the safe exit speed that G2 and G3 hint at: with it the last
+// block known, if it is a piece of an arc, need not end at rest.
 #pragma once
 
 #include <array>

@@ -3,11 +3,12 @@
 //   v_s, v_c, v_e   speed at the start, in the cruise and at the end of a move, mm/s
 //   a               acceleration of both ramps, mm/s²
 //   T_a, T_c, T_d   durations of acceleration, cruise and deceleration, s
-//   T_l             duration of the lead, s
+//   T_l, v_l        duration of the lead, s; speed right behind it, mm/s
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <span>
@@ -107,6 +108,17 @@ struct Phase {
   double accel_mm_s2 = 0.0;
 };
 
+// A block of Marlin's in whole steps. Rates in steps/s.
+struct StepBlock {
+  std::uint32_t step_events = 0;  // 0: the move is none of Marlin's
+  std::uint32_t accel_steps_s2 = 0;
+  std::uint32_t nominal_rate_steps_s = 0;
+  std::uint32_t initial_rate_steps_s = 0;
+  std::uint32_t final_rate_steps_s = 0;
+  std::uint32_t accel_steps = 0;
+  std::uint32_t decel_steps = 0;
+};
+
 // A segment with its trapezoid.
 struct PlannedMove {
   gcode::Segment segment;
@@ -117,15 +129,27 @@ struct PlannedMove {
   double cruise_v_mm_s = 0.0;
   double end_v_mm_s = 0.0;
   double accel_mm_s2 = 0.0;
-  // The lead: time at the speed of the start, which then jumps to that of the cruise. Marlin makes
-  // the first step of a line at its entry rate, however short the ramp would be. A move with a lead
-  // has no ramp up.
+  // The lead: time at the speed of the start, which then leaps by so much. Marlin makes the first
+  // step of a line at its entry rate and counts that time as time of acceleration.
   double lead_s = 0.0;
+  double leap_mm_s = 0.0;
+  bool has_whole_steps = false;  // its ramps are made of them: as_played() of a move of Marlin's
   double accel_s = 0.0;
   double cruise_s = 0.0;
   double decel_s = 0.0;
+  StepBlock block = {};
 
   [[nodiscard]] double duration_s() const { return lead_s + accel_s + cruise_s + decel_s; }
+  // The ramps' own accelerations, which differ from accel_mm_s2 where they have whole steps.
+  [[nodiscard]] double ramp_up_mm_s2() const {
+    return has_whole_steps && accel_s > 0.0 ? (cruise_v_mm_s - ramp_v_mm_s()) / accel_s
+                                            : accel_mm_s2;
+  }
+  [[nodiscard]] double ramp_down_mm_s2() const {
+    return has_whole_steps && decel_s > 0.0 ? (cruise_v_mm_s - end_v_mm_s) / decel_s : accel_mm_s2;
+  }
+  // Speed at which the ramp up begins.
+  [[nodiscard]] double ramp_v_mm_s() const { return start_v_mm_s + leap_mm_s; }
   // Lead, acceleration, cruise and deceleration, in this order. Any of them may last no time.
   [[nodiscard]] std::array<Phase, 4> phases() const;
   // Distance covered t seconds after the start of the move; t is clamped to the move.
@@ -136,6 +160,11 @@ struct PlannedMove {
   // Time after the start at which the distance is covered; the inverse of distance_mm.
   [[nodiscard]] double time_s(double distance_mm) const;
 };
+
+// The move as the firmware carries it out. Marlin's stepper interrupt makes another motion of a
+// trapezoid than planned: it takes less time, with leaps of speed (marlin_trapezoid.cpp). Other
+// firmwares carry out what they plan.
+[[nodiscard]] PlannedMove as_played(PlannedMove move);
 
 // How long the moves take, one after the other.
 [[nodiscard]] double duration_s(std::span<const PlannedMove> moves);
@@ -171,7 +200,17 @@ class Planner {
 
   // Limits for the moves added from now on.
   void apply(const gcode::LimitChange& change) { planner::apply(change, limits_); }
+  // What a line means to the moves around it: the limits it sets, and that it may have waited for
+  // the moves before.
+  void apply(const gcode::Event& event) {
+    if (event.waits_for_buffer) empty_buffer();
+    apply(*event.limits);
+  }
   [[nodiscard]] const Limits& limits() const { return limits_; }
+
+  // The line that has been read waits until no move is in front of the queue. Limits set from now
+  // on hold for none of the moves added so far.
+  virtual void empty_buffer() {}
 
   // Queues a segment, whose feed must be above zero. False, and nothing queued, if it has no length
   // at all.
@@ -183,6 +222,9 @@ class Planner {
   // Takes the final moves out, appends them to `out` and returns how many. After stop() these are
   // all moves queued before it.
   virtual std::size_t take(std::vector<PlannedMove>& out) = 0;
+
+  // As take(), with the moves as_played().
+  std::size_t take_played(std::vector<PlannedMove>& out);
 
   // Moves queued and not yet taken.
   [[nodiscard]] virtual std::size_t pending() const = 0;

@@ -27,8 +27,15 @@
 // (PrepareMoves). If the moves before a stop are too few to fill the ring, they begin when the stop
 // is read.
 //
-// Limits. M201, M203 and M204 count for moves added later. M566 counts for all junctions that are
-// computed after it, and these include junctions of provisional moves.
+// The buffer. A line's moves wait in front of the ring while that is full (GCodes.cpp, ReadMove).
+// The firmware reads on until the next line that needs the buffer: a move, or a command that is
+// tied to its place among them (GCodes2.cpp, HandleGcode and HandleMcode; GCodeQueue.cpp).
+//
+// Limits. M201, M203, M204 and M203 I count when a move leaves the buffer for the ring
+// (DDA::InitStandardMove), so also for a move that was read before them and waits. M205, M566 and
+// its P count for all junctions that are computed after them: that of the move that waits, and
+// those of provisional moves where a later move raises them (DoLookahead, MatchSpeeds). A frozen
+// move keeps its trapezoid.
 //
 // Left out: pressure advance (its default of 0 leaves acceleration alone; M572), input shaping, the
 // reduced accelerations of M201.1, kinematics other than Cartesian and cores, tools with several X
@@ -103,11 +110,14 @@ class RrfPlanner final : public Planner {
   RrfPlanner(const Limits& limits, const FirmwareConfig& config);
 
   bool add(const gcode::Segment& segment) override;
+  void empty_buffer() override;
   void stop() override;
   std::size_t take(std::vector<PlannedMove>& out) override;
   [[nodiscard]] std::size_t pending() const override;
 
  private:
+  // Puts the first segment of the buffer into the ring, which must have room.
+  void admit();
   void wait_for_space();
   [[nodiscard]] bool can_add() const;
   [[nodiscard]] bool can_freeze() const;
@@ -123,6 +133,7 @@ class RrfPlanner final : public Planner {
   rrf::Settings settings_;
   std::size_t ring_length_;
   std::int64_t clock_hz_;
+  std::deque<gcode::Segment> buffer_;  // of one line: an arc may have many
   std::deque<rrf::Dda> provisional_;
   bool frozen_extrudes_ = false;  // the move frozen last lays filament
   std::vector<PlannedMove> final_;
