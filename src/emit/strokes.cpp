@@ -155,7 +155,8 @@ bool turns_quickly(const VelocityXY& before, const VelocityXY& after, const Line
          rules.max_speed_step_mm_s;
 }
 
-// Whether t is near a sharp corner, or near the end of the run, beyond which the path does not go on.
+// Whether t is near a sharp corner, or near the end of the run, beyond which the path does not go
+// on.
 bool is_at_corner(const Run& run, const Timetable& table, std::size_t move, double t) {
   constexpr double kReach_s = 8e-3;
   const std::vector<planner::PlannedMove>& moves = *run.moves;

@@ -27,8 +27,8 @@ struct Stroke {
 // Decimals of E in a line.
 inline constexpr int kFilamentDecimals = 5;
 // Marlin adds what a relative line extrudes to the reading of E in single precision (gcode.cpp,
-// get_destination_from_command). Below this reading a line loses less than 4 nm. Where E reads more,
-// it is set to 0.
+// get_destination_from_command). Below this reading a line loses less than 4 nm. Where E reads
+// more, it is set to 0.
 inline constexpr double kMostReadingOfE_mm = 64.0;
 
 // What a run is written in: places, and speeds as F before M220.

@@ -6,8 +6,8 @@
 #include <array>
 
 #include "firmware_commands.hpp"
-#include "unflex/gcode/rrf_meta.hpp"
 #include "unflex/gcode/command.hpp"
+#include "unflex/gcode/rrf_meta.hpp"
 
 namespace unflex::gcode {
 namespace {

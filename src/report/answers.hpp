@@ -27,8 +27,8 @@ struct Better {
 };
 [[nodiscard]] Better better(const Report& report);
 
-// Where the timing is free: "9.8s → 6.3s to print, 36 % less; the nozzle may stray 20 µm". Empty:
-// the timing is as sliced.
+// Where the timing is free: "9.8s → 6.3s to print, 36 % less; the nozzle may stray 20 µm and keeps
+// to it". Empty: the timing is as sliced.
 [[nodiscard]] std::string faster_text(const Report& report);
 
 struct Worst {

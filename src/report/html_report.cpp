@@ -308,8 +308,10 @@ std::string change(double from_mm, double to_mm) {
 
 std::string better_answer(const Report& r) {
   const Better found = better(r);
-  std::vector<std::string> lines = {
-      escape_html(fmt::format("{}, {}.", times_text(found.times()), found.now))};
+  const std::string faster = faster_text(r);
+  const bool is_allowed = !faster.empty() && found.times() < 1.0;
+  const std::string times = is_allowed ? "Now" : times_text(found.times()) + ",";
+  std::vector<std::string> lines = {escape_html(fmt::format("{} {}.", times, found.now))};
   if (found.off) {
     lines.push_back(fmt::format("{} if the frequencies are 5 % off.",
                                 change(found.off->now_mm, found.off->compensated_mm)));
@@ -321,7 +323,7 @@ std::string better_answer(const Report& r) {
             ? fmt::format(", {} if they are 5 % off", micrometres_text(*found.off->zv_mm))
             : std::string{}));
   }
-  if (const std::string faster = faster_text(r); !faster.empty()) {
+  if (!faster.empty()) {
     lines.insert(lines.begin(), escape_html(faster) + ".");
   }
   return answer(term("Better?", kTypical),

@@ -55,7 +55,7 @@ std::vector<planner::PlannedMove> planned(const std::string& text, const EmitOpt
   planner::KlipperPlanner planner(how.printer_limits, how.fixed);
   for (const std::string& line : testing::lines_of(text)) {
     const gcode::Event event = interpreter.interpret({line, 0});
-    planner.apply(*event.limits);
+    planner.apply(event);
     for (const gcode::Segment& segment : event.segments) {
       planner.add(segment);
     }

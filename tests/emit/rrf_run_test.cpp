@@ -61,7 +61,7 @@ std::vector<planner::PlannedMove> plan_of(const std::string& text, const EmitOpt
     if (line.starts_with("G1") || is_barrier) {
       empty_buffer();
     }
-    planner.apply(*event.limits);
+    planner.apply(event);
     if (is_barrier) {
       planner.stop();
     }
@@ -131,8 +131,7 @@ TEST(RrfRun, HasNoLineSlowerThanItSays) {
     const double up = std::max(0.0, v - std::min(v, moves[i - 1].segment.feed_mm_s));
     const double down = std::max(0.0, v - std::min(v, moves[i + 1].segment.feed_mm_s));
     const double says_s = (moves[i].length_mm + (up * up + down * down) / 2e5) / v;
-    constexpr double kTwoStepClocks_s = 2.0 / 750000.0;
-    EXPECT_LT(moves[i].duration_s(), 1.001 * says_s + kTwoStepClocks_s) << lines[moves[i].segment.line - 1];
+    EXPECT_LT(moves[i].duration_s(), 1.001 * says_s + 2e-6) << lines[moves[i].segment.line - 1];
     ++looked_at;
   }
   EXPECT_GT(looked_at, 1000U);

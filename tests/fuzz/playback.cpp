@@ -60,7 +60,7 @@ Playback play(const std::string& text, const PrinterSetup& setup, std::size_t mo
     playback.text += line.text;
     gcode::Event event = interpreter.interpret(std::move(line));
     check_event(event, interpreter.state());
-    planner->apply(*event.limits);
+    planner->apply(event);
     for (const gcode::Segment& segment : event.segments) {
       playback.given.push_back({segment, planner->limits()});
       planner->add(segment);

@@ -292,7 +292,7 @@ std::vector<At> nozzle_path(const Lines& lines, const machine::Settings& setting
   const auto planner = planner::make_planner(rules.limits, rules.fixed);
   for (const std::string& line : lines) {
     const gcode::Event event = interpreter.interpret({line, 0});
-    planner->apply(*event.limits);
+    planner->apply(event);
     for (const gcode::Segment& segment : event.segments) {
       planner->add(segment);
     }

@@ -27,10 +27,11 @@ TEST(Summary, IsExactlyThis) {
       "              87.5 % of the extruded path is compensated; the rest stays as sliced, most of "
       "it "
       "because of: run left as sliced.\n"
+      "Faster?       1h 00m 00s → 1h 00m 18s to print, 0 % more; the nozzle may stray 20 µm and "
+      "keeps to it\n"
       "Better?       200 → 3.12 µm RMS from the path: 64 times less than now (under the printer's "
       "own input shaper, MZV 45 Hz)\n"
       "              150 → 6.10 if the frequencies are 5 % off\n"
-      "              1h 00m 00s → 1h 00m 18s to print, 0 % more; the nozzle may stray 20 µm\n"
       "Where worst?  12.0 µm in line 41, layer 1, at X20.0 Y-2.3\n"
       "              Now 800 µm in line 95, layer 2, Perimeter, at X20.0 Y30.0\n"
       "              Before the first layer 900 → 50.0 µm at most\n"
@@ -97,19 +98,35 @@ TEST(Summary, ComparesWithZvWhereThePrinterHasNoShaper) {
   report.violations.clear();
   report.violation_count = 0;
   const std::string text = to_text(report);
-  EXPECT_THAT(text,
-              HasSubstr("cube.gcode → out.gcode\nBetter?       200 → 3.12 µm RMS from the path: "
-                        "64 times less than now (without an input shaper)\n"));
+  EXPECT_THAT(text, HasSubstr("\nBetter?       200 → 3.12 µm RMS from the path: "
+                              "64 times less than now (without an input shaper)\n"));
   EXPECT_THAT(text, HasSubstr("A ZV shaper would leave 4.00 µm, 9.00 if they are 5 % off\n"));
   EXPECT_THAT(text, HasSubstr("Safe?         Yes, every rule is kept.\n"));
 }
 
 TEST(Summary, SaysWhereThePrintIsWorseThanNow) {
   Report report = sample_report();
+  report.free_timing = {};
   report.compensated.extruding.contour_rms_mm = 0.5;
   EXPECT_THAT(to_text(report), HasSubstr("2.5 times MORE than now"));
   report.compensated = report.uncompensated;
   EXPECT_THAT(to_text(report), HasSubstr("as much as now"));
+}
+
+// A print that is as fast as a tolerance allows may stray more than now.
+TEST(Summary, OfAFasterPrintBeginsWithItsTimeAndNamesNoLoss) {
+  Report report = sample_report();
+  report.compensated.extruding.contour_rms_mm = 0.5;
+  report.free_timing.tolerance_mm = 0.02;
+  report.free_timing.contour_p999_mm = 0.0195;
+  report.reference_time_s = 100.0;
+  report.emitted_time_s = 80.0;
+  std::string text = to_text(report);
+  EXPECT_THAT(text, HasSubstr("Faster?       1m 40s → 1m 20s to print, 20 % less; the nozzle may "
+                              "stray 20 µm and keeps to it\nBetter?       "));
+  EXPECT_THAT(text, ::testing::Not(HasSubstr("MORE than now")));
+  report.free_timing.contour_p999_mm = 0.03;
+  EXPECT_THAT(to_text(report), HasSubstr("may stray 20 µm and strays further in places\n"));
 }
 
 TEST(Summary, SaysWhereMotorsKeepThePrintersOwnLimits) {

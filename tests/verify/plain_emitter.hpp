@@ -77,7 +77,7 @@ class PlainEmitter {
       for (const gcode::Segment& segment : event.segments) {
         planner.add(segment);
       }
-      planner.apply(*event.limits);
+      planner.apply(event);
       if (event.kind == gcode::EventKind::barrier) {
         planner.stop();
       }
