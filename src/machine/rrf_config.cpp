@@ -46,7 +46,7 @@ class RrfConfigReader {
   // What has been read, with what follows from all of it.
   Reading finish();
 
-  // A line that may or may not be carried out has one of these words.
+  // Heeds a line that may or may not be carried out: it may set the shaper.
   void doubt(std::string_view line) {
     const gcode::Command command = gcode::parse(line);
     may_set_shaper_ = may_set_shaper_ || command.is('M', 593) || command.is('M', 98);
@@ -211,7 +211,7 @@ class Branches {
     if (indent_ && indent > *indent_) {
       if (meta == gcode::MetaCommand::none) {
         reader.doubt(line);
-        // What is refused outside of branches is a machine of some other kind.
+        // A line that is refused elsewhere tells of a machine that unflex does not know.
         if (!inside_->take(line, number)) {
           keys_.insert("kinematics.type");
         }

@@ -295,10 +295,10 @@ void Verifier::play_run() {
   }
   if (compensated) {
     const gcode::ModalState& modal = output_.section().regime->modal;
-    const gcode::Shaper own = gcode::Interpreter(rules_.interpreter).state().input_shaper();
     // A macro may have switched on what nobody has told of.
-    const bool is_touched =
-        (modal.shaper_touched_x && own.unknown_x) || (modal.shaper_touched_y && own.unknown_y);
+    const gcode::InterpreterOptions& told = rules_.interpreter;
+    const bool is_touched = (modal.shaper_touched_x && told.shaper_unknown_x) ||
+                            (modal.shaper_touched_y && told.shaper_unknown_y);
     if (modal.input_shaper().is_on() || modal.input_shaper().is_unknown() || is_touched) {
       violations_.in_output(output_.section().line.number,
                             "the printer's input shaper is on in a compensated run");
