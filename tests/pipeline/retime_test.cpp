@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -20,15 +18,10 @@ class Retime : public ::testing::Test {
   // The result of retime() for this content.
   static std::string retimed(const std::string& content, double factor,
                              const std::vector<verify::TimeNote>& notes = {}) {
-    const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / "retime.gcode";
-    {
-      std::ofstream file(path, std::ios::binary);
-      file << content;
-    }
+    const testing::JobFolder folder(content);
+    const std::filesystem::path path = folder.job().input;
     EXPECT_TRUE(retime(path.string(), "retime.gcode", notes, {0, 1000.0, 1000.0 * factor}));
-    std::ifstream file(path, std::ios::binary);
-    std::string result((std::istreambuf_iterator<char>(file)), {});
-    std::filesystem::remove(path);
+    const std::string result = testing::read_file(path);
     return result;
   }
 };
