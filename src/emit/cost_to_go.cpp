@@ -90,5 +90,7 @@ void CostToGo<kModes>::compute(std::size_t from, std::size_t until, bool is_last
 template class CostToGo<1>;
 template class CostToGo<2>;
 template class CostToGo<3>;
+template class CostToGo<4>;
+template class CostToGo<6>;
 
 }  // namespace unflex::emit

@@ -48,5 +48,7 @@ class CostToGo {
 extern template class CostToGo<1>;
 extern template class CostToGo<2>;
 extern template class CostToGo<3>;
+extern template class CostToGo<4>;
+extern template class CostToGo<6>;
 
 }  // namespace unflex::emit

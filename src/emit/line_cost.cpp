@@ -14,15 +14,28 @@ using dynamics::FlexibleAxis;
 constexpr std::size_t kPerNode = 2;
 // During a line the error is sampled at no more than this many moments.
 constexpr std::size_t kLooks = 16;
+// The frequencies of the two nozzles that follow the lines are off by this share of what they may
+// be off by. More makes the error larger in the middle of the band, less at its ends.
+constexpr double kOfFreqError = 0.7;
 
+std::vector<FlexibleAxis> models_for(const FlexibleAxis& axis, double freq_error) {
+  if (freq_error <= 0.0) {
+    return {axis};
+  }
+  const double off = kOfFreqError * freq_error;
+  return {axis.detuned(1.0 - off), axis.detuned(1.0 + off)};
+}
+
+// modes_each modes of each axis, one axis after the other.
 template <int kModes>
-NozzleAnswers<kModes> nozzle_answers(const FlexibleAxis& axis, double dt, std::size_t count) {
+NozzleAnswers<kModes> nozzle_answers(const std::vector<FlexibleAxis>& axes, std::size_t modes_each,
+                                     double dt, std::size_t count) {
   NozzleAnswers<kModes> result;
   result.free.resize(count + 1);
   result.step.resize(count + 1);
   result.ramp.resize(count + 1);
   for (std::size_t mode = 0; mode < kModes; ++mode) {
-    const StepMatrix step(axis, mode, dt);
+    const StepMatrix step(axes[mode / modes_each], mode % modes_each, dt);
     const auto at = static_cast<Eigen::Index>(2 * mode);
     result.free[0].template middleCols<2>(at).setIdentity();
     result.step[0].template segment<2>(at).setZero();
@@ -108,18 +121,21 @@ template <int kModes>
 LineCosts<kModes>::LineCosts(const BaseTrajectory& base,
                              const std::function<ErrorWeight(double)>& weight,
                              const LineRules& rules)
-    : Candidates(base, weight) {
+    : Candidates(base, weight), modes_each_(kModes / nozzles_for(rules)) {
   const auto longest = static_cast<std::size_t>(std::ceil(rules.max_line_s / dt_s())) + 1;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    Nozzle& nozzle = nozzles_[axis];
-    nozzle.model = axis == 0 ? rules.nozzle_x : rules.nozzle_y;
-    const Followed follows(base, axis == 0 ? &BaseTrajectory::x_at : &BaseTrajectory::y_at,
-                           nozzle.model);
-    nozzle.at.reserve(size());
-    for (std::size_t k = 0; k < size(); ++k) {
-      nozzle.at.push_back(vector_of<kModes>(follows.at(time_s(k))));
+    Axis& all = axes_[axis];
+    all.models = models_for(axis == 0 ? rules.nozzle_x : rules.nozzle_y, rules.freq_error);
+    std::vector<Followed> follow;
+    for (const FlexibleAxis& model : all.models) {
+      follow.emplace_back(base, axis == 0 ? &BaseTrajectory::x_at : &BaseTrajectory::y_at, model);
     }
-    nozzle.answers = nozzle_answers<kModes>(nozzle.model, dt_s(), longest);
+    all.at.reserve(size());
+    for (std::size_t k = 0; k < size(); ++k) {
+      all.at.push_back(
+          beside_each_other([&](std::size_t nozzle) { return follow[nozzle].at(time_s(k)); }));
+    }
+    all.answers = nozzle_answers<kModes>(all.models, modes_each_, dt_s(), longest);
   }
   shapes_.emplace_back();
   for (std::size_t m = 1; m <= longest; ++m) {
@@ -132,34 +148,59 @@ LineCosts<kModes>::LineCosts(const BaseTrajectory& base,
 }
 
 template <int kModes>
+template <class StateOfNozzle>
+ModesVector<kModes> LineCosts<kModes>::beside_each_other(StateOfNozzle state_of_nozzle) const {
+  ModesVector<kModes> result;
+  for (std::size_t nozzle = 0; nozzle < nozzles(); ++nozzle) {
+    const dynamics::NozzleState state = state_of_nozzle(nozzle);
+    for (std::size_t mode = 0; mode < modes_each_; ++mode) {
+      const auto at = static_cast<Eigen::Index>(2 * (nozzle * modes_each_ + mode));
+      result.template segment<2>(at) << state.parts[mode].position, state.parts[mode].velocity;
+    }
+  }
+  return result;
+}
+
+template <int kModes>
+ModesVector<kModes> LineCosts<kModes>::riding(std::size_t axis, double position_mm,
+                                              double velocity_mm_s) const {
+  return beside_each_other([&](std::size_t nozzle) {
+    return axes_[axis].models[nozzle].riding(position_mm, velocity_mm_s);
+  });
+}
+
+template <int kModes>
 typename LineCosts<kModes>::Shape LineCosts<kModes>::shape(std::size_t m) const {
   const double duration = static_cast<double>(m) * dt_s();
   Shape result;
   const std::size_t looks = std::min(m, kLooks);
-  const double between_s = duration / static_cast<double>(looks);
+  result.between_s = duration / static_cast<double>(looks);
+  const double share_s = result.between_s / static_cast<double>(nozzles());
   for (std::size_t look = 1; look <= looks; ++look) {
     const std::size_t j = look * m / looks;
-    const auto row = [&](const NozzleAnswers<kModes>& answer) {
-      Row result_row;
-      for (Eigen::Index i = 0; i < 2 * kModes; ++i) {
+    const auto row = [&](const NozzleAnswers<kModes>& answer, std::size_t nozzle) {
+      Row result_row = Row::Zero();
+      for (auto [i, end] = entries(nozzle); i < end; ++i) {
         result_row[i] = answer.free[j](0, i);
       }
-      const double ramp = position_of(answer.ramp[j]) / duration;
-      result_row[2 * kModes] = position_of(answer.step[j]) - ramp;
+      const double ramp = place(nozzle, answer.ramp[j]) / duration;
+      result_row[2 * kModes] = place(nozzle, answer.step[j]) - ramp;
       result_row[2 * kModes + 1] = ramp;
       return result_row;
     };
     const double s = static_cast<double>(j) / static_cast<double>(m);
-    result.looks.push_back({j, s, row(answers(0)), row(answers(1))});
-    const Row& x = result.looks.back().x;
-    const Row& y = result.looks.back().y;
-    result.xx += between_s * x.transpose() * x;
-    result.xy += between_s * x.transpose() * y;
-    result.yy += between_s * y.transpose() * y;
+    for (std::size_t nozzle = 0; nozzle < nozzles(); ++nozzle) {
+      const Row x = row(answers(0), nozzle);
+      const Row y = row(answers(1), nozzle);
+      result.looks.push_back({j, s, nozzle, x, y});
+      result.xx += share_s * x.transpose() * x;
+      result.xy += share_s * x.transpose() * y;
+      result.yy += share_s * y.transpose() * y;
+    }
     Row base = Row::Zero();
     base[2 * kModes] = 1.0 - s;
     base[2 * kModes + 1] = s;
-    result.base += kBaseWeight * between_s * base.transpose() * base;
+    result.base += kBaseWeight * result.between_s * base.transpose() * base;
   }
   return result;
 }
@@ -189,31 +230,32 @@ LineCost<kModes> LineCosts<kModes>::line(std::size_t k, std::size_t m) const {
   }
   Row slope_x = Row::Zero();
   Row slope_y = Row::Zero();
-  const double between_s = duration / static_cast<double>(shape.looks.size());
-  const double base_weight = kBaseWeight * between_s;
-  for (const typename Shape::Look& look : shape.looks) {
+  const double share_s = shape.between_s / static_cast<double>(nozzles());
+  const double base_weight = kBaseWeight * share_s;
+  for (const Look& look : shape.looks) {
     const std::size_t j = look.j;
     std::array<double, 2> off{};
     std::array<double, 2> off_base{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const auto a = static_cast<Eigen::Index>(axis);
       const NozzleAnswers<kModes>& answer = answers(axis);
-      double swing = answer.free[j](0, 0) * begin[axis][0];
-      for (Eigen::Index i = 1; i < 2 * kModes; ++i) {
+      auto [i, end] = entries(look.nozzle);
+      double swing = answer.free[j](0, i) * begin[axis][i];
+      for (++i; i < end; ++i) {
         swing += answer.free[j](0, i) * begin[axis][i];
       }
-      off[axis] = swing + position_of(answer.ramp[j]) * speed[axis] -
-                  (nozzle_mm(axis, k + j) - base_mm(k)[a]);
+      off[axis] = swing + place(look.nozzle, answer.ramp[j]) * speed[axis] -
+                  (place(look.nozzle, nozzle(axis, k + j)) - base_mm(k)[a]);
       off_base[axis] = speed[axis] * look.s * duration - (base_mm(k + j)[a] - base_mm(k)[a]);
     }
     const ErrorWeight& w = weight(k + j);
     if (!same_weight) {
-      xx += between_s * w.xx * look.x.transpose() * look.x;
-      xy += between_s * w.xy * look.x.transpose() * look.y;
-      yy += between_s * w.yy * look.y.transpose() * look.y;
+      xx += share_s * w.xx * look.x.transpose() * look.x;
+      xy += share_s * w.xy * look.x.transpose() * look.y;
+      yy += share_s * w.yy * look.y.transpose() * look.y;
     }
-    const double to_x = between_s * (w.xx * off[0] + w.xy * off[1]);
-    const double to_y = between_s * (w.xy * off[0] + w.yy * off[1]);
+    const double to_x = share_s * (w.xx * off[0] + w.xy * off[1]);
+    const double to_y = share_s * (w.xy * off[0] + w.yy * off[1]);
     slope_x += to_x * look.x;
     slope_y += to_y * look.y;
     Row base = Row::Zero();
@@ -280,12 +322,13 @@ ZVector<kModes> LineCosts<kModes>::lead_kick(double line_s, double steps,
   const auto j = static_cast<std::size_t>(after_s / dt_s() + 0.5);
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
-    Eigen::Index at = kOfAxis<kModes> * a;
-    for (const dynamics::Mode& mode : nozzles_[axis].model.modes()) {
-      const Eigen::Index column = at - kOfAxis<kModes> * a + 1;
-      kick.template segment<2>(at) =
-          -mode.gain * mode.stiffness_per_s2() * area[a] * answers(axis).free[j].col(column);
-      at += 2;
+    for (std::size_t nozzle = 0; nozzle < nozzles(); ++nozzle) {
+      auto column = static_cast<Eigen::Index>(entries(nozzle).first);
+      for (const dynamics::Mode& mode : axes_[axis].models[nozzle].modes()) {
+        kick.template segment<2>(kOfAxis<kModes> * a + column) =
+            -mode.gain * mode.stiffness_per_s2() * area[a] * answers(axis).free[j].col(column + 1);
+        column += 2;
+      }
     }
   }
   return kick;
@@ -293,13 +336,19 @@ ZVector<kModes> LineCosts<kModes>::lead_kick(double line_s, double steps,
 
 template <int kModes>
 Quadratic<kModes> LineCosts<kModes>::ring_down() const {
-  constexpr int kStates = 2 * kModes;
   const ErrorWeight& w = weight(size() - 1);
   Quadratic<kModes> result;
-  result.matrix.template block<kStates, kStates>(0, 0) =
-      w.xx * ring_down_square<kModes>(nozzles_[0].model);
-  result.matrix.template block<kStates, kStates>(kOfAxis<kModes>, kOfAxis<kModes>) =
-      w.yy * ring_down_square<kModes>(nozzles_[1].model);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double share = (axis == 0 ? w.xx : w.yy) / static_cast<double>(nozzles());
+    for (std::size_t nozzle = 0; nozzle < nozzles(); ++nozzle) {
+      const auto size = static_cast<Eigen::Index>(2 * modes_each_);
+      const Eigen::Index at = kOfAxis<kModes> * static_cast<Eigen::Index>(axis) +
+                              static_cast<Eigen::Index>(entries(nozzle).first);
+      result.matrix.block(at, at, size, size) =
+          share * ring_down_square<dynamics::kMostModes>(axes_[axis].models[nozzle])
+                      .topLeftCorner(size, size);
+    }
+  }
   return result;
 }
 
@@ -312,5 +361,7 @@ Quadratic<kModes> LineCosts<kModes>::ring_down() const {
 UNFLEX_FOR_MODES(1)
 UNFLEX_FOR_MODES(2)
 UNFLEX_FOR_MODES(3)
+UNFLEX_FOR_MODES(4)
+UNFLEX_FOR_MODES(6)
 
 }  // namespace unflex::emit

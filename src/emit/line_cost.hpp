@@ -10,7 +10,13 @@
 //   w          (z, u)
 //   J          ½ ∫ pᵀWp + ε|d|² dt, p being the places of e, and d the line minus the base
 //
-// Both axes have kModes modes. An axis that has fewer gets modes that never move.
+// Whole steps leave errors that a line cannot avoid. Those near the resonance would have to cancel
+// each other, which they do for one frequency only. So where frequencies may be off, two nozzles
+// follow the lines, one that swings slower and one that swings faster, and pᵀWp is the mean of
+// both. Their modes stand beside each other in e: first all of one nozzle, then all of the other.
+//
+// Both axes have kModes modes, of all nozzles together. An axis that has fewer gets modes that
+// never move.
 #pragma once
 
 #include <Eigen/Core>
@@ -100,8 +106,8 @@ template <int kModes>
 [[nodiscard]] Quadratic<kModes> ending_on_base(const LineCost<kModes>& line,
                                                const Quadratic<kModes>& to_go);
 
-// Responses of the nozzle on one axis after j candidate intervals: to its own state, and to a step
-// and a ramp of the base. The nozzle's place is the sum of those of its modes.
+// Responses of the modes on one axis after j candidate intervals: to their own state, and to a step
+// and a ramp of the base.
 template <int kModes>
 struct NozzleAnswers {
   // What each mode makes of its own state: one block of 2 × 2 beside the other.
@@ -149,26 +155,37 @@ class LineCosts : public Candidates {
   LineCosts(const dynamics::BaseTrajectory& base, const std::function<ErrorWeight(double)>& weight,
             const LineRules& rules);
 
-  // The place of f on one axis at candidate k.
-  [[nodiscard]] double nozzle_mm(std::size_t axis, std::size_t k) const {
-    return position_of(nozzle(axis, k));
+  // How many nozzles follow the lines.
+  [[nodiscard]] std::size_t nozzles() const { return axes_[0].models.size(); }
+  // The place of a nozzle in this state: the sum of those of its modes. With `times`, each of its
+  // entries i counts times[i].
+  template <class State>
+  [[nodiscard]] auto place(std::size_t nozzle, const State& state) const {
+    const std::size_t first = 2 * nozzle * modes_each_;
+    auto sum = state[first];
+    for (std::size_t i = first + 2; i < first + 2 * modes_each_; i += 2) {
+      sum += state[i];
+    }
+    return sum;
+  }
+  // The entries of a state that belong to a nozzle: the first, and the one behind the last.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> entries(std::size_t nozzle) const {
+    return {2 * nozzle * modes_each_, 2 * (nozzle + 1) * modes_each_};
   }
   // f of one axis at candidate k.
   [[nodiscard]] const ModesVector<kModes>& nozzle(std::size_t axis, std::size_t k) const {
-    return nozzles_[axis].at[k];
+    return axes_[axis].at[k];
   }
-  // A nozzle that goes along with the base.
+  // Nozzles that go along with the base.
   [[nodiscard]] ModesVector<kModes> riding(std::size_t axis, double position_mm,
-                                           double velocity_mm_s = 0.0) const {
-    return vector_of<kModes>(nozzles_[axis].model.riding(position_mm, velocity_mm_s));
-  }
+                                           double velocity_mm_s = 0.0) const;
   // The gain of a mode; 0 if the axis does not have it.
   [[nodiscard]] double gain(std::size_t axis, std::size_t mode) const {
-    const auto modes = nozzles_[axis].model.modes();
-    return mode < modes.size() ? modes[mode].gain : 0.0;
+    const auto modes = axes_[axis].models[mode / modes_each_].modes();
+    return mode % modes_each_ < modes.size() ? modes[mode % modes_each_].gain : 0.0;
   }
   [[nodiscard]] const NozzleAnswers<kModes>& answers(std::size_t axis) const {
-    return nozzles_[axis].answers;
+    return axes_[axis].answers;
   }
 
   // The line from candidate k to k + m. k + m < size(), and the line lasts no longer than
@@ -190,16 +207,18 @@ class LineCosts : public Candidates {
   static constexpr int kRow = kOfAxis<kModes> + 1;
   using Row = Eigen::Matrix<double, 1, kRow>;
   using RowSquare = Eigen::Matrix<double, kRow, kRow>;
-  // What all lines over m candidates share: the nozzle's place on an axis by (e, o, u) at some
-  // moments, and the sums of its squares.
+  // What all lines over m candidates share: the nozzles' places on the axes by (e, o, u) at some
+  // moments, and the sums of their squares.
+  struct Look {
+    std::size_t j = 0;       // candidates since the line's begin
+    double s = 0.0;          // j as a share of the line
+    std::size_t nozzle = 0;  // of those that follow the lines
+    Row x;
+    Row y;
+  };
   struct Shape {
-    struct Look {
-      std::size_t j = 0;  // candidates since the line's begin
-      double s = 0.0;     // j as a share of the line
-      Row x;
-      Row y;
-    };
-    std::vector<Look> looks;
+    std::vector<Look> looks;  // all nozzles at one moment, one after the other
+    double between_s = 0.0;   // time between two moments
     RowSquare xx = RowSquare::Zero();
     RowSquare xy = RowSquare::Zero();
     RowSquare yy = RowSquare::Zero();
@@ -207,19 +226,30 @@ class LineCosts : public Candidates {
   };
   [[nodiscard]] Shape shape(std::size_t m) const;
 
-  struct Nozzle {
-    dynamics::FlexibleAxis model;
-    std::vector<ModesVector<kModes>> at;  // f
+  struct Axis {
+    std::vector<dynamics::FlexibleAxis> models;  // one for each nozzle
+    std::vector<ModesVector<kModes>> at;         // f
     NozzleAnswers<kModes> answers;
   };
+  // One state of each nozzle as a vector.
+  template <class StateOfNozzle>
+  [[nodiscard]] ModesVector<kModes> beside_each_other(StateOfNozzle state_of_nozzle) const;
 
-  std::array<Nozzle, 2> nozzles_;
+  std::array<Axis, 2> axes_;
+  std::size_t modes_each_ = kModes;  // of one nozzle
   std::vector<std::size_t> same_weight_until_;
   std::vector<Shape> shapes_;  // by m
 };
 
+// Two nozzles follow the lines if frequencies may be off.
+[[nodiscard]] inline std::size_t nozzles_for(const LineRules& rules) {
+  return rules.freq_error > 0.0 ? 2 : 1;
+}
+
 extern template class LineCosts<1>;
 extern template class LineCosts<2>;
 extern template class LineCosts<3>;
+extern template class LineCosts<4>;
+extern template class LineCosts<6>;
 
 }  // namespace unflex::emit

@@ -34,29 +34,33 @@ void LineFan<kModes>::begin(std::size_t k, std::span<const ZVector<kModes>> stat
 template <int kModes>
 void LineFan<kModes>::reach(std::size_t m) {
   const Eigen::Vector2d& base = costs_->base_mm(k_);
+  const double share = 1.0 / static_cast<double>(costs_->nozzles());
   for (std::size_t j = m_ + 1; j <= m; ++j) {
     const ErrorWeight& w = costs_->weight(k_ + j);
-    const auto error = [&](const Axis& axis, std::size_t index) -> Lanes {
-      const auto& free = axis.answers->free[j];
-      const double off = base[static_cast<Eigen::Index>(index)] - costs_->nozzle_mm(index, k_ + j);
-      Lanes sum = axis.place + off + free(0, 0) * axis.behind[0] + free(0, 1) * axis.behind[1];
-      for (Eigen::Index part = 2; part < 2 * kModes; ++part) {
-        sum += free(0, part) * axis.behind[static_cast<std::size_t>(part)];
-      }
-      return sum;
-    };
-    const Lanes ex = error(x_, 0);
-    const Lanes ey = error(y_, 1);
-    const Lanes to_x = w.xx * ex + w.xy * ey;
-    const Lanes to_y = w.xy * ex + w.yy * ey;
-    const double ramp_x = position_of(x_.answers->ramp[j]);
-    const double ramp_y = position_of(y_.answers->ramp[j]);
-    square_ += to_x * ex + to_y * ey;
-    x_.pull += ramp_x * to_x;
-    y_.pull += ramp_y * to_y;
-    x_.ramps += w.xx * ramp_x * ramp_x;
-    ramps_xy_ += w.xy * ramp_x * ramp_y;
-    y_.ramps += w.yy * ramp_y * ramp_y;
+    for (std::size_t nozzle = 0; nozzle < costs_->nozzles(); ++nozzle) {
+      const auto error = [&](const Axis& axis, std::size_t index) -> Lanes {
+        const auto& free = axis.answers->free[j];
+        const double off = base[static_cast<Eigen::Index>(index)] -
+                           costs_->place(nozzle, costs_->nozzle(index, k_ + j));
+        Lanes sum = axis.place + off;
+        for (auto [i, end] = costs_->entries(nozzle); i < end; ++i) {
+          sum += free(0, i) * axis.behind[i];
+        }
+        return sum;
+      };
+      const Lanes ex = error(x_, 0);
+      const Lanes ey = error(y_, 1);
+      const Lanes to_x = share * (w.xx * ex + w.xy * ey);
+      const Lanes to_y = share * (w.xy * ex + w.yy * ey);
+      const double ramp_x = costs_->place(nozzle, x_.answers->ramp[j]);
+      const double ramp_y = costs_->place(nozzle, y_.answers->ramp[j]);
+      square_ += to_x * ex + to_y * ey;
+      x_.pull += ramp_x * to_x;
+      y_.pull += ramp_y * to_y;
+      x_.ramps += share * w.xx * ramp_x * ramp_x;
+      ramps_xy_ += share * w.xy * ramp_x * ramp_y;
+      y_.ramps += share * w.yy * ramp_y * ramp_y;
+    }
     const double t = static_cast<double>(j) * costs_->dt_s();
     const Eigen::Vector2d way = costs_->base_mm(k_ + j) - base;
     x_.base += way[0];
@@ -177,5 +181,7 @@ ZVector<kModes> LineFan<kModes>::after(std::size_t lane, const Eigen::Vector2d& 
 template class LineFan<1>;
 template class LineFan<2>;
 template class LineFan<3>;
+template class LineFan<4>;
+template class LineFan<6>;
 
 }  // namespace unflex::emit

@@ -100,5 +100,7 @@ class LineFan {
 extern template class LineFan<1>;
 extern template class LineFan<2>;
 extern template class LineFan<3>;
+extern template class LineFan<4>;
+extern template class LineFan<6>;
 
 }  // namespace unflex::emit

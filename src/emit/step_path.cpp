@@ -95,7 +95,9 @@ Polygon step_path(const dynamics::BaseTrajectory& base, const std::vector<double
                   const AxisGrid& x, const AxisGrid& y, const LineRules& rules) {
   const std::size_t modes = std::max(rules.nozzle_x.mode_count(), rules.nozzle_y.mode_count());
   return with_modes(modes, [&](auto count) {
-    return path_of<decltype(count)::value>(base, wanted, weight, ends, x, y, rules);
+    constexpr int kModes = decltype(count)::value;
+    return nozzles_for(rules) == 1 ? path_of<kModes>(base, wanted, weight, ends, x, y, rules)
+                                   : path_of<2 * kModes>(base, wanted, weight, ends, x, y, rules);
   });
 }
 

@@ -467,5 +467,7 @@ Polygon search(const LineCosts<kModes>& costs, const std::vector<std::size_t>& w
 UNFLEX_FOR_MODES(1)
 UNFLEX_FOR_MODES(2)
 UNFLEX_FOR_MODES(3)
+UNFLEX_FOR_MODES(4)
+UNFLEX_FOR_MODES(6)
 
 }  // namespace unflex::emit

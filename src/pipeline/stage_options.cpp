@@ -467,6 +467,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   // The costs of lines leave out the lead of modes behind each other.
   options.lines.nozzle_x = nozzle_x(settings);
   options.lines.nozzle_y = nozzle_y(settings);
+  options.lines.freq_error = settings.freq_error();
   const auto reach = [](const std::optional<machine::Range>& travel) {
     return travel ? emit::Reach{travel->min, travel->max} : emit::Reach{.min_mm = 0.0};
   };
@@ -481,8 +482,10 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
         std::max(settings.period_ms() * 1e-3, kShortest / settings.max_lines_per_s());
   }
   if (settings.printer.firmware == Firmware::marlin) {
-    // Rounding may take a step off either end.
-    options.lines.min_steps = options.fixed.min_steps_per_segment;
+    // Rounding may take a step off either end. The first step of a line comes late, which is not
+    // little in a line of one step or two: such lines leave 1.2 µm RMS where others leave 0.8.
+    constexpr int kFewestSteps = 3;
+    options.lines.min_steps = std::max(options.fixed.min_steps_per_segment, kFewestSteps);
     options.lines.min_line_mm = (settings.printer.min_steps_per_segment + 1.0) * grid_mm(settings);
     // With classic jerk as high as in a run, each line begins at its own speed.
     options.lines.leads = !options.fixed.classic_jerk;

@@ -397,6 +397,133 @@ struct RandomWay {
   RunEnds ends;
 };
 
+// Two nozzles whose frequencies are off, each with two modes along Y: the cost is the mean of what
+// each costs alone, step by step, and the states stand beside each other.
+TEST(LineCosts, AreTheMeanOfTwoNozzlesWhereFrequenciesMayBeOff) {
+  using dynamics::Mode;
+  constexpr int kAll = 4;
+  const BaseTrajectory base = wavy_base();
+  const std::array along_y = {Mode{285.3, 0.071, 0.7}, Mode{365.1, 0.085, 0.3}};
+  LineRules rules;
+  rules.nozzle_y = dynamics::FlexibleAxis(along_y);
+  const ErrorWeight weight{0.9, 0.2, 0.3};
+  const auto at_all_times = [&](double) { return weight; };
+  LineRules robust = rules;
+  robust.freq_error = 0.1;
+  const LineCosts<kAll> costs(base, at_all_times, robust);
+  ASSERT_EQ(costs.nozzles(), 2U);
+  const std::size_t k = 50;
+  const std::size_t m = 10;
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0.0, 0.02);
+  WVector<kAll> w = WVector<kAll>::NullaryExpr([&] { return normal(random); });
+  // X has one mode, so that the other one of each nozzle never moves.
+  for (const Eigen::Index i : {2, 3, 6, 7}) {
+    w[i] = 0.0;
+  }
+  double mean = 0.0;
+  double ringing = 0.0;
+  ZVector<kAll> expected = ZVector<kAll>::Zero();
+  for (Eigen::Index nozzle = 0; nozzle < 2; ++nozzle) {
+    LineRules alone = rules;
+    const double factor = nozzle == 0 ? 1.0 - 0.07 : 1.0 + 0.07;
+    alone.nozzle_x = rules.nozzle_x.detuned(factor);
+    alone.nozzle_y = rules.nozzle_y.detuned(factor);
+    const LineCosts<2> one(base, at_all_times, alone);
+    WVector<2> v;
+    v << w.segment<4>(4 * nozzle), w[8], w.segment<4>(9 + 4 * nozzle), w[17], w[18], w[19];
+    const LineCost<2> line = one.line(k, m);
+    mean += 0.5 * (v.dot(0.5 * (line.matrix * v) + line.slope) + line.constant);
+    const ZVector<2> after = line.move * v + line.shift;
+    expected.segment<4>(4 * nozzle) = after.head<4>();
+    expected[8] = after[4];
+    expected.segment<4>(9 + 4 * nozzle) = after.segment<4>(5);
+    expected[17] = after[9];
+    ringing += 0.5 * one.ring_down().at(after);
+  }
+  const LineCost<kAll> line = costs.line(k, m);
+  EXPECT_NEAR(w.dot(0.5 * (line.matrix * w) + line.slope) + line.constant, mean, 1e-12 * mean);
+  EXPECT_LE((line.move * w + line.shift - expected).cwiseAbs().maxCoeff(), 1e-10);
+  EXPECT_NEAR(costs.ring_down().at(expected), ringing, 1e-12 * ringing);
+
+  LineFan<kAll> fan(costs);
+  const ZVector<kAll> before = w.head<kOfZ<kAll>>();
+  fan.begin(k, std::span(&before, 1));
+  fan.reach(m);
+  const Eigen::Vector2d speed =
+      (costs.base_mm(k + m) - costs.base_mm(k) + w.tail<2>() - Eigen::Vector2d(w[8], w[17])) /
+      fan.duration_s();
+  EXPECT_LE((fan.after(0, speed) - expected).cwiseAbs().maxCoeff(), 1e-9);
+  // The fan looks at each candidate, the line at no more than 16 moments: at ten candidates both
+  // see the same.
+  EXPECT_NEAR(fan.cost(0, speed), mean, 1e-9 * mean);
+  const Quadratic<kAll> to_go = costs.ring_down();
+  EXPECT_NEAR(fan.choice(to_go).at(0, speed), mean + ringing, 1e-9 * (mean + ringing));
+}
+
+// Round a circle, from rest to 9 rad/s.
+struct Circle {
+  double radius_mm = 0.0;
+  static constexpr double kUntil_s = 1.0;
+
+  static double angle(double t) {
+    return 9.0 * (t < 0.1 ? t * t * t / 0.02 * (2.0 - t / 0.1) : t - 0.05);
+  }
+  [[nodiscard]] std::array<double, 2> operator()(double t) const {
+    return {radius_mm * std::sin(angle(t)), radius_mm * (1.0 - std::cos(angle(t)))};
+  }
+  // Only the error across the path counts.
+  static ErrorWeight weight(double t) {
+    const double x = std::sin(angle(t));
+    const double y = -std::cos(angle(t));
+    return {x * x + 1e-2 * y * y, 0.99 * x * y, y * y + 1e-2 * x * x};
+  }
+  // ∫ of the square of the error across the path, µm²·s, of a nozzle whose frequency is off by this
+  // factor, while the circle is even.
+  [[nodiscard]] double square_of_error(const LineRules& rules, double factor) const {
+    const BaseTrajectory base = testing::sampled(*this, kUntil_s + 0.3);
+    RunEnds ends;
+    ends.end_x_mm = (*this)(kUntil_s)[0];
+    ends.end_y_mm = (*this)(kUntil_s)[1];
+    ends.until_s = kUntil_s;
+    const Polygon polygon = step_path(base, {}, weight, ends, kSteps, kSteps, rules);
+    EXPECT_GE(polygon.times_s.size(), 2U) << radius_mm;
+    LineRules real = rules;
+    real.nozzle_x = rules.nozzle_x.detuned(factor);
+    real.nozzle_y = rules.nozzle_y.detuned(factor);
+    const Followed fx(base, &BaseTrajectory::x_at, real.nozzle_x);
+    const Followed fy(base, &BaseTrajectory::y_at, real.nozzle_y);
+    double sum = 0.0;
+    double before_s = 0.0;
+    follow(polygon, real, kUntil_s, [&](double t, NozzleState x, NozzleState y) {
+      const double off_x = 1e3 * (x.position() - fx.at(t).position());
+      const double off_y = 1e3 * (y.position() - fy.at(t).position());
+      const double across = off_x * std::sin(angle(t)) - off_y * std::cos(angle(t));
+      sum += t > 0.2 ? (t - before_s) * across * across : 0.0;
+      before_s = t;
+    });
+    return sum;
+  }
+};
+
+// Whole steps leave errors that cancel each other at one frequency, or little of them over a band.
+TEST(StepPath, SuitsABandOfFrequencies) {
+  const LineRules exact = marlin_rules();
+  LineRules robust = exact;
+  robust.freq_error = 0.1;
+  const auto rms_um = [&](const LineRules& rules, double factor) {
+    double sum = 0.0;
+    for (const double radius_mm : {4.0, 5.0, 6.0, 7.0}) {
+      sum += Circle{radius_mm}.square_of_error(rules, factor);
+    }
+    return std::sqrt(sum / 4.0 / 0.8);
+  };
+  for (const double factor : {0.9, 1.1}) {
+    EXPECT_LT(rms_um(robust, factor), 0.8 * rms_um(exact, factor)) << factor;
+  }
+  EXPECT_LT(rms_um(robust, 1.0), 1.3 * rms_um(exact, 1.0));
+}
+
 TEST(StepPath, KeepsAllRulesOnRandomWays) {
   const LineRules rules = marlin_rules();
   for (unsigned seed = 0; seed < 40; ++seed) {

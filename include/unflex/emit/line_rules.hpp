@@ -18,6 +18,9 @@ struct Reach {
 struct LineRules {
   dynamics::FlexibleAxis nozzle_x;  // what hangs on the base
   dynamics::FlexibleAxis nozzle_y;
+  // The frequencies may be off by this share, up and down. Lines between whole steps suit nozzles
+  // that are. 0: the frequencies are exact.
+  double freq_error = 0.0;
   Reach reach_x;
   Reach reach_y;
   double tolerance_mm = 3e-4;  // largest nozzle error by what one line leaves out
