@@ -324,11 +324,18 @@ class SpeedSolver {
 
   // RepRapFirmware leaves out a line's ramp up from the faster of its two ends, and so goes no
   // faster than that end, if the ramp would take less than ten step clocks and gain less than 10 %
-  // (DDA.cpp, RecalculateMove). Returns the least gain over `end_mm_s` with which the ramp stays.
+  // (DDA.cpp, RecalculateMove). Returns the least gain over `end_mm_s` with which the ramp stays,
+  // and some room.
   [[nodiscard]] static double least_gain(double end_mm_s, double accel_mm_s2) {
     constexpr double kTenClocks_s = 10.0 / 750000.0;
     constexpr double kRoom = 1.05;
     return kRoom * std::min(accel_mm_s2 * kTenClocks_s, end_mm_s / 9.0);
+  }
+
+  // Whether that gain is enough. One that was chosen to be, and then rounded, is.
+  [[nodiscard]] static bool is_enough(double gain_mm_s, double least_mm_s) {
+    constexpr double kRounded = 0.99;
+    return gain_mm_s >= kRounded * least_mm_s;
   }
 
   // The line before i is faster than v and so ends slower than it goes. If it began slower too, it
@@ -343,11 +350,11 @@ class SpeedSolver {
     }
     const double faster_end = std::max(began, v);
     const double gain = least_gain(faster_end, accel_mm_s2_[i - 1]);
-    if (before - faster_end >= gain) {
+    if (is_enough(before - faster_end, gain)) {
       return v;
     }
     const double slower = before - gain;
-    if (slower >= began) {
+    if (v > began && slower >= began) {
       return before - v < 0.5 * gain ? before : slower;
     }
     // However slow this line is, the line before gains too little over its own beginning.
@@ -369,7 +376,7 @@ class SpeedSolver {
     const double after = i + 1 < speed_mm_s_.size() ? speed_mm_s_[i + 1] : 0.0;
     const double faster_end = std::max(before, std::min(after, v));
     const double gain = least_gain(faster_end, accel_mm_s2_[i]);
-    if (v == faster_end || v - faster_end >= gain) {
+    if (v == faster_end || is_enough(v - faster_end, gain)) {
       return v;
     }
     return v - faster_end < 0.5 * gain ? faster_end : faster_end + gain;

@@ -501,7 +501,9 @@ constexpr std::array kKeys = {
         "How much of its neighbours on either side such a part takes into account, at least; axes "
         "of several modes and a base that suits several models need more"},
     Key{"solve.lead_in_ms", &setting<&S::solve, &O::lead_in_ms>, Bounds{.min = 0.0, .max = 1000.0},
-        "ms", "How long before the plan the base may start"},
+        "ms",
+        "How long before the plan the base may start at least. Where a run begins to lay filament, "
+        "the time that the base needs to get ahead of the nozzle"},
     Key{"solve.tail_ms", &setting<&S::solve, &O::tail_ms>, Bounds{.min = 0.0, .max = 1000.0}, "ms",
         "How long after the plan the base may settle",
         "8ζ/ω of the slower axis, at least 2; Marlin, RRF 1 / emit.max_lines_per_s",

@@ -110,13 +110,32 @@ double accel_by_lines(const machine::Settings& settings) {
              : std::numeric_limits<double>::infinity();
 }
 
+// The shortest line that Marlin makes, along X or Y. Rounding may take a step off either end.
+double min_line_mm(const machine::Settings& settings) {
+  return settings.printer.firmware == Firmware::marlin
+             ? (settings.printer.min_steps_per_segment + 1.0) * grid_mm(settings)
+             : 0.0;
+}
+
+// The largest acceleration at which the lines can follow a base that turns round. It goes as far as
+// the shortest line in the time of a line, at²/2. A quicker base turns where no line ends.
+double accel_by_turns(const machine::Settings& settings, double asked_mm_s2) {
+  // With less than this share more than the sliced moves ask for, the nozzle hardly follows them.
+  constexpr double kLeast = 1.4;
+  const double shortest_mm = min_line_mm(settings);
+  const double line_s = settings.min_line_s();
+  return shortest_mm > 0.0 && !settings.is_timing_free()
+             ? std::max(2.0 * shortest_mm / (line_s * line_s), kLeast * asked_mm_s2)
+             : std::numeric_limits<double>::infinity();
+}
+
 // The acceleration that the base may have so that the text stays within the limits. There is a
 // limit of acceleration and, if lines end on a fine grid, one of the change of speed from line to
 // line. Whole steps of a motor are too coarse for the second.
 double planned_base_accel(const machine::Settings& settings, double asked_mm_s2) {
   const double shortest_s = settings.min_line_s();
-  const double limit =
-      std::min(settings.base_max_accel_mm_s2(asked_mm_s2), accel_by_lines(settings));
+  const double limit = std::min({settings.base_max_accel_mm_s2(asked_mm_s2),
+                                 accel_by_lines(settings), accel_by_turns(settings, asked_mm_s2)});
   const double axes =
       shares_motors(settings) ? 2.0 : 1.0;  // number of axes whose rounding a motor gets
   const double share = settings.is_timing_free() ? kAccelShareOfFreeTiming : kAccelShare;
@@ -230,10 +249,12 @@ double half_period_s(const machine::Settings& settings) {
   return 0.5 / std::min(settings.dynamics_x.slowest_hz(), settings.dynamics_y.slowest_hz());
 }
 
+// What the nozzle strays that may be seen in a print.
+constexpr double kSeen_mm = 10e-3;
+
 // Whether the run begins to lay filament while the nozzle still swings from the motion before it.
 bool draws_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
                     const machine::Settings& settings) {
-  constexpr double kSeen_mm = 10e-3;
   const verify::NozzleModel model{nozzle_x(settings), nozzle_y(settings)};
   if (verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) < kSeen_mm) {
     return false;
@@ -246,6 +267,36 @@ bool draws_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
     start_s += move.duration_s();
   }
   return false;
+}
+
+// A nozzle that accelerates out of a rest needs its base ahead by the lag, at once. How long the
+// base takes to get there, from rest to rest, where the run begins to lay filament and what is
+// missing would be seen: beside a path that soon bends, or if the axes lag differently.
+double time_ahead_s(const Piece& run, const compensate::Setup& setup, double soon_s) {
+  constexpr double kStraight = 0.999;  // cosine of the angle
+  const planner::PlannedMove& first = run.moves.front();
+  if (!first.segment.extruding()) {
+    return 0.0;
+  }
+  const double x = first.direction[gcode::X];
+  const double y = first.direction[gcode::Y];
+  const auto lag_mm = [&](const compensate::AxisSetup& axis, double share) {
+    return axis.axis.largest_lag_mm(first.accel_mm_s2 * std::abs(share), 0.0);
+  };
+  const double lag_x_mm = lag_mm(setup.x, x);
+  const double lag_y_mm = lag_mm(setup.y, y);
+  double seen_mm = std::abs(lag_x_mm * std::abs(y) - lag_y_mm * std::abs(x));
+  double start_s = first.duration_s();
+  for (std::size_t i = 1; i < run.moves.size() && start_s < soon_s; ++i) {
+    const auto& next = run.moves[i].direction;
+    if (x * next[gcode::X] + y * next[gcode::Y] < kStraight) {
+      seen_mm = std::hypot(lag_x_mm, lag_y_mm);
+    }
+    start_s += run.moves[i].duration_s();
+  }
+  return seen_mm > kSeen_mm ? 2.0 * std::sqrt(std::max(lag_x_mm / setup.x.limits.max_accel_mm_s2,
+                                                       lag_y_mm / setup.y.limits.max_accel_mm_s2))
+                            : 0.0;
 }
 
 // Filament per mm of path, in mm, from which on a move has too much. Klipper refuses such a move.
@@ -389,11 +440,9 @@ compensate::Setup compensate_setup(const machine::Settings& settings) {
                                settings.solve.overlap_s, settings.solve.window_s);
   setup.travel_weight = settings.solve.travel_weight;
   setup.jerk_weight = settings.jerk_weight();
-  if (settings.is_timing_free()) {
-    // A run that ends as soon as it can has little time to bring the nozzle to rest.
-    constexpr double kEndWeight = 10.0;
-    setup.end_weight = kEndWeight;
-  }
+  // What swings at the end of a run, travel before a wall for instance, is drawn by the next.
+  constexpr double kEndWeight = 10.0;
+  setup.end_weight = kEndWeight;
   if (settings.along_weight() < 1.0) {
     // A motion that is free along the path takes longer to settle than one that is not.
     constexpr double kLeastOverlap_s = 0.2;
@@ -430,8 +479,12 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
   };
   keep_above_zero(gcode::X, settings.printer.travel_x_mm, result.setup.x.limits);
   keep_above_zero(gcode::Y, settings.printer.travel_y_mm, result.setup.y.limits);
-  if (run.begins_run() && draws_swinging(run, nozzle, settings)) {
-    result.setup.lead_in_s = std::max(result.setup.lead_in_s, half_period_s(settings));
+  if (run.begins_run()) {
+    const double half_s = half_period_s(settings);
+    const double swing_s = draws_swinging(run, nozzle, settings) ? half_s : 0.0;
+    // The plan begins at a node, where its acceleration may leap.
+    const double nodes = std::ceil(time_ahead_s(run, result.setup, half_s) / setup.period_s);
+    result.setup.lead_in_s = std::max({result.setup.lead_in_s, swing_s, nodes * setup.period_s});
   }
   return result;
 }
@@ -486,7 +539,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
     // little in a line of one step or two: such lines leave 1.2 µm RMS where others leave 0.8.
     constexpr int kFewestSteps = 3;
     options.lines.min_steps = std::max(options.fixed.min_steps_per_segment, kFewestSteps);
-    options.lines.min_line_mm = (settings.printer.min_steps_per_segment + 1.0) * grid_mm(settings);
+    options.lines.min_line_mm = min_line_mm(settings);
     // With classic jerk as high as in a run, each line begins at its own speed.
     options.lines.leads = !options.fixed.classic_jerk;
   }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "plain_emission.hpp"
+#include "speeds.hpp"
 #include "unflex/emit/emitter.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
@@ -135,6 +136,45 @@ TEST(RrfRun, HasNoLineSlowerThanItSays) {
     ++looked_at;
   }
   EXPECT_GT(looked_at, 1000U);
+}
+
+// A line that is only a little faster than the one before it gets the least speed that keeps its
+// ramps. Lines behind it that are much slower stay so.
+TEST(RrfRun, GivesEachLineAboutTheTimeItIsToTake) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> a_little(0.0, 4.0);
+  std::uniform_real_distribution<double> slower(0.5, 0.9);
+  for (const double accel_mm_s2 : {5e4, 1e5, 2e5}) {
+    EmitOptions how = rrf_options();
+    how.line_accel_mm_s2 = accel_mm_s2;
+    how.run_limits.axis_max_accel_mm_s2 = {accel_mm_s2, accel_mm_s2, 200.0, accel_mm_s2};
+    how.run_limits.print_accel_mm_s2 = how.run_limits.travel_accel_mm_s2 = accel_mm_s2;
+    std::vector<Stroke> strokes;
+    std::vector<double> wanted_mm_s;
+    double x_mm = 0.0;
+    double t = 0.0;
+    const auto add = [&](double duration_s, double speed_mm_s) {
+      x_mm += duration_s * speed_mm_s;
+      t += duration_s;
+      Stroke stroke;
+      stroke.end_s = t;
+      stroke.x_mm = x_mm;
+      strokes.push_back(stroke);
+      wanted_mm_s.push_back(speed_mm_s);
+    };
+    for (int i = 0; i < 200; ++i) {
+      const double even_mm_s = 30.0 + a_little(random);
+      add(30e-3, even_mm_s);
+      add(4e-3, even_mm_s + a_little(random));
+      add(9e-3, even_mm_s * slower(random));
+    }
+    set_speeds({}, Passing{}, how, Grid{}, 0.0, strokes);
+    for (std::size_t i = 1; i < strokes.size(); ++i) {
+      // The gain that keeps a ramp is up to a ninth of a speed.
+      EXPECT_NEAR(strokes[i].speed_mm_s, wanted_mm_s[i], 0.13 * wanted_mm_s[i])
+          << i << " at " << accel_mm_s2;
+    }
+  }
 }
 
 // A slow circle with waves, as a vase is printed: the lines are a few steps long, so their speeds

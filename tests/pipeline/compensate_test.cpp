@@ -449,6 +449,29 @@ TEST_F(Texts, StopTheNozzleBeforeTheyDraw) {
   EXPECT_LT(report_.compensated.extruding.contour_max_mm, 6e-3);
 }
 
+// Where a run begins with a bend, the base first gets ahead of the nozzle.
+TEST_F(Texts, BeginWithTheBaseAheadWhereThatIsSeen) {
+  const std::string head = "G90\nM83\nG1 X60 Y60 Z0.4 F6000\nG4 P500\n";
+  const std::vector<std::string> quick = {"limits.max_accel_mm_s2=10000", "dynamics.y.freq_hz=36"};
+  const std::string bend = compensated(
+      head + "G1 X60.2 Y60.03 E.02 F6000\nG1 X60.4 Y60.1 E.02\nG1 X70 Y66 E1\n", 1, quick);
+  EXPECT_THAT(bend, HasSubstr(";unflex run LEAD_IN=0.006000\n"));
+  EXPECT_LT(report_.compensated.extruding.contour_max_mm, 8e-3);
+  const std::string straight = compensated(head + "G1 X80 E1 F6000\nG1 Y80 E1\n", 1, quick);
+  EXPECT_THAT(straight, HasSubstr(";unflex run\n"));
+  const std::string diagonal = compensated(head + "G1 X80 Y80 E1 F6000\n", 1, quick);
+  EXPECT_THAT(diagonal, HasSubstr(";unflex run LEAD_IN=")) << "the axes lag differently";
+}
+
+// What still swings when a travel ends is drawn by the next run.
+TEST_F(Texts, EndTravelWithoutASwing) {
+  compensated(
+      "G90\nM83\nG1 X60 Y60 Z0.6 F6000\nG4 P500\nG1 X152.2 Y148.7 F18000\nG1 Z.2\n"
+      "M204 S1000\nG1 X153.3 Y148 E.05 F1800\nG1 X168.6 Y141 E.7\n",
+      1, {"limits.max_accel_mm_s2=10000", "dynamics.y.freq_hz=36", "dynamics.freq_error=0.1"});
+  EXPECT_LT(report_.compensated.extruding.contour_max_mm, 10e-3);
+}
+
 TEST_F(Texts, StopForObjectLabelsAndSavedStates) {
   const std::string label = "EXCLUDE_OBJECT_START NAME=cube";
   const std::string output =
