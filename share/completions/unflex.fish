@@ -107,6 +107,7 @@ complete -c unflex -n '__unflex_in tune' -s o -l output -x -a $gcode -d 'Where t
 complete -c unflex -n '__unflex_in tune' -l like -x -a $gcode -d 'A sliced print, for its start code and end code'
 complete -c unflex -n '__unflex_in tune' -l nozzle-temp -x -d 'Without --like: degrees Celsius'
 complete -c unflex -n '__unflex_in tune' -l bed-temp -x -d 'Without --like: degrees Celsius'
+complete -c unflex -n '__unflex_in tune' -l accel -x -d 'Acceleration of the tower, mm/s²'
 complete -c unflex -n '__unflex_in tune' -l report -x -a '(__unflex_files .html)' -d 'Write a page with pictures of the walls'
 
 complete -c unflex -n '__unflex_in hotend' -l power -x -d 'What means full power in the log'

@@ -148,6 +148,11 @@ void add_tune(CLI::App& program, RunConfig& config) {
   command->add_option("--bed-temp", tune.bed_temp_c, "Without --like: the bed's temperature")
       ->type_name("C")
       ->check(positive());
+  command
+      ->add_option("--accel", tune.accel_mm_s2,
+                   "Acceleration of the tower, in mm/s^2, where the printer's own is too little")
+      ->type_name("N")
+      ->check(positive());
   add_settings(*command, config);
   command
       ->add_option("--report", config.report,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <optional>
 #include <sstream>
@@ -34,6 +35,7 @@ constexpr double kDampingErrorOfGiven = 0.05;
 // A printer of which the towers are made, and the codes of its prints.
 struct Printer {
   machine::Settings settings;
+  std::optional<tune::AccelLimits> own = {};  // with --accel
   Known known;
   tune::Codes codes;
 };
@@ -99,6 +101,35 @@ Result<machine::Settings> load_settings(const RunConfig& config, const machine::
   });
 }
 
+// The limits of the printer that a tower of another acceleration goes beyond.
+tune::AccelLimits own_limits(const machine::Settings& settings) {
+  const std::array<double, 4> axes = settings.axis_max_accel_mm_s2();
+  const bool is_klipper = settings.printer.firmware == Firmware::klipper;
+  return {axes[0], axes[1],
+          is_klipper ? settings.limits.max_accel_mm_s2 : settings.print_accel_mm_s2(),
+          settings.travel_accel_mm_s2()};
+}
+
+// The settings of the printer with the acceleration of --accel, and its own limits.
+Status raise_accel(const RunConfig& config, const machine::PrintText* print, Printer& printer) {
+  if (!config.tune.accel_mm_s2) {
+    return {};
+  }
+  printer.own = own_limits(printer.settings);
+  RunConfig raised = config;
+  for (const char* const key :
+       {"limits.max_accel_mm_s2", "limits.print_accel_mm_s2", "limits.travel_accel_mm_s2",
+        "limits.max_x_accel_mm_s2", "limits.max_y_accel_mm_s2"}) {
+    raised.overrides.push_back(fmt::format("{}={}", key, *config.tune.accel_mm_s2));
+  }
+  Result<machine::Settings> settings = load_settings(raised, print);
+  if (!settings) {
+    return tl::unexpected(settings.error());
+  }
+  printer.settings = std::move(*settings);
+  return {};
+}
+
 double accel_mm_s2(const machine::Settings& settings) {
   if (settings.printer.firmware == Firmware::klipper) {
     return settings.limits.max_accel_mm_s2;
@@ -142,6 +173,9 @@ Result<Printer> first_printer(const RunConfig& config) {
     return tl::unexpected(settings.error());
   }
   printer.settings = std::move(*settings);
+  if (Status raised = raise_accel(config, print ? &*print : nullptr, printer); !raised) {
+    return tl::unexpected(raised.error());
+  }
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const Result<tune::Knowledge> known = knowledge_of(printer.settings, axis);
     if (!known) {
@@ -212,6 +246,21 @@ Result<std::string> new_printer_file(const RunConfig& config, const Known& known
       });
 }
 
+// A zone that reaches an end of the bands may go on beyond it.
+std::string edge_text(std::size_t axis, const tune::Trial& trial, const tune::Zone& zone) {
+  if (zone.first > 1 && zone.last < trial.bands) {
+    return {};
+  }
+  const bool both = zone.first == 1 && zone.last == trial.bands;
+  return fmt::format("   careful: {} show no waves, so {} may lie beyond; {}\n",
+                     both              ? "all bands"
+                     : zone.first == 1 ? "the lowest bands"
+                                       : "the highest bands",
+                     kLetters[axis] == 'x' ? "x" : "y",
+                     both ? "the tower may be too slow to show any: try --accel"
+                          : "make the next tower, which tries around here, before you trust it");
+}
+
 // The printer after what its tower tells.
 Result<Printer> read_tower(const RunConfig& config, std::string& summary) {
   Result<Input> input = Input::open(config.input);
@@ -229,7 +278,10 @@ Result<Printer> read_tower(const RunConfig& config, std::string& summary) {
   if (!settings) {
     return tl::unexpected(settings.error());
   }
-  Printer printer{std::move(*settings), {}, std::move(record->codes)};
+  Printer printer{.settings = std::move(*settings), .known = {}, .codes = std::move(record->codes)};
+  if (Status raised = raise_accel(config, nullptr, printer); !raised) {
+    return tl::unexpected(raised.error());
+  }
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const tune::Trial& trial = record->trials[axis];
     printer.known[axis] = trial.known;
@@ -242,6 +294,7 @@ Result<Printer> read_tower(const RunConfig& config, std::string& summary) {
     }
     printer.known[axis] = *known;
     summary += fmt::format("{}: {}\n", kLetters[axis], known_text(*known));
+    summary += edge_text(axis, trial, *config.tune.zones[axis]);
   }
   return printer;
 }
@@ -276,6 +329,7 @@ Status write_tower(const RunConfig& config, const Printer& printer, std::string&
   wanted.firmware = printer.settings.printer.firmware;
   wanted.codes = printer.codes;
   wanted.accel_mm_s2 = accel_mm_s2(printer.settings);
+  wanted.own = printer.own;
   wanted.max_velocity_mm_s = printer.settings.limits.max_velocity_mm_s;
   wanted.nozzle_diameter_mm = printer.settings.extruder.nozzle_diameter_mm;
   wanted.filament_diameter_mm = printer.settings.extruder.filament_diameter_mm;
@@ -283,6 +337,13 @@ Status write_tower(const RunConfig& config, const Printer& printer, std::string&
   for (std::size_t axis = 0; axis < 2; ++axis) {
     wanted.trials[axis] = tune::next_trial(printer.known[axis], wanted.accel_mm_s2);
     const tune::Trial& trial = wanted.trials[axis];
+    if (const double needed = tune::needed_accel_mm_s2(trial, wanted.accel_mm_s2); needed > 0.0) {
+      return fail(ErrorKind::usage,
+                  fmt::format("{}: at {:.0f} mm/s² no waves can be seen in the walls; the tower "
+                              "needs {:.0f} mm/s²: give --accel {:.0f} if the machine can do that",
+                              kLetters[axis], wanted.accel_mm_s2, std::ceil(needed / 50.0) * 50.0,
+                              std::ceil(needed / 50.0) * 50.0));
+    }
     middle.freq_hz[axis] = trial.freq_hz((trial.bands + 1) / 2);
     middle.damping_ratio[axis] = trial.damping_ratio((trial.bands + 1) / 2);
   }
@@ -328,7 +389,9 @@ Status write_tower(const RunConfig& config, const Printer& printer, std::string&
       "{}: print it; then look at the right wall for x and at the front wall for y, count from the "
       "bed, and run\nunflex tune {} --read x=FIRST..LAST --read y=FIRST..LAST{} -o NEXT\n",
       config.output, config.output,
-      config.printer_file ? " --printer " + *config.printer_file : std::string{});
+      (config.printer_file ? " --printer " + *config.printer_file : std::string{}) +
+          (config.tune.accel_mm_s2 ? fmt::format(" --accel {:g}", *config.tune.accel_mm_s2)
+                                   : std::string{}));
   return output->write(pipeline::join_bands(*bands)).and_then([&] { return output->commit(); });
 }
 

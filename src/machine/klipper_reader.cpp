@@ -84,6 +84,27 @@ std::optional<double> number_of(std::string_view text) {
   return whole ? std::optional(value) : std::nullopt;
 }
 
+// Whether a macro gives an input shaper a frequency of its own. One that switches it off, or back
+// to what the configuration says, does not.
+bool sets_shaper(std::string_view macro) {
+  const std::string text = lower(macro);
+  constexpr std::string_view kFrequency = "shaper_freq_";
+  for (std::size_t at = text.find("set_input_shaper"); at != std::string::npos;
+       at = text.find("set_input_shaper", at + 1)) {
+    const std::string_view line = std::string_view(text).substr(at, text.find('\n', at) - at);
+    const std::size_t word = line.find(kFrequency);
+    const std::size_t value = word == std::string_view::npos ? word : line.find('=', word);
+    if (value == std::string_view::npos) {
+      continue;
+    }
+    const std::size_t digit = line.find_first_not_of(" 0.", value + 1);
+    if (digit != std::string_view::npos && line[digit] >= '1' && line[digit] <= '9') {
+      return true;
+    }
+  }
+  return false;
+}
+
 // "57:11, 2:1": the product of the ratios.
 std::optional<double> gear_ratio(std::string_view text) {
   double product = 1.0;
@@ -145,6 +166,7 @@ class Reader {
     minimum_cruise_ratio();
     firmware_retraction();
     kalico();
+    heads();
     travel("x");
     travel("y");
     input_shaper("x");
@@ -271,6 +293,28 @@ class Reader {
     const KlipperOption& kinematics = *option("printer", "kinematics");
     if (kinematics.text.starts_with("limited_")) {
       recognised("kalico_limited", kinematics.place);
+    }
+  }
+
+  // What tells of more than one head, or of more than one resonance: a second carriage, a tool
+  // changer (viesturz/klipper-toolchanger), and macros that set input shapers.
+  void heads() {
+    for (const auto& [name, section] : config_->sections) {
+      const bool changes_heads =
+          name == "dual_carriage" || name.starts_with("dual_carriage ") || name == "toolchanger";
+      const KlipperOption* const text =
+          name.starts_with("gcode_macro ") ? section.find("gcode") : nullptr;
+      if (changes_heads) {
+        note(section.place, fmt::format("[{}]: this printer has more than one head, and unflex "
+                                        "takes one resonance for all; measure the head that "
+                                        "prints, and keep a printer file for each",
+                                        name));
+      } else if (text != nullptr && sets_shaper(text->text)) {
+        note(section.place, fmt::format("[{}] sets an input shaper, as where the resonance is not "
+                                        "always the same; unflex takes one resonance, so keep a "
+                                        "printer file for each",
+                                        name));
+      }
     }
   }
 

@@ -119,8 +119,7 @@ bool warn_of_no_run(const Job& job, report::Report& report) {
 void warn_of_no_gain(const Job& job, report::Report& report) {
   constexpr double kWorse = 1.05;
   constexpr double kWorse_mm = 2e-4;
-  const report::FreeTiming& timing = report.free_timing;
-  if (timing.tolerance_mm > 0.0 && timing.contour_p999_mm <= kWorse * timing.tolerance_mm) {
+  if (report.free_timing.is_kept()) {
     return;  // it was to be faster, and is as exact as it was to be
   }
   const double now_mm = report.uncompensated.extruding.contour_rms_mm;

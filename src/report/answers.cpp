@@ -110,14 +110,11 @@ std::string faster_text(const Report& report) {
     return {};
   }
   const double change = 1.0 - report.emitted_time_s / report.reference_time_s;
-  constexpr double kKept = 1.05;
-  const bool is_kept =
-      report.free_timing.contour_p999_mm <= kKept * report.free_timing.tolerance_mm;
   return fmt::format("{} → {} to print, {:.0f} % {}; the nozzle may stray {:.4g} µm and {}",
                      duration_text(report.reference_time_s), duration_text(report.emitted_time_s),
                      100.0 * std::abs(change), change >= 0.0 ? "less" : "more",
                      report.free_timing.tolerance_mm * 1e3,
-                     is_kept ? "keeps to it" : "strays further in places");
+                     report.free_timing.is_kept() ? "keeps to it" : "strays further in places");
 }
 
 Worst worst(const Report& report) {

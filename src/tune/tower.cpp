@@ -211,15 +211,14 @@ class Writer {
   std::string text_;
 };
 
-std::string accel_command(const TowerSettings& settings) {
-  switch (settings.firmware) {
-    case Firmware::marlin:
-    case Firmware::rrf:
-      return fmt::format("M204 P{0:.0f} T{0:.0f}", settings.accel_mm_s2);
-    case Firmware::klipper:
-      break;
+// Sets these limits. Klipper has one for all moves, and Marlin and RepRapFirmware one for each axis
+// besides, which is set only if the tower goes beyond the printer's own.
+std::string accel_commands(Firmware firmware, const AccelLimits& limits, bool with_axes) {
+  if (firmware == Firmware::klipper) {
+    return fmt::format("M204 S{:.0f}", limits.print);
   }
-  return fmt::format("M204 S{:.0f}", settings.accel_mm_s2);
+  return (with_axes ? fmt::format("M201 X{:.0f} Y{:.0f}\n", limits.x, limits.y) : std::string{}) +
+         fmt::format("M204 P{:.0f} T{:.0f}", limits.print, limits.travel);
 }
 
 constexpr std::string_view kCenterMark = "; unflex tune: center=";
@@ -279,7 +278,9 @@ Tower tower(const TowerSettings& settings) {
   for (const char* mode : {"G21", "G90", "M83", "G92 E0"}) {
     writer.line(mode);
   }
-  writer.line(accel_command(settings));
+  const double accel = settings.accel_mm_s2;
+  writer.line(
+      accel_commands(settings.firmware, {accel, accel, accel, accel}, settings.own.has_value()));
   result.start = comments + whole_lines(settings.codes.start) + writer.take();
   // Above whatever the start code has laid.
   writer.lift(kClear_mm);
@@ -314,6 +315,9 @@ Tower tower(const TowerSettings& settings) {
   }
   writer.line(fmt::format("G1 E-1.00000 F{:.0f}", 60.0 * kInnerSpeed_mm_s / 2.0));
   writer.lift(z_mm - layer_mm + kLiftAtEnd_mm);
+  if (settings.own) {
+    writer.line(accel_commands(settings.firmware, *settings.own, true));
+  }
   result.foot = writer.take() + whole_lines(settings.codes.end);
   // Walls printed first in each ring.
   result.walls = {writer.straight_part(1), writer.straight_part(0)};

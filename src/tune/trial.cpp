@@ -163,6 +163,13 @@ Trial next_trial(const Knowledge& known, double accel_mm_s2) {
   return known.rounds % 2 == 0 ? freq_trial(known, accel_mm_s2) : damping_trial(known, accel_mm_s2);
 }
 
+double needed_accel_mm_s2(const Trial& trial, double accel_mm_s2) {
+  // A zone of 30 % either way is most of the first tower.
+  constexpr double kWidest = 0.3;
+  const double half_zone = half_zone_of(trial.waves, trial.known.damping_ratio);
+  return half_zone > kWidest ? accel_mm_s2 * half_zone / kWidest : 0.0;
+}
+
 Result<Knowledge> read(const Trial& trial, const Zone& zone) {
   if (zone.first < 1 || zone.first > zone.last || zone.last > trial.bands) {
     return fail(ErrorKind::usage,

@@ -9,6 +9,8 @@ namespace {
 
 // What is larger by less is rounding, so that an even difference has its first line.
 constexpr double kRounding = 1e-9;
+// A sliced file that lays less filament than this in the window, 10 µm/s, is no measure.
+constexpr double kLeast_mm = 1e-4;
 
 // The roots of a·t² + b·t + c = 0; 0 in place of one that there is not.
 std::array<double, 2> roots(double a, double b, double c) {
@@ -151,7 +153,7 @@ void FlowDifferenceGauge::go_on(const Rate& sliced, const Rate& difference, doub
   sliced_mm_ += s.integral(duration_s);
   difference_mm_ += d.integral(duration_s);
   look_at(sliced_mm_, difference_mm_, duration_s);
-  if (sliced_mm_ > 0.0) {
+  if (sliced_mm_ > kLeast_mm) {
     const double relative = difference_mm_ / sliced_mm_;
     relative_s_.add_square(relative * relative, duration_s);
   }
@@ -165,7 +167,7 @@ void FlowDifferenceGauge::go_on(const Rate& sliced, const Rate& difference, doub
 
 // later_s: how much later the window ends than the one at hand.
 void FlowDifferenceGauge::look_at(double sliced_mm, double difference_mm, double later_s) {
-  if (!(sliced_mm > 0.0)) {
+  if (!(sliced_mm > kLeast_mm)) {
     return;
   }
   const double relative = difference_mm / sliced_mm;

@@ -13,10 +13,12 @@ double LogHistogram::quantile(double fraction) const {
   const double target = fraction * std::accumulate(weights_.begin(), weights_.end(), 0.0);
   double weight = 0.0;
   for (std::size_t cell = 0; cell < weights_.size(); ++cell) {
-    weight += weights_[cell];
-    if (weight > 0.0 && weight >= target) {
-      return 0.5 * (border(cell) + border(cell + 1));
+    const double here = weights_[cell];
+    if (here > 0.0 && weight + here >= target) {
+      const double share = (target - weight) / here;
+      return border(cell) + share * (border(cell + 1) - border(cell));
     }
+    weight += here;
   }
   return 0.0;
 }

@@ -56,6 +56,20 @@ TEST_F(Tune, WritesATowerReadsItAndWritesTheNext) {
   EXPECT_THAT(read_file(path("t2.gcode")), HasSubstr("; unflex tune: start="));
 }
 
+// M201 of a stock Ender-3. The tower of another acceleration is compensated within its own limits.
+TEST_F(Tune, RaisesTheLimitsOfASlowPrinterForItsTower) {
+  write_file(path("slow.toml"),
+             "schema_version = 1\n[printer]\nfirmware = \"marlin\"\ntravel_x_mm = [0, 220]\n"
+             "travel_y_mm = [0, 220]\n[limits]\nmax_x_accel_mm_s2 = 500\nmax_y_accel_mm_s2 = 500\n"
+             "print_accel_mm_s2 = 500\ntravel_accel_mm_s2 = 1000\n");
+  const std::vector<std::string> slow = {"tune", "-o",        "t.gcode",  "--nozzle-temp",
+                                         "210",  "--printer", "slow.toml"};
+  const Outcome refused = run_as_typed(slow);
+  EXPECT_EQ(refused.exit_code, 1) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("at 500 mm/s² no waves can be seen in the walls; the tower "
+                                     "needs 750 mm/s²: give --accel 750"));
+}
+
 TEST_F(Tune, TellsTheLinesIfThereIsNoPrinterFile) {
   // The first lines of a tower are enough to read it.
   const std::string trial =

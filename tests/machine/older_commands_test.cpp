@@ -231,6 +231,27 @@ TEST(HybridCorexy, MayBeInverted) {
   }
 }
 
+// One resonance for both heads would be wrong for one of them.
+TEST(KlipperHeads, AreToldOfWhereThereIsMoreThanOne) {
+  const std::string printer(kKlipper);
+  const auto notes = [&](const std::string& more) {
+    std::string text;
+    for (const Diagnostic& note : read(printer + more, "printer.cfg").notes) {
+      text += to_string(note) + "\n";
+    }
+    return text;
+  };
+  const std::string alone = notes("");
+  EXPECT_THAT(notes("[dual_carriage]\naxis: x\n"),
+              HasSubstr("[dual_carriage]: this printer has more than one head"));
+  EXPECT_THAT(notes("[toolchanger]\nname: a\n"), HasSubstr("[toolchanger]: this printer"));
+  const std::string macro = "[gcode_macro T1]\ngcode:\n  ACTIVATE_EXTRUDER EXTRUDER=extruder1\n  ";
+  EXPECT_THAT(notes(macro + "SET_INPUT_SHAPER SHAPER_FREQ_X=52 SHAPER_FREQ_Y=37\n"),
+              HasSubstr("[gcode_macro T1] sets an input shaper"));
+  EXPECT_EQ(notes(macro + "SET_INPUT_SHAPER SHAPER_FREQ_X=0 SHAPER_FREQ_Y=0\n"), alone);
+  EXPECT_EQ(notes(macro + "SET_INPUT_SHAPER SHAPER_FREQ_X={params.X}\n"), alone);
+}
+
 // docs.kalico.gg, Config_Reference: constants.
 TEST(KalicoReferences, AreFollowed) {
   const Settings s = read(

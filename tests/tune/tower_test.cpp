@@ -140,6 +140,21 @@ TEST(Tower, FitsSlowAndFastPrinters) {
   }
 }
 
+// Marlin keeps what M201 and M204 set until it is set again.
+TEST(Tower, GoesBeyondThePrintersLimitsAndSetsThemAgain) {
+  TowerSettings raised = settings(2500.0);
+  raised.firmware = Firmware::marlin;
+  EXPECT_EQ(tower(raised).start.find("M201"), std::string::npos);
+  raised.own = AccelLimits{500.0, 400.0, 450.0, 300.0};
+  const Tower built = tower(raised);
+  EXPECT_TRUE(built.start.ends_with("M201 X2500 Y2500\nM204 P2500 T2500\n")) << built.start;
+  const std::size_t back = built.foot.find("M201 X500 Y400\nM204 P450 T300\n");
+  ASSERT_NE(back, std::string::npos) << built.foot;
+  EXPECT_LT(back, built.foot.find(raised.codes.end));
+  raised.firmware = Firmware::klipper;
+  EXPECT_NE(tower(raised).foot.find("\nM204 S450\n"), std::string::npos);
+}
+
 TEST(Tower, TellsWhatItIs) {
   const TowerSettings wanted = settings();
   const Result<TowerRecord> record = record_of(whole(tower(wanted)), "tower.gcode");

@@ -24,6 +24,15 @@ TEST(Trial, TriesAllFrequenciesOfPrintersIfNothingIsKnown) {
   EXPECT_GT(2.0 * trial.waves.freq_hz, 1.2 * trial.value(trial.bands));
 }
 
+// A stock Ender-3 has 500 mm/s².
+TEST(Trial, NeedsAnAccelerationThatMakesWavesSeen) {
+  const double needed = needed_accel_mm_s2(next_trial({}, 500.0), 500.0);
+  EXPECT_GT(needed, 600.0);
+  EXPECT_LT(needed, 1000.0);
+  EXPECT_EQ(needed_accel_mm_s2(next_trial({}, 1.01 * needed), 1.01 * needed), 0.0);
+  EXPECT_EQ(needed_accel_mm_s2(next_trial({}, kAccel_mm_s2), kAccel_mm_s2), 0.0);
+}
+
 TEST(Trial, TakesTurnsBetweenFrequencyAndDamping) {
   EXPECT_EQ(next_trial(known(45.0, 0.1, 0), kAccel_mm_s2).parameter, Parameter::freq_hz);
   EXPECT_EQ(next_trial(known(45.0, 0.1, 1), kAccel_mm_s2).parameter, Parameter::damping_ratio);

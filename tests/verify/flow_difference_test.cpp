@@ -85,6 +85,15 @@ TEST_F(TwoFiles, AreNotComparedWhereNothingIsLaid) {
   EXPECT_FALSE(gauge_.stats());
 }
 
+// A share of next to nothing would be any number.
+TEST_F(TwoFiles, AreNotComparedWhereHardlyAnythingIsLaid) {
+  gauge_.begin_run(0.0);
+  sliced(move(1e-15, 1e-15, 5.0 * kTau_s));
+  output(move(1.0, 1.0, 5.0 * kTau_s));
+  gauge_.end_run();
+  EXPECT_FALSE(gauge_.stats());
+}
+
 TEST_F(TwoFiles, AreNotComparedInLessThanAWindow) {
   gauge_.begin_run(0.0);
   for (int i = 0; i < 10; ++i) {

@@ -69,6 +69,7 @@ struct TuneConfig {
   std::optional<std::string> like;  // a sliced print, for its start and end codes
   std::optional<double> nozzle_temp_c;
   double bed_temp_c = 0.0;
+  std::optional<double> accel_mm_s2 = {};  // of the tower, instead of the printer's own
 };
 
 // What `hotend` works on, besides a log (RunConfig::input) or a printer's model.

@@ -97,6 +97,12 @@ struct FreeTiming {
   double speed_p999 = 0.0;
   double speed_max = 0.0;
   std::size_t speed_max_line = 0;  // of the input
+
+  // Whether the nozzle keeps to the tolerance, with what rounding adds; false if there is none.
+  [[nodiscard]] bool is_kept() const {
+    constexpr double kRounded = 1.05;
+    return tolerance_mm > 0.0 && contour_p999_mm <= kRounded * tolerance_mm;
+  }
 };
 
 // A stretch of the input whose lines, kept or rewritten, are more than the budget.

@@ -14,6 +14,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,11 +32,21 @@ struct Codes {
   double center_y_mm = 0.0;
 };
 
+// Limits of a printer, mm/s².
+struct AccelLimits {
+  double x = 0.0;
+  double y = 0.0;
+  double print = 0.0;
+  double travel = 0.0;
+};
+
 struct TowerSettings {
   std::array<Trial, 2> trials;  // X's and Y's
   Firmware firmware = Firmware::klipper;
   Codes codes;
   double accel_mm_s2 = 5000.0;  // of the print
+  // The printer's own limits, if the tower is to go beyond them. They are back when it is done.
+  std::optional<AccelLimits> own = {};
   double max_velocity_mm_s = 300.0;
   double nozzle_diameter_mm = 0.4;
   double filament_diameter_mm = 1.75;

@@ -68,6 +68,10 @@ struct Zone {
 // What to try next for an axis whose print accelerates by as much.
 [[nodiscard]] Trial next_trial(const Knowledge& known, double accel_mm_s2);
 
+// The acceleration of the print with which the trial's walls can be read: below it, bands that are
+// far off show no waves either. 0 if the one that the trial is made for is enough.
+[[nodiscard]] double needed_accel_mm_s2(const Trial& trial, double accel_mm_s2);
+
 // What the zone tells. If it reaches an end of the bands, the true value may lie beyond, and the
 // error says so. Errors are of kind usage: the trial has no such bands.
 [[nodiscard]] Result<Knowledge> read(const Trial& trial, const Zone& zone);
