@@ -28,6 +28,15 @@ has tower.txt "freq_hz = 44.4"
 "$UNFLEX" printer init --from m503.txt -o printer.toml --set kinematics.type=cartesian \
   --set dynamics.x.freq_hz=44.4 --set dynamics.y.freq_hz=38 >init.txt 2>init.err
 
+# Its 500 mm/s² are too few to see anything in a tower of unflex' own.
+printf '[kinematics]\ntype = "cartesian"\n[printer]\nfirmware = "marlin"\n%s\n' \
+  "[limits]
+print_accel_mm_s2 = 500
+max_x_accel_mm_s2 = 500
+max_y_accel_mm_s2 = 500" >stock.toml
+refused 1 "$UNFLEX" tune -o tower.gcode --nozzle-temp 210 --printer stock.toml
+has err.txt "give --accel 750"
+
 "$UNFLEX" compensate plate.gcode --in-place --printer printer.toml >summary.txt 2>summary.err
 has plate.gcode ";unflex run"
 has summary.txt "Safe?         Yes, every rule is kept."
