@@ -132,10 +132,13 @@ double accel_by_turns(const machine::Settings& settings, double asked_mm_s2) {
 // The acceleration that the base may have so that the text stays within the limits. There is a
 // limit of acceleration and, if lines end on a fine grid, one of the change of speed from line to
 // line. Whole steps of a motor are too coarse for the second.
-double planned_base_accel(const machine::Settings& settings, double asked_mm_s2) {
+double planned_base_accel(const machine::Settings& settings, double asked_mm_s2,
+                          bool for_turns = true) {
   const double shortest_s = settings.min_line_s();
-  const double limit = std::min({settings.base_max_accel_mm_s2(asked_mm_s2),
-                                 accel_by_lines(settings), accel_by_turns(settings, asked_mm_s2)});
+  const double by_turns =
+      for_turns ? accel_by_turns(settings, asked_mm_s2) : std::numeric_limits<double>::infinity();
+  const double limit =
+      std::min({settings.base_max_accel_mm_s2(asked_mm_s2), accel_by_lines(settings), by_turns});
   const double axes =
       shares_motors(settings) ? 2.0 : 1.0;  // number of axes whose rounding a motor gets
   const double share = settings.is_timing_free() ? kAccelShareOfFreeTiming : kAccelShare;
@@ -252,13 +255,16 @@ double half_period_s(const machine::Settings& settings) {
 // What the nozzle strays that may be seen in a print.
 constexpr double kSeen_mm = 10e-3;
 
-// Whether the run begins to lay filament while the nozzle still swings from the motion before it.
-bool draws_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
-                    const machine::Settings& settings) {
+// Whether the nozzle still swings from the motion before when the run begins.
+bool begins_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
+                     const machine::Settings& settings) {
   const verify::NozzleModel model{nozzle_x(settings), nozzle_y(settings)};
-  if (verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) < kSeen_mm) {
-    return false;
-  }
+  return run.begins_run() &&
+         verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) >= kSeen_mm;
+}
+
+// Whether the run soon lays filament.
+bool draws_soon(const Piece& run, const machine::Settings& settings) {
   double start_s = 0.0;
   for (const planner::PlannedMove& move : run.moves) {
     if (start_s > half_period_s(settings) || move.segment.extruding()) {
@@ -462,7 +468,9 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
     result.asked_accel_mm_s2 =
         std::max(result.asked_accel_mm_s2, std::round(planner::asked_accel_mm_s2(move)));
   }
-  result.accel = {planned_base_accel(settings, result.asked_accel_mm_s2),
+  // A swing that is there needs all that the motors give.
+  const bool swings = begins_swinging(run, nozzle, settings);
+  result.accel = {planned_base_accel(settings, result.asked_accel_mm_s2, !swings),
                   settings.emit_accel_mm_s2(result.asked_accel_mm_s2)};
   result.accel_by_lines_mm_s2 = accel_by_lines(settings);
   for (compensate::AxisSetup* const axis : {&result.setup.x, &result.setup.y}) {
@@ -481,7 +489,7 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
   keep_above_zero(gcode::Y, settings.printer.travel_y_mm, result.setup.y.limits);
   if (run.begins_run()) {
     const double half_s = half_period_s(settings);
-    const double swing_s = draws_swinging(run, nozzle, settings) ? half_s : 0.0;
+    const double swing_s = swings && draws_soon(run, settings) ? half_s : 0.0;
     // The plan begins at a node, where its acceleration may leap.
     const double nodes = std::ceil(time_ahead_s(run, result.setup, half_s) / setup.period_s);
     result.setup.lead_in_s = std::max({result.setup.lead_in_s, swing_s, nodes * setup.period_s});
