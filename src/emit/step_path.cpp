@@ -2,8 +2,10 @@
 #include "step_path.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include "leaps.hpp"
+#include "line_fan.hpp"
 #include "step_search.hpp"
 
 namespace unflex::emit {
@@ -24,6 +26,20 @@ State<kModes> start_of(const RunEnds& ends, const LineCosts<kModes>& costs, cons
   return state;
 }
 
+// z of nozzles that go along with a line which is off the base by so much, more and more.
+template <int kModes>
+ZVector<kModes> going_along(const LineCosts<kModes>& costs, const Eigen::Vector2d& off_mm,
+                            const Eigen::Vector2d& off_mm_s) {
+  ZVector<kModes> z;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    z.template segment<2 * kModes>(a * kOfAxis<kModes>) =
+        costs.riding(axis, off_mm[a], off_mm_s[a]);
+    z[place_of_o<kModes>(axis)] = off_mm[a];
+  }
+  return z;
+}
+
 // The state at the end of a leap, all along which the nozzle has followed the line.
 template <int kModes>
 State<kModes> end_of(const Leap& leap, const LineCosts<kModes>& costs, const StepGrid& grid) {
@@ -31,12 +47,7 @@ State<kModes> end_of(const Leap& leap, const LineCosts<kModes>& costs, const Ste
   const Eigen::Vector2d before = grid.mm(leap.begin) - costs.base_mm(leap.from);
   const Eigen::Vector2d off = grid.mm(leap.end) - costs.base_mm(leap.until);
   State<kModes> state;
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    const auto a = static_cast<Eigen::Index>(axis);
-    state.z.template segment<2 * kModes>(a * kOfAxis<kModes>) =
-        costs.riding(axis, off[a], (off[a] - before[a]) / duration_s);
-    state.z[place_of_o<kModes>(axis)] = off[a];
-  }
+  state.z = going_along<kModes>(costs, off, (off - before) / duration_s);
   state.at = leap.end;
   state.speed_mm_s = (grid.mm(leap.end) - grid.mm(leap.begin)) / duration_s;
   state.line_s = duration_s;
@@ -48,6 +59,39 @@ void append(const Polygon& part, Polygon& all) {
   all.times_s.insert(all.times_s.end(), part.times_s.begin(), part.times_s.end());
   all.x_mm.insert(all.x_mm.end(), part.x_mm.begin(), part.x_mm.end());
   all.y_mm.insert(all.y_mm.end(), part.y_mm.begin(), part.y_mm.end());
+}
+
+// The mean over the nozzles of J along these lines.
+template <int kModes>
+double cost_of(const Polygon& polygon, const LineCosts<kModes>& costs, const State<kModes>& start,
+               const LineRules& rules) {
+  const auto candidate = [&](std::size_t i) {
+    return static_cast<std::size_t>(nearest_whole(polygon.times_s[i] / costs.dt_s()));
+  };
+  const auto longest = static_cast<std::size_t>(rules.max_line_s / costs.dt_s() + 1e-9);
+  LineFan<kModes> fan(costs);
+  ZVector<kModes> z = start.z;
+  double sum = 0.0;
+  for (std::size_t i = 1; i < polygon.times_s.size(); ++i) {
+    const std::size_t k = candidate(i - 1);
+    const std::size_t m = candidate(i) - k;
+    const Eigen::Vector2d way(polygon.x_mm[i] - polygon.x_mm[i - 1],
+                              polygon.y_mm[i] - polygon.y_mm[i - 1]);
+    if (m > longest) {
+      // A leap, at whose end the nozzle goes along with the line.
+      const double duration_s = costs.dt_s() * static_cast<double>(m);
+      const Eigen::Vector2d to(polygon.x_mm[i], polygon.y_mm[i]);
+      z = going_along<kModes>(costs, to - costs.base_mm(k + m),
+                              (way - (costs.base_mm(k + m) - costs.base_mm(k))) / duration_s);
+      continue;
+    }
+    fan.begin(k, std::span(&z, 1));
+    fan.reach(m);
+    const Eigen::Vector2d speed = way / fan.duration_s();
+    sum += fan.cost(0, speed);
+    z = fan.after(0, speed);
+  }
+  return sum;
 }
 
 template <int kModes>
@@ -85,7 +129,26 @@ Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>&
     }
     begin = end_of(leap, costs, grid);
   }
-  return go_on({begin, last, end, ends.until_s.has_value(), ends.lines_after}) ? all : Polygon{};
+  if (!go_on({begin, last, end, ends.until_s.has_value(), ends.lines_after})) {
+    return {};
+  }
+  if constexpr (kModes % 2 == 0) {
+    // Lines that do much harm to both nozzles may do less if they are made for the expected one.
+    constexpr double kMuch_mm = 2e-3;
+    if (costs.nozzles() == 2) {
+      const State<kModes> start = start_of(ends, costs, grid, rules);
+      const double cost = cost_of(all, costs, start, rules);
+      if (2.0 * cost > kMuch_mm * kMuch_mm * all.times_s.back()) {
+        LineRules exact = rules;
+        exact.freq_error = 0.0;
+        Polygon other = path_of<kModes / 2>(base, wanted, weight, ends, x, y, exact);
+        if (!other.times_s.empty() && cost_of(other, costs, start, rules) < cost) {
+          return other;
+        }
+      }
+    }
+  }
+  return all;
 }
 
 }  // namespace

@@ -167,10 +167,9 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
       return std::nullopt;
     }
     return fmt::format(
-        "compensation would be worse: with the swing that is left, contour RMS {:.3f} to {:.3f} "
-        "µm, "
-        "largest {:.3f} to {:.3f} µm",
-        b.rms_mm * 1e3, a.rms_mm * 1e3, b.max_mm * 1e3, a.max_mm * 1e3);
+        "{}with the swing that is left, contour RMS {:.3f} to {:.3f} µm, largest {:.3f} to {:.3f} "
+        "µm",
+        kWorse, b.rms_mm * 1e3, a.rms_mm * 1e3, b.max_mm * 1e3, a.max_mm * 1e3);
   }
   // Travel draws nothing, and straight travel has no contour error whatever happens. So its
   // tracking error counts, since it tells what swing is left to the next run. If the firmware
@@ -182,7 +181,7 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
        no_worse(swing_after_mm, swing_before_mm + chance, kNothing_mm))) {
     return std::nullopt;
   }
-  return fmt::format("compensation would be worse: tracking RMS in travel {:.3f} to {:.3f} µm",
+  return fmt::format("{}tracking RMS in travel {:.3f} to {:.3f} µm", kWorse,
                      b.tracking_rms_mm * 1e3, a.tracking_rms_mm * 1e3);
 }
 

@@ -48,6 +48,9 @@ struct Verdict {
   double wait_s = 0.0;                         // planner::wait_s() of the run
 };
 
+// How an objection begins that is against no limit.
+inline constexpr std::string_view kWorse = "compensation would be worse: ";
+
 // Replays the text of a compensated run as the printer would, in the state the printer is in before
 // the run. Objects if the run breaks a hard rule, has more lines per second than allowed, or
 // deviates more than its original moves (`before`). rate: has counted the lines before the run.

@@ -269,9 +269,11 @@ std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& 
     objection = try_run(job, plan(job, 1.0, 1.0), false, text);
   }
   // Whole steps may make a line too quick, or the lines a few too many, and so may lines for a free
-  // timing, which takes all that the motors give. Aiming lower helps.
+  // timing, which takes all that the motors give. Aiming lower helps, but lines that may do less
+  // than their base follow it worse: what helps then is a base that does less.
   for (const double share : kLower) {
-    if (objection && (counts_steps || job.retimed)) {
+    const bool breaks_limit = objection && !objection->starts_with(kWorse);
+    if (objection && ((counts_steps && breaks_limit) || job.retimed)) {
       objection = try_run(job, plan(job, 1.0, share), false, text);
     }
   }
