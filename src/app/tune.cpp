@@ -104,10 +104,7 @@ Result<machine::Settings> load_settings(const RunConfig& config, const machine::
 // The limits of the printer that a tower of another acceleration goes beyond.
 tune::AccelLimits own_limits(const machine::Settings& settings) {
   const std::array<double, 4> axes = settings.axis_max_accel_mm_s2();
-  const bool is_klipper = settings.printer.firmware == Firmware::klipper;
-  return {axes[0], axes[1],
-          is_klipper ? settings.limits.max_accel_mm_s2 : settings.print_accel_mm_s2(),
-          settings.travel_accel_mm_s2()};
+  return {axes[0], axes[1], settings.print_accel_mm_s2(), settings.travel_accel_mm_s2()};
 }
 
 // The settings of the printer with the acceleration of --accel, and its own limits.
@@ -248,17 +245,20 @@ Result<std::string> new_printer_file(const RunConfig& config, const Known& known
 
 // A zone that reaches an end of the bands may go on beyond it.
 std::string edge_text(std::size_t axis, const tune::Trial& trial, const tune::Zone& zone) {
-  if (zone.first > 1 && zone.last < trial.bands) {
-    return {};
+  const bool at_lowest = zone.first == 1;
+  const bool at_highest = zone.last == trial.bands;
+  if (at_lowest && at_highest) {
+    return fmt::format(
+        "   careful: no band shows waves, so nothing is known of {}; the tower may "
+        "be too slow to show any: try --accel\n",
+        kLetters[axis]);
   }
-  const bool both = zone.first == 1 && zone.last == trial.bands;
-  return fmt::format("   careful: {} show no waves, so {} may lie beyond; {}\n",
-                     both              ? "all bands"
-                     : zone.first == 1 ? "the lowest bands"
-                                       : "the highest bands",
-                     kLetters[axis] == 'x' ? "x" : "y",
-                     both ? "the tower may be too slow to show any: try --accel"
-                          : "make the next tower, which tries around here, before you trust it");
+  return at_lowest || at_highest
+             ? fmt::format(
+                   "   careful: the {} band shows no waves, so {} may lie beyond it; the "
+                   "next tower tries around here\n",
+                   at_lowest ? "lowest" : "highest", kLetters[axis])
+             : std::string{};
 }
 
 // The printer after what its tower tells.
@@ -338,11 +338,11 @@ Status write_tower(const RunConfig& config, const Printer& printer, std::string&
     wanted.trials[axis] = tune::next_trial(printer.known[axis], wanted.accel_mm_s2);
     const tune::Trial& trial = wanted.trials[axis];
     if (const double needed = tune::needed_accel_mm_s2(trial, wanted.accel_mm_s2); needed > 0.0) {
-      return fail(ErrorKind::usage,
-                  fmt::format("{}: at {:.0f} mm/s² no waves can be seen in the walls; the tower "
-                              "needs {:.0f} mm/s²: give --accel {:.0f} if the machine can do that",
-                              kLetters[axis], wanted.accel_mm_s2, std::ceil(needed / 50.0) * 50.0,
-                              std::ceil(needed / 50.0) * 50.0));
+      return fail(
+          ErrorKind::usage,
+          fmt::format("{0}: at {1:.0f} mm/s² no waves can be seen in the walls; the tower "
+                      "needs {2:.0f} mm/s²: give --accel {2:.0f} if the machine can do that",
+                      kLetters[axis], wanted.accel_mm_s2, std::ceil(needed / 50.0) * 50.0));
     }
     middle.freq_hz[axis] = trial.freq_hz((trial.bands + 1) / 2);
     middle.damping_ratio[axis] = trial.damping_ratio((trial.bands + 1) / 2);

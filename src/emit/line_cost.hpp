@@ -10,10 +10,10 @@
 //   w          (z, u)
 //   J          ½ ∫ pᵀWp + ε|d|² dt, p being the places of e, and d the line minus the base
 //
-// Whole steps leave errors that a line cannot avoid. Those near the resonance would have to cancel
-// each other, which they do for one frequency only. So where frequencies may be off, two nozzles
-// follow the lines, one that swings slower and one that swings faster, and pᵀWp is the mean of
-// both. Their modes stand beside each other in e: first all of one nozzle, then all of the other.
+// Whole steps leave errors that a line cannot avoid. Those near the resonance can cancel each other
+// for one frequency only. So two nozzles follow the lines where frequencies may be off: one swings
+// slower, the other faster, and pᵀWp is the mean of both. e holds first all modes of one nozzle,
+// then all of the other.
 //
 // Both axes have kModes modes, of all nozzles together. An axis that has fewer gets modes that
 // never move.
@@ -157,20 +157,18 @@ class LineCosts : public Candidates {
 
   // How many nozzles follow the lines.
   [[nodiscard]] std::size_t nozzles() const { return axes_[0].models.size(); }
-  // The place of a nozzle in this state: the sum of those of its modes. With `times`, each of its
-  // entries i counts times[i].
-  template <class State>
-  [[nodiscard]] auto place(std::size_t nozzle, const State& state) const {
-    const std::size_t first = 2 * nozzle * modes_each_;
-    auto sum = state[first];
-    for (std::size_t i = first + 2; i < first + 2 * modes_each_; i += 2) {
-      sum += state[i];
-    }
-    return sum;
-  }
   // The entries of a state that belong to a nozzle: the first, and the one behind the last.
   [[nodiscard]] std::pair<std::size_t, std::size_t> entries(std::size_t nozzle) const {
     return {2 * nozzle * modes_each_, 2 * (nozzle + 1) * modes_each_};
+  }
+  // The place of a nozzle in this state: the sum of those of its modes.
+  [[nodiscard]] double place(std::size_t nozzle, const ModesVector<kModes>& state) const {
+    auto [i, end] = entries(nozzle);
+    double sum = state[i];
+    for (i += 2; i < end; i += 2) {
+      sum += state[i];
+    }
+    return sum;
   }
   // f of one axis at candidate k.
   [[nodiscard]] const ModesVector<kModes>& nozzle(std::size_t axis, std::size_t k) const {
@@ -212,7 +210,7 @@ class LineCosts : public Candidates {
   struct Look {
     std::size_t j = 0;       // candidates since the line's begin
     double s = 0.0;          // j as a share of the line
-    std::size_t nozzle = 0;  // of those that follow the lines
+    std::size_t nozzle = 0;  // which of them
     Row x;
     Row y;
   };

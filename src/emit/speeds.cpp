@@ -332,7 +332,7 @@ class SpeedSolver {
     return kRoom * std::min(accel_mm_s2 * kTenClocks_s, end_mm_s / 9.0);
   }
 
-  // Whether that gain is enough. One that was chosen to be, and then rounded, is.
+  // Whether a gain keeps the ramp. The least gain itself does, rounded as it is in F.
   [[nodiscard]] static bool is_enough(double gain_mm_s, double least_mm_s) {
     constexpr double kRounded = 0.99;
     return gain_mm_s >= kRounded * least_mm_s;

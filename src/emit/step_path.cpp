@@ -26,7 +26,8 @@ State<kModes> start_of(const RunEnds& ends, const LineCosts<kModes>& costs, cons
   return state;
 }
 
-// z of nozzles that go along with a line which is off the base by so much, more and more.
+// z of nozzles that go along with a line. off_mm, off_mm_s: how far the line is off the base, and
+// how fast that changes.
 template <int kModes>
 ZVector<kModes> going_along(const LineCosts<kModes>& costs, const Eigen::Vector2d& off_mm,
                             const Eigen::Vector2d& off_mm_s) {
@@ -122,7 +123,8 @@ Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>&
     lines_before_s = all.times_s;
     return !part.times_s.empty();
   };
-  State<kModes> begin = start_of(ends, costs, grid, rules);
+  const State<kModes> start = start_of(ends, costs, grid, rules);
+  State<kModes> begin = start;
   for (const Leap& leap : leaps(costs, wanted_at, begin.at, last, end, grid, rules)) {
     if (!go_on({begin, leap.from, leap.begin, true, 0})) {
       return {};
@@ -133,10 +135,9 @@ Polygon path_of(const dynamics::BaseTrajectory& base, const std::vector<double>&
     return {};
   }
   if constexpr (kModes % 2 == 0) {
-    // Lines that do much harm to both nozzles may do less if they are made for the expected one.
+    // Lines for two nozzles may leave much in both. Those for the expected nozzle may leave less.
     constexpr double kMuch_mm = 2e-3;
     if (costs.nozzles() == 2) {
-      const State<kModes> start = start_of(ends, costs, grid, rules);
       const double cost = cost_of(all, costs, start, rules);
       if (2.0 * cost > kMuch_mm * kMuch_mm * all.times_s.back()) {
         LineRules exact = rules;

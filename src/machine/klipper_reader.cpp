@@ -310,9 +310,9 @@ class Reader {
                                         "prints, and keep a printer file for each",
                                         name));
       } else if (text != nullptr && sets_shaper(text->text)) {
-        note(section.place, fmt::format("[{}] sets an input shaper, as where the resonance is not "
-                                        "always the same; unflex takes one resonance, so keep a "
-                                        "printer file for each",
+        note(section.place, fmt::format("[{}] sets an input shaper of its own, so there is more "
+                                        "than one resonance; unflex takes one, so keep a printer "
+                                        "file for each",
                                         name));
       }
     }

@@ -120,7 +120,7 @@ double min_line_mm(const machine::Settings& settings) {
 // The largest acceleration at which the lines can follow a base that turns round. It goes as far as
 // the shortest line in the time of a line, at²/2. A quicker base turns where no line ends.
 double accel_by_turns(const machine::Settings& settings, double asked_mm_s2) {
-  // With less than this share more than the sliced moves ask for, the nozzle hardly follows them.
+  // The base leads the nozzle, so it needs more than the sliced moves ask for.
   constexpr double kLeast = 1.4;
   const double shortest_mm = min_line_mm(settings);
   const double line_s = settings.min_line_s();
@@ -252,7 +252,7 @@ double half_period_s(const machine::Settings& settings) {
   return 0.5 / std::min(settings.dynamics_x.slowest_hz(), settings.dynamics_y.slowest_hz());
 }
 
-// What the nozzle strays that may be seen in a print.
+// An error of the nozzle that may be seen in a print.
 constexpr double kSeen_mm = 10e-3;
 
 // Whether the nozzle still swings from the motion before when the run begins.
@@ -275,9 +275,10 @@ bool draws_soon(const Piece& run, const machine::Settings& settings) {
   return false;
 }
 
-// A nozzle that accelerates out of a rest needs its base ahead by the lag, at once. How long the
-// base takes to get there, from rest to rest, where the run begins to lay filament and what is
-// missing would be seen: beside a path that soon bends, or if the axes lag differently.
+// A nozzle that accelerates out of a rest needs its base ahead by the lag, at once. Returns how
+// long the base takes to get there, from rest to rest. Returns 0 where nobody would see what is
+// missing: the run begins with travel, or straight and with axes that lag alike, or the lag is
+// small.
 double time_ahead_s(const Piece& run, const compensate::Setup& setup, double soon_s) {
   constexpr double kStraight = 0.999;  // cosine of the angle
   const planner::PlannedMove& first = run.moves.front();
@@ -468,7 +469,7 @@ RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
     result.asked_accel_mm_s2 =
         std::max(result.asked_accel_mm_s2, std::round(planner::asked_accel_mm_s2(move)));
   }
-  // A swing that is there needs all that the motors give.
+  // To end a swing takes all that the motors give.
   const bool swings = begins_swinging(run, nozzle, settings);
   result.accel = {planned_base_accel(settings, result.asked_accel_mm_s2, !swings),
                   settings.emit_accel_mm_s2(result.asked_accel_mm_s2)};
@@ -543,10 +544,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
         std::max(settings.period_ms() * 1e-3, kShortest / settings.max_lines_per_s());
   }
   if (settings.printer.firmware == Firmware::marlin) {
-    // Rounding may take a step off either end. The first step of a line comes late, which is not
-    // little in a line of one step or two: such lines leave 1.2 µm RMS where others leave 0.8.
-    constexpr int kFewestSteps = 3;
-    options.lines.min_steps = std::max(options.fixed.min_steps_per_segment, kFewestSteps);
+    options.lines.min_steps = options.fixed.min_steps_per_segment;
     options.lines.min_line_mm = min_line_mm(settings);
     // With classic jerk as high as in a run, each line begins at its own speed.
     options.lines.leads = !options.fixed.classic_jerk;

@@ -22,8 +22,8 @@ class LogHistogram {
     weights_[std::min(cell, kCells - 1)] += weight;
   }
 
-  // Where the given fraction of the whole weight is reached, within 1 %, if weights are even in a
-  // cell; 0 for an empty histogram.
+  // Where the given fraction of the whole weight is reached, within 1 %. The weight of a cell
+  // counts as even all over it. 0 for an empty histogram.
   [[nodiscard]] double quantile(double fraction) const;
   // Total weight of the cells that begin below the value.
   [[nodiscard]] double weight_below(double value) const;
