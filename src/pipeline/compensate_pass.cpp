@@ -224,7 +224,7 @@ class Compensator {
             "{:.0f}; raise that if the motors can",
             accel, job_.settings.base_max_accel_mm_s2(setup.asked_accel_mm_s2));
       } else if (nodes <= kMaxRunNodes) {
-        job->is_timed = !job_.settings.is_timing_free() || !reasons.empty();
+        job->is_timed = !job_.settings.is_timing_free();
         if (job_.settings.is_timing_free() && piece.begins_run() && piece.ends_run()) {
           job->sliced_setup =
               setup_for(rules_.sliced_setup, piece, job->nozzle, job_.settings).setup;

@@ -193,8 +193,26 @@ void keep_timing(RunJob& job, std::string reason) {
   }
 }
 
+namespace {
+
+// The timing as sliced, but for F.
+void keep_feed(RunJob& job, const compensate::Engine& engine) {
+  if (std::optional<timing::Timed> timed =
+          timing::within_feed(job.course(), job.setup, job.first_stage, job.bounds, engine)) {
+    job.retimed =
+        NewTiming{std::move(timed->moves), counts_of(job.piece.move_counts, timed->pieces)};
+  }
+}
+
+}  // namespace
+
 void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
   try {
+    if (job.keeps_timing()) {
+      keep_feed(job, *choice.engine);
+      job.is_timed = true;
+      return;
+    }
     std::optional<timing::Timed> timed =
         timing::faster(job.course(), job.setup, job.first_stage, job.bounds, *choice.engine);
     if (choice.is_optimal) {
@@ -220,6 +238,7 @@ void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
                     std::move(timed->base)};
     } else {
       keep_timing(job, "no faster timing was found that keeps the tolerance");
+      keep_feed(job, *choice.engine);
     }
   } catch (const std::exception& exception) {
     // Out of memory, mostly.
@@ -277,7 +296,7 @@ void solve_windows(RunJob& job, std::size_t first, std::size_t count,
 
 namespace {
 
-// The run of `job` as it was before its timing was chosen.
+// The run of `job` as it was before its timing was chosen. If it keeps its timing, that stays.
 std::unique_ptr<RunJob> untimed(const RunJob& job, const compensate::Setup& setup) {
   auto run = std::make_unique<RunJob>();
   run->piece = job.piece;
@@ -288,6 +307,10 @@ std::unique_ptr<RunJob> untimed(const RunJob& job, const compensate::Setup& setu
   run->bounds = job.bounds;
   run->accel = job.accel;
   run->lines_after = job.lines_after;
+  if (job.keeps_timing()) {
+    run->slow_reason = job.slow_reason;
+    run->retimed = job.retimed;
+  }
   return run;
 }
 
@@ -322,6 +345,9 @@ std::unique_ptr<RunJob> with_reserve(const RunJob& job, const RunRules& rules, d
 
 std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules) {
   std::unique_ptr<RunJob> run = untimed(job, job.sliced_setup.value_or(job.setup));
+  if (!run->bounds.empty()) {
+    keep_feed(*run, *compensate::make_rough_engine());
+  }
   solve_all(*run, rules);
   return run;
 }

@@ -97,6 +97,8 @@ struct RunJob {
   [[nodiscard]] const std::vector<planner::PlannedMove>& reference() const {
     return retimed ? retimed->moves : piece.moves;
   }
+  // Whether its timing could be free but stays as sliced, apart from what F asks for.
+  [[nodiscard]] bool keeps_timing() const { return !slow_reason.empty(); }
   [[nodiscard]] bool has_base() const { return retimed && retimed->base; }
   // How long before the plan the base begins.
   [[nodiscard]] double lead_in_s() const {

@@ -208,14 +208,14 @@ bool RunWriter::fits(const RunJob& job) const {
 std::optional<std::string> RunWriter::write_in_time(const RunJob& job, std::string& text) {
   std::optional<std::string> objection = write_run(job, text);
   if (!objection) {
-    if (!job.slow_reason.empty()) {
+    if (job.keeps_timing()) {
       note_slow(job, job.slow_reason);
     } else if (!job.scaled_reason.empty()) {
       note_scaled(job, job.scaled_reason);
     }
     return objection;
   }
-  if (!job.retimed) {
+  if (!job.retimed || job.keeps_timing()) {
     return write_with_reserve(job, std::move(*objection), text);
   }
   // Its lines may break a limit: what is rounded swings about what was optimised, and a free timing

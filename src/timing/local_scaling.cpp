@@ -5,6 +5,9 @@
 //
 //   u ← u g^{−α}     a ← a g^{−β}     V ← V F/v where the nozzle runs ahead of F
 //
+// A run that keeps its timing only becomes slower where its nozzle runs ahead of F: V alone
+// changes.
+//
 // The exponents become smaller from round to round. Once the plan's time hardly changes, limits are
 // lowered only, until the nozzle keeps the tolerance everywhere.
 #include <algorithm>
@@ -60,6 +63,8 @@ constexpr std::array kPieces = {1.1, 2.3};
 // With a third piece a swing behind a corner does not slow down the rest of a long line. But speeds
 // that change more often make swings of their own.
 constexpr std::array kMorePieces = {1.1, 2.3, 5.0};
+// What runs ahead of F does so for a moment, at vertices and behind them.
+constexpr std::array kFeedPieces = {1.1, 2.3, 5.0, 10.0};
 // A round that changes the run's time by less than this share is the last of its kind.
 constexpr double kGain = 1e-3;
 
@@ -69,12 +74,18 @@ double scale(double g, double exponent) {
   return std::clamp(std::pow(std::max(g, kLeastError), -exponent), kLeastFactor, kMostFactor);
 }
 
+enum class Goal {
+  least_time,  // whatever keeps the tolerance and F
+  feed,        // as sliced, but for F
+};
+
 class LocalScaling {
  public:
-  LocalScaling(const compensate::Course& course, const compensate::Setup& setup,
+  LocalScaling(Goal goal, const compensate::Course& course, const compensate::Setup& setup,
                const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
                const compensate::Engine& engine, std::span<const double> ends)
-      : course_(course),
+      : goal_(goal),
+        course_(course),
         setup_(setup),
         nozzle_(nozzle),
         engine_(engine),
@@ -94,9 +105,15 @@ class LocalScaling {
     limit_accel();
     bounds_ = pieces_.bounds;
     limit_vertices();
-    if (models_.size() > 1) {
+    if (goal_ == Goal::least_time && models_.size() > 1) {
       allow_as_sliced(allowed);
     }
+  }
+
+  // Whether the nozzle keeps F in the timing as sliced.
+  [[nodiscard]] bool keeps_feed_as_sliced(std::span<const MoveBounds> bounds) {
+    const std::optional<NozzleMeasure> sliced = try_plan(course_.moves, bounds);
+    return !sliced || std::ranges::max(sliced->speed) <= kKeptFeed;
   }
 
   std::optional<Timed> find() {
@@ -104,9 +121,10 @@ class LocalScaling {
     // Where F is slow, the nozzle may run ahead of it in the timing as sliced. So one that is
     // hardly slower is better.
     constexpr double kHardlySlower = 1.01;
-    double least_s = kHardlySlower * planner::duration_s(course_.moves);
+    double least_s = goal_ == Goal::feed ? std::numeric_limits<double>::infinity()
+                                         : kHardlySlower * planner::duration_s(course_.moves);
     course_.moves = pieces_.moves;
-    bool repairs = false;
+    bool repairs = goal_ == Goal::feed;
     int repaired = 0;
     double last_s = 0.0;
     for (int round = 0; repaired < kRepairs; ++round) {
@@ -249,8 +267,11 @@ class LocalScaling {
                                         compensate::join(spans, y)};
     NozzleMeasure measured = measure(plan, bounds, starts_s_, base, models_, allowances_,
                                      course.before.empty() ? &nozzle_ : nullptr);
-    if (!course.after.empty()) {
+    if (!course.after.empty() || goal_ == Goal::feed) {
       measured.left.assign(models_.size(), 0.0);
+    }
+    if (goal_ == Goal::feed) {
+      std::ranges::fill(measured.error, 0.0);
     }
     return measured;
   }
@@ -367,6 +388,7 @@ class LocalScaling {
     }
   }
 
+  Goal goal_;
   compensate::Course course_;
   compensate::Setup setup_;
   const dynamics::NozzleXY& nozzle_;
@@ -404,7 +426,7 @@ std::optional<Timed> faster(const compensate::Course& course, const compensate::
                             const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
                             const compensate::Engine& engine) {
   const auto find = [&](std::span<const double> ends) {
-    return LocalScaling(course, setup, nozzle, bounds, engine, ends).find();
+    return LocalScaling(Goal::least_time, course, setup, nozzle, bounds, engine, ends).find();
   };
   std::optional<Timed> found = find(kPieces);
   if (found && is_slow_on_long_lines(*found, bounds)) {
@@ -414,6 +436,22 @@ std::optional<Timed> faster(const compensate::Course& course, const compensate::
     }
   }
   return found;
+}
+
+std::optional<Timed> within_feed(const compensate::Course& course, const compensate::Setup& setup,
+                                 const dynamics::NozzleXY& nozzle,
+                                 std::span<const MoveBounds> bounds,
+                                 const compensate::Engine& engine) {
+  std::vector<MoveBounds> as_sliced(bounds.begin(), bounds.end());
+  for (std::size_t i = 0; i < as_sliced.size(); ++i) {
+    const planner::PlannedMove& move = course.moves[i];
+    as_sliced[i].speed_mm_s = move.cruise_v_mm_s;
+    as_sliced[i].accel_mm_s2 = move.accel_mm_s2;
+    as_sliced[i].start_speed_mm_s = move.start_v_mm_s;
+    as_sliced[i].end_speed_mm_s = move.end_v_mm_s;
+  }
+  LocalScaling scaling(Goal::feed, course, setup, nozzle, as_sliced, engine, kFeedPieces);
+  return scaling.keeps_feed_as_sliced(as_sliced) ? std::nullopt : scaling.find();
 }
 
 }  // namespace unflex::timing

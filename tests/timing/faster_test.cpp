@@ -170,5 +170,51 @@ TEST(Faster, GivesUpWhereNothingIsToBeGained) {
   EXPECT_FALSE(timed(moves, setup(), bounds_of(moves)).has_value());
 }
 
+// A base that suits a band of frequencies goes ahead of the path and back.
+compensate::Setup for_a_band() {
+  compensate::Setup band = setup();
+  for (compensate::AxisSetup* const axis : {&band.x, &band.y}) {
+    axis->plants = {{band.x.axis.detuned(0.9), 1.0 / 3.0}, {band.x.axis.detuned(1.1), 1.0 / 3.0}};
+  }
+  return band;
+}
+
+std::optional<Timed> with_feed_kept(const Moves& moves, const std::vector<MoveBounds>& bounds) {
+  const auto engine = compensate::make_banded_engine();
+  return within_feed(moves, for_a_band(), at_rest(moves), bounds, *engine);
+}
+
+TEST(WithinFeed, SlowsDownTheNozzleWhereItRunsAheadOfFAndNowhereElse) {
+  int slowed = 0;
+  for (unsigned seed = 21; seed <= 28; ++seed) {
+    const Moves moves = tour(seed, 25.0 * (seed % 4 + 1));
+    const auto result = with_feed_kept(moves, bounds_of(moves));
+    const Drawn sliced = draw(moves, for_a_band(), setup().x.axis);
+    if (!result) {
+      EXPECT_LT(sliced.fastest, 1.02) << seed;
+      continue;
+    }
+    EXPECT_GT(sliced.fastest, 1.0) << seed;
+    ++slowed;
+    const Drawn drawn = draw(result->moves, for_a_band(), setup().x.axis);
+    EXPECT_LT(drawn.fastest, 1.025) << seed << ", before " << sliced.fastest;
+    EXPECT_LT(drawn.duration_s, 1.05 * planner::duration_s(moves)) << seed;
+  }
+  EXPECT_GT(slowed, 3);
+}
+
+TEST(WithinFeed, SlowsDownTheBaseInTravel) {
+  constexpr double kFeed_mm_s = 160.0;
+  const Moves moves =
+      plan({{0.0, 0.0}, {8.0, 0.0, false}}, planner_limits(kFeed_mm_s, 5000.0, 5.0));
+  std::vector<MoveBounds> bounds = bounds_of(moves);
+  EXPECT_FALSE(with_feed_kept(moves, bounds));  // Nothing says how fast travel may be.
+  bounds.front().nozzle_speed_mm_s = 0.985 * kFeed_mm_s;
+  const auto result = with_feed_kept(moves, bounds);
+  ASSERT_TRUE(result.has_value());
+  EXPECT_GT(draw(moves, for_a_band(), setup().x.axis).base_mm_s, 1.01 * kFeed_mm_s);
+  EXPECT_LT(draw(result->moves, for_a_band(), setup().x.axis).base_mm_s, 1.005 * kFeed_mm_s);
+}
+
 }  // namespace
 }  // namespace unflex::timing

@@ -62,6 +62,7 @@ struct Drawn {
   double fastest = 0.0;                // relative to F, likewise
   double swing_mm = 0.0;               // in the end
   double accel_mm_s2 = 0.0;            // of the base
+  double base_mm_s = 0.0;              // its largest speed
 };
 
 inline double distance_mm(const planner::PlannedMove& move, double x_mm, double y_mm) {
@@ -80,6 +81,10 @@ inline Drawn played(const Moves& moves, const dynamics::BaseTrajectory& base,
     for (const double accel : own->accel_mm_s2) {
       drawn.accel_mm_s2 = std::max(drawn.accel_mm_s2, std::abs(accel));
     }
+  }
+  for (std::size_t k = 0; k < base.nodes(); ++k) {
+    drawn.base_mm_s =
+        std::max(drawn.base_mm_s, std::hypot(base.x.velocity_mm_s[k], base.y.velocity_mm_s[k]));
   }
   const auto nozzle_x =
       compensate::testing::play(axis, base.x, base.period_s, compensate::testing::at_rest(moves).x);

@@ -74,6 +74,14 @@ struct Timed {
                                           std::span<const MoveBounds> bounds,
                                           const compensate::Engine& engine);
 
+// The moves of the course in their timing as sliced, slower where the nozzle would run ahead of F,
+// or the base in travel. nullopt: neither does, or no such timing was found.
+[[nodiscard]] std::optional<Timed> within_feed(const compensate::Course& course,
+                                               const compensate::Setup& setup,
+                                               const dynamics::NozzleXY& nozzle,
+                                               std::span<const MoveBounds> bounds,
+                                               const compensate::Engine& engine);
+
 // As faster(), by a program in which path and time are found together; the base comes with it. For
 // whole runs of axes with one mode, or of such in a band of frequencies. The error tells why there
 // is no such timing.
