@@ -489,8 +489,8 @@ constexpr std::array kKeys = {
         &derived<&S::base_max_velocity_mm_s>},
     Key{"base.max_accel_mm_s2", &setting<&S::base, &B::max_accel_mm_s2>, kPositive, "mm/s²",
         "Acceleration a motor can do",
-        "2 × limits.max_accel_mm_s2 (2√2 × for a Klipper on which a motor moves X and Y), or the "
-        "plan's if more",
+        "2 × the larger of limits.max_accel_mm_s2 and what a run's plan accelerates; 2√2 × for a "
+        "Klipper on which a motor moves X and Y",
         &derived<&S::base_max_accel_mm_s2>},
     Key{"base.max_jerk_mm_s3", &setting<&S::base, &B::max_jerk_mm_s3>, kNotNegative, "mm/s³",
         "Jerk a motor can do; 0 does not limit it"},

@@ -149,6 +149,7 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
   report.base_max_velocity_mm_s = verified.base_max_velocity_mm_s;
   report.base_max_accel_mm_s2 = verified.base_max_accel_mm_s2;
   report.base_max_step_mm_s = verified.base_max_step_mm_s;
+  report.base_accel_limit_mm_s2 = verified.base_accel_limit_mm_s2;
   report.output_lines = verified.output_lines;
   report.output_bytes = verified.output_bytes;
   report.max_lines_per_s = verified.max_lines_per_s;

@@ -98,8 +98,12 @@ void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::NozzleStep&
   if (step.extruding) {
     version.histogram.add_square(step.contour2_mm2, step.h_s);
   }
-  if (step.measured) {
-    measured_step(number, step);
+  if (step.measured && step.piece != version.piece) {
+    close_chunk(number, std::numeric_limits<double>::infinity());
+    enter(number, step.piece);
+  }
+  if (step.extruding && version.piece != kNoPiece) {
+    lay(number, step);
   }
   if (!step.waiting && version.ring.advance(step.h_s)) {
     if (step.measured) {
@@ -118,26 +122,18 @@ void Recorder::Gatherer::move_along(Version& version, const verify::NozzleStep& 
   version.where.along_mm = std::max(version.where.along_mm, along_mm);
 }
 
-void Recorder::Gatherer::measured_step(int number, const verify::NozzleStep& step) {
+void Recorder::Gatherer::lay(int number, const verify::NozzleStep& step) {
   Version& version = versions_[number];
-  if (step.piece != version.piece) {
-    close_chunk(number, std::numeric_limits<double>::infinity());
-    enter(number, step.piece);
-  }
-  // What is laid along moves without filament has no place in a layer.
-  if (!step.extruding || !cells_[version.where.move].extruding) {
-    return;
-  }
   Chunk& chunk = version.chunk;
   chunk.weight_s += step.h_s;
   chunk.sum_contour2 += step.h_s * step.contour2_mm2;
   if (step.contour2_mm2 > chunk.contour2_max_mm2) {
     chunk.contour2_max_mm2 = step.contour2_mm2;
-    chunk.max_x_mm = step.reference_x_mm;
-    chunk.max_y_mm = step.reference_y_mm;
+    chunk.max_x_mm = step.measured ? step.reference_x_mm : step.nozzle.x.position;
+    chunk.max_y_mm = step.measured ? step.reference_y_mm : step.nozzle.y.position;
     chunk.max_line = step.line;
   }
-  if (chunk.weight_s >= kChunk_s) {
+  if (step.measured && chunk.weight_s >= kChunk_s) {
     move_along(version, step);
     close_chunk(number, version.where.along_mm);
     version.chunk.from_mm = version.where.along_mm;
@@ -152,6 +148,9 @@ void Recorder::Gatherer::enter(int number, std::size_t piece) {
   append_moves(version, move);
   version.where = {move, 0.0};
   version.chunk.from_mm = 0.0;
+  if (const PathMove& entered = cells_[move]; entered.extruding) {
+    version.laid = {entered.layer, entered.feature, entered.z_mm};
+  }
   complete_moves(std::min(versions_[0].where.move, versions_[1].where.move));
 }
 
@@ -199,25 +198,28 @@ void Recorder::Gatherer::leave_start() {
 
 void Recorder::Gatherer::close_chunk(int number, double to_mm) {
   Version& version = versions_[number];
+  if (version.chunk.contour2_max_mm2 < 0.0 || !version.laid) {
+    return;  // what comes out before the first line belongs to that
+  }
   const Chunk chunk = std::exchange(version.chunk, Chunk{});
-  if (chunk.contour2_max_mm2 < 0.0) {
-    return;
-  }
   const PathMove& move = cells_[version.where.move];
-  cells_.deviate(version.where.move, number, chunk.from_mm, std::min(to_mm, move.length_mm),
-                 report::deviation_code(chunk.contour2_max_mm2));
-  layers_[move.layer].sums[number].add(chunk);
-  if (feature_sums_.size() <= move.feature) {
-    feature_sums_.resize(move.feature + 1);
+  if (move.extruding) {
+    cells_.deviate(version.where.move, number, chunk.from_mm, std::min(to_mm, move.length_mm),
+                   report::deviation_code(chunk.contour2_max_mm2));
   }
-  feature_sums_[move.feature][number].add(chunk);
+  const Laid& laid = *version.laid;
+  layers_[laid.layer].sums[number].add(chunk);
+  if (feature_sums_.size() <= laid.feature) {
+    feature_sums_.resize(laid.feature + 1);
+  }
+  feature_sums_[laid.feature][number].add(chunk);
 
   if (chunk.contour2_max_mm2 > version.block.contour2_mm2) {
     const double along_mm = move.along_mm(chunk.max_x_mm, chunk.max_y_mm);
     version.block = {chunk.contour2_max_mm2, {version.where.move, along_mm},
-                     chunk.max_line,         move.layer,
-                     move.feature,           chunk.max_x_mm,
-                     chunk.max_y_mm,         move.z_mm};
+                     chunk.max_line,         laid.layer,
+                     laid.feature,           chunk.max_x_mm,
+                     chunk.max_y_mm,         laid.z_mm};
   }
   version.block_s += chunk.weight_s;
   if (version.block_s >= kBlock_s) {

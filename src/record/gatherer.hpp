@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "feature_log.hpp"
@@ -43,6 +44,12 @@ class Recorder::Gatherer final : public verify::Observer {
     double max_x_mm = 0.0, max_y_mm = 0.0;  // where the reference was at the largest deviation
     std::size_t max_line = 0;
   };
+  // What belongs to a move that lays filament. Some may come out behind its end, in travel.
+  struct Laid {
+    std::size_t layer = 0;
+    std::size_t feature = 0;
+    double z_mm = 0.0;
+  };
   // One of the two nozzles.
   struct Version {
     explicit Version(double half_width_s, std::size_t places) : ring(half_width_s), worst(places) {}
@@ -51,6 +58,7 @@ class Recorder::Gatherer final : public verify::Observer {
     std::size_t first_piece = 0;  // first piece of the section on `path`
     std::size_t piece = 0;        // the nozzle's piece on `path`
     PathPoint where;
+    std::optional<Laid> laid;  // by the last move that lays filament
     Chunk chunk;
     double block_s = 0.0;
     PlaceCandidate block;  // worst of the last tenth of a second
@@ -77,7 +85,8 @@ class Recorder::Gatherer final : public verify::Observer {
     std::array<std::vector<report::Moment>, 2> moments;
   };
 
-  void measured_step(int number, const verify::NozzleStep& step);
+  // Filament comes out.
+  void lay(int number, const verify::NozzleStep& step);
   void move_along(Version& version, const verify::NozzleStep& step) const;
   void enter(int number, std::size_t piece);
   void leave_start();

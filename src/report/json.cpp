@@ -175,6 +175,7 @@ void add_motion(const Report& r, Json& json) {
   json["base"] = {{"max_velocity_mm_s", r.base_max_velocity_mm_s},
                   {"max_accel_mm_s2", r.base_max_accel_mm_s2},
                   {"max_step_mm_s", r.base_max_step_mm_s},
+                  {"accel_limit_mm_s2", r.base_accel_limit_mm_s2},
                   {"own_max_velocity_mm_s", r.facts.motor_max_velocity_mm_s},
                   {"own_max_accel_mm_s2", r.facts.motor_max_accel_mm_s2},
                   {"own_max_accel_origin", r.facts.motor_max_accel_origin}};

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "rounding.hpp"
+
 namespace unflex::verify {
 namespace {
 
@@ -30,17 +32,22 @@ double filament_per_mm(const PathPiece& piece) {
   return piece.extruding ? piece.move.segment.delta(gcode::E) / piece.length_xy_mm : 0.0;
 }
 
-// The lag s_p − s_F along the moves that lay filament, with Q(s_F) = laid_mm. It is below 0 if s_F
-// is ahead. s_p is given by the piece's number and along_mm.
+// The lag s_p − s_F, with Q(s_F) = laid_mm. It is below 0 if s_F is ahead. s_p is given by the
+// piece's number and along_mm.
 double laid_lag_mm(const ReferencePath& path, std::size_t number, double along_mm, double laid_mm) {
+  const bool travels = !path[number].extruding;
+  if (travels && std::abs(laid_mm - path[number].filament_mm) < kRounding_mm) {
+    return 0.0;  // what is laid before the travel is complete
+  }
+  const auto counts = [&] { return travels || path[number].extruding; };
   double lag_mm = 0.0;
   while (laid_mm < path[number].filament_mm && number > path.first()) {
-    lag_mm += path[number].extruding ? along_mm : 0.0;
+    lag_mm += counts() ? along_mm : 0.0;
     along_mm = path[--number].length_xy_mm;
   }
   const auto lays_mm = [&] { return filament_per_mm(path[number]) * path[number].length_xy_mm; };
   while (laid_mm > path[number].filament_mm + lays_mm() && number + 1 < path.end()) {
-    lag_mm -= path[number].extruding ? path[number].length_xy_mm - along_mm : 0.0;
+    lag_mm -= counts() ? path[number].length_xy_mm - along_mm : 0.0;
     along_mm = 0.0;
     ++number;
   }
@@ -55,7 +62,7 @@ double laid_lag_mm(const ReferencePath& path, std::size_t number, double along_m
 }  // namespace
 
 void FilamentLag::add(const ReferencePath& path, std::size_t current, double r_x_mm, double r_y_mm,
-                      double p_x_mm, double p_y_mm, double laid_mm, double h) {
+                      double p_x_mm, double p_y_mm, double laid_mm, bool flows, double h) {
   const double off_x_mm = p_x_mm - r_x_mm;
   const double off_y_mm = p_y_mm - r_y_mm;
   const double reach_mm = kSearch * std::sqrt(off_x_mm * off_x_mm + off_y_mm * off_y_mm);
@@ -80,7 +87,7 @@ void FilamentLag::add(const ReferencePath& path, std::size_t current, double r_x
     look_at(number);
     ahead_mm += path[number].length_xy_mm;
   }
-  if (!path[nearest].extruding) {
+  if (!path[nearest].extruding && !flows) {
     return;
   }
   const double lag_mm = laid_lag_mm(path, nearest, best.along_mm, laid_mm);

@@ -5,7 +5,8 @@
 //   s_p    where along the sliced path the nozzle is nearest to it
 //   Q(s)   filament that the sliced file lays up to there
 //   s_F    the place whose filament comes out now: Q(s_F) = F
-//   lag    s_p − s_F, mm of path, moves without filament left out
+//   lag    s_p − s_F, mm of path. Between places of two lines the travel is left out. If the nozzle
+//          travels already, or still, while filament comes out, that way counts.
 //
 // The path may come close to itself. So it is searched only around r, no further than a few times
 // |p − r|.
@@ -20,9 +21,10 @@ namespace unflex::verify {
 
 class FilamentLag {
  public:
-  // Adds a step of h seconds. The reference is on piece `current` of the path, which lays filament.
+  // Adds a step of h seconds. The reference is on piece `current` of the path. flows: filament
+  // comes out now. It does, or the reference lays filament.
   void add(const ReferencePath& path, std::size_t current, double r_x_mm, double r_y_mm,
-           double p_x_mm, double p_y_mm, double laid_mm, double h);
+           double p_x_mm, double p_y_mm, double laid_mm, bool flows, double h);
   [[nodiscard]] LagStats stats() const;
 
  private:

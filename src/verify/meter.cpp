@@ -274,8 +274,8 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
       advance(reference.x, h);
       advance(reference.y, h);
       measurement = sample(reference, phase.extruding, h);
-      if (follows_filament_ && !waiting_ && reference.extruding) {
-        measure_filament(reference, laid_mm_ + phase.e.position, h);
+      if (follows_filament_ && !waiting_ && (reference.extruding || phase.extruding)) {
+        measure_filament(reference, phase, h);
       }
     } else if (phase.extruding) {
       time_s_ = start_s + number * h;
@@ -378,9 +378,10 @@ Meter::Sample Meter::sample_at_rest(double h) {
   return {contour2, line};
 }
 
-void Meter::measure_filament(const ReferencePhase& reference, double laid_mm, double h) {
+void Meter::measure_filament(const ReferencePhase& reference, const BasePhase& phase, double h) {
   filament_lag_.add(*path_, current_, reference.x.position, reference.y.position,
-                    nozzle_.x.position(), nozzle_.y.position(), laid_mm, h);
+                    nozzle_.x.position(), nozzle_.y.position(), laid_mm_ + phase.e.position,
+                    phase.extruding, h);
 }
 
 void Meter::tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,

@@ -176,7 +176,7 @@ class Meter {
   };
   Sample sample(const ReferencePhase& reference, bool laying, double h);
   Sample sample_at_rest(double h);
-  void measure_filament(const ReferencePhase& reference, double laid_mm, double h);
+  void measure_filament(const ReferencePhase& reference, const BasePhase& phase, double h);
   void tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
             const Sample& sample);
 

@@ -98,10 +98,25 @@ void BaseCheck::add(const planner::PlannedMove& move) {
   // The firmware may pass from kept motion into the run, and out of the run, at some speed.
   if (last_duration_s_ == 0.0) {
     last_velocity_ = velocity_at(move, move.start_v_mm_s);
+    join(last_velocity_);
   }
   change_of_velocity(velocity, duration, segment.line);
   keep(move);
   durations_s_.add_square(duration * duration, 1.0);
+}
+
+void BaseCheck::add_kept(const planner::PlannedMove& move) {
+  if (is_beside_run_) {
+    join(velocity_at(move, move.start_v_mm_s));
+  }
+  is_beside_run_ = false;
+  joined_velocity_ = velocity_at(move, move.end_v_mm_s);
+}
+
+void BaseCheck::join(const PerMotor& velocity) {
+  for (std::size_t motor = 0; motor < velocity.size(); ++motor) {
+    max_step_ = std::max(max_step_, std::abs(velocity[motor] - joined_velocity_[motor]));
+  }
 }
 
 void BaseCheck::keep(const planner::PlannedMove& move) {
@@ -129,6 +144,9 @@ void BaseCheck::change_of_velocity(const PerMotor& velocity, double duration_s, 
 
 void BaseCheck::end_run() {
   change_of_velocity(end_velocity_, 0.0, last_line_);
+  is_beside_run_ = true;
+  joined_velocity_ = end_velocity_;
+  largest_accel_limit_ = std::max(largest_accel_limit_, accel_limit_mm_s2());
   report(velocity_, "velocity", "mm/s", rules_->base_max_velocity_mm_s);
   report(accel_, "acceleration", "mm/s²", accel_limit_mm_s2());
 }

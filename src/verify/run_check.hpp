@@ -56,9 +56,13 @@ class BaseCheck {
   void add_planned(const planner::PlannedMove& move);
   void add(const planner::PlannedMove& move);
   void end_run();
+  // A move between runs, of which the step of speed counts where it meets one.
+  void add_kept(const planner::PlannedMove& move);
 
   // The most that a motor may accelerate by what the run's plan has asked so far.
   [[nodiscard]] double accel_limit_mm_s2() const;
+  // The largest of all runs.
+  [[nodiscard]] double largest_accel_limit_mm_s2() const { return largest_accel_limit_; }
   [[nodiscard]] double max_velocity_mm_s() const { return max_velocity_; }
   [[nodiscard]] double max_accel_mm_s2() const { return max_accel_; }
   [[nodiscard]] double max_step_mm_s() const { return max_step_; }
@@ -79,6 +83,8 @@ class BaseCheck {
   [[nodiscard]] PerMotor velocity_at(const planner::PlannedMove& move, double v_mm_s) const;
   void keep(const planner::PlannedMove& move);
   void change_of_velocity(const PerMotor& velocity, double duration_s, std::size_t line);
+  // Kept motion and a run meet, and the later of them begins with this velocity.
+  void join(const PerMotor& velocity);
   void report(const Largest& largest, std::string_view what, std::string_view unit, double limit);
 
   const Rules* rules_;
@@ -86,6 +92,8 @@ class BaseCheck {
   Motors motors_;
   PerMotor last_velocity_{};      // mean over the last move
   PerMotor end_velocity_{};       // at the end of the last move
+  PerMotor joined_velocity_{};    // at the end of what the next run or kept move meets
+  bool is_beside_run_ = false;    // whether that is a run
   double last_duration_s_ = 0.0;  // duration of the last move; 0: at rest
   std::size_t last_line_ = 0;
   // Without what rounding may have added.
@@ -95,6 +103,7 @@ class BaseCheck {
   double max_velocity_ = 0.0;
   double max_accel_ = 0.0;
   double max_step_ = 0.0;
+  double largest_accel_limit_ = 0.0;
   LogHistogram durations_s_;  // every move counts as one
 };
 

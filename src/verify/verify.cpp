@@ -370,6 +370,8 @@ void Verifier::play_run_moves(bool compensated) {
       if (compensated) {
         base_.add(move);
         run_steps_.play(move);
+      } else {
+        base_.add_kept(move);
       }
       if (++moves_ % kMovesPerUpdate == 0) {
         compare_lines(false);
@@ -596,6 +598,7 @@ VerifyReport Verifier::report() {
   report.base_max_velocity_mm_s = base_.max_velocity_mm_s();
   report.base_max_accel_mm_s2 = base_.max_accel_mm_s2();
   report.base_max_step_mm_s = base_.max_step_mm_s();
+  report.base_accel_limit_mm_s2 = base_.largest_accel_limit_mm_s2();
   report.worst_run_drift_s = emitted_.main().worst_lag_s();
   report.max_lines_per_s = std::max(max_lines_per_s_, rate_.max_per_s());
   report.segment_ms_median = 1e3 * base_.median_duration_s();

@@ -370,9 +370,10 @@ TEST(ToToml, ReadsBackAsTheSameSettings) {
 }
 
 TEST(ToToml, ShowsWhatHoldsForUnsetKeys) {
-  EXPECT_THAT(to_toml(read("")), HasSubstr("# max_accel_mm_s2 = 10000  (unset: 2 × "
-                                           "limits.max_accel_mm_s2 (2√2 × for a Klipper on which "
-                                           "a motor moves X and Y), or the plan's if more)"));
+  EXPECT_THAT(to_toml(read("")), HasSubstr("# max_accel_mm_s2 = 10000  (unset: 2 × the larger of "
+                                           "limits.max_accel_mm_s2 and what a run's plan "
+                                           "accelerates; 2√2 × for a Klipper on which a motor "
+                                           "moves X and Y)"));
 }
 
 TEST(Rows, HoldOneRowPerOriginInTheSameOrder) {

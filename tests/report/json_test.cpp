@@ -24,6 +24,7 @@ TEST(JsonReport, HasEveryValueUnderItsKey) {
   EXPECT_EQ(json["base"], (nlohmann::json{{"max_velocity_mm_s", 123.0},
                                           {"max_accel_mm_s2", 19999.0},
                                           {"max_step_mm_s", 27.5},
+                                          {"accel_limit_mm_s2", 20000.0},
                                           {"own_max_velocity_mm_s", 300.0},
                                           {"own_max_accel_mm_s2", 8000.0},
                                           {"own_max_accel_origin", "--set"}}));

@@ -81,6 +81,7 @@ inline Report sample_report() {
   r.base_max_velocity_mm_s = 123.0;
   r.base_max_accel_mm_s2 = 19999.0;
   r.base_max_step_mm_s = 27.5;
+  r.base_accel_limit_mm_s2 = 20000.0;
   r.runs_total = 900;
   r.runs_compensated = 895;
   r.runs_fallback = 5;

@@ -28,11 +28,12 @@ class Lag : public ::testing::Test {
 
   // The lag of one moment.
   double lag_mm(std::size_t piece, double reference_mm, double nozzle_x_mm, double nozzle_y_mm,
-                double laid_mm) {
+                double laid_mm, bool flows = true) {
     const PathPiece& on = path_[piece];
     FilamentLag lag;
     lag.add(path_, piece, on.x_mm + reference_mm * on.direction_x,
-            on.y_mm + reference_mm * on.direction_y, nozzle_x_mm, nozzle_y_mm, laid_mm, 1e-4);
+            on.y_mm + reference_mm * on.direction_y, nozzle_x_mm, nozzle_y_mm, laid_mm, flows,
+            1e-4);
     return lag.stats().max_mm;
   }
 
@@ -63,13 +64,23 @@ TEST_F(Lag, IsTheDistanceFromTheNozzleToThePlaceWhoseFilamentComesOut) {
   EXPECT_NEAR(lag_mm(0, 5.0, 4.9, 0.0, 0.5), 0.1, 1e-12);
 }
 
-TEST_F(Lag, LeavesOutMovesWithoutFilament) {
+TEST_F(Lag, LeavesOutTravelBetweenTheNozzleAndItsFilament) {
   // 0.1 mm on the last move, with the filament of a place 0.2 mm before the end of the first.
   EXPECT_NEAR(lag_mm(3, 0.1, 29.9, 1.0, 1.98), 0.3, 1e-12);
   // The nozzle is before the end of the first move, with the filament of a place on the last.
   EXPECT_NEAR(lag_mm(0, 19.8, 19.8, 0.0, 2.01), 0.4, 1e-12);
-  // If the nozzle is on a move without filament, nothing is measured.
-  EXPECT_EQ(lag_mm(1, 5.0, 25.0, 0.0, 1.0), 0.0);
+}
+
+TEST_F(Lag, CountsTravelWhileFilamentComesOut) {
+  // 0.3 mm behind the end of the first move, of which 0.01 mm of filament are missing: 0.1 mm.
+  EXPECT_NEAR(lag_mm(0, 19.9, 20.3, 0.0, 1.99), 0.4, 1e-12);
+  EXPECT_NEAR(lag_mm(1, 0.2, 20.3, 0.0, 1.99), 0.4, 1e-12);
+  // 0.4 mm before the begin of the last move, of which 0.005 mm of filament are laid: 0.1 mm.
+  EXPECT_NEAR(lag_mm(2, 0.5, 30.0, 0.6, 2.005), 0.5, 1e-12);
+  // All that is laid before the travel is laid, and nothing of what comes behind it.
+  EXPECT_EQ(lag_mm(1, 5.0, 25.0, 0.0, 2.0 - 1e-9), 0.0);
+  // Nothing comes out, so what is missing is somewhere else.
+  EXPECT_EQ(lag_mm(1, 5.0, 25.0, 0.0, 1.0, false), 0.0);
 }
 
 TEST_F(Lag, IsNoneOfAPlaceThatIsOnlyNearInSpace) {
@@ -79,8 +90,8 @@ TEST_F(Lag, IsNoneOfAPlaceThatIsOnlyNearInSpace) {
 
 TEST_F(Lag, IsWeighedByTime) {
   FilamentLag lag;
-  lag.add(path_, 0, 5.0, 0.0, 5.0, 0.0, 0.48, 3e-4);
-  lag.add(path_, 0, 6.0, 0.0, 6.0, 0.0, 0.6, 1e-4);
+  lag.add(path_, 0, 5.0, 0.0, 5.0, 0.0, 0.48, true, 3e-4);
+  lag.add(path_, 0, 6.0, 0.0, 6.0, 0.0, 0.6, true, 1e-4);
   EXPECT_NEAR(lag.stats().rms_mm, 0.2 * std::sqrt(0.75), 1e-12);
   EXPECT_NEAR(lag.stats().max_mm, 0.2, 1e-12);
   EXPECT_EQ(FilamentLag().stats().rms_mm, 0.0);

@@ -219,11 +219,12 @@ struct Report {
   std::vector<PlantDeviation> plants;    // in the order of the settings
   std::optional<Robustness> robustness;  // set if the base is to suit more models than one
 
-  // What the compensated runs ask of a motor of X or Y at most, and its largest change of speed
-  // from one line to the next.
+  // What the compensated runs ask of a motor of X or Y at most, its largest change of speed from
+  // one line to the next, and the largest acceleration that a run was allowed.
   double base_max_velocity_mm_s = 0.0;
   double base_max_accel_mm_s2 = 0.0;
   double base_max_step_mm_s = 0.0;
+  double base_accel_limit_mm_s2 = 0.0;
 
   std::size_t runs_total = 0;  // stretches between stops that could be compensated
   std::size_t runs_compensated = 0;

@@ -156,6 +156,8 @@ struct VerifyReport {
   // middles. Motors and runs as for base_max_velocity_mm_s.
   double base_max_accel_mm_s2 = 0.0;
   double base_max_step_mm_s = 0.0;  // that change itself, which a motor takes at once
+  // The largest acceleration that a run's motors were allowed; 0 without such runs.
+  double base_accel_limit_mm_s2 = 0.0;
   double input_extrusion_mm = 0.0;  // net filament
   double output_extrusion_mm = 0.0;
   // Largest filament error of one move or one run of the input. What the output's lines cannot
