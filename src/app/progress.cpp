@@ -51,6 +51,19 @@ void ProgressBar::update(std::string_view stage, double fraction) {
                   bar_text(stage, fraction, left ? time_left_text(*left) : "", columns_of(fd_)))));
 }
 
+void OneEstimate::update(std::string_view stage, double fraction) {
+  constexpr TimeLeft::Seconds kWorthALine{60.0};
+  if (told_ == stage) {
+    return;
+  }
+  const std::optional<TimeLeft::Seconds> left = time_left_.update(stage, fraction, clock_());
+  if (left && *left > kWorthALine) {
+    told_ = stage;
+    static_cast<void>(
+        write_all(fd_, fmt::format("unflex: {}, {}\n", stage, time_left_text(*left))));
+  }
+}
+
 std::string bar_text(std::string_view stage, double fraction, std::string_view left,
                      std::size_t columns) {
   // The last column stays free: a cursor beyond it would wrap.
@@ -78,6 +91,9 @@ std::string bar_text(std::string_view stage, double fraction, std::string_view l
 std::unique_ptr<Progress> make_progress(bool quiet) {
   if (!quiet && can_redraw(STDERR_FILENO)) {
     return std::make_unique<ProgressBar>(STDERR_FILENO);
+  }
+  if (!quiet) {
+    return std::make_unique<OneEstimate>(STDERR_FILENO);
   }
   return std::make_unique<SignalledProgress>();
 }

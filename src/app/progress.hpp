@@ -40,12 +40,28 @@ class ProgressBar final : public SignalledProgress {
   bool drawn_ = false;
 };
 
+// Says once how long a stage that takes minutes will take, on an fd that is no terminal.
+class OneEstimate final : public SignalledProgress {
+ public:
+  explicit OneEstimate(int fd, ProgressBar::Clock clock = &std::chrono::steady_clock::now)
+      : fd_(fd), clock_(std::move(clock)) {}
+
+  void update(std::string_view stage, double fraction) override;
+
+ private:
+  int fd_;
+  ProgressBar::Clock clock_;
+  TimeLeft time_left_;
+  std::string told_;  // the stage that was told of
+};
+
 // The bar's text for a terminal of `columns`, without control characters. left: the time left, as
 // text, or empty; it gives way where there is no room.
 [[nodiscard]] std::string bar_text(std::string_view stage, double fraction, std::string_view left,
                                    std::size_t columns);
 
-// A bar if stderr is a terminal that can show one and `quiet` is not set.
+// A bar if stderr is a terminal that can show one, an estimate elsewhere; neither if `quiet` is
+// set.
 [[nodiscard]] std::unique_ptr<Progress> make_progress(bool quiet);
 
 }  // namespace unflex::app

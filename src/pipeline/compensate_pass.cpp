@@ -20,6 +20,7 @@
 #include "report_rows.hpp"
 #include "retime.hpp"
 #include "rewrite_lines.hpp"
+#include "run_progress.hpp"
 #include "run_writer.hpp"
 #include "stage_options.hpp"
 #include "task_pool.hpp"
@@ -65,6 +66,14 @@ std::string text_of(const Piece& piece) {
     }
   }
   return text;
+}
+
+std::size_t bytes_of(const Piece& piece) {
+  std::size_t bytes = 0;
+  for (const gcode::Event& event : piece.events) {
+    bytes += event.added ? 0 : event.line.text.size();
+  }
+  return bytes;
 }
 
 machine::Settings as_sliced(machine::Settings settings) {
@@ -134,6 +143,7 @@ class Compensator {
         }
         queue_.pop_front();
       }
+      tell_progress();
       if (progress_->cancelled()) {
         return fail(ErrorKind::internal, "cancelled");
       }
@@ -258,6 +268,7 @@ class Compensator {
     }
     layers_.add(job);
     lines_queued_ += job->piece.events.size();
+    job->bytes = bytes_of(job->piece);
     queue_.push_back(std::move(job));
   }
 
@@ -436,9 +447,18 @@ class Compensator {
       tickets_.erase(tickets_.begin(), tickets_.begin() + static_cast<std::ptrdiff_t>(tickets));
       first_ticket_ += tickets;
     }
-    progress_->update("compensating",
-                      share_of_input(static_cast<double>(bytes_written_), input_bytes_));
+    tell_progress();
     return {};
+  }
+
+  // Runs that are being worked on count for what is done of them.
+  void tell_progress() {
+    double done_bytes = static_cast<double>(bytes_written_);
+    for (const std::shared_ptr<RunJob>& job : queue_) {
+      done_bytes += share_done(*job) * static_cast<double>(job->bytes);
+    }
+    done_bytes = most_done_bytes_ = std::max(most_done_bytes_, done_bytes);
+    progress_->update("compensating", share_of_input(done_bytes, input_bytes_));
   }
 
   void put(std::string input, std::string output) {
@@ -516,10 +536,11 @@ class Compensator {
   std::deque<std::shared_ptr<RunJob>> queue_;
   std::size_t nodes_queued_ = 0;
   std::size_t lines_queued_ = 0;
-  std::deque<Ticket> tickets_;    // for the windows in queue_
-  std::size_t first_ticket_ = 0;  // number of the first ticket in tickets_
-  double input_bytes_;            // 0: not known
-  std::size_t bytes_written_ = 0;
+  std::deque<Ticket> tickets_;     // for the windows in queue_
+  std::size_t first_ticket_ = 0;   // number of the first ticket in tickets_
+  double input_bytes_;             // 0: not known
+  std::size_t bytes_written_ = 0;  // of the input
+  double most_done_bytes_ = 0.0;   // with what is done of the runs in the queue
   bool told_of_cap_ = false;
   bool all_read_ = false;
   std::mutex mutex_;

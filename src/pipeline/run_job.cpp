@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "judge.hpp"
+#include "run_progress.hpp"
 #include "unflex/emit/emitter.hpp"
 #include "unflex/timing/stretched.hpp"
 
@@ -208,13 +209,14 @@ void keep_feed(RunJob& job, const compensate::Engine& engine) {
 
 void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
   try {
+    const CountedEngine engine(*choice.engine, job.nodes_timed);
     if (job.keeps_timing()) {
-      keep_feed(job, *choice.engine);
+      keep_feed(job, engine);
       job.is_timed = true;
       return;
     }
     std::optional<timing::Timed> timed =
-        timing::faster(job.course(), job.setup, job.first_stage, job.bounds, *choice.engine);
+        timing::faster(job.course(), job.setup, job.first_stage, job.bounds, engine);
     if (choice.is_optimal) {
       tl::expected<timing::Timed, std::string> optimal =
           timing::optimal(job.course(), job.setup, job.first_stage, job.bounds);
@@ -238,7 +240,7 @@ void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
                     std::move(timed->base)};
     } else {
       keep_timing(job, "no faster timing was found that keeps the tolerance");
-      keep_feed(job, *choice.engine);
+      keep_feed(job, engine);
     }
   } catch (const std::exception& exception) {
     // Out of memory, mostly.

@@ -64,6 +64,7 @@ struct RunJob {
   std::string scaled_reason;  // why the timing is not the optimal one, where that is asked for
   std::string slow_reason;    // why the timing stays as sliced
   std::atomic<bool> is_timed = false;
+  std::atomic<std::size_t> nodes_timed = 0;  // solved so far in the search for the timing
   // By how much the new timing is stretched so that the layer lasts long enough; unset: not known
   // yet.
   std::optional<double> stretch;
@@ -73,6 +74,7 @@ struct RunJob {
   std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
   std::vector<Probe> probes;
   std::size_t queued_nodes = 0;          // nodes as sliced, while the piece is in the queue
+  std::size_t bytes = 0;                 // of its lines, once it is in the queue
   std::size_t submitted = 0;             // windows given to the solvers
   int lines_after = 0;                   // Run::lines_after, counted in the sliced lines
   std::atomic<std::size_t> missing = 0;  // axes of windows not yet solved

@@ -191,6 +191,20 @@ TEST_F(BarOnAPipe, TellsTheTimeLeftOnceItIsKnown) {
   EXPECT_THAT(text, HasSubstr("]  10 %, 2 min left\r"));
 }
 
+TEST_F(BarOnAPipe, IsOneLineThatTellsOfMinutesIfItMayNotBeRedrawn) {
+  std::chrono::steady_clock::time_point now{};
+  OneEstimate estimate(ends_[1], [&now] { return now; });
+  for (int second = 0; second <= 100; ++second) {
+    estimate.update("solving", second / 100.0);  // a minute and a half
+    now += 1s;
+  }
+  for (int second = 0; second <= 50; ++second) {
+    estimate.update("verifying", second / 50.0);  // less than a minute
+    now += 1s;
+  }
+  EXPECT_EQ(written(), "unflex: solving, 2 min left\n");
+}
+
 TEST_F(BarOnAPipe, IsClearedAtTheEnd) {
   { ProgressBar(ends_[1]).update("solving", 0.25); }
   const std::string text = written();

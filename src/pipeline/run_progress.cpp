@@ -1,0 +1,48 @@
+#include "run_progress.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "run_job.hpp"
+
+namespace unflex::pipeline {
+namespace {
+
+// Of the work on a run: the search for its timing, where that is free, and the windows of the
+// timing that it has. The rest are its lines.
+constexpr double kTiming = 0.8;
+constexpr double kWindows = 0.9;
+
+// A search that goes on gets slower and slower on the bar, as nobody knows how many rounds it has.
+double share_timed(const RunJob& job) {
+  constexpr double kRounds = 8.0;
+  if (job.is_timed) {
+    return 1.0;
+  }
+  const double nodes_of_round = 2.0 * static_cast<double>(std::max<std::size_t>(job.grid.count, 1));
+  return 1.0 - std::exp(-static_cast<double>(job.nodes_timed) / (kRounds * nodes_of_round));
+}
+
+}  // namespace
+
+Result<compensate::AxisSolution> CountedEngine::solve(const compensate::AxisWindow& window) const {
+  Result<compensate::AxisSolution> solution = engine_->solve(window);
+  *nodes_ += window.nodes();
+  return solution;
+}
+
+double share_done(const RunJob& job) {
+  if (job.prepared) {
+    return 1.0;
+  }
+  const bool searches = !job.bounds.empty();
+  const double timing = searches ? kTiming * share_timed(job) : 0.0;
+  if (!job.is_laid_out || job.spans.empty()) {
+    return timing;
+  }
+  const double windows = 2.0 * static_cast<double>(job.spans.size());
+  const double solved = 1.0 - static_cast<double>(job.missing) / windows;
+  return timing + (kWindows - timing) * solved;
+}
+
+}  // namespace unflex::pipeline
