@@ -17,6 +17,8 @@ test_packages=(
   libgmock-dev libgtest-dev
   # Builds are cached, the format of sources is checked, the picture of modules is drawn.
   ccache clang-format graphviz
+  # Another compiler reads what changed.
+  clang-16
   # Tests look at HTML reports in a real browser.
   chromium python3
   # Tests make packages, format the manual page and let shells complete command lines.
@@ -26,7 +28,7 @@ test_packages=(
   prusa-slicer python3-jinja2 python3-yaml
 )
 # Debian's default clang, 14, does not understand the ranges of libstdc++ 12.
-fuzz_packages=(clang-16 libclang-rt-16-dev llvm-16)
+fuzz_packages=(libclang-rt-16-dev llvm-16)
 
 if [[ ${1:-} == --tests ]]; then
   packages+=("${test_packages[@]}")

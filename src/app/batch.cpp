@@ -30,17 +30,30 @@ constexpr int kStateColumns = 9;
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kBetweenSweeps{2};
 
-// Checks the settings, so that what is wrong with them is said once and not for every print.
-Status check_settings(const RunConfig& config) {
+// Settings are checked first, so that what is wrong with them is said once and not for every print.
+Status check_printer_file(const RunConfig& config) {
   std::error_code failed;
   if (config.printer_file && std::filesystem::exists(*config.printer_file, failed) &&
       !std::filesystem::is_regular_file(*config.printer_file, failed)) {
     return fail(ErrorKind::usage, {*config.printer_file, 0},
                 "is read for every print; give --printer a file");
   }
-  return machine::load(config.printer_file, config.overrides)
-      .and_then(without_guess)
-      .map([](const machine::Settings&) {});
+  return {};
+}
+
+// Checks the settings of each printer that has a print.
+Status check_printers(const RunConfig& config, const BatchFiles& files) {
+  std::set<std::optional<std::string>> printers;
+  for (const BatchPrint& print : files.prints) {
+    printers.insert(print.printer_file ? print.printer_file : config.printer_file);
+  }
+  for (const std::optional<std::string>& printer : printers) {
+    if (const auto loaded = machine::load(printer, config.overrides).and_then(without_guess);
+        !loaded) {
+      return tl::unexpected(loaded.error());
+    }
+  }
+  return {};
 }
 
 // The folders on the way to the output that do not exist yet. Unless they are kept, the empty ones
@@ -95,6 +108,9 @@ RunConfig config_of(const RunConfig& config, const BatchPrint& print, unsigned w
   one.output = print.output;
   one.print_name = print.output;
   one.report = print.report;
+  if (print.printer_file) {
+    one.printer_file = print.printer_file;
+  }
   one.workers = workers;
   one.quiet = true;
   return one;
@@ -273,8 +289,9 @@ Result<ExitCode> run_batch(const RunConfig& config, Console& console) {
   if (!files) {
     return tl::unexpected(files.error());
   }
-  const Status checked =
-      check_settings(config).and_then([&] { return check_summary(config, *files); });
+  const Status checked = check_printer_file(config)
+                             .and_then([&] { return check_printers(config, *files); })
+                             .and_then([&] { return check_summary(config, *files); });
   if (!checked) {
     return tl::unexpected(checked.error());
   }

@@ -37,15 +37,19 @@ fs::path place_of(const fs::path& file) {
 class Finder {
  public:
   explicit Finder(const RunConfig& config)
-      : root_(config.input), output_(config.output), own_{place_of(output_)} {
+      : has_printer_file_(config.printer_file.has_value()),
+        output_(config.output),
+        own_{place_of(output_)} {
     if (config.report) {
       reports_ = *config.report;
       own_.insert(place_of(*reports_));
     }
   }
 
-  // Takes what is in the folder, whose name below the root is `below`.
-  void look(const fs::path& folder, const fs::path& below, BatchFiles& files) {
+  // Takes what is in the folder, whose name below the root is `below`. printer_file: of the folder
+  // above.
+  void look(const fs::path& folder, const fs::path& below,
+            const std::optional<std::string>& printer_file, BatchFiles& files) {
     std::error_code failed;
     std::vector<fs::directory_entry> entries;
     for (fs::directory_iterator entry(folder, failed), end; !failed && entry != end;
@@ -59,16 +63,27 @@ class Finder {
       return;
     }
     std::ranges::sort(entries);
+    const std::optional<std::string> own = printer_file_of(folder, below);
     for (const fs::directory_entry& entry : entries) {
       const fs::path name = entry.path().filename();
       if (!name.string().starts_with('.')) {
-        take(entry, below / name, files);
+        take(entry, below / name, own ? own : printer_file, files);
       }
     }
   }
 
  private:
-  void take(const fs::directory_entry& entry, const fs::path& name, BatchFiles& files) {
+  // What is named on the command line holds for the folder of the batch itself.
+  [[nodiscard]] std::optional<std::string> printer_file_of(const fs::path& folder,
+                                                           const fs::path& below) const {
+    std::error_code failed;
+    const fs::path file = folder / kPrinterFileName;
+    const bool holds = !below.empty() || !has_printer_file_;
+    return holds && fs::is_regular_file(file, failed) ? std::optional(file.string()) : std::nullopt;
+  }
+
+  void take(const fs::directory_entry& entry, const fs::path& name,
+            const std::optional<std::string>& printer_file, BatchFiles& files) {
     std::error_code failed;
     const auto pass_by = [&](std::string why) {
       files.passed_by.push_back({{entry.path().string(), 0}, std::move(why)});
@@ -77,11 +92,11 @@ class Finder {
       if (entry.is_symlink(failed)) {
         pass_by("is a link to a folder, which is not followed; give that folder itself");
       } else if (!own_.contains(place_of(entry.path()))) {
-        look(entry.path(), name, files);
+        look(entry.path(), name, printer_file, files);
       }
     } else if (is_print(name.string())) {
       if (entry.is_regular_file(failed)) {
-        add(entry, name, files);
+        add(entry, name, printer_file, files);
       } else if (entry.is_symlink(failed)) {
         files.unreadable.push_back(
             fail(ErrorKind::input, {entry.path().string(), 0}, "is a link that leads to no file")
@@ -92,13 +107,15 @@ class Finder {
     }
   }
 
-  void add(const fs::directory_entry& entry, const fs::path& name, BatchFiles& files) {
+  void add(const fs::directory_entry& entry, const fs::path& name,
+           const std::optional<std::string>& printer_file, BatchFiles& files) {
     std::error_code failed;
     const std::uintmax_t bytes = entry.file_size(failed);
     BatchPrint print{.name = name.string(),
                      .input = entry.path().string(),
                      .output = (output_ / name).string(),
                      .report = {},
+                     .printer_file = printer_file,
                      .bytes = failed ? 0 : bytes};
     if (reports_) {
       // The page's name holds the print's whole name, as a.gcode and a.g may stand side by side.
@@ -107,7 +124,7 @@ class Finder {
     files.prints.push_back(std::move(print));
   }
 
-  fs::path root_;
+  bool has_printer_file_;
   fs::path output_;
   std::optional<fs::path> reports_;
   std::set<fs::path> own_;
@@ -205,7 +222,7 @@ Result<BatchFiles> find_prints(const RunConfig& config) {
     return tl::unexpected(checked.error());
   }
   BatchFiles files;
-  Finder(config).look(config.input, {}, files);
+  Finder(config).look(config.input, {}, {}, files);
   if (files.prints.empty() && !files.unreadable.empty()) {
     return tl::unexpected(files.unreadable.front());
   }

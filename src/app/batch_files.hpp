@@ -25,6 +25,8 @@ struct BatchPrint {
   std::string input;
   std::string output;
   std::optional<std::string> report;
+  // That of its own folder or the next one above that has one; unset: that of the command line.
+  std::optional<std::string> printer_file;
   std::uintmax_t bytes = 0;
 };
 
@@ -33,6 +35,9 @@ struct BatchFiles {
   std::vector<Error> unreadable;      // folders that could not be looked into
   std::vector<Diagnostic> passed_by;  // what looks like a print and was left out
 };
+
+// The printer file of a folder, which holds for the prints in it and below.
+inline constexpr std::string_view kPrinterFileName = "printer.toml";
 
 // Looks through the folder config.input, and all below, for prints. The output mirrors it in
 // config.output, pages go to config.report. Names that begin with a dot, links to folders, and the

@@ -87,7 +87,11 @@ void take_tolerances(RunConfig& config) {
     return;
   }
   // Without a value a flag is "true".
-  std::string_view rest = config.faster_um == "true" ? "5,10,20,50,100" : config.faster_um;
+  constexpr std::string_view kUsual = "5,10,20,50,100";
+  std::string_view rest = config.faster_um;
+  if (rest == "true") {
+    rest = kUsual;
+  }
   for (bool more = true; more;) {
     const std::size_t comma = rest.find(',');
     const std::string_view word = rest.substr(0, comma);

@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <string_view>
 
+#include "identification_parts.hpp"
 #include "sparkline.hpp"
 #include "unflex/app/run_config.hpp"
-#include "unflex/report/html_page.hpp"
 #include "unflex/report/json_parts.hpp"
-#include "unflex/report/svg_plot.hpp"
 
 namespace unflex::app {
 namespace {
@@ -23,16 +21,6 @@ using identify::ModeEstimate;
 using identify::ModeOfAxis;
 using report::Json;
 
-std::string number_text(double value, const Estimate& estimate) {
-  return app::number_text(value, estimate.high - estimate.low);
-}
-
-std::string estimate_text(const Estimate& e) { return number_text(e.value, e); }
-
-std::string interval_text(const Estimate& e) {
-  return fmt::format("{} to {}", number_text(e.low, e), number_text(e.high, e));
-}
-
 // "45.4 Hz (44.9 to 45.9), ζ 0.071 (0.066 to 0.076)", and the gain where there are others.
 std::string mode_text(const ModeEstimate& mode, bool is_alone) {
   std::string text =
@@ -42,68 +30,6 @@ std::string mode_text(const ModeEstimate& mode, bool is_alone) {
     text += fmt::format(", gain {} ({})", estimate_text(mode.gain), interval_text(mode.gain));
   }
   return text;
-}
-
-std::string mode_name(const ModeEstimate& mode) {
-  return fmt::format("{:.1f} Hz", mode.freq_hz.value);
-}
-
-// Where the sensor's own axes lie against the motion; empty where nothing tells.
-std::string sensor_text(const std::array<double, 3>& direction) {
-  constexpr double kAlone = 0.97;
-  constexpr std::string_view kNames = "xyz";
-  std::string parts;
-  for (std::size_t c = 0; c < 3; ++c) {
-    if (std::abs(direction[c]) > kAlone) {
-      return fmt::format("the sensor's {}", kNames[c]);
-    }
-    if (direction[c] != 0.0) {
-      parts += fmt::format("{}{} {:.2f}", parts.empty() ? "" : ", ", kNames[c], direction[c]);
-    }
-  }
-  return parts.empty() ? parts : fmt::format("the sensor's {}", parts);
-}
-
-// The heights at which a curve is drawn. A spectrum holds energies, which span decades, so we draw
-// their roots, the amplitudes. A curve that swings about 0 is drawn as it is.
-std::vector<double> heights(const Curve& curve, const std::vector<double>& values) {
-  std::vector<double> result;
-  for (const double value : values) {
-    result.push_back(curve.is_spectrum ? std::sqrt(std::max(value, 0.0)) : value);
-  }
-  return result;
-}
-
-// A curve of a record's picture.
-struct Trace {
-  std::string name;
-  std::vector<double> values;
-  std::string colour;
-  report::Stroke stroke = report::Stroke::solid;
-};
-
-// What was measured and what the model says of it: as a whole, each mode alone, noise, and what is
-// left.
-std::vector<Trace> traces_of(const IdentifiedRecord& record) {
-  constexpr std::array<std::string_view, 3> kColours = {"--series-3", "--series-4", "--series-5"};
-  const Curve& curve = record.fit.curve;
-  std::vector<Trace> traces = {{"measured", curve.measured, "--series-1", report::Stroke::solid},
-                               {record.fit.is_trusted() ? "fitted" : "closest fit", curve.fitted,
-                                "--series-2", report::Stroke::dashed}};
-  if (!curve.is_spectrum) {
-    return traces;
-  }
-  for (std::size_t m = 0; m < curve.modes.size(); ++m) {
-    traces.push_back({mode_name(record.fit.model.modes[m]), curve.modes[m],
-                      std::string(kColours.at(m)), report::Stroke::solid});
-  }
-  traces.push_back({"noise", curve.noise, "--muted", report::Stroke::solid});
-  std::vector<double> left;
-  for (std::size_t i = 0; i < curve.x.size(); ++i) {
-    left.push_back(std::abs(curve.measured[i] - curve.fitted[i]));
-  }
-  traces.push_back({"unexplained", left, "--series-6", report::Stroke::dotted});
-  return traces;
 }
 
 std::string drawing(const IdentifiedRecord& record) {
@@ -238,76 +164,6 @@ Json record_json(const IdentifiedRecord& record) {
   return json;
 }
 
-std::string figure(const IdentifiedRecord& record) {
-  const Curve& curve = record.fit.curve;
-  if (curve.x.empty()) {
-    return {};
-  }
-  report::Plot plot{.title = fmt::format("Measured and fitted, {}", record.name),
-                    .x_label = curve.is_spectrum ? "frequency, Hz" : "time, s",
-                    .y_label = curve.is_spectrum ? "amplitude, relative" : "acceleration, relative",
-                    .width_px = 680,
-                    .height_px = 300};
-  for (const Trace& trace : traces_of(record)) {
-    report::PlotCurve& drawn = plot.curves.emplace_back();
-    drawn.label = trace.name;
-    drawn.colour = trace.colour;
-    drawn.stroke = trace.stroke;
-    const std::vector<double> y = heights(curve, trace.values);
-    for (std::size_t i = 0; i < curve.x.size(); ++i) {
-      drawn.points.push_back({curve.x[i], y[i]});
-    }
-  }
-  return report::svg_plot(plot) + report::svg_legend(plot);
-}
-
-std::string modes_table(const AxisModel& model) {
-  std::string rows;
-  for (const ModeEstimate& mode : model.modes) {
-    rows += fmt::format("<tr><td>{} Hz ({})</td><td>{} ({})</td><td>{} ({})</td></tr>\n",
-                        estimate_text(mode.freq_hz), interval_text(mode.freq_hz),
-                        estimate_text(mode.damping_ratio), interval_text(mode.damping_ratio),
-                        estimate_text(mode.gain), interval_text(mode.gain));
-  }
-  return fmt::format(
-      "<table class=\"data\"><thead><tr><th>frequency (95 %)</th><th>damping ratio (95 %)</th>"
-      "<th>gain (95 %)</th></tr></thead><tbody>\n{}</tbody></table>\n",
-      rows);
-}
-
-std::string record_card(const IdentifiedRecord& record) {
-  const identify::RecordFit& fit = record.fit;
-  std::string remarks;
-  if (!fit.is_trusted()) {
-    remarks = fmt::format("<p role=\"alert\"><strong>Not used:</strong> {}</p>\n",
-                          report::escape_html(fit.refusal));
-  }
-  for (const std::string& warning : fit.warnings) {
-    remarks += fmt::format("<p role=\"note\"><strong>Mind:</strong> {}</p>\n",
-                           report::escape_html(warning));
-  }
-  const std::string sensor = sensor_text(fit.direction);
-  return fmt::format(
-      "<section class=\"card\"><h2>{} along {}</h2>\n"
-      "<p>By {}{}{}. {:.0f} % of the record is not explained by {}.</p>\n{}{}{}</section>\n",
-      report::escape_html(record.name), letter(record.axis), to_string(fit.model.method),
-      sensor.empty() ? "" : ", along ", sensor, 100.0 * fit.unexplained,
-      fit.is_trusted() ? "the model" : "the closest fit", remarks,
-      fit.is_trusted() ? modes_table(fit.model) : std::string{}, figure(record));
-}
-
-std::string found_text(const Identification& identification) {
-  std::string found;
-  for (const auto& [axis, model] : identification.axes) {
-    std::string modes;
-    for (const ModeEstimate& mode : model.modes) {
-      modes += fmt::format("{}{}", modes.empty() ? "" : " and ", estimate_text(mode.freq_hz));
-    }
-    found += fmt::format("{}{} {} Hz", found.empty() ? "" : ", ", letter(axis), modes);
-  }
-  return found;
-}
-
 }  // namespace
 
 std::string snippet(const Identification& identification) {
@@ -369,25 +225,6 @@ std::string identification_json(const Identification& identification) {
   json["snippet"] = snippet(identification);
   json["warnings"] = identification.warnings;
   return report::dump(json);
-}
-
-std::string identification_html(const Identification& identification) {
-  const std::string found = found_text(identification);
-  std::string body =
-      found.empty()
-          ? std::string("<section class=\"card\"><h2>No record carries a model</h2></section>\n")
-          : fmt::format(
-                "<section class=\"card\"><h2>{}: {}</h2>\n<p>For the "
-                "printer file:</p>\n<pre>{}</pre></section>\n",
-                identification.is_second ? "What still rings" : "The nozzle swings", found,
-                report::escape_html(snippet(identification)));
-  for (const IdentifiedRecord& record : identification.records) {
-    body += record_card(record);
-  }
-  return report::html_page({.title = "Resonances",
-                            .style = ".plot { width: 100%; height: auto; max-width: 60rem; }",
-                            .body = body,
-                            .script = {}});
 }
 
 }  // namespace unflex::app

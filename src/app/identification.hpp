@@ -2,10 +2,12 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "unflex/identify/axis_model.hpp"
+#include "unflex/rivals/klipper_calibration.hpp"
 
 namespace unflex::app {
 
@@ -13,6 +15,8 @@ struct IdentifiedRecord {
   std::string name;
   identify::Axis axis = identify::Axis::x;
   identify::RecordFit fit;
+  // What Klipper's calibration would set up for the record; unset: it is no spectrum of an axis.
+  std::optional<rivals::FittedShaper> shaper;
 };
 
 struct Identification {

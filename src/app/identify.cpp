@@ -13,6 +13,7 @@
 #include "inputs.hpp"
 #include "outputs.hpp"
 #include "print_run.hpp"
+#include "record_densities.hpp"
 #include "results.hpp"
 #include "unflex/core/errno_text.hpp"
 #include "unflex/machine/machine.hpp"
@@ -73,7 +74,14 @@ Status add_set(const IdentifyConfig& config, const identify::DataSet& set, Ident
   for (const std::string& warning : fitted->warnings) {
     warn(all, set.name, warning);
   }
-  all.records.push_back({set.name, *axis, std::move(*fitted)});
+  std::optional<rivals::FittedShaper> shaper;
+  if (!config.second && fitted->curve.is_spectrum) {
+    const Densities densities = densities_of(set);
+    if (const auto found = rivals::klipper_calibration(densities.step_hz, densities.sum)) {
+      shaper = found->recommended;
+    }
+  }
+  all.records.push_back({set.name, *axis, std::move(*fitted), shaper});
   return {};
 }
 
@@ -104,7 +112,7 @@ Status add_tower(const IdentifyConfig& config, Identification& all) {
     warn(all, std::string(kName), warning);
   }
   all.records.push_back(
-      {std::string(kName), config.axis.value_or(identify::Axis::x), std::move(*fitted)});
+      {std::string(kName), config.axis.value_or(identify::Axis::x), std::move(*fitted), {}});
   return {};
 }
 

@@ -11,6 +11,7 @@
 #include "inspection.hpp"
 #include "machine_records.hpp"
 #include "outputs.hpp"
+#include "record_densities.hpp"
 #include "results.hpp"
 #include "unflex/identify/axis_model.hpp"
 #include "unflex/pipeline/study_machines.hpp"
@@ -22,38 +23,6 @@ namespace {
 
 using identify::Axis;
 using identify::DataSet;
-
-// The densities of a record: of the column with the most motion, and the sum of all three.
-struct Densities {
-  double step_hz = 0.0;
-  std::vector<double> column;
-  std::vector<double> sum;
-};
-
-Densities densities_of(const DataSet& set) {
-  constexpr double kFrom_hz = 15.0;
-  constexpr double kTo_hz = 128.0;
-  const identify::Spectrum spectrum = spectrum_of(set);
-  Densities result{spectrum.step_hz, {}, spectrum.density[0]};
-  double most = -1.0;
-  for (const std::vector<double>& column : spectrum.density) {
-    double energy = 0.0;
-    for (std::size_t k = 0; k < column.size(); ++k) {
-      const double freq_hz = static_cast<double>(k) * spectrum.step_hz;
-      energy += freq_hz > kFrom_hz && freq_hz < kTo_hz ? column[k] : 0.0;
-    }
-    if (energy > most) {
-      most = energy;
-      result.column = column;
-    }
-  }
-  for (std::size_t c = 1; c < 3; ++c) {
-    for (std::size_t k = 0; k < std::min(result.sum.size(), spectrum.density[c].size()); ++k) {
-      result.sum[k] += spectrum.density[c][k];
-    }
-  }
-  return result;
-}
 
 // An axis as one record tells of it.
 struct KnownAxis {

@@ -12,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "band_gain.hpp"
 #include "gap_check.hpp"
 #include "input_bytes.hpp"
 #include "layer_times.hpp"
@@ -110,6 +111,7 @@ class Compensator {
         writer_(rules_, job.input_name, job.settings.max_lines_per_s(), report),
         nozzle_(rules_.verify.nozzle, rules_.verify.fixed,
                 gcode::Interpreter(rules_.emit.interpreter).state().input_shaper()),
+        band_gain_(job_.settings),
         layers_(job.settings.is_timing_free() ? job.settings.timing.min_layer_s : 0.0),
         input_bytes_(input_bytes(job)),
         engine_(engines.threaded ? engines.threaded() : nullptr),
@@ -163,6 +165,7 @@ class Compensator {
       return tl::unexpected(*pieces_.error());
     }
     put({}, writer_.finish());
+    report_->free_timing.narrower = band_gain_.result();
     for (const Diagnostic& warning : pieces_.warnings()) {
       report_->warnings.push_back(to_string(warning));
     }
@@ -283,6 +286,7 @@ class Compensator {
 
   void time_in_thread(const std::shared_ptr<RunJob>& job) {
     job->bounds = move_bounds(job->piece, job_.settings);
+    band_gain_.choose(*job);
     pool_.submit([this, job] {
       choose_timing(*job, {job_.settings.timing.is_optimal(), timer_.get()});
       wake();
@@ -438,6 +442,9 @@ class Compensator {
       return tl::unexpected(text.error());
     }
     put(text_of(job.piece), std::move(*text));
+    if (job.piece.is_run) {
+      band_gain_.add(job);
+    }
     report_->solver_iterations += job.iterations;
     nodes_queued_ -= job.queued_nodes;
     lines_queued_ -= job.piece.events.size();
@@ -532,6 +539,7 @@ class Compensator {
   // The nozzle after the last piece read, as if every run so far were compensated. Kept motion
   // leaves a swing, with which the next run starts.
   NozzleFollower nozzle_;
+  BandGain band_gain_;
   LayerTimes layers_;
   std::deque<std::shared_ptr<RunJob>> queue_;
   std::size_t nodes_queued_ = 0;

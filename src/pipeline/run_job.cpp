@@ -205,42 +205,56 @@ void keep_feed(RunJob& job, const compensate::Engine& engine) {
   }
 }
 
+struct FoundTiming {
+  std::optional<timing::Timed> timed;  // unset: none that is faster
+  std::string scaled_reason;           // as RunJob's
+};
+
+FoundTiming find_timing(const RunJob& job, const compensate::Setup& setup,
+                        const TimingChoice& choice) {
+  FoundTiming found{
+      timing::faster(job.course(), setup, job.first_stage, job.bounds, *choice.engine), {}};
+  if (!choice.is_optimal) {
+    return found;
+  }
+  tl::expected<timing::Timed, std::string> optimal =
+      timing::optimal(job.course(), setup, job.first_stage, job.bounds);
+  // The optimal motion is the shortest among those near it, so the scaled one may be shorter.
+  if (!optimal) {
+    found.scaled_reason = std::move(optimal.error());
+  } else if (found.timed &&
+             planner::duration_s(found.timed->moves) <= planner::duration_s(optimal->moves)) {
+    found.scaled_reason = "the scaled timing takes less time than the optimal one that was found";
+  } else {
+    found.timed = std::move(*optimal);
+  }
+  return found;
+}
+
 }  // namespace
 
 void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
   try {
     const CountedEngine engine(*choice.engine, job.nodes_timed);
+    const TimingChoice counted{choice.is_optimal, &engine};
     if (job.keeps_timing()) {
       keep_feed(job, engine);
-      job.is_timed = true;
-      return;
-    }
-    std::optional<timing::Timed> timed =
-        timing::faster(job.course(), job.setup, job.first_stage, job.bounds, engine);
-    if (choice.is_optimal) {
-      tl::expected<timing::Timed, std::string> optimal =
-          timing::optimal(job.course(), job.setup, job.first_stage, job.bounds);
-      // The optimal motion is the shortest among those near it, so the scaled one may be shorter.
-      if (!optimal) {
-        job.scaled_reason = std::move(optimal.error());
-      } else if (timed &&
-                 planner::duration_s(timed->moves) <= planner::duration_s(optimal->moves)) {
-        job.scaled_reason = "the scaled timing takes less time than the optimal one that was found";
-      } else {
-        timed = std::move(*optimal);
+    } else if (FoundTiming found = find_timing(job, job.setup, counted); found.timed) {
+      job.scaled_reason = std::move(found.scaled_reason);
+      if (found.timed->plants) {
+        job.setup.x.plants = std::move(found.timed->plants->x);
+        job.setup.y.plants = std::move(found.timed->plants->y);
       }
-    }
-    if (timed) {
-      if (timed->plants) {
-        job.setup.x.plants = std::move(timed->plants->x);
-        job.setup.y.plants = std::move(timed->plants->y);
-      }
-      job.retimed =
-          NewTiming{std::move(timed->moves), counts_of(job.piece.move_counts, timed->pieces),
-                    std::move(timed->base)};
+      job.retimed = NewTiming{std::move(found.timed->moves),
+                              counts_of(job.piece.move_counts, found.timed->pieces),
+                              std::move(found.timed->base)};
     } else {
       keep_timing(job, "no faster timing was found that keeps the tolerance");
       keep_feed(job, engine);
+    }
+    if (job.narrow_setup) {
+      const FoundTiming narrow = find_timing(job, *job.narrow_setup, counted);
+      job.narrow_s = planner::duration_s(narrow.timed ? narrow.timed->moves : job.piece.moves);
     }
   } catch (const std::exception& exception) {
     // Out of memory, mostly.

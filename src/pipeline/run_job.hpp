@@ -61,6 +61,10 @@ struct RunJob {
   // Only if the timing is free: what each move may do, and the new timing, if there is one.
   std::vector<timing::MoveBounds> bounds;
   std::optional<NewTiming> retimed;
+  // Only for runs of a sample (BandGain): the setup for a narrower band, and how long the run takes
+  // with that.
+  std::optional<compensate::Setup> narrow_setup;
+  std::optional<double> narrow_s;
   std::string scaled_reason;  // why the timing is not the optimal one, where that is asked for
   std::string slow_reason;    // why the timing stays as sliced
   std::atomic<bool> is_timed = false;

@@ -105,16 +105,38 @@ Better better(const Report& report) {
   return result;
 }
 
-std::string faster_text(const Report& report) {
+std::vector<std::string> faster_texts(const Report& report) {
   if (report.free_timing.tolerance_mm <= 0.0 || report.reference_time_s <= 0.0) {
     return {};
   }
   const double change = 1.0 - report.emitted_time_s / report.reference_time_s;
-  return fmt::format("{} → {} to print, {:.0f} % {}; the nozzle may stray {:.4g} µm and {}",
-                     duration_text(report.reference_time_s), duration_text(report.emitted_time_s),
-                     100.0 * std::abs(change), change >= 0.0 ? "less" : "more",
-                     report.free_timing.tolerance_mm * 1e3,
-                     report.free_timing.is_kept() ? "keeps to it" : "strays further in places");
+  std::vector<std::string> lines = {
+      fmt::format("{} → {} to print, {:.0f} % {}; the nozzle may stray {:.4g} µm and {}",
+                  duration_text(report.reference_time_s), duration_text(report.emitted_time_s),
+                  100.0 * std::abs(change), change >= 0.0 ? "less" : "more",
+                  report.free_timing.tolerance_mm * 1e3,
+                  report.free_timing.is_kept() ? "keeps to it" : "strays further in places")};
+  constexpr double kWorthIt = 0.02;  // of the print time
+  if (const std::optional<NarrowerBand>& narrower = report.free_timing.narrower;
+      narrower && narrower->saves_s > kWorthIt * report.emitted_time_s) {
+    lines.push_back(
+        fmt::format("Frequencies known to {0:.3g} % would save some {1:.0f} % more: "
+                    "dynamics.freq_error = {2:.3g}",
+                    100.0 * narrower->freq_error, 100.0 * narrower->saves_s / report.emitted_time_s,
+                    narrower->freq_error));
+  }
+  return lines;
+}
+
+bool is_hardly_worth_it(const Report& report) {
+  return report.free_timing.tolerance_mm <= 0.0 &&
+         report.uncompensated.extruding.contour_p99_mm < kSeen_mm;
+}
+
+std::string hardly_worth_it_text(const Report& report) {
+  return fmt::format(
+      "Hardly worth it: as sliced 99 % of the time are within {} µm, and an eye sees {:.0f}",
+      micrometres_text(report.uncompensated.extruding.contour_p99_mm), 1e3 * kSeen_mm);
 }
 
 Worst worst(const Report& report) {

@@ -28,8 +28,17 @@ struct Better {
 [[nodiscard]] Better better(const Report& report);
 
 // Where the timing is free: "9.8s → 6.3s to print, 36 % less; the nozzle may stray 20 µm and keeps
-// to it". Empty: the timing is as sliced.
-[[nodiscard]] std::string faster_text(const Report& report);
+// to it", and what a narrower band of frequencies would save, if that is worth it. Empty: the
+// timing is as sliced.
+[[nodiscard]] std::vector<std::string> faster_texts(const Report& report);
+
+// What an eye sees of waves on a wall that is held into light from one side (docs/tune.md).
+inline constexpr double kSeen_mm = 0.008;
+
+// Whether the print as sliced strays less than an eye sees but for one hundredth of the time, so
+// that compensating it shows little.
+[[nodiscard]] bool is_hardly_worth_it(const Report& report);
+[[nodiscard]] std::string hardly_worth_it_text(const Report& report);
 
 struct Worst {
   std::optional<Place> compensated;

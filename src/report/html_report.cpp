@@ -308,7 +308,7 @@ std::string change(double from_mm, double to_mm) {
 
 std::string better_answer(const Report& r) {
   const Better found = better(r);
-  const std::string faster = faster_text(r);
+  const std::vector<std::string> faster = faster_texts(r);
   const bool is_allowed = !faster.empty() && found.times() < 1.0;
   const std::string times = is_allowed ? "Now" : times_text(found.times()) + ",";
   std::vector<std::string> lines = {escape_html(fmt::format("{} {}.", times, found.now))};
@@ -323,8 +323,11 @@ std::string better_answer(const Report& r) {
             ? fmt::format(", {} if they are 5 % off", micrometres_text(*found.off->zv_mm))
             : std::string{}));
   }
-  if (!faster.empty()) {
-    lines.insert(lines.begin(), escape_html(faster) + ".");
+  if (is_hardly_worth_it(r)) {
+    lines.push_back(escape_html(hardly_worth_it_text(r)) + ".");
+  }
+  for (std::size_t i = 0; i < faster.size(); ++i) {
+    lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(i), escape_html(faster[i]) + ".");
   }
   return answer(term("Better?", kTypical),
                 change(found.exact.now_mm, found.exact.compensated_mm) + " off the path", lines);

@@ -185,15 +185,19 @@ void add_timing(const Report& r, Json& json) {
   const FreeTiming& timing = r.free_timing;
   json["timing"] = nullptr;
   if (timing.tolerance_mm > 0.0) {
-    json["timing"] = {{"tolerance_mm", timing.tolerance_mm},
-                      {"contour_p999_mm", timing.contour_p999_mm},
-                      {"speed_of_feed_p999", timing.speed_p999},
-                      {"speed_of_feed_max", timing.speed_max},
-                      {"speed_of_feed_max_line", timing.speed_max_line},
-                      {"pieces_as_sliced", timing.pieces_as_sliced},
-                      {"as_sliced", fallbacks_json(timing.as_sliced)},
-                      {"pieces_scaled", timing.pieces_scaled},
-                      {"scaled", fallbacks_json(timing.scaled)}};
+    json["timing"] = {
+        {"tolerance_mm", timing.tolerance_mm},
+        {"contour_p999_mm", timing.contour_p999_mm},
+        {"speed_of_feed_p999", timing.speed_p999},
+        {"speed_of_feed_max", timing.speed_max},
+        {"speed_of_feed_max_line", timing.speed_max_line},
+        {"pieces_as_sliced", timing.pieces_as_sliced},
+        {"as_sliced", fallbacks_json(timing.as_sliced)},
+        {"pieces_scaled", timing.pieces_scaled},
+        {"scaled", fallbacks_json(timing.scaled)},
+        {"narrower", timing.narrower ? Json{{"freq_error", timing.narrower->freq_error},
+                                            {"saves_s", timing.narrower->saves_s}}
+                                     : Json(nullptr)}};
   }
 }
 

@@ -239,6 +239,11 @@ void write_curve(Sink out, const PlotCurve& curve, const Frame& frame) {
   for (const PlotPoint& point : curve.points) {
     pixels.push_back(frame.pixel(point));
   }
+  if (pixels.size() == 1) {
+    fmt::format_to(out, R"x(<circle cx="{:.1f}" cy="{:.1f}" r="4" fill="var({})"/>)x", pixels[0].x,
+                   pixels[0].y, curve.colour);
+    return;
+  }
   std::string path;
   for (const PlotPoint& point : simplified(pixels)) {
     fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", path.empty() ? 'M' : 'L', point.x,

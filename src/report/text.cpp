@@ -43,10 +43,8 @@ std::string zv_text(const Better& answer) {
 void write_better(Sink out, const Report& r) {
   const Better answer = better(r);
   // A print that was to be faster may stray more than now, as far as it was allowed.
-  const std::string faster = faster_text(r);
-  if (!faster.empty()) {
-    write_answer(out, "Faster?", {faster});
-  }
+  const std::vector<std::string> faster = faster_texts(r);
+  write_answer(out, "Faster?", faster);
   const bool is_allowed = !faster.empty() && answer.times() < 1.0;
   const std::string times = is_allowed ? "" : ": " + times_text(answer.times());
   std::vector<std::string> lines = {fmt::format(
@@ -58,6 +56,9 @@ void write_better(Sink out, const Report& r) {
   }
   if (answer.exact.zv_mm) {
     lines.push_back(zv_text(answer));
+  }
+  if (is_hardly_worth_it(r)) {
+    lines.push_back(hardly_worth_it_text(r));
   }
   write_answer(out, "Better?", lines);
 }
@@ -383,6 +384,10 @@ std::string to_text(const Report& report) {
   fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "off path, µm", "max", "p99", "RMS");
   write_deviation(out, "extruding", report.uncompensated.extruding, report.compensated.extruding);
   write_deviation(out, "all moves", report.uncompensated.all, report.compensated.all);
+  if (report.compensated.all.contour_max_mm > report.uncompensated.all.contour_max_mm) {
+    fmt::format_to(out,
+                   "                  (in travel, where nothing is laid, straying is harmless)\n");
+  }
   write_corners(out, report.uncompensated_corners, report.compensated_corners);
   write_sensitivity(out, report);
   write_unshaped(out, report.unshaped);

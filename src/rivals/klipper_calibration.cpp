@@ -141,6 +141,13 @@ ShaperPulses FittedShaper::pulses() const {
   return *dynamics::shaper_pulses(kind, freq_hz, kDampingRatio);
 }
 
+std::vector<double> amplitude_left(const ShaperPulses& pulses, const std::vector<double>& freq_hz) {
+  const Eigen::ArrayXd left = left_of(
+      pulses, kDampingRatio,
+      Eigen::Map<const Eigen::ArrayXd>(freq_hz.data(), static_cast<Eigen::Index>(freq_hz.size())));
+  return {left.begin(), left.end()};
+}
+
 double advised_accel_mm_s2(const ShaperPulses& pulses) {
   constexpr double kMostSmoothing_mm = 0.12;  // TARGET_SMOOTHING
   const Smoothing of = smoothing_of(pulses);

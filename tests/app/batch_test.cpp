@@ -147,6 +147,26 @@ TEST_F(BatchTest, DoesAllAgainForOtherSettings) {
             "done");
 }
 
+TEST_F(BatchTest, TakesThePrinterFileOfTheFolderOfAPrint) {
+  add("top.toml", "[dynamics]\nx.freq_hz = 45\ny.freq_hz = 45\nfreq_error = 0\n");
+  add("in/printer.toml", "[dynamics]\nx.freq_hz = 99\n");  // stands back behind --printer
+  add("in/big/printer.toml", "[dynamics]\nx.freq_hz = 60\ny.freq_hz = 60\nfreq_error = 0\n");
+  add("in/a.gcode");
+  add("in/big/parts/b.gcode");
+  const Outcome outcome = run(batch({"--printer", "top.toml"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const auto& [name, printer] : {std::pair<std::string, std::string>("a.gcode", "top.toml"),
+                                      {"big/parts/b.gcode", "in/big/printer.toml"}}) {
+    const Outcome alone =
+        run({"compensate", "in/" + name, "-o", "-", "--engine", "banded", "--printer", printer});
+    EXPECT_EQ(read_file(path("out/" + name)), alone.out) << name;
+  }
+  add("in/big/printer.toml", "[dynamics]\nx.freq = 60\n");
+  const Outcome wrong = run(batch({"--printer", "top.toml"}));
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_THAT(wrong.err, HasSubstr("in/big/printer.toml:2: "));
+}
+
 TEST_F(BatchTest, DoesAllAgainWhereItsMemoryIsDamaged) {
   add("in/a.g");
   EXPECT_EQ(states().at("a.g"), "done");

@@ -93,6 +93,7 @@ inline Report sample_report() {
                    .as_sliced = {{50, 60, "base acceleration above the limit"}},
                    .pieces_scaled = 2,
                    .scaled = {{40, 49, "it is a part of a long motion"}},
+                   .narrower = report::NarrowerBand{0.05, 432.0},
                    .contour_p999_mm = 0.0188,
                    .speed_p999 = 1.012,
                    .speed_max = 1.019,

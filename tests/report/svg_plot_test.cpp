@@ -122,5 +122,13 @@ TEST(SvgLegend, NamesTheCurvesThatHaveANameAndShowsTheirStroke) {
   EXPECT_THAT(legend, Not(HasSubstr("--before")));
 }
 
+TEST(SvgPlot, DrawsASinglePointAsADot) {
+  Plot plot;
+  plot.curves.emplace_back().points = {{20.0, 5.0}};
+  const std::string svg = svg_plot(plot);
+  EXPECT_NE(svg.find("<circle cx=\""), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace unflex::report

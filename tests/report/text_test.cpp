@@ -29,6 +29,8 @@ TEST(Summary, IsExactlyThis) {
       "because of: run left as sliced.\n"
       "Faster?       1h 00m 00s → 1h 00m 18s to print, 0 % more; the nozzle may stray 20 µm and "
       "keeps to it\n"
+      "              Frequencies known to 5 % would save some 12 % more: dynamics.freq_error = "
+      "0.05\n"
       "Better?       200 → 3.12 µm RMS from the path: 64 times less than now (under the printer's "
       "own input shaper, MZV 45 Hz)\n"
       "              150 → 6.10 if the frequencies are 5 % off\n"
@@ -114,6 +116,28 @@ TEST(Summary, SaysWhereThePrintIsWorseThanNow) {
 }
 
 // A print that is as fast as a tolerance allows may stray more than now.
+TEST(Summary, SaysWhereCompensationIsHardlyWorthIt) {
+  Report report = sample_report();
+  report.free_timing.tolerance_mm = 0.0;
+  EXPECT_THAT(to_text(report), ::testing::Not(HasSubstr("Hardly worth it")));
+  report.uncompensated.extruding.contour_p99_mm = 0.0079;
+  EXPECT_THAT(to_text(report), HasSubstr("Hardly worth it: as sliced 99 % of the time are within "
+                                         "7.90 µm, and an eye sees 8\n"));
+  EXPECT_THAT(to_html(report), HasSubstr("Hardly worth it"));
+  // A faster print is worth it for its time.
+  report.free_timing.tolerance_mm = 0.02;
+  EXPECT_THAT(to_text(report), ::testing::Not(HasSubstr("Hardly worth it")));
+}
+
+TEST(Summary, SaysThatStrayingInTravelIsHarmless) {
+  Report report = sample_report();
+  report.uncompensated.all.contour_max_mm = 0.02;
+  report.compensated.all.contour_max_mm = 0.15;
+  EXPECT_THAT(to_text(report), HasSubstr("20.0 → 150"));
+  EXPECT_THAT(to_text(report),
+              HasSubstr("(in travel, where nothing is laid, straying is harmless)"));
+}
+
 TEST(Summary, OfAFasterPrintBeginsWithItsTimeAndNamesNoLoss) {
   Report report = sample_report();
   report.compensated.extruding.contour_rms_mm = 0.5;
@@ -121,6 +145,7 @@ TEST(Summary, OfAFasterPrintBeginsWithItsTimeAndNamesNoLoss) {
   report.free_timing.contour_p999_mm = 0.0195;
   report.reference_time_s = 100.0;
   report.emitted_time_s = 80.0;
+  report.free_timing.narrower = NarrowerBand{0.05, 1.0};  // too little to be told
   std::string text = to_text(report);
   EXPECT_THAT(text, HasSubstr("Faster?       1m 40s → 1m 20s to print, 20 % less; the nozzle may "
                               "stray 20 µm and keeps to it\nBetter?       "));

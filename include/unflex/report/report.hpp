@@ -83,6 +83,12 @@ struct Fallback {
   std::string reason;
 };
 
+// What frequencies that are known better would gain where the timing is free.
+struct NarrowerBand {
+  double freq_error = 0.0;  // their band
+  double saves_s = 0.0;     // of print time, as far as a sample of runs tells
+};
+
 // What became of the timing, where it is chosen by a tolerance of the nozzle.
 struct FreeTiming {
   double tolerance_mm = 0.0;         // 0: the timing is as sliced
@@ -91,6 +97,7 @@ struct FreeTiming {
   // Likewise those whose timing is scaled, where the optimal one is asked for.
   std::size_t pieces_scaled = 0;
   std::vector<Fallback> scaled;
+  std::optional<NarrowerBand> narrower;
   // While filament is laid: the contour error that 99.9 % of the time are within, and the nozzle's
   // speed relative to F.
   double contour_p999_mm = 0.0;

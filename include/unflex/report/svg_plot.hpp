@@ -20,7 +20,7 @@ struct PlotCurve {
   std::string colour = "--text";  // a CSS property of the page
   Stroke stroke = Stroke::solid;
   double width_px = 1.5;
-  std::vector<PlotPoint> points;
+  std::vector<PlotPoint> points;  // a single one is drawn as a dot
 };
 
 struct PlotRange {

@@ -28,6 +28,11 @@ struct FittedShaper {
   [[nodiscard]] dynamics::ShaperPulses pulses() const;
 };
 
+// The share of a vibration's amplitude that the pulses leave, at each frequency, for the damping
+// ratio that Klipper takes if it is told none.
+[[nodiscard]] std::vector<double> amplitude_left(const dynamics::ShaperPulses& pulses,
+                                                 const std::vector<double>& freq_hz);
+
 struct KlipperCalibration {
   std::vector<FittedShaper> shapers;  // ZV, MZV, EI, 2HUMP_EI, 3HUMP_EI, each at its own frequency
   FittedShaper recommended;
