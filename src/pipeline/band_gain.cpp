@@ -1,6 +1,6 @@
 #include "band_gain.hpp"
 
-#include <utility>
+#include <cstddef>
 
 #include "stage_options.hpp"
 #include "unflex/planner/planner.hpp"
@@ -11,6 +11,8 @@ namespace {
 constexpr double kNarrower = 0.5;
 // The share of the motion that is sampled.
 constexpr double kSampled = 0.06;
+// Runs of fewer moves prime the nozzle, or are like no other.
+constexpr std::size_t kFewest = 8;
 
 }  // namespace
 
@@ -27,11 +29,9 @@ void BandGain::choose(RunJob& job) {
   if (!setup_) {
     return;
   }
-  // A print's first run primes the nozzle, and is like no other.
-  const bool is_first = std::exchange(is_first_, false);
   const double sliced_s = planner::duration_s(job.piece.moves);
   offered_s_ += sliced_s;
-  if (!is_first && chosen_s_ < kSampled * offered_s_) {
+  if (job.piece.moves.size() >= kFewest && chosen_s_ < kSampled * offered_s_) {
     chosen_s_ += sliced_s;
     job.narrow_setup = setup_for(*setup_, job.piece, job.nozzle, *settings_).setup;
   }

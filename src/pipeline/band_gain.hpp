@@ -26,12 +26,11 @@ class BandGain {
   const machine::Settings* settings_;
   double freq_error_;                       // of the narrower band
   std::optional<compensate::Setup> setup_;  // for it
-  bool is_first_ = true;
-  double offered_s_ = 0.0;  // of all runs, as sliced
-  double chosen_s_ = 0.0;   // of those of the sample
-  double timed_s_ = 0.0;    // of all runs, as timed
-  double sampled_s_ = 0.0;  // of those of the sample, as timed
-  double narrow_s_ = 0.0;   // and for the narrower band
+  double offered_s_ = 0.0;                  // of all runs, as sliced
+  double chosen_s_ = 0.0;                   // of those of the sample
+  double timed_s_ = 0.0;                    // of all runs, as timed
+  double sampled_s_ = 0.0;                  // of those of the sample, as timed
+  double narrow_s_ = 0.0;                   // and for the narrower band
 };
 
 }  // namespace unflex::pipeline

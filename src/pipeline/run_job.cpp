@@ -205,6 +205,7 @@ void keep_feed(RunJob& job, const compensate::Engine& engine) {
   }
 }
 
+// A timing of the run as sliced, whatever has been chosen for it.
 struct FoundTiming {
   std::optional<timing::Timed> timed;  // unset: none that is faster
   std::string scaled_reason;           // as RunJob's
@@ -212,13 +213,13 @@ struct FoundTiming {
 
 FoundTiming find_timing(const RunJob& job, const compensate::Setup& setup,
                         const TimingChoice& choice) {
-  FoundTiming found{
-      timing::faster(job.course(), setup, job.first_stage, job.bounds, *choice.engine), {}};
+  const compensate::Course sliced{job.piece.before, job.piece.moves, job.piece.after};
+  FoundTiming found{timing::faster(sliced, setup, job.first_stage, job.bounds, *choice.engine), {}};
   if (!choice.is_optimal) {
     return found;
   }
   tl::expected<timing::Timed, std::string> optimal =
-      timing::optimal(job.course(), setup, job.first_stage, job.bounds);
+      timing::optimal(sliced, setup, job.first_stage, job.bounds);
   // The optimal motion is the shortest among those near it, so the scaled one may be shorter.
   if (!optimal) {
     found.scaled_reason = std::move(optimal.error());
@@ -237,6 +238,10 @@ void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
   try {
     const CountedEngine engine(*choice.engine, job.nodes_timed);
     const TimingChoice counted{choice.is_optimal, &engine};
+    if (job.narrow_setup) {
+      const FoundTiming narrow = find_timing(job, *job.narrow_setup, counted);
+      job.narrow_s = planner::duration_s(narrow.timed ? narrow.timed->moves : job.piece.moves);
+    }
     if (job.keeps_timing()) {
       keep_feed(job, engine);
     } else if (FoundTiming found = find_timing(job, job.setup, counted); found.timed) {
@@ -251,10 +256,6 @@ void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
     } else {
       keep_timing(job, "no faster timing was found that keeps the tolerance");
       keep_feed(job, engine);
-    }
-    if (job.narrow_setup) {
-      const FoundTiming narrow = find_timing(job, *job.narrow_setup, counted);
-      job.narrow_s = planner::duration_s(narrow.timed ? narrow.timed->moves : job.piece.moves);
     }
   } catch (const std::exception& exception) {
     // Out of memory, mostly.

@@ -203,5 +203,24 @@ TEST(TimingKeys, KeepLayersLongEnoughForAnyNumberOfWorkers) {
   EXPECT_EQ(outputs.front(), outputs.back());
 }
 
+TEST(TimingKeys, ABandOfFrequenciesTellsWhatHalfOfItWouldSave) {
+  const auto with_band = [](const std::string& band) {
+    const JobFolder folder(kStart + zigzag(12, 20.0), {"timing.tolerance_um=20", band});
+    SilentProgress progress;
+    return compensate(folder.job(), progress);
+  };
+  const Result<report::Report> wide = with_band("dynamics.freq_error=0.1");
+  ASSERT_TRUE(wide.has_value()) << to_string(wide.error());
+  ASSERT_TRUE(wide->free_timing.narrower.has_value());
+  EXPECT_DOUBLE_EQ(wide->free_timing.narrower->freq_error, 0.05);
+  // The sample is the whole print, so what it tells is what the narrower band takes.
+  const Result<report::Report> narrow = with_band("dynamics.freq_error=0.05");
+  ASSERT_TRUE(narrow.has_value()) << to_string(narrow.error());
+  EXPECT_NEAR(wide->emitted_time_s - wide->free_timing.narrower->saves_s, narrow->emitted_time_s,
+              0.02 * narrow->emitted_time_s);
+  EXPECT_LT(narrow->emitted_time_s, wide->emitted_time_s);
+  EXPECT_FALSE(with_band("dynamics.freq_error=0")->free_timing.narrower.has_value());
+}
+
 }  // namespace
 }  // namespace unflex::pipeline
