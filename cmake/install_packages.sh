@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# install_packages.sh [--tests | --fuzz | --coverage]
+# install_packages.sh [--tests]
 #
-# Installs the packages that unflex is built from on Debian 12. --tests adds those of its tests,
-# --fuzz those of sanitizers and fuzzing, --coverage those of counting lines. Does nothing if all is
-# installed; otherwise it needs root or sudo.
+# Installs the packages that unflex is built from on Debian 12. --tests adds those of its tests, of
+# sanitizers, of fuzzing and of counting lines. Does nothing if all is installed; otherwise it needs
+# root or sudo.
 set -euo pipefail
 
 packages=(
@@ -17,8 +17,9 @@ test_packages=(
   libgmock-dev libgtest-dev
   # Builds are cached, the format of sources is checked, the picture of modules is drawn.
   ccache clang-format graphviz
-  # Another compiler reads what changed.
-  clang-16
+  # Another compiler reads what changed, with sanitizers and without; lines that run are counted.
+  # Debian's default clang, 14, does not understand the ranges of libstdc++ 12.
+  clang-16 libclang-rt-16-dev llvm-16 gcovr
   # Tests look at HTML reports in a real browser.
   chromium python3
   # Tests make packages, format the manual page and let shells complete command lines.
@@ -27,15 +28,9 @@ test_packages=(
   # run Klipper's macros.
   prusa-slicer python3-jinja2 python3-yaml
 )
-# Debian's default clang, 14, does not understand the ranges of libstdc++ 12.
-fuzz_packages=(libclang-rt-16-dev llvm-16)
 
 if [[ ${1:-} == --tests ]]; then
   packages+=("${test_packages[@]}")
-elif [[ ${1:-} == --fuzz ]]; then
-  packages+=("${test_packages[@]}" "${fuzz_packages[@]}")
-elif [[ ${1:-} == --coverage ]]; then
-  packages+=("${test_packages[@]}" gcovr)
 fi
 
 if ! command -v dpkg-query >/dev/null; then

@@ -15,7 +15,7 @@ if ((${#targets[@]} == 0)); then
   targets=(gcode settings records container compensate)
 fi
 
-"$root/cmake/install_packages.sh" --fuzz
+"$root/cmake/install_packages.sh" --tests
 
 if [[ ! -e $build/CMakeCache.txt ]]; then
   cmake -G Ninja -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=RelWithDebInfo -DUNFLEX_FUZZ=ON \

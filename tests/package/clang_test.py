@@ -18,6 +18,7 @@ ROOT = sys.argv[1]
 # What changed further back has been read before.
 COMMITS = 10
 OPTIONS = ["-std=c++20", "-DFMT_SHARED", '-DUNFLEX_VERSION=""', f"-I{ROOT}/include",
+           f"-I{ROOT}/tests", f"-I{ROOT}/src/pipeline",
            "-isystem", "/usr/include/eigen3", "-isystem", "/usr/include/coin",
            "-Wall", "-Wextra", "-Werror", "-Wno-missing-braces"]
 # Headers that take long, read once for all sources.
@@ -37,7 +38,7 @@ def changed_sources():
     """Paths below ROOT; none in a copy without its history."""
     names = set(git("diff", "--name-only", f"HEAD~{COMMITS}"))
     names.update(git("ls-files", "--others", "--exclude-standard"))
-    return sorted(name for name in names if name.startswith("src/") and name.endswith(".cpp") and
+    return sorted(name for name in names if name.startswith(("src/", "tests/fuzz/")) and name.endswith(".cpp") and
                   os.path.exists(os.path.join(ROOT, name)))
 
 

@@ -40,17 +40,24 @@ class Library(unittest.TestCase):
                           f"-DCMAKE_CXX_COMPILER={CXX}", *options)
 
     def test_the_example_writes_what_the_program_writes(self):
-        build, configured = self.configure("example")
-        self.assertEqual(configured.returncode, 0, configured.stderr)
-        built = run("cmake", "--build", build)
-        self.assertEqual(built.returncode, 0, built.stdout + built.stderr)
+        """The commands are those of docs/library.md, in a folder of their own."""
+        root = os.path.dirname(EXAMPLES)
+        with open(os.path.join(root, "docs", "library.md"), encoding="utf-8") as page:
+            commands = [line.split() for line in page if line.startswith("    ")]
+        self.assertEqual(len(commands), 4)
+        commands[0][2] = BUILD
+        for words in commands:
+            words[:] = [word.replace("/tmp/", self.folder + "/page/") for word in words]
+        commands[1].append(f"-DCMAKE_CXX_COMPILER={CXX}")
         source = os.path.join(DATA, "pipeline_washer_arcs.gcode")
         printer = os.path.join(EXAMPLES, "printer.toml")
         ours, theirs = (os.path.join(self.folder, name) for name in ("ours.gcode", "theirs.gcode"))
+        commands[3][1:] = [source, theirs, printer]  # a shorter print, and nothing in the sources
+        for words in commands:
+            done = run(*words, cwd=root)
+            self.assertEqual(done.returncode, 0, " ".join(words) + "\n" + done.stdout + done.stderr)
         program = run(UNFLEX, "compensate", source, "-o", ours, "--printer", printer)
         self.assertEqual(program.returncode, 0, program.stderr)
-        example = run(os.path.join(build, "compensate_file"), source, theirs, printer)
-        self.assertEqual(example.returncode, 0, example.stdout + example.stderr)
         self.assertGreater(os.path.getsize(ours), os.path.getsize(source))
         with open(ours, "rb") as first, open(theirs, "rb") as second:
             self.assertEqual(first.read(), second.read())

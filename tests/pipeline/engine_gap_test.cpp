@@ -1,5 +1,5 @@
-// Compares the banded engine with Ipopt, which solves by an entirely different method, on all
-// windows of a stretch of a real print.
+// Compares the banded engine with Ipopt, which solves by an entirely different method, on
+// every third window of a stretch of a real print.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -53,6 +53,8 @@ Gap gap_over(const std::string& text) {
   const auto banded = compensate::make_banded_engine();
   const auto ipopt = compensate::make_ipopt_engine();
   Gap gap;
+  constexpr std::size_t kOneOf = 3;  // Ipopt takes seconds for each
+  std::size_t number = 0;
   for (Piece piece; reader.next(piece).value(); piece = {}) {
     if (!piece.is_run) {
       continue;
@@ -63,7 +65,7 @@ Gap gap_over(const std::string& text) {
     const auto spans = compensate::mesh(course, compensate::node_grid(course, setup), setup);
     const auto windows = compensate::windows(course, spans, start, setup);
     for (std::size_t i = 0; i < windows.size(); ++i) {
-      if (!spans[i].cruise) {
+      if (!spans[i].cruise && number++ % kOneOf == 0) {
         compare(windows[i].x, *banded, *ipopt, gap);
         compare(windows[i].y, *banded, *ipopt, gap);
       }
