@@ -144,6 +144,7 @@ class Compensator {
           return status;
         }
         queue_.pop_front();
+        tell_progress();
       }
       tell_progress();
       if (progress_->cancelled()) {
@@ -454,7 +455,6 @@ class Compensator {
       tickets_.erase(tickets_.begin(), tickets_.begin() + static_cast<std::ptrdiff_t>(tickets));
       first_ticket_ += tickets;
     }
-    tell_progress();
     return {};
   }
 

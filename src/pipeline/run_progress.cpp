@@ -8,8 +8,8 @@
 namespace unflex::pipeline {
 namespace {
 
-// Of the work on a run: the search for its timing, where that is free, and the windows of the
-// timing that it has. The rest are its lines.
+// What is done of a run once its timing is found, where that is free, and once its windows are
+// solved. Its lines are left then.
 constexpr double kTiming = 0.8;
 constexpr double kWindows = 0.9;
 
