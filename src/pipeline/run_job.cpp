@@ -205,12 +205,12 @@ void keep_feed(RunJob& job, const compensate::Engine& engine) {
   }
 }
 
-// A timing of the run as sliced, whatever has been chosen for it.
 struct FoundTiming {
   std::optional<timing::Timed> timed;  // unset: none that is faster
   std::string scaled_reason;           // as RunJob's
 };
 
+// Searches from the timing as sliced, whatever has been chosen for the run.
 FoundTiming find_timing(const RunJob& job, const compensate::Setup& setup,
                         const TimingChoice& choice) {
   const compensate::Course sliced{job.piece.before, job.piece.moves, job.piece.after};

@@ -74,6 +74,14 @@ double scale(double g, double exponent) {
   return std::clamp(std::pow(std::max(g, kLeastError), -exponent), kLeastFactor, kMostFactor);
 }
 
+// The move becomes no faster than it was sliced.
+void bind_as_sliced(const planner::PlannedMove& move, MoveBounds& bounds) {
+  bounds.speed_mm_s = move.cruise_v_mm_s;
+  bounds.accel_mm_s2 = move.accel_mm_s2;
+  bounds.start_speed_mm_s = move.start_v_mm_s;
+  bounds.end_speed_mm_s = move.end_v_mm_s;
+}
+
 enum class Goal {
   least_time,  // whatever keeps the tolerance and F
   feed,        // as sliced, but for F
@@ -182,10 +190,7 @@ class LocalScaling {
     }
     for (std::size_t i = 0; i < path.size(); ++i) {
       if (is_kept_[i]) {
-        bounds[i].speed_mm_s = path[i].cruise_v_mm_s;
-        bounds[i].accel_mm_s2 = path[i].accel_mm_s2;
-        bounds[i].start_speed_mm_s = path[i].start_v_mm_s;
-        bounds[i].end_speed_mm_s = path[i].end_v_mm_s;
+        bind_as_sliced(path[i], bounds[i]);
       }
     }
   }
@@ -444,11 +449,7 @@ std::optional<Timed> within_feed(const compensate::Course& course, const compens
                                  const compensate::Engine& engine) {
   std::vector<MoveBounds> as_sliced(bounds.begin(), bounds.end());
   for (std::size_t i = 0; i < as_sliced.size(); ++i) {
-    const planner::PlannedMove& move = course.moves[i];
-    as_sliced[i].speed_mm_s = move.cruise_v_mm_s;
-    as_sliced[i].accel_mm_s2 = move.accel_mm_s2;
-    as_sliced[i].start_speed_mm_s = move.start_v_mm_s;
-    as_sliced[i].end_speed_mm_s = move.end_v_mm_s;
+    bind_as_sliced(course.moves[i], as_sliced[i]);
   }
   LocalScaling scaling(Goal::feed, course, setup, nozzle, as_sliced, engine, kFeedPieces);
   return scaling.keeps_feed_as_sliced(as_sliced) ? std::nullopt : scaling.find();
