@@ -128,15 +128,14 @@ std::vector<std::string> faster_texts(const Report& report) {
   return lines;
 }
 
-bool is_hardly_worth_it(const Report& report) {
-  return report.free_timing.tolerance_mm <= 0.0 &&
-         report.uncompensated.extruding.contour_p99_mm < kSeen_mm;
-}
-
-std::string hardly_worth_it_text(const Report& report) {
+std::optional<std::string> hardly_worth_it(const Report& report) {
+  const double strays_mm = report.uncompensated.extruding.contour_p99_mm;
+  if (report.free_timing.tolerance_mm > 0.0 || strays_mm >= kSeen_mm) {
+    return std::nullopt;
+  }
   return fmt::format(
       "Hardly worth it: as sliced 99 % of the time are within {} µm, and an eye sees {:.0f}",
-      micrometres_text(report.uncompensated.extruding.contour_p99_mm), 1e3 * kSeen_mm);
+      micrometres_text(strays_mm), 1e3 * kSeen_mm);
 }
 
 Worst worst(const Report& report) {

@@ -35,10 +35,9 @@ struct Better {
 // What an eye sees of waves on a wall that is held into light from one side (docs/tune.md).
 inline constexpr double kSeen_mm = 0.008;
 
-// Whether the print as sliced strays less than an eye sees but for one hundredth of the time, so
-// that compensating it shows little.
-[[nodiscard]] bool is_hardly_worth_it(const Report& report);
-[[nodiscard]] std::string hardly_worth_it_text(const Report& report);
+// What to say of a print that strays less than an eye sees as sliced, but for one hundredth of the
+// time, so that compensating it shows little. nullopt: of another print, or of one made for speed.
+[[nodiscard]] std::optional<std::string> hardly_worth_it(const Report& report);
 
 struct Worst {
   std::optional<Place> compensated;

@@ -323,8 +323,8 @@ std::string better_answer(const Report& r) {
             ? fmt::format(", {} if they are 5 % off", micrometres_text(*found.off->zv_mm))
             : std::string{}));
   }
-  if (is_hardly_worth_it(r)) {
-    lines.push_back(escape_html(hardly_worth_it_text(r)) + ".");
+  if (const std::optional<std::string> text = hardly_worth_it(r)) {
+    lines.push_back(escape_html(*text) + ".");
   }
   for (std::size_t i = 0; i < faster.size(); ++i) {
     lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(i), escape_html(faster[i]) + ".");

@@ -57,8 +57,8 @@ void write_better(Sink out, const Report& r) {
   if (answer.exact.zv_mm) {
     lines.push_back(zv_text(answer));
   }
-  if (is_hardly_worth_it(r)) {
-    lines.push_back(hardly_worth_it_text(r));
+  if (const std::optional<std::string> text = hardly_worth_it(r)) {
+    lines.push_back(*text);
   }
   write_answer(out, "Better?", lines);
 }
