@@ -289,6 +289,18 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
   return lines;
 }
 
+std::string advance_line(Firmware firmware, double advance_s) {
+  switch (firmware) {
+    case Firmware::marlin:
+      return fmt::format("M900 K{}", advance_s);
+    case Firmware::rrf:
+      return fmt::format("M572 D0 S{}", advance_s);
+    case Firmware::klipper:
+      break;
+  }
+  return fmt::format("SET_PRESSURE_ADVANCE ADVANCE={}", advance_s);
+}
+
 std::string unknown_shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                  const gcode::Shaper& current) {
   const bool x = wanted.unknown_x && !current.unknown_x;

@@ -75,10 +75,18 @@ planner::Limits run_limits(const Run& run, const planner::Limits& file,
                        raised(options.run_limits, run.accel.lines_mm_s2));
 }
 
+// Pressure advance in force.
+double advance_s(const std::optional<double>& of_file, const EmitOptions& options) {
+  return of_file.value_or(options.fixed.pressure_advance_s);
+}
+
 EmitOptions in_run(const Run& run, const RunStart& start, EmitOptions options) {
   options.lines.max_accel_mm_s2 = std::max(options.lines.max_accel_mm_s2, run.accel.base_mm_s2);
   options.line_accel_mm_s2 = std::max(options.line_accel_mm_s2, run.accel.lines_mm_s2);
   options.run_limits = run_limits(run, start.limits, options);
+  if (options.pressure.is_written) {
+    options.pressure.hotend.advance_s = advance_s(start.advance_s, options);
+  }
   return options;
 }
 
@@ -135,6 +143,10 @@ void Emitter::line(const gcode::Event& event, std::string& out) {
   if (event.added) {
     sign(out);
   }
+  const bool lays = !event.segments.empty() && event.segments.front().extruding();
+  if (lays || moves_by_itself(event)) {
+    restore_advance(out);
+  }
   if (moves_by_itself(event)) {
     restore_shaper(out);
     limits_known_ = false;
@@ -161,7 +173,8 @@ RunStart run_start(Firmware firmware, const gcode::ModalState& state,
   return {{state.base_mm[X], state.base_mm[Y], state.base_mm[Z]},
           state.speed_factor,
           limits,
-          firmware == Firmware::marlin && state.known[E]};
+          firmware == Firmware::marlin && state.known[E],
+          state.pressure_advance_s};
 }
 
 bool RunPlan::empty() const { return strokes == nullptr || strokes->empty(); }
@@ -183,6 +196,7 @@ RunPlan retimed(const RunPlan& plan, const Run& run, const EmitOptions& options)
 RunStart Emitter::run_start() const {
   RunStart start = emit::run_start(options_.fixed.firmware, printer_.state(), input_limits_);
   start.zeroes_e = start.zeroes_e && e_is_known();
+  start.advance_s = input_.state().pressure_advance_s;
   return start;
 }
 
@@ -232,6 +246,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
 
 void Emitter::finish(std::string& out) {
   restore_shaper(out);
+  restore_advance(out);
   if (const std::string words = shaper_left_off(); !words.empty()) {
     write(fmt::format("{}: the printer's own input shaper is not known and still off; set it again "
                       "as its configuration has it: {}",
@@ -257,6 +272,9 @@ void Emitter::sign(std::string& out) {
 void Emitter::enter_run(const Run& run, std::string& out) {
   sign(out);
   switch_shaper_off(out);
+  if (options_.pressure.is_written) {
+    set_advance(0.0, out);
+  }
   if (moving_) {
     // A run begins at rest, but no firmware stops by itself between the move before it and its
     // first line. G4 without a time makes all three firmwares end their motion and go on at once.
@@ -410,6 +428,16 @@ void Emitter::set_limits(const planner::Limits& limits, std::string& out, bool m
 void Emitter::restore_shaper(std::string& out) {
   set_shaper(input_.state().input_shaper(), printer_.state().input_shaper(), out);
   tell_shaper(out);
+}
+
+void Emitter::set_advance(double wanted_s, std::string& out) {
+  if (advance_s(printer_.state().pressure_advance_s, options_) != wanted_s) {
+    write(advance_line(options_.fixed.firmware, wanted_s), out);
+  }
+}
+
+void Emitter::restore_advance(std::string& out) {
+  set_advance(advance_s(input_.state().pressure_advance_s, options_), out);
 }
 
 // Off, whoever may have switched it on: the printer's configuration, the file, or a macro.

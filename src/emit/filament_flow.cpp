@@ -34,6 +34,11 @@ double most_flow_step_mm_s(const planner::FirmwareConfig& firmware) {
   return std::numeric_limits<double>::infinity();
 }
 
+double drawing_back_mm_s2(const planner::FirmwareConfig& firmware) {
+  return firmware.firmware == Firmware::klipper ? firmware.max_extrude_only_accel_mm_s2
+                                                : std::numeric_limits<double>::infinity();
+}
+
 void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Stroke> strokes) {
   if (!(most_mm_s > 0.0) || std::isinf(most_mm_s)) {
     return;

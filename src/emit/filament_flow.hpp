@@ -17,6 +17,10 @@ namespace unflex::emit {
 // of E are raised in a run.
 [[nodiscard]] double most_flow_step_mm_s(const planner::FirmwareConfig& firmware);
 
+// The acceleration of filament in lines that draw it back, mm/s²: Klipper takes such lines for
+// retractions (kinematics/extruder.py, check_move). For the other firmwares it is infinite.
+[[nodiscard]] double drawing_back_mm_s2(const planner::FirmwareConfig& firmware);
+
 // Moves filament between neighbouring lines until |Δr| min(v, v') ≤ most_mm_s at every joint. The
 // sum over all lines stays, and no line lays less than 0 if none did before.
 void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Stroke> strokes);

@@ -257,4 +257,10 @@ bool split_quick_joins(const BaseTrajectory& base, const std::vector<double>& x_
   return halve(base, rules, times, [&](std::size_t i) { return join(i) || join(i - 1); });
 }
 
+bool split_at_joins(const BaseTrajectory& base, const std::vector<bool>& joins,
+                    const LineRules& rules, std::vector<double>& times) {
+  return halve(base, rules, times,
+               [&](std::size_t i) { return joins[i - 1] || (i > 1 && joins[i - 2]); });
+}
+
 }  // namespace unflex::emit

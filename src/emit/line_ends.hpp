@@ -41,4 +41,9 @@ bool split_quick_joins(const dynamics::BaseTrajectory& base, const std::vector<d
                        const std::vector<double>& y_mm, const LineRules& rules,
                        std::vector<double>& times);
 
+// Halves both lines of each of these joins, the i-th being behind line i. A line stays whole if its
+// halves would be too short. Returns whether any line was halved.
+bool split_at_joins(const dynamics::BaseTrajectory& base, const std::vector<bool>& joins,
+                    const LineRules& rules, std::vector<double>& times);
+
 }  // namespace unflex::emit

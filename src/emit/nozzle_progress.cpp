@@ -28,9 +28,11 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
     : moves_(run.moves), period_s_(run.base->period_s) {
   path_mm_.push_back(0.0);
   filament_mm_.push_back(0.0);
+  laid_mm_.push_back(0.0);
   for (const PlannedMove& move : *moves_) {
     path_mm_.push_back(path_mm_.back() + move.segment.length_xy_mm());
     filament_mm_.push_back(filament_mm_.back() + move.segment.delta(E));
+    laid_mm_.push_back(laid_mm_.back() + std::max(move.segment.delta(E), 0.0));
   }
   std::size_t i = 0;
   const auto reference_mm = [&](double t) {
@@ -44,6 +46,18 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
     }
     return path_mm_[i] + length * move.distance_mm(std::max(t - starts_s[i], 0.0)) / move.length_mm;
   };
+  const auto flow_mm_s = [&](double t) {
+    const auto after = std::upper_bound(starts_s.begin(), starts_s.end(), t);
+    const std::size_t number =
+        static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - starts_s.begin() - 1, 0));
+    if (number >= moves_->size()) {
+      return 0.0;
+    }
+    const PlannedMove& move = (*moves_)[number];
+    return std::max(move.direction[E], 0.0) * move.velocity_mm_s(t - starts_s[number]);
+  };
+  flow_begin_mm_s_ = run.goes_on ? flow_mm_s(0.0) : 0.0;
+  flow_end_mm_s_ = run.until_s ? flow_mm_s(*run.until_s) : 0.0;
   // A run begins at rest. A part of a run begins in motion, and we take the nozzle to be on the
   // reference then.
   const dynamics::AxisMotion x = run.base->x_at(0.0);
@@ -134,14 +148,20 @@ double NozzleProgress::begin_s(std::size_t i) const {
   return period_s_ * (static_cast<double>(k - 1) + share);
 }
 
-double NozzleProgress::filament_mm(double t) const {
+double NozzleProgress::filament_mm(double t) const { return along(filament_mm_, t); }
+
+double NozzleProgress::laid_mm(double t) const { return along(laid_mm_, t); }
+
+double NozzleProgress::drawn_back_mm(double t) const { return filament_mm(t) - laid_mm(t); }
+
+double NozzleProgress::along(const std::vector<double>& at_moves, double t) const {
   const double at = progress_mm(t);
   const auto after = std::upper_bound(path_mm_.begin(), path_mm_.end() - 1, at);
   const std::size_t i =
       after == path_mm_.begin() ? 0 : static_cast<std::size_t>(after - path_mm_.begin()) - 1;
   const double length = path_mm_[i + 1] - path_mm_[i];
   const double share = length > 0.0 ? std::min((at - path_mm_[i]) / length, 1.0) : 1.0;
-  return filament_mm_[i] + share * (filament_mm_[i + 1] - filament_mm_[i]);
+  return at_moves[i] + share * (at_moves[i + 1] - at_moves[i]);
 }
 
 bool NozzleProgress::past_first_move(double t) const { return progress_mm(t) >= path_mm_[1]; }

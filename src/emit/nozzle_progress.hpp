@@ -23,6 +23,16 @@ class NozzleProgress {
 
   // Q(s_n(t)), mm, from 0 on. As the nozzle never goes back, it is monotone where Q is.
   [[nodiscard]] double filament_mm(double t) const;
+  // Its parts: what moves lay, and what wipes draw back, which is below 0.
+  [[nodiscard]] double laid_mm(double t) const;
+  [[nodiscard]] double drawn_back_mm(double t) const;
+  [[nodiscard]] double all_laid_mm() const { return laid_mm_.back(); }
+  // s_n(t)
+  [[nodiscard]] double way_mm(double t) const { return progress_mm(t); }
+  // Filament per s that the plan lays where the run begins, and where the next part takes over; 0
+  // at rest.
+  [[nodiscard]] double flow_begin_mm_s() const { return flow_begin_mm_s_; }
+  [[nodiscard]] double flow_end_mm_s() const { return flow_end_mm_s_; }
   // When the nozzle reaches the beginning of move i.
   [[nodiscard]] double begin_s(std::size_t i) const;
   // Whether the nozzle has left the run's first move behind.
@@ -33,11 +43,16 @@ class NozzleProgress {
   [[nodiscard]] double nearest_mm(double x_mm, double y_mm, std::size_t move,
                                   double reference_mm) const;
   [[nodiscard]] double progress_mm(double t) const;
+  // What has come by t of a quantity that is known where moves begin and end.
+  [[nodiscard]] double along(const std::vector<double>& at_moves, double t) const;
 
   const std::vector<planner::PlannedMove>* moves_;
   double period_s_;
   std::vector<double> path_mm_;      // where each move begins along the path, and the end
   std::vector<double> filament_mm_;  // Q there
+  std::vector<double> laid_mm_;      // what of it is laid
+  double flow_begin_mm_s_ = 0.0;
+  double flow_end_mm_s_ = 0.0;
   std::vector<double> progress_mm_;  // s_n at the base's nodes
 };
 

@@ -21,6 +21,7 @@
 #include <optional>
 
 #include "dialect.hpp"
+#include "filament_flow.hpp"
 #include "unflex/core/number.hpp"
 
 namespace unflex::emit {
@@ -212,6 +213,11 @@ class SpeedSolver {
       distance_mm_[i] = std::hypot(stroke.x_mm - at[X], stroke.y_mm - at[Y], dz);
       if (dz != 0.0) {
         accel_mm_s2_[i] = std::min(accel_mm_s2_[i], z_accel_mm_s2 * distance_mm_[i] / std::abs(dz));
+      }
+      const double de = stroke.e_mm - at[E];
+      if (de < 0.0) {
+        accel_mm_s2_[i] = std::min(
+            accel_mm_s2_[i], drawing_back_mm_s2(options.fixed) * distance_mm_[i] / std::abs(de));
       }
       const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm, stroke.e_mm};
       for (std::size_t axis = 0; options.fixed.firmware == Firmware::marlin && axis < to.size();

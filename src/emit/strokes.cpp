@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <span>
 #include <utility>
 
 #include "dialect.hpp"
-#include "filament_flow.hpp"
+#include "filament.hpp"
 #include "line_ends.hpp"
 #include "nozzle_progress.hpp"
 #include "speeds.hpp"
@@ -109,22 +108,6 @@ gcode::Position start_of(const Run& run) {
     }
   }
   return run.moves->front().segment.start_mm;
-}
-
-// The filament that the run's lines have laid at time t: what belongs to the place where the nozzle
-// is. Once the moves have ended it is all of their filament, since a tail lays none. Marlin may
-// still owe filament of a move it skipped (`behind_mm`). The first line lays it, or draws it back,
-// so we subtract it from the first move.
-double filament_of_lines(const NozzleProgress& nozzle, const Timetable& table, double all_mm,
-                         double behind_mm, double t) {
-  if (table.tail_at(t)) {
-    return all_mm;
-  }
-  const double filament_mm = nozzle.filament_mm(t);
-  if (nozzle.past_first_move(t)) {
-    return filament_mm - behind_mm;
-  }
-  return filament_mm - std::clamp(filament_mm, std::min(behind_mm, 0.0), std::max(behind_mm, 0.0));
 }
 
 gcode::Position start_position(const Run& run, const Grid& grid) {
@@ -232,8 +215,25 @@ std::pair<SpeedSteps, SpeedSteps> speed_steps(const dynamics::BaseTrajectory& ba
   return {x, y};
 }
 
-Polygon polygon(const Run& run, const Timetable& table, const std::vector<double>& wanted,
-                const Grid& grid, const LineRules& rules) {
+// Halves lines where the filament cannot change its speed as fast as the hotend asks. Returns
+// whether any line was halved.
+bool split_for_filament(const Run& run, const NozzleProgress& nozzle,
+                        const std::vector<double>& x_mm, const std::vector<double>& y_mm,
+                        const LineRules& rules, const EmitOptions& options,
+                        std::vector<double>& times) {
+  if (!writes_pressure(nozzle, options)) {
+    return false;
+  }
+  LinesInTime lines{times, {}};
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    lines.lengths_mm.push_back(std::hypot(x_mm[i] - x_mm[i - 1], y_mm[i] - y_mm[i - 1]));
+  }
+  return split_at_joins(*run.base, joins_at_limit(nozzle, lines, options), rules, times);
+}
+
+Polygon polygon(const Run& run, const Timetable& table, const NozzleProgress& nozzle,
+                const std::vector<double>& wanted, const Grid& grid, const LineRules& rules,
+                const EmitOptions& options) {
   const dynamics::BaseTrajectory& base = *run.base;
   if (grid.x.step_mm > kCoarse_mm || grid.y.step_mm > kCoarse_mm) {
     const std::array<double, 2> start = start_of_lines(run, grid);
@@ -261,7 +261,9 @@ Polygon polygon(const Run& run, const Timetable& table, const std::vector<double
   while (split_lines(base, vertices.first.nozzle_error_mm, vertices.second.nozzle_error_mm, rules,
                      times) ||
          split_quick_joins(base, vertices.first.position_mm, vertices.second.position_mm, rules,
-                           times)) {
+                           times) ||
+         split_for_filament(run, nozzle, vertices.first.position_mm, vertices.second.position_mm,
+                            rules, options, times)) {
     vertices = choose();
   }
   return {std::move(times), std::move(vertices.first.position_mm),
@@ -365,9 +367,9 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   rules.burst_lines = static_cast<int>(run.limits_share * rules.burst_lines);
   rules.max_accel_mm_s2 *= run.limits_share;
   const NozzleProgress nozzle(run, table.starts_s(), rules.nozzle_x, rules.nozzle_y);
-  const Polygon vertices =
-      polygon(run, table, wanted_times(run, table, event_times_s, nozzle, options.has_free_timing),
-              grid, rules);
+  const Polygon vertices = polygon(
+      run, table, nozzle, wanted_times(run, table, event_times_s, nozzle, options.has_free_timing),
+      grid, rules, options);
   const std::vector<double>& times = vertices.times_s;
   if (times.empty()) {
     return {};
@@ -376,8 +378,8 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   const gcode::Position end = end_of_lines(run, table, grid);
   std::vector<Stroke> result;
   const double file_start_e_mm = start_of(run)[gcode::E];
-  const double behind_mm = file_start_e_mm - start[gcode::E];
-  const double all_mm = end[gcode::E] - file_start_e_mm;
+  const RunFilament filament{end[gcode::E] - file_start_e_mm, file_start_e_mm - start[gcode::E]};
+  std::vector<double> ends_s;  // of the strokes
   std::size_t laying = 0;  // lines that lay the run's filament; lines of the tail come after them
   Stroke last{0.0, start[X], start[Y], start[Z]};
   double dropped_s = times.front();
@@ -391,7 +393,6 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
     stroke.x_mm = is_end ? end[X] : vertices.x_mm[i];
     stroke.y_mm = is_end ? end[Y] : vertices.y_mm[i];
     stroke.z_mm = is_end ? end[Z] : grid.z.nearest(table.height_mm(times[i]));
-    stroke.e_mm = filament_of_lines(nozzle, table, all_mm, behind_mm, times[i]);
     // An event goes before the stroke that begins nearest to its moment.
     while (event < event_times_s.size() &&
            event_times_s[event] <= times[i] - 0.5 * rules.min_line_s) {
@@ -414,6 +415,7 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
       before = velocity_mm_s(last, stroke);
       laying += laying == result.size() && !table.tail_at(times[i - 1]) ? 1 : 0;
       result.push_back(stroke);
+      ends_s.push_back(times[i]);
       last = stroke;
     } else if (result.empty()) {
       dropped_s += times[i] - times[i - 1];
@@ -421,13 +423,12 @@ std::vector<Stroke> strokes(const Run& run, const Grid& grid, const EmitOptions&
   }
   if (!result.empty()) {
     Stroke& final = result.back();
-    final.e_mm = all_mm;
     final.x_mm = end[X];
     final.y_mm = end[Y];
     final.z_mm = end[Z];
     climb_in_time({0.0, start[X], start[Y], start[Z]}, ends.out_mm_s.value_or(VelocityXY{}), grid,
                   options, result);
-    level_flow(start, most_flow_step_mm_s(options.fixed), std::span(result).first(laying));
+    lay_filament(run, table, nozzle, filament, start, ends_s, laying, options, result);
     if (skips_last_move(run, grid)) {
       // The text ends where the file does, by a line that the firmware skips as well.
       const gcode::Position file_end = end_of_moves(run);

@@ -48,6 +48,7 @@ using S = Settings;
 using P = PrinterSettings;
 using L = LimitSettings;
 using E = ExtruderSettings;
+using W = PressureSettings;
 using H = HotendSettings;
 using D = AxisDynamics;
 using N = SecondSettings;
@@ -60,6 +61,8 @@ using T = EmitSettings;
 using F = TimingSettings;
 using V = VerifySettings;
 
+constexpr std::array<std::string_view, 4> kPressureShapes = {"linear", "two_slopes", "tanh",
+                                                             "reciprocal"};
 constexpr std::string_view kNotLimited = "not limited";
 constexpr std::string_view kOtherForm = "not used";
 constexpr std::string_view kNotKnown = "not known";
@@ -348,6 +351,32 @@ constexpr std::array kKeys = {
     Key{"extruder.pressure_advance_smooth_s", &setting<&S::extruder, &E::pressure_advance_smooth_s>,
         Bounds{.min = 0.0, .max = 0.2, .min_open = true}, "s",
         "Klipper: [extruder] pressure_advance_smooth_time"},
+
+    Key{"pressure.written", &setting<&S::pressure, &W::written>, kAny, "",
+        "Whether pressure advance is written into the filament of compensated runs, with the "
+        "printer's own switched off; only where extruder.pressure_advance_s or the print tells it"},
+    Key{"pressure.shape",
+        &setting<&S::pressure, &W::shape>,
+        kAny,
+        "",
+        "How much filament is pressed together at a flow q: K q with K of "
+        "extruder.pressure_advance_s (linear); beyond the knee with a second slope (two_slopes); "
+        "plus offset·tanh(q/knee) (tanh) or offset·(1 − 1/(1 + q/knee)) (reciprocal)",
+        {},
+        nullptr,
+        kPressureShapes},
+    Key{"pressure.offset_mm", &setting<&S::pressure, &W::offset_mm>, kNotNegative, "mm",
+        "Filament, for tanh and reciprocal"},
+    Key{"pressure.knee_mm_s", &setting<&S::pressure, &W::knee_mm_s>, kPositive, "mm/s",
+        "Flow of filament, for two_slopes, tanh and reciprocal"},
+    Key{"pressure.second_advance_s", &setting<&S::pressure, &W::second_advance_s>, kNotNegative,
+        "s", "Slope beyond the knee, for two_slopes"},
+    Key{"pressure.dead_time_ms", &setting<&S::pressure, &W::dead_time_ms>,
+        Bounds{.min = 0.0, .max = 50.0}, "ms", "Time until the flow answers the extruder at all"},
+    Key{"pressure.max_extruder_accel_mm_s2", &setting<&S::pressure, &W::max_extruder_accel_mm_s2>,
+        kPositive, "mm/s²", "Acceleration of filament that the extruder follows"},
+    Key{"pressure.line_width_mm", &setting<&S::pressure, &W::line_width_mm>, kPositive, "mm",
+        "Width of a line, to tell errors of its width in µm"},
 
     Key{"hotend.gain_c", &setting<&S::hotend, &H::gain_c>, kPositive, "°C",
         "Rise of temperature for each count of power, of which 255 are full power", kNotKnown},

@@ -517,6 +517,21 @@ std::vector<timing::MoveBounds> move_bounds(const Piece& run, const machine::Set
   return bounds;
 }
 
+// The advance itself is the file's, or the printer's.
+dynamics::HotendPressure hotend_pressure(const machine::Settings& settings) {
+  using enum dynamics::PressureShape;
+  const machine::PressureSettings& set = settings.pressure;
+  const auto shape = set.shape == "two_slopes"   ? two_slopes
+                     : set.shape == "tanh"       ? tanh
+                     : set.shape == "reciprocal" ? reciprocal
+                                                 : linear;
+  return {.shape = shape,
+          .offset_mm = set.offset_mm,
+          .knee_mm_s = set.knee_mm_s,
+          .second_advance_s = set.second_advance_s,
+          .dead_time_s = set.dead_time_ms * 1e-3};
+}
+
 emit::EmitOptions emit_options(const machine::Settings& settings, std::string version) {
   emit::EmitOptions options;
   options.interpreter = interpreter_options(settings);
@@ -525,6 +540,9 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.fixed = firmware_config(settings);
   options.run_limits = run_limits(options.printer_limits, settings);
   options.line_accel_mm_s2 = settings.emit_accel_mm_s2();
+  options.pressure = {.is_written = settings.pressure.written,
+                      .hotend = hotend_pressure(settings),
+                      .max_accel_mm_s2 = settings.pressure.max_extruder_accel_mm_s2};
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
   // The costs of lines leave out the lead of modes behind each other.
   options.lines.nozzle_x = nozzle_x(settings);
@@ -582,6 +600,10 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.max_lines_per_s = settings.max_lines_per_s();
   rules.steps = step_rules(settings);
   rules.tolerance_mm = settings.largest_tolerance_um() * 1e-3;
+  rules.line.hotend = hotend_pressure(settings);
+  rules.line.hotend.advance_s = settings.extruder.pressure_advance_s;
+  rules.line.width_mm = settings.pressure.line_width_mm;
+  rules.line.smooth_s = settings.extruder.pressure_advance_smooth_s;
   rules.filament_area_mm2 = settings.filament_area_mm2();
   rules.may_ask_ahead = settings.hotend.ahead;
   rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);

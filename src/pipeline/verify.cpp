@@ -33,6 +33,19 @@ report::CornerRow row(const verify::CornerStats& stats) {
   return {stats.count, stats.rms_mm, stats.p99_mm, stats.max_mm, stats.max_line};
 }
 
+report::WidthRow row(const verify::WidthStats& stats) {
+  return {stats.rms, stats.p99, stats.largest, stats.wide, stats.line};
+}
+
+report::LineRow row(const verify::LineStats& stats) {
+  return {row(stats.width),
+          {stats.edge.rms_mm, stats.edge.p99_mm, stats.edge.max_mm, stats.edge.line},
+          row(stats.other[0]),
+          row(stats.other[1]),
+          row(stats.other[2]),
+          row(stats.other[3])};
+}
+
 report::FlowRow row(const verify::FlowStats& stats) {
   return {stats.max_mm3_s, stats.max_line, stats.max_change_mm3_s2, stats.max_change_line};
 }
@@ -134,6 +147,10 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
   report.compensated = rows(verified.compensated);
   report.uncompensated_corners = row(verified.uncompensated_corners);
   report.compensated_corners = row(verified.compensated_corners);
+  if (verified.uncompensated_line.length_mm > 0.0) {
+    report.laid_line = {verified.uncompensated_line.length_mm, row(verified.uncompensated_line),
+                        row(verified.compensated_line)};
+  }
   constexpr std::size_t kErrors = verify::kFrequencyErrors.size();
   for (std::size_t i = 0; i < verified.detuned.size(); ++i) {
     const report::Spread before = spread(verified.detuned[i].uncompensated);

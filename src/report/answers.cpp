@@ -71,9 +71,11 @@ std::string kept_text(const Report& report) {
 
 }  // namespace
 
-double Better::times() const {
-  return exact.compensated_mm > 0.0 ? exact.now_mm / exact.compensated_mm : 0.0;
+double times_smaller(const Comparison& comparison) {
+  return comparison.compensated_mm > 0.0 ? comparison.now_mm / comparison.compensated_mm : 0.0;
 }
+
+double Better::times() const { return times_smaller(exact); }
 
 Better better(const Report& report) {
   const bool shaped = report.unshaped.has_value();
@@ -92,6 +94,10 @@ Better better(const Report& report) {
   result.exact = {report.uncompensated.extruding.contour_rms_mm,
                   report.compensated.extruding.contour_rms_mm,
                   zv_where([](double error) { return error == 0.0; })};
+  if (report.laid_line) {
+    result.edge = {report.laid_line->uncompensated.edge.rms_mm,
+                   report.laid_line->compensated.edge.rms_mm, std::nullopt};
+  }
   for (const Sensitivity& one : report.sensitivity) {
     if (is_off(one.frequency_error)) {
       Comparison& off = result.off ? *result.off : result.off.emplace();
@@ -136,6 +142,18 @@ std::optional<std::string> hardly_worth_it(const Report& report) {
   return fmt::format(
       "Hardly worth it: as sliced 99 % of the time are within {} µm, and an eye sees {:.0f}",
       micrometres_text(strays_mm), 1e3 * kSeen_mm);
+}
+
+std::string width_text(const Report& report) {
+  if (!report.laid_line) {
+    return "How wide the line comes out is not known: give extruder.pressure_advance_s, which the "
+           "printer's own pressure advance has";
+  }
+  const WidthRow& before = report.laid_line->uncompensated.width;
+  const WidthRow& after = report.laid_line->compensated.width;
+  return fmt::format("The line's width is {} % RMS off, {} for 99 % of the way",
+                     percent_change_text(before.rms, after.rms),
+                     percent_change_text(before.p99, after.p99));
 }
 
 Worst worst(const Report& report) {

@@ -22,9 +22,14 @@ struct Better {
   std::string now;  // "without an input shaper"
   Comparison exact;
   std::optional<Comparison> off;  // the worse of both if the frequencies are 5 % off
+  // How far the edges of the line of plastic are off, RMS, where that is known.
+  std::optional<Comparison> edge;
   // How many times smaller the error is than now; 0 if nothing is left of it.
   [[nodiscard]] double times() const;
 };
+
+// How many times smaller the error is than now; 0 if nothing is left of it.
+[[nodiscard]] double times_smaller(const Comparison& comparison);
 [[nodiscard]] Better better(const Report& report);
 
 // Where the timing is free: "9.8s → 6.3s to print, 36 % less; the nozzle may stray 20 µm and keeps
@@ -38,6 +43,9 @@ inline constexpr double kSeen_mm = 0.008;
 // What to say of a print that strays less than an eye sees as sliced, but for one hundredth of the
 // time, so that compensating it shows little. nullopt: of another print, or of one made for speed.
 [[nodiscard]] std::optional<std::string> hardly_worth_it(const Report& report);
+
+// What to say of the width of the line: how far it is off, or how to find out.
+[[nodiscard]] std::string width_text(const Report& report);
 
 struct Worst {
   std::optional<Place> compensated;

@@ -209,11 +209,30 @@ Json facts_json(const Report& r) {
                     fitted.sliced_mm, fitted.fitted_mm, fitted.least_factor, fitted.most_factor,
                     fitted.material_mm3, fitted.end_mm));
   }
-  add("Filament laid ahead of the nozzle or behind",
-      fmt::format(
-          "{} → {} µm RMS, {} → {} µm at most", micrometres_text(r.uncompensated_lag.rms_mm),
-          micrometres_text(r.compensated_lag.rms_mm), micrometres_text(r.uncompensated_lag.max_mm),
-          micrometres_text(r.compensated_lag.max_mm)));
+  if (r.laid_line) {
+    const LineRow& before = r.laid_line->uncompensated;
+    const LineRow& after = r.laid_line->compensated;
+    add("Edges of the line",
+        fmt::format("{} → {} µm RMS, 99 % within {} → {} µm, {} → {} µm at most, as sliced in line "
+                    "{}, compensated in line {}",
+                    micrometres_text(before.edge.rms_mm), micrometres_text(after.edge.rms_mm),
+                    micrometres_text(before.edge.p99_mm), micrometres_text(after.edge.p99_mm),
+                    micrometres_text(before.edge.max_mm), micrometres_text(after.edge.max_mm),
+                    before.edge.line, after.edge.line));
+    add("Width of the line if the hotend is another",
+        fmt::format("{} % RMS with 20 % less pressure, {} with more; {} with 2 ms more dead time",
+                    percent_change_text(before.less_pressure.rms, after.less_pressure.rms),
+                    percent_change_text(before.more_pressure.rms, after.more_pressure.rms),
+                    percent_change_text(before.later.rms, after.later.rms)));
+  }
+  if (!r.laid_line) {
+    add("Filament laid ahead of the nozzle or behind",
+        fmt::format("{} → {} µm RMS, {} → {} µm at most",
+                    micrometres_text(r.uncompensated_lag.rms_mm),
+                    micrometres_text(r.compensated_lag.rms_mm),
+                    micrometres_text(r.uncompensated_lag.max_mm),
+                    micrometres_text(r.compensated_lag.max_mm)));
+  }
   const FlowRow& flow = r.uncompensated_flow;
   const FlowRow& asked = r.compensated_flow;
   add("Flow of filament",
@@ -266,6 +285,13 @@ constexpr std::string_view kTypical =
     "sliced path. It is computed: the file is replayed as the firmware would, with the nozzle "
     "hanging on springs and dampers of the frequencies given in the settings.";
 
+constexpr std::string_view kTypicalEdge =
+    "Root mean square, over the way on which filament is laid, of how far the edges of the line of "
+    "plastic are off: the distance of the nozzle from the sliced path, and half of what the line "
+    "is "
+    "too wide or too narrow. It is computed: the file is replayed as the firmware would, with the "
+    "nozzle hanging on springs and dampers, and filament pressed together in the hotend.";
+
 // A length with three figures, in µm.
 std::string um_text(double mm) {
   const double value = mm * 1e3;
@@ -312,6 +338,15 @@ std::string better_answer(const Report& r) {
   const bool is_allowed = !faster.empty() && found.times() < 1.0;
   const std::string times = is_allowed ? "Now" : times_text(found.times()) + ",";
   std::vector<std::string> lines = {escape_html(fmt::format("{} {}.", times, found.now))};
+  if (found.edge) {
+    lines = {escape_html(fmt::format("{}, {}.", times_text(times_smaller(*found.edge)), found.now)),
+             escape_html(width_text(r) + "."),
+             "The nozzle is " + change(found.exact.now_mm, found.exact.compensated_mm) +
+                 " off the path" +
+                 (is_allowed ? "." : escape_html(": " + times_text(found.times()) + "."))};
+  } else {
+    lines.push_back(escape_html(width_text(r) + "."));
+  }
   if (found.off) {
     lines.push_back(fmt::format("{} if the frequencies are 5 % off.",
                                 change(found.off->now_mm, found.off->compensated_mm)));
@@ -328,6 +363,12 @@ std::string better_answer(const Report& r) {
   }
   for (std::size_t i = 0; i < faster.size(); ++i) {
     lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(i), escape_html(faster[i]) + ".");
+  }
+  if (found.edge) {
+    return answer(
+        term("Better?", kTypicalEdge),
+        change(found.edge->now_mm, found.edge->compensated_mm) + " at the edges of the line",
+        lines);
   }
   return answer(term("Better?", kTypical),
                 change(found.exact.now_mm, found.exact.compensated_mm) + " off the path", lines);

@@ -32,6 +32,36 @@ Json corners_json(const CornerRow& row) {
           {"max_line", row.max_line}};
 }
 
+Json width_json(const WidthRow& row) {
+  return {{"rms", row.rms},
+          {"p99", row.p99},
+          {"largest", row.largest},
+          {"wide", row.wide},
+          {"line", row.line}};
+}
+
+Json line_json(const LineRow& row) {
+  return {{"width", width_json(row.width)},
+          {"edge",
+           {{"rms_mm", row.edge.rms_mm},
+            {"p99_mm", row.edge.p99_mm},
+            {"max_mm", row.edge.max_mm},
+            {"line", row.edge.line}}},
+          {"less_pressure", width_json(row.less_pressure)},
+          {"more_pressure", width_json(row.more_pressure)},
+          {"earlier", width_json(row.earlier)},
+          {"later", width_json(row.later)}};
+}
+
+Json laid_line_json(const std::optional<LaidLine>& laid) {
+  if (!laid) {
+    return nullptr;
+  }
+  return {{"length_mm", laid->length_mm},
+          {"uncompensated", line_json(laid->uncompensated)},
+          {"compensated", line_json(laid->compensated)}};
+}
+
 Json flow_json(const FlowRow& row) {
   return {{"max_mm3_s", row.max_mm3_s},
           {"max_line", row.max_line},
@@ -143,7 +173,8 @@ void add_answers(const Report& r, Json& json) {
       {"better",
        {{"now", first.now},
         {"exact", comparison_json(first.exact)},
-        {"off_by_5_percent", comparison_json(first.off)}}},
+        {"off_by_5_percent", comparison_json(first.off)},
+        {"edge", comparison_json(first.edge)}}},
       {"worst",
        {{"now", place_json(r, second.now, &Place::before_mm)},
         {"compensated", place_json(r, second.compensated, &Place::after_mm)}}},
@@ -166,6 +197,7 @@ void add_motion(const Report& r, Json& json) {
                        {"compensated", rows_json(r.compensated)}};
   json["corners"] = {{"uncompensated", corners_json(r.uncompensated_corners)},
                      {"compensated", corners_json(r.compensated_corners)}};
+  json["laid_line"] = laid_line_json(r.laid_line);
   json["plants"] = plants_json(r.plants);
   json["robustness"] = nullptr;
   if (r.robustness) {

@@ -47,9 +47,21 @@ void write_better(Sink out, const Report& r) {
   write_answer(out, "Faster?", faster);
   const bool is_allowed = !faster.empty() && answer.times() < 1.0;
   const std::string times = is_allowed ? "" : ": " + times_text(answer.times());
-  std::vector<std::string> lines = {fmt::format(
-      "{} µm RMS from the path{} ({})",
-      change_text(answer.exact.now_mm, answer.exact.compensated_mm), times, answer.now)};
+  std::vector<std::string> lines;
+  if (answer.edge) {
+    lines.push_back(fmt::format("{} µm RMS at the edges of the line: {} ({})",
+                                change_text(answer.edge->now_mm, answer.edge->compensated_mm),
+                                times_text(times_smaller(*answer.edge)), answer.now));
+    lines.push_back(width_text(r));
+    lines.push_back(fmt::format("The nozzle is {} µm RMS from the path{}",
+                                change_text(answer.exact.now_mm, answer.exact.compensated_mm),
+                                times));
+  } else {
+    lines.push_back(fmt::format("{} µm RMS from the path{} ({})",
+                                change_text(answer.exact.now_mm, answer.exact.compensated_mm),
+                                times, answer.now));
+    lines.push_back(width_text(r));
+  }
   if (answer.off) {
     lines.push_back(fmt::format("{} if the frequencies are 5 % off",
                                 change_text(answer.off->now_mm, answer.off->compensated_mm)));
@@ -122,6 +134,30 @@ void write_corners(Sink out, const CornerRow& before, const CornerRow& after) {
                    change_text(before.p99_mm, after.p99_mm),
                    change_text(before.rms_mm, after.rms_mm));
   }
+}
+
+void write_line(Sink out, const std::optional<LaidLine>& line) {
+  if (!line) {
+    return;
+  }
+  const LineRow& before = line->uncompensated;
+  const LineRow& after = line->compensated;
+  fmt::format_to(out, "  {:<16}{:<20}{:<20}{}\n", "edges of lines",
+                 change_text(before.edge.max_mm, after.edge.max_mm),
+                 change_text(before.edge.p99_mm, after.edge.p99_mm),
+                 change_text(before.edge.rms_mm, after.edge.rms_mm));
+  const auto change = [&](const WidthRow LineRow::*row) {
+    return percent_change_text((before.*row).rms, (after.*row).rms);
+  };
+  fmt::format_to(out,
+                 "width         {:+.0f} → {:+.0f} % off at most, near lines {} and {}; {:.1f} → "
+                 "{:.1f} % of the way are more than 10 % off\n"
+                 "              {} % RMS if the pressure is 20 % lower, {} if it is higher; {} if "
+                 "the dead time is 2 ms longer\n",
+                 100.0 * before.width.largest, 100.0 * after.width.largest, before.width.line,
+                 after.width.line, 100.0 * before.width.wide, 100.0 * after.width.wide,
+                 change(&LineRow::less_pressure), change(&LineRow::more_pressure),
+                 change(&LineRow::later));
 }
 
 // What the printer's own shaper leaves out of the figures before.
@@ -263,10 +299,13 @@ void write_output(Sink out, const Report& r) {
   }
   fmt::format_to(out, "filament      {:.2f} mm in, {:.2f} mm out\n", r.input_extrusion_mm,
                  r.output_extrusion_mm);
-  fmt::format_to(
-      out, "              laid {} → {} µm RMS ahead of the nozzle or behind, {} → {} µm at most\n",
-      micrometres_text(r.uncompensated_lag.rms_mm), micrometres_text(r.compensated_lag.rms_mm),
-      micrometres_text(r.uncompensated_lag.max_mm), micrometres_text(r.compensated_lag.max_mm));
+  if (!r.laid_line) {
+    fmt::format_to(
+        out,
+        "              laid {} → {} µm RMS ahead of the nozzle or behind, {} → {} µm at most\n",
+        micrometres_text(r.uncompensated_lag.rms_mm), micrometres_text(r.compensated_lag.rms_mm),
+        micrometres_text(r.uncompensated_lag.max_mm), micrometres_text(r.compensated_lag.max_mm));
+  }
   if (r.flow_difference) {
     fmt::format_to(out, "              {}\n", flow_difference_text(*r.flow_difference));
   }
@@ -299,6 +338,13 @@ std::string flow_difference_text(const FlowDifferenceRow& difference) {
       "at most {:.1f} % {} than as sliced over 10 ms, near line {}; {:.1f} for 99 % of the time",
       100.0 * std::abs(difference.relative), difference.relative < 0.0 ? "less" : "more",
       difference.line, 100.0 * difference.p99);
+}
+
+std::string percent_change_text(double from, double to) {
+  // The figures of micrometres_text(), which counts thousandths of a millimetre.
+  constexpr double kPercent = 100.0;
+  return fmt::format("{} → {}", micrometres_text(from * kPercent / kMicrometresPerMm),
+                     micrometres_text(to * kPercent / kMicrometresPerMm));
 }
 
 std::string times_text(double times) {
@@ -389,6 +435,7 @@ std::string to_text(const Report& report) {
                    "                  (in travel, where nothing is laid, straying is harmless)\n");
   }
   write_corners(out, report.uncompensated_corners, report.compensated_corners);
+  write_line(out, report.laid_line);
   write_sensitivity(out, report);
   write_unshaped(out, report.unshaped);
   write_plants(out, report.plants);

@@ -1,8 +1,7 @@
 // How far the filament that is laid lags behind the nozzle.
 //
 // Notation:
-//   r, p   reference and nozzle                F   filament that the file has laid, mm
-//   s_p    where along the sliced path the nozzle is nearest to it
+//   F      filament that has been laid, mm     s_p    where along the sliced path the nozzle is
 //   Q(s)   filament that the sliced file lays up to there
 //   s_F    the place whose filament comes out now: Q(s_F) = F
 //   lag    s_p − s_F, mm of path. Between places of two lines the travel is left out. If the nozzle
@@ -14,6 +13,7 @@
 
 #include <cstddef>
 
+#include "nozzle_place.hpp"
 #include "unflex/verify/reference_path.hpp"
 #include "unflex/verify/verify.hpp"
 
@@ -21,10 +21,10 @@ namespace unflex::verify {
 
 class FilamentLag {
  public:
-  // Adds a step of h seconds. The reference is on piece `current` of the path. flows: filament
-  // comes out now. It does, or the reference lays filament.
-  void add(const ReferencePath& path, std::size_t current, double r_x_mm, double r_y_mm,
-           double p_x_mm, double p_y_mm, double laid_mm, bool flows, double h);
+  // Adds a step of h seconds, with the nozzle at this place of the path. flows: filament comes out
+  // now. It does, or the reference lays filament.
+  void add(const ReferencePath& path, const PathPlace& nozzle, double laid_mm, bool flows,
+           double h);
   [[nodiscard]] LagStats stats() const;
 
  private:

@@ -85,6 +85,9 @@ void Meter::begin_section(ReferencePath& path, double unplayed_s, double unplaye
     }
   }
   corner_section_ = path.section();
+  if (line_) {
+    line_->begin_section(path);
+  }
   const double begin_s = path.section_start_s() - unplayed_s;
   corner_shift_s_ += time_s_ - begin_s;
   time_s_ = begin_s;
@@ -134,10 +137,10 @@ void Meter::shift_to(double x_mm, double y_mm) {
   base_y_mm_ = y_mm;
 }
 
-void Meter::play(const planner::PlannedMove& move) {
+void Meter::play(const planner::PlannedMove& move, const planner::PlannedMove& pushed) {
   shift_to(move.segment.start_mm[gcode::X], move.segment.start_mm[gcode::Y]);
   phases_.clear();
-  append_phases(move, phases_);
+  append_phases(move, pushed.segment.delta(gcode::E), phases_);
   const double start_s = time_s_;
   double elapsed_s = 0.0;
   for (const BasePhase& phase : phases_) {
@@ -155,6 +158,9 @@ void Meter::settle(const BasePhase& phase) {
   nozzle_.y = dynamics::exact_step(model_.y, nozzle_.y, phase.y, phase.duration_s);
   if (corners_) {
     corners_->lift();
+  }
+  if (line_) {
+    line_->rest(phase.duration_s);
   }
   BasePhase end = phase;
   advance(end.x, phase.duration_s);
@@ -264,6 +270,8 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
     advance(phase.x, h);
     advance(phase.y, h);
     advance(phase.e, h);
+    const dynamics::BaseSegment pushed_from = phase.pushed;
+    advance(phase.pushed, h);
     if (corners_) {
       corners_->sample(start_s + number * h + corner_shift_s_, nozzle_.x.position(),
                        nozzle_.y.position());
@@ -274,12 +282,19 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
       advance(reference.x, h);
       advance(reference.y, h);
       measurement = sample(reference, phase.extruding, h);
-      if (follows_filament_ && !waiting_ && (reference.extruding || phase.extruding)) {
-        measure_filament(reference, phase, h);
-      }
     } else if (phase.extruding) {
       time_s_ = start_s + number * h;
       measurement = sample_at_rest(h);
+    }
+    if (!waiting_ && (line_ || (follows_filament_ && measured))) {
+      const std::optional<PathPlace> at = place(measured, reference);
+      if (measured && follows_filament_ && at && (reference.extruding || phase.extruding)) {
+        filament_lag_.add(*path_, *at, laid_mm_ + phase.e.position, phase.extruding, h);
+      }
+      if (line_) {
+        line_->add(*path_, {h, phase.pushed.position - pushed_from.position, pushed_from.velocity,
+                            phase.pushed.velocity, phase.extruding, measurement.contour2_mm2, at});
+      }
     }
     if (observer_ != nullptr) {
       time_s_ = start_s + number * h;
@@ -378,10 +393,19 @@ Meter::Sample Meter::sample_at_rest(double h) {
   return {contour2, line};
 }
 
-void Meter::measure_filament(const ReferencePhase& reference, const BasePhase& phase, double h) {
-  filament_lag_.add(*path_, current_, reference.x.position, reference.y.position,
-                    nozzle_.x.position(), nozzle_.y.position(), laid_mm_ + phase.e.position,
-                    phase.extruding, h);
+// Where the nozzle is on the path. While the reference does not move, it is where the reference
+// will begin, or has ended.
+std::optional<PathPlace> Meter::place(bool measured, const ReferencePhase& reference) const {
+  if (measured) {
+    return nearest_place(*path_, current_, reference.x.position, reference.y.position,
+                         nozzle_.x.position(), nozzle_.y.position());
+  }
+  if (path_->first() == path_->end()) {
+    return std::nullopt;
+  }
+  const bool before = current_ < path_->end();
+  const std::size_t piece = before ? current_ : path_->end() - 1;
+  return PathPlace{piece, before ? 0.0 : (*path_)[piece].length_xy_mm};
 }
 
 void Meter::tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
@@ -420,7 +444,9 @@ void Meter::wait_for_reference() {
   waiting_ = true;
   path_->extend_to(time_s_ + kSameTime_s);
   while (path_->end_s() - time_s_ > kSameTime_s) {
-    play(BasePhase{{base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, {}, path_->end_s() - time_s_});
+    play(BasePhase{.x = {base_x_mm_, 0.0, 0.0},
+                   .y = {base_y_mm_, 0.0, 0.0},
+                   .duration_s = path_->end_s() - time_s_});
     path_->extend_to(time_s_ + kSameTime_s);
   }
   waiting_ = false;
@@ -435,6 +461,9 @@ void Meter::wait_for_reference() {
 void Meter::hold(double duration_s) {
   nozzle_.x = dynamics::exact_step(model_.x, nozzle_.x, {base_x_mm_, 0.0, 0.0}, duration_s);
   nozzle_.y = dynamics::exact_step(model_.y, nozzle_.y, {base_y_mm_, 0.0, 0.0}, duration_s);
+  if (line_) {
+    line_->rest(duration_s);
+  }
   if (corners_) {
     corners_->lift();
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "filament_lag.hpp"
+#include "laid_line.hpp"
 #include "shaped_base.hpp"
 #include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
@@ -104,7 +105,9 @@ class Meter {
   // to come before the section begins, counted as in BasePhase::e.
   void begin_section(ReferencePath& path, double unplayed_s = 0.0, double unplayed_mm = 0.0);
   // Moves the base. If it does not start where the base stands, base and nozzle are shifted there.
-  void play(const planner::PlannedMove& move);
+  void play(const planner::PlannedMove& move) { play(move, move); }
+  // A move whose filament comes out otherwise than it is pushed.
+  void play(const planner::PlannedMove& laid, const planner::PlannedMove& pushed);
   // Moves the base by a phase that begins where the base stands.
   void play(BasePhase phase);
   // Filament that phases have counted becomes filament laid; they will count from 0 again.
@@ -126,6 +129,11 @@ class Meter {
   // Also measures the filament's lag.
   void follow_filament() { follows_filament_ = true; }
   [[nodiscard]] LagStats filament_lag() const { return filament_lag_.stats(); }
+
+  // Also measures the line of plastic.
+  void follow_line(const LineModel& model) { line_.emplace(model); }
+  // nullptr if it is not followed.
+  [[nodiscard]] LaidLine* line() { return line_ ? &*line_ : nullptr; }
 
   // Also measures how far the nozzle passes from corners.
   void follow_corners() { corners_.emplace(near_.reach_s()); }
@@ -176,7 +184,8 @@ class Meter {
   };
   Sample sample(const ReferencePhase& reference, bool laying, double h);
   Sample sample_at_rest(double h);
-  void measure_filament(const ReferencePhase& reference, const BasePhase& phase, double h);
+  [[nodiscard]] std::optional<PathPlace> place(bool measured,
+                                               const ReferencePhase& reference) const;
   void tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
             const Sample& sample);
 
@@ -197,6 +206,7 @@ class Meter {
   // Filament laid before the move or the shaped motion at hand, counted as in
   // ReferencePath::filament_mm().
   double laid_mm_ = 0.0;
+  std::optional<LaidLine> line_;
   std::optional<CornerGauge> corners_;
   // What corners_ has of the path: the pieces before this one, in the sections up to this one.
   std::size_t corner_piece_ = 0;

@@ -46,10 +46,10 @@ void Nozzles::shape(const planner::Shaping& shaping) {
   shaping_ = shaping;
 }
 
-void Nozzles::play(const planner::PlannedMove& move) {
+void Nozzles::play(const planner::PlannedMove& move, const planner::PlannedMove& pushed) {
   if (!shaping_.acts()) {
     rested_s_ = 0.0;
-    for_each([&](Meter& meter) { meter.play(move); });
+    for_each([&](Meter& meter) { meter.play(move, pushed); });
     return;
   }
   const gcode::Position& from = move.segment.start_mm;

@@ -36,7 +36,9 @@ class Nozzles {
   void begin_section(ReferencePath& path);
   // Sets how the printer's own shaper changes the motion from now on.
   void shape(const planner::Shaping& shaping);
-  void play(const planner::PlannedMove& move);
+  void play(const planner::PlannedMove& move) { play(move, move); }
+  // A move whose filament comes out otherwise than it is pushed.
+  void play(const planner::PlannedMove& laid, const planner::PlannedMove& pushed);
   // Plays the end of the shaped motion and returns how long the base moves after the plan's end.
   // Only what comes before that end is measured.
   double finish();
@@ -45,6 +47,8 @@ class Nozzles {
   void wait_for_reference();
   // The machine stands still for duration_s. Motion that the shaper has delayed is played first.
   void hold(double duration_s);
+  // Measures the line of plastic, too.
+  void follow_line(const LineModel& model) { main_.follow_line(model); }
   void follow_lag(bool on) { main_.follow_lag(on); }
   void follow_feed(bool on) { main_.follow_feed(on); }
 

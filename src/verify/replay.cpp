@@ -55,17 +55,19 @@ bool is_known_addition(std::string_view content, Firmware firmware) {
   const gcode::Command command = gcode::parse(content);
   if (firmware != Firmware::klipper) {
     constexpr std::array<int, 5> kLimits = {201, 203, 204, 205, 593};
-    constexpr std::array<int, 2> kOfMarlin = {200, 221};  // what E means
+    constexpr std::array<int, 3> kOfMarlin = {200, 221, 900};  // what E means, pressure advance
+    constexpr std::array<int, 2> kOfRrf = {566, 572};
     const auto is_any_of = [&](const auto& numbers) {
       return std::ranges::any_of(numbers, [&](int number) { return command.is('M', number); });
     };
     if (is_any_of(kLimits) || (firmware == Firmware::marlin && is_any_of(kOfMarlin)) ||
-        (firmware == Firmware::rrf && command.is('M', 566))) {
+        (firmware == Firmware::rrf && is_any_of(kOfRrf))) {
       return true;
     }
   } else if (command.kind == gcode::CommandKind::extended) {
-    constexpr std::array<std::string_view, 4> kNames = {"SET_VELOCITY_LIMIT", "SET_INPUT_SHAPER",
-                                                        kCheckpointMacro, kLimitsMacro};
+    constexpr std::array<std::string_view, 5> kNames = {"SET_VELOCITY_LIMIT", "SET_INPUT_SHAPER",
+                                                        "SET_PRESSURE_ADVANCE", kCheckpointMacro,
+                                                        kLimitsMacro};
     return std::ranges::find(kNames, command.name) != kNames.end();
   }
   if (command.is('G', 4)) {

@@ -13,20 +13,20 @@ dynamics::BaseSegment later(const dynamics::BaseSegment& base, double h) {
           base.velocity + base.acceleration * h, base.acceleration};
 }
 
-// Filament that a move lays, counted from its start; zero if it pulls filament back.
-dynamics::BaseSegment along_filament(const planner::PlannedMove& move, double distance_mm,
-                                     double speed_mm_s, double accel_mm_s2) {
-  if (!move.segment.extruding()) {
-    return {};
-  }
-  const double per_mm = move.segment.delta(gcode::E) / move.length_mm;
-  return {per_mm * distance_mm, per_mm * speed_mm_s, per_mm * accel_mm_s2};
+// So much filament, counted from the start of the move.
+dynamics::BaseSegment along_filament(const planner::PlannedMove& move, double filament_mm,
+                                     double distance_mm, const planner::Phase& phase) {
+  const double per_mm = filament_mm != 0.0 ? filament_mm / move.length_mm : 0.0;
+  return {per_mm * distance_mm, per_mm * phase.speed_mm_s, per_mm * phase.accel_mm_s2};
 }
 
 }  // namespace
 
-void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& phases) {
+void append_phases(const planner::PlannedMove& move, double pushed_mm,
+                   std::vector<BasePhase>& phases) {
   double elapsed_s = 0.0;
+  const double laid_mm = move.segment.extruding() ? move.segment.delta(gcode::E) : 0.0;
+  pushed_mm = move.segment.moves_xy() ? pushed_mm : 0.0;
   for (const planner::Phase& phase : move.phases()) {
     if (phase.duration_s <= 0.0) {
       continue;
@@ -38,8 +38,9 @@ void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& pha
                                    ratio * phase.speed_mm_s, ratio * phase.accel_mm_s2};
     };
     phases.push_back({along(gcode::X), along(gcode::Y),
-                      along_filament(move, distance_mm, phase.speed_mm_s, phase.accel_mm_s2),
-                      phase.duration_s, move.segment.extruding()});
+                      along_filament(move, laid_mm, distance_mm, phase),
+                      along_filament(move, pushed_mm, distance_mm, phase), phase.duration_s,
+                      move.segment.extruding()});
     elapsed_s += phase.duration_s;
   }
 }
@@ -61,7 +62,7 @@ ShapedBase::ShapedBase(const planner::Shaping& shaping, double x_mm, double y_mm
   set(e_, {});
   // The base has rested for as long as the pulses look back.
   given_until_s_ = -memory_s_ - 1.0;
-  give({{x_mm, 0.0, 0.0}, {y_mm, 0.0, 0.0}, {}, memory_s_ + 1.0});
+  give({.x = {x_mm, 0.0, 0.0}, .y = {y_mm, 0.0, 0.0}, .duration_s = memory_s_ + 1.0});
 }
 
 void ShapedBase::give(const BasePhase& phase) {
@@ -71,7 +72,7 @@ void ShapedBase::give(const BasePhase& phase) {
 
 void ShapedBase::add(const planner::PlannedMove& move, std::vector<BasePhase>& shaped) {
   std::vector<BasePhase> phases;
-  append_phases(move, phases);
+  append_phases(move, move.segment.delta(gcode::E), phases);
   for (BasePhase& phase : phases) {
     phase.e.position += filament_mm_;
     give(phase);
@@ -90,10 +91,10 @@ void ShapedBase::rest(double duration_s, std::vector<BasePhase>& shaped) {
     return;
   }
   const Timed& last = given_.back();
-  BasePhase rest{later(last.phase.x, last.phase.duration_s),
-                 later(last.phase.y, last.phase.duration_s),
-                 {filament_mm_, 0.0, 0.0},
-                 duration_s};
+  BasePhase rest{.x = later(last.phase.x, last.phase.duration_s),
+                 .y = later(last.phase.y, last.phase.duration_s),
+                 .e = {filament_mm_, 0.0, 0.0},
+                 .duration_s = duration_s};
   rest.x.velocity = rest.x.acceleration = 0.0;
   rest.y.velocity = rest.y.acceleration = 0.0;
   give(rest);
@@ -105,7 +106,8 @@ void ShapedBase::advance(std::vector<BasePhase>& shaped) {
     const double until_s =
         std::min({given_until_s_, next_change(x_), next_change(y_), next_change(e_)});
     shaped.push_back({sum(x_, &BasePhase::x), sum(y_, &BasePhase::y), sum(e_, &BasePhase::e),
-                      until_s - time_s_, given_[e_.front().index - forgotten_].phase.extruding});
+                      sum(e_, &BasePhase::pushed), until_s - time_s_,
+                      given_[e_.front().index - forgotten_].phase.extruding});
     time_s_ = until_s;
   }
   while (given_.size() > 1 && given_[1].start_s <= time_s_ - memory_s_) {

@@ -25,12 +25,16 @@ struct BasePhase {
   dynamics::BaseSegment y;
   // Filament that comes out meanwhile, counted from the start of the move or of the shaped motion.
   dynamics::BaseSegment e = {};
+  // Filament that the extruder pushes or draws back, in moves of X or Y. Its place has no meaning.
+  dynamics::BaseSegment pushed = {};
   double duration_s = 0.0;
   bool extruding = false;  // the move lays filament
 };
 
-// Appends the phases of one move, except those without duration.
-void append_phases(const planner::PlannedMove& move, std::vector<BasePhase>& phases);
+// Appends the phases of one move, except those without duration. pushed_mm: what the extruder
+// pushes meanwhile, if that is not what comes out.
+void append_phases(const planner::PlannedMove& move, double pushed_mm,
+                   std::vector<BasePhase>& phases);
 
 class ShapedBase {
  public:

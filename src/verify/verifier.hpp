@@ -12,6 +12,7 @@
 #include "flow_gauge.hpp"
 #include "line_check.hpp"
 #include "nozzles.hpp"
+#include "output_moves.hpp"
 #include "progress_timing.hpp"
 #include "replay.hpp"
 #include "run_check.hpp"
@@ -69,8 +70,9 @@ class Verifier {
   bool next_reference_move(ReferenceMove& move);
   bool next_kept_move(planner::PlannedMove& move);
   bool next_sliced_move(std::deque<planner::PlannedMove>& own, planner::PlannedMove& move);
-  bool next_output_move(planner::PlannedMove& move);
-  bool next_output_move_ahead(planner::PlannedMove& move);
+  bool take_output_move(OutputMove& move);
+  bool next_output_move(OutputMove& move);
+  bool next_output_move_ahead(planner::PlannedMove& laid);
   bool ends_here(const planner::PlannedMove& move, const Replay& file);
   void begin_section(bool compensated);
   void play_run();
@@ -78,6 +80,9 @@ class Verifier {
   void join_over_barrier();
   void shape_sliced();
   void shape_emitted();
+  [[nodiscard]] dynamics::HotendPressure hotend() const;
+  [[nodiscard]] double advance_s(const Section& section) const;
+  void set_pressure(Nozzles& nozzles, const Section& section) const;
   // Calls action with the nozzles on the sliced file's plan.
   template <class Action>
   void for_sliced(Action action) {
@@ -87,7 +92,7 @@ class Verifier {
     }
   }
   void play_run_moves(bool compensated);
-  void play(const planner::PlannedMove& move);
+  void play(const OutputMove& move);
   void end_section();
   void let_original_follow(double until_s);
   void let_kept_follow(double until_s);
@@ -131,9 +136,11 @@ class Verifier {
   // Where the timing is free, the sliced moves come at the pace of the emitted ones. Both are read
   // ahead, and each sliced move is asked for by two paths.
   ProgressTiming progress_timing_;
-  std::deque<planner::PlannedMove> output_ahead_;
+  std::deque<OutputMove> output_ahead_;
   std::deque<planner::PlannedMove> sliced_for_timing_;
   std::deque<planner::PlannedMove> sliced_for_kept_;
+  OutputFilament output_filament_;
+  double run_pushed_mm_ = 0.0;  // filament that the run's moves push
   Nozzles original_;
   std::optional<Nozzles> unshaped_;  // from the first motion on that a shaper changes
   // The nozzle if the sliced moves of a compensated run were kept. It starts from the state of

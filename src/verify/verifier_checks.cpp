@@ -51,12 +51,12 @@ void Verifier::check_run(bool compensated) {
   if (too_much_line_ != 0 && !too_much_in_input_) {
     violations_.in_output(too_much_line_, "so much filament is too much for so short a way");
   }
-  const double difference_mm = filament_.output_mm() - filament_.input_mm();
+  const double difference_mm = run_pushed_mm_ - filament_.input_mm();
   if (std::abs(difference_mm) > filament_tolerance_mm()) {
     violations_.in_output(
         output_.following().line.number,
         fmt::format("the run before lays {:.5f} mm of filament instead of {:.5f} mm",
-                    filament_.output_mm(), filament_.input_mm()));
+                    run_pushed_mm_, filament_.input_mm()));
   }
   totals_.worst_move_extrusion_error_mm =
       std::max({totals_.worst_move_extrusion_error_mm, filament_.worst_move_error_mm(),

@@ -85,6 +85,8 @@ Verifier::Verifier(std::istream& input, const std::string& input_name, std::istr
       rules_of_run_(rules_, violations_),
       input_excursion_(rules_.travel),
       output_excursion_(rules_.travel) {
+  original_.follow_line(rules.line);
+  emitted_.follow_line(rules.line);
   input_.on_line([this](const gcode::Line& line) {
     input_notes_.read(line);
     if (observer_ != nullptr) {
@@ -184,9 +186,18 @@ bool Verifier::next_sliced_move(std::deque<planner::PlannedMove>& own, planner::
   return true;
 }
 
-bool Verifier::next_output_move(planner::PlannedMove& move) {
+bool Verifier::take_output_move(OutputMove& move) {
+  planner::PlannedMove played;
+  if (!output_.next(played)) {
+    return false;
+  }
+  move = output_filament_.laid(std::move(played));
+  return true;
+}
+
+bool Verifier::next_output_move(OutputMove& move) {
   if (output_ahead_.empty()) {
-    return output_.next(move);
+    return take_output_move(move);
   }
   move = std::move(output_ahead_.front());
   output_ahead_.pop_front();
@@ -194,11 +205,13 @@ bool Verifier::next_output_move(planner::PlannedMove& move) {
 }
 
 // For progress_timing_, before the move is played.
-bool Verifier::next_output_move_ahead(planner::PlannedMove& move) {
-  if (!output_.next(move)) {
+bool Verifier::next_output_move_ahead(planner::PlannedMove& laid) {
+  OutputMove move;
+  if (!take_output_move(move)) {
     return false;
   }
-  output_ahead_.push_back(move);
+  laid = move.laid;
+  output_ahead_.push_back(std::move(move));
   return true;
 }
 
@@ -263,6 +276,7 @@ void Verifier::begin_section(bool compensated) {
     observer_->section(path_, *emitted_path_);
   }
   filament_.begin_run(*emitted_path_);
+  run_pushed_mm_ = 0.0;
   input_flow_.begin_section();
   output_flow_.begin_section();
   section_first_ = path_.end();
@@ -338,6 +352,14 @@ void Verifier::join_over_barrier() {
 
 void Verifier::shape_sliced() {
   static_cast<void>(input_.has_move());  // so that the regime of a run is known
+  for_sliced([&](Nozzles& nozzles) { set_pressure(nozzles, input_.section()); });
+  set_pressure(emitted_, output_.section());
+  const bool compensated = output_.has_move() && output_.section().compensated;
+  if (compensated && advance_s(output_.section()) == 0.0 && hotend().advance_s > 0.0) {
+    output_filament_.begin_written(hotend());
+  } else {
+    output_filament_.begin_plain();
+  }
   if (!takes_shaper(input_.section(), original_shaper_)) {
     return;
   }
@@ -353,6 +375,25 @@ void Verifier::shape_sliced() {
   original_.shape(shaping);
 }
 
+// The hotend is taken to be what the sliced file advances for.
+dynamics::HotendPressure Verifier::hotend() const {
+  dynamics::HotendPressure hotend = rules_.line.hotend;
+  hotend.advance_s = advance_s(input_.section());
+  return hotend;
+}
+
+double Verifier::advance_s(const Section& section) const {
+  const double of_printer_s = rules_.fixed.pressure_advance_s;
+  return section.regime ? section.regime->modal.pressure_advance_s.value_or(of_printer_s)
+                        : of_printer_s;
+}
+
+void Verifier::set_pressure(Nozzles& nozzles, const Section& section) const {
+  if (section.regime && input_.section().regime) {
+    nozzles.main().line()->set(hotend(), {advance_s(section), rules_.line.smooth_s});
+  }
+}
+
 void Verifier::shape_emitted() {
   if (takes_shaper(output_.section(), emitted_shaper_)) {
     emitted_.shape(planner::shaping(rules_.fixed, emitted_shaper_));
@@ -360,18 +401,18 @@ void Verifier::shape_emitted() {
 }
 
 void Verifier::play_run_moves(bool compensated) {
-  planner::PlannedMove move;
+  OutputMove move;
   for (;;) {
     if (next_output_move(move)) {
-      if (ends_here(move, output_)) {
+      if (ends_here(move.pushed, output_)) {
         return;
       }
       play(move);
       if (compensated) {
-        base_.add(move);
-        run_steps_.play(move);
+        base_.add(move.pushed);
+        run_steps_.play(move.pushed);
       } else {
-        base_.add_kept(move);
+        base_.add_kept(move.pushed);
       }
       if (++moves_ % kMovesPerUpdate == 0) {
         compare_lines(false);
@@ -394,7 +435,8 @@ void Verifier::play_run_moves(bool compensated) {
   }
 }
 
-void Verifier::play(const planner::PlannedMove& move) {
+void Verifier::play(const OutputMove& output) {
+  const planner::PlannedMove& move = output.pushed;
   rate_.add(move);
   output_switching_.move();
   const double start_s = emitted_.plan_time_s();
@@ -406,17 +448,18 @@ void Verifier::play(const planner::PlannedMove& move) {
     since_kept_motion_s_ = 0.0;
   }
   output_notes_.play(move.segment.line, totals_.emitted_time_s);
-  emitted_.play(move);
-  filament_.play(move, start_s);
+  emitted_.play(output.laid, move);
+  filament_.play(output.laid, start_s);
+  run_pushed_mm_ += move.segment.delta(gcode::E);
   if (compensated) {
-    rules_of_run_.add(move, emitted_.main(), late,
+    rules_of_run_.add(output.laid, emitted_.main(), late,
                       has_free_timing() ? owed_filament_mm() : filament_tolerance_mm());
   }
   totals_.emitted_time_s += move.duration_s();
   totals_.output_extrusion_mm += move.segment.delta(gcode::E);
-  output_flow_.play(move);
+  output_flow_.play(output.laid);
   if (compensated && !has_free_timing()) {
-    flow_difference_.play_output(move);
+    flow_difference_.play_output(output.laid);
   }
   output_steps_.play(move);
   output_excursion_.add(move.segment);
@@ -516,8 +559,8 @@ void Verifier::finish_reference() {
 
 void Verifier::play_kept_line() {
   begin_section(false);
-  planner::PlannedMove move;
-  while (output_.next(move) && !ends_here(move, output_)) {
+  OutputMove move;
+  while (take_output_move(move) && !ends_here(move.pushed, output_)) {
     play(move);
   }
   end_section();
@@ -589,6 +632,11 @@ VerifyReport Verifier::report() {
   report.compensated_feed = emitted_.main().feed();
   report.uncompensated_corners = original_.main().corners();
   report.compensated_corners = emitted_.main().corners();
+  for (Nozzles* const nozzles : {&original_, &emitted_}) {
+    nozzles->main().line()->finish();
+  }
+  report.uncompensated_line = original_.main().line()->stats();
+  report.compensated_line = emitted_.main().line()->stats();
   report.uncompensated_flow = input_flow_.stats();
   report.compensated_flow = output_flow_.stats();
   report.flow_difference = flow_difference_.stats();

@@ -60,11 +60,15 @@ std::size_t count(const std::string& text, const std::string& part) {
 TEST(HtmlReport, AnswersThreeQuestionsFirst) {
   const std::string page = to_html(sample_report());
   EXPECT_THAT(page, HasSubstr("<title>cube.gcode</title>"));
-  EXPECT_THAT(page,
-              HasSubstr("<b class=\"before\">200</b> → <b class=\"after\">3.12 µm</b> off the "
-                        "path"));
-  EXPECT_THAT(page, HasSubstr("64 times less than now, under the printer&#39;s own input shaper, "
+  EXPECT_THAT(page, HasSubstr("<b class=\"before\">16.0</b> → <b class=\"after\">2.00 µm</b> at "
+                              "the edges of the line"));
+  EXPECT_THAT(page, HasSubstr("8.0 times less than now, under the printer&#39;s own input shaper, "
                               "MZV 45 Hz."));
+  EXPECT_THAT(page, HasSubstr("The line&#39;s width is 6.00 → 0.50 % RMS off, 31.0 → 2.10 for 99 % "
+                              "of the way."));
+  EXPECT_THAT(
+      page, HasSubstr("The nozzle is <b class=\"before\">200</b> → <b class=\"after\">3.12 µm</b> "
+                      "off the path: 64 times less than now."));
   EXPECT_THAT(page, HasSubstr("<b class=\"before\">150</b> → <b class=\"after\">6.10 µm</b> if the "
                               "frequencies are 5 % off."));
   EXPECT_THAT(page, HasSubstr("<b class=\"after\">12.0 µm</b></p>"));

@@ -31,9 +31,10 @@ class Lag : public ::testing::Test {
                 double laid_mm, bool flows = true) {
     const PathPiece& on = path_[piece];
     FilamentLag lag;
-    lag.add(path_, piece, on.x_mm + reference_mm * on.direction_x,
-            on.y_mm + reference_mm * on.direction_y, nozzle_x_mm, nozzle_y_mm, laid_mm, flows,
-            1e-4);
+    const PathPlace nozzle =
+        nearest_place(path_, piece, on.x_mm + reference_mm * on.direction_x,
+                      on.y_mm + reference_mm * on.direction_y, nozzle_x_mm, nozzle_y_mm);
+    lag.add(path_, nozzle, laid_mm, flows, 1e-4);
     return lag.stats().max_mm;
   }
 
@@ -90,8 +91,8 @@ TEST_F(Lag, IsNoneOfAPlaceThatIsOnlyNearInSpace) {
 
 TEST_F(Lag, IsWeighedByTime) {
   FilamentLag lag;
-  lag.add(path_, 0, 5.0, 0.0, 5.0, 0.0, 0.48, true, 3e-4);
-  lag.add(path_, 0, 6.0, 0.0, 6.0, 0.0, 0.6, true, 1e-4);
+  lag.add(path_, {0, 5.0}, 0.48, true, 3e-4);
+  lag.add(path_, {0, 6.0}, 0.6, true, 1e-4);
   EXPECT_NEAR(lag.stats().rms_mm, 0.2 * std::sqrt(0.75), 1e-12);
   EXPECT_NEAR(lag.stats().max_mm, 0.2, 1e-12);
   EXPECT_EQ(FilamentLag().stats().rms_mm, 0.0);

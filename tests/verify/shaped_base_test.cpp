@@ -140,7 +140,7 @@ TEST(ShapedBase, WithoutPulsesIsThePlan) {
   base.add(move, shaped);
   base.finish(shaped, shaped);
   std::vector<BasePhase> planned;
-  append_phases(move, planned);
+  append_phases(move, move.segment.delta(gcode::E), planned);
   ASSERT_EQ(shaped.size(), planned.size());
   for (std::size_t i = 0; i < shaped.size(); ++i) {
     EXPECT_NEAR(shaped[i].duration_s, planned[i].duration_s, 1e-9);

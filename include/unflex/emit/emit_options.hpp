@@ -3,11 +3,20 @@
 
 #include <string>
 
+#include "unflex/dynamics/hotend_pressure.hpp"
 #include "unflex/emit/line_rules.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::emit {
+
+// How pressure advance is written into the filament of a run.
+struct PressureWriting {
+  bool is_written = false;
+  // In a run its advance is what the file has set, or the printer's configuration. 0: not known.
+  dynamics::HotendPressure hotend = {};
+  double max_accel_mm_s2 = 10000.0;  // of filament, that the extruder can follow
+};
 
 struct EmitOptions {
   gcode::InterpreterOptions interpreter;
@@ -16,6 +25,7 @@ struct EmitOptions {
   planner::Limits run_limits;     // inside a compensated run
   double line_accel_mm_s2 = 1e6;  // acceleration of a line inside a run
   LineRules lines;
+  PressureWriting pressure;
   std::string version;  // for the comment at the first run
   // Runs need not last as long as sliced.
   bool has_free_timing = false;

@@ -77,6 +77,8 @@ class Emitter {
   void restore_shaper(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out, bool may_be_interrupted = false);
   void switch_shaper_off(std::string& out);
+  void set_advance(double wanted_s, std::string& out);
+  void restore_advance(std::string& out);
   void set_shaper(const gcode::Shaper& wanted, const gcode::Shaper& current, std::string& out);
   void write_checkpoint(std::string_view words, std::string& out);
   void tell_shaper(std::string& out);

@@ -142,6 +142,19 @@ struct ExtruderSettings {
   }
 };
 
+// The filament that is pressed together in the hotend (unflex/dynamics/hotend_pressure.hpp), with
+// ExtruderSettings::pressure_advance_s, and whether unflex makes up for it.
+struct PressureSettings {
+  bool written = true;
+  std::string shape = "linear";
+  double offset_mm = 0.0;
+  double knee_mm_s = 1.0;
+  double second_advance_s = 0.0;
+  double dead_time_ms = 0.0;
+  double max_extruder_accel_mm_s2 = 10000.0;
+  double line_width_mm = 0.45;  // of a line that is laid, to tell widths in µm
+};
+
 // The hotend as two lags behind a dead time (unflex/hotend/plant.hpp), and what is done with it.
 // `unflex hotend` finds it and tunes by it.
 struct HotendSettings {
@@ -297,6 +310,7 @@ struct Settings {
   PrinterSettings printer;
   LimitSettings limits;
   ExtruderSettings extruder;
+  PressureSettings pressure;
   HotendSettings hotend;
   AxisDynamics dynamics_x;
   AxisDynamics dynamics_y;

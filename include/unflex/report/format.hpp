@@ -19,6 +19,9 @@ namespace unflex::report {
 // "21 times less than now", of an error that was so many times as large; 0: none is left.
 [[nodiscard]] std::string times_text(double times);
 
+// "16.2 → 0.54": shares as percent, without the unit.
+[[nodiscard]] std::string percent_change_text(double from, double to);
+
 // "0.90 to 3.10": the least and the greatest RMS of the plants, µm, without the unit.
 [[nodiscard]] std::string range_text(const std::vector<PlantDeviation>& plants,
                                      Spread PlantDeviation::*which);

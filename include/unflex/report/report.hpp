@@ -45,6 +45,40 @@ struct CornerRow {
   std::size_t max_line = 0;  // of the input
 };
 
+// How much wider the line of plastic is than sliced, relative to its width.
+struct WidthRow {
+  double rms = 0.0;
+  double p99 = 0.0;
+  double largest = 0.0;  // with its sign
+  double wide = 0.0;     // share of the way that is off by more than 10 %
+  std::size_t line = 0;  // of the input, with the largest error
+};
+
+// How far the edges of that line are off.
+struct EdgeRow {
+  double rms_mm = 0.0;
+  double p99_mm = 0.0;
+  double max_mm = 0.0;
+  std::size_t line = 0;
+};
+
+struct LineRow {
+  WidthRow width;
+  EdgeRow edge;
+  // With a hotend that is not as assumed.
+  WidthRow less_pressure;  // 20 % lower, and higher
+  WidthRow more_pressure;
+  WidthRow earlier;  // dead time 2 ms shorter, but not below 0, and longer
+  WidthRow later;
+};
+
+// The line of plastic that comes out.
+struct LaidLine {
+  double length_mm = 0.0;  // of the lines that are measured
+  LineRow uncompensated;   // with the printer's own pressure advance
+  LineRow compensated;
+};
+
 // Contour error of extruding moves if the true frequencies are the assumed ones times 1 +
 // frequency_error.
 struct Sensitivity {
@@ -220,6 +254,7 @@ struct Report {
   DeviationRows compensated;
   CornerRow uncompensated_corners;
   CornerRow compensated_corners;
+  std::optional<LaidLine> laid_line;  // unset: nothing tells the hotend's pressure
   // The output is made for frequencies up to this share off, either way; 0: for exact ones.
   double freq_error = 0.0;
   std::vector<Sensitivity> sensitivity;  // by rising error

@@ -14,6 +14,7 @@
 #include "unflex/planner/planner.hpp"
 #include "unflex/verify/corners.hpp"
 #include "unflex/verify/deviation.hpp"
+#include "unflex/verify/line_stats.hpp"
 #include "unflex/verify/observer.hpp"
 #include "unflex/verify/step_rates.hpp"
 
@@ -59,6 +60,7 @@ struct Rules {
   // What a compensated run may ask of the motors. Sliced motion that asks for more breaks no rule
   // (VerifyReport::sliced_step_breaches).
   StepRules steps;
+  LineModel line;
   double filament_area_mm2 = 2.405281875467;  // cross-section; here of 1.75 mm
   // What the hotend melts. It breaks no rule to ask for more (VerifyReport::too_much_flow).
   double max_flow_mm3_s = std::numeric_limits<double>::infinity();
@@ -170,6 +172,8 @@ struct VerifyReport {
   // How far the nozzle passes from the corners of the sliced path.
   CornerStats uncompensated_corners;
   CornerStats compensated_corners;
+  LineStats uncompensated_line;
+  LineStats compensated_line;
   FlowStats uncompensated_flow;
   FlowStats compensated_flow;
   std::optional<TooMuchFlow> too_much_flow;  // where the flow is largest

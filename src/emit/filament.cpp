@@ -1,0 +1,180 @@
+#include "filament.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+#include "filament_flow.hpp"
+#include "pressure_program.hpp"
+
+namespace unflex::emit {
+namespace {
+
+using gcode::X;
+using gcode::Y;
+
+// V(t) where E = V: once the moves have ended it is all of their filament, since a tail lays none.
+double laid_mm(const NozzleProgress& nozzle, const Timetable& table, const RunFilament& filament,
+               double t) {
+  if (table.tail_at(t)) {
+    return filament.all_mm;
+  }
+  const double behind_mm = filament.behind_mm;
+  const double filament_mm = nozzle.filament_mm(t);
+  if (nozzle.past_first_move(t)) {
+    return filament_mm - behind_mm;
+  }
+  return filament_mm - std::clamp(filament_mm, std::min(behind_mm, 0.0), std::max(behind_mm, 0.0));
+}
+
+// The lines push what the nozzle lays.
+void lay_as_the_nozzle_goes(const NozzleProgress& nozzle, const Timetable& table,
+                            const RunFilament& filament, const gcode::Position& start_mm,
+                            const std::vector<double>& ends_s, std::size_t laying,
+                            const EmitOptions& options, std::vector<Stroke>& strokes) {
+  for (std::size_t i = 0; i < strokes.size(); ++i) {
+    strokes[i].e_mm = laid_mm(nozzle, table, filament, ends_s[i]);
+  }
+  strokes.back().e_mm = filament.all_mm;
+  level_flow(start_mm, most_flow_step_mm_s(options.fixed), std::span(strokes).first(laying));
+}
+
+// Where lines are slow, neighbouring errors cancel within the width of a nozzle. So no line counts
+// as shorter than this.
+constexpr double kShortest_mm = 0.03;
+
+// The lines of the problem, without limits.
+std::vector<PressureLine> wanted_lines(const NozzleProgress& nozzle, const LinesInTime& in_time,
+                                       const dynamics::HotendPressure& hotend) {
+  const std::size_t count = in_time.lengths_mm.size();
+  std::vector<PressureLine> lines(count);
+  std::vector<double> ways_mm(count);
+  double laid_mm = 0.0;
+  double way_mm = nozzle.way_mm(in_time.times_s.front() + hotend.dead_time_s);
+  double drawn_mm = 0.0;
+  double drawn_way_mm = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    PressureLine& line = lines[i];
+    line.duration_s = in_time.times_s[i + 1] - in_time.times_s[i];
+    line.length_mm = in_time.lengths_mm[i];
+    const double until_s = in_time.times_s[i + 1] + hotend.dead_time_s;
+    const double until_mm = i + 1 == count ? nozzle.all_laid_mm() : nozzle.laid_mm(until_s);
+    line.wanted_mm = until_mm - laid_mm;
+    laid_mm = until_mm;
+    ways_mm[i] = nozzle.way_mm(until_s) - way_mm;
+    way_mm += ways_mm[i];
+    if (line.wanted_mm > 0.0) {
+      drawn_mm += line.wanted_mm;
+      drawn_way_mm += ways_mm[i];
+    }
+    const double flow_mm_s = line.wanted_mm / line.duration_s;
+    line.slope_s = hotend.slope_s(flow_mm_s);
+    line.rest_mm = hotend.pressed_mm(flow_mm_s) - line.slope_s * flow_mm_s;
+  }
+  // Errors count relative to the filament that a place asks for, and where none is, to the mean.
+  const double mean_mm = drawn_way_mm > 0.0 ? drawn_mm / drawn_way_mm : 1.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    constexpr double kNoWay_mm = 1e-6;
+    const bool draws = lines[i].wanted_mm > 0.0 && ways_mm[i] > kNoWay_mm;
+    const double per_mm = draws ? lines[i].wanted_mm / ways_mm[i] : mean_mm;
+    lines[i].weight = 1.0 / (per_mm * per_mm * std::max(ways_mm[i], kShortest_mm));
+  }
+  return lines;
+}
+
+// How much line i may draw back, mm, with a minus. Klipper accelerates such a line slowly, so that
+// its ramps would take more of its time than the line before and after leave it.
+double least_mm(const std::vector<PressureLine>& lines, std::size_t i,
+                const planner::FirmwareConfig& firmware) {
+  constexpr double kRamps = 0.3;  // share of a line's time
+  const auto speed_mm_s = [&](std::size_t k) { return lines[k].length_mm / lines[k].duration_s; };
+  double change_mm_s = 0.0;
+  if (i > 0) {
+    change_mm_s = std::abs(speed_mm_s(i) - speed_mm_s(i - 1));
+  }
+  if (i + 1 < lines.size()) {
+    change_mm_s = std::max(change_mm_s, std::abs(speed_mm_s(i + 1) - speed_mm_s(i)));
+  }
+  const double accel_mm_s2 = std::max(change_mm_s / (kRamps * lines[i].duration_s), 1.0);
+  return -lines[i].length_mm * drawing_back_mm_s2(firmware) / accel_mm_s2;
+}
+
+std::vector<PressureLine> lines_of(const NozzleProgress& nozzle, const LinesInTime& in_time,
+                                   const EmitOptions& options) {
+  std::vector<PressureLine> lines = wanted_lines(nozzle, in_time, options.pressure.hotend);
+  const double step_mm_s = most_flow_step_mm_s(options.fixed);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const double next_s = lines[std::min(i + 1, lines.size() - 1)].duration_s;
+    lines[i].most_step_mm_s = std::min(
+        step_mm_s, options.pressure.max_accel_mm_s2 * 0.5 * (lines[i].duration_s + next_s));
+    lines[i].least_mm = least_mm(lines, i, options.fixed);
+  }
+  return lines;
+}
+
+PressureEnds ends_of(const NozzleProgress& nozzle, const EmitOptions& options) {
+  const dynamics::HotendPressure& hotend = options.pressure.hotend;
+  return {hotend.pressed_mm(nozzle.flow_begin_mm_s()), hotend.pressed_mm(nozzle.flow_end_mm_s())};
+}
+
+// The lines push what has to be pushed for V to come out of the hotend.
+void write_pressure(const Run& run, const NozzleProgress& nozzle, const RunFilament& filament,
+                    const gcode::Position& start_mm, const std::vector<double>& ends_s,
+                    const EmitOptions& options, std::vector<Stroke>& strokes) {
+  LinesInTime in_time;
+  in_time.times_s.push_back(ends_s.front() - strokes.front().end_s);
+  Stroke before{.x_mm = start_mm[X], .y_mm = start_mm[Y]};
+  for (std::size_t i = 0; i < strokes.size(); ++i) {
+    in_time.times_s.push_back(ends_s[i]);
+    in_time.lengths_mm.push_back(
+        std::hypot(strokes[i].x_mm - before.x_mm, strokes[i].y_mm - before.y_mm));
+    before = strokes[i];
+  }
+  const PressureEnds ends = ends_of(nozzle, options);
+  const std::vector<double> pushed = pushed_filament(lines_of(nozzle, in_time, options), ends);
+  double e_mm = ends.begin_mm;
+  for (std::size_t i = 0; i < strokes.size(); ++i) {
+    e_mm += pushed[i];
+    strokes[i].e_mm = e_mm + nozzle.drawn_back_mm(ends_s[i]) - filament.behind_mm;
+  }
+  if (!run.until_s) {
+    strokes.back().e_mm = filament.all_mm;
+  }
+}
+
+}  // namespace
+
+bool writes_pressure(const NozzleProgress& nozzle, const EmitOptions& options) {
+  return options.pressure.hotend.advance_s > 0.0 && nozzle.all_laid_mm() > 0.0;
+}
+
+std::vector<bool> joins_at_limit(const NozzleProgress& nozzle, const LinesInTime& in_time,
+                                 const EmitOptions& options) {
+  constexpr double kAtLimit = 0.95;
+  const std::vector<PressureLine> lines = lines_of(nozzle, in_time, options);
+  const std::vector<double> pushed = pushed_filament(lines, ends_of(nozzle, options));
+  std::vector<bool> result(lines.size(), false);
+  for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
+    const PressureLine& a = lines[i];
+    const PressureLine& b = lines[i + 1];
+    const double v_mm_s = std::min(a.length_mm / a.duration_s, b.length_mm / b.duration_s);
+    const double step_mm_s = v_mm_s * (pushed[i + 1] / b.length_mm - pushed[i] / a.length_mm);
+    // What the extruder's acceleration allows in a line shrinks with the line.
+    result[i] = std::abs(step_mm_s) > kAtLimit * most_flow_step_mm_s(options.fixed);
+  }
+  return result;
+}
+
+void lay_filament(const Run& run, const Timetable& table, const NozzleProgress& nozzle,
+                  const RunFilament& filament, const gcode::Position& start_mm,
+                  const std::vector<double>& ends_s, std::size_t laying, const EmitOptions& options,
+                  std::vector<Stroke>& strokes) {
+  if (writes_pressure(nozzle, options)) {
+    write_pressure(run, nozzle, filament, start_mm, ends_s, options, strokes);
+  } else {
+    lay_as_the_nozzle_goes(nozzle, table, filament, start_mm, ends_s, laying, options, strokes);
+  }
+}
+
+}  // namespace unflex::emit
