@@ -84,8 +84,9 @@ EmitOptions in_run(const Run& run, const RunStart& start, EmitOptions options) {
   options.lines.max_accel_mm_s2 = std::max(options.lines.max_accel_mm_s2, run.accel.base_mm_s2);
   options.line_accel_mm_s2 = std::max(options.line_accel_mm_s2, run.accel.lines_mm_s2);
   options.run_limits = run_limits(run, start.limits, options);
-  if (options.pressure.is_written) {
-    options.pressure.hotend.advance_s = advance_s(start.advance_s, options);
+  double& advance = options.pressure.hotend.advance_s;
+  if (options.pressure.is_written && advance == 0.0) {
+    advance = advance_s(start.advance_s, options);
   }
   return options;
 }
@@ -131,6 +132,7 @@ void Emitter::copy(const gcode::Event& event, std::string& out) {
   const gcode::Event read = printer_.interpret(event.line);
   planner::apply(*read.limits, limits_);
   limits_known_ = limits_known_ && !event.may_set_limits;
+  advance_known_ = advance_known_ && !event.position_lost;
   note_motion(read);
 }
 
@@ -144,12 +146,12 @@ void Emitter::line(const gcode::Event& event, std::string& out) {
     sign(out);
   }
   const bool lays = !event.segments.empty() && event.segments.front().extruding();
-  if (lays || moves_by_itself(event)) {
-    restore_advance(out);
-  }
   if (moves_by_itself(event)) {
     restore_shaper(out);
     limits_known_ = false;
+  }
+  if (lays || moves_by_itself(event)) {
+    restore_advance(out);
   }
   copy(event, out);
   follow_input(event);
@@ -272,8 +274,8 @@ void Emitter::sign(std::string& out) {
 void Emitter::enter_run(const Run& run, std::string& out) {
   sign(out);
   switch_shaper_off(out);
-  if (options_.pressure.is_written) {
-    set_advance(0.0, out);
+  if (plan_writes_pressure()) {
+    switch_advance_off(out);
   }
   if (moving_) {
     // A run begins at rest, but no firmware stops by itself between the move before it and its
@@ -430,14 +432,25 @@ void Emitter::restore_shaper(std::string& out) {
   tell_shaper(out);
 }
 
-void Emitter::set_advance(double wanted_s, std::string& out) {
-  if (advance_s(printer_.state().pressure_advance_s, options_) != wanted_s) {
-    write(advance_line(options_.fixed.firmware, wanted_s), out);
+bool Emitter::plan_writes_pressure() const {
+  return options_.pressure.is_written &&
+         (options_.pressure.hotend.advance_s > 0.0 ||
+          advance_s(input_.state().pressure_advance_s, options_) > 0.0);
+}
+
+// Off, though a macro may have switched it on.
+void Emitter::switch_advance_off(std::string& out) {
+  if (!advance_known_ || advance_s(printer_.state().pressure_advance_s, options_) != 0.0) {
+    write(advance_line(options_.fixed.firmware, 0.0), out);
   }
+  advance_known_ = true;
 }
 
 void Emitter::restore_advance(std::string& out) {
-  set_advance(advance_s(input_.state().pressure_advance_s, options_), out);
+  const double wanted_s = advance_s(input_.state().pressure_advance_s, options_);
+  if (advance_s(printer_.state().pressure_advance_s, options_) != wanted_s) {
+    write(advance_line(options_.fixed.firmware, wanted_s), out);
+  }
 }
 
 // Off, whoever may have switched it on: the printer's configuration, the file, or a macro.

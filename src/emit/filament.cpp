@@ -103,12 +103,17 @@ double least_mm(const std::vector<PressureLine>& lines, std::size_t i,
 std::vector<PressureLine> lines_of(const NozzleProgress& nozzle, const LinesInTime& in_time,
                                    const EmitOptions& options) {
   std::vector<PressureLine> lines = wanted_lines(nozzle, in_time, options.pressure.hotend);
+  // Rounding may add a little to what the firmware takes of filament on a line.
+  constexpr double kOfMost = 0.98;
   const double step_mm_s = most_flow_step_mm_s(options.fixed);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const double next_s = lines[std::min(i + 1, lines.size() - 1)].duration_s;
     lines[i].most_step_mm_s = std::min(
         step_mm_s, options.pressure.max_accel_mm_s2 * 0.5 * (lines[i].duration_s + next_s));
-    lines[i].least_mm = least_mm(lines, i, options.fixed);
+    const gcode::InterpreterOptions& takes = options.interpreter;
+    lines[i].most_mm =
+        kOfMost * std::max(takes.max_extrude_dab_mm, takes.max_extrude_ratio * lines[i].length_mm);
+    lines[i].least_mm = std::max(least_mm(lines, i, options.fixed), -lines[i].most_mm);
   }
   return lines;
 }
@@ -146,7 +151,8 @@ void write_pressure(const Run& run, const NozzleProgress& nozzle, const RunFilam
 }  // namespace
 
 bool writes_pressure(const NozzleProgress& nozzle, const EmitOptions& options) {
-  return options.pressure.hotend.advance_s > 0.0 && nozzle.all_laid_mm() > 0.0;
+  return options.pressure.is_written && options.pressure.hotend.advance_s > 0.0 &&
+         nozzle.all_laid_mm() > 0.0;
 }
 
 std::vector<bool> joins_at_limit(const NozzleProgress& nozzle, const LinesInTime& in_time,
@@ -160,8 +166,10 @@ std::vector<bool> joins_at_limit(const NozzleProgress& nozzle, const LinesInTime
     const PressureLine& b = lines[i + 1];
     const double v_mm_s = std::min(a.length_mm / a.duration_s, b.length_mm / b.duration_s);
     const double step_mm_s = v_mm_s * (pushed[i + 1] / b.length_mm - pushed[i] / a.length_mm);
-    // What the extruder's acceleration allows in a line shrinks with the line.
-    result[i] = std::abs(step_mm_s) > kAtLimit * most_flow_step_mm_s(options.fixed);
+    // What the extruder's acceleration allows in a line shrinks with the line. But in short lines
+    // the firmware takes any filament.
+    result[i] = std::abs(step_mm_s) > kAtLimit * most_flow_step_mm_s(options.fixed) ||
+                std::max(pushed[i] / a.most_mm, pushed[i + 1] / b.most_mm) > kAtLimit;
   }
   return result;
 }

@@ -251,6 +251,9 @@ class PressureProgram {
       if (std::isfinite(lines[k].least_mm)) {
         sides_.push_back({joins_.size() + k, -1.0, -lines[k].least_mm});
       }
+      if (std::isfinite(lines[k].most_mm)) {
+        sides_.push_back({joins_.size() + k, 1.0, lines[k].most_mm});
+      }
     }
     double cost = cost_of(u_) + 1e-9;
     for (Side& side : sides_) {

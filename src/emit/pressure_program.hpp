@@ -11,6 +11,7 @@
 //   ε        filament that comes out meanwhile, minus w, mm
 //   η        the same if the flow were what it is at the end of the line, mm
 //   c        weight of ε²
+//   m, M     the least and the most that it may push, mm
 //   f_j      change of the flow pushed where lines j and j + 1 join, mm/s, and J_j what it may be
 //
 // In a line the flow q goes to x/T as e^(−t/K). So
@@ -23,12 +24,12 @@
 // speeds. The problem is
 //
 //   min ½ Σ c (ε² + κ η²) + ½ c_n (u_n − U)² + ½ ρ Σ f²
-//   subject to   |f_j| ≤ J_j,  x_k ≥ m_k,  Σ x = Σ w + U − u_0
+//   subject to   |f_j| ≤ J_j,  m_k ≤ x_k ≤ M_k,  Σ x = Σ w + U − u_0
 //
 // η damps what ε does not see: a flow that is too high at the beginning of a line and too low at
 // its end, and the other way round in the next one.
 //
-// in u_1 … u_n. With m ≤ 0 it has a solution: pushing the same per mm in all lines. x depends on
+// in u_1 … u_n. It has a solution where pushing the same per mm in all lines is one. x depends on
 // two of them, f on three. So the Hessian has two diagonals on either side of its own, and a
 // solution takes a time that grows as n.
 #pragma once
@@ -47,6 +48,7 @@ struct PressureLine {
   double weight = 1.0;          // c, 1/mm
   double most_step_mm_s = 0.0;  // J at the join with the next line
   double least_mm = 0.0;        // m
+  double most_mm = 0.0;         // M
 };
 
 // κ

@@ -323,10 +323,22 @@ void Interpreter::rrf_m_code(Event& event) {
       return limits_unknown(event);
     case 566:
       return rrf_jerk(event, kPerMinute);
+    case 572:
+      rrf_pressure_advance();
+      return other_m_code(event);
     case 593:
       return rrf_shaper(event);
     default:
       return other_m_code(event);
+  }
+}
+
+// Move.cpp, ConfigurePressureAdvance: S of the extruders that D names, of all without D. unflex
+// follows the first extruder.
+void Interpreter::rrf_pressure_advance() {
+  const std::optional<double> advance = command_.value('S');
+  if (advance && *advance >= 0.0 && command_.value('D').value_or(0.0) == 0.0) {
+    state_.pressure_advance_s = advance;
   }
 }
 

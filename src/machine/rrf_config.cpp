@@ -107,6 +107,12 @@ Status RrfConfigReader::take(std::string_view line, std::size_t number) {
     case 350:
       steps_.set_microsteps(command, place, reader_.reading);
       break;
+    case 572:
+      if (command.value('S') && command.value('D').value_or(0.0) == 0.0) {
+        reader_.reading.add("extruder.pressure_advance_s", std::max(0.0, *command.value('S')),
+                            place);
+      }
+      break;
     case 593:
       if (is_taken) {
         shaper(place);

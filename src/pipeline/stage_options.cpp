@@ -417,7 +417,9 @@ planner::FirmwareConfig firmware_config(const machine::Settings& settings) {
   config.max_extrude_only_velocity_mm_s = settings.max_extrude_only_velocity_mm_s();
   config.max_extrude_only_accel_mm_s2 = settings.max_extrude_only_accel_mm_s2();
   config.instantaneous_corner_velocity_mm_s = settings.extruder.instantaneous_corner_velocity_mm_s;
-  config.pressure_advance_s = settings.extruder.pressure_advance_s;
+  config.pressure_advance_s = config.firmware == Firmware::marlin
+                                  ? settings.printer.linear_advance_s
+                                  : settings.extruder.pressure_advance_s;
   config.pressure_advance_smooth_s = settings.extruder.pressure_advance_smooth_s;
   config.shaper = {settings.shaper_type_x(), settings.shaper_type_y(),
                    settings.shaper_damping_ratio_x(), settings.shaper_damping_ratio_y()};
@@ -517,7 +519,7 @@ std::vector<timing::MoveBounds> move_bounds(const Piece& run, const machine::Set
   return bounds;
 }
 
-// The advance itself is the file's, or the printer's.
+// An advance of 0 is that of the file, or the printer's.
 dynamics::HotendPressure hotend_pressure(const machine::Settings& settings) {
   using enum dynamics::PressureShape;
   const machine::PressureSettings& set = settings.pressure;
@@ -526,6 +528,7 @@ dynamics::HotendPressure hotend_pressure(const machine::Settings& settings) {
                      : set.shape == "reciprocal" ? reciprocal
                                                  : linear;
   return {.shape = shape,
+          .advance_s = set.advance_s.value_or(0.0),
           .offset_mm = set.offset_mm,
           .knee_mm_s = set.knee_mm_s,
           .second_advance_s = set.second_advance_s,
@@ -601,7 +604,7 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.steps = step_rules(settings);
   rules.tolerance_mm = settings.largest_tolerance_um() * 1e-3;
   rules.line.hotend = hotend_pressure(settings);
-  rules.line.hotend.advance_s = settings.extruder.pressure_advance_s;
+  rules.line.is_written = settings.pressure.written;
   rules.line.width_mm = settings.pressure.line_width_mm;
   rules.line.smooth_s = settings.extruder.pressure_advance_smooth_s;
   rules.filament_area_mm2 = settings.filament_area_mm2();

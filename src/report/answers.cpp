@@ -146,8 +146,8 @@ std::optional<std::string> hardly_worth_it(const Report& report) {
 
 std::string width_text(const Report& report) {
   if (!report.laid_line) {
-    return "How wide the line comes out is not known: give extruder.pressure_advance_s, which the "
-           "printer's own pressure advance has";
+    return "How wide the line comes out is not known: give pressure.advance_s, the pressure advance "
+           "that the hotend needs";
   }
   const WidthRow& before = report.laid_line->uncompensated.width;
   const WidthRow& after = report.laid_line->compensated.width;

@@ -121,6 +121,10 @@ void Verifier::check_regime(const Section& input, const Section& output) {
   // Kept motion between compensated runs may pass without the shaper, because each switch is a
   // stop. The shaper must be restored at the end and before the machine moves by itself.
   const bool shaper_matters = input.kind == SectionKind::end || input.moves_by_itself;
+  if ((shaper_matters || input.kind == SectionKind::run) && rules_.line.is_written &&
+      advance_s(input) != advance_s(output)) {
+    violations_.in_output(line, "the printer's pressure advance is not restored");
+  }
   if (shaper_matters && !same_shaper(before.modal, after.modal)) {
     violations_.in_output(line, "the printer's input shaper is not restored");
   }

@@ -355,7 +355,8 @@ void Verifier::shape_sliced() {
   for_sliced([&](Nozzles& nozzles) { set_pressure(nozzles, input_.section()); });
   set_pressure(emitted_, output_.section());
   const bool compensated = output_.has_move() && output_.section().compensated;
-  if (compensated && advance_s(output_.section()) == 0.0 && hotend().advance_s > 0.0) {
+  if (compensated && rules_.line.is_written && advance_s(output_.section()) == 0.0 &&
+      hotend().advance_s > 0.0) {
     output_filament_.begin_written(hotend());
   } else {
     output_filament_.begin_plain();
@@ -375,10 +376,12 @@ void Verifier::shape_sliced() {
   original_.shape(shaping);
 }
 
-// The hotend is taken to be what the sliced file advances for.
+// Where nothing else is known, the hotend is taken to be what the sliced file advances for.
 dynamics::HotendPressure Verifier::hotend() const {
   dynamics::HotendPressure hotend = rules_.line.hotend;
-  hotend.advance_s = advance_s(input_.section());
+  if (hotend.advance_s == 0.0) {
+    hotend.advance_s = advance_s(input_.section());
+  }
   return hotend;
 }
 

@@ -225,6 +225,39 @@ TEST(Emitter, GivesTheShaperBackBeforeTheMachineMovesByItself) {
   }
 }
 
+EmitOptions with_pressure(Firmware firmware, double printers_own_s) {
+  EmitOptions how = options();
+  how.interpreter.firmware = how.fixed.firmware = firmware;
+  how.fixed.pressure_advance_s = printers_own_s;
+  how.pressure.is_written = true;
+  return how;
+}
+
+TEST(Emitter, SwitchesPressureAdvanceOffWhereRunsAdvanceByThemselves) {
+  const std::string input = kHead + "G1 X10 E1 F3000\nG1 E-1\nG1 E1\nG1 Y10 E1\nM104 S0\n";
+  const std::string off = "SET_PRESSURE_ADVANCE ADVANCE=0\n";
+  const std::string on = "SET_PRESSURE_ADVANCE ADVANCE=0.04\n";
+  const std::vector<std::string> written =
+      outline(emit(input, with_pressure(Firmware::klipper, 0.04)).text);
+  EXPECT_EQ(std::ranges::count(written, off), 1);
+  EXPECT_EQ(std::ranges::count(written, on), 1);
+  EXPECT_EQ(written.back(), on);
+  // The file's own counts, and nothing is written where there is none.
+  EXPECT_THAT(
+      emit("SET_PRESSURE_ADVANCE ADVANCE=0.07\n" + input, with_pressure(Firmware::klipper, 0.04))
+          .text,
+      ::testing::EndsWith("SET_PRESSURE_ADVANCE ADVANCE=0.07\n"));
+  EXPECT_THAT(emit(input, with_pressure(Firmware::klipper, 0.0)).text, Not(HasSubstr("ADVANCE=")));
+}
+
+TEST(Emitter, GivesPressureAdvanceBackBeforeTheMachineMovesByItself) {
+  const std::string on = "SET_PRESSURE_ADVANCE ADVANCE=0.04\n";
+  const std::string text = emit(kHead + "G1 X10 E1 F3000\nSOME_MACRO\nG1 X0 Y0 Z0.2\nG1 Y10 E1\n",
+                                with_pressure(Firmware::klipper, 0.04))
+                               .text;
+  EXPECT_THAT(text, HasSubstr(on + "SOME_MACRO\n"));
+}
+
 TEST(Emitter, LeavesTheShaperOffOverPausesAndRetractions) {
   EXPECT_THAT(
       from_first_run(kHead + "G1 X10 E1\nG4 P10\nM400\nG1 E-1 F2400\nG1 X20 F6000\nG1 E1\n"),

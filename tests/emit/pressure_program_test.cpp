@@ -18,7 +18,8 @@
 namespace unflex::emit {
 namespace {
 
-constexpr double kNoLeast = -std::numeric_limits<double>::infinity();
+constexpr double kNoMost = std::numeric_limits<double>::infinity();
+constexpr double kNoLeast = -kNoMost;
 
 // Lines of a wall whose speed changes: the nozzle accelerates, goes evenly, and comes to rest.
 std::vector<PressureLine> wall(std::size_t count, unsigned seed, double advance_s) {
@@ -37,6 +38,7 @@ std::vector<PressureLine> wall(std::size_t count, unsigned seed, double advance_
     line.weight = 1.0 / (0.04 * 0.04 * std::max(line.length_mm, 0.03));
     line.most_step_mm_s = 1e3;
     line.least_mm = kNoLeast;
+    line.most_mm = kNoMost;
   }
   return lines;
 }
@@ -99,7 +101,7 @@ class Dense : public nlp::Problem {
     const std::size_t n = lines.size();
     for (const PressureLine& line : lines) {
       variables_.lower.push_back(std::max(line.least_mm, -nlp::kNoBound));
-      variables_.upper.push_back(nlp::kNoBound);
+      variables_.upper.push_back(std::min(line.most_mm, nlp::kNoBound));
       start_.push_back(line.wanted_mm);
     }
     for (std::size_t k = 0; k + 1 < n; ++k) {
@@ -211,6 +213,7 @@ class Dense : public nlp::Problem {
 struct Limits {
   double most_step_mm_s;
   double least_mm;
+  double most_mm = kNoMost;
 };
 
 class AgainstIpopt : public ::testing::TestWithParam<Limits> {};
@@ -221,6 +224,7 @@ TEST_P(AgainstIpopt, FindsTheSameOptimum) {
     for (PressureLine& line : lines) {
       line.most_step_mm_s = GetParam().most_step_mm_s;
       line.least_mm = GetParam().least_mm;
+      line.most_mm = GetParam().most_mm;
     }
     const std::vector<double> pushed = pushed_filament(lines, {});
     const Dense problem(lines);
@@ -238,7 +242,7 @@ TEST_P(AgainstIpopt, FindsTheSameOptimum) {
 INSTANTIATE_TEST_SUITE_P(Limits, AgainstIpopt,
                          ::testing::Values(Limits{1e3, kNoLeast}, Limits{1.0, kNoLeast},
                                            Limits{1e3, -0.002}, Limits{0.5, -0.001},
-                                           Limits{0.2, 0.0}));
+                                           Limits{0.2, 0.0}, Limits{1.0, -0.003, 0.012}));
 
 TEST(PressureProgram, KeepsItsLimitsAndAllFilament) {
   for (unsigned seed = 1; seed <= 20; ++seed) {

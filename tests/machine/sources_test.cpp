@@ -253,6 +253,15 @@ TEST(RrfConfig, MayPushLessThanItPulled) {
   EXPECT_EQ(told(s, "printer.unretract_extra_length_mm"), "-0.5 config.g:2");
 }
 
+TEST(RrfConfig, TellsThePressureAdvanceOfTheFirstExtruder) {
+  const auto advance = [](const std::string& line) {
+    return told(read("M550 P\"x\"\n" + line + "\n", "config.g"), "extruder.pressure_advance_s");
+  };
+  EXPECT_EQ(advance("M572 D0 S0.045"), "0.045 config.g:2");
+  EXPECT_EQ(advance("M572 D0:1 S0.05:0.06"), "0.05 config.g:2");
+  EXPECT_EQ(advance("M572 D1 S0.045"), "0 default");
+}
+
 TEST(RrfConfig, GivesTravelAsPairsToo) {
   const Settings s = read("M550 P\"x\"\nM208 X-2:210 Y0:200.5 Z0:200\nM593 P\"none\"\n");
   EXPECT_EQ(by_key(s)["printer.travel_x_mm"].value, "[-2, 210]");

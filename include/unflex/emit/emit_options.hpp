@@ -13,7 +13,7 @@ namespace unflex::emit {
 // How pressure advance is written into the filament of a run.
 struct PressureWriting {
   bool is_written = false;
-  // In a run its advance is what the file has set, or the printer's configuration. 0: not known.
+  // An advance of 0 is what the file or the printer's configuration has set.
   dynamics::HotendPressure hotend = {};
   double max_accel_mm_s2 = 10000.0;  // of filament, that the extruder can follow
 };

@@ -77,7 +77,9 @@ class Emitter {
   void restore_shaper(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out, bool may_be_interrupted = false);
   void switch_shaper_off(std::string& out);
-  void set_advance(double wanted_s, std::string& out);
+  // Whether runs push filament for the hotend, so that the printer must not.
+  [[nodiscard]] bool plan_writes_pressure() const;
+  void switch_advance_off(std::string& out);
   void restore_advance(std::string& out);
   void set_shaper(const gcode::Shaper& wanted, const gcode::Shaper& current, std::string& out);
   void write_checkpoint(std::string_view words, std::string& out);
@@ -90,6 +92,7 @@ class Emitter {
   planner::Limits input_limits_;  // as the input has them
   planner::Limits limits_;        // as the output has them
   bool limits_known_ = true;      // false if a macro may have changed limits_
+  bool advance_known_ = true;     // false if a macro may have set pressure advance
   bool signed_ = false;           // the line that names the version has been written
   bool move_waits_ = false;       // limits written next may hold for the last move as well
   bool moving_ = false;           // the last line moves X or Y, so the next may begin at speed

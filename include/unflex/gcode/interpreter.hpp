@@ -374,6 +374,7 @@ class Interpreter {
   void rrf_flow_factor(Event& event);
   void rrf_volumetric();
   void rrf_retraction_settings(Event& event);
+  void rrf_pressure_advance();
   void rrf_shaper(Event& event);
   void rrf_wait_for_heater(Event& event);
   void rrf_pop();

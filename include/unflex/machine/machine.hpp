@@ -131,8 +131,9 @@ struct ExtruderSettings {
   std::optional<double> max_extrude_only_accel_mm_s2;    // unset: Klipper's formula
   std::optional<double> max_flow_mm3_s;                  // unset: not limited
   double instantaneous_corner_velocity_mm_s = 1.0;
-  // Klipper's [extruder], if the print does not set it. It decides how long a switch of the shaper
-  // takes.
+  // The printer's own, if the print does not set it: Klipper's [extruder], M572 of RepRapFirmware.
+  // Marlin's is PrinterSettings::linear_advance_s. In Klipper it decides how long a switch of the
+  // shaper takes.
   double pressure_advance_s = 0.0;
   double pressure_advance_smooth_s = 0.04;
 
@@ -142,10 +143,11 @@ struct ExtruderSettings {
   }
 };
 
-// The filament that is pressed together in the hotend (unflex/dynamics/hotend_pressure.hpp), with
-// ExtruderSettings::pressure_advance_s, and whether unflex makes up for it.
+// The filament that is pressed together in the hotend (unflex/dynamics/hotend_pressure.hpp), and
+// whether unflex makes up for it.
 struct PressureSettings {
   bool written = true;
+  std::optional<double> advance_s;  // unset: what the printer's own pressure advance is set to
   std::string shape = "linear";
   double offset_mm = 0.0;
   double knee_mm_s = 1.0;

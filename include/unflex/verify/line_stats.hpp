@@ -10,8 +10,10 @@ namespace unflex::verify {
 
 // What decides how wide a line of plastic comes out.
 struct LineModel {
-  // An advance of 0 is not known, unless the file sets one. Then no line is measured.
+  // An advance of 0 is what the sliced file or the printer has set; if that is 0 as well, it is not
+  // known, and no line is measured.
   dynamics::HotendPressure hotend;
+  bool is_written = true;  // compensated runs advance by themselves, without the printer
   double smooth_s = 0.0;   // the longest time over which the firmware smooths its advance
   double width_mm = 0.45;  // of a line, for edges
 };

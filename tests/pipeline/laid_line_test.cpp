@@ -1,0 +1,145 @@
+// The line of plastic of a whole print, before and after, on each firmware.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "jobs.hpp"
+#include "paths.hpp"
+#include "unflex/core/progress.hpp"
+
+namespace unflex::pipeline::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct Machine {
+  std::string_view name;
+  std::vector<std::string> overrides;
+  std::string_view off;  // the line that switches pressure advance off
+  std::string_view on;
+  double most;  // share of the error under the printer's own that may be left
+};
+
+void PrintTo(const Machine& machine, std::ostream* out) { *out << machine.name; }
+
+const std::vector<std::string> kAxes = {"dynamics.x.freq_hz=45", "dynamics.x.damping_ratio=0.06",
+                                        "dynamics.y.freq_hz=45", "dynamics.y.damping_ratio=0.06"};
+
+report::Report compensated(const std::string& print, std::vector<std::string> overrides,
+                           std::string& output) {
+  overrides.insert(overrides.end(), kAxes.begin(), kAxes.end());
+  const JobFolder folder(print, overrides);
+  SilentProgress progress;
+  const auto report = compensate(folder.job(), progress);
+  EXPECT_TRUE(report) << to_string(report.error());
+  EXPECT_EQ(complaints(*report), "");
+  output = folder.output();
+  return *report;
+}
+
+std::string star() {
+  const std::string text =
+      read_file(std::filesystem::path(test_paths::kData) / "pipeline_star.gcode");
+  std::string kept;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size() - 1) + 1;
+    const std::string line = text.substr(at, end - at);
+    // The advance is the configuration's.
+    if (!line.starts_with("M900") && !line.starts_with("SET_PRESSURE_ADVANCE") &&
+        !line.starts_with("M572")) {
+      kept += line;
+    }
+    at = end;
+  }
+  return kept;
+}
+
+class LaidLine : public ::testing::TestWithParam<Machine> {};
+
+TEST_P(LaidLine, IsAsWideAsSlicedWhereItsPressureIsWritten) {
+  std::string output;
+  std::vector<std::string> overrides = GetParam().overrides;
+  const report::Report written = compensated(star(), overrides, output);
+  EXPECT_THAT(output, HasSubstr(GetParam().off));
+  EXPECT_GT(output.rfind(GetParam().on), output.rfind(";unflex end"));
+  overrides.push_back("pressure.written=false");
+  const report::Report own = compensated(star(), overrides, output);
+  EXPECT_THAT(output, Not(HasSubstr(GetParam().off)));
+  ASSERT_TRUE(written.laid_line && own.laid_line);
+  const report::LineRow& line = written.laid_line->compensated;
+  EXPECT_LT(line.width.rms, GetParam().most * own.laid_line->compensated.width.rms);
+  EXPECT_LT(line.width.rms, 0.5 * written.laid_line->uncompensated.width.rms);
+  EXPECT_LT(line.edge.rms_mm, GetParam().most * own.laid_line->compensated.edge.rms_mm);
+  // The sliced file is the same.
+  EXPECT_EQ(written.laid_line->uncompensated.width.rms, own.laid_line->uncompensated.width.rms);
+  // All else is as without.
+  EXPECT_NEAR(written.compensated.extruding.contour_rms_mm,
+              own.compensated.extruding.contour_rms_mm,
+              0.1 * own.compensated.extruding.contour_rms_mm);
+  EXPECT_NEAR(written.output_extrusion_mm, own.output_extrusion_mm, 1e-4);
+  EXPECT_NEAR(written.emitted_time_s, own.emitted_time_s, 2e-3 * own.emitted_time_s);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Firmwares, LaidLine,
+    ::testing::Values(Machine{"klipper",
+                              {"printer.firmware=klipper", "extruder.pressure_advance_s=0.04"},
+                              "\nSET_PRESSURE_ADVANCE ADVANCE=0\n",
+                              "\nSET_PRESSURE_ADVANCE ADVANCE=0.04\n",
+                              0.5},
+                      Machine{"marlin",
+                              {"printer.firmware=marlin", "printer.linear_advance_s=0.04"},
+                              "\nM900 K0\n",
+                              "\nM900 K0.04\n",
+                              0.7},
+                      Machine{"rrf",
+                              {"printer.firmware=rrf", "extruder.pressure_advance_s=0.04"},
+                              "\nM572 D0 S0\n",
+                              "\nM572 D0 S0.04\n",
+                              0.5}),
+    [](const auto& machine) { return std::string(machine.param.name); });
+
+TEST(LaidLineOf, AFileFollowsTheAdvanceThatItSets) {
+  std::string output;
+  const std::string print = "SET_PRESSURE_ADVANCE ADVANCE=0.05\n" + star();
+  const report::Report report = compensated(print, {"printer.firmware=klipper"}, output);
+  ASSERT_TRUE(report.laid_line);
+  EXPECT_GT(output.rfind("\nSET_PRESSURE_ADVANCE ADVANCE=0.05\n"), output.rfind(";unflex end"));
+  EXPECT_LT(report.laid_line->compensated.width.rms, 0.05);
+}
+
+TEST(LaidLineOf, APrinterWithoutAdvanceNeedsThatOfItsHotend) {
+  std::string output;
+  const report::Report nothing = compensated(star(), {"printer.firmware=klipper"}, output);
+  EXPECT_FALSE(nothing.laid_line);
+  EXPECT_THAT(output, Not(HasSubstr("PRESSURE")));
+  const report::Report known =
+      compensated(star(), {"printer.firmware=klipper", "pressure.advance_s=0.04"}, output);
+  ASSERT_TRUE(known.laid_line);
+  EXPECT_THAT(output, Not(HasSubstr("ADVANCE=0.04")));
+  EXPECT_LT(known.laid_line->compensated.width.rms, 0.1 * known.laid_line->uncompensated.width.rms);
+}
+
+TEST(LaidLineOf, ABentPressureIsMadeUpForAsWell) {
+  for (const std::string shape : {"two_slopes", "tanh", "reciprocal"}) {
+    std::string output;
+    const report::Report report =
+        compensated(star(),
+                    {"printer.firmware=klipper", "extruder.instantaneous_corner_velocity_mm_s=5",
+                     "extruder.max_extrude_only_accel_mm_s2=10000", "pressure.advance_s=0.03",
+                     "pressure.shape=" + shape, "pressure.offset_mm=0.04", "pressure.knee_mm_s=2",
+                     "pressure.second_advance_s=0.02", "pressure.dead_time_ms=3"},
+                    output);
+    ASSERT_TRUE(report.laid_line) << shape;
+    EXPECT_LT(report.laid_line->compensated.width.rms, 0.03) << shape;
+  }
+}
+
+}  // namespace
+}  // namespace unflex::pipeline::testing
