@@ -348,7 +348,8 @@ constexpr std::array kKeys = {
         "Klipper: [extruder] instantaneous_corner_velocity"},
     Key{"extruder.pressure_advance_s", &setting<&S::extruder, &E::pressure_advance_s>, kNotNegative,
         "s",
-        "Klipper: [extruder] pressure_advance, RRF: M572 S; where it is on, Klipper's shaper switches "
+        "Klipper: [extruder] pressure_advance, RRF: M572 S; where it is on, Klipper's shaper "
+        "switches "
         "later"},
     Key{"extruder.pressure_advance_smooth_s", &setting<&S::extruder, &E::pressure_advance_smooth_s>,
         Bounds{.min = 0.0, .max = 0.2, .min_open = true}, "s",
@@ -358,13 +359,15 @@ constexpr std::array kKeys = {
         "Whether pressure advance is written into the filament of compensated runs, with the "
         "printer's own switched off; only where that, the print or pressure.advance_s tells it"},
     Key{"pressure.advance_s", &setting<&S::pressure, &W::advance_s>, kNotNegative, "s",
-        "Pressure advance that the hotend needs, whatever the printer's own is set to; 0: not known",
+        "Pressure advance that the hotend needs, whatever the printer's own is set to; 0: not "
+        "known",
         "the printer's own, or the print's"},
     Key{"pressure.shape",
         &setting<&S::pressure, &W::shape>,
         kAny,
         "",
-        "How much filament is pressed together at a flow q: K q with the advance K (linear); beyond the knee with a second slope (two_slopes); "
+        "How much filament is pressed together at a flow q: K q with the advance K (linear); "
+        "beyond the knee with a second slope (two_slopes); "
         "plus offset·tanh(q/knee) (tanh) or offset·(1 − 1/(1 + q/knee)) (reciprocal)",
         {},
         nullptr,

@@ -146,14 +146,18 @@ std::optional<std::string> hardly_worth_it(const Report& report) {
 
 std::string width_text(const Report& report) {
   if (!report.laid_line) {
-    return "How wide the line comes out is not known: give pressure.advance_s, the pressure advance "
+    return "How wide the line comes out is not known: give pressure.advance_s, the pressure "
+           "advance "
            "that the hotend needs";
   }
   const WidthRow& before = report.laid_line->uncompensated.width;
   const WidthRow& after = report.laid_line->compensated.width;
-  return fmt::format("The line's width is {} % RMS off, {} for 99 % of the way",
+  const auto written = std::ranges::find(report.printer, "pressure.written", &Setting::key);
+  const bool may_be = written != report.printer.end() && written->value == "false";
+  return fmt::format("The line's width is {} % RMS off, {} for 99 % of the way{}",
                      percent_change_text(before.rms, after.rms),
-                     percent_change_text(before.p99, after.p99));
+                     percent_change_text(before.p99, after.p99),
+                     may_be ? "; pressure.written = true makes it even" : "");
 }
 
 Worst worst(const Report& report) {

@@ -32,7 +32,8 @@ TEST_F(Tune, WritesATowerReadsItAndWritesTheNext) {
   const Outcome made = run_as_typed({"tune", "-o", "t1.gcode", "--printer", "p.toml", "--like",
                                      "part.gcode", "--report", "t1.html"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
-  EXPECT_EQ(made.err, "");
+  // A slow machine takes more than a minute and is told how long it will take.
+  EXPECT_THAT(made.err, ::testing::MatchesRegex("(unflex: compensating the tower.*\n)?"));
   EXPECT_THAT(made.out, AllOf(HasSubstr("x: bands 1 to 40 try frequencies 22 to 101.6 Hz\n"),
                               HasSubstr("--read x=FIRST..LAST --read y=FIRST..LAST --printer "
                                         "p.toml -o NEXT\n")));

@@ -1,15 +1,15 @@
 // The line of plastic of a whole print, before and after, on each firmware.
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <filesystem>
+#include <cmath>
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "jobs.hpp"
-#include "paths.hpp"
 #include "unflex/core/progress.hpp"
 
 namespace unflex::pipeline::testing {
@@ -33,6 +33,10 @@ const std::vector<std::string> kAxes = {"dynamics.x.freq_hz=45", "dynamics.x.dam
 
 report::Report compensated(const std::string& print, std::vector<std::string> overrides,
                            std::string& output) {
+  // An extruder section that carries it.
+  overrides.insert(overrides.begin(),
+                   {"pressure.written=true", "extruder.instantaneous_corner_velocity_mm_s=5",
+                    "extruder.max_extrude_only_accel_mm_s2=10000"});
   overrides.insert(overrides.end(), kAxes.begin(), kAxes.end());
   const JobFolder folder(print, overrides);
   SilentProgress progress;
@@ -43,21 +47,20 @@ report::Report compensated(const std::string& print, std::vector<std::string> ov
   return *report;
 }
 
-std::string star() {
-  const std::string text =
-      read_file(std::filesystem::path(test_paths::kData) / "pipeline_star.gcode");
-  std::string kept;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size() - 1) + 1;
-    const std::string line = text.substr(at, end - at);
-    // The advance is the configuration's.
-    if (!line.starts_with("M900") && !line.starts_with("SET_PRESSURE_ADVANCE") &&
-        !line.starts_with("M572")) {
-      kept += line;
-    }
-    at = end;
+// A wall with twelve corners, and a zigzag of infill.
+std::string walls() {
+  std::string text = "G28\nG90\nM83\nG1 Z0.2 F600\nG1 X50 Y50 F9000\nG1 F5400\n";
+  for (int corner = 1; corner <= 12; ++corner) {
+    const double angle = std::numbers::pi / 6.0 * corner;
+    const double radius = corner % 2 == 0 ? 20.0 : 12.0;
+    text += fmt::format("G1 X{:.3f} Y{:.3f} E0.5\n", 50.0 + radius * std::cos(angle),
+                        50.0 + radius * std::sin(angle));
   }
-  return kept;
+  text += "G1 X80 Y80 F9000\nG1 F6000\n";
+  for (int side = 0; side < 8; ++side) {
+    text += fmt::format("G1 X{} Y{:.1f} E0.6\n", side % 2 == 0 ? 95 : 80, 80.0 + 0.5 * side);
+  }
+  return text;
 }
 
 class LaidLine : public ::testing::TestWithParam<Machine> {};
@@ -65,11 +68,11 @@ class LaidLine : public ::testing::TestWithParam<Machine> {};
 TEST_P(LaidLine, IsAsWideAsSlicedWhereItsPressureIsWritten) {
   std::string output;
   std::vector<std::string> overrides = GetParam().overrides;
-  const report::Report written = compensated(star(), overrides, output);
+  const report::Report written = compensated(walls(), overrides, output);
   EXPECT_THAT(output, HasSubstr(GetParam().off));
   EXPECT_GT(output.rfind(GetParam().on), output.rfind(";unflex end"));
   overrides.push_back("pressure.written=false");
-  const report::Report own = compensated(star(), overrides, output);
+  const report::Report own = compensated(walls(), overrides, output);
   EXPECT_THAT(output, Not(HasSubstr(GetParam().off)));
   ASSERT_TRUE(written.laid_line && own.laid_line);
   const report::LineRow& line = written.laid_line->compensated;
@@ -107,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(LaidLineOf, AFileFollowsTheAdvanceThatItSets) {
   std::string output;
-  const std::string print = "SET_PRESSURE_ADVANCE ADVANCE=0.05\n" + star();
+  const std::string print = "SET_PRESSURE_ADVANCE ADVANCE=0.05\n" + walls();
   const report::Report report = compensated(print, {"printer.firmware=klipper"}, output);
   ASSERT_TRUE(report.laid_line);
   EXPECT_GT(output.rfind("\nSET_PRESSURE_ADVANCE ADVANCE=0.05\n"), output.rfind(";unflex end"));
@@ -116,11 +119,11 @@ TEST(LaidLineOf, AFileFollowsTheAdvanceThatItSets) {
 
 TEST(LaidLineOf, APrinterWithoutAdvanceNeedsThatOfItsHotend) {
   std::string output;
-  const report::Report nothing = compensated(star(), {"printer.firmware=klipper"}, output);
+  const report::Report nothing = compensated(walls(), {"printer.firmware=klipper"}, output);
   EXPECT_FALSE(nothing.laid_line);
   EXPECT_THAT(output, Not(HasSubstr("PRESSURE")));
   const report::Report known =
-      compensated(star(), {"printer.firmware=klipper", "pressure.advance_s=0.04"}, output);
+      compensated(walls(), {"printer.firmware=klipper", "pressure.advance_s=0.04"}, output);
   ASSERT_TRUE(known.laid_line);
   EXPECT_THAT(output, Not(HasSubstr("ADVANCE=0.04")));
   EXPECT_LT(known.laid_line->compensated.width.rms, 0.1 * known.laid_line->uncompensated.width.rms);
@@ -130,9 +133,8 @@ TEST(LaidLineOf, ABentPressureIsMadeUpForAsWell) {
   for (const std::string shape : {"two_slopes", "tanh", "reciprocal"}) {
     std::string output;
     const report::Report report =
-        compensated(star(),
-                    {"printer.firmware=klipper", "extruder.instantaneous_corner_velocity_mm_s=5",
-                     "extruder.max_extrude_only_accel_mm_s2=10000", "pressure.advance_s=0.03",
+        compensated(walls(),
+                    {"printer.firmware=klipper", "pressure.advance_s=0.03",
                      "pressure.shape=" + shape, "pressure.offset_mm=0.04", "pressure.knee_mm_s=2",
                      "pressure.second_advance_s=0.02", "pressure.dead_time_ms=3"},
                     output);

@@ -103,10 +103,9 @@ TEST(Summary, TellsHowToKnowTheLineWhereItDoesNot) {
   Report report = sample_report();
   report.laid_line.reset();
   const std::string text = to_text(report);
-  EXPECT_THAT(text,
-              HasSubstr("\nBetter?       200 → 3.12 µm RMS from the path: 64 times less than "
-                        "now (under the printer's own input shaper, MZV 45 Hz)\n"
-                        "              How wide the line comes out is not known: give "
+  EXPECT_THAT(text, HasSubstr("\nBetter?       200 → 3.12 µm RMS from the path: 64 times less than "
+                              "now (under the printer's own input shaper, MZV 45 Hz)\n"
+                              "              How wide the line comes out is not known: give "
                               "pressure.advance_s, the pressure advance that the hotend needs\n"));
   EXPECT_THAT(text, HasSubstr("laid 60.0 → 4.50 µm RMS ahead of the nozzle or behind"));
   EXPECT_THAT(text, Not(HasSubstr("edges")));

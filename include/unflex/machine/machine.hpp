@@ -146,7 +146,7 @@ struct ExtruderSettings {
 // The filament that is pressed together in the hotend (unflex/dynamics/hotend_pressure.hpp), and
 // whether unflex makes up for it.
 struct PressureSettings {
-  bool written = true;
+  bool written = false;
   std::optional<double> advance_s;  // unset: what the printer's own pressure advance is set to
   std::string shape = "linear";
   double offset_mm = 0.0;
