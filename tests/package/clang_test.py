@@ -16,7 +16,7 @@ import unittest
 ROOT = sys.argv[1]
 
 # What changed further back has been read before.
-COMMITS = 10
+COMMITS = 5
 OPTIONS = ["-std=c++20", "-DFMT_SHARED", '-DUNFLEX_VERSION=""', f"-I{ROOT}/include",
            f"-I{ROOT}/tests", f"-I{ROOT}/src/pipeline",
            "-isystem", "/usr/include/eigen3", "-isystem", "/usr/include/coin",
