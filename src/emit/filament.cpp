@@ -83,18 +83,18 @@ std::vector<PressureLine> wanted_lines(const NozzleProgress& nozzle, const Lines
   return lines;
 }
 
-// How much line i may draw back, mm, with a minus. Klipper accelerates such a line slowly, so that
-// its ramps would take more of its time than the line before and after leave it.
+// The least that line i may push, mm: below 0, what it may draw back. Klipper accelerates a line
+// that draws back slowly, and its ramps must not take more than a share of its time.
 double least_mm(const std::vector<PressureLine>& lines, std::size_t i,
                 const planner::FirmwareConfig& firmware) {
   constexpr double kRamps = 0.3;  // share of a line's time
-  const auto speed_mm_s = [&](std::size_t k) { return lines[k].length_mm / lines[k].duration_s; };
+  const double speed_mm_s = lines[i].speed_mm_s();
   double change_mm_s = 0.0;
   if (i > 0) {
-    change_mm_s = std::abs(speed_mm_s(i) - speed_mm_s(i - 1));
+    change_mm_s = std::abs(speed_mm_s - lines[i - 1].speed_mm_s());
   }
   if (i + 1 < lines.size()) {
-    change_mm_s = std::max(change_mm_s, std::abs(speed_mm_s(i + 1) - speed_mm_s(i)));
+    change_mm_s = std::max(change_mm_s, std::abs(lines[i + 1].speed_mm_s() - speed_mm_s));
   }
   const double accel_mm_s2 = std::max(change_mm_s / (kRamps * lines[i].duration_s), 1.0);
   return -lines[i].length_mm * drawing_back_mm_s2(firmware) / accel_mm_s2;
@@ -164,10 +164,10 @@ std::vector<bool> joins_at_limit(const NozzleProgress& nozzle, const LinesInTime
   for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
     const PressureLine& a = lines[i];
     const PressureLine& b = lines[i + 1];
-    const double v_mm_s = std::min(a.length_mm / a.duration_s, b.length_mm / b.duration_s);
+    const double v_mm_s = std::min(a.speed_mm_s(), b.speed_mm_s());
     const double step_mm_s = v_mm_s * (pushed[i + 1] / b.length_mm - pushed[i] / a.length_mm);
-    // What the extruder's acceleration allows in a line shrinks with the line. But in short lines
-    // the firmware takes any filament.
+    // Shorter lines help where the firmware limits a join or the filament per mm. They do not help
+    // against the extruder's acceleration, which allows less change in less time.
     result[i] = std::abs(step_mm_s) > kAtLimit * most_flow_step_mm_s(options.fixed) ||
                 std::max(pushed[i] / a.most_mm, pushed[i + 1] / b.most_mm) > kAtLimit;
   }

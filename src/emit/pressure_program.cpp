@@ -100,6 +100,12 @@ struct Row {
   }
 };
 
+// A part of the cost: ½ weight row².
+struct Term {
+  Row row;
+  double weight = 0.0;
+};
+
 // One side of a bound: σ row ≤ bound.
 struct Side {
   std::size_t row = 0;
@@ -114,20 +120,19 @@ struct Side {
 class PressureProgram {
  public:
   PressureProgram(const std::vector<PressureLine>& lines, const PressureEnds& ends)
-      : n_(lines.size()), pushed_(n_), error_(n_), hessian_(n_) {
+      : n_(lines.size()), pushed_(n_), hessian_(n_) {
     for (std::size_t k = 0; k < n_; ++k) {
       add_line(lines, ends, k);
-    }
-    for (std::size_t j = 0; j + 1 < n_; ++j) {
-      add_join(lines, j);
-      add_end(lines, j);
-    }
-    for (const PressureLine& line : lines) {
-      weights_.push_back(line.weight);
-      wanted_mm_ += line.wanted_mm;
+      wanted_mm_ += lines[k].wanted_mm;
     }
     wanted_mm_ += ends.end_mm - ends.begin_mm;
-    add_last(ends);
+    for (std::size_t k = 0; k + 1 < n_; ++k) {
+      add_end(lines, k);
+    }
+    add_last(lines.back(), ends);
+    for (std::size_t j = 0; j + 1 < n_; ++j) {
+      add_join(lines, j);
+    }
     sum_.assign(n_, 0.0);
     for (const Row& row : pushed_) {
       row.add_to(sum_, 1.0);
@@ -179,7 +184,7 @@ class PressureProgram {
     add(k, alpha, alpha - 1.0);
     error.constant = x.constant + constant - line.wanted_mm;
     pushed_[k] = x;
-    error_[k] = error;
+    terms_.push_back({error, line.weight});
   }
 
   void add_join(const std::vector<PressureLine>& lines, std::size_t j) {
@@ -187,7 +192,7 @@ class PressureProgram {
     const PressureLine& b = lines[j + 1];
     Row f;
     if (a.length_mm > 0.0 && b.length_mm > 0.0) {
-      const double v = std::min(a.length_mm / a.duration_s, b.length_mm / b.duration_s);
+      const double v = std::min(a.speed_mm_s(), b.speed_mm_s());
       const Row& before = pushed_[j];
       const Row& after = pushed_[j + 1];
       f.first = before.first;
@@ -202,6 +207,7 @@ class PressureProgram {
       add(after, v / b.length_mm);
     }
     joins_.push_back(f);
+    terms_.push_back({f, kSmoothness});
   }
 
   // η of line k. The wanted flow at its end lies between those of line k and the next.
@@ -219,23 +225,18 @@ class PressureProgram {
     end.count = 1;
     end.factor[0] = duration_s / slope_s;
     end.constant = -end.factor[0] * u_.back();
-    ends_.push_back(end);
+    terms_.push_back({end, kAtEnds * a.weight});
   }
 
   // u_n − U.
-  void add_last(const PressureEnds& ends) {
+  void add_last(const PressureLine& line, const PressureEnds& ends) {
     Row last;
     last.first = n_ - 1;
     last.count = 1;
     last.factor[0] = 1.0;
     last.constant = -ends.end_mm;
-    ends_.push_back(last);
+    terms_.push_back({last, line.weight});
     u_.push_back(ends.end_mm);
-  }
-
-  // c κ, and c_n at the end.
-  [[nodiscard]] double weight_at_end(std::size_t k) const {
-    return k + 1 < n_ ? kAtEnds * weights_[k] : weights_[k];
   }
 
   void start(const std::vector<PressureLine>& lines) {
@@ -266,17 +267,9 @@ class PressureProgram {
 
   [[nodiscard]] double cost_of(const std::vector<double>& u) const {
     double cost = 0.0;
-    for (std::size_t k = 0; k < n_; ++k) {
-      const double e = error_[k].of(u);
-      cost += 0.5 * weights_[k] * e * e;
-    }
-    for (std::size_t k = 0; k < n_; ++k) {
-      const double e = ends_[k].of(u);
-      cost += 0.5 * weight_at_end(k) * e * e;
-    }
-    for (const Row& join : joins_) {
-      const double f = join.of(u);
-      cost += 0.5 * kSmoothness * f * f;
+    for (const Term& term : terms_) {
+      const double value = term.row.of(u);
+      cost += 0.5 * term.weight * value * value;
     }
     return cost;
   }
@@ -290,12 +283,11 @@ class PressureProgram {
       miss = std::max(miss, std::abs(residual(side)) / (std::abs(side.bound) + 1e-3));
     }
     const double sum_miss = wanted_mm_ - sum_of_pushed();
-    const double cost = cost_of(u_);
-    assemble();
-    if (gap <= kPrecision * cost + 1e-12 && miss < 1e-6 && std::abs(sum_miss) < 1e-9 &&
+    if (gap <= kPrecision * cost_of(u_) + 1e-12 && miss < 1e-6 && std::abs(sum_miss) < 1e-9 &&
         steps_ > 0) {
       return true;
     }
+    assemble();
     std::vector<double> to_sum = sum_;
     hessian_.solve(to_sum);
     const double mean = sides_.empty() ? 0.0 : gap / static_cast<double>(sides_.size());
@@ -335,14 +327,8 @@ class PressureProgram {
 
   void assemble() {
     hessian_.clear();
-    for (std::size_t k = 0; k < n_; ++k) {
-      error_[k].add_to(hessian_, weights_[k]);
-    }
-    for (std::size_t k = 0; k < n_; ++k) {
-      ends_[k].add_to(hessian_, weight_at_end(k));
-    }
-    for (const Row& join : joins_) {
-      join.add_to(hessian_, kSmoothness);
+    for (const Term& term : terms_) {
+      term.row.add_to(hessian_, term.weight);
     }
     for (const Side& side : sides_) {
       rows_[side.row].add_to(hessian_, side.multiplier / side.slack);
@@ -353,14 +339,8 @@ class PressureProgram {
   std::vector<double> newton(double target, bool correct, const std::vector<double>& to_sum,
                              double sum_miss) {
     std::vector<double> right(u_.size(), 0.0);
-    for (std::size_t k = 0; k < n_; ++k) {
-      error_[k].add_to(right, -weights_[k] * error_[k].of(u_));
-    }
-    for (std::size_t k = 0; k < n_; ++k) {
-      ends_[k].add_to(right, -weight_at_end(k) * ends_[k].of(u_));
-    }
-    for (const Row& join : joins_) {
-      join.add_to(right, -kSmoothness * join.of(u_));
+    for (const Term& term : terms_) {
+      term.row.add_to(right, -term.weight * term.row.of(u_));
     }
     const auto aim = [&](const Side& side) {
       return target - (correct ? side.slack_step * side.multiplier_step : 0.0);
@@ -405,11 +385,9 @@ class PressureProgram {
 
   std::size_t n_;
   std::vector<Row> pushed_;  // x
-  std::vector<Row> error_;   // ε
-  std::vector<Row> ends_;    // η, and u_n − U
   std::vector<Row> joins_;   // f
   std::vector<Row> rows_;    // f, then x
-  std::vector<double> weights_;
+  std::vector<Term> terms_;  // ε, then η and u_n − U, then f
   std::vector<double> sum_;  // gradient of Σ x
   double wanted_mm_ = 0.0;   // Σ w
   Pentadiagonal hessian_;

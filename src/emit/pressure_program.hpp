@@ -16,12 +16,12 @@
 //
 // In a line the flow q goes to x/T as e^(−t/K). So
 //
-//   u_k − P_k = a (u_{k−1} − P_k) + K (1 − a) (x_k/T − q_k)         ε_k = x_k − (u_k − u_{k−1}) −
-//   w_k
+//   u_k − P_k = a (u_{k−1} − P_k) + K (1 − a) (x_k/T − q_k)
+//   ε_k = x_k − (u_k − u_{k−1}) − w_k
 //
 // where P and K are taken at the wanted flow q. Klipper passes a join at no more than
 // J/|Δ(x/d)| (kinematics/extruder.py, calc_junction), so f is Δ(x/d) times the slower of both
-// speeds. The problem is
+// speeds. The problem in u_1 … u_n is
 //
 //   min ½ Σ c (ε² + κ η²) + ½ c_n (u_n − U)² + ½ ρ Σ f²
 //   subject to   |f_j| ≤ J_j,  m_k ≤ x_k ≤ M_k,  Σ x = Σ w + U − u_0
@@ -29,9 +29,9 @@
 // η damps what ε does not see: a flow that is too high at the beginning of a line and too low at
 // its end, and the other way round in the next one.
 //
-// in u_1 … u_n. It has a solution where pushing the same per mm in all lines is one. x depends on
-// two of them, f on three. So the Hessian has two diagonals on either side of its own, and a
-// solution takes a time that grows as n.
+// It has a solution where pushing the same per mm in all lines keeps to m and M. x depends on two
+// unknowns, f on three. So the Hessian has two diagonals on either side of its own, and a solution
+// takes a time that grows as n.
 #pragma once
 
 #include <cstddef>
@@ -49,6 +49,8 @@ struct PressureLine {
   double most_step_mm_s = 0.0;  // J at the join with the next line
   double least_mm = 0.0;        // m
   double most_mm = 0.0;         // M
+
+  [[nodiscard]] double speed_mm_s() const { return length_mm / duration_s; }
 };
 
 // κ
@@ -62,7 +64,8 @@ struct PressureEnds {
   double end_mm = 0.0;
 };
 
-// Filament pushed with each line, x.
+// Filament pushed with each line, x. A single line, and lines for which no solution is found, push
+// what they want.
 [[nodiscard]] std::vector<double> pushed_filament(const std::vector<PressureLine>& lines,
                                                   const PressureEnds& ends);
 

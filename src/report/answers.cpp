@@ -147,8 +147,7 @@ std::optional<std::string> hardly_worth_it(const Report& report) {
 std::string width_text(const Report& report) {
   if (!report.laid_line) {
     return "How wide the line comes out is not known: give pressure.advance_s, the pressure "
-           "advance "
-           "that the hotend needs";
+           "advance that the hotend needs";
   }
   const WidthRow& before = report.laid_line->uncompensated.width;
   const WidthRow& after = report.laid_line->compensated.width;
@@ -157,7 +156,7 @@ std::string width_text(const Report& report) {
   return fmt::format("The line's width is {} % RMS off, {} for 99 % of the way{}",
                      percent_change_text(before.rms, after.rms),
                      percent_change_text(before.p99, after.p99),
-                     may_be ? "; pressure.written = true makes it even" : "");
+                     may_be ? "; pressure.written = true may lay it more evenly" : "");
 }
 
 Worst worst(const Report& report) {

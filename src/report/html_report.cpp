@@ -224,8 +224,7 @@ Json facts_json(const Report& r) {
                     percent_change_text(before.less_pressure.rms, after.less_pressure.rms),
                     percent_change_text(before.more_pressure.rms, after.more_pressure.rms),
                     percent_change_text(before.later.rms, after.later.rms)));
-  }
-  if (!r.laid_line) {
+  } else {
     add("Filament laid ahead of the nozzle or behind",
         fmt::format("{} → {} µm RMS, {} → {} µm at most",
                     micrometres_text(r.uncompensated_lag.rms_mm),
@@ -288,8 +287,8 @@ constexpr std::string_view kTypical =
 constexpr std::string_view kTypicalEdge =
     "Root mean square, over the way on which filament is laid, of how far the edges of the line of "
     "plastic are off: the distance of the nozzle from the sliced path, and half of what the line "
-    "is "
-    "too wide or too narrow. It is computed: the file is replayed as the firmware would, with the "
+    "is too wide or too narrow. It is computed: the file is replayed as the firmware would, with "
+    "the "
     "nozzle hanging on springs and dampers, and filament pressed together in the hotend.";
 
 // A length with three figures, in µm.
@@ -336,16 +335,22 @@ std::string better_answer(const Report& r) {
   const Better found = better(r);
   const std::vector<std::string> faster = faster_texts(r);
   const bool is_allowed = !faster.empty() && found.times() < 1.0;
-  const std::string times = is_allowed ? "Now" : times_text(found.times()) + ",";
-  std::vector<std::string> lines = {escape_html(fmt::format("{} {}.", times, found.now))};
+  const std::string from_path =
+      change(found.exact.now_mm, found.exact.compensated_mm) + " off the path";
+  std::string explanation(kTypical);
+  std::string headline = from_path;
+  std::vector<std::string> lines;
   if (found.edge) {
-    lines = {escape_html(fmt::format("{}, {}.", times_text(times_smaller(*found.edge)), found.now)),
-             escape_html(width_text(r) + "."),
-             "The nozzle is " + change(found.exact.now_mm, found.exact.compensated_mm) +
-                 " off the path" +
-                 (is_allowed ? "." : escape_html(": " + times_text(found.times()) + "."))};
+    explanation = kTypicalEdge;
+    headline = change(found.edge->now_mm, found.edge->compensated_mm) + " at the edges of the line";
+    const std::string edge_times = times_text(times_smaller(*found.edge));
+    const std::string times = is_allowed ? "" : ": " + times_text(found.times());
+    lines = {escape_html(fmt::format("{}, {}.", edge_times, found.now)),
+             escape_html(width_text(r) + "."), "The nozzle is " + from_path + times + "."};
   } else {
-    lines.push_back(escape_html(width_text(r) + "."));
+    const std::string times = is_allowed ? "Now" : times_text(found.times()) + ",";
+    lines = {escape_html(fmt::format("{} {}.", times, found.now)),
+             escape_html(width_text(r) + ".")};
   }
   if (found.off) {
     lines.push_back(fmt::format("{} if the frequencies are 5 % off.",
@@ -364,14 +369,7 @@ std::string better_answer(const Report& r) {
   for (std::size_t i = 0; i < faster.size(); ++i) {
     lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(i), escape_html(faster[i]) + ".");
   }
-  if (found.edge) {
-    return answer(
-        term("Better?", kTypicalEdge),
-        change(found.edge->now_mm, found.edge->compensated_mm) + " at the edges of the line",
-        lines);
-  }
-  return answer(term("Better?", kTypical),
-                change(found.exact.now_mm, found.exact.compensated_mm) + " off the path", lines);
+  return answer(term("Better?", explanation), headline, lines);
 }
 
 std::string worst_answer(const Report& r) {

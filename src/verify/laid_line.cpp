@@ -77,7 +77,7 @@ void LaidLine::take_pieces(const ReferencePath& path) {
       continue;
     }
     const PathPiece& piece = path[next_piece_];
-    const bool is_laid = piece.extruding && piece.length_xy_mm > 0.0 && hotend_.advance_s > 0.0;
+    const bool is_laid = piece.extruding && piece.length_xy_mm > 0.0 && is_measuring();
     if (!is_laid || piece.section != section_) {
       end_line();
     }

@@ -46,6 +46,8 @@ class LaidLine {
   // From now on. `hotend` is what the file is printed with; with an advance of 0 it is not known,
   // and nothing is measured.
   void set(const dynamics::HotendPressure& hotend, const FirmwareAdvance& advance);
+  // Whether the hotend is known.
+  [[nodiscard]] bool is_measuring() const { return hotend_.advance_s > 0.0; }
   // Measures against this path from now on, beginning with its current section.
   void begin_section(const ReferencePath& path);
 

@@ -286,12 +286,14 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
       time_s_ = start_s + number * h;
       measurement = sample_at_rest(h);
     }
-    if (!waiting_ && (line_ || (follows_filament_ && measured))) {
+    const bool follows_line = line_ && line_->is_measuring();
+    const bool has_lag = measured && follows_filament_ && (reference.extruding || phase.extruding);
+    if (!waiting_ && (follows_line || has_lag)) {
       const std::optional<PathPlace> at = place(measured, reference);
-      if (measured && follows_filament_ && at && (reference.extruding || phase.extruding)) {
+      if (has_lag && at) {
         filament_lag_.add(*path_, *at, laid_mm_ + phase.e.position, phase.extruding, h);
       }
-      if (line_) {
+      if (follows_line) {
         line_->add(*path_, {h, phase.pushed.position - pushed_from.position, pushed_from.velocity,
                             phase.pushed.velocity, phase.extruding, measurement.contour2_mm2, at});
       }

@@ -132,6 +132,7 @@ class Meter {
 
   // Also measures the line of plastic.
   void follow_line(const LineModel& model) { line_.emplace(model); }
+  void drop_line() { line_.reset(); }
   // nullptr if it is not followed.
   [[nodiscard]] LaidLine* line() { return line_ ? &*line_ : nullptr; }
 

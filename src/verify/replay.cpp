@@ -174,6 +174,7 @@ void Replay::read_line() {
     end.kind = SectionKind::end;
     end.line.number = lines_read_;
     end.regime = before;
+    end.advance_s = before.modal.pressure_advance_s;
     push_section(std::move(end));
   }
 }
@@ -251,6 +252,7 @@ void Replay::read_run_moves(gcode::Event event, const Regime& before) {
   if (!run.regime.has_value()) {
     run.regime = before;
   }
+  run.advance_s = before.modal.pressure_advance_s;
   if (!run.compensated) {
     place(std::move(event.line), before, true);
   }
@@ -261,6 +263,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   Section section;
   section.kind = kind;
   section.regime = before;
+  section.advance_s = before.modal.pressure_advance_s;
   section.dwell_s = event.dwell_s;
   if (kind == SectionKind::barrier) {
     section.switching_s =

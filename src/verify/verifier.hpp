@@ -83,6 +83,7 @@ class Verifier {
   [[nodiscard]] dynamics::HotendPressure hotend() const;
   [[nodiscard]] double advance_s(const Section& section) const;
   void set_pressure(Nozzles& nozzles, const Section& section) const;
+  void follow_pressure(bool compensated);
   // Calls action with the nozzles on the sliced file's plan.
   template <class Action>
   void for_sliced(Action action) {
@@ -107,6 +108,7 @@ class Verifier {
   [[nodiscard]] double owed_filament_mm() const;
   void check_run(bool compensated);
   void check_flow();
+  void check_advance(std::size_t line);
   bool sections_agree();
   void check_regime(const Section& input, const Section& output);
   void play_kept_line();
@@ -140,7 +142,8 @@ class Verifier {
   std::deque<planner::PlannedMove> sliced_for_timing_;
   std::deque<planner::PlannedMove> sliced_for_kept_;
   OutputFilament output_filament_;
-  double run_pushed_mm_ = 0.0;  // filament that the run's moves push
+  double run_pushed_mm_ = 0.0;   // filament that the run's moves push
+  bool laying_checked_ = false;  // the section lays filament outside of a run, which was checked
   Nozzles original_;
   std::optional<Nozzles> unshaped_;  // from the first motion on that a shaper changes
   // The nozzle if the sliced moves of a compensated run were kept. It starts from the state of

@@ -85,6 +85,13 @@ void Verifier::check_flow() {
   totals_.too_much_flow = {flow.max_mm3_s, sliced_mm3_s, flow.max_line};
 }
 
+// Where unflex writes the advance into runs, the printer's own must be as sliced outside of them.
+void Verifier::check_advance(std::size_t line) {
+  if (rules_.line.is_written && advance_s(input_.section()) != advance_s(output_.section())) {
+    violations_.in_output(line, "the printer's pressure advance is not restored");
+  }
+}
+
 bool Verifier::sections_agree() {
   const Section& input = input_.section();
   const Section& output = output_.section();
@@ -121,9 +128,8 @@ void Verifier::check_regime(const Section& input, const Section& output) {
   // Kept motion between compensated runs may pass without the shaper, because each switch is a
   // stop. The shaper must be restored at the end and before the machine moves by itself.
   const bool shaper_matters = input.kind == SectionKind::end || input.moves_by_itself;
-  if ((shaper_matters || input.kind == SectionKind::run) && rules_.line.is_written &&
-      advance_s(input) != advance_s(output)) {
-    violations_.in_output(line, "the printer's pressure advance is not restored");
+  if (shaper_matters) {
+    check_advance(line);
   }
   if (shaper_matters && !same_shaper(before.modal, after.modal)) {
     violations_.in_output(line, "the printer's input shaper is not restored");

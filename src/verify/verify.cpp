@@ -231,6 +231,7 @@ void Verifier::begin_section(bool compensated) {
   rules_of_run_.begin(rate_, since_kept_motion_s_ < kRingsFor_s,
                       compensated && output_.section().has_free_timing);
   path_.begin_section();
+  follow_pressure(compensated);
   shape_sliced();
   for_sliced([&](Nozzles& nozzles) { nozzles.begin_section(path_); });
   if (compensated) {
@@ -277,6 +278,7 @@ void Verifier::begin_section(bool compensated) {
   }
   filament_.begin_run(*emitted_path_);
   run_pushed_mm_ = 0.0;
+  laying_checked_ = false;
   input_flow_.begin_section();
   output_flow_.begin_section();
   section_first_ = path_.end();
@@ -352,21 +354,13 @@ void Verifier::join_over_barrier() {
 
 void Verifier::shape_sliced() {
   static_cast<void>(input_.has_move());  // so that the regime of a run is known
-  for_sliced([&](Nozzles& nozzles) { set_pressure(nozzles, input_.section()); });
-  set_pressure(emitted_, output_.section());
-  const bool compensated = output_.has_move() && output_.section().compensated;
-  if (compensated && rules_.line.is_written && advance_s(output_.section()) == 0.0 &&
-      hotend().advance_s > 0.0) {
-    output_filament_.begin_written(hotend());
-  } else {
-    output_filament_.begin_plain();
-  }
   if (!takes_shaper(input_.section(), original_shaper_)) {
     return;
   }
   const planner::Shaping shaping = planner::shaping(rules_.fixed, original_shaper_);
   if (shaping.acts() && !unshaped_) {
     unshaped_ = original_;
+    unshaped_->main().drop_line();  // nothing is told of it
     unshaped_->watch_as(NozzleBase::unshaped);
     if (observer_ == nullptr || !observer_->asks_for_unshaped()) {
       unshaped_->drop_detuned();
@@ -386,14 +380,25 @@ dynamics::HotendPressure Verifier::hotend() const {
 }
 
 double Verifier::advance_s(const Section& section) const {
-  const double of_printer_s = rules_.fixed.pressure_advance_s;
-  return section.regime ? section.regime->modal.pressure_advance_s.value_or(of_printer_s)
-                        : of_printer_s;
+  return section.advance_s.value_or(rules_.fixed.pressure_advance_s);
 }
 
 void Verifier::set_pressure(Nozzles& nozzles, const Section& section) const {
   if (section.regime && input_.section().regime) {
     nozzles.main().line()->set(hotend(), {advance_s(section), rules_.line.smooth_s});
+  }
+}
+
+// What the section of either file makes of the filament in the hotend.
+void Verifier::follow_pressure(bool compensated) {
+  static_cast<void>(input_.has_move());  // so that the regime of a run is known
+  set_pressure(original_, input_.section());
+  set_pressure(emitted_, output_.section());
+  if (compensated && rules_.line.is_written && advance_s(output_.section()) == 0.0 &&
+      hotend().advance_s > 0.0) {
+    output_filament_.begin_written(hotend());
+  } else {
+    output_filament_.begin_plain();
   }
 }
 
@@ -435,6 +440,9 @@ void Verifier::play_run_moves(bool compensated) {
       return;
     }
     join_over_barrier();
+    // So that what the next part is printed with is known.
+    static_cast<void>(output_.has_move());
+    set_pressure(emitted_, output_.section());
   }
 }
 
@@ -447,6 +455,10 @@ void Verifier::play(const OutputMove& output) {
   const bool late = emitted_path_->section_complete() &&
                     start_s >= emitted_path_->end_s() + kLate_s + emitted_.main().lag_s();
   since_kept_motion_s_ += move.duration_s();
+  if (!compensated && move.segment.extruding() && !laying_checked_) {
+    check_advance(move.segment.line);
+    laying_checked_ = true;
+  }
   if (!compensated && move.segment.length_xy_mm() > 0.0) {
     since_kept_motion_s_ = 0.0;
   }

@@ -558,5 +558,25 @@ TEST(Verify, StopsWhenCancelled) {
   EXPECT_LT(progress.fraction_, 0.9);
 }
 
+// The printer's own pressure advance matters where filament is laid outside of a run.
+TEST(PressureAdvance, IsToBeAsSlicedWhereFilamentIsLaid) {
+  Rules rules;
+  rules.fixed.pressure_advance_s = 0.04;
+  const std::string head = "G28\nG90\nM83\nG1 X10 Y10 Z0.2 F6000\n";
+  const std::string off = "SET_PRESSURE_ADVANCE ADVANCE=0\n";
+  const std::string on = "SET_PRESSURE_ADVANCE ADVANCE=0.04\n";
+  const std::string travel = "G1 X50\n";
+  const std::string line = "G1 X60 E1\nG1 X70 E1\n";
+  const auto violations = [&](const std::string& output) {
+    return testing::violations_of(testing::verify_text(head + travel + line, head + output, rules));
+  };
+  EXPECT_EQ(violations(travel + line), "");
+  EXPECT_EQ(violations(off + travel + on + line), "");
+  EXPECT_EQ(violations(off + travel + line + on),
+            "out.gcode:7: the printer's pressure advance is not restored\n");
+  EXPECT_EQ(violations(travel + line + off),
+            "out.gcode:8: the printer's pressure advance is not restored\n");
+}
+
 }  // namespace
 }  // namespace unflex::verify
