@@ -289,7 +289,8 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
   return lines;
 }
 
-std::string advance_line(Firmware firmware, double advance_s) {
+std::string advance_line(Firmware firmware, const gcode::PressureAdvance& wanted) {
+  const double advance_s = wanted.advance_s.value_or(0.0);
   switch (firmware) {
     case Firmware::marlin:
       return fmt::format("M900 K{}", advance_s);
@@ -298,7 +299,9 @@ std::string advance_line(Firmware firmware, double advance_s) {
     case Firmware::klipper:
       break;
   }
-  return fmt::format("SET_PRESSURE_ADVANCE ADVANCE={}", advance_s);
+  return fmt::format("SET_PRESSURE_ADVANCE{}{} ADVANCE={}{}",
+                     wanted.extruder.empty() ? "" : " EXTRUDER=", wanted.extruder, advance_s,
+                     wanted.smooth_s ? fmt::format(" SMOOTH_TIME={}", *wanted.smooth_s) : "");
 }
 
 std::string unknown_shaper_lines(Firmware firmware, const gcode::Shaper& wanted,

@@ -60,8 +60,9 @@ struct ZLimits {
 [[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                     const gcode::Shaper& current);
 
-// The line that sets pressure advance.
-[[nodiscard]] std::string advance_line(Firmware firmware, double advance_s);
+// The line that sets pressure advance. What is not given stays as it is; the smooth time and the
+// name of the extruder are Klipper's.
+[[nodiscard]] std::string advance_line(Firmware firmware, const gcode::PressureAdvance& wanted);
 
 // What to type after the print for those axes whose shaper is off, though the printer may have one
 // that is not known: "SET_INPUT_SHAPER SHAPER_FREQ_X=... SHAPER_FREQ_Y=...". Empty if there are

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dialect.hpp"
+#include "filament.hpp"
 #include "strokes.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/core/own_marks.hpp"
@@ -75,19 +76,12 @@ planner::Limits run_limits(const Run& run, const planner::Limits& file,
                        raised(options.run_limits, run.accel.lines_mm_s2));
 }
 
-// Pressure advance in force.
-double advance_s(const std::optional<double>& of_file, const EmitOptions& options) {
-  return of_file.value_or(options.fixed.pressure_advance_s);
-}
-
 EmitOptions in_run(const Run& run, const RunStart& start, EmitOptions options) {
   options.lines.max_accel_mm_s2 = std::max(options.lines.max_accel_mm_s2, run.accel.base_mm_s2);
   options.line_accel_mm_s2 = std::max(options.line_accel_mm_s2, run.accel.lines_mm_s2);
   options.run_limits = run_limits(run, start.limits, options);
-  double& advance = options.pressure.hotend.advance_s;
-  if (options.pressure.is_written && advance == 0.0) {
-    advance = advance_s(start.advance_s, options);
-  }
+  options.pressure.hotend = hotend_of(options, start.advance);
+  options.run_advance = advance_in_run(options, start.advance);
   return options;
 }
 
@@ -151,7 +145,7 @@ void Emitter::line(const gcode::Event& event, std::string& out) {
     limits_known_ = false;
   }
   if (lays || moves_by_itself(event)) {
-    restore_advance(out);
+    restore_advance(moves_by_itself(event), out);
   }
   copy(event, out);
   follow_input(event);
@@ -176,7 +170,7 @@ RunStart run_start(Firmware firmware, const gcode::ModalState& state,
           state.speed_factor,
           limits,
           firmware == Firmware::marlin && state.known[E],
-          state.pressure_advance_s};
+          state.pressure_advance};
 }
 
 bool RunPlan::empty() const { return strokes == nullptr || strokes->empty(); }
@@ -198,7 +192,7 @@ RunPlan retimed(const RunPlan& plan, const Run& run, const EmitOptions& options)
 RunStart Emitter::run_start() const {
   RunStart start = emit::run_start(options_.fixed.firmware, printer_.state(), input_limits_);
   start.zeroes_e = start.zeroes_e && e_is_known();
-  start.advance_s = input_.state().pressure_advance_s;
+  start.advance = input_.state().pressure_advance;
   return start;
 }
 
@@ -248,7 +242,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
 
 void Emitter::finish(std::string& out) {
   restore_shaper(out);
-  restore_advance(out);
+  restore_advance(true, out);
   if (const std::string words = shaper_left_off(); !words.empty()) {
     write(fmt::format("{}: the printer's own input shaper is not known and still off; set it again "
                       "as its configuration has it: {}",
@@ -274,9 +268,7 @@ void Emitter::sign(std::string& out) {
 void Emitter::enter_run(const Run& run, std::string& out) {
   sign(out);
   switch_shaper_off(out);
-  if (plan_writes_pressure()) {
-    switch_advance_off(out);
-  }
+  set_run_advance(out);
   if (moving_) {
     // A run begins at rest, but no firmware stops by itself between the move before it and its
     // first line. G4 without a time makes all three firmwares end their motion and go on at once.
@@ -432,24 +424,43 @@ void Emitter::restore_shaper(std::string& out) {
   tell_shaper(out);
 }
 
-bool Emitter::plan_writes_pressure() const {
-  return options_.pressure.is_written &&
-         (options_.pressure.hotend.advance_s > 0.0 ||
-          advance_s(input_.state().pressure_advance_s, options_) > 0.0);
-}
-
-// Off, though a macro may have switched it on.
-void Emitter::switch_advance_off(std::string& out) {
-  if (!advance_known_ || advance_s(printer_.state().pressure_advance_s, options_) != 0.0) {
-    write(advance_line(options_.fixed.firmware, 0.0), out);
+// What a macro may have set is set again.
+void Emitter::set_run_advance(std::string& out) {
+  const gcode::PressureAdvance& sliced = input_.state().pressure_advance;
+  const gcode::PressureAdvance& present = printer_.state().pressure_advance;
+  const std::optional<planner::FirmwareAdvance> wanted = advance_in_run(options_, sliced);
+  if (!wanted ||
+      (advance_known_ && planner::advance_in_force(options_.fixed, present) == *wanted)) {
+    return;
   }
+  write(advance_line(options_.fixed.firmware,
+                     {wanted->advance_s,
+                      wanted->smooth_s > 0.0 ? std::optional(wanted->smooth_s) : std::nullopt,
+                      sliced.extruder}),
+        out);
   advance_known_ = true;
 }
 
-void Emitter::restore_advance(std::string& out) {
-  const double wanted_s = advance_s(input_.state().pressure_advance_s, options_);
-  if (advance_s(printer_.state().pressure_advance_s, options_) != wanted_s) {
-    write(advance_line(options_.fixed.firmware, wanted_s), out);
+// A new smooth time is a stop, so it stays between runs.
+void Emitter::restore_advance(bool with_smooth_time, std::string& out) {
+  const gcode::PressureAdvance& sliced = input_.state().pressure_advance;
+  const gcode::PressureAdvance& present = printer_.state().pressure_advance;
+  const auto differs = [](const std::optional<double>& a, const std::optional<double>& b,
+                          double of_printer) {
+    return a.value_or(of_printer) != b.value_or(of_printer);
+  };
+  const double of_printer_s = options_.fixed.pressure_advance_s;
+  const double smooth_of_printer_s = options_.fixed.pressure_advance_smooth_s;
+  const bool smooths_otherwise =
+      with_smooth_time && differs(present.smooth_s, sliced.smooth_s, smooth_of_printer_s);
+  if (smooths_otherwise || differs(present.advance_s, sliced.advance_s, of_printer_s)) {
+    write(advance_line(
+              options_.fixed.firmware,
+              {sliced.advance_s.value_or(of_printer_s),
+               smooths_otherwise ? std::optional(sliced.smooth_s.value_or(smooth_of_printer_s))
+                                 : std::nullopt,
+               sliced.extruder}),
+          out);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "filament_flow.hpp"
 #include "pressure_program.hpp"
+#include "smoothed_filament.hpp"
 
 namespace unflex::emit {
 namespace {
@@ -28,13 +29,55 @@ double laid_mm(const NozzleProgress& nozzle, const Timetable& table, const RunFi
   return filament_mm - std::clamp(filament_mm, std::min(behind_mm, 0.0), std::max(behind_mm, 0.0));
 }
 
+LinesInTime lines_in_time(const gcode::Position& start_mm, const std::vector<double>& ends_s,
+                          const std::vector<Stroke>& strokes) {
+  LinesInTime result;
+  result.times_s.push_back(ends_s.front() - strokes.front().end_s);
+  Stroke before{.x_mm = start_mm[X], .y_mm = start_mm[Y]};
+  for (std::size_t i = 0; i < strokes.size(); ++i) {
+    result.times_s.push_back(ends_s[i]);
+    result.lengths_mm.push_back(
+        std::hypot(strokes[i].x_mm - before.x_mm, strokes[i].y_mm - before.y_mm));
+    before = strokes[i];
+  }
+  return result;
+}
+
+// Lines of a few ms change the flow by no more than this, mm/s.
+constexpr double kStepOfLines_mm_s = 1.0;
+
+// Klipper's smooth time at which a step of the flow where lines join does not ask for more
+// acceleration of the extruder than it has: a step Δ is K Δ more filament, by a parabola up and one
+// down. Where it may be shorter than lines take, nothing is won.
+double smooth_time_s(double advance_s, double max_accel_mm_s2) {
+  constexpr double kLeast_s = 0.005;
+  constexpr double kSteps_per_s = 1e4;
+  const double smooth_s = 2.0 * std::sqrt(advance_s * kStepOfLines_mm_s / max_accel_mm_s2);
+  return std::max(kLeast_s, std::ceil(smooth_s * kSteps_per_s) / kSteps_per_s);
+}
+
 // The lines push what the nozzle lays.
 void lay_as_the_nozzle_goes(const NozzleProgress& nozzle, const Timetable& table,
                             const RunFilament& filament, const gcode::Position& start_mm,
                             const std::vector<double>& ends_s, std::size_t laying,
                             const EmitOptions& options, std::vector<Stroke>& strokes) {
-  for (std::size_t i = 0; i < strokes.size(); ++i) {
-    strokes[i].e_mm = laid_mm(nozzle, table, filament, ends_s[i]);
+  const double ahead_s = options.run_advance ? options.pressure.hotend.dead_time_s : 0.0;
+  const auto laid_by = [&](double t) { return laid_mm(nozzle, table, filament, t + ahead_s); };
+  const double smooth_s = options.run_advance ? options.run_advance->smooth_s : 0.0;
+  if (smooth_s > 0.0) {
+    const LinesInTime in_time = lines_in_time(start_mm, ends_s, strokes);
+    LaidLines lines{in_time.times_s, in_time.lengths_mm};
+    for (std::size_t i = 0; i < strokes.size(); ++i) {
+      lines.speeds_mm_s[i] /= lines.times_s[i + 1] - lines.times_s[i];
+    }
+    const std::vector<double> e_mm = filament_to_smooth(lines, smooth_s, laid_by);
+    for (std::size_t i = 0; i < strokes.size(); ++i) {
+      strokes[i].e_mm = e_mm[i + 1];
+    }
+  } else {
+    for (std::size_t i = 0; i < strokes.size(); ++i) {
+      strokes[i].e_mm = laid_by(ends_s[i]);
+    }
   }
   strokes.back().e_mm = filament.all_mm;
   level_flow(start_mm, most_flow_step_mm_s(options.fixed), std::span(strokes).first(laying));
@@ -127,15 +170,7 @@ PressureEnds ends_of(const NozzleProgress& nozzle, const EmitOptions& options) {
 void write_pressure(const Run& run, const NozzleProgress& nozzle, const RunFilament& filament,
                     const gcode::Position& start_mm, const std::vector<double>& ends_s,
                     const EmitOptions& options, std::vector<Stroke>& strokes) {
-  LinesInTime in_time;
-  in_time.times_s.push_back(ends_s.front() - strokes.front().end_s);
-  Stroke before{.x_mm = start_mm[X], .y_mm = start_mm[Y]};
-  for (std::size_t i = 0; i < strokes.size(); ++i) {
-    in_time.times_s.push_back(ends_s[i]);
-    in_time.lengths_mm.push_back(
-        std::hypot(strokes[i].x_mm - before.x_mm, strokes[i].y_mm - before.y_mm));
-    before = strokes[i];
-  }
+  const LinesInTime in_time = lines_in_time(start_mm, ends_s, strokes);
   const PressureEnds ends = ends_of(nozzle, options);
   const std::vector<double> pushed = pushed_filament(lines_of(nozzle, in_time, options), ends);
   double e_mm = ends.begin_mm;
@@ -150,9 +185,32 @@ void write_pressure(const Run& run, const NozzleProgress& nozzle, const RunFilam
 
 }  // namespace
 
+dynamics::HotendPressure hotend_of(const EmitOptions& options,
+                                   const gcode::PressureAdvance& of_file) {
+  dynamics::HotendPressure hotend = options.pressure.hotend;
+  if (hotend.advance_s == 0.0) {
+    hotend.advance_s = planner::advance_in_force(options.fixed, of_file).advance_s;
+  }
+  return hotend;
+}
+
+std::optional<planner::FirmwareAdvance> advance_in_run(const EmitOptions& options,
+                                                       const gcode::PressureAdvance& of_file) {
+  const dynamics::HotendPressure hotend = hotend_of(options, of_file);
+  if (!options.pressure.is_written || hotend.advance_s == 0.0) {
+    return std::nullopt;
+  }
+  if (!options.pressure.printer_presses) {
+    return planner::FirmwareAdvance{};
+  }
+  return planner::FirmwareAdvance{
+      hotend.advance_s,
+      std::min(smooth_time_s(hotend.advance_s, options.pressure.max_accel_mm_s2),
+               of_file.smooth_s.value_or(options.fixed.pressure_advance_smooth_s))};
+}
+
 bool writes_pressure(const NozzleProgress& nozzle, const EmitOptions& options) {
-  return options.pressure.is_written && options.pressure.hotend.advance_s > 0.0 &&
-         nozzle.all_laid_mm() > 0.0;
+  return options.run_advance && options.run_advance->advance_s == 0.0 && nozzle.all_laid_mm() > 0.0;
 }
 
 std::vector<bool> joins_at_limit(const NozzleProgress& nozzle, const LinesInTime& in_time,

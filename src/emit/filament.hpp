@@ -1,14 +1,15 @@
 // The filament of a run as a motion of its own, E(t), and what each of its lines pushes.
 //
 // Notation:
-//   V(t)   filament that shall have come out at time t: what belongs to the place where the nozzle
-//   is E(t)   filament that the extruder has pushed. Where the printer's own pressure advance is
-//   left
-//          on, E = V, and the printer adds the rest. Where it is written, E is such that V comes
-//          out of the hotend (pressure_program.hpp)
+//   V(t)   filament that shall have come out at time t: what belongs to the place where the
+//          nozzle is
+//   E(t)   filament that the lines push. Where the printer presses filament together by itself, E
+//          is V, or what becomes V once the printer has smoothed it (smoothed_filament.hpp). Where
+//          unflex does, E is such that V comes out of the hotend (pressure_program.hpp)
 //   δ      the hotend's dead time
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "nozzle_progress.hpp"
@@ -29,6 +30,16 @@ struct LinesInTime {
   std::vector<double> times_s;
   std::vector<double> lengths_mm;
 };
+
+// The hotend of a run: with an advance of 0, it needs what the file or the printer has set.
+[[nodiscard]] dynamics::HotendPressure hotend_of(const EmitOptions& options,
+                                                 const gcode::PressureAdvance& of_file);
+
+// The printer's own advance while a run prints; nullopt where it stays as it is. Klipper advances
+// by itself what a linear hotend needs, smoothed over less time. Otherwise it is off, and pressure
+// is written into the filament.
+[[nodiscard]] std::optional<planner::FirmwareAdvance> advance_in_run(
+    const EmitOptions& options, const gcode::PressureAdvance& of_file);
 
 // Whether pressure advance is written into the run.
 [[nodiscard]] bool writes_pressure(const NozzleProgress& nozzle, const EmitOptions& options);

@@ -188,19 +188,24 @@ void Interpreter::object_label(Event& event) {
 // switching the advance on or off changes the smoothing time too.
 void Interpreter::pressure_advance(Event& event) {
   const Parameter advance = number_of(command_, "ADVANCE");
-  const bool smooth_time_given = command_.parameter("SMOOTH_TIME").has_value();
-  const std::string extruder = command_.parameter("EXTRUDER").value_or("");
-  if (extruder != pressure_advance_extruder_) {
-    pressure_advance_extruder_ = extruder;
+  const Parameter smooth_time = number_of(command_, "SMOOTH_TIME");
+  PressureAdvance& state = state_.pressure_advance;
+  std::string extruder = command_.parameter("EXTRUDER").value_or("");
+  if (extruder != state.extruder) {
+    state = PressureAdvance{};
+    state.extruder = std::move(extruder);
     pressure_advance_on_.reset();
-    state_.pressure_advance_s.reset();
   }
-  bool stops = smooth_time_given;
+  bool stops =
+      options_.advance_of_runs == RunAdvance::off || command_.parameter("SMOOTH_TIME").has_value();
+  if (smooth_time.value) {
+    state.smooth_s = *smooth_time.value;
+  }
   if (advance.value) {
     const bool on = *advance.value > 0.0;
     stops = stops || pressure_advance_on_ != on;
     pressure_advance_on_ = on;
-    state_.pressure_advance_s = *advance.value;
+    state.advance_s = *advance.value;
   }
   if (stops) {
     event.kind = EventKind::barrier;

@@ -94,6 +94,9 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
   state_.shaper_unknown_y = options_.shaper_unknown_y;
   state_.filament_diameter_mm = options_.filament_diameter_mm;
   state_.absolute_e = !options_.relative_e;
+  if (options_.begins_advanced && options_.advance_of_runs == RunAdvance::on) {
+    pressure_advance_on_ = true;
+  }
   if (options_.firmware == Firmware::marlin) {
     state_.g91_covers_e = false;
     state_.feed_mm_s = 4000.0 / kSecondsPerMinute;  // DEFAULT_FEEDRATE_MM_M

@@ -360,8 +360,10 @@ void Interpreter::marlin_pressure_advance(Event& event) {
     pressure_advance_on_.reset();
     return;
   }
-  if (k && *k >= 0.0 && *k <= kMost && (!pressure_advance_on_ || state_.pressure_advance_s != k)) {
-    state_.pressure_advance_s = k;
+  const bool stops = options_.advance_of_runs == RunAdvance::off || !pressure_advance_on_ ||
+                     state_.pressure_advance.advance_s != k;
+  if (k && *k >= 0.0 && *k <= kMost && stops) {
+    state_.pressure_advance.advance_s = k;
     pressure_advance_on_ = *k > 0.0;
     event.kind = EventKind::barrier;
   }

@@ -324,7 +324,7 @@ void Interpreter::rrf_m_code(Event& event) {
     case 566:
       return rrf_jerk(event, kPerMinute);
     case 572:
-      rrf_pressure_advance();
+      rrf_pressure_advance(event);
       return other_m_code(event);
     case 593:
       return rrf_shaper(event);
@@ -335,10 +335,13 @@ void Interpreter::rrf_m_code(Event& event) {
 
 // Move.cpp, ConfigurePressureAdvance: S of the extruders that D names, of all without D. unflex
 // follows the first extruder.
-void Interpreter::rrf_pressure_advance() {
+void Interpreter::rrf_pressure_advance(Event& event) {
   const std::optional<double> advance = command_.value('S');
   if (advance && *advance >= 0.0 && command_.value('D').value_or(0.0) == 0.0) {
-    state_.pressure_advance_s = advance;
+    state_.pressure_advance.advance_s = advance;
+    if (options_.advance_of_runs == RunAdvance::off) {
+      event.kind = EventKind::barrier;
+    }
   }
 }
 

@@ -65,7 +65,9 @@ void Interpreter::lose_position(Event& event) {
   state_.shaper_touched_x = state_.shaper_touched_y = true;
   // Another extruder may be in use, so the next value may stop the machine. The last value known is
   // still the best guess.
-  pressure_advance_on_.reset();
+  if (options_.advance_of_runs != RunAdvance::on) {
+    pressure_advance_on_.reset();
+  }
   if (options_.firmware == Firmware::rrf) {
     lose_tool();  // a macro may select one
   }

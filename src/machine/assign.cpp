@@ -50,6 +50,15 @@ std::string store(const Value& value, const Key& key, bool& target) {
   return {};
 }
 
+std::string store(const Value& value, const Key& key, std::optional<bool>& target) {
+  bool flag = false;
+  std::string wrong = store(value, key, flag);
+  if (wrong.empty()) {
+    target = flag;
+  }
+  return wrong;
+}
+
 std::string store(const Value& value, const Key& key, Firmware& target) {
   if (const auto* text = std::get_if<std::string>(&value.content)) {
     for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {

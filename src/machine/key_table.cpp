@@ -356,8 +356,11 @@ constexpr std::array kKeys = {
         "Klipper: [extruder] pressure_advance_smooth_time"},
 
     Key{"pressure.written", &setting<&S::pressure, &W::written>, kAny, "",
-        "Whether pressure advance is written into the filament of compensated runs, with the "
-        "printer's own switched off; only where that, the print or pressure.advance_s tells it"},
+        "Whether compensated runs press filament together as the hotend needs it: Klipper's own "
+        "pressure advance with a shorter smooth time if the shape is linear; else the printer's "
+        "own is off and the advance is written into the filament. Only where the printer's, the "
+        "print's or pressure.advance_s tells it",
+        "true for Klipper with a linear shape, else false"},
     Key{"pressure.advance_s", &setting<&S::pressure, &W::advance_s>, kNotNegative, "s",
         "Pressure advance that the hotend needs, whatever the printer's own is set to; 0: not "
         "known",

@@ -26,9 +26,9 @@ struct Bounds {
 // The member behind a key. The alternative held says what type of value the key takes.
 using Member =
     std::variant<double& (*)(Draft&), std::optional<double>& (*)(Draft&), bool& (*)(Draft&),
-                 Firmware& (*)(Draft&), Kinematics& (*)(Draft&), std::optional<Range>& (*)(Draft&),
-                 std::string& (*)(Draft&), std::vector<ModeSettings>& (*)(Draft&),
-                 std::vector<PlantSettings>& (*)(Draft&)>;
+                 std::optional<bool>& (*)(Draft&), Firmware& (*)(Draft&), Kinematics& (*)(Draft&),
+                 std::optional<Range>& (*)(Draft&), std::string& (*)(Draft&),
+                 std::vector<ModeSettings>& (*)(Draft&), std::vector<PlantSettings>& (*)(Draft&)>;
 
 struct Key {
   std::string_view name;

@@ -87,7 +87,8 @@ std::optional<std::string> value_in_force(const Key& key, Draft& draft) {
 }
 
 std::string range_text(const Key& key) {
-  if (std::holds_alternative<bool& (*)(Draft&)>(key.member)) {
+  if (std::holds_alternative<bool& (*)(Draft&)>(key.member) ||
+      std::holds_alternative<std::optional<bool>& (*)(Draft&)>(key.member)) {
     return "true, false";
   }
   if (std::holds_alternative<Firmware& (*)(Draft&)>(key.member)) {

@@ -207,6 +207,12 @@ double Settings::max_extrude_only_accel_mm_s2() const {
                                                         default_extrude_ratio(extruder));
 }
 
+bool Settings::printer_presses() const {
+  return printer.firmware == Firmware::klipper && pressure.shape == PressureSettings{}.shape;
+}
+
+bool Settings::writes_pressure() const { return pressure.written.value_or(printer_presses()); }
+
 double Settings::most_of_motor() const {
   if (printer.firmware != Firmware::klipper) {
     return 1.0;

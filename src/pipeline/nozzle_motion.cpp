@@ -94,7 +94,7 @@ double NozzleFollower::follow(const Piece& piece) {
   for (std::size_t i = 0; i < piece.events.size(); ++i) {
     const gcode::Event& event = piece.events[i];
     if (emit::moves_by_itself(event)) {
-      stops_s += change(printer_, piece.pressure_advance_s);
+      stops_s += change(printer_, piece.pressure_advance);
     }
     for (std::size_t k = 0; k < piece.move_counts[i]; ++k, ++next) {
       const planner::PlannedMove move = planner::as_played(piece.moves[next]);
@@ -117,13 +117,13 @@ double NozzleFollower::follow(const Piece& piece) {
     if (event.sets_shaper) {
       // The sliced file has this stop too, so it does not count as added.
       printer_ = *event.shaper;
-      static_cast<void>(change(printer_, piece.pressure_advance_s));
+      static_cast<void>(change(printer_, piece.pressure_advance));
     }
   }
   return stops_s;
 }
 
-double NozzleFollower::begin_run(const Piece& run) { return change({}, run.pressure_advance_s); }
+double NozzleFollower::begin_run(const Piece& run) { return change({}, run.pressure_advance); }
 
 void NozzleFollower::set(const dynamics::NozzleXY& nozzle, const gcode::Position& base) {
   driven_ = nozzle;
@@ -139,9 +139,8 @@ void NozzleFollower::pause(double duration_s) {
 
 // Switches the shaper. Meanwhile the machine stands still: the motion that the old shaper has
 // delayed ends, and the nozzle rings.
-double NozzleFollower::change(const gcode::Shaper& next, std::optional<double> pressure_advance_s) {
-  const double stop_s =
-      planner::switching_s(config_, {present_, pressure_advance_s}, {next, pressure_advance_s});
+double NozzleFollower::change(const gcode::Shaper& next, const gcode::PressureAdvance& advance) {
+  const double stop_s = planner::switching_s(config_, {present_, advance}, {next, advance});
   if (stop_s == 0.0) {
     return stop_s;
   }

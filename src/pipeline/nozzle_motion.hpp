@@ -63,7 +63,7 @@ class NozzleFollower {
   [[nodiscard]] const dynamics::NozzleXY& nozzle() const { return driven_; }
 
  private:
-  double change(const gcode::Shaper& next, std::optional<double> pressure_advance_s);
+  double change(const gcode::Shaper& next, const gcode::PressureAdvance& advance);
   void pause(double duration_s);
 
   verify::NozzleModel model_;

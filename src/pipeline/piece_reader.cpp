@@ -293,7 +293,7 @@ void PieceReader::append(gcode::Event&& event) {
   }
   append_between();
   if (!open_.is_run || open_.events.empty()) {
-    open_.pressure_advance_s = interpreter_.state().pressure_advance_s;
+    open_.pressure_advance = interpreter_.state().pressure_advance;
   }
   if (open_.is_run && open_.events.empty()) {
     // The event is a move, so it has changed nothing of this state.

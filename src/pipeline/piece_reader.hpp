@@ -35,7 +35,7 @@ struct Piece {
   emit::RunStart start;  // only for runs and parts
   // Pressure advance that the file has set when a run begins, or when what is between two runs
   // ends; nullopt: not set.
-  std::optional<double> pressure_advance_s;
+  gcode::PressureAdvance pressure_advance;
   gcode::Position from_mm{};  // where the piece's first move finds the machine
   // Some moves of the run around this part: none before the first part and after the last.
   std::vector<planner::PlannedMove> before;

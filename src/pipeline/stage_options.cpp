@@ -378,6 +378,12 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   const double settling_s =
       std::max(nozzle_x(settings).settling_s(), nozzle_y(settings).settling_s());
   options.settling_s = std::min(settling_s, kLongestCalm_s);
+  if (settings.writes_pressure()) {
+    options.advance_of_runs =
+        settings.printer_presses() ? gcode::RunAdvance::on : gcode::RunAdvance::off;
+    options.begins_advanced = settings.pressure.advance_s.value_or(0.0) > 0.0 ||
+                              settings.extruder.pressure_advance_s > 0.0;
+  }
   options.max_extrude_ratio = max_extrude_ratio(settings);
   options.max_extrude_dab_mm = settings.extruder.nozzle_diameter_mm * options.max_extrude_ratio;
   return options;
@@ -543,7 +549,8 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.fixed = firmware_config(settings);
   options.run_limits = run_limits(options.printer_limits, settings);
   options.line_accel_mm_s2 = settings.emit_accel_mm_s2();
-  options.pressure = {.is_written = settings.pressure.written,
+  options.pressure = {.is_written = settings.writes_pressure(),
+                      .printer_presses = settings.printer_presses(),
                       .hotend = hotend_pressure(settings),
                       .max_accel_mm_s2 = settings.pressure.max_extruder_accel_mm_s2};
   options.lines.tolerance_mm = settings.tolerance_um() * 1e-3;
@@ -604,9 +611,8 @@ verify::Rules verify_rules(const machine::Settings& settings) {
   rules.steps = step_rules(settings);
   rules.tolerance_mm = settings.largest_tolerance_um() * 1e-3;
   rules.line.hotend = hotend_pressure(settings);
-  rules.line.is_written = settings.pressure.written;
+  rules.line.is_written = settings.writes_pressure();
   rules.line.width_mm = settings.pressure.line_width_mm;
-  rules.line.smooth_s = settings.extruder.pressure_advance_smooth_s;
   rules.filament_area_mm2 = settings.filament_area_mm2();
   rules.may_ask_ahead = settings.hotend.ahead;
   rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);

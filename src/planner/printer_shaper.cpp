@@ -104,12 +104,21 @@ Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper) {
              set.damping_ratio_y.value_or(installed.damping_ratio_y))};
 }
 
+FirmwareAdvance advance_in_force(const FirmwareConfig& config,
+                                 const gcode::PressureAdvance& of_file) {
+  const double advance_s = of_file.advance_s.value_or(config.pressure_advance_s);
+  if (!(advance_s > 0.0)) {
+    return {};
+  }
+  return {advance_s, config.firmware == Firmware::klipper
+                         ? of_file.smooth_s.value_or(config.pressure_advance_smooth_s)
+                         : 0.0};
+}
+
 double switching_s(const FirmwareConfig& config, const Filters& before, const Filters& after) {
-  const auto advances = [&](const Filters& filters) {
-    return config.firmware == Firmware::klipper &&
-           filters.pressure_advance_s.value_or(config.pressure_advance_s) > 0.0;
-  };
-  if (same(before.shaper, after.shaper) && advances(before) == advances(after)) {
+  const double smooth_before_s = advance_in_force(config, before.advance).smooth_s;
+  const double smooth_after_s = advance_in_force(config, after.advance).smooth_s;
+  if (same(before.shaper, after.shaper) && smooth_before_s == smooth_after_s) {
     return 0.0;
   }
   const Shaping from = shaping(config, before.shaper);
@@ -121,11 +130,10 @@ double switching_s(const FirmwareConfig& config, const Filters& before, const Fi
     case Firmware::klipper:
       break;
   }
-  const auto scan_s = [&](const Filters& filters, const Shaping& of_filters) {
-    return std::max({kLeastScan_s, of_filters.reach_s(),
-                     advances(filters) ? 0.5 * config.pressure_advance_smooth_s : 0.0});
+  const auto scan_s = [](double smooth_s, const Shaping& of_filters) {
+    return std::max({kLeastScan_s, of_filters.reach_s(), 0.5 * smooth_s});
   };
-  return scan_s(before, from) + scan_s(after, shaping(config, after.shaper));
+  return scan_s(smooth_before_s, from) + scan_s(smooth_after_s, shaping(config, after.shaper));
 }
 
 }  // namespace unflex::planner

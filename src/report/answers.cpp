@@ -152,7 +152,8 @@ std::string width_text(const Report& report) {
   const WidthRow& before = report.laid_line->uncompensated.width;
   const WidthRow& after = report.laid_line->compensated.width;
   const auto written = std::ranges::find(report.printer, "pressure.written", &Setting::key);
-  const bool may_be = written != report.printer.end() && written->value == "false";
+  const bool may_be =
+      written != report.printer.end() ? written->value == "false" : report.firmware != "klipper";
   return fmt::format("The line's width is {} % RMS off, {} for 99 % of the way{}",
                      percent_change_text(before.rms, after.rms),
                      percent_change_text(before.p99, after.p99),

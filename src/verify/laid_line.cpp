@@ -22,6 +22,9 @@ std::size_t cells(double duration_s) {
   return static_cast<std::size_t>(std::lround(duration_s / kCell_s));
 }
 
+// As far as the firmware may smooth ahead: Klipper takes a smooth time of 0.2 s at most.
+constexpr std::size_t kLatency = 200;
+
 double begin_of_bin_mm(std::size_t number) {
   return kEnd_mm + kBin_mm * static_cast<double>(number);
 }
@@ -39,11 +42,12 @@ double overlap_mm(std::size_t bin, double a_mm, double b_mm) {
 }  // namespace
 
 LaidLine::LaidLine(const LineModel& model) : model_(model) {
-  later_mm_.assign(latency() + 1, 0.0);
+  later_mm_.assign(kLatency + 1, 0.0);
   set(model.hotend, {});
 }
 
-void LaidLine::set(const dynamics::HotendPressure& hotend, const FirmwareAdvance& advance) {
+void LaidLine::set(const dynamics::HotendPressure& hotend,
+                   const planner::FirmwareAdvance& advance) {
   hotend_ = hotend;
   advance_ = advance;
   pressed_[0].set(hotend);
@@ -175,8 +179,6 @@ void LaidLine::fill(double duration_s, double pushed_mm, double from_mm_s, doubl
   at_ = to;
 }
 
-std::size_t LaidLine::latency() const { return cells(0.5 * model_.smooth_s); }
-
 void LaidLine::close_cell(const Place& at) {
   const double pushed_mm = cell_.pushed_mm;
   cell_.pushed_mm = later_mm_.front();
@@ -190,7 +192,7 @@ void LaidLine::close_cell(const Place& at) {
   cell_.from = at;
   sum_contour2_ = 0.0;
   filled_s_ = 0.0;
-  if (cells_.size() > latency()) {
+  if (cells_.size() > kLatency) {
     lay(cells_.front());
     cells_.pop_front();
   }
@@ -198,7 +200,7 @@ void LaidLine::close_cell(const Place& at) {
 
 // Smooths what was pushed in the last cell.
 void LaidLine::spread(double pushed_mm) {
-  const std::size_t half = advance_.advance_s > 0.0 ? cells(0.5 * advance_.smooth_s) : 0;
+  const std::size_t half = std::min(cells(0.5 * advance_.smooth_s), kLatency);
   if (half <= 1) {
     cells_.back().pushed_mm += pushed_mm;
     return;
@@ -283,7 +285,7 @@ void LaidLine::count(const Bin& bin) {
 void LaidLine::finish() {
   end_line();
   // What is still in cells has been pushed for so long.
-  rest(kCell_s * static_cast<double>(latency() + 1));
+  rest(kCell_s * static_cast<double>(kLatency + 1));
   end_lines_before(lines_ + 1);
 }
 

@@ -14,9 +14,9 @@
 //   edge      |contour error| + |w|/2 · width of a line, mm: how far one edge of the line may be
 //   off
 //
-// Retractions by moves of filament alone are left out: what they do to the pressure, the next one
-// undoes. E(t), V(t) and s(t) are kept on a grid of cells in time. What comes out in a cell is
-// spread evenly over the way that the nozzle makes in it.
+// Retractions are left out, by moves of filament alone and by wipes: what they do to the pressure,
+// the next one undoes. E(t), V(t) and s(t) are kept on a grid of cells in time. What comes out in a
+// cell is spread evenly over the way that the nozzle makes in it.
 #pragma once
 
 #include <array>
@@ -27,17 +27,12 @@
 
 #include "nozzle_place.hpp"
 #include "pressed_filament.hpp"
+#include "unflex/planner/printer_shaper.hpp"
 #include "unflex/verify/line_stats.hpp"
 #include "unflex/verify/log_histogram.hpp"
 #include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
-
-// The firmware's pressure advance.
-struct FirmwareAdvance {
-  double advance_s = 0.0;
-  double smooth_s = 0.0;  // 2W; only if advance_s is above 0
-};
 
 class LaidLine {
  public:
@@ -45,7 +40,7 @@ class LaidLine {
 
   // From now on. `hotend` is what the file is printed with; with an advance of 0 it is not known,
   // and nothing is measured.
-  void set(const dynamics::HotendPressure& hotend, const FirmwareAdvance& advance);
+  void set(const dynamics::HotendPressure& hotend, const planner::FirmwareAdvance& advance);
   // Whether the hotend is known.
   [[nodiscard]] bool is_measuring() const { return hotend_.advance_s > 0.0; }
   // Measures against this path from now on, beginning with its current section.
@@ -117,7 +112,6 @@ class LaidLine {
             double contour2_mm2, const Place& from, const Place& to);
   void close_cell(const Place& at);
   void spread(double pushed_mm);
-  [[nodiscard]] std::size_t latency() const;
   void lay(const Cell& cell);
   void deposit(const Place& from, const Place& to, const PerHotend& out_mm, double contour2_mm2);
   void end_lines_before(std::size_t number);
@@ -126,7 +120,7 @@ class LaidLine {
 
   LineModel model_;
   dynamics::HotendPressure hotend_;
-  FirmwareAdvance advance_;
+  planner::FirmwareAdvance advance_;
   std::array<PressedFilament, kHotends> pressed_;
 
   const ReferencePath* path_ = nullptr;
@@ -141,10 +135,11 @@ class LaidLine {
   // The cell being filled.
   double filled_s_ = 0.0;
   Cell cell_;
-  double advanced_mm_ = 0.0;     // K ė where the last cell ended
-  double sum_contour2_ = 0.0;    // ∫ over the cell
-  Place at_;                     // where the last step ended
-  std::deque<Cell> cells_;       // the last ones, latency() at most, which may still get filament
+  double advanced_mm_ = 0.0;   // K ė where the last cell ended
+  double sum_contour2_ = 0.0;  // ∫ over the cell
+  Place at_;                   // where the last step ended
+  std::deque<Cell>
+      cells_;  // the last ones, as many as smoothing reaches ahead, which may still get filament
   std::deque<double> later_mm_;  // what the cells to come get from those before
 
   Widths width_;

@@ -34,7 +34,7 @@ bool only_word(const gcode::Command& command, char letter) {
 }
 
 planner::Filters filters_of(const gcode::ModalState& state) {
-  return {state.input_shaper(), state.pressure_advance_s};
+  return {state.input_shaper(), state.pressure_advance};
 }
 
 // What the line that announces a run says of its lead-in.
@@ -174,7 +174,7 @@ void Replay::read_line() {
     end.kind = SectionKind::end;
     end.line.number = lines_read_;
     end.regime = before;
-    end.advance_s = before.modal.pressure_advance_s;
+    end.advance = before.modal.pressure_advance;
     push_section(std::move(end));
   }
 }
@@ -252,7 +252,7 @@ void Replay::read_run_moves(gcode::Event event, const Regime& before) {
   if (!run.regime.has_value()) {
     run.regime = before;
   }
-  run.advance_s = before.modal.pressure_advance_s;
+  run.advance = before.modal.pressure_advance;
   if (!run.compensated) {
     place(std::move(event.line), before, true);
   }
@@ -263,7 +263,7 @@ void Replay::read_section(SectionKind kind, gcode::Event event, const Regime& be
   Section section;
   section.kind = kind;
   section.regime = before;
-  section.advance_s = before.modal.pressure_advance_s;
+  section.advance = before.modal.pressure_advance;
   section.dwell_s = event.dwell_s;
   if (kind == SectionKind::barrier) {
     section.switching_s =

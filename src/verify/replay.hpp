@@ -44,7 +44,7 @@ struct Section {
   std::optional<Regime> regime;  // before the line; run: before its first move; end: the final one
   // Pressure advance that the file has set when the section begins; of a run that was joined over
   // barriers, when its last part begins. nullopt: as the printer's configuration has it.
-  std::optional<double> advance_s;
+  gcode::PressureAdvance advance;
   double dwell_s = 0.0;
   // barrier: for how long the machine stands still to switch its shaper or pressure advance.
   double switching_s = 0.0;

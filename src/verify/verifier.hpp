@@ -81,7 +81,7 @@ class Verifier {
   void shape_sliced();
   void shape_emitted();
   [[nodiscard]] dynamics::HotendPressure hotend() const;
-  [[nodiscard]] double advance_s(const Section& section) const;
+  [[nodiscard]] planner::FirmwareAdvance advance_of(const Section& section) const;
   void set_pressure(Nozzles& nozzles, const Section& section) const;
   void follow_pressure(bool compensated);
   // Calls action with the nozzles on the sliced file's plan.
@@ -108,7 +108,7 @@ class Verifier {
   [[nodiscard]] double owed_filament_mm() const;
   void check_run(bool compensated);
   void check_flow();
-  void check_advance(std::size_t line);
+  void check_advance(bool with_smooth_time, std::size_t line);
   bool sections_agree();
   void check_regime(const Section& input, const Section& output);
   void play_kept_line();

@@ -374,18 +374,18 @@ void Verifier::shape_sliced() {
 dynamics::HotendPressure Verifier::hotend() const {
   dynamics::HotendPressure hotend = rules_.line.hotend;
   if (hotend.advance_s == 0.0) {
-    hotend.advance_s = advance_s(input_.section());
+    hotend.advance_s = advance_of(input_.section()).advance_s;
   }
   return hotend;
 }
 
-double Verifier::advance_s(const Section& section) const {
-  return section.advance_s.value_or(rules_.fixed.pressure_advance_s);
+planner::FirmwareAdvance Verifier::advance_of(const Section& section) const {
+  return planner::advance_in_force(rules_.fixed, section.advance);
 }
 
 void Verifier::set_pressure(Nozzles& nozzles, const Section& section) const {
   if (section.regime && input_.section().regime) {
-    nozzles.main().line()->set(hotend(), {advance_s(section), rules_.line.smooth_s});
+    nozzles.main().line()->set(hotend(), advance_of(section));
   }
 }
 
@@ -394,7 +394,7 @@ void Verifier::follow_pressure(bool compensated) {
   static_cast<void>(input_.has_move());  // so that the regime of a run is known
   set_pressure(original_, input_.section());
   set_pressure(emitted_, output_.section());
-  if (compensated && rules_.line.is_written && advance_s(output_.section()) == 0.0 &&
+  if (compensated && rules_.line.is_written && advance_of(output_.section()).advance_s == 0.0 &&
       hotend().advance_s > 0.0) {
     output_filament_.begin_written(hotend());
   } else {
@@ -456,7 +456,7 @@ void Verifier::play(const OutputMove& output) {
                     start_s >= emitted_path_->end_s() + kLate_s + emitted_.main().lag_s();
   since_kept_motion_s_ += move.duration_s();
   if (!compensated && move.segment.extruding() && !laying_checked_) {
-    check_advance(move.segment.line);
+    check_advance(false, move.segment.line);
     laying_checked_ = true;
   }
   if (!compensated && move.segment.length_xy_mm() > 0.0) {

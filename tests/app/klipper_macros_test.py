@@ -83,8 +83,11 @@ class Printer:
         own = {"configfile": {"settings": {"printer": {
                    "max_velocity": OWN_LIMITS["VELOCITY"], "max_accel": OWN_LIMITS["ACCEL"],
                    "square_corner_velocity": OWN_LIMITS["SQUARE_CORNER_VELOCITY"],
-                   "minimum_cruise_ratio": OWN_LIMITS["MINIMUM_CRUISE_RATIO"]}}},
-               "toolhead": {"max_velocity": self.limits["VELOCITY"],
+                   "minimum_cruise_ratio": OWN_LIMITS["MINIMUM_CRUISE_RATIO"]},
+                   "extruder": {"pressure_advance": 0.04,
+                                "pressure_advance_smooth_time": 0.03}}},
+               "toolhead": {"extruder": "extruder",
+                            "max_velocity": self.limits["VELOCITY"],
                             "max_accel": self.limits["ACCEL"],
                             "square_corner_velocity": self.limits["SQUARE_CORNER_VELOCITY"],
                             "minimum_cruise_ratio": self.limits["MINIMUM_CRUISE_RATIO"]},
@@ -230,12 +233,14 @@ class Macros(unittest.TestCase):
                     self.assertFalse(self.printer.card["is_active"])
                     self.assertEqual(self.printer.done[-1][0], asked)
 
-    def test_put_limits_and_shaper_back_for_a_cancel_inside_a_run(self):
+    def test_put_limits_shaper_and_advance_back_for_a_cancel_inside_a_run(self):
         self.printer.start(PRINT)
         self.printer.print_until("G1 X1")
         self.printer.run("CANCEL_PRINT NOW=1")
         self.assertEqual(self.printer.limits, OWN_LIMITS)
         self.assertEqual(self.printer.shaper_x_hz, 45.0)
+        self.assertIn(("SET_PRESSURE_ADVANCE", "ADVANCE=0.04 SMOOTH_TIME=0.03"),
+                      self.printer.done)
 
 
 if __name__ == "__main__":

@@ -230,32 +230,70 @@ EmitOptions with_pressure(Firmware firmware, double printers_own_s) {
   how.interpreter.firmware = how.fixed.firmware = firmware;
   how.fixed.pressure_advance_s = printers_own_s;
   how.pressure.is_written = true;
+  how.pressure.printer_presses = firmware == Firmware::klipper;
   return how;
 }
 
-TEST(Emitter, SwitchesPressureAdvanceOffWhereRunsAdvanceByThemselves) {
-  const std::string input = kHead + "G1 X10 E1 F3000\nG1 E-1\nG1 E1\nG1 Y10 E1\nM104 S0\n";
-  const std::string off = "SET_PRESSURE_ADVANCE ADVANCE=0\n";
-  const std::string on = "SET_PRESSURE_ADVANCE ADVANCE=0.04\n";
-  const std::vector<std::string> written =
-      outline(emit(input, with_pressure(Firmware::klipper, 0.04)).text);
-  EXPECT_EQ(std::ranges::count(written, off), 1);
-  EXPECT_EQ(std::ranges::count(written, on), 1);
-  EXPECT_EQ(written.back(), on);
-  // The file's own counts, and nothing is written where there is none.
+// Lines of the text that set pressure advance.
+std::vector<std::string> advances(const std::string& text) {
+  std::vector<std::string> result;
+  for (const std::string& line : outline(text)) {
+    if (line.find("ADVANCE=") != std::string::npos || line.starts_with("M572")) {
+      result.push_back(line);
+    }
+  }
+  return result;
+}
+
+const std::string kLays = kHead + "G1 X10 E1 F3000\nG1 E-1\nG1 E1\nG1 Y10 E1\nM104 S0\n";
+
+// What Klipper advances by itself needs no other advance between runs.
+TEST(Emitter, LetsKlipperAdvanceWithLessSmoothing) {
+  const EmitOptions how = with_pressure(Firmware::klipper, 0.04);
+  EXPECT_THAT(advances(emit(kLays, how).text),
+              ElementsAre("SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.005\n",
+                          "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.04\n"));
+  const std::string of_file = "SET_PRESSURE_ADVANCE ADVANCE=0.07 SMOOTH_TIME=0.02\n";
   EXPECT_THAT(
-      emit("SET_PRESSURE_ADVANCE ADVANCE=0.07\n" + input, with_pressure(Firmware::klipper, 0.04))
-          .text,
-      ::testing::EndsWith("SET_PRESSURE_ADVANCE ADVANCE=0.07\n"));
-  EXPECT_THAT(emit(input, with_pressure(Firmware::klipper, 0.0)).text, Not(HasSubstr("ADVANCE=")));
+      advances(emit(of_file + kLays, how).text),
+      ElementsAre(of_file, "SET_PRESSURE_ADVANCE ADVANCE=0.07 SMOOTH_TIME=0.0053\n", of_file))
+      << "the file's own counts";
+  const std::string of_extruder = "SET_PRESSURE_ADVANCE EXTRUDER=extruder ADVANCE=0.03\n";
+  EXPECT_THAT(
+      advances(emit(of_extruder + kLays, how).text),
+      ElementsAre(of_extruder,
+                  "SET_PRESSURE_ADVANCE EXTRUDER=extruder ADVANCE=0.03 SMOOTH_TIME=0.005\n",
+                  "SET_PRESSURE_ADVANCE EXTRUDER=extruder ADVANCE=0.03 SMOOTH_TIME=0.04\n"));
+  EXPECT_THAT(advances(emit(kLays, with_pressure(Firmware::klipper, 0.0)).text), ElementsAre());
+  EmitOptions other = how;
+  other.pressure.hotend.advance_s = 0.05;
+  EXPECT_THAT(advances(emit(kLays + "G1 X0 Z1 E1\n", other).text),
+              ElementsAre("SET_PRESSURE_ADVANCE ADVANCE=0.05 SMOOTH_TIME=0.005\n",
+                          "SET_PRESSURE_ADVANCE ADVANCE=0.04\n",
+                          "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.04\n"))
+      << "what is laid between runs gets the printer's own";
+  EmitOptions shorter = how;
+  shorter.fixed.pressure_advance_smooth_s = 0.003;
+  EXPECT_THAT(advances(emit(kLays, shorter).text), ElementsAre());
+}
+
+TEST(Emitter, SwitchesPressureAdvanceOffWhereRunsAdvanceByThemselves) {
+  EXPECT_THAT(advances(emit(kLays, with_pressure(Firmware::rrf, 0.04)).text),
+              ElementsAre("M572 D0 S0\n", "M572 D0 S0.04\n"));
+  EmitOptions bent = with_pressure(Firmware::klipper, 0.04);
+  bent.pressure.printer_presses = false;
+  bent.pressure.hotend.shape = dynamics::PressureShape::tanh;
+  bent.pressure.hotend.offset_mm = 0.02;
+  EXPECT_THAT(advances(emit(kLays, bent).text), ElementsAre("SET_PRESSURE_ADVANCE ADVANCE=0\n",
+                                                            "SET_PRESSURE_ADVANCE ADVANCE=0.04\n"));
 }
 
 TEST(Emitter, GivesPressureAdvanceBackBeforeTheMachineMovesByItself) {
-  const std::string on = "SET_PRESSURE_ADVANCE ADVANCE=0.04\n";
   const std::string text = emit(kHead + "G1 X10 E1 F3000\nSOME_MACRO\nG1 X0 Y0 Z0.2\nG1 Y10 E1\n",
                                 with_pressure(Firmware::klipper, 0.04))
                                .text;
-  EXPECT_THAT(text, HasSubstr(on + "SOME_MACRO\n"));
+  EXPECT_THAT(text, HasSubstr("SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.04\nSOME_MACRO\n"));
+  EXPECT_EQ(advances(text).size(), 4U) << "and sets it again";
 }
 
 TEST(Emitter, LeavesTheShaperOffOverPausesAndRetractions) {

@@ -20,7 +20,7 @@ KEY = r"(# )?(\w+) = "
 MASS = re.compile(r"(# )?(mass_g|stiffness_n_mm|damping_n_s_mm) = ")
 SEVERAL = re.compile(r"# (mode|plant) = ")
 # Unset, these limit nothing, so their comments show an example.
-NO_DEFAULT = re.compile(r"# (max_flow_mm3_s|max_speed_mm_s|outer_wall_tolerance_um|gain_c|advance_s|time_constant_s|"
+NO_DEFAULT = re.compile(r"# (written|max_flow_mm3_s|max_speed_mm_s|outer_wall_tolerance_um|gain_c|advance_s|time_constant_s|"
                         r"dead_time_s|heater_w) = ")
 MODAL = re.compile(r"(# )?(freq_hz|damping_ratio) = ")
 

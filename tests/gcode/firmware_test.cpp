@@ -194,6 +194,42 @@ TEST(FirmwareRetraction, TakesNewSettings) {
   EXPECT_NEAR(session.move("G10").delta(E), -1.5, 1e-12);
 }
 
+// unflex sets it again behind macros, so the next value of the file is no stop.
+TEST(PressureAdvance, WhichRunsHaveOnIsOnBehindMacros) {
+  InterpreterOptions options = default_options(Firmware::klipper);
+  options.advance_of_runs = RunAdvance::on;
+  Session none(options);
+  EXPECT_EQ(none.read("SET_PRESSURE_ADVANCE ADVANCE=0.04").kind, EventKind::barrier);
+  EXPECT_EQ(none.read("SOME_MACRO").kind, EventKind::barrier);
+  EXPECT_EQ(none.read("SET_PRESSURE_ADVANCE ADVANCE=0.05").kind, EventKind::passive);
+  options.begins_advanced = true;
+  Session known(options);
+  EXPECT_EQ(known.read("SET_PRESSURE_ADVANCE ADVANCE=0.04").kind, EventKind::passive);
+}
+
+TEST(PressureAdvance, WhichRunsHaveOffEndsThem) {
+  for (const auto& [firmware, line] :
+       {std::pair{Firmware::klipper, "SET_PRESSURE_ADVANCE ADVANCE=0.04"},
+        std::pair{Firmware::marlin, "M900 K0.04"}, std::pair{Firmware::rrf, "M572 D0 S0.04"}}) {
+    InterpreterOptions options = default_options(firmware);
+    options.advance_of_runs = RunAdvance::off;
+    Session session(options);
+    for (int times = 0; times < 2; ++times) {
+      EXPECT_EQ(session.read(line).kind, EventKind::barrier) << line;
+    }
+  }
+}
+
+TEST(PressureAdvance, KeepsWhatKlipperIsToldOfItsExtruder) {
+  Session session;
+  session.read("SET_PRESSURE_ADVANCE EXTRUDER=extruder1 ADVANCE=0.04 SMOOTH_TIME=0.02");
+  EXPECT_EQ(session.state().pressure_advance.extruder, "extruder1");
+  EXPECT_EQ(session.state().pressure_advance.smooth_s, 0.02);
+  session.read("SET_PRESSURE_ADVANCE ADVANCE=0.05");
+  EXPECT_EQ(session.state().pressure_advance.extruder, "");
+  EXPECT_FALSE(session.state().pressure_advance.smooth_s);
+}
+
 // A changed smoothing time makes Klipper stop, and so does switching the advance on or off.
 TEST(PressureAdvance, StopsOnlyWhenItIsSwitchedOnOrOff) {
   Session session;
@@ -207,7 +243,7 @@ TEST(PressureAdvance, StopsOnlyWhenItIsSwitchedOnOrOff) {
             EventKind::barrier);
   EXPECT_FALSE(session.read("SET_PRESSURE_ADVANCE ADVANCE=0.05").position_lost);
   session.read("MY_MACRO");
-  EXPECT_EQ(session.state().pressure_advance_s, 0.05) << "the best guess";
+  EXPECT_EQ(session.state().pressure_advance.advance_s, 0.05) << "the best guess";
   EXPECT_EQ(session.read("SET_PRESSURE_ADVANCE ADVANCE=0.05").kind, EventKind::barrier);
 }
 

@@ -168,7 +168,7 @@ TEST(MarlinDwell, TakesSecondsBeforeMilliseconds) {
 TEST(MarlinLinearAdvance, StopsOnlyForANewFactor) {
   Session session(default_options(Firmware::marlin));
   EXPECT_EQ(session.read("M900 K0.05").kind, EventKind::barrier);
-  EXPECT_EQ(session.state().pressure_advance_s, 0.05);
+  EXPECT_EQ(session.state().pressure_advance.advance_s, 0.05);
   EXPECT_EQ(session.read("M900 K0.05").kind, EventKind::passive);
   EXPECT_EQ(session.read("M900 K0").kind, EventKind::barrier);
   EXPECT_EQ(session.read("M900 K11").kind, EventKind::passive) << "out of range";

@@ -39,13 +39,13 @@ TEST(RrfBuffer, IsAwaitedByMovesAndByWhatIsTiedToItsPlaceAmongThem) {
 
 TEST(RrfAdvance, IsThatOfTheFirstExtruder) {
   Session session(default_options(Firmware::rrf));
-  EXPECT_FALSE(session.state().pressure_advance_s);
+  EXPECT_FALSE(session.state().pressure_advance.advance_s);
   session.read("M572 D0 S0.045");
-  EXPECT_EQ(session.state().pressure_advance_s, 0.045);
+  EXPECT_EQ(session.state().pressure_advance.advance_s, 0.045);
   session.read("M572 D1 S0.08");
-  EXPECT_EQ(session.state().pressure_advance_s, 0.045);
+  EXPECT_EQ(session.state().pressure_advance.advance_s, 0.045);
   session.read("M572 S0");
-  EXPECT_EQ(session.state().pressure_advance_s, 0.0);
+  EXPECT_EQ(session.state().pressure_advance.advance_s, 0.0);
 }
 
 TEST_P(RrfPassive, LetsTheMotionGoOn) {

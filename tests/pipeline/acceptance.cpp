@@ -56,9 +56,10 @@ bool is_motion(std::string_view line) {
 
 // A line that unflex adds to raise and restore limits and to correct modes and coordinates.
 bool is_own(std::string_view line) {
-  constexpr std::array<std::string_view, 10> kBeginnings = {";unflex",
+  constexpr std::array<std::string_view, 11> kBeginnings = {";unflex",
                                                             "SET_VELOCITY_LIMIT ",
                                                             "SET_INPUT_SHAPER ",
+                                                            "SET_PRESSURE_ADVANCE ",
                                                             "G1 F",
                                                             "G92 E",
                                                             "G90",

@@ -139,12 +139,16 @@ TEST(Switching, DoesNotStopWhereBothAreOff) {
   }
 }
 
+gcode::PressureAdvance with(double advance_s, std::optional<double> smooth_s = {}) {
+  return {advance_s, smooth_s};
+}
+
 TEST(Switching, WaitsForTheFilterOfPressureAdvanceToo) {
   FirmwareConfig config = config_of(Firmware::klipper);
-  EXPECT_NEAR(switching_s(config, {kOn, 0.05}, {kOff, 0.05}), 0.040, 1e-12);
+  EXPECT_NEAR(switching_s(config, {kOn, with(0.05)}, {kOff, with(0.05)}), 0.040, 1e-12);
   config.pressure_advance_s = 0.03;
   EXPECT_NEAR(switching_s(config, {kOn}, {kOff}), 0.040, 1e-12);
-  EXPECT_NEAR(switching_s(config, {kOn, 0.0}, {kOff, 0.0}), 0.010528, 1e-6)
+  EXPECT_NEAR(switching_s(config, {kOn, with(0.0)}, {kOff, with(0.0)}), 0.010528, 1e-6)
       << "the file has switched it off";
   config.pressure_advance_smooth_s = 0.01;
   EXPECT_NEAR(switching_s(config, {kOn}, {kOff}), 0.009528 + 0.005, 1e-6);
@@ -152,10 +156,15 @@ TEST(Switching, WaitsForTheFilterOfPressureAdvanceToo) {
 
 TEST(Switching, StopsKlipperWherePressureAdvanceIsSwitchedOnOrOff) {
   const FirmwareConfig config = config_of(Firmware::klipper);
-  EXPECT_NEAR(switching_s(config, {kOn, 0.0}, {kOn, 0.05}), 0.009528 + 0.020, 1e-6);
-  EXPECT_NEAR(switching_s(config, {kOff, 0.05}, {kOff, 0.0}), 0.020 + 0.001, 1e-12);
-  EXPECT_DOUBLE_EQ(switching_s(config, {kOn, 0.03}, {kOn, 0.05}), 0.0);
-  EXPECT_DOUBLE_EQ(switching_s(config_of(Firmware::marlin), {kOn, 0.0}, {kOn, 0.05}), 0.0);
+  EXPECT_NEAR(switching_s(config, {kOn, with(0.0)}, {kOn, with(0.05)}), 0.009528 + 0.020, 1e-6);
+  EXPECT_NEAR(switching_s(config, {kOff, with(0.05)}, {kOff, with(0.0)}), 0.020 + 0.001, 1e-12);
+  EXPECT_DOUBLE_EQ(switching_s(config, {kOn, with(0.03)}, {kOn, with(0.05)}), 0.0);
+  EXPECT_NEAR(switching_s(config, {kOff, with(0.05)}, {kOff, with(0.05, 0.005)}), 0.020 + 0.0025,
+              1e-12)
+      << "another smooth time";
+  EXPECT_DOUBLE_EQ(switching_s(config, {kOn, with(0.0)}, {kOn, with(0.0, 0.005)}), 0.0);
+  EXPECT_DOUBLE_EQ(switching_s(config_of(Firmware::marlin), {kOn, with(0.0)}, {kOn, with(0.05)}),
+                   0.0);
 }
 
 TEST(Switching, WaitsForTheDelayedPartOfTheMotionInMarlin) {

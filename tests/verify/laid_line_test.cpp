@@ -26,8 +26,8 @@ class Straight : public ::testing::Test {
     path_.extend_to(10.0);
   }
 
-  LineStats laid(const LineModel& model, const FirmwareAdvance& advance, double times = 1.0,
-                 double contour_mm = 0.0) {
+  LineStats laid(const LineModel& model, const planner::FirmwareAdvance& advance,
+                 double times = 1.0, double contour_mm = 0.0) {
     LaidLine line(model);
     line.set(model.hotend, advance);
     line.begin_section(path_);
@@ -126,7 +126,7 @@ TEST_F(Straight, TellsHotendsThatAreNotAsAssumed) {
 
 // Klipper's smoothing delays nothing on the whole, but it rounds off what the advance does.
 TEST_F(Straight, IsWorseWithASmoothedAdvance) {
-  const LineModel model{.hotend = {.advance_s = kAdvance_s}, .smooth_s = 0.04};
+  const LineModel model{.hotend = {.advance_s = kAdvance_s}};
   const LineStats smoothed = laid(model, {kAdvance_s, 0.04});
   const LineStats sharp = laid(model, {kAdvance_s, 0.0});
   EXPECT_GT(smoothed.width.rms, 10.0 * sharp.width.rms);

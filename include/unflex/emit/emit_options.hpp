@@ -1,18 +1,23 @@
 // What the emitter has to know of the printer, and how it is to write.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "unflex/dynamics/hotend_pressure.hpp"
 #include "unflex/emit/line_rules.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
+#include "unflex/planner/printer_shaper.hpp"
 
 namespace unflex::emit {
 
-// How pressure advance is written into the filament of a run.
+// How filament is pressed together for the hotend in a run.
 struct PressureWriting {
+  // Whether unflex sees to it; else the printer's own pressure advance stays as it is.
   bool is_written = false;
+  // Klipper, with a linear hotend: its own advance does it, smoothed over less time.
+  bool printer_presses = false;
   // An advance of 0 is what the file or the printer's configuration has set.
   dynamics::HotendPressure hotend = {};
   double max_accel_mm_s2 = 10000.0;  // of filament, that the extruder can follow
@@ -26,6 +31,8 @@ struct EmitOptions {
   double line_accel_mm_s2 = 1e6;  // acceleration of a line inside a run
   LineRules lines;
   PressureWriting pressure;
+  // The printer's own advance while a run prints; nullopt: as it is. Set for each run.
+  std::optional<planner::FirmwareAdvance> run_advance = {};
   std::string version;  // for the comment at the first run
   // Runs need not last as long as sliced.
   bool has_free_timing = false;

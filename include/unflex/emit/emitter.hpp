@@ -77,10 +77,8 @@ class Emitter {
   void restore_shaper(std::string& out);
   void set_limits(const planner::Limits& limits, std::string& out, bool may_be_interrupted = false);
   void switch_shaper_off(std::string& out);
-  // Whether runs push filament for the hotend, so that the printer must not.
-  [[nodiscard]] bool plan_writes_pressure() const;
-  void switch_advance_off(std::string& out);
-  void restore_advance(std::string& out);
+  void set_run_advance(std::string& out);
+  void restore_advance(bool with_smooth_time, std::string& out);
   void set_shaper(const gcode::Shaper& wanted, const gcode::Shaper& current, std::string& out);
   void write_checkpoint(std::string_view words, std::string& out);
   void tell_shaper(std::string& out);

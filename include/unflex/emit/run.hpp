@@ -22,8 +22,7 @@ struct RunStart {
   planner::Limits limits;           // as the input has them
   // Marlin: what E reads is known, so it is set to 0 before the first line.
   bool zeroes_e = false;
-  // Pressure advance as the file has set it; nullopt: as the printer's configuration has it.
-  std::optional<double> advance_s = {};
+  gcode::PressureAdvance advance = {};
 
   friend bool operator==(const RunStart&, const RunStart&) = default;
 };

@@ -168,6 +168,14 @@ struct MarlinArcs {
 };
 
 // What the firmware's configuration decides about the meaning of a line.
+// What pressure advance is while a compensated run prints. It decides which lines a run may hold,
+// and so the sliced and the emitted file have to be read alike.
+enum class RunAdvance {
+  as_sliced,
+  on,   // whatever a macro has done: a value behind one does not stop the machine
+  off,  // a line that sets it ends a run, since it must be off again behind it
+};
+
 struct InterpreterOptions {
   Firmware firmware = Firmware::klipper;
   // The mode of E before the file's first M82 or M83.
@@ -195,6 +203,8 @@ struct InterpreterOptions {
   std::string shaper_type{};
   // RepRapFirmware from 3.6: M205 sets the jerk of prints alone; M566 sets it and its upper bound.
   bool has_print_jerk = false;
+  RunAdvance advance_of_runs = RunAdvance::as_sliced;
+  bool begins_advanced = false;  // it is so from the first run on, whatever the file sets
   // Filament diameter of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
   double filament_diameter_mm = 1.75;
   // A move has too much filament if it lays more mm per mm than this, and more than
@@ -209,6 +219,16 @@ struct InterpreterOptions {
 
 // The options with the default values of the firmware's source.
 [[nodiscard]] InterpreterOptions default_options(Firmware firmware);
+
+// The firmware's pressure advance, where the file sets it: SET_PRESSURE_ADVANCE, M900 K, M572 S.
+// nullopt: as the printer's configuration has it.
+struct PressureAdvance {
+  std::optional<double> advance_s;
+  std::optional<double> smooth_s;  // Klipper: SMOOTH_TIME
+  std::string extruder{};          // Klipper: EXTRUDER, as the last line has it
+
+  friend bool operator==(const PressureAdvance&, const PressureAdvance&) = default;
+};
 
 // The state a line is read in.
 struct ModalState {
@@ -242,8 +262,7 @@ struct ModalState {
   bool shaper_touched_x = true;
   bool shaper_touched_y = true;
   ShaperSettings shaper;
-  // SET_PRESSURE_ADVANCE ADVANCE, M900 K, M572 S, where the file sets it.
-  std::optional<double> pressure_advance_s;
+  PressureAdvance pressure_advance;
   AxisValues steps_per_mm;    // M92, where the file sets it
   bool inverse_time = false;  // RepRapFirmware, G93: F is one over minutes
 
@@ -374,7 +393,7 @@ class Interpreter {
   void rrf_flow_factor(Event& event);
   void rrf_volumetric();
   void rrf_retraction_settings(Event& event);
-  void rrf_pressure_advance();
+  void rrf_pressure_advance(Event& event);
   void rrf_shaper(Event& event);
   void rrf_wait_for_heater(Event& event);
   void rrf_pop();
@@ -409,9 +428,8 @@ class Interpreter {
   InterpreterOptions options_;
   ModalState state_;
   std::map<std::string, ModalState, std::less<>> saved_states_;  // SAVE_GCODE_STATE, by name
-  // Whether the last SET_PRESSURE_ADVANCE switched pressure advance on, and for which extruder.
+  // Whether the last SET_PRESSURE_ADVANCE switched pressure advance on.
   std::optional<bool> pressure_advance_on_;
-  std::string pressure_advance_extruder_;
   std::vector<ModalState> pushed_states_;  // RepRapFirmware, M120
   std::optional<int> tool_;                // the tool in use, where the file selects it
   std::map<int, double> flow_factors_;     // M221 of the tools not in use

@@ -146,7 +146,8 @@ struct ExtruderSettings {
 // The filament that is pressed together in the hotend (unflex/dynamics/hotend_pressure.hpp), and
 // whether unflex makes up for it.
 struct PressureSettings {
-  bool written = false;
+  // unset: where Klipper's own pressure advance does it, only smoothed less
+  std::optional<bool> written;
   std::optional<double> advance_s;  // unset: what the printer's own pressure advance is set to
   std::string shape = "linear";
   double offset_mm = 0.0;
@@ -368,6 +369,10 @@ struct Settings {
   [[nodiscard]] double max_extrude_cross_section_mm2() const;
   [[nodiscard]] double max_extrude_only_velocity_mm_s() const;
   [[nodiscard]] double max_extrude_only_accel_mm_s2() const;
+  // Whether the firmware's own advance, smoothed over less time, does what the hotend needs.
+  [[nodiscard]] bool printer_presses() const;
+  // Whether runs press filament together as the hotend needs it.
+  [[nodiscard]] bool writes_pressure() const;
   // The most that the plan may ask of a motor of X and Y, relative to the limits. Klipper limits
   // what the tool does, the other firmwares what the motors do.
   [[nodiscard]] double most_of_motor() const;

@@ -41,11 +41,22 @@ struct Shaping {
 // configuration. An unknown type counts as the firmware's default.
 [[nodiscard]] Shaping shaping(const FirmwareConfig& config, const gcode::Shaper& shaper);
 
+// The firmware's pressure advance in force.
+struct FirmwareAdvance {
+  double advance_s = 0.0;
+  double smooth_s = 0.0;  // Klipper's smooth time; 0 where the advance is
+
+  friend bool operator==(const FirmwareAdvance&, const FirmwareAdvance&) = default;
+};
+
+// What the file has not set is the configuration's.
+[[nodiscard]] FirmwareAdvance advance_in_force(const FirmwareConfig& config,
+                                               const gcode::PressureAdvance& of_file);
+
 // What filters a printer's steps.
 struct Filters {
   gcode::Shaper shaper;
-  // The value in force, where the file sets it; nullopt: the configuration's.
-  std::optional<double> pressure_advance_s = {};
+  gcode::PressureAdvance advance = {};
 };
 
 // The shortest time that the machine stands still when a line changes the filters. 0 if they are
@@ -56,7 +67,7 @@ struct Filters {
 // calc_step_gen_restart):
 //   stop = d(before) + d(after),   d = max(1 ms, reach of the shaper, half of the smooth time of
 //   pressure advance)
-// It does so for a pressure advance of 0 that becomes another one, too, and the other way round
+// It does so for a new smooth time too, which is 0 where pressure advance is
 // (kinematics/extruder.py, _set_pressure_advance).
 // Marlin waits until the delayed part of the motion is over. RepRapFirmware does so too, and starts
 // from standstill when it has waited 10 ms for further lines (Configuration.h, DefaultGracePeriod).

@@ -14,7 +14,6 @@ struct LineModel {
   // known, and no line is measured.
   dynamics::HotendPressure hotend;
   bool is_written = true;  // compensated runs advance by themselves, without the printer
-  double smooth_s = 0.0;   // the longest time over which the firmware smooths its advance
   double width_mm = 0.45;  // of a line, for edges
 };
 

@@ -1,0 +1,192 @@
+#include "smoothed_filament.hpp"
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+namespace unflex::emit {
+namespace {
+
+// Gauss–Legendre, on [0, 1].
+constexpr std::array<double, 3> kPoints = {0.112701665379258, 0.5, 0.887298334620742};
+constexpr std::array<double, 3> kWeights = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
+// Where the nozzle stands, time still counts a little.
+constexpr double kLeastSpeed_mm_s = 2.0;
+// A line that would lay less than this share of what it shall lay is left as wanted.
+constexpr double kLeastShare = 0.1;
+
+// What S E at one moment depends on: knots from `first` on, each with its coefficient.
+struct Sample {
+  std::size_t first = 0;
+  std::vector<double> of_knots;
+};
+
+class Smoother {
+ public:
+  Smoother(const std::vector<double>& times_s, double smooth_s)
+      : times_s_(times_s), half_s_(0.5 * smooth_s) {}
+
+  // At a moment within line i, the one between knots i and i + 1.
+  void sample(std::size_t i, double at_s, Sample& out) const {
+    // The first and the last knot have no change of Ė, since E is not known beyond them.
+    std::size_t first = i + 1;
+    while (first > 1 && at_s - times_s_[first - 1] < half_s_) {
+      --first;
+    }
+    std::size_t last = i;
+    while (last + 2 < times_s_.size() && times_s_[last + 1] - at_s < half_s_) {
+      ++last;
+    }
+    out.first = std::min(first - 1, i);
+    out.of_knots.assign(std::max(last + 1, i + 1) - out.first + 1, 0.0);
+    const double share = (at_s - times_s_[i]) / duration_s(i);
+    at(out, i) += 1.0 - share;
+    at(out, i + 1) += share;
+    for (std::size_t k = first; k <= last; ++k) {
+      const double left_s = half_s_ - std::abs(at_s - times_s_[k]);
+      if (left_s > 0.0) {
+        const double g = left_s * left_s * left_s / (6.0 * half_s_ * half_s_);
+        at(out, k - 1) += g / duration_s(k - 1);
+        at(out, k) -= g / duration_s(k - 1) + g / duration_s(k);
+        at(out, k + 1) += g / duration_s(k);
+      }
+    }
+  }
+
+ private:
+  static double& at(Sample& out, std::size_t knot) { return out.of_knots[knot - out.first]; }
+  [[nodiscard]] double duration_s(std::size_t line) const {
+    return times_s_[line + 1] - times_s_[line];
+  }
+
+  const std::vector<double>& times_s_;
+  double half_s_;
+};
+
+// The normal equations of a stretch of free knots.
+class Fit {
+ public:
+  explicit Fit(std::size_t first, std::size_t count) : first_(first), rows_(count), right_(count) {}
+
+  // Sample · e shall be `wanted_mm`. Knots that are not free are as given.
+  void add(const Sample& sample, double weight, double wanted_mm,
+           const std::vector<double>& given) {
+    double left_mm = wanted_mm;
+    for (std::size_t j = 0; j < sample.of_knots.size(); ++j) {
+      if (!is_free(sample.first + j)) {
+        left_mm -= sample.of_knots[j] * given[sample.first + j];
+      }
+    }
+    for (std::size_t j = 0; j < sample.of_knots.size(); ++j) {
+      if (!is_free(sample.first + j)) {
+        continue;
+      }
+      const std::size_t row = sample.first + j - first_;
+      right_[row] += weight * sample.of_knots[j] * left_mm;
+      std::vector<double>& entries = rows_[row];
+      entries.resize(std::max(entries.size(), sample.of_knots.size() - j), 0.0);
+      for (std::size_t l = j; l < sample.of_knots.size() && is_free(sample.first + l); ++l) {
+        entries[l - j] += weight * sample.of_knots[j] * sample.of_knots[l];
+      }
+    }
+  }
+
+  // Puts the knots where they fit best. They stay as they are if that is not decided.
+  void solve(std::vector<double>& knots_mm) const {
+    const auto count = static_cast<Eigen::Index>(rows_.size());
+    std::size_t entries = 0;
+    for (const std::vector<double>& row : rows_) {
+      entries += row.size();
+    }
+    using Matrix = Eigen::SparseMatrix<double>;
+    Matrix matrix(count, count);
+    matrix.reserve(static_cast<Eigen::Index>(entries));
+    Eigen::VectorXd right(count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      // The upper half by rows is the lower half by columns.
+      const std::vector<double>& row = rows_[static_cast<std::size_t>(k)];
+      matrix.startVec(k);
+      for (Eigen::Index j = 0; j < static_cast<Eigen::Index>(row.size()) && k + j < count; ++j) {
+        matrix.insertBack(k + j, k) = row[static_cast<std::size_t>(j)];
+      }
+      right[k] = right_[static_cast<std::size_t>(k)];
+    }
+    matrix.finalize();
+    const Eigen::SimplicialLDLT<Matrix, Eigen::Lower, Eigen::NaturalOrdering<int>> factors(matrix);
+    if (factors.info() != Eigen::Success || !(factors.vectorD().minCoeff() > 0.0)) {
+      return;
+    }
+    const Eigen::VectorXd solution = factors.solve(right);
+    std::copy(solution.begin(), solution.end(),
+              knots_mm.begin() + static_cast<std::ptrdiff_t>(first_));
+  }
+
+ private:
+  [[nodiscard]] bool is_free(std::size_t knot) const {
+    return knot >= first_ && knot < first_ + rows_.size();
+  }
+
+  std::size_t first_;
+  std::vector<std::vector<double>> rows_;  // each from its diagonal to the right
+  std::vector<double> right_;
+};
+
+// Lines that would lay too little, or draw filament back, get their ends as wanted.
+void keep_laying(const std::vector<double>& wanted_mm, std::size_t first, std::size_t last,
+                 std::vector<double>& knots_mm) {
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::size_t i = first; i < last; ++i) {
+      const bool is_as_wanted = knots_mm[i] == wanted_mm[i] && knots_mm[i + 1] == wanted_mm[i + 1];
+      if (!is_as_wanted &&
+          knots_mm[i + 1] - knots_mm[i] < kLeastShare * (wanted_mm[i + 1] - wanted_mm[i])) {
+        knots_mm[i] = wanted_mm[i];
+        knots_mm[i + 1] = wanted_mm[i + 1];
+        changed = true;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<double> filament_to_smooth(const LaidLines& lines, double smooth_s,
+                                       const std::function<double(double)>& wanted_mm) {
+  std::vector<double> wanted;
+  wanted.reserve(lines.times_s.size());
+  for (const double t : lines.times_s) {
+    wanted.push_back(wanted_mm(t));
+  }
+  std::vector<double> result = wanted;
+  const Smoother smoother(lines.times_s, smooth_s);
+  Sample sample;
+  const std::size_t count = lines.speeds_mm_s.size();
+  for (std::size_t begin = 0; begin < count;) {
+    std::size_t end = begin;
+    while (end < count && wanted[end + 1] > wanted[end]) {
+      ++end;
+    }
+    if (end < begin + 2) {
+      begin = std::max(end, begin + 1);
+      continue;
+    }
+    Fit fit(begin + 1, end - begin - 1);
+    for (std::size_t i = begin; i < end; ++i) {
+      const double duration_s = lines.times_s[i + 1] - lines.times_s[i];
+      const double way_mm = duration_s * (lines.speeds_mm_s[i] + kLeastSpeed_mm_s);
+      for (std::size_t p = 0; p < kPoints.size(); ++p) {
+        const double at_s = lines.times_s[i] + kPoints[p] * duration_s;
+        smoother.sample(i, at_s, sample);
+        fit.add(sample, kWeights[p] * way_mm, wanted_mm(at_s), wanted);
+      }
+    }
+    fit.solve(result);
+    keep_laying(wanted, begin, end, result);
+    begin = end;
+  }
+  return result;
+}
+
+}  // namespace unflex::emit

@@ -1,0 +1,124 @@
+#include "smoothed_filament.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <random>
+#include <vector>
+
+namespace unflex::emit {
+namespace {
+
+constexpr double kSmooth_s = 0.006;
+
+// E of knots that are joined by straight lines, smoothed by Klipper's triangle: a plain sum.
+double smoothed_mm(const std::vector<double>& times_s, const std::vector<double>& e_mm,
+                   double smooth_s, double at_s) {
+  const auto line_mm = [&](double t) {
+    const auto after = std::clamp<std::ptrdiff_t>(
+        std::upper_bound(times_s.begin(), times_s.end(), t) - times_s.begin(), 1,
+        std::ssize(times_s) - 1);
+    const auto k = static_cast<std::size_t>(after);
+    const double share = (t - times_s[k - 1]) / (times_s[k] - times_s[k - 1]);
+    return e_mm[k - 1] + share * (e_mm[k] - e_mm[k - 1]);
+  };
+  constexpr int kParts = 400;
+  const double half_s = 0.5 * smooth_s;
+  double sum = 0.0;
+  for (int i = 0; i < kParts; ++i) {
+    const double away_s = half_s * ((2.0 * i + 1.0) / kParts - 1.0);
+    sum += (1.0 - std::abs(away_s) / half_s) * line_mm(at_s + away_s);
+  }
+  return sum * 2.0 / kParts;
+}
+
+LaidLines lines_of(std::size_t count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> duration_s(0.0015, 0.006);
+  LaidLines lines{.times_s = {0.0}, .speeds_mm_s = std::vector<double>(count, 60.0)};
+  for (std::size_t i = 0; i < count; ++i) {
+    lines.times_s.push_back(lines.times_s.back() + duration_s(random));
+  }
+  return lines;
+}
+
+// A flow that rises and falls with the corners of a wall.
+double wall_mm(double t) {
+  constexpr double kOften = 2.0 * std::numbers::pi * 25.0;
+  return 3.0 * t - 1.5 / kOften * std::sin(kOften * t);
+}
+
+double error_mm(const LaidLines& lines, const std::vector<double>& e_mm) {
+  double sum = 0.0;
+  int count = 0;
+  for (double t = 0.02; t < lines.times_s.back() - 0.02; t += 3.7e-4) {
+    sum += std::pow(smoothed_mm(lines.times_s, e_mm, kSmooth_s, t) - wall_mm(t), 2);
+    ++count;
+  }
+  return std::sqrt(sum / count);
+}
+
+TEST(SmoothedFilament, ComesNearerThanWhatIsWanted) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    const LaidLines lines = lines_of(60, seed);
+    std::vector<double> wanted;
+    for (const double t : lines.times_s) {
+      wanted.push_back(wall_mm(t));
+    }
+    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, wall_mm);
+    ASSERT_EQ(e_mm.size(), wanted.size());
+    EXPECT_EQ(e_mm.front(), wanted.front());
+    EXPECT_EQ(e_mm.back(), wanted.back());
+    const double fitted_mm = error_mm(lines, e_mm);
+    EXPECT_LT(fitted_mm, 0.3 * error_mm(lines, wanted)) << seed;
+    // No knot can be moved for the better.
+    std::mt19937 random(seed);
+    std::uniform_int_distribution<std::size_t> any(8, 50);
+    for (int i = 0; i < 5; ++i) {
+      for (const double by_mm : {-2e-4, 2e-4}) {
+        std::vector<double> other = e_mm;
+        other[any(random)] += by_mm;
+        EXPECT_GT(error_mm(lines, other), fitted_mm);
+      }
+    }
+  }
+}
+
+TEST(SmoothedFilament, LeavesEvenFlowAsItIs) {
+  const LaidLines lines = lines_of(30, 5);
+  const std::vector<double> e_mm =
+      filament_to_smooth(lines, kSmooth_s, [](double t) { return 2.0 * t; });
+  for (std::size_t k = 0; k < e_mm.size(); ++k) {
+    EXPECT_NEAR(e_mm[k], 2.0 * lines.times_s[k], 1e-12);
+  }
+}
+
+// Travel between two lines of plastic stays without filament, and no line draws any back.
+TEST(SmoothedFilament, MovesNoFilamentIntoTravel) {
+  const LaidLines lines = lines_of(60, 9);
+  const double from_s = lines.times_s[20];
+  const double to_s = lines.times_s[33];
+  const auto laid_mm = [&](double t) {
+    return 4.0 * (std::min(t, from_s) + std::max(t - to_s, 0.0));
+  };
+  const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, laid_mm);
+  for (std::size_t k = 20; k <= 33; ++k) {
+    EXPECT_EQ(e_mm[k], laid_mm(lines.times_s[k]));
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(e_mm));
+}
+
+TEST(SmoothedFilament, HoldsForFewLines) {
+  for (const std::size_t count : {1, 2, 3}) {
+    const LaidLines lines = lines_of(count, 3);
+    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, wall_mm);
+    EXPECT_EQ(e_mm.size(), count + 1);
+    EXPECT_EQ(e_mm.back(), wall_mm(lines.times_s.back()));
+  }
+}
+
+}  // namespace
+}  // namespace unflex::emit
