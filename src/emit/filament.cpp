@@ -70,7 +70,8 @@ void lay_as_the_nozzle_goes(const NozzleProgress& nozzle, const Timetable& table
     for (std::size_t i = 0; i < strokes.size(); ++i) {
       lines.speeds_mm_s[i] /= lines.times_s[i + 1] - lines.times_s[i];
     }
-    const std::vector<double> e_mm = filament_to_smooth(lines, smooth_s, laid_by);
+    const std::vector<double> e_mm =
+        filament_to_smooth(lines, smooth_s, most_flow_step_mm_s(options.fixed), laid_by);
     for (std::size_t i = 0; i < strokes.size(); ++i) {
       strokes[i].e_mm = e_mm[i + 1];
     }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 namespace unflex::emit {
 namespace {
@@ -133,6 +134,70 @@ class Fit {
   std::vector<double> right_;
 };
 
+// Joins between lines, and which of them are drawn to the most that the flow may change there.
+class Joins {
+ public:
+  Joins(const LaidLines& lines, std::size_t first, std::size_t last, double most_mm_s)
+      : lines_(lines), most_mm_s_(most_mm_s), first_(first), drawn_(last - first, 0.0) {}
+
+  // Draws those that exceed it, and lets go of those that would be below by themselves. Whether
+  // that has changed any.
+  bool find(const std::vector<double>& knots_mm) {
+    bool changed = false;
+    for (std::size_t i = 0; i < drawn_.size(); ++i) {
+      const double step_mm_s = step(first_ + i, knots_mm);
+      const bool exceeds = std::abs(step_mm_s) > most_mm_s_;
+      const double drawn_mm_s = exceeds ? std::copysign(most_mm_s_, step_mm_s) : 0.0;
+      changed = changed || drawn_mm_s != drawn_[i];
+      drawn_[i] = drawn_mm_s;
+    }
+    return changed;
+  }
+
+  void draw(Fit& fit, const std::vector<double>& given) const {
+    constexpr double kWeight = 0.01;  // mm s²
+    for (std::size_t i = 0; i < drawn_.size(); ++i) {
+      if (drawn_[i] != 0.0) {
+        fit.add(step_at(first_ + i), kWeight, drawn_[i], given);
+      }
+    }
+  }
+
+  // Where lines are shorter than the smoothing, the flow might swing from line to line unseen.
+  void calm(Fit& fit, const std::vector<double>& given) const {
+    constexpr double kWeight = 3e-9;  // mm s²: it decides only what S does not feel
+    for (std::size_t i = 0; i < drawn_.size(); ++i) {
+      fit.add(step_at(first_ + i), kWeight, 0.0, given);
+    }
+  }
+
+ private:
+  // min(v, v')/d of the lines before and behind knot k.
+  [[nodiscard]] std::pair<double, double> per_mm(std::size_t k) const {
+    const double slower_mm_s = std::min(lines_.speeds_mm_s[k - 1], lines_.speeds_mm_s[k]);
+    return {slower_mm_s / length_mm(k - 1), slower_mm_s / length_mm(k)};
+  }
+  // The change of the flow at knot k.
+  [[nodiscard]] Sample step_at(std::size_t k) const {
+    const auto [before, after] = per_mm(k);
+    return {k - 1, {before, -before - after, after}};
+  }
+  [[nodiscard]] double step(std::size_t k, const std::vector<double>& knots_mm) const {
+    const auto [before, after] = per_mm(k);
+    return after * (knots_mm[k + 1] - knots_mm[k]) - before * (knots_mm[k] - knots_mm[k - 1]);
+  }
+  [[nodiscard]] double length_mm(std::size_t line) const {
+    constexpr double kLeast_mm = 1e-6;
+    return std::max(lines_.speeds_mm_s[line] * (lines_.times_s[line + 1] - lines_.times_s[line]),
+                    kLeast_mm);
+  }
+
+  const LaidLines& lines_;
+  double most_mm_s_;
+  std::size_t first_;          // knot
+  std::vector<double> drawn_;  // to which change of the flow; 0: not drawn
+};
+
 // Lines that would lay too little, or draw filament back, get their ends as wanted.
 void keep_laying(const std::vector<double>& wanted_mm, std::size_t first, std::size_t last,
                  std::vector<double>& knots_mm) {
@@ -150,9 +215,47 @@ void keep_laying(const std::vector<double>& wanted_mm, std::size_t first, std::s
   }
 }
 
+struct Problem {
+  const LaidLines& lines;
+  double smooth_s;
+  double most_step_mm_s;
+  const std::vector<double>& wanted_at_knots_mm;
+  const std::function<double(double)>& wanted_mm;
+};
+
+// The lines from `begin` to before `end`, which all lay.
+void fit_stretch(const Problem& problem, std::size_t begin, std::size_t end,
+                 std::vector<double>& knots_mm) {
+  const LaidLines& lines = problem.lines;
+  const std::vector<double>& wanted = problem.wanted_at_knots_mm;
+  const Smoother smoother(lines.times_s, problem.smooth_s);
+  Fit fit(begin + 1, end - begin - 1);
+  Sample sample;
+  for (std::size_t i = begin; i < end; ++i) {
+    const double duration_s = lines.times_s[i + 1] - lines.times_s[i];
+    const double way_mm = duration_s * (lines.speeds_mm_s[i] + kLeastSpeed_mm_s);
+    for (std::size_t p = 0; p < kPoints.size(); ++p) {
+      const double at_s = lines.times_s[i] + kPoints[p] * duration_s;
+      smoother.sample(i, at_s, sample);
+      fit.add(sample, kWeights[p] * way_mm, problem.wanted_mm(at_s), wanted);
+    }
+  }
+  Joins joins(lines, begin + 1, end, problem.most_step_mm_s);
+  joins.calm(fit, wanted);
+  fit.solve(knots_mm);
+  constexpr int kMostRounds = 12;
+  for (int round = 0; round < kMostRounds && joins.find(knots_mm); ++round) {
+    Fit bounded = fit;
+    joins.draw(bounded, wanted);
+    bounded.solve(knots_mm);
+  }
+  keep_laying(wanted, begin, end, knots_mm);
+}
+
 }  // namespace
 
 std::vector<double> filament_to_smooth(const LaidLines& lines, double smooth_s,
+                                       double most_step_mm_s,
                                        const std::function<double(double)>& wanted_mm) {
   std::vector<double> wanted;
   wanted.reserve(lines.times_s.size());
@@ -160,31 +263,16 @@ std::vector<double> filament_to_smooth(const LaidLines& lines, double smooth_s,
     wanted.push_back(wanted_mm(t));
   }
   std::vector<double> result = wanted;
-  const Smoother smoother(lines.times_s, smooth_s);
-  Sample sample;
   const std::size_t count = lines.speeds_mm_s.size();
   for (std::size_t begin = 0; begin < count;) {
     std::size_t end = begin;
     while (end < count && wanted[end + 1] > wanted[end]) {
       ++end;
     }
-    if (end < begin + 2) {
-      begin = std::max(end, begin + 1);
-      continue;
+    if (end >= begin + 2) {
+      fit_stretch({lines, smooth_s, most_step_mm_s, wanted, wanted_mm}, begin, end, result);
     }
-    Fit fit(begin + 1, end - begin - 1);
-    for (std::size_t i = begin; i < end; ++i) {
-      const double duration_s = lines.times_s[i + 1] - lines.times_s[i];
-      const double way_mm = duration_s * (lines.speeds_mm_s[i] + kLeastSpeed_mm_s);
-      for (std::size_t p = 0; p < kPoints.size(); ++p) {
-        const double at_s = lines.times_s[i] + kPoints[p] * duration_s;
-        smoother.sample(i, at_s, sample);
-        fit.add(sample, kWeights[p] * way_mm, wanted_mm(at_s), wanted);
-      }
-    }
-    fit.solve(result);
-    keep_laying(wanted, begin, end, result);
-    begin = end;
+    begin = std::max(end, begin + 1);
   }
   return result;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -13,6 +14,7 @@ namespace unflex::emit {
 namespace {
 
 constexpr double kSmooth_s = 0.006;
+constexpr double kFree = std::numeric_limits<double>::infinity();
 
 // E of knots that are joined by straight lines, smoothed by Klipper's triangle: a plain sum.
 double smoothed_mm(const std::vector<double>& times_s, const std::vector<double>& e_mm,
@@ -68,7 +70,7 @@ TEST(SmoothedFilament, ComesNearerThanWhatIsWanted) {
     for (const double t : lines.times_s) {
       wanted.push_back(wall_mm(t));
     }
-    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, wall_mm);
+    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kFree, wall_mm);
     ASSERT_EQ(e_mm.size(), wanted.size());
     EXPECT_EQ(e_mm.front(), wanted.front());
     EXPECT_EQ(e_mm.back(), wanted.back());
@@ -90,7 +92,7 @@ TEST(SmoothedFilament, ComesNearerThanWhatIsWanted) {
 TEST(SmoothedFilament, LeavesEvenFlowAsItIs) {
   const LaidLines lines = lines_of(30, 5);
   const std::vector<double> e_mm =
-      filament_to_smooth(lines, kSmooth_s, [](double t) { return 2.0 * t; });
+      filament_to_smooth(lines, kSmooth_s, kFree, [](double t) { return 2.0 * t; });
   for (std::size_t k = 0; k < e_mm.size(); ++k) {
     EXPECT_NEAR(e_mm[k], 2.0 * lines.times_s[k], 1e-12);
   }
@@ -104,17 +106,41 @@ TEST(SmoothedFilament, MovesNoFilamentIntoTravel) {
   const auto laid_mm = [&](double t) {
     return 4.0 * (std::min(t, from_s) + std::max(t - to_s, 0.0));
   };
-  const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, laid_mm);
+  const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kFree, laid_mm);
   for (std::size_t k = 20; k <= 33; ++k) {
     EXPECT_EQ(e_mm[k], laid_mm(lines.times_s[k]));
   }
   EXPECT_TRUE(std::ranges::is_sorted(e_mm));
 }
 
+// By how much the changes of the flow where lines join exceed `most`, in total, mm/s.
+double excess_mm_s(const LaidLines& lines, const std::vector<double>& e_mm, double most_mm_s) {
+  const auto flow_mm_s = [&](std::size_t k) {
+    return (e_mm[k + 1] - e_mm[k]) / (lines.times_s[k + 1] - lines.times_s[k]);
+  };
+  double sum_mm_s = 0.0;
+  for (std::size_t k = 0; k + 2 < e_mm.size(); ++k) {
+    sum_mm_s += std::max(std::abs(flow_mm_s(k + 1) - flow_mm_s(k)) - most_mm_s, 0.0);
+  }
+  return sum_mm_s;
+}
+
+// All lines are of one speed, so it is the steps of the flow that the limit is about.
+TEST(SmoothedFilament, KeepsTheStepOfTheFlow) {
+  constexpr double kMost_mm_s = 1.0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    const LaidLines lines = lines_of(60, seed);
+    const std::vector<double> free = filament_to_smooth(lines, kSmooth_s, kFree, wall_mm);
+    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kMost_mm_s, wall_mm);
+    EXPECT_LT(excess_mm_s(lines, e_mm, kMost_mm_s), 0.1 * excess_mm_s(lines, free, kMost_mm_s));
+    EXPECT_LT(error_mm(lines, e_mm), 3.0 * error_mm(lines, free)) << seed;
+  }
+}
+
 TEST(SmoothedFilament, HoldsForFewLines) {
   for (const std::size_t count : {1, 2, 3}) {
     const LaidLines lines = lines_of(count, 3);
-    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, wall_mm);
+    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kFree, wall_mm);
     EXPECT_EQ(e_mm.size(), count + 1);
     EXPECT_EQ(e_mm.back(), wall_mm(lines.times_s.back()));
   }
