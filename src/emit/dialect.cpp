@@ -290,7 +290,7 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
 }
 
 std::string advance_line(Firmware firmware, const gcode::PressureAdvance& wanted) {
-  const double advance_s = wanted.advance_s.value_or(0.0);
+  const double advance_s = wanted.advance_s.value();
   switch (firmware) {
     case Firmware::marlin:
       return fmt::format("M900 K{}", advance_s);

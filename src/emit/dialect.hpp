@@ -60,8 +60,8 @@ struct ZLimits {
 [[nodiscard]] std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wanted,
                                                     const gcode::Shaper& current);
 
-// The line that sets pressure advance. What is not given stays as it is; the smooth time and the
-// name of the extruder are Klipper's.
+// The line that sets pressure advance, which has to be given. The smooth time and the name of the
+// extruder are Klipper's; without a smooth time it stays as it is.
 [[nodiscard]] std::string advance_line(Firmware firmware, const gcode::PressureAdvance& wanted);
 
 // What to type after the print for those axes whose shaper is off, though the printer may have one

@@ -444,22 +444,17 @@ void Emitter::set_run_advance(std::string& out) {
 // A new smooth time is a stop, so it stays between runs.
 void Emitter::restore_advance(bool with_smooth_time, std::string& out) {
   const gcode::PressureAdvance& sliced = input_.state().pressure_advance;
-  const gcode::PressureAdvance& present = printer_.state().pressure_advance;
-  const auto differs = [](const std::optional<double>& a, const std::optional<double>& b,
-                          double of_printer) {
-    return a.value_or(of_printer) != b.value_or(of_printer);
+  const auto setting = [&](const gcode::PressureAdvance& of_file) {
+    return std::pair{of_file.advance_s.value_or(options_.fixed.pressure_advance_s),
+                     of_file.smooth_s.value_or(options_.fixed.pressure_advance_smooth_s)};
   };
-  const double of_printer_s = options_.fixed.pressure_advance_s;
-  const double smooth_of_printer_s = options_.fixed.pressure_advance_smooth_s;
-  const bool smooths_otherwise =
-      with_smooth_time && differs(present.smooth_s, sliced.smooth_s, smooth_of_printer_s);
-  if (smooths_otherwise || differs(present.advance_s, sliced.advance_s, of_printer_s)) {
-    write(advance_line(
-              options_.fixed.firmware,
-              {sliced.advance_s.value_or(of_printer_s),
-               smooths_otherwise ? std::optional(sliced.smooth_s.value_or(smooth_of_printer_s))
-                                 : std::nullopt,
-               sliced.extruder}),
+  const auto [advance_s, smooth_s] = setting(sliced);
+  const auto [present_s, present_smooth_s] = setting(printer_.state().pressure_advance);
+  const bool smooths_otherwise = with_smooth_time && present_smooth_s != smooth_s;
+  if (smooths_otherwise || present_s != advance_s) {
+    write(advance_line(options_.fixed.firmware,
+                       {advance_s, smooths_otherwise ? std::optional(smooth_s) : std::nullopt,
+                        sliced.extruder}),
           out);
   }
 }

@@ -71,13 +71,9 @@ void lay_as_the_nozzle_goes(const NozzleProgress& nozzle, const Timetable& table
   const auto laid_by = [&](double t) { return laid_mm(nozzle, table, filament, t + ahead_s); };
   const double smooth_s = options.run_advance ? options.run_advance->smooth_s : 0.0;
   if (smooth_s > 0.0 && smooth_s <= kLongestFitted_s) {
-    const LinesInTime in_time = lines_in_time(start_mm, ends_s, strokes);
-    LaidLines lines{in_time.times_s, in_time.lengths_mm};
-    for (std::size_t i = 0; i < strokes.size(); ++i) {
-      lines.speeds_mm_s[i] /= lines.times_s[i + 1] - lines.times_s[i];
-    }
     const std::vector<double> e_mm =
-        filament_to_smooth(lines, smooth_s, most_flow_step_mm_s(options.fixed), laid_by);
+        filament_to_smooth(lines_in_time(start_mm, ends_s, strokes), smooth_s,
+                           most_flow_step_mm_s(options.fixed), laid_by);
     for (std::size_t i = 0; i < strokes.size(); ++i) {
       strokes[i].e_mm = e_mm[i + 1];
     }

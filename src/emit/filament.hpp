@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "lines_in_time.hpp"
 #include "nozzle_progress.hpp"
 #include "strokes.hpp"
 #include "timetable.hpp"
@@ -23,12 +24,6 @@ struct RunFilament {
   double all_mm = 0.0;  // of all of them
   // Marlin may still owe filament of a move it skipped. The first line lays it, or draws it back.
   double behind_mm = 0.0;
-};
-
-// Lines to be: when they begin, and when the last one ends; and how long each of them is.
-struct LinesInTime {
-  std::vector<double> times_s;
-  std::vector<double> lengths_mm;
 };
 
 // The hotend of a run: with an advance of 0, it needs what the file or the printer has set.

@@ -18,6 +18,14 @@ constexpr double kLeastSpeed_mm_s = 2.0;
 // A line that would lay less than this share of what it shall lay is left as wanted.
 constexpr double kLeastShare = 0.1;
 
+double duration_s(const LinesInTime& lines, std::size_t i) {
+  return lines.times_s[i + 1] - lines.times_s[i];
+}
+
+double speed_mm_s(const LinesInTime& lines, std::size_t i) {
+  return lines.lengths_mm[i] / duration_s(lines, i);
+}
+
 // What S E at one moment depends on: knots from `first` on, each with its coefficient.
 struct Sample {
   std::size_t first = 0;
@@ -26,8 +34,8 @@ struct Sample {
 
 class Smoother {
  public:
-  Smoother(const std::vector<double>& times_s, double smooth_s)
-      : times_s_(times_s), half_s_(0.5 * smooth_s) {}
+  Smoother(const LinesInTime& lines, double smooth_s)
+      : lines_(lines), times_s_(lines.times_s), half_s_(0.5 * smooth_s) {}
 
   // At a moment within line i, the one between knots i and i + 1.
   void sample(std::size_t i, double at_s, Sample& out) const {
@@ -42,26 +50,24 @@ class Smoother {
     }
     out.first = std::min(first - 1, i);
     out.of_knots.assign(std::max(last + 1, i + 1) - out.first + 1, 0.0);
-    const double share = (at_s - times_s_[i]) / duration_s(i);
+    const double share = (at_s - times_s_[i]) / duration_s(lines_, i);
     at(out, i) += 1.0 - share;
     at(out, i + 1) += share;
     for (std::size_t k = first; k <= last; ++k) {
       const double left_s = half_s_ - std::abs(at_s - times_s_[k]);
       if (left_s > 0.0) {
         const double g = left_s * left_s * left_s / (6.0 * half_s_ * half_s_);
-        at(out, k - 1) += g / duration_s(k - 1);
-        at(out, k) -= g / duration_s(k - 1) + g / duration_s(k);
-        at(out, k + 1) += g / duration_s(k);
+        at(out, k - 1) += g / duration_s(lines_, k - 1);
+        at(out, k) -= g / duration_s(lines_, k - 1) + g / duration_s(lines_, k);
+        at(out, k + 1) += g / duration_s(lines_, k);
       }
     }
   }
 
  private:
   static double& at(Sample& out, std::size_t knot) { return out.of_knots[knot - out.first]; }
-  [[nodiscard]] double duration_s(std::size_t line) const {
-    return times_s_[line + 1] - times_s_[line];
-  }
 
+  const LinesInTime& lines_;
   const std::vector<double>& times_s_;
   double half_s_;
 };
@@ -137,7 +143,7 @@ class Fit {
 // Joins between lines, and which of them are drawn to the most that the flow may change there.
 class Joins {
  public:
-  Joins(const LaidLines& lines, std::size_t first, std::size_t last, double most_mm_s)
+  Joins(const LinesInTime& lines, std::size_t first, std::size_t last, double most_mm_s)
       : lines_(lines), most_mm_s_(most_mm_s), first_(first), drawn_(last - first, 0.0) {}
 
   // Draws those that exceed it, and lets go of those that would be below by themselves. Whether
@@ -174,7 +180,7 @@ class Joins {
  private:
   // min(v, v')/d of the lines before and behind knot k.
   [[nodiscard]] std::pair<double, double> per_mm(std::size_t k) const {
-    const double slower_mm_s = std::min(lines_.speeds_mm_s[k - 1], lines_.speeds_mm_s[k]);
+    const double slower_mm_s = std::min(speed_mm_s(lines_, k - 1), speed_mm_s(lines_, k));
     return {slower_mm_s / length_mm(k - 1), slower_mm_s / length_mm(k)};
   }
   // The change of the flow at knot k.
@@ -188,11 +194,10 @@ class Joins {
   }
   [[nodiscard]] double length_mm(std::size_t line) const {
     constexpr double kLeast_mm = 1e-6;
-    return std::max(lines_.speeds_mm_s[line] * (lines_.times_s[line + 1] - lines_.times_s[line]),
-                    kLeast_mm);
+    return std::max(lines_.lengths_mm[line], kLeast_mm);
   }
 
-  const LaidLines& lines_;
+  const LinesInTime& lines_;
   double most_mm_s_;
   std::size_t first_;          // knot
   std::vector<double> drawn_;  // to which change of the flow; 0: not drawn
@@ -216,7 +221,7 @@ void keep_laying(const std::vector<double>& wanted_mm, std::size_t first, std::s
 }
 
 struct Problem {
-  const LaidLines& lines;
+  const LinesInTime& lines;
   double smooth_s;
   double most_step_mm_s;
   const std::vector<double>& wanted_at_knots_mm;
@@ -226,16 +231,15 @@ struct Problem {
 // The lines from `begin` to before `end`, which all lay.
 void fit_stretch(const Problem& problem, std::size_t begin, std::size_t end,
                  std::vector<double>& knots_mm) {
-  const LaidLines& lines = problem.lines;
+  const LinesInTime& lines = problem.lines;
   const std::vector<double>& wanted = problem.wanted_at_knots_mm;
-  const Smoother smoother(lines.times_s, problem.smooth_s);
+  const Smoother smoother(lines, problem.smooth_s);
   Fit fit(begin + 1, end - begin - 1);
   Sample sample;
   for (std::size_t i = begin; i < end; ++i) {
-    const double duration_s = lines.times_s[i + 1] - lines.times_s[i];
-    const double way_mm = duration_s * (lines.speeds_mm_s[i] + kLeastSpeed_mm_s);
+    const double way_mm = lines.lengths_mm[i] + kLeastSpeed_mm_s * duration_s(lines, i);
     for (std::size_t p = 0; p < kPoints.size(); ++p) {
-      const double at_s = lines.times_s[i] + kPoints[p] * duration_s;
+      const double at_s = lines.times_s[i] + kPoints[p] * duration_s(lines, i);
       smoother.sample(i, at_s, sample);
       fit.add(sample, kWeights[p] * way_mm, problem.wanted_mm(at_s), wanted);
     }
@@ -254,7 +258,7 @@ void fit_stretch(const Problem& problem, std::size_t begin, std::size_t end,
 
 }  // namespace
 
-std::vector<double> filament_to_smooth(const LaidLines& lines, double smooth_s,
+std::vector<double> filament_to_smooth(const LinesInTime& lines, double smooth_s,
                                        double most_step_mm_s,
                                        const std::function<double(double)>& wanted_mm) {
   std::vector<double> wanted;
@@ -263,7 +267,7 @@ std::vector<double> filament_to_smooth(const LaidLines& lines, double smooth_s,
     wanted.push_back(wanted_mm(t));
   }
   std::vector<double> result = wanted;
-  const std::size_t count = lines.speeds_mm_s.size();
+  const std::size_t count = lines.lengths_mm.size();
   for (std::size_t begin = 0; begin < count;) {
     std::size_t end = begin;
     while (end < count && wanted[end + 1] > wanted[end]) {

@@ -26,18 +26,15 @@
 #include <functional>
 #include <vector>
 
-namespace unflex::emit {
+#include "lines_in_time.hpp"
 
-struct LaidLines {
-  std::vector<double> times_s;      // t_0 … t_n, rising
-  std::vector<double> speeds_mm_s;  // v of the n lines
-};
+namespace unflex::emit {
 
 // e_0 … e_n, mm. A knot moves only where the lines on both of its sides lay, so e is V at either
 // end and wherever laying begins or ends. No line that lays draws filament back. A join may still
 // exceed J a little.
 [[nodiscard]] std::vector<double> filament_to_smooth(
-    const LaidLines& lines, double smooth_s, double most_step_mm_s,
+    const LinesInTime& lines, double smooth_s, double most_step_mm_s,
     const std::function<double(double)>& wanted_mm);
 
 }  // namespace unflex::emit

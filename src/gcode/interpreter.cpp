@@ -94,7 +94,7 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
   state_.shaper_unknown_y = options_.shaper_unknown_y;
   state_.filament_diameter_mm = options_.filament_diameter_mm;
   state_.absolute_e = !options_.relative_e;
-  if (options_.begins_advanced && options_.advance_of_runs == RunAdvance::on) {
+  if (options_.begins_advanced) {
     pressure_advance_on_ = true;
   }
   if (options_.firmware == Firmware::marlin) {

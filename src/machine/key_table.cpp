@@ -61,7 +61,7 @@ using T = EmitSettings;
 using F = TimingSettings;
 using V = VerifySettings;
 
-constexpr std::array<std::string_view, 4> kPressureShapes = {"linear", "two_slopes", "tanh",
+constexpr std::array<std::string_view, 4> kPressureShapes = {kLinearPressure, "two_slopes", "tanh",
                                                              "reciprocal"};
 constexpr std::string_view kNotLimited = "not limited";
 constexpr std::string_view kOtherForm = "not used";
@@ -349,8 +349,7 @@ constexpr std::array kKeys = {
     Key{"extruder.pressure_advance_s", &setting<&S::extruder, &E::pressure_advance_s>, kNotNegative,
         "s",
         "Klipper: [extruder] pressure_advance, RRF: M572 S; where it is on, Klipper's shaper "
-        "switches "
-        "later"},
+        "switches later"},
     Key{"extruder.pressure_advance_smooth_s", &setting<&S::extruder, &E::pressure_advance_smooth_s>,
         Bounds{.min = 0.0, .max = 0.2, .min_open = true}, "s",
         "Klipper: [extruder] pressure_advance_smooth_time"},

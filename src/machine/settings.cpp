@@ -208,7 +208,7 @@ double Settings::max_extrude_only_accel_mm_s2() const {
 }
 
 bool Settings::printer_presses() const {
-  return printer.firmware == Firmware::klipper && pressure.shape == PressureSettings{}.shape;
+  return printer.firmware == Firmware::klipper && pressure.shape == kLinearPressure;
 }
 
 bool Settings::writes_pressure() const { return pressure.written.value_or(printer_presses()); }

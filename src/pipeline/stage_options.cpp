@@ -378,11 +378,12 @@ gcode::InterpreterOptions interpreter_options(const machine::Settings& settings)
   const double settling_s =
       std::max(nozzle_x(settings).settling_s(), nozzle_y(settings).settling_s());
   options.settling_s = std::min(settling_s, kLongestCalm_s);
-  if (settings.writes_pressure()) {
-    options.advance_of_runs =
-        settings.printer_presses() ? gcode::RunAdvance::on : gcode::RunAdvance::off;
+  if (settings.writes_pressure() && settings.printer_presses()) {
+    options.advance_of_runs = gcode::RunAdvance::on;
     options.begins_advanced = settings.pressure.advance_s.value_or(0.0) > 0.0 ||
                               settings.extruder.pressure_advance_s > 0.0;
+  } else if (settings.writes_pressure()) {
+    options.advance_of_runs = gcode::RunAdvance::off;
   }
   options.max_extrude_ratio = max_extrude_ratio(settings);
   options.max_extrude_dab_mm = settings.extruder.nozzle_diameter_mm * options.max_extrude_ratio;

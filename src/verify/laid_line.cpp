@@ -22,7 +22,7 @@ std::size_t cells(double duration_s) {
   return static_cast<std::size_t>(std::lround(duration_s / kCell_s));
 }
 
-// As far as the firmware may smooth ahead: Klipper takes a smooth time of 0.2 s at most.
+// Cells, as far as the firmware may smooth ahead: Klipper takes a smooth time of 0.2 s at most.
 constexpr std::size_t kLatency = 200;
 
 double begin_of_bin_mm(std::size_t number) {

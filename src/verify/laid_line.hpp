@@ -15,8 +15,9 @@
 //   off
 //
 // Retractions are left out, by moves of filament alone and by wipes: what they do to the pressure,
-// the next one undoes. E(t), V(t) and s(t) are kept on a grid of cells in time. What comes out in a
-// cell is spread evenly over the way that the nozzle makes in it.
+// the next one undoes. Only where pressure is written into the filament, wipes count. E(t), V(t)
+// and s(t) are kept on a grid of cells in time. What comes out in a cell is spread evenly over the
+// way that the nozzle makes in it.
 #pragma once
 
 #include <array>

@@ -26,6 +26,7 @@ void append_phases(const planner::PlannedMove& move, double pushed_mm,
                    std::vector<BasePhase>& phases) {
   double elapsed_s = 0.0;
   const double laid_mm = move.segment.extruding() ? move.segment.delta(gcode::E) : 0.0;
+  // A wipe. In a run that is written for the hotend, lines may draw back where they lay.
   const bool draws_back = pushed_mm < 0.0 && pushed_mm == move.segment.delta(gcode::E);
   pushed_mm = move.segment.moves_xy() && !draws_back ? pushed_mm : 0.0;
   for (const planner::Phase& phase : move.phases()) {

@@ -25,7 +25,8 @@ struct BasePhase {
   dynamics::BaseSegment y;
   // Filament that comes out meanwhile, counted from the start of the move or of the shaped motion.
   dynamics::BaseSegment e = {};
-  // Filament that the extruder pushes or draws back, in moves of X or Y. Its place has no meaning.
+  // Filament that the extruder pushes in moves of X or Y, without wipes. It may draw some back
+  // where it pushes other filament than comes out. Its place has no meaning.
   dynamics::BaseSegment pushed = {};
   double duration_s = 0.0;
   bool extruding = false;  // the move lays filament

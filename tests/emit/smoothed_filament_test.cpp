@@ -37,12 +37,15 @@ double smoothed_mm(const std::vector<double>& times_s, const std::vector<double>
   return sum * 2.0 / kParts;
 }
 
-LaidLines lines_of(std::size_t count, unsigned seed) {
+LinesInTime lines_of(std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> duration_s(0.0015, 0.006);
-  LaidLines lines{.times_s = {0.0}, .speeds_mm_s = std::vector<double>(count, 60.0)};
+  constexpr double kSpeed_mm_s = 60.0;
+  LinesInTime lines{.times_s = {0.0}, .lengths_mm = {}};
   for (std::size_t i = 0; i < count; ++i) {
-    lines.times_s.push_back(lines.times_s.back() + duration_s(random));
+    const double one_s = duration_s(random);
+    lines.times_s.push_back(lines.times_s.back() + one_s);
+    lines.lengths_mm.push_back(kSpeed_mm_s * one_s);
   }
   return lines;
 }
@@ -53,7 +56,7 @@ double wall_mm(double t) {
   return 3.0 * t - 1.5 / kOften * std::sin(kOften * t);
 }
 
-double error_mm(const LaidLines& lines, const std::vector<double>& e_mm) {
+double error_mm(const LinesInTime& lines, const std::vector<double>& e_mm) {
   double sum = 0.0;
   int count = 0;
   for (double t = 0.02; t < lines.times_s.back() - 0.02; t += 3.7e-4) {
@@ -65,7 +68,7 @@ double error_mm(const LaidLines& lines, const std::vector<double>& e_mm) {
 
 TEST(SmoothedFilament, ComesNearerThanWhatIsWanted) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
-    const LaidLines lines = lines_of(60, seed);
+    const LinesInTime lines = lines_of(60, seed);
     std::vector<double> wanted;
     for (const double t : lines.times_s) {
       wanted.push_back(wall_mm(t));
@@ -90,7 +93,7 @@ TEST(SmoothedFilament, ComesNearerThanWhatIsWanted) {
 }
 
 TEST(SmoothedFilament, LeavesEvenFlowAsItIs) {
-  const LaidLines lines = lines_of(30, 5);
+  const LinesInTime lines = lines_of(30, 5);
   const std::vector<double> e_mm =
       filament_to_smooth(lines, kSmooth_s, kFree, [](double t) { return 2.0 * t; });
   for (std::size_t k = 0; k < e_mm.size(); ++k) {
@@ -100,7 +103,7 @@ TEST(SmoothedFilament, LeavesEvenFlowAsItIs) {
 
 // Travel between two lines of plastic stays without filament, and no line draws any back.
 TEST(SmoothedFilament, MovesNoFilamentIntoTravel) {
-  const LaidLines lines = lines_of(60, 9);
+  const LinesInTime lines = lines_of(60, 9);
   const double from_s = lines.times_s[20];
   const double to_s = lines.times_s[33];
   const auto laid_mm = [&](double t) {
@@ -114,7 +117,7 @@ TEST(SmoothedFilament, MovesNoFilamentIntoTravel) {
 }
 
 // By how much the changes of the flow where lines join exceed `most`, in total, mm/s.
-double excess_mm_s(const LaidLines& lines, const std::vector<double>& e_mm, double most_mm_s) {
+double excess_mm_s(const LinesInTime& lines, const std::vector<double>& e_mm, double most_mm_s) {
   const auto flow_mm_s = [&](std::size_t k) {
     return (e_mm[k + 1] - e_mm[k]) / (lines.times_s[k + 1] - lines.times_s[k]);
   };
@@ -129,7 +132,7 @@ double excess_mm_s(const LaidLines& lines, const std::vector<double>& e_mm, doub
 TEST(SmoothedFilament, KeepsTheStepOfTheFlow) {
   constexpr double kMost_mm_s = 1.0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
-    const LaidLines lines = lines_of(60, seed);
+    const LinesInTime lines = lines_of(60, seed);
     const std::vector<double> free = filament_to_smooth(lines, kSmooth_s, kFree, wall_mm);
     const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kMost_mm_s, wall_mm);
     EXPECT_LT(excess_mm_s(lines, e_mm, kMost_mm_s), 0.1 * excess_mm_s(lines, free, kMost_mm_s));
@@ -139,7 +142,7 @@ TEST(SmoothedFilament, KeepsTheStepOfTheFlow) {
 
 TEST(SmoothedFilament, HoldsForFewLines) {
   for (const std::size_t count : {1, 2, 3}) {
-    const LaidLines lines = lines_of(count, 3);
+    const LinesInTime lines = lines_of(count, 3);
     const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kFree, wall_mm);
     EXPECT_EQ(e_mm.size(), count + 1);
     EXPECT_EQ(e_mm.back(), wall_mm(lines.times_s.back()));

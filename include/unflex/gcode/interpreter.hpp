@@ -167,15 +167,15 @@ struct MarlinArcs {
   bool circles = false;          // ARC_P_CIRCLES: P is a number of full circles
 };
 
-// What the firmware's configuration decides about the meaning of a line.
 // What pressure advance is while a compensated run prints. It decides which lines a run may hold,
-// and so the sliced and the emitted file have to be read alike.
+// so the sliced file and the emitted one have to be read with the same value.
 enum class RunAdvance {
   as_sliced,
-  on,   // whatever a macro has done: a value behind one does not stop the machine
-  off,  // a line that sets it ends a run, since it must be off again behind it
+  on,   // also behind a macro, so the next value of the file does not stop the machine
+  off,  // a line that sets it ends a run, since it must be off again behind that line
 };
 
+// What the firmware's configuration decides about the meaning of a line.
 struct InterpreterOptions {
   Firmware firmware = Firmware::klipper;
   // The mode of E before the file's first M82 or M83.
@@ -204,7 +204,8 @@ struct InterpreterOptions {
   // RepRapFirmware from 3.6: M205 sets the jerk of prints alone; M566 sets it and its upper bound.
   bool has_print_jerk = false;
   RunAdvance advance_of_runs = RunAdvance::as_sliced;
-  bool begins_advanced = false;  // it is so from the first run on, whatever the file sets
+  // Pressure advance is on before the file sets it.
+  bool begins_advanced = false;
   // Filament diameter of M200 without D: DEFAULT_NOMINAL_FILAMENT_DIA, DefaultFilamentDiameter.
   double filament_diameter_mm = 1.75;
   // A move has too much filament if it lays more mm per mm than this, and more than

@@ -143,13 +143,16 @@ struct ExtruderSettings {
   }
 };
 
+// The shape of a pressure that is proportional to the flow.
+inline constexpr std::string_view kLinearPressure = "linear";
+
 // The filament that is pressed together in the hotend (unflex/dynamics/hotend_pressure.hpp), and
 // whether unflex makes up for it.
 struct PressureSettings {
-  // unset: where Klipper's own pressure advance does it, only smoothed less
+  // unset: only where the printer's own pressure advance does it, smoothed over less time
   std::optional<bool> written;
   std::optional<double> advance_s;  // unset: what the printer's own pressure advance is set to
-  std::string shape = "linear";
+  std::string shape{kLinearPressure};
   double offset_mm = 0.0;
   double knee_mm_s = 1.0;
   double second_advance_s = 0.0;

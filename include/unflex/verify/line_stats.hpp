@@ -13,7 +13,8 @@ struct LineModel {
   // An advance of 0 is what the sliced file or the printer has set; if that is 0 as well, it is not
   // known, and no line is measured.
   dynamics::HotendPressure hotend;
-  bool is_written = true;  // compensated runs advance by themselves, without the printer
+  // Compensated runs set pressure advance, or do without the printer's.
+  bool is_written = true;
   double width_mm = 0.45;  // of a line, for edges
 };
 
