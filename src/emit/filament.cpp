@@ -43,24 +43,16 @@ LinesInTime lines_in_time(const gcode::Position& start_mm, const std::vector<dou
   return result;
 }
 
-// Klipper's smooth time at which the extruder need not accelerate filament by more than `most`.
-// Where lines join, a step Δ of the flow is K Δ more filament, by a parabola up and one down. Where
-// a printer brakes and accelerates at a corner, the advance turns round by 2 K q̇ in half of the
-// smooth time. Where it may be shorter than lines take, nothing is won.
-double smooth_time_s(double advance_s, double printer_accel_mm_s2, double most_mm_s2) {
-  constexpr double kStep_mm_s = 1.0;        // Δ; lines of a few ms change the flow by no more
-  constexpr double kFilamentPerMm = 0.037;  // of a line of 0.45 mm in layers of 0.2 mm
-  constexpr double kLeast_s = 0.005;
+// Klipper's smooth time in which the extruder follows what a step Δ of the flow is where lines
+// join: K Δ more filament, by a parabola up and one down. Where it is shorter than lines take,
+// nothing is won.
+double smooth_time_s(double advance_s, double most_mm_s2) {
+  constexpr double kStep_mm_s = 0.8;  // Δ
+  constexpr double kLeast_s = 0.008;
   constexpr double kSteps_per_s = 1e4;
-  const double at_joins_s = 2.0 * std::sqrt(advance_s * kStep_mm_s / most_mm_s2);
-  const double at_corners_s = 4.0 * advance_s * kFilamentPerMm * printer_accel_mm_s2 / most_mm_s2;
-  const double smooth_s = std::max(at_joins_s, at_corners_s);
+  const double smooth_s = 2.0 * std::sqrt(advance_s * kStep_mm_s / most_mm_s2);
   return std::max(kLeast_s, std::ceil(smooth_s * kSteps_per_s) / kSteps_per_s);
 }
-
-// Up to this smooth time the lines' filament is fitted to it. The fit undoes what the smoothing
-// does to corners, and where the smooth time is longer, the extruder needs that.
-constexpr double kLongestFitted_s = 0.006;
 
 // The lines push what the nozzle lays.
 void lay_as_the_nozzle_goes(const NozzleProgress& nozzle, const Timetable& table,
@@ -70,10 +62,14 @@ void lay_as_the_nozzle_goes(const NozzleProgress& nozzle, const Timetable& table
   const double ahead_s = options.run_advance ? options.pressure.hotend.dead_time_s : 0.0;
   const auto laid_by = [&](double t) { return laid_mm(nozzle, table, filament, t + ahead_s); };
   const double smooth_s = options.run_advance ? options.run_advance->smooth_s : 0.0;
-  if (smooth_s > 0.0 && smooth_s <= kLongestFitted_s) {
+  if (smooth_s > 0.0) {
     const std::vector<double> e_mm =
-        filament_to_smooth(lines_in_time(start_mm, ends_s, strokes), smooth_s,
-                           most_flow_step_mm_s(options.fixed), laid_by);
+        filament_to_smooth(lines_in_time(start_mm, ends_s, strokes),
+                           {.advance_s = options.run_advance->advance_s,
+                            .smooth_s = smooth_s,
+                            .most_step_mm_s = most_flow_step_mm_s(options.fixed),
+                            .most_accel_mm_s2 = options.pressure.max_accel_mm_s2},
+                           laid_by);
     for (std::size_t i = 0; i < strokes.size(); ++i) {
       strokes[i].e_mm = e_mm[i + 1];
     }
@@ -208,8 +204,7 @@ std::optional<planner::FirmwareAdvance> advance_in_run(const EmitOptions& option
   }
   return planner::FirmwareAdvance{
       hotend.advance_s,
-      std::min(smooth_time_s(hotend.advance_s, options.printer_limits.max_accel_mm_s2,
-                             options.pressure.max_accel_mm_s2),
+      std::min(smooth_time_s(hotend.advance_s, options.pressure.max_accel_mm_s2),
                of_file.smooth_s.value_or(options.fixed.pressure_advance_smooth_s))};
 }
 

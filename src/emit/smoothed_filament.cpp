@@ -1,196 +1,136 @@
 #include "smoothed_filament.hpp"
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <utility>
+#include <optional>
+#include <span>
+
+#include "unflex/quadratic/elastic_program.hpp"
 
 namespace unflex::emit {
 namespace {
+
+constexpr int kWidth = 18;
+using Program = quadratic::ElasticProgram<kWidth>;
 
 // Gauss–Legendre, on [0, 1].
 constexpr std::array<double, 3> kPoints = {0.112701665379258, 0.5, 0.887298334620742};
 constexpr std::array<double, 3> kWeights = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
 // Where the nozzle stands, time still counts a little.
 constexpr double kLeastSpeed_mm_s = 2.0;
-// A line that would lay less than this share of what it shall lay is left as wanted.
+// A line lays at least this share of what it shall lay.
 constexpr double kLeastShare = 0.1;
+// The unknowns are how far knots are from where they are wanted, in this unit.
+constexpr double kUnit_mm = 1e-3;
+// Where lines are shorter than the smoothing, the flow might swing from line to line unseen.
+constexpr double kCalm = 3e-3;  // s² mm
+// A limit that is broken by as much as it allows costs this many units² mm.
+constexpr double kPrice = 1e3;
+constexpr double kGap = 1e-4;
+// A motor follows in about this time, so the mean of p̈ over it counts. Its moments are so far
+// apart.
+constexpr double kFollows_s = 4e-3;
+constexpr double kApart_s = 1e-3;
+// Limits count only where the best E without any comes so near to them, as a share of them.
+constexpr double kNear = 0.6;
 
-double duration_s(const LinesInTime& lines, std::size_t i) {
-  return lines.times_s[i + 1] - lines.times_s[i];
-}
-
-double speed_mm_s(const LinesInTime& lines, std::size_t i) {
-  return lines.lengths_mm[i] / duration_s(lines, i);
-}
-
-// What S E at one moment depends on: knots from `first` on, each with its coefficient.
-struct Sample {
+// Σ factor e over neighbouring knots.
+struct Functional {
   std::size_t first = 0;
-  std::vector<double> of_knots;
+  std::array<double, kWidth> factors{};
+
+  void add(std::size_t knot, double factor) { factors[knot - first] += factor; }
 };
 
+// Lower ≤ the functional ≤ upper.
+struct Limit {
+  Functional value;
+  double lower = 0.0;
+  double upper = 0.0;
+};
+
+Limit within(Functional value, double most) {
+  for (double& factor : value.factors) {
+    factor /= most;
+  }
+  return {value, -1.0, 1.0};
+}
+
+// What is linear in the knots.
 class Smoother {
  public:
-  Smoother(const LinesInTime& lines, double smooth_s)
-      : lines_(lines), times_s_(lines.times_s), half_s_(0.5 * smooth_s) {}
+  Smoother(const LinesInTime& lines, const SmoothingExtruder& extruder)
+      : lines_(lines),
+        times_s_(lines.times_s),
+        advance_s_(extruder.advance_s),
+        half_s_(0.5 * extruder.smooth_s) {}
 
-  // At a moment within line i, the one between knots i and i + 1.
-  void sample(std::size_t i, double at_s, Sample& out) const {
+  [[nodiscard]] double duration_s(std::size_t i) const { return times_s_[i + 1] - times_s_[i]; }
+
+  // Whether a functional holds all that smoothing sees from any moment of line i.
+  [[nodiscard]] bool sees(std::size_t i) const {
+    const double reach_s = half_s_ + 0.5 * kFollows_s;
+    return line_at(times_s_[i + 1] + reach_s) + 2 - line_at(times_s_[i] - reach_s) <= kWidth;
+  }
+
+  // S E
+  [[nodiscard]] Functional smoothed(double at_s) const {
+    Functional result = begin(at_s);
+    add_filament(at_s, 1.0, result);
     // The first and the last knot have no change of Ė, since E is not known beyond them.
-    std::size_t first = i + 1;
-    while (first > 1 && at_s - times_s_[first - 1] < half_s_) {
-      --first;
-    }
-    std::size_t last = i;
-    while (last + 2 < times_s_.size() && times_s_[last + 1] - at_s < half_s_) {
-      ++last;
-    }
-    out.first = std::min(first - 1, i);
-    out.of_knots.assign(std::max(last + 1, i + 1) - out.first + 1, 0.0);
-    const double share = (at_s - times_s_[i]) / duration_s(lines_, i);
-    at(out, i) += 1.0 - share;
-    at(out, i + 1) += share;
-    for (std::size_t k = first; k <= last; ++k) {
+    const std::size_t last = std::min(line_at(at_s + half_s_), times_s_.size() - 2);
+    for (std::size_t k = std::max<std::size_t>(line_at(at_s - half_s_) + 1, 1); k <= last; ++k) {
       const double left_s = half_s_ - std::abs(at_s - times_s_[k]);
       if (left_s > 0.0) {
         const double g = left_s * left_s * left_s / (6.0 * half_s_ * half_s_);
-        at(out, k - 1) += g / duration_s(lines_, k - 1);
-        at(out, k) -= g / duration_s(lines_, k - 1) + g / duration_s(lines_, k);
-        at(out, k + 1) += g / duration_s(lines_, k);
+        result.add(k - 1, g / duration_s(k - 1));
+        result.add(k, -g / duration_s(k - 1) - g / duration_s(k));
+        result.add(k + 1, g / duration_s(k));
       }
     }
+    return result;
   }
 
- private:
-  static double& at(Sample& out, std::size_t knot) { return out.of_knots[knot - out.first]; }
-
-  const LinesInTime& lines_;
-  const std::vector<double>& times_s_;
-  double half_s_;
-};
-
-// The normal equations of a stretch of free knots.
-class Fit {
- public:
-  explicit Fit(std::size_t first, std::size_t count) : first_(first), rows_(count), right_(count) {}
-
-  // Sample · e shall be `wanted_mm`. Knots that are not free are as given.
-  void add(const Sample& sample, double weight, double wanted_mm,
-           const std::vector<double>& given) {
-    double left_mm = wanted_mm;
-    for (std::size_t j = 0; j < sample.of_knots.size(); ++j) {
-      if (!is_free(sample.first + j)) {
-        left_mm -= sample.of_knots[j] * given[sample.first + j];
-      }
-    }
-    for (std::size_t j = 0; j < sample.of_knots.size(); ++j) {
-      if (!is_free(sample.first + j)) {
-        continue;
-      }
-      const std::size_t row = sample.first + j - first_;
-      right_[row] += weight * sample.of_knots[j] * left_mm;
-      std::vector<double>& entries = rows_[row];
-      entries.resize(std::max(entries.size(), sample.of_knots.size() - j), 0.0);
-      for (std::size_t l = j; l < sample.of_knots.size() && is_free(sample.first + l); ++l) {
-        entries[l - j] += weight * sample.of_knots[j] * sample.of_knots[l];
-      }
-    }
+  // The mean of p̈ around a moment. What E itself adds is so little that its middle will do.
+  [[nodiscard]] Functional acceleration(double at_s) const {
+    Functional result = begin(at_s - 0.5 * kFollows_s);
+    add_difference(at_s, 1.0, result);
+    add_difference(at_s + 0.5 * kFollows_s, advance_s_ / kFollows_s, result);
+    add_difference(at_s - 0.5 * kFollows_s, -advance_s_ / kFollows_s, result);
+    return result;
   }
 
-  // Puts the knots where they fit best. They stay as they are if that is not decided.
-  void solve(std::vector<double>& knots_mm) const {
-    const auto count = static_cast<Eigen::Index>(rows_.size());
-    std::size_t entries = 0;
-    for (const std::vector<double>& row : rows_) {
-      entries += row.size();
-    }
-    using Matrix = Eigen::SparseMatrix<double>;
-    Matrix matrix(count, count);
-    matrix.reserve(static_cast<Eigen::Index>(entries));
-    Eigen::VectorXd right(count);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      // The upper half by rows is the lower half by columns.
-      const std::vector<double>& row = rows_[static_cast<std::size_t>(k)];
-      matrix.startVec(k);
-      for (Eigen::Index j = 0; j < static_cast<Eigen::Index>(row.size()) && k + j < count; ++j) {
-        matrix.insertBack(k + j, k) = row[static_cast<std::size_t>(j)];
-      }
-      right[k] = right_[static_cast<std::size_t>(k)];
-    }
-    matrix.finalize();
-    const Eigen::SimplicialLDLT<Matrix, Eigen::Lower, Eigen::NaturalOrdering<int>> factors(matrix);
-    if (factors.info() != Eigen::Success || !(factors.vectorD().minCoeff() > 0.0)) {
-      return;
-    }
-    const Eigen::VectorXd solution = factors.solve(right);
-    std::copy(solution.begin(), solution.end(),
-              knots_mm.begin() + static_cast<std::ptrdiff_t>(first_));
-  }
-
- private:
-  [[nodiscard]] bool is_free(std::size_t knot) const {
-    return knot >= first_ && knot < first_ + rows_.size();
-  }
-
-  std::size_t first_;
-  std::vector<std::vector<double>> rows_;  // each from its diagonal to the right
-  std::vector<double> right_;
-};
-
-// Joins between lines, and which of them are drawn to the most that the flow may change there.
-class Joins {
- public:
-  Joins(const LinesInTime& lines, std::size_t first, std::size_t last, double most_mm_s)
-      : lines_(lines), most_mm_s_(most_mm_s), first_(first), drawn_(last - first, 0.0) {}
-
-  // Draws those that exceed it, and lets go of those that would be below by themselves. Whether
-  // that has changed any.
-  bool find(const std::vector<double>& knots_mm) {
-    bool changed = false;
-    for (std::size_t i = 0; i < drawn_.size(); ++i) {
-      const double step_mm_s = step(first_ + i, knots_mm);
-      const bool exceeds = std::abs(step_mm_s) > most_mm_s_;
-      const double drawn_mm_s = exceeds ? std::copysign(most_mm_s_, step_mm_s) : 0.0;
-      changed = changed || drawn_mm_s != drawn_[i];
-      drawn_[i] = drawn_mm_s;
-    }
-    return changed;
-  }
-
-  void draw(Fit& fit, const std::vector<double>& given) const {
-    constexpr double kWeight = 0.01;  // mm s²
-    for (std::size_t i = 0; i < drawn_.size(); ++i) {
-      if (drawn_[i] != 0.0) {
-        fit.add(step_at(first_ + i), kWeight, drawn_[i], given);
-      }
-    }
-  }
-
-  // Where lines are shorter than the smoothing, the flow might swing from line to line unseen.
-  void calm(Fit& fit, const std::vector<double>& given) const {
-    constexpr double kWeight = 3e-9;  // mm s²: it decides only what S does not feel
-    for (std::size_t i = 0; i < drawn_.size(); ++i) {
-      fit.add(step_at(first_ + i), kWeight, 0.0, given);
-    }
-  }
-
- private:
-  // min(v, v')/d of the lines before and behind knot k.
-  [[nodiscard]] std::pair<double, double> per_mm(std::size_t k) const {
-    const double slower_mm_s = std::min(speed_mm_s(lines_, k - 1), speed_mm_s(lines_, k));
-    return {slower_mm_s / length_mm(k - 1), slower_mm_s / length_mm(k)};
-  }
-  // The change of the flow at knot k.
-  [[nodiscard]] Sample step_at(std::size_t k) const {
-    const auto [before, after] = per_mm(k);
+  // f at knot k
+  [[nodiscard]] Functional step(std::size_t k) const {
+    const double slower_mm_s =
+        std::min(length_mm(k - 1) / duration_s(k - 1), length_mm(k) / duration_s(k));
+    const double before = slower_mm_s / length_mm(k - 1);
+    const double after = slower_mm_s / length_mm(k);
     return {k - 1, {before, -before - after, after}};
   }
-  [[nodiscard]] double step(std::size_t k, const std::vector<double>& knots_mm) const {
-    const auto [before, after] = per_mm(k);
-    return after * (knots_mm[k + 1] - knots_mm[k]) - before * (knots_mm[k] - knots_mm[k - 1]);
+
+ private:
+  // The line at this moment; before all lines and behind them the first and the last.
+  [[nodiscard]] std::size_t line_at(double at_s) const {
+    const auto after = std::upper_bound(times_s_.begin() + 1, times_s_.end() - 1, at_s);
+    return static_cast<std::size_t>(after - times_s_.begin()) - 1;
+  }
+  [[nodiscard]] Functional begin(double at_s) const { return {line_at(at_s - half_s_), {}}; }
+
+  void add_filament(double at_s, double factor, Functional& out) const {
+    const std::size_t i = line_at(at_s);
+    const double share = std::clamp((at_s - times_s_[i]) / duration_s(i), 0.0, 1.0);
+    out.add(i, factor * (1.0 - share));
+    out.add(i + 1, factor * share);
+  }
+  // (E(τ + h) − 2 E(τ) + E(τ − h))/h²
+  void add_difference(double at_s, double factor, Functional& out) const {
+    const double each = factor / (half_s_ * half_s_);
+    add_filament(at_s - half_s_, each, out);
+    add_filament(at_s, -2.0 * each, out);
+    add_filament(at_s + half_s_, each, out);
   }
   [[nodiscard]] double length_mm(std::size_t line) const {
     constexpr double kLeast_mm = 1e-6;
@@ -198,20 +138,21 @@ class Joins {
   }
 
   const LinesInTime& lines_;
-  double most_mm_s_;
-  std::size_t first_;          // knot
-  std::vector<double> drawn_;  // to which change of the flow; 0: not drawn
+  const std::vector<double>& times_s_;
+  double advance_s_;
+  double half_s_;
 };
 
 // Lines that would lay too little, or draw filament back, get their ends as wanted.
 void keep_laying(const std::vector<double>& wanted_mm, std::size_t first, std::size_t last,
                  std::vector<double>& knots_mm) {
+  constexpr double kRounding = 0.9;
   for (bool changed = true; changed;) {
     changed = false;
     for (std::size_t i = first; i < last; ++i) {
       const bool is_as_wanted = knots_mm[i] == wanted_mm[i] && knots_mm[i + 1] == wanted_mm[i + 1];
-      if (!is_as_wanted &&
-          knots_mm[i + 1] - knots_mm[i] < kLeastShare * (wanted_mm[i + 1] - wanted_mm[i])) {
+      if (!is_as_wanted && knots_mm[i + 1] - knots_mm[i] <
+                               kRounding * kLeastShare * (wanted_mm[i + 1] - wanted_mm[i])) {
         knots_mm[i] = wanted_mm[i];
         knots_mm[i + 1] = wanted_mm[i + 1];
         changed = true;
@@ -220,46 +161,173 @@ void keep_laying(const std::vector<double>& wanted_mm, std::size_t first, std::s
   }
 }
 
-struct Problem {
-  const LinesInTime& lines;
-  double smooth_s;
-  double most_step_mm_s;
-  const std::vector<double>& wanted_at_knots_mm;
-  const std::function<double(double)>& wanted_mm;
-};
+// The lines from `begin` to before `end`, which all lay. Knots from begin + 1 to end − 1 are free.
+class Stretch {
+ public:
+  Stretch(const LinesInTime& lines, const SmoothingExtruder& extruder, std::size_t begin,
+          std::size_t end, const std::vector<double>& wanted_at_knots_mm,
+          const std::function<double(double)>& wanted_mm)
+      : lines_(lines),
+        extruder_(extruder),
+        smoother_(lines, extruder),
+        begin_(begin),
+        end_(end),
+        wanted_at_knots_mm_(wanted_at_knots_mm),
+        wanted_mm_(wanted_mm) {}
 
-// The lines from `begin` to before `end`, which all lay.
-void fit_stretch(const Problem& problem, std::size_t begin, std::size_t end,
-                 std::vector<double>& knots_mm) {
-  const LinesInTime& lines = problem.lines;
-  const std::vector<double>& wanted = problem.wanted_at_knots_mm;
-  const Smoother smoother(lines, problem.smooth_s);
-  Fit fit(begin + 1, end - begin - 1);
-  Sample sample;
-  for (std::size_t i = begin; i < end; ++i) {
-    const double way_mm = lines.lengths_mm[i] + kLeastSpeed_mm_s * duration_s(lines, i);
-    for (std::size_t p = 0; p < kPoints.size(); ++p) {
-      const double at_s = lines.times_s[i] + kPoints[p] * duration_s(lines, i);
-      smoother.sample(i, at_s, sample);
-      fit.add(sample, kWeights[p] * way_mm, problem.wanted_mm(at_s), wanted);
+  void fit(std::vector<double>& knots_mm) {
+    for (std::size_t i = begin_; i < end_; ++i) {
+      if (!smoother_.sees(i)) {
+        return;
+      }
+    }
+    constexpr double kBroken = -1e-3;
+    Steps best = solve({});
+    std::vector<Limit> counting = all_limits();
+    const auto far = std::stable_partition(
+        counting.begin(), counting.end(),
+        [&](const Limit& limit) { return !best || is_near(limit, kNear, *best); });
+    std::vector<Limit> others(far, counting.end());
+    counting.erase(far, counting.end());
+    const auto is_broken = [&](const Limit& limit) {
+      return !best || is_near(limit, kBroken, *best);
+    };
+    if (std::ranges::any_of(counting, is_broken)) {
+      best = solve(counting);
+      if (std::ranges::any_of(others, is_broken)) {
+        counting.insert(counting.end(), others.begin(), others.end());
+        best = solve(counting);
+      }
+    }
+    if (best) {
+      for (std::size_t k = begin_ + 1; k < end_; ++k) {
+        knots_mm[k] = wanted_at_knots_mm_[k] + kUnit_mm * (*best)[k - begin_ - 1];
+      }
+      keep_laying(wanted_at_knots_mm_, begin_, end_, knots_mm);
     }
   }
-  Joins joins(lines, begin + 1, end, problem.most_step_mm_s);
-  joins.calm(fit, wanted);
-  fit.solve(knots_mm);
-  constexpr int kMostRounds = 12;
-  for (int round = 0; round < kMostRounds && joins.find(knots_mm); ++round) {
-    Fit bounded = fit;
-    joins.draw(bounded, wanted);
-    bounded.solve(knots_mm);
+
+ private:
+  using Steps = std::optional<std::span<const double>>;
+
+  [[nodiscard]] std::size_t unknowns() const {
+    return std::max<std::size_t>(end_ - begin_ - 1, kWidth);
   }
-  keep_laying(wanted, begin, end, knots_mm);
-}
+  [[nodiscard]] bool is_free(std::size_t knot) const { return knot > begin_ && knot < end_; }
+
+  // Its value at the knots as they are wanted.
+  [[nodiscard]] double value_as_wanted(const Functional& of_knots) const {
+    double sum = 0.0;
+    for (std::size_t j = 0; j < kWidth; ++j) {
+      if (of_knots.factors[j] != 0.0) {
+        sum += of_knots.factors[j] * wanted_at_knots_mm_[of_knots.first + j];
+      }
+    }
+    return sum;
+  }
+  [[nodiscard]] double value_of(const Functional& of_knots, std::span<const double> steps) const {
+    double sum = value_as_wanted(of_knots);
+    for (std::size_t j = 0; j < kWidth; ++j) {
+      if (of_knots.factors[j] != 0.0 && is_free(of_knots.first + j)) {
+        sum += of_knots.factors[j] * kUnit_mm * steps[of_knots.first + j - begin_ - 1];
+      }
+    }
+    return sum;
+  }
+
+  // Whether the value comes nearer to an end of its limit than by `margin`, or is beyond.
+  [[nodiscard]] bool is_near(const Limit& limit, double margin,
+                             std::span<const double> steps) const {
+    const double value = value_of(limit.value, steps);
+    return value < limit.lower + margin || value > limit.upper - margin;
+  }
+
+  struct Place {
+    std::size_t first = 0;
+    Program::Gradient gradient;
+  };
+  // By the unknowns, in `unit`s.
+  [[nodiscard]] Place by_unknowns(const Functional& of_knots, double unit) const {
+    const std::size_t from = std::max(of_knots.first, begin_ + 1) - begin_ - 1;
+    Place place{std::min(from, unknowns() - kWidth), Program::Gradient::Zero()};
+    for (std::size_t j = 0; j < kWidth; ++j) {
+      const std::size_t knot = of_knots.first + j;
+      if (of_knots.factors[j] != 0.0 && is_free(knot)) {
+        place.gradient[static_cast<Eigen::Index>(knot - begin_ - 1 - place.first)] =
+            of_knots.factors[j] * kUnit_mm / unit;
+      }
+    }
+    return place;
+  }
+
+  void add_square(const Functional& of_knots, double less, double unit, double weight) {
+    const Place place = by_unknowns(of_knots, unit);
+    program_.add_square(place.first, place.gradient, (value_as_wanted(of_knots) - less) / unit,
+                        weight);
+  }
+
+  [[nodiscard]] std::vector<Limit> all_limits() const {
+    std::vector<Limit> result;
+    if (std::isfinite(extruder_.most_step_mm_s)) {
+      for (std::size_t k = begin_ + 1; k < end_; ++k) {
+        result.push_back(within(smoother_.step(k), extruder_.most_step_mm_s));
+      }
+    }
+    for (std::size_t i = begin_; i < end_; ++i) {
+      const double all_mm = wanted_at_knots_mm_[i + 1] - wanted_at_knots_mm_[i];
+      result.push_back({{i, {-1.0 / all_mm, 1.0 / all_mm}},
+                        kLeastShare,
+                        std::numeric_limits<double>::infinity()});
+    }
+    if (std::isfinite(extruder_.most_accel_mm_s2)) {
+      const double from_s = lines_.times_s[begin_];
+      const double length_s = lines_.times_s[end_] - from_s;
+      for (std::size_t i = 0; static_cast<double>(i) * kApart_s <= length_s; ++i) {
+        result.push_back(within(smoother_.acceleration(from_s + static_cast<double>(i) * kApart_s),
+                                extruder_.most_accel_mm_s2));
+      }
+    }
+    return result;
+  }
+
+  [[nodiscard]] Steps solve(const std::vector<Limit>& limits) {
+    program_.reset(unknowns());
+    for (std::size_t i = end_ - begin_ - 1; i < unknowns(); ++i) {
+      program_.fix(i);
+    }
+    for (std::size_t i = begin_; i < end_; ++i) {
+      const double duration_s = smoother_.duration_s(i);
+      const double way_mm = lines_.lengths_mm[i] + kLeastSpeed_mm_s * duration_s;
+      for (std::size_t p = 0; p < kPoints.size(); ++p) {
+        const double at_s = lines_.times_s[i] + kPoints[p] * duration_s;
+        add_square(smoother_.smoothed(at_s), wanted_mm_(at_s), kUnit_mm, kWeights[p] * way_mm);
+      }
+    }
+    for (std::size_t k = begin_ + 1; k < end_; ++k) {
+      add_square(smoother_.step(k), 0.0, 1.0, kCalm);
+    }
+    for (const Limit& limit : limits) {
+      const Place place = by_unknowns(limit.value, 1.0);
+      program_.add_row(place.first, place.gradient, value_as_wanted(limit.value), limit.lower,
+                       limit.upper, kPrice);
+    }
+    int iterations = 0;
+    return program_.solve(kGap, iterations);
+  }
+
+  const LinesInTime& lines_;
+  const SmoothingExtruder& extruder_;
+  Smoother smoother_;
+  std::size_t begin_;
+  std::size_t end_;
+  const std::vector<double>& wanted_at_knots_mm_;
+  const std::function<double(double)>& wanted_mm_;
+  Program program_;
+};
 
 }  // namespace
 
-std::vector<double> filament_to_smooth(const LinesInTime& lines, double smooth_s,
-                                       double most_step_mm_s,
+std::vector<double> filament_to_smooth(const LinesInTime& lines, const SmoothingExtruder& extruder,
                                        const std::function<double(double)>& wanted_mm) {
   std::vector<double> wanted;
   wanted.reserve(lines.times_s.size());
@@ -274,7 +342,7 @@ std::vector<double> filament_to_smooth(const LinesInTime& lines, double smooth_s
       ++end;
     }
     if (end >= begin + 2) {
-      fit_stretch({lines, smooth_s, most_step_mm_s, wanted, wanted_mm}, begin, end, result);
+      Stretch(lines, extruder, begin, end, wanted, wanted_mm).fit(result);
     }
     begin = std::max(end, begin + 1);
   }

@@ -25,10 +25,10 @@
 #include <span>
 
 #include "edge_nozzles.hpp"
-#include "elastic_program.hpp"
 #include "section_nodes.hpp"
 #include "section_rounds.hpp"
 #include "section_spline.hpp"
+#include "unflex/quadratic/elastic_program.hpp"
 
 namespace unflex::timing {
 namespace {
@@ -79,7 +79,7 @@ class Program {
   using Shares = typename Spline::Shares;
   using Values = typename Spline::Values;
   using Place = typename Spline::Place;
-  using Rows = ElasticProgram<Spline::kWidth>;
+  using Rows = quadratic::ElasticProgram<Spline::kWidth>;
   using Gradient = typename Spline::Gradient;
 
   Program(const Section& section, const SectionRules& rules)

@@ -251,24 +251,24 @@ const std::string kLays = kHead + "G1 X10 E1 F3000\nG1 E-1\nG1 E1\nG1 Y10 E1\nM1
 TEST(Emitter, LetsKlipperAdvanceWithLessSmoothing) {
   const EmitOptions how = with_pressure(Firmware::klipper, 0.04);
   EXPECT_THAT(advances(emit(kLays, how).text),
-              ElementsAre("SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.005\n",
+              ElementsAre("SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.008\n",
                           "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.04\n"));
-  const std::string of_file = "SET_PRESSURE_ADVANCE ADVANCE=0.07 SMOOTH_TIME=0.02\n";
+  const std::string of_file = "SET_PRESSURE_ADVANCE ADVANCE=0.4 SMOOTH_TIME=0.02\n";
   EXPECT_THAT(
       advances(emit(of_file + kLays, how).text),
-      ElementsAre(of_file, "SET_PRESSURE_ADVANCE ADVANCE=0.07 SMOOTH_TIME=0.0053\n", of_file))
+      ElementsAre(of_file, "SET_PRESSURE_ADVANCE ADVANCE=0.4 SMOOTH_TIME=0.0114\n", of_file))
       << "the file's own counts";
   const std::string of_extruder = "SET_PRESSURE_ADVANCE EXTRUDER=extruder ADVANCE=0.03\n";
   EXPECT_THAT(
       advances(emit(of_extruder + kLays, how).text),
       ElementsAre(of_extruder,
-                  "SET_PRESSURE_ADVANCE EXTRUDER=extruder ADVANCE=0.03 SMOOTH_TIME=0.005\n",
+                  "SET_PRESSURE_ADVANCE EXTRUDER=extruder ADVANCE=0.03 SMOOTH_TIME=0.008\n",
                   "SET_PRESSURE_ADVANCE EXTRUDER=extruder ADVANCE=0.03 SMOOTH_TIME=0.04\n"));
   EXPECT_THAT(advances(emit(kLays, with_pressure(Firmware::klipper, 0.0)).text), ElementsAre());
   EmitOptions other = how;
   other.pressure.hotend.advance_s = 0.05;
   EXPECT_THAT(advances(emit(kLays + "G1 X0 Z1 E1\n", other).text),
-              ElementsAre("SET_PRESSURE_ADVANCE ADVANCE=0.05 SMOOTH_TIME=0.005\n",
+              ElementsAre("SET_PRESSURE_ADVANCE ADVANCE=0.05 SMOOTH_TIME=0.008\n",
                           "SET_PRESSURE_ADVANCE ADVANCE=0.04\n",
                           "SET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.04\n"))
       << "what is laid between runs gets the printer's own";

@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kSmooth_s = 0.006;
 constexpr double kFree = std::numeric_limits<double>::infinity();
+constexpr SmoothingExtruder kFreely{.smooth_s = kSmooth_s};
 
 // E of knots that are joined by straight lines, smoothed by Klipper's triangle: a plain sum.
 double smoothed_mm(const std::vector<double>& times_s, const std::vector<double>& e_mm,
@@ -73,7 +74,7 @@ TEST(SmoothedFilament, ComesNearerThanWhatIsWanted) {
     for (const double t : lines.times_s) {
       wanted.push_back(wall_mm(t));
     }
-    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kFree, wall_mm);
+    const std::vector<double> e_mm = filament_to_smooth(lines, kFreely, wall_mm);
     ASSERT_EQ(e_mm.size(), wanted.size());
     EXPECT_EQ(e_mm.front(), wanted.front());
     EXPECT_EQ(e_mm.back(), wanted.back());
@@ -95,7 +96,7 @@ TEST(SmoothedFilament, ComesNearerThanWhatIsWanted) {
 TEST(SmoothedFilament, LeavesEvenFlowAsItIs) {
   const LinesInTime lines = lines_of(30, 5);
   const std::vector<double> e_mm =
-      filament_to_smooth(lines, kSmooth_s, kFree, [](double t) { return 2.0 * t; });
+      filament_to_smooth(lines, kFreely, [](double t) { return 2.0 * t; });
   for (std::size_t k = 0; k < e_mm.size(); ++k) {
     EXPECT_NEAR(e_mm[k], 2.0 * lines.times_s[k], 1e-12);
   }
@@ -109,7 +110,7 @@ TEST(SmoothedFilament, MovesNoFilamentIntoTravel) {
   const auto laid_mm = [&](double t) {
     return 4.0 * (std::min(t, from_s) + std::max(t - to_s, 0.0));
   };
-  const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kFree, laid_mm);
+  const std::vector<double> e_mm = filament_to_smooth(lines, kFreely, laid_mm);
   for (std::size_t k = 20; k <= 33; ++k) {
     EXPECT_EQ(e_mm[k], laid_mm(lines.times_s[k]));
   }
@@ -133,17 +134,77 @@ TEST(SmoothedFilament, KeepsTheStepOfTheFlow) {
   constexpr double kMost_mm_s = 1.0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     const LinesInTime lines = lines_of(60, seed);
-    const std::vector<double> free = filament_to_smooth(lines, kSmooth_s, kFree, wall_mm);
-    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kMost_mm_s, wall_mm);
+    const std::vector<double> free = filament_to_smooth(lines, kFreely, wall_mm);
+    const std::vector<double> e_mm =
+        filament_to_smooth(lines, {.smooth_s = kSmooth_s, .most_step_mm_s = kMost_mm_s}, wall_mm);
     EXPECT_LT(excess_mm_s(lines, e_mm, kMost_mm_s), 0.1 * excess_mm_s(lines, free, kMost_mm_s));
     EXPECT_LT(error_mm(lines, e_mm), 3.0 * error_mm(lines, free)) << seed;
+  }
+}
+
+// The largest mean acceleration over 4 ms of what Klipper pushes, S(E + K Ė), by differences.
+double largest_accel_mm_s2(const LinesInTime& lines, const std::vector<double>& e_mm,
+                           const SmoothingExtruder& extruder) {
+  constexpr double kStep_s = 2e-4;
+  constexpr double kOver_s = 4e-3;
+  const auto smooth_mm = [&](double t) {
+    return smoothed_mm(lines.times_s, e_mm, extruder.smooth_s, t);
+  };
+  const auto pushed_mm = [&](double t) {
+    return smooth_mm(t) +
+           extruder.advance_s * (smooth_mm(t + kStep_s) - smooth_mm(t - kStep_s)) / (2.0 * kStep_s);
+  };
+  const auto speed_mm_s = [&](double t) {
+    return (pushed_mm(t + kStep_s) - pushed_mm(t - kStep_s)) / (2.0 * kStep_s);
+  };
+  double largest = 0.0;
+  for (double t = 0.02; t < lines.times_s.back() - 0.02; t += 7e-4) {
+    largest = std::max(
+        largest, std::abs(speed_mm_s(t + 0.5 * kOver_s) - speed_mm_s(t - 0.5 * kOver_s)) / kOver_s);
+  }
+  return largest;
+}
+
+TEST(SmoothedFilament, AsksForNoMoreAccelerationThanTheExtruderHas) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const LinesInTime lines = lines_of(60, seed);
+    SmoothingExtruder extruder{.advance_s = 0.4, .smooth_s = 2.0 * kSmooth_s};
+    const double free_mm_s2 =
+        largest_accel_mm_s2(lines, filament_to_smooth(lines, extruder, wall_mm), extruder);
+    double last_mm = error_mm(lines, filament_to_smooth(lines, extruder, wall_mm));
+    for (const double share : {0.6, 0.3}) {
+      extruder.most_accel_mm_s2 = share * free_mm_s2;
+      const std::vector<double> e_mm = filament_to_smooth(lines, extruder, wall_mm);
+      EXPECT_LT(largest_accel_mm_s2(lines, e_mm, extruder), 1.1 * share * free_mm_s2) << seed;
+      // The tighter the limit, the less of the flow's changes is left.
+      EXPECT_GT(error_mm(lines, e_mm), 0.999 * last_mm) << seed;
+      last_mm = error_mm(lines, e_mm);
+    }
+  }
+}
+
+// Limits far away change nothing, though they are part of the problem once any of them is broken.
+TEST(SmoothedFilament, TakesNoNoticeOfLimitsThatItKeeps) {
+  const LinesInTime lines = lines_of(60, 4);
+  const std::vector<double> free = filament_to_smooth(lines, kFreely, wall_mm);
+  const std::vector<double> bounded = filament_to_smooth(
+      lines, {.advance_s = 0.4, .smooth_s = kSmooth_s, .most_accel_mm_s2 = 1e7}, wall_mm);
+  EXPECT_EQ(bounded, free);
+}
+
+// A smooth time of far more lines than there is room for leaves E as it is wanted.
+TEST(SmoothedFilament, LeavesLinesThatAreTooShortForTheSmoothTime) {
+  const LinesInTime lines = lines_of(60, 4);
+  const std::vector<double> e_mm = filament_to_smooth(lines, {.smooth_s = 0.2}, wall_mm);
+  for (std::size_t k = 0; k < e_mm.size(); ++k) {
+    EXPECT_EQ(e_mm[k], wall_mm(lines.times_s[k]));
   }
 }
 
 TEST(SmoothedFilament, HoldsForFewLines) {
   for (const std::size_t count : {1, 2, 3}) {
     const LinesInTime lines = lines_of(count, 3);
-    const std::vector<double> e_mm = filament_to_smooth(lines, kSmooth_s, kFree, wall_mm);
+    const std::vector<double> e_mm = filament_to_smooth(lines, kFreely, wall_mm);
     EXPECT_EQ(e_mm.size(), count + 1);
     EXPECT_EQ(e_mm.back(), wall_mm(lines.times_s.back()));
   }

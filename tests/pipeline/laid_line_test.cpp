@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(
     Firmwares, LaidLine,
     ::testing::Values(Machine{"klipper",
                               {"printer.firmware=klipper", "extruder.pressure_advance_s=0.04"},
-                              "\nSET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.005\n",
+                              "\nSET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.008\n",
                               "\nSET_PRESSURE_ADVANCE ADVANCE=0.04 SMOOTH_TIME=0.04\n",
                               0.25},
                       Machine{"marlin",

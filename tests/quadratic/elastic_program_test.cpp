@@ -1,4 +1,4 @@
-#include "elastic_program.hpp"
+#include "unflex/quadratic/elastic_program.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace unflex::timing {
+namespace unflex::quadratic {
 namespace {
 
 constexpr int kWidth = 18;
@@ -294,4 +294,4 @@ TEST(ElasticProgram, ForgetsTheProgramBefore) {
 }
 
 }  // namespace
-}  // namespace unflex::timing
+}  // namespace unflex::quadratic

@@ -1,4 +1,4 @@
-#include "elastic_program.hpp"
+#include "unflex/quadratic/elastic_program.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include "unflex/core/wide_registers.hpp"
 
-namespace unflex::timing {
+namespace unflex::quadratic {
 namespace {
 
 constexpr int kMostIterations = 60;
@@ -379,4 +379,4 @@ double ElasticProgram<W>::value_at_solution(std::size_t row) const {
 template class ElasticProgram<18>;
 template class ElasticProgram<24>;
 
-}  // namespace unflex::timing
+}  // namespace unflex::quadratic

@@ -22,7 +22,7 @@
 #include <span>
 #include <vector>
 
-namespace unflex::timing {
+namespace unflex::quadratic {
 
 template <int W>
 class ElasticProgram {
@@ -113,4 +113,4 @@ class ElasticProgram {
 extern template class ElasticProgram<18>;
 extern template class ElasticProgram<24>;
 
-}  // namespace unflex::timing
+}  // namespace unflex::quadratic
