@@ -53,12 +53,15 @@ void add_tower(CLI::App& command, RunConfig& config) {
       ->check(positive());
 }
 
-// "x=12..19", or "x=14" for a single band.
+// "x=12..19", or "x=14" for a single band; "pressure=12..19" likewise.
 std::string read_zone(const std::string& text, TuneConfig& tune) {
-  const bool has_axis = text.size() > 2 && text[1] == '=' &&
-                        std::string_view("xyXY").find(text[0]) != std::string_view::npos;
-  const std::string_view bands =
-      std::string_view(text).substr(std::min<std::size_t>(2, text.size()));
+  const std::size_t equals = std::min(text.find('='), text.size());
+  const std::string of = text.substr(0, equals);
+  std::optional<tune::Zone>* const zone = of == "x" || of == "X"   ? &tune.zones[0]
+                                          : of == "y" || of == "Y" ? &tune.zones[1]
+                                          : of == "pressure"       ? &tune.pressure_zone
+                                                                   : nullptr;
+  const std::string_view bands = std::string_view(text).substr(std::min(equals + 1, text.size()));
   const std::size_t dots = bands.find("..");
   const bool is_range = dots != std::string_view::npos;
   const std::optional<double> first = parse_number(bands.substr(0, dots));
@@ -67,14 +70,13 @@ std::string read_zone(const std::string& text, TuneConfig& tune) {
     constexpr double kMost = 1000.0;
     return value && *value >= 1.0 && *value <= kMost && *value == std::floor(*value);
   };
-  if (!has_axis || !is_band(first) || !is_band(last)) {
+  if (zone == nullptr || !is_band(first) || !is_band(last)) {
     return fmt::format(
-        "'{}' must have the form x=12..19, the first and the last band whose walls "
-        "show no waves",
+        "'{}' must have the form x=12..19 or pressure=12..19, the first and the last band whose "
+        "walls are even",
         text);
   }
-  tune.zones[text[0] == 'x' || text[0] == 'X' ? 0 : 1] =
-      tune::Zone{static_cast<std::size_t>(*first), static_cast<std::size_t>(*last)};
+  *zone = tune::Zone{static_cast<std::size_t>(*first), static_cast<std::size_t>(*last)};
   return {};
 }
 
@@ -117,7 +119,8 @@ void add_identify(CLI::App& program, RunConfig& config) {
 
 void add_tune(CLI::App& program, RunConfig& config) {
   CLI::App* const command = program.add_subcommand(
-      "tune", "Find the resonances by printing towers and looking at their walls");
+      "tune",
+      "Find the resonances or the pressure advance by printing towers and looking at their walls");
   TuneConfig& tune = config.tune;
   command->add_option("TOWER", config.input, "The tower that was printed; without it, the first")
       ->type_name("");
@@ -131,9 +134,12 @@ void add_tune(CLI::App& program, RunConfig& config) {
               }
             }
           },
-          "The bands of TOWER without waves: x=FIRST..LAST, y=FIRST..LAST; repeatable")
+          "The bands of TOWER with even walls: x=FIRST..LAST, y=FIRST..LAST, or "
+          "pressure=FIRST..LAST; repeatable")
       ->type_name("ZONE")
       ->allow_extra_args(false);
+  command->add_flag("--pressure", tune.asks_for_pressure,
+                    "The first tower tries pressure advances, not frequencies");
   command->add_option("-o,--output", config.output, "Where to write the next tower, - for stdout")
       ->type_name("OUT");
   command

@@ -134,15 +134,20 @@ Status check_records(const RunConfig& run_config) {
 
 Status check_tune(const RunConfig& config) {
   const TuneConfig& tune = config.tune;
-  const bool has_zone = tune.zones[0] || tune.zones[1];
+  const bool has_zone = tune.zones[0] || tune.zones[1] || tune.pressure_zone;
   if (config.input.empty() && has_zone) {
     return usage("--read is of a tower that was printed; give its file too");
   }
   if (!config.input.empty() && !has_zone) {
-    return usage("what do its walls show? give --read x=FIRST..LAST or y=FIRST..LAST");
+    return usage(
+        "what do its walls show? give --read x=FIRST..LAST, y=FIRST..LAST or "
+        "pressure=FIRST..LAST");
   }
   if (config.input.empty() && config.output.empty()) {
     return usage("where to write the tower? give -o OUT, or -o - for stdout");
+  }
+  if (!config.input.empty() && tune.asks_for_pressure) {
+    return usage("--pressure is for the first tower; TOWER tells what it tries");
   }
   if (config.input == kStandardStream) {
     return usage("the tower that was printed must be a file");

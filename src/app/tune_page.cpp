@@ -85,6 +85,30 @@ std::string picture(const std::vector<std::vector<Relief>>& reliefs, std::size_t
   return to_base64(grey.bmp());
 }
 
+// A wall as wide as it is: light where it is thicker, dark where it is thinner. Each row is a
+// band's ring, as far as its first side goes.
+std::string width_picture(const std::vector<pipeline::RingWidths>& widths, double side_mm) {
+  constexpr double kBin_mm = 0.4;
+  constexpr double kBrightnessPerShare = 1.2;
+  const auto width = static_cast<std::size_t>(side_mm / kBin_mm);
+  GreyPicture grey(width, widths.size());
+  for (std::size_t band = 0; band < widths.size(); ++band) {
+    const std::vector<double>& errors = widths[band].errors;
+    for (std::size_t i = 0; i < width; ++i) {
+      grey.set(i, band, 0.5 + kBrightnessPerShare * (i < errors.size() ? errors[i] : 0.0));
+    }
+  }
+  return to_base64(grey.bmp());
+}
+
+constexpr std::string_view kStyle =
+    ".wall { display: flex; gap: .6rem; align-items: flex-start; }\n"
+    ".wall img { width: min(100%, 44rem); image-rendering: pixelated; flex: 1 1 auto; "
+    "min-width: 0; }\n"
+    ".bands { display: flex; flex-direction: column; font-size: .72rem; color: var(--muted); "
+    "white-space: nowrap; }\n"
+    ".bands span { flex: 1 1 0; line-height: 12px; }\n";
+
 std::string value_text(const tune::Trial& trial, std::size_t band) {
   return trial.parameter == tune::Parameter::freq_hz ? fmt::format("{:.2f} Hz", trial.value(band))
                                                      : fmt::format("ζ {:.3f}", trial.value(band));
@@ -138,13 +162,6 @@ std::string axis_card(std::size_t axis, const tune::TowerSettings& settings,
 std::string tune_page(const tune::TowerSettings& settings, const tune::Tower& tower,
                       const std::vector<std::vector<Relief>>& reliefs,
                       const pipeline::TrueAxes& axes) {
-  constexpr std::string_view kStyle =
-      ".wall { display: flex; gap: .6rem; align-items: flex-start; }\n"
-      ".wall img { width: min(100%, 44rem); image-rendering: pixelated; flex: 1 1 auto; "
-      "min-width: 0; }\n"
-      ".bands { display: flex; flex-direction: column; font-size: .72rem; color: var(--muted); "
-      "white-space: nowrap; }\n"
-      ".bands span { flex: 1 1 0; line-height: 12px; }\n";
   std::string body = fmt::format(
       "<section class=\"card\"><h2>A tower of {} bands</h2>\n"
       "<p>Print the file as it is: on the bed's middle, without input shaping of your own, at 100 "
@@ -159,6 +176,53 @@ std::string tune_page(const tune::TowerSettings& settings, const tune::Tower& to
   }
   return report::html_page(
       {.title = "Calibration tower", .style = std::string(kStyle), .body = body, .script = {}});
+}
+
+std::string pressure_page(const tune::PressureTowerSettings& settings, const tune::Tower& tower,
+                          const std::vector<pipeline::RingWidths>& widths,
+                          const pipeline::TrueHotend& hotend) {
+  const tune::PressureTrial& trial = settings.trial;
+  const bool is_sum = trial.parameter == tune::PressureParameter::sum;
+  const auto value_of = [&](std::size_t band) {
+    return is_sum ? fmt::format("{:.4f} s", trial.advance_s(band))
+                  : fmt::format("{:.2f} ms", 1e3 * trial.dead_time_s(band));
+  };
+  constexpr int kRow_px = 12;
+  std::string rows;
+  std::string numbers;
+  for (std::size_t band = trial.bands; band >= 1; --band) {
+    rows +=
+        fmt::format("<tr><td>{}</td><td>{:.1f} mm</td><td>{}</td><td>{:.0f} %</td></tr>\n", band,
+                    tower.bottoms_mm[band - 1], value_of(band), 100.0 * widths[band - 1].seen());
+    numbers += fmt::format("<span>{}</span>", band % 5 == 0 || band == 1
+                                                  ? fmt::format("{} · {}", band, value_of(band))
+                                                  : std::string{});
+  }
+  const tune::PressureWall wall = tune::pressure_wall(settings);
+  const std::string body = fmt::format(
+      "<section class=\"card\"><h2>A tower of {0} bands: {1}</h2>\n"
+      "<p>Print the file as it is, at 100 % speed. It is a hollow square of {2:.0f} mm, {3:.0f} mm "
+      "high. Its walls are slow ({4:.0f} mm/s) at both ends and fast ({5:.0f} mm/s) between. Each "
+      "band is made for another hotend. Where the speed changes, {6:.0f} mm from the corners' "
+      "ends, the wall is thick or thin, unless the band's value is your hotend's own.</p>\n"
+      "<p>Below is one wall from the first half of a corner on, as it would be with a pressure "
+      "advance of {7:.4f} s and a dead time of {8:.1f} ms: light is thick, dark is thin. Count the "
+      "bands from the bed, by the grooves between them; band 1, 6, 11 … begin with a deep one. "
+      "Write down the first and the last band whose walls are even, and give them as <code>--read "
+      "pressure=FIRST..LAST</code>. If none is, give the one that shows the least: where thick "
+      "places and thin ones are about the same.</p>\n"
+      "<div class=\"wall\"><img alt=\"A wall of the tower\" style=\"height:{9}px\" "
+      "src=\"data:image/bmp;base64,{10}\"><div class=\"bands\" style=\"height:{9}px\">{11}</div>"
+      "</div>\n"
+      "<details><summary>All bands</summary><table class=\"data\"><thead><tr><th>band</th>"
+      "<th>begins at</th><th>made for</th><th>off in the picture</th></tr></thead><tbody>\n{12}"
+      "</tbody></table></details></section>\n",
+      trial.bands, is_sum ? "pressure advance" : "dead time", tower.side_mm,
+      tower.bottoms_mm.back() + tower.bottoms_mm[1] - tower.bottoms_mm[0], wall.slow_mm_s,
+      wall.fast_mm_s, wall.slow_mm, hotend.advance_s, 1e3 * hotend.dead_time_s,
+      kRow_px * static_cast<int>(trial.bands), width_picture(widths, tower.side_mm), numbers, rows);
+  return report::html_page(
+      {.title = "Pressure tower", .style = std::string(kStyle), .body = body, .script = {}});
 }
 
 }  // namespace unflex::app

@@ -14,4 +14,10 @@ namespace unflex::app {
                                     const std::vector<std::vector<pipeline::Relief>>& reliefs,
                                     const pipeline::TrueAxes& axes);
 
+// The page on a tower for the pressure. widths: those of its bands' outer rings with this hotend.
+[[nodiscard]] std::string pressure_page(const tune::PressureTowerSettings& settings,
+                                        const tune::Tower& tower,
+                                        const std::vector<pipeline::RingWidths>& widths,
+                                        const pipeline::TrueHotend& hotend);
+
 }  // namespace unflex::app

@@ -20,17 +20,37 @@ namespace unflex::pipeline {
 namespace {
 
 machine::Settings settings_of_band(const machine::Settings& settings,
-                                   const tune::TowerSettings& tower, std::size_t band) {
+                                   const std::array<tune::Trial, 2>& trials, std::size_t band) {
   machine::Settings result = settings;
   const auto set = [&](machine::AxisDynamics& axis, const tune::Trial& trial) {
     const std::size_t number = std::min(band, trial.bands);
     axis = {.freq_hz = trial.freq_hz(number), .damping_ratio = trial.damping_ratio(number)};
   };
-  set(result.dynamics_x, tower.trials[0]);
-  set(result.dynamics_y, tower.trials[1]);
+  set(result.dynamics_x, trials[0]);
+  set(result.dynamics_y, trials[1]);
   result.dynamics_error = {.freq = 0.0, .damping = 0.0};
   result.second = {};
   result.solve.along_weight = 1.0;
+  return result;
+}
+
+machine::Settings settings_of_band(const machine::Settings& settings,
+                                   const tune::PressureTrial& trial, std::size_t band) {
+  machine::Settings result = settings;
+  result.pressure.written = true;
+  result.pressure.shape = machine::PressureSettings{}.shape;
+  result.pressure.advance_s = trial.advance_s(band);
+  result.pressure.dead_time_ms = 1e3 * trial.dead_time_s(band);
+  return result;
+}
+
+template <class Trials>
+std::vector<machine::Settings> settings_of_all(const machine::Settings& settings,
+                                               const Trials& trials, std::size_t bands) {
+  std::vector<machine::Settings> result;
+  for (std::size_t band = 1; band <= bands; ++band) {
+    result.push_back(settings_of_band(settings, trials, band));
+  }
   return result;
 }
 
@@ -149,6 +169,36 @@ class WallWatcher final : public verify::Observer {
   std::vector<Relief> reliefs_;
 };
 
+// Takes the widths of a band's last line of plastic, which is the outer ring of its last layer.
+class WidthWatcher final : public verify::Observer {
+ public:
+  void line(const gcode::Line&) override {}
+  void section(const verify::ReferencePath&, const verify::ReferencePath&) override {}
+  void step(verify::NozzleId, const verify::NozzleStep&) override {}
+  void hold(double) override {}
+  void advanced(const verify::ReferencePath&, double) override {}
+  [[nodiscard]] double memory_s() const override { return 0.0; }
+  [[nodiscard]] bool asks_for_unshaped() const override { return false; }
+
+  void width(verify::NozzleId nozzle, const verify::WidthBin& bin) override {
+    if (nozzle.base != verify::NozzleBase::emitted || nozzle.model != 0) {
+      return;
+    }
+    if (bin.path != path_) {
+      path_ = bin.path;
+      widths_.errors.clear();
+      widths_.begin_mm = bin.begin_mm;
+    }
+    widths_.errors.push_back(bin.error);
+  }
+
+  [[nodiscard]] const RingWidths& widths() const { return widths_; }
+
+ private:
+  std::size_t path_ = 0;
+  RingWidths widths_;
+};
+
 }  // namespace
 
 double Relief::height_um() const {
@@ -159,10 +209,20 @@ double Relief::height_um() const {
   return high - low;
 }
 
+std::vector<machine::Settings> settings_of_bands(const tune::TowerSettings& tower,
+                                                 const machine::Settings& settings) {
+  return settings_of_all(settings, tower.trials,
+                         std::max(tower.trials[0].bands, tower.trials[1].bands));
+}
+
+std::vector<machine::Settings> settings_of_bands(const tune::PressureTowerSettings& tower,
+                                                 const machine::Settings& settings) {
+  return settings_of_all(settings, tower.trial, tower.trial.bands);
+}
+
 Result<std::vector<Band>> compensate_bands(const tune::Tower& tower,
-                                           const tune::TowerSettings& towers,
-                                           const machine::Settings& settings, unsigned workers,
-                                           Progress& progress) {
+                                           const std::vector<machine::Settings>& settings,
+                                           unsigned workers, Progress& progress) {
   std::vector<Band> result;
   BandProgress part(progress, tower.bands.size());
   for (std::size_t number = 1; number <= tower.bands.size(); ++number) {
@@ -170,12 +230,12 @@ Result<std::vector<Band>> compensate_bands(const tune::Tower& tower,
     std::string sliced = tower.start + (number == 1 ? tower.base : tower.approach(number)) +
                          tune::band_begins(number) + tower.bands[number - 1] +
                          tune::band_ends(number) + tower.foot;
-    machine::Settings made_for = settings_of_band(settings, towers, number);
+    const machine::Settings& made_for = settings[number - 1];
     Result<std::string> compensated = compensate_band(sliced, made_for, number, workers, part);
     if (!compensated) {
       return tl::unexpected(compensated.error());
     }
-    result.push_back({std::move(made_for), std::move(sliced), std::move(*compensated)});
+    result.push_back({made_for, std::move(sliced), std::move(*compensated)});
   }
   return result;
 }
@@ -210,6 +270,39 @@ Result<std::vector<std::vector<Relief>>> print_bands(const std::vector<Band>& ba
       return tl::unexpected(report.error());
     }
     result.push_back(watcher.reliefs());
+  }
+  return result;
+}
+
+double RingWidths::seen() const {
+  double largest = 0.0;
+  for (std::size_t i = 0; i + kBinsSeen <= errors.size(); ++i) {
+    double sum = 0.0;
+    for (std::size_t j = i; j < i + kBinsSeen; ++j) {
+      sum += errors[j];
+    }
+    largest = std::max(largest, std::abs(sum) / static_cast<double>(kBinsSeen));
+  }
+  return largest;
+}
+
+Result<std::vector<RingWidths>> print_bands(const std::vector<Band>& bands,
+                                            const TrueHotend& hotend, Progress& progress) {
+  std::vector<RingWidths> result;
+  for (const Band& band : bands) {
+    machine::Settings as_it_is = band.made_for;
+    as_it_is.pressure.advance_s = hotend.advance_s;
+    as_it_is.pressure.dead_time_ms = 1e3 * hotend.dead_time_s;
+    WidthWatcher watcher;
+    std::istringstream sliced(band.sliced);
+    std::istringstream compensated(band.compensated);
+    const Result<verify::VerifyReport> report =
+        verify::verify(sliced, "the tower", compensated, "the compensated tower",
+                       verify_rules(as_it_is), progress, {.detuned = {}, .observer = &watcher});
+    if (!report) {
+      return tl::unexpected(report.error());
+    }
+    result.push_back(watcher.widths());
   }
   return result;
 }

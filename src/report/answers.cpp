@@ -147,7 +147,7 @@ std::optional<std::string> hardly_worth_it(const Report& report) {
 std::string width_text(const Report& report) {
   if (!report.laid_line) {
     return "How wide the line comes out is not known: give pressure.advance_s, the pressure "
-           "advance that the hotend needs";
+           "advance that the hotend needs; unflex tune --pressure finds it by printing";
   }
   const WidthRow& before = report.laid_line->uncompensated.width;
   const WidthRow& after = report.laid_line->compensated.width;

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <optional>
 
-#include "unflex/core/number.hpp"
+#include "comment_fields.hpp"
 
 namespace unflex::tune {
 namespace {
@@ -117,26 +117,9 @@ std::string_view word(Parameter parameter) {
   return parameter == Parameter::freq_hz ? "freq_hz" : "damping_ratio";
 }
 
-// Takes " name=value" from the front of a line.
-std::optional<std::string_view> take(std::string_view& line, std::string_view name) {
-  if (!line.starts_with(' ')) {
-    return std::nullopt;
-  }
-  line.remove_prefix(1);
-  if (!line.starts_with(name) || line.substr(name.size(), 1) != "=") {
-    return std::nullopt;
-  }
-  line.remove_prefix(name.size() + 1);
-  const std::string_view value = line.substr(0, line.find(' '));
-  line.remove_prefix(value.size());
-  return value;
-}
-
-bool take_number(std::string_view& line, std::string_view name, double& number) {
-  const std::optional<std::string_view> text = take(line, name);
-  const std::optional<double> value = text ? parse_number(*text) : std::nullopt;
-  number = value.value_or(0.0);
-  return value && std::isfinite(*value) && *value >= 0.0;
+// A number that is not negative.
+bool take_positive(std::string_view& line, std::string_view name, double& number) {
+  return take_number(line, name, number) && number >= 0.0;
 }
 
 }  // namespace
@@ -235,13 +218,16 @@ Result<AxisTrial> from_comment(std::string_view line, const SourcePlace& place) 
   const bool good =
       parameter &&
       (*parameter == word(Parameter::freq_hz) || *parameter == word(Parameter::damping_ratio)) &&
-      take_number(rest, "bands", bands) && take_number(rest, "first", trial.first) &&
-      take_number(rest, "step", trial.step) && take_number(rest, "freq_hz", trial.known.freq_hz) &&
-      take_number(rest, "freq_error", trial.known.freq_error) &&
-      take_number(rest, "damping_ratio", trial.known.damping_ratio) &&
-      take_number(rest, "damping_error", trial.known.damping_error) &&
-      take_number(rest, "rounds", rounds) && take_number(rest, "wave_hz", trial.waves.freq_hz) &&
-      take_number(rest, "wave_accel", trial.waves.accel_mm_s2) && take_number(rest, "waves", count);
+      take_positive(rest, "bands", bands) && take_positive(rest, "first", trial.first) &&
+      take_positive(rest, "step", trial.step) &&
+      take_positive(rest, "freq_hz", trial.known.freq_hz) &&
+      take_positive(rest, "freq_error", trial.known.freq_error) &&
+      take_positive(rest, "damping_ratio", trial.known.damping_ratio) &&
+      take_positive(rest, "damping_error", trial.known.damping_error) &&
+      take_positive(rest, "rounds", rounds) &&
+      take_positive(rest, "wave_hz", trial.waves.freq_hz) &&
+      take_positive(rest, "wave_accel", trial.waves.accel_mm_s2) &&
+      take_positive(rest, "waves", count);
   constexpr double kMost = 1000.0;
   if (!good || bands < 1.0 || bands > kMost || rounds > kMost || count > kMost ||
       trial.first <= 0.0 || trial.step <= 0.0) {

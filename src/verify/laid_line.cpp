@@ -258,7 +258,11 @@ void LaidLine::end_lines_before(std::size_t number) {
 void LaidLine::measure(Line& line, double until_mm) {
   const double last_mm = std::min(until_mm, line.length_mm - kEnd_mm) + kRounding_mm;
   while (!line.bins.empty() && begin_of_bin_mm(line.first_bin + 1) <= last_mm) {
-    count(line.bins.front());
+    const Bin& bin = line.bins.front();
+    count(bin);
+    if (observer_ != nullptr) {
+      observer_->width(nozzle_, {line.number, begin_of_bin_mm(line.first_bin), width_error(bin)});
+    }
     line.bins.pop_front();
     ++line.first_bin;
   }
@@ -266,7 +270,7 @@ void LaidLine::measure(Line& line, double until_mm) {
 
 void LaidLine::count(const Bin& bin) {
   bins_ += 1.0;
-  const double error = bin.laid_mm[0] / bin.wanted_mm - 1.0;
+  const double error = width_error(bin);
   width_.add(error, bin.line);
   for (std::size_t i = 0; i < kOtherHotends; ++i) {
     other_[i].add(bin.laid_mm[1 + i] / bin.wanted_mm - 1.0, bin.line);

@@ -31,6 +31,7 @@
 #include "unflex/planner/printer_shaper.hpp"
 #include "unflex/verify/line_stats.hpp"
 #include "unflex/verify/log_histogram.hpp"
+#include "unflex/verify/observer.hpp"
 #include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
@@ -42,6 +43,11 @@ class LaidLine {
   // From now on. `hotend` is what the file is printed with; with an advance of 0 it is not known,
   // and nothing is measured.
   void set(const dynamics::HotendPressure& hotend, const planner::FirmwareAdvance& advance);
+  // Tells the observer of each bin, as of this nozzle. Null: nobody.
+  void watch(Observer* observer, NozzleId nozzle) {
+    observer_ = observer;
+    nozzle_ = nozzle;
+  }
   // Whether the hotend is known.
   [[nodiscard]] bool is_measuring() const { return hotend_.advance_s > 0.0; }
   // Measures against this path from now on, beginning with its current section.
@@ -118,8 +124,13 @@ class LaidLine {
   void end_lines_before(std::size_t number);
   void measure(Line& line, double until_mm);
   void count(const Bin& bin);
+  [[nodiscard]] static double width_error(const Bin& bin) {
+    return bin.laid_mm[0] / bin.wanted_mm - 1.0;
+  }
 
   LineModel model_;
+  Observer* observer_ = nullptr;
+  NozzleId nozzle_;
   dynamics::HotendPressure hotend_;
   planner::FirmwareAdvance advance_;
   std::array<PressedFilament, kHotends> pressed_;

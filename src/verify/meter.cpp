@@ -66,6 +66,14 @@ Meter::Meter(const NozzleModel& model, double near_s) : model_(model), near_(nea
 void Meter::watch(Observer* observer, NozzleId id) {
   observer_ = observer;
   id_ = id;
+  if (line_) {
+    line_->watch(observer_, id_);
+  }
+}
+
+void Meter::follow_line(const LineModel& model) {
+  line_.emplace(model);
+  line_->watch(observer_, id_);
 }
 
 void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm) {

@@ -131,7 +131,7 @@ class Meter {
   [[nodiscard]] LagStats filament_lag() const { return filament_lag_.stats(); }
 
   // Also measures the line of plastic.
-  void follow_line(const LineModel& model) { line_.emplace(model); }
+  void follow_line(const LineModel& model);
   void drop_line() { line_.reset(); }
   // nullptr if it is not followed.
   [[nodiscard]] LaidLine* line() { return line_ ? &*line_ : nullptr; }

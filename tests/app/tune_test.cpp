@@ -89,6 +89,38 @@ TEST_F(Tune, TellsTheLinesIfThereIsNoPrinterFile) {
   EXPECT_THAT(wrong.err, HasSubstr("the bands 1 to 40"));
 }
 
+// A tower for the pressure is read into the printer file, and the next one is written.
+TEST_F(Tune, ReadsAPressureTowerAndWritesTheNext) {
+  write_file(path("p.toml"), std::string(kPrinter) + "[dynamics.x]\nfreq_hz = 45\n");
+  // The first lines of a tower are enough to read it. So small a sum leaves few dead times to try.
+  write_file(path("t1.gcode"),
+             "; unflex tune: pressure parameter=sum bands=11 first=0.005 step=0.0002 sum=0.006 "
+             "sum_error=0.001 dead_time=0.004 dead_time_error=0.005 rounds=1\n"
+             "; unflex tune: center=110 110\n; unflex tune: start=G28\n");
+  const Outcome read = run_as_typed({"tune", "t1.gcode", "--read", "pressure=5..7", "--printer",
+                                     "p.toml", "-o", "t2.gcode", "--report", "t2.html"});
+  ASSERT_EQ(read.exit_code, 0) << read.err;
+  EXPECT_THAT(read.out,
+              AllOf(HasSubstr("pressure advance 0.0020 s, dead time 4.0 ms; their sum 0.0060 s"),
+                    HasSubstr("bands 1 to 15 try dead times -2 to 5 ms\n"),
+                    HasSubstr("unflex tune t2.gcode --read pressure=FIRST..LAST --printer p.toml "
+                              "-o NEXT\n"),
+                    HasSubstr("p.toml: written\n")));
+  EXPECT_THAT(read_file(path("p.toml")),
+              AllOf(HasSubstr("[pressure]\nadvance_s = 0.00200"), HasSubstr("dead_time_ms = 4.00"),
+                    HasSubstr("firmware = \"klipper\"  # mine\n")));
+  EXPECT_THAT(
+      read_file(path("t2.gcode")),
+      AllOf(HasSubstr("; unflex tune: start=G28\n"), HasSubstr("; band 15 ends\n"),
+            HasSubstr("SET_PRESSURE_ADVANCE ADVANCE=0.008000\n"), HasSubstr(";unflex run\n")));
+  EXPECT_THAT(read_file(path("t2.html")),
+              AllOf(HasSubstr("data:image/bmp;base64,"), HasSubstr("pressure=FIRST..LAST")));
+  const Outcome wrong =
+      run_as_typed({"tune", "t2.gcode", "--read", "x=5..7", "--printer", "p.toml"});
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_THAT(wrong.err, HasSubstr("t2.gcode tries the pressure"));
+}
+
 TEST_F(Tune, RefusesWhatMakesNoSense) {
   write_file(path("part.gcode"), small_print());
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
@@ -98,6 +130,8 @@ TEST_F(Tune, RefusesWhatMakesNoSense) {
       {{"tune", "--read", "x=1..2", "-o", "t.gcode"}, "give its file too"},
       {{"tune", "part.gcode", "--read", "z=1..2"}, "x=12..19"},
       {{"tune", "part.gcode", "--read", "x=1..b"}, "x=12..19"},
+      {{"tune", "part.gcode", "--read", "pressure=3..0"}, "pressure=12..19"},
+      {{"tune", "part.gcode", "--pressure", "--read", "pressure=1..2"}, "for the first tower"},
       {{"tune", "part.gcode", "--read", "x=2..3", "--printer", "p.toml"}, "is no tower"},
       {{"tune", "-o", "t.gcode", "--nozzle-temp", "210", "--report", "t.json"}, ".html"},
       {{"tune", "-o", "t.gcode", "--nozzle-temp", "210", "--printer", "p.toml", "--set",

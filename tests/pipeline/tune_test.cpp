@@ -67,7 +67,7 @@ std::array<tune::Knowledge, 2> tuned(const machine::Settings& settings, const Tr
   for (int round = 0; round < rounds; ++round) {
     const tune::TowerSettings towers = tower_settings(settings, known);
     const tune::Tower tower = tune::tower(towers);
-    const auto bands = compensate_bands(tower, towers, settings, 2, progress);
+    const auto bands = compensate_bands(tower, settings_of_bands(towers, settings), 2, progress);
     EXPECT_TRUE(bands) << to_string(bands.error());
     const auto reliefs = print_bands(*bands, tower, axes, progress);
     EXPECT_TRUE(reliefs) << to_string(reliefs.error());
@@ -128,7 +128,7 @@ TEST(Tune, BandsMakeOnePrintThatBreaksNoRule) {
     const tune::TowerSettings towers = even_tower(settings);
     const tune::Tower tower = tune::tower(towers);
     SilentProgress progress;
-    const auto bands = compensate_bands(tower, towers, settings, 2, progress);
+    const auto bands = compensate_bands(tower, settings_of_bands(towers, settings), 2, progress);
     ASSERT_TRUE(bands) << to_string(bands.error());
     std::string sliced = tower.start + tower.base;
     for (std::size_t number = 1; number <= tower.bands.size(); ++number) {
@@ -153,8 +153,8 @@ TEST(Tune, GivesTheSameForAnyNumberOfThreads) {
   const tune::TowerSettings towers = even_tower(settings);
   const tune::Tower tower = tune::tower(towers);
   SilentProgress progress;
-  const auto one = compensate_bands(tower, towers, settings, 1, progress);
-  const auto three = compensate_bands(tower, towers, settings, 3, progress);
+  const auto one = compensate_bands(tower, settings_of_bands(towers, settings), 1, progress);
+  const auto three = compensate_bands(tower, settings_of_bands(towers, settings), 3, progress);
   ASSERT_TRUE(one && three);
   EXPECT_EQ(join_bands(*one), join_bands(*three));
 }
@@ -164,7 +164,8 @@ TEST(Tune, RefusesAPrinterThatCannotBeCompensated) {
   settings.refusal = Diagnostic{{"p.toml", 3}, "this firmware caps limits"};
   const tune::TowerSettings towers = even_tower(settings);
   SilentProgress progress;
-  const auto bands = compensate_bands(tune::tower(towers), towers, settings, 1, progress);
+  const auto bands =
+      compensate_bands(tune::tower(towers), settings_of_bands(towers, settings), 1, progress);
   ASSERT_FALSE(bands);
   EXPECT_EQ(bands.error().message, "this firmware caps limits");
 }
@@ -174,7 +175,8 @@ TEST(Tune, RefusesABandThatStaysAsSliced) {
   const machine::Settings settings = printer({"emit.max_lines_per_s=12"});
   const tune::TowerSettings towers = even_tower(settings);
   SilentProgress progress;
-  const auto bands = compensate_bands(tune::tower(towers), towers, settings, 1, progress);
+  const auto bands =
+      compensate_bands(tune::tower(towers), settings_of_bands(towers, settings), 1, progress);
   ASSERT_FALSE(bands);
   EXPECT_EQ(bands.error().kind, ErrorKind::usage);
   EXPECT_NE(bands.error().message.find("stays as sliced"), std::string::npos)

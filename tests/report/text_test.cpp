@@ -106,7 +106,8 @@ TEST(Summary, TellsHowToKnowTheLineWhereItDoesNot) {
   EXPECT_THAT(text, HasSubstr("\nBetter?       200 → 3.12 µm RMS from the path: 64 times less than "
                               "now (under the printer's own input shaper, MZV 45 Hz)\n"
                               "              How wide the line comes out is not known: give "
-                              "pressure.advance_s, the pressure advance that the hotend needs\n"));
+                              "pressure.advance_s, the pressure advance that the hotend needs; "
+                              "unflex tune --pressure finds it by printing\n"));
   EXPECT_THAT(text, HasSubstr("laid 60.0 → 4.50 µm RMS ahead of the nozzle or behind"));
   EXPECT_THAT(text, Not(HasSubstr("edges")));
 }

@@ -66,7 +66,9 @@ struct IdentifyConfig {
 struct TuneConfig {
   // The bands without waves, for X and Y.
   std::array<std::optional<tune::Zone>, 2> zones;
-  std::optional<std::string> like;  // a sliced print, for its start and end codes
+  bool asks_for_pressure = false;           // the first tower shall be for the hotend
+  std::optional<tune::Zone> pressure_zone;  // the bands with even walls
+  std::optional<std::string> like;          // a sliced print, for its start and end codes
   std::optional<double> nozzle_temp_c;
   double bed_temp_c = 0.0;
   std::optional<double> accel_mm_s2 = {};  // of the tower, instead of the printer's own

@@ -9,6 +9,7 @@
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/tune/pressure_tower.hpp"
 #include "unflex/tune/tower.hpp"
 
 namespace unflex::pipeline {
@@ -21,14 +22,21 @@ struct Band {
   std::string compensated;
 };
 
-// Compensates each band for the values that its number has in the trials, by the exact design of
-// one mode for each axis, since a base that suits several models hides what is looked for. Whatever
-// else `settings` say holds. workers: how many threads. Errors: those of compensate(), and a rule
-// that is broken, of kind internal.
-[[nodiscard]] Result<std::vector<Band>> compensate_bands(const tune::Tower& tower,
-                                                         const tune::TowerSettings& towers,
-                                                         const machine::Settings& settings,
-                                                         unsigned workers, Progress& progress);
+// What each band is compensated with: the values that its number has in the trials, by the exact
+// design of one mode for each axis, since a base that suits several models hides what is looked
+// for. Whatever else `settings` say holds.
+[[nodiscard]] std::vector<machine::Settings> settings_of_bands(const tune::TowerSettings& tower,
+                                                               const machine::Settings& settings);
+// What each band is compensated with for a hotend whose pressure is linear. It is written on all
+// firmwares.
+[[nodiscard]] std::vector<machine::Settings> settings_of_bands(
+    const tune::PressureTowerSettings& tower, const machine::Settings& settings);
+
+// Compensates each band of the tower with its settings. workers: how many threads. Errors: those of
+// compensate(), and a rule that is broken, of kind internal.
+[[nodiscard]] Result<std::vector<Band>> compensate_bands(
+    const tune::Tower& tower, const std::vector<machine::Settings>& settings, unsigned workers,
+    Progress& progress);
 
 // The bands as one file.
 [[nodiscard]] std::string join_bands(const std::vector<Band>& bands);
@@ -55,5 +63,28 @@ struct Relief {
                                                                    const tune::Tower& tower,
                                                                    const TrueAxes& axes,
                                                                    Progress& progress);
+
+// The hotend of a printer as it is.
+struct TrueHotend {
+  double advance_s = 0.0;
+  double dead_time_s = 0.0;
+};
+
+// A band's outer ring in its last layer: how far its width is off in bins of 0.4 mm, as a share.
+// The first and the last millimetre have none.
+struct RingWidths {
+  double begin_mm = 0.0;  // where the first bin begins on the ring
+  std::vector<double> errors;
+
+  // What an eye sees: the largest mean of neighbouring bins, without its sign.
+  static constexpr std::size_t kBinsSeen = 2;
+  [[nodiscard]] double seen() const;
+};
+
+// What a printer with this hotend makes of the bands, by a simulation of the compensated file's
+// replay. Its axes are those that the bands are made for.
+[[nodiscard]] Result<std::vector<RingWidths>> print_bands(const std::vector<Band>& bands,
+                                                          const TrueHotend& hotend,
+                                                          Progress& progress);
 
 }  // namespace unflex::pipeline

@@ -40,8 +40,8 @@ struct AccelLimits {
   double travel = 0.0;
 };
 
-struct TowerSettings {
-  std::array<Trial, 2> trials;  // X's and Y's
+// Which printer a tower is for.
+struct TowerPrinter {
   Firmware firmware = Firmware::klipper;
   Codes codes;
   double accel_mm_s2 = 5000.0;  // of the print
@@ -51,6 +51,10 @@ struct TowerSettings {
   double nozzle_diameter_mm = 0.4;
   double filament_diameter_mm = 1.75;
   std::size_t layers_per_band = 8;  // at least 2
+};
+
+struct TowerSettings : TowerPrinter {
+  std::array<Trial, 2> trials;  // X's and Y's
 };
 
 // The straight part of a wall behind its waves.
@@ -70,7 +74,7 @@ struct Tower {
   // Moves to where a band begins, number 1 … . Behind `start` this stands in for what lies below.
   [[nodiscard]] std::string approach(std::size_t number) const;
   std::vector<double> bottoms_mm;  // height at which each band begins
-  std::vector<Wall> walls;         // the right one and the bottom one
+  std::vector<Wall> walls;         // of a tower for axes: the right one and the bottom one
   double side_mm = 0.0;            // of the square
   double brim_mm = 0.0;            // how far the brim reaches beyond it
   double begin_x_mm = 0.0;         // where each band begins and ends

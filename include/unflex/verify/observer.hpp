@@ -49,6 +49,13 @@ struct NozzleStep {
   std::size_t piece = 0;  // piece of the reference's path
 };
 
+// A bin of a line of plastic, once all that comes out there has come out (Rules::line).
+struct WidthBin {
+  std::size_t path = 0;   // number of the line of plastic, from 1 on
+  double begin_mm = 0.0;  // where the bin begins on it
+  double error = 0.0;     // of the width, as a share of what the sliced file asks for
+};
+
 class Observer {
  public:
   virtual ~Observer() = default;
@@ -62,6 +69,8 @@ class Observer {
   // is the same move in both.
   virtual void section(const ReferencePath& sliced, const ReferencePath& emitted) = 0;
   virtual void step(NozzleId nozzle, const NozzleStep& step) = 0;
+  // The line that lies below this nozzle. Few ask for it.
+  virtual void width(NozzleId /*nozzle*/, const WidthBin& /*bin*/) {}
   // The base stands still for duration_s, between sections.
   virtual void hold(double duration_s) = 0;
   // All nozzles on the sliced file's plan have been moved to this time of `sliced`.

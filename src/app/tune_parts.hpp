@@ -1,0 +1,64 @@
+// What towers of all kinds share: the printer that they are for, the files that come of them.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "results.hpp"
+#include "unflex/app/run_config.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/machine/toml_edit.hpp"
+#include "unflex/pipeline/tune.hpp"
+
+namespace unflex::app {
+
+// A printer for which towers are made, and the codes of its prints.
+struct TowerSite {
+  machine::Settings settings;
+  std::optional<tune::AccelLimits> own = {};  // its own limits, with --accel
+  tune::Codes codes;
+};
+
+// How a kind of tower loads the settings. The print is null if there is none.
+using LoadSettings =
+    std::function<Result<machine::Settings>(const RunConfig& config, const machine::PrintText*)>;
+
+// For the first tower, with the codes of --like or of the temperatures.
+[[nodiscard]] Result<TowerSite> first_site(const RunConfig& config, const LoadSettings& load);
+// For a tower after one that has told its codes.
+[[nodiscard]] Result<TowerSite> later_site(const RunConfig& config, const LoadSettings& load,
+                                           tune::Codes codes);
+
+// The text of the tower that has been printed (RunConfig::input).
+[[nodiscard]] Result<std::string> printed_tower(const RunConfig& config);
+
+// Whether somebody has given this key.
+[[nodiscard]] bool is_given(const machine::Settings& settings, const std::string& key);
+
+// What a tower's settings say of the printer.
+[[nodiscard]] tune::TowerPrinter tower_printer(const TowerSite& site);
+
+// Compensates the bands and writes the tower to RunConfig::output, and the page that `page` makes
+// of them to RunConfig::report. An error of kind usage if the tower is larger than the bed.
+using PageOf = std::function<Result<std::string>(const std::vector<pipeline::Band>& bands,
+                                                 Progress& progress)>;
+[[nodiscard]] Status write_tower(const RunConfig& config, const TowerSite& site,
+                                 const tune::Tower& tower,
+                                 const std::vector<machine::Settings>& of_bands,
+                                 const PageOf& page);
+
+// The options of this tower's command that the next one's needs as well.
+[[nodiscard]] std::string further_options(const RunConfig& config);
+
+// The printer file with these values; empty if there is none, and then `summary` gets the lines.
+[[nodiscard]] Result<std::string> edited_printer_file(const RunConfig& config,
+                                                      const std::vector<machine::TomlEdit>& edits,
+                                                      std::string& summary);
+
+// Ends the command: writes the printer file if there is text for it, and tells the summary.
+[[nodiscard]] Result<ExitCode> finish_tune(const RunConfig& config, const std::string& printer_file,
+                                           std::string summary);
+
+}  // namespace unflex::app

@@ -1,0 +1,100 @@
+#include "unflex/tune/pressure_tower.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "tower_writer.hpp"
+
+namespace unflex::tune {
+namespace {
+
+constexpr double kSlow_mm_s = 20.0;
+constexpr double kFast_mm_s = 120.0;
+// Most hotends melt as much.
+constexpr double kFlow_mm3_s = 11.0;
+constexpr double kSlow_mm = 10.0;
+// Where the speed is even between its changes.
+constexpr double kEven_mm = 36.0;
+constexpr double kLongestRunUp_mm = 12.0;
+
+std::string advance_command(Firmware firmware, double advance_s) {
+  switch (firmware) {
+    case Firmware::klipper:
+      return fmt::format("SET_PRESSURE_ADVANCE ADVANCE={:.6f}\n", advance_s);
+    case Firmware::marlin:
+      return fmt::format("M900 K{:.6f}\n", advance_s);
+    case Firmware::rrf:
+      break;
+  }
+  return fmt::format("M572 D0 S{:.6f}\n", advance_s);
+}
+
+}  // namespace
+
+PressureWall pressure_wall(const PressureTowerSettings& settings) {
+  PressureWall wall{.slow_mm_s = kSlow_mm_s, .slow_mm = kSlow_mm};
+  const TowerWriter lines(settings, 0.0);
+  const double flow_mm3_s = settings.max_flow_mm3_s.value_or(kFlow_mm3_s);
+  const double slow2 = kSlow_mm_s * kSlow_mm_s;
+  wall.fast_mm_s = std::min({kFast_mm_s, settings.max_velocity_mm_s,
+                             flow_mm3_s / (lines.layer() * lines.width()),
+                             std::sqrt(slow2 + 2.0 * settings.accel_mm_s2 * kLongestRunUp_mm)});
+  wall.slow_mm_s = std::min(kSlow_mm_s, 0.5 * wall.fast_mm_s);
+  wall.fast_mm = kEven_mm + (wall.fast_mm_s * wall.fast_mm_s - wall.slow_mm_s * wall.slow_mm_s) /
+                                settings.accel_mm_s2;
+  return wall;
+}
+
+Tower tower(const PressureTowerSettings& settings) {
+  const PressureWall parts = pressure_wall(settings);
+  TowerWriter writer(settings, parts.fast_mm + 2.0 * parts.slow_mm);
+  const auto step_wall = [&](int wall, double inset_mm) {
+    const Point start = writer.corner(wall + 2, inset_mm, 1.0);
+    const auto at = [&](double distance_mm) {
+      return TowerWriter::on_wall(wall, start, distance_mm, 0.0);
+    };
+    writer.extrude(at(parts.slow_mm), parts.slow_mm_s);
+    writer.extrude(at(parts.slow_mm + parts.fast_mm), parts.fast_mm_s);
+    writer.extrude(writer.corner(wall + 3, inset_mm, 0.0), parts.slow_mm_s);
+  };
+  return writer.write(to_comment(settings.trial) + "\n",
+                      {.count = settings.trial.bands,
+                       .corner_speed_mm_s = parts.slow_mm_s,
+                       .outer_wall = step_wall,
+                       .head =
+                           [&](std::size_t band) {
+                             return advance_command(settings.firmware,
+                                                    settings.trial.advance_s(band));
+                           },
+                       .after = advance_command(settings.firmware, settings.own_advance_s)});
+}
+
+bool is_pressure_tower(const std::string& text) {
+  return text.find(kPressureMark) != std::string::npos;
+}
+
+Result<PressureTowerRecord> pressure_record_of(const std::string& text, const std::string& name) {
+  PressureTowerRecord record;
+  bool found = false;
+  Result<Codes> codes =
+      codes_in(text, name, kPressureMark, [&](std::string_view line, const SourcePlace& place) {
+        return pressure_trial(line, place).map([&](const PressureTrial& trial) {
+          record.trial = trial;
+          found = true;
+        });
+      });
+  if (!codes) {
+    return tl::unexpected(codes.error());
+  }
+  if (!found) {
+    return fail(ErrorKind::input, {name, 0}, kNoTower);
+  }
+  record.codes = std::move(*codes);
+  return record;
+}
+
+}  // namespace unflex::tune
