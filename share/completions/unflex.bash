@@ -16,7 +16,7 @@ _unflex_options() {
       echo '-h --help --axis --freq-start --freq-end --wave-spacing-mm --speed-mm-s --decay' \
            '--second --make-test -o --output --printer --set --report -q --quiet' ;;
     tune)
-      echo '-h --help --read -o --output --like --nozzle-temp --bed-temp --accel --printer --set' \
+      echo '-h --help --read --pressure -o --output --like --nozzle-temp --bed-temp --accel --printer --set' \
            '--report -j --jobs -q --quiet' ;;
     hotend)
       echo '-h --help --power --heater --ambient --ku --pu --rule --target --flow --heater-watts' \

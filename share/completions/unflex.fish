@@ -106,6 +106,7 @@ complete -c unflex -n '__unflex_in tune' -l read -x -d 'Bands without waves, x=F
 complete -c unflex -n '__unflex_in tune' -s o -l output -x -a $gcode -d 'Where to write the next tower, - for stdout'
 complete -c unflex -n '__unflex_in tune' -l like -x -a $gcode -d 'A sliced print, for its start code and end code'
 complete -c unflex -n '__unflex_in tune' -l nozzle-temp -x -d 'Without --like: degrees Celsius'
+complete -c unflex -n '__unflex_in tune' -l pressure -d 'The first tower tries pressure advances'
 complete -c unflex -n '__unflex_in tune' -l bed-temp -x -d 'Without --like: degrees Celsius'
 complete -c unflex -n '__unflex_in tune' -l accel -x -d 'Acceleration of the tower, mm/s²'
 complete -c unflex -n '__unflex_in tune' -l report -x -a '(__unflex_files .html)' -d 'Write a page with pictures of the walls'
