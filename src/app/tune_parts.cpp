@@ -182,6 +182,13 @@ tune::TowerPrinter tower_printer(const TowerSite& site) {
           .filament_diameter_mm = site.settings.extruder.filament_diameter_mm};
 }
 
+void lower_accel(const TowerSite& site, double most_mm_s2, tune::TowerPrinter& tower) {
+  if (tower.accel_mm_s2 > most_mm_s2) {
+    tower.accel_mm_s2 = most_mm_s2;
+    tower.own = site.own.value_or(own_limits(site.settings));
+  }
+}
+
 Status write_tower(const RunConfig& config, const TowerSite& site, const tune::Tower& tower,
                    const std::vector<machine::Settings>& of_bands, const PageOf& page_of) {
   if (Status placed = check_place(site.settings, tower, site.codes); !placed) {

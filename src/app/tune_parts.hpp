@@ -40,6 +40,9 @@ using LoadSettings =
 // What a tower's settings say of the printer.
 [[nodiscard]] tune::TowerPrinter tower_printer(const TowerSite& site);
 
+// Has the tower accelerate no more than this. The printer has its own limits back behind it.
+void lower_accel(const TowerSite& site, double most_mm_s2, tune::TowerPrinter& tower);
+
 // Compensates the bands and writes the tower to RunConfig::output, and the page that `page` makes
 // of them to RunConfig::report. An error of kind usage if the tower is larger than the bed.
 using PageOf = std::function<Result<std::string>(const std::vector<pipeline::Band>& bands,

@@ -116,6 +116,10 @@ Status write_next(const RunConfig& config, const Printer& printer, std::string& 
   wanted.own_advance_s = printer.site.settings.extruder.pressure_advance_s;
   wanted.layers_per_band = kLayersPerBand;
   wanted.trial = tune::next_trial(printer.known);
+  lower_accel(
+      printer.site,
+      tune::followed_accel_mm_s2(wanted, printer.site.settings.pressure.max_extruder_accel_mm_s2),
+      wanted);
   const tune::Tower tower = tune::tower(wanted);
   const std::size_t middle = (wanted.trial.bands + 1) / 2;
   const pipeline::TrueHotend hotend{wanted.trial.advance_s(middle),

@@ -43,7 +43,9 @@ report::LineRow row(const verify::LineStats& stats) {
           row(stats.other[0]),
           row(stats.other[1]),
           row(stats.other[2]),
-          row(stats.other[3])};
+          row(stats.other[3]),
+          {stats.first.rms, stats.first.mean},
+          {stats.last.rms, stats.last.mean}};
 }
 
 report::FlowRow row(const verify::FlowStats& stats) {

@@ -47,6 +47,8 @@ Json line_json(const LineRow& row) {
             {"p99_mm", row.edge.p99_mm},
             {"max_mm", row.edge.max_mm},
             {"line", row.edge.line}}},
+          {"first_mm", {{"rms", row.first.rms}, {"mean", row.first.mean}}},
+          {"last_mm", {{"rms", row.last.rms}, {"mean", row.last.mean}}},
           {"less_pressure", width_json(row.less_pressure)},
           {"more_pressure", width_json(row.more_pressure)},
           {"earlier", width_json(row.earlier)},

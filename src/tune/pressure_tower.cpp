@@ -49,6 +49,14 @@ PressureWall pressure_wall(const PressureTowerSettings& settings) {
   return wall;
 }
 
+double followed_accel_mm_s2(const PressureTowerSettings& settings, double extruder_mm_s2) {
+  constexpr double kSoon_s = 0.008;
+  // While nothing is known, bands that are far off need not be even.
+  const double advance_s =
+      std::max(settings.trial.known.has_sum() ? settings.trial.known.advance_s() : 0.1, 1e-3);
+  return kSoon_s * extruder_mm_s2 / (advance_s * TowerWriter(settings, 0.0).filament_per_mm());
+}
+
 Tower tower(const PressureTowerSettings& settings) {
   const PressureWall parts = pressure_wall(settings);
   TowerWriter writer(settings, parts.fast_mm + 2.0 * parts.slow_mm);

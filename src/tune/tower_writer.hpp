@@ -25,6 +25,7 @@ class TowerWriter {
 
   [[nodiscard]] double layer() const { return 0.5 * printer_->nozzle_diameter_mm; }
   [[nodiscard]] double width() const { return 1.125 * printer_->nozzle_diameter_mm; }
+  [[nodiscard]] double filament_per_mm() const { return e_per_mm_; }
   [[nodiscard]] double side_mm() const { return side_mm_; }
   // What has been written since.
   [[nodiscard]] std::string take();

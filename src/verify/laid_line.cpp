@@ -39,6 +39,11 @@ double overlap_mm(std::size_t bin, double a_mm, double b_mm) {
   return std::max(std::min(b_mm, begin + kBin_mm) - std::max(a_mm, begin), 0.0);
 }
 
+// How much of [a, b] lies in the first millimetre.
+double of_first_mm(double a_mm, double b_mm) {
+  return std::max(std::min(b_mm, kEnd_mm) - a_mm, 0.0);
+}
+
 }  // namespace
 
 LaidLine::LaidLine(const LineModel& model) : model_(model) {
@@ -114,6 +119,7 @@ void LaidLine::extend(Line& line, const PathPiece& piece) {
   const double from_mm = line.length_mm;
   line.length_mm += piece.length_xy_mm;
   const double per_mm = piece.move.segment.delta(gcode::E) / piece.length_xy_mm;
+  line.first.wanted_mm += per_mm * of_first_mm(from_mm, line.length_mm);
   for (std::size_t number = bin_at(from_mm); begin_of_bin_mm(number) < line.length_mm; ++number) {
     if (number < line.first_bin) {
       continue;
@@ -234,6 +240,7 @@ void LaidLine::deposit(const Place& from, const Place& to, const PerHotend& out_
   Line& line = open_[to.line - open_.front().number];
   const double a_mm = std::min(from.along_mm, to.along_mm);
   const double b_mm = std::max({from.along_mm, to.along_mm, a_mm + kRounding_mm});
+  line.first.laid_mm[0] += of_first_mm(a_mm, b_mm) / (b_mm - a_mm) * out_mm[0];
   for (std::size_t number = std::max(bin_at(a_mm), line.first_bin);
        begin_of_bin_mm(number) < b_mm && number - line.first_bin < line.bins.size(); ++number) {
     const double share = overlap_mm(number, a_mm, b_mm) / (b_mm - a_mm);
@@ -250,7 +257,23 @@ void LaidLine::deposit(const Place& from, const Place& to, const PerHotend& out_
 void LaidLine::end_lines_before(std::size_t number) {
   while (!open_.empty() && open_.front().number < number) {
     measure(open_.front(), open_.front().length_mm);
+    measure_ends(open_.front());
     open_.pop_front();
+  }
+}
+
+// The bins that are left are those of the last millimetre.
+void LaidLine::measure_ends(const Line& line) {
+  constexpr double kShortest_mm = 3.0;
+  Bin last;
+  for (const Bin& bin : line.bins) {
+    last.wanted_mm += bin.wanted_mm;
+    last.laid_mm[0] += bin.laid_mm[0];
+  }
+  if (line.length_mm >= kShortest_mm && line.first.wanted_mm > 0.0 && last.wanted_mm > 0.0) {
+    lines_with_ends_ += 1.0;
+    first_.add(width_error(line.first));
+    last_.add(width_error(last));
   }
 }
 
@@ -303,6 +326,15 @@ void LaidLine::Widths::add(double width_error, std::size_t at_line) {
   }
 }
 
+void LaidLine::Ends::add(double error) {
+  sum += error;
+  sum2 += error * error;
+}
+
+EndStats LaidLine::Ends::stats(double count) const {
+  return count > 0.0 ? EndStats{std::sqrt(sum2 / count), sum / count} : EndStats{};
+}
+
 WidthStats LaidLine::Widths::stats(double count) const {
   if (count == 0.0) {
     return {};
@@ -318,6 +350,8 @@ LineStats LaidLine::stats() const {
   for (std::size_t i = 0; i < kOtherHotends; ++i) {
     result.other[i] = other_[i].stats(bins_);
   }
+  result.first = first_.stats(lines_with_ends_);
+  result.last = last_.stats(lines_with_ends_);
   if (bins_ > 0.0) {
     result.edge = {std::sqrt(sum_edge2_ / bins_),
                    std::min(edge_mm_.quantile(0.99), largest_edge_mm_), largest_edge_mm_,

@@ -8,7 +8,8 @@
 //   V(t)      filament that has come out by then (PressedFilament)
 //   s(t)      where on its line the nozzle is
 //   bin       0.4 mm of a line of the sliced file. A line is the way in X and Y between two places
-//             where nothing is laid; its first and last millimetre have no bins
+//             where nothing is laid; its first and last millimetre have no bins, but are measured
+//             as a whole
 //   w         width error of a bin: filament that comes out while s is in it, over what the sliced
 //             file asks there, minus one
 //   edge      |contour error| + |w|/2 · width of a line, mm: how far one edge of the line may be
@@ -98,6 +99,7 @@ class LaidLine {
     std::size_t number = 0;
     double length_mm = 0.0;  // as far as it is known
     bool is_complete = false;
+    Bin first;                  // its first millimetre
     std::size_t first_bin = 0;  // number of the first that is kept
     std::deque<Bin> bins;
   };
@@ -109,6 +111,14 @@ class LaidLine {
     std::size_t line = 0;
     void add(double width_error, std::size_t at_line);
     [[nodiscard]] WidthStats stats(double count) const;
+  };
+
+  // One end of the lines.
+  struct Ends {
+    double sum = 0.0;
+    double sum2 = 0.0;
+    void add(double error);
+    [[nodiscard]] EndStats stats(double count) const;
   };
 
   void take_pieces(const ReferencePath& path);
@@ -124,6 +134,7 @@ class LaidLine {
   void end_lines_before(std::size_t number);
   void measure(Line& line, double until_mm);
   void count(const Bin& bin);
+  void measure_ends(const Line& line);
   [[nodiscard]] static double width_error(const Bin& bin) {
     return bin.laid_mm[0] / bin.wanted_mm - 1.0;
   }
@@ -161,6 +172,9 @@ class LaidLine {
   double largest_edge_mm_ = 0.0;
   std::size_t edge_line_ = 0;
   double bins_ = 0.0;
+  Ends first_;
+  Ends last_;
+  double lines_with_ends_ = 0.0;
 };
 
 }  // namespace unflex::verify

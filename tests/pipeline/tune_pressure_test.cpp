@@ -32,6 +32,9 @@ tune::PressureTowerSettings tower_settings(const machine::Settings& settings,
   tower.firmware = settings.printer.firmware;
   tower.accel_mm_s2 = settings.limits.max_accel_mm_s2;
   tower.trial = tune::next_trial(known);
+  tower.accel_mm_s2 =
+      std::min(tower.accel_mm_s2,
+               tune::followed_accel_mm_s2(tower, settings.pressure.max_extruder_accel_mm_s2));
   tower.layers_per_band = 2;
   tower.codes = {"G28\nM109 S200\n", "M104 S0\n", 110.0, 105.0};
   return tower;

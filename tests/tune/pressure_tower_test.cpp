@@ -62,6 +62,18 @@ TEST(PressureTower, MeltsNoMoreThanTheHotendCan) {
   EXPECT_NEAR(pressure_wall(all).fast_mm_s * 0.2 * 0.45, 6.0, 1e-9);
 }
 
+// A bowden of 0.4 s needs 0.4 · q̇ of speed at once: within 8 ms, 80 mm/s by 10 000 mm/s².
+TEST(PressureTower, AcceleratesAsTheExtruderCanFollow) {
+  PressureTowerSettings all = settings();
+  all.trial = next_trial(PressureKnowledge{.sum_s = 0.404, .rounds = 1});
+  const double accel_mm_s2 = followed_accel_mm_s2(all, 10000.0);
+  // A line of 0.45 mm in layers of 0.2 mm.
+  const double per_mm = (0.25 * 0.2 + 0.25 * 3.14159265 * 0.04) / (0.25 * 3.14159265 * 1.75 * 1.75);
+  EXPECT_NEAR(0.4 * per_mm * accel_mm_s2, 80.0, 0.01);
+  all.trial = next_trial(PressureKnowledge{.sum_s = 0.044, .rounds = 1});
+  EXPECT_GT(followed_accel_mm_s2(all, 10000.0), 20000.0);
+}
+
 // The sliced tower tries the bands' advances by the firmware's own means, and the printer has its
 // own back behind it.
 TEST(PressureTower, SetsTheAdvanceOfEachBandAndThePrintersOwnBehind) {

@@ -107,6 +107,31 @@ TEST_F(Straight, IsTooThinAtItsBeginAndTooWideAtItsEndWithoutAdvance) {
   EXPECT_NEAR(stats.width.wide, wide / count, 1.1 / count);
 }
 
+// The first millimetre gets what has come out when the nozzle has made it, and the last what comes
+// out from there on until it stands.
+TEST_F(Straight, MeasuresItsEndsAsAWhole) {
+  const LineModel model{.hotend = {.advance_s = kAdvance_s}};
+  const planner::PlannedMove& move = moves_.front();
+  double flow = 0.0;
+  double first_mm = 0.0;
+  double before_last_mm = 0.0;
+  constexpr double kFine_s = 1e-6;
+  for (double t = 0.0; t < move.duration_s(); t += kFine_s) {
+    flow += kFine_s * (kPerMm * move.velocity_mm_s(t) - flow) / kAdvance_s;
+    const double out_mm = kPerMm * move.distance_mm(t) - kAdvance_s * flow;
+    first_mm = move.distance_mm(t) < 1.0 ? out_mm : first_mm;
+    before_last_mm = move.distance_mm(t) < 59.0 ? out_mm : before_last_mm;
+  }
+  const double all_mm = 60.0 * kPerMm - kAdvance_s * flow;
+  const LineStats without = laid(model, {});
+  EXPECT_NEAR(without.first.mean, first_mm / kPerMm - 1.0, 0.01);
+  EXPECT_NEAR(without.last.mean, (all_mm - before_last_mm) / kPerMm - 1.0, 0.03);
+  EXPECT_DOUBLE_EQ(without.first.rms, std::abs(without.first.mean));
+  const LineStats advanced = laid(model, {kAdvance_s, 0.0});
+  EXPECT_NEAR(advanced.first.mean, 0.0, 0.01);
+  EXPECT_NEAR(advanced.last.mean, 0.0, 0.01);
+}
+
 TEST_F(Straight, TellsHotendsThatAreNotAsAssumed) {
   const LineModel model{.hotend = {.advance_s = kAdvance_s}};
   const LineStats right = laid(model, {kAdvance_s, 0.0});

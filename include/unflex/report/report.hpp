@@ -62,6 +62,12 @@ struct EdgeRow {
   std::size_t line = 0;
 };
 
+// How much more filament comes out at one end of lines than is sliced there, relative to it.
+struct LineEndRow {
+  double rms = 0.0;
+  double mean = 0.0;
+};
+
 struct LineRow {
   WidthRow width;
   EdgeRow edge;
@@ -70,6 +76,8 @@ struct LineRow {
   WidthRow more_pressure;
   WidthRow earlier;  // dead time 2 ms shorter, but not below 0, and longer
   WidthRow later;
+  LineEndRow first = {};  // over the first and the last millimetre of lines
+  LineEndRow last = {};
 };
 
 // The line of plastic that comes out.

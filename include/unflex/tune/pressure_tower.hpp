@@ -23,6 +23,12 @@ struct PressureTowerSettings : TowerPrinter {
   std::optional<double> max_flow_mm3_s = {};  // what the hotend melts
 };
 
+// The most that a tower of this trial may accelerate, mm/s², if the extruder accelerates filament
+// by no more than `extruder_mm_s2`: where the speed begins to change, it has to come up to K q̇ at
+// once.
+[[nodiscard]] double followed_accel_mm_s2(const PressureTowerSettings& settings,
+                                          double extruder_mm_s2);
+
 // The parts of each wall, one behind the other, and their speeds.
 struct PressureWall {
   double slow_mm_s = 0.0;

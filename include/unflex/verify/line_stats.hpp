@@ -36,6 +36,13 @@ struct EdgeStats {
   std::size_t line = 0;
 };
 
+// How much more filament comes out at one end of the lines than is sliced there, relative to it:
+// each line of at least 3 mm counts once.
+struct EndStats {
+  double rms = 0.0;
+  double mean = 0.0;
+};
+
 // Hotends that differ from the model: pressure 20 % lower and higher, dead time 2 ms shorter (but
 // not below 0) and longer.
 inline constexpr std::size_t kOtherHotends = 4;
@@ -44,6 +51,8 @@ struct LineStats {
   double length_mm = 0.0;  // of the bins; 0: nothing is known of the line
   WidthStats width;
   EdgeStats edge;
+  EndStats first;  // over the first millimetre of lines, and over the last one, or a little more
+  EndStats last;
   std::array<WidthStats, kOtherHotends> other;
 };
 
