@@ -214,23 +214,10 @@ Result<ExitCode> tune_axes(const RunConfig& config, const std::optional<std::str
   if (!printer) {
     return tl::unexpected(printer.error());
   }
-  console.warnings(setting_warnings(printer->site.settings));
-  std::string printer_file;
-  if (printed) {
-    Result<std::string> text =
-        edited_printer_file(config, edits_of(config.tune.zones, printer->known), summary);
-    if (!text) {
-      return tl::unexpected(text.error());
-    }
-    printer_file = std::move(*text);
-  }
-  // The tower comes first: what was read is in the printer file only if all went well.
-  if (!config.output.empty()) {
-    if (Status written = write_next(config, *printer, summary); !written) {
-      return tl::unexpected(written.error());
-    }
-  }
-  return finish_tune(config, printer_file, std::move(summary));
+  return finish_tune(
+      config, console, printer->site.settings,
+      printed ? std::optional(edits_of(config.tune.zones, printer->known)) : std::nullopt,
+      [&](std::string& text) { return write_next(config, *printer, text); }, std::move(summary));
 }
 
 }  // namespace unflex::app

@@ -88,9 +88,8 @@ std::string picture(const std::vector<std::vector<Relief>>& reliefs, std::size_t
 // A wall as wide as it is: light where it is thicker, dark where it is thinner. Each row is a
 // band's ring, as far as its first side goes.
 std::string width_picture(const std::vector<pipeline::RingWidths>& widths, double side_mm) {
-  constexpr double kBin_mm = 0.4;
   constexpr double kBrightnessPerShare = 1.2;
-  const auto width = static_cast<std::size_t>(side_mm / kBin_mm);
+  const auto width = static_cast<std::size_t>(side_mm / pipeline::RingWidths::kBin_mm);
   GreyPicture grey(width, widths.size());
   for (std::size_t band = 0; band < widths.size(); ++band) {
     const std::vector<double>& errors = widths[band].errors;

@@ -110,6 +110,24 @@ Status write_file(const std::string& name, const std::string& text) {
   return output->write(text).and_then([&] { return output->commit(); });
 }
 
+// The printer file with these values; empty if there is none, and then the summary gets the lines.
+Result<std::string> edited_printer_file(const RunConfig& config,
+                                        const std::vector<machine::TomlEdit>& edits,
+                                        std::string& summary) {
+  if (!config.printer_file) {
+    summary += "for the printer file:\n";
+    for (const machine::TomlEdit& edit : edits) {
+      summary += fmt::format("{} = {}  # {}\n", edit.key, edit.value, edit.remark);
+    }
+    return std::string{};
+  }
+  return Input::open(*config.printer_file)
+      .and_then([](Input input) { return input.read_all(); })
+      .and_then([&](const std::string& text) {
+        return machine::with_values(text, *config.printer_file, edits);
+      });
+}
+
 }  // namespace
 
 Result<TowerSite> first_site(const RunConfig& config, const LoadSettings& load) {
@@ -232,25 +250,25 @@ std::string further_options(const RunConfig& config) {
                                   : std::string{});
 }
 
-Result<std::string> edited_printer_file(const RunConfig& config,
-                                        const std::vector<machine::TomlEdit>& edits,
-                                        std::string& summary) {
-  if (!config.printer_file) {
-    summary += "for the printer file:\n";
-    for (const machine::TomlEdit& edit : edits) {
-      summary += fmt::format("{} = {}  # {}\n", edit.key, edit.value, edit.remark);
+Result<ExitCode> finish_tune(const RunConfig& config, Console& console,
+                             const machine::Settings& settings,
+                             const std::optional<std::vector<machine::TomlEdit>>& read,
+                             const WriteNext& write_next, std::string summary) {
+  console.warnings(setting_warnings(settings));
+  std::string printer_file;
+  if (read) {
+    Result<std::string> text = edited_printer_file(config, *read, summary);
+    if (!text) {
+      return tl::unexpected(text.error());
     }
-    return std::string{};
+    printer_file = std::move(*text);
   }
-  return Input::open(*config.printer_file)
-      .and_then([](Input input) { return input.read_all(); })
-      .and_then([&](const std::string& text) {
-        return machine::with_values(text, *config.printer_file, edits);
-      });
-}
-
-Result<ExitCode> finish_tune(const RunConfig& config, const std::string& printer_file,
-                             std::string summary) {
+  // The tower comes first: what was read is in the printer file only if all went well.
+  if (!config.output.empty()) {
+    if (Status written = write_next(summary); !written) {
+      return tl::unexpected(written.error());
+    }
+  }
   if (!printer_file.empty()) {
     if (Status written = write_file(*config.printer_file, printer_file); !written) {
       return tl::unexpected(written.error());

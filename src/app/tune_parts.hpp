@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "console.hpp"
 #include "results.hpp"
 #include "unflex/app/run_config.hpp"
 #include "unflex/machine/machine.hpp"
@@ -55,13 +56,14 @@ using PageOf = std::function<Result<std::string>(const std::vector<pipeline::Ban
 // The options of this tower's command that the next one's needs as well.
 [[nodiscard]] std::string further_options(const RunConfig& config);
 
-// The printer file with these values; empty if there is none, and then `summary` gets the lines.
-[[nodiscard]] Result<std::string> edited_printer_file(const RunConfig& config,
-                                                      const std::vector<machine::TomlEdit>& edits,
-                                                      std::string& summary);
+// Writes the next tower, and adds to the summary what it tries and what to do with it.
+using WriteNext = std::function<Status(std::string& summary)>;
 
-// Ends the command: writes the printer file if there is text for it, and tells the summary.
-[[nodiscard]] Result<ExitCode> finish_tune(const RunConfig& config, const std::string& printer_file,
-                                           std::string summary);
+// Ends the command: warns, writes the next tower if one is asked for, puts what was read into the
+// printer file, and tells the summary. read: unset if no tower was read.
+[[nodiscard]] Result<ExitCode> finish_tune(
+    const RunConfig& config, Console& console, const machine::Settings& settings,
+    const std::optional<std::vector<machine::TomlEdit>>& read, const WriteNext& write_next,
+    std::string summary);
 
 }  // namespace unflex::app

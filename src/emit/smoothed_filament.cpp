@@ -12,6 +12,7 @@
 namespace unflex::emit {
 namespace {
 
+// Over so many neighbouring knots smoothing may reach.
 constexpr int kWidth = 18;
 using Program = quadratic::ElasticProgram<kWidth>;
 
@@ -35,6 +36,8 @@ constexpr double kFollows_s = 4e-3;
 constexpr double kApart_s = 1e-3;
 // Limits count only where the best E without any comes so near to them, as a share of them.
 constexpr double kNear = 0.6;
+// A limit counts as broken if it is exceeded by more than this share of it.
+constexpr double kBroken = -1e-3;
 
 // Σ factor e over neighbouring knots.
 struct Functional {
@@ -181,22 +184,23 @@ class Stretch {
         return;
       }
     }
-    constexpr double kBroken = -1e-3;
-    Steps best = solve({});
-    std::vector<Limit> counting = all_limits();
-    const auto far = std::stable_partition(
-        counting.begin(), counting.end(),
-        [&](const Limit& limit) { return !best || is_near(limit, kNear, *best); });
-    std::vector<Limit> others(far, counting.end());
-    counting.erase(far, counting.end());
+    add_squares();
+    Steps best = solve();
+    std::vector<Limit> near = all_limits();
+    const auto behind = std::stable_partition(near.begin(), near.end(), [&](const Limit& limit) {
+      return !best || is_near(limit, kNear, *best);
+    });
+    const std::vector<Limit> far(behind, near.end());
+    near.erase(behind, near.end());
     const auto is_broken = [&](const Limit& limit) {
       return !best || is_near(limit, kBroken, *best);
     };
-    if (std::ranges::any_of(counting, is_broken)) {
-      best = solve(counting);
-      if (std::ranges::any_of(others, is_broken)) {
-        counting.insert(counting.end(), others.begin(), others.end());
-        best = solve(counting);
+    if (std::ranges::any_of(near, is_broken)) {
+      add_rows(near);
+      best = solve();
+      if (std::ranges::any_of(far, is_broken)) {
+        add_rows(far);
+        best = solve();
       }
     }
     if (best) {
@@ -215,7 +219,7 @@ class Stretch {
   }
   [[nodiscard]] bool is_free(std::size_t knot) const { return knot > begin_ && knot < end_; }
 
-  // Its value at the knots as they are wanted.
+  // The functional's value if all knots are as wanted.
   [[nodiscard]] double value_as_wanted(const Functional& of_knots) const {
     double sum = 0.0;
     for (std::size_t j = 0; j < kWidth; ++j) {
@@ -246,7 +250,7 @@ class Stretch {
     std::size_t first = 0;
     Program::Gradient gradient;
   };
-  // By the unknowns, in `unit`s.
+  // The derivative by the unknowns, in this unit.
   [[nodiscard]] Place by_unknowns(const Functional& of_knots, double unit) const {
     const std::size_t from = std::max(of_knots.first, begin_ + 1) - begin_ - 1;
     Place place{std::min(from, unknowns() - kWidth), Program::Gradient::Zero()};
@@ -290,7 +294,7 @@ class Stretch {
     return result;
   }
 
-  [[nodiscard]] Steps solve(const std::vector<Limit>& limits) {
+  void add_squares() {
     program_.reset(unknowns());
     for (std::size_t i = end_ - begin_ - 1; i < unknowns(); ++i) {
       program_.fix(i);
@@ -306,11 +310,18 @@ class Stretch {
     for (std::size_t k = begin_ + 1; k < end_; ++k) {
       add_square(smoother_.step(k), 0.0, 1.0, kCalm);
     }
+  }
+
+  void add_rows(const std::vector<Limit>& limits) {
     for (const Limit& limit : limits) {
       const Place place = by_unknowns(limit.value, 1.0);
       program_.add_row(place.first, place.gradient, value_as_wanted(limit.value), limit.lower,
                        limit.upper, kPrice);
     }
+  }
+
+  // The best steps within the rows so far. They hold until the next call.
+  [[nodiscard]] Steps solve() {
     int iterations = 0;
     return program_.solve(kGap, iterations);
   }

@@ -22,7 +22,7 @@
 //
 //   min Σ c (S E − V)² + ρ Σ f²,    f = Δ(ΔE/d) min(v, v')
 //   subject to  |f| ≤ J                      at the joins (filament_flow.hpp)
-//               |p̈| ≤ A                      wherever its part by Ė is even
+//               |mean of p̈ over 4 ms| ≤ A    every millisecond
 //               ΔE ≥ a share of ΔV           in each line, so that none draws back
 //
 // The first sum is over Gauss's points of all lines, c being the way that they stand for; the

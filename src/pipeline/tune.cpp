@@ -121,8 +121,31 @@ class BandProgress final : public Progress {
   std::size_t band_ = 0;
 };
 
+// Looks at one thing while a band is verified.
+class Watcher : public verify::Observer {
+ public:
+  void line(const gcode::Line&) override {}
+  void section(const verify::ReferencePath&, const verify::ReferencePath&) override {}
+  void step(verify::NozzleId, const verify::NozzleStep&) override {}
+  void hold(double) override {}
+  void advanced(const verify::ReferencePath&, double) override {}
+  [[nodiscard]] double memory_s() const override { return 0.0; }
+  [[nodiscard]] bool asks_for_unshaped() const override { return false; }
+};
+
+// Has `watcher` look while the band is printed on the rules' machine, and on these others.
+Status watch(const Band& band, const verify::Rules& rules,
+             const std::vector<verify::NozzleModel>& others, Watcher& watcher, Progress& progress) {
+  std::istringstream sliced(band.sliced);
+  std::istringstream compensated(band.compensated);
+  const Result<verify::VerifyReport> report =
+      verify::verify(sliced, "the tower", compensated, "the compensated tower", rules, progress,
+                     {.detuned = others, .observer = &watcher});
+  return report ? Status{} : tl::unexpected(report.error());
+}
+
 // Looks at the nozzle in the straight parts of walls.
-class WallWatcher final : public verify::Observer {
+class WallWatcher final : public Watcher {
  public:
   explicit WallWatcher(const std::vector<tune::Wall>& walls) : walls_(&walls) {
     for (const tune::Wall& wall : walls) {
@@ -131,13 +154,6 @@ class WallWatcher final : public verify::Observer {
           {std::vector<double>(static_cast<std::size_t>(std::floor(length_mm / kRelief_mm)), 0.0)});
     }
   }
-
-  void line(const gcode::Line&) override {}
-  void section(const verify::ReferencePath&, const verify::ReferencePath&) override {}
-  void hold(double) override {}
-  void advanced(const verify::ReferencePath&, double) override {}
-  [[nodiscard]] double memory_s() const override { return 0.0; }
-  [[nodiscard]] bool asks_for_unshaped() const override { return false; }
 
   void step(verify::NozzleId nozzle, const verify::NozzleStep& step) override {
     if (nozzle.base != verify::NozzleBase::emitted || nozzle.model != 1 || !step.extruding) {
@@ -170,16 +186,8 @@ class WallWatcher final : public verify::Observer {
 };
 
 // Takes the widths of a band's last line of plastic, which is the outer ring of its last layer.
-class WidthWatcher final : public verify::Observer {
+class WidthWatcher final : public Watcher {
  public:
-  void line(const gcode::Line&) override {}
-  void section(const verify::ReferencePath&, const verify::ReferencePath&) override {}
-  void step(verify::NozzleId, const verify::NozzleStep&) override {}
-  void hold(double) override {}
-  void advanced(const verify::ReferencePath&, double) override {}
-  [[nodiscard]] double memory_s() const override { return 0.0; }
-  [[nodiscard]] bool asks_for_unshaped() const override { return false; }
-
   void width(verify::NozzleId nozzle, const verify::WidthBin& bin) override {
     if (nozzle.base != verify::NozzleBase::emitted || nozzle.model != 0) {
       return;
@@ -187,7 +195,6 @@ class WidthWatcher final : public verify::Observer {
     if (bin.path != path_) {
       path_ = bin.path;
       widths_.errors.clear();
-      widths_.begin_mm = bin.begin_mm;
     }
     widths_.errors.push_back(bin.error);
   }
@@ -261,18 +268,16 @@ Result<std::vector<std::vector<Relief>>> print_bands(const std::vector<Band>& ba
                                   dynamics::from_frequency(axes.freq_hz[1], axes.damping_ratio[1])};
   for (const Band& band : bands) {
     WallWatcher watcher(tower.walls);
-    std::istringstream sliced(band.sliced);
-    std::istringstream compensated(band.compensated);
-    const Result<verify::VerifyReport> report = verify::verify(
-        sliced, "the tower", compensated, "the compensated tower", verify_rules(band.made_for),
-        progress, {.detuned = {model}, .observer = &watcher});
-    if (!report) {
-      return tl::unexpected(report.error());
+    if (Status watched = watch(band, verify_rules(band.made_for), {model}, watcher, progress);
+        !watched) {
+      return tl::unexpected(watched.error());
     }
     result.push_back(watcher.reliefs());
   }
   return result;
 }
+
+static_assert(RingWidths::kBin_mm == verify::kWidthBin_mm);
 
 double RingWidths::seen() const {
   double largest = 0.0;
@@ -294,13 +299,8 @@ Result<std::vector<RingWidths>> print_bands(const std::vector<Band>& bands,
     as_it_is.pressure.advance_s = hotend.advance_s;
     as_it_is.pressure.dead_time_ms = 1e3 * hotend.dead_time_s;
     WidthWatcher watcher;
-    std::istringstream sliced(band.sliced);
-    std::istringstream compensated(band.compensated);
-    const Result<verify::VerifyReport> report =
-        verify::verify(sliced, "the tower", compensated, "the compensated tower",
-                       verify_rules(as_it_is), progress, {.detuned = {}, .observer = &watcher});
-    if (!report) {
-      return tl::unexpected(report.error());
+    if (Status watched = watch(band, verify_rules(as_it_is), {}, watcher, progress); !watched) {
+      return tl::unexpected(watched.error());
     }
     result.push_back(watcher.widths());
   }

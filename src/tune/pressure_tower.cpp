@@ -36,13 +36,12 @@ std::string advance_command(Firmware firmware, double advance_s) {
 }  // namespace
 
 PressureWall pressure_wall(const PressureTowerSettings& settings) {
-  PressureWall wall{.slow_mm_s = kSlow_mm_s, .slow_mm = kSlow_mm};
   const TowerWriter lines(settings, 0.0);
   const double flow_mm3_s = settings.max_flow_mm3_s.value_or(kFlow_mm3_s);
-  const double slow2 = kSlow_mm_s * kSlow_mm_s;
-  wall.fast_mm_s = std::min({kFast_mm_s, settings.max_velocity_mm_s,
-                             flow_mm3_s / (lines.layer() * lines.width()),
-                             std::sqrt(slow2 + 2.0 * settings.accel_mm_s2 * kLongestRunUp_mm)});
+  PressureWall wall{.slow_mm = kSlow_mm};
+  wall.fast_mm_s = std::min(
+      {kFast_mm_s, settings.max_velocity_mm_s, flow_mm3_s / (lines.layer() * lines.width()),
+       std::sqrt(kSlow_mm_s * kSlow_mm_s + 2.0 * settings.accel_mm_s2 * kLongestRunUp_mm)});
   wall.slow_mm_s = std::min(kSlow_mm_s, 0.5 * wall.fast_mm_s);
   wall.fast_mm = kEven_mm + (wall.fast_mm_s * wall.fast_mm_s - wall.slow_mm_s * wall.slow_mm_s) /
                                 settings.accel_mm_s2;
@@ -51,9 +50,11 @@ PressureWall pressure_wall(const PressureTowerSettings& settings) {
 
 double followed_accel_mm_s2(const PressureTowerSettings& settings, double extruder_mm_s2) {
   constexpr double kSoon_s = 0.008;
-  // While nothing is known, bands that are far off need not be even.
-  const double advance_s =
-      std::max(settings.trial.known.has_sum() ? settings.trial.known.advance_s() : 0.1, 1e-3);
+  // What counts while nothing is known. A larger advance shows in the first tower all the same.
+  constexpr double kUnknown_s = 0.1;
+  constexpr double kLeast_s = 1e-3;
+  const PressureKnowledge& known = settings.trial.known;
+  const double advance_s = known.has_sum() ? std::max(known.advance_s(), kLeast_s) : kUnknown_s;
   return kSoon_s * extruder_mm_s2 / (advance_s * TowerWriter(settings, 0.0).filament_per_mm());
 }
 

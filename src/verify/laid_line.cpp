@@ -8,7 +8,6 @@ namespace unflex::verify {
 namespace {
 
 constexpr double kCell_s = 5e-4;
-constexpr double kBin_mm = 0.4;
 constexpr double kEnd_mm = 1.0;  // of a line, without bins
 // The nozzle does not go back on its line by more than this.
 constexpr double kBack_mm = 10.0;
@@ -26,17 +25,17 @@ std::size_t cells(double duration_s) {
 constexpr std::size_t kLatency = 200;
 
 double begin_of_bin_mm(std::size_t number) {
-  return kEnd_mm + kBin_mm * static_cast<double>(number);
+  return kEnd_mm + kWidthBin_mm * static_cast<double>(number);
 }
 
 std::size_t bin_at(double along_mm) {
-  return static_cast<std::size_t>(std::max(along_mm - kEnd_mm, 0.0) / kBin_mm);
+  return static_cast<std::size_t>(std::max(along_mm - kEnd_mm, 0.0) / kWidthBin_mm);
 }
 
 // How much of [a, b] lies in the bin.
 double overlap_mm(std::size_t bin, double a_mm, double b_mm) {
   const double begin = begin_of_bin_mm(bin);
-  return std::max(std::min(b_mm, begin + kBin_mm) - std::max(a_mm, begin), 0.0);
+  return std::max(std::min(b_mm, begin + kWidthBin_mm) - std::max(a_mm, begin), 0.0);
 }
 
 // How much of [a, b] lies in the first millimetre.
@@ -284,7 +283,7 @@ void LaidLine::measure(Line& line, double until_mm) {
     const Bin& bin = line.bins.front();
     count(bin);
     if (observer_ != nullptr) {
-      observer_->width(nozzle_, {line.number, begin_of_bin_mm(line.first_bin), width_error(bin)});
+      observer_->width(nozzle_, {line.number, width_error(bin)});
     }
     line.bins.pop_front();
     ++line.first_bin;
@@ -345,7 +344,7 @@ WidthStats LaidLine::Widths::stats(double count) const {
 
 LineStats LaidLine::stats() const {
   LineStats result;
-  result.length_mm = kBin_mm * bins_;
+  result.length_mm = kWidthBin_mm * bins_;
   result.width = width_.stats(bins_);
   for (std::size_t i = 0; i < kOtherHotends; ++i) {
     result.other[i] = other_[i].stats(bins_);

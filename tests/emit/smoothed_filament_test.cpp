@@ -183,7 +183,7 @@ TEST(SmoothedFilament, AsksForNoMoreAccelerationThanTheExtruderHas) {
   }
 }
 
-// Limits far away change nothing, though they are part of the problem once any of them is broken.
+// Limits that E keeps by itself change nothing.
 TEST(SmoothedFilament, TakesNoNoticeOfLimitsThatItKeeps) {
   const LinesInTime lines = lines_of(60, 4);
   const std::vector<double> free = filament_to_smooth(lines, kFreely, wall_mm);

@@ -10,21 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/jobs.hpp"
-#include "unflex/pipeline/pipeline.hpp"
-#include "unflex/pipeline/tune.hpp"
+#include "tower_prints.hpp"
 
 namespace unflex::pipeline {
 namespace {
-
-machine::Settings printer(const std::vector<std::string>& more = {}) {
-  std::vector<std::string> overrides = {"printer.firmware=klipper", "dynamics.x.freq_hz=45",
-                                        "dynamics.y.freq_hz=45"};
-  overrides.insert(overrides.end(), more.begin(), more.end());
-  Result<machine::Settings> settings = machine::load(std::nullopt, overrides);
-  EXPECT_TRUE(settings) << to_string(settings.error());
-  return *settings;
-}
 
 tune::PressureTowerSettings tower_settings(const machine::Settings& settings,
                                            const tune::PressureKnowledge& known) {
@@ -113,7 +102,8 @@ TEST(TunePressure, FourRoundsFindAHotendThatNobodyKnows) {
   for (int i = 0; i < hotends; ++i) {
     const double advance_s = std::exp(log_advance(random));
     const TrueHotend hotend{advance_s, dead_time_s(random)};
-    const tune::PressureKnowledge known = tuned(printer(), hotend, 4, asked != nullptr);
+    const tune::PressureKnowledge known =
+        tuned(testing::tower_printer({}), hotend, 4, asked != nullptr);
     const double off = known.advance_s() / hotend.advance_s - 1.0;
     const double late_ms = 1e3 * (known.dead_time_s - hotend.dead_time_s);
     fmt::print("K {:.4f} s, {:.2f} ms: off by {:+.2f} %, {:+.2f} ms\n", hotend.advance_s,
@@ -127,7 +117,7 @@ TEST(TunePressure, FourRoundsFindAHotendThatNobodyKnows) {
 TEST(TunePressure, BandsMakeOnePrintThatBreaksNoRule) {
   for (const std::vector<std::string>& firmware :
        {std::vector<std::string>{}, {"printer.firmware=marlin"}, {"printer.firmware=rrf"}}) {
-    const machine::Settings settings = printer(firmware);
+    const machine::Settings settings = testing::tower_printer(firmware);
     tune::PressureTowerSettings towers = tower_settings(settings, {.sum_s = 0.05, .rounds = 1});
     towers.trial.bands = 2;
     towers.trial.first_s = 0.05;
@@ -137,15 +127,7 @@ TEST(TunePressure, BandsMakeOnePrintThatBreaksNoRule) {
     SilentProgress progress;
     const auto bands = compensate_bands(tower, settings_of_bands(towers, settings), 2, progress);
     ASSERT_TRUE(bands) << to_string(bands.error());
-    std::string sliced = tower.start + tower.base;
-    for (std::size_t number = 1; number <= tower.bands.size(); ++number) {
-      sliced += tune::band_begins(number) + tower.bands[number - 1] + tune::band_ends(number);
-    }
-    const testing::JobFolder folder(sliced + tower.foot);
-    folder.set_output(join_bands(*bands));
-    Job job = folder.job();
-    job.settings = bands->front().made_for;
-    const Result<report::Report> report = verify(job, progress);
+    const Result<report::Report> report = testing::verify_joined(tower, *bands);
     ASSERT_TRUE(report) << to_string(report.error());
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
     EXPECT_EQ(report->runs_fallback, 0U);

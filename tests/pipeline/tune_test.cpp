@@ -9,20 +9,16 @@
 #include <random>
 #include <string>
 
-#include "pipeline/jobs.hpp"
-#include "unflex/pipeline/pipeline.hpp"
+#include "tower_prints.hpp"
 
 namespace unflex::pipeline {
 namespace {
 
 machine::Settings printer(const std::vector<std::string>& more = {}) {
-  std::vector<std::string> overrides = {"printer.firmware=klipper", "dynamics.x.freq_hz=45",
-                                        "dynamics.y.freq_hz=45", "printer.input_shaper_freq_x_hz=0",
+  std::vector<std::string> overrides = {"printer.input_shaper_freq_x_hz=0",
                                         "printer.input_shaper_freq_y_hz=0"};
   overrides.insert(overrides.end(), more.begin(), more.end());
-  Result<machine::Settings> settings = machine::load(std::nullopt, overrides);
-  EXPECT_TRUE(settings) << to_string(settings.error());
-  return *settings;
+  return testing::tower_printer(overrides);
 }
 
 tune::TowerSettings tower_settings(const machine::Settings& settings,
@@ -130,15 +126,7 @@ TEST(Tune, BandsMakeOnePrintThatBreaksNoRule) {
     SilentProgress progress;
     const auto bands = compensate_bands(tower, settings_of_bands(towers, settings), 2, progress);
     ASSERT_TRUE(bands) << to_string(bands.error());
-    std::string sliced = tower.start + tower.base;
-    for (std::size_t number = 1; number <= tower.bands.size(); ++number) {
-      sliced += tune::band_begins(number) + tower.bands[number - 1] + tune::band_ends(number);
-    }
-    const testing::JobFolder folder(sliced + tower.foot);
-    folder.set_output(join_bands(*bands));
-    Job job = folder.job();
-    job.settings = bands->front().made_for;
-    const Result<report::Report> report = verify(job, progress);
+    const Result<report::Report> report = testing::verify_joined(tower, *bands);
     ASSERT_TRUE(report) << to_string(report.error());
     EXPECT_EQ(report->violation_count, 0U) << testing::complaints(*report);
     // One run for each layer of the base, and one for each of the bands'.

@@ -70,10 +70,10 @@ struct TrueHotend {
   double dead_time_s = 0.0;
 };
 
-// A band's outer ring in its last layer: how far its width is off in bins of 0.4 mm, as a share.
-// The first and the last millimetre have none.
+// A band's outer ring in its last layer: how far its width is off in each bin, as a share. The
+// first and the last millimetre have none.
 struct RingWidths {
-  double begin_mm = 0.0;  // where the first bin begins on the ring
+  static constexpr double kBin_mm = 0.4;
   std::vector<double> errors;
 
   // What an eye sees: the largest mean of neighbouring bins, without its sign.

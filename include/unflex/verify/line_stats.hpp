@@ -18,7 +18,10 @@ struct LineModel {
   double width_mm = 0.45;  // of a line, for edges
 };
 
-// How much wider the line is than sliced, relative to its width, in bins of 0.4 mm. The first and
+// Length of a bin.
+inline constexpr double kWidthBin_mm = 0.4;
+
+// How much wider the line is than sliced, relative to its width, in bins. The first and
 // the last millimetre of each line are left out.
 struct WidthStats {
   double rms = 0.0;

@@ -51,9 +51,8 @@ struct NozzleStep {
 
 // A bin of a line of plastic, once all that comes out there has come out (Rules::line).
 struct WidthBin {
-  std::size_t path = 0;   // number of the line of plastic, from 1 on
-  double begin_mm = 0.0;  // where the bin begins on it
-  double error = 0.0;     // of the width, as a share of what the sliced file asks for
+  std::size_t path = 0;  // number of the line of plastic, from 1 on
+  double error = 0.0;    // of the width, as a share of what the sliced file asks for
 };
 
 class Observer {
