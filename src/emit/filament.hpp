@@ -26,10 +26,6 @@ struct RunFilament {
   double behind_mm = 0.0;
 };
 
-// The hotend of a run: with an advance of 0, it needs what the file or the printer has set.
-[[nodiscard]] dynamics::HotendPressure hotend_of(const EmitOptions& options,
-                                                 const gcode::PressureAdvance& of_file);
-
 // The printer's own advance while a run prints; nullopt where it stays as it is. Klipper advances
 // by itself what a linear hotend needs, smoothed over less time. Otherwise it is off, and pressure
 // is written into the filament.

@@ -12,9 +12,9 @@
 namespace unflex::emit {
 namespace {
 
-// Over so many neighbouring knots smoothing may reach.
-constexpr int kWidth = 18;
-using Program = quadratic::ElasticProgram<kWidth>;
+// Over so many neighbouring knots smoothing reaches, mostly, and where lines are short.
+constexpr int kMostly = 18;
+constexpr int kShortLines = 40;
 
 // Gauss–Legendre, on [0, 1].
 constexpr std::array<double, 3> kPoints = {0.112701665379258, 0.5, 0.887298334620742};
@@ -39,22 +39,25 @@ constexpr double kNear = 0.6;
 // A limit counts as broken if it is exceeded by more than this share of it.
 constexpr double kBroken = -1e-3;
 
-// Σ factor e over neighbouring knots.
+// Σ factor e over W neighbouring knots.
+template <int W>
 struct Functional {
   std::size_t first = 0;
-  std::array<double, kWidth> factors{};
+  std::array<double, W> factors{};
 
   void add(std::size_t knot, double factor) { factors[knot - first] += factor; }
 };
 
 // Lower ≤ the functional ≤ upper.
+template <int W>
 struct Limit {
-  Functional value;
+  Functional<W> value;
   double lower = 0.0;
   double upper = 0.0;
 };
 
-Limit within(Functional value, double most) {
+template <int W>
+Limit<W> within(Functional<W> value, double most) {
   for (double& factor : value.factors) {
     factor /= most;
   }
@@ -62,6 +65,7 @@ Limit within(Functional value, double most) {
 }
 
 // What is linear in the knots.
+template <int W>
 class Smoother {
  public:
   Smoother(const LinesInTime& lines, const SmoothingExtruder& extruder)
@@ -75,12 +79,12 @@ class Smoother {
   // Whether a functional holds all that smoothing sees from any moment of line i.
   [[nodiscard]] bool sees(std::size_t i) const {
     const double reach_s = half_s_ + 0.5 * kFollows_s;
-    return line_at(times_s_[i + 1] + reach_s) + 2 - line_at(times_s_[i] - reach_s) <= kWidth;
+    return line_at(times_s_[i + 1] + reach_s) + 2 - line_at(times_s_[i] - reach_s) <= W;
   }
 
   // S E
-  [[nodiscard]] Functional smoothed(double at_s) const {
-    Functional result = begin(at_s);
+  [[nodiscard]] Functional<W> smoothed(double at_s) const {
+    Functional<W> result = begin(at_s);
     add_filament(at_s, 1.0, result);
     // The first and the last knot have no change of Ė, since E is not known beyond them.
     const std::size_t last = std::min(line_at(at_s + half_s_), times_s_.size() - 2);
@@ -97,8 +101,8 @@ class Smoother {
   }
 
   // The mean of p̈ around a moment. What E itself adds is so little that its middle will do.
-  [[nodiscard]] Functional acceleration(double at_s) const {
-    Functional result = begin(at_s - 0.5 * kFollows_s);
+  [[nodiscard]] Functional<W> acceleration(double at_s) const {
+    Functional<W> result = begin(at_s - 0.5 * kFollows_s);
     add_difference(at_s, 1.0, result);
     add_difference(at_s + 0.5 * kFollows_s, advance_s_ / kFollows_s, result);
     add_difference(at_s - 0.5 * kFollows_s, -advance_s_ / kFollows_s, result);
@@ -106,7 +110,7 @@ class Smoother {
   }
 
   // f at knot k
-  [[nodiscard]] Functional step(std::size_t k) const {
+  [[nodiscard]] Functional<W> step(std::size_t k) const {
     const double slower_mm_s =
         std::min(length_mm(k - 1) / duration_s(k - 1), length_mm(k) / duration_s(k));
     const double before = slower_mm_s / length_mm(k - 1);
@@ -120,16 +124,16 @@ class Smoother {
     const auto after = std::upper_bound(times_s_.begin() + 1, times_s_.end() - 1, at_s);
     return static_cast<std::size_t>(after - times_s_.begin()) - 1;
   }
-  [[nodiscard]] Functional begin(double at_s) const { return {line_at(at_s - half_s_), {}}; }
+  [[nodiscard]] Functional<W> begin(double at_s) const { return {line_at(at_s - half_s_), {}}; }
 
-  void add_filament(double at_s, double factor, Functional& out) const {
+  void add_filament(double at_s, double factor, Functional<W>& out) const {
     const std::size_t i = line_at(at_s);
     const double share = std::clamp((at_s - times_s_[i]) / duration_s(i), 0.0, 1.0);
     out.add(i, factor * (1.0 - share));
     out.add(i + 1, factor * share);
   }
   // (E(τ + h) − 2 E(τ) + E(τ − h))/h²
-  void add_difference(double at_s, double factor, Functional& out) const {
+  void add_difference(double at_s, double factor, Functional<W>& out) const {
     const double each = factor / (half_s_ * half_s_);
     add_filament(at_s - half_s_, each, out);
     add_filament(at_s, -2.0 * each, out);
@@ -165,6 +169,7 @@ void keep_laying(const std::vector<double>& wanted_mm, std::size_t first, std::s
 }
 
 // The lines from `begin` to before `end`, which all lay. Knots from begin + 1 to end − 1 are free.
+template <int W>
 class Stretch {
  public:
   Stretch(const LinesInTime& lines, const SmoothingExtruder& extruder, std::size_t begin,
@@ -178,21 +183,22 @@ class Stretch {
         wanted_at_knots_mm_(wanted_at_knots_mm),
         wanted_mm_(wanted_mm) {}
 
-  void fit(std::vector<double>& knots_mm) {
+  // false: smoothing reaches over more knots than this.
+  [[nodiscard]] bool fit(std::vector<double>& knots_mm) {
     for (std::size_t i = begin_; i < end_; ++i) {
       if (!smoother_.sees(i)) {
-        return;
+        return false;
       }
     }
     add_squares();
     Steps best = solve();
-    std::vector<Limit> near = all_limits();
-    const auto behind = std::stable_partition(near.begin(), near.end(), [&](const Limit& limit) {
+    std::vector<Limit<W>> near = all_limits();
+    const auto behind = std::stable_partition(near.begin(), near.end(), [&](const Limit<W>& limit) {
       return !best || is_near(limit, kNear, *best);
     });
-    const std::vector<Limit> far(behind, near.end());
+    const std::vector<Limit<W>> far(behind, near.end());
     near.erase(behind, near.end());
-    const auto is_broken = [&](const Limit& limit) {
+    const auto is_broken = [&](const Limit<W>& limit) {
       return !best || is_near(limit, kBroken, *best);
     };
     if (std::ranges::any_of(near, is_broken)) {
@@ -209,29 +215,30 @@ class Stretch {
       }
       keep_laying(wanted_at_knots_mm_, begin_, end_, knots_mm);
     }
+    return true;
   }
 
  private:
+  using Program = quadratic::ElasticProgram<W>;
   using Steps = std::optional<std::span<const double>>;
 
-  [[nodiscard]] std::size_t unknowns() const {
-    return std::max<std::size_t>(end_ - begin_ - 1, kWidth);
-  }
+  [[nodiscard]] std::size_t unknowns() const { return std::max<std::size_t>(end_ - begin_ - 1, W); }
   [[nodiscard]] bool is_free(std::size_t knot) const { return knot > begin_ && knot < end_; }
 
   // The functional's value if all knots are as wanted.
-  [[nodiscard]] double value_as_wanted(const Functional& of_knots) const {
+  [[nodiscard]] double value_as_wanted(const Functional<W>& of_knots) const {
     double sum = 0.0;
-    for (std::size_t j = 0; j < kWidth; ++j) {
+    for (std::size_t j = 0; j < W; ++j) {
       if (of_knots.factors[j] != 0.0) {
         sum += of_knots.factors[j] * wanted_at_knots_mm_[of_knots.first + j];
       }
     }
     return sum;
   }
-  [[nodiscard]] double value_of(const Functional& of_knots, std::span<const double> steps) const {
+  [[nodiscard]] double value_of(const Functional<W>& of_knots,
+                                std::span<const double> steps) const {
     double sum = value_as_wanted(of_knots);
-    for (std::size_t j = 0; j < kWidth; ++j) {
+    for (std::size_t j = 0; j < W; ++j) {
       if (of_knots.factors[j] != 0.0 && is_free(of_knots.first + j)) {
         sum += of_knots.factors[j] * kUnit_mm * steps[of_knots.first + j - begin_ - 1];
       }
@@ -240,7 +247,7 @@ class Stretch {
   }
 
   // Whether the value comes nearer to an end of its limit than by `margin`, or is beyond.
-  [[nodiscard]] bool is_near(const Limit& limit, double margin,
+  [[nodiscard]] bool is_near(const Limit<W>& limit, double margin,
                              std::span<const double> steps) const {
     const double value = value_of(limit.value, steps);
     return value < limit.lower + margin || value > limit.upper - margin;
@@ -248,13 +255,13 @@ class Stretch {
 
   struct Place {
     std::size_t first = 0;
-    Program::Gradient gradient;
+    typename Program::Gradient gradient;
   };
   // The derivative by the unknowns, in this unit.
-  [[nodiscard]] Place by_unknowns(const Functional& of_knots, double unit) const {
+  [[nodiscard]] Place by_unknowns(const Functional<W>& of_knots, double unit) const {
     const std::size_t from = std::max(of_knots.first, begin_ + 1) - begin_ - 1;
-    Place place{std::min(from, unknowns() - kWidth), Program::Gradient::Zero()};
-    for (std::size_t j = 0; j < kWidth; ++j) {
+    Place place{std::min(from, unknowns() - W), Program::Gradient::Zero()};
+    for (std::size_t j = 0; j < W; ++j) {
       const std::size_t knot = of_knots.first + j;
       if (of_knots.factors[j] != 0.0 && is_free(knot)) {
         place.gradient[static_cast<Eigen::Index>(knot - begin_ - 1 - place.first)] =
@@ -264,14 +271,14 @@ class Stretch {
     return place;
   }
 
-  void add_square(const Functional& of_knots, double less, double unit, double weight) {
+  void add_square(const Functional<W>& of_knots, double less, double unit, double weight) {
     const Place place = by_unknowns(of_knots, unit);
     program_.add_square(place.first, place.gradient, (value_as_wanted(of_knots) - less) / unit,
                         weight);
   }
 
-  [[nodiscard]] std::vector<Limit> all_limits() const {
-    std::vector<Limit> result;
+  [[nodiscard]] std::vector<Limit<W>> all_limits() const {
+    std::vector<Limit<W>> result;
     if (std::isfinite(extruder_.most_step_mm_s)) {
       for (std::size_t k = begin_ + 1; k < end_; ++k) {
         result.push_back(within(smoother_.step(k), extruder_.most_step_mm_s));
@@ -312,8 +319,8 @@ class Stretch {
     }
   }
 
-  void add_rows(const std::vector<Limit>& limits) {
-    for (const Limit& limit : limits) {
+  void add_rows(const std::vector<Limit<W>>& limits) {
+    for (const Limit<W>& limit : limits) {
       const Place place = by_unknowns(limit.value, 1.0);
       program_.add_row(place.first, place.gradient, value_as_wanted(limit.value), limit.lower,
                        limit.upper, kPrice);
@@ -328,7 +335,7 @@ class Stretch {
 
   const LinesInTime& lines_;
   const SmoothingExtruder& extruder_;
-  Smoother smoother_;
+  Smoother<W> smoother_;
   std::size_t begin_;
   std::size_t end_;
   const std::vector<double>& wanted_at_knots_mm_;
@@ -353,7 +360,9 @@ std::vector<double> filament_to_smooth(const LinesInTime& lines, const Smoothing
       ++end;
     }
     if (end >= begin + 2) {
-      Stretch(lines, extruder, begin, end, wanted, wanted_mm).fit(result);
+      static_cast<void>(
+          Stretch<kMostly>(lines, extruder, begin, end, wanted, wanted_mm).fit(result) ||
+          Stretch<kShortLines>(lines, extruder, begin, end, wanted, wanted_mm).fit(result));
     }
     begin = std::max(end, begin + 1);
   }

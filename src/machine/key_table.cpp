@@ -572,6 +572,10 @@ constexpr std::array kKeys = {
         {},
         nullptr,
         kTimingMethods},
+    Key{"timing.width_tolerance", &setting<&S::timing, &F::width_tolerance>,
+        Bounds{.min = 0.0, .max = 10.0}, "",
+        "How far the width of a line may be off, as a share of it, where the pressure of the "
+        "hotend is known; 0: it does not count"},
     Key{"timing.max_speed_mm_s", &setting<&S::timing, &F::max_speed_mm_s>, kPositive, "mm/s",
         "Speed of travel in a print with free timing", "the slicer's F"},
     Key{"timing.keep_accel_limits", &setting<&S::timing, &F::keep_accel_limits>, kAny, "",

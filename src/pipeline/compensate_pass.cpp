@@ -287,6 +287,7 @@ class Compensator {
 
   void time_in_thread(const std::shared_ptr<RunJob>& job) {
     job->bounds = move_bounds(job->piece, job_.settings);
+    job->extruder = extruder_of(job->piece, rules_.emit, job_.settings.timing);
     band_gain_.choose(*job);
     pool_.submit([this, job] {
       choose_timing(*job, {job_.settings.timing.is_optimal(), timer_.get()});

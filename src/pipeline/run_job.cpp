@@ -214,12 +214,13 @@ struct FoundTiming {
 FoundTiming find_timing(const RunJob& job, const compensate::Setup& setup,
                         const TimingChoice& choice) {
   const compensate::Course sliced{job.piece.before, job.piece.moves, job.piece.after};
-  FoundTiming found{timing::faster(sliced, setup, job.first_stage, job.bounds, *choice.engine), {}};
+  FoundTiming found{
+      timing::faster(sliced, setup, job.first_stage, job.bounds, *choice.engine, job.extruder), {}};
   if (!choice.is_optimal) {
     return found;
   }
   tl::expected<timing::Timed, std::string> optimal =
-      timing::optimal(sliced, setup, job.first_stage, job.bounds);
+      timing::optimal(sliced, setup, job.first_stage, job.bounds, job.extruder);
   // The optimal motion is the shortest among those near it, so the scaled one may be shorter.
   if (!optimal) {
     found.scaled_reason = std::move(optimal.error());
@@ -322,6 +323,7 @@ std::unique_ptr<RunJob> untimed(const RunJob& job, const compensate::Setup& setu
   run->setup = setup;
   run->sliced_setup = job.sliced_setup;
   run->bounds = job.bounds;
+  run->extruder = job.extruder;
   run->accel = job.accel;
   run->lines_after = job.lines_after;
   if (job.keeps_timing()) {

@@ -60,6 +60,8 @@ struct RunJob {
   emit::RunAccel accel;
   // Only if the timing is free: what each move may do, and the new timing, if there is one.
   std::vector<timing::MoveBounds> bounds;
+  // Only if the new timing depends on it.
+  std::optional<timing::Extruder> extruder;
   std::optional<NewTiming> retimed;
   // Only for runs of a sample (BandGain): the setup for a narrower band, and how long the run takes
   // with that.

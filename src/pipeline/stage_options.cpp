@@ -526,6 +526,15 @@ std::vector<timing::MoveBounds> move_bounds(const Piece& run, const machine::Set
   return bounds;
 }
 
+std::optional<timing::Extruder> extruder_of(const Piece& run, const emit::EmitOptions& options,
+                                            const machine::TimingSettings& timing) {
+  const dynamics::HotendPressure hotend = emit::hotend_of(options, run.start.advance);
+  if (!options.pressure.is_written || hotend.advance_s == 0.0 || timing.width_tolerance == 0.0) {
+    return std::nullopt;
+  }
+  return timing::Extruder{hotend, options.pressure.max_accel_mm_s2, timing.width_tolerance};
+}
+
 // An advance of 0 is that of the file, or the printer's.
 dynamics::HotendPressure hotend_pressure(const machine::Settings& settings) {
   using enum dynamics::PressureShape;

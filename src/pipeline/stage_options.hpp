@@ -51,6 +51,10 @@ struct RunSetup {
 // What each move of the run may do if its timing is free.
 [[nodiscard]] std::vector<timing::MoveBounds> move_bounds(const Piece& run,
                                                           const machine::Settings& settings);
+// What lays the run, and how evenly it is to lay; nullopt: its width does not count.
+[[nodiscard]] std::optional<timing::Extruder> extruder_of(const Piece& run,
+                                                          const emit::EmitOptions& options,
+                                                          const machine::TimingSettings& timing);
 [[nodiscard]] verify::Rules verify_rules(const machine::Settings& settings);
 
 }  // namespace unflex::pipeline

@@ -65,17 +65,29 @@ UNFLEX_INLINE bool factor_columns(double* columns, std::size_t size) {
   return true;
 }
 
+UNFLEX_WIDE void add_square_to(Width<5> /*width*/, const double* g, double f, double* block) {
+  add_square_to<5>(g, f, block);
+}
 UNFLEX_WIDE void add_square_to(Width<18> /*width*/, const double* g, double f, double* block) {
   add_square_to<18>(g, f, block);
 }
 UNFLEX_WIDE void add_square_to(Width<24> /*width*/, const double* g, double f, double* block) {
   add_square_to<24>(g, f, block);
 }
+UNFLEX_WIDE void add_square_to(Width<40> /*width*/, const double* g, double f, double* block) {
+  add_square_to<40>(g, f, block);
+}
+UNFLEX_WIDE bool factor_columns(Width<5> /*width*/, double* columns, std::size_t size) {
+  return factor_columns<5>(columns, size);
+}
 UNFLEX_WIDE bool factor_columns(Width<18> /*width*/, double* columns, std::size_t size) {
   return factor_columns<18>(columns, size);
 }
 UNFLEX_WIDE bool factor_columns(Width<24> /*width*/, double* columns, std::size_t size) {
   return factor_columns<24>(columns, size);
+}
+UNFLEX_WIDE bool factor_columns(Width<40> /*width*/, double* columns, std::size_t size) {
+  return factor_columns<40>(columns, size);
 }
 
 }  // namespace
@@ -376,7 +388,9 @@ double ElasticProgram<W>::value_at_solution(std::size_t row) const {
          gradients_[row].dot(Eigen::Map<const Gradient>(delta_.data() + first_[row]));
 }
 
+template class ElasticProgram<5>;
 template class ElasticProgram<18>;
 template class ElasticProgram<24>;
+template class ElasticProgram<40>;
 
 }  // namespace unflex::quadratic

@@ -37,6 +37,8 @@ constexpr double kMoreError = 0.002;
 constexpr double kMoreSpeed = 0.00002;
 constexpr double kAlpha = 0.45;
 constexpr double kBeta = 0.2;
+constexpr double kBetaOfWidth = 0.5;
+constexpr int kMendsByAccel = 4;
 constexpr double kCooling = 0.87;  // of both, from round to round
 // The repairs are in more of a hurry, and reach further from round to round.
 constexpr double kAlphaOfRepairs = 0.8;
@@ -52,6 +54,8 @@ constexpr double kLeastSpeed_mm_s = 1.0;
 constexpr double kAim = 0.97;
 // The nozzle's speed relative to F, likewise.
 constexpr double kAimOfFeed = 1.014;
+// How far in time the width depends on accelerations.
+constexpr double kWidthReach_s = 0.02;
 // A larger swing in the end counts as this.
 constexpr double kMostLeft = 4.0;
 // How far in time an error depends on a limit, and how long the pieces at both ends of a move are,
@@ -91,21 +95,23 @@ class LocalScaling {
  public:
   LocalScaling(Goal goal, const compensate::Course& course, const compensate::Setup& setup,
                const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
-               const compensate::Engine& engine, std::span<const double> ends)
+               const compensate::Engine& engine, const std::optional<Extruder>& extruder,
+               std::span<const double> ends)
       : goal_(goal),
         course_(course),
         setup_(setup),
         nozzle_(nozzle),
         engine_(engine),
+        extruder_(extruder),
         models_(models_of(setup)),
         omega_rad_s_(std::min(setup.x.axis.slowest_rad_s(), setup.y.axis.slowest_rad_s())) {
     std::vector<double> ends_s;
     for (const double end : ends) {
       ends_s.push_back(end / omega_rad_s_);
     }
-    std::vector<MoveBounds> allowed(bounds.begin(), bounds.end());
-    keep_seams(course.moves, allowed);
-    pieces_ = in_pieces(course.moves, allowed, ends_s);
+    allowed_.assign(bounds.begin(), bounds.end());
+    keep_seams(course.moves, allowed_);
+    pieces_ = in_pieces(course.moves, allowed_, ends_s);
     const std::vector<bool> of_moves = std::exchange(is_kept_, {});
     for (std::size_t i = 0; i < of_moves.size(); ++i) {
       is_kept_.insert(is_kept_.end(), pieces_.counts[i], of_moves[i]);
@@ -114,7 +120,7 @@ class LocalScaling {
     bounds_ = pieces_.bounds;
     limit_vertices();
     if (goal_ == Goal::least_time && models_.size() > 1) {
-      allow_as_sliced(allowed);
+      allow_as_sliced();
     }
   }
 
@@ -131,6 +137,7 @@ class LocalScaling {
     constexpr double kHardlySlower = 1.01;
     double least_s = goal_ == Goal::feed ? std::numeric_limits<double>::infinity()
                                          : kHardlySlower * planner::duration_s(course_.moves);
+    const std::span<const planner::PlannedMove> sliced = course_.moves;
     course_.moves = pieces_.moves;
     bool repairs = goal_ == Goal::feed;
     int repaired = 0;
@@ -144,9 +151,15 @@ class LocalScaling {
       repaired += repairs ? 1 : 0;
       last_s = plan_s;
       if (repairs && plan_s >= least_s) {
-        break;  // it becomes only slower
+        if (best || lays_evenly(sliced)) {
+          break;  // it becomes only slower
+        }
+        least_s = std::numeric_limits<double>::infinity();
       }
-      const std::optional<NozzleMeasure> measured = try_plan(plan, pieces_.bounds);
+      std::optional<NozzleMeasure> measured = try_plan(plan, pieces_.bounds);
+      if (measured) {
+        forget_seams(measured->width);
+      }
       if (measured && keeps(*measured, repaired)) {
         const double gain_s = least_s - plan_s;
         if (gain_s > 0.0) {
@@ -236,11 +249,34 @@ class LocalScaling {
            std::isfinite(pieces_.bounds[vertex].start_speed_mm_s);
   }
 
+  // Pieces that keep their timing cannot give way to the extruder.
+  void forget_seams(std::vector<double>& width) const {
+    for (std::size_t i = 0; i < is_kept_.size(); ++i) {
+      if (is_kept_[i]) {
+        const auto node = [&](double t) {
+          return std::min(static_cast<std::size_t>(std::max(t, 0.0) / period_s_), width.size());
+        };
+        std::fill(width.begin() + static_cast<std::ptrdiff_t>(node(starts_s_[i])),
+                  width.begin() + static_cast<std::ptrdiff_t>(node(starts_s_[i + 1])), 0.0);
+      }
+    }
+  }
+
+  // Whether the extruder can lay evenly in the timing as sliced.
+  [[nodiscard]] bool lays_evenly(std::span<const planner::PlannedMove> sliced) {
+    if (!extruder_) {
+      return true;
+    }
+    const std::optional<NozzleMeasure> measured = try_plan(sliced, allowed_);
+    return !measured || std::ranges::max(measured->width) <= kKept;
+  }
+
   // Each repair moves all nodes behind it along the path, which may break what was kept by a hair.
   // So in a long run a little more counts as kept with each repair.
   [[nodiscard]] bool keeps(const NozzleMeasure& measured, int repaired) const {
     return std::ranges::max(measured.error) <= kKept + kMoreError * repaired &&
            std::ranges::max(measured.speed) <= kKeptFeed + kMoreSpeed * repaired &&
+           std::ranges::max(measured.width) <= kKept + kMoreError * repaired &&
            left_of(measured) <= kKept;
   }
 
@@ -271,7 +307,7 @@ class LocalScaling {
     const dynamics::BaseTrajectory base{grid.period_s, compensate::join(spans, x),
                                         compensate::join(spans, y)};
     NozzleMeasure measured = measure(plan, bounds, starts_s_, base, models_, allowances_,
-                                     course.before.empty() ? &nozzle_ : nullptr);
+                                     course.before.empty() ? &nozzle_ : nullptr, extruder_);
     if (!course.after.empty() || goal_ == Goal::feed) {
       measured.left.assign(models_.size(), 0.0);
     }
@@ -283,9 +319,9 @@ class LocalScaling {
 
   // Where the axes may be several things, the nozzle of one may stray more than its tolerance even
   // in the timing as sliced. There it may stray as far as that.
-  void allow_as_sliced(std::span<const MoveBounds> bounds) {
+  void allow_as_sliced() {
     constexpr double kSampling = 1.02;
-    const std::optional<NozzleMeasure> sliced = try_plan(course_.moves, bounds);
+    const std::optional<NozzleMeasure> sliced = try_plan(course_.moves, allowed_);
     if (!sliced) {
       return;
     }
@@ -343,6 +379,7 @@ class LocalScaling {
     const double reach = kErrorReach * (1.0 + kWider * std::max(repaired - 1, 0));
     const Near error = largest_near(measured.error, reach / omega_rad_s_);
     const Near speed = largest_near(measured.speed, kSpeedReach / omega_rad_s_);
+    const Near width = largest_near(measured.width, kWidthReach_s);
     const double left = std::min(left_of(measured), kMostLeft);
     for (std::size_t i = 1; i < plan.size(); ++i) {
       const double g = error.vertex[i] / kAim;
@@ -362,15 +399,23 @@ class LocalScaling {
       }
       const bool is_near_end = starts_s_.back() - starts_s_[i + 1] < kEndReach / omega_rad_s_;
       const double g = std::max(error.piece[i], is_near_end ? left : 0.0) / kAim;
+      const double of_width = width.piece[i] / kAim;
       MoveBounds& own = bounds_[i];
       const MoveBounds& allowed = pieces_.bounds[i];
       if (plan[i].accel_s + plan[i].decel_s > 0.0) {
-        own.accel_mm_s2 =
-            std::min(allowed.accel_mm_s2, own.accel_mm_s2 * std::min(scale(g, beta), most));
+        // That the nozzle becomes slower at a vertex does not help the extruder, which follows
+        // where speeds change slowly enough.
+        double factor = std::min(scale(g, beta), most);
+        if (of_width > 1.0) {
+          factor = std::min(factor, scale(of_width, kBetaOfWidth));
+        }
+        own.accel_mm_s2 = std::min(allowed.accel_mm_s2, own.accel_mm_s2 * factor);
       }
       const double ahead = speed.piece[i] / kAimOfFeed;
-      if (repairs && g > 1.0) {
-        own.speed_mm_s = std::max(plan[i].cruise_v_mm_s * scale(g, alpha), kLeastSpeed_mm_s);
+      // Where the acceleration alone does not mend the width, the speed does.
+      const double of_speed = repaired > kMendsByAccel ? std::max(g, of_width) : g;
+      if (repairs && of_speed > 1.0) {
+        own.speed_mm_s = std::max(plan[i].cruise_v_mm_s * scale(of_speed, alpha), kLeastSpeed_mm_s);
       }
       if (ahead > 1.0) {
         own.speed_mm_s = std::max(plan[i].cruise_v_mm_s * std::max(1.0 / ahead, kLeastSpeedFactor),
@@ -398,12 +443,14 @@ class LocalScaling {
   compensate::Setup setup_;
   const dynamics::NozzleXY& nozzle_;
   const compensate::Engine& engine_;
+  std::optional<Extruder> extruder_;
   std::vector<AxesModel> models_;
   ModelShares shares_{setup_};
   double omega_rad_s_;
   std::vector<bool> is_kept_;  // of each piece
   Allowances allowances_;
   std::vector<double> left_allowed_;  // for each model; empty: 1
+  std::vector<MoveBounds> allowed_;   // of the moves
   Pieces pieces_;                     // with what each may do
   std::vector<MoveBounds> bounds_;
   std::vector<double> vertex_mm_s_;
@@ -429,9 +476,11 @@ bool is_slow_on_long_lines(const Timed& timed, std::span<const MoveBounds> bound
 
 std::optional<Timed> faster(const compensate::Course& course, const compensate::Setup& setup,
                             const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
-                            const compensate::Engine& engine) {
+                            const compensate::Engine& engine,
+                            const std::optional<Extruder>& extruder) {
   const auto find = [&](std::span<const double> ends) {
-    return LocalScaling(Goal::least_time, course, setup, nozzle, bounds, engine, ends).find();
+    return LocalScaling(Goal::least_time, course, setup, nozzle, bounds, engine, extruder, ends)
+        .find();
   };
   std::optional<Timed> found = find(kPieces);
   if (found && is_slow_on_long_lines(*found, bounds)) {
@@ -451,7 +500,7 @@ std::optional<Timed> within_feed(const compensate::Course& course, const compens
   for (std::size_t i = 0; i < as_sliced.size(); ++i) {
     bind_as_sliced(course.moves[i], as_sliced[i]);
   }
-  LocalScaling scaling(Goal::feed, course, setup, nozzle, as_sliced, engine, kFeedPieces);
+  LocalScaling scaling(Goal::feed, course, setup, nozzle, as_sliced, engine, {}, kFeedPieces);
   return scaling.keeps_feed_as_sliced(as_sliced) ? std::nullopt : scaling.find();
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "laid_width.hpp"
+
 namespace unflex::timing {
 namespace {
 
@@ -17,6 +19,8 @@ constexpr double kBetweenLooks[] = {0.25, 0.5, 0.75};
 // The share of the distance along the path that counts, as where filament is laid
 // (emit/nozzle_progress.cpp).
 constexpr double kTowardsReference = 0.01;
+// What lines of G-code keep of the width that is foreseen.
+constexpr double kOfLines = 0.9;
 // Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
 // There the nozzle may stray so many times the tolerance.
 constexpr double kBeside = 1.5;
@@ -43,18 +47,30 @@ class Walk {
  public:
   Walk(std::span<const planner::PlannedMove> plan, std::span<const MoveBounds> bounds,
        std::span<const double> starts_s, const dynamics::BaseTrajectory& base)
-      : plan_(plan), bounds_(bounds), starts_s_(starts_s), base_(base), from_mm_{0.0} {
+      : plan_(plan),
+        bounds_(bounds),
+        starts_s_(starts_s),
+        base_(base),
+        from_mm_{0.0},
+        filament_mm_{0.0} {
     for (const planner::PlannedMove& move : plan) {
       from_mm_.push_back(from_mm_.back() + move.length_mm);
+      filament_mm_.push_back(filament_mm_.back() + move.length_mm * filament_per_mm(move));
       const double flat2 =
           move.direction[X] * move.direction[X] + move.direction[Y] * move.direction[Y];
       inverse_flat2_.push_back(flat2 > 0.0 ? 1.0 / flat2 : 0.0);
     }
   }
 
+  // Where the nozzle is on the path at each node, and what is laid up to there.
+  struct Laid {
+    std::vector<double> way_mm;
+    std::vector<double> filament_mm;
+  };
+
   // may_be_left: the swing in the end that counts as 1, relative to the tolerance.
   // allowance: for each piece; empty: 1.
-  void add(const AxesModel& model, dynamics::NozzleXY nozzle, double may_be_left,
+  Laid add(const AxesModel& model, dynamics::NozzleXY nozzle, double may_be_left,
            std::span<const double> allowance, NozzleMeasure& result) const {
     const double h = base_.period_s;
     const dynamics::ExactMap map_x(model.x, h / kLooks);
@@ -62,9 +78,11 @@ class Walk {
     std::size_t now = 0;  // the piece that the plan is on
     dynamics::NozzleMotionXY last = nozzle.motion();
     Place furthest;
+    Laid laid;
     std::vector<AtNode> nodes(base_.nodes());
     std::vector<double>& of_pieces = result.of_pieces.emplace_back(plan_.size(), 0.0);
     for (std::size_t node = 0; node + 1 < base_.nodes(); ++node) {
+      note(furthest, laid);
       for (int look = 0; look < kLooks; ++look) {
         map_x.advance(segment_of(base_.x, node, look, h), nozzle.x);
         map_y.advance(segment_of(base_.y, node, look, h), nozzle.y);
@@ -103,10 +121,12 @@ class Walk {
         last = at;
       }
     }
+    note(furthest, laid);
     add(nodes, model.times_tolerance, result);
     const double left_mm = std::hypot(swing_mm(model.x, nozzle.x, base_.x.position_mm.back()),
                                       swing_mm(model.y, nozzle.y, base_.y.position_mm.back()));
     result.left.push_back(left_mm / (may_be_left * bounds_.back().tolerance_mm));
+    return laid;
   }
 
  private:
@@ -161,6 +181,16 @@ class Walk {
     double travel_mm_s = std::numeric_limits<double>::infinity();  // on the others
   };
 
+  [[nodiscard]] static double filament_per_mm(const planner::PlannedMove& move) {
+    return move.segment.extruding() ? move.direction[gcode::E] : 0.0;
+  }
+
+  void note(const Place& at, Laid& laid) const {
+    laid.way_mm.push_back(at.progress_mm);
+    laid.filament_mm.push_back(filament_mm_[at.piece] + (at.progress_mm - from_mm_[at.piece]) *
+                                                            filament_per_mm(plan_[at.piece]));
+  }
+
   void note(const Place& at, double speed_mm_s, std::span<const double> allowance,
             AtNode& node) const {
     node.error_mm = std::max(node.error_mm, at.error_mm);
@@ -198,6 +228,7 @@ class Walk {
   std::span<const double> starts_s_;
   const dynamics::BaseTrajectory& base_;
   std::vector<double> from_mm_;        // length of the path before each piece
+  std::vector<double> filament_mm_;    // laid there
   std::vector<double> inverse_flat2_;  // 1 / (d_x² + d_y²) of its direction; 0 if it is upright
 };
 
@@ -237,9 +268,11 @@ std::vector<AxesModel> models_of(const compensate::Setup& setup) {
 NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
                       std::span<const MoveBounds> bounds, std::span<const double> starts_s,
                       const dynamics::BaseTrajectory& base, const std::vector<AxesModel>& models,
-                      const Allowances& allowances, const dynamics::NozzleXY* nozzle) {
+                      const Allowances& allowances, const dynamics::NozzleXY* nozzle,
+                      const std::optional<Extruder>& extruder) {
   NozzleMeasure result;
   result.error.assign(base.nodes(), 0.0);
+  result.width.assign(base.nodes(), 0.0);
   result.speed.assign(base.nodes(), 0.0);
   const Walk walk(plan, bounds, starts_s, base);
   const dynamics::AxisMotion x = base.x_at(0.0);
@@ -253,8 +286,15 @@ NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
                model.y.swinging_as(models.front().y, nozzle->y, y.position_mm)};
     }
     constexpr double kByFirst = 0.5;
-    walk.add(model, start, m == 0 ? kByFirst : 1.0,
-             allowances.empty() ? std::span<const double>{} : allowances[m], result);
+    const Walk::Laid laid =
+        walk.add(model, start, m == 0 ? kByFirst : 1.0,
+                 allowances.empty() ? std::span<const double>{} : allowances[m], result);
+    if (m == 0 && extruder) {
+      result.width = width_errors(laid.filament_mm, laid.way_mm, base.period_s, *extruder);
+      for (double& width : result.width) {
+        width /= kOfLines * extruder->width_tolerance;
+      }
+    }
   }
   return result;
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -56,6 +57,8 @@ struct NozzleMeasure {
   // The nozzle's speed relative to F, and in travel the base's as well; at the edges of a band it
   // may be more.
   std::vector<double> speed;
+  // What the extruder lays too much there with the first model, relative to its tolerance.
+  std::vector<double> width;
   // For each model, how far the nozzle swings in the end, relative to what it may: half the
   // tolerance for the first one, since the next run begins with that swing, and all of it for the
   // others.
@@ -64,12 +67,13 @@ struct NozzleMeasure {
 
 // plan: what the base was found for, whose pieces have these bounds, beginning at starts_s[0],
 // which also has the end of the last one. nozzle: where the run begins; unset for a part that
-// begins in motion.
+// begins in motion. extruder: unset if it lays as the nozzle goes.
 [[nodiscard]] NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
                                     std::span<const MoveBounds> bounds,
                                     std::span<const double> starts_s,
                                     const dynamics::BaseTrajectory& base,
                                     const std::vector<AxesModel>& models,
-                                    const Allowances& allowances, const dynamics::NozzleXY* nozzle);
+                                    const Allowances& allowances, const dynamics::NozzleXY* nozzle,
+                                    const std::optional<Extruder>& extruder);
 
 }  // namespace unflex::timing

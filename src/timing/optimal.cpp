@@ -226,10 +226,11 @@ dynamics::BaseTrajectory base_on(const compensate::NodeGrid& grid,
           through(std::move(y_mm), grid.period_s)};
 }
 
-// Whether each model's nozzle keeps what it is allowed when the base moves so. A single place that
-// is a little worse than in the programs is not worth another attempt.
-bool is_kept(const Timed& timed, std::span<const MoveBounds> bounds, const compensate::Setup& setup,
-             const dynamics::NozzleXY& nozzle) {
+// What the motion breaks when the base moves so; nullptr: nothing. A single place that is a little
+// worse than in the programs is not worth another attempt.
+const char* broken_by(const Timed& timed, std::span<const MoveBounds> bounds,
+                      const compensate::Setup& setup, const dynamics::NozzleXY& nozzle,
+                      const std::optional<Extruder>& extruder) {
   std::vector<MoveBounds> of_pieces;
   for (std::size_t i = 0; i < timed.pieces.size(); ++i) {
     of_pieces.insert(of_pieces.end(), timed.pieces[i], bounds[i]);
@@ -238,21 +239,23 @@ bool is_kept(const Timed& timed, std::span<const MoveBounds> bounds, const compe
   for (const planner::PlannedMove& move : timed.moves) {
     starts_s.push_back(starts_s.back() + move.duration_s());
   }
-  const NozzleMeasure measured =
-      measure(timed.moves, of_pieces, starts_s, *timed.base, models_of(setup), {}, &nozzle);
+  const NozzleMeasure measured = measure(timed.moves, of_pieces, starts_s, *timed.base,
+                                         models_of(setup), {}, &nozzle, extruder);
   constexpr double kMoreError = 0.03;
   constexpr double kMoreSpeed = 0.05;
-  return std::ranges::max(measured.error) <= kKept + kMoreError &&
-         std::ranges::max(measured.speed) <= kKeptFeed + kMoreSpeed &&
-         std::ranges::max(measured.left) <= kKept;
+  if (std::ranges::max(measured.error) > kKept + kMoreError ||
+      std::ranges::max(measured.speed) > kKeptFeed + kMoreSpeed ||
+      std::ranges::max(measured.left) > kKept) {
+    return "the nozzle would stray further than the tolerance, or run ahead of F";
+  }
+  return std::ranges::max(measured.width) > kKept ? "the extruder could not lay evenly enough"
+                                                  : nullptr;
 }
 
-tl::expected<Timed, std::string> optimal_from(const FirstPlan& first,
-                                              const compensate::Course& course,
-                                              const compensate::Setup& setup,
-                                              const SectionRules& rules,
-                                              const dynamics::NozzleXY& nozzle,
-                                              std::span<const MoveBounds> bounds) {
+tl::expected<Timed, std::string> optimal_from(
+    const FirstPlan& first, const compensate::Course& course, const compensate::Setup& setup,
+    const SectionRules& rules, const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
+    const std::optional<Extruder>& extruder) {
   const double slowest_rad_s = std::min(rules.x.omega_rad_s, rules.y.omega_rad_s);
   auto parts = sections(course.moves, bounds, setup, kSettling / slowest_rad_s, first);
   if (!parts) {
@@ -274,9 +277,8 @@ tl::expected<Timed, std::string> optimal_from(const FirstPlan& first,
   compensate::Course retimed = course;
   retimed.moves = result.moves;
   result.base = base_on(compensate::node_grid(retimed, setup), motion->parts, start_mm, setup);
-  if (!is_kept(result, bounds, setup, nozzle)) {
-    return tl::unexpected<std::string>(
-        "the nozzle would stray further than the tolerance, or run ahead of F");
+  if (const char* const reason = broken_by(result, bounds, setup, nozzle, extruder)) {
+    return tl::unexpected<std::string>(reason);
   }
   join_even(result.moves, result.pieces);
   return result;
@@ -287,7 +289,8 @@ tl::expected<Timed, std::string> optimal_from(const FirstPlan& first,
 tl::expected<Timed, std::string> optimal(const compensate::Course& course,
                                          const compensate::Setup& setup,
                                          const dynamics::NozzleXY& nozzle,
-                                         std::span<const MoveBounds> bounds) {
+                                         std::span<const MoveBounds> bounds,
+                                         const std::optional<Extruder>& extruder) {
   const std::optional<SectionRules> rules = rules_of(setup);
   if (!rules) {
     return tl::unexpected<std::string>("the axes have several modes or plants");
@@ -298,7 +301,7 @@ tl::expected<Timed, std::string> optimal(const compensate::Course& course,
   std::string reason;
   for (const FirstPlan& first : kFirstPlans) {
     tl::expected<Timed, std::string> found =
-        optimal_from(first, course, setup, *rules, nozzle, bounds);
+        optimal_from(first, course, setup, *rules, nozzle, bounds, extruder);
     if (found) {
       return found;
     }

@@ -192,6 +192,28 @@ TEST(SmoothedFilament, TakesNoNoticeOfLimitsThatItKeeps) {
   EXPECT_EQ(bounded, free);
 }
 
+// Also where smoothing reaches over three times as many lines as elsewhere.
+TEST(SmoothedFilament, FitsShortLines) {
+  LinesInTime lines{.times_s = {0.0}, .lengths_mm = {}};
+  for (int i = 0; i < 300; ++i) {
+    lines.times_s.push_back(lines.times_s.back() + 5e-4);
+    lines.lengths_mm.push_back(0.03);
+  }
+  const SmoothingExtruder extruder{.advance_s = 0.4, .smooth_s = 0.012};
+  const auto error_of = [&](const std::vector<double>& e_mm) {
+    double sum = 0.0;
+    for (double t = 0.03; t < lines.times_s.back() - 0.03; t += 3.7e-4) {
+      sum += std::pow(smoothed_mm(lines.times_s, e_mm, extruder.smooth_s, t) - wall_mm(t), 2);
+    }
+    return std::sqrt(sum);
+  };
+  std::vector<double> wanted;
+  for (const double t : lines.times_s) {
+    wanted.push_back(wall_mm(t));
+  }
+  EXPECT_LT(error_of(filament_to_smooth(lines, extruder, wall_mm)), 0.2 * error_of(wanted));
+}
+
 // A smooth time of far more lines than there is room for leaves E as it is wanted.
 TEST(SmoothedFilament, LeavesLinesThatAreTooShortForTheSmoothTime) {
   const LinesInTime lines = lines_of(60, 4);

@@ -86,6 +86,22 @@ TEST_P(LaidLine, IsAsWideAsSliced) {
   EXPECT_NEAR(written.emitted_time_s, own.emitted_time_s, 2e-3 * own.emitted_time_s);
 }
 
+// With a bowden the nozzle may not go as fast as its own tolerance would let it.
+TEST(LaidLineOfABowden, HasItsWidthWithFreeTiming) {
+  const std::vector<std::string> bowden = {"printer.firmware=klipper", "timing.tolerance_um=20",
+                                           "extruder.pressure_advance_s=0.4",
+                                           "pressure.max_extruder_accel_mm_s2=5000"};
+  std::string output;
+  const report::Report even = compensated(walls(), bowden, output);
+  std::vector<std::string> any = bowden;
+  any.push_back("timing.width_tolerance=0");
+  const report::Report fast = compensated(walls(), any, output);
+  ASSERT_TRUE(even.laid_line && fast.laid_line);
+  EXPECT_GT(fast.laid_line->compensated.width.p99, 0.2);
+  EXPECT_LT(even.laid_line->compensated.width.p99, 0.1);
+  EXPECT_GT(even.emitted_time_s, fast.emitted_time_s);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Firmwares, LaidLine,
     ::testing::Values(Machine{"klipper",

@@ -293,5 +293,42 @@ TEST(ElasticProgram, ForgetsTheProgramBefore) {
   EXPECT_NEAR(solved(program, 1e-9)[0], 3.0, 1e-12);
 }
 
+// The steps of rows that reach over five unknowns, in a band of this width.
+template <int W>
+std::vector<double> in_a_band_of() {
+  constexpr std::size_t kUnknowns = 60;
+  constexpr std::size_t kReach = 5;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  ElasticProgram<W> program;
+  program.reset(kUnknowns);
+  program.add_damping(1.0);
+  for (std::size_t i = 0; i + kReach <= kUnknowns; ++i) {
+    const std::size_t first = std::min(i, kUnknowns - W);
+    typename ElasticProgram<W>::Gradient g = ElasticProgram<W>::Gradient::Zero();
+    for (std::size_t j = 0; j < kReach; ++j) {
+      g[static_cast<long>(i - first + j)] = any(random);
+    }
+    program.add_square(first, g, any(random), 2.0);
+    program.add_row(first, g, 2.0 * any(random), -0.5, 0.5, 10.0);
+  }
+  int iterations = 0;
+  const auto found = program.solve(1e-9, iterations);
+  EXPECT_TRUE(found);
+  return {found->begin(), found->end()};
+}
+
+// So all widths that there are solve one program alike.
+TEST(ElasticProgram, DoesNotDependOnTheWidthOfTheBand) {
+  const std::vector<double> narrow = in_a_band_of<5>();
+  for (const std::vector<double>& wide :
+       {in_a_band_of<18>(), in_a_band_of<24>(), in_a_band_of<40>()}) {
+    ASSERT_EQ(wide.size(), narrow.size());
+    for (std::size_t i = 0; i < narrow.size(); ++i) {
+      EXPECT_NEAR(wide[i], narrow[i], 1e-5);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace unflex::quadratic

@@ -141,6 +141,33 @@ TEST(Faster, GivesMoreShareToThePlantThatStraysFurthest) {
   EXPECT_LT(drawn.largest_error_mm, 1.1 * kTolerance_mm);
 }
 
+// A bowden's extruder cannot follow what a tolerance of the nozzle alone would allow.
+TEST(Faster, GivesWayToTheExtruder) {
+  Moves moves = tour(3, 120.0);
+  for (planner::PlannedMove& move : moves) {
+    move.direction[gcode::E] = 0.035;
+  }
+  const auto engine = compensate::make_banded_engine();
+  const auto free = faster(moves, setup(), at_rest(moves), bounds_of(moves), *engine);
+  ASSERT_TRUE(free.has_value());
+  double last_s = planner::duration_s(free->moves);
+  for (const double accel_mm_s2 : {20000.0, 10000.0, 5000.0}) {
+    const auto even = faster(
+        moves, setup(), at_rest(moves), bounds_of(moves), *engine,
+        Extruder{
+            .hotend = {.advance_s = 0.4}, .max_accel_mm_s2 = accel_mm_s2, .width_tolerance = 0.1});
+    ASSERT_TRUE(even.has_value()) << accel_mm_s2;
+    EXPECT_GT(planner::duration_s(even->moves), last_s) << accel_mm_s2;
+    last_s = planner::duration_s(even->moves);
+  }
+  // One that follows everything changes nothing.
+  const auto quick = faster(
+      moves, setup(), at_rest(moves), bounds_of(moves), *engine,
+      Extruder{.hotend = {.advance_s = 0.01}, .max_accel_mm_s2 = 1e6, .width_tolerance = 0.1});
+  ASSERT_TRUE(quick.has_value());
+  EXPECT_EQ(planner::duration_s(quick->moves), planner::duration_s(free->moves));
+}
+
 TEST(Faster, LeavesAPartAsItIsWhereItMeetsItsNeighbours) {
   // 0.3 s of it are some 15 mm at 50 mm/s.
   std::vector<Point> points;

@@ -41,4 +41,8 @@ struct EmitOptions {
   bool checkpoints = false;
 };
 
+// The hotend of a run: with an advance of 0, it needs what the file or the printer has set.
+[[nodiscard]] dynamics::HotendPressure hotend_of(const EmitOptions& options,
+                                                 const gcode::PressureAdvance& of_file);
+
 }  // namespace unflex::emit

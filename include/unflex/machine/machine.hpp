@@ -256,14 +256,16 @@ struct SolveSettings {
 
 inline constexpr std::string_view kAllFeatures = "all";
 
-// As fast as a tolerance of the nozzle allows, instead of as sliced (docs/timing.md).
 // How a free timing is found (unflex/timing/timing.hpp).
 inline constexpr std::string_view kScaled = "scaled";
 inline constexpr std::string_view kOptimal = "optimal";
 
+// As fast as a tolerance of the nozzle allows, instead of as sliced (docs/timing.md).
 struct TimingSettings {
-  double tolerance_um = 0.0;                      // 0: the timing stays as sliced
-  std::string method{kScaled};                    // or kOptimal
+  double tolerance_um = 0.0;    // 0: the timing stays as sliced
+  std::string method{kScaled};  // or kOptimal
+  // Share of a line's width by which it may be off, where pressure is written; 0: it may be any.
+  double width_tolerance = 0.1;
   std::optional<double> max_speed_mm_s;           // of travel; unset: the slicer's F
   bool keep_accel_limits = false;                 // those of the plan as sliced
   std::optional<double> outer_wall_tolerance_um;  // unset: tolerance_um

@@ -21,6 +21,7 @@
 #include "unflex/compensate/run.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/hotend_pressure.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::timing {
@@ -41,6 +42,13 @@ struct MoveBounds {
 
 // Largest e of travel: it should not leave the way that the slicer has found between walls.
 inline constexpr double kTravelTolerance_mm = 0.2;
+
+// What feeds the nozzle, and how evenly it is to lay.
+struct Extruder {
+  dynamics::HotendPressure hotend;
+  double max_accel_mm_s2 = 0.0;  // of filament
+  double width_tolerance = 0.0;  // a share of the width
+};
 
 // What the firmware's limits of axes let a move do, those of acceleration in X and Y and of corners
 // aside. limits: those of the printer, not of the print.
@@ -66,13 +74,15 @@ struct Timed {
 
 // The moves of the course in less time, within the bounds, of which there is one for each move. A
 // part of a longer run keeps its timing where it meets its neighbours. Where the axes may be
-// several things and the nozzle of one strays further as sliced, it may stray as far. nullopt: no
-// such timing was found.
+// several things and the nozzle of one strays further as sliced, it may stray as far. Where the
+// extruder cannot lay evenly as sliced, the time may become longer. nullopt: no such timing was
+// found.
 [[nodiscard]] std::optional<Timed> faster(const compensate::Course& course,
                                           const compensate::Setup& setup,
                                           const dynamics::NozzleXY& nozzle,
                                           std::span<const MoveBounds> bounds,
-                                          const compensate::Engine& engine);
+                                          const compensate::Engine& engine,
+                                          const std::optional<Extruder>& extruder = {});
 
 // The moves of the course in their timing as sliced, slower where the nozzle would run ahead of F,
 // or the base in travel. nullopt: neither does, or no such timing was found.
@@ -85,9 +95,9 @@ struct Timed {
 // As faster(), by a program in which path and time are found together; the base comes with it. For
 // whole runs of axes with one mode, or of such in a band of frequencies. The error tells why there
 // is no such timing.
-[[nodiscard]] tl::expected<Timed, std::string> optimal(const compensate::Course& course,
-                                                       const compensate::Setup& setup,
-                                                       const dynamics::NozzleXY& nozzle,
-                                                       std::span<const MoveBounds> bounds);
+[[nodiscard]] tl::expected<Timed, std::string> optimal(
+    const compensate::Course& course, const compensate::Setup& setup,
+    const dynamics::NozzleXY& nozzle, std::span<const MoveBounds> bounds,
+    const std::optional<Extruder>& extruder = {});
 
 }  // namespace unflex::timing
