@@ -90,6 +90,11 @@ double first_end(double start, double to, const LineRules& rules) {
   return start + std::max(even_share_s(start, to, rules), rules.min_line_s);
 }
 
+double next_node(double t, double period_s) {
+  constexpr double kRounding = 1e-6;
+  return std::ceil(t / period_s - kRounding) * period_s;
+}
+
 // The largest change of a motor's speed between two moments line_s apart, the later of which lies
 // in [from, to]. Where lines of that length join, motors' speeds change by no more than this.
 double change_over(const BaseTrajectory& base, double from, double to, double line_s,
@@ -116,10 +121,13 @@ class Candidate {
   // Whether the line moves the nozzle little, and speed changes little at both its ends: from the
   // line before, which began at `before`, and to the shortest line that may come behind.
   [[nodiscard]] bool good(double before, double from, double to) const {
+    return joins_well(before, from, to) &&
+           largest_nozzle_error_mm(*base_, from, to, *rules_) <= rules_->tolerance_mm;
+  }
+  [[nodiscard]] bool joins_well(double before, double from, double to) const {
     const double after = to + rules_->min_line_s;
     return std::max(change(before, from, to), change(from, to, after)) <=
-               kOwnShare * rules_->max_speed_step_mm_s &&
-           largest_nozzle_error_mm(*base_, from, to, *rules_) <= rules_->tolerance_mm;
+           kOwnShare * rules_->max_speed_step_mm_s;
   }
 
  private:
@@ -143,17 +151,24 @@ class Candidate {
 };
 
 // Halves the lines that `which` names by the places of their ends in `times`. A line stays whole if
-// its halves would be too short. Returns whether any line was halved.
+// its halves would be too short. at_nodes: it is cut at the node next to its middle, if that may
+// be. Returns whether any line was halved.
 template <typename Which>
-bool halve(const BaseTrajectory& base, const LineRules& rules, std::vector<double>& times,
-           Which which) {
+bool halve(const BaseTrajectory& base, const LineRules& rules, bool at_nodes,
+           std::vector<double>& times, Which which) {
   std::vector<double> result = {times.front()};
   for (std::size_t i = 1; i < times.size(); ++i) {
     const double from = times[i - 1];
-    const double middle = 0.5 * (from + times[i]);
-    if (which(i) && long_enough(base, from, middle, rules) &&
-        long_enough(base, middle, times[i], rules)) {
-      result.push_back(middle);
+    const auto may_be = [&](double middle) {
+      return long_enough(base, from, middle, rules) && long_enough(base, middle, times[i], rules);
+    };
+    if (which(i)) {
+      const double half = 0.5 * (from + times[i]);
+      const double node = std::round(half / base.period_s) * base.period_s;
+      const double middle = at_nodes && may_be(node) ? node : half;
+      if (may_be(middle)) {
+        result.push_back(middle);
+      }
     }
     result.push_back(times[i]);
   }
@@ -200,8 +215,14 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     }
     // The rest must be long enough for a line too. We take the shortest line in any case, and a
     // longer one as long as it is good.
+    // Lines end at nodes, so that many are of one length and share what is costly to find
+    // (vertices.cpp), unless the shortest line would be too long that way.
     double end = 0.0;
-    for (double t = first_end(start, to, rules); t < to; t += h) {
+    const double shortest = first_end(start, to, rules);
+    const double at_node = next_node(shortest, h);
+    const bool may_be =
+        line.joins_well(before, start, at_node) && cuts_well(base, at_node, to, rules);
+    for (double t = may_be ? at_node : shortest; t < to; t += h) {
       if (long_enough(base, start, t, rules) && long_enough(base, t, to, rules)) {
         end = t;
         break;
@@ -236,7 +257,7 @@ bool split_lines(const BaseTrajectory& base, const std::vector<double>& x_error_
   constexpr double kAddedUp = 4.0;
   const double most = kAddedUp * rules.tolerance_mm;
   const auto off = [&](std::size_t i) { return std::hypot(x_error_mm[i], y_error_mm[i]) > most; };
-  return halve(base, rules, times,
+  return halve(base, rules, true, times,
                [&](std::size_t i) { return off(i) || (i + 1 < times.size() && off(i + 1)); });
 }
 
@@ -254,12 +275,13 @@ bool split_quick_joins(const BaseTrajectory& base, const std::vector<double>& x_
            rules.motors.largest_of_xy(change(i, x_mm), change(i, y_mm), 0.0) >
                rules.max_speed_step_mm_s;
   };
-  return halve(base, rules, times, [&](std::size_t i) { return join(i) || join(i - 1); });
+  // Halves of one length change their speed least.
+  return halve(base, rules, false, times, [&](std::size_t i) { return join(i) || join(i - 1); });
 }
 
 bool split_at_joins(const BaseTrajectory& base, const std::vector<bool>& joins,
                     const LineRules& rules, std::vector<double>& times) {
-  return halve(base, rules, times,
+  return halve(base, rules, true, times,
                [&](std::size_t i) { return joins[i - 1] || (i > 1 && joins[i - 2]); });
 }
 

@@ -18,6 +18,8 @@
 // cost. The last g is treated like a u. The gains stay what they are (O'Donoghue, Stathopoulos &
 // Boyd, A splitting method for optimal control, IEEE Trans. Control Syst. Technol. 21, 2013). Where
 // a bound is still broken by more than a little, the vertices stay on the curve.
+//
+// Lines of as many steps of one length share M, H and how h follows from the chord.
 #include "vertices.hpp"
 
 #include <Eigen/Core>
@@ -27,6 +29,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <utility>
 #include <vector>
 
 namespace unflex::emit {
@@ -55,6 +58,8 @@ constexpr double kAtEnd = 1e3;
 constexpr int kMostRounds = 200;
 constexpr double kSettled_mm_s = 0.02;
 constexpr double kPull = 0.3;
+// So many lines on either side go on with one that still changes.
+constexpr std::size_t kAround = 24;
 // A change of speed may exceed its bounds by this share of their width: ADMM ends a little outside,
 // and the last line, which ends where the base does, takes what is left.
 constexpr double kOfBounds = 0.02;
@@ -71,14 +76,25 @@ struct Bounds {
   }
 };
 
+// What all lines of so many steps of one length share: where they take (y, o), what that costs, and
+// how the cost's slope follows from what the chord is off at each step.
+template <int kModes>
+struct Shape {
+  static constexpr int kAll = kOfAll<kModes>;
+  Eigen::Matrix<double, kOfZ<kModes>, kAll> move =
+      Eigen::Matrix<double, kOfZ<kModes>, kAll>::Zero();
+  Square<kAll> cost = Square<kAll>::Zero();
+  std::vector<Vector<kAll>> of_nozzle;
+  std::vector<Vector<kAll>> of_base;
+};
+
 // One line: where it takes (y, o), and what it costs: ½ wᵀHw + hᵀw for w = (z, u).
 template <int kModes>
 struct Stage {
   static constexpr int kZ = kOfZ<kModes>;
   static constexpr int kAll = kOfAll<kModes>;
-  Eigen::Matrix<double, kZ, kAll> move = Eigen::Matrix<double, kZ, kAll>::Zero();
+  const Shape<kModes>* shape = nullptr;
   Vector<kZ> shift = Vector<kZ>::Zero();
-  Square<kAll> cost = Square<kAll>::Zero();
   Vector<kAll> slope = Vector<kAll>::Zero();
   double duration_s = 0.0;
   double chord_mm_s = 0.0;
@@ -88,15 +104,20 @@ struct Stage {
   double feed_forward = 0.0;
   double curvature = 0.0;                    // of the cost along u
   Vector<kAll> pull = Vector<kAll>::Zero();  // the cost's slope without the cost to go and w
-  double target = 0.0;                       // w − λ
+
+  // Where the line leads from (z, u).
+  [[nodiscard]] Vector<kZ> behind(const Vector<kZ>& z, double u) const {
+    Vector<kAll> w;
+    w << z, u;
+    return shape->move * w + shift;
+  }
 };
 
 // The cost and the bounds at the end of the last line.
 template <int kModes>
 struct Ending {
   Square<kOfZ<kModes>> cost = Square<kOfZ<kModes>>::Zero();
-  Bounds bounds;        // of the last g
-  double target = 0.0;  // w − λ
+  Bounds bounds;  // of the last g
 };
 
 // One step of the same length for each mode.
@@ -143,68 +164,84 @@ class Steps {
 };
 
 template <int kModes>
-Stage<kModes> stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed,
-                    const Steps<kModes>& step, double from, double to) {
+Shape<kModes> shape_of(const Steps<kModes>& step, int steps) {
   constexpr int kY = kOfY<kModes>;
   constexpr int kEnds = kY + 2;  // (y, o_k, o_{k+1})
-  using State = Vector<kY>;
-  const double duration = to - from;
-  const int steps = static_cast<int>(std::lround(duration / step.dt()));
-  const double b0 = (base.*axis)(from).position_mm;
-  const double slope = ((base.*axis)(to).position_mm - b0) / duration;
-  // First by where the line begins and ends, (y, o_k, o_{k+1}).
-  Square<kEnds> cost = Square<kEnds>::Zero();
-  Vector<kEnds> gradient = Vector<kEnds>::Zero();
+  constexpr int kAll = kOfAll<kModes>;
   using Row = Eigen::Matrix<double, 1, kEnds>;
-  const auto add_square = [&](const Row& row, double value, double weight) {
-    cost += weight * row.transpose() * row;
-    gradient += weight * value * row.transpose();
-  };
-  // The nozzle's answer to these, and to the chord alone.
+  const double duration = steps * step.dt();
+  // o_{k+1} = o_k + T (g_{k−1} + u)
+  Eigen::Matrix<double, kEnds, kAll> of_speed = Eigen::Matrix<double, kEnds, kAll>::Zero();
+  of_speed.template leftCols<kY + 1>().template topRows<kY + 1>().setIdentity();
+  of_speed(kY + 1, kY) = 1.0;
+  of_speed(kY + 1, kY + 1) = duration;
+  of_speed(kY + 1, kY + 2) = duration;
+  // The nozzle's answer to (y, o_k, o_{k+1}).
   Eigen::Matrix<double, kY, kEnds> answer = Eigen::Matrix<double, kY, kEnds>::Zero();
   answer.template leftCols<kY>().setIdentity();
-  State chord = vector_of<kModes>(followed.at(from)) - step.resting(b0);
-  State off = State::Zero();
+  Square<kEnds> cost = Square<kEnds>::Zero();
+  Shape<kModes> result;
+  const auto add_square = [&](const Row& row, double weight, std::vector<Vector<kAll>>& slopes) {
+    cost += weight * row.transpose() * row;
+    slopes.push_back(weight * (row * of_speed).transpose());
+  };
   for (int i = 0; i < steps; ++i) {
     const double s = static_cast<double>(i) / steps;
     step.advance(answer);
     answer.col(kY) += step.base(1.0 - s, -1.0 / duration);
     answer.col(kY + 1) += step.base(s, 1.0 / duration);
-    step.advance(chord);
-    chord += step.base(slope * s * duration, slope);
-    const double end = s + 1.0 / steps;
-    const double t = from + end * duration;
-    off = chord - (vector_of<kModes>(followed.at(t)) - step.resting(b0));
     Row of_nozzle = answer.row(0);
     for (int mode = 1; mode < kModes; ++mode) {
       of_nozzle += answer.row(2 * mode);
     }
-    add_square(of_nozzle, position_of(off), step.dt());
-    const double chord_off = slope * end * duration - ((base.*axis)(t).position_mm - b0);
+    add_square(of_nozzle, step.dt(), result.of_nozzle);
     Row of_base = Row::Zero();
-    of_base[kY] = 1.0 - end;
-    of_base[kY + 1] = end;
-    add_square(of_base, chord_off, kBaseWeight * step.dt());
+    of_base[kY + 1] = static_cast<double>(i + 1) / steps;
+    of_base[kY] = 1.0 - of_base[kY + 1];
+    add_square(of_base, kBaseWeight * step.dt(), result.of_base);
   }
-  // o_{k+1} = o_k + T (g_{k−1} + u)
-  Eigen::Matrix<double, kEnds, kOfAll<kModes>> of_speed =
-      Eigen::Matrix<double, kEnds, kOfAll<kModes>>::Zero();
-  of_speed.template leftCols<kY + 1>().template topRows<kY + 1>().setIdentity();
-  of_speed(kY + 1, kY) = 1.0;
-  of_speed(kY + 1, kY + 1) = duration;
-  of_speed(kY + 1, kY + 2) = duration;
-  Stage<kModes> result;
   result.cost = of_speed.transpose() * cost * of_speed;
-  result.slope = of_speed.transpose() * gradient;
   result.move.template topRows<kY>() = answer * of_speed;
   result.move.row(kY) = of_speed.row(kY + 1);
   result.move(kY + 1, kY + 1) = 1.0;
   result.move(kY + 1, kY + 2) = 1.0;
+  return result;
+}
+
+template <int kModes>
+Stage<kModes> stage(const BaseTrajectory& base, AxisAt axis, const Followed& followed,
+                    const Steps<kModes>& step, const Shape<kModes>& shape, double from, double to) {
+  constexpr int kY = kOfY<kModes>;
+  const double duration = to - from;
+  const std::size_t steps = shape.of_nozzle.size();
+  const double b0 = (base.*axis)(from).position_mm;
+  const double slope = ((base.*axis)(to).position_mm - b0) / duration;
+  Stage<kModes> result;
+  // The nozzle's answer to the chord alone, and how far that is from the nozzle that follows b.
+  Vector<kY> chord = vector_of<kModes>(followed.at(from)) - step.resting(b0);
+  Vector<kY> off = Vector<kY>::Zero();
+  for (std::size_t i = 0; i < steps; ++i) {
+    const double s = static_cast<double>(i) / static_cast<double>(steps);
+    const double end = static_cast<double>(i + 1) / static_cast<double>(steps);
+    step.advance(chord);
+    chord += step.base(slope * s * duration, slope);
+    const double t = from + end * duration;
+    off = chord - (vector_of<kModes>(followed.at(t)) - step.resting(b0));
+    const double chord_off = slope * end * duration - ((base.*axis)(t).position_mm - b0);
+    result.slope += position_of(off) * shape.of_nozzle[i] + chord_off * shape.of_base[i];
+  }
+  result.shape = &shape;
   result.shift.template head<kY>() = off;
   result.duration_s = duration;
   result.chord_mm_s = slope;
   return result;
 }
+
+// The lines from `first` to before `behind`.
+struct Stretch {
+  std::size_t first = 0;
+  std::size_t behind = 0;
+};
 
 // Sets the feedback of all laws for a pull of ρ towards the targets.
 template <int kModes>
@@ -214,46 +251,15 @@ void set_feedback(const Ending<kModes>& ending, double rho, std::vector<Stage<kM
   to_go(kZ - 1, kZ - 1) += rho;
   for (std::size_t k = stages.size(); k-- > 0;) {
     Stage<kModes>& line = stages[k];
-    Square<kOfAll<kModes>> cost = line.cost + line.move.transpose() * to_go * line.move;
+    const auto& move = line.shape->move;
+    Square<kOfAll<kModes>> cost = line.shape->cost + move.transpose() * to_go * move;
     cost(kZ, kZ) += rho;
-    line.pull = line.slope + line.move.transpose() * (to_go * line.shift);
+    line.pull = line.slope + move.transpose() * (to_go * line.shift);
     line.curvature = cost(kZ, kZ);
     line.feedback = -cost.row(kZ).template head<kZ>() / cost(kZ, kZ);
     to_go =
         cost.template topLeftCorner<kZ, kZ>() + cost.col(kZ).template head<kZ>() * line.feedback;
   }
-}
-
-// Sets the feed-forward of all laws, once the feedback is set.
-template <int kModes>
-void set_feed_forward(const Ending<kModes>& ending, double rho,
-                      std::vector<Stage<kModes>>& stages) {
-  constexpr int kZ = kOfZ<kModes>;
-  Vector<kZ> to_go = Vector<kZ>::Zero();
-  to_go[kZ - 1] = -rho * ending.target;
-  for (std::size_t k = stages.size(); k-- > 0;) {
-    Stage<kModes>& line = stages[k];
-    Vector<kOfAll<kModes>> slope = line.pull + line.move.transpose() * to_go;
-    slope[kZ] -= rho * line.target;
-    line.feed_forward = -slope[kZ] / line.curvature;
-    to_go = slope.template head<kZ>() + line.feedback.transpose() * slope[kZ];
-  }
-}
-
-// Calls use(k, u) for each line with the u of its law, off the grid. Returns the last g.
-template <int kModes, typename Use>
-double apply_laws(const std::vector<Stage<kModes>>& stages, Use use) {
-  constexpr int kZ = kOfZ<kModes>;
-  Vector<kZ> z = Vector<kZ>::Zero();
-  for (std::size_t k = 0; k < stages.size(); ++k) {
-    const Stage<kModes>& line = stages[k];
-    const double u = line.feedback * z + line.feed_forward;
-    use(k, u);
-    Vector<kOfAll<kModes>> w;
-    w << z, u;
-    z = line.move * w + line.shift;
-  }
-  return z[kZ - 1];
 }
 
 // The median of the lines' curvatures.
@@ -285,40 +291,118 @@ struct Drawn {
   }
 };
 
-// Sets the laws of all lines so that each u lies within its bounds, nearly.
+// Sets the laws of all lines so that each u lies within its bounds, nearly. The feedback of all
+// laws is set at once. Then only lines near those whose u still changes are worked on: what u does
+// is forgotten within as many lines as the nozzle rings.
 template <int kModes>
-void regulate(Ending<kModes>& ending, std::vector<Stage<kModes>>& stages) {
-  set_feedback(ending, 0.0, stages);
-  set_feed_forward(ending, 0.0, stages);
-  bool within = true;
-  const auto begin = [&](double value, const Bounds& bounds) {
-    const Drawn drawn{bounds.nearest(value), 0.0};
-    within = within && drawn.w == value;
-    return drawn;
-  };
-  std::vector<Drawn> changes(stages.size());
-  const double last =
-      apply_laws(stages, [&](std::size_t k, double u) { changes[k] = begin(u, stages[k].bounds); });
-  Drawn at_end = begin(last, ending.bounds);
-  if (within) {
-    return;
-  }
-  const double rho = kPull * middle_curvature(stages);
-  set_feedback(ending, rho, stages);
-  double change = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < kMostRounds && change > kSettled_mm_s; ++round) {
-    for (std::size_t k = 0; k < stages.size(); ++k) {
-      stages[k].target = changes[k].target();
-    }
-    ending.target = at_end.target();
-    set_feed_forward(ending, rho, stages);
-    change = 0.0;
-    const double g = apply_laws(stages, [&](std::size_t k, double u) {
-      change = std::max(change, changes[k].draw(u, stages[k].bounds));
+class Regulator {
+ public:
+  Regulator(Ending<kModes>& ending, std::vector<Stage<kModes>>& stages)
+      : ending_(ending),
+        stages_(stages),
+        drawn_(stages.size() + 1),
+        to_go_(stages.size() + 1, State::Zero()),
+        z_(stages.size() + 1, State::Zero()),
+        moved_(stages.size() + 1, 0.0) {}
+
+  void regulate() {
+    const Stretch all{0, stages_.size()};
+    set_feedback(ending_, 0.0, stages_);
+    set_feed_forward(all, 0.0);
+    bool within = true;
+    apply_laws(all, [&](std::size_t k, double value) {
+      drawn_[k] = {bounds_of(k).nearest(value), 0.0};
+      within = within && drawn_[k].w == value;
     });
-    change = std::max(change, at_end.draw(g, ending.bounds));
+    if (within) {
+      return;
+    }
+    const double rho = kPull * middle_curvature(stages_);
+    set_feedback(ending_, rho, stages_);
+    std::vector<Stretch> moving = {all};
+    for (int round = 0; round < kMostRounds && !moving.empty(); ++round) {
+      for (std::size_t i = moving.size(); i-- > 0;) {
+        set_feed_forward(moving[i], rho);
+      }
+      for (const Stretch& stretch : moving) {
+        apply_laws(stretch, [&](std::size_t k, double value) {
+          moved_[k] = drawn_[k].draw(value, bounds_of(k));
+        });
+      }
+      moving = around_moving(moving);
+    }
   }
-}
+
+ private:
+  static constexpr int kZ = kOfZ<kModes>;
+  using State = Vector<kZ>;
+
+  // Bounds of u on line k, or of the last g.
+  [[nodiscard]] const Bounds& bounds_of(std::size_t k) const {
+    return k < stages_.size() ? stages_[k].bounds : ending_.bounds;
+  }
+
+  // Sets the feed-forward of the laws, once the feedback is set.
+  void set_feed_forward(const Stretch& stretch, double rho) {
+    if (stretch.behind == stages_.size()) {
+      to_go_.back()[kZ - 1] = -rho * drawn_.back().target();
+    }
+    State to_go = to_go_[stretch.behind];
+    for (std::size_t k = stretch.behind; k-- > stretch.first;) {
+      Stage<kModes>& line = stages_[k];
+      Vector<kOfAll<kModes>> slope = line.pull + line.shape->move.transpose() * to_go;
+      slope[kZ] -= rho * drawn_[k].target();
+      line.feed_forward = -slope[kZ] / line.curvature;
+      to_go = slope.template head<kZ>() + line.feedback.transpose() * slope[kZ];
+      to_go_[k] = to_go;
+    }
+  }
+
+  // Calls use(k, u) for each line with the u of its law, off the grid, and at the end of all lines
+  // with the last g.
+  template <typename Use>
+  void apply_laws(const Stretch& stretch, Use use) {
+    State z = z_[stretch.first];
+    for (std::size_t k = stretch.first; k < stretch.behind; ++k) {
+      const Stage<kModes>& line = stages_[k];
+      const double u = line.feedback * z + line.feed_forward;
+      use(k, u);
+      z = line.behind(z, u);
+      z_[k + 1] = z;
+    }
+    if (stretch.behind == stages_.size()) {
+      use(stages_.size(), z[kZ - 1]);
+    }
+  }
+
+  [[nodiscard]] std::vector<Stretch> around_moving(const std::vector<Stretch>& stretches) const {
+    std::vector<Stretch> result;
+    for (const Stretch& stretch : stretches) {
+      const std::size_t ends = stretch.behind == stages_.size() ? 1 : 0;
+      for (std::size_t k = stretch.first; k < stretch.behind + ends; ++k) {
+        if (moved_[k] <= kSettled_mm_s) {
+          continue;
+        }
+        const std::size_t first = std::max(stretch.first + kAround, k) - kAround;
+        const std::size_t behind = std::min(stretch.behind, k + kAround + 1);
+        if (!result.empty() && first <= result.back().behind) {
+          result.back().behind = std::max(result.back().behind, behind);
+        } else {
+          result.push_back({first, behind});
+        }
+      }
+    }
+    return result;
+  }
+
+  Ending<kModes>& ending_;
+  std::vector<Stage<kModes>>& stages_;
+  // Those of u on each line, and of the last g.
+  std::vector<Drawn> drawn_;
+  std::vector<State> to_go_;   // slope of the cost to go, before each line and behind the last one
+  std::vector<State> z_;       // there
+  std::vector<double> moved_;  // by the last round, mm/s
+};
 
 // `reach`, widened to where the base itself goes.
 Reach with_base(Reach reach, const BaseTrajectory& base, AxisAt axis) {
@@ -368,16 +452,24 @@ AxisVertices choose_vertices(const BaseTrajectory& base, AxisAt axis, const Flex
                              Ends ends) {
   constexpr int kZ = kOfZ<kModes>;
   const std::size_t lines = times.size() - 1;
-  std::map<std::int64_t, Steps<kModes>> steps;  // by length; there are only a few lengths
+  // By length of a step, and by that and their number; most lines are of a few lengths.
+  std::map<std::int64_t, Steps<kModes>> steps;
+  std::map<std::pair<std::int64_t, int>, Shape<kModes>> shapes;
   std::vector<Stage<kModes>> stages;
+  stages.reserve(lines);
   std::vector<double> on_curve = {(base.*axis)(0.0).position_mm};
   for (std::size_t k = 0; k < lines; ++k) {
     const double duration = times[k + 1] - times[k];
-    const double dt = duration / std::ceil(duration / base.period_s - 1e-9);
+    const int count = static_cast<int>(std::ceil(duration / base.period_s - 1e-9));
+    const double dt = duration / count;
     constexpr double kSame_s = 1e-12;
-    const Steps<kModes>& step =
-        steps.try_emplace(std::llround(dt / kSame_s), nozzle, dt).first->second;
-    stages.push_back(stage(base, axis, followed, step, times[k], times[k + 1]));
+    const std::int64_t length = std::llround(dt / kSame_s);
+    const Steps<kModes>& step = steps.try_emplace(length, nozzle, dt).first->second;
+    auto shape = shapes.find({length, count});
+    if (shape == shapes.end()) {
+      shape = shapes.emplace(std::pair{length, count}, shape_of(step, count)).first;
+    }
+    stages.push_back(stage(base, axis, followed, step, shape->second, times[k], times[k + 1]));
     on_curve.push_back((base.*axis)(times[k + 1]).position_mm);
   }
   Ending<kModes> ending;
@@ -387,7 +479,7 @@ AxisVertices choose_vertices(const BaseTrajectory& base, AxisAt axis, const Flex
   // After the run e rings down.
   ending.cost.template topLeftCorner<kZ - 2, kZ - 2>() = ring_down_square<kModes>(nozzle);
   ending.cost(kZ - 2, kZ - 2) = kAtEnd;
-  regulate(ending, stages);
+  Regulator<kModes>(ending, stages).regulate();
   // Chooses the vertices by the laws, or on the curve. The last line takes what is left. Returns
   // whether it and all other lines keep their bounds.
   const auto draw = [&](bool by_law, AxisVertices& result) {
@@ -406,11 +498,10 @@ AxisVertices choose_vertices(const BaseTrajectory& base, AxisAt axis, const Flex
         }
         vertex = grid.nearest(std::clamp(vertex, within.min_mm, within.max_mm));
       }
-      Vector<kOfAll<kModes>> w;
-      w << z, (vertex - on_curve[k + 1] - z[kZ - 2]) / line.duration_s - z[kZ - 1];
-      z = line.move * w + line.shift;
+      const double u = (vertex - on_curve[k + 1] - z[kZ - 2]) / line.duration_s - z[kZ - 1];
+      z = line.behind(z, u);
       const double rounding = grid.step_mm / line.duration_s;
-      within_bounds = within_bounds && line.bounds.hold(w[kZ], rounding) &&
+      within_bounds = within_bounds && line.bounds.hold(u, rounding) &&
                       (k + 1 < lines || ending.bounds.hold(z[kZ - 1], rounding));
       result.position_mm.push_back(vertex);
       result.nozzle_error_mm.push_back(position_of(z.template head<kZ - 2>()));
