@@ -25,6 +25,9 @@ constexpr int kMaxSamples = 128;
 // which are not on its curve.
 constexpr double kOwnShare = 0.8;
 
+// Likewise, for a line that is made longer to end at a node, so that the base still has room.
+constexpr double kShareAtNodes = 0.4;
+
 // e at `steps` + 1 points, equally spaced over the line. steps is no more than kMaxSamples.
 std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, AxisAt at,
                                                  const BaseTrajectory& base, double from,
@@ -121,13 +124,14 @@ class Candidate {
   // Whether the line moves the nozzle little, and speed changes little at both its ends: from the
   // line before, which began at `before`, and to the shortest line that may come behind.
   [[nodiscard]] bool good(double before, double from, double to) const {
-    return joins_well(before, from, to) &&
+    return joins_within(kOwnShare, before, from, to) &&
            largest_nozzle_error_mm(*base_, from, to, *rules_) <= rules_->tolerance_mm;
   }
-  [[nodiscard]] bool joins_well(double before, double from, double to) const {
+  // Whether speed changes by no more than this share of what it may at both ends of the line.
+  [[nodiscard]] bool joins_within(double share, double before, double from, double to) const {
     const double after = to + rules_->min_line_s;
     return std::max(change(before, from, to), change(from, to, after)) <=
-           kOwnShare * rules_->max_speed_step_mm_s;
+           share * rules_->max_speed_step_mm_s;
   }
 
  private:
@@ -220,8 +224,8 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     double end = 0.0;
     const double shortest = first_end(start, to, rules);
     const double at_node = next_node(shortest, h);
-    const bool may_be =
-        line.joins_well(before, start, at_node) && cuts_well(base, at_node, to, rules);
+    const bool may_be = line.joins_within(kShareAtNodes, before, start, at_node) &&
+                        cuts_well(base, at_node, to, rules);
     for (double t = may_be ? at_node : shortest; t < to; t += h) {
       if (long_enough(base, start, t, rules) && long_enough(base, t, to, rules)) {
         end = t;
