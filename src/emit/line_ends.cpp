@@ -25,7 +25,7 @@ constexpr int kMaxSamples = 128;
 // which are not on its curve.
 constexpr double kOwnShare = 0.8;
 
-// Likewise, for a line that is made longer to end at a node, so that the base still has room.
+// Likewise, for a line that is made longer so that it ends at a node.
 constexpr double kShareAtNodes = 0.4;
 
 // e at `steps` + 1 points, equally spaced over the line. steps is no more than kMaxSamples.
@@ -155,8 +155,8 @@ class Candidate {
 };
 
 // Halves the lines that `which` names by the places of their ends in `times`. A line stays whole if
-// its halves would be too short. at_nodes: it is cut at the node next to its middle, if that may
-// be. Returns whether any line was halved.
+// its halves would be too short. at_nodes: it is cut at the node next to its middle, unless a part
+// would be too short. Returns whether any line was halved.
 template <typename Which>
 bool halve(const BaseTrajectory& base, const LineRules& rules, bool at_nodes,
            std::vector<double>& times, Which which) {
@@ -219,8 +219,8 @@ void append_line_ends(const BaseTrajectory& base, double from, double to, const 
     }
     // The rest must be long enough for a line too. We take the shortest line in any case, and a
     // longer one as long as it is good.
-    // Lines end at nodes, so that many are of one length and share what is costly to find
-    // (vertices.cpp), unless the shortest line would be too long that way.
+    // The shortest line ends at a node, unless speed would change too much then. So many lines are
+    // of one length, and these share what is costly to find (vertices.cpp).
     double end = 0.0;
     const double shortest = first_end(start, to, rules);
     const double at_node = next_node(shortest, h);

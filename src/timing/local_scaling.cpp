@@ -1,9 +1,14 @@
 // Notation:
 //   u   largest speed at a vertex      V, a   largest speed and acceleration on a piece
 //   g   error relative to the tolerance, the largest near a place
+//   w   error of the line's width relative to its tolerance, likewise
 //   A   limit of the base's acceleration, per axis or per motor
 //
 //   u ← u g^{−α}     a ← a g^{−β}     V ← V F/v where the nozzle runs ahead of F
+//   a ← a w^{−γ} where w > 1
+//
+// The extruder follows where speeds change slowly enough, so w makes accelerations smaller. A
+// nozzle that becomes slower at a vertex would not help it.
 //
 // A run that keeps its timing only becomes slower where its nozzle runs ahead of F: V alone
 // changes.
@@ -37,7 +42,8 @@ constexpr double kMoreError = 0.002;
 constexpr double kMoreSpeed = 0.00002;
 constexpr double kAlpha = 0.45;
 constexpr double kBeta = 0.2;
-constexpr double kBetaOfWidth = 0.5;
+constexpr double kGamma = 0.5;
+// After so many repairs by accelerations alone, the width makes speeds smaller as well.
 constexpr int kMendsByAccel = 4;
 constexpr double kCooling = 0.87;  // of both, from round to round
 // The repairs are in more of a hurry, and reach further from round to round.
@@ -54,7 +60,7 @@ constexpr double kLeastSpeed_mm_s = 1.0;
 constexpr double kAim = 0.97;
 // The nozzle's speed relative to F, likewise.
 constexpr double kAimOfFeed = 1.014;
-// How far in time the width depends on accelerations.
+// How far in time the width depends on accelerations, on either side.
 constexpr double kWidthReach_s = 0.02;
 // A larger swing in the end counts as this.
 constexpr double kMostLeft = 4.0;
@@ -403,16 +409,13 @@ class LocalScaling {
       MoveBounds& own = bounds_[i];
       const MoveBounds& allowed = pieces_.bounds[i];
       if (plan[i].accel_s + plan[i].decel_s > 0.0) {
-        // That the nozzle becomes slower at a vertex does not help the extruder, which follows
-        // where speeds change slowly enough.
         double factor = std::min(scale(g, beta), most);
         if (of_width > 1.0) {
-          factor = std::min(factor, scale(of_width, kBetaOfWidth));
+          factor = std::min(factor, scale(of_width, kGamma));
         }
         own.accel_mm_s2 = std::min(allowed.accel_mm_s2, own.accel_mm_s2 * factor);
       }
       const double ahead = speed.piece[i] / kAimOfFeed;
-      // Where the acceleration alone does not mend the width, the speed does.
       const double of_speed = repaired > kMendsByAccel ? std::max(g, of_width) : g;
       if (repairs && of_speed > 1.0) {
         own.speed_mm_s = std::max(plan[i].cruise_v_mm_s * scale(of_speed, alpha), kLeastSpeed_mm_s);

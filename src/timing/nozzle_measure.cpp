@@ -19,7 +19,8 @@ constexpr double kBetweenLooks[] = {0.25, 0.5, 0.75};
 // The share of the distance along the path that counts, as where filament is laid
 // (emit/nozzle_progress.cpp).
 constexpr double kTowardsReference = 0.01;
-// What lines of G-code keep of the width that is foreseen.
+// Lines of G-code lay a little less evenly than is foreseen, so only this share of the tolerance of
+// the width is used.
 constexpr double kOfLines = 0.9;
 // Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
 // There the nozzle may stray so many times the tolerance.
@@ -69,20 +70,21 @@ class Walk {
   };
 
   // may_be_left: the swing in the end that counts as 1, relative to the tolerance.
-  // allowance: for each piece; empty: 1.
-  Laid add(const AxesModel& model, dynamics::NozzleXY nozzle, double may_be_left,
-           std::span<const double> allowance, NozzleMeasure& result) const {
+  // allowance: for each piece; empty: 1. laid: nullptr if nobody asks for it.
+  void add(const AxesModel& model, dynamics::NozzleXY nozzle, double may_be_left,
+           std::span<const double> allowance, NozzleMeasure& result, Laid* laid) const {
     const double h = base_.period_s;
     const dynamics::ExactMap map_x(model.x, h / kLooks);
     const dynamics::ExactMap map_y(model.y, h / kLooks);
     std::size_t now = 0;  // the piece that the plan is on
     dynamics::NozzleMotionXY last = nozzle.motion();
     Place furthest;
-    Laid laid;
     std::vector<AtNode> nodes(base_.nodes());
     std::vector<double>& of_pieces = result.of_pieces.emplace_back(plan_.size(), 0.0);
     for (std::size_t node = 0; node + 1 < base_.nodes(); ++node) {
-      note(furthest, laid);
+      if (laid != nullptr) {
+        note(furthest, *laid);
+      }
       for (int look = 0; look < kLooks; ++look) {
         map_x.advance(segment_of(base_.x, node, look, h), nozzle.x);
         map_y.advance(segment_of(base_.y, node, look, h), nozzle.y);
@@ -121,12 +123,13 @@ class Walk {
         last = at;
       }
     }
-    note(furthest, laid);
+    if (laid != nullptr) {
+      note(furthest, *laid);
+    }
     add(nodes, model.times_tolerance, result);
     const double left_mm = std::hypot(swing_mm(model.x, nozzle.x, base_.x.position_mm.back()),
                                       swing_mm(model.y, nozzle.y, base_.y.position_mm.back()));
     result.left.push_back(left_mm / (may_be_left * bounds_.back().tolerance_mm));
-    return laid;
   }
 
  private:
@@ -228,7 +231,7 @@ class Walk {
   std::span<const double> starts_s_;
   const dynamics::BaseTrajectory& base_;
   std::vector<double> from_mm_;        // length of the path before each piece
-  std::vector<double> filament_mm_;    // laid there
+  std::vector<double> filament_mm_;    // laid on that length
   std::vector<double> inverse_flat2_;  // 1 / (d_x² + d_y²) of its direction; 0 if it is upright
 };
 
@@ -286,10 +289,12 @@ NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
                model.y.swinging_as(models.front().y, nozzle->y, y.position_mm)};
     }
     constexpr double kByFirst = 0.5;
-    const Walk::Laid laid =
-        walk.add(model, start, m == 0 ? kByFirst : 1.0,
-                 allowances.empty() ? std::span<const double>{} : allowances[m], result);
-    if (m == 0 && extruder) {
+    Walk::Laid laid;
+    const bool lays = m == 0 && extruder;
+    walk.add(model, start, m == 0 ? kByFirst : 1.0,
+             allowances.empty() ? std::span<const double>{} : allowances[m], result,
+             lays ? &laid : nullptr);
+    if (lays) {
       result.width = width_errors(laid.filament_mm, laid.way_mm, base.period_s, *extruder);
       for (double& width : result.width) {
         width /= kOfLines * extruder->width_tolerance;

@@ -57,7 +57,8 @@ struct NozzleMeasure {
   // The nozzle's speed relative to F, and in travel the base's as well; at the edges of a band it
   // may be more.
   std::vector<double> speed;
-  // What the extruder lays too much there with the first model, relative to its tolerance.
+  // By how much the width of the line is off there with the first model's nozzle, relative to what
+  // it may.
   std::vector<double> width;
   // For each model, how far the nozzle swings in the end, relative to what it may: half the
   // tolerance for the first one, since the next run begins with that swing, and all of it for the
@@ -67,7 +68,7 @@ struct NozzleMeasure {
 
 // plan: what the base was found for, whose pieces have these bounds, beginning at starts_s[0],
 // which also has the end of the last one. nozzle: where the run begins; unset for a part that
-// begins in motion. extruder: unset if it lays as the nozzle goes.
+// begins in motion. extruder: unset if the width does not count.
 [[nodiscard]] NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
                                     std::span<const MoveBounds> bounds,
                                     std::span<const double> starts_s,
