@@ -4,8 +4,10 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <exception>
 #include <optional>
+#include <string_view>
 
 #include "batch.hpp"
 #include "console.hpp"
@@ -26,6 +28,7 @@
 #include "signals.hpp"
 #include "tune.hpp"
 #include "unflex/core/caught.hpp"
+#include "unflex/core/lanes.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 #include "unflex/pipeline/study_accels.hpp"
 #include "unflex/pipeline/study_fastest.hpp"
@@ -283,8 +286,16 @@ int run(const RunConfig& asked) {
   return code;
 }
 
+// Whether to do without the wide registers that the processor has, to show that it makes no
+// difference.
+static bool prefers_two_lanes() {
+  const char* const lanes = std::getenv("UNFLEX_LANES");
+  return lanes != nullptr && std::string_view(lanes) == "2";
+}
+
 int run_program(const std::vector<std::string>& arguments) {
   reserve_standard_descriptors();
+  prefer_two_lanes(prefers_two_lanes());
   try {
     const Result<CommandLine> command_line = parse_command_line(arguments);
     if (!command_line) {

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
-#include "free_solver.hpp"
+#include "contour_kernel.hpp"
+#include "free_steps.hpp"
+#include "stage_form.hpp"
 
 namespace unflex::compensate {
 namespace {
@@ -13,31 +16,9 @@ namespace {
 constexpr int kRounds = 5;
 // In so many rounds the nearest place is looked for as far as the contour reaches.
 constexpr int kWideRounds = 2;
-constexpr std::size_t kAround = 2;  // edges
-// How far q goes in a round: so many times the way to the nearest place, and this share of the way
-// that it went in the round before.
-constexpr double kStep = 2.8;
-constexpr double kInertia = 0.45;
 // What q may still move by when it counts as found.
 constexpr double kSettled_mm = 3e-4;
 constexpr double kCornerReach_s = 1e-3;
-
-struct Place {
-  double x_mm = 0.0;
-  double y_mm = 0.0;
-  std::size_t vertex = 0;  // where the edge begins that it lies on
-  double by_x_mm = 0.0;    // the way of the last round
-  double by_y_mm = 0.0;
-};
-
-// An edge of the path: from a vertex to the next.
-struct Edge {
-  double x_mm = 0.0;
-  double y_mm = 0.0;
-  double dx_mm = 0.0;
-  double dy_mm = 0.0;
-  double inverse_square = 0.0;  // of its length; 0 if it has none
-};
 
 std::vector<Edge> edges_of(const std::vector<PathVertex>& path) {
   std::vector<Edge> edges;
@@ -51,153 +32,142 @@ std::vector<Edge> edges_of(const std::vector<PathVertex>& path) {
   return edges;
 }
 
-// The place nearest to p on the edges from vertex `first` to vertex `last`.
-Place nearest(const std::vector<Edge>& edges, std::size_t first, std::size_t last, const Place& p) {
-  Place found{edges[first].x_mm, edges[first].y_mm, first};
-  double least =
-      (found.x_mm - p.x_mm) * (found.x_mm - p.x_mm) + (found.y_mm - p.y_mm) * (found.y_mm - p.y_mm);
-  for (std::size_t i = first; i < last; ++i) {
-    const Edge& edge = edges[i];
-    const double s =
-        std::clamp(((p.x_mm - edge.x_mm) * edge.dx_mm + (p.y_mm - edge.y_mm) * edge.dy_mm) *
-                       edge.inverse_square,
-                   0.0, 1.0);
-    const Place place{edge.x_mm + s * edge.dx_mm, edge.y_mm + s * edge.dy_mm, i};
-    const double away = (place.x_mm - p.x_mm) * (place.x_mm - p.x_mm) +
-                        (place.y_mm - p.y_mm) * (place.y_mm - p.y_mm);
-    if (away < least) {
-      least = away;
-      found = place;
+// ε + λ of each sample.
+std::vector<double> along_weights(const RunWindow& window) {
+  const Contour& contour = *window.contour;
+  const std::size_t samples = window.x.reference_mm.size();
+  std::vector<double> along(samples, contour.along_weight);
+  const double reach = 2.0 * kCornerReach_s / window.x.period_s;
+  for (const PathVertex& vertex : window.path) {
+    if (vertex.is_sharp) {
+      const double from = std::max(std::ceil(vertex.sample - reach), 0.0);
+      for (auto i = static_cast<std::size_t>(from);
+           i < samples && static_cast<double>(i) <= vertex.sample + reach; ++i) {
+        along[i] = contour.along_weight + contour.corner_weight;
+      }
     }
   }
-  return found;
+  return along;
 }
 
-class Aiming {
+std::vector<Reach> reaches_of(const RunWindow& window) {
+  const double reach = 2.0 * window.contour->reach_s / window.x.period_s;
+  const std::vector<PathVertex>& path = window.path;
+  std::vector<Reach> result;
+  result.reserve(window.x.nodes());
+  Reach at;
+  for (std::size_t k = 0; k < window.x.nodes(); ++k) {
+    const auto now = static_cast<double>(2 * k);
+    while (at.first + 1 < path.size() && path[at.first + 1].sample < now - reach) {
+      ++at.first;
+    }
+    while (at.last + 1 < path.size() && path[at.last].sample < now + reach) {
+      ++at.last;
+    }
+    result.push_back(at);
+  }
+  return result;
+}
+
+// An axis of a window: its program, factored, and how it comes to its aims. The program is factored
+// once, since its matrix does not depend on the aims.
+class AimedAxis {
  public:
-  explicit Aiming(RunWindow& window)
-      : window_(window),
-        contour_(*window.contour),
-        samples_(window.x.reference_mm.size()),
-        nodes_(window.x.nodes()),
-        edges_(edges_of(window.path)) {
-    set_along_weights();
-    for (std::size_t i = 0; i < samples_; ++i) {
-      const double factor = 1.0 + along_[i];
-      window_.x.weight[i] *= factor;
-      window_.y.weight[i] *= factor;
+  // model_of: of each pair. along: ε + λ of each sample. All of them must stay where they are.
+  AimedAxis(AxisWindow& window, const std::vector<ModelPair>& pairs,
+            std::size_t ModelPair::*model_of, const std::vector<double>& along,
+            const ContourKernel& kernel)
+      : window_(window), along_(along), kernel_(kernel) {
+    scaled_.assign(window_);
+    form_.assign(scaled_);
+    ready_ = form_.factor({});
+    of_pair_.assign(kernel.pair_places(), pairs.front().*model_of);
+    parts_.resize(kernel.pair_places() * form_.model_places());
+    std::fill_n(parts_.data(), parts_.size(), 0.0);
+    std::vector<double> shares(window_.models());
+    for (const ModelPair& pair : pairs) {
+      shares[pair.*model_of] += pair.share;
     }
-    std::vector<Place> reference;
-    for (std::size_t k = 0; k < nodes_; ++k) {
-      reference.push_back({window_.x.reference_mm[2 * k], window_.y.reference_mm[2 * k]});
+    // A model that no pair holds has no share, and keeps r as its aim.
+    for (std::size_t c = 0; c < pairs.size(); ++c) {
+      const std::size_t model = pairs[c].*model_of;
+      of_pair_[c] = model;
+      if (shares[model] > 0.0) {
+        parts_[c * form_.model_places() + model] = pairs[c].share / shares[model];
+      }
     }
-    nearest_.assign(contour_.pairs.size(), reference);
-    set_aims();
+    const std::size_t aims = window_.nodes() * form_.model_places();
+    node_aims_mm_.resize(aims);
+    middle_aims_mm_.resize(aims);
+  }
+  // The form points to the scaled window.
+  AimedAxis(const AimedAxis&) = delete;
+  AimedAxis& operator=(const AimedAxis&) = delete;
+
+  [[nodiscard]] bool is_ready() const { return ready_; }
+
+  // q at the reference.
+  [[nodiscard]] PairCoordinate reference() const {
+    const std::size_t pairs = kernel_.pair_places();
+    PairCoordinate q;
+    q.place_mm.resize(window_.nodes() * pairs);
+    q.way_mm.resize(q.place_mm.size());
+    for (std::size_t k = 0; k < window_.nodes(); ++k) {
+      std::fill_n(q.place_mm.data() + k * pairs, pairs, window_.reference_mm[2 * k]);
+    }
+    std::fill_n(q.way_mm.data(), q.way_mm.size(), 0.0);
+    return q;
   }
 
-  void set_aims() {
-    aims_of(
-        window_.x, [](const ModelPair& pair) { return pair.x; },
-        [](const Place& place) { return place.x_mm; });
-    aims_of(
-        window_.y, [](const ModelPair& pair) { return pair.y; },
-        [](const Place& place) { return place.y_mm; });
+  // From the reference to the optimum.
+  void solve_first() { form_.step_to_optimum(); }
+  // From the optimum for the aims of before to that for aims at q.
+  void follow(const PairCoordinate& q) {
+    set_aims(q);
+    form_.follow_aims(node_aims_mm_, middle_aims_mm_);
+  }
+  [[nodiscard]] PairNozzles nozzles() {
+    form_.write_nozzles(nozzles_mm_);
+    return {nozzles_mm_.data(), form_.model_places(), of_pair_.data()};
   }
 
-  // Takes q farther towards the places nearest to the nozzles. x_mm and y_mm: of each model at each
-  // node. Returns the longest way that a q went.
-  double follow(const std::vector<std::vector<double>>& x_mm,
-                const std::vector<std::vector<double>>& y_mm, bool everywhere) {
-    const double reach = 2.0 * contour_.reach_s / window_.x.period_s;
-    const std::vector<PathVertex>& path = window_.path;
-    std::size_t first = 0;
-    std::size_t last = 0;
-    double farthest = 0.0;
-    for (std::size_t k = 0; k < nodes_; ++k) {
-      const auto now = static_cast<double>(2 * k);
-      while (first + 1 < path.size() && path[first + 1].sample < now - reach) {
-        ++first;
-      }
-      while (last + 1 < path.size() && path[last].sample < now + reach) {
-        ++last;
-      }
-      for (std::size_t c = 0; c < contour_.pairs.size(); ++c) {
-        const ModelPair& pair = contour_.pairs[c];
-        Place& q = nearest_[c][k];
-        const std::size_t around = q.vertex;
-        const std::size_t from =
-            everywhere || around < first + kAround ? first : std::min(around - kAround, last);
-        const std::size_t to = everywhere ? last : std::min(last, around + kAround);
-        const Place found = nearest(edges_, from, to, {x_mm[pair.x][k], y_mm[pair.y][k]});
-        q.by_x_mm = kInertia * q.by_x_mm + kStep * (found.x_mm - q.x_mm);
-        q.by_y_mm = kInertia * q.by_y_mm + kStep * (found.y_mm - q.y_mm);
-        q.x_mm += q.by_x_mm;
-        q.y_mm += q.by_y_mm;
-        q.vertex = found.vertex;
-        farthest = std::max({farthest, std::abs(q.by_x_mm), std::abs(q.by_y_mm)});
+  // The optimum for aims at q, which become the window's; nullopt if rounding keeps it away.
+  [[nodiscard]] std::optional<AxisSolution> finish(const PairCoordinate& q) {
+    follow(q);
+    const std::size_t places = form_.model_places();
+    window_.aims_mm.resize(window_.models());
+    for (std::size_t c = 0; c < window_.models(); ++c) {
+      std::vector<double>& aim_mm = window_.aims_mm[c];
+      aim_mm.resize(window_.reference_mm.size());
+      for (std::size_t k = 0; k < window_.nodes(); ++k) {
+        aim_mm[2 * k] = node_aims_mm_[k * places + c];
+        if (k + 1 < window_.nodes()) {
+          aim_mm[2 * k + 1] = middle_aims_mm_[k * places + c];
+        }
       }
     }
-    return farthest;
+    return step_without_limits(form_, scaled_.nodes) ? std::optional(solution_of(form_, scaled_))
+                                                     : std::nullopt;
   }
 
  private:
-  // ε + λ of each sample.
-  void set_along_weights() {
-    along_.assign(samples_, contour_.along_weight);
-    const double reach = 2.0 * kCornerReach_s / window_.x.period_s;
-    for (const PathVertex& vertex : window_.path) {
-      if (vertex.is_sharp) {
-        const double from = std::max(std::ceil(vertex.sample - reach), 0.0);
-        for (auto i = static_cast<std::size_t>(from);
-             i < samples_ && static_cast<double>(i) <= vertex.sample + reach; ++i) {
-          along_[i] = contour_.along_weight + contour_.corner_weight;
-        }
-      }
-    }
+  void set_aims(const PairCoordinate& q) {
+    kernel_.set_aims(
+        {window_.reference_mm.data(), along_.data(), parts_.data(), form_.model_places()},
+        q.place_mm, window_.nodes(), node_aims_mm_, middle_aims_mm_);
   }
 
-  // In the middle between two nodes q is as far from r as on the average of both.
-  template <class Model, class Coordinate>
-  void aims_of(AxisWindow& axis, const Model& model_of, const Coordinate& coordinate) {
-    const std::vector<double>& r = axis.reference_mm;
-    axis.aims_mm.resize(axis.models());
-    for (std::size_t m = 0; m < axis.models(); ++m) {
-      std::vector<double>& aim = axis.aims_mm[m];
-      mean_mm_.assign(nodes_, 0.0);
-      double share = 0.0;
-      for (std::size_t c = 0; c < contour_.pairs.size(); ++c) {
-        if (model_of(contour_.pairs[c]) == m) {
-          share += contour_.pairs[c].share;
-          for (std::size_t k = 0; k < nodes_; ++k) {
-            mean_mm_[k] += contour_.pairs[c].share * coordinate(nearest_[c][k]);
-          }
-        }
-      }
-      aim = r;
-      if (share == 0.0) {
-        // No pair holds this model, as its share is zero. So its aim has no weight.
-        continue;
-      }
-      double before_mm = 0.0;  // how far q is from r, at the node before
-      for (std::size_t k = 0; k < nodes_; ++k) {
-        const double off_mm = mean_mm_[k] / share - r[2 * k];
-        aim[2 * k] += off_mm / (1.0 + along_[2 * k]);
-        if (k > 0) {
-          aim[2 * k - 1] += 0.5 * (before_mm + off_mm) / (1.0 + along_[2 * k - 1]);
-        }
-        before_mm = off_mm;
-      }
-    }
-  }
-
-  RunWindow& window_;
-  const Contour& contour_;
-  std::size_t samples_;
-  std::size_t nodes_;
-  std::vector<Edge> edges_;
-  std::vector<double> along_;
-  std::vector<std::vector<Place>> nearest_;  // q of each pair, at the nodes
-  std::vector<double> mean_mm_;
+  AxisWindow& window_;
+  const std::vector<double>& along_;
+  const ContourKernel& kernel_;
+  ScaledWindow scaled_;
+  StageForm form_;
+  bool ready_ = false;
+  std::vector<std::size_t> of_pair_;
+  LaneArray parts_;
+  LaneArray node_aims_mm_;
+  LaneArray middle_aims_mm_;
+  LaneArray nozzles_mm_;
 };
 
 // Models by rising frequency.
@@ -295,22 +265,34 @@ std::vector<ModelPair> pairs_of(const AxisSetup& x, const AxisSetup& y) {
 }
 
 FreeSolutions aim(RunWindow& window) {
-  Aiming aiming(window);
-  FreeSolver x(window.x);
-  FreeSolver y(window.y);
+  const std::vector<ModelPair>& pairs = window.contour->pairs;
+  const std::unique_ptr<ContourKernel> kernel = make_contour_kernel(pairs.size());
+  const std::vector<Edge> edges = edges_of(window.path);
+  const std::vector<Reach> reaches = reaches_of(window);
+  const std::vector<double> along = along_weights(window);
+  for (std::size_t i = 0; i < along.size(); ++i) {
+    window.x.weight[i] *= 1.0 + along[i];
+    window.y.weight[i] *= 1.0 + along[i];
+  }
+  AimedAxis x(window.x, pairs, &ModelPair::x, along, *kernel);
+  AimedAxis y(window.y, pairs, &ModelPair::y, along, *kernel);
   if (!x.is_ready() || !y.is_ready()) {
     return {};
   }
-  for (int round = 0; round < kRounds; ++round) {
-    x.solve();
-    y.solve();
-    const double farthest = aiming.follow(x.nozzles_mm(), y.nozzles_mm(), round < kWideRounds);
-    aiming.set_aims();
-    if (farthest < kSettled_mm) {
-      break;
+  PairPlaces q{x.reference(), y.reference(), {}};
+  q.vertex.resize(q.x.place_mm.size());
+  std::fill_n(q.vertex.data(), q.vertex.size(), 0.0);
+  x.solve_first();
+  y.solve_first();
+  for (int round = 0;; ++round) {
+    const double farthest_mm =
+        kernel->follow(edges, reaches, x.nozzles(), y.nozzles(), round < kWideRounds, q);
+    if (farthest_mm < kSettled_mm || round + 1 == kRounds) {
+      return {x.finish(q.x), y.finish(q.y)};
     }
+    x.follow(q.x);
+    y.follow(q.y);
   }
-  return {x.solution(), y.solution()};
 }
 
 }  // namespace unflex::compensate

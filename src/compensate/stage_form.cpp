@@ -1,170 +1,125 @@
 #include "stage_form.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <span>
 
 namespace unflex::compensate {
 namespace {
 
-// b' = b + ḃ + b̈/2 + j/6 and so on.
-constexpr std::array<double, 3> kBaseByJerk = {1.0 / 6.0, 0.5, 1.0};
-
-// From b, ḃ and b̈ one interval before the base rests: the place where it will rest, and what the
-// input of the interval before does to it.
-constexpr std::array<double, 3> kRestingSoon = {1.0, 2.0 / 3.0, 1.0 / 6.0};
-constexpr double kRestingSoonByJerk = 1.0 / 6.0 + 0.5 * 2.0 / 3.0 + 1.0 / 6.0;
+// What starts may differ by and yet be the same.
+constexpr double kSame = 1e-9;
 
 }  // namespace
 
-void ModeSteps::clear() {
-  for (std::vector<double>& part : own) {
-    part.clear();
+std::size_t StageForm::place(std::size_t component) const {
+  if (component < count()) {
+    return component;
   }
-  for (std::array<std::vector<double>, 2>* of : {&by_accel, &by_jerk}) {
-    for (std::vector<double>& part : *of) {
-      part.clear();
-    }
-  }
+  return component < 2 * count() ? kernel_->mode_places() + component - count()
+                                 : kernel_->base_place() + component - 2 * count();
 }
 
-void ModeSteps::add(const dynamics::Mode& mode, double period_s) {
-  const AxisChain chain(mode, period_s);
-  const ChainMatrix& growth = chain.growth;
-  own[0].push_back(1.0 + growth(0, 0));
-  own[1].push_back(growth(0, 1));
-  own[2].push_back(growth(1, 0));
-  own[3].push_back(1.0 + growth(1, 1));
-  by_accel[0].push_back(mode.gain * (growth(0, 4) - growth(2, 4)));
-  by_accel[1].push_back(mode.gain * (growth(1, 4) - growth(3, 4)));
-  by_jerk[0].push_back(mode.gain * (chain.input(0) - chain.input(2)));
-  by_jerk[1].push_back(mode.gain * (chain.input(1) - chain.input(3)));
-}
-
-void StageForm::set_models(const AxisWindow& window) {
+// Modes that are alike and begin alike swing alike.
+void StageForm::set_model(const AxisWindow& window) {
+  model_.clear();
   modes_.clear();
-  gains_.clear();
-  models_.clear();
-  model_of_.clear();
+  model_.jerk_weight = window_->jerk_weight;
   for (std::size_t c = 0; c < window.models(); ++c) {
     const Plant plant = window.model(c);
-    Model model;
-    model.first_mode = modes_.count();
-    for (const dynamics::Mode& mode : plant.axis.modes()) {
-      modes_.add(mode, window.period_s);
-      gains_.push_back(mode.gain);
+    const std::span<const dynamics::Mode> modes = plant.axis.modes();
+    dynamics::NozzleState start;
+    if (window.start) {
+      start = window.in_model(c, window.start->nozzle, window.start->base_mm);
     }
-    model.end_mode = modes_.count();
-    model_of_.resize(modes_.count(), c);
-    model.share = plant.share;
-    models_.push_back(std::move(model));
-  }
-  size_ = base() + 3;
-  const auto n = static_cast<Eigen::Index>(size_);
-  node_square_.setZero(n, n);
-  middle_square_.setZero(n, n);
-  middle_cross_.setZero(n);
-  middle_curvature_ = 0.0;
-  accel_column_.setZero(n);
-  input_column_.setZero(n);
-  for (std::size_t i = 0; i < modes_.count(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    const auto rate_at = static_cast<Eigen::Index>(rates() + i);
-    accel_column_(at) = modes_.by_accel[0][i];
-    accel_column_(rate_at) = modes_.by_accel[1][i];
-    input_column_(at) = modes_.by_jerk[0][i];
-    input_column_(rate_at) = modes_.by_jerk[1][i];
-  }
-  accel_column_.tail(3) << 0.5, 1.0, 1.0;
-  input_column_.tail(3) << kBaseByJerk[0], kBaseByJerk[1], kBaseByJerk[2];
-  middle_of_.resize(base());
-  for (Model& model : models_) {
-    Vector place = Vector::Zero(n);
-    Vector rate = Vector::Zero(n);
-    place(static_cast<Eigen::Index>(base())) = 1.0;
-    rate(static_cast<Eigen::Index>(base()) + 1) = 1.0;
-    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
-      place(static_cast<Eigen::Index>(i)) = 1.0;
-      rate(static_cast<Eigen::Index>(rates() + i)) = 1.0;
-    }
-    // p_c = (p₁ + p₂)/2 + (ṗ₁ − ṗ₂)/8.
-    Vector after = 0.5 * place - 0.125 * rate;
-    model.middle_input = by_input(after.data());
-    transpose_step(after.data());
-    model.middle = 0.5 * place + 0.125 * rate + after;
-    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
-      for (const std::size_t at : {i, rates() + i}) {
-        middle_of_[at] = model.middle(static_cast<Eigen::Index>(at));
+    std::vector<StageModel::Part> parts;
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+      Swing swing{modes[i], {}};
+      if (window.start && modes[i].gain != 0.0) {
+        swing.start = {start.parts[i].position / modes[i].gain - window.start->base_mm,
+                       start.parts[i].velocity / modes[i].gain};
+      }
+      const auto known = std::ranges::find_if(modes_, [&](const Swing& other) {
+        return other.mode.omega_rad_s == swing.mode.omega_rad_s &&
+               other.mode.zeta == swing.mode.zeta &&
+               std::abs(other.start.position - swing.start.position) <= kSame &&
+               std::abs(other.start.velocity - swing.start.velocity) <=
+                   kSame * swing.mode.omega_rad_s;
+      });
+      parts.push_back({static_cast<std::size_t>(known - modes_.begin()), modes[i].gain});
+      if (known == modes_.end()) {
+        modes_.push_back(swing);
+        model_.modes.add(swing.mode, window.period_s);
       }
     }
-    node_square_ += model.share * place * place.transpose();
-    middle_square_ += model.share * model.middle * model.middle.transpose();
-    middle_cross_ += model.share * model.middle_input * model.middle;
-    middle_curvature_ += model.share * model.middle_input * model.middle_input;
+    model_.parts_of.push_back(std::move(parts));
+    model_.shares.push_back(plant.share);
   }
+  if (kernel_ == nullptr || kernel_modes_ != count() || kernel_models_ != window.models()) {
+    kernel_ = make_stage_kernel(count(), window.models());
+    kernel_modes_ = count();
+    kernel_models_ = window.models();
+  }
+  kernel_->assign(model_);
 }
 
 void StageForm::assign(const ScaledWindow& scaled) {
   window_ = &scaled;
   faint_pull_ = kFaintPull;
-  nodes_ = scaled.nodes;
   const AxisWindow& window = *scaled.window;
-  set_models(window);
-  const auto n = static_cast<Eigen::Index>(size_);
-  states_.resize(nodes_ * size_);
-  state_steps_.resize(nodes_ * size_);
-  feedback_.resize((nodes_ - 1) * size_);
-  node_pull_.resize(nodes_ * models_.size());
-  middle_pull_.resize((nodes_ - 1) * models_.size());
-  for (Padded* values :
-       {&inputs_, &input_steps_, &feedforward_, &middle_weight_, &inverse_curvature_}) {
-    values->resize(nodes_ - 1);
+  set_model(window);
+  const std::size_t nodes = scaled.nodes;
+  arrays_.resize(nodes, kernel_->state_size(), kernel_->model_places());
+  arrays_.rests_at_end = scaled.end_base.has_value();
+  slope_.resize(kernel_->state_size());
+  first_step_.assign(kernel_->state_size(), 0.0);
+  for (std::size_t k = 0; k < nodes; ++k) {
+    const bool at_end = k == 0 || k + 1 == nodes;
+    arrays_.node_weight[k] = window.weight[2 * k] * (at_end ? 1.0 / 6.0 : 1.0 / 3.0);
   }
-  node_weight_.resize(nodes_);
-  for (Matrix* matrix : {&cost_to_go_, &next_}) {
-    matrix->setZero(n, n);
+  for (std::size_t k = 0; k + 1 < nodes; ++k) {
+    arrays_.middle_weight[k] = window.weight[2 * k + 1] * (2.0 / 3.0);
   }
-  for (Vector* vector : {&by_input_, &by_accel_, &cross_, &pivot_row_}) {
-    vector->resize(n);
-  }
-  for (std::vector<double>& row : in_rows_) {
-    row.resize(modes_.count());
-  }
-  for (std::size_t k = 0; k < nodes_; ++k) {
-    const bool at_end = k == 0 || k + 1 == nodes_;
-    node_weight_[k] = window.weight[2 * k] * (at_end ? 1.0 / 6.0 : 1.0 / 3.0);
-  }
-  for (std::size_t k = 0; k + 1 < nodes_; ++k) {
-    middle_weight_[k] = window.weight[2 * k + 1] * (2.0 / 3.0);
-  }
+  set_aims();
   set_start();
+}
+
+void StageForm::set_aims() {
+  const AxisWindow& window = *window_->window;
+  const std::size_t places = kernel_->model_places();
+  for (std::size_t c = 0; c < places; ++c) {
+    // A lane that is too many has no weight.
+    const std::vector<double>& aim_mm = window.aim_mm(std::min(c, window.models() - 1));
+    for (std::size_t k = 0; k < arrays_.nodes; ++k) {
+      arrays_.node_aim[k * places + c] = window_->to_scaled_position(aim_mm[2 * k]);
+      if (k + 1 < arrays_.nodes) {
+        arrays_.middle_aim[k * places + c] = window_->to_scaled_position(aim_mm[2 * k + 1]);
+      }
+    }
+  }
 }
 
 // Goes from the given start, or from rest at the first reference point, without any jerk until the
 // end asks for it.
 void StageForm::set_start() {
   const AxisWindow& window = *window_->window;
-  const auto n = static_cast<Eigen::Index>(size_);
-  const auto accel = static_cast<Eigen::Index>(place(RowKind::accel));
+  const auto n = static_cast<Eigen::Index>(components());
+  const Eigen::Index accel = n - 1;
   Vector first = Vector::Zero(n);
   if (window.start) {
-    const double b = window_->to_scaled_position(window.start->base_mm);
-    first(accel - 2) = b;
-    for (std::size_t c = 0; c < models_.size(); ++c) {
-      const dynamics::NozzleState nozzle =
-          window.in_model(c, window.start->nozzle, window.start->base_mm);
-      for (std::size_t i = models_[c].first_mode; i < models_[c].end_mode; ++i) {
-        const dynamics::NozzleMotion& part = nozzle.parts[i - models_[c].first_mode];
-        first(static_cast<Eigen::Index>(i)) =
-            (part.position - gains_[i] * window.start->base_mm) / window_->unit[0];
-        first(static_cast<Eigen::Index>(rates() + i)) = part.velocity / window_->unit[1];
-      }
+    first(accel - 2) = window_->to_scaled_position(window.start->base_mm);
+    for (std::size_t i = 0; i < count(); ++i) {
+      first(static_cast<Eigen::Index>(i)) = modes_[i].start.position / window_->unit[0];
+      first(static_cast<Eigen::Index>(count() + i)) = modes_[i].start.velocity / window_->unit[1];
     }
     start_basis_.setZero(n, 1);
     start_basis_(accel, 0) = 1.0;
   } else {
     start_basis_.setIdentity(n, n);
   }
-  if (window_->end_base && nodes_ == 2) {
+  if (window_->end_base && arrays_.nodes == 2) {
     // The only input cannot keep both b and ḃ. So b̈ at the first node is tied to the rest of that
     // state.
     first(accel) = 6.0 * (*window_->end_base - first(accel - 2)) - 4.0 * first(accel - 1);
@@ -176,136 +131,103 @@ void StageForm::set_start() {
       start_basis_(accel, accel - 1) = -4.0;
     }
   }
-  roll_out(first);
+  std::fill_n(arrays_.states.data(), kernel_->state_size(), 0.0);
+  for (std::size_t i = 0; i < components(); ++i) {
+    arrays_.states[place(i)] = first(static_cast<Eigen::Index>(i));
+  }
+  kernel_->roll_out(window_->end_base.value_or(0.0), arrays_);
 }
 
-void StageForm::roll_out(const Vector& first) {
-  std::ranges::copy(first, states_.begin());
-  std::vector<double> feedback(size_);
-  for (std::size_t k = 0; k + 1 < nodes_; ++k) {
-    const double* const z = state(states_, k);
-    double input = 0.0;
-    if (prescribed(k)) {
-      set_prescribed_feedback(k, feedback.data());
-      for (std::size_t i = base(); i < size_; ++i) {
-        input += feedback[i] * z[i];
-      }
-      if (k + 3 == nodes_) {
-        input += *window_->end_base / kRestingSoonByJerk;
-      }
+bool StageForm::factor(const PerKind<const double*>& weights) {
+  return kernel_->factor(weights, arrays_) && factor_start();
+}
+
+bool StageForm::factor_start() {
+  const auto n = static_cast<Eigen::Index>(components());
+  Eigen::MatrixXd cost_to_go(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      cost_to_go(i, j) = kernel_->cost_to_go(place(static_cast<std::size_t>(i)),
+                                             place(static_cast<std::size_t>(j)));
     }
-    inputs_[k] = input;
-    step(z, input, state(states_, k + 1));
   }
+  const Eigen::MatrixXd reduced = start_basis_.transpose() * cost_to_go * start_basis_;
+  start_inverse_ = Eigen::MatrixXd::Identity(reduced.rows(), reduced.rows());
+  if (reduced.rows() > 0) {
+    const Eigen::LLT<Eigen::MatrixXd> llt(reduced);
+    if (llt.info() != Eigen::Success) {
+      return false;
+    }
+    llt.solveInPlace(start_inverse_);
+  }
+  return true;
 }
 
-void StageForm::step(const double* z, double input, double* next) const {
-  const std::size_t count = modes_.count();
-  const double* const rate = z + count;
-  const double* const b = z + base();
-  for (std::size_t i = 0; i < count; ++i) {
-    next[i] = modes_.own[0][i] * z[i] + modes_.own[1][i] * rate[i] + modes_.by_accel[0][i] * b[2] +
-              modes_.by_jerk[0][i] * input;
-    next[count + i] = modes_.own[2][i] * z[i] + modes_.own[3][i] * rate[i] +
-                      modes_.by_accel[1][i] * b[2] + modes_.by_jerk[1][i] * input;
+void StageForm::set_first_step(const std::vector<double>& slope, double* step) {
+  const auto n = static_cast<Eigen::Index>(components());
+  Vector g(n);
+  for (std::size_t i = 0; i < components(); ++i) {
+    g(static_cast<Eigen::Index>(i)) = slope[place(i)];
   }
-  double* const to = next + base();
-  to[0] = b[0] + b[1] + 0.5 * b[2] + kBaseByJerk[0] * input;
-  to[1] = b[1] + b[2] + kBaseByJerk[1] * input;
-  to[2] = b[2] + input;
-}
-
-void StageForm::transpose_step(double* v) const {
-  const std::size_t count = modes_.count();
-  double* const rates = v + count;
-  double* const b = v + base();
-  double by_accel = 0.5 * b[0] + b[1] + b[2];
-  for (std::size_t i = 0; i < count; ++i) {
-    const double y = v[i];
-    const double rate = rates[i];
-    by_accel += modes_.by_accel[0][i] * y + modes_.by_accel[1][i] * rate;
-    v[i] = modes_.own[0][i] * y + modes_.own[2][i] * rate;
-    rates[i] = modes_.own[1][i] * y + modes_.own[3][i] * rate;
+  const Vector at_start = start_basis_.transpose() * g;
+  const Vector first = -start_inverse_ * at_start;
+  // The model's decrease is ½ Σ r²/R over the inputs, plus such a term for the start.
+  arrays_.decrement -= 0.5 * first.dot(at_start);
+  const Vector dz = start_basis_ * first;
+  std::fill_n(step, kernel_->state_size(), 0.0);
+  for (std::size_t i = 0; i < components(); ++i) {
+    step[place(i)] = dz(static_cast<Eigen::Index>(i));
   }
-  b[1] += b[0];
-  b[2] = by_accel;
-}
-
-double StageForm::by_input(const double* v) const {
-  const std::size_t count = modes_.count();
-  const double* const b = v + base();
-  // Sums side by side, since each addition has to wait for the one before it.
-  double places = kBaseByJerk[0] * b[0] + kBaseByJerk[1] * b[1];
-  double rates = kBaseByJerk[2] * b[2];
-  for (std::size_t i = 0; i < count; ++i) {
-    places += modes_.by_jerk[0][i] * v[i];
-    rates += modes_.by_jerk[1][i] * v[count + i];
-  }
-  return places + rates;
-}
-
-double StageForm::by_feedback(std::size_t k, const double* z) const {
-  const std::size_t count = modes_.count();
-  const double* const feedback = state(feedback_, k);
-  const double* const b = feedback + base();
-  double places = b[0] * z[base()] + b[1] * z[base() + 1];
-  double rates = b[2] * z[base() + 2];
-  for (std::size_t i = 0; i < count; ++i) {
-    places += feedback[i] * z[i];
-    rates += feedback[count + i] * z[count + i];
-  }
-  return places + rates;
-}
-
-double StageForm::swing(const Model& model, const double* z, std::size_t rate) const {
-  const double* const of = z + rate * modes_.count();
-  double sum = 0.0;
-  for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
-    sum += of[i];
-  }
-  return sum;
 }
 
 void StageForm::evaluate(const PerKind<bool>& kinds) {
-  half_cost_ = 0.0;
-  const std::size_t count = models_.size();
-  for (std::size_t k = 0; k < nodes_; ++k) {
-    const double* const z = state(states_, k);
-    const double* const next = k + 1 < nodes_ ? state(states_, k + 1) : nullptr;
-    for (std::size_t c = 0; c < count; ++c) {
-      const Model& model = models_[c];
-      const double p = z[base()] + swing(model, z);
-      const std::vector<double>& aim = window_->aim(c);
-      const double error = p - aim[2 * k];
-      const double pull = node_weight_[k] * model.share * error;
-      node_pull_[k * count + c] = pull;
-      half_cost_ += 0.5 * pull * error;
-      if (next != nullptr) {
-        const double rate = z[base() + 1] + swing(model, z, 1);
-        const double p_next = next[base()] + swing(model, next);
-        const double rate_next = next[base() + 1] + swing(model, next, 1);
-        const double middle_error =
-            0.5 * (p + p_next) + 0.125 * (rate - rate_next) - aim[2 * k + 1];
-        const double middle_pull = middle_weight_[k] * model.share * middle_error;
-        middle_pull_[k * count + c] = middle_pull;
-        half_cost_ += 0.5 * middle_pull * middle_error;
-      }
-    }
-    if (next != nullptr) {
-      half_cost_ += 0.5 * window_->jerk_weight * inputs_[k] * inputs_[k];
-    }
-  }
-  split_rows(states_, inputs_, kinds, rows_);
+  kernel_->evaluate(arrays_);
+  split_rows(arrays_.states, arrays_.inputs, kinds, rows_);
 }
 
-void StageForm::split_rows(const std::vector<double>& states, const Padded& inputs,
+void StageForm::solve(const PerKind<const double*>& forces) {
+  faint_pull_ = -faint_pull_;
+  PerKind<bool> kinds{};
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    kinds[i] = forces[i] != nullptr;
+  }
+  kernel_->carry_slope_back(forces, faint_pull_, true, arrays_, slope_.data());
+  set_first_step(slope_, arrays_.state_steps.data());
+  kernel_->step_forward(arrays_);
+  split_rows(arrays_.state_steps, arrays_.input_steps, kinds, row_steps_);
+}
+
+void StageForm::step_to_optimum() {
+  faint_pull_ = -faint_pull_;
+  kernel_->evaluate(arrays_);
+  kernel_->carry_slope_back({}, faint_pull_, true, arrays_, slope_.data());
+  set_first_step(slope_, first_step_.data());
+  kernel_->go_forward(first_step_.data(), arrays_);
+}
+
+void StageForm::follow_aims(const LaneArray& node_aims_mm, const LaneArray& middle_aims_mm) {
+  faint_pull_ = -faint_pull_;
+  kernel_->change_aims(node_aims_mm.data(), middle_aims_mm.data(), window_->origin_mm,
+                       1.0 / window_->unit[0], arrays_);
+  kernel_->carry_slope_back({}, faint_pull_, false, arrays_, slope_.data());
+  set_first_step(slope_, first_step_.data());
+  kernel_->go_forward(first_step_.data(), arrays_);
+}
+
+void StageForm::write_nozzles(LaneArray& nozzles_mm) const {
+  nozzles_mm.resize(arrays_.nodes * kernel_->model_places());
+  kernel_->write_nozzles(window_->origin_mm, window_->unit[0], arrays_, nozzles_mm.data());
+}
+
+void StageForm::split_rows(const LaneArray& states, const Padded& inputs,
                            const PerKind<bool>& kinds, PerKind<Padded>& rows) const {
+  const std::size_t size = kernel_->state_size();
   for (const RowKind kind : kNodeKinds) {
     if (kinds[index_of(kind)]) {
       Padded& row = rows[index_of(kind)];
-      row.resize(nodes_);
-      for (std::size_t k = 0; k < nodes_; ++k) {
-        row[k] = state(states, k)[place(kind)];
+      row.resize(arrays_.nodes);
+      for (std::size_t k = 0; k < arrays_.nodes; ++k) {
+        row[k] = states[k * size + place(kind)];
       }
     }
   }
@@ -315,135 +237,36 @@ void StageForm::split_rows(const std::vector<double>& states, const Padded& inpu
 }
 
 ProblemSize StageForm::size() const {
+  const std::size_t n = components();
   const std::size_t at_end = window_->end_base ? 2 : 0;
-  const std::size_t at_start = size_ - static_cast<std::size_t>(start_basis_.cols());
-  return {nodes_ * size_ + nodes_ - 1, (nodes_ - 1) * size_ + at_start + at_end};
-}
-
-bool StageForm::prescribed(std::size_t k) const {
-  return window_->end_base.has_value() && k + 3 >= nodes_;
-}
-
-void StageForm::set_prescribed_feedback(std::size_t k, double* feedback) const {
-  std::fill_n(feedback, size_, 0.0);
-  double* const b = feedback + base();
-  if (k + 2 == nodes_) {
-    b[1] = b[2] = -2.0;
-    return;
-  }
-  std::ranges::copy(kRestingSoon, b);
-  transpose_step(feedback);
-  for (std::size_t i = 0; i < size_; ++i) {
-    feedback[i] /= -kRestingSoonByJerk;
-  }
-}
-
-// What the node adds to the slope of the cost of what is still to come.
-void StageForm::add_node(std::size_t k, const PerKind<const double*>& forces, double* g) const {
-  const double* const pull = node_pull_.data() + k * models_.size();
-  for (std::size_t i = 0; i < modes_.count(); ++i) {
-    g[i] += pull[model_of_[i]] - faint_pull_;
-  }
-  for (std::size_t c = 0; c < models_.size(); ++c) {
-    g[base()] += pull[c] - faint_pull_;
-  }
-  for (const RowKind kind : kNodeKinds) {
-    if (forces[index_of(kind)] != nullptr) {
-      g[place(kind)] -= forces[index_of(kind)][k];
-    }
-  }
-}
-
-// Takes the slope from behind an interval to before it, and sets the interval's feedforward.
-void StageForm::carry_slope_back(std::size_t k, const PerKind<const double*>& forces, double* g) {
-  const std::size_t count = modes_.count();
-  const double* const pull = middle_pull_.data() + k * models_.size();
-  const double* const jerk_force = forces[index_of(RowKind::jerk)];
-  double slope = window_->jerk_weight * inputs_[k] - (jerk_force != nullptr ? jerk_force[k] : 0.0) +
-                 by_input(g);
-  for (std::size_t c = 0; c < models_.size(); ++c) {
-    slope += pull[c] * models_[c].middle_input;
-  }
-  feedforward_[k] = -slope * inverse_curvature_[k];
-  decrement_ -= 0.5 * slope * feedforward_[k];
-  transpose_step(g);
-  // A model's place in the middle hangs on its own modes and on the base.
-  for (std::size_t i = 0; i < count; ++i) {
-    g[i] += pull[model_of_[i]] * middle_of_[i];
-    g[count + i] += pull[model_of_[i]] * middle_of_[count + i];
-  }
-  for (std::size_t c = 0; c < models_.size(); ++c) {
-    const double* const middle = models_[c].middle.data() + base();
-    for (std::size_t i = 0; i < 3; ++i) {
-      g[base() + i] += pull[c] * middle[i];
-    }
-  }
-  const double* const feedback = state(feedback_, k);
-  for (std::size_t i = 0; i < size_; ++i) {
-    g[i] += slope * feedback[i];
-  }
-}
-
-void StageForm::solve(const PerKind<const double*>& forces) {
-  faint_pull_ = -faint_pull_;
-  PerKind<bool> kinds{};
-  for (std::size_t i = 0; i < kinds.size(); ++i) {
-    kinds[i] = forces[i] != nullptr;
-  }
-  const auto n = static_cast<Eigen::Index>(size_);
-  // The model's decrease is ½ Σ r²/R over the inputs, plus such a term for the start.
-  decrement_ = 0.0;
-  Vector g = Vector::Zero(n);
-  add_node(nodes_ - 1, forces, g.data());
-  for (std::size_t k = nodes_ - 1; k-- > 0;) {
-    carry_slope_back(k, forces, g.data());
-    add_node(k, forces, g.data());
-  }
-  const Vector at_start = start_basis_.transpose() * g;
-  const Vector first = -start_inverse_ * at_start;
-  decrement_ -= 0.5 * first.dot(at_start);
-  Eigen::Map<Vector>(state_steps_.data(), n) = start_basis_ * first;
-  for (std::size_t k = 0; k + 1 < nodes_; ++k) {
-    const double* const z = state(state_steps_, k);
-    input_steps_[k] = by_feedback(k, z) + feedforward_[k];
-    step(z, input_steps_[k], state(state_steps_, k + 1));
-  }
-  split_rows(state_steps_, input_steps_, kinds, row_steps_);
+  const std::size_t at_start = n - static_cast<std::size_t>(start_basis_.cols());
+  return {arrays_.nodes * n + arrays_.nodes - 1, (arrays_.nodes - 1) * n + at_start + at_end};
 }
 
 void StageForm::advance(double length) {
-  const auto size = static_cast<Eigen::Index>(states_.size());
-  Eigen::Map<Vector>(states_.data(), size) +=
-      length * Eigen::Map<const Vector>(state_steps_.data(), size);
-  as_array(inputs_) += length * as_array(input_steps_);
+  const auto size = static_cast<Eigen::Index>(arrays_.states.size());
+  Eigen::Map<Vector>(arrays_.states.data(), size) +=
+      length * Eigen::Map<const Vector>(arrays_.state_steps.data(), size);
+  as_array(arrays_.inputs) += length * as_array(arrays_.input_steps);
 }
 
 void StageForm::save() {
-  saved_states_ = states_;
-  saved_inputs_ = inputs_;
+  saved_states_.resize(arrays_.states.size());
+  std::copy_n(arrays_.states.data(), arrays_.states.size(), saved_states_.data());
+  saved_inputs_ = arrays_.inputs;
 }
 
 void StageForm::restore() {
-  states_ = saved_states_;
-  inputs_ = saved_inputs_;
-}
-
-void StageForm::write_nozzles(std::vector<std::vector<double>>& nozzles_mm) const {
-  nozzles_mm.resize(models_.size());
-  for (std::size_t c = 0; c < models_.size(); ++c) {
-    nozzles_mm[c].resize(nodes_);
-    for (std::size_t k = 0; k < nodes_; ++k) {
-      const double* const z = state(states_, k);
-      nozzles_mm[c][k] = window_->origin_mm + window_->unit[0] * (z[base()] + swing(models_[c], z));
-    }
-  }
+  std::copy_n(saved_states_.data(), saved_states_.size(), arrays_.states.data());
+  arrays_.inputs = saved_inputs_;
 }
 
 void StageForm::write(dynamics::AxisTrajectory& base) const {
+  const std::size_t size = kernel_->state_size();
   const auto put = [&](RowKind kind, double offset, std::vector<double>& to) {
-    to.resize(nodes_);
-    for (std::size_t k = 0; k < nodes_; ++k) {
-      to[k] = offset + window_->unit[index_of(kind)] * state(states_, k)[place(kind)];
+    to.resize(arrays_.nodes);
+    for (std::size_t k = 0; k < arrays_.nodes; ++k) {
+      to[k] = offset + window_->unit[index_of(kind)] * arrays_.states[k * size + place(kind)];
     }
   };
   put(RowKind::position, window_->origin_mm, base.position_mm);

@@ -92,6 +92,11 @@ TEST_P(Determinism, HoldsForEitherWayToAskForTheEngine) {
   EXPECT_TRUE(make({"--engine", "banded", "-j", "3"}) == banded);
 }
 
+TEST_P(Determinism, HoldsForEitherWidthOfRegisters) {
+  const Made first = make();
+  EXPECT_TRUE(make({}, [] { ::setenv("UNFLEX_LANES", "2", 1); }) == first);
+}
+
 TEST_P(Determinism, HoldsInAnyEnvironment) {
   const Made first = make();
   const auto with = [](const char* name, const char* value) {
