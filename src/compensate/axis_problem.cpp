@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "unflex/nlp/problem.hpp"
 
@@ -17,15 +18,12 @@ using collocation::StateVector;
 
 AxisProblem::AxisProblem(const AxisWindow& window, ActiveLimits active)
     : window_(&window), active_(active), origin_mm_(window.reference_mm.front()) {
-  for (std::size_t i = 0; i < window.models(); ++i) {
-    const Plant model = window.model(i);
-    const std::size_t first = modes_.size();
-    for (const dynamics::Mode& mode : model.axis.modes()) {
-      const double omega_h = mode.omega_rad_s * window.period_s;
-      modes_.push_back({2.0 * mode.zeta * omega_h, std::pow(omega_h, 2), mode.gain});
-    }
-    models_.push_back({first, modes_.size(), model.share});
+  SharedModes shared = shared_modes(window);
+  for (const SharedModes::Swing& swing : shared.modes) {
+    const double omega_h = swing.mode.omega_rad_s * window.period_s;
+    modes_.push_back({2.0 * swing.mode.zeta * omega_h, std::pow(omega_h, 2)});
   }
+  models_ = std::move(shared.models);
 }
 
 int AxisProblem::place(Component component, std::size_t mode) const {
@@ -42,8 +40,7 @@ void AxisProblem::dynamics(double /*t*/, const PointVector& z, StateVector& f) c
     const int rate = place(kNozzleRate, i);
     const Mode& mode = modes_[i];
     f(q) = z(rate);
-    f(rate) = mode.damping * (mode.gain * z(kBaseRate) - z(rate)) +
-              mode.stiffness * (mode.gain * z(kBase) - z(q));
+    f(rate) = mode.damping * (z(kBaseRate) - z(rate)) + mode.stiffness * (z(kBase) - z(q));
   }
   f(kBase) = z(kBaseRate);
   f(kBaseRate) = z(place(kBaseAccel));
@@ -59,8 +56,8 @@ void AxisProblem::dynamics_jacobian(double /*t*/, const PointVector& /*z*/,
     fz(q, rate) = 1.0;
     fz(rate, q) = -mode.stiffness;
     fz(rate, rate) = -mode.damping;
-    fz(rate, kBase) = mode.gain * mode.stiffness;
-    fz(rate, kBaseRate) = mode.gain * mode.damping;
+    fz(rate, kBase) = mode.stiffness;
+    fz(rate, kBaseRate) = mode.damping;
   }
   fz(kBase, kBaseRate) = 1.0;
   fz(kBaseRate, place(kBaseAccel)) = 1.0;
@@ -91,21 +88,20 @@ std::size_t AxisProblem::sample(double t) const {
   return static_cast<std::size_t>(std::lround(2.0 * t));
 }
 
-double AxisProblem::error(const Model& model, std::size_t sampled, const PointVector& z) const {
-  double nozzle = z(place(kNozzle, model.first_mode));
-  for (std::size_t i = model.first_mode + 1; i < model.end_mode; ++i) {
-    nozzle += z(place(kNozzle, i));
+double AxisProblem::error(std::size_t model, std::size_t sampled, const PointVector& z) const {
+  double nozzle = 0.0;
+  for (const auto& [mode, gain] : models_[model].parts) {
+    nozzle += gain * z(place(kNozzle, mode));
   }
-  const auto index = static_cast<std::size_t>(&model - models_.data());
-  return nozzle - to_scaled(kNozzle, window_->aim_mm(index)[sampled]);
+  return nozzle - to_scaled(kNozzle, window_->aim_mm(model)[sampled]);
 }
 
 double AxisProblem::cost(double t, const PointVector& z) const {
   const std::size_t sampled = sample(t);
   double sum = 0.0;
-  for (const Model& model : models_) {
-    const double away = error(model, sampled, z);
-    sum += model.share * away * away;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const double away = error(i, sampled, z);
+    sum += models_[i].share * away * away;
   }
   return window_->weight[sampled] * sum;
 }
@@ -113,20 +109,21 @@ double AxisProblem::cost(double t, const PointVector& z) const {
 void AxisProblem::cost_gradient(double t, const PointVector& z, PointVector& gradient) const {
   const std::size_t sampled = sample(t);
   gradient.setZero();
-  for (const Model& model : models_) {
-    const double slope = 2.0 * window_->weight[sampled] * model.share * error(model, sampled, z);
-    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
-      gradient(place(kNozzle, i)) = slope;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    const double slope = 2.0 * window_->weight[sampled] * models_[i].share * error(i, sampled, z);
+    for (const auto& [mode, gain] : models_[i].parts) {
+      gradient(place(kNozzle, mode)) += slope * gain;
     }
   }
 }
 
 void AxisProblem::cost_hessian(double t, const PointVector& /*z*/, PointByPoint& h) const {
   h.setZero();
-  for (const Model& model : models_) {
-    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
-      for (std::size_t j = model.first_mode; j < model.end_mode; ++j) {
-        h(place(kNozzle, i), place(kNozzle, j)) = 2.0 * window_->weight[sample(t)] * model.share;
+  for (const SharedModes::Model& model : models_) {
+    const double bend = 2.0 * window_->weight[sample(t)] * model.share;
+    for (const auto& [i, gain_i] : model.parts) {
+      for (const auto& [j, gain_j] : model.parts) {
+        h(place(kNozzle, i), place(kNozzle, j)) += bend * gain_i * gain_j;
       }
     }
   }
@@ -135,10 +132,10 @@ void AxisProblem::cost_hessian(double t, const PointVector& /*z*/, PointByPoint&
 PointByPointPattern AxisProblem::cost_pattern() const {
   PointByPointPattern pattern(states() + 1, states() + 1);
   pattern.setConstant(false);
-  for (const Model& model : models_) {
-    for (std::size_t i = model.first_mode; i < model.end_mode; ++i) {
-      for (std::size_t j = model.first_mode; j < model.end_mode; ++j) {
-        pattern(place(kNozzle, i), place(kNozzle, j)) = true;
+  for (const SharedModes::Model& model : models_) {
+    for (const SharedModes::Part& i : model.parts) {
+      for (const SharedModes::Part& j : model.parts) {
+        pattern(place(kNozzle, i.mode), place(kNozzle, j.mode)) = true;
       }
     }
   }
@@ -190,10 +187,14 @@ void AxisProblem::set_nozzle(const dynamics::NozzleState& nozzle, double base_mm
                              PointVector& z) const {
   for (std::size_t i = 0; i < models_.size(); ++i) {
     const dynamics::NozzleState state = window_->in_model(i, nozzle, base_mm);
-    for (std::size_t mode = models_[i].first_mode; mode < models_[i].end_mode; ++mode) {
-      const dynamics::NozzleMotion& part = state.parts[mode - models_[i].first_mode];
-      z(place(kNozzle, mode)) = (part.position - modes_[mode].gain * origin_mm_) / kLengthUnitMm;
-      z(place(kNozzleRate, mode)) = to_scaled(kNozzleRate, part.velocity);
+    for (std::size_t part = 0; part < models_[i].parts.size(); ++part) {
+      const auto& [mode, gain] = models_[i].parts[part];
+      // A mode without gain goes along with the base.
+      const bool swings = gain != 0.0;
+      const double place_mm = swings ? state.parts[part].position / gain : base_mm;
+      const double rate_mm_s = swings ? state.parts[part].velocity / gain : 0.0;
+      z(place(kNozzle, mode)) = to_scaled(kNozzle, place_mm);
+      z(place(kNozzleRate, mode)) = to_scaled(kNozzleRate, rate_mm_s);
     }
   }
 }

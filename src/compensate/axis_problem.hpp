@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "limits.hpp"
+#include "shared_modes.hpp"
 #include "unflex/collocation/optimal_control_problem.hpp"
 #include "unflex/compensate/axis_window.hpp"
 
@@ -13,8 +14,8 @@ namespace unflex::compensate {
 
 inline constexpr double kLengthUnitMm = 0.01;
 
-// States q, q̇, b, ḃ, then q_i, q̇_i of the other modes and of the other models of the axis; control
-// b̈. With one mode q is p, the nozzle.
+// States q, q̇, b, ḃ, then q_i, q̇_i of the other modes of all models of the axis (shared_modes.hpp);
+// control b̈. A model's nozzle is the sum of its modes' q times their gains; with one mode q is p.
 class AxisProblem final : public collocation::OptimalControlProblem {
  public:
   // The numbers are places in z if the axis has one model of one mode.
@@ -24,7 +25,7 @@ class AxisProblem final : public collocation::OptimalControlProblem {
   AxisProblem(const AxisWindow& window, ActiveLimits active);
 
   // The place of a component in z. A component of the nozzle has one place for each mode; modes are
-  // counted through all models.
+  // counted as in SharedModes.
   [[nodiscard]] int place(Component component, std::size_t mode = 0) const;
 
   int states() const override { return 2 + 2 * static_cast<int>(modes_.size()); }
@@ -69,20 +70,14 @@ class AxisProblem final : public collocation::OptimalControlProblem {
   struct Mode {
     double damping;    // 2ζωh
     double stiffness;  // (ωh)²
-    double gain;       // g
   };
   std::vector<Mode> modes_;  // of all models
-  struct Model {
-    std::size_t first_mode;
-    std::size_t end_mode;
-    double share;  // α
-  };
-  std::vector<Model> models_;
+  std::vector<SharedModes::Model> models_;
   // Sets the places of the nozzle in z, of all models.
   void set_nozzle(const dynamics::NozzleState& nozzle, double base_mm,
                   collocation::PointVector& z) const;
   // p − r of a model.
-  [[nodiscard]] double error(const Model& model, std::size_t sampled,
+  [[nodiscard]] double error(std::size_t model, std::size_t sampled,
                              const collocation::PointVector& z) const;
 };
 

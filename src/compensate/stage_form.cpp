@@ -3,17 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <span>
 
 namespace unflex::compensate {
-namespace {
-
-// What starts may differ by and yet be the same.
-constexpr double kSame = 1e-9;
-
-}  // namespace
-
 std::size_t StageForm::place(std::size_t component) const {
   if (component < count()) {
     return component;
@@ -22,41 +13,14 @@ std::size_t StageForm::place(std::size_t component) const {
                                  : kernel_->base_place() + component - 2 * count();
 }
 
-// Modes that are alike and begin alike swing alike.
 void StageForm::set_model(const AxisWindow& window) {
+  shared_ = shared_modes(window);
   model_.clear();
-  modes_.clear();
   model_.jerk_weight = window_->jerk_weight;
-  for (std::size_t c = 0; c < window.models(); ++c) {
-    const Plant plant = window.model(c);
-    const std::span<const dynamics::Mode> modes = plant.axis.modes();
-    dynamics::NozzleState start;
-    if (window.start) {
-      start = window.in_model(c, window.start->nozzle, window.start->base_mm);
-    }
-    std::vector<StageModel::Part> parts;
-    for (std::size_t i = 0; i < modes.size(); ++i) {
-      Swing swing{modes[i], {}};
-      if (window.start && modes[i].gain != 0.0) {
-        swing.start = {start.parts[i].position / modes[i].gain - window.start->base_mm,
-                       start.parts[i].velocity / modes[i].gain};
-      }
-      const auto known = std::ranges::find_if(modes_, [&](const Swing& other) {
-        return other.mode.omega_rad_s == swing.mode.omega_rad_s &&
-               other.mode.zeta == swing.mode.zeta &&
-               std::abs(other.start.position - swing.start.position) <= kSame &&
-               std::abs(other.start.velocity - swing.start.velocity) <=
-                   kSame * swing.mode.omega_rad_s;
-      });
-      parts.push_back({static_cast<std::size_t>(known - modes_.begin()), modes[i].gain});
-      if (known == modes_.end()) {
-        modes_.push_back(swing);
-        model_.modes.add(swing.mode, window.period_s);
-      }
-    }
-    model_.parts_of.push_back(std::move(parts));
-    model_.shares.push_back(plant.share);
+  for (const SharedModes::Swing& swing : shared_.modes) {
+    model_.modes.add(swing.mode, window.period_s);
   }
+  model_.models = shared_.models;
   if (kernel_ == nullptr || kernel_modes_ != count() || kernel_models_ != window.models()) {
     kernel_ = make_stage_kernel(count(), window.models());
     kernel_modes_ = count();
@@ -111,8 +75,9 @@ void StageForm::set_start() {
   if (window.start) {
     first(accel - 2) = window_->to_scaled_position(window.start->base_mm);
     for (std::size_t i = 0; i < count(); ++i) {
-      first(static_cast<Eigen::Index>(i)) = modes_[i].start.position / window_->unit[0];
-      first(static_cast<Eigen::Index>(count() + i)) = modes_[i].start.velocity / window_->unit[1];
+      first(static_cast<Eigen::Index>(i)) = shared_.modes[i].ahead.position / window_->unit[0];
+      first(static_cast<Eigen::Index>(count() + i)) =
+          shared_.modes[i].ahead.velocity / window_->unit[1];
     }
     start_basis_.setZero(n, 1);
     start_basis_(accel, 0) = 1.0;

@@ -4,8 +4,7 @@
 //
 // Notation, beside that of axis_chain.hpp:
 //   c           models
-//   y_i         how far a mode whose gain is 1 is ahead of the base. One that several models have
-//               counts once
+//   y_i         how far a mode whose gain is 1 is ahead of the base (shared_modes.hpp)
 //   z           (y_1, …, y_K, ẏ_1, …, ẏ_K, b, ḃ, b̈)
 //   g_ci        gain of a mode in a model; p_c = b + Σ g_ci y_i
 //
@@ -40,6 +39,7 @@
 #include "axis_chain.hpp"
 #include "lane_array.hpp"
 #include "padded.hpp"
+#include "shared_modes.hpp"
 #include "stage_kernel.hpp"
 
 namespace unflex::compensate {
@@ -105,12 +105,7 @@ class StageForm {
 
   const ScaledWindow* window_ = nullptr;
   StageModel model_;
-  // All modes, and how far and how fast each is ahead of the base at the start, if that is given.
-  struct Swing {
-    dynamics::Mode mode;
-    dynamics::NozzleMotion start;
-  };
-  std::vector<Swing> modes_;
+  SharedModes shared_;
   std::unique_ptr<StageKernel> kernel_;
   std::size_t kernel_modes_ = 0;
   std::size_t kernel_models_ = 0;

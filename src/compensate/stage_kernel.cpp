@@ -30,8 +30,7 @@ void ModeSteps::add(const dynamics::Mode& mode, double period_s) {
 
 void StageModel::clear() {
   modes.clear();
-  parts_of.clear();
-  shares.clear();
+  models.clear();
 }
 
 void StageArrays::resize(std::size_t node_count, std::size_t state_size, std::size_t model_places) {

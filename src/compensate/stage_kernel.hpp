@@ -15,6 +15,7 @@
 #include "axis_chain.hpp"
 #include "lane_array.hpp"
 #include "padded.hpp"
+#include "shared_modes.hpp"
 
 namespace unflex::compensate {
 
@@ -33,17 +34,10 @@ struct ModeSteps {
 // What all stages of a window have in common.
 struct StageModel {
   ModeSteps modes;
-  // Models by the modes that they are made of, and their shares α.
-  struct Part {
-    std::size_t mode = 0;
-    double gain = 0.0;
-  };
-  std::vector<std::vector<Part>> parts_of;
-  std::vector<double> shares;
+  std::vector<SharedModes::Model> models;
   double jerk_weight = 0.0;  // ρ
 
   void clear();
-  [[nodiscard]] std::size_t models() const { return parts_of.size(); }
 };
 
 // b' = b + ḃ + b̈/2 + j/6 and so on.

@@ -103,8 +103,8 @@ class LaneStages final : public StageKernel {
     middle_base_square_ = {};
     middle_base_cross_ = {};
     middle_curvature_ = 0.0;
-    for (std::size_t c = 0; c < model.models(); ++c) {
-      add_model(c, model.parts_of[c], model.shares[c]);
+    for (std::size_t c = 0; c < model.models.size(); ++c) {
+      add_model(c, model.models[c].parts, model.models[c].share);
     }
   }
 
@@ -402,7 +402,7 @@ class LaneStages final : public StageKernel {
             -(0.5 + 2.0 / 3.0 + 1.0 / 6.0) / kRestingByJerk};
   }
 
-  void add_model(std::size_t c, const std::vector<StageModel::Part>& parts, double share) {
+  void add_model(std::size_t c, const std::vector<SharedModes::Part>& parts, double share) {
     const std::size_t k = mode_places();
     const std::size_t models = model_places();
     const std::size_t swing = 2 * k;

@@ -5,15 +5,14 @@
 #include <cmath>
 #include <cstddef>
 
+#include "unflex/dynamics/node_map.hpp"
+
 namespace unflex::emit {
 namespace {
 
 using dynamics::Mode;
 using dynamics::NozzleMotion;
 using dynamics::NozzleState;
-
-// Integration steps per node period.
-constexpr int kSubsteps = 4;
 
 // ∫ q_i q_j of two modes that ring down, by the states of both: AᵢᵀX + XAⱼ + E = 0, where E takes
 // the product of the positions.
@@ -69,36 +68,21 @@ StepMatrix::StepMatrix(const dynamics::FlexibleAxis& axis, std::size_t mode, dou
   column(4, {}, {0.0, 0.0, 1.0});
 }
 
-Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
+Followed::Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
                    const dynamics::FlexibleAxis& nozzle)
     : Followed(base, axis, nozzle,
-               nozzle.riding((base.*axis)(0.0).position_mm, (base.*axis)(0.0).velocity_mm_s)) {}
+               nozzle.riding(base.at(base.*axis, 0.0).position_mm,
+                             base.at(base.*axis, 0.0).velocity_mm_s)) {}
 
-Followed::Followed(const dynamics::BaseTrajectory& base, AxisAt axis,
+Followed::Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
                    const dynamics::FlexibleAxis& nozzle, const NozzleState& start)
     : period_s_(base.period_s), modes_(nozzle.mode_count()) {
-  const double dt = base.period_s / kSubsteps;
-  std::vector<StepMatrix> steps;
-  for (std::size_t mode = 0; mode < modes_; ++mode) {
-    steps.emplace_back(nozzle, mode, dt);
-  }
+  const dynamics::NodeMap map(nozzle, base.period_s);
+  states_.reserve(base.nodes());
   NozzleState state = start;
   states_.push_back(state);
-  for (std::size_t k = 1; k < base.nodes(); ++k) {
-    for (int i = 0; i < kSubsteps; ++i) {
-      const double t = base.period_s * static_cast<double>(k - 1) + i * dt;
-      const dynamics::AxisMotion from = (base.*axis)(t);
-      const double middle = (base.*axis)(t + 0.5 * dt).accel_mm_s2;
-      for (std::size_t mode = 0; mode < modes_; ++mode) {
-        const StepMatrix& step = steps[mode];
-        NozzleMotion& part = state.parts[mode];
-        const Eigen::Vector2d origin(step.gain() * from.position_mm, 0.0);
-        const Eigen::Vector2d next =
-            step.free() * (Eigen::Vector2d(part.position, part.velocity) - origin) +
-            step.base(0.0, from.velocity_mm_s, middle) + origin;
-        part = {next[0], next[1]};
-      }
-    }
+  for (std::size_t k = 0; k + 1 < base.nodes(); ++k) {
+    map.advance(base.*axis, k, state);
     states_.push_back(state);
   }
 }

@@ -11,8 +11,8 @@
 
 namespace unflex::emit {
 
-// BaseTrajectory::x_at or y_at.
-using AxisAt = dynamics::AxisMotion (dynamics::BaseTrajectory::*)(double) const;
+// BaseTrajectory::x or y_at.
+using BaseAxis = dynamics::AxisTrajectory dynamics::BaseTrajectory::*;
 
 // States of a nozzle of kModes modes as vectors: (q_1, q̇_1, …).
 template <int kModes>
@@ -61,9 +61,10 @@ class StepMatrix {
 // a given state.
 class Followed {
  public:
-  Followed(const dynamics::BaseTrajectory& base, AxisAt axis, const dynamics::FlexibleAxis& nozzle);
-  Followed(const dynamics::BaseTrajectory& base, AxisAt axis, const dynamics::FlexibleAxis& nozzle,
-           const dynamics::NozzleState& start);
+  Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
+           const dynamics::FlexibleAxis& nozzle);
+  Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
+           const dynamics::FlexibleAxis& nozzle, const dynamics::NozzleState& start);
 
   [[nodiscard]] dynamics::NozzleState at(double t) const;
 

@@ -128,7 +128,7 @@ LineCosts<kModes>::LineCosts(const BaseTrajectory& base,
     all.models = models_for(axis == 0 ? rules.nozzle_x : rules.nozzle_y, rules.freq_error);
     std::vector<Followed> follow;
     for (const FlexibleAxis& model : all.models) {
-      follow.emplace_back(base, axis == 0 ? &BaseTrajectory::x_at : &BaseTrajectory::y_at, model);
+      follow.emplace_back(base, axis == 0 ? &BaseTrajectory::x : &BaseTrajectory::y, model);
     }
     all.at.reserve(size());
     for (std::size_t k = 0; k < size(); ++k) {

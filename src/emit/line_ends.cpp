@@ -29,19 +29,19 @@ constexpr double kOwnShare = 0.8;
 constexpr double kShareAtNodes = 0.4;
 
 // e at `steps` + 1 points, equally spaced over the line. steps is no more than kMaxSamples.
-std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, AxisAt at,
+std::array<double, kMaxSamples + 1> nozzle_error(const FlexibleAxis& axis, BaseAxis at,
                                                  const BaseTrajectory& base, double from,
                                                  double duration, int steps) {
   std::array<double, kMaxSamples + 1> d{};
   const auto weight = [&](int i) { return i == 0 || i == steps ? 0.5 : 1.0; };
   const auto s = [&](int i) { return static_cast<double>(i) / steps - 0.5; };
-  const double origin = (base.*at)(from).position_mm;
+  const double origin = base.at(base.*at, from).position_mm;
   double sum = 0.0;
   double moment = 0.0;
   double inertia = 0.0;
   for (int i = 0; i <= steps; ++i) {
     double& value = d[static_cast<std::size_t>(i)];
-    value = (base.*at)(from + (s(i) + 0.5) * duration).position_mm - origin;
+    value = base.at(base.*at, from + (s(i) + 0.5) * duration).position_mm - origin;
     sum += weight(i) * value;
     moment += weight(i) * s(i) * value;
     inertia += weight(i) * s(i) * s(i);
@@ -72,13 +72,13 @@ double largest_nozzle_error_mm(const BaseTrajectory& base, double from, double t
   const double duration = to - from;
   const int steps =
       std::clamp(static_cast<int>(std::ceil(2.0 * duration / base.period_s)), 6, kMaxSamples);
-  const auto x = nozzle_error(rules.nozzle_x, &BaseTrajectory::x_at, base, from, duration, steps);
-  const auto y = nozzle_error(rules.nozzle_y, &BaseTrajectory::y_at, base, from, duration, steps);
-  double largest = 0.0;
+  const auto x = nozzle_error(rules.nozzle_x, &BaseTrajectory::x, base, from, duration, steps);
+  const auto y = nozzle_error(rules.nozzle_y, &BaseTrajectory::y, base, from, duration, steps);
+  double largest2 = 0.0;
   for (std::size_t i = 0; i <= static_cast<std::size_t>(steps); ++i) {
-    largest = std::max(largest, std::hypot(x[i], y[i]));
+    largest2 = std::max(largest2, x[i] * x[i] + y[i] * y[i]);
   }
-  return largest;
+  return std::sqrt(largest2);
 }
 
 // How long each line is if as many as possible share the time evenly.
@@ -104,14 +104,14 @@ double change_over(const BaseTrajectory& base, double from, double to, double li
                    const Motors& motors) {
   double most = 0.0;
   for (double t = std::max(from, line_s); t < to + base.period_s; t += base.period_s) {
-    const auto change = [&](AxisAt axis) {
+    const auto change = [&](BaseAxis axis) {
       const auto speed = [&](double at) {
-        return (base.*axis)(std::min(at, base.duration_s())).velocity_mm_s;
+        return base.at(base.*axis, std::min(at, base.duration_s())).velocity_mm_s;
       };
       return speed(t) - speed(t - line_s);
     };
-    most = std::max(most, motors.largest_of_xy(change(&BaseTrajectory::x_at),
-                                               change(&BaseTrajectory::y_at), 0.0));
+    most = std::max(
+        most, motors.largest_of_xy(change(&BaseTrajectory::x), change(&BaseTrajectory::y), 0.0));
   }
   return most;
 }
@@ -138,16 +138,16 @@ class Candidate {
   // The largest change of a motor's speed where lines from a to b and from b to c join. A line
   // without time stands for rest.
   [[nodiscard]] double change(double a, double b, double c) const {
-    const auto along = [&](AxisAt axis) {
+    const auto along = [&](BaseAxis axis) {
       const auto speed = [&](double from, double to) {
-        return from < to ? ((base_->*axis)(to).position_mm - (base_->*axis)(from).position_mm) /
+        return from < to ? (base_->at(base_->*axis, to).position_mm -
+                            base_->at(base_->*axis, from).position_mm) /
                                (to - from)
                          : 0.0;
       };
       return speed(b, c) - speed(a, b);
     };
-    return rules_->motors.largest_of_xy(along(&BaseTrajectory::x_at), along(&BaseTrajectory::y_at),
-                                        0.0);
+    return rules_->motors.largest_of_xy(along(&BaseTrajectory::x), along(&BaseTrajectory::y), 0.0);
   }
 
   const BaseTrajectory* base_;

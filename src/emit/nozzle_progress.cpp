@@ -75,8 +75,8 @@ NozzleProgress::NozzleProgress(const Run& run, const std::vector<double>& starts
     state = {nozzle_x.riding(at[X], v * move.direction[X]),
              nozzle_y.riding(at[Y], v * move.direction[Y])};
   }
-  const Followed along_x(*run.base, &dynamics::BaseTrajectory::x_at, nozzle_x, state.x);
-  const Followed along_y(*run.base, &dynamics::BaseTrajectory::y_at, nozzle_y, state.y);
+  const Followed along_x(*run.base, &dynamics::BaseTrajectory::x, nozzle_x, state.x);
+  const Followed along_y(*run.base, &dynamics::BaseTrajectory::y, nozzle_y, state.y);
   double furthest = 0.0;
   for (std::size_t k = 0; k < run.base->nodes(); ++k) {
     const double t = period_s_ * static_cast<double>(k);

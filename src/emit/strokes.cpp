@@ -249,8 +249,8 @@ Polygon polygon(const Run& run, const Timetable& table, const NozzleProgress& no
   for (std::size_t i = 1; i < required.size(); ++i) {
     append_line_ends(base, required[i - 1], required[i], rules, times);
   }
-  const VertexChooser along_x(base, &dynamics::BaseTrajectory::x_at, rules.nozzle_x);
-  const VertexChooser along_y(base, &dynamics::BaseTrajectory::y_at, rules.nozzle_y);
+  const VertexChooser along_x(base, &dynamics::BaseTrajectory::x, rules.nozzle_x);
+  const VertexChooser along_y(base, &dynamics::BaseTrajectory::y, rules.nozzle_y);
   const auto choose = [&] {
     const Ends ends{!run.goes_on, !run.until_s};
     const auto [of_x, of_y] = speed_steps(base, times, ends, rules);

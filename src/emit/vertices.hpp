@@ -47,7 +47,7 @@ struct AxisVertices {
 // included.
 class VertexChooser {
  public:
-  VertexChooser(const dynamics::BaseTrajectory& base, AxisAt axis,
+  VertexChooser(const dynamics::BaseTrajectory& base, BaseAxis axis,
                 const dynamics::FlexibleAxis& nozzle);
 
   // For lines that end at times[1], times[2] …. The first and the last vertex are the base's own,
@@ -60,7 +60,7 @@ class VertexChooser {
 
  private:
   const dynamics::BaseTrajectory* base_;
-  AxisAt axis_;
+  BaseAxis axis_;
   dynamics::FlexibleAxis nozzle_;
   Followed followed_;
 };

@@ -8,6 +8,7 @@
 #include "plan_walk.hpp"
 
 namespace unflex::pipeline {
+
 void EmissionCost::add(const std::vector<planner::PlannedMove>& original, double lead_in_s,
                        const dynamics::BaseTrajectory& base,
                        const std::vector<planner::PlannedMove>& replayed, double late_s,
@@ -15,11 +16,12 @@ void EmissionCost::add(const std::vector<planner::PlannedMove>& original, double
   const double h = base.period_s;
   dynamics::NozzleXY optimal = start;
   dynamics::NozzleXY real = start;
+  const NozzleOnBase on_base(base, model);
   PlanWalk sliced(original);
   PlanWalk emitted(replayed);
   for (std::size_t k = 0; k + 1 < base.nodes(); ++k) {
     const double t = static_cast<double>(k + 1) * h;
-    advance(base, k, model, optimal);
+    on_base.advance(k, optimal);
     emitted.to(t + late_s, [&](const planner::PlannedMove& move, double from_s, double to_s) {
       advance(move, from_s, to_s, model, real);
     });

@@ -10,21 +10,6 @@
 namespace unflex::pipeline {
 namespace {
 
-// Advances the nozzle by one node period. The base's acceleration is linear between nodes; for the
-// nozzle, the mean of each half is accurate enough.
-dynamics::NozzleState after_node(const dynamics::AxisTrajectory& base, std::size_t k, double h,
-                                 const dynamics::FlexibleAxis& axis,
-                                 const dynamics::NozzleState& before) {
-  const double change = base.accel_mm_s2[k + 1] - base.accel_mm_s2[k];
-  const dynamics::AxisMotion middle = dynamics::between(base, k, 0.5 * h, h);
-  const dynamics::NozzleState state = dynamics::exact_step(
-      axis, before,
-      {base.position_mm[k], base.velocity_mm_s[k], base.accel_mm_s2[k] + 0.25 * change}, 0.5 * h);
-  return dynamics::exact_step(
-      axis, state, {middle.position_mm, middle.velocity_mm_s, base.accel_mm_s2[k] + 0.75 * change},
-      0.5 * h);
-}
-
 // How the deviation of a nozzle develops while its base stands still.
 dynamics::NozzleState swing(const dynamics::FlexibleAxis& axis,
                             const dynamics::NozzleState& deviation, double duration_s) {
@@ -67,12 +52,6 @@ void advance(const planner::PlannedMove& move, double from_s, double to_s,
     nozzle.y = step(gcode::Y, model.y, nozzle.y);
     t = until_s;
   }
-}
-
-void advance(const dynamics::BaseTrajectory& base, std::size_t k, const verify::NozzleModel& model,
-             dynamics::NozzleXY& nozzle) {
-  nozzle = {after_node(base.x, k, base.period_s, model.x, nozzle.x),
-            after_node(base.y, k, base.period_s, model.y, nozzle.y)};
 }
 
 double across_mm(const gcode::Segment& segment, double x_mm, double y_mm) {

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 
 #include "piece_reader.hpp"
 #include "unflex/dynamics/base_trajectory.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/node_map.hpp"
 #include "unflex/planner/planner.hpp"
 #include "unflex/planner/printer_shaper.hpp"
 #include "unflex/verify/deviation.hpp"
@@ -24,9 +26,24 @@ namespace unflex::pipeline {
 void advance(const planner::PlannedMove& move, double from_s, double to_s,
              const verify::NozzleModel& model, dynamics::NozzleXY& nozzle);
 
-// Takes the nozzle from node k of the base's motion to the next.
-void advance(const dynamics::BaseTrajectory& base, std::size_t k, const verify::NozzleModel& model,
-             dynamics::NozzleXY& nozzle);
+// Takes the nozzle from node to node of the base's motion.
+class NozzleOnBase {
+ public:
+  // Both must outlive it.
+  NozzleOnBase(const dynamics::BaseTrajectory& base, const verify::NozzleModel& model)
+      : base_(&base), x_(model.x, base.period_s), y_(model.y, base.period_s) {}
+
+  // From node k to the next.
+  void advance(std::size_t k, dynamics::NozzleXY& nozzle) const {
+    x_.advance(base_->x, k, nozzle.x);
+    y_.advance(base_->y, k, nozzle.y);
+  }
+
+ private:
+  const dynamics::BaseTrajectory* base_;
+  dynamics::NodeMap x_;
+  dynamics::NodeMap y_;
+};
 
 // The part of an offset that is across the segment, which moves in X or Y; without sign.
 [[nodiscard]] double across_mm(const gcode::Segment& segment, double x_mm, double y_mm);

@@ -21,10 +21,11 @@ PathError path_error(const std::vector<planner::PlannedMove>& plan, double lead_
                      const verify::NozzleModel& model) {
   PathError error;
   dynamics::NozzleXY nozzle = start;
+  const NozzleOnBase on_base(base, model);
   PlanWalk sliced(plan);
   for (std::size_t k = 0; k + 1 < base.nodes() && !sliced.at_end(); ++k) {
     const double t = static_cast<double>(k + 1) * base.period_s - lead_in_s;
-    advance(base, k, model, nozzle);
+    on_base.advance(k, nozzle);
     sliced.to(t, [](const planner::PlannedMove&, double, double) {});
     if (t > 0.0 && !sliced.at_end() && sliced.move().segment.extruding()) {
       const gcode::Position planned = sliced.position_mm();

@@ -322,11 +322,8 @@ std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& sett
   const std::vector<machine::PlantSettings>& x = settings.dynamics_x.plants;
   const std::vector<machine::PlantSettings>& y = settings.dynamics_y.plants;
   const machine::SecondSettings& second = settings.second;
-  // As coarse as those with other frequencies (verify::detuned).
-  constexpr double kCoarseStep_s = 1e-3;
   std::vector<verify::NozzleModel> nozzles(std::max(x.size(), y.size()), nominal);
   for (std::size_t i = 0; i < nozzles.size(); ++i) {
-    nozzles[i].step_s = std::max(nominal.step_s, kCoarseStep_s);
     if (i < x.size()) {
       nozzles[i].x = behind(axis(x[i].modes), second.x_freq_hz, second.x_damping_ratio);
     }

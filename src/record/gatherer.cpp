@@ -96,7 +96,7 @@ void Recorder::Gatherer::step(verify::NozzleId nozzle, const verify::NozzleStep&
   const int number = nozzle.base == NozzleBase::emitted ? 1 : 0;
   Version& version = versions_[number];
   if (step.extruding) {
-    version.histogram.add_square(step.contour2_mm2, step.h_s);
+    version.histogram.add_square(step.mean_contour2_mm2, step.h_s);
   }
   if (step.measured && step.piece != version.piece) {
     close_chunk(number, std::numeric_limits<double>::infinity());
@@ -126,9 +126,9 @@ void Recorder::Gatherer::lay(int number, const verify::NozzleStep& step) {
   Version& version = versions_[number];
   Chunk& chunk = version.chunk;
   chunk.weight_s += step.h_s;
-  chunk.sum_contour2 += step.h_s * step.contour2_mm2;
-  if (step.contour2_mm2 > chunk.contour2_max_mm2) {
-    chunk.contour2_max_mm2 = step.contour2_mm2;
+  chunk.sum_contour2 += step.h_s * step.mean_contour2_mm2;
+  if (step.largest_contour2_mm2 > chunk.contour2_max_mm2) {
+    chunk.contour2_max_mm2 = step.largest_contour2_mm2;
     chunk.max_x_mm = step.measured ? step.reference_x_mm : step.nozzle.x.position;
     chunk.max_y_mm = step.measured ? step.reference_y_mm : step.nozzle.y.position;
     chunk.max_line = step.line;

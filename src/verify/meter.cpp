@@ -17,26 +17,23 @@ constexpr double kLagLeastSpeed_mm_s = 5.0;
 
 // In a long cruise we look so often whether the nozzle has come to rest on the base.
 constexpr double kLook_s = 1.0;
-// Below this it has. What is left, less than an atom, is dropped, and samples may be this many
-// times further apart, since nothing but the place changes any more.
-constexpr double kRests_mm = 1e-7;
-constexpr double kSparser = 32.0;
+// If it has, steps may be so many times longer, since nothing but the place changes any more.
+constexpr double kSparser = 6.0;
 
 bool is_cruise(const BasePhase& phase) {
   return phase.x.acceleration == 0.0 && phase.y.acceleration == 0.0;
-}
-
-bool rests_on(const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
-              const dynamics::BaseSegment& base) {
-  const dynamics::FlexibleAxis::Gap gap =
-      axis.gap(nozzle, axis.riding(base.position, base.velocity));
-  return std::max(gap.place_mm, gap.speed_mm) < kRests_mm;
 }
 
 // The state of the base h seconds later.
 void advance(dynamics::BaseSegment& base, double h) {
   base.position += h * (base.velocity + 0.5 * base.acceleration * h);
   base.velocity += base.acceleration * h;
+}
+
+std::vector<NozzleModel> with(const NozzleModel& model, const std::vector<NozzleModel>& others) {
+  std::vector<NozzleModel> all = {model};
+  all.insert(all.end(), others.begin(), others.end());
+  return all;
 }
 
 }  // namespace
@@ -61,23 +58,27 @@ void LagEstimate::restart() {
   weight_s_ = 0.0;
 }
 
-Meter::Meter(const NozzleModel& model, double near_s) : model_(model), near_(near_s) {}
+Meter::Meter(const NozzleModel& model, const std::vector<NozzleModel>& others)
+    : bundle_(with(model, others)), near_(verify::reach_s(model)) {}
 
-void Meter::watch(Observer* observer, NozzleId id) {
+void Meter::watch(Observer* observer, NozzleBase base) {
   observer_ = observer;
-  id_ = id;
+  base_ = base;
   if (line_) {
-    line_->watch(observer_, id_);
+    line_->watch(observer_, {base_, 0});
   }
 }
 
+void Meter::drop_others() { bundle_.keep_first(); }
+
 void Meter::follow_line(const LineModel& model) {
   line_.emplace(model);
-  line_->watch(observer_, id_);
+  line_->watch(observer_, {base_, 0});
 }
 
 void Meter::set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm) {
-  nozzle_ = nozzle;
+  bundle_.set_nozzle(0, nozzle);
+  last_look_.reset();
   base_x_mm_ = base_x_mm;
   base_y_mm_ = base_y_mm;
 }
@@ -101,6 +102,7 @@ void Meter::begin_section(ReferencePath& path, double unplayed_s, double unplaye
   time_s_ = begin_s;
   laid_mm_ = path.filament_mm() - unplayed_mm;
   section_error_ = {};
+  last_look_.reset();
 }
 
 double Meter::base_offset_mm() {
@@ -127,7 +129,8 @@ double Meter::swing_mm() const {
   if (path_->first() == path_->end()) {
     return 0.0;
   }
-  return verify::swing_mm(nozzle_, (*path_)[path_->end() - 1].move.segment.end_mm, model_);
+  return verify::swing_mm(nozzle(), (*path_)[path_->end() - 1].move.segment.end_mm,
+                          bundle_.model());
 }
 
 void Meter::follow_lag(bool on) {
@@ -136,11 +139,14 @@ void Meter::follow_lag(bool on) {
 }
 
 void Meter::shift_to(double x_mm, double y_mm) {
-  if (corners_ && (x_mm != base_x_mm_ || y_mm != base_y_mm_)) {
+  if (x_mm == base_x_mm_ && y_mm == base_y_mm_) {
+    return;
+  }
+  if (corners_) {
     corners_->lift();
   }
-  nozzle_.x.add(model_.x.riding(x_mm - base_x_mm_));
-  nozzle_.y.add(model_.y.riding(y_mm - base_y_mm_));
+  bundle_.shift(x_mm - base_x_mm_, y_mm - base_y_mm_);
+  last_look_.reset();
   base_x_mm_ = x_mm;
   base_y_mm_ = y_mm;
 }
@@ -162,8 +168,8 @@ void Meter::play(const planner::PlannedMove& move, const planner::PlannedMove& p
 }
 
 void Meter::settle(const BasePhase& phase) {
-  nozzle_.x = dynamics::exact_step(model_.x, nozzle_.x, phase.x, phase.duration_s);
-  nozzle_.y = dynamics::exact_step(model_.y, nozzle_.y, phase.y, phase.duration_s);
+  bundle_.settle(phase.x, phase.y, phase.duration_s);
+  last_look_.reset();
   if (corners_) {
     corners_->lift();
   }
@@ -234,65 +240,52 @@ void Meter::take_corners() {
 }
 
 void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
-  // For fewer steps it does not pay to set up maps.
-  constexpr double kManySteps = 8.0;
-  if (is_cruise(phase) && rests_on(model_.x, nozzle_.x, phase.x) &&
-      rests_on(model_.y, nozzle_.y, phase.y)) {
-    const double few = std::ceil(duration_s / (kSparser * model_.step_s) - 1e-9);
-    const double h = duration_s / std::max(1.0, few);
-    integrate(phase, std::max(1.0, few), h, measured, [&] {
-      nozzle_.x = model_.x.riding(phase.x.position + h * phase.x.velocity, phase.x.velocity);
-      nozzle_.y = model_.y.riding(phase.y.position + h * phase.y.velocity, phase.y.velocity);
-    });
-    return;
-  }
-  const double steps = std::max(1.0, std::ceil(duration_s / model_.step_s - 1e-9));
+  const bool rides = is_cruise(phase) && bundle_.rest_on(phase.x, phase.y);
+  const double longest_s = (rides ? kSparser : 1.0) * bundle_.step_s();
+  const double steps = std::max(1.0, std::ceil(duration_s / longest_s - 1e-9));
   const double h = duration_s / steps;
-  if (steps < kManySteps) {
-    integrate(phase, steps, h, measured, [&] {
-      nozzle_.x = dynamics::rk4_step(model_.x, nozzle_.x, phase.x, h);
-      nozzle_.y = dynamics::rk4_step(model_.y, nozzle_.y, phase.y, h);
-    });
-    return;
-  }
-  const dynamics::Rk4Map map_x(model_.x, h);
-  const dynamics::Rk4Map map_y(model_.y, h);
-  integrate(phase, steps, h, measured, [&] {
-    map_x.advance(phase.x, nozzle_.x);
-    map_y.advance(phase.y, nozzle_.y);
-  });
-}
-
-template <typename OneStep>
-void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
-                      const OneStep& step) {
   const double start_s = time_s_;
+  bundle_.begin_steps(steps, h);
   ReferencePhase reference;
   if (measured) {
-    path_->extend_to(start_s + steps * h + reach_s());
+    path_->extend_to(start_s + duration_s + reach_s());
     take_corners();
-    reference = reference_phase(steps * h);
+    reference = reference_phase(duration_s);
   }
+  const bool looks = measured || phase.extruding;
+  if (!looks || (last_look_ && last_measured_ != measured)) {
+    last_look_.reset();
+  }
+  const auto look_after = [&](double since_s) {
+    return measured ? look(reference, since_s) : look_at_rest(since_s);
+  };
+  if (looks && !last_look_) {
+    last_look_ = look_after(0.0);
+  }
+  last_measured_ = measured;
   for (double number = 1.0; number <= steps; number += 1.0) {
-    step();
+    const dynamics::NozzleMotionXY from = corners_ ? bundle_.motion(0) : dynamics::NozzleMotionXY{};
+    bundle_.step(phase.x, phase.y);
     advance(phase.x, h);
     advance(phase.y, h);
     advance(phase.e, h);
+    if (rides) {
+      bundle_.ride_on(phase.x, phase.y);
+    }
     const dynamics::BaseSegment pushed_from = phase.pushed;
     advance(phase.pushed, h);
+    time_s_ = start_s + number * h;
     if (corners_) {
-      corners_->sample(start_s + number * h + corner_shift_s_, nozzle_.x.position(),
-                       nozzle_.y.position());
+      pass_corners(from, h);
     }
-    Sample measurement;
-    if (measured) {
-      time_s_ = start_s + number * h;
+    Sample sample;
+    if (looks) {
       advance(reference.x, h);
       advance(reference.y, h);
-      measurement = sample(reference, phase.extruding, h);
-    } else if (phase.extruding) {
-      time_s_ = start_s + number * h;
-      measurement = sample_at_rest(h);
+      sample = look_after(h);
+      bundle_.count(measured, phase.extruding);
+      count(*last_look_, sample, reference, measured, phase.extruding, h);
+      last_look_ = sample;
     }
     const bool follows_line = line_ && line_->is_measuring();
     const bool has_lag = measured && follows_filament_ && (reference.extruding || phase.extruding);
@@ -302,15 +295,29 @@ void Meter::integrate(BasePhase& phase, double steps, double h, bool measured,
         filament_lag_.add(*path_, *at, laid_mm_ + phase.e.position, phase.extruding, h);
       }
       if (follows_line) {
-        line_->add(*path_, {h, phase.pushed.position - pushed_from.position, pushed_from.velocity,
-                            phase.pushed.velocity, phase.extruding, measurement.contour2_mm2, at});
+        line_->add(*path_,
+                   {h, phase.pushed.position - pushed_from.position, pushed_from.velocity,
+                    phase.pushed.velocity, phase.extruding, looks ? bundle_.mean_mm2() : 0.0, at});
       }
     }
     if (observer_ != nullptr) {
-      time_s_ = start_s + number * h;
-      tell(phase, h, measured, reference, measurement);
+      tell(phase, h, measured, reference, sample);
     }
   }
+  time_s_ = start_s;
+}
+
+// Between two looks the nozzle goes in a curve, of which the middle shows enough.
+void Meter::pass_corners(const dynamics::NozzleMotionXY& from, double h) {
+  const double now_s = time_s_ + corner_shift_s_;
+  const dynamics::NozzleMotionXY to = bundle_.motion(0);
+  if (corners_->is_near(now_s - 0.5 * h)) {
+    const auto middle = [&](const dynamics::NozzleMotion& a, const dynamics::NozzleMotion& b) {
+      return 0.5 * (a.position + b.position) + 0.125 * h * (a.velocity - b.velocity);
+    };
+    corners_->sample(now_s - 0.5 * h, middle(from.x, to.x), middle(from.y, to.y));
+  }
+  corners_->sample(now_s, to.x.position, to.y.position);
 }
 
 // The reference's motion for the next duration_s. In that time it must change neither its
@@ -351,64 +358,74 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
           piece.extruding};
 }
 
-// laying: filament is laid by what is played now.
-Meter::Sample Meter::sample(const ReferencePhase& reference, bool laying, double h) {
-  const double nozzle_x_mm = nozzle_.x.position();
-  const double nozzle_y_mm = nozzle_.y.position();
-  const double error_x = reference.x.position - nozzle_x_mm;
-  const double error_y = reference.y.position - nozzle_y_mm;
-
+Meter::Sample Meter::look(const ReferencePhase& reference, double since_s) {
   near_.slide(*path_, time_s_);
-  std::size_t nearest = current_;
-  const double contour2 = near_.squared_contour_error(*path_, nozzle_x_mm, nozzle_y_mm, nearest);
-  const double tracking2 = error_x * error_x + error_y * error_y;
-  const std::size_t line = (*path_)[nearest].move.segment.line;
-  all_.add(contour2, tracking2, h, line);
-  if (laying) {
-    extruding_.add(contour2, tracking2, h, line);
-    section_error_.add(contour2, h, line);
-    if (follow_feed_ && (*path_)[nearest].extruding) {
-      const double v_x = nozzle_.x.velocity();
-      const double v_y = nozzle_.y.velocity();
-      feed_.add(v_x * v_x + v_y * v_y, (*path_)[nearest].move.segment.feed_mm_s, h, line);
-    }
-  }
-  if (follow_lag_) {
-    const double v_x = reference.x.velocity;
-    const double v_y = reference.y.velocity;
-    lag_.add(error_x * v_x + error_y * v_y, v_x * v_x + v_y * v_y, h);
-  }
-  return {contour2, line};
+  bundle_.look(*path_, near_, since_s);
+  const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
+  const double error_x = reference.x.position - nozzle.x.position;
+  const double error_y = reference.y.position - nozzle.y.position;
+  return {error_x * error_x + error_y * error_y, (*path_)[bundle_.nearest()].move.segment.line};
 }
 
 // Filament is laid before the reference moves or after it has ended.
-Meter::Sample Meter::sample_at_rest(double h) {
+Meter::Sample Meter::look_at_rest(double since_s) {
   if (path_->first() == path_->end()) {
     return {};
   }
   const bool before = current_ < path_->end();
   const std::size_t piece = before ? current_ : path_->end() - 1;
-  const double begin_s = (*path_)[piece].start_s;
-  near_.slide(*path_, std::clamp(time_s_, begin_s, (*path_)[piece].end_s));
-  std::size_t nearest = piece;
-  const double contour2 =
-      near_.squared_contour_error(*path_, nozzle_.x.position(), nozzle_.y.position(), nearest);
+  near_.slide(*path_, std::clamp(time_s_, (*path_)[piece].start_s, (*path_)[piece].end_s));
+  bundle_.look(*path_, near_, since_s);
   const gcode::Segment& segment = (*path_)[piece].move.segment;
   const gcode::Position& at = before ? segment.start_mm : segment.end_mm;
-  const double error_x = at[gcode::X] - nozzle_.x.position();
-  const double error_y = at[gcode::Y] - nozzle_.y.position();
-  const std::size_t line = (*path_)[nearest].move.segment.line;
-  extruding_.add(contour2, error_x * error_x + error_y * error_y, h, line);
-  section_error_.add(contour2, h, line);
-  return {contour2, line};
+  const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
+  const double error_x = at[gcode::X] - nozzle.x.position;
+  const double error_y = at[gcode::Y] - nozzle.y.position;
+  return {error_x * error_x + error_y * error_y, (*path_)[bundle_.nearest()].move.segment.line};
+}
+
+// What happens between two looks. laying: filament is laid by what is played now.
+void Meter::count(const Sample& from, const Sample& to, const ReferencePhase& reference,
+                  bool measured, bool laying, double h) {
+  const double tracking2 = 0.5 * (from.tracking2_mm2 + to.tracking2_mm2);
+  const double tracking2_max = std::max(from.tracking2_mm2, to.tracking2_mm2);
+  const auto add = [&](DeviationAccumulator& figures) {
+    figures.add(bundle_.mean_mm2(), bundle_.largest_mm2(), tracking2, tracking2_max, h, to.line);
+  };
+  if (measured) {
+    add(all_);
+  }
+  if (laying) {
+    add(extruding_);
+    section_error_.add(bundle_.mean_mm2(), bundle_.largest_mm2(), h, to.line);
+  }
+  if (!measured) {
+    return;
+  }
+  if (laying && follow_feed_ && (*path_)[bundle_.nearest()].extruding) {
+    const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
+    const double v_x = nozzle.x.velocity;
+    const double v_y = nozzle.y.velocity;
+    feed_.add(v_x * v_x + v_y * v_y, (*path_)[bundle_.nearest()].move.segment.feed_mm_s, h,
+              to.line);
+  }
+  if (follow_lag_) {
+    const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
+    const double v_x = reference.x.velocity;
+    const double v_y = reference.y.velocity;
+    lag_.add((reference.x.position - nozzle.x.position) * v_x +
+                 (reference.y.position - nozzle.y.position) * v_y,
+             v_x * v_x + v_y * v_y, h);
+  }
 }
 
 // Where the nozzle is on the path. While the reference does not move, it is where the reference
 // will begin, or has ended.
 std::optional<PathPlace> Meter::place(bool measured, const ReferencePhase& reference) const {
   if (measured) {
+    const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
     return nearest_place(*path_, current_, reference.x.position, reference.y.position,
-                         nozzle_.x.position(), nozzle_.y.position());
+                         nozzle.x.position, nozzle.y.position);
   }
   if (path_->first() == path_->end()) {
     return std::nullopt;
@@ -423,11 +440,9 @@ void Meter::tell(const BasePhase& phase, double h, bool measured, const Referenc
   NozzleStep step;
   step.time_s = time_s_;
   step.h_s = h;
-  step.nozzle = nozzle_.motion();
   step.base_x = phase.x;
   step.base_y = phase.y;
   step.extruding = phase.extruding;
-  step.contour2_mm2 = sample.contour2_mm2;
   step.line = sample.line;
   step.measured = measured;
   step.waiting = waiting_;
@@ -436,19 +451,34 @@ void Meter::tell(const BasePhase& phase, double h, bool measured, const Referenc
     step.reference_y_mm = reference.y.position;
     step.piece = current_;
   }
-  observer_->step(id_, step);
+  for (std::size_t number = 0; number < bundle_.count(); ++number) {
+    step.nozzle = bundle_.motion(number);
+    if (measured || phase.extruding) {
+      step.contour2_mm2 = bundle_.now_mm2(number);
+      step.mean_contour2_mm2 = bundle_.mean_mm2(number);
+      step.largest_contour2_mm2 = bundle_.largest_mm2(number);
+    }
+    observer_->step({base_, number}, step);
+  }
 }
 
 void Meter::look() {
   static_cast<void>(next_reference_change());
   if (current_ < path_->end() && (*path_)[current_].measured &&
       (*path_)[current_].start_s <= time_s_ + kSameTime_s) {
-    static_cast<void>(sample(reference_phase(0.0), (*path_)[current_].extruding, 0.0));
+    const Sample sample = look(reference_phase(0.0), 0.0);
+    const bool laying = (*path_)[current_].extruding;
+    bundle_.count_moment(laying);
+    all_.add(bundle_.now_mm2(), sample.tracking2_mm2, 0.0, sample.line);
+    if (laying) {
+      extruding_.add(bundle_.now_mm2(), sample.tracking2_mm2, 0.0, sample.line);
+      section_error_.add(0.0, bundle_.now_mm2(), 0.0, sample.line);
+    }
   }
 }
 
 void Meter::wait_for_reference() {
-  const NozzleXY nozzle = nozzle_;
+  const std::vector<double> states = bundle_.states();
   const double time_s = time_s_;
   // Waits in bounded stretches, so that a reference far ahead need not be known to its end at once.
   waiting_ = true;
@@ -460,7 +490,8 @@ void Meter::wait_for_reference() {
     path_->extend_to(time_s_ + kSameTime_s);
   }
   waiting_ = false;
-  nozzle_ = nozzle;
+  bundle_.set_states(states);
+  last_look_.reset();
   corner_shift_s_ += time_s_ - time_s;
   time_s_ = time_s;
   if (corners_) {
@@ -469,8 +500,8 @@ void Meter::wait_for_reference() {
 }
 
 void Meter::hold(double duration_s) {
-  nozzle_.x = dynamics::exact_step(model_.x, nozzle_.x, {base_x_mm_, 0.0, 0.0}, duration_s);
-  nozzle_.y = dynamics::exact_step(model_.y, nozzle_.y, {base_y_mm_, 0.0, 0.0}, duration_s);
+  bundle_.settle({base_x_mm_, 0.0, 0.0}, {base_y_mm_, 0.0, 0.0}, duration_s);
+  last_look_.reset();
   if (line_) {
     line_->rest(duration_s);
   }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "bundle.hpp"
 #include "filament_lag.hpp"
 #include "laid_line.hpp"
 #include "shaped_base.hpp"
@@ -67,11 +68,11 @@ class FeedGauge {
 // The contour error of a nozzle in one section.
 class SectionError {
  public:
-  void add(double contour2_mm2, double weight_s, std::size_t line) {
+  void add(double contour2_mm2, double contour2_max_mm2, double weight_s, std::size_t line) {
     sum_contour2_ += weight_s * contour2_mm2;
     weight_s_ += weight_s;
-    if (contour2_mm2 > contour2_max_) {
-      contour2_max_ = contour2_mm2;
+    if (contour2_max_mm2 > contour2_max_) {
+      contour2_max_ = contour2_max_mm2;
       line_ = line;
     }
   }
@@ -89,16 +90,23 @@ class SectionError {
   std::size_t line_ = 0;
 };
 
+// Moves a bundle of nozzles. The first is measured in every way, the others by their contour errors
+// alone.
 class Meter {
  public:
-  // near_s: how far from its time the reference's path counts as near.
-  Meter(const NozzleModel& model, double near_s);
-  explicit Meter(const NozzleModel& model) : Meter(model, verify::reach_s(model)) {}
+  explicit Meter(const NozzleModel& model, const std::vector<NozzleModel>& others = {});
 
-  // Tells the observer of every step.
-  void watch(Observer* observer, NozzleId id);
+  // Tells the observer of every step of each nozzle.
+  void watch(Observer* observer, NozzleBase base);
+  // From now on there is the first nozzle alone.
+  void drop_others();
+  // How many others there are, and how far they stray.
+  [[nodiscard]] std::size_t others() const { return bundle_.count() - 1; }
+  [[nodiscard]] Deviation deviation_of_other(std::size_t number) const {
+    return bundle_.deviation(number + 1);
+  }
 
-  // The nozzle and base at the very start.
+  // The first nozzle and the base at the very start.
   void set_state(const NozzleXY& nozzle, double base_x_mm, double base_y_mm);
   // Measures against this path from now on. The path must live as long. The clock is set to
   // unplayed_s before the start of the path's current section. unplayed_mm: filament that is still
@@ -124,7 +132,10 @@ class Meter {
   // The base stands still; nothing is measured.
   void hold(double duration_s);
   // Puts the clock forward, within a section.
-  void skip(double duration_s) { time_s_ += duration_s; }
+  void skip(double duration_s) {
+    time_s_ += duration_s;
+    last_look_.reset();
+  }
 
   // Also measures the filament's lag.
   void follow_filament() { follows_filament_ = true; }
@@ -149,7 +160,7 @@ class Meter {
   [[nodiscard]] double lag_s() const { return lag_.present_s(); }
 
   [[nodiscard]] double time_s() const { return time_s_; }
-  [[nodiscard]] const NozzleXY& nozzle() const { return nozzle_; }
+  [[nodiscard]] NozzleXY nozzle() const { return bundle_.nozzle(); }
   [[nodiscard]] double base_x_mm() const { return base_x_mm_; }
   [[nodiscard]] double base_y_mm() const { return base_y_mm_; }
   [[nodiscard]] const DeviationAccumulator& extruding() const { return extruding_; }
@@ -173,28 +184,32 @@ class Meter {
   };
 
   void integrate(BasePhase& phase, double duration_s, bool measured);
-  template <typename OneStep>
-  void integrate(BasePhase& phase, double steps, double h, bool measured, const OneStep& step);
   [[nodiscard]] double next_reference_change();
   void take_corners();
+  void pass_corners(const dynamics::NozzleMotionXY& from, double h);
   [[nodiscard]] ReferencePhase reference_phase(double duration_s) const;
-  // What was measured of the nozzle.
+  // What a look shows of the first nozzle.
   struct Sample {
-    double contour2_mm2 = 0.0;
+    double tracking2_mm2 = 0.0;
     std::size_t line = 0;
   };
-  Sample sample(const ReferencePhase& reference, bool laying, double h);
-  Sample sample_at_rest(double h);
+  // since_s: when the last look was; 0 if this one has nothing to do with it.
+  [[nodiscard]] Sample look(const ReferencePhase& reference, double since_s);
+  [[nodiscard]] Sample look_at_rest(double since_s);
+  void count(const Sample& from, const Sample& to, const ReferencePhase& reference, bool measured,
+             bool laying, double h);
   [[nodiscard]] std::optional<PathPlace> place(bool measured,
                                                const ReferencePhase& reference) const;
   void tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
             const Sample& sample);
 
-  NozzleModel model_;
   std::vector<BasePhase> phases_;  // phases of the move at hand
   ReferencePath* path_ = nullptr;
   double time_s_ = 0.0;
-  NozzleXY nozzle_;
+  Bundle bundle_;
+  // What was seen last, if it is what the next step begins with.
+  std::optional<Sample> last_look_;
+  bool last_measured_ = false;
   double base_x_mm_ = 0.0;
   double base_y_mm_ = 0.0;
   std::size_t current_ = 0;  // piece of the reference at time_s_
@@ -220,7 +235,7 @@ class Meter {
   bool follow_lag_ = false;
   bool waiting_ = false;
   Observer* observer_ = nullptr;
-  NozzleId id_;
+  NozzleBase base_ = NozzleBase::sliced;
 };
 
 }  // namespace unflex::verify

@@ -10,11 +10,7 @@ constexpr double kSameTime_s = 1e-10;
 }  // namespace
 
 Nozzles::Nozzles(const NozzleModel& model, const Observation& observation, NozzleBase base)
-    : main_(model), observer_(observation.observer) {
-  for (const NozzleModel& other : observation.detuned) {
-    // One reach for all, so that one stretch of the path counts as near for all.
-    detuned_.emplace_back(other, main_.reach_s());
-  }
+    : main_(model, observation.detuned), observer_(observation.observer) {
   main_.follow_filament();
   main_.follow_corners();
   watch_as(base);
@@ -22,8 +18,7 @@ Nozzles::Nozzles(const NozzleModel& model, const Observation& observation, Nozzl
 
 void Nozzles::watch_as(NozzleBase base) {
   if (observer_ != nullptr) {
-    std::size_t number = 0;
-    for_each([&](Meter& meter) { meter.watch(observer_, {base, number++}); });
+    main_.watch(observer_, base);
   }
 }
 
@@ -38,7 +33,7 @@ double Nozzles::plan_y_mm() const { return shaped_ ? to_mm_[gcode::Y] : main_.ba
 void Nozzles::begin_section(ReferencePath& path) {
   const double unplayed_s = shaped_ ? shaped_->unplayed_s() : 0.0;
   const double unplayed_mm = shaped_ ? shaped_->filament_mm() : 0.0;
-  for_each([&](Meter& meter) { meter.begin_section(path, unplayed_s, unplayed_mm); });
+  main_.begin_section(path, unplayed_s, unplayed_mm);
 }
 
 void Nozzles::shape(const planner::Shaping& shaping) {
@@ -49,7 +44,7 @@ void Nozzles::shape(const planner::Shaping& shaping) {
 void Nozzles::play(const planner::PlannedMove& move, const planner::PlannedMove& pushed) {
   if (!shaping_.acts()) {
     rested_s_ = 0.0;
-    for_each([&](Meter& meter) { meter.play(move, pushed); });
+    main_.play(move, pushed);
     return;
   }
   const gcode::Position& from = move.segment.start_mm;
@@ -69,10 +64,8 @@ void Nozzles::begin_shaped(const gcode::Position& from) {
   shaped_.emplace(shaping_, from[gcode::X], from[gcode::Y]);
   before_plan_s_ = shaped_->lead_s();
   const double back_s = std::min(before_plan_s_, rested_s_);
-  for_each([&](Meter& meter) {
-    meter.hold(-back_s);
-    meter.shift_to(from[gcode::X], from[gcode::Y]);
-  });
+  main_.hold(-back_s);
+  main_.shift_to(from[gcode::X], from[gcode::Y]);
   rested_s_ = 0.0;
 }
 
@@ -80,9 +73,9 @@ void Nozzles::play_shaped(const std::vector<BasePhase>& phases) {
   for (const BasePhase& phase : phases) {
     if (before_plan_s_ > kSameTime_s) {
       before_plan_s_ -= phase.duration_s;
-      for_each([&](Meter& meter) { meter.settle(phase); });
+      main_.settle(phase);
     } else {
-      for_each([&](Meter& meter) { meter.play(phase); });
+      main_.play(phase);
     }
   }
 }
@@ -97,23 +90,23 @@ double Nozzles::finish() {
   play_shaped(phases_);
   double duration_s = 0.0;
   for (const BasePhase& phase : behind) {
-    for_each([&](Meter& meter) { meter.settle(phase); });
+    main_.settle(phase);
     duration_s += phase.duration_s;
   }
-  for_each([&](Meter& meter) { meter.add_filament(shaped_->filament_mm()); });
+  main_.add_filament(shaped_->filament_mm());
   shaped_.reset();
   return duration_s;
 }
 
 void Nozzles::wait_for_reference() {
   if (!shaped_) {
-    for_each([](Meter& meter) { meter.wait_for_reference(); });
+    main_.wait_for_reference();
   }
 }
 
 void Nozzles::hold(double duration_s) {
   const double rest_s = std::max(0.0, duration_s - finish());
-  for_each([&](Meter& meter) { meter.hold(rest_s); });
+  main_.hold(rest_s);
   rested_s_ += rest_s;
 }
 

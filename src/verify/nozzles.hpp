@@ -21,11 +21,15 @@ class Nozzles {
   // What the observer is told from now on that these nozzles hang on.
   void watch_as(NozzleBase base);
   // Only main() goes on.
-  void drop_detuned() { detuned_.clear(); }
+  void drop_detuned() { main_.drop_others(); }
 
   [[nodiscard]] const Meter& main() const { return main_; }
   [[nodiscard]] Meter& main() { return main_; }
-  [[nodiscard]] const std::vector<Meter>& detuned() const { return detuned_; }
+  // The nozzles of the observation.
+  [[nodiscard]] std::size_t detuned() const { return main_.others(); }
+  [[nodiscard]] Deviation deviation_of_detuned(std::size_t number) const {
+    return main_.deviation_of_other(number);
+  }
 
   // The clock of the moves that have been played; the nozzles are no further than that.
   [[nodiscard]] double plan_time_s() const;
@@ -53,14 +57,6 @@ class Nozzles {
   void follow_feed(bool on) { main_.follow_feed(on); }
 
  private:
-  template <class Action>
-  void for_each(Action action) {
-    action(main_);
-    for (Meter& meter : detuned_) {
-      action(meter);
-    }
-  }
-
   void begin_shaped(const gcode::Position& from);
   void play_shaped(const std::vector<BasePhase>& phases);
 
@@ -71,7 +67,6 @@ class Nozzles {
   gcode::Position to_mm_{};           // end of the last move given to shaped_
   std::vector<BasePhase> phases_;
   Meter main_;
-  std::vector<Meter> detuned_;
   Observer* observer_;
 };
 

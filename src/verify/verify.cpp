@@ -635,11 +635,11 @@ VerifyReport Verifier::report() {
     report.unshaped = deviation(unshaped_->main());
   }
   report.compensated = deviation(emitted_.main());
-  for (std::size_t i = 0; i < original_.detuned().size(); ++i) {
+  for (std::size_t i = 0; i < original_.detuned(); ++i) {
     report.detuned.push_back(
-        {deviation(original_.detuned()[i]), std::nullopt, deviation(emitted_.detuned()[i])});
-    if (unshaped_ && i < unshaped_->detuned().size()) {
-      report.detuned.back().unshaped = deviation(unshaped_->detuned()[i]);
+        {original_.deviation_of_detuned(i), std::nullopt, emitted_.deviation_of_detuned(i)});
+    if (unshaped_ && i < unshaped_->detuned()) {
+      report.detuned.back().unshaped = unshaped_->deviation_of_detuned(i);
     }
   }
   report.uncompensated_lag = original_.main().filament_lag();

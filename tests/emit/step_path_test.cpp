@@ -74,8 +74,8 @@ void follow(const Polygon& polygon, const LineRules& rules, double until_s,
 // itself.
 double error_um(const Polygon& polygon, const BaseTrajectory& base, const LineRules& rules,
                 std::array<double, 2> normal) {
-  const Followed fx(base, &BaseTrajectory::x_at, rules.nozzle_x);
-  const Followed fy(base, &BaseTrajectory::y_at, rules.nozzle_y);
+  const Followed fx(base, &BaseTrajectory::x, rules.nozzle_x);
+  const Followed fy(base, &BaseTrajectory::y, rules.nozzle_y);
   double sum = 0.0;
   int count = 0;
   follow(polygon, rules, base.duration_s(), [&](double t, NozzleState x, NozzleState y) {
@@ -104,8 +104,8 @@ TEST(LineCosts, AgreeWithTheNozzleStepByStep) {
   const ErrorWeight weight{0.9, 0.2, 0.3};
   const LineCosts<1> costs(
       base, [&](double t) { return t < 0.06 ? weight : ErrorWeight{}; }, rules);
-  const Followed fx(base, &BaseTrajectory::x_at, rules.nozzle_x);
-  const Followed fy(base, &BaseTrajectory::y_at, rules.nozzle_y);
+  const Followed fx(base, &BaseTrajectory::x, rules.nozzle_x);
+  const Followed fy(base, &BaseTrajectory::y, rules.nozzle_y);
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0.0, 0.02);
   for (const std::size_t k : {0U, 50U, 115U}) {  // the last line sees two weights
@@ -163,8 +163,8 @@ TEST(LineCosts, AgreeWithANozzleOfSeveralModes) {
   const ErrorWeight weight{0.9, 0.2, 0.3};
   const LineCosts<kThree> costs(
       base, [&](double) { return weight; }, rules);
-  const Followed fx(base, &BaseTrajectory::x_at, rules.nozzle_x);
-  const Followed fy(base, &BaseTrajectory::y_at, rules.nozzle_y);
+  const Followed fx(base, &BaseTrajectory::x, rules.nozzle_x);
+  const Followed fy(base, &BaseTrajectory::y, rules.nozzle_y);
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0.0, 0.02);
   const auto swing = [&](const dynamics::FlexibleAxis& axis) {
@@ -491,8 +491,8 @@ struct Circle {
     LineRules real = rules;
     real.nozzle_x = rules.nozzle_x.detuned(factor);
     real.nozzle_y = rules.nozzle_y.detuned(factor);
-    const Followed fx(base, &BaseTrajectory::x_at, real.nozzle_x);
-    const Followed fy(base, &BaseTrajectory::y_at, real.nozzle_y);
+    const Followed fx(base, &BaseTrajectory::x, real.nozzle_x);
+    const Followed fy(base, &BaseTrajectory::y, real.nozzle_y);
     double sum = 0.0;
     double before_s = 0.0;
     follow(polygon, real, kUntil_s, [&](double t, NozzleState x, NozzleState y) {

@@ -247,7 +247,7 @@ TEST_F(Turn, MakesUpForACoarseGrid) {
   std::vector<double> times = {0.0};
   append_line_ends(base_, 0.0, kDuration_s, how.lines, times);
   const auto rms_mm = [&](double step_mm, double then_rounded_to_mm) {
-    const auto place = [&](AxisAt axis) {
+    const auto place = [&](BaseAxis axis) {
       std::vector<double> at = VertexChooser(base_, axis, how.lines.nozzle_x)
                                    .choose(times, {0.0, step_mm}, {}, {})
                                    .position_mm;
@@ -257,8 +257,8 @@ TEST_F(Turn, MakesUpForACoarseGrid) {
       }
       return at;
     };
-    const auto x = place(&dynamics::BaseTrajectory::x_at);
-    const auto y = place(&dynamics::BaseTrajectory::y_at);
+    const auto x = place(&dynamics::BaseTrajectory::x);
+    const auto y = place(&dynamics::BaseTrajectory::y);
     std::vector<Stroke> drawn;
     for (std::size_t i = 1; i < times.size(); ++i) {
       drawn.push_back({times[i], x[i], y[i]});

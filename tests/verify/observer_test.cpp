@@ -28,8 +28,8 @@ class Sums final : public Observer {
     Nozzle& sum = nozzles[{nozzle.base == NozzleBase::emitted, nozzle.model}];
     if (step.extruding) {
       sum.extruding_s += step.h_s;
-      sum.squares += step.h_s * step.contour2_mm2;
-      sum.most = std::max(sum.most, step.contour2_mm2);
+      sum.squares += step.h_s * step.mean_contour2_mm2;
+      sum.most = std::max(sum.most, step.largest_contour2_mm2);
     }
     if (step.measured) {
       const PathPiece& piece = (*paths[nozzle.base == NozzleBase::emitted ? 1 : 0])[step.piece];

@@ -32,6 +32,7 @@ Rules rules_with(const std::string& type_x, double freq_x_hz, const std::string&
                  double freq_y_hz) {
   Rules rules;
   rules.nozzle.x = rules.nozzle.y = {kOmega_rad_s, kZeta};
+  rules.nozzle.step_s = 1e-4;
   rules.fixed.shaper = {type_x, type_y, 0.1, 0.1};
   rules.interpreter.shaper_freq_x_hz = freq_x_hz;
   rules.interpreter.shaper_freq_y_hz = freq_y_hz;

@@ -82,6 +82,9 @@ inline void store(const TwoLanes& lanes, double* to) {
 [[nodiscard]] inline TwoLanes operator*(const TwoLanes& a, const TwoLanes& b) {
   return {a.low * b.low, a.high * b.high};
 }
+[[nodiscard]] inline TwoLanes operator/(const TwoLanes& a, const TwoLanes& b) {
+  return {a.low / b.low, a.high / b.high};
+}
 [[nodiscard]] inline TwoLanes operator*(double a, const TwoLanes& b) {
   return {a * b.low, a * b.high};
 }
@@ -158,6 +161,9 @@ inline void store(const FourLanes& lanes, double* to) {
 }
 [[nodiscard]] inline FourLanes operator*(const FourLanes& a, const FourLanes& b) {
   return {a.all * b.all};
+}
+[[nodiscard]] inline FourLanes operator/(const FourLanes& a, const FourLanes& b) {
+  return {a.all / b.all};
 }
 [[nodiscard]] inline FourLanes operator*(double a, const FourLanes& b) { return {a * b.all}; }
 [[nodiscard]] inline double sum(const FourLanes& lanes) {

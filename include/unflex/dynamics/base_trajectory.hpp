@@ -1,6 +1,7 @@
 // The motion of the base over a run, sampled at equally spaced nodes.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -22,7 +23,13 @@ struct AxisMotion {
 
 // The motion `s` seconds after node k, between nodes k and k+1, which are h seconds apart; k + 1 <
 // number of nodes.
-[[nodiscard]] AxisMotion between(const AxisTrajectory& axis, std::size_t k, double s, double h);
+[[nodiscard]] inline AxisMotion between(const AxisTrajectory& axis, std::size_t k, double s,
+                                        double h) {
+  const double a0 = axis.accel_mm_s2[k];
+  const double jerk = (axis.accel_mm_s2[k + 1] - a0) / h;
+  return {axis.position_mm[k] + s * (axis.velocity_mm_s[k] + s * (0.5 * a0 + s * jerk / 6.0)),
+          axis.velocity_mm_s[k] + s * (a0 + 0.5 * s * jerk), a0 + s * jerk};
+}
 
 struct BaseTrajectory {
   double period_s = 0.0;  // h
@@ -34,9 +41,12 @@ struct BaseTrajectory {
   // t is clamped to [0, duration_s()].
   [[nodiscard]] AxisMotion x_at(double t) const { return at(x, t); }
   [[nodiscard]] AxisMotion y_at(double t) const { return at(y, t); }
-
- private:
-  [[nodiscard]] AxisMotion at(const AxisTrajectory& axis, double t) const;
+  // axis: x or y.
+  [[nodiscard]] AxisMotion at(const AxisTrajectory& axis, double t) const {
+    const double clamped = std::clamp(t, 0.0, duration_s());
+    const auto k = std::min(static_cast<std::size_t>(clamped / period_s), nodes() - 2);
+    return between(axis, k, clamped - static_cast<double>(k) * period_s, period_s);
+  }
 };
 
 }  // namespace unflex::dynamics

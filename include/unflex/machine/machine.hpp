@@ -307,7 +307,7 @@ inline constexpr double kEmitAccelFactor = 5.0;
 inline constexpr double kClockRoom = 1.002;
 
 struct VerifySettings {
-  double step_ms = 0.1;
+  double step_ms = 0.5;
   double hold_s = 0.5;
 };
 

@@ -47,13 +47,18 @@ struct Deviation {
 class DeviationAccumulator {
  public:
   void add(double contour2_mm2, double tracking2_mm2, double weight_s, std::size_t line) {
+    add(contour2_mm2, contour2_mm2, tracking2_mm2, tracking2_mm2, weight_s, line);
+  }
+  // The mean and the largest of a stretch of time.
+  void add(double contour2_mm2, double contour2_max_mm2, double tracking2_mm2,
+           double tracking2_max_mm2, double weight_s, std::size_t line) {
     contour_s_.add_square(contour2_mm2, weight_s);
     sum_contour2_ += weight_s * contour2_mm2;
     sum_tracking2_ += weight_s * tracking2_mm2;
     weight_s_ += weight_s;
-    tracking2_max_ = std::max(tracking2_max_, tracking2_mm2);
-    if (contour2_mm2 > contour2_max_) {
-      contour2_max_ = contour2_mm2;
+    tracking2_max_ = std::max(tracking2_max_, tracking2_max_mm2);
+    if (contour2_max_mm2 > contour2_max_) {
+      contour2_max_ = contour2_max_mm2;
       line_ = line;
     }
   }
@@ -73,8 +78,9 @@ class DeviationAccumulator {
 struct NozzleModel {
   dynamics::FlexibleAxis x;
   dynamics::FlexibleAxis y;
-  double step_s = 1e-4;  // longest RK4 step; steps also end at every change of acceleration
-  double hold_s = 0.5;   // how long the base is held after the end of the file
+  double step_s =
+      5e-4;             // longest time between two looks; steps also end where acceleration changes
+  double hold_s = 0.5;  // how long the base is held after the end of the file
 };
 
 // The model with a step just fine enough to compare two motions: 40 steps per period of the faster

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <vector>
 
 #include "unflex/verify/deviation.hpp"
 #include "unflex/verify/reference_path.hpp"
@@ -33,6 +34,32 @@ class NearPath {
                                              double p_y_mm, std::size_t& nearest);
   [[nodiscard]] double reach_s() const { return reach_s_; }
 
+  // A piece of the path within reach: where it begins, and its direction and length in X and Y.
+  struct Span {
+    double x_mm = 0.0;
+    double y_mm = 0.0;
+    double direction_x = 0.0;
+    double direction_y = 0.0;
+    double length_mm = 0.0;
+    double start_s = 0.0;
+    double end_s = 0.0;
+  };
+  // All of them, by time. The first is that of piece number first().
+  [[nodiscard]] const Span* spans() const { return spans_.data() + dropped_; }
+  [[nodiscard]] std::size_t span_count() const { return end_ - first_; }
+  [[nodiscard]] std::size_t first() const { return first_; }
+  // Whether the first span begins before t − τ, and the last ends after t + τ. They count from
+  // begin_mm() and to end_mm(), which take longer to find than that no nozzle is near: these lie
+  // before begin_bound_mm() and behind end_bound_mm().
+  [[nodiscard]] bool begins_cut() const { return spans()->start_s < time_s_ - reach_s_; }
+  [[nodiscard]] bool ends_cut() const {
+    return spans()[span_count() - 1].end_s > time_s_ + reach_s_;
+  }
+  [[nodiscard]] double begin_bound_mm(const ReferencePath& path);
+  [[nodiscard]] double begin_mm(const ReferencePath& path) const;
+  [[nodiscard]] double end_bound_mm(const ReferencePath& path);
+  [[nodiscard]] double end_mm(const ReferencePath& path) const;
+
  private:
   // Remembers for a while where a piece of the path is cut at t − τ or t + τ.
   class Cut {
@@ -51,8 +78,14 @@ class NearPath {
 
   double reach_s_;
   double time_s_ = 0.0;
+  void add_span(const PathPiece& piece);
+  void drop_span();
+
   std::size_t first_ = 0;  // pieces that reach into [t − τ, t + τ]
   std::size_t end_ = 0;
+  // Those pieces, from dropped_ on. What the path has of them lies far apart in memory.
+  std::vector<Span> spans_;
+  std::size_t dropped_ = 0;
   Cut first_cut_;
   Cut last_cut_;
 };
@@ -72,13 +105,14 @@ inline double NearPath::Cut::at(const PathPiece& piece, std::size_t number, doub
 
 inline void NearPath::slide(const ReferencePath& path, double t) {
   time_s_ = t;
-  first_ = std::max(first_, path.first());
-  while (path[first_].end_s < t - reach_s_ && first_ + 1 < path.end()) {
-    ++first_;
+  while (first_ < path.first()) {
+    drop_span();
   }
-  end_ = std::max(end_, first_ + 1);
-  while (end_ < path.end() && path[end_].start_s <= t + reach_s_) {
-    ++end_;
+  while (path[first_].end_s < t - reach_s_ && first_ + 1 < path.end()) {
+    drop_span();
+  }
+  while (end_ <= first_ || (end_ < path.end() && path[end_].start_s <= t + reach_s_)) {
+    add_span(path[end_]);
   }
 }
 
@@ -90,19 +124,18 @@ inline double NearPath::squared_contour_error(const ReferencePath& path, double 
   const double to_s = time_s_ + reach_s_;
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t number = first_; number < end_; ++number) {
-    const PathPiece& piece = path[number];
-    const double x = p_x_mm - piece.x_mm;
-    const double y = p_y_mm - piece.y_mm;
-    double along =
-        std::clamp(x * piece.direction_x + y * piece.direction_y, 0.0, piece.length_xy_mm);
-    if (piece.start_s < from_s && along < first_cut_.at(piece, number, from_s, kCutKept_s)) {
-      along = std::max(along, piece.covered_xy_mm(from_s));
+    const Span& span = spans()[number - first_];
+    const double x = p_x_mm - span.x_mm;
+    const double y = p_y_mm - span.y_mm;
+    double along = std::clamp(x * span.direction_x + y * span.direction_y, 0.0, span.length_mm);
+    if (span.start_s < from_s && along < first_cut_.at(path[number], number, from_s, kCutKept_s)) {
+      along = std::max(along, path[number].covered_xy_mm(from_s));
     }
-    if (piece.end_s > to_s && along > last_cut_.at(piece, number, to_s, 0.0)) {
-      along = std::min(along, piece.covered_xy_mm(to_s));
+    if (span.end_s > to_s && along > last_cut_.at(path[number], number, to_s, 0.0)) {
+      along = std::min(along, path[number].covered_xy_mm(to_s));
     }
-    const double across_x = x - along * piece.direction_x;
-    const double across_y = y - along * piece.direction_y;
+    const double across_x = x - along * span.direction_x;
+    const double across_y = y - along * span.direction_y;
     const double distance2 = across_x * across_x + across_y * across_y;
     if (distance2 < best) {
       best = distance2;

@@ -35,10 +35,13 @@ struct NozzleStep {
   dynamics::BaseSegment base_y;
   // What is played now lays filament.
   bool extruding = false;
-  // Distance from the path, and the line of the sliced file that is nearest to the nozzle. Set
-  // while the reference moves or filament is laid.
+  // Distance from the path, and the line of the sliced file that is nearest to the nozzle: the
+  // square of the distance, its mean during the step, and the largest that it was during the step
+  // or just before. Set while the reference moves or filament is laid.
   double contour2_mm2 = 0.0;
-  std::size_t line = 0;
+  double mean_contour2_mm2 = 0.0;
+  double largest_contour2_mm2 = 0.0;
+  std::size_t line = 0;  // the first nozzle's, for the others too
   // Whether the reference moves. Only then the fields after `waiting` are set.
   bool measured = false;
   // The base has ended early and rests while the reference runs on. The nozzle state is reset

@@ -88,7 +88,8 @@ struct BlamedRun {
   std::string reason;  // message of the first violation
 };
 
-// Deviations of a further nozzle (Observation::detuned) on the two bases.
+// Deviations of a further nozzle (Observation::detuned) on the two bases: RMS, largest and
+// duration. The other figures are 0.
 struct Detuned {
   Deviation uncompensated;
   // As VerifyReport::unshaped. Only if an observer asks for it.

@@ -1,0 +1,60 @@
+// The nozzle from node to node of a base whose acceleration is linear between nodes, exactly.
+//
+// Notation:
+//   g, τ   gain and lead of a mode      a, j   the base's acceleration at a node, and its slope
+//   y      q − g b − τ ḃ, of which ÿ + 2ζωẏ + ω²y = F + F' t, with F' = −(g + 2ζωτ) j and
+//          F = −(g + 2ζωτ) a − τ j
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "unflex/dynamics/base_trajectory.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+
+namespace unflex::dynamics {
+
+class NodeMap {
+ public:
+  // period_s: between nodes.
+  NodeMap(const FlexibleAxis& axis, double period_s);
+
+  // From node k to the next.
+  void advance(const AxisTrajectory& base, std::size_t k, NozzleState& state) const {
+    const double v = base.velocity_mm_s[k];
+    const double a = base.accel_mm_s2[k];
+    const double a_next = base.accel_mm_s2[k + 1];
+    const double j = (a_next - a) * per_period_;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const OfMode& map = maps_[i];
+      NozzleMotion& part = state.parts[i];
+      const double y = part.position - map.gain * base.position_mm[k] - map.lead_s * v;
+      const double rate = part.velocity - map.gain * v - map.lead_s * a;
+      const double slope = -map.push * j;
+      const double force = -map.push * a - map.lead_s * j;
+      part = {map.gain * base.position_mm[k + 1] + map.lead_s * base.velocity_mm_s[k + 1] +
+                  (map.of_place.position * y + map.of_rate.position * rate) +
+                  (map.of_force.position * force + map.of_slope.position * slope),
+              map.gain * base.velocity_mm_s[k + 1] + map.lead_s * a_next +
+                  (map.of_place.velocity * y + map.of_rate.velocity * rate) +
+                  (map.of_force.velocity * force + map.of_slope.velocity * slope)};
+    }
+  }
+
+ private:
+  // What one unit of each makes of y and its rate in a period.
+  struct OfMode {
+    double gain = 1.0;
+    double lead_s = 0.0;
+    double push = 1.0;  // g + 2ζωτ
+    NozzleMotion of_place;
+    NozzleMotion of_rate;
+    NozzleMotion of_force;  // F
+    NozzleMotion of_slope;  // F'
+  };
+  double per_period_ = 0.0;
+  std::array<OfMode, kMostModes> maps_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace unflex::dynamics

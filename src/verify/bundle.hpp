@@ -1,0 +1,100 @@
+// Nozzles of different dynamics on one base, which are moved and measured together. They lie in
+// lanes (unflex/core/lanes.hpp).
+//
+// Notation:
+//   c   contour error      h   step
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "bundle_kernel.hpp"
+#include "unflex/verify/deviation.hpp"
+#include "unflex/verify/near_path.hpp"
+
+namespace unflex::verify {
+
+// Figures of all nozzles, by their numbers.
+struct BundleSums {
+  std::vector<double> contour2_mm2_s;    // ∫ c² dt
+  std::vector<double> contour2_max_mm2;  // largest c²
+  double weight_s = 0.0;
+};
+
+class Bundle {
+ public:
+  // models: one or more. All are looked at in steps of the first one's length, or shorter ones if
+  // one of them swings faster.
+  explicit Bundle(std::vector<NozzleModel> models);
+
+  [[nodiscard]] std::size_t count() const { return models_.size(); }
+  // Forgets all others, and what they are like.
+  void keep_first();
+  [[nodiscard]] const NozzleModel& model(std::size_t number = 0) const { return models_[number]; }
+  // The longest time between two looks.
+  [[nodiscard]] double step_s() const;
+
+  [[nodiscard]] NozzleXY nozzle(std::size_t number = 0) const;
+  void set_nozzle(std::size_t number, const NozzleXY& nozzle);
+  [[nodiscard]] dynamics::NozzleMotionXY motion(std::size_t number) const;
+  // States of all nozzles.
+  [[nodiscard]] const std::vector<double>& states() const { return arrays_.states; }
+  void set_states(const std::vector<double>& states) { arrays_.states = states; }
+
+  // Base and nozzles are moved by as much.
+  void shift(double x_mm, double y_mm);
+  // The base goes on, or stands still, for so long.
+  void settle(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y, double duration_s);
+  // Whether all nozzles go along with a base in even motion.
+  [[nodiscard]] bool rest_on(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y) const;
+  void ride_on(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y);
+
+  // So many steps of h seconds will follow.
+  void begin_steps(double steps, double h);
+  // x, y: the base at the start of the step.
+  void step(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y);
+
+  // Measures c of all nozzles at the time of the last slide() of `near`, and between this look and
+  // the one before, h seconds ago. h is 0 if the two have nothing to do with each other.
+  void look(const ReferencePath& path, NearPath& near, double h);
+  // Adds up what was since the look before. moves: the reference moves; lays: filament is laid.
+  void count(bool moves, bool lays);
+  // The last look alone, without weight.
+  void count_moment(bool lays);
+  // The mean of c² since the look before, and the largest that it has been since then, or just
+  // before where three looks show a top between them. count() may lower the latter.
+  [[nodiscard]] double mean_mm2(std::size_t number = 0) const { return arrays_.mean_mm2[number]; }
+  [[nodiscard]] double largest_mm2(std::size_t number = 0) const {
+    return arrays_.largest_mm2[number];
+  }
+  // c² at the last look.
+  [[nodiscard]] double now_mm2(std::size_t number = 0) const { return arrays_.now_mm2[number]; }
+  // The piece of the path that was nearest to the first nozzle at the last look.
+  [[nodiscard]] std::size_t nearest() const { return nearest_; }
+
+  // RMS, largest and duration of a nozzle; the other figures are 0.
+  [[nodiscard]] Deviation deviation(std::size_t number) const {
+    return {stats(extruding_, number), stats(all_, number)};
+  }
+
+ private:
+  template <class Change>
+  void change_all(const Change& change);
+  void add(const std::vector<double>& largest_mm2, double h, BundleSums& sums) const;
+  [[nodiscard]] DeviationStats stats(const BundleSums& sums, std::size_t number) const;
+
+  std::vector<NozzleModel> models_;
+  const BundleKernel* kernel_;
+  double fastest_rad_s_ = 0.0;
+  BundleArrays arrays_;
+  bool has_maps_ = false;
+  double h_ = 0.0;
+  int rk4_steps_ = 1;
+  std::size_t nearest_ = 0;
+  double last_h_ = 0.0;  // h of the last look
+  bool last_lays_ = false;
+  BundleSums all_;
+  BundleSums extruding_;
+};
+
+}  // namespace unflex::verify

@@ -1,0 +1,19 @@
+#include <cstddef>
+
+#include "bundle_kernels.hpp"
+
+#ifdef UNFLEX_FOUR_LANES
+UNFLEX_FOUR_LANES_BEGIN
+// After all that it needs.
+#include "bundle_lanes.hpp"
+
+namespace unflex::verify {
+
+const BundleKernel& four_lanes_bundle() {
+  static const LaneBundle<FourLanes> kernel;
+  return kernel;
+}
+
+}  // namespace unflex::verify
+UNFLEX_FOUR_LANES_END
+#endif

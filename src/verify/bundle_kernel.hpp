@@ -1,0 +1,70 @@
+// What Bundle (bundle.hpp) does in each step, with nozzles in lanes (unflex/core/lanes.hpp).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/verify/near_path.hpp"
+
+namespace unflex::verify {
+
+struct BundleArrays {
+  std::size_t places = 0;  // nozzles, in full lanes
+  std::size_t modes = 0;   // the most that a nozzle has
+  // By axis, mode and nozzle. A mode that a nozzle does not have has no gain.
+  std::vector<double> stiffness_per_s2;  // ω²
+  std::vector<double> damping_per_s;     // 2ζω
+  std::vector<double> gain;
+  std::vector<double> lead_s;
+  // Positions likewise, then velocities.
+  std::vector<double> states;
+  // What a step makes of one unit of position, velocity, velocity of the base and acceleration of
+  // the base: each as states.
+  std::array<std::vector<double>, 4> maps;
+  // By nozzle.
+  std::vector<double> nearest;      // number of the nearest piece of the path
+  std::vector<double> now_mm2;      // c² at the last look
+  std::vector<double> before_mm2;   // and at the one before
+  std::vector<double> mean_mm2;     // between these two
+  std::vector<double> largest_mm2;  // between these two, or at a top just before
+  // At the last look: the way from the path to the nozzle and its rate, x and y of each, and
+  // whether the end of a piece was nearest.
+  static constexpr std::size_t kIsAtEnd = 4;
+  std::array<std::vector<double>, 5> away;
+  // The nozzle's place and velocity then.
+  std::array<std::vector<double>, 4> was;
+
+  [[nodiscard]] std::size_t place(std::size_t axis, std::size_t mode) const {
+    return (axis * modes + mode) * places;
+  }
+  // How many positions there are, and as many velocities.
+  [[nodiscard]] std::size_t parts() const { return 2 * modes * places; }
+};
+
+class BundleKernel {
+ public:
+  BundleKernel() = default;
+  BundleKernel(const BundleKernel&) = delete;
+  BundleKernel& operator=(const BundleKernel&) = delete;
+  virtual ~BundleKernel() = default;
+
+  // What a step of h seconds does, by so many RK4 steps.
+  virtual void set_maps(double h, int rk4_steps, BundleArrays& at) const = 0;
+  // A step that the maps know.
+  virtual void step_by_maps(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y,
+                            BundleArrays& at) const = 0;
+  // A step of h seconds, by so many RK4 steps.
+  virtual void step(const dynamics::BaseSegment& x, const dynamics::BaseSegment& y, double h,
+                    int rk4_steps, BundleArrays& at) const = 0;
+  // c² of the nozzles where they are, and what it has been since the look before, h seconds ago, if
+  // h is not 0. before_h: likewise how long before that another look was.
+  virtual void look(const ReferencePath& path, NearPath& near, double before_h, double h,
+                    BundleArrays& at) const = 0;
+};
+
+// By the processor's registers.
+[[nodiscard]] const BundleKernel& bundle_kernel();
+
+}  // namespace unflex::verify

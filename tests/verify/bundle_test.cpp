@@ -1,0 +1,254 @@
+// Nozzles in lanes: they move as one by one, and are measured as closely as by many more looks.
+#include "bundle.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "replaying.hpp"
+#include "unflex/core/lanes.hpp"
+
+namespace unflex::verify {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+std::vector<NozzleModel> models_of(std::size_t count, std::size_t modes) {
+  std::vector<NozzleModel> models;
+  for (std::size_t i = 0; i < count; ++i) {
+    NozzleModel model;
+    std::vector<dynamics::Mode> x;
+    std::vector<dynamics::Mode> y;
+    // The nozzles differ in how many modes they have, too.
+    const std::size_t own = 1 + (i + modes - 1) % modes;
+    for (std::size_t mode = 0; mode < own; ++mode) {
+      const auto number = static_cast<double>(mode + 1);
+      const double gain = 1.0 / static_cast<double>(own);
+      x.push_back({(230.0 + 11.0 * static_cast<double>(i)) * number, 0.05 * number, gain});
+      y.push_back({(290.0 - 7.0 * static_cast<double>(i)) * number, 0.04 * number, gain});
+    }
+    model.x = dynamics::FlexibleAxis(x);
+    model.y = dynamics::FlexibleAxis(y);
+    models.push_back(model);
+  }
+  return models;
+}
+
+NozzleXY somewhere(const NozzleModel& model, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  NozzleXY nozzle{model.x.riding(100.0, 20.0), model.y.riding(50.0, -30.0)};
+  for (std::size_t i = 0; i < model.x.mode_count(); ++i) {
+    nozzle.x.parts[i].position += 0.1 * uniform(random);
+    nozzle.y.parts[i].velocity += 10.0 * uniform(random);
+  }
+  return nozzle;
+}
+
+// A straight path along x.
+ReferencePath straight(std::vector<planner::PlannedMove>& moves, std::size_t& taken) {
+  moves = testing::plan_path({{0.0, 0.0, 0.0}, {1000.0, 0.0, 100.0, 1.0}}, planner::Limits{});
+  taken = 0;
+  ReferencePath path([&](ReferenceMove& next) {
+    if (taken == moves.size()) {
+      return false;
+    }
+    next.move = moves[taken++];
+    return true;
+  });
+  path.begin_section();
+  path.extend_to(20.0);
+  return path;
+}
+
+TEST(Bundle, MovesNozzlesAsOneByOne) {
+  constexpr double kStep_s = 5e-4;
+  std::mt19937_64 random(1);
+  for (const std::size_t modes : {1U, 3U}) {
+    for (std::size_t count = 1; count <= 9; ++count) {
+      const std::vector<NozzleModel> models = models_of(count, modes);
+      Bundle bundle(models);
+      std::vector<NozzleXY> alone;
+      for (std::size_t i = 0; i < count; ++i) {
+        alone.push_back(somewhere(models[i], random));
+        bundle.set_nozzle(i, alone[i]);
+      }
+      // By single steps, and by maps.
+      for (const double steps : {2.0, 20.0}) {
+        dynamics::BaseSegment x{100.0, 20.0, 3000.0};
+        dynamics::BaseSegment y{50.0, -30.0, 2000.0};
+        bundle.begin_steps(steps, kStep_s);
+        for (double step = 0.0; step < steps; ++step) {
+          bundle.step(x, y);
+          for (std::size_t i = 0; i < count; ++i) {
+            alone[i].x = dynamics::exact_step(models[i].x, alone[i].x, x, kStep_s);
+            alone[i].y = dynamics::exact_step(models[i].y, alone[i].y, y, kStep_s);
+          }
+          for (dynamics::BaseSegment* base : {&x, &y}) {
+            base->position += kStep_s * (base->velocity + 0.5 * kStep_s * base->acceleration);
+            base->velocity += kStep_s * base->acceleration;
+          }
+        }
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        // RK4 errs by a share of the swing, which is a tenth of a millimetre.
+        EXPECT_LE(apart_mm(bundle.nozzle(i), alone[i], models[i]), 1e-4) << i;
+      }
+    }
+  }
+}
+
+TEST(Bundle, FindsEachNozzlesDistanceFromThePath) {
+  std::vector<planner::PlannedMove> moves = testing::plan_path(
+      {{0.0, 0.0, 0.0}, {5.0, 0.0, 100.0, 1.0}, {5.0, 5.0, 100.0, 1.0}, {8.0, 5.0, 100.0, 1.0}},
+      planner::Limits{});
+  std::size_t taken = 0;
+  ReferencePath path([&](ReferenceMove& next) {
+    if (taken == moves.size()) {
+      return false;
+    }
+    next.move = moves[taken++];
+    return true;
+  });
+  path.begin_section();
+  path.extend_to(10.0);
+  const std::vector<NozzleModel> models = models_of(6, 1);
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> uniform(-1.0, 9.0);
+  for (double t = 0.0; t < path.end_s(); t += 0.003) {
+    Bundle bundle(models);
+    NearPath near(0.03);
+    near.begin(path);
+    near.slide(path, t);
+    std::vector<std::pair<double, double>> places;
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      places.emplace_back(uniform(random), uniform(random));
+      bundle.set_nozzle(
+          i, {models[i].x.riding(places[i].first), models[i].y.riding(places[i].second)});
+    }
+    bundle.look(path, near, 0.0);
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      std::size_t nearest = 0;
+      EXPECT_DOUBLE_EQ(bundle.now_mm2(i), near.squared_contour_error(path, places[i].first,
+                                                                     places[i].second, nearest));
+      if (i == 0) {
+        EXPECT_EQ(bundle.nearest(), nearest);
+      }
+    }
+  }
+}
+
+// A nozzle that swings across a straight path, looked at as rarely as it may be.
+TEST(Bundle, MeasuresASwingFromFewLooks) {
+  constexpr double kAmplitude_mm = 0.01;
+  std::vector<planner::PlannedMove> moves;
+  std::size_t taken = 0;
+  ReferencePath path = straight(moves, taken);
+  const NozzleModel model;
+  const double omega = model.y.main_rad_s();
+  for (const double looks : {16.0, 17.3, 25.0}) {
+    Bundle bundle({model});
+    NearPath near(reach_s(model));
+    near.begin(path);
+    const double h = 2.0 * kPi / (omega * looks);
+    const double begin_s = 1.0;
+    double sum = 0.0;
+    double largest = 0.0;
+    for (int i = 0; i <= 1000; ++i) {
+      const double t = i * h;
+      NozzleXY nozzle;
+      nozzle.x = model.x.riding(100.0 * (begin_s + t) - 1.0, 100.0);
+      nozzle.y.parts[0] = {kAmplitude_mm * std::sin(omega * t + 0.3),
+                           kAmplitude_mm * omega * std::cos(omega * t + 0.3)};
+      bundle.set_nozzle(0, nozzle);
+      near.slide(path, begin_s + t);
+      bundle.look(path, near, i > 0 ? h : 0.0);
+      if (i > 0) {
+        sum += bundle.mean_mm2();
+        largest = std::max(largest, bundle.largest_mm2());
+      }
+    }
+    const double mean = 0.5 * kAmplitude_mm * kAmplitude_mm;
+    EXPECT_NEAR(sum / 1000.0, mean, 3e-3 * mean) << looks;
+    EXPECT_NEAR(std::sqrt(largest), kAmplitude_mm, 2e-3 * kAmplitude_mm) << looks;
+  }
+}
+
+TEST(Bundle, CountsATopOnlyWhileFilamentIsLaid) {
+  std::vector<planner::PlannedMove> moves;
+  std::size_t taken = 0;
+  ReferencePath path = straight(moves, taken);
+  const NozzleModel model;
+  Bundle bundle({model});
+  NearPath near(reach_s(model));
+  near.begin(path);
+  constexpr double kStep_s = 5e-4;
+  // Looks on both sides of a top, and one at it.
+  for (int i = 0; i < 4; ++i) {
+    const double off_mm = std::array{0.0, 1.0, 0.9, 0.1}[static_cast<std::size_t>(i)];
+    bundle.set_nozzle(0, {model.x.riding(100.0), model.y.riding(off_mm)});
+    near.slide(path, 1.0 + i * kStep_s);
+    bundle.look(path, near, i > 0 ? kStep_s : 0.0);
+    if (i > 0) {
+      bundle.count(true, i == 2);
+    }
+  }
+  const Deviation deviation = bundle.deviation(0);
+  EXPECT_DOUBLE_EQ(deviation.extruding.contour_max_mm, 1.0);
+  EXPECT_DOUBLE_EQ(deviation.extruding.duration_s, kStep_s);
+  EXPECT_GT(deviation.all.contour_max_mm, 1.0);
+  EXPECT_LT(deviation.all.contour_max_mm, std::sqrt(1.125));
+}
+
+TEST(Bundle, IsTheSameInRegistersOfTwoNumbersAndOfFour) {
+  if (!has_four_lanes()) {
+    GTEST_SKIP() << "This processor has registers of two numbers only.";
+  }
+  const auto measured = [](bool two_lanes) {
+    prefer_two_lanes(two_lanes);
+    std::vector<planner::PlannedMove> moves = testing::plan_path(
+        {{0.0, 0.0, 0.0}, {2.0, 0.0, 100.0, 1.0}, {2.0, 2.0, 100.0, 1.0}, {3.0, 5.0, 100.0, 1.0}},
+        planner::Limits{});
+    std::size_t taken = 0;
+    ReferencePath path([&](ReferenceMove& next) {
+      if (taken == moves.size()) {
+        return false;
+      }
+      next.move = moves[taken++];
+      return true;
+    });
+    path.begin_section();
+    path.extend_to(10.0);
+    Bundle bundle(models_of(7, 2));
+    NearPath near(0.03);
+    near.begin(path);
+    std::mt19937_64 random(3);
+    std::uniform_real_distribution<double> uniform(-5e3, 5e3);
+    dynamics::BaseSegment x;
+    dynamics::BaseSegment y;
+    std::vector<double> figures;
+    for (int i = 0; i < 300; ++i) {
+      constexpr double kStep_s = 4e-4;
+      x.acceleration = uniform(random);
+      y.acceleration = uniform(random);
+      bundle.begin_steps(i % 2 == 0 ? 1.0 : 10.0, kStep_s);
+      bundle.step(x, y);
+      near.slide(path, i * kStep_s);
+      bundle.look(path, near, i > 0 ? kStep_s : 0.0);
+      bundle.count(true, i % 7 != 0);
+      figures.insert(figures.end(), bundle.states().begin(), bundle.states().end());
+      for (std::size_t number = 0; number < bundle.count(); ++number) {
+        figures.push_back(bundle.mean_mm2(number));
+        figures.push_back(bundle.largest_mm2(number));
+      }
+    }
+    prefer_two_lanes(false);
+    return figures;
+  };
+  EXPECT_EQ(measured(true), measured(false));
+}
+
+}  // namespace
+}  // namespace unflex::verify
