@@ -95,6 +95,7 @@ class LaneStages final : public StageKernel {
     node_square_.assign_zeros(k * k);
     node_cross_.assign_zeros(k);
     middle_square_.assign_zeros(4 * k * k);
+    in_one_model_.assign(groups() * groups(), 0);
     middle_by_base_.assign_zeros(3 * 2 * k);
     middle_cross_.assign_zeros(2 * k);
     cost_to_go_.assign_zeros(4 * k * k);
@@ -411,6 +412,9 @@ class LaneStages final : public StageKernel {
     place[swing] = 1.0;
     rate[swing + 1] = 1.0;
     for (const auto& [i, gain] : parts) {
+      for (const auto& [other, other_gain] : parts) {
+        in_one_model_[i / kLanes * groups() + other / kLanes] = 1;
+      }
       place[i] += gain;
       rate[k + i] += gain;
       by_model_[c * k + i] += gain;
@@ -635,57 +639,75 @@ class LaneStages final : public StageKernel {
   void carry_swing_back(const double* f, const LaneRow<Lanes, 2 * V>& c, double middle,
                         double node) {
     const std::size_t g = groups();
-    const std::size_t places = kLanes * g;
-    const std::size_t swing = 2 * places;
     for (std::size_t a = 0; a < g; ++a) {
       for (std::size_t v = a; v < g; ++v) {
-        const Lanes o0 = own(0, v);
-        const Lanes o1 = own(1, v);
-        const Lanes o2 = own(2, v);
-        const Lanes o3 = own(3, v);
-        Lanes block[4][kLanes];  // from places and rates to places and rates
-        for (std::size_t lane = 0; lane < kLanes; ++lane) {
-          const std::size_t i = kLanes * a + lane;
-          const std::size_t r = places + i;
-          const Lanes pp = load<Lanes>(to_go(i, v));
-          const Lanes pr = load<Lanes>(to_go(i, g + v));
-          const Lanes rp = load<Lanes>(to_go(r, v));
-          const Lanes rr = load<Lanes>(to_go(r, g + v));
-          const Lanes place_p = o0 * pp + o2 * pr;
-          const Lanes place_r = o1 * pp + o3 * pr;
-          const Lanes rate_p = o0 * rp + o2 * rr;
-          const Lanes rate_r = o1 * rp + o3 * rr;
-          const double own_0 = own_[i];
-          const double own_1 = own_[places + i];
-          const double own_2 = own_[2 * places + i];
-          const double own_3 = own_[3 * places + i];
-          const auto square = [&](std::size_t row, std::size_t group) {
-            return middle * load<Lanes>(middle_square_.at(row * swing + kLanes * group)) +
-                   f[row] * c[group];
-          };
-          block[0][lane] =
-              own_0 * place_p + own_2 * rate_p +
-              (square(i, v) + node * load<Lanes>(node_square_.at(i * places + kLanes * v)));
-          block[1][lane] = own_0 * place_r + own_2 * rate_r + square(i, g + v);
-          block[2][lane] = own_1 * place_p + own_3 * rate_p + square(r, v);
-          block[3][lane] = own_1 * place_r + own_3 * rate_r + square(r, g + v);
-          store(block[0][lane], to_go(i, v));
-          store(block[1][lane], to_go(i, g + v));
-          store(block[2][lane], to_go(r, v));
-          store(block[3][lane], to_go(r, g + v));
+        if (in_one_model_[a * g + v] != 0) {
+          carry_block_back<true>(a, v, f, c, middle, node);
+        } else {
+          carry_block_back<false>(a, v, f, c, middle, node);
         }
-        if (v > a) {
-          for (auto& quarter : block) {
-            transpose(quarter[0], quarter[1], quarter[2], quarter[3]);
-          }
-          for (std::size_t lane = 0; lane < kLanes; ++lane) {
-            const std::size_t i = kLanes * v + lane;
-            store(block[0][lane], to_go(i, a));
-            store(block[2][lane], to_go(i, g + a));
-            store(block[1][lane], to_go(places + i, a));
-            store(block[3][lane], to_go(places + i, g + a));
-          }
-        }
+      }
+    }
+  }
+
+  // Four modes' rows and four modes' columns of that. kCosts: whether some model has modes of both,
+  // so that the stage's own cost has products of them.
+  template <bool kCosts>
+  void carry_block_back(std::size_t a, std::size_t v, const double* f,
+                        const LaneRow<Lanes, 2 * V>& c, double middle, double node) {
+    const std::size_t g = groups();
+    const std::size_t places = kLanes * g;
+    const std::size_t swing = 2 * places;
+    const Lanes o0 = own(0, v);
+    const Lanes o1 = own(1, v);
+    const Lanes o2 = own(2, v);
+    const Lanes o3 = own(3, v);
+    Lanes block[4][kLanes];  // from places and rates to places and rates
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const std::size_t i = kLanes * a + lane;
+      const std::size_t r = places + i;
+      const Lanes pp = load<Lanes>(to_go(i, v));
+      const Lanes pr = load<Lanes>(to_go(i, g + v));
+      const Lanes rp = load<Lanes>(to_go(r, v));
+      const Lanes rr = load<Lanes>(to_go(r, g + v));
+      const Lanes place_p = o0 * pp + o2 * pr;
+      const Lanes place_r = o1 * pp + o3 * pr;
+      const Lanes rate_p = o0 * rp + o2 * rr;
+      const Lanes rate_r = o1 * rp + o3 * rr;
+      const double own_0 = own_[i];
+      const double own_1 = own_[places + i];
+      const double own_2 = own_[2 * places + i];
+      const double own_3 = own_[3 * places + i];
+      block[0][lane] = own_0 * place_p + own_2 * rate_p + f[i] * c[v];
+      block[1][lane] = own_0 * place_r + own_2 * rate_r + f[i] * c[g + v];
+      block[2][lane] = own_1 * place_p + own_3 * rate_p + f[r] * c[v];
+      block[3][lane] = own_1 * place_r + own_3 * rate_r + f[r] * c[g + v];
+      if constexpr (kCosts) {
+        const auto square = [&](std::size_t row, std::size_t group) {
+          return middle * load<Lanes>(middle_square_.at(row * swing + kLanes * group));
+        };
+        block[0][lane] =
+            block[0][lane] +
+            (square(i, v) + node * load<Lanes>(node_square_.at(i * places + kLanes * v)));
+        block[1][lane] = block[1][lane] + square(i, g + v);
+        block[2][lane] = block[2][lane] + square(r, v);
+        block[3][lane] = block[3][lane] + square(r, g + v);
+      }
+      store(block[0][lane], to_go(i, v));
+      store(block[1][lane], to_go(i, g + v));
+      store(block[2][lane], to_go(r, v));
+      store(block[3][lane], to_go(r, g + v));
+    }
+    if (v > a) {
+      for (auto& quarter : block) {
+        transpose(quarter[0], quarter[1], quarter[2], quarter[3]);
+      }
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const std::size_t i = kLanes * v + lane;
+        store(block[0][lane], to_go(i, a));
+        store(block[2][lane], to_go(i, g + a));
+        store(block[1][lane], to_go(places + i, a));
+        store(block[3][lane], to_go(places + i, g + a));
       }
     }
   }
@@ -785,6 +807,7 @@ class LaneStages final : public StageKernel {
   Numbers<kK> node_cross_;
   double node_base_ = 0.0;
   Numbers<4 * kK * kK> middle_square_;
+  std::vector<char> in_one_model_;  // whether some model has modes of both groups
   Numbers<6 * kK> middle_by_base_;
   std::array<std::array<double, 3>, 3> middle_base_square_{};
   // Σ α μ m and Σ α μ².
@@ -809,11 +832,13 @@ std::unique_ptr<StageKernel> fitting_stages(std::size_t modes, std::size_t model
     std::size_t models;
     std::unique_ptr<StageKernel> (*make)(std::size_t, std::size_t);
   };
+  constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();
   constexpr Choice kChoices[] = {
-      {4, 4, make_lane_stages<Lanes, 1, 1>},  {8, 4, make_lane_stages<Lanes, 2, 1>},
-      {12, 4, make_lane_stages<Lanes, 3, 1>}, {8, 8, make_lane_stages<Lanes, 2, 2>},
-      {12, 8, make_lane_stages<Lanes, 3, 2>}, {16, 8, make_lane_stages<Lanes, 4, 2>},
-      {20, 8, make_lane_stages<Lanes, 5, 2>}, {24, 8, make_lane_stages<Lanes, 6, 2>},
+      {4, 4, make_lane_stages<Lanes, 1, 1>},     {8, 4, make_lane_stages<Lanes, 2, 1>},
+      {8, 8, make_lane_stages<Lanes, 2, 2>},     {12, 4, make_lane_stages<Lanes, 3, 1>},
+      {12, 8, make_lane_stages<Lanes, 3, 2>},    {16, kAny, make_lane_stages<Lanes, 4, 0>},
+      {20, kAny, make_lane_stages<Lanes, 5, 0>}, {24, kAny, make_lane_stages<Lanes, 6, 0>},
+      {28, kAny, make_lane_stages<Lanes, 7, 0>}, {32, kAny, make_lane_stages<Lanes, 8, 0>},
   };
   for (const Choice& choice : kChoices) {
     if (modes <= choice.modes && models <= choice.models) {
