@@ -31,7 +31,7 @@ echo "Compensating examples/washer.gcode, eight minutes of printing; this takes 
 echo
 cd -- "$root"
 build/unflex compensate examples/washer.gcode -o "$output" --printer examples/printer.toml \
-  --report "$report"
+  --report "$report" --check-solver --strict
 
 cat <<END
 

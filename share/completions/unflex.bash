@@ -6,8 +6,8 @@ _unflex_options() {
   case $1 in
     '') echo '-h --help --version' ;;
     compensate)
-      echo "-h --help -o --output --in-place --log --strict $print --faster --timing --max-deviation --engine -j --jobs" ;;
-    batch) echo "-h --help -o --output $print --summary --faster --timing --max-deviation --engine -j --jobs" ;;
+      echo "-h --help -o --output --in-place --log --strict $print --faster --timing --max-deviation --engine --check-solver -j --jobs" ;;
+    batch) echo "-h --help -o --output $print --summary --faster --timing --max-deviation --engine --check-solver -j --jobs" ;;
     verify) echo "-h --help --against --strict $print --faster --max-deviation" ;;
     inspect) echo "-h --help --all --strict $print" ;;
     filament) echo '-h --help -o --output --in-place --strict --printer --set --filament-start-mm -q --quiet' ;;

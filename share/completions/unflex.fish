@@ -82,6 +82,7 @@ complete -c unflex -n '__unflex_in compensate batch verify' -l faster -d 'As fas
 complete -c unflex -n '__unflex_in compensate batch' -l timing -x -a 'scaled optimal' -d 'How --faster finds the timing'
 complete -c unflex -n '__unflex_in compensate batch verify' -l max-deviation -x -d 'Exit with 3 if extruding moves stray further, mm'
 complete -c unflex -n '__unflex_in compensate batch study' -l engine -x -a 'auto banded ipopt' -d 'What solves'
+complete -c unflex -n '__unflex_in compensate batch' -l check-solver -d 'Have a sample solved by Ipopt as well'
 complete -c unflex -n '__unflex_in compensate batch study tune' -s j -l jobs -x -d 'How many to compute at once'
 complete -c unflex -n '__unflex_in study' -l machines -x -a '(__fish_complete_directories (commandline -ct))' -d 'Folder of resonance records of real machines'
 complete -c unflex -n '__unflex_in study' -l faster -d 'The least print time within contour errors; =µm, as =10,20,50'

@@ -224,6 +224,9 @@ Status check_batch(const RunConfig& config) {
 }  // namespace
 
 Status complete(RunConfig& config) {
+  if (config.check_solver && config.engine == pipeline::EngineChoice::ipopt) {
+    return usage("--check-solver: it is Ipopt that checks; leave out --engine ipopt");
+  }
   if (writes_print(config.command)) {
     if (Status checked = check_output(config); !checked) {
       return checked;

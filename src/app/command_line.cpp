@@ -115,6 +115,11 @@ void add_engine(CLI::App& command, RunConfig& config, const char* help) {
                                                     {"ipopt", pipeline::EngineChoice::ipopt}}));
 }
 
+void add_check_solver(CLI::App& command, RunConfig& config) {
+  command.add_flag("--check-solver", config.check_solver,
+                   "Have a sample solved by Ipopt as well, and warn if it finds something else");
+}
+
 void add_print_and_output(CLI::App& command, RunConfig& config) {
   command.add_option("IN", config.input, "Sliced G-code, - for stdin")->type_name("")->required();
   command.add_option("-o,--output", config.output, "Where to write, - for stdout")
@@ -134,8 +139,8 @@ void add_compensate(CLI::App& program, RunConfig& config) {
   add_faster(*command, config);
   add_timing(*command, config);
   add_max_deviation(*command, config);
-  add_engine(*command, config,
-             "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
+  add_engine(*command, config, "What solves: banded, which is also auto, or ipopt");
+  add_check_solver(*command, config);
   add_jobs(*command, config);
   command->callback([&config] {
     config.command = Command::compensate;
@@ -161,8 +166,8 @@ void add_batch(CLI::App& program, RunConfig& config) {
   add_faster(*command, config);
   add_timing(*command, config);
   add_max_deviation(*command, config);
-  add_engine(*command, config,
-             "What solves: banded, ipopt, or auto, banded with a sample checked by ipopt");
+  add_engine(*command, config, "What solves: banded, which is also auto, or ipopt");
+  add_check_solver(*command, config);
   add_jobs(*command, config);
   command->callback([&config] {
     config.command = Command::batch;

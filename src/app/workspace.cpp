@@ -176,6 +176,7 @@ Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   }
   job.settings = space.settings;
   job.engine = config.engine;
+  job.check_solver = config.check_solver;
   job.workers = config.workers;
   job.all_shapers = config.report.has_value();
   return job;

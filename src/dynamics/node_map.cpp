@@ -14,7 +14,7 @@ NozzleMotion free_motion(const Mode& mode, double place, double rate, double h) 
 
 // Under F + F' t there is the steady motion (F + F' t)/ω² − 2ζF'/ω³, and the rest is free.
 NodeMap::NodeMap(const FlexibleAxis& axis, double period_s)
-    : per_period_(1.0 / period_s), count_(axis.mode_count()) {
+    : period_s_(period_s), count_(axis.mode_count()) {
   for (std::size_t i = 0; i < count_; ++i) {
     const Mode& mode = axis.modes()[i];
     const double omega = mode.omega_rad_s;

@@ -159,6 +159,43 @@ AxisModel with_others_as_plants(const std::vector<AxisModel>& models) {
   return result;
 }
 
+// An axis with modes out of `known` in place of its own, keeping the gains, as far as that
+// changes how it swings by no more than `most`.
+std::vector<ModeOfAxis> shared_with(const std::vector<ModeOfAxis>& known,
+                                    const std::vector<ModeOfAxis>& own, double most) {
+  std::vector<ModeOfAxis> modes = own;
+  std::vector<bool> is_shared(modes.size(), false);
+  const auto replaced = [&](std::size_t m, const ModeOfAxis& by) {
+    std::vector<ModeOfAxis> other = modes;
+    other[m].freq_hz = by.freq_hz;
+    other[m].damping_ratio = by.damping_ratio;
+    return other;
+  };
+  // One after the other, that with the least effect first.
+  for (std::size_t round = 0; round < modes.size(); ++round) {
+    double least = most;
+    std::size_t which = modes.size();
+    std::vector<ModeOfAxis> best;
+    for (std::size_t m = 0; m < modes.size(); ++m) {
+      for (const ModeOfAxis& mode : known) {
+        std::vector<ModeOfAxis> other = replaced(m, mode);
+        const double change = is_shared[m] ? most : distance(other, own);
+        if (change < least) {
+          least = change;
+          which = m;
+          best = std::move(other);
+        }
+      }
+    }
+    if (which == modes.size()) {
+      break;
+    }
+    modes = std::move(best);
+    is_shared[which] = true;
+  }
+  return modes;
+}
+
 }  // namespace
 
 std::string_view to_string(Method method) {
@@ -169,6 +206,8 @@ std::string_view to_string(Method method) {
 
 std::vector<Plant> other_plants(const AxisModel& model) {
   constexpr double kNear = 0.03;
+  // What is below a hundredth of the swing is below a hundredth of what is left to err.
+  constexpr double kNothing = 0.01;
   constexpr std::size_t kMost = 6;
   const auto away = [&](const Plant& plant) { return distance(plant.modes, model.values()); };
   std::vector<Plant> others(model.plants.begin() + 1, model.plants.end());
@@ -188,8 +227,11 @@ std::vector<Plant> other_plants(const AxisModel& model) {
   for (const Plant& plant : others) {
     kept += plant.share;
   }
+  std::vector<ModeOfAxis> known = model.values();
   for (Plant& plant : others) {
     plant.share *= all / kept;
+    plant.modes = shared_with(known, plant.modes, kNothing * swing(model.values()));
+    known.insert(known.end(), plant.modes.begin(), plant.modes.end());
   }
   return others;
 }

@@ -24,16 +24,12 @@ namespace {
 // Most passes over one print. Each pass keeps the runs that broke rules in the passes before.
 constexpr int kMostPasses = 5;
 
-Engines engines_of(EngineChoice choice) {
-  switch (choice) {
-    case EngineChoice::ipopt:
-      return {nullptr, compensate::make_ipopt_engine};
-    case EngineChoice::banded:
-      return {compensate::make_banded_engine, nullptr};
-    case EngineChoice::automatic:
-      break;
+Engines engines_of(const Job& job) {
+  if (job.engine == EngineChoice::ipopt) {
+    return {nullptr, compensate::make_ipopt_engine};
   }
-  return {compensate::make_banded_engine, compensate::make_ipopt_engine};
+  return {compensate::make_banded_engine,
+          job.check_solver ? compensate::make_ipopt_engine : nullptr};
 }
 
 std::string name_of(const Engines& engines) {
@@ -134,6 +130,23 @@ void warn_of_no_gain(const Job& job, report::Report& report) {
                   report::micrometres_text(compensated_mm), report::micrometres_text(now_mm))}));
 }
 
+// Both engines find the optimum of the same program, so that they differ is an error of either.
+void warn_of_gap(const Job& job, report::Report& report) {
+  constexpr double kMostGap = 1e-5;
+  constexpr double kMost_mm = 5e-4;
+  const report::SolverCheck& check = report.solver_check;
+  if (check.largest_gap <= kMostGap && check.largest_difference_mm <= kMost_mm) {
+    return;
+  }
+  report.warnings.push_back(to_string(Diagnostic{
+      {job.input_name, 0},
+      fmt::format(
+          "the solver and Ipopt do not find the same motion: their costs differ by {:.2g} %, "
+          "the base by {} µm; do not print this, use --engine ipopt, and report it with the "
+          "print and the printer file",
+          100.0 * check.largest_gap, report::micrometres_text(check.largest_difference_mm))}));
+}
+
 // A stream has gone by before it is known what comes, so its hotend is not followed.
 Status follow_hotend(const Job& job, Progress& progress, report::Report& report) {
   if (job.input_fd < 0 && job.output_fd < 0) {
@@ -156,7 +169,7 @@ Result<report::Report> compensate(const Job& job, Progress& progress) {
   if (const std::optional<Diagnostic>& refusal = job.settings.refusal) {
     return fail(ErrorKind::usage, refusal->place, refusal->message);
   }
-  return compensate_with(job, engines_of(job.engine), progress);
+  return compensate_with(job, engines_of(job), progress);
 }
 
 Result<report::Report> compensate_with(const Job& job, const Engines& engines, Progress& progress) {
@@ -195,6 +208,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
                         std::back_inserter(report.warnings));
     }
     warn_of_no_gain(job, report);
+    warn_of_gap(job, report);
     add_performance(begin, report);
     return report;
   }

@@ -283,6 +283,19 @@ class Compensator {
     if (checks_) {
       gaps_.choose(*job);
     }
+    choose_comparison(*job);
+  }
+
+  // A base for the nominal axes alone is found for an eighth of the print, or its beginning: it
+  // takes as long as the other one, and only shows what suiting a band costs.
+  void choose_comparison(RunJob& job) {
+    constexpr double kShare = 8.0;
+    constexpr double kAlways_s = 120.0;
+    job.compares_nominal =
+        job.setup.is_robust() && compared_s_ <= std::max(laid_out_s_ / kShare, kAlways_s);
+    const double duration_s = planner::duration_s(job.reference());
+    laid_out_s_ += duration_s;
+    compared_s_ += job.compares_nominal ? duration_s : 0.0;
   }
 
   void time_in_thread(const std::shared_ptr<RunJob>& job) {
@@ -537,6 +550,8 @@ class Compensator {
   report::Report* report_;
   RunWriter writer_;
   GapCheck gaps_;
+  double laid_out_s_ = 0.0;  // how long all runs so far take
+  double compared_s_ = 0.0;  // and those that compare the nominal base
   // The nozzle after the last piece read, as if every run so far were compensated. Kept motion
   // leaves a swing, with which the next run starts.
   NozzleFollower nozzle_;

@@ -82,7 +82,7 @@ std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
 }
 
 void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
-  if (!job.setup.is_robust()) {
+  if (!job.compares_nominal) {
     return;
   }
   if (const std::optional<dynamics::BaseTrajectory> nominal = nominal_base(job)) {
@@ -326,6 +326,7 @@ std::unique_ptr<RunJob> untimed(const RunJob& job, const compensate::Setup& setu
   run->extruder = job.extruder;
   run->accel = job.accel;
   run->lines_after = job.lines_after;
+  run->compares_nominal = job.compares_nominal;
   if (job.keeps_timing()) {
     run->slow_reason = job.slow_reason;
     run->retimed = job.retimed;

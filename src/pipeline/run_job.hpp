@@ -89,8 +89,10 @@ struct RunJob {
   dynamics::BaseTrajectory base;
   emit::RunPlan plan;
   verify::RunDeviation before;  // deviation of the run's sliced moves
-  // Contour error of the nominal axes; set only with dynamics.*_error. `robust`: on the emitted
-  // base. `nominal`: on the base optimised for them alone.
+  // Whether to find the base for the nominal axes alone, too.
+  bool compares_nominal = false;
+  // Contour error of the nominal axes, if that is so. `robust`: on the emitted base. `nominal`: on
+  // the base optimised for them alone.
   PathError robust;
   PathError nominal;
   std::size_t iterations = 0;

@@ -257,6 +257,10 @@ void write_runs(Sink out, const Report& r) {
   }
   fmt::format_to(out, "solver        {}, {} parts, {} iterations\n", r.solver_engine,
                  r.windows_total, r.solver_iterations);
+  if (r.solver_check.windows > 0) {
+    fmt::format_to(out, "              on {} of them Ipopt finds the same within {} µm\n",
+                   r.solver_check.windows, micrometres_text(r.solver_check.largest_difference_mm));
+  }
 }
 
 void write_path(Sink out, const Report& r) {

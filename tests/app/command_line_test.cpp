@@ -124,6 +124,9 @@ TEST(CommandLine, TellsWhatAnOptionTakes) {
               StartsWith("--engine: '1' is none of auto, banded, ipopt;"));
   EXPECT_EQ(read({"compensate", "a", "-o", "b", "--engine", "ipopt"}).engine,
             pipeline::EngineChoice::ipopt);
+  EXPECT_TRUE(read({"compensate", "a", "-o", "b", "--check-solver"}).check_solver);
+  EXPECT_THAT(refusal({"compensate", "a", "-o", "b", "--engine", "ipopt", "--check-solver"}),
+              StartsWith("--check-solver: it is Ipopt that checks; leave out --engine ipopt"));
   EXPECT_EQ(read({"identify", "a.csv", "--axis", "Y"}).identify.axis, identify::Axis::y);
   for (const char* jobs : {"0", "257", "1.5", "many"}) {
     EXPECT_EQ(refusal({"compensate", "a", "-o", "b", "-j", jobs}),

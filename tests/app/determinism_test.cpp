@@ -85,7 +85,8 @@ TEST_P(Determinism, HoldsForAnyNumberOfWorkersAndEveryTime) {
 }
 
 TEST_P(Determinism, HoldsForEitherWayToAskForTheEngine) {
-  const Made with_check = make();
+  const Made with_check = make({"--check-solver"});
+  EXPECT_GT(with_check.report["solver"]["checked_windows"], 0);
   const Made banded = make({"--engine", "banded"});
   EXPECT_EQ(banded.output, with_check.output);
   EXPECT_EQ(banded.report["deviation"], with_check.report["deviation"]);

@@ -224,7 +224,7 @@ TEST_F(Identify, WritesThePrinterFileItself) {
                          "--record", kTurnedSensor, "-o", "p.toml"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   const std::string file = read_file(path("p.toml"));
-  EXPECT_THAT(file, AllOf(HasSubstr("freq_hz = 58.1"), HasSubstr("{share = "),
+  EXPECT_THAT(file, AllOf(HasSubstr("freq_hz = 58.09"), HasSubstr("{share = "),
                           HasSubstr("ender3_resonances_x_20210821_152037.csv")));
   write_file(path("stiff_x.csv"), stiff_machine());
   outcome =

@@ -72,6 +72,7 @@ TEST(Summary, IsExactlyThis) {
       "              and 3 more, listed by --report\n"
       "              12 other moves stay as they are: Z move\n"
       "solver        ipopt 3.11.9, 1000 parts, 4242 iterations\n"
+      "              on 8 of them Ipopt finds the same within 0.00 µm\n"
       "path          87.5 % of 8000 mm extruded are compensated\n"
       "              900.0 mm stay as they are: run left as sliced\n"
       "              100.0 mm stay as they are: start unknown\n"

@@ -114,6 +114,7 @@ struct RunConfig {
   machine::SlicerVariables slicer_settings;
   std::optional<double> max_deviation_mm;
   pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
+  bool check_solver = false;
   unsigned workers = 1;
   bool quiet = false;
   bool all_settings = false;  // inspect: those at their default, too

@@ -19,12 +19,13 @@ class NodeMap {
   // period_s: between nodes.
   NodeMap(const FlexibleAxis& axis, double period_s);
 
-  // From node k to the next.
+  // From node k to the next. A base that is joined of parts may be elsewhere at the next node than
+  // it goes to from this one: it jumps there, and the nozzle does not.
   void advance(const AxisTrajectory& base, std::size_t k, NozzleState& state) const {
     const double v = base.velocity_mm_s[k];
     const double a = base.accel_mm_s2[k];
-    const double a_next = base.accel_mm_s2[k + 1];
-    const double j = (a_next - a) * per_period_;
+    const AxisMotion end = between(base, k, period_s_, period_s_);
+    const double j = (base.accel_mm_s2[k + 1] - a) / period_s_;
     for (std::size_t i = 0; i < count_; ++i) {
       const OfMode& map = maps_[i];
       NozzleMotion& part = state.parts[i];
@@ -32,10 +33,10 @@ class NodeMap {
       const double rate = part.velocity - map.gain * v - map.lead_s * a;
       const double slope = -map.push * j;
       const double force = -map.push * a - map.lead_s * j;
-      part = {map.gain * base.position_mm[k + 1] + map.lead_s * base.velocity_mm_s[k + 1] +
+      part = {map.gain * end.position_mm + map.lead_s * end.velocity_mm_s +
                   (map.of_place.position * y + map.of_rate.position * rate) +
                   (map.of_force.position * force + map.of_slope.position * slope),
-              map.gain * base.velocity_mm_s[k + 1] + map.lead_s * a_next +
+              map.gain * end.velocity_mm_s + map.lead_s * end.accel_mm_s2 +
                   (map.of_place.velocity * y + map.of_rate.velocity * rate) +
                   (map.of_force.velocity * force + map.of_slope.velocity * slope)};
     }
@@ -52,7 +53,7 @@ class NodeMap {
     NozzleMotion of_force;  // F
     NozzleMotion of_slope;  // F'
   };
-  double per_period_ = 0.0;
+  double period_s_ = 0.0;
   std::array<OfMode, kMostModes> maps_;
   std::size_t count_ = 0;
 };

@@ -37,6 +37,8 @@ struct Job {
   std::string output_name;
   machine::Settings settings;
   EngineChoice engine = EngineChoice::automatic;
+  // Has a fixed sample of windows solved by Ipopt as well, and warns if it finds something else.
+  bool check_solver = false;
   // Measure the print with all input shapers, as reports show them, not only with ZV.
   bool all_shapers = false;
   unsigned workers = 1;  // threads or solver processes that compute at once

@@ -210,7 +210,7 @@ struct LineBudget {
   double cost_max_mm = 0.0;
 };
 
-// Windows that a second engine has solved as well.
+// Windows that a second engine has solved as well, if asked for.
 struct SolverCheck {
   std::size_t windows = 0;
   double largest_gap = 0.0;            // relative gap of the objectives
