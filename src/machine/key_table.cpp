@@ -616,7 +616,7 @@ constexpr std::array kKeys = {
         "Klipper: call UNFLEX_CHECKPOINT at the end of each run, where a pause then takes effect"},
 
     Key{"verify.step_ms", &setting<&S::verify, &V::step_ms>, Bounds{.min = 0.001, .max = 0.5}, "ms",
-        "Step of the integration of the nozzle's motion"},
+        "How far apart looks at the nozzle are at most"},
     Key{"verify.hold_s", &setting<&S::verify, &V::hold_s>, Bounds{.min = 0.0, .max = 10.0}, "s",
         "How long the nozzle is watched after the last move"},
 };
