@@ -66,13 +66,7 @@ class LaneContour final : public ContourKernel {
         farthest = larger(farthest, go(near_y, place, q.y));
       }
     }
-    double each[kLanes];
-    store(farthest, each);
-    double longest = 0.0;
-    for (const double way : each) {
-      longest = way > longest ? way : longest;
-    }
-    return longest;
+    return most(farthest);
   }
 
   void set_aims(const AimRule& rule, const LaneArray& q_mm, std::size_t nodes,

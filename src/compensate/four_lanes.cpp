@@ -7,11 +7,12 @@
 
 #include "lane_kernels.hpp"
 
-#ifdef UNFLEX_FOUR_LANES
 UNFLEX_FOUR_LANES_BEGIN
 // After all that they need.
 #include "contour_lanes.hpp"
 #include "stage_lanes.hpp"
+// And after that.
+#include "stage_factor_lanes.hpp"
 
 namespace unflex::compensate {
 
@@ -25,4 +26,3 @@ std::unique_ptr<ContourKernel> make_four_lanes_contour(std::size_t pairs) {
 
 }  // namespace unflex::compensate
 UNFLEX_FOUR_LANES_END
-#endif

@@ -10,10 +10,8 @@ namespace unflex::compensate {
                                                                  std::size_t models);
 [[nodiscard]] std::unique_ptr<ContourKernel> make_two_lanes_contour(std::size_t pairs);
 
-#ifdef UNFLEX_FOUR_LANES
 [[nodiscard]] std::unique_ptr<StageKernel> make_four_lanes_stages(std::size_t modes,
                                                                   std::size_t models);
 [[nodiscard]] std::unique_ptr<ContourKernel> make_four_lanes_contour(std::size_t pairs);
-#endif
 
 }  // namespace unflex::compensate

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace unflex::compensate {
 std::size_t StageForm::place(std::size_t component) const {
@@ -14,18 +15,18 @@ std::size_t StageForm::place(std::size_t component) const {
 }
 
 void StageForm::set_model(const AxisWindow& window) {
-  shared_ = shared_modes(window);
+  SharedModes shared = shared_modes(window);
+  if (kernel_ == nullptr || shared.modes.size() != shared_.modes.size() ||
+      shared.models.size() != shared_.models.size()) {
+    kernel_ = make_stage_kernel(shared.modes.size(), shared.models.size());
+  }
+  shared_ = std::move(shared);
   model_.clear();
   model_.jerk_weight = window_->jerk_weight;
   for (const SharedModes::Swing& swing : shared_.modes) {
     model_.modes.add(swing.mode, window.period_s);
   }
   model_.models = shared_.models;
-  if (kernel_ == nullptr || kernel_modes_ != count() || kernel_models_ != window.models()) {
-    kernel_ = make_stage_kernel(count(), window.models());
-    kernel_modes_ = count();
-    kernel_models_ = window.models();
-  }
   kernel_->assign(model_);
 }
 

@@ -107,8 +107,6 @@ class StageForm {
   StageModel model_;
   SharedModes shared_;
   std::unique_ptr<StageKernel> kernel_;
-  std::size_t kernel_modes_ = 0;
-  std::size_t kernel_models_ = 0;
   StageArrays arrays_;
   Eigen::MatrixXd start_basis_;  // δz_0 = start_basis_ y with y free
   Eigen::MatrixXd start_inverse_;

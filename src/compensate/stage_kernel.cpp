@@ -50,12 +50,8 @@ void StageArrays::resize(std::size_t node_count, std::size_t state_size, std::si
 }
 
 std::unique_ptr<StageKernel> make_stage_kernel(std::size_t modes, std::size_t models) {
-#ifdef UNFLEX_FOUR_LANES
-  if (has_four_lanes()) {
-    return make_four_lanes_stages(modes, models);
-  }
-#endif
-  return make_two_lanes_stages(modes, models);
+  return has_four_lanes() ? make_four_lanes_stages(modes, models)
+                          : make_two_lanes_stages(modes, models);
 }
 
 }  // namespace unflex::compensate

@@ -9,6 +9,8 @@
 // After all that they need.
 #include "contour_lanes.hpp"
 #include "stage_lanes.hpp"
+// And after that.
+#include "stage_factor_lanes.hpp"
 
 namespace unflex::compensate {
 

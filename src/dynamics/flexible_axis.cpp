@@ -323,16 +323,12 @@ NozzleState exact_step(const FlexibleAxis& axis, const NozzleState& state, const
   return next;
 }
 
-StepMap::StepMap(OneStep one_step, const FlexibleAxis& axis, double h)
-    : count_(axis.modes().size()) {
+ExactMap::ExactMap(const FlexibleAxis& axis, double h) : count_(axis.modes().size()) {
   for (std::size_t i = 0; i < count_; ++i) {
     const Mode& mode = axis.modes()[i];
-    maps_[i] = {mode.gain, one_step(mode, {1.0, 0.0}, {}, h), one_step(mode, {0.0, 1.0}, {}, h),
-                one_step(mode, {}, {0.0, 1.0, 0.0}, h), one_step(mode, {}, {0.0, 0.0, 1.0}, h)};
+    maps_[i] = {mode.gain, exact_part(mode, {1.0, 0.0}, {}, h), exact_part(mode, {0.0, 1.0}, {}, h),
+                exact_part(mode, {}, {0.0, 1.0, 0.0}, h), exact_part(mode, {}, {0.0, 0.0, 1.0}, h)};
   }
 }
-
-Rk4Map::Rk4Map(const FlexibleAxis& axis, double h) : StepMap(&rk4_part, axis, h) {}
-ExactMap::ExactMap(const FlexibleAxis& axis, double h) : StepMap(&exact_part, axis, h) {}
 
 }  // namespace unflex::dynamics

@@ -65,7 +65,6 @@ StepMatrix::StepMatrix(const dynamics::FlexibleAxis& axis, std::size_t mode, dou
   column(1, {{NozzleMotion{0.0, 1.0}}}, {});
   column(2, {}, {1.0, 0.0, 0.0});
   column(3, {}, {0.0, 1.0, 0.0});
-  column(4, {}, {0.0, 0.0, 1.0});
 }
 
 Followed::Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,

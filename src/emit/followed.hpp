@@ -11,7 +11,7 @@
 
 namespace unflex::emit {
 
-// BaseTrajectory::x or y_at.
+// BaseTrajectory::x or y.
 using BaseAxis = dynamics::AxisTrajectory dynamics::BaseTrajectory::*;
 
 // States of a nozzle of kModes modes as vectors: (q_1, q̇_1, …).
@@ -47,14 +47,15 @@ class StepMatrix {
   [[nodiscard]] double dt() const { return dt_; }
   [[nodiscard]] double gain() const { return gain_; }
   [[nodiscard]] Eigen::Matrix2d free() const { return columns_.leftCols<2>(); }
-  [[nodiscard]] Eigen::Vector2d base(double position, double velocity, double accel = 0.0) const {
-    return columns_.col(2) * position + columns_.col(3) * velocity + columns_.col(4) * accel;
+  // What a base of even velocity does in a step.
+  [[nodiscard]] Eigen::Vector2d base(double position, double velocity) const {
+    return columns_.col(2) * position + columns_.col(3) * velocity;
   }
 
  private:
   double dt_;
   double gain_ = 0.0;
-  Eigen::Matrix<double, 2, 5> columns_ = Eigen::Matrix<double, 2, 5>::Zero();
+  Eigen::Matrix<double, 2, 4> columns_ = Eigen::Matrix<double, 2, 4>::Zero();
 };
 
 // The state of the nozzle that follows one axis of the base. It starts along with the base, or with

@@ -206,7 +206,7 @@ std::string_view to_string(Method method) {
 
 std::vector<Plant> other_plants(const AxisModel& model) {
   constexpr double kNear = 0.03;
-  // What is below a hundredth of the swing is below a hundredth of what is left to err.
+  // A change by less than this share of the swing does not count.
   constexpr double kNothing = 0.01;
   constexpr std::size_t kMost = 6;
   const auto away = [&](const Plant& plant) { return distance(plant.modes, model.values()); };

@@ -16,12 +16,7 @@ constexpr double kRests_mm = 1e-7;
 }  // namespace
 
 const BundleKernel& bundle_kernel() {
-#ifdef UNFLEX_FOUR_LANES
-  if (has_four_lanes()) {
-    return four_lanes_bundle();
-  }
-#endif
-  return two_lanes_bundle();
+  return has_four_lanes() ? four_lanes_bundle() : two_lanes_bundle();
 }
 
 Bundle::Bundle(std::vector<NozzleModel> models)

@@ -2,7 +2,6 @@
 
 #include "bundle_kernels.hpp"
 
-#ifdef UNFLEX_FOUR_LANES
 UNFLEX_FOUR_LANES_BEGIN
 // After all that it needs.
 #include "bundle_lanes.hpp"
@@ -16,4 +15,3 @@ const BundleKernel& four_lanes_bundle() {
 
 }  // namespace unflex::verify
 UNFLEX_FOUR_LANES_END
-#endif

@@ -7,8 +7,6 @@
 namespace unflex::verify {
 
 [[nodiscard]] const BundleKernel& two_lanes_bundle();
-#ifdef UNFLEX_FOUR_LANES
 [[nodiscard]] const BundleKernel& four_lanes_bundle();
-#endif
 
 }  // namespace unflex::verify

@@ -162,7 +162,7 @@ class LaneBundle final : public BundleKernel {
     return {best, number + broadcast<Lanes>(static_cast<double>(near.first()))};
   }
 
-  // Only what goes across a piece changes e.
+  // Only what goes across a piece changes e. Where that is not all of e, the piece ends or is cut.
   [[nodiscard]] static Away away_from(const NearPath& near, const Found& found, const Lanes& px,
                                       const Lanes& py, const Lanes& vx, const Lanes& vy) {
     double number[kLanes];
@@ -180,12 +180,11 @@ class LaneBundle final : public BundleKernel {
     const Lanes y = py - of(&NearPath::Span::y_mm);
     const Lanes along = direction_x * x + direction_y * y;
     const Lanes speed = direction_x * vx + direction_y * vy;
-    const Lanes none = broadcast<Lanes>(0.0);
-    const Lanes one = broadcast<Lanes>(1.0);
-    const Lanes inside = select(less(none, along), one, none) *
-                         select(less(along, of(&NearPath::Span::length_mm)), one, none);
-    return {x - direction_x * along, y - direction_y * along, vx - direction_x * speed,
-            vy - direction_y * speed, one - inside};
+    const Lanes across_x = x - direction_x * along;
+    const Lanes across_y = y - direction_y * along;
+    const Lanes is_at_end = select(less(across_x * across_x + across_y * across_y, found.distance2),
+                                   broadcast<Lanes>(1.0), broadcast<Lanes>(0.0));
+    return {across_x, across_y, vx - direction_x * speed, vy - direction_y * speed, is_at_end};
   }
 
   // Where the middle one of three looks is highest, the top of the parabola through them, and else
@@ -279,15 +278,6 @@ class LaneBundle final : public BundleKernel {
     }
     return sum;
   }
-
-  [[nodiscard]] static double least(const Lanes& lanes) {
-    double each[kLanes];
-    store(lanes, each);
-    const double first = each[0] < each[1] ? each[0] : each[1];
-    const double second = each[2] < each[3] ? each[2] : each[3];
-    return first < second ? first : second;
-  }
-  [[nodiscard]] static double most(const Lanes& lanes) { return -least(-1.0 * lanes); }
 };
 
 }  // namespace unflex::verify

@@ -256,15 +256,16 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
   if (!looks || (last_look_ && last_measured_ != measured)) {
     last_look_.reset();
   }
+  dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
   const auto look_after = [&](double since_s) {
-    return measured ? look(reference, since_s) : look_at_rest(since_s);
+    return measured ? look(reference, nozzle, since_s) : look_at_rest(nozzle, since_s);
   };
   if (looks && !last_look_) {
     last_look_ = look_after(0.0);
   }
   last_measured_ = measured;
   for (double number = 1.0; number <= steps; number += 1.0) {
-    const dynamics::NozzleMotionXY from = corners_ ? bundle_.motion(0) : dynamics::NozzleMotionXY{};
+    const dynamics::NozzleMotionXY from = nozzle;
     bundle_.step(phase.x, phase.y);
     advance(phase.x, h);
     advance(phase.y, h);
@@ -272,11 +273,12 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
     if (rides) {
       bundle_.ride_on(phase.x, phase.y);
     }
+    nozzle = bundle_.motion(0);
     const dynamics::BaseSegment pushed_from = phase.pushed;
     advance(phase.pushed, h);
     time_s_ = start_s + number * h;
     if (corners_) {
-      pass_corners(from, h);
+      pass_corners(from, nozzle, h);
     }
     Sample sample;
     if (looks) {
@@ -284,13 +286,13 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
       advance(reference.y, h);
       sample = look_after(h);
       bundle_.count(measured, phase.extruding);
-      count(*last_look_, sample, reference, measured, phase.extruding, h);
+      count(*last_look_, sample, reference, nozzle, measured, phase.extruding, h);
       last_look_ = sample;
     }
     const bool follows_line = line_ && line_->is_measuring();
     const bool has_lag = measured && follows_filament_ && (reference.extruding || phase.extruding);
     if (!waiting_ && (follows_line || has_lag)) {
-      const std::optional<PathPlace> at = place(measured, reference);
+      const std::optional<PathPlace> at = place(measured, reference, nozzle);
       if (has_lag && at) {
         filament_lag_.add(*path_, *at, laid_mm_ + phase.e.position, phase.extruding, h);
       }
@@ -308,9 +310,9 @@ void Meter::integrate(BasePhase& phase, double duration_s, bool measured) {
 }
 
 // Between two looks the nozzle goes in a curve, of which the middle shows enough.
-void Meter::pass_corners(const dynamics::NozzleMotionXY& from, double h) {
+void Meter::pass_corners(const dynamics::NozzleMotionXY& from, const dynamics::NozzleMotionXY& to,
+                         double h) {
   const double now_s = time_s_ + corner_shift_s_;
-  const dynamics::NozzleMotionXY to = bundle_.motion(0);
   if (corners_->is_near(now_s - 0.5 * h)) {
     const auto middle = [&](const dynamics::NozzleMotion& a, const dynamics::NozzleMotion& b) {
       return 0.5 * (a.position + b.position) + 0.125 * h * (a.velocity - b.velocity);
@@ -358,17 +360,17 @@ Meter::ReferencePhase Meter::reference_phase(double duration_s) const {
           piece.extruding};
 }
 
-Meter::Sample Meter::look(const ReferencePhase& reference, double since_s) {
+Meter::Sample Meter::look(const ReferencePhase& reference, const dynamics::NozzleMotionXY& nozzle,
+                          double since_s) {
   near_.slide(*path_, time_s_);
   bundle_.look(*path_, near_, since_s);
-  const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
   const double error_x = reference.x.position - nozzle.x.position;
   const double error_y = reference.y.position - nozzle.y.position;
   return {error_x * error_x + error_y * error_y, (*path_)[bundle_.nearest()].move.segment.line};
 }
 
 // Filament is laid before the reference moves or after it has ended.
-Meter::Sample Meter::look_at_rest(double since_s) {
+Meter::Sample Meter::look_at_rest(const dynamics::NozzleMotionXY& nozzle, double since_s) {
   if (path_->first() == path_->end()) {
     return {};
   }
@@ -378,7 +380,6 @@ Meter::Sample Meter::look_at_rest(double since_s) {
   bundle_.look(*path_, near_, since_s);
   const gcode::Segment& segment = (*path_)[piece].move.segment;
   const gcode::Position& at = before ? segment.start_mm : segment.end_mm;
-  const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
   const double error_x = at[gcode::X] - nozzle.x.position;
   const double error_y = at[gcode::Y] - nozzle.y.position;
   return {error_x * error_x + error_y * error_y, (*path_)[bundle_.nearest()].move.segment.line};
@@ -386,7 +387,7 @@ Meter::Sample Meter::look_at_rest(double since_s) {
 
 // What happens between two looks. laying: filament is laid by what is played now.
 void Meter::count(const Sample& from, const Sample& to, const ReferencePhase& reference,
-                  bool measured, bool laying, double h) {
+                  const dynamics::NozzleMotionXY& nozzle, bool measured, bool laying, double h) {
   const double tracking2 = 0.5 * (from.tracking2_mm2 + to.tracking2_mm2);
   const double tracking2_max = std::max(from.tracking2_mm2, to.tracking2_mm2);
   const auto add = [&](DeviationAccumulator& figures) {
@@ -403,14 +404,12 @@ void Meter::count(const Sample& from, const Sample& to, const ReferencePhase& re
     return;
   }
   if (laying && follow_feed_ && (*path_)[bundle_.nearest()].extruding) {
-    const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
     const double v_x = nozzle.x.velocity;
     const double v_y = nozzle.y.velocity;
     feed_.add(v_x * v_x + v_y * v_y, (*path_)[bundle_.nearest()].move.segment.feed_mm_s, h,
               to.line);
   }
   if (follow_lag_) {
-    const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
     const double v_x = reference.x.velocity;
     const double v_y = reference.y.velocity;
     lag_.add((reference.x.position - nozzle.x.position) * v_x +
@@ -421,9 +420,9 @@ void Meter::count(const Sample& from, const Sample& to, const ReferencePhase& re
 
 // Where the nozzle is on the path. While the reference does not move, it is where the reference
 // will begin, or has ended.
-std::optional<PathPlace> Meter::place(bool measured, const ReferencePhase& reference) const {
+std::optional<PathPlace> Meter::place(bool measured, const ReferencePhase& reference,
+                                      const dynamics::NozzleMotionXY& nozzle) const {
   if (measured) {
-    const dynamics::NozzleMotionXY nozzle = bundle_.motion(0);
     return nearest_place(*path_, current_, reference.x.position, reference.y.position,
                          nozzle.x.position, nozzle.y.position);
   }
@@ -466,7 +465,7 @@ void Meter::look() {
   static_cast<void>(next_reference_change());
   if (current_ < path_->end() && (*path_)[current_].measured &&
       (*path_)[current_].start_s <= time_s_ + kSameTime_s) {
-    const Sample sample = look(reference_phase(0.0), 0.0);
+    const Sample sample = look(reference_phase(0.0), bundle_.motion(0), 0.0);
     const bool laying = (*path_)[current_].extruding;
     bundle_.count_moment(laying);
     all_.add(bundle_.now_mm2(), sample.tracking2_mm2, 0.0, sample.line);

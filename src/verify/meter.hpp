@@ -186,20 +186,23 @@ class Meter {
   void integrate(BasePhase& phase, double duration_s, bool measured);
   [[nodiscard]] double next_reference_change();
   void take_corners();
-  void pass_corners(const dynamics::NozzleMotionXY& from, double h);
+  void pass_corners(const dynamics::NozzleMotionXY& from, const dynamics::NozzleMotionXY& to,
+                    double h);
   [[nodiscard]] ReferencePhase reference_phase(double duration_s) const;
   // What a look shows of the first nozzle.
   struct Sample {
     double tracking2_mm2 = 0.0;
     std::size_t line = 0;
   };
-  // since_s: when the last look was; 0 if this one has nothing to do with it.
-  [[nodiscard]] Sample look(const ReferencePhase& reference, double since_s);
-  [[nodiscard]] Sample look_at_rest(double since_s);
-  void count(const Sample& from, const Sample& to, const ReferencePhase& reference, bool measured,
-             bool laying, double h);
-  [[nodiscard]] std::optional<PathPlace> place(bool measured,
-                                               const ReferencePhase& reference) const;
+  // nozzle: the first one. since_s: when the last look was; 0 if this one has nothing to do with
+  // it.
+  [[nodiscard]] Sample look(const ReferencePhase& reference, const dynamics::NozzleMotionXY& nozzle,
+                            double since_s);
+  [[nodiscard]] Sample look_at_rest(const dynamics::NozzleMotionXY& nozzle, double since_s);
+  void count(const Sample& from, const Sample& to, const ReferencePhase& reference,
+             const dynamics::NozzleMotionXY& nozzle, bool measured, bool laying, double h);
+  [[nodiscard]] std::optional<PathPlace> place(bool measured, const ReferencePhase& reference,
+                                               const dynamics::NozzleMotionXY& nozzle) const;
   void tell(const BasePhase& phase, double h, bool measured, const ReferencePhase& reference,
             const Sample& sample);
 

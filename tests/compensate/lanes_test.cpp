@@ -20,8 +20,6 @@ using testing::random_path;
 using testing::solve_by_ipopt;
 using testing::WindowKind;
 
-#ifdef UNFLEX_FOUR_LANES
-
 class Lanes : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -156,8 +154,6 @@ TEST_F(Lanes, AddUpInOneOrder) {
   const double numbers[kLanes] = {1e16, 1.0, -1e16, 1.0};
   EXPECT_EQ(sum(load<TwoLanes>(numbers)), 2.0);
 }
-
-#endif
 
 // More modes and models than there is a kernel of its own for.
 TEST(Stages, TakeAnyNumberOfModesAndModels) {

@@ -47,20 +47,44 @@ NozzleXY somewhere(const NozzleModel& model, std::mt19937_64& random) {
   return nozzle;
 }
 
-// A straight path along x.
-ReferencePath straight(std::vector<planner::PlannedMove>& moves, std::size_t& taken) {
-  moves = testing::plan_path({{0.0, 0.0, 0.0}, {1000.0, 0.0, 100.0, 1.0}}, planner::Limits{});
-  taken = 0;
-  ReferencePath path([&](ReferenceMove& next) {
-    if (taken == moves.size()) {
-      return false;
+// Straight along x.
+std::vector<planner::PlannedMove> straight() {
+  return testing::plan_path({{0.0, 0.0, 0.0}, {1000.0, 0.0, 100.0, 1.0}}, planner::Limits{});
+}
+
+// Rk4Step's tests hold for the bundle, too.
+TEST(Bundle, StepsAsRungeAndKuttaDo) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (int trial = 0; trial < 500; ++trial) {
+    NozzleModel model;
+    model.x = dynamics::from_frequency(60.0 + 40.0 * unit(random), 0.6 + 0.6 * unit(random));
+    model.y = dynamics::from_frequency(60.0 + 40.0 * unit(random), 0.6 + 0.6 * unit(random));
+    const auto segment = [&] {
+      return dynamics::BaseSegment{200.0 * unit(random), 100.0 * unit(random), 2e4 * unit(random)};
+    };
+    const dynamics::BaseSegment x = segment();
+    const dynamics::BaseSegment y = segment();
+    const NozzleXY start{{x.position + unit(random), 100.0 * unit(random)},
+                         {y.position + unit(random), 100.0 * unit(random)}};
+    // One step of Runge and Kutta's. More are made of one that is longer against the period.
+    const double h = 0.15 * (1.01 + 0.98 * unit(random)) /
+                     std::max(model.x.fastest_rad_s(), model.y.fastest_rad_s());
+    const NozzleXY wanted{dynamics::rk4_step(model.x, start.x, x, h),
+                          dynamics::rk4_step(model.y, start.y, y, h)};
+    // By a single step, and by a map.
+    for (const double steps : {1.0, 20.0}) {
+      Bundle bundle({model});
+      bundle.set_nozzle(0, start);
+      bundle.begin_steps(steps, h);
+      bundle.step(x, y);
+      const NozzleXY found = bundle.nozzle();
+      ASSERT_NEAR(found.x.position(), wanted.x.position(), 1e-12);
+      ASSERT_NEAR(found.x.velocity(), wanted.x.velocity(), 1e-9);
+      ASSERT_NEAR(found.y.position(), wanted.y.position(), 1e-12);
+      ASSERT_NEAR(found.y.velocity(), wanted.y.velocity(), 1e-9);
     }
-    next.move = moves[taken++];
-    return true;
-  });
-  path.begin_section();
-  path.extend_to(20.0);
-  return path;
+  }
 }
 
 TEST(Bundle, MovesNozzlesAsOneByOne) {
@@ -101,19 +125,10 @@ TEST(Bundle, MovesNozzlesAsOneByOne) {
 }
 
 TEST(Bundle, FindsEachNozzlesDistanceFromThePath) {
-  std::vector<planner::PlannedMove> moves = testing::plan_path(
+  const std::vector<planner::PlannedMove> moves = testing::plan_path(
       {{0.0, 0.0, 0.0}, {5.0, 0.0, 100.0, 1.0}, {5.0, 5.0, 100.0, 1.0}, {8.0, 5.0, 100.0, 1.0}},
       planner::Limits{});
-  std::size_t taken = 0;
-  ReferencePath path([&](ReferenceMove& next) {
-    if (taken == moves.size()) {
-      return false;
-    }
-    next.move = moves[taken++];
-    return true;
-  });
-  path.begin_section();
-  path.extend_to(10.0);
+  ReferencePath path = testing::path_of(moves, 10.0);
   const std::vector<NozzleModel> models = models_of(6, 1);
   std::mt19937_64 random(2);
   std::uniform_real_distribution<double> uniform(-1.0, 9.0);
@@ -143,9 +158,8 @@ TEST(Bundle, FindsEachNozzlesDistanceFromThePath) {
 // A nozzle that swings across a straight path, looked at as rarely as it may be.
 TEST(Bundle, MeasuresASwingFromFewLooks) {
   constexpr double kAmplitude_mm = 0.01;
-  std::vector<planner::PlannedMove> moves;
-  std::size_t taken = 0;
-  ReferencePath path = straight(moves, taken);
+  const std::vector<planner::PlannedMove> moves = straight();
+  ReferencePath path = testing::path_of(moves, 20.0);
   const NozzleModel model;
   const double omega = model.y.main_rad_s();
   for (const double looks : {16.0, 17.3, 25.0}) {
@@ -177,9 +191,8 @@ TEST(Bundle, MeasuresASwingFromFewLooks) {
 }
 
 TEST(Bundle, CountsATopOnlyWhileFilamentIsLaid) {
-  std::vector<planner::PlannedMove> moves;
-  std::size_t taken = 0;
-  ReferencePath path = straight(moves, taken);
+  const std::vector<planner::PlannedMove> moves = straight();
+  ReferencePath path = testing::path_of(moves, 20.0);
   const NozzleModel model;
   Bundle bundle({model});
   NearPath near(reach_s(model));
@@ -208,19 +221,10 @@ TEST(Bundle, IsTheSameInRegistersOfTwoNumbersAndOfFour) {
   }
   const auto measured = [](bool two_lanes) {
     prefer_two_lanes(two_lanes);
-    std::vector<planner::PlannedMove> moves = testing::plan_path(
+    const std::vector<planner::PlannedMove> moves = testing::plan_path(
         {{0.0, 0.0, 0.0}, {2.0, 0.0, 100.0, 1.0}, {2.0, 2.0, 100.0, 1.0}, {3.0, 5.0, 100.0, 1.0}},
         planner::Limits{});
-    std::size_t taken = 0;
-    ReferencePath path([&](ReferenceMove& next) {
-      if (taken == moves.size()) {
-        return false;
-      }
-      next.move = moves[taken++];
-      return true;
-    });
-    path.begin_section();
-    path.extend_to(10.0);
+    ReferencePath path = testing::path_of(moves, 10.0);
     Bundle bundle(models_of(7, 2));
     NearPath near(0.03);
     near.begin(path);

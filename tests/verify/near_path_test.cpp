@@ -10,29 +10,17 @@ namespace unflex::verify {
 namespace {
 
 // A path that passes close to itself: it goes there, and back 1 mm beside.
-ReferencePath hairpin(std::vector<planner::PlannedMove>& moves, std::size_t& taken) {
+std::vector<planner::PlannedMove> hairpin() {
   planner::Limits limits;
   limits.max_accel_mm_s2 = 1e6;
-  moves = testing::plan_path(
+  return testing::plan_path(
       {{0.0, 0.0, 100.0}, {50.0, 0.0, 100.0, 1.0}, {50.0, 1.0, 100.0, 0.1}, {0.0, 1.0, 100.0, 1.0}},
       limits);
-  taken = 0;
-  ReferencePath path([&](ReferenceMove& next) {
-    if (taken == moves.size()) {
-      return false;
-    }
-    next.move = moves[taken++];
-    return true;
-  });
-  path.begin_section();
-  path.extend_to(10.0);
-  return path;
 }
 
 TEST(NearPath, MeasuresTheDistanceToThePathNearTheTime) {
-  std::vector<planner::PlannedMove> moves;
-  std::size_t taken = 0;
-  const ReferencePath path = hairpin(moves, taken);
+  const std::vector<planner::PlannedMove> moves = hairpin();
+  const ReferencePath path = testing::path_of(moves, 10.0);
   NearPath near(0.03);
   near.begin(path);
   std::size_t nearest = 99;

@@ -40,6 +40,20 @@ inline std::vector<planner::PlannedMove> plan_path(const std::vector<Point>& poi
   return moves;
 }
 
+// The path of these moves, known up to that time. The moves must outlive it.
+inline ReferencePath path_of(const std::vector<planner::PlannedMove>& moves, double until_s) {
+  ReferencePath path([&moves, taken = std::size_t{0}](ReferenceMove& next) mutable {
+    if (taken == moves.size()) {
+      return false;
+    }
+    next.move = moves[taken++];
+    return true;
+  });
+  path.begin_section();
+  path.extend_to(until_s);
+  return path;
+}
+
 inline NozzleXY at_rest(const std::vector<planner::PlannedMove>& moves) {
   const gcode::Position& start = moves.front().segment.start_mm;
   return {{start[gcode::X], 0.0}, {start[gcode::Y], 0.0}};

@@ -107,6 +107,15 @@ inline void store(const TwoLanes& lanes, double* to) {
 [[nodiscard]] inline TwoLanes larger(const TwoLanes& a, const TwoLanes& b) {
   return select(less(b, a), a, b);
 }
+// The least of the four numbers, and the most.
+[[nodiscard]] inline double least(const TwoLanes& lanes) {
+  double each[kLanes];
+  store(lanes, each);
+  const double first = each[0] < each[1] ? each[0] : each[1];
+  const double second = each[2] < each[3] ? each[2] : each[3];
+  return first < second ? first : second;
+}
+[[nodiscard]] inline double most(const TwoLanes& lanes) { return -least(-1.0 * lanes); }
 // Rows become columns.
 inline void transpose(TwoLanes& a, TwoLanes& b, TwoLanes& c, TwoLanes& d) {
   const auto column = [](double e, double f, double g, double h) {
@@ -185,6 +194,14 @@ inline void store(const FourLanes& lanes, double* to) {
 [[nodiscard]] inline FourLanes larger(const FourLanes& a, const FourLanes& b) {
   return select(less(b, a), a, b);
 }
+[[nodiscard]] inline double least(const FourLanes& lanes) {
+  double each[kLanes];
+  store(lanes, each);
+  const double first = each[0] < each[1] ? each[0] : each[1];
+  const double second = each[2] < each[3] ? each[2] : each[3];
+  return first < second ? first : second;
+}
+[[nodiscard]] inline double most(const FourLanes& lanes) { return -least(-1.0 * lanes); }
 inline void transpose(FourLanes& a, FourLanes& b, FourLanes& c, FourLanes& d) {
   const FourNumbers even = __builtin_shufflevector(a.all, b.all, 0, 4, 2, 6);
   const FourNumbers odd = __builtin_shufflevector(a.all, b.all, 1, 5, 3, 7);
@@ -197,6 +214,11 @@ inline void transpose(FourLanes& a, FourLanes& b, FourLanes& c, FourLanes& d) {
 }
 
 UNFLEX_FOUR_LANES_END
+#else
+#define UNFLEX_FOUR_LANES_BEGIN
+#define UNFLEX_FOUR_LANES_END
+// There are none, and has_four_lanes() says so.
+using FourLanes = TwoLanes;
 #endif
 
 }  // namespace unflex

@@ -157,7 +157,8 @@ class FlexibleAxis {
 [[nodiscard]] FlexibleAxis from_frequency(double freq_hz, double damping_ratio);
 
 // One step of the classical fourth-order Runge–Kutta method, h seconds. The base is sampled exactly
-// at the beginning, the middle and the end of the step.
+// at the beginning, the middle and the end of the step. The verifier does it for several nozzles at
+// once (src/verify/bundle_lanes.hpp).
 [[nodiscard]] NozzleState rk4_step(const FlexibleAxis& axis, const NozzleState& state,
                                    const BaseSegment& base, double h);
 
@@ -166,9 +167,11 @@ class FlexibleAxis {
 [[nodiscard]] NozzleState exact_step(const FlexibleAxis& axis, const NozzleState& state,
                                      const BaseSegment& base, double h);
 
-// A step of a fixed length as a linear map, for many steps of that length.
-class StepMap {
+// exact_step() of a fixed length as a linear map, for many steps of that length.
+class ExactMap {
  public:
+  ExactMap(const FlexibleAxis& axis, double h);
+
   // The base's position is carried along so that numbers stay small.
   void advance(const BaseSegment& base, NozzleState& state) const {
     for (std::size_t i = 0; i < count_; ++i) {
@@ -185,10 +188,6 @@ class StepMap {
     }
   }
 
- protected:
-  using OneStep = NozzleMotion (*)(const Mode&, NozzleMotion, const BaseSegment&, double);
-  StepMap(OneStep one_step, const FlexibleAxis& axis, double h);
-
  private:
   // What one unit of each makes of a mode's part in one step.
   struct OfMode {
@@ -200,18 +199,6 @@ class StepMap {
   };
   std::array<OfMode, kMostModes> maps_;
   std::size_t count_ = 1;
-};
-
-// rk4_step() as a map.
-class Rk4Map : public StepMap {
- public:
-  Rk4Map(const FlexibleAxis& axis, double h);
-};
-
-// exact_step() as a map.
-class ExactMap : public StepMap {
- public:
-  ExactMap(const FlexibleAxis& axis, double h);
 };
 
 }  // namespace unflex::dynamics

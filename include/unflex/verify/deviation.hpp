@@ -78,8 +78,8 @@ class DeviationAccumulator {
 struct NozzleModel {
   dynamics::FlexibleAxis x;
   dynamics::FlexibleAxis y;
-  double step_s =
-      5e-4;             // longest time between two looks; steps also end where acceleration changes
+  // Longest time between two looks. Looks are also taken where acceleration changes.
+  double step_s = 5e-4;
   double hold_s = 0.5;  // how long the base is held after the end of the file
 };
 

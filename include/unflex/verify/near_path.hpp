@@ -48,9 +48,9 @@ class NearPath {
   [[nodiscard]] const Span* spans() const { return spans_.data() + dropped_; }
   [[nodiscard]] std::size_t span_count() const { return end_ - first_; }
   [[nodiscard]] std::size_t first() const { return first_; }
-  // Whether the first span begins before t − τ, and the last ends after t + τ. They count from
-  // begin_mm() and to end_mm(), which take longer to find than that no nozzle is near: these lie
-  // before begin_bound_mm() and behind end_bound_mm().
+  // Whether the first span begins before t − τ, and the last ends after t + τ. Then they count from
+  // begin_mm() and to end_mm() on. These take long to find. Who is behind begin_bound_mm() and
+  // before end_bound_mm() need not ask.
   [[nodiscard]] bool begins_cut() const { return spans()->start_s < time_s_ - reach_s_; }
   [[nodiscard]] bool ends_cut() const {
     return spans()[span_count() - 1].end_s > time_s_ + reach_s_;
@@ -120,19 +120,19 @@ inline void NearPath::slide(const ReferencePath& path, double t) {
 // computed only if the nearest point is close to it.
 inline double NearPath::squared_contour_error(const ReferencePath& path, double p_x_mm,
                                               double p_y_mm, std::size_t& nearest) {
-  const double from_s = time_s_ - reach_s_;
-  const double to_s = time_s_ + reach_s_;
+  const bool is_begin_cut = begins_cut();
+  const bool is_end_cut = ends_cut();
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t number = first_; number < end_; ++number) {
     const Span& span = spans()[number - first_];
     const double x = p_x_mm - span.x_mm;
     const double y = p_y_mm - span.y_mm;
     double along = std::clamp(x * span.direction_x + y * span.direction_y, 0.0, span.length_mm);
-    if (span.start_s < from_s && along < first_cut_.at(path[number], number, from_s, kCutKept_s)) {
-      along = std::max(along, path[number].covered_xy_mm(from_s));
+    if (is_begin_cut && number == first_ && along < begin_bound_mm(path)) {
+      along = std::max(along, begin_mm(path));
     }
-    if (span.end_s > to_s && along > last_cut_.at(path[number], number, to_s, 0.0)) {
-      along = std::min(along, path[number].covered_xy_mm(to_s));
+    if (is_end_cut && number + 1 == end_ && along > end_bound_mm(path)) {
+      along = std::min(along, end_mm(path));
     }
     const double across_x = x - along * span.direction_x;
     const double across_y = y - along * span.direction_y;
