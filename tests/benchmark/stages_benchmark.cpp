@@ -12,6 +12,7 @@
 #include "judge.hpp"
 #include "run_job.hpp"
 #include "stage_options.hpp"
+#include "unflex/emit/emitter.hpp"
 #include "unflex/machine/machine.hpp"
 
 namespace unflex::pipeline {
@@ -28,11 +29,12 @@ const std::string& print() {
 }
 
 machine::Settings settings(const std::string& firmware) {
-  return machine::load(std::nullopt, {"printer.firmware=" + firmware}).value();
+  return machine::load(std::nullopt, {"printer.firmware=" + firmware, "dynamics.freq_error=0"})
+      .value();
 }
 
 RunRules rules_of(const machine::Settings& s) {
-  return {compensate_setup(s), emit_options(s, "benchmark"), verify_rules(s)};
+  return {compensate_setup(s), compensate_setup(s), emit_options(s, "benchmark"), verify_rules(s)};
 }
 
 std::vector<Piece> pieces(const RunRules& rules) {
@@ -57,7 +59,7 @@ std::unique_ptr<RunJob> job_of(const machine::Settings& s, const RunRules& rules
   }
   job->nozzle = {{job->piece.moves.front().segment.start_mm[gcode::X], 0.0},
                  {job->piece.moves.front().segment.start_mm[gcode::Y], 0.0}};
-  job->setup = setup_for(rules.setup, job->piece.moves, s);
+  job->setup = setup_for(rules.setup, job->piece, job->nozzle, s).setup;
   job->grid = compensate::node_grid(job->course(), rules.setup);
   job->spans = compensate::mesh(job->course(), job->grid, rules.setup);
   job->results.resize(job->spans.size());
@@ -86,11 +88,10 @@ BENCHMARK(ReadAndPlan)->Unit(benchmark::kMillisecond);
 // accel: the base's limit in mm/s²; 0 for the default, which hardly any window reaches.
 void Solve(benchmark::State& state, compensate::Engine& engine, double accel) {
   const machine::Settings s = settings("klipper");
-  RunRules rules = rules_of(s);
+  const auto job = job_of(s, rules_of(s));
   if (accel > 0.0) {
-    rules.setup.x.limits.max_accel_mm_s2 = rules.setup.y.limits.max_accel_mm_s2 = accel;
+    job->setup.x.limits.max_accel_mm_s2 = job->setup.y.limits.max_accel_mm_s2 = accel;
   }
-  const auto job = job_of(s, rules);
   std::vector<compensate::RunWindow> windows = windows_of(*job, 0, job->spans.size());
   double nodes = 0.0;
   for (const compensate::RunWindow& window : windows) {
