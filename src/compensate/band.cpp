@@ -1,12 +1,78 @@
 #include "unflex/compensate/band.hpp"
 
 #include <array>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <numbers>
+#include <span>
 
 namespace unflex::compensate {
 namespace {
 
 // What the middle of a band has of its share; the edges have the rest.
 constexpr double kMiddleShare = 1.0 / 3.0;
+// An edge leaves modes as they are where that changes it by less than this share of how far it is
+// from the axis. Each mode that edge and axis have in common makes the base cheaper to solve.
+constexpr double kNothing = 0.1;
+
+// How a mode answers the base at ω, before the gain.
+std::complex<double> response(const dynamics::Mode& mode, double omega_rad_s) {
+  const std::complex<double> spring(1.0, 2.0 * mode.zeta * omega_rad_s / mode.omega_rad_s);
+  return spring / (spring - std::pow(omega_rad_s / mode.omega_rad_s, 2));
+}
+
+// By how much two axes are apart after the speed of the base has stepped, which has a spectrum of
+// 1/ω²: the norm of their distance, up to a factor. Frequencies from a quarter of the slowest
+// mode's to twice the fastest's count.
+double apart(std::span<const dynamics::Mode> a, std::span<const dynamics::Mode> b,
+             const dynamics::FlexibleAxis& middle) {
+  constexpr std::size_t kPlaces = 200;
+  const double from = 0.25 * middle.slowest_rad_s();
+  const double step = (2.0 * middle.fastest_rad_s() - from) / kPlaces;
+  double sum = 0.0;
+  for (std::size_t k = 0; k < kPlaces; ++k) {
+    const double omega = from + static_cast<double>(k) * step;
+    std::complex<double> difference;
+    for (const dynamics::Mode& mode : a) {
+      difference += mode.gain * response(mode, omega);
+    }
+    for (const dynamics::Mode& mode : b) {
+      difference -= mode.gain * response(mode, omega);
+    }
+    sum += std::norm(difference) / std::pow(omega, 4);
+  }
+  return std::sqrt(sum);
+}
+
+// The axis with its modes detuned, but for those whose detuning changes nothing.
+dynamics::FlexibleAxis edge(const dynamics::FlexibleAxis& axis, double freq_factor,
+                            double damping_factor) {
+  const dynamics::FlexibleAxis all = axis.detuned(freq_factor, damping_factor);
+  std::vector<dynamics::Mode> modes(all.modes().begin(), all.modes().end());
+  const double most = kNothing * apart(axis.modes(), all.modes(), axis);
+  while (true) {
+    double least = most;
+    std::vector<dynamics::Mode> best;
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+      const dynamics::Mode& as_given = axis.modes()[i];
+      if (modes[i].omega_rad_s == as_given.omega_rad_s || as_given.lead_s != 0.0) {
+        continue;
+      }
+      std::vector<dynamics::Mode> one_less = modes;
+      one_less[i] = as_given;
+      const double change = apart(one_less, all.modes(), axis);
+      if (change < least) {
+        least = change;
+        best = std::move(one_less);
+      }
+    }
+    if (best.empty()) {
+      return dynamics::FlexibleAxis(modes);
+    }
+    modes = std::move(best);
+  }
+}
 
 }  // namespace
 
@@ -26,7 +92,7 @@ std::vector<Plant> edges(const dynamics::FlexibleAxis& axis, const Band& band, d
     return result;
   }
   const auto add = [&](double freq_factor, double damping_factor) {
-    result.push_back({axis.detuned(freq_factor, damping_factor)});
+    result.push_back({edge(axis, freq_factor, damping_factor)});
   };
   for (const double sign : {-1.0, 1.0}) {
     if (band.freq_error > 0.0 && band.damping_error > 0.0) {

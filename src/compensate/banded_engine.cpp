@@ -14,6 +14,7 @@
 #include "interior_point.hpp"
 #include "limits.hpp"
 #include "stage_form.hpp"
+#include "stretches.hpp"
 
 namespace unflex::compensate {
 namespace {
@@ -31,6 +32,64 @@ const char* name_of(RowKind kind) {
   }
 }
 
+// From the saved optimum without limits to that within them.
+InteriorPoint::Outcome solve_where_limits_count(FlatForm& form, InteriorPoint& interior_point,
+                                                const ScaledWindow& scaled,
+                                                const PerKind<std::optional<RowBounds>>& bounds,
+                                                bool strict, const Precision& precision,
+                                                Stretches& /*stretches*/) {
+  form.restore();
+  return interior_point.solve(form, scaled.nodes, bounds, strict, precision);
+}
+
+// Likewise. Rows bound the base in stretches alone, to which those are added that it needs.
+InteriorPoint::Outcome solve_where_limits_count(StageForm& form, InteriorPoint& interior_point,
+                                                const ScaledWindow& scaled,
+                                                const PerKind<std::optional<RowBounds>>& bounds,
+                                                bool strict, const Precision& precision,
+                                                Stretches& stretches) {
+  // How far from a broken limit the base has to change because of it, at first.
+  constexpr double kReach_s = 0.01;
+  auto reach = static_cast<std::size_t>(kReach_s / scaled.window->period_s) + 1;
+  PerKind<bool> kinds{};
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    kinds[i] = bounds[i].has_value();
+  }
+  const auto add = [&] {
+    form.evaluate(kinds);
+    PerKind<const double*> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = kinds[i] ? form.rows(kRowKinds[i]) : nullptr;
+    }
+    return add_broken(values, bounds, scaled.nodes, reach, stretches);
+  };
+  int iterations = 0;
+  form.restore();
+  add();
+  while (true) {
+    form.restore();
+    form.focus(stretches);
+    InteriorPoint::Outcome outcome = interior_point.solve(
+        form, scaled.nodes, bounds_within(bounds, scaled.nodes, stretches), strict, precision);
+    iterations += outcome.iterations;
+    outcome.iterations = iterations;
+    if (!outcome.converged) {
+      break;
+    }
+    if (!add()) {
+      return outcome;
+    }
+    reach *= 2;
+  }
+  // Steps that are not quite Newton's may lead into a corner.
+  form.restore();
+  form.focus({});
+  InteriorPoint::Outcome outcome =
+      interior_point.solve(form, scaled.nodes, bounds, strict, precision);
+  outcome.iterations += iterations;
+  return outcome;
+}
+
 template <class Form>
 Result<AxisSolution> solve_by(Form& form, InteriorPoint& interior_point, const ScaledWindow& scaled,
                               bool strict, const Precision& precision) {
@@ -40,12 +99,12 @@ Result<AxisSolution> solve_by(Form& form, InteriorPoint& interior_point, const S
   }
   form.save();
   const AxisWindow& window = *scaled.window;
+  Stretches stretches;
   return solve_within_limits(window, [&](const ActiveLimits& active) -> Result<AxisSolution> {
     int iterations = 1;
     if (active != ActiveLimits{}) {
-      form.restore();
-      const InteriorPoint::Outcome outcome =
-          interior_point.solve(form, scaled.nodes, row_bounds(scaled, active), strict, precision);
+      const InteriorPoint::Outcome outcome = solve_where_limits_count(
+          form, interior_point, scaled, row_bounds(scaled, active), strict, precision, stretches);
       iterations = outcome.iterations;
       if (!outcome.converged) {
         return fail(

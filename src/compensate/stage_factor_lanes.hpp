@@ -5,6 +5,52 @@ namespace unflex::compensate {
 
 template <class Lanes, std::size_t V, std::size_t W>
 bool LaneStages<Lanes, V, W>::factor(const PerKind<const double*>& weights, StageArrays& at) {
+  begin_at_end(weights, at);
+  for (std::size_t k = at.nodes - 1; k-- > 0;) {
+    if (!carry_cost_back(k, weights, at)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template <class Lanes, std::size_t V, std::size_t W>
+bool LaneStages<Lanes, V, W>::factor_and_keep(const PerKind<const double*>& weights,
+                                              StageArrays& at) {
+  kept_.resize(((at.nodes - 1) / kKeptNodes + 1) * kept_size());
+  begin_at_end(weights, at);
+  for (std::size_t k = at.nodes - 1; k-- > 0;) {
+    if (!carry_cost_back(k, weights, at)) {
+      return false;
+    }
+    if (k % kKeptNodes == 0) {
+      keep(k);
+    }
+  }
+  return true;
+}
+
+template <class Lanes, std::size_t V, std::size_t W>
+bool LaneStages<Lanes, V, W>::factor_between(std::size_t first, std::size_t last,
+                                             const PerKind<const double*>& weights,
+                                             StageArrays& at) {
+  if (last + 1 == at.nodes) {
+    begin_at_end(weights, at);
+  } else {
+    take_kept(last);
+  }
+  for (std::size_t k = last; k-- > first;) {
+    if (!carry_cost_back(k, weights, at)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// P of the last node.
+template <class Lanes, std::size_t V, std::size_t W>
+void LaneStages<Lanes, V, W>::begin_at_end(const PerKind<const double*>& weights,
+                                           const StageArrays& at) {
   const std::size_t g = groups();
   const double last = at.node_weight[at.nodes - 1];
   const std::size_t k_places = kLanes * g;
@@ -21,12 +67,30 @@ bool LaneStages<Lanes, V, W>::factor(const PerKind<const double*>& weights, Stag
   base_square_ = {};
   base_square_[0][0] = last * node_base_;
   add_rows(weights, at.nodes - 1);
-  for (std::size_t k = at.nodes - 1; k-- > 0;) {
-    if (!carry_cost_back(k, weights, at)) {
-      return false;
-    }
+}
+
+template <class Lanes, std::size_t V, std::size_t W>
+void LaneStages<Lanes, V, W>::keep(std::size_t k) {
+  const std::size_t square = 4 * mode_places() * mode_places();
+  const std::size_t cross = 3 * 2 * mode_places();
+  double* const to = kept_.data() + k / kKeptNodes * kept_size();
+  std::copy_n(cost_to_go_.at(0), square, to);
+  std::copy_n(base_to_go_.at(0), cross, to + square);
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::copy_n(base_square_[i].data(), 3, to + square + cross + 3 * i);
   }
-  return true;
+}
+
+template <class Lanes, std::size_t V, std::size_t W>
+void LaneStages<Lanes, V, W>::take_kept(std::size_t k) {
+  const std::size_t square = 4 * mode_places() * mode_places();
+  const std::size_t cross = 3 * 2 * mode_places();
+  const double* const from = kept_.data() + k / kKeptNodes * kept_size();
+  std::copy_n(from, square, cost_to_go_.at(0));
+  std::copy_n(from + square, cross, base_to_go_.at(0));
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::copy_n(from + square + cross + 3 * i, 3, base_square_[i].data());
+  }
 }
 
 // P from behind an interval to before it, and the interval's feedback.

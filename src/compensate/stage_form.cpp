@@ -33,6 +33,7 @@ void StageForm::set_model(const AxisWindow& window) {
 void StageForm::assign(const ScaledWindow& scaled) {
   window_ = &scaled;
   faint_pull_ = kFaintPull;
+  factored_.clear();
   const AxisWindow& window = *scaled.window;
   set_model(window);
   const std::size_t nodes = scaled.nodes;
@@ -105,7 +106,44 @@ void StageForm::set_start() {
 }
 
 bool StageForm::factor(const PerKind<const double*>& weights) {
-  return kernel_->factor(weights, arrays_) && factor_start();
+  const bool has_weights =
+      std::ranges::any_of(weights, [](const double* of_kind) { return of_kind != nullptr; });
+  if (!has_weights) {
+    return kernel_->factor_and_keep(weights, arrays_) && factor_start();
+  }
+  // Steps by the feedback without weights may be poor ones where limits hold the base for long.
+  constexpr int kPatience = 20;
+  if (factored_.empty() || ++times_factored_ > kPatience) {
+    return kernel_->factor(weights, arrays_) && factor_start();
+  }
+  // The first one last, since the start needs its P.
+  for (auto range = factored_.rbegin(); range != factored_.rend(); ++range) {
+    if (!kernel_->factor_between(range->first, range->last, weights, arrays_)) {
+      return false;
+    }
+  }
+  return factored_.front().first > 0 || factor_start();
+}
+
+// How long before a weighted row the feedback still differs from that without weights.
+std::size_t StageForm::lead_nodes() const {
+  constexpr double kLead_s = 0.02;
+  return static_cast<std::size_t>(kLead_s / window_->window->period_s) + 1;
+}
+
+void StageForm::focus(const Stretches& stretches) {
+  constexpr std::size_t kKept = StageKernel::kKeptNodes;
+  factored_.clear();
+  times_factored_ = 0;
+  for (const NodeRange& stretch : stretches) {
+    const std::size_t first = stretch.first - std::min(stretch.first, lead_nodes());
+    const std::size_t last = std::min((stretch.last / kKept + 1) * kKept, arrays_.nodes - 1);
+    if (!factored_.empty() && first <= factored_.back().last) {
+      factored_.back().last = last;
+    } else {
+      factored_.push_back({first, last});
+    }
+  }
 }
 
 bool StageForm::factor_start() {

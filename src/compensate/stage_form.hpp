@@ -41,6 +41,7 @@
 #include "padded.hpp"
 #include "shared_modes.hpp"
 #include "stage_kernel.hpp"
+#include "stretches.hpp"
 
 namespace unflex::compensate {
 
@@ -52,7 +53,13 @@ class StageForm {
   [[nodiscard]] double half_cost() const { return arrays_.half_cost; }
   [[nodiscard]] const double* rows(RowKind kind) const { return rows_[index_of(kind)].data(); }
 
+  // Prepares for steps. Also for focus(), if there are no weights.
   [[nodiscard]] bool factor(const PerKind<const double*>& weights);
+  // From now on rows have weights in these stretches alone, and factor() works on these, and on
+  // what lies closely before them. Elsewhere the feedback stays that without weights. Steps are
+  // then not quite Newton's, but they lead to the same optimum, since gradients are exact. An empty
+  // list: the whole window.
+  void focus(const Stretches& stretches);
   void solve(const PerKind<const double*>& forces);
   [[nodiscard]] const double* row_steps(RowKind kind) const {
     return row_steps_[index_of(kind)].data();
@@ -98,6 +105,7 @@ class StageForm {
   void set_start();
   void set_aims();
   [[nodiscard]] bool factor_start();
+  [[nodiscard]] std::size_t lead_nodes() const;
   // The step of the first node from the slope there.
   void set_first_step(const std::vector<double>& slope, double* step);
   void split_rows(const LaneArray& states, const Padded& inputs, const PerKind<bool>& kinds,
@@ -108,7 +116,9 @@ class StageForm {
   SharedModes shared_;
   std::unique_ptr<StageKernel> kernel_;
   StageArrays arrays_;
-  Eigen::MatrixXd start_basis_;  // δz_0 = start_basis_ y with y free
+  std::vector<NodeRange> factored_;  // what factor() works on; empty: all
+  int times_factored_ = 0;           // since focus()
+  Eigen::MatrixXd start_basis_;      // δz_0 = start_basis_ y with y free
   Eigen::MatrixXd start_inverse_;
   std::vector<double> slope_;  // of the first node's cost
   std::vector<double> first_step_;

@@ -72,6 +72,8 @@ struct StageArrays {
 
 class StageKernel {
  public:
+  static constexpr std::size_t kKeptNodes = 32;
+
   StageKernel() = default;
   StageKernel(const StageKernel&) = delete;
   StageKernel& operator=(const StageKernel&) = delete;
@@ -90,6 +92,14 @@ class StageKernel {
   // From the last stage to the first: the feedback of all intervals. P of the first node is in
   // cost_to_go(). False if the program has no minimum.
   [[nodiscard]] virtual bool factor(const PerKind<const double*>& weights, StageArrays& at) = 0;
+  // As factor(), and keeps P of every kKeptNodes-th node.
+  [[nodiscard]] virtual bool factor_and_keep(const PerKind<const double*>& weights,
+                                             StageArrays& at) = 0;
+  // The feedback of the intervals between these nodes alone, `last` being one whose P is kept, or
+  // the window's last. Sets cost_to_go() if `first` is the window's first node.
+  [[nodiscard]] virtual bool factor_between(std::size_t first, std::size_t last,
+                                            const PerKind<const double*>& weights,
+                                            StageArrays& at) = 0;
   // P between two places of z of the first node.
   [[nodiscard]] virtual double cost_to_go(std::size_t row, std::size_t column) const = 0;
   // Pulls and cost of the present states.

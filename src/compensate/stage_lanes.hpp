@@ -127,6 +127,9 @@ class LaneStages final : public StageKernel {
   }
 
   bool factor(const PerKind<const double*>& weights, StageArrays& at) override;
+  bool factor_and_keep(const PerKind<const double*>& weights, StageArrays& at) override;
+  bool factor_between(std::size_t first, std::size_t last, const PerKind<const double*>& weights,
+                      StageArrays& at) override;
   double cost_to_go(std::size_t row, std::size_t column) const override {
     const std::size_t swing = base_place();
     if (row < swing && column < swing) {
@@ -502,6 +505,12 @@ class LaneStages final : public StageKernel {
   }
 
   // stage_factor_lanes.hpp has these.
+  void begin_at_end(const PerKind<const double*>& weights, const StageArrays& at);
+  [[nodiscard]] std::size_t kept_size() const {
+    return 4 * mode_places() * mode_places() + 3 * 2 * mode_places() + 9;
+  }
+  void keep(std::size_t k);
+  void take_kept(std::size_t k);
   bool carry_cost_back(std::size_t k, const PerKind<const double*>& weights, StageArrays& at);
   void carry_swing_back(const double* f, const LaneRow<Lanes, 2 * V>& c, double middle,
                         double node);
@@ -587,6 +596,7 @@ class LaneStages final : public StageKernel {
   Numbers<4 * kK * kK> cost_to_go_;  // P_ss
   Numbers<6 * kK> base_to_go_;       // P_bs
   std::array<std::array<double, 3>, 3> base_square_{};
+  std::vector<double> kept_;  // P of every kKeptNodes-th node, kept_size() numbers each
 };
 
 template <class Lanes, std::size_t V, std::size_t W>
