@@ -206,9 +206,10 @@ std::string_view to_string(Method method) {
 
 std::vector<Plant> other_plants(const AxisModel& model) {
   constexpr double kNear = 0.03;
-  // A change by less than this share of the swing does not count.
-  constexpr double kNothing = 0.01;
-  constexpr std::size_t kMost = 6;
+  // A change by less than this share of the swing does not count: the plants' errors change by a
+  // few per cent, and each mode less makes the base cheaper to find.
+  constexpr double kNothing = 0.1;
+  constexpr std::size_t kMost = 5;
   const auto away = [&](const Plant& plant) { return distance(plant.modes, model.values()); };
   std::vector<Plant> others(model.plants.begin() + 1, model.plants.end());
   const double far = kNear * swing(model.values());
