@@ -135,6 +135,10 @@ LineCosts<kModes>::LineCosts(const BaseTrajectory& base,
       all.at.push_back(
           beside_each_other([&](std::size_t nozzle) { return follow[nozzle].at(time_s(k)); }));
     }
+    all.riding_at_1_mm = beside_each_other(
+        [&](std::size_t nozzle) { return all.models[nozzle].riding(1.0, 0.0); });
+    all.riding_at_1_mm_s = beside_each_other(
+        [&](std::size_t nozzle) { return all.models[nozzle].riding(0.0, 1.0); });
     all.answers = nozzle_answers<kModes>(all.models, modes_each_, dt_s(), longest);
   }
   shapes_.emplace_back();
@@ -164,9 +168,7 @@ ModesVector<kModes> LineCosts<kModes>::beside_each_other(StateOfNozzle state_of_
 template <int kModes>
 ModesVector<kModes> LineCosts<kModes>::riding(std::size_t axis, double position_mm,
                                               double velocity_mm_s) const {
-  return beside_each_other([&](std::size_t nozzle) {
-    return axes_[axis].models[nozzle].riding(position_mm, velocity_mm_s);
-  });
+  return position_mm * axes_[axis].riding_at_1_mm + velocity_mm_s * axes_[axis].riding_at_1_mm_s;
 }
 
 template <int kModes>

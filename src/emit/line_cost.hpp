@@ -228,6 +228,8 @@ class LineCosts : public Candidates {
     std::vector<dynamics::FlexibleAxis> models;  // one for each nozzle
     std::vector<ModesVector<kModes>> at;         // f
     NozzleAnswers<kModes> answers;
+    ModesVector<kModes> riding_at_1_mm = ModesVector<kModes>::Zero();
+    ModesVector<kModes> riding_at_1_mm_s = ModesVector<kModes>::Zero();
   };
   // One state of each nozzle as a vector.
   template <class StateOfNozzle>
