@@ -75,26 +75,32 @@ Followed::Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
 
 Followed::Followed(const dynamics::BaseTrajectory& base, BaseAxis axis,
                    const dynamics::FlexibleAxis& nozzle, const NozzleState& start)
-    : period_s_(base.period_s), modes_(nozzle.mode_count()) {
+    : modes_(nozzle.mode_count()), period_s_(base.period_s) {
   const dynamics::NodeMap map(nozzle, base.period_s);
-  states_.reserve(base.nodes());
+  parts_.reserve(modes_ * base.nodes());
   NozzleState state = start;
-  states_.push_back(state);
+  note(state);
   for (std::size_t k = 0; k + 1 < base.nodes(); ++k) {
     map.advance(base.*axis, k, state);
-    states_.push_back(state);
+    note(state);
   }
+}
+
+void Followed::note(const NozzleState& state) {
+  parts_.insert(parts_.end(), state.parts.begin(),
+                state.parts.begin() + static_cast<std::ptrdiff_t>(modes_));
 }
 
 // Interpolates by cubics between the nodes.
 NozzleState Followed::at(double t) const {
   const double scaled = t / period_s_;
-  const auto k = std::min(static_cast<std::size_t>(std::max(scaled, 0.0)), states_.size() - 2);
+  const std::size_t last = parts_.size() / modes_ - 2;
+  const std::size_t k = std::min(static_cast<std::size_t>(std::max(scaled, 0.0)), last);
   const double s = scaled - static_cast<double>(k);
   NozzleState result;
   for (std::size_t mode = 0; mode < modes_; ++mode) {
-    const NozzleMotion& a = states_[k].parts[mode];
-    const NozzleMotion& b = states_[k + 1].parts[mode];
+    const NozzleMotion& a = parts_[k * modes_ + mode];
+    const NozzleMotion& b = parts_[(k + 1) * modes_ + mode];
     const double rise = b.position - a.position;
     const double va = a.velocity * period_s_;
     const double vb = b.velocity * period_s_;

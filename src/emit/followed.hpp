@@ -70,9 +70,11 @@ class Followed {
   [[nodiscard]] dynamics::NozzleState at(double t) const;
 
  private:
-  std::vector<dynamics::NozzleState> states_;  // at the base's nodes
-  double period_s_;
+  void note(const dynamics::NozzleState& state);
+
   std::size_t modes_;
+  std::vector<dynamics::NozzleMotion> parts_;  // of each mode, at the base's nodes
+  double period_s_;
 };
 
 // Calls use(std::integral_constant<int, n>) for n modes, so that sizes are known to the compiler.

@@ -32,7 +32,7 @@ namespace {
 
 // Per worker: nodes of runs that may be read and not yet written, and windows that solver processes
 // are given ahead.
-constexpr std::size_t kNodesAhead = 100'000;
+constexpr std::size_t kNodesAhead = 30'000;
 constexpr std::size_t kWindowsAhead = 24;
 // At most so many lines may wait in the queue. It bounds memory where moves are tiny.
 constexpr std::size_t kLinesAhead = 200'000;

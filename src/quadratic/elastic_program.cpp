@@ -42,6 +42,51 @@ UNFLEX_INLINE void add_square_to(const double* __restrict g, double f, double* _
   }
 }
 
+// block += Σ f_r g_r g_rᵀ over four rows, so that the block is read and written once.
+template <int W>
+UNFLEX_INLINE void add_squares_to(const double* const* rows, const double* f,
+                                  double* __restrict block) {
+  constexpr int kLanes = 4;
+  const double* __restrict const a = rows[0];
+  const double* __restrict const b = rows[1];
+  const double* __restrict const c = rows[2];
+  const double* __restrict const d = rows[3];
+  for (int i = 0; i < W; ++i) {
+    const double of_a = f[0] * a[i];
+    const double of_b = f[1] * b[i];
+    const double of_c = f[2] * c[i];
+    const double of_d = f[3] * d[i];
+    for (int j = i / kLanes * kLanes; j < W; ++j) {
+      block[i * W + j] += (of_a * a[j] + of_b * b[j]) + (of_c * c[j] + of_d * d[j]);
+    }
+  }
+}
+
+// y += f g
+template <int W>
+UNFLEX_INLINE void add_to(const double* __restrict g, double f, double* __restrict y) {
+  for (int i = 0; i < W; ++i) {
+    y[i] += f * g[i];
+  }
+}
+
+// g·x, in four sums side by side.
+template <int W>
+UNFLEX_INLINE double product(const double* __restrict g, const double* __restrict x) {
+  constexpr int kLanes = 4;
+  double sums[kLanes] = {0.0, 0.0, 0.0, 0.0};
+  int i = 0;
+  for (; i + kLanes <= W; i += kLanes) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      sums[lane] += g[i + lane] * x[i + lane];
+    }
+  }
+  for (; i < W; ++i) {
+    sums[0] += g[i] * x[i];
+  }
+  return (sums[0] + sums[2]) + (sums[1] + sums[3]);
+}
+
 // L D Lᵀ in a band: column i holds what is at the diagonal and below.
 template <int W>
 UNFLEX_INLINE bool factor_columns(double* columns, std::size_t size) {
@@ -68,14 +113,54 @@ UNFLEX_INLINE bool factor_columns(double* columns, std::size_t size) {
 UNFLEX_WIDE void add_square_to(Width<5> /*width*/, const double* g, double f, double* block) {
   add_square_to<5>(g, f, block);
 }
+UNFLEX_WIDE void add_squares_to(Width<5> /*width*/, const double* const* rows, const double* f,
+                                double* block) {
+  add_squares_to<5>(rows, f, block);
+}
+UNFLEX_WIDE void add_to(Width<5> /*width*/, const double* g, double f, double* y) {
+  add_to<5>(g, f, y);
+}
+UNFLEX_WIDE double product(Width<5> /*width*/, const double* g, const double* x) {
+  return product<5>(g, x);
+}
 UNFLEX_WIDE void add_square_to(Width<18> /*width*/, const double* g, double f, double* block) {
   add_square_to<18>(g, f, block);
+}
+UNFLEX_WIDE void add_squares_to(Width<18> /*width*/, const double* const* rows, const double* f,
+                                double* block) {
+  add_squares_to<18>(rows, f, block);
+}
+UNFLEX_WIDE void add_to(Width<18> /*width*/, const double* g, double f, double* y) {
+  add_to<18>(g, f, y);
+}
+UNFLEX_WIDE double product(Width<18> /*width*/, const double* g, const double* x) {
+  return product<18>(g, x);
 }
 UNFLEX_WIDE void add_square_to(Width<24> /*width*/, const double* g, double f, double* block) {
   add_square_to<24>(g, f, block);
 }
+UNFLEX_WIDE void add_squares_to(Width<24> /*width*/, const double* const* rows, const double* f,
+                                double* block) {
+  add_squares_to<24>(rows, f, block);
+}
+UNFLEX_WIDE void add_to(Width<24> /*width*/, const double* g, double f, double* y) {
+  add_to<24>(g, f, y);
+}
+UNFLEX_WIDE double product(Width<24> /*width*/, const double* g, const double* x) {
+  return product<24>(g, x);
+}
 UNFLEX_WIDE void add_square_to(Width<40> /*width*/, const double* g, double f, double* block) {
   add_square_to<40>(g, f, block);
+}
+UNFLEX_WIDE void add_squares_to(Width<40> /*width*/, const double* const* rows, const double* f,
+                                double* block) {
+  add_squares_to<40>(rows, f, block);
+}
+UNFLEX_WIDE void add_to(Width<40> /*width*/, const double* g, double f, double* y) {
+  add_to<40>(g, f, y);
+}
+UNFLEX_WIDE double product(Width<40> /*width*/, const double* g, const double* x) {
+  return product<40>(g, x);
 }
 UNFLEX_WIDE bool factor_columns(Width<5> /*width*/, double* columns, std::size_t size) {
   return factor_columns<5>(columns, size);
@@ -192,6 +277,9 @@ double ElasticProgram<W>::linearise() {
   for (std::size_t row = 0; row < first_.size();) {
     const std::size_t first = first_[row];
     block = {};
+    const double* stiff_rows[4];
+    double stiffnesses[4];
+    int stiff = 0;
     for (; row < first_.size() && first_[row] == first; ++row) {
       double stiffness = 0.0;
       double multiplier = 0.0;
@@ -204,11 +292,19 @@ double ElasticProgram<W>::linearise() {
         force += own.sign * own.stiffness * (own.breach - own.room);
       }
       const Gradient& g = gradients_[row];
-      at(lagrangian_, row) += multiplier * g;
-      at(step_, row) -= force * g;
+      add_to(Width<W>{}, g.data(), multiplier, lagrangian_.data() + first);
+      add_to(Width<W>{}, g.data(), -force, step_.data() + first);
       if (stiffness > kStiff) {
-        add_square_to(Width<W>{}, g.data(), stiffness, block.data());
+        stiff_rows[stiff] = g.data();
+        stiffnesses[stiff++] = stiffness;
+        if (stiff == 4) {
+          add_squares_to(Width<W>{}, stiff_rows, stiffnesses, block.data());
+          stiff = 0;
+        }
       }
+    }
+    for (int i = 0; i < stiff; ++i) {
+      add_square_to(Width<W>{}, stiff_rows[i], stiffnesses[i], block.data());
     }
     for (int i = 0; i < W; ++i) {
       double* const column = &factor_[(first + i) * W];
@@ -291,7 +387,7 @@ double ElasticProgram<W>::predict() {
   for (std::size_t i = 0; i < sides_.size();) {
     const std::size_t row = sides_[i].row;
     const Gradient& g = gradients_[row];
-    const double along = g.dot(at(step_, row));
+    const double along = product(Width<W>{}, g.data(), step_.data() + first_[row]);
     double force = 0.0;
     double of_target = 0.0;
     for (; i < sides_.size() && sides_[i].row == row; ++i) {
@@ -307,8 +403,8 @@ double ElasticProgram<W>::predict() {
                                    side.breach_product * by_slack);
       of_target += signed_stiffness * (by_multiplier - by_slack);
     }
-    at(corrector_, row) -= force * g;
-    at(of_target_, row) -= of_target * g;
+    add_to(Width<W>{}, g.data(), -force, corrector_.data() + first_[row]);
+    add_to(Width<W>{}, g.data(), -of_target, of_target_.data() + first_[row]);
   }
   return kOfTheWay * length;
 }
@@ -323,7 +419,7 @@ double ElasticProgram<W>::correct(double target) {
   double length = 1.0 / kOfTheWay;
   for (std::size_t i = 0; i < sides_.size();) {
     const std::size_t row = sides_[i].row;
-    const double along = gradients_[row].dot(at(step_, row));
+    const double along = product(Width<W>{}, gradients_[row].data(), step_.data() + first_[row]);
     for (; i < sides_.size() && sides_[i].row == row; ++i) {
       move(target, along, sides_[i], length);
     }

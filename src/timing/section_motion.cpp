@@ -647,11 +647,18 @@ class SplineMotion : public SectionMotion {
     const auto k = static_cast<std::size_t>(next - times_.begin()) - 1;
     constexpr int kNewtonSteps = 4;
     double x = (wanted - times_[k]) / (times_[k + 1] - times_[k]);
+    SplineShares<D> shares = spline_shares<D>(x);
     for (int i = 0; i < kNewtonSteps; ++i) {
-      x = std::clamp(x - (clock(k, x) - wanted) / clock(k, x, 1), 0.0, 1.0);
+      const double late = spline_.clock(k, shares) - wanted;
+      const double nearer = std::clamp(x - late / spline_.clock(k, shares, 1), 0.0, 1.0);
+      if (nearer == x) {
+        break;
+      }
+      x = nearer;
+      shares = spline_shares<D>(x);
     }
     using Spline = SectionSpline<D>;
-    const auto at = spline_.place(k, spline_shares<D>(x));
+    const auto at = spline_.place(k, shares);
     const double h = spline_.period_s();
     const Vector place = Spline::apply(spline_.x().base, spline_.y().base, at);
     const Vector speed = Spline::apply(spline_.x().base_speed, spline_.y().base_speed, at);
@@ -680,8 +687,8 @@ class SplineMotion : public SectionMotion {
   }
 
  private:
-  [[nodiscard]] double clock(std::size_t k, double x, int derivative = 0) const {
-    return spline_.clock(k, spline_shares<D>(x), derivative);
+  [[nodiscard]] double clock(std::size_t k, double x) const {
+    return spline_.clock(k, spline_shares<D>(x));
   }
 
   SectionSpline<D> spline_;
