@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -86,16 +87,24 @@ class SectionSpline {
     Values y;
   };
   [[nodiscard]] Place place(std::size_t k, const Shares& shares) const {
+    // x, y and t side by side in a register; the fourth is not used.
+    std::array<std::array<double, 4>, D + 1> points{};
+    for (std::size_t i = 0; i <= D; ++i) {
+      std::copy_n(&points_[kPerPoint * (k + i)], kPerPoint, points[i].data());
+    }
     Values x{};
     Values y{};
     Values t{};
-    const double* const points = &points_[kPerPoint * k];
     for (int j = 0; j < D; ++j) {
-      for (int i = 0; i <= D; ++i) {
-        x[j] += shares[j][i] * points[kPerPoint * i];
-        y[j] += shares[j][i] * points[kPerPoint * i + 1];
-        t[j] += shares[j][i] * points[kPerPoint * i + 2];
+      std::array<double, 4> sum{};
+      for (std::size_t i = 0; i <= D; ++i) {
+        for (std::size_t lane = 0; lane < sum.size(); ++lane) {
+          sum[lane] += shares[j][i] * points[i][lane];
+        }
       }
+      x[j] = sum[0];
+      y[j] = sum[1];
+      t[j] = sum[2];
     }
     const TimeDerivatives<D> by_time(t);
     return {by_time, by_time.by_time(x), by_time.by_time(y)};
@@ -121,28 +130,25 @@ class SectionSpline {
   // points from number k on.
   double linearise(const Place& at, const Shares& shares, Vector n, const Values& of_x,
                    const Values& of_y, double scale, Gradient& g) const {
-    Values x = at.by_time.by_function(of_x);
-    Values y = at.by_time.by_function(of_y);
+    const Values x = at.by_time.by_function(of_x);
+    const Values y = at.by_time.by_function(of_y);
     const Values clock_x = at.by_time.by_clock(of_x, at.x);
     const Values clock_y = at.by_time.by_clock(of_y, at.y);
-    Values t{};
+    std::array<std::array<double, 4>, D> factors{};  // of x, y and t
     for (int j = 0; j < D; ++j) {
-      t[j] = scale * (n.x * clock_x[j] + n.y * clock_y[j]);
-      x[j] *= scale * n.x;
-      y[j] *= scale * n.y;
+      factors[j] = {x[j] * (scale * n.x), y[j] * (scale * n.y),
+                    scale * (n.x * clock_x[j] + n.y * clock_y[j]), 0.0};
     }
     for (int i = 0; i <= D; ++i) {
-      double gx = 0.0;
-      double gy = 0.0;
-      double gt = 0.0;
+      std::array<double, 4> sum{};
       for (int j = 0; j < D; ++j) {
-        gx += x[j] * shares[j][i];
-        gy += y[j] * shares[j][i];
-        gt += t[j] * shares[j][i];
+        for (std::size_t lane = 0; lane < sum.size(); ++lane) {
+          sum[lane] += factors[j][lane] * shares[j][i];
+        }
       }
-      g[kPerPoint * i] = gx;
-      g[kPerPoint * i + 1] = gy;
-      g[kPerPoint * i + 2] = gt;
+      for (int part = 0; part < kPerPoint; ++part) {
+        g[kPerPoint * i + part] = sum[static_cast<std::size_t>(part)];
+      }
     }
     const Vector value = apply(of_x, of_y, at);
     return scale * (n.x * value.x + n.y * value.y);

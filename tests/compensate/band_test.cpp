@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
+#include <vector>
 
 namespace unflex::compensate {
 namespace {
@@ -40,6 +42,20 @@ TEST(Band, OfFrequencyAndDampingHasFourCorners) {
   ASSERT_EQ(damping.size(), 2U);
   EXPECT_EQ(damping[0].axis.main_rad_s(), 100.0);
   EXPECT_DOUBLE_EQ(damping[0].axis.main_damping_ratio(), 0.4);
+}
+
+TEST(Band, LeavesAModeAsItIsWhoseDetuningChangesNothing) {
+  // For the same acceleration the second mode swings a sixtieth as far as the main one, and the
+  // third a third as far.
+  const std::vector<dynamics::Mode> modes = {
+      {300.0, 0.1, 0.6}, {1000.0, 0.1, 0.1}, {350.0, 0.1, 0.3}};
+  const dynamics::FlexibleAxis axis(modes);
+  for (const Plant& edge : edges(axis, {.freq_error = 0.1}, 1.0)) {
+    const double factor = edge.axis.modes()[0].omega_rad_s / 300.0;
+    EXPECT_NEAR(std::abs(factor - 1.0), 0.1, 1e-12);
+    EXPECT_EQ(edge.axis.modes()[1].omega_rad_s, 1000.0);
+    EXPECT_NEAR(edge.axis.modes()[2].omega_rad_s, factor * 350.0, 1e-9);
+  }
 }
 
 TEST(Band, HasAModeThatNobodyKnowsOf) {
