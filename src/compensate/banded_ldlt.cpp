@@ -2,7 +2,7 @@
 
 namespace unflex::compensate {
 
-bool BandedLdlt::factor(const Band& h, std::size_t first, std::size_t last) {
+bool BandedLdlt::factor(const BandMatrix& h, std::size_t first, std::size_t last) {
   first_ = first;
   size_ = last - first + 1;
   const std::size_t steps = (size_ - kHalfBand) / 2;

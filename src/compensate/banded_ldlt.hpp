@@ -18,13 +18,13 @@ namespace unflex::compensate {
 inline constexpr std::size_t kHalfBand = 5;
 
 // Diagonals of the upper triangle: [d][r] stands at row r, column r + d.
-using Band = std::array<Padded, kHalfBand + 1>;
+using BandMatrix = std::array<Padded, kHalfBand + 1>;
 
 class BandedLdlt {
  public:
   // Factorises the rows and columns first … last of h, at least five. Returns false if a pivot is
   // not positive; then the factor is of no use.
-  [[nodiscard]] bool factor(const Band& h, std::size_t first, std::size_t last);
+  [[nodiscard]] bool factor(const BandMatrix& h, std::size_t first, std::size_t last);
 
   // x ← H⁻¹ x on first … last. Entries beside them are not touched.
   void solve(double* x) const;

@@ -123,8 +123,8 @@ class FlatForm {
   PerKind<Padded> rows_;
   PerKind<Padded> row_steps_;
   Padded scratch_;
-  Band cost_hessian_;
-  Band hessian_;
+  BandMatrix cost_hessian_;
+  BandMatrix hessian_;
   BandedLdlt ldlt_;
 };
 

@@ -52,7 +52,7 @@ inline void add_diagonal(const std::array<double, kHalfBand + 1>& s, const doubl
 
 // to += Σ_k w_k s sᵀ, with s standing at column k.
 template <std::size_t L>
-inline void add_squares(const std::array<double, kHalfBand + 1>& s, const double* w, Band& to,
+inline void add_squares(const std::array<double, kHalfBand + 1>& s, const double* w, BandMatrix& to,
                         std::size_t count) {
   [&]<std::size_t... D>(std::index_sequence<D...>) {
     (add_diagonal<L, D>(s, w, to[D].data(), count), ...);

@@ -7,7 +7,7 @@ namespace unflex::compensate {
 namespace {
 
 // An excess up to this share of the bounds' width is rounding.
-constexpr double kRounding = 1e-7;
+constexpr double kRounding = 1e-9;
 
 // Bounds that no value comes near, and yet not so far that sums with them lose digits.
 Interval far_out(const Interval& bounds) {

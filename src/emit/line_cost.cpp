@@ -135,10 +135,10 @@ LineCosts<kModes>::LineCosts(const BaseTrajectory& base,
       all.at.push_back(
           beside_each_other([&](std::size_t nozzle) { return follow[nozzle].at(time_s(k)); }));
     }
-    all.riding_at_1_mm = beside_each_other(
-        [&](std::size_t nozzle) { return all.models[nozzle].riding(1.0, 0.0); });
-    all.riding_at_1_mm_s = beside_each_other(
-        [&](std::size_t nozzle) { return all.models[nozzle].riding(0.0, 1.0); });
+    all.riding_at_1_mm =
+        beside_each_other([&](std::size_t nozzle) { return all.models[nozzle].riding(1.0, 0.0); });
+    all.riding_at_1_mm_s =
+        beside_each_other([&](std::size_t nozzle) { return all.models[nozzle].riding(0.0, 1.0); });
     all.answers = nozzle_answers<kModes>(all.models, modes_each_, dt_s(), longest);
   }
   shapes_.emplace_back();

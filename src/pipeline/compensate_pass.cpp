@@ -290,7 +290,7 @@ class Compensator {
   // takes as long as the other one, and only shows what suiting a band costs.
   void choose_comparison(RunJob& job) {
     constexpr double kShare = 8.0;
-    constexpr double kAlways_s = 30.0;
+    constexpr double kAlways_s = 120.0;
     job.compares_nominal =
         job.setup.is_robust() && compared_s_ <= std::max(laid_out_s_ / kShare, kAlways_s);
     const double duration_s = planner::duration_s(job.reference());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "laid_width.hpp"
 
@@ -25,6 +26,8 @@ constexpr double kOfLines = 0.9;
 // Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
 // There the nozzle may stray so many times the tolerance.
 constexpr double kBeside = 1.5;
+// So many nodes' looks are found for all nozzles together.
+constexpr std::size_t kNodesAtOnce = 128;
 
 // The base between a node and the next, a look further. Its acceleration is linear there, and the
 // mean over the time to the next look serves the nozzle.
@@ -69,68 +72,160 @@ class Walk {
     std::vector<double> filament_mm;
   };
 
-  // may_be_left: the swing in the end that counts as 1, relative to the tolerance.
-  // allowance: for each piece; empty: 1. laid: nullptr if nobody asks for it.
-  void add(const AxesModel& model, dynamics::NozzleXY nozzle, double may_be_left,
-           std::span<const double> allowance, NozzleMeasure& result, Laid* laid) const {
+  // A nozzle at a node.
+  struct AtNode {
+    double error_mm = 0.0;
+    double speed_mm_s = 0.0;
+    // Those of the pieces on which it lays filament.
+    double tolerance_mm = std::numeric_limits<double>::infinity();
+    double feed_mm_s = std::numeric_limits<double>::infinity();
+    double travel_mm_s = std::numeric_limits<double>::infinity();  // on the others
+  };
+
+  // What all nozzles share between two looks.
+  struct Look {
+    dynamics::BaseSegment x;
+    dynamics::BaseSegment y;
+    // At its end: the piece that the plan is on, and where on the path that is. nullopt: the plan
+    // has not begun, or has ended.
+    std::optional<std::size_t> now;
+    double reference_mm = 0.0;
+  };
+  // The looks behind each of these nodes, which go on from those of the call before.
+  void look(std::size_t first_node, std::size_t last_node, std::vector<Look>& looks) {
     const double h = base_.period_s;
-    const dynamics::ExactMap map_x(model.x, h / kLooks);
-    const dynamics::ExactMap map_y(model.y, h / kLooks);
-    std::size_t now = 0;  // the piece that the plan is on
-    dynamics::NozzleMotionXY last = nozzle.motion();
-    Place furthest;
-    std::vector<AtNode> nodes(base_.nodes());
-    std::vector<double>& of_pieces = result.of_pieces.emplace_back(plan_.size(), 0.0);
-    for (std::size_t node = 0; node + 1 < base_.nodes(); ++node) {
-      if (laid != nullptr) {
-        note(furthest, *laid);
-      }
-      for (int look = 0; look < kLooks; ++look) {
-        map_x.advance(segment_of(base_.x, node, look, h), nozzle.x);
-        map_y.advance(segment_of(base_.y, node, look, h), nozzle.y);
-        const double t = (static_cast<double>(node) + (look + 1.0) / kLooks) * h;
+    looks.clear();
+    for (std::size_t node = first_node; node < last_node; ++node) {
+      for (int i = 0; i < kLooks; ++i) {
+        Look& look = looks.emplace_back();
+        look.x = segment_of(base_.x, node, i, h);
+        look.y = segment_of(base_.y, node, i, h);
+        const double t = (static_cast<double>(node) + (i + 1.0) / kLooks) * h;
         if (t < starts_s_.front() || t > starts_s_.back()) {
           continue;
         }
-        while (now + 1 < plan_.size() && starts_s_[now + 1] <= t) {
-          ++now;
+        while (now_ + 1 < plan_.size() && starts_s_[now_ + 1] <= t) {
+          ++now_;
         }
-        const dynamics::NozzleMotionXY at = nozzle.motion();
-        const double speed_mm_s =
-            std::sqrt(at.x.velocity * at.x.velocity + at.y.velocity * at.y.velocity);
-        const double reference_mm = from_mm_[now] + plan_[now].distance_mm(t - starts_s_[now]);
-        const auto take = [&](Place found) {
-          // Filament is never laid backwards.
-          if (found.progress_mm < furthest.progress_mm) {
-            found.progress_mm = furthest.progress_mm;
-            found.piece = furthest.piece;
-          }
-          furthest = found;
-          note(found, speed_mm_s, allowance, nodes[node + 1]);
-          const double tolerance_mm = model.times_tolerance * bounds_[found.piece].tolerance_mm;
-          of_pieces[found.piece] = std::max(of_pieces[found.piece], found.error_mm / tolerance_mm);
-        };
-        const std::size_t last_piece = furthest.piece;
-        const Place ahead = place(now, at.x.position, at.y.position, reference_mm);
-        if (ahead.piece != last_piece) {
-          // The error may be largest where the piece changes.
-          for (const double share : kBetweenLooks) {
-            take(place(now, last.x.position + share * (at.x.position - last.x.position),
-                       last.y.position + share * (at.y.position - last.y.position), reference_mm));
-          }
-        }
-        take(ahead);
-        last = at;
+        look.now = now_;
+        look.reference_mm = from_mm_[now_] + plan_[now_].distance_mm(t - starts_s_[now_]);
       }
     }
-    if (laid != nullptr) {
-      note(furthest, *laid);
-    }
-    add(nodes, model.times_tolerance, result);
-    const double left_mm = std::hypot(swing_mm(model.x, nozzle.x, base_.x.position_mm.back()),
-                                      swing_mm(model.y, nozzle.y, base_.y.position_mm.back()));
-    result.left.push_back(left_mm / (may_be_left * bounds_.back().tolerance_mm));
   }
+
+  // A nozzle on its way.
+  class Nozzle {
+   public:
+    // allowance: for each piece; empty: 1. laid: nullptr if nobody asks for it.
+    Nozzle(const Walk& walk, const AxesModel& model, const dynamics::NozzleXY& start,
+           std::span<const double> allowance, Laid* laid)
+        : walk_(&walk),
+          model_(&model),
+          allowance_(allowance),
+          laid_(laid),
+          map_x_(model.x, walk.base_.period_s / kLooks),
+          map_y_(model.y, walk.base_.period_s / kLooks),
+          nozzle_(start),
+          last_(start.motion()),
+          nodes_(1),
+          of_pieces_(walk.plan_.size(), 0.0) {
+      note_laid();
+    }
+
+    // Goes on to the ends of these looks.
+    void go(std::span<const Look> looks, NozzleMeasure& result) {
+      for (std::size_t i = 0; i < looks.size(); ++i) {
+        if (i % kLooks == 0) {
+          nodes_.emplace_back();
+        }
+        const Look& look = looks[i];
+        map_x_.advance(look.x, nozzle_.x);
+        map_y_.advance(look.y, nozzle_.y);
+        if (look.now) {
+          see(*look.now, look.reference_mm);
+        }
+        if (i % kLooks + 1 == kLooks) {
+          note_laid();
+        }
+      }
+      settle(nodes_.size() - 1, result);
+    }
+
+    // may_be_left: the swing in the end that counts as 1, relative to the tolerance.
+    void end(double may_be_left, NozzleMeasure& result) {
+      settle(nodes_.size(), result);
+      const double left_mm =
+          std::hypot(swing_mm(model_->x, nozzle_.x, walk_->base_.x.position_mm.back()),
+                     swing_mm(model_->y, nozzle_.y, walk_->base_.y.position_mm.back()));
+      result.left.push_back(left_mm / (may_be_left * walk_->bounds_.back().tolerance_mm));
+      result.of_pieces.push_back(std::move(of_pieces_));
+    }
+
+   private:
+    void see(std::size_t now, double reference_mm) {
+      const dynamics::NozzleMotionXY at = nozzle_.motion();
+      const double speed_mm_s =
+          std::sqrt(at.x.velocity * at.x.velocity + at.y.velocity * at.y.velocity);
+      const std::size_t last_piece = furthest_.piece;
+      const Place ahead = walk_->place(now, at.x.position, at.y.position, reference_mm);
+      if (ahead.piece != last_piece) {
+        // The error may be largest where the piece changes.
+        for (const double share : kBetweenLooks) {
+          take(walk_->place(now, last_.x.position + share * (at.x.position - last_.x.position),
+                            last_.y.position + share * (at.y.position - last_.y.position),
+                            reference_mm),
+               speed_mm_s);
+        }
+      }
+      take(ahead, speed_mm_s);
+      last_ = at;
+    }
+
+    void take(Place found, double speed_mm_s) {
+      // Filament is never laid backwards.
+      if (found.progress_mm < furthest_.progress_mm) {
+        found.progress_mm = furthest_.progress_mm;
+        found.piece = furthest_.piece;
+      }
+      furthest_ = found;
+      walk_->note(found, speed_mm_s, allowance_, nodes_.back());
+      const double tolerance_mm =
+          model_->times_tolerance * walk_->bounds_[found.piece].tolerance_mm;
+      of_pieces_[found.piece] = std::max(of_pieces_[found.piece], found.error_mm / tolerance_mm);
+    }
+
+    void note_laid() {
+      if (laid_ != nullptr) {
+        walk_->note(furthest_, *laid_);
+      }
+    }
+
+    // Adds the nodes before the `until`-th of nodes_, whose neighbours are known, to the result.
+    void settle(std::size_t until, NozzleMeasure& result) {
+      for (; settled_ < until; ++settled_) {
+        walk_->add(nodes_, settled_, first_ + settled_, model_->times_tolerance, result);
+      }
+      // The next one needs the last one beside it.
+      const std::size_t dropped = settled_ > 0 ? settled_ - 1 : 0;
+      nodes_.erase(nodes_.begin(), nodes_.begin() + static_cast<std::ptrdiff_t>(dropped));
+      settled_ -= dropped;
+      first_ += dropped;
+    }
+
+    const Walk* walk_;
+    const AxesModel* model_;
+    std::span<const double> allowance_;
+    Laid* laid_;
+    dynamics::ExactMap map_x_;
+    dynamics::ExactMap map_y_;
+    dynamics::NozzleXY nozzle_;
+    dynamics::NozzleMotionXY last_;
+    Place furthest_;
+    std::vector<AtNode> nodes_;  // from the first_ on
+    std::size_t first_ = 0;
+    std::size_t settled_ = 0;  // how many of nodes_ are part of the result
+    std::vector<double> of_pieces_;
+  };
 
  private:
   // Filament is laid up to the nearest place. Where the path comes back to itself, as travel does
@@ -174,16 +269,6 @@ class Walk {
     return found;
   }
 
-  // A nozzle at a node.
-  struct AtNode {
-    double error_mm = 0.0;
-    double speed_mm_s = 0.0;
-    // Those of the pieces on which it lays filament.
-    double tolerance_mm = std::numeric_limits<double>::infinity();
-    double feed_mm_s = std::numeric_limits<double>::infinity();
-    double travel_mm_s = std::numeric_limits<double>::infinity();  // on the others
-  };
-
   [[nodiscard]] static double filament_per_mm(const planner::PlannedMove& move) {
     return move.segment.extruding() ? move.direction[gcode::E] : 0.0;
   }
@@ -208,21 +293,21 @@ class Walk {
     }
   }
 
-  void add(const std::vector<AtNode>& nodes, double times_tolerance, NozzleMeasure& result) const {
-    for (std::size_t k = 0; k < nodes.size(); ++k) {
-      double tolerance_mm = std::min(times_tolerance * nodes[k].tolerance_mm, kTravelTolerance_mm);
-      for (const std::size_t beside : {k > 0 ? k - 1 : 0, std::min(k + 1, nodes.size() - 1)}) {
-        tolerance_mm =
-            std::min(tolerance_mm, kBeside * times_tolerance * nodes[beside].tolerance_mm);
-      }
-      result.error[k] = std::max(result.error[k], nodes[k].error_mm / tolerance_mm);
-      if (times_tolerance == 1.0) {
-        // In travel the base keeps F as well, since its motors are what F is for there.
-        const double of_travel_mm_s = std::max(
-            nodes[k].speed_mm_s, std::hypot(base_.x.velocity_mm_s[k], base_.y.velocity_mm_s[k]));
-        result.speed[k] = std::max({result.speed[k], nodes[k].speed_mm_s / nodes[k].feed_mm_s,
-                                    of_travel_mm_s / nodes[k].travel_mm_s});
-      }
+  // Adds a node, the i-th of `nodes` and the k-th of the base, to the result.
+  void add(const std::vector<AtNode>& nodes, std::size_t i, std::size_t k, double times_tolerance,
+           NozzleMeasure& result) const {
+    const AtNode& node = nodes[i];
+    double tolerance_mm = std::min(times_tolerance * node.tolerance_mm, kTravelTolerance_mm);
+    for (const std::size_t beside : {i > 0 ? i - 1 : 0, std::min(i + 1, nodes.size() - 1)}) {
+      tolerance_mm = std::min(tolerance_mm, kBeside * times_tolerance * nodes[beside].tolerance_mm);
+    }
+    result.error[k] = std::max(result.error[k], node.error_mm / tolerance_mm);
+    if (times_tolerance == 1.0) {
+      // In travel the base keeps F as well, since its motors are what F is for there.
+      const double of_travel_mm_s =
+          std::max(node.speed_mm_s, std::hypot(base_.x.velocity_mm_s[k], base_.y.velocity_mm_s[k]));
+      result.speed[k] = std::max(
+          {result.speed[k], node.speed_mm_s / node.feed_mm_s, of_travel_mm_s / node.travel_mm_s});
     }
   }
 
@@ -233,6 +318,7 @@ class Walk {
   std::vector<double> from_mm_;        // length of the path before each piece
   std::vector<double> filament_mm_;    // laid on that length
   std::vector<double> inverse_flat2_;  // 1 / (d_x² + d_y²) of its direction; 0 if it is upright
+  std::size_t now_ = 0;                // the piece that the plan is on
 };
 
 }  // namespace
@@ -277,9 +363,11 @@ NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
   result.error.assign(base.nodes(), 0.0);
   result.width.assign(base.nodes(), 0.0);
   result.speed.assign(base.nodes(), 0.0);
-  const Walk walk(plan, bounds, starts_s, base);
+  Walk walk(plan, bounds, starts_s, base);
   const dynamics::AxisMotion x = base.x_at(0.0);
   const dynamics::AxisMotion y = base.y_at(0.0);
+  Walk::Laid laid;
+  std::vector<Walk::Nozzle> nozzles;
   for (std::size_t m = 0; m < models.size(); ++m) {
     const AxesModel& model = models[m];
     dynamics::NozzleXY start{model.x.riding(x.position_mm, x.velocity_mm_s),
@@ -288,17 +376,25 @@ NozzleMeasure measure(std::span<const planner::PlannedMove> plan,
       start = {model.x.swinging_as(models.front().x, nozzle->x, x.position_mm),
                model.y.swinging_as(models.front().y, nozzle->y, y.position_mm)};
     }
-    constexpr double kByFirst = 0.5;
-    Walk::Laid laid;
-    const bool lays = m == 0 && extruder;
-    walk.add(model, start, m == 0 ? kByFirst : 1.0,
-             allowances.empty() ? std::span<const double>{} : allowances[m], result,
-             lays ? &laid : nullptr);
-    if (lays) {
-      result.width = width_errors(laid.filament_mm, laid.way_mm, base.period_s, *extruder);
-      for (double& width : result.width) {
-        width /= kOfLines * extruder->width_tolerance;
-      }
+    nozzles.emplace_back(walk, model, start,
+                         allowances.empty() ? std::span<const double>{} : allowances[m],
+                         m == 0 && extruder ? &laid : nullptr);
+  }
+  std::vector<Walk::Look> looks;
+  for (std::size_t first = 0; first + 1 < base.nodes(); first += kNodesAtOnce) {
+    walk.look(first, std::min(first + kNodesAtOnce, base.nodes() - 1), looks);
+    for (Walk::Nozzle& each : nozzles) {
+      each.go(looks, result);
+    }
+  }
+  constexpr double kByFirst = 0.5;
+  for (Walk::Nozzle& each : nozzles) {
+    each.end(&each == nozzles.data() ? kByFirst : 1.0, result);
+  }
+  if (extruder) {
+    result.width = width_errors(laid.filament_mm, laid.way_mm, base.period_s, *extruder);
+    for (double& width : result.width) {
+      width /= kOfLines * extruder->width_tolerance;
     }
   }
   return result;

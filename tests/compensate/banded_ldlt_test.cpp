@@ -13,7 +13,7 @@ TEST(BandedLdlt, SolvesWhatADenseFactorSolves) {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   for (std::size_t size = 5; size <= 40; ++size) {
     constexpr std::size_t kFirst = 3;
-    Band band;
+    BandMatrix band;
     for (Padded& diagonal : band) {
       diagonal.resize(size + 7);
       for (std::size_t i = 0; i < size + 7; ++i) {
@@ -44,7 +44,7 @@ TEST(BandedLdlt, SolvesWhatADenseFactorSolves) {
 
 TEST(BandedLdlt, RefusesWhatIsNotPositiveDefinite) {
   for (const std::size_t bad : {0U, 3U, 10U, 11U, 15U, 20U}) {
-    Band band;
+    BandMatrix band;
     for (Padded& diagonal : band) {
       diagonal.resize(21);
       as_array(diagonal).setConstant(0.1);

@@ -75,7 +75,7 @@ TEST(Stretches, AloneHaveBounds) {
 // flat form as a whole.
 TEST(Stretches, LeadToTheOptimumOfTheWholeWindow) {
   std::mt19937_64 random(11);
-  for (const double accel_mm_s2 : {12e3, 8e3, 5.5e3, 4e3}) {
+  for (const double accel_mm_s2 : {12e3, 8e3, 6.5e3, 5.5e3}) {
     AxisWindow window = testing::random_path(random, 2000, {});
     window.limits.max_accel_mm_s2 = accel_mm_s2;
     const auto by_stages = make_banded_engine(BandedForm::stages)->solve(window);
