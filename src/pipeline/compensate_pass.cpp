@@ -291,9 +291,9 @@ class Compensator {
   void choose_comparison(RunJob& job) {
     constexpr double kShare = 8.0;
     constexpr double kAlways_s = 120.0;
-    job.compares_nominal =
-        job.setup.is_robust() && compared_s_ <= std::max(laid_out_s_ / kShare, kAlways_s);
     const double duration_s = planner::duration_s(job.reference());
+    job.compares_nominal = job.setup.is_robust() &&
+                           compared_s_ + duration_s <= std::max(laid_out_s_ / kShare, kAlways_s);
     laid_out_s_ += duration_s;
     compared_s_ += job.compares_nominal ? duration_s : 0.0;
   }
