@@ -616,9 +616,10 @@ std::unique_ptr<StageKernel> fitting_stages(std::size_t modes, std::size_t model
   constexpr Choice kChoices[] = {
       {4, 4, make_lane_stages<Lanes, 1, 1>},     {8, 4, make_lane_stages<Lanes, 2, 1>},
       {8, 8, make_lane_stages<Lanes, 2, 2>},     {12, 4, make_lane_stages<Lanes, 3, 1>},
-      {12, 8, make_lane_stages<Lanes, 3, 2>},    {16, kAny, make_lane_stages<Lanes, 4, 0>},
-      {20, kAny, make_lane_stages<Lanes, 5, 0>}, {24, kAny, make_lane_stages<Lanes, 6, 0>},
-      {28, kAny, make_lane_stages<Lanes, 7, 0>}, {32, kAny, make_lane_stages<Lanes, 8, 0>},
+      {12, 8, make_lane_stages<Lanes, 3, 2>},    {12, 12, make_lane_stages<Lanes, 3, 3>},
+      {16, kAny, make_lane_stages<Lanes, 4, 0>}, {20, kAny, make_lane_stages<Lanes, 5, 0>},
+      {24, kAny, make_lane_stages<Lanes, 6, 0>}, {28, kAny, make_lane_stages<Lanes, 7, 0>},
+      {32, kAny, make_lane_stages<Lanes, 8, 0>},
   };
   for (const Choice& choice : kChoices) {
     if (modes <= choice.modes && models <= choice.models) {

@@ -209,7 +209,7 @@ std::vector<Plant> other_plants(const AxisModel& model) {
   // A change by less than this share of the swing does not count: the plants' errors change by a
   // few per cent, and each mode less makes the base cheaper to find.
   constexpr double kNothing = 0.1;
-  constexpr std::size_t kMost = 5;
+  constexpr std::size_t kMost = 6;
   const auto away = [&](const Plant& plant) { return distance(plant.modes, model.values()); };
   std::vector<Plant> others(model.plants.begin() + 1, model.plants.end());
   const double far = kNear * swing(model.values());

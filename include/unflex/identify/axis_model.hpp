@@ -116,7 +116,7 @@ struct Sweep {
 // Whether the main modes of these models are within 5 % of each other.
 [[nodiscard]] bool agree(const std::vector<AxisModel>& models);
 
-// The plants besides the estimate, at most five. None if all of them swing as it does within 3 %, as
+// The plants besides the estimate, at most six. None if all of them swing as it does within 3 %, as
 // those of a good record do. They have modes in common, with each other and with the estimate, as
 // far as that changes how each swings by less than a tenth.
 [[nodiscard]] std::vector<Plant> other_plants(const AxisModel& model);
