@@ -55,6 +55,10 @@ using PerKind = std::array<T, kRowKinds.size()>;
   return static_cast<std::size_t>(kind);
 }
 
+[[nodiscard]] constexpr std::size_t row_count(RowKind kind, std::size_t nodes) {
+  return kind == RowKind::jerk ? nodes - 1 : nodes;
+}
+
 // A pull on the nozzle at every node, too weak to be noticed. Where the reference rests, steps
 // would otherwise ring out into denormal numbers, which take ten times as long. The forms reverse
 // the pull with every step. Otherwise steps would settle to it and become as small again.
@@ -90,6 +94,13 @@ struct RowBounds {
   Interval inner;  // if they differ from node to node: the widest
   Interval last;
   std::vector<Interval> each = {};  // of every node, if they differ from node to node
+
+  [[nodiscard]] const Interval& at(std::size_t k, std::size_t nodes) const {
+    if (!each.empty()) {
+      return each[k];
+    }
+    return k == 0 ? first : (k + 1 == nodes ? last : inner);
+  }
 };
 
 // The bounds of those kinds that the active limits bound.

@@ -42,7 +42,8 @@ InteriorPoint::Outcome solve_where_limits_count(FlatForm& form, InteriorPoint& i
   return interior_point.solve(form, scaled.nodes, bounds, strict, precision);
 }
 
-// Likewise. Rows bound the base in stretches alone, to which those are added that it needs.
+// Likewise. Rows bound the base in stretches alone. If it breaks a limit elsewhere, the stretches
+// grow and it is solved again.
 InteriorPoint::Outcome solve_where_limits_count(StageForm& form, InteriorPoint& interior_point,
                                                 const ScaledWindow& scaled,
                                                 const PerKind<std::optional<RowBounds>>& bounds,

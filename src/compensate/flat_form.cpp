@@ -234,7 +234,7 @@ void FlatForm::evaluate(const PerKind<bool>& kinds) {
   for (const RowKind kind : kRowKinds) {
     if (kinds[index_of(kind)]) {
       Padded& rows = rows_[index_of(kind)];
-      rows.resize(row_count(kind));
+      rows.resize(row_count(kind, nodes_));
       apply(kind, stencils_[index_of(kind)], c_, rows);
     }
   }
@@ -354,7 +354,7 @@ void FlatForm::solve(const PerKind<const double*>& forces) {
   for (const RowKind kind : kRowKinds) {
     if (forces[index_of(kind)] != nullptr) {
       Padded& steps = row_steps_[index_of(kind)];
-      steps.resize(row_count(kind));
+      steps.resize(row_count(kind, nodes_));
       apply(kind, stencils_[index_of(kind)], step_, steps);
     }
   }

@@ -86,10 +86,6 @@ class FlatForm {
   void write_nozzles(std::vector<std::vector<double>>& nozzles_mm);
 
  private:
-  [[nodiscard]] std::size_t row_count(RowKind kind) const {
-    return kind == RowKind::jerk ? nodes_ - 1 : nodes_;
-  }
-
   void find_ends();
   void keep_ends();
   void add_up_cost();

@@ -49,7 +49,7 @@ void InteriorPoint::start(const PerKind<std::optional<RowBounds>>& bounds,
       continue;
     }
     const RowKind kind = kRowKinds[i];
-    rows.count = kind == RowKind::jerk ? nodes - 1 : nodes;
+    rows.count = row_count(kind, nodes);
     sides_ += 2 * rows.count;
     rows.weight.resize(rows.count);
     rows.force.resize(rows.count);
@@ -58,12 +58,7 @@ void InteriorPoint::start(const PerKind<std::optional<RowBounds>>& bounds,
         kind == RowKind::position ? 1.0 : std::max(size_of(inner.lower), size_of(inner.upper));
     rows.scale = rows.scale > 0.0 ? std::min(rows.scale, 1.0) : 1.0;
     const std::vector<Interval>& each = bounds[i]->each;
-    const auto bounds_at = [&](std::size_t k) {
-      if (!each.empty()) {
-        return apart(each[k]);
-      }
-      return k == 0 ? apart(bounds[i]->first) : (k + 1 == nodes ? apart(bounds[i]->last) : inner);
-    };
+    const auto bounds_at = [&](std::size_t k) { return apart(bounds[i]->at(k, nodes)); };
     const Row value(values[i], static_cast<Eigen::Index>(rows.count));
     double beyond =
         std::max({(inner.lower - value).maxCoeff(), (value - inner.upper).maxCoeff(), 0.0});

@@ -1,7 +1,6 @@
 #include "stretches.hpp"
 
 #include <algorithm>
-#include <limits>
 
 namespace unflex::compensate {
 namespace {
@@ -14,17 +13,6 @@ Interval far_out(const Interval& bounds) {
   constexpr double kTimes = 100.0;
   const double far = kTimes * (bounds.upper - bounds.lower);
   return {bounds.lower - far, bounds.upper + far};
-}
-
-Interval bounds_at(const RowBounds& bounds, std::size_t k, std::size_t count) {
-  if (!bounds.each.empty()) {
-    return bounds.each[k];
-  }
-  return k == 0 ? bounds.first : (k + 1 == count ? bounds.last : bounds.inner);
-}
-
-std::size_t rows_of(std::size_t kind, std::size_t nodes) {
-  return kind == index_of(RowKind::jerk) ? nodes - 1 : nodes;
 }
 
 bool is_out(double value, const Interval& bounds) {
@@ -44,8 +32,9 @@ bool add_broken(const PerKind<const double*>& values,
   }
   std::vector<NodeRange> added;
   for (std::size_t i = 0; i < bounds.size(); ++i) {
-    for (std::size_t k = 0; bounds[i] && k < rows_of(i, nodes); ++k) {
-      if (counts[k] == 0 && is_out(values[i][k], bounds_at(*bounds[i], k, rows_of(i, nodes)))) {
+    const std::size_t count = bounds[i] ? row_count(kRowKinds[i], nodes) : 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (counts[k] == 0 && is_out(values[i][k], bounds[i]->at(k, nodes))) {
         added.push_back({k - std::min(k, reach), std::min(k + reach, nodes - 1)});
       }
     }
@@ -73,12 +62,12 @@ PerKind<std::optional<RowBounds>> bounds_within(const PerKind<std::optional<RowB
     if (!bounds[i]) {
       continue;
     }
-    const std::size_t count = rows_of(i, nodes);
+    const std::size_t count = row_count(kRowKinds[i], nodes);
     std::vector<Interval>& each = result[i]->each;
     each.assign(count, far_out(bounds[i]->inner));
     for (const NodeRange& range : stretches) {
       for (std::size_t k = range.first; k <= std::min(range.last, count - 1); ++k) {
-        each[k] = bounds_at(*bounds[i], k, count);
+        each[k] = bounds[i]->at(k, nodes);
       }
     }
   }

@@ -110,70 +110,29 @@ UNFLEX_INLINE bool factor_columns(double* columns, std::size_t size) {
   return true;
 }
 
-UNFLEX_WIDE void add_square_to(Width<5> /*width*/, const double* g, double f, double* block) {
-  add_square_to<5>(g, f, block);
-}
-UNFLEX_WIDE void add_squares_to(Width<5> /*width*/, const double* const* rows, const double* f,
-                                double* block) {
-  add_squares_to<5>(rows, f, block);
-}
-UNFLEX_WIDE void add_to(Width<5> /*width*/, const double* g, double f, double* y) {
-  add_to<5>(g, f, y);
-}
-UNFLEX_WIDE double product(Width<5> /*width*/, const double* g, const double* x) {
-  return product<5>(g, x);
-}
-UNFLEX_WIDE void add_square_to(Width<18> /*width*/, const double* g, double f, double* block) {
-  add_square_to<18>(g, f, block);
-}
-UNFLEX_WIDE void add_squares_to(Width<18> /*width*/, const double* const* rows, const double* f,
-                                double* block) {
-  add_squares_to<18>(rows, f, block);
-}
-UNFLEX_WIDE void add_to(Width<18> /*width*/, const double* g, double f, double* y) {
-  add_to<18>(g, f, y);
-}
-UNFLEX_WIDE double product(Width<18> /*width*/, const double* g, const double* x) {
-  return product<18>(g, x);
-}
-UNFLEX_WIDE void add_square_to(Width<24> /*width*/, const double* g, double f, double* block) {
-  add_square_to<24>(g, f, block);
-}
-UNFLEX_WIDE void add_squares_to(Width<24> /*width*/, const double* const* rows, const double* f,
-                                double* block) {
-  add_squares_to<24>(rows, f, block);
-}
-UNFLEX_WIDE void add_to(Width<24> /*width*/, const double* g, double f, double* y) {
-  add_to<24>(g, f, y);
-}
-UNFLEX_WIDE double product(Width<24> /*width*/, const double* g, const double* x) {
-  return product<24>(g, x);
-}
-UNFLEX_WIDE void add_square_to(Width<40> /*width*/, const double* g, double f, double* block) {
-  add_square_to<40>(g, f, block);
-}
-UNFLEX_WIDE void add_squares_to(Width<40> /*width*/, const double* const* rows, const double* f,
-                                double* block) {
-  add_squares_to<40>(rows, f, block);
-}
-UNFLEX_WIDE void add_to(Width<40> /*width*/, const double* g, double f, double* y) {
-  add_to<40>(g, f, y);
-}
-UNFLEX_WIDE double product(Width<40> /*width*/, const double* g, const double* x) {
-  return product<40>(g, x);
-}
-UNFLEX_WIDE bool factor_columns(Width<5> /*width*/, double* columns, std::size_t size) {
-  return factor_columns<5>(columns, size);
-}
-UNFLEX_WIDE bool factor_columns(Width<18> /*width*/, double* columns, std::size_t size) {
-  return factor_columns<18>(columns, size);
-}
-UNFLEX_WIDE bool factor_columns(Width<24> /*width*/, double* columns, std::size_t size) {
-  return factor_columns<24>(columns, size);
-}
-UNFLEX_WIDE bool factor_columns(Width<40> /*width*/, double* columns, std::size_t size) {
-  return factor_columns<40>(columns, size);
-}
+// Attributes for wide registers need functions that are not templates.
+#define UNFLEX_FOR_WIDTH(W)                                                                       \
+  UNFLEX_WIDE void add_square_to(Width<W> /*width*/, const double* g, double f, double* block) {  \
+    add_square_to<W>(g, f, block);                                                                \
+  }                                                                                               \
+  UNFLEX_WIDE void add_squares_to(Width<W> /*width*/, const double* const* rows, const double* f, \
+                                  double* block) {                                                \
+    add_squares_to<W>(rows, f, block);                                                            \
+  }                                                                                               \
+  UNFLEX_WIDE void add_to(Width<W> /*width*/, const double* g, double f, double* y) {             \
+    add_to<W>(g, f, y);                                                                           \
+  }                                                                                               \
+  UNFLEX_WIDE double product(Width<W> /*width*/, const double* g, const double* x) {              \
+    return product<W>(g, x);                                                                      \
+  }                                                                                               \
+  UNFLEX_WIDE bool factor_columns(Width<W> /*width*/, double* columns, std::size_t size) {        \
+    return factor_columns<W>(columns, size);                                                      \
+  }
+
+UNFLEX_FOR_WIDTH(5)
+UNFLEX_FOR_WIDTH(18)
+UNFLEX_FOR_WIDTH(24)
+UNFLEX_FOR_WIDTH(40)
 
 }  // namespace
 

@@ -107,13 +107,16 @@ inline void store(const TwoLanes& lanes, double* to) {
 [[nodiscard]] inline TwoLanes larger(const TwoLanes& a, const TwoLanes& b) {
   return select(less(b, a), a, b);
 }
+[[nodiscard]] inline double least_of(const double* each) {
+  const double first = each[0] < each[1] ? each[0] : each[1];
+  const double second = each[2] < each[3] ? each[2] : each[3];
+  return first < second ? first : second;
+}
 // The least of the four numbers, and the most.
 [[nodiscard]] inline double least(const TwoLanes& lanes) {
   double each[kLanes];
   store(lanes, each);
-  const double first = each[0] < each[1] ? each[0] : each[1];
-  const double second = each[2] < each[3] ? each[2] : each[3];
-  return first < second ? first : second;
+  return least_of(each);
 }
 [[nodiscard]] inline double most(const TwoLanes& lanes) { return -least(-1.0 * lanes); }
 // Rows become columns.
@@ -197,9 +200,7 @@ inline void store(const FourLanes& lanes, double* to) {
 [[nodiscard]] inline double least(const FourLanes& lanes) {
   double each[kLanes];
   store(lanes, each);
-  const double first = each[0] < each[1] ? each[0] : each[1];
-  const double second = each[2] < each[3] ? each[2] : each[3];
-  return first < second ? first : second;
+  return least_of(each);
 }
 [[nodiscard]] inline double most(const FourLanes& lanes) { return -least(-1.0 * lanes); }
 inline void transpose(FourLanes& a, FourLanes& b, FourLanes& c, FourLanes& d) {

@@ -85,10 +85,6 @@ class ElasticProgram {
   void advance(double length);
   void hold_fixed(std::vector<double>& x) const;
 
-  [[nodiscard]] auto at(std::vector<double>& x, std::size_t row) const {
-    return Eigen::Map<Gradient>(x.data() + first_[row]);
-  }
-
   std::size_t size_ = 0;
   // Column i holds rows i … i + W − 1.
   std::vector<double> hessian_;
