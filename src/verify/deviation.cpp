@@ -26,7 +26,7 @@ DeviationStats DeviationAccumulator::stats() const {
 }
 
 NozzleModel coarse(NozzleModel model) {
-  constexpr double kSamplesPerPeriod = 40.0;
+  constexpr double kSamplesPerPeriod = 20.0;
   const double fastest_rad_s = std::max(model.x.fastest_rad_s(), model.y.fastest_rad_s());
   model.step_s =
       std::max(model.step_s, 2.0 * std::numbers::pi / (kSamplesPerPeriod * fastest_rad_s));

@@ -83,7 +83,7 @@ struct NozzleModel {
   double hold_s = 0.5;  // how long the base is held after the end of the file
 };
 
-// The model with a step just fine enough to compare two motions: 40 steps per period of the faster
+// The model with a step just fine enough to compare two motions: 20 steps per period of the faster
 // axis.
 [[nodiscard]] NozzleModel coarse(NozzleModel model);
 
