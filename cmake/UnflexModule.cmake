@@ -13,6 +13,10 @@ function(unflex_module name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(unflex_${name} PUBLIC cxx_std_20)
+  # Eigen would sum by as many numbers at once as the processor's registers hold, so in another order
+  # on another processor. Wide registers are used in unflex/core/lanes.hpp, in one order.
+  target_compile_definitions(unflex_${name} PUBLIC EIGEN_DONT_VECTORIZE
+                                                   $<$<NOT:$<BOOL:${UNFLEX_THREADS}>>:UNFLEX_NO_THREADS>)
   target_link_libraries(unflex_${name} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE_LINKS})
   unflex_flags(unflex_${name})
   if(NOT ARG_NUMERICAL)

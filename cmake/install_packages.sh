@@ -15,6 +15,8 @@ packages=(
 )
 test_packages=(
   libgmock-dev libgtest-dev
+  # Results of core/math are held against it.
+  libmpfr-dev
   # Builds are cached, the format of sources is checked, the picture of modules is drawn.
   ccache clang-format graphviz
   # Another compiler reads what changed, with sanitizers and without; lines that run are counted.

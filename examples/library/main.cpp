@@ -3,6 +3,7 @@
 
 #include "unflex/machine/machine.hpp"
 #include "unflex/pipeline/pipeline.hpp"
+#include "unflex/platform/files.hpp"
 
 int main(int argc, char** argv) {
   if (argc != 4) {
@@ -16,9 +17,9 @@ int main(int argc, char** argv) {
             return unflex::machine::load({.print = &print, .printer_file = argv[3]});
           })
           .and_then([&](const unflex::machine::Settings& settings) {
-            return unflex::pipeline::compensate({.input = argv[1],
+            return unflex::pipeline::compensate({.input = unflex::platform::file_store(argv[1]),
                                                  .input_name = argv[1],
-                                                 .output = argv[2],
+                                                 .output = unflex::platform::file_store(argv[2]),
                                                  .output_name = argv[2],
                                                  .settings = settings},
                                                 progress);

@@ -227,6 +227,11 @@ Status complete(RunConfig& config) {
   if (config.check_solver && config.engine == pipeline::EngineChoice::ipopt) {
     return usage("--check-solver: it is Ipopt that checks; leave out --engine ipopt");
   }
+  if (Status built = pipeline::check_built(config.check_solver ? pipeline::EngineChoice::ipopt
+                                                               : config.engine);
+      !built) {
+    return built;
+  }
   if (writes_print(config.command)) {
     if (Status checked = check_output(config); !checked) {
       return checked;

@@ -10,6 +10,7 @@
 
 #include "results.hpp"
 #include "unflex/filament/profile.hpp"
+#include "unflex/platform/files.hpp"
 #include "workspace.hpp"
 
 namespace unflex::app {
@@ -69,9 +70,9 @@ Result<std::optional<pipeline::FittedPrint>> fit_to_filament(const RunConfig& co
     return tl::unexpected(profile.error());
   }
   const Status fitted = input.make_seekable().and_then([&] {
-    const std::filesystem::path sliced = input.path();
+    const std::shared_ptr<TextStore> sliced = platform::file_store(input.path());
     return input.replace_text([&](const Input::Write& write) {
-      return pipeline::fit_filament(sliced, input.name(), settings, *profile,
+      return pipeline::fit_filament(*sliced, input.name(), settings, *profile,
                                     config.command == Command::filament, write)
           .map([&](pipeline::FittedPrint print) { result = std::move(print); });
     });

@@ -99,7 +99,7 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
   if (!job) {
     return tl::unexpected(job.error());
   }
-  const bool passed_on = job->output_fd >= 0;
+  const bool passed_on = job->output_stream != nullptr;
   Result<report::Report> report = with_progress(config, [&](Progress& progress) {
     return config.command == Command::compensate ? pipeline::compensate(*job, progress)
                                                  : pipeline::verify(*job, progress);

@@ -7,11 +7,13 @@
 #include <cmath>
 #include <string_view>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::app {
 
 std::string number_text(double value, double width) {
   const double wide = std::max(width, 1e-9 * std::abs(value));
-  const int decimals = std::clamp(static_cast<int>(std::ceil(1.0 - std::log10(wide))), 0, 5);
+  const int decimals = std::clamp(static_cast<int>(std::ceil(1.0 - math::log10(wide))), 0, 5);
   return fmt::format("{:.{}f}", value, decimals);
 }
 

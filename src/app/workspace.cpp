@@ -10,6 +10,8 @@
 #include "filament.hpp"
 #include "files.hpp"
 #include "results.hpp"
+#include "unflex/platform/descriptors.hpp"
+#include "unflex/platform/files.hpp"
 
 namespace unflex::app {
 namespace {
@@ -156,23 +158,27 @@ void pack_output(const RunConfig& config, Workspace& space) {
 
 Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   pipeline::Job job;
-  job.input = space.input.path();
+  job.input = platform::file_store(space.input.path());
   job.input_name = space.input.name();
   job.output_name = writes_print(config.command) ? config.print_name : config.output;
   if (space.output) {
     pack_output(config, space);
-    job.output = space.output->path();
-    job.input_fd_kind = space.input.kind();
-    job.output_fd_kind = space.output->kind();
+    job.output = platform::file_store(space.output->path());
+    job.input_stream_kind = space.input.kind();
+    job.output_stream_kind = space.output->kind();
     const Result<int> stream = space.output->stream_fd();
     if (!stream) {
       return tl::unexpected(stream.error());
     }
-    job.output_fd = *stream;
-    job.input_fd = space.input.stream_fd();
+    if (*stream >= 0) {
+      job.output_stream = platform::descriptor_sink(*stream);
+    }
+    if (const int source = space.input.stream_fd(); source >= 0) {
+      job.input_stream = platform::descriptor_source(source);
+    }
     job.input_head = space.input.head();
   } else if (space.compensated) {
-    job.output = space.compensated->path();
+    job.output = platform::file_store(space.compensated->path());
   }
   job.settings = space.settings;
   job.engine = config.engine;

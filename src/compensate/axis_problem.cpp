@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "unflex/core/math.hpp"
 #include "unflex/nlp/problem.hpp"
 
 namespace unflex::compensate {
@@ -21,7 +22,7 @@ AxisProblem::AxisProblem(const AxisWindow& window, ActiveLimits active)
   SharedModes shared = shared_modes(window);
   for (const SharedModes::Swing& swing : shared.modes) {
     const double omega_h = swing.mode.omega_rad_s * window.period_s;
-    modes_.push_back({2.0 * swing.mode.zeta * omega_h, std::pow(omega_h, 2)});
+    modes_.push_back({2.0 * swing.mode.zeta * omega_h, math::square(omega_h)});
   }
   models_ = std::move(shared.models);
 }

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <span>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::compensate {
 namespace {
 
@@ -17,8 +19,13 @@ constexpr double kNothing = 0.1;
 
 // How a mode answers the base at ω, before the gain.
 std::complex<double> response(const dynamics::Mode& mode, double omega_rad_s) {
-  const std::complex<double> spring(1.0, 2.0 * mode.zeta * omega_rad_s / mode.omega_rad_s);
-  return spring / (spring - std::pow(omega_rad_s / mode.omega_rad_s, 2));
+  const double r = omega_rad_s / mode.omega_rad_s;
+  const double loss = 2.0 * mode.zeta * r;
+  const double left = 1.0 - r * r;
+  // (1 + i loss) / (left + i loss), not by the compiler's division, which differs between
+  // compilers.
+  const double size = left * left + loss * loss;
+  return {(left + loss * loss) / size, loss * (left - 1.0) / size};
 }
 
 // By how much two axes are apart after the speed of the base has stepped, which has a spectrum of
@@ -39,7 +46,7 @@ double apart(std::span<const dynamics::Mode> a, std::span<const dynamics::Mode> 
     for (const dynamics::Mode& mode : b) {
       difference -= mode.gain * response(mode, omega);
     }
-    sum += std::norm(difference) / std::pow(omega, 4);
+    sum += std::norm(difference) / math::power(omega, 4);
   }
   return std::sqrt(sum);
 }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "limits.hpp"
 #include "stage_form.hpp"
 #include "stretches.hpp"
+#include "unflex/core/threads.hpp"
 
 namespace unflex::compensate {
 namespace {
@@ -139,7 +139,7 @@ class Workspaces {
  public:
   std::unique_ptr<Workspace> take() {
     {
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       if (!idle_.empty()) {
         std::unique_ptr<Workspace> workspace = std::move(idle_.back());
         idle_.pop_back();
@@ -150,12 +150,12 @@ class Workspaces {
   }
 
   void give_back(std::unique_ptr<Workspace> workspace) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     idle_.push_back(std::move(workspace));
   }
 
  private:
-  std::mutex mutex_;
+  Mutex mutex_;
   std::vector<std::unique_ptr<Workspace>> idle_;
 };
 
@@ -181,8 +181,8 @@ class BandedEngine final : public Engine {
         form_ == BandedForm::flat || (form_ == BandedForm::fitting && FlatForm::suits(scaled));
     if (is_flat && FlatForm::takes(window)) {
       // If the flat form runs out of digits, the stage form has some left.
-      Result<AxisSolution> solution = solve_by(work.flat, work.interior_point, scaled,
-                                               form_ == BandedForm::fitting, precision_);
+      Result<AxisSolution> solution =
+          solve_by(work.flat, work.interior_point, scaled, true, precision_);
       if (solution || form_ == BandedForm::flat) {
         return solution;
       }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "stencil_loops.hpp"
+#include "unflex/core/pair.hpp"
 
 namespace unflex::compensate {
 namespace {
@@ -13,18 +14,38 @@ constexpr std::size_t kFewestNodes = 8;
 constexpr double kSmallestOmegaH = 0.05;
 constexpr std::size_t kMiddle = 2;  // c_{k+2} is where p_k is, roughly
 
+// What rounds away here is lost to the whole form, so it is worked out to twice the precision.
+using math::Pair;
+using PairStencil = std::array<Pair, kHalfBand + 1>;
+constexpr std::size_t kStates = 5;
+using PairMatrix = std::array<std::array<Pair, kStates>, kStates>;
+
 // Coefficients in powers of q from those in powers of s = q − 1.
-Stencil shifted(const Stencil& in_s) {
-  Stencil result{};
-  Stencil power{1.0};  // (q − 1)ⁱ
+PairStencil shifted(const PairStencil& in_s) {
+  PairStencil result{};
+  PairStencil power{{{1.0}}};  // (q − 1)ⁱ
   for (std::size_t i = 0; i <= kHalfBand; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      result[j] += in_s[i] * power[j];
+      result[j] = result[j] + in_s[i] * power[j];
     }
     for (std::size_t j = kHalfBand; j > 0; --j) {
       power[j] = power[j - 1] - power[j];
     }
     power[0] = -power[0];
+  }
+  return result;
+}
+
+// growth · m
+PairMatrix grown(const ChainMatrix& growth, const PairMatrix& m) {
+  PairMatrix result{};
+  for (std::size_t i = 0; i < kStates; ++i) {
+    for (std::size_t k = 0; k < kStates; ++k) {
+      const double factor = growth(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+      for (std::size_t j = 0; factor != 0.0 && j < kStates; ++j) {
+        result[i][j] = result[i][j] + Pair{factor} * m[k][j];
+      }
+    }
   }
   return result;
 }
@@ -42,25 +63,45 @@ void apply(RowKind kind, const Stencil& stencil, const Padded& x, Padded& y) {
 // The polynomials are found in s = q − 1, the eigenvalues of Φ − I: those of Φ lie so close to 1
 // that in q the nozzle's coefficients, of size (ωh)², would be differences of numbers about 1.
 FlatStencils::FlatStencils(const AxisChain& chain) {
-  ChainMatrix adjugate = ChainMatrix::Identity();  // N_4, then N_3 …
-  jerk[5] = 1.0;
-  for (std::size_t i = 5; i-- > 0;) {
-    const ChainVector v = adjugate * chain.input;
-    for (std::size_t component = 0; component < state.size(); ++component) {
-      state[component][i] = v(static_cast<Eigen::Index>(component));
+  std::array<PairStencil, kStates> of_states{};
+  PairStencil of_jerk{};
+  PairMatrix adjugate{};  // N_4, then N_3 …
+  for (std::size_t i = 0; i < kStates; ++i) {
+    adjugate[i][i] = {1.0};
+  }
+  of_jerk[5] = {1.0};
+  for (std::size_t i = kStates; i-- > 0;) {
+    for (std::size_t component = 0; component < kStates; ++component) {
+      for (std::size_t j = 0; j < kStates; ++j) {
+        of_states[component][i] =
+            of_states[component][i] +
+            adjugate[component][j] * Pair{chain.input(static_cast<Eigen::Index>(j))};
+      }
     }
-    const ChainMatrix next = chain.growth * adjugate;
+    adjugate = grown(chain.growth, adjugate);
     // b, ḃ and b̈ are three integrations of the jerk: s³ divides the polynomial.
-    jerk[i] = i < 3 ? 0.0 : -next.trace() / static_cast<double>(5 - i);
-    adjugate = next + jerk[i] * ChainMatrix::Identity();
-  }
-  const double scale = 1.0 / state[AxisChain::kNozzle][0];
-  for (Stencil* stencil : {&state[0], &state[1], &state[2], &state[3], &state[4], &jerk}) {
-    for (double& coefficient : *stencil) {
-      coefficient *= scale;
+    if (i >= 3) {
+      Pair trace;
+      for (std::size_t j = 0; j < kStates; ++j) {
+        trace = trace + adjugate[j][j];
+      }
+      of_jerk[i] = -trace / Pair{static_cast<double>(kStates - i)};
+      for (std::size_t j = 0; j < kStates; ++j) {
+        adjugate[j][j] = adjugate[j][j] + of_jerk[i];
+      }
     }
-    *stencil = shifted(*stencil);
   }
+  const Pair unit = of_states[AxisChain::kNozzle][0];
+  const auto put = [&](const PairStencil& from, Stencil& to) {
+    const PairStencil in_q = shifted(from);
+    for (std::size_t i = 0; i <= kHalfBand; ++i) {
+      to[i] = (in_q[i] / unit).high;
+    }
+  };
+  for (std::size_t component = 0; component < kStates; ++component) {
+    put(of_states[component], state[component]);
+  }
+  put(of_jerk, jerk);
   const Stencil& p = state[AxisChain::kNozzle];
   const Stencil& rate = state[AxisChain::kNozzleRate];
   for (std::size_t i = 0; i <= kHalfBand; ++i) {
@@ -259,7 +300,19 @@ bool FlatForm::factor(const PerKind<const double*>& weights) {
     }
   }
   tie_ends_of_hessian();
-  return ldlt_.factor(hessian_, first_, last_);
+  // Where weights differ by more than numbers have digits, a pivot may come out negative. A little
+  // more on the diagonal, far below what it says, still gives steps that go down.
+  constexpr int kMostTries = 4;
+  constexpr double kFirstShare = 1e-15;
+  constexpr double kMore = 10.0;
+  bool is_factored = ldlt_.factor(hessian_, first_, last_);
+  double share = kFirstShare;
+  for (int i = 0; i < kMostTries && !is_factored; ++i) {
+    as_array(hessian_[0]) *= 1.0 + share;
+    share *= kMore;
+    is_factored = ldlt_.factor(hessian_, first_, last_);
+  }
+  return is_factored;
 }
 
 // Goes from the Hessian of all of c to that of the unknowns.

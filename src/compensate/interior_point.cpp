@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::compensate {
 namespace {
 
@@ -88,7 +90,8 @@ void InteriorPoint::start(const PerKind<std::optional<RowBounds>>& bounds,
     }
     excess = std::max(excess, beyond / rows.scale);
   }
-  const double barrier = kBarrierShare * std::pow(1.0 + excess, kBarrierPower) * half_cost_per_node;
+  const double barrier =
+      kBarrierShare * math::pow(1.0 + excess, kBarrierPower) * half_cost_per_node;
   for (Rows& rows : rows_) {
     for (Side* side : {&rows.lower, &rows.upper}) {
       if (rows.active) {
@@ -146,7 +149,7 @@ double InteriorPoint::predict(const PerKind<const double*>& steps) {
   }
   const double length = 1.0 / steepest;
   const double left = (1.0 - length) * gap_ - length * length * (first + second);
-  return std::pow(std::max(left, 0.0) / gap_, 3) * gap_ / static_cast<double>(sides_);
+  return math::power(std::max(left, 0.0) / gap_, 3) * gap_ / static_cast<double>(sides_);
 }
 
 void InteriorPoint::correct(double target) {

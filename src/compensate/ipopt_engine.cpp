@@ -65,6 +65,8 @@ class IpoptEngine final : public Engine {
 
 }  // namespace
 
+bool has_ipopt_engine() { return true; }
+
 std::unique_ptr<Engine> make_ipopt_engine() { return std::make_unique<IpoptEngine>(); }
 
 }  // namespace unflex::compensate

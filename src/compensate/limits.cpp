@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::compensate {
 namespace {
 
@@ -55,7 +57,7 @@ void bound_position(const AxisWindow& window, bool between, std::optional<double
   double margin = 0.0;
   if (between && std::isfinite(limits.max_accel_mm_s2)) {
     // Between nodes b departs from the chord by at most A h²/8.
-    margin = std::min(limits.max_accel_mm_s2 * std::pow(window.period_s, 2) / 8.0,
+    margin = std::min(limits.max_accel_mm_s2 * math::square(window.period_s) / 8.0,
                       0.5 * (limits.max_position_mm - limits.min_position_mm));
     // If the base rests closer to the end of the travel than the margin, it can only set off
     // inwards.

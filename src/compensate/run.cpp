@@ -7,6 +7,7 @@
 #include "contour.hpp"
 #include "limits.hpp"
 #include "shared_motors.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::compensate {
 namespace {
@@ -90,7 +91,7 @@ AxisWindow make_axis(const AxisSetup& axis, const Setup& setup, double period_s,
   window.period_s = period_s;
   // The effect of the base's jerk on the nozzle's motion goes with (ωh)². With this weight one
   // value serves all resonances.
-  window.jerk_weight = setup.jerk_weight * std::pow(axis.axis.main_rad_s() * period_s, 4);
+  window.jerk_weight = setup.jerk_weight * math::power(axis.axis.main_rad_s() * period_s, 4);
   window.limits = axis.limits;
   // If the sliced path itself leaves the travel, the base may go as far but no further.
   const auto [low, high] = std::ranges::minmax(reference);

@@ -11,7 +11,9 @@ namespace {
 std::string_view remedy(int error) {
   switch (error) {
     case ENOSPC:
+#ifdef EDQUOT  // not on Windows
     case EDQUOT:
+#endif
       return "; make room there";
     case EFBIG:
       return "; raise the limit on the size of files (ulimit -f)";

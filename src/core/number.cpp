@@ -9,6 +9,8 @@
 #include <limits>
 #include <system_error>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex {
 namespace {
 
@@ -145,7 +147,7 @@ std::string readable(double value) {
   if (!(size < kMost) || (size > 0.0 && size < kLeast)) {
     return fmt::format("{:.{}g}", value, kDigits);
   }
-  const int before = size > 0.0 ? to_int(std::floor(std::log10(size))) + 1 : 1;
+  const int before = size > 0.0 ? to_int(std::floor(math::log10(size))) + 1 : 1;
   const int decimals = std::clamp(kDigits - before, 0, kMostDecimals);
   std::string text;
   append_scaled(text, to_scaled(value, decimals), decimals);

@@ -14,6 +14,8 @@
 #include <limits>
 #include <numbers>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::dynamics {
 namespace {
 
@@ -36,9 +38,9 @@ struct FreeResponse {
 
 FreeResponse underdamped(double omega, double zeta, double h) {
   const double damped = omega * std::sqrt((1.0 - zeta) * (1.0 + zeta));
-  const double decay = std::exp(-zeta * omega * h);
+  const double decay = math::exp(-zeta * omega * h);
   const double phase = damped * h;
-  return {decay * std::cos(phase), decay * (phase > 0.0 ? std::sin(phase) / damped : h)};
+  return {decay * math::cos(phase), decay * (phase > 0.0 ? math::sin(phase) / damped : h)};
 }
 
 // With κ for ω_d the circular functions become hyperbolic ones. These would overflow for large κh,
@@ -46,9 +48,9 @@ FreeResponse underdamped(double omega, double zeta, double h) {
 // conjugate.
 FreeResponse overdamped(double omega, double zeta, double h) {
   const double root = std::sqrt((zeta - 1.0) * (zeta + 1.0));
-  const double slow = std::exp(-omega / (zeta + root) * h);
+  const double slow = math::exp(-omega / (zeta + root) * h);
   const double two_kappa_h = 2.0 * omega * root * h;
-  const double fast_part = -std::expm1(-two_kappa_h);  // 1 − e^{−2κh}
+  const double fast_part = -math::expm1(-two_kappa_h);  // 1 − e^{−2κh}
   return {slow * (1.0 - 0.5 * fast_part),
           slow * h * (two_kappa_h > 0.0 ? fast_part / two_kappa_h : 1.0)};
 }
@@ -220,7 +222,7 @@ double FlexibleAxis::unseen_s() const {
   for (const std::complex<double>& zero : zeros()) {
     slowest_per_s = std::min(slowest_per_s, std::abs(zero.real()));
   }
-  return std::log(1e5) / std::max(slowest_per_s, kLeast_per_s);
+  return math::log(1e5) / std::max(slowest_per_s, kLeast_per_s);
 }
 
 // With N_i and D_i the numerator and denominator of mode i, a s + b and α s + β are what solves

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::dynamics {
 
 double HotendPressure::pressed_mm(double flow_mm_s) const {
@@ -16,7 +18,7 @@ double HotendPressure::pressed_mm(double flow_mm_s) const {
           advance_s * std::min(q, knee_mm_s) + second_advance_s * std::max(q - knee_mm_s, 0.0);
       break;
     case PressureShape::tanh:
-      pressed += offset_mm * std::tanh(q / knee_mm_s);
+      pressed += offset_mm * math::tanh(q / knee_mm_s);
       break;
     case PressureShape::reciprocal:
       pressed += offset_mm * (1.0 - 1.0 / (1.0 + q / knee_mm_s));
@@ -33,7 +35,7 @@ double HotendPressure::slope_s(double flow_mm_s) const {
     case PressureShape::two_slopes:
       return q > knee_mm_s ? second_advance_s : advance_s;
     case PressureShape::tanh: {
-      const double bend = std::tanh(q / knee_mm_s);
+      const double bend = math::tanh(q / knee_mm_s);
       return advance_s + offset_mm / knee_mm_s * (1.0 - bend * bend);
     }
     case PressureShape::reciprocal: {

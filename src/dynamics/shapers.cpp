@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <numbers>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::dynamics {
 namespace {
 
@@ -16,7 +18,7 @@ double damped_period(double freq_hz, double zeta) {
 
 // What damping leaves of a vibration after a share of the damped period.
 double decay(double zeta, double periods) {
-  return std::exp(-2.0 * std::numbers::pi * zeta * periods / std::sqrt(1.0 - zeta * zeta));
+  return math::exp(-2.0 * std::numbers::pi * zeta * periods / std::sqrt(1.0 - zeta * zeta));
 }
 
 // ZV convolved with itself: half periods apart, weights C(n, i) Kⁱ.
@@ -49,7 +51,7 @@ ShaperPulses mzv(const MzvForm& form, double freq_hz, double zeta) {
   std::vector<double> weights(static_cast<std::size_t>(n), 1.0);
   for (int k = 1; k < n; ++k) {
     const auto at = static_cast<std::size_t>(k);
-    weights[at] = 2 * k <= n - 1 ? weights[at - 1] * std::sin((n - k) * beta) / std::sin(k * beta)
+    weights[at] = 2 * k <= n - 1 ? weights[at - 1] * math::sin((n - k) * beta) / math::sin(k * beta)
                                  : weights[static_cast<std::size_t>(n - 1 - k)];
   }
   const double spacing = form.duration_periods / (n - 1);

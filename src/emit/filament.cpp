@@ -8,6 +8,7 @@
 #include "filament_flow.hpp"
 #include "pressure_program.hpp"
 #include "smoothed_filament.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::emit {
 namespace {
@@ -37,7 +38,7 @@ LinesInTime lines_in_time(const gcode::Position& start_mm, const std::vector<dou
   for (std::size_t i = 0; i < strokes.size(); ++i) {
     result.times_s.push_back(ends_s[i]);
     result.lengths_mm.push_back(
-        std::hypot(strokes[i].x_mm - before.x_mm, strokes[i].y_mm - before.y_mm));
+        math::hypot(strokes[i].x_mm - before.x_mm, strokes[i].y_mm - before.y_mm));
     before = strokes[i];
   }
   return result;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::emit {
 namespace {
 
@@ -51,8 +53,8 @@ void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Str
   std::vector<LineFlow> lines;
   Stroke before{0.0, start_mm[X], start_mm[Y], start_mm[Z]};
   for (const Stroke& stroke : strokes) {
-    const double length =
-        std::hypot(stroke.x_mm - before.x_mm, stroke.y_mm - before.y_mm, stroke.z_mm - before.z_mm);
+    const double length = math::hypot(stroke.x_mm - before.x_mm, stroke.y_mm - before.y_mm,
+                                      stroke.z_mm - before.z_mm);
     lines.push_back({length, length / (stroke.end_s - before.end_s), stroke.e_mm - before.e_mm});
     before = stroke;
   }

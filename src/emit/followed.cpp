@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "unflex/core/math.hpp"
 #include "unflex/dynamics/node_map.hpp"
 
 namespace unflex::emit {
@@ -45,7 +46,7 @@ Eigen::Matrix2d ring_down_of(const Mode& mode) {
   const double mixed = 0.5 / (omega * omega);
   Eigen::Matrix2d result;
   result << (1.0 + 4.0 * zeta * zeta) / (4.0 * zeta * omega), mixed, mixed,
-      1.0 / (4.0 * zeta * std::pow(omega, 3));
+      1.0 / (4.0 * zeta * math::power(omega, 3));
   return result;
 }
 

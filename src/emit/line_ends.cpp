@@ -12,6 +12,7 @@
 #include <array>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
 #include "vertices.hpp"
 
 namespace unflex::emit {
@@ -260,7 +261,7 @@ bool split_lines(const BaseTrajectory& base, const std::vector<double>& x_error_
   // Errors of lines add up, with any sign, for as long as the nozzle rings.
   constexpr double kAddedUp = 4.0;
   const double most = kAddedUp * rules.tolerance_mm;
-  const auto off = [&](std::size_t i) { return std::hypot(x_error_mm[i], y_error_mm[i]) > most; };
+  const auto off = [&](std::size_t i) { return math::hypot(x_error_mm[i], y_error_mm[i]) > most; };
   return halve(base, rules, true, times,
                [&](std::size_t i) { return off(i) || (i + 1 < times.size() && off(i + 1)); });
 }

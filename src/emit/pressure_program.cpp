@@ -11,6 +11,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::emit {
 namespace {
 
@@ -162,7 +164,7 @@ class PressureProgram {
   void add_line(const std::vector<PressureLine>& lines, const PressureEnds& ends, std::size_t k) {
     const PressureLine& line = lines[k];
     const double slope_s = std::max(line.slope_s, kLeastSlope_s);
-    const double left = std::exp(-line.duration_s / slope_s);
+    const double left = math::exp(-line.duration_s / slope_s);
     const double alpha = line.duration_s / (slope_s * (1.0 - left));
     Row x;
     x.constant = -line.duration_s * line.rest_mm / slope_s;

@@ -22,6 +22,7 @@
 
 #include "dialect.hpp"
 #include "filament_flow.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/core/number.hpp"
 
 namespace unflex::emit {
@@ -49,7 +50,7 @@ constexpr double kPassing_s = 0.05;
 constexpr std::size_t kNoStroke = std::numeric_limits<std::size_t>::max();
 
 double magnitude(const std::optional<std::array<double, 2>>& velocity_mm_s) {
-  return velocity_mm_s ? std::hypot((*velocity_mm_s)[0], (*velocity_mm_s)[1]) : 0.0;
+  return velocity_mm_s ? math::hypot((*velocity_mm_s)[0], (*velocity_mm_s)[1]) : 0.0;
 }
 
 // The line that leads to `next` (side = −1) or away from it (side = 1), with that velocity and as
@@ -63,7 +64,7 @@ gcode::Segment passing_line(const gcode::Segment& next, const std::array<double,
   far = near;
   far[X] += side * kPassing_s * velocity_mm_s[0];
   far[Y] += side * kPassing_s * velocity_mm_s[1];
-  line.feed_mm_s = std::hypot(velocity_mm_s[0], velocity_mm_s[1]);
+  line.feed_mm_s = math::hypot(velocity_mm_s[0], velocity_mm_s[1]);
   if (next.length_xy_mm() > 0.0) {
     far[E] += side * kPassing_s * line.feed_mm_s * next.delta(E) / next.length_xy_mm();
   }
@@ -210,7 +211,7 @@ class SpeedSolver {
     for (std::size_t i = 0; i < strokes.size(); ++i) {
       const Stroke& stroke = strokes[i];
       const double dz = stroke.z_mm - at[Z];
-      distance_mm_[i] = std::hypot(stroke.x_mm - at[X], stroke.y_mm - at[Y], dz);
+      distance_mm_[i] = math::hypot(stroke.x_mm - at[X], stroke.y_mm - at[Y], dz);
       if (dz != 0.0) {
         accel_mm_s2_[i] = std::min(accel_mm_s2_[i], z_accel_mm_s2 * distance_mm_[i] / std::abs(dz));
       }

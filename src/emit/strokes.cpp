@@ -12,6 +12,7 @@
 #include "speeds.hpp"
 #include "step_path.hpp"
 #include "timetable.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/compensable.hpp"
 
@@ -226,7 +227,7 @@ bool split_for_filament(const Run& run, const NozzleProgress& nozzle,
   }
   LinesInTime lines{times, {}};
   for (std::size_t i = 1; i < times.size(); ++i) {
-    lines.lengths_mm.push_back(std::hypot(x_mm[i] - x_mm[i - 1], y_mm[i] - y_mm[i - 1]));
+    lines.lengths_mm.push_back(math::hypot(x_mm[i] - x_mm[i - 1], y_mm[i] - y_mm[i - 1]));
   }
   return split_at_joins(*run.base, joins_at_limit(nozzle, lines, options), rules, times);
 }
@@ -279,7 +280,7 @@ double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& be
   // Share of the line's time that ramps may take. F makes up for them, so F changes more than the
   // speed does.
   constexpr double kRamps = 0.03;
-  const double length = std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
+  const double length = math::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
   const double dz = to.z_mm - from.z_mm;
   double most = 2.0 * gcode::kMaxSlope * length;
   if (std::abs(dz) < kUnseen_mm) {
@@ -287,7 +288,7 @@ double change_of_z_mm(const Stroke& from, const Stroke& to, const VelocityXY& be
     const VelocityXY own = velocity_mm_s(from, to);
     // Where the path bends, a line has to slow down as if it had a ramp.
     const auto change_mm_s = [&](const VelocityXY& other) {
-      return std::hypot(own[0] - other[0], own[1] - other[1]);
+      return math::hypot(own[0] - other[0], own[1] - other[1]);
     };
     const ZLimits limits = z_limits(options.fixed, options.run_limits);
     most = std::min({most, limits.speed_mm_s * duration_s,
@@ -322,7 +323,7 @@ Passing passing(const Run& run) {
   const auto velocity = [&](double t) -> std::optional<std::array<double, 2>> {
     constexpr double kMoves_mm_s = 0.1;
     const std::array v{run.base->x_at(t).velocity_mm_s, run.base->y_at(t).velocity_mm_s};
-    return std::hypot(v[0], v[1]) > kMoves_mm_s ? std::optional(v) : std::nullopt;
+    return math::hypot(v[0], v[1]) > kMoves_mm_s ? std::optional(v) : std::nullopt;
   };
   Passing result;
   result.kept_before = run.kept_before;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::emit {
 namespace {
 
@@ -28,8 +30,8 @@ Timetable::Timetable(const Run& run) : run_(&run) {
   travelled_mm_.push_back(0.0);
   for (std::size_t k = 1; k < base.nodes(); ++k) {
     travelled_mm_.push_back(travelled_mm_.back() +
-                            std::hypot(base.x.position_mm[k] - base.x.position_mm[k - 1],
-                                       base.y.position_mm[k] - base.y.position_mm[k - 1]));
+                            math::hypot(base.x.position_mm[k] - base.x.position_mm[k - 1],
+                                        base.y.position_mm[k] - base.y.position_mm[k - 1]));
   }
 }
 
@@ -73,7 +75,7 @@ bool Timetable::filament_changes(std::size_t i) const {
   }
   const double t = starts_s_[i];
   const double speed =
-      std::hypot(run_->base->x_at(t).velocity_mm_s, run_->base->y_at(t).velocity_mm_s);
+      math::hypot(run_->base->x_at(t).velocity_mm_s, run_->base->y_at(t).velocity_mm_s);
   const double jump = std::abs(filament_per_mm(i) - filament_per_mm(i - 1));
   return jump * std::max(speed, 1.0) * kTypicalLineS / 4.0 > kFilamentStepMm;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -81,7 +82,7 @@ std::optional<std::string> Interpreter::approach(const Line& line) const {
   };
   const double x_mm = target_mm(X, 'X');
   const double y_mm = target_mm(Y, 'Y');
-  const double way_mm = std::hypot(x_mm - state_.position_mm[X], y_mm - state_.position_mm[Y]);
+  const double way_mm = math::hypot(x_mm - state_.position_mm[X], y_mm - state_.position_mm[Y]);
   if (!(way_mm >= kShortest_mm)) {
     return std::nullopt;
   }

@@ -76,7 +76,7 @@ char folded(char c) {
 }  // namespace
 
 std::optional<FeatureKind> feature_by_word(std::string_view word) {
-  const auto* const found = std::ranges::find(kFeatureWords, word);
+  const auto found = std::ranges::find(kFeatureWords, word);
   return found == kFeatureWords.end()
              ? std::nullopt
              : std::optional(static_cast<FeatureKind>(found - kFeatureWords.begin()));
@@ -96,7 +96,7 @@ std::optional<std::string_view> feature_name(std::string_view line) {
 }
 
 FeatureKind feature_by_name(std::string_view name) {
-  const auto* const found = std::ranges::find_if(kNames, [&](const Name& known) {
+  const auto found = std::ranges::find_if(kNames, [&](const Name& known) {
     return std::ranges::equal(known.first, name, {}, {}, folded);
   });
   return found == kNames.end() ? Kind::other : found->second;

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "arc.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::gcode {
 namespace {
@@ -31,7 +32,7 @@ double angle_of(const Arc& arc) {
   const double b = -arc.centre_offset_mm[1];
   const double end_a = arc.end_mm[0] - arc.start_mm[0] + a;
   const double end_b = arc.end_mm[1] - arc.start_mm[1] + b;
-  const double angle = std::atan2(a * end_b - b * end_a, a * end_a + b * end_b);
+  const double angle = math::atan2(a * end_b - b * end_a, a * end_a + b * end_b);
   if (std::abs(angle) < kNoAngle) {
     return 0.0;
   }
@@ -69,7 +70,7 @@ void append_turn(const Arc& arc, double angle, bool closed, double from, double 
                  double feed_mm_s, const MarlinArcs& rules, std::vector<ArcPiece>& pieces) {
   const auto [i, j] = arc.centre_offset_mm;
   const double count = static_cast<double>(
-      segment_count(std::hypot(i, j), std::abs(angle), closed, feed_mm_s, rules));
+      segment_count(math::hypot(i, j), std::abs(angle), closed, feed_mm_s, rules));
   const double theta = angle / count;
   const double sine = theta - theta * theta * theta / 6.0;
   const double cosine = 1.0 - 0.5 * theta * theta;
@@ -82,8 +83,8 @@ void append_turn(const Arc& arc, double angle, bool closed, double from, double 
       a = a * cosine - b * sine;
       b = turned_b;
     } else {
-      const double c = std::cos(n * theta);
-      const double s = std::sin(n * theta);
+      const double c = math::cos(n * theta);
+      const double s = math::sin(n * theta);
       a = -i * c + j * s;
       b = -i * s - j * c;
     }
@@ -95,7 +96,7 @@ void append_turn(const Arc& arc, double angle, bool closed, double from, double 
 }  // namespace
 
 ArcPieces plan_marlin_arc(const Arc& arc, int circles, double feed_mm_s, const MarlinArcs& rules) {
-  const double radius_mm = std::hypot(arc.centre_offset_mm[0], arc.centre_offset_mm[1]);
+  const double radius_mm = math::hypot(arc.centre_offset_mm[0], arc.centre_offset_mm[1]);
   const double turns = std::abs(angle_of(arc)) + circles * kTurn;
   if (!(radius_mm * turns / std::min(rules.min_segment_mm, rules.max_segment_mm) <= kMostPieces)) {
     return std::nullopt;

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "arc.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -194,7 +195,7 @@ std::optional<std::array<double, 2>> centre_offset(const Command& command, const
 bool radius_reaches(const Command& command, double unit_mm, const Arc& arc) {
   const double radius_mm = command.value('R').value_or(0.0) * unit_mm;
   const double half_chord_mm =
-      0.5 * std::hypot(arc.end_mm[0] - arc.start_mm[0], arc.end_mm[1] - arc.start_mm[1]);
+      0.5 * math::hypot(arc.end_mm[0] - arc.start_mm[0], arc.end_mm[1] - arc.start_mm[1]);
   constexpr double kMissingShare = 0.02;
   return radius_mm * radius_mm * (1.0 + kMissingShare) >= half_chord_mm * half_chord_mm;
 }
@@ -203,8 +204,8 @@ bool radius_reaches(const Command& command, double unit_mm, const Arc& arc) {
 double gap_at_end_mm(const Arc& arc) {
   const double x = arc.start_mm[0] + arc.centre_offset_mm[0];
   const double y = arc.start_mm[1] + arc.centre_offset_mm[1];
-  return std::abs(std::hypot(arc.end_mm[0] - x, arc.end_mm[1] - y) -
-                  std::hypot(arc.centre_offset_mm[0], arc.centre_offset_mm[1]));
+  return std::abs(math::hypot(arc.end_mm[0] - x, arc.end_mm[1] - y) -
+                  math::hypot(arc.centre_offset_mm[0], arc.centre_offset_mm[1]));
 }
 
 int whole_circles(const Command& command, const MarlinArcs& rules) {
@@ -364,7 +365,7 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
       !start.known && starts_known(target, known_or_assumed(), in_xy_plane) && modes_certain();
   settle(target, state_);
   const Position start_mm = state_.position_mm;
-  const double radius_mm = std::hypot((*offset)[0], (*offset)[1]);
+  const double radius_mm = math::hypot((*offset)[0], (*offset)[1]);
   event.segments.reserve(pieces->size());
   for (std::size_t i = 0; i < pieces->size(); ++i) {
     const ArcPiece& piece = (*pieces)[i];

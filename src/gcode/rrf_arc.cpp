@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "arc.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::gcode {
 namespace {
@@ -25,9 +26,9 @@ double angle_of(const Arc& arc) {
     return kTurn;
   }
   const auto [i, j] = arc.centre_offset_mm;
-  const double first = std::atan2(-j, -i);
+  const double first = math::atan2(-j, -i);
   const double last =
-      std::atan2(arc.end_mm[1] - arc.start_mm[1] - j, arc.end_mm[0] - arc.start_mm[0] - i);
+      math::atan2(arc.end_mm[1] - arc.start_mm[1] - j, arc.end_mm[0] - arc.start_mm[0] - i);
   const double angle = arc.clockwise ? first - last : last - first;
   return angle < 0.0 ? angle + kTurn : angle;
 }
@@ -48,19 +49,19 @@ double segment_count(double radius_mm, double angle, double feed_mm_s) {
 
 ArcPieces plan_rrf_arc(const Arc& arc, double feed_mm_s) {
   const auto [i, j] = arc.centre_offset_mm;
-  const double radius_mm = std::hypot(i, j);
+  const double radius_mm = math::hypot(i, j);
   const double angle = angle_of(arc);
   const double count = segment_count(radius_mm, angle, feed_mm_s);
   if (!(count <= kMostArcPieces)) {
     return std::nullopt;
   }
-  const double first = std::atan2(-j, -i);
+  const double first = math::atan2(-j, -i);
   const double step = (arc.clockwise ? -angle : angle) / count;
   std::vector<ArcPiece> pieces(static_cast<std::size_t>(count));
   for (std::size_t n = 1; n < pieces.size(); ++n) {
     const double at = first + static_cast<double>(n) * step;
-    pieces[n - 1] = {{arc.start_mm[0] + i + radius_mm * std::cos(at),
-                      arc.start_mm[1] + j + radius_mm * std::sin(at)},
+    pieces[n - 1] = {{arc.start_mm[0] + i + radius_mm * math::cos(at),
+                      arc.start_mm[1] + j + radius_mm * math::sin(at)},
                      static_cast<double>(n) / count};
   }
   pieces.back() = {{arc.end_mm[0], arc.end_mm[1]}, 1.0};

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "controller.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::hotend {
 namespace {
@@ -260,7 +261,7 @@ std::optional<double> lead_s(const Plant& plant, double from_c, double to_c, dou
     return std::nullopt;  // beyond where the hotend would go
   }
   const OneLag lag = plant.one_lag();
-  return lag.dead_time_s + lag.time_constant_s * std::log(ratio);
+  return lag.dead_time_s + lag.time_constant_s * math::log(ratio);
 }
 
 std::vector<Ahead> choose_ahead(const Loop& loop, const Course& course,

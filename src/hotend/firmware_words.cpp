@@ -4,12 +4,14 @@
 
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::hotend {
 namespace {
 
 // K of a τ, and τ of a K, since K τ = ΔT / (ΔT/100)^E.
 double across_power_law(double value, double rise_c, double exponent) {
-  return rise_c / (value * std::pow(rise_c / 100.0, exponent));
+  return rise_c / (value * math::pow(rise_c / 100.0, exponent));
 }
 
 }  // namespace

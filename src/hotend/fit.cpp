@@ -20,6 +20,7 @@
 #include "fit_errors.hpp"
 #include "fit_model.hpp"
 #include "jumps.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::hotend {
 namespace {
@@ -37,13 +38,13 @@ Eigen::Vector3d within_bounds(Eigen::Vector3d p) {
   constexpr double kLongestConstant_s = 5000.0;
   constexpr double kLongestLag_s = 100.0;
   constexpr double kLongestDeadTime_s = 60.0;
-  p[0] = std::clamp(p[0], std::log(2.0), std::log(kLongestConstant_s));
-  p[1] = std::clamp(p[1], std::log(kShortestLag_s), std::min(p[0], std::log(kLongestLag_s)));
+  p[0] = std::clamp(p[0], math::log(2.0), math::log(kLongestConstant_s));
+  p[1] = std::clamp(p[1], math::log(kShortestLag_s), std::min(p[0], math::log(kLongestLag_s)));
   p[2] = std::clamp(p[2], 0.0, kLongestDeadTime_s);
   return p;
 }
 
-Lags lags_of(const Eigen::Vector3d& p) { return {std::exp(p[0]), std::exp(p[1]), p[2]}; }
+Lags lags_of(const Eigen::Vector3d& p) { return {math::exp(p[0]), math::exp(p[1]), p[2]}; }
 
 class Search {
  public:
@@ -147,7 +148,7 @@ class Search {
     for (const double constant_s : {15.0, 40.0, 100.0, 200.0, 400.0, 900.0}) {
       for (const double lag_s : {0.5, 2.5, 8.0}) {
         for (const double dead_time_s : {0.5, 2.0, 4.0, 6.0, 9.0, 14.0, 22.0, 35.0}) {
-          found.push_back(at({std::log(constant_s), std::log(lag_s), dead_time_s}));
+          found.push_back(at({math::log(constant_s), math::log(lag_s), dead_time_s}));
         }
       }
     }
@@ -298,8 +299,8 @@ Result<PlantFit> fit_plant(const Log& log, const FitOptions& options) {
       worth_of_data = independent(solution.residual.head(model.size()));
     }
     const auto count = static_cast<double>(model.size());
-    const double criterion = *worth_of_data * std::log(std::max(solution.sum / count, 1e-12)) +
-                             (beginning.at_rest ? 0.0 : 2.0 * std::log(*worth_of_data) + kWorth);
+    const double criterion = *worth_of_data * math::log(std::max(solution.sum / count, 1e-12)) +
+                             (beginning.at_rest ? 0.0 : 2.0 * math::log(*worth_of_data) + kWorth);
     if (!best || criterion < least) {
       least = criterion;
       best = fit_of(log, search, solution, beginning, options, temperature_c);

@@ -15,6 +15,7 @@
 #include <cstddef>
 
 #include "jumps.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::hotend {
 namespace {
@@ -56,7 +57,7 @@ class FadingSum {
 
  private:
   void fade_to(double time_s) {
-    sum_ *= std::exp(-(at_s_ - time_s) / constant_s_);
+    sum_ *= math::exp(-(at_s_ - time_s) / constant_s_);
     at_s_ = time_s;
   }
 

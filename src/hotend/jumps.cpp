@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
 #include "unflex/hotend/plant.hpp"
 
 namespace unflex::hotend {
@@ -44,7 +45,7 @@ Eigen::MatrixXd columns_of(const std::vector<Jump>& jumps, const Log& log, const
       if (since_s > 0.0) {
         columns(k, j) =
             jump.width_s / apart_s *
-            (std::exp(-since_s / lags.time_constant_s) - std::exp(-since_s / lags.sensor_lag_s));
+            (math::exp(-since_s / lags.time_constant_s) - math::exp(-since_s / lags.sensor_lag_s));
       }
     }
   }

@@ -53,8 +53,8 @@ std::size_t meaning(std::string_view name) {
   std::string lower(name);
   std::ranges::transform(lower, lower.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const auto* const found = std::ranges::find(kNames, std::string_view(lower),
-                                              &std::pair<std::string_view, std::size_t>::first);
+  const auto found = std::ranges::find(kNames, std::string_view(lower),
+                                       &std::pair<std::string_view, std::size_t>::first);
   return found == kNames.end() ? kColumns.size() : found->second;
 }
 

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <string_view>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::hotend {
 
 OneLag Plant::one_lag() const {
@@ -55,8 +57,8 @@ Result<Ultimate> ultimate(const Plant& plant, double sample_s) {
                 "give dead_time_s");
   }
   const auto phase = [&](double omega) {
-    return omega * dead_time_s + std::atan(omega * plant.time_constant_s) +
-           std::atan(omega * plant.sensor_lag_s);
+    return omega * dead_time_s + math::atan(omega * plant.time_constant_s) +
+           math::atan(omega * plant.sensor_lag_s);
   };
   // The phase grows with ω, and the dead time alone has it beyond π at the upper end.
   double low = 0.0;
@@ -67,25 +69,25 @@ Result<Ultimate> ultimate(const Plant& plant, double sample_s) {
     (phase(middle) < std::numbers::pi ? low : high) = middle;
   }
   const double omega = 0.5 * (low + high);
-  return Ultimate{.gain = std::hypot(1.0, omega * plant.time_constant_s) *
-                          std::hypot(1.0, omega * plant.sensor_lag_s) / plant.gain_c,
+  return Ultimate{.gain = math::hypot(1.0, omega * plant.time_constant_s) *
+                          math::hypot(1.0, omega * plant.sensor_lag_s) / plant.gain_c,
                   .period_s = 2.0 * std::numbers::pi / omega};
 }
 
 ExactStep exact_step(double time_constant_s, double sensor_lag_s, double step_s) {
-  ExactStep step{.block = std::exp(-step_s / time_constant_s)};
+  ExactStep step{.block = math::exp(-step_s / time_constant_s)};
   if (sensor_lag_s <= 0.0) {
     step.cross = step.block;
     return step;
   }
-  step.sensor = std::exp(-step_s / sensor_lag_s);
+  step.sensor = math::exp(-step_s / sensor_lag_s);
   // cross = (block − sensor) / (1 − τ₂/τ₁), which is 0/0 where the lags are equal.
   const double apart = 1.0 / sensor_lag_s - 1.0 / time_constant_s;
   constexpr double kClose = 1e-3;
   if (apart == 0.0) {
     step.cross = step.sensor * step_s / sensor_lag_s;
   } else if (std::abs(step_s * apart) < kClose) {
-    step.cross = step.sensor * std::expm1(step_s * apart) / (sensor_lag_s * apart);
+    step.cross = step.sensor * math::expm1(step_s * apart) / (sensor_lag_s * apart);
   } else {
     step.cross = (step.block - step.sensor) / (sensor_lag_s * apart);
   }

@@ -61,8 +61,7 @@ std::string_view to_string(Rule rule) {
 }
 
 std::optional<Rule> rule_of(std::string_view word) {
-  const auto* const found =
-      std::ranges::find(kNames, word, &std::pair<Rule, std::string_view>::second);
+  const auto found = std::ranges::find(kNames, word, &std::pair<Rule, std::string_view>::second);
   return found == kNames.end() ? std::nullopt : std::optional(found->first);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/identify/axis_model.hpp"
 
 namespace unflex::identify {
@@ -36,7 +37,9 @@ struct Band {
   // the nozzle little, and must not cost a mode.
   Eigen::ArrayXd floor = {};
 
-  [[nodiscard]] Eigen::ArrayXd logarithms() const { return (density + floor).log(); }
+  [[nodiscard]] Eigen::ArrayXd logarithms() const {
+    return (density + floor).unaryExpr(&math::log);
+  }
   [[nodiscard]] double top_hz() const { return freq_hz[freq_hz.size() - 1]; }
 };
 

@@ -12,6 +12,7 @@
 
 #include "modes_interval.hpp"
 #include "response.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/identify/axis_model.hpp"
 
 namespace unflex::identify {
@@ -28,8 +29,8 @@ Eigen::MatrixXd covariance_of(const AxisModel& model) {
 Eigen::VectorXd parameters_of(const std::vector<ModeOfAxis>& modes) {
   Eigen::VectorXd result(3 * static_cast<Eigen::Index>(modes.size()));
   for (std::size_t m = 0; m < modes.size(); ++m) {
-    result.segment(3 * static_cast<Eigen::Index>(m), 3) << std::log(modes[m].freq_hz),
-        std::log(modes[m].damping_ratio), modes[m].gain;
+    result.segment(3 * static_cast<Eigen::Index>(m), 3) << math::log(modes[m].freq_hz),
+        math::log(modes[m].damping_ratio), modes[m].gain;
   }
   return result;
 }
@@ -45,7 +46,7 @@ std::vector<std::size_t> matched(const std::vector<ModeOfAxis>& modes,
   }
   for (const ModeOfAxis& one : like) {
     const auto distance = [&](const ModeOfAxis& mode) {
-      return std::abs(std::log(mode.freq_hz / one.freq_hz));
+      return std::abs(math::log(mode.freq_hz / one.freq_hz));
     };
     const auto nearest = std::ranges::min_element(modes, {}, distance);
     const auto at = static_cast<std::size_t>(nearest - modes.begin());
@@ -124,7 +125,7 @@ AxisModel averaged(const std::vector<Measurement>& all) {
 
 double width(const AxisModel& model) {
   const Estimate& main_hz = model.modes.front().freq_hz;
-  return std::log(main_hz.high / main_hz.low);
+  return math::log(main_hz.high / main_hz.low);
 }
 
 // The record whose model is nearest to the others'. Where two are as near, the one with the
@@ -240,7 +241,7 @@ std::vector<Plant> other_plants(const AxisModel& model) {
 bool agree(const std::vector<AxisModel>& models) {
   constexpr double kApart = 0.05;
   const auto main_log = [](const AxisModel& model) {
-    return std::log(model.values().front().freq_hz);
+    return math::log(model.values().front().freq_hz);
   };
   const auto [least, most] = std::ranges::minmax(models, {}, main_log);
   return main_log(most) - main_log(least) < kApart;

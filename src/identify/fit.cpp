@@ -6,6 +6,7 @@
 
 #include "ring_fit.hpp"
 #include "sweep_fit.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/identify/axis_model.hpp"
 
 namespace unflex::identify {
@@ -17,7 +18,7 @@ using Samples = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 double motion(const std::vector<double>& samples) {
   double sum = 0.0;
   for (std::size_t i = 1; i < samples.size(); ++i) {
-    sum += std::pow(samples[i] - samples[i - 1], 2);
+    sum += math::square(samples[i] - samples[i - 1]);
   }
   return sum;
 }

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "modes_interval.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::identify {
 namespace {
@@ -64,7 +65,7 @@ std::string doubt(const Eigen::VectorXd& theta, const Band& band, const ModesMod
     for (const ModeOfAxis& other : modes) {
       // Two modes at one place that work against each other stand for a shape that is neither's.
       if (mode.gain > kLeastOfPair && other.gain < -kLeastOfPair &&
-          std::abs(std::log(mode.freq_hz / other.freq_hz)) < kApart) {
+          std::abs(math::log(mode.freq_hz / other.freq_hz)) < kApart) {
         return "its gains nearly cancel";
       }
     }
@@ -125,13 +126,13 @@ Eigen::VectorXd difference(const std::vector<ModeOfAxis>& best,
   Eigen::VectorXd result = Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(best.size()));
   for (std::size_t m = 0; m < best.size(); ++m) {
     const auto distance = [&](const ModeOfAxis& mode) {
-      return std::abs(std::log(mode.freq_hz / best[m].freq_hz));
+      return std::abs(math::log(mode.freq_hz / best[m].freq_hz));
     };
     const ModeOfAxis nearest = std::ranges::min(other, {}, distance);
     if (distance(nearest) < kFarthest) {
       result.segment(3 * static_cast<Eigen::Index>(m), 3)
-          << std::log(nearest.freq_hz / best[m].freq_hz),
-          std::log(nearest.damping_ratio / best[m].damping_ratio), nearest.gain - best[m].gain;
+          << math::log(nearest.freq_hz / best[m].freq_hz),
+          math::log(nearest.damping_ratio / best[m].damping_ratio), nearest.gain - best[m].gain;
     }
   }
   return result;
@@ -159,7 +160,7 @@ void add_rival(const Solution& solution, double worse, const Band& band, const M
       });
   if (!is_known) {
     choice.rivals.push_back(
-        {theta, std::exp(-0.5 * std::max(worse, 0.0)),
+        {theta, math::exp(-0.5 * std::max(worse, 0.0)),
          reason.empty() && worse < kAsGood &&
              (!has_mode_near(choice.theta, theta[0]) || !has_mode_near(theta, choice.theta[0]))});
   }
@@ -207,7 +208,7 @@ Choice choose(const std::vector<std::vector<Solution>>& found, const Band& band,
       choice.theta = theta;
       choice.spread = Eigen::MatrixXd::Zero(theta.size() - 2, theta.size() - 2);
     } else {
-      const double odd = std::exp(-0.5 * (merit(*solution) - merit(*choice.best)));
+      const double odd = math::exp(-0.5 * (merit(*solution) - merit(*choice.best)));
       const Eigen::VectorXd off = difference(modes_of(choice.theta), modes_of(theta));
       choice.spread += odd * off * off.transpose();
       odds += odd;

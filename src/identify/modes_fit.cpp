@@ -9,6 +9,7 @@
 
 #include "modes_interval.hpp"
 #include "response.hpp"
+#include "unflex/core/math.hpp"
 #include "welch.hpp"
 
 namespace unflex::identify {
@@ -105,7 +106,7 @@ void add_warnings(const Choice& choice, const Band& band, RecordFit& record) {
     record.warnings.push_back(
         fmt::format("another model fits as well, with {:.1f} Hz instead of {:.1f} Hz: measure once "
                     "more",
-                    std::exp(rival->theta[0]), record.model.modes.front().freq_hz.value));
+                    math::exp(rival->theta[0]), record.model.modes.front().freq_hz.value));
   }
   for (const ModeEstimate& mode : record.model.modes) {
     if (mode.freq_hz.value > band.top_hz() && std::abs(mode.gain.value) > kLargeGain) {
@@ -168,7 +169,7 @@ std::string disagreement(const RecordFit& sum, const RecordFit& column) {
   constexpr double kApart = 0.2;
   const double of_sum_hz = sum.model.values().front().freq_hz;
   const double of_column_hz = column.model.values().front().freq_hz;
-  return std::abs(std::log(of_sum_hz / of_column_hz)) > kApart
+  return std::abs(math::log(of_sum_hz / of_column_hz)) > kApart
              ? fmt::format(
                    "the sensor's columns tell of different resonances, {:.1f} Hz and "
                    "{:.1f} Hz",

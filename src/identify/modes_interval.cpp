@@ -10,6 +10,7 @@
 
 #include "modes_search.hpp"
 #include "response.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::identify {
 namespace {
@@ -58,8 +59,8 @@ std::vector<ModeOfAxis> moved(const std::vector<ModeOfAxis>& modes, const Eigen:
   double sum = 0.0;
   for (std::size_t m = 0; m < modes.size(); ++m) {
     const auto at = 3 * static_cast<Eigen::Index>(m);
-    result[m].freq_hz *= std::exp(by[at]);
-    result[m].damping_ratio = std::clamp(modes[m].damping_ratio * std::exp(by[at + 1]),
+    result[m].freq_hz *= math::exp(by[at]);
+    result[m].damping_ratio = std::clamp(modes[m].damping_ratio * math::exp(by[at + 1]),
                                          0.5 * kLeastDamping, 1.5 * kMostDamping);
     result[m].gain += by[at + 2];
     sum += result[m].gain;
@@ -169,7 +170,7 @@ double spread_of_response(double freq_hz, const std::vector<ModeOfAxis>& modes,
   for (Eigen::Index i = 0; i < root.cols(); ++i) {
     const std::complex<double> by =
         (response_of(place, moved(modes, kStep * root.col(i)))[0] - middle) / kStep;
-    variance += std::pow((by / middle).real(), 2);
+    variance += math::square((by / middle).real());
   }
   return std::sqrt(variance);
 }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "response.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "welch_window.hpp"
 
@@ -75,8 +76,8 @@ void ModesModel::operator()(const Eigen::VectorXd& theta, Eigen::ArrayXd& values
   Eigen::ArrayXcd whole = Eigen::ArrayXcd::Zero(places);
   Eigen::ArrayXXcd parts(places, jacobian != nullptr ? 3 * modes : 0);
   for (Eigen::Index m = 0; m < modes; ++m) {
-    const double mode_hz = std::exp(theta[3 * m]);
-    const double damping_ratio = std::exp(theta[3 * m + 1]);
+    const double mode_hz = math::exp(theta[3 * m]);
+    const double damping_ratio = math::exp(theta[3 * m + 1]);
     const double a = theta[3 * m + 2];
     for (Eigen::Index i = 0; i < places; ++i) {
       const double r = fine_hz_[i] / mode_hz;
@@ -112,10 +113,10 @@ void ModesModel::operator()(const Eigen::VectorXd& theta, Eigen::ArrayXd& values
       smeared(i, c) = kernel_.dot(fine.col(c).segment(i * kPartsOfBin, kernel_.size()));
     }
   }
-  const double white = std::exp(theta[3 * modes]);
-  const double rise = std::exp(theta[3 * modes + 1]);
+  const double white = math::exp(theta[3 * modes]);
+  const double rise = math::exp(theta[3 * modes + 1]);
   const Eigen::ArrayXd density = smeared.col(0).array() + white + rise * noise_shape_ + floor_;
-  values = density.log();
+  values = density.unaryExpr(&math::log);
   if (jacobian != nullptr) {
     jacobian->resize(bins, theta.size());
     jacobian->leftCols(3 * modes) =
@@ -128,7 +129,7 @@ void ModesModel::operator()(const Eigen::VectorXd& theta, Eigen::ArrayXd& values
 Eigen::ArrayXd ModesModel::density(const Eigen::VectorXd& theta) const {
   Eigen::ArrayXd values;
   (*this)(theta, values, nullptr);
-  return (values.exp() - floor_).max(0.0);
+  return (values.unaryExpr(&math::exp) - floor_).max(0.0);
 }
 
 Eigen::ArrayXd ModesModel::mode_density(const Eigen::VectorXd& theta, Eigen::Index mode) const {
@@ -139,7 +140,7 @@ Eigen::ArrayXd ModesModel::mode_density(const Eigen::VectorXd& theta, Eigen::Ind
 }
 
 Eigen::ArrayXd ModesModel::noise_density(const Eigen::VectorXd& theta) const {
-  return std::exp(theta[theta.size() - 2]) + std::exp(theta[theta.size() - 1]) * noise_shape_;
+  return math::exp(theta[theta.size() - 2]) + math::exp(theta[theta.size() - 1]) * noise_shape_;
 }
 
 std::vector<ModeOfAxis> modes_of(const Eigen::VectorXd& theta) {
@@ -153,8 +154,8 @@ std::vector<ModeOfAxis> modes_of_logarithms(const Eigen::VectorXd& parameters) {
   }
   std::vector<ModeOfAxis> modes;
   for (Eigen::Index i = 0; i < parameters.size(); i += 3) {
-    modes.push_back({.freq_hz = std::exp(parameters[i]),
-                     .damping_ratio = std::exp(parameters[i + 1]),
+    modes.push_back({.freq_hz = math::exp(parameters[i]),
+                     .damping_ratio = math::exp(parameters[i + 1]),
                      .gain = parameters[i + 2] / sum});
   }
   return modes;

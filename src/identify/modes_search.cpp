@@ -5,6 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::identify {
 namespace {
 
@@ -16,15 +18,15 @@ constexpr double kFirstNoise = 1e-3;
 
 double bic_of(const ModesModel& model, const RobustFit& fit, Eigen::Index unknowns) {
   const double bins = model.independent_bins();
-  return bins * std::log(fit.loss / static_cast<double>(fit.residual.size())) +
-         static_cast<double>(unknowns) * std::log(bins);
+  return bins * math::log(fit.loss / static_cast<double>(fit.residual.size())) +
+         static_cast<double>(unknowns) * math::log(bins);
 }
 
 Eigen::VectorXd with_mode(const Eigen::VectorXd& theta, double freq_hz, double damping_ratio,
                           double a) {
   const Eigen::Index count = theta.size() - 2;
   Eigen::VectorXd result(theta.size() + 3);
-  result << theta.head(count), std::log(freq_hz), std::log(damping_ratio), a, theta.tail(2);
+  result << theta.head(count), math::log(freq_hz), math::log(damping_ratio), a, theta.tail(2);
   return result;
 }
 
@@ -159,15 +161,15 @@ class Search {
   }
 
   [[nodiscard]] Eigen::VectorXd without_modes() const {
-    return Eigen::Vector2d(std::log(kFirstNoise),
-                           noise_rises_ ? std::log(kFirstNoise) : kNoRise_log);
+    return Eigen::Vector2d(math::log(kFirstNoise),
+                           noise_rises_ ? math::log(kFirstNoise) : kNoRise_log);
   }
 
   // Scales all amplitudes so that the logarithm of the density is right on average.
   [[nodiscard]] Eigen::VectorXd scaled(Eigen::VectorXd theta) const {
     Eigen::ArrayXd values;
     model_(theta, values, nullptr);
-    const double factor = std::exp(0.5 * (logarithms_ - values).mean());
+    const double factor = math::exp(0.5 * (logarithms_ - values).mean());
     for (Eigen::Index m = 0; m < modes_in(theta); ++m) {
       theta[3 * m + 2] *= factor;
     }
@@ -177,8 +179,8 @@ class Search {
   [[nodiscard]] Eigen::VectorXd random_start(Eigen::Index modes) {
     Eigen::VectorXd theta = without_modes();
     for (Eigen::Index m = 0; m < modes; ++m) {
-      const double freq_hz = 20.0 * std::pow(6.5, uniform(0.0, 1.0));
-      const double damping_ratio = 0.03 * std::pow(8.0, uniform(0.0, 1.0));
+      const double freq_hz = 20.0 * math::pow(6.5, uniform(0.0, 1.0));
+      const double damping_ratio = 0.03 * math::pow(8.0, uniform(0.0, 1.0));
       const double a = m == 0 ? 1.0 : uniform(-0.4, 0.8);
       theta = with_mode(theta, freq_hz, damping_ratio, a);
     }
@@ -273,13 +275,13 @@ Prior prior_of(const Eigen::VectorXd& theta, const Sweep& sweep) {
     prior.precision[i] = kVariance / (deviation * deviation);
   };
   for (Eigen::Index m = 0; m < modes; ++m) {
-    set(3 * m, std::log(std::max(0.9 * kFitFrom_hz, sweep.start_hz)), std::log(1.25 * sweep.end_hz),
-        std::log(60.0), 1.5);
-    set(3 * m + 1, std::log(kLeastDamping), std::log(kMostDamping), std::log(0.08), 0.8);
+    set(3 * m, math::log(std::max(0.9 * kFitFrom_hz, sweep.start_hz)),
+        math::log(1.25 * sweep.end_hz), math::log(60.0), 1.5);
+    set(3 * m + 1, math::log(kLeastDamping), math::log(kMostDamping), math::log(0.08), 0.8);
     set(3 * m + 2, -30.0, 30.0, 0.0, 2.0);
   }
   for (Eigen::Index i = 3 * modes; i < count; ++i) {
-    set(i, std::log(1e-8), std::log(10.0), std::log(1e-3), 3.0);
+    set(i, math::log(1e-8), math::log(10.0), math::log(1e-3), 3.0);
   }
   if (!rises(theta)) {
     prior.low[count - 1] = prior.high[count - 1] = prior.centre[count - 1] = kNoRise_log;
@@ -291,7 +293,7 @@ Solution rigid(const ModesModel& model, const Eigen::ArrayXd& logarithms) {
   constexpr double kFarAbove_hz = 1e5;
   constexpr Eigen::Index kUnknowns = 3;
   Prior prior = prior_of(Eigen::VectorXd::Zero(5), Sweep{});
-  prior.low[0] = prior.high[0] = prior.centre[0] = std::log(kFarAbove_hz);
+  prior.low[0] = prior.high[0] = prior.centre[0] = math::log(kFarAbove_hz);
   prior.low[1] = prior.high[1] = prior.centre[1];
   Solution best;
   for (const double a : {1.0, 0.1}) {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::identify {
 namespace {
 
@@ -24,13 +26,13 @@ Eigen::ArrayXd sweep_energy(const Eigen::ArrayXd& freq_hz, double start_hz) {
   constexpr std::array kHarmonics = {3.0, 5.0};
   Eigen::ArrayXd energy = freq_hz.square();
   for (const double n : kHarmonics) {
-    energy += (freq_hz > n * start_hz).select(freq_hz.square() / std::pow(n, 5), 0.0);
+    energy += (freq_hz > n * start_hz).select(freq_hz.square() / math::power(n, 5), 0.0);
   }
   return energy;
 }
 
 Estimate estimate_of(double value, double log_variance) {
-  const double factor = std::exp(kQuantile * std::sqrt(std::max(log_variance, 0.0)));
+  const double factor = math::exp(kQuantile * std::sqrt(std::max(log_variance, 0.0)));
   return {.value = value, .low = value / factor, .high = value * factor};
 }
 

@@ -18,6 +18,7 @@
 #include "fourier.hpp"
 #include "least_squares.hpp"
 #include "modes_interval.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::identify {
 namespace {
@@ -41,13 +42,14 @@ Swings swings(const Eigen::ArrayXd& time_s, double freq_hz, double given_damping
   const double damping_ratio = std::min(given_damping_ratio, kGreatest);
   const double omega = 2.0 * std::numbers::pi * freq_hz;
   const double omega_d = omega * std::sqrt(1.0 - damping_ratio * damping_ratio);
-  const Eigen::ArrayXd envelope = (-damping_ratio * omega * time_s).exp();
-  return {envelope * (omega_d * time_s).cos(), envelope * (omega_d * time_s).sin()};
+  const Eigen::ArrayXd envelope = (-damping_ratio * omega * time_s).unaryExpr(&math::exp);
+  const Eigen::ArrayXd phase = omega_d * time_s;
+  return {envelope * phase.unaryExpr(&math::cos), envelope * phase.unaryExpr(&math::sin)};
 }
 
 // The model; p is ln f, ln ζ, a, b, c, then a and b of each known mode.
 Eigen::ArrayXd ringing(const Eigen::ArrayXd& time_s, const Eigen::VectorXd& p, const Known& known) {
-  const Swings own = swings(time_s, std::exp(p[0]), std::exp(p[1]));
+  const Swings own = swings(time_s, math::exp(p[0]), math::exp(p[1]));
   Eigen::ArrayXd sum = p[2] * own.cosine + p[3] * own.sine + p[4];
   Eigen::Index at = 5;
   for (const ModeOfAxis& mode : known) {
@@ -63,7 +65,7 @@ Eigen::VectorXd with_amplitudes(const Eigen::ArrayXd& time_s, const Eigen::Array
                                 double freq_hz, double damping_ratio, const Known& known) {
   const Eigen::Index amplitudes = 3 + 2 * static_cast<Eigen::Index>(known.size());
   Eigen::VectorXd p = Eigen::VectorXd::Zero(2 + amplitudes);
-  p.head(2) << std::log(freq_hz), std::log(damping_ratio);
+  p.head(2) << math::log(freq_hz), math::log(damping_ratio);
   Eigen::MatrixXd columns(data.size(), amplitudes);
   for (Eigen::Index column = 0; column < amplitudes; ++column) {
     Eigen::VectorXd unit = p;
@@ -115,7 +117,7 @@ struct Ringing {
   Eigen::ArrayXd data;
 
   [[nodiscard]] double amplitude() const {
-    return std::hypot(fit.parameters[2], fit.parameters[3]);
+    return math::hypot(fit.parameters[2], fit.parameters[3]);
   }
 };
 
@@ -141,11 +143,12 @@ std::optional<Ringing> fit_from(const Eigen::ArrayXd& all, Eigen::Index start, d
       is_first = false;
     }
   }
-  const double freq_hz = std::exp(result.fit.parameters[0]);
+  const double freq_hz = math::exp(result.fit.parameters[0]);
   result.spread = std::sqrt(result.fit.weighted_sum /
                             static_cast<double>(result.data.size() - result.fit.parameters.size()));
   const bool usable = freq_hz > kLowest_hz && freq_hz < kHighest_hz &&
-                      std::exp(result.fit.parameters[1]) < kMostDamping && is_apart(freq_hz, known);
+                      math::exp(result.fit.parameters[1]) < kMostDamping &&
+                      is_apart(freq_hz, known);
   return usable ? std::optional(std::move(result)) : std::nullopt;
 }
 
@@ -214,9 +217,9 @@ Result<RecordFit> fit_ringing(const std::vector<double>& samples, double rate_hz
   }
   const Eigen::ArrayXd weights = Eigen::ArrayXd::Ones(ring->data.size());
   const auto period = std::max<Eigen::Index>(
-      1, static_cast<Eigen::Index>(rate_hz / std::exp(ring->fit.parameters[0])));
-  const double freq_hz = std::exp(ring->fit.parameters[0]);
-  const double damping_ratio = std::exp(ring->fit.parameters[1]);
+      1, static_cast<Eigen::Index>(rate_hz / math::exp(ring->fit.parameters[0])));
+  const double freq_hz = math::exp(ring->fit.parameters[0]);
+  const double damping_ratio = math::exp(ring->fit.parameters[1]);
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(3, 3);
   covariance.topLeftCorner(2, 2) = sandwich(ring->fit, weights, period).topLeftCorner(2, 2);
   RecordFit record;

@@ -20,6 +20,7 @@
 #include "modes_interval.hpp"
 #include "modes_model.hpp"
 #include "response.hpp"
+#include "unflex/core/math.hpp"
 #include "welch.hpp"
 
 namespace unflex::identify {
@@ -71,12 +72,12 @@ FineBand fine_band_of(const EnergySpectrum& spectrum, const Sweep& sweep) {
 
 // Parameters are those of ModesModel: log f, log ζ and a for each mode, then log N₀ and log N₁.
 Eigen::ArrayXd noise_of(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p) {
-  return std::exp(p[p.size() - 2]) + std::exp(p[p.size() - 1]) * noise_rise(freq_hz);
+  return math::exp(p[p.size() - 2]) + math::exp(p[p.size() - 1]) * noise_rise(freq_hz);
 }
 
 // What mode m alone would give at frequencies ν.
 Eigen::ArrayXcd answer(const Eigen::ArrayXd& freq_hz, const Eigen::VectorXd& p, Eigen::Index m) {
-  return p[3 * m + 2] * mode_response(freq_hz, std::exp(p[3 * m]), std::exp(p[3 * m + 1]));
+  return p[3 * m + 2] * mode_response(freq_hz, math::exp(p[3 * m]), math::exp(p[3 * m + 1]));
 }
 
 Eigen::ArrayXd energy_of(const Eigen::ArrayXd& freq_hz, const Eigen::ArrayXd& excitation,
@@ -120,7 +121,7 @@ Eigen::VectorXd start_of(const FineBand& band, const Eigen::ArrayXd& excitation,
                          const Eigen::VectorXd& theta) {
   constexpr double kFirstNoise = 0.05;
   Eigen::VectorXd start = theta;
-  start.tail(2).setConstant(std::log(kFirstNoise));
+  start.tail(2).setConstant(math::log(kFirstNoise));
   const double mean =
       (energy_of(band.freq_hz, excitation, start) - noise_of(band.freq_hz, start)).mean();
   for (Eigen::Index m = 0; m < modes_in(start); ++m) {

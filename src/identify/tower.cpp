@@ -5,14 +5,15 @@
 
 #include "modes_interval.hpp"
 #include "response.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::identify {
 namespace {
 
 // ζ from the ratio of two successive waves: δ = ln ratio = 2πζ / √(1 − ζ²).
 double damping_of(double ratio) {
-  const double decrement = std::log(ratio);
-  return decrement / std::hypot(2.0 * std::numbers::pi, decrement);
+  const double decrement = math::log(ratio);
+  return decrement / math::hypot(2.0 * std::numbers::pi, decrement);
 }
 
 }  // namespace
@@ -40,7 +41,7 @@ Result<RecordFit> fit_tower(const Tower& tower) {
   RecordFit record;
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(3, 3);
   const double spread = std::max(tower.spacing_spread_mm / tower.spacing_mm, kLeast);
-  covariance(0, 0) = std::pow(spread / kQuantile, 2);
+  covariance(0, 0) = math::square(spread / kQuantile);
   Estimate damping{.value = 0.1, .low = 0.03, .high = 0.2};
   if (tower.decay == 0.0) {
     record.warnings.emplace_back(
@@ -51,7 +52,7 @@ Result<RecordFit> fit_tower(const Tower& tower) {
                .low = damping_of(least),
                .high = damping_of(tower.decay + tower.decay_spread)};
   }
-  covariance(1, 1) = std::pow(std::log(damping.high / damping.low) / (2.0 * kQuantile), 2);
+  covariance(1, 1) = math::square(math::log(damping.high / damping.low) / (2.0 * kQuantile));
   record.model = model_of(Method::tower, {{freq_hz, damping.value}}, covariance);
   record.model.modes.front().damping_ratio = damping;
   return record;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::identify {
 
 Eigen::VectorXd kaiser_amplitude() {
@@ -12,7 +14,8 @@ Eigen::VectorXd kaiser_amplitude() {
     const double square =
         kBetaOfWindow * kBetaOfWindow - std::numbers::pi * std::numbers::pi * x * x;
     const double root = std::sqrt(std::abs(square));
-    amplitude[i] = root < 1e-9 ? 1.0 : (square > 0.0 ? std::sinh(root) : std::sin(root)) / root;
+    const auto sinh = [](double of) { return 0.5 * (math::expm1(of) - math::expm1(-of)); };
+    amplitude[i] = root < 1e-9 ? 1.0 : (square > 0.0 ? sinh(root) : math::sin(root)) / root;
   }
   return amplitude;
 }

@@ -1,7 +1,6 @@
 // Small files as text.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "unflex/core/error.hpp"
@@ -9,6 +8,6 @@
 namespace unflex::machine {
 
 // The whole file. Errors are of kind usage; a file that is too large for a printer file is one.
-[[nodiscard]] Result<std::string> read_printer_file(const std::filesystem::path& file);
+[[nodiscard]] Result<std::string> read_printer_file(const std::string& file);
 
 }  // namespace unflex::machine

@@ -1,18 +1,15 @@
 #include "klipper_config.hpp"
 
 #include <fmt/core.h>
-#include <glob.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "file_text.hpp"
 #include "text_lines.hpp"
+#include "unflex/platform/files.hpp"
 
 namespace unflex::machine {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::string_view kSavedMark = "#*#";
 constexpr std::string_view kSavedHeader =
@@ -87,16 +84,6 @@ Status parse_line(Parser& parser, std::string_view line, std::size_t number) {
   return {};
 }
 
-// The files that a pattern names, sorted.
-std::vector<std::string> included_files(const std::string& pattern) {
-  glob_t found{};
-  static_cast<void>(::glob(pattern.c_str(), GLOB_NOSORT, nullptr, &found));
-  std::vector<std::string> files(found.gl_pathv, found.gl_pathv + found.gl_pathc);
-  ::globfree(&found);
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 void note_missing(const std::string& path, const SourcePlace& place, KlipperConfig& config) {
   config.missing.push_back({.place = place, .path = path});
   config.notes.push_back(
@@ -107,25 +94,24 @@ void note_missing(const std::string& path, const SourcePlace& place, KlipperConf
 }
 
 Status parse_file(std::string_view text, const std::string& file, KlipperConfig& config,
-                  std::vector<fs::path>& open_files);
+                  std::vector<std::string>& open_files);
 
 Status include(std::string_view pattern, const SourcePlace& place, KlipperConfig& config,
-               std::vector<fs::path>& open_files) {
-  const std::string path = (fs::path(place.file).parent_path() / pattern).string();
-  const std::vector<std::string> files = included_files(path);
+               std::vector<std::string>& open_files) {
+  const std::string path = platform::name_beside(place.file, pattern);
+  const std::vector<std::string> files = platform::matching_files(path);
   if (files.empty() && path.find_first_of("*?[") != std::string::npos) {
     config.missing.push_back({.place = place, .path = path, .is_allowed = true});
   } else if (files.empty()) {
     note_missing(path, place, config);
   }
   for (const std::string& file : files) {
-    std::error_code ignored;
     // Mainsail and Fluidd put links here, which lead nowhere once they are copied.
-    if (!fs::exists(file, ignored)) {
+    if (!platform::exists(file)) {
       note_missing(file, place, config);
       continue;
     }
-    if (std::ranges::find(open_files, fs::weakly_canonical(file, ignored)) != open_files.end()) {
+    if (std::ranges::find(open_files, platform::canonical_name(file)) != open_files.end()) {
       return fail(ErrorKind::usage, place, fmt::format("{} includes itself", file));
     }
     const Result<std::string> text = read_printer_file(file);
@@ -140,9 +126,8 @@ Status include(std::string_view pattern, const SourcePlace& place, KlipperConfig
 }
 
 Status parse_file(std::string_view text, const std::string& file, KlipperConfig& config,
-                  std::vector<fs::path>& open_files) {
-  std::error_code ignored;
-  open_files.push_back(fs::weakly_canonical(file, ignored));
+                  std::vector<std::string>& open_files) {
+  open_files.push_back(platform::canonical_name(file));
   Parser parser{.file = file, .config = &config};
   Status status;
   for_each_line(text, 1, [&](std::string_view line, std::size_t number) {
@@ -246,7 +231,7 @@ const KlipperSection* KlipperConfig::find(const std::string& section) const {
 
 Result<KlipperConfig> parse_klipper_config(std::string_view text, const std::string& file) {
   KlipperConfig config;
-  std::vector<fs::path> open_files;
+  std::vector<std::string> open_files;
   const std::size_t saved = text.find(kSavedHeader);
   const std::string_view written = text.substr(0, saved);
   if (Status parsed = parse_file(written, file, config, open_files); !parsed) {

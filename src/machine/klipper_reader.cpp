@@ -229,7 +229,7 @@ class Reader {
       }
     }
     const KlipperOption& given = *option("printer", "kinematics");
-    const auto* known = std::ranges::find(kKinematics, given.text, &KnownKinematics::name);
+    const auto known = std::ranges::find(kKinematics, given.text, &KnownKinematics::name);
     if (known == kKinematics.end()) {
       return fail(
           ErrorKind::usage, given.place,

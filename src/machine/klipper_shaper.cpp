@@ -27,7 +27,7 @@ constexpr std::array kRows = {Row{"zv", 1.01, 0.03},       Row{"mzv", 1.015, 0.0
 }  // namespace
 
 std::optional<ShaperResonance> resonance_of_shaper(std::string_view type, double shaper_freq_hz) {
-  const auto* const row = std::ranges::find(kRows, type, &Row::type);
+  const auto row = std::ranges::find(kRows, type, &Row::type);
   if (row == kRows.end()) {
     return std::nullopt;
   }

@@ -297,7 +297,7 @@ Status read_print(const Sources& sources, Draft& draft) {
 Status read_sources(const Sources& sources, Draft& draft) {
   if (sources.printer_file) {
     const Result<std::string> text = read_printer_file(*sources.printer_file);
-    const Status read = text ? read_printer(*text, sources.printer_file->string(), draft)
+    const Status read = text ? read_printer(*text, *sources.printer_file, draft)
                              : Status(tl::unexpected(text.error()));
     if (!read) {
       return read;
@@ -341,7 +341,7 @@ Result<Settings> load(const Sources& sources) {
   return finish(std::move(draft));
 }
 
-Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
+Result<Settings> load(const std::optional<std::string>& printer_file,
                       const std::vector<std::string>& overrides) {
   return load(Sources{.print = nullptr, .printer_file = printer_file, .overrides = overrides});
 }

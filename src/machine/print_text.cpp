@@ -1,10 +1,12 @@
 #include "unflex/machine/print_text.hpp"
 
 #include <algorithm>
-#include <fstream>
+#include <istream>
+#include <memory>
 #include <utility>
 
 #include "unflex/gcode/command.hpp"
+#include "unflex/platform/files.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -42,16 +44,16 @@ std::size_t head_end(std::string_view text) {
   return is_full ? text.rfind('\n') + 1 : std::string_view::npos;
 }
 
-Result<PrintText> read_print_text(const std::filesystem::path& file, const std::string& name) {
-  std::ifstream stream(file, std::ios::binary);
+Result<PrintText> read_print_text(const std::string& file, const std::string& name) {
+  const std::unique_ptr<std::istream> stream = platform::read_file(file);
   PrintText print{.name = name, .head = {}, .tail = {}, .tail_line = 1, .is_stream = false};
   std::string block(kBlockBytes, '\0');
   std::size_t lines = 0;
   bool in_head = true;
   // One pass through all of the file, since a line's number needs the count of the lines before it.
-  while (stream.read(block.data(), static_cast<std::streamsize>(block.size())) ||
-         stream.gcount() > 0) {
-    const std::string_view read(block.data(), static_cast<std::size_t>(stream.gcount()));
+  while (stream->read(block.data(), static_cast<std::streamsize>(block.size())) ||
+         stream->gcount() > 0) {
+    const std::string_view read(block.data(), static_cast<std::size_t>(stream->gcount()));
     lines += static_cast<std::size_t>(std::ranges::count(read, '\n'));
     if (in_head) {
       print.head += read;
@@ -64,7 +66,7 @@ Result<PrintText> read_print_text(const std::filesystem::path& file, const std::
       print.tail.erase(0, print.tail.size() - kTailBytes);
     }
   }
-  if (stream.bad() || !stream.eof()) {
+  if (stream->bad() || !stream->eof()) {
     return fail(ErrorKind::input, {name, 0}, "cannot read the file");
   }
   const std::size_t in_tail = static_cast<std::size_t>(std::ranges::count(print.tail, '\n'));

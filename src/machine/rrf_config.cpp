@@ -173,7 +173,7 @@ Status RrfConfigReader::kinematics(const gcode::Command& command, std::string_vi
                                  Type{2, Kinematics::corexz}, Type{11, Kinematics::hybrid_corexy}};
   constexpr int kLastOfOld = 2;
   const int number = to_int(*value);
-  const auto* type = std::ranges::find(kTypes, number, &Type::number);
+  const auto type = std::ranges::find(kTypes, number, &Type::number);
   if (type == kTypes.end() || (is_old && number > kLastOfOld)) {
     return refuse(
         place, fmt::format("kinematics {}{} is a machine that {}", letter, number, kNotSupported));

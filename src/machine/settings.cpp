@@ -13,6 +13,7 @@
 #include <limits>
 #include <numbers>
 
+#include "unflex/core/math.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
 #include "variants.hpp"
@@ -220,7 +221,7 @@ double Settings::most_of_motor() const {
   double most = 0.0;
   const Motors motors(kinematics.type, printer.firmware);
   for (const auto& row : motors.rows()) {
-    most = std::max(most, std::hypot(row[0], row[1]));
+    most = std::max(most, math::hypot(row[0], row[1]));
   }
   return most;
 }

@@ -152,7 +152,7 @@ class Reader {
     if (given == nullptr) {
       return std::nullopt;
     }
-    const auto* const known = std::ranges::find(kFlavors, lower(given->text), &Flavor::name);
+    const auto known = std::ranges::find(kFlavors, lower(given->text), &Flavor::name);
     if (known != kFlavors.end()) {
       return known->firmware;
     }

@@ -110,15 +110,15 @@ Result<std::string> with_values(std::string_view text, const std::string& name,
                             by_hand));
   }
   std::string result(text);
-  try {
-    // Each new line goes right below its section's name, so the last comes first.
-    for (const TomlEdit& edit : edits | std::views::reverse) {
-      const toml::table root = toml::parse(result);
-      const toml::node_view<const toml::node> node = root.at_path(edit.key);
-      result = node ? replaced(result, node.node()->source(), edit) : inserted(result, root, edit);
+  // Each new line goes right below its section's name, so the last comes first.
+  for (const TomlEdit& edit : edits | std::views::reverse) {
+    const toml::parse_result parsed = toml::parse(result);
+    if (!parsed) {
+      return refused();
     }
-  } catch (const toml::parse_error&) {
-    return refused();
+    const toml::table& root = parsed.table();
+    const toml::node_view<const toml::node> node = root.at_path(edit.key);
+    result = node ? replaced(result, node.node()->source(), edit) : inserted(result, root, edit);
   }
   // The file is the user's. So what was written is read again before anyone relies on it.
   const auto before = others(text, edits);

@@ -121,26 +121,23 @@ toml::table parse_override_value(std::string_view text) {
   if (const std::optional<double> number = parse_number(text)) {
     return toml::table{{"value", *number}};
   }
-  try {
-    toml::table table = toml::parse(fmt::format("value = {}", text));
-    if (table.size() == 1) {
-      return table;
-    }
-  } catch (const toml::parse_error&) {
-    // Not TOML: a bare word, which the caller takes or rejects by the key's type.
+  toml::parse_result parsed = toml::parse(fmt::format("value = {}", text));
+  if (parsed && parsed.table().size() == 1) {
+    return std::move(parsed).table();
   }
+  // Not TOML: a bare word, which the caller takes or rejects by the key's type.
   return toml::table{{"value", std::string(text)}};
 }
 
 }  // namespace
 
 Status read_toml(std::string_view text, const std::string& name, Draft& draft) {
-  try {
-    return store_all(toml::parse(text), name, draft);
-  } catch (const toml::parse_error& error) {
-    return fail(ErrorKind::usage, {name, error.source().begin.line},
-                fmt::format("not valid TOML: {}", error.description()));
+  const toml::parse_result parsed = toml::parse(text);
+  if (!parsed) {
+    return fail(ErrorKind::usage, {name, parsed.error().source().begin.line},
+                fmt::format("not valid TOML: {}", parsed.error().description()));
   }
+  return store_all(parsed.table(), name, draft);
 }
 
 Status apply_override(const std::string& text, Draft& draft) {

@@ -12,6 +12,7 @@
 
 #include "key_table.hpp"
 #include "toml_reader.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/feature.hpp"
 #include "unflex/machine/recommend.hpp"
@@ -30,7 +31,7 @@ std::optional<SourcePlace> place_of(const Draft& draft, std::string_view key) {
 
 // Rounds a bound to three digits that a user may type, so that the result keeps the bound.
 double typed(double value, double (*round)(double)) {
-  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
+  const double unit = math::pow(10.0, std::floor(math::log10(value)) - 2.0);
   return round(value / unit) * unit;
 }
 std::string at_most(double value) { return readable(typed(value, std::floor)); }
@@ -360,7 +361,7 @@ Status check_second(const Draft& draft) {
                                   key, second_hz, most));
     }
     for (const double hz : known_hz) {
-      if (std::abs(std::log(second_hz / hz)) < kNear) {
+      if (std::abs(math::log(second_hz / hz)) < kNear) {
         return conflict(draft, {key},
                         fmt::format("{} is {}, the same as the axis' own {:.4g} Hz; measure the "
                                     "axis again instead",

@@ -2,18 +2,19 @@
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
-#include <fstream>
+#include <istream>
 #include <iterator>
+#include <memory>
+#include <ostream>
 #include <utility>
 #include <vector>
 
 #include "compensate_pass.hpp"
 #include "extruded_path.hpp"
-#include "fd_stream.hpp"
 #include "report_rows.hpp"
 #include "retime.hpp"
 #include "rewrite_lines.hpp"
+#include "stream_buffers.hpp"
 #include "unflex/core/errno_text.hpp"
 #include "unflex/pipeline/temperature.hpp"
 #include "unflex/report/format.hpp"
@@ -52,26 +53,21 @@ PassOutcome pass(const Job& job, const Engines& engines, const std::vector<verif
     return failed(tl::unexpected(processes.error()));
   }
   CpuSlots slots(job.workers);
-  FdSource source(job, progress, slots);
-  FdSink sink(job, progress, slots);
+  SourceBuffer source(job, progress, slots);
+  SinkBuffer sink(job, progress, slots);
   std::istream in_stream(&source);
   std::ostream out_stream(&sink);
-  std::ifstream in_file;
-  std::ofstream out_file;
-  if (job.input_fd < 0) {
-    in_file.open(job.input, std::ios::binary);
-  }
-  if (job.output_fd < 0) {
-    out_file.open(job.output, std::ios::binary | std::ios::trunc);
-  }
-  if (!in_file) {
+  source.set_stream(in_stream);
+  const std::unique_ptr<std::istream> in_text = job.input_stream ? nullptr : job.input->read();
+  const std::unique_ptr<std::ostream> out_text = job.output_stream ? nullptr : job.output->write();
+  if (in_text && !*in_text) {
     return failed(fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file"));
   }
-  if (!out_file) {
+  if (out_text && !*out_text) {
     return failed(fail(ErrorKind::internal, {job.output_name, 0}, "cannot write the output"));
   }
-  std::istream& input = job.input_fd < 0 ? in_file : in_stream;
-  std::ostream& output = job.output_fd < 0 ? out_file : out_stream;
+  std::istream& input = in_text ? *in_text : in_stream;
+  std::ostream& output = out_text ? *out_text : out_stream;
   PassOutcome outcome = compensate_pass(
       job, engines, kept, {input, output, *processes, slots, [&] { source.stop(); }, last},
       progress, report);
@@ -149,7 +145,7 @@ void warn_of_gap(const Job& job, report::Report& report) {
 
 // A stream has gone by before it is known what comes, so its hotend is not followed.
 Status follow_hotend(const Job& job, Progress& progress, report::Report& report) {
-  if (job.input_fd < 0 && job.output_fd < 0) {
+  if (!job.input_stream && !job.output_stream) {
     return follow_temperature(job, OutputMay::change, progress, report);
   }
   if (job.settings.hotend.ahead) {
@@ -161,15 +157,24 @@ Status follow_hotend(const Job& job, Progress& progress, report::Report& report)
 }
 
 // Whether the output can be written once more.
-bool can_repeat(const Job& job) { return job.input_fd < 0 && job.output_fd < 0; }
+bool can_repeat(const Job& job) { return !job.input_stream && !job.output_stream; }
 
 }  // namespace
+
+Status check_built(EngineChoice engine) {
+  if (engine == EngineChoice::ipopt && !compensate::has_ipopt_engine()) {
+    return fail(ErrorKind::usage, "Ipopt is not built into this unflex; the banded engine solves");
+  }
+  return {};
+}
 
 Result<report::Report> compensate(const Job& job, Progress& progress) {
   if (const std::optional<Diagnostic>& refusal = job.settings.refusal) {
     return fail(ErrorKind::usage, refusal->place, refusal->message);
   }
-  return compensate_with(job, engines_of(job), progress);
+  return check_built(job.check_solver ? EngineChoice::ipopt : job.engine).and_then([&] {
+    return compensate_with(job, engines_of(job), progress);
+  });
 }
 
 Result<report::Report> compensate_with(const Job& job, const Engines& engines, Progress& progress) {
@@ -187,11 +192,11 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
     if (!outcome.status) {
       return tl::unexpected(outcome.status.error());
     }
-    if (report.reference_time_s > 0.0 && job.output_fd < 0) {
+    if (report.reference_time_s > 0.0 && !job.output_stream) {
       if (!job.settings.is_timing_free()) {
         outcome.time_notes.clear();  // all of the print takes about as much longer
       }
-      if (Status status = retime(job.output, job.output_name, outcome.time_notes,
+      if (Status status = retime(*job.output, job.output_name, outcome.time_notes,
                                  {0, report.reference_time_s, report.emitted_time_s});
           !status) {
         return tl::unexpected(status.error());
@@ -200,8 +205,8 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
     if (Status status = follow_hotend(job, progress, report); !status) {
       return tl::unexpected(status.error());
     }
-    if (job.output_fd < 0) {
-      report.output_bytes = std::filesystem::file_size(job.output);
+    if (!job.output_stream) {
+      report.output_bytes = job.output->bytes().value_or(0);
     }
     if (!warn_of_no_run(job, report)) {
       std::ranges::move(remarks(report.extruded_path, report.unknown_commands, job.input_name),

@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -25,6 +23,7 @@
 #include "run_writer.hpp"
 #include "stage_options.hpp"
 #include "task_pool.hpp"
+#include "unflex/core/threads.hpp"
 #include "verify_thread.hpp"
 
 namespace unflex::pipeline {
@@ -86,7 +85,7 @@ machine::Settings as_sliced(machine::Settings settings) {
 // may be worse by more before it counts as a violation.
 verify::Rules rules_of_pass(const Job& job, bool last) {
   verify::Rules rules = verify_rules(job.settings);
-  if (job.output_fd >= 0 || last) {
+  if (job.output_stream || last) {
     rules.leeway = {2.2, 5e-3, 30e-3, rules.leeway.chance_mm};
   }
   return rules;
@@ -175,7 +174,7 @@ class Compensator {
   }
 
   void wake() {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     news_.notify_one();
   }
 
@@ -412,7 +411,7 @@ class Compensator {
       return;
     }
     const CpuSlot::Without without(*slots_);
-    std::unique_lock lock(mutex_);
+    Lock lock(mutex_);
     // The verifier does not tell when it has caught up, so look again soon.
     news_.wait_for(lock, verifier_.is_behind() ? kShortPatience : kPatience, [this] {
       return can_write() || can_feed() || (has_room() && !all_read_ && pieces_.has_news());
@@ -484,7 +483,7 @@ class Compensator {
 
   void put(std::string input, std::string output) {
     bytes_written_ += input.size();
-    if (job_.output_fd >= 0) {
+    if (job_.output_stream) {
       // A stream cannot be corrected at its end, so its durations are scaled by the factor so far.
       output = scaled_lines(output, writer_.time_factor());
     }
@@ -567,8 +566,8 @@ class Compensator {
   double most_done_bytes_ = 0.0;   // with what is done of the runs in the queue
   bool told_of_cap_ = false;
   bool all_read_ = false;
-  std::mutex mutex_;
-  std::condition_variable news_;                // a piece has been read or a run been prepared
+  Mutex mutex_;
+  Condition news_;                              // a piece has been read or a run been prepared
   std::unique_ptr<compensate::Engine> engine_;  // used in threads; null: the processes solve
   std::unique_ptr<compensate::Engine> divider_ =
       compensate::make_banded_engine();  // for solve_in_process()

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <algorithm>
-#include <condition_variable>
-#include <mutex>
+
+#include "unflex/core/threads.hpp"
 
 namespace unflex::pipeline {
 
@@ -14,21 +14,21 @@ class CpuSlots {
   explicit CpuSlots(unsigned count) : free_(std::max(count, 1U)) {}
 
   void take() {
-    std::unique_lock lock(mutex_);
+    Lock lock(mutex_);
     given_.wait(lock, [this] { return free_ > 0; });
     --free_;
   }
   void give() {
     {
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       ++free_;
     }
     given_.notify_one();
   }
 
  private:
-  std::mutex mutex_;
-  std::condition_variable given_;
+  Mutex mutex_;
+  Condition given_;
   unsigned free_;
 };
 

@@ -1,6 +1,7 @@
 #include "unflex/pipeline/filament.hpp"
 
-#include <fstream>
+#include <istream>
+#include <memory>
 #include <utility>
 
 #include "extrusion_mode.hpp"
@@ -9,16 +10,16 @@
 
 namespace unflex::pipeline {
 
-Result<FittedPrint> fit_filament(const std::filesystem::path& print, const std::string& name,
+Result<FittedPrint> fit_filament(const TextStore& print, const std::string& name,
                                  const machine::Settings& settings,
                                  const filament::Profile& profile, bool is_marked,
                                  const std::function<Status(std::string_view)>& write) {
   constexpr std::size_t kBlock = 1U << 16U;
-  std::ifstream stream(print, std::ios::binary);
-  if (!stream) {
+  const std::unique_ptr<std::istream> stream = print.read();
+  if (!*stream) {
     return fail(ErrorKind::input, {name, 0}, "cannot be read");
   }
-  gcode::LineReader reader(stream, name);
+  gcode::LineReader reader(*stream, name);
   filament::Fitter fitter(
       {.interpreter = interpreter_options(settings),
        .sliced_area_mm2 = filament::area_of_diameter_mm2(settings.extruder.filament_diameter_mm),

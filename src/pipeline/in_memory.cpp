@@ -3,11 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cerrno>
-
-#include "memory_file.hpp"
-#include "unflex/core/errno_text.hpp"
-
 namespace unflex::pipeline {
 
 void PartProgress::update(std::string_view /*phase*/, double fraction) {
@@ -16,11 +11,7 @@ void PartProgress::update(std::string_view /*phase*/, double fraction) {
 }
 
 Result<report::Report> compensate_in_memory(Job job, std::string_view at, Progress& progress) {
-  const MemoryFile output;
-  if (!output.is_open()) {
-    return fail(ErrorKind::internal, fmt::format("no memory for the print: {}", errno_text(errno)));
-  }
-  job.output = output.name();
+  job.output = memory_store();
   job.output_name = job.input_name;
   Result<report::Report> report = compensate(job, progress);
   if (report && report->violation_count > 0) {

@@ -1,20 +1,13 @@
 // How much there is to read, for progress.
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <system_error>
-
 #include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::pipeline {
 
 // 0 if the size is not known: for a stream, or a file whose name is gone since it was opened.
 [[nodiscard]] inline double input_bytes(const Job& job) {
-  std::error_code unknown;
-  const std::uintmax_t bytes =
-      job.input_fd < 0 ? std::filesystem::file_size(job.input, unknown) : 0;
-  return unknown ? 0.0 : static_cast<double>(bytes);
+  return job.input_stream ? 0.0 : static_cast<double>(job.input->bytes().value_or(0));
 }
 
 // −1, unknown progress, if the size is not known.

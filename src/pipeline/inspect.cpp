@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <fstream>
+#include <istream>
 #include <limits>
 #include <memory>
 #include <string_view>
@@ -220,8 +220,8 @@ class Inspector {
 }  // namespace
 
 Result<Inspection> inspect(const Job& job, Progress& progress) {
-  std::ifstream input(job.input, std::ios::binary);
-  if (!input) {
+  const std::unique_ptr<std::istream> input = job.input->read();
+  if (!*input) {
     return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
   }
   const double bytes = input_bytes(job);
@@ -229,7 +229,7 @@ Result<Inspection> inspect(const Job& job, Progress& progress) {
   Inspection result;
   Inspector inspector(result, job.settings);
   CpuSlots slots(2);
-  PieceThread pieces(input, job.input_name, verify_rules(job.settings), slots, [] {});
+  PieceThread pieces(*input, job.input_name, verify_rules(job.settings), slots, [] {});
   std::deque<std::unique_ptr<Piece>> read;
   for (pieces.exchange(read); !read.empty(); pieces.exchange(read)) {
     for (const std::unique_ptr<Piece>& piece : read) {

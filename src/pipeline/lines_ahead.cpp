@@ -7,16 +7,15 @@
 
 namespace unflex::pipeline {
 
-Status put_ahead(const std::string& path, const std::string& name,
-                 const std::vector<LineAhead>& lines) {
+Status put_ahead(TextStore& text, const std::string& name, const std::vector<LineAhead>& lines) {
   auto next_to_stand = lines.begin();
   auto next_to_go = lines.begin();
   std::size_t number = 0;
-  return rewrite_lines(path, name, [&](std::string_view text, std::string& out) {
-    while (!text.empty()) {
-      const std::size_t newline = text.find('\n');
-      const std::string_view line = text.substr(0, newline == text.npos ? newline : newline + 1);
-      text.remove_prefix(line.size());
+  return rewrite_lines(text, name, [&](std::string_view piece, std::string& out) {
+    while (!piece.empty()) {
+      const std::size_t newline = piece.find('\n');
+      const std::string_view line = piece.substr(0, newline == piece.npos ? newline : newline + 1);
+      piece.remove_prefix(line.size());
       ++number;
       for (; next_to_stand != lines.end() && next_to_stand->before_line == number;
            ++next_to_stand) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/core/text_store.hpp"
 
 namespace unflex::pipeline {
 
@@ -18,7 +19,7 @@ struct LineAhead {
 // Puts the lines where they shall stand. Every other byte stays. Numbers are those before this
 // change. From one LineAhead to the next before_line rises, and so does from_line where it is not
 // 0. Fails like rewrite_lines().
-[[nodiscard]] Status put_ahead(const std::string& path, const std::string& name,
+[[nodiscard]] Status put_ahead(TextStore& text, const std::string& name,
                                const std::vector<LineAhead>& lines);
 
 // The number that a line has after put_ahead(). The line must be none of those that were put ahead.

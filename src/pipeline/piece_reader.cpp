@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "own_output.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
 #include "unflex/verify/endless.hpp"
@@ -46,8 +47,8 @@ constexpr std::size_t kBordersPerLook = 8;
 double turn_before(const std::vector<planner::PlannedMove>& moves, std::size_t move) {
   const planner::PlannedMove& from = moves[move - 1];
   const planner::PlannedMove& to = moves[move];
-  return to.start_v_mm_s * std::hypot(to.direction[gcode::X] - from.direction[gcode::X],
-                                      to.direction[gcode::Y] - from.direction[gcode::Y]);
+  return to.start_v_mm_s * math::hypot(to.direction[gcode::X] - from.direction[gcode::X],
+                                       to.direction[gcode::Y] - from.direction[gcode::Y]);
 }
 
 // The first moves that take kAround_s.

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <utility>
 
+#include "unflex/core/threads.hpp"
+
 namespace unflex::pipeline {
 namespace {
 
@@ -29,7 +31,7 @@ PieceThread::PieceThread(std::istream& input, std::string name, const verify::Ru
 
 PieceThread::~PieceThread() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     stopped_ = true;
   }
   stop_input_();
@@ -38,11 +40,30 @@ PieceThread::~PieceThread() {
 
 void PieceThread::give_up() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     failure_ = std::current_exception();
     ended_ = true;
   }
   news_.notify_one();
+}
+
+bool PieceThread::read_piece(Piece& piece, std::optional<Error>& error) {
+  const Result<bool> more = reader_.next(piece);
+  if (!more) {
+    error = more.error();
+  }
+  return more && *more;
+}
+
+void PieceThread::read_here(std::size_t lines) {
+  while (!kHasThreads && !ended_ && (pieces_.empty() || lines_ahead_ < lines)) {
+    auto piece = std::make_unique<Piece>();
+    ended_ = !read_piece(*piece, error_);
+    if (!ended_) {
+      lines_ahead_ += piece->events.size();
+      pieces_.push_back(std::move(piece));
+    }
+  }
 }
 
 void PieceThread::read(const std::function<void()>& wake) {
@@ -59,14 +80,10 @@ void PieceThread::read(const std::function<void()>& wake) {
     }
     std::optional<Error> error;
     std::size_t lines_ahead = 0;
-    const Result<bool> more = reader_.next(*piece);
-    ended = !more || !*more;
-    if (!more) {
-      error = more.error();
-    }
+    ended = !read_piece(*piece, error);
     const CpuSlot::Without without(*slots_);
     {
-      std::unique_lock lock(mutex_);
+      Lock lock(mutex_);
       room_.wait(lock, [this] { return stopped_ || lines_ahead_ < kMostAhead; });
       if (stopped_) {
         return;
@@ -89,8 +106,9 @@ void PieceThread::read(const std::function<void()>& wake) {
 }
 
 void PieceThread::exchange(std::deque<std::unique_ptr<Piece>>& pieces) {
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   returned_ = std::exchange(pieces, {});
+  read_here(kMostAhead / 2);
   // Threads that wake each other for every piece do little else.
   news_.wait(lock, [this] { return lines_ahead_ >= kMostAhead / 2 || ended_; });
   pieces.swap(pieces_);
@@ -99,7 +117,8 @@ void PieceThread::exchange(std::deque<std::unique_ptr<Piece>>& pieces) {
 }
 
 std::unique_ptr<Piece> PieceThread::take() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
+  read_here(1);
   if (pieces_.empty()) {
     return nullptr;
   }
@@ -113,7 +132,8 @@ std::unique_ptr<Piece> PieceThread::take() {
 }
 
 bool PieceThread::has_news() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
+  read_here(1);
   return !pieces_.empty() || ended_;
 }
 
@@ -125,7 +145,7 @@ const std::optional<Error>& PieceThread::error() const {
 }
 
 bool PieceThread::at_end() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return pieces_.empty() && ended_;
 }
 

@@ -1,20 +1,18 @@
-// Reads pieces ahead.
+// Reads pieces ahead, or where the library has no threads, when they are asked for.
 #pragma once
 
-#include <condition_variable>
 #include <deque>
 #include <exception>
 #include <functional>
 #include <istream>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "cpu_slots.hpp"
 #include "piece_reader.hpp"
+#include "unflex/core/threads.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
@@ -47,15 +45,20 @@ class PieceThread {
 
  private:
   void read(const std::function<void()>& wake);
+  // Reads a piece into `piece`. Returns whether there was one, and sets `error` if it could not be
+  // read.
+  bool read_piece(Piece& piece, std::optional<Error>& error);
+  // Where the library has no threads, reads on until so many lines wait, or the input ends.
+  void read_here(std::size_t lines);
   // Ends the thread with the exception that is being handled; error() throws it again.
   void give_up();
 
   CpuSlots* slots_;
   std::function<void()> stop_input_;
   PieceReader reader_;
-  std::mutex mutex_;
-  std::condition_variable room_;
-  std::condition_variable news_;
+  Mutex mutex_;
+  Condition room_;
+  Condition news_;
   std::deque<std::unique_ptr<Piece>> pieces_;
   std::deque<std::unique_ptr<Piece>> returned_;
   std::size_t lines_ahead_ = 0;  // in pieces_
@@ -63,7 +66,7 @@ class PieceThread {
   std::exception_ptr failure_;
   bool ended_ = false;
   bool stopped_ = false;
-  std::jthread thread_;
+  Thread thread_;
 };
 
 }  // namespace unflex::pipeline

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <deque>
-#include <fstream>
+#include <istream>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -228,14 +228,14 @@ class CourseMaker {
 
 }  // namespace
 
-Result<PrintCourse> print_course(const std::filesystem::path& text, const std::string& name,
+Result<PrintCourse> print_course(const TextStore& text, const std::string& name,
                                  const machine::Settings& settings, Progress& progress) {
   constexpr std::size_t kLinesPerUpdate = 10000;
-  std::ifstream stream(text, std::ios::binary);
-  if (!stream) {
+  const std::unique_ptr<std::istream> stream = text.read();
+  if (!*stream) {
     return fail(ErrorKind::input, {name, 0}, "cannot read the file");
   }
-  gcode::LineReader reader(stream, name);
+  gcode::LineReader reader(*stream, name);
   CourseMaker maker(settings);
   for (;;) {
     gcode::Line line;

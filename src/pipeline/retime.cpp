@@ -43,8 +43,8 @@ gcode::TimeFactors factors_at(const verify::TimeNote& note, const verify::TimeNo
           ratio(end.emitted_s - note.emitted_s, left_s)};
 }
 
-Status retime(const std::string& path, const std::string& name,
-              const std::vector<verify::TimeNote>& notes, const verify::TimeNote& end) {
+Status retime(TextStore& text, const std::string& name, const std::vector<verify::TimeNote>& notes,
+              const verify::TimeNote& end) {
   std::size_t number = 0;
   auto next = notes.begin();
   const auto factors_of_line = [&] {
@@ -55,8 +55,8 @@ Status retime(const std::string& path, const std::string& name,
                ? factors_at(*next, end)
                : gcode::TimeFactors::even(end.emitted_s / end.reference_s);
   };
-  return rewrite_lines(path, name, [&](std::string_view text, std::string& out) {
-    append_scaled_lines(text, factors_of_line, out);
+  return rewrite_lines(text, name, [&](std::string_view piece, std::string& out) {
+    append_scaled_lines(piece, factors_of_line, out);
   });
 }
 

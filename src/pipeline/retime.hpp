@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/core/text_store.hpp"
 #include "unflex/gcode/time_note.hpp"
 #include "unflex/verify/verify.hpp"
 
@@ -25,7 +26,7 @@ inline constexpr double kShortest_s = 10.0;
 // Corrects such durations in a file, in place, each by what has been printed before it and what is
 // still to come. A line that is not among the notes, which rise, tells of the whole print. Fails if
 // the file cannot be read or written; `name` is what the error calls it.
-[[nodiscard]] Status retime(const std::string& path, const std::string& name,
+[[nodiscard]] Status retime(TextStore& text, const std::string& name,
                             const std::vector<verify::TimeNote>& notes,
                             const verify::TimeNote& end);
 

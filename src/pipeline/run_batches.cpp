@@ -1,7 +1,7 @@
 #include "run_batches.hpp"
 
 #include <algorithm>
-#include <fstream>
+#include <istream>
 #include <iterator>
 
 #include "input_bytes.hpp"
@@ -18,12 +18,12 @@ constexpr double kBatch_s = 20.0;
 
 Result<std::vector<Diagnostic>> for_each_batch(
     const Job& job, Progress& progress, const std::function<void(std::vector<study::Run>&&)>& use) {
-  std::ifstream input(job.input, std::ios::binary);
-  if (!input) {
+  const std::unique_ptr<std::istream> input = job.input->read();
+  if (!*input) {
     return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
   }
   const double bytes = input_bytes(job);
-  PieceReader reader(input, job.input_name, interpreter_options(job.settings),
+  PieceReader reader(*input, job.input_name, interpreter_options(job.settings),
                      planner_limits(job.settings), firmware_config(job.settings));
   std::vector<study::Run> batch;
   double batch_s = 0.0;

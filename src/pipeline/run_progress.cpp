@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "run_job.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -20,7 +21,7 @@ double share_timed(const RunJob& job) {
     return 1.0;
   }
   const double nodes_of_round = 2.0 * static_cast<double>(std::max<std::size_t>(job.grid.count, 1));
-  return 1.0 - std::exp(-static_cast<double>(job.nodes_timed) / (kRounds * nodes_of_round));
+  return 1.0 - math::exp(-static_cast<double>(job.nodes_timed) / (kRounds * nodes_of_round));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "judge.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -198,8 +199,8 @@ emit::RunPlan RunWriter::in_time(const RunJob& job) const {
 bool RunWriter::fits(const RunJob& job) const {
   const gcode::Position& at = emitter_.printer().state().position_mm;
   const bool same_place =
-      job.piece.begins_run() || std::hypot(job.plan.from_mm[0] - at[gcode::X],
-                                           job.plan.from_mm[1] - at[gcode::Y]) < kSamePlace_mm;
+      job.piece.begins_run() || math::hypot(job.plan.from_mm[0] - at[gcode::X],
+                                            job.plan.from_mm[1] - at[gcode::Y]) < kSamePlace_mm;
   return same_place && job.plan.start == emitter_.run_start();
 }
 

@@ -10,6 +10,7 @@
 
 #include "step_rates.hpp"
 #include "unflex/compensate/band.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/planner/rrf_planner.hpp"
 
@@ -297,7 +298,7 @@ double time_ahead_s(const Piece& run, const compensate::Setup& setup, double soo
   for (std::size_t i = 1; i < run.moves.size() && start_s < soon_s; ++i) {
     const auto& next = run.moves[i].direction;
     if (x * next[gcode::X] + y * next[gcode::Y] < kStraight) {
-      seen_mm = std::hypot(lag_x_mm, lag_y_mm);
+      seen_mm = math::hypot(lag_x_mm, lag_y_mm);
     }
     start_s += run.moves[i].duration_s();
   }

@@ -3,28 +3,28 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <fstream>
+#include <istream>
+#include <memory>
 #include <string>
 #include <utility>
 
 #include "in_memory.hpp"
-#include "memory_file.hpp"
-#include "unflex/core/errno_text.hpp"
 
 namespace unflex::pipeline {
 namespace {
 
-Status scale_accels(const Job& job, double ratio, const std::string& to) {
-  std::ifstream input(job.input, std::ios::binary);
-  std::ofstream output(to, std::ios::binary);
+Result<std::string> with_scaled_accels(const Job& job, double ratio) {
+  const std::unique_ptr<std::istream> input = job.input->read();
+  std::string result;
   std::string line;
-  while (std::getline(input, line)) {
-    output << study::with_scaled_accels(line, ratio) << (input.eof() ? "" : "\n");
+  while (std::getline(*input, line)) {
+    result += study::with_scaled_accels(line, ratio);
+    result += input->eof() ? "" : "\n";
   }
-  output.flush();
-  return input.eof() && output ? Status{}
-                               : fail(ErrorKind::input, {job.input_name, 0}, "cannot be copied");
+  if (!input->eof()) {
+    return fail(ErrorKind::input, {job.input_name, 0}, "cannot be copied");
+  }
+  return result;
 }
 
 }  // namespace
@@ -35,19 +35,15 @@ Result<study::AccelsOutcome> study_accels(const Job& job, const std::vector<doub
   outcome.input = job.input_name;
   outcome.scaled = scale;
   for (const double accel_mm_s2 : accels_mm_s2) {
-    const MemoryFile input;
-    if (!input.is_open()) {
-      return fail(ErrorKind::internal,
-                  fmt::format("no memory for the print: {}", errno_text(errno)));
-    }
     Job at = job;
     at.settings.limits.max_accel_mm_s2 = accel_mm_s2;
     if (scale) {
       const double ratio = accel_mm_s2 / job.settings.limits.max_accel_mm_s2;
-      if (Status scaled = scale_accels(job, ratio, input.name()); !scaled) {
+      Result<std::string> scaled = with_scaled_accels(job, ratio);
+      if (!scaled) {
         return tl::unexpected(scaled.error());
       }
-      at.input = input.name();
+      at.input = memory_store(std::move(*scaled));
     }
     PartProgress part(progress, outcome.accels.size(), accels_mm_s2.size());
     const Result<report::Report> report =

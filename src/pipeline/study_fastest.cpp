@@ -3,7 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <fstream>
+#include <istream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -150,13 +150,13 @@ machine::Settings settings_of_fastest(machine::Settings settings) {
 Result<study::FastestOutcome> study_fastest(const Job& job,
                                             const std::vector<double>& tolerances_mm,
                                             const study::ToleranceRule& rule, Progress& progress) {
-  std::ifstream input(job.input, std::ios::binary);
-  if (!input) {
+  const std::unique_ptr<std::istream> input = job.input->read();
+  if (!*input) {
     return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
   }
   const planner::Limits limits = planner_limits(job.settings);
   const planner::FirmwareConfig config = firmware_config(job.settings);
-  PieceReader reader(input, job.input_name, interpreter_options(job.settings), limits, config);
+  PieceReader reader(*input, job.input_name, interpreter_options(job.settings), limits, config);
   PathCollector collector(limits, config);
   for (bool more = true; more;) {
     Piece piece;

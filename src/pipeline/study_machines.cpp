@@ -8,6 +8,9 @@ namespace unflex::pipeline {
 Result<study::MachinesOutcome> study_machines(const Job& job,
                                               const std::vector<KnownMachine>& machines,
                                               Progress& progress) {
+  if (Status built = check_built(job.engine); !built) {
+    return tl::unexpected(built.error());
+  }
   const study::Options options{.ipopt = job.engine == EngineChoice::ipopt, .workers = job.workers};
   std::vector<study::MachineBench> benches;
   for (const KnownMachine& known : machines) {

@@ -39,6 +39,9 @@ std::string describe(const machine::Settings& settings) {
 }  // namespace
 
 Result<study::Outcome> study_print(const Job& job, bool traces, Progress& progress) {
+  if (Status built = check_built(job.engine); !built) {
+    return tl::unexpected(built.error());
+  }
   const study::BenchSetup setup = bench_setup(job.settings);
   const study::Options options{.ipopt = job.engine == EngineChoice::ipopt, .workers = job.workers};
   study::Outcome outcome;

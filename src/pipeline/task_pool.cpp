@@ -3,9 +3,14 @@
 #include <exception>
 #include <utility>
 
+#include "unflex/core/threads.hpp"
+
 namespace unflex::pipeline {
 
 TaskPool::TaskPool(unsigned threads, CpuSlots& slots) : slots_(&slots) {
+  if (!kHasThreads) {
+    return;
+  }
   threads_.reserve(threads);
   try {
     for (unsigned i = 0; i < threads; ++i) {
@@ -18,7 +23,7 @@ TaskPool::TaskPool(unsigned threads, CpuSlots& slots) : slots_(&slots) {
 
 TaskPool::~TaskPool() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     ends_ = true;
   }
   wake_.notify_all();
@@ -31,7 +36,7 @@ void TaskPool::submit(Task task) {
     return;
   }
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     tasks_.push_back(std::move(task));
   }
   wake_.notify_one();
@@ -41,7 +46,7 @@ void TaskPool::work() {
   for (;;) {
     Task task;
     {
-      std::unique_lock lock(mutex_);
+      Lock lock(mutex_);
       wake_.wait(lock, [this] { return ends_ || !tasks_.empty(); });
       if (ends_) {
         return;

@@ -1,14 +1,12 @@
 // Threads that carry out tasks in the order they come.
 #pragma once
 
-#include <condition_variable>
 #include <deque>
 #include <functional>
-#include <mutex>
-#include <thread>
 #include <vector>
 
 #include "cpu_slots.hpp"
+#include "unflex/core/threads.hpp"
 
 namespace unflex::pipeline {
 
@@ -30,11 +28,11 @@ class TaskPool {
   void work();
 
   CpuSlots* slots_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
+  Mutex mutex_;
+  Condition wake_;
   std::deque<Task> tasks_;
   bool ends_ = false;
-  std::vector<std::jthread> threads_;
+  std::vector<Thread> threads_;
 };
 
 }  // namespace unflex::pipeline

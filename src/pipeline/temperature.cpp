@@ -136,11 +136,11 @@ Status follow_temperature(const Job& job, OutputMay may, Progress& progress,
     return {};
   }
   const Result<PrintCourse> sliced =
-      print_course(job.input, job.input_name, job.settings, progress);
+      print_course(*job.input, job.input_name, job.settings, progress);
   if (!sliced) {
     return tl::unexpected(sliced.error());
   }
-  Result<PrintCourse> output = print_course(job.output, job.output_name, job.settings, progress);
+  Result<PrintCourse> output = print_course(*job.output, job.output_name, job.settings, progress);
   if (!output) {
     return tl::unexpected(output.error());
   }
@@ -156,7 +156,7 @@ Status follow_temperature(const Job& job, OutputMay may, Progress& progress,
         *loop, output->course, output->commands, settings.band_c,
         settings.ahead_when == "both" ? hotend::AheadWhen::both : hotend::AheadWhen::heating);
     lines = lines_of(output->commands, ahead);
-    if (Status status = put_ahead(job.output, job.output_name, lines); !status) {
+    if (Status status = put_ahead(*job.output, job.output_name, lines); !status) {
       return status;
     }
     for (const hotend::Ahead& one : ahead) {

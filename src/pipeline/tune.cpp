@@ -3,15 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <fstream>
+#include <istream>
+#include <iterator>
 #include <limits>
-#include <sstream>
 
-#include "memory_file.hpp"
 #include "stage_options.hpp"
-#include "unflex/core/errno_text.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 #include "unflex/verify/verify.hpp"
@@ -72,15 +69,9 @@ const report::Fallback* kept_run(const report::Report& report, const std::string
 Result<std::string> compensate_band(const std::string& sliced, const machine::Settings& settings,
                                     std::size_t band, unsigned workers, Progress& progress) {
   const std::string name = fmt::format("band {} of the tower", band);
-  const MemoryFile input;
-  const MemoryFile output;
-  if (!input.is_open() || !output.is_open()) {
-    return fail(ErrorKind::internal, fmt::format("no memory for the tower: {}", errno_text(errno)));
-  }
-  std::ofstream(input.name(), std::ios::binary) << sliced;
-  const Job job{.input = input.name(),
+  const Job job{.input = memory_store(sliced),
                 .input_name = name,
-                .output = output.name(),
+                .output = memory_store(),
                 .output_name = name,
                 .settings = settings,
                 .engine = EngineChoice::banded,
@@ -99,9 +90,7 @@ Result<std::string> compensate_band(const std::string& sliced, const machine::Se
         ErrorKind::usage,
         fmt::format("{} stays as sliced, so nothing can be read from it: {}", name, kept->reason));
   }
-  std::ostringstream text;
-  text << std::ifstream(output.name(), std::ios::binary).rdbuf();
-  return text.str();
+  return std::string(std::istreambuf_iterator<char>(*job.output->read()), {});
 }
 
 // Progress of one band among all.

@@ -1,12 +1,11 @@
 #include "unflex/verify/verify.hpp"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
-#include <fstream>
 #include <istream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -20,6 +19,7 @@
 #include "unflex/pipeline/pipeline.hpp"
 #include "unflex/pipeline/temperature.hpp"
 #include "unflex/planner/printer_shaper.hpp"
+#include "unflex/platform/usage.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -71,28 +71,13 @@ report::DeviationRows rows(const verify::Deviation& deviation) {
   return {row(deviation.extruding), row(deviation.all)};
 }
 
-double cpu_s(int who) {
-  rusage usage{};
-  getrusage(who, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-double peak_rss_mb(int who) {
-  rusage usage{};
-  getrusage(who, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
-}
-
 }  // namespace
 
 void add_performance(std::chrono::steady_clock::time_point begin, report::Report& report) {
   report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  report.cpu_s = cpu_s(RUSAGE_SELF) + cpu_s(RUSAGE_CHILDREN);
+  report.cpu_s = platform::processor_s();
   report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
-  report.peak_rss_mb = std::max(peak_rss_mb(RUSAGE_SELF), peak_rss_mb(RUSAGE_CHILDREN));
+  report.peak_rss_mb = platform::peak_memory_mb();
 }
 
 report::Report new_report(std::string command, const Job& job) {
@@ -208,15 +193,15 @@ void add_verification(const verify::VerifyReport& verified, record::Recorder& re
 }
 
 Status add_verification(const Job& job, Progress& progress, report::Report& report) {
-  std::ifstream input(job.input, std::ios::binary);
-  std::ifstream output(job.output, std::ios::binary);
-  if (!input) {
+  const std::unique_ptr<std::istream> input = job.input->read();
+  const std::unique_ptr<std::istream> output = job.output->read();
+  if (!*input) {
     return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
   }
-  if (!output) {
+  if (!*output) {
     return fail(ErrorKind::input, {job.output_name, 0}, "cannot read the file");
   }
-  const Result<std::optional<std::size_t>> measured_with = own_line(input, job.input_name);
+  const Result<std::optional<std::size_t>> measured_with = own_line(*input, job.input_name);
   if (!measured_with) {
     return tl::unexpected(measured_with.error());
   }
@@ -224,7 +209,7 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
     // Compared with it, the output would look as good as sliced.
     return tl::unexpected(compensated_already(job.input_name, **measured_with));
   }
-  const Result<std::optional<std::size_t>> own = own_line(output, job.output_name);
+  const Result<std::optional<std::size_t>> own = own_line(*output, job.output_name);
   if (!own) {
     return tl::unexpected(own.error());
   }
@@ -232,7 +217,7 @@ Status add_verification(const Job& job, Progress& progress, report::Report& repo
   rules.approaches = own->has_value();
   const std::unique_ptr<record::Recorder> recorder = recorder_for(job, rules);
   const Result<verify::VerifyReport> result =
-      verify::verify(input, job.input_name, output, job.output_name, rules, progress,
+      verify::verify(*input, job.input_name, *output, job.output_name, rules, progress,
                      observation_of(*recorder, rules));
   if (!result) {
     return tl::unexpected(result.error());

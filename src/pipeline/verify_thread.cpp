@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "unflex/core/threads.hpp"
+
 namespace unflex::pipeline {
 namespace {
 
@@ -11,7 +13,7 @@ constexpr std::size_t kLong_bytes = 4U << 20U;
 
 void TextQueue::push(std::string text) {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     if (dropped_) {
       return;
     }
@@ -24,33 +26,33 @@ void TextQueue::push(std::string text) {
 
 void TextQueue::end() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     ended_ = true;
   }
   changed_.notify_one();
 }
 
 void TextQueue::drop() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   dropped_ = true;
   texts_.clear();
   bytes_ = 0;
 }
 
 bool TextQueue::is_long() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return bytes_ > kLong_bytes;
 }
 
 bool TextQueue::is_starved() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return reader_waits_;
 }
 
 TextQueue::int_type TextQueue::underflow() {
   const auto ready = [this] { return ended_ || !texts_.empty(); };
   for (;;) {
-    std::unique_lock lock(mutex_);
+    Lock lock(mutex_);
     if (!ready()) {
       reader_waits_ = true;
       lock.unlock();
@@ -106,7 +108,8 @@ void VerifyThread::push(std::string input, std::string output) {
 }
 
 bool VerifyThread::is_behind() {
-  return (input_.is_long() || output_.is_long()) && !input_.is_starved() && !output_.is_starved();
+  return kHasThreads && (input_.is_long() || output_.is_long()) && !input_.is_starved() &&
+         !output_.is_starved();
 }
 
 void VerifyThread::end() {

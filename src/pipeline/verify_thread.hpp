@@ -2,18 +2,16 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <deque>
 #include <exception>
 #include <istream>
-#include <mutex>
 #include <optional>
 #include <streambuf>
 #include <string>
-#include <thread>
 
 #include "cpu_slots.hpp"
 #include "unflex/core/progress.hpp"
+#include "unflex/core/threads.hpp"
 #include "unflex/verify/verify.hpp"
 
 namespace unflex::pipeline {
@@ -37,8 +35,8 @@ class TextQueue final : public std::streambuf {
 
  private:
   CpuSlots* slots_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
+  Mutex mutex_;
+  Condition changed_;
   std::deque<std::string> texts_;
   std::size_t bytes_ = 0;
   bool reader_waits_ = false;
@@ -64,8 +62,8 @@ class VerifyThread {
   [[nodiscard]] bool is_behind();
   // Tells that both texts have ended.
   void end();
-  // After end(): waits for the result. Throws what the thread could not handle, such as memory that
-  // ran out.
+  // After end(): waits for the result, or finds it where the library has no threads. Throws what
+  // the thread could not handle, such as memory that ran out.
   [[nodiscard]] Result<verify::VerifyReport> result();
 
  private:
@@ -82,7 +80,7 @@ class VerifyThread {
   Stopped stopped_;
   Result<verify::VerifyReport> result_;
   std::exception_ptr failure_;
-  std::jthread thread_;
+  Thread thread_;
 };
 
 }  // namespace unflex::pipeline

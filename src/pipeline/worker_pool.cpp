@@ -51,6 +51,14 @@ std::string answer(const compensate::Engine& engine, std::string_view window) {
   }
 }
 
+struct WorkerPool::Worker {
+  pid_t pid = -1;
+  int socket = -1;
+  std::optional<Task> task;  // the window it is solving
+};
+
+WorkerPool::WorkerPool(EngineFactory factory) : factory_(std::move(factory)) {}
+
 Result<WorkerPool> WorkerPool::start(unsigned workers, const EngineFactory& factory) {
   WorkerPool pool(factory);
   // The vector gets its size before any fork: a worker closes the sockets of all earlier workers.

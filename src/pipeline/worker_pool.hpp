@@ -2,8 +2,6 @@
 // a process of its own, forked before the program has any thread.
 #pragma once
 
-#include <sys/types.h>
-
 #include <cstddef>
 #include <deque>
 #include <functional>
@@ -55,13 +53,9 @@ class WorkerPool {
     std::string message;
     bool tried = false;  // a worker died of it
   };
-  struct Worker {
-    pid_t pid = -1;
-    int socket = -1;
-    std::optional<Task> task;  // the window it is solving
-  };
+  struct Worker;  // a process
 
-  explicit WorkerPool(EngineFactory factory) : factory_(std::move(factory)) {}
+  explicit WorkerPool(EngineFactory factory);
   Status spawn(Worker& worker);
   void feed();
   void replace(Worker& worker);

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "marlin_block.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::planner::marlin {
 namespace {
@@ -48,6 +49,10 @@ float junction_accel(const Settings& settings, float accel, const Vector& along)
   return accel;
 }
 
+float arccos(double t) {
+  return static_cast<float>(math::atan2(std::sqrt((1.0 - t) * (1.0 + t)), t));
+}
+
 // arccos(t) for t in (0, 1) by chords of the curve, as the firmware has it by default
 // (JD_USE_LOOKUP_TABLE): chord i spans 1 − 2⁻ⁱ to 1 − 2⁻⁽ⁱ⁺¹⁾, inner points raised so that the
 // error is the same to both sides, ±0.01 rad at most. The chords are made in floats, because near t
@@ -61,8 +66,8 @@ class ChordArccos {
       const bool last = i + 1 == kChords;
       const float x0 = 1.0F - std::ldexp(1.0F, -i);
       const float x1 = last ? kStraight : 0.5F * x0 + 0.5F;
-      const float y0 = std::acos(x0) * (first ? 1.0F : kRaise);
-      const float y1 = std::acos(x1) * (last ? 1.0F : kRaise);
+      const float y0 = arccos(x0) * (first ? 1.0F : kRaise);
+      const float y1 = arccos(x1) * (last ? 1.0F : kRaise);
       chords_[static_cast<std::size_t>(i)] = {(y0 - y1) / (x0 - x1),
                                               (y1 * x0 - y0 * x1) / (x0 - x1)};
     }

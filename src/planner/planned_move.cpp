@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::planner {
@@ -112,8 +113,8 @@ double asked_accel_mm_s2(const PlannedMove& move) {
 
 bool turns_sharply(const gcode::Position& before, const gcode::Position& after) {
   constexpr double kCosine = 0.9397;
-  const double lengths =
-      std::hypot(before[gcode::X], before[gcode::Y]) * std::hypot(after[gcode::X], after[gcode::Y]);
+  const double lengths = math::hypot(before[gcode::X], before[gcode::Y]) *
+                         math::hypot(after[gcode::X], after[gcode::Y]);
   return before[gcode::X] * after[gcode::X] + before[gcode::Y] * after[gcode::Y] <
          kCosine * lengths;
 }

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::record {
 namespace {
 
@@ -339,11 +341,11 @@ std::vector<report::HistogramCell> Recorder::Gatherer::histogram() const {
   double after_s = 0.0;
   for (int cell = 0; cell < kHistogramCells; ++cell) {
     const double to_mm = cell + 1 < kHistogramCells
-                             ? kFinestCell_mm * std::exp2((cell + 1) / kCellsPerOctave)
+                             ? kFinestCell_mm * math::exp2((cell + 1) / kCellsPerOctave)
                              : std::numeric_limits<double>::infinity();
     const double before_to_s = versions_[0].histogram.weight_below(to_mm);
     const double after_to_s = versions_[1].histogram.weight_below(to_mm);
-    result.push_back({cell == 0 ? 0.0 : kFinestCell_mm * std::exp2(cell / kCellsPerOctave),
+    result.push_back({cell == 0 ? 0.0 : kFinestCell_mm * math::exp2(cell / kCellsPerOctave),
                       before_to_s - before_s, after_to_s - after_s});
     before_s = before_to_s;
     after_s = after_to_s;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::record {
 namespace {
 
@@ -113,7 +115,7 @@ bool LayerStore::merges(const Point& point) const {
     const int most = std::max(kSmall, std::max(range.most, code));
     return most - least <= kAlike + kAlikePerLevel * level_;
   };
-  if (std::hypot(point.x - from.x, point.y - from.y) > least_ &&
+  if (math::hypot(point.x - from.x, point.y - from.y) > least_ &&
       !(alike(codes_[0], point.before) && alike(codes_[1], point.after))) {
     return false;
   }
@@ -128,7 +130,7 @@ bool LayerStore::near_chord(const Point& from, const Point& to) const {
     const double to_x = point.x - from.x;
     const double to_y = point.y - from.y;
     const double along = std::clamp((to_x * x + to_y * y) / length2, 0.0, 1.0);
-    return std::hypot(to_x - along * x, to_y - along * y) <= tolerance_;
+    return math::hypot(to_x - along * x, to_y - along * y) <= tolerance_;
   };
   return is_near(points_.back()) && std::all_of(left_out_.begin(), left_out_.end(), is_near);
 }
@@ -144,7 +146,7 @@ std::size_t LayerStore::size_bytes() const {
 // Whether the path is so small that nobody would miss it.
 bool LayerStore::too_small(std::span<const Point> path) const {
   return tolerance_ > kCoarsest && std::all_of(path.begin(), path.end(), [&](const Point& point) {
-           return std::hypot(point.x - path[0].x, point.y - path[0].y) <= tolerance_;
+           return math::hypot(point.x - path[0].x, point.y - path[0].y) <= tolerance_;
          });
 }
 
@@ -181,7 +183,7 @@ std::array<double, 2> LayerStore::extent(std::int32_t Point::*coordinate) const 
     for (std::size_t i = paths_[path].begin + 1; i < end_of(path); ++i) {
       const Point& from = points_[i - 1];
       const Point& to = points_[i];
-      const double length = std::hypot(to.x - from.x, to.y - from.y);
+      const double length = math::hypot(to.x - from.x, to.y - from.y);
       lengths.emplace_back(from.*coordinate, 0.5 * length);
       lengths.emplace_back(to.*coordinate, 0.5 * length);
       whole += length;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::record {
 namespace {
 
@@ -16,7 +18,7 @@ WorstPlaces::Change WorstPlaces::add(const PlaceCandidate& candidate, std::size_
     return change;
   }
   const auto is_near = [&](const Kept& kept) {
-    return std::hypot(kept.candidate.x_mm - candidate.x_mm, kept.candidate.y_mm - candidate.y_mm) <
+    return math::hypot(kept.candidate.x_mm - candidate.x_mm, kept.candidate.y_mm - candidate.y_mm) <
            kSamePlace_mm;
   };
   const bool known = std::any_of(places_.begin(), places_.end(), [&](const Kept& kept) {

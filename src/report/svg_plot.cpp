@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "assets.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/report/html_page.hpp"
 
 namespace unflex::report {
@@ -91,7 +92,7 @@ double distance(const PlotPoint& p, const PlotPoint& a, const PlotPoint& b) {
   const double square = dx * dx + dy * dy;
   const double along =
       square > 0.0 ? std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / square, 0.0, 1.0) : 0.0;
-  return std::hypot(p.x - a.x - along * dx, p.y - a.y - along * dy);
+  return math::hypot(p.x - a.x - along * dx, p.y - a.y - along * dy);
 }
 
 // D. H. Douglas & T. K. Peucker, "Algorithms for the reduction of the number of points required to
@@ -133,7 +134,7 @@ std::vector<PlotPoint> simplified(const std::vector<PlotPoint>& points) {
 // 1, 2 or 5 times a power of ten, so that about `wanted` of them fill the range.
 double tick_step(const PlotRange& range, double wanted) {
   const double rough = (range.to - range.from) / wanted;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
+  const double power = math::pow(10.0, std::floor(math::log10(rough)));
   double nearest = power;
   for (const double multiple : {2.0, 5.0, 10.0}) {
     // Compare ratios: the border between two steps is their geometric mean.
@@ -152,7 +153,7 @@ struct Tick {
 std::vector<Tick> linear_ticks(const PlotRange& range, double wanted) {
   const double step = tick_step(range, wanted);
   // As many decimals as the step between ticks needs.
-  const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
+  const int decimals = std::max(0, -static_cast<int>(std::floor(math::log10(step) + 1e-9)));
   std::vector<Tick> result;
   for (double number = std::ceil(range.from / step - 1e-9); number * step <= range.to + 1e-9 * step;
        number += 1.0) {
@@ -170,9 +171,9 @@ std::vector<Tick> logarithmic_ticks(const PlotRange& range) {
   std::vector<Tick> result;
   for (double power = std::floor(range.from); power <= range.to; power += 1.0) {
     for (const double multiple : {1.0, 2.0, 5.0}) {
-      const double at = power + std::log10(multiple);
+      const double at = power + math::log10(multiple);
       if (at >= range.from && at <= range.to) {
-        result.push_back({at, fmt::format("{:g}", multiple * std::pow(10.0, power))});
+        result.push_back({at, fmt::format("{:g}", multiple * math::pow(10.0, power))});
       }
     }
   }
@@ -182,11 +183,11 @@ std::vector<Tick> logarithmic_ticks(const PlotRange& range) {
 // The plot with logarithms for x.
 Plot in_logarithms(Plot plot) {
   if (plot.x) {
-    plot.x = PlotRange{std::log10(plot.x->from), std::log10(plot.x->to)};
+    plot.x = PlotRange{math::log10(plot.x->from), math::log10(plot.x->to)};
   }
   for (PlotCurve& curve : plot.curves) {
     for (PlotPoint& point : curve.points) {
-      point.x = std::log10(point.x);
+      point.x = math::log10(point.x);
     }
   }
   return plot;

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::rivals {
 namespace {
 
@@ -66,7 +68,7 @@ AxisPath basis_path(const BasisTable& table, double knot_s) {
 std::vector<double> filtered_basis(const BasisTable& table, const dynamics::FlexibleAxis& axis,
                                    double knot_s, std::size_t longest) {
   const double memory_s =
-      kSupport * knot_s - std::log(kForgotten) / std::max(axis.decay_per_s(), 1e-9);
+      kSupport * knot_s - math::log(kForgotten) / std::max(axis.decay_per_s(), 1e-9);
   const double samples = std::ceil(kSamples * memory_s / knot_s);
   TimeGrid grid{0.0, knot_s / kSamples, longest};
   if (samples < static_cast<double>(longest)) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::rivals {
 namespace {
 
@@ -39,7 +41,7 @@ Bins bins_of(double step_hz, const std::vector<double>& density) {
   for (Eigen::Index k = 0; k < count; ++k) {
     const double freq_hz = static_cast<double>(k) * step_hz;
     const double share =
-        freq_hz < kLow_hz ? std::exp(1.0 - std::pow(kLow_hz / (freq_hz + 0.1), 2)) : 1.0;
+        freq_hz < kLow_hz ? math::exp(1.0 - math::square(kLow_hz / (freq_hz + 0.1))) : 1.0;
     bins.freq_hz[k] = freq_hz;
     bins.density[k] = share * density[static_cast<std::size_t>(k)] / (freq_hz + 0.1);
   }
@@ -55,9 +57,11 @@ Eigen::ArrayXd left_of(const ShaperPulses& pulses, double damping_ratio,
   Eigen::ArrayXd cosine = sine;
   for (const dynamics::Pulse& pulse : pulses) {
     const Eigen::ArrayXd decayed =
-        pulse.weight * (-damping_ratio * omega * (pulses.back().time_s - pulse.time_s)).exp();
-    sine += decayed * (damped * omega * pulse.time_s).sin();
-    cosine += decayed * (damped * omega * pulse.time_s).cos();
+        pulse.weight *
+        (-damping_ratio * omega * (pulses.back().time_s - pulse.time_s)).unaryExpr(&math::exp);
+    const Eigen::ArrayXd phase = damped * omega * pulse.time_s;
+    sine += decayed * phase.unaryExpr(&math::sin);
+    cosine += decayed * phase.unaryExpr(&math::cos);
   }
   return (sine.square() + cosine.square()).sqrt();
 }
@@ -115,7 +119,7 @@ std::vector<FittedShaper> tried(const Candidate& candidate, const Bins& bins) {
     one.vibration = vibration_of(pulses, bins);
     one.smoothing_mm = smoothing_mm(pulses);
     const double v = one.vibration;
-    one.score = one.smoothing_mm * (std::pow(v, 1.5) + 0.2 * v + 0.01);
+    one.score = one.smoothing_mm * (math::pow(v, 1.5) + 0.2 * v + 0.01);
     results.push_back(one);
   }
   return results;

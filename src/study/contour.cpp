@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::study {
 
 double reach_of(double slowest_rad_s) {
@@ -20,7 +22,7 @@ ContourGauge::ContourGauge(const std::vector<planner::PlannedMove>& moves, doubl
     const gcode::Position& to = move.segment.end_mm;
     const double dx = to[gcode::X] - from[gcode::X];
     const double dy = to[gcode::Y] - from[gcode::Y];
-    const double length = std::hypot(dx, dy);
+    const double length = math::hypot(dx, dy);
     Edge edge{.start_s = start_s,
               .end_s = start_s + move.duration_s(),
               .x_mm = from[gcode::X],

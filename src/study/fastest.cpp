@@ -11,7 +11,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <mutex>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -19,6 +18,7 @@
 #include "built_shaper.hpp"
 #include "contour.hpp"
 #include "tasks.hpp"
+#include "unflex/core/threads.hpp"
 #include "unflex/planner/klipper_planner.hpp"
 #include "unflex/rivals/axis_path.hpp"
 #include "unflex/rivals/klipper_calibration.hpp"
@@ -258,7 +258,7 @@ Result<FastestOutcome> study_fastest(const PrintPath& path,
   }
   const std::vector<Candidate> grid = candidates(path, setup.workers);
   const auto never = [](const PathErrors&) { return false; };
-  std::mutex mutex;
+  Mutex mutex;
   std::size_t tried = 0;
   // The longest searches, those of the slowest contenders, begin first; the sliced plan comes last.
   const std::size_t count = shapers.size();
@@ -278,7 +278,7 @@ Result<FastestOutcome> study_fastest(const PrintPath& path,
             return std::nullopt;
           }
           {
-            const std::lock_guard lock(mutex);
+            const Lock lock(mutex);
             progress.update("studying", static_cast<double>(tried++) /
                                             static_cast<double>(count * grid.size()));
           }

@@ -9,6 +9,7 @@
 #include "html_figures.hpp"
 #include "report_parts.hpp"
 #include "step.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/report/format.hpp"
 #include "unflex/report/html_page.hpp"
 #include "unflex/report/svg_plot.hpp"
@@ -52,14 +53,14 @@ void write_lead(Sink out, const Outcome& outcome) {
   for (const MethodResult& method : first.methods) {
     most_mm = std::max(most_mm, method.straying[0].max_mm);
   }
-  const double longest = std::log(most_mm / kBarFrom_mm);
+  const double longest = math::log(most_mm / kBarFrom_mm);
   for (const MethodResult& method : first.methods) {
     if (!method.used) {
       continue;
     }
     const double max_mm = method.straying[0].max_mm;
     const double share =
-        std::clamp(std::log(std::max(max_mm, kBarFrom_mm) / kBarFrom_mm) / longest, 0.0, 1.0);
+        std::clamp(math::log(std::max(max_mm, kBarFrom_mm) / kBarFrom_mm) / longest, 0.0, 1.0);
     fmt::format_to(out,
                    "<span>{}</span><div class=\"bar{}\"><i style=\"--share:{:.3f}\"></i>{} "
                    "µm</div>\n",

@@ -83,7 +83,7 @@ struct ShaperMethod {
 };
 
 std::optional<ShaperMethod> shaper_of(Method method) {
-  const auto* const form = std::ranges::find(kMzvMethods, method, &MzvMethod::method);
+  const auto form = std::ranges::find(kMzvMethods, method, &MzvMethod::method);
   if (form != kMzvMethods.end()) {
     return ShaperMethod{form->form, form->name};
   }

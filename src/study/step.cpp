@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::study {
 namespace {
 
@@ -54,7 +56,7 @@ double Staircase::left_mm() const {
   const dynamics::NozzleMotion at = nozzle(last_s());
   const double y_mm = at.position - 1.0;
   const double damped_rad_s = omega_rad_s_ * std::sqrt(1.0 - zeta_ * zeta_);
-  return std::hypot(y_mm, (at.velocity + zeta_ * omega_rad_s_ * y_mm) / damped_rad_s);
+  return math::hypot(y_mm, (at.velocity + zeta_ * omega_rad_s_ * y_mm) / damped_rad_s);
 }
 
 std::vector<NamedStaircase> staircases(double zeta, double freq_factor) {

@@ -7,11 +7,10 @@
 #include <functional>
 #include <iterator>
 #include <memory>
-#include <mutex>
-#include <thread>
 
 #include "tasks.hpp"
 #include "unflex/compensate/band.hpp"
+#include "unflex/core/threads.hpp"
 
 namespace unflex::study {
 namespace {
@@ -135,30 +134,35 @@ Result<Outcome> study_corner(const Options& options, Progress& progress) {
     return tl::unexpected(cases.error());
   }
   const auto engine = make_engine(options);
-  const auto banded = compensate::make_banded_engine();
-  const auto ipopt = compensate::make_ipopt_engine();
+  // Ipopt's chains take longest, so they come first.
+  std::vector<std::unique_ptr<compensate::Engine>> chaining;
+  if (compensate::has_ipopt_engine()) {
+    chaining.push_back(compensate::make_ipopt_engine());
+  }
+  chaining.push_back(compensate::make_banded_engine());
   Outcome outcome;
   outcome.engine = engine->name();
   outcome.cases.resize(cases->size());
-  std::array<Result<std::vector<ChainResult>>, 2> measured;
+  std::vector<Result<std::vector<ChainResult>>> measured(chaining.size());
   const std::vector<Case> chained = chain_cases(*cases, options);
-  std::mutex mutex;
+  Mutex mutex;
   std::size_t done = 0;
-  // Both engines' chains first, since Ipopt's takes longest; they count as one task each.
-  in_parallel(cases->size() + 2, threads(options), [&](std::size_t task) {
+  const std::size_t tasks = chaining.size() + cases->size();
+  in_parallel(tasks, threads(options), [&](std::size_t task) {
     if (progress.cancelled()) {
       return;
     }
-    if (task < 2) {
-      measured[task] = chains(chained, task == 0 ? *ipopt : *banded);
+    if (task < chaining.size()) {
+      measured[task] = chains(chained, *chaining[task]);
     } else {
-      const Case& of = (*cases)[task - 2];
+      const std::size_t number = task - chaining.size();
+      const Case& of = (*cases)[number];
       BenchSetup setup = corner_setup(of);
       const Run run = run_of(of);
       setup.trace_step_s = options.traces ? kTraceStep_s : 0.0;
       setup.trace_from_s = -setup.unflex.lead_in_s;
       setup.trace_to_s = planner::duration_s(run.plan) + kTraceTail_s;
-      CaseResult& result = outcome.cases[task - 2];
+      CaseResult& result = outcome.cases[number];
       result = {std::string(of.name),
                 describe(of),
                 planner::duration_s(run.plan),
@@ -168,9 +172,8 @@ Result<Outcome> study_corner(const Options& options, Progress& progress) {
                 run.plan.front().segment.end_mm[gcode::Y]};
       drop_repeated_traces(of, result.methods);
     }
-    const std::lock_guard lock(mutex);
-    progress.update("studying",
-                    static_cast<double>(++done) / static_cast<double>(cases->size() + 2));
+    const Lock lock(mutex);
+    progress.update("studying", static_cast<double>(++done) / static_cast<double>(tasks));
   });
   if (progress.cancelled()) {
     return fail(ErrorKind::internal, "cancelled");

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
-#include <thread>
 #include <vector>
+
+#include "unflex/core/threads.hpp"
 
 namespace unflex::study {
 
@@ -15,7 +16,7 @@ void in_parallel(std::size_t count, unsigned workers,
       work(i);
     }
   };
-  std::vector<std::jthread> threads;
+  std::vector<Thread> threads;
   for (unsigned i = 1; i < std::min<std::size_t>(workers, count); ++i) {
     threads.emplace_back(loop);
   }

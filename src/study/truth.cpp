@@ -10,6 +10,8 @@
 #include <unsupported/Eigen/NumericalDiff>
 #include <unsupported/Eigen/Polynomials>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::study {
 namespace {
 
@@ -42,19 +44,19 @@ std::optional<Bins> bins_of(double step_hz, const std::vector<double>& density) 
     const double freq_hz = static_cast<double>(k) * step_hz;
     const auto i = static_cast<Eigen::Index>(k - first);
     bins.freq_hz[i] = freq_hz;
-    bins.logarithm[i] = std::log(std::max(density[k] / sum, 1e-12) / (freq_hz * freq_hz));
+    bins.logarithm[i] = math::log(std::max(density[k] / sum, 1e-12) / (freq_hz * freq_hz));
   }
   return sum > 0.0 ? std::optional(std::move(bins)) : std::nullopt;
 }
 
 // A value between two bounds from a number without any.
 double within(double low, double high, double x) {
-  return low + (high - low) * 0.5 * (1.0 + std::tanh(x));
+  return low + (high - low) * 0.5 * (1.0 + math::tanh(x));
 }
 
 double inside(double low, double high, double value) {
   const double share = std::clamp((value - low) / (high - low), 1e-3, 1.0 - 1e-3);
-  return std::atanh(2.0 * share - 1.0);
+  return 0.5 * math::log(share / (1.0 - share));
 }
 
 constexpr double kLeast_hz = 17.0;
@@ -63,18 +65,18 @@ constexpr double kLeastDamping = 0.015;
 constexpr double kMostDamping = 0.35;
 
 double freq_of(const Eigen::VectorXd& p, int mode) {
-  return std::exp(within(std::log(kLeast_hz), std::log(kMost_hz), p[3 * mode]));
+  return math::exp(within(math::log(kLeast_hz), math::log(kMost_hz), p[3 * mode]));
 }
 
 double damping_of(const Eigen::VectorXd& p, int mode) {
-  return std::exp(within(std::log(kLeastDamping), std::log(kMostDamping), p[3 * mode + 1]));
+  return math::exp(within(math::log(kLeastDamping), math::log(kMostDamping), p[3 * mode + 1]));
 }
 
 int modes_of(const Eigen::VectorXd& p) { return static_cast<int>(p.size() - 1) / 3; }
 
 Eigen::ArrayXd logarithm_of(const Eigen::VectorXd& p, const Eigen::ArrayXd& freq_hz) {
   Eigen::ArrayXd result(freq_hz.size());
-  const double noise = std::exp(p[p.size() - 1]);
+  const double noise = math::exp(p[p.size() - 1]);
   for (Eigen::Index k = 0; k < freq_hz.size(); ++k) {
     Complex sum = 0.0;
     for (int m = 0; m < modes_of(p); ++m) {
@@ -83,7 +85,7 @@ Eigen::ArrayXd logarithm_of(const Eigen::VectorXd& p, const Eigen::ArrayXd& freq
       sum += p[3 * m + 2] * (1.0 + loss) / (1.0 - r * r + loss);
     }
     const double square = freq_hz[k] * freq_hz[k] / 3600.0;
-    result[k] = std::log(std::norm(sum) + noise / square + 1e-14);
+    result[k] = math::log(std::norm(sum) + noise / square + 1e-14);
   }
   return result;
 }
@@ -161,14 +163,14 @@ std::vector<double> peaks_of(const Bins& bins, const Eigen::ArrayXd& heights, st
 Eigen::VectorXd with_mode(const Eigen::VectorXd& p, double freq_hz, double damping, double a) {
   const Eigen::Index count = p.size() - 1;
   Eigen::VectorXd result(p.size() + 3);
-  result << p.head(count), inside(std::log(kLeast_hz), std::log(kMost_hz), std::log(freq_hz)),
-      inside(std::log(kLeastDamping), std::log(kMostDamping), std::log(damping)), a, p.tail(1);
+  result << p.head(count), inside(math::log(kLeast_hz), math::log(kMost_hz), math::log(freq_hz)),
+      inside(math::log(kLeastDamping), math::log(kMostDamping), math::log(damping)), a, p.tail(1);
   return result;
 }
 
 // Scaled so that the logarithm is right on average.
 Eigen::VectorXd scaled(Eigen::VectorXd p, const Bins& bins) {
-  const double factor = std::exp(0.5 * (bins.logarithm - logarithm_of(p, bins.freq_hz)).mean());
+  const double factor = math::exp(0.5 * (bins.logarithm - logarithm_of(p, bins.freq_hz)).mean());
   for (int m = 0; m < modes_of(p); ++m) {
     p[3 * m + 2] *= factor;
   }
@@ -204,7 +206,7 @@ bool is_machine(const std::vector<dynamics::Mode>& modes) {
     }
     for (const dynamics::Mode& other : modes) {
       if (mode.gain > 0.2 && other.gain < -0.2 &&
-          std::abs(std::log(mode.omega_rad_s / other.omega_rad_s)) < kApart) {
+          std::abs(math::log(mode.omega_rad_s / other.omega_rad_s)) < kApart) {
         return false;
       }
     }
@@ -217,7 +219,7 @@ std::vector<Fit> extended(const Bins& bins, const std::vector<Fit>& fewer) {
   constexpr std::size_t kKept = 6;
   constexpr std::size_t kBases = 3;
   const Eigen::ArrayXd swing = bins.logarithm;
-  const Eigen::ArrayXd accel = bins.logarithm + 2.0 * bins.freq_hz.log();
+  const Eigen::ArrayXd accel = bins.logarithm + 2.0 * bins.freq_hz.unaryExpr(&math::log);
   std::vector<double> places = {25.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0};
   for (const Eigen::ArrayXd& heights : {swing, accel}) {
     const std::vector<double> more = peaks_of(bins, heights, 3);
@@ -299,8 +301,8 @@ std::optional<std::vector<dynamics::Mode>> fitted_truth(double step_hz,
     fits = extended(*bins, fits);
     for (const Fit& fit : fits) {
       const std::vector<dynamics::Mode> modes = modes_from(fit.p);
-      const double criterion = count * std::log(fit.cost / count) +
-                               static_cast<double>(fit.p.size()) * std::log(count) +
+      const double criterion = count * math::log(fit.cost / count) +
+                               static_cast<double>(fit.p.size()) * math::log(count) +
                                (is_minimum_phase(modes) ? 0.0 : kPhaseWorth);
       if (is_machine(modes) && criterion < least) {
         least = criterion;

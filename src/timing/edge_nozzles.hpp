@@ -15,6 +15,7 @@
 #include "section_motion.hpp"
 #include "section_nodes.hpp"
 #include "section_spline.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/dynamics/flexible_axis.hpp"
 
 namespace unflex::timing {
@@ -43,8 +44,8 @@ class EdgeNozzles {
   [[nodiscard]] double largest_swing_mm(Vector base_mm) const {
     double largest = 0.0;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
-      largest = std::max(largest, std::hypot(swing_mm(edges_[i].x, ends_[i].x, base_mm.x),
-                                             swing_mm(edges_[i].y, ends_[i].y, base_mm.y)));
+      largest = std::max(largest, math::hypot(swing_mm(edges_[i].x, ends_[i].x, base_mm.x),
+                                              swing_mm(edges_[i].y, ends_[i].y, base_mm.y)));
     }
     return largest;
   }

@@ -26,6 +26,7 @@
 #include "model_shares.hpp"
 #include "nozzle_measure.hpp"
 #include "pieces.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/timing/timing.hpp"
 
 namespace unflex::timing {
@@ -81,7 +82,7 @@ constexpr double kGain = 1e-3;
 // g^{−exponent}, within what a limit may change by.
 double scale(double g, double exponent) {
   constexpr double kLeastError = 1e-3;
-  return std::clamp(std::pow(std::max(g, kLeastError), -exponent), kLeastFactor, kMostFactor);
+  return std::clamp(math::pow(std::max(g, kLeastError), -exponent), kLeastFactor, kMostFactor);
 }
 
 // The move becomes no faster than it was sliced.
@@ -378,7 +379,7 @@ class LocalScaling {
   void rescale(const std::vector<planner::PlannedMove>& plan, const NozzleMeasure& measured,
                int round, int repaired) {
     const bool repairs = repaired > 0;
-    const double cooled = std::pow(kCooling, round);
+    const double cooled = math::power(kCooling, round);
     const double alpha = repairs ? kAlphaOfRepairs : kAlpha * cooled;
     const double beta = repairs ? kBetaOfRepairs : kBeta * cooled;
     const double most = repairs ? 1.0 : kMostFactor;

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::timing {
 namespace {
 
@@ -31,11 +33,11 @@ std::vector<double> errors_along(gcode::Axis along, const NozzleMeasure& measure
     for (std::size_t i = 0; i < pieces.size(); ++i) {
       if (pieces[i].segment.extruding()) {
         const double allowed = allowances.empty() ? 1.0 : allowances[m][i];
-        sum += std::pow(std::abs(pieces[i].direction[along]) * measured.of_pieces[m][i] / allowed,
-                        kPower);
+        sum += math::pow(std::abs(pieces[i].direction[along]) * measured.of_pieces[m][i] / allowed,
+                         kPower);
       }
     }
-    errors.push_back(std::pow(sum, 1.0 / kPower) + kNothing);
+    errors.push_back(math::pow(sum, 1.0 / kPower) + kNothing);
   }
   return errors;
 }
@@ -62,7 +64,8 @@ void ModelShares::adapt(const std::vector<double>& errors, std::vector<double>& 
       std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
   factors.resize(errors.size(), 1.0);
   for (std::size_t m = 0; m < errors.size(); ++m) {
-    factors[m] = std::clamp(factors[m] * std::pow(errors[m] / mean, kResponse), 1.0 / kMost, kMost);
+    factors[m] =
+        std::clamp(factors[m] * math::pow(errors[m] / mean, kResponse), 1.0 / kMost, kMost);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "laid_width.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::timing {
 namespace {
@@ -22,7 +23,7 @@ constexpr double kBetweenLooks[] = {0.25, 0.5, 0.75};
 constexpr double kTowardsReference = 0.01;
 // Lines of G-code lay a little less evenly than is foreseen, so only this share of the tolerance of
 // the width is used.
-constexpr double kOfLines = 0.9;
+constexpr double kOfLines = 0.86;
 // Lines do not end exactly where filament does, so a little of it may come a node earlier or later.
 // There the nozzle may stray so many times the tolerance.
 constexpr double kBeside = 1.5;
@@ -155,8 +156,8 @@ class Walk {
     void end(double may_be_left, NozzleMeasure& result) {
       settle(nodes_.size(), result);
       const double left_mm =
-          std::hypot(swing_mm(model_->x, nozzle_.x, walk_->base_.x.position_mm.back()),
-                     swing_mm(model_->y, nozzle_.y, walk_->base_.y.position_mm.back()));
+          math::hypot(swing_mm(model_->x, nozzle_.x, walk_->base_.x.position_mm.back()),
+                      swing_mm(model_->y, nozzle_.y, walk_->base_.y.position_mm.back()));
       result.left.push_back(left_mm / (may_be_left * walk_->bounds_.back().tolerance_mm));
       result.of_pieces.push_back(std::move(of_pieces_));
     }
@@ -304,8 +305,8 @@ class Walk {
     result.error[k] = std::max(result.error[k], node.error_mm / tolerance_mm);
     if (times_tolerance == 1.0) {
       // In travel the base keeps F as well, since its motors are what F is for there.
-      const double of_travel_mm_s =
-          std::max(node.speed_mm_s, std::hypot(base_.x.velocity_mm_s[k], base_.y.velocity_mm_s[k]));
+      const double of_travel_mm_s = std::max(
+          node.speed_mm_s, math::hypot(base_.x.velocity_mm_s[k], base_.y.velocity_mm_s[k]));
       result.speed[k] = std::max(
           {result.speed[k], node.speed_mm_s / node.feed_mm_s, of_travel_mm_s / node.travel_mm_s});
     }
@@ -326,7 +327,7 @@ class Walk {
 double swing_mm(const dynamics::FlexibleAxis& axis, const dynamics::NozzleState& nozzle,
                 double base_mm) {
   const dynamics::FlexibleAxis::Gap gap = axis.gap(nozzle, axis.riding(base_mm));
-  return std::hypot(gap.place_mm, gap.speed_mm);
+  return math::hypot(gap.place_mm, gap.speed_mm);
 }
 
 std::vector<AxesModel> models_of(const compensate::Setup& setup) {

@@ -28,6 +28,7 @@
 #include "section_nodes.hpp"
 #include "section_rounds.hpp"
 #include "section_spline.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/quadratic/elastic_program.hpp"
 
 namespace unflex::timing {
@@ -436,20 +437,20 @@ class Program {
     const Vector velocity =
         Spline::apply(spline_.x().nozzle_speed, spline_.y().nozzle_speed, at.place);
     const double feed = rounds_.factors(at.k).feed * nodes_.period_s() * feed_mm_s;
-    if (std::hypot(velocity.x, velocity.y) < kNearFeed * feed) {
+    if (math::hypot(velocity.x, velocity.y) < kNearFeed * feed) {
       return;
     }
     // A direction that stays from round to round: around one that does not, the nozzle would swing
     // from round to round to where no facet is near.
-    double direction = std::atan2(velocity.y, velocity.x);
+    double direction = math::atan2(velocity.y, velocity.x);
     const Vector d = direction_of(legs_[at.leg]);
-    const double speed = std::hypot(velocity.x, velocity.y);
+    const double speed = math::hypot(velocity.x, velocity.y);
     const double along = velocity.x * d.x + velocity.y * d.y;
-    if (along > std::cos(kFacet_rad) * speed) {
-      direction = std::atan2(d.y, d.x);
+    if (along > math::cos(kFacet_rad) * speed) {
+      direction = math::atan2(d.y, d.x);
     }
     // One facet is enough there.
-    const bool is_along = along > std::cos(kAlong_rad) * speed &&
+    const bool is_along = along > math::cos(kAlong_rad) * speed &&
                           !nodes_.is_near_vertex(at.leg, at.k, at.x) &&
                           !nodes_.is_near_vertex(at.leg + 1, at.k, at.x);
     Gradient g;
@@ -457,7 +458,7 @@ class Program {
       if (facet != 0.0 && is_along) {
         continue;
       }
-      const Vector n{std::cos(direction + facet), std::sin(direction + facet)};
+      const Vector n{math::cos(direction + facet), math::sin(direction + facet)};
       const double v = spline_.linearise(at.place, *at.shares, n, spline_.x().nozzle_speed,
                                          spline_.y().nozzle_speed, 1.0 / feed, g);
       add_row(at, g, v, -kInfinity);
@@ -484,10 +485,10 @@ class Program {
     constexpr double kAllBack = 1e-6;
     const bool turns_back = a.x * b.x + a.y * b.y < 0.0;
     const double times =
-        turns_back && std::hypot(a.x + b.x, a.y + b.y) > kAllBack ? kTimesBack : 1.0;
+        turns_back && math::hypot(a.x + b.x, a.y + b.y) > kAllBack ? kTimesBack : 1.0;
     const double side = turns_back ? -1.0 : 1.0;
     Vector through{a.x + side * b.x, a.y + side * b.y};
-    const double length = std::hypot(through.x, through.y);
+    const double length = math::hypot(through.x, through.y);
     through = {through.x / length, through.y / length};
     add_strip(at, through, corner, times * std::min(of_before, of_after), false);
     add_feed(at, std::min({before.feed_mm_s, after.feed_mm_s, after.entry_mm_s}));
@@ -560,7 +561,7 @@ class Program {
         const Vector speed =
             Spline::apply(spline_.x().nozzle_speed, spline_.y().nozzle_speed, here.place);
         excess[k].include({a / (rules_.max_accel_mm_s2 * h * h), error(here),
-                           std::hypot(speed.x, speed.y) / (h * legs_[here.leg].feed_mm_s)});
+                           math::hypot(speed.x, speed.y) / (h * legs_[here.leg].feed_mm_s)});
       }
     }
     const double of_end = excess_at_end(excess);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::timing {
 namespace {
 
@@ -57,7 +59,7 @@ void SectionNodes::bind(const std::vector<double>& begins) {
   for (std::size_t i = 1; i < legs_.size(); ++i) {
     const Vector a = direction_of(legs_[i - 1]);
     const Vector b = direction_of(legs_[i]);
-    turned_rad += std::abs(std::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y));
+    turned_rad += std::abs(math::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y));
     const bool is_border = legs_[i - 1].lays_filament != legs_[i].lays_filament ||
                            !have_same_feed(legs_[i - 1], legs_[i]) ||
                            legs_[i - 1].tolerance_mm != legs_[i].tolerance_mm ||
@@ -97,7 +99,7 @@ double SectionNodes::distance_mm(std::size_t leg, Vector nozzle) const {
   const double along = along_mm(leg, nozzle);
   const Vector s = start_of(legs_[leg]);
   const Vector d = direction_of(legs_[leg]);
-  return std::hypot(nozzle.x - s.x - along * d.x, nozzle.y - s.y - along * d.y);
+  return math::hypot(nozzle.x - s.x - along * d.x, nozzle.y - s.y - along * d.y);
 }
 
 std::size_t SectionNodes::nearest_leg(std::size_t k, double x, Vector nozzle) const {

@@ -5,6 +5,7 @@
 
 #include "bounded_plan.hpp"
 #include "corner_speed.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::timing {
 namespace {
@@ -22,7 +23,7 @@ constexpr double kLeastSpeed_mm_s = 1.0;
 constexpr double kShortestPause_s = 5e-3;
 
 double flat_share(const planner::PlannedMove& move) {
-  return std::hypot(move.direction[X], move.direction[Y]);
+  return math::hypot(move.direction[X], move.direction[Y]);
 }
 
 // From one place to another, in X and Y alone.
@@ -32,7 +33,7 @@ planner::PlannedMove straight(const gcode::Position& from, const gcode::Position
   move.segment.start_mm[Y] = from[Y];
   move.segment.end_mm[X] = to[X];
   move.segment.end_mm[Y] = to[Y];
-  move.length_mm = std::hypot(to[X] - from[X], to[Y] - from[Y]);
+  move.length_mm = math::hypot(to[X] - from[X], to[Y] - from[Y]);
   move.direction[X] = (to[X] - from[X]) / move.length_mm;
   move.direction[Y] = (to[Y] - from[Y]) / move.length_mm;
   return move;
@@ -63,7 +64,7 @@ double distance_mm(const planner::PlannedMove& line, const gcode::Position& plac
   const double y = place[Y] - line.segment.start_mm[Y];
   const double along =
       std::clamp(x * line.direction[X] + y * line.direction[Y], 0.0, line.length_mm);
-  return std::hypot(x - along * line.direction[X], y - along * line.direction[Y]);
+  return math::hypot(x - along * line.direction[X], y - along * line.direction[Y]);
 }
 
 // Neighbours that lie on one line become one leg.

@@ -5,6 +5,7 @@
 
 #include "pieces.hpp"
 #include "sections.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::timing {
 namespace {
@@ -54,7 +55,7 @@ Timed timed_moves(std::span<const planner::PlannedMove> path, std::span<const Mo
       at.time_s += result.moves.back().duration_s();
       continue;
     }
-    const double length_mm = std::hypot(move.segment.delta(X), move.segment.delta(Y));
+    const double length_mm = math::hypot(move.segment.delta(X), move.segment.delta(Y));
     const double end_mm = path_mm + length_mm;
     const bool is_last = i + 1 == path.size();
     const std::size_t first = result.moves.size();

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "comment_fields.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::tune {
 namespace {
@@ -33,7 +34,7 @@ PressureTrial broad_trial(const PressureKnowledge& known) {
   PressureTrial trial{.known = known};
   trial.bands = kMostBands;
   trial.first_s = kLeastSum_s;
-  trial.step = std::pow(kMostSum_s / kLeastSum_s, 1.0 / static_cast<double>(kMostBands - 1));
+  trial.step = math::pow(kMostSum_s / kLeastSum_s, 1.0 / static_cast<double>(kMostBands - 1));
   return trial;
 }
 
@@ -79,7 +80,7 @@ std::string_view word(PressureParameter parameter) {
 
 double PressureTrial::value_s(std::size_t band) const {
   const double steps = static_cast<double>(band) - 1.0;
-  return is_broad(*this) ? first_s * std::pow(step, steps) : first_s + step * steps;
+  return is_broad(*this) ? first_s * math::pow(step, steps) : first_s + step * steps;
 }
 
 double PressureTrial::advance_s(std::size_t band) const {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tower_writer.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::tune {
 namespace {
@@ -78,7 +79,7 @@ void write_wall(TowerWriter& writer, int wall, double inset_mm, const Parts& par
   for (int i = 1; i <= lines; ++i) {
     const double waves_done = static_cast<double>(i) / per_wave;
     to(parts.lead_in_mm + parts.wave_mm * waves_done,
-       0.5 * waves.height_mm() * (1.0 - std::cos(2.0 * kPi * waves_done)));
+       0.5 * waves.height_mm() * (1.0 - math::cos(2.0 * kPi * waves_done)));
   }
   writer.extrude(writer.corner(wall + 3, inset_mm, 0.0), parts.speed_mm_s);
 }

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "unflex/core/math.hpp"
 #include "unflex/core/number.hpp"
 
 namespace unflex::tune {
@@ -88,8 +89,8 @@ TowerWriter::TowerWriter(const TowerPrinter& printer, double wall_mm)
     : printer_(&printer),
       side_mm_(std::max(kLeastSide_mm, std::ceil(wall_mm + 2.0 * kCornerRadius_mm))) {
   // A line with round sides, as slicers reckon it.
-  const double area_mm2 = (width() - layer()) * layer() + kPi * std::pow(layer() / 2.0, 2);
-  e_per_mm_ = area_mm2 / (kPi * std::pow(printer.filament_diameter_mm / 2.0, 2));
+  const double area_mm2 = (width() - layer()) * layer() + kPi * math::square(layer() / 2.0);
+  e_per_mm_ = area_mm2 / (kPi * math::square(printer.filament_diameter_mm / 2.0));
 }
 
 std::string TowerWriter::take() { return std::exchange(text_, {}); }
@@ -130,20 +131,20 @@ Point TowerWriter::corner(int number, double inset_mm, double share) const {
   const double from = 0.5 * kPi * number;
   const double middle = from + 0.25 * kPi;
   const double angle = from + 0.5 * kPi * share;
-  return {printer_->codes.center_x_mm + std::numbers::sqrt2 * half_mm * std::cos(middle) +
-              radius_mm * std::cos(angle),
-          printer_->codes.center_y_mm + std::numbers::sqrt2 * half_mm * std::sin(middle) +
-              radius_mm * std::sin(angle)};
+  return {printer_->codes.center_x_mm + std::numbers::sqrt2 * half_mm * math::cos(middle) +
+              radius_mm * math::cos(angle),
+          printer_->codes.center_y_mm + std::numbers::sqrt2 * half_mm * math::sin(middle) +
+              radius_mm * math::sin(angle)};
 }
 
 Point TowerWriter::on_wall(int wall, Point start, double distance_mm, double inward_mm) {
   const double along = 0.5 * kPi * wall;
-  return {start.x_mm + distance_mm * std::cos(along) - inward_mm * std::sin(along),
-          start.y_mm + distance_mm * std::sin(along) + inward_mm * std::cos(along)};
+  return {start.x_mm + distance_mm * math::cos(along) - inward_mm * math::sin(along),
+          start.y_mm + distance_mm * math::sin(along) + inward_mm * math::cos(along)};
 }
 
 void TowerWriter::extrude(Point to, double speed_mm_s) {
-  const double length_mm = std::hypot(to.x_mm - at_.x_mm, to.y_mm - at_.y_mm);
+  const double length_mm = math::hypot(to.x_mm - at_.x_mm, to.y_mm - at_.y_mm);
   line(fmt::format("G1 X{:.4f} Y{:.4f} E{:.5f} F{:.0f}", to.x_mm, to.y_mm, e_per_mm_ * length_mm,
                    60.0 * speed_mm_s));
   at_ = to;

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "comment_fields.hpp"
+#include "unflex/core/math.hpp"
 
 namespace unflex::tune {
 namespace {
@@ -50,9 +51,9 @@ double omega(double freq_hz) { return 2.0 * kPi * freq_hz; }
 // mean of what is left of each by the end. An error of 1 % lets 0.02 of that pass, either way.
 double um_per_percent(const Waves& waves, double damping_ratio) {
   const double fading = 2.0 * kPi * waves.count * damping_ratio;
-  const double mean_left = (1.0 - std::exp(-fading)) / fading;
+  const double mean_left = (1.0 - math::exp(-fading)) / fading;
   return 2e3 * 0.02 * kPi * waves.count * mean_left * waves.accel_mm_s2 /
-         std::pow(omega(waves.freq_hz), 2);
+         math::square(omega(waves.freq_hz));
 }
 
 // Half the width of the zone that the waves will leave if the other value is right.
@@ -75,7 +76,7 @@ Trial broad_trial(const Knowledge& known, double accel_mm_s2) {
   trial.first = kSlowest_hz;
   trial.step = kBroadStep;
   trial.bands = static_cast<std::size_t>(
-      1.0 + std::floor(std::log(kFastest_hz / kSlowest_hz) / std::log(kBroadStep)));
+      1.0 + std::floor(math::log(kFastest_hz / kSlowest_hz) / math::log(kBroadStep)));
   trial.waves = {kBroadWave_hz, std::min(kBroadAccel_mm_s2, kShareOfAccel * accel_mm_s2), 1};
   return trial;
 }
@@ -94,7 +95,7 @@ Trial freq_trial(const Knowledge& known, double accel_mm_s2) {
   const double steps = steps_to_end(reach, half_zone);
   trial.bands = static_cast<std::size_t>(2.0 * steps + 1.0);
   trial.step = 1.0 + reach / steps;
-  trial.first = known.freq_hz * std::pow(trial.step, -steps);
+  trial.first = known.freq_hz * math::pow(trial.step, -steps);
   return trial;
 }
 
@@ -124,11 +125,11 @@ bool take_positive(std::string_view& line, std::string_view name, double& number
 
 }  // namespace
 
-double Waves::height_mm() const { return 2.0 * accel_mm_s2 / std::pow(omega(freq_hz), 2); }
+double Waves::height_mm() const { return 2.0 * accel_mm_s2 / math::square(omega(freq_hz)); }
 
 double Trial::value(std::size_t band) const {
   const double steps = static_cast<double>(band) - 1.0;
-  return parameter == Parameter::freq_hz ? first * std::pow(step, steps) : first + step * steps;
+  return parameter == Parameter::freq_hz ? first * math::pow(step, steps) : first + step * steps;
 }
 
 double Trial::freq_hz(std::size_t band) const {
@@ -170,8 +171,8 @@ Result<Knowledge> read(const Trial& trial, const Zone& zone) {
   if (trial.parameter == Parameter::freq_hz) {
     // What passes at the pole is |1 − (f/f_c)²|, which is the same at both edges.
     known.freq_hz = std::sqrt(2.0 / (1.0 / (low * low) + 1.0 / (high * high)));
-    const double half = 0.5 * std::log(high / low);
-    const double step = std::log(trial.step);
+    const double half = 0.5 * math::log(high / low);
+    const double step = math::log(trial.step);
     known.freq_error = std::max(0.5 * step, kUnevenEye * half);
     if (at_low_end || at_high_end) {
       // The zone may go on. The same is tried once more, around here.

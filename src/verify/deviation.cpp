@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "meter.hpp"
+#include "unflex/core/math.hpp"
 #include "unflex/verify/reference_path.hpp"
 
 namespace unflex::verify {
@@ -36,7 +37,7 @@ NozzleModel coarse(NozzleModel model) {
 double apart_mm(const NozzleXY& a, const NozzleXY& b, const NozzleModel& model) {
   const dynamics::FlexibleAxis::Gap x = model.x.gap(a.x, b.x);
   const dynamics::FlexibleAxis::Gap y = model.y.gap(a.y, b.y);
-  return std::hypot(x.place_mm, x.speed_mm, std::hypot(y.place_mm, y.speed_mm));
+  return math::hypot(x.place_mm, x.speed_mm, math::hypot(y.place_mm, y.speed_mm));
 }
 
 double swing_mm(const NozzleXY& nozzle, const gcode::Position& at, const NozzleModel& model) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::verify {
 namespace {
 
@@ -41,7 +43,7 @@ std::vector<NozzleModel> with(const NozzleModel& model, const std::vector<Nozzle
 void LagEstimate::add(double error_dot_velocity, double velocity2, double h) {
   if (h != last_h_) {
     last_h_ = h;
-    keep_ = std::exp(-h / kLagMemory_s);
+    keep_ = math::exp(-h / kLagMemory_s);
   }
   error_dot_velocity_ = keep_ * error_dot_velocity_ + h * error_dot_velocity;
   velocity2_ = keep_ * velocity2_ + h * velocity2;
@@ -122,7 +124,7 @@ double Meter::to_path_end_mm(const gcode::Position& from) const {
     return 0.0;
   }
   const gcode::Position& end = (*path_)[path_->end() - 1].move.segment.end_mm;
-  return std::hypot(from[gcode::X] - end[gcode::X], from[gcode::Y] - end[gcode::Y]);
+  return math::hypot(from[gcode::X] - end[gcode::X], from[gcode::Y] - end[gcode::Y]);
 }
 
 double Meter::swing_mm() const {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::verify {
 
 PressedFilament::PressedFilament(const dynamics::HotendPressure& hotend) : hotend_(hotend) {
@@ -65,7 +67,7 @@ double PressedFilament::follow(double duration_s, double rate_mm_s) {
 double PressedFilament::follow_evenly(double duration_s, double rate_mm_s) {
   const double before_mm_s = flow_mm_s_;
   const auto later = [&](double t, double slope_s) {
-    return slope_s > 0.0 ? rate_mm_s + (before_mm_s - rate_mm_s) * std::exp(-t / slope_s)
+    return slope_s > 0.0 ? rate_mm_s + (before_mm_s - rate_mm_s) * math::exp(-t / slope_s)
                          : rate_mm_s;
   };
   const double middle_mm_s = later(0.5 * duration_s, hotend_.slope_s(before_mm_s));

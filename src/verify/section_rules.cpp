@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/math.hpp"
+
 namespace unflex::verify {
 namespace {
 
@@ -36,8 +38,8 @@ double SectionRules::largest_offset_mm(double max_accel_mm_s2, double v_mm_s) co
   // could.
   constexpr double kTimesInFreeTiming = 2.5;
   return kRounding_mm + (has_free_timing_ ? kTimesInFreeTiming : 1.0) *
-                            std::hypot(rules_->nozzle.x.largest_lag_mm(max_accel_mm_s2, v_mm_s),
-                                       rules_->nozzle.y.largest_lag_mm(max_accel_mm_s2, v_mm_s));
+                            math::hypot(rules_->nozzle.x.largest_lag_mm(max_accel_mm_s2, v_mm_s),
+                                        rules_->nozzle.y.largest_lag_mm(max_accel_mm_s2, v_mm_s));
 }
 
 void SectionRules::Breach::offer(double a_value, double limit, std::size_t a_line) {

@@ -1,6 +1,7 @@
 // A print gives equal bytes, wherever, whenever and however the program is run.
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pty.h>
@@ -96,6 +97,19 @@ TEST_P(Determinism, HoldsForEitherWayToAskForTheEngine) {
 TEST_P(Determinism, HoldsForEitherWidthOfRegisters) {
   const Made first = make();
   EXPECT_TRUE(make({}, [] { ::setenv("UNFLEX_LANES", "2", 1); }) == first);
+}
+
+// The C library chooses its functions by processor, and unflex its registers.
+TEST_P(Determinism, HoldsOnAnOlderProcessor) {
+  const auto is_old = [] {
+    ::setenv("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4", 1);
+    ::setenv("UNFLEX_LANES", "2", 1);
+  };
+  for (const Words& timing :
+       {Words{}, Words{"--faster"}, Words{"--faster", "--timing", "optimal"}}) {
+    const Made first = make(timing);
+    EXPECT_TRUE(make(timing, is_old) == first) << fmt::format("{}", fmt::join(timing, " "));
+  }
 }
 
 TEST_P(Determinism, HoldsInAnyEnvironment) {

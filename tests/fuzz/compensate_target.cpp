@@ -3,8 +3,6 @@
 // The checks judge the output by its text alone, read as the printer reads it.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -74,28 +72,6 @@ machine::Settings settings_of(const CompensateVariant& variant) {
   return *settings;
 }
 
-// A file that exists only in memory.
-class MemoryFile {
- public:
-  explicit MemoryFile(std::string_view text) : fd_(memfd_create("unflex", MFD_CLOEXEC)) {
-    require(fd_ >= 0 && write(fd_, text.data(), text.size()) == std::ssize(text),
-            "no memory for a file");
-  }
-  ~MemoryFile() { close(fd_); }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-
-  [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", fd_); }
-  [[nodiscard]] std::string text() const {
-    std::string text(static_cast<std::size_t>(lseek(fd_, 0, SEEK_END)), '\0');
-    require(pread(fd_, text.data(), text.size(), 0) == std::ssize(text), "cannot read a file");
-    return text;
-  }
-
- private:
-  int fd_;
-};
-
 struct Compensated {
   report::Report report;
   std::string text;
@@ -103,18 +79,17 @@ struct Compensated {
 
 Result<Compensated> run(const std::string& text, const machine::Settings& settings,
                         unsigned workers) {
-  const MemoryFile input(text);
-  const MemoryFile output("");
-  const pipeline::Job job{.input = input.path(),
+  const pipeline::Job job{.input = memory_store(text),
                           .input_name = "in.gcode",
-                          .output = output.path(),
+                          .output = memory_store(),
                           .output_name = "out.gcode",
                           .settings = settings,
                           .engine = pipeline::EngineChoice::banded,
                           .workers = workers};
   SilentProgress progress;
   return pipeline::compensate(job, progress).map([&](report::Report report) {
-    return Compensated{std::move(report), output.text()};
+    return Compensated{std::move(report),
+                       {std::istreambuf_iterator<char>(*job.output->read()), {}}};
   });
 }
 

@@ -14,6 +14,7 @@
 #include "compensate_with.hpp"
 #include "engines.hpp"
 #include "jobs.hpp"
+#include "unflex/platform/files.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -648,7 +649,7 @@ TEST(Compensate, StopsWhenItIsToldTo) {
 TEST(Compensate, FailsWhereTheDiskIsFull) {
   const JobFolder folder(print_of({20}));
   Job job = folder.job();
-  job.output = "/dev/full";
+  job.output = platform::file_store("/dev/full");
   SilentProgress progress;
   const Result<report::Report> report = compensate(job, progress);
   ASSERT_FALSE(report.has_value());
@@ -659,7 +660,7 @@ TEST(Compensate, FailsWhereTheDiskIsFull) {
 TEST(Compensate, FailsWhereTheOutputCannotBeCreated) {
   const JobFolder folder(print_of({20}));
   Job job = folder.job();
-  job.output = job.input / "below-a-file";
+  job.output = platform::file_store(folder.path() / "in.gcode" / "below-a-file");
   SilentProgress progress;
   const Result<report::Report> report = compensate(job, progress);
   ASSERT_FALSE(report.has_value());
@@ -669,7 +670,7 @@ TEST(Compensate, FailsWhereTheOutputCannotBeCreated) {
 TEST(Compensate, FailsWhereTheInputIsMissing) {
   const JobFolder folder("");
   Job job = folder.job();
-  job.input += "-missing";
+  job.input = platform::file_store(folder.path() / "missing");
   SilentProgress progress;
   const Result<report::Report> report = compensate(job, progress);
   ASSERT_FALSE(report.has_value());

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "unflex/platform/files.hpp"
+
 namespace unflex::pipeline::testing {
 
 std::string read_file(const std::filesystem::path& file) {
@@ -56,9 +58,9 @@ JobFolder::~JobFolder() {
 }
 
 Job JobFolder::job(unsigned workers) const {
-  return {.input = folder_ / "in.gcode",
+  return {.input = platform::file_store(folder_ / "in.gcode"),
           .input_name = "in.gcode",
-          .output = folder_ / "out.gcode",
+          .output = platform::file_store(folder_ / "out.gcode"),
           .output_name = "out.gcode",
           .settings = settings_,
           .workers = workers};

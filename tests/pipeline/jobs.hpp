@@ -29,6 +29,7 @@ class JobFolder {
 
   [[nodiscard]] Job job(unsigned workers = 1) const;
   [[nodiscard]] std::string output() const { return read_file(folder_ / "out.gcode"); }
+  [[nodiscard]] const std::filesystem::path& path() const { return folder_; }
   void set_output(std::string_view text) const { write_file(folder_ / "out.gcode", text); }
 
  private:

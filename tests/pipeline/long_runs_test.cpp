@@ -17,6 +17,7 @@
 #include "jobs.hpp"
 #include "piece_reader.hpp"
 #include "unflex/core/number.hpp"
+#include "unflex/platform/descriptors.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -216,11 +217,12 @@ TEST(LongRun, ThatCannotGoOnStandsAsAWhole) {
 TEST(LongRun, ThatCannotGoOnIsAnErrorWithItsLinesWhereItsBeginningIsPassedOn) {
   const JobFolder folder(spiral(90.0));
   Job job = folder.job(2);
-  job.output_fd = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  job.output_stream = platform::descriptor_sink(nowhere);
   SilentProgress progress;
   const Result<report::Report> report =
       compensate_with(job, {factory(up_to(125.0)), nullptr}, progress);
-  ::close(job.output_fd);
+  ::close(nowhere);
   ASSERT_FALSE(report.has_value());
   EXPECT_GT(report.error().place.line, 100U);
   EXPECT_THAT(report.error().message, HasSubstr("too far out"));

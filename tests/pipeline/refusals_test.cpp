@@ -11,6 +11,7 @@
 #include "unflex/core/progress.hpp"
 #include "unflex/pipeline/pipeline.hpp"
 #include "unflex/pipeline/study_print.hpp"
+#include "unflex/platform/files.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -53,7 +54,7 @@ TEST_P(EveryTask, NeedsAFileThatIsThere) {
   const JobFolder folder(kPrint);
   folder.set_output(kPrint);
   Job job = folder.job();
-  job.input += "-missing";
+  job.input = platform::file_store(folder.path() / "missing");
   job.input_name = "print";
   EXPECT_EQ(refusal(job), "print: cannot read the file");
 }

@@ -9,6 +9,7 @@
 #include "jobs.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/core/progress.hpp"
+#include "unflex/platform/files.hpp"
 
 namespace unflex::pipeline {
 namespace {
@@ -18,11 +19,9 @@ class Retime : public ::testing::Test {
   // The result of retime() for this content.
   static std::string retimed(const std::string& content, double factor,
                              const std::vector<verify::TimeNote>& notes = {}) {
-    const testing::JobFolder folder(content);
-    const std::filesystem::path path = folder.job().input;
-    EXPECT_TRUE(retime(path.string(), "retime.gcode", notes, {0, 1000.0, 1000.0 * factor}));
-    const std::string result = testing::read_file(path);
-    return result;
+    const auto text = memory_store(content);
+    EXPECT_TRUE(retime(*text, "retime.gcode", notes, {0, 1000.0, 1000.0 * factor}));
+    return {std::istreambuf_iterator<char>(*text->read()), {}};
   }
 };
 
@@ -97,7 +96,8 @@ TEST_F(Retime, FollowsAFreeTiming) {
 }
 
 TEST_F(Retime, FailsWithoutAFile) {
-  const Status status = retime("/nonexistent/file.gcode", "out.gcode", {}, {0, 1.0, 1.0});
+  const auto missing = platform::file_store("/nonexistent/file.gcode");
+  const Status status = retime(*missing, "out.gcode", {}, {0, 1.0, 1.0});
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(to_string(status.error()).rfind("out.gcode", 0), 0U);
 }

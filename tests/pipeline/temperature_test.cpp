@@ -270,9 +270,10 @@ TEST_F(AskedAhead, MustNotWaitOrSwitchOff) {
 }
 
 PrintCourse course_of(const std::string& text, Firmware firmware) {
-  const JobFolder folder(text, with_model(firmware));
   SilentProgress progress;
-  return print_course(folder.job().input, "in.gcode", folder.job().settings, progress).value();
+  return print_course(*memory_store(text), "in.gcode", testing::settings(with_model(firmware)),
+                      progress)
+      .value();
 }
 
 // When commands come and from when on nothing stands in their way.
@@ -373,10 +374,9 @@ TEST(PrintCourse, KnowsWhatMacrosHeatTo) {
 class LinesAhead : public ::testing::Test {
  protected:
   static std::string put(const std::string& text, const std::vector<LineAhead>& lines) {
-    const JobFolder folder("");
-    folder.set_output(text);
-    EXPECT_TRUE(put_ahead(folder.job().output.string(), "out.gcode", lines));
-    return folder.output();
+    const auto store = memory_store(text);
+    EXPECT_TRUE(put_ahead(*store, "out.gcode", lines));
+    return {std::istreambuf_iterator<char>(*store->read()), {}};
   }
 };
 

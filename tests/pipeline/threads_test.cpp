@@ -14,11 +14,12 @@
 #include <thread>
 
 #include "cpu_slots.hpp"
-#include "fd_stream.hpp"
 #include "gap_check.hpp"
 #include "jobs.hpp"
 #include "stage_options.hpp"
+#include "stream_buffers.hpp"
 #include "task_pool.hpp"
+#include "unflex/platform/descriptors.hpp"
 #include "verify_thread.hpp"
 
 namespace unflex::pipeline {
@@ -180,7 +181,7 @@ class CancelledProgress final : public Progress {
   [[nodiscard]] bool cancelled() const override { return true; }
 };
 
-TEST(FdSink, SaysWhereItWasCancelledBeforeAllWasWritten) {
+TEST(SinkBuffer, SaysWhereItWasCancelledBeforeAllWasWritten) {
   std::array<int, 2> pipe{};
   ASSERT_EQ(::pipe2(pipe.data(), O_NONBLOCK), 0);
   while (::write(pipe[1], "x", 1) == 1) {
@@ -188,10 +189,10 @@ TEST(FdSink, SaysWhereItWasCancelledBeforeAllWasWritten) {
   CpuSlots slots(1);
   const CpuSlot slot(slots);
   Job job;
-  job.output_fd = pipe[1];
-  job.output_fd_kind = container::Kind::gzip;
+  job.output_stream = platform::descriptor_sink(pipe[1]);
+  job.output_stream_kind = container::Kind::gzip;
   const CancelledProgress progress;
-  FdSink sink(job, progress, slots);
+  SinkBuffer sink(job, progress, slots);
   EXPECT_FALSE(sink.finish());
   EXPECT_EQ(sink.error(), 0);
   ::close(pipe[0]);
@@ -221,7 +222,7 @@ TEST(Compensate, IsNotDoneWhereItsInputEndedForBeingCancelled) {
   constexpr std::string_view kBegun = "G28\nM106 S9\n";
   ASSERT_EQ(::write(pipe[1], kBegun.data(), kBegun.size()), std::ssize(kBegun));
   Job job = folder.job();
-  job.input_fd = pipe[0];
+  job.input_stream = platform::descriptor_source(pipe[0]);
   CancelledInTheReader progress;
   const Result<report::Report> report = compensate(job, progress);
   ASSERT_FALSE(report.has_value());

@@ -113,7 +113,11 @@ class Engine {
   [[nodiscard]] virtual std::string name() const = 0;
 };
 
-// Hargraves–Paris transcription solved by Ipopt. Not thread-safe (see nlp/ipopt_solver.hpp).
+// Whether the library was built with Ipopt.
+[[nodiscard]] bool has_ipopt_engine();
+
+// Hargraves–Paris transcription solved by Ipopt. Not thread-safe (see nlp/ipopt_solver.hpp). Null
+// if the library was built without Ipopt.
 [[nodiscard]] std::unique_ptr<Engine> make_ipopt_engine();
 
 // Solves the program of make_ipopt_engine() without its equality constraints, by interior points of

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstddef>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -422,9 +421,9 @@ struct Settings {
 
 // Where settings come from.
 struct Sources {
-  const PrintText* print = nullptr;                   // the print they are for, if it is at hand
-  std::optional<std::filesystem::path> printer_file;  // --printer
-  std::vector<std::string> overrides;                 // --set, "key=value"
+  const PrintText* print = nullptr;         // the print they are for, if it is at hand
+  std::optional<std::string> printer_file;  // --printer
+  std::vector<std::string> overrides;       // --set, "key=value"
   // If no source names a firmware, take the one that the print was sliced for. If this is false,
   // take the default: many printers are sliced for as if they had another firmware.
   bool firmware_as_sliced = false;
@@ -441,7 +440,7 @@ struct Sources {
 [[nodiscard]] bool describes_printer(const PrintText& text);
 
 // Reads the settings without a print.
-[[nodiscard]] Result<Settings> load(const std::optional<std::filesystem::path>& printer_file,
+[[nodiscard]] Result<Settings> load(const std::optional<std::string>& printer_file,
                                     const std::vector<std::string>& overrides);
 
 // Reads the settings from the text of a printer file; `name` stands for the file in messages.

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -26,8 +25,7 @@ struct PrintText {
 };
 
 // The head and the tail of a file. Errors are of kind input.
-[[nodiscard]] Result<PrintText> read_print_text(const std::filesystem::path& file,
-                                                const std::string& name);
+[[nodiscard]] Result<PrintText> read_print_text(const std::string& file, const std::string& name);
 
 // Where the head of a print ends that begins like `text`: behind the line of the first move (G0 to
 // G3). If no move comes within kMaxHeadBytes, the head ends behind the last whole line in these

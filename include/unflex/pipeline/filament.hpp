@@ -1,13 +1,13 @@
 // A print's text, fitted to the filament that there is.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/core/text_store.hpp"
 #include "unflex/filament/fitter.hpp"
 #include "unflex/machine/machine.hpp"
 
@@ -22,7 +22,7 @@ struct FittedPrint {
 // messages call the print. is_marked: the text ends with a comment by which it is known again.
 // Errors are those of filament::Fitter::fit(), of reading and of `write`.
 [[nodiscard]] Result<FittedPrint> fit_filament(
-    const std::filesystem::path& print, const std::string& name, const machine::Settings& settings,
+    const TextStore& print, const std::string& name, const machine::Settings& settings,
     const filament::Profile& profile, bool is_marked,
     const std::function<Status(std::string_view)>& write);
 

@@ -2,14 +2,16 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "unflex/container/container.hpp"
+#include "unflex/core/byte_stream.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/core/progress.hpp"
+#include "unflex/core/text_store.hpp"
 #include "unflex/machine/machine.hpp"
 #include "unflex/report/report.hpp"
 
@@ -23,17 +25,16 @@ enum class EngineChoice {
 };
 
 struct Job {
-  std::filesystem::path input;   // a seekable file
-  std::string input_name;        // as the user calls it, for messages ("-" for stdin)
-  std::filesystem::path output;  // compensate: written here, not atomically
-  // compensate: streams that are read and written as the text comes, instead of the files.
-  // Negative: not used.
-  int input_fd = -1;
-  std::string input_head = {};  // first bytes of input_fd, read already
-  int output_fd = -1;
-  // What the two descriptors carry: text or gzip. Files hold text.
-  container::Kind input_fd_kind = container::Kind::text;
-  container::Kind output_fd_kind = container::Kind::text;
+  std::shared_ptr<TextStore> input;
+  std::string input_name;             // as the user calls it, for messages ("-" for stdin)
+  std::shared_ptr<TextStore> output;  // compensate: written here, not atomically
+  // compensate: streams that are read and written as the text comes, instead of these two.
+  std::shared_ptr<ByteSource> input_stream = {};
+  std::string input_head = {};  // first bytes of input_stream, read already
+  std::shared_ptr<ByteSink> output_stream = {};
+  // What the two streams carry: text or gzip. `input` and `output` hold text.
+  container::Kind input_stream_kind = container::Kind::text;
+  container::Kind output_stream_kind = container::Kind::text;
   std::string output_name;
   machine::Settings settings;
   EngineChoice engine = EngineChoice::automatic;
@@ -43,6 +44,9 @@ struct Job {
   bool all_shapers = false;
   unsigned workers = 1;  // threads or solver processes that compute at once
 };
+
+// An error of kind usage if the library was built without this engine.
+[[nodiscard]] Status check_built(EngineChoice engine);
 
 // Reads the input, compensates it, writes the output and verifies what was written.
 // Forks its workers first: call it before any thread exists.

@@ -44,7 +44,8 @@ struct Outcome {
 };
 
 struct Options {
-  bool ipopt = false;                   // unflex' bases by Ipopt instead of the banded engine
+  bool ipopt =
+      false;  // unflex' bases by Ipopt, which must be built in, instead of the banded engine
   unsigned workers = 1;                 // threads; the result does not depend on them
   std::vector<std::string> cases = {};  // names of those to run; none: all
   bool traces = false;                  // record traces for the figures

@@ -1,4 +1,4 @@
-// Streams over file descriptors: a pipe is read as its text comes and written to at once.
+// A print that is read as its bytes come and written at once, as from pipe to pipe.
 #pragma once
 
 #include <atomic>
@@ -15,13 +15,17 @@
 
 namespace unflex::pipeline {
 
-// The reader gives its slot back while it waits. The text ends early when cancelled or stopped.
-class FdSource final : public std::streambuf {
+// The text of Job::input_stream. The reader gives its slot back while it waits. The text ends early
+// when cancelled or stopped. A stream over it becomes bad if it cannot be read on.
+class SourceBuffer final : public std::streambuf {
  public:
-  FdSource(const Job& job, const Progress& progress, CpuSlots& slots);
+  SourceBuffer(const Job& job, const Progress& progress, CpuSlots& slots);
 
   // Nothing more is wanted: ends a read that is under way in another thread.
   void stop() { stopped_ = true; }
+
+  // The stream that becomes bad.
+  void set_stream(std::istream& stream) { stream_ = &stream; }
 
   // Why the text could not be unpacked, if the stream is bad because of that.
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
@@ -33,9 +37,11 @@ class FdSource final : public std::streambuf {
   // Reads the next bytes into block_; false at the end.
   bool read_block();
   bool unpack_block();
+  void make_bad();
   [[nodiscard]] bool is_unwanted() const { return stopped_ || progress_->cancelled(); }
 
-  int fd_;
+  ByteSource* source_;
+  std::istream* stream_ = nullptr;
   std::atomic<bool> stopped_ = false;
   const Progress* progress_;
   CpuSlots* slots_;
@@ -43,11 +49,13 @@ class FdSource final : public std::streambuf {
   std::unique_ptr<container::Unpacker> unpacker_;
   std::string text_;  // unpacked text
   std::optional<Error> error_;
+  bool is_bad_ = false;
 };
 
-class FdSink final : public std::streambuf {
+// Writes to Job::output_stream.
+class SinkBuffer final : public std::streambuf {
  public:
-  FdSink(const Job& job, const Progress& progress, CpuSlots& slots);
+  SinkBuffer(const Job& job, const Progress& progress, CpuSlots& slots);
 
   // Call it once after all of the text; packed output is incomplete without it. False if not all
   // was written: the work was cancelled, or error() tells why.
@@ -63,7 +71,7 @@ class FdSink final : public std::streambuf {
  private:
   bool write_out(std::string_view bytes);
 
-  int fd_;
+  ByteSink* sink_;
   int error_ = 0;
   bool is_whole_ = true;  // all that came has been written
   const Progress* progress_;

@@ -1,0 +1,21 @@
+# WebAssembly with WASI, by Debian's clang-22 and its libc++; for browsers and node.
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR wasm32)
+set(CMAKE_C_COMPILER clang-22)
+set(CMAKE_CXX_COMPILER clang++-22)
+set(CMAKE_C_COMPILER_TARGET wasm32-wasi)
+set(CMAKE_CXX_COMPILER_TARGET wasm32-wasi)
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+# The compiler calls the target by another name than Debian's folders. Nothing is thrown in this
+# build: where memory runs out, it traps.
+set(CMAKE_C_FLAGS_INIT "-Wno-deprecated")
+set(CMAKE_CXX_FLAGS_INIT "-Wno-deprecated -fignore-exceptions")
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-z,stack-size=1048576")
+set(CMAKE_EXECUTABLE_SUFFIX .wasm)
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+
+set(UNFLEX_IPOPT OFF CACHE BOOL "")
+set(UNFLEX_THREADS OFF CACHE BOOL "")
+set(UNFLEX_TESTS OFF CACHE BOOL "")
+# clang does not share compiled headers between levels of optimisation.
+set(CMAKE_DISABLE_PRECOMPILE_HEADERS ON CACHE BOOL "")

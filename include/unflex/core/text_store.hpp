@@ -1,0 +1,38 @@
+// Where a text lies: a file, or memory. It can be read from its beginning as often as is asked for.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <iosfwd>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace unflex {
+
+// Appends to `out` what shall stand in the place of `text`, which is whole lines. Only the text's
+// last line may lack its ending.
+using LineChange = std::function<void(std::string_view text, std::string& out)>;
+
+class TextStore {
+ public:
+  TextStore() = default;
+  TextStore(const TextStore&) = delete;
+  TextStore& operator=(const TextStore&) = delete;
+  virtual ~TextStore() = default;
+
+  // A seekable stream at the beginning, bad if the text cannot be read.
+  [[nodiscard]] virtual std::unique_ptr<std::istream> read() const = 0;
+  // Empties the text. The stream is bad if it cannot be written.
+  [[nodiscard]] virtual std::unique_ptr<std::ostream> write() = 0;
+  // Hands the text to `change`, block by block in order, and writes what it makes of it over the
+  // text. False if it cannot be read or written.
+  [[nodiscard]] virtual bool rewrite(const LineChange& change) = 0;
+  // Its length. nullopt if that is not known, as of a file whose name is gone since it was opened.
+  [[nodiscard]] virtual std::optional<std::uint64_t> bytes() const = 0;
+};
+
+[[nodiscard]] std::shared_ptr<TextStore> memory_store(std::string text = {});
+
+}  // namespace unflex

@@ -1,0 +1,10 @@
+// Where the library is built without Ipopt.
+#include "unflex/compensate/axis_window.hpp"
+
+namespace unflex::compensate {
+
+bool has_ipopt_engine() { return false; }
+
+std::unique_ptr<Engine> make_ipopt_engine() { return nullptr; }
+
+}  // namespace unflex::compensate
