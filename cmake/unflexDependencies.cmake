@@ -1,6 +1,6 @@
 # Looks for the libraries that unflex is built from. The build uses this file, and so does every
 # project that links the library: it is installed beside unflexConfig.cmake. Sets
-# unflex_NOT_FOUND_MESSAGE if something is missing.
+# unflex_NOT_FOUND_MESSAGE if something is missing. unflex_HAS_IPOPT says whether Ipopt is needed.
 set(unflex_NOT_FOUND_MESSAGE)
 set(unflex_missing)
 
@@ -15,9 +15,11 @@ endmacro()
 find_package(PkgConfig QUIET)
 unflex_need(PKG_CONFIG_FOUND pkg-config pkg-config)
 if(PKG_CONFIG_FOUND)
-  pkg_check_modules(IPOPT QUIET IMPORTED_TARGET ipopt)
-  # Ipopt links LAPACK and BLAS, which its package merely recommends.
-  unflex_need(IPOPT_FOUND Ipopt coinor-libipopt-dev libblas-dev liblapack-dev)
+  if(unflex_HAS_IPOPT)
+    pkg_check_modules(IPOPT QUIET IMPORTED_TARGET ipopt)
+    # Ipopt links LAPACK and BLAS, which its package merely recommends.
+    unflex_need(IPOPT_FOUND Ipopt coinor-libipopt-dev libblas-dev liblapack-dev)
+  endif()
   pkg_check_modules(ZSTD QUIET IMPORTED_TARGET libzstd)
   unflex_need(ZSTD_FOUND Zstandard libzstd-dev)
 endif()

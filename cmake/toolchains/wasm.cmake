@@ -9,7 +9,7 @@ set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 # The compiler calls the target by another name than Debian's folders. Nothing is thrown in this
 # build: where memory runs out, it traps.
 set(CMAKE_C_FLAGS_INIT "-Wno-deprecated")
-set(CMAKE_CXX_FLAGS_INIT "-Wno-deprecated -fignore-exceptions")
+set(CMAKE_CXX_FLAGS_INIT "-Wno-deprecated -fignore-exceptions -isystem ${CMAKE_CURRENT_LIST_DIR}/wasm")
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-z,stack-size=1048576")
 set(CMAKE_EXECUTABLE_SUFFIX .wasm)
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unsupported/Eigen/FFT>
 
+#include "unflex/core/math.hpp"
 #include "welch_window.hpp"
 
 namespace unflex::identify {
@@ -18,11 +19,22 @@ Eigen::Index window_length(double rate_hz) {
   return length;
 }
 
+// I₀(x) = Σ ((x/2)ᵏ / k!)², the modified Bessel function of order 0.
+double bessel_i0(double x) {
+  double term = 1.0;
+  double sum = 1.0;
+  for (int k = 1; term > 1e-17 * sum; ++k) {
+    term *= math::square(0.5 * x / k);
+    sum += term;
+  }
+  return sum;
+}
+
 Eigen::ArrayXd kaiser_window(Eigen::Index length) {
   Eigen::ArrayXd window(length);
   for (Eigen::Index i = 0; i < length; ++i) {
     const double x = 2.0 * static_cast<double>(i) / static_cast<double>(length - 1) - 1.0;
-    window[i] = std::cyl_bessel_i(0.0, kBetaOfWindow * std::sqrt(std::max(1.0 - x * x, 0.0)));
+    window[i] = bessel_i0(kBetaOfWindow * std::sqrt(std::max(1.0 - x * x, 0.0)));
   }
   return window;
 }

@@ -1,6 +1,7 @@
 #include "unflex/platform/usage.hpp"
 
-// clang-format off: the second needs the first.
+// The second needs the first.
+// clang-format off
 #include <windows.h>
 #include <psapi.h>
 // clang-format on
