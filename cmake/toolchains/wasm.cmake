@@ -1,4 +1,5 @@
 # WebAssembly with WASI, by Debian's clang-22 and its libc++; for browsers and node.
+include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR wasm32)
 set(CMAKE_C_COMPILER clang-22)
@@ -12,10 +13,7 @@ set(CMAKE_C_FLAGS_INIT "-Wno-deprecated")
 set(CMAKE_CXX_FLAGS_INIT "-Wno-deprecated -fignore-exceptions -isystem ${CMAKE_CURRENT_LIST_DIR}/wasm")
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-z,stack-size=1048576")
 set(CMAKE_EXECUTABLE_SUFFIX .wasm)
-set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 
-set(UNFLEX_IPOPT OFF CACHE BOOL "")
 set(UNFLEX_THREADS OFF CACHE BOOL "")
-set(UNFLEX_TESTS OFF CACHE BOOL "")
 # clang does not share compiled headers between levels of optimisation.
 set(CMAKE_DISABLE_PRECOMPILE_HEADERS ON CACHE BOOL "")

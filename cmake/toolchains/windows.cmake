@@ -1,11 +1,8 @@
 # Windows, by Debian's MinGW-w64 with POSIX threads; one executable without other files.
+include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
 set(CMAKE_SYSTEM_NAME Windows)
 set(CMAKE_SYSTEM_PROCESSOR x86_64)
 set(CMAKE_C_COMPILER x86_64-w64-mingw32-gcc-posix)
 set(CMAKE_CXX_COMPILER x86_64-w64-mingw32-g++-posix)
 set(CMAKE_RC_COMPILER x86_64-w64-mingw32-windres)
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-static")
-set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
-
-set(UNFLEX_IPOPT OFF CACHE BOOL "")
-set(UNFLEX_TESTS OFF CACHE BOOL "")

@@ -300,8 +300,9 @@ bool FlatForm::factor(const PerKind<const double*>& weights) {
     }
   }
   tie_ends_of_hessian();
-  // Where weights differ by more than numbers have digits, a pivot may come out negative. A little
-  // more on the diagonal, far below what it says, still gives steps that go down.
+  // Where weights differ by more than numbers have digits, rounding may make a pivot negative. A
+  // diagonal that is larger by 1e-15 to 1e-12 of itself makes it positive, and steps still lower
+  // the cost.
   constexpr int kMostTries = 4;
   constexpr double kFirstShare = 1e-15;
   constexpr double kMore = 10.0;

@@ -169,14 +169,15 @@ double hypot(double x, double y) {
   if (b <= kNothing * a) {
     return a + b;
   }
-  double scale = 1.0;
+  // Squares must neither overflow nor vanish.
+  constexpr double kUp = 0x1p600;
+  constexpr double kDown = 0x1p-600;
   if (a > kBig) {
-    scale = 0x1p600;
-  } else if (b < kSmall) {
-    scale = 0x1p-600;
+    return kUp * hypot(kDown * a, kDown * b);
   }
-  a /= scale;
-  b /= scale;
+  if (b < kSmall) {
+    return kDown * hypot(kUp * a, kUp * b);
+  }
   const double h = std::sqrt(a * a + b * b);
   // h² − a² − b², so written that little is rounded.
   double excess = 0.0;
@@ -187,7 +188,7 @@ double hypot(double x, double y) {
     const double d = h - a;
     excess = 2.0 * d * (a - 2.0 * b) + ((4.0 * d - b) * b + d * d);
   }
-  return (h - excess / (2.0 * h)) * scale;
+  return h - excess / (2.0 * h);
 }
 
 }  // namespace unflex::math

@@ -149,15 +149,18 @@ double log_at_edge(double x) {
 
 bool has_log(double x) { return x > 0.0 && x < kInfinity; }
 
+double log_to_base(double x, const Pair& per_ln) {
+  return has_log(x) ? product(log_of(x), per_ln).high : log_at_edge(x);
+}
+
 }  // namespace
 
 double exp(double x) { return exp(Pair{x, 0.0}); }
 
 double exp2(double x) {
-  if (!(std::abs(x) < 2000.0)) {
-    return exp(x);
-  }
-  return exp(product({x, 0.0}, kLn2));
+  // Beyond this the result is 0 or infinite, and the product might not be a number.
+  constexpr double kFar = 2000.0;
+  return std::abs(x) < kFar ? exp(product({x, 0.0}, kLn2)) : exp(x);
 }
 
 double expm1(double x) {
@@ -195,19 +198,9 @@ double log(double x) {
   return k * kLn2High - ((half_square - (s * (half_square + series) + k * kLn2Low.high)) - f);
 }
 
-double log2(double x) {
-  if (!has_log(x)) {
-    return log_at_edge(x);
-  }
-  return product(log_of(x), kPerLn2).high;
-}
+double log2(double x) { return log_to_base(x, kPerLn2); }
 
-double log10(double x) {
-  if (!has_log(x)) {
-    return log_at_edge(x);
-  }
-  return product(log_of(x), kPerLn10).high;
-}
+double log10(double x) { return log_to_base(x, kPerLn10); }
 
 double pow(double x, double y) {
   if (y == 0.0 || x == 1.0) {
@@ -220,11 +213,10 @@ double pow(double x, double y) {
     return kNaN;
   }
   const Pair ln = log_of(x);
-  const double far = y * ln.high;
-  if (!(std::abs(far) < 800.0)) {
-    return exp(far);
-  }
-  return exp(product({y, 0.0}, ln));
+  // As in exp2().
+  constexpr double kFar = 800.0;
+  const double about = y * ln.high;
+  return std::abs(about) < kFar ? exp(product({y, 0.0}, ln)) : exp(about);
 }
 
 double tanh(double x) {

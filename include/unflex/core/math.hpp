@@ -23,7 +23,7 @@ namespace unflex::math {
 // an angle off by 1e-16 of x.
 [[nodiscard]] double sin(double x);
 [[nodiscard]] double cos(double x);
-// In (−π, π]; 0 if both are 0.
+// In [−π, π]; 0 if both are 0.
 [[nodiscard]] double atan2(double y, double x);
 [[nodiscard]] double atan(double x);
 

@@ -1,20 +1,13 @@
 #include "unflex/platform/descriptors.hpp"
 
-#include <poll.h>
-#include <unistd.h>
-
 #include <cerrno>
+
+#include "descriptor_calls.hpp"
 
 namespace unflex::platform {
 namespace {
 
-bool wait_for(int descriptor, short events, std::chrono::milliseconds most) {
-  pollfd what{descriptor, events, 0};
-  const int count = ::poll(&what, 1, static_cast<int>(most.count()));
-  return count > 0 || (count < 0 && errno != EINTR);
-}
-
-tl::expected<std::size_t, int> outcome(ssize_t count) {
+tl::expected<std::size_t, int> outcome(std::ptrdiff_t count) {
   if (count < 0) {
     return tl::unexpected(errno);
   }
@@ -25,10 +18,10 @@ class DescriptorSource final : public ByteSource {
  public:
   explicit DescriptorSource(int descriptor) : descriptor_(descriptor) {}
   [[nodiscard]] bool wait(std::chrono::milliseconds most) override {
-    return wait_for(descriptor_, POLLIN, most);
+    return wait_to_read(descriptor_, most);
   }
   [[nodiscard]] tl::expected<std::size_t, int> read(char* to, std::size_t room) override {
-    return outcome(::read(descriptor_, to, room));
+    return outcome(read_bytes(descriptor_, to, room));
   }
 
  private:
@@ -39,10 +32,10 @@ class DescriptorSink final : public ByteSink {
  public:
   explicit DescriptorSink(int descriptor) : descriptor_(descriptor) {}
   [[nodiscard]] bool wait(std::chrono::milliseconds most) override {
-    return wait_for(descriptor_, POLLOUT, most);
+    return wait_to_write(descriptor_, most);
   }
   [[nodiscard]] tl::expected<std::size_t, int> write(std::string_view bytes) override {
-    return outcome(::write(descriptor_, bytes.data(), bytes.size()));
+    return outcome(write_bytes(descriptor_, bytes));
   }
 
  private:
