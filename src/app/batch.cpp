@@ -1,26 +1,25 @@
 #include "batch.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 #include <numeric>
 #include <optional>
 #include <set>
-#include <system_error>
-#include <thread>
 #include <utility>
 
 #include "batch_files.hpp"
 #include "batch_manifest.hpp"
 #include "batch_print.hpp"
-#include "batch_processes.hpp"
 #include "batch_summary.hpp"
+#include "batch_workers.hpp"
 #include "outputs.hpp"
 #include "results.hpp"
+#include "unflex/core/threads.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/platform/folders.hpp"
+#include "unflex/platform/names.hpp"
 #include "unflex/report/format.hpp"
 
 namespace unflex::app {
@@ -32,9 +31,8 @@ constexpr std::chrono::milliseconds kBetweenSweeps{2};
 
 // Settings are checked first, so that what is wrong with them is said once and not for every print.
 Status check_printer_file(const RunConfig& config) {
-  std::error_code failed;
-  if (config.printer_file && std::filesystem::exists(*config.printer_file, failed) &&
-      !std::filesystem::is_regular_file(*config.printer_file, failed)) {
+  const auto state = platform::state_of(config.printer_file.value_or(""));
+  if (state && state->kind != platform::FileKind::file) {
     return fail(ErrorKind::usage, {*config.printer_file, 0},
                 "is read for every print; give --printer a file");
   }
@@ -60,26 +58,23 @@ Status check_printers(const RunConfig& config, const BatchFiles& files) {
 // are removed in the end, so that a refusal leaves none behind.
 class NewFolders {
  public:
-  explicit NewFolders(const std::filesystem::path& folder) {
-    std::error_code failed;
-    for (std::filesystem::path at = folder;
-         !at.empty() && !std::filesystem::exists(std::filesystem::symlink_status(at, failed));
-         at = at.parent_path()) {
+  explicit NewFolders(const std::string& folder) {
+    for (std::string at = folder; !at.empty() && !platform::is_taken(at);
+         at = platform::folder_of(at)) {
       missing_.push_back(at);
     }
   }
   NewFolders(const NewFolders&) = delete;
   NewFolders& operator=(const NewFolders&) = delete;
   ~NewFolders() {
-    for (const std::filesystem::path& folder : missing_) {
-      std::error_code failed;
-      std::filesystem::remove(folder, failed);
+    for (const std::string& folder : missing_) {
+      platform::remove_empty_folder(folder);
     }
   }
   void keep() { missing_.clear(); }
 
  private:
-  std::vector<std::filesystem::path> missing_;  // the innermost first
+  std::vector<std::string> missing_;  // the innermost first
 };
 
 // Checks that the summary does not take the place of a file that is read or made.
@@ -87,14 +82,14 @@ Status check_summary(const RunConfig& config, const BatchFiles& files) {
   if (!config.summary) {
     return {};
   }
-  std::vector<std::string> others = {
-      (std::filesystem::path(config.output) / kManifestName).string(),
-      config.printer_file.value_or("")};
+  std::vector<std::string> others = {platform::joined(config.output, kManifestName),
+                                     config.printer_file.value_or("")};
   for (const BatchPrint& print : files.prints) {
     others.insert(others.end(), {print.input, print.output, print.report.value_or("")});
   }
-  const bool taken = std::ranges::any_of(
-      others, [&](const std::string& other) { return same_file(*config.summary, other); });
+  const bool taken = std::ranges::any_of(others, [&](const std::string& other) {
+    return platform::same_file(*config.summary, other);
+  });
   return taken ? Status(fail(ErrorKind::usage, {*config.summary, 0},
                              "is read or written already; give the summary a name of its own"))
                : Status{};
@@ -118,15 +113,15 @@ RunConfig config_of(const RunConfig& config, const BatchPrint& print, unsigned w
 
 // Removes the temporary files of prints that were killed; false if some may be left.
 bool sweep(const std::vector<BatchPrint>& prints) {
-  std::set<std::filesystem::path> folders;
+  std::set<std::string> folders;
   for (const BatchPrint& print : prints) {
-    folders.insert(std::filesystem::path(print.output).parent_path());
+    folders.insert(platform::folder_of(print.output));
     if (print.report) {
-      folders.insert(std::filesystem::path(*print.report).parent_path());
+      folders.insert(platform::folder_of(*print.report));
     }
   }
   bool all_gone = true;
-  for (const std::filesystem::path& folder : folders) {
+  for (const std::string& folder : folders) {
     all_gone = TemporaryFile::remove_abandoned(folder) && all_gone;
   }
   return all_gone;
@@ -136,7 +131,7 @@ bool sweep(const std::vector<BatchPrint>& prints) {
 void sweep_patiently(const std::vector<BatchPrint>& prints) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!sweep(prints) && std::chrono::steady_clock::now() < end) {
-    std::this_thread::sleep_for(kBetweenSweeps);
+    sleep_for(kBetweenSweeps);
   }
 }
 
@@ -175,7 +170,7 @@ class Batch {
     std::ranges::stable_sort(waiting,
                              [&](std::size_t a, std::size_t b) { return bytes(a) < bytes(b); });
     Status status = work_on(std::move(waiting));
-    if (ending_signal() != 0) {
+    if (platform::ending_signal() != 0) {
       sweep_patiently(files_.prints);
       status = interrupted(Command::batch);
     }
@@ -188,11 +183,11 @@ class Batch {
   [[nodiscard]] const BatchSummary& summary() const { return summary_; }
 
  private:
-  [[nodiscard]] std::uintmax_t bytes(std::size_t print) const { return files_.prints[print].bytes; }
+  [[nodiscard]] std::uint64_t bytes(std::size_t print) const { return files_.prints[print].bytes; }
 
   // waiting: the next print is at the end.
   Status work_on(std::vector<std::size_t> waiting) {
-    BatchProcesses processes(config_->workers);
+    BatchWorkers processes(config_->workers);
     while (!waiting.empty() || processes.any()) {
       while (const unsigned workers = processes.workers_for_next(waiting.size())) {
         if (Status started = start(processes, waiting.back(), workers); !started) {
@@ -200,24 +195,24 @@ class Batch {
         }
         waiting.pop_back();
       }
-      for (BatchProcesses::Done& done : processes.take()) {
+      for (BatchWorkers::Done& done : processes.take()) {
         take(std::move(done));
       }
-      if (ending_signal() != 0) {
+      if (platform::ending_signal() != 0) {
         break;
       }
     }
     return {};
   }
 
-  Status start(BatchProcesses& processes, std::size_t number, unsigned workers) {
+  Status start(BatchWorkers& processes, std::size_t number, unsigned workers) {
     const BatchPrint& print = files_.prints[number];
     return processes.start(number, workers, [&] {
       return work_on_batch_print(config_of(*config_, print, workers), manifest_.find(print.name));
     });
   }
 
-  void take(BatchProcesses::Done done) {
+  void take(BatchWorkers::Done done) {
     const BatchPrint& print = files_.prints[done.ticket];
     BatchAnswer& answer = done.answer;
     if (!done.answered) {
@@ -229,7 +224,7 @@ class Batch {
       }
     }
     // If a signal ended the print, the message about the whole batch tells that.
-    if (ending_signal() == 0 || answer.state != BatchState::failed) {
+    if (platform::ending_signal() == 0 || answer.state != BatchState::failed) {
       add({print.name, print.input, print.output, std::move(answer), done.wall_s});
     }
   }
@@ -237,9 +232,11 @@ class Batch {
   void add_unreadable(const Error& error) {
     BatchAnswer answer;
     fail_by(error, answer);
-    const std::string name =
-        std::filesystem::path(error.place.file).lexically_relative(config_->input).string();
-    add({name, error.place.file, {}, std::move(answer), 0.0});
+    add({name_below(config_->input, error.place.file),
+         error.place.file,
+         {},
+         std::move(answer),
+         0.0});
   }
 
   void add(BatchRow row) {

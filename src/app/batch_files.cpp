@@ -4,15 +4,22 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <map>
 #include <set>
-#include <system_error>
 #include <utility>
+
+#include "unflex/core/errno_text.hpp"
+#include "unflex/platform/files.hpp"
+#include "unflex/platform/folders.hpp"
+#include "unflex/platform/names.hpp"
 
 namespace unflex::app {
 namespace {
 
-namespace fs = std::filesystem;
+using platform::FileKind;
+using platform::FolderEntry;
+using platform::joined;
 
 constexpr std::array<std::string_view, 5> kSuffixes = {".gcode", ".gco", ".g", ".bgcode",
                                                        ".gcode.gz"};
@@ -26,11 +33,9 @@ bool ends_with(std::string_view name, std::string_view suffix) {
                     [](char a, char b) { return a == small(b); });
 }
 
-// Where a file is, or would be if it does not exist yet.
-fs::path place_of(const fs::path& file) {
-  std::error_code failed;
-  fs::path place = fs::weakly_canonical(file, failed);
-  return failed ? file.lexically_normal() : place;
+tl::unexpected<Error> cannot_read_folder(const std::string& folder, int error) {
+  return fail(ErrorKind::input, {folder, 0},
+              fmt::format("cannot read the folder: {}", errno_text(error)));
 }
 
 // Looks through folders.
@@ -39,110 +44,101 @@ class Finder {
   explicit Finder(const RunConfig& config)
       : has_printer_file_(config.printer_file.has_value()),
         output_(config.output),
-        own_{place_of(output_)} {
-    if (config.report) {
-      reports_ = *config.report;
-      own_.insert(place_of(*reports_));
+        reports_(config.report),
+        own_{platform::canonical_name(output_)} {
+    if (reports_) {
+      own_.insert(platform::canonical_name(*reports_));
     }
   }
 
   // Takes what is in the folder, whose name below the root is `below`. printer_file: of the folder
   // above.
-  void look(const fs::path& folder, const fs::path& below,
+  void look(const std::string& folder, const std::string& below,
             const std::optional<std::string>& printer_file, BatchFiles& files) {
-    std::error_code failed;
-    std::vector<fs::directory_entry> entries;
-    for (fs::directory_iterator entry(folder, failed), end; !failed && entry != end;
-         entry.increment(failed)) {
-      entries.push_back(*entry);
-    }
-    if (failed) {
-      files.unreadable.push_back(fail(ErrorKind::input, {folder.string(), 0},
-                                      fmt::format("cannot read the folder: {}", failed.message()))
-                                     .value());
+    const auto entries = platform::entries_of(folder);
+    if (!entries) {
+      files.unreadable.push_back(cannot_read_folder(folder, entries.error()).value());
       return;
     }
-    std::ranges::sort(entries);
     const std::optional<std::string> own = printer_file_of(folder, below);
-    for (const fs::directory_entry& entry : entries) {
-      const fs::path name = entry.path().filename();
-      if (!name.string().starts_with('.')) {
-        take(entry, below / name, own ? own : printer_file, files);
+    for (const FolderEntry& entry : *entries) {
+      if (!entry.name.starts_with('.')) {
+        take(entry, folder, below, own ? own : printer_file, files);
       }
     }
   }
 
  private:
   // What is named on the command line holds for the folder of the batch itself.
-  [[nodiscard]] std::optional<std::string> printer_file_of(const fs::path& folder,
-                                                           const fs::path& below) const {
-    std::error_code failed;
-    const fs::path file = folder / kPrinterFileName;
+  [[nodiscard]] std::optional<std::string> printer_file_of(const std::string& folder,
+                                                           const std::string& below) const {
+    std::string file = joined(folder, kPrinterFileName);
+    const auto state = platform::state_of(file);
     const bool holds = !below.empty() || !has_printer_file_;
-    return holds && fs::is_regular_file(file, failed) ? std::optional(file.string()) : std::nullopt;
+    return holds && state && state->kind == FileKind::file ? std::optional(std::move(file))
+                                                           : std::nullopt;
   }
 
-  void take(const fs::directory_entry& entry, const fs::path& name,
+  void take(const FolderEntry& entry, const std::string& folder, const std::string& below,
             const std::optional<std::string>& printer_file, BatchFiles& files) {
-    std::error_code failed;
+    const std::string file = joined(folder, entry.name);
+    const std::string name = joined(below, entry.name);
     const auto pass_by = [&](std::string why) {
-      files.passed_by.push_back({{entry.path().string(), 0}, std::move(why)});
+      files.passed_by.push_back({{file, 0}, std::move(why)});
     };
-    if (entry.is_directory(failed)) {
-      if (entry.is_symlink(failed)) {
+    if (entry.kind == FileKind::folder) {
+      if (entry.is_link) {
         pass_by("is a link to a folder, which is not followed; give that folder itself");
-      } else if (!own_.contains(place_of(entry.path()))) {
-        look(entry.path(), name, printer_file, files);
+      } else if (!own_.contains(platform::canonical_name(file))) {
+        look(file, name, printer_file, files);
       }
-    } else if (is_print(name.string())) {
-      if (entry.is_regular_file(failed)) {
-        add(entry, name, printer_file, files);
-      } else if (entry.is_symlink(failed)) {
+    } else if (is_print(name)) {
+      if (entry.kind == FileKind::file) {
+        add(file, name, entry.bytes, printer_file, files);
+      } else if (entry.is_link) {
         files.unreadable.push_back(
-            fail(ErrorKind::input, {entry.path().string(), 0}, "is a link that leads to no file")
-                .value());
+            fail(ErrorKind::input, {file, 0}, "is a link that leads to no file").value());
       } else {
         pass_by("is neither a file nor a folder and is left out");
       }
     }
   }
 
-  void add(const fs::directory_entry& entry, const fs::path& name,
+  void add(const std::string& file, const std::string& name, std::uint64_t bytes,
            const std::optional<std::string>& printer_file, BatchFiles& files) {
-    std::error_code failed;
-    const std::uintmax_t bytes = entry.file_size(failed);
-    BatchPrint print{.name = name.string(),
-                     .input = entry.path().string(),
-                     .output = (output_ / name).string(),
+    BatchPrint print{.name = name,
+                     .input = file,
+                     .output = joined(output_, name),
                      .report = {},
                      .printer_file = printer_file,
-                     .bytes = failed ? 0 : bytes};
+                     .bytes = bytes};
     if (reports_) {
       // The page's name holds the print's whole name, as a.gcode and a.g may stand side by side.
-      print.report = (*reports_ / name).string() + ".html";
+      print.report = joined(*reports_, name) + ".html";
     }
     files.prints.push_back(std::move(print));
   }
 
   bool has_printer_file_;
-  fs::path output_;
-  std::optional<fs::path> reports_;
-  std::set<fs::path> own_;
+  std::string output_;
+  std::optional<std::string> reports_;
+  std::set<std::string> own_;
 };
 
 Status check_folders(const RunConfig& config) {
-  std::error_code failed;
-  if (!fs::exists(config.input, failed)) {
-    return fail(ErrorKind::input, {config.input, 0},
-                failed ? fmt::format("cannot read the folder: {}", failed.message())
-                       : "there is no such folder");
+  const auto input = platform::state_of(config.input);
+  if (!input && input.error() != ENOENT) {
+    return cannot_read_folder(config.input, input.error());
   }
-  if (!fs::is_directory(config.input, failed)) {
+  if (!input) {
+    return fail(ErrorKind::input, {config.input, 0}, "there is no such folder");
+  }
+  if (input->kind != FileKind::folder) {
     return fail(ErrorKind::input, {config.input, 0},
                 "is not a folder; for one print there is unflex compensate");
   }
   // We do not compare names: a folder may have several of them where capitals do not count.
-  if (fs::equivalent(config.input, config.output, failed)) {
+  if (platform::same_file(config.input, config.output)) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the folder of the prints too; give -o another");
   }
@@ -157,15 +153,15 @@ std::string in_small_letters(std::string text) {
 // Checks that no two names lead to one file. Links can do that, and so can folders and printers'
 // cards that take capitals for small letters.
 Status check_distinct(const std::vector<BatchPrint>& prints) {
-  std::map<fs::path, const BatchPrint*> inputs;
-  std::map<fs::path, const BatchPrint*> outputs;
-  std::map<fs::path, const BatchPrint*> reports;
+  std::map<std::string, const BatchPrint*> inputs;
+  std::map<std::string, const BatchPrint*> outputs;
+  std::map<std::string, const BatchPrint*> reports;
   std::map<std::string, const BatchPrint*> names;
   for (const BatchPrint& print : prints) {
-    inputs.emplace(place_of(print.input), &print);
+    inputs.emplace(platform::canonical_name(print.input), &print);
   }
   for (const BatchPrint& print : prints) {
-    const fs::path place = place_of(print.output);
+    const std::string place = platform::canonical_name(print.output);
     if (const auto replaced = inputs.find(place); replaced != inputs.end()) {
       return fail(ErrorKind::usage, {print.output, 0},
                   fmt::format("would replace the print {}; give -o another folder",
@@ -187,7 +183,7 @@ Status check_distinct(const std::vector<BatchPrint>& prints) {
     if (!print.report) {
       continue;
     }
-    const fs::path place = place_of(*print.report);
+    const std::string place = platform::canonical_name(*print.report);
     if (inputs.contains(place) || outputs.contains(place)) {
       return fail(ErrorKind::usage, {*print.report, 0},
                   "is a print too, by a link; give --report a folder without links");
@@ -215,6 +211,15 @@ std::string print_suffixes() {
     text += fmt::format("{}*{}", text.empty() ? "" : ", ", suffix);
   }
   return text;
+}
+
+std::string name_below(std::string_view folder, std::string_view file) {
+  if (file == folder) {
+    return ".";
+  }
+  const std::string any_name_in_it = joined(folder, "x");
+  file.remove_prefix(std::min(any_name_in_it.size() - 1, file.size()));
+  return std::string(file);
 }
 
 Result<BatchFiles> find_prints(const RunConfig& config) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -27,7 +26,7 @@ struct BatchPrint {
   std::optional<std::string> report;
   // That of its own folder or the next one above that has one; unset: that of the command line.
   std::optional<std::string> printer_file;
-  std::uintmax_t bytes = 0;
+  std::uint64_t bytes = 0;
 };
 
 struct BatchFiles {
@@ -38,6 +37,9 @@ struct BatchFiles {
 
 // The printer file of a folder, which holds for the prints in it and below.
 inline constexpr std::string_view kPrinterFileName = "printer.toml";
+
+// The name of what is in the folder, without the folder's; "." for the folder itself.
+[[nodiscard]] std::string name_below(std::string_view folder, std::string_view file);
 
 // Looks through the folder config.input, and all below, for prints. The output mirrors it in
 // config.output, pages go to config.report. Names that begin with a dot, links to folders, and the

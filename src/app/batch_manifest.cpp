@@ -1,17 +1,20 @@
 #include "batch_manifest.hpp"
 
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <sys/file.h>
 
 #include <cerrno>
 #include <chrono>
-#include <fstream>
-#include <system_error>
-#include <thread>
+#include <istream>
+#include <memory>
 #include <utility>
 
 #include "outputs.hpp"
+#include "unflex/core/errno_text.hpp"
+#include "unflex/core/threads.hpp"
+#include "unflex/platform/files.hpp"
+#include "unflex/platform/folders.hpp"
+#include "unflex/platform/names.hpp"
+#include "unflex/platform/replacing.hpp"
 
 namespace unflex::app {
 namespace {
@@ -23,19 +26,22 @@ constexpr int kSchemaVersion = 1;
 constexpr int kClaims = 10;
 constexpr std::chrono::milliseconds kBetweenClaims{100};
 
-Status claim(int folder, const std::string& name) {
-  for (int i = 0; ::flock(folder, LOCK_EX | LOCK_NB) != 0; ++i) {
-    if (errno != EWOULDBLOCK && errno != EINTR) {
-      // Network file systems may not know such claims; the manifest itself is safe without them.
-      return {};
+Result<FileDescriptor> claim(const std::string& folder) {
+  for (int i = 0;; ++i) {
+    tl::expected<FileDescriptor, int> claimed = platform::claim_folder(folder);
+    if (claimed) {
+      return std::move(*claimed);
+    }
+    if (claimed.error() != EWOULDBLOCK) {
+      return fail(ErrorKind::usage, {folder, 0},
+                  fmt::format("cannot make the folder: {}", errno_text(claimed.error())));
     }
     if (i == kClaims) {
-      return fail(ErrorKind::usage, {name, 0},
+      return fail(ErrorKind::usage, {folder, 0},
                   "another unflex batch works in this folder; wait for it or give -o another");
     }
-    std::this_thread::sleep_for(kBetweenClaims);
+    sleep_for(kBetweenClaims);
   }
-  return {};
 }
 
 }  // namespace
@@ -52,21 +58,18 @@ std::string key_of(std::string_view name) {
   return key;
 }
 
-Result<BatchManifest> BatchManifest::open(const std::filesystem::path& folder) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  FileDescriptor claimed(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (failed || !claimed.valid()) {
-    return fail(
-        ErrorKind::usage, {folder.string(), 0},
-        fmt::format("cannot make the folder: {}", failed ? failed.message() : errno_text(errno)));
+Result<BatchManifest> BatchManifest::open(const std::string& folder) {
+  if (const int error = platform::make_folders(folder); error != 0) {
+    return fail(ErrorKind::usage, {folder, 0},
+                fmt::format("cannot make the folder: {}", errno_text(error)));
   }
-  if (Status free = claim(claimed.get(), folder.string()); !free) {
-    return tl::unexpected(free.error());
+  Result<FileDescriptor> claimed = claim(folder);
+  if (!claimed) {
+    return tl::unexpected(claimed.error());
   }
-  BatchManifest manifest(folder / kManifestName, std::move(claimed));
+  BatchManifest manifest(platform::joined(folder, kManifestName), std::move(*claimed));
   // Checks before the work begins that the manifest can be written.
-  if (const Result<Output> probe = Output::open(manifest.file_.string()); !probe) {
+  if (const Result<Output> probe = Output::open(manifest.file_); !probe) {
     return tl::unexpected(probe.error());
   }
   manifest.read();
@@ -74,20 +77,19 @@ Result<BatchManifest> BatchManifest::open(const std::filesystem::path& folder) {
 }
 
 void BatchManifest::read() {
-  std::ifstream stream(file_, std::ios::binary);
-  if (!stream) {
+  const std::unique_ptr<std::istream> stream = platform::read_file(file_);
+  const Json json = Json::parse(*stream, nullptr, false);
+  if (!json.is_object() || json.value("schema_version", Json()) != kSchemaVersion) {
     return;
   }
-  try {
-    const Json json = Json::parse(stream);
-    if (json.at("schema_version") != kSchemaVersion) {
+  const Json prints = json.value("prints", Json::object());
+  for (const auto& [key, value] : prints.items()) {
+    const std::optional<BatchRecord> record = record_from(value);
+    if (!record) {
+      records_.clear();
       return;
     }
-    for (const auto& [key, record] : json.at("prints").items()) {
-      records_[key] = record_from(record);
-    }
-  } catch (const Json::exception&) {
-    records_.clear();
+    records_[key] = *record;
   }
 }
 
@@ -102,7 +104,7 @@ Status BatchManifest::put(const std::string& name, const BatchRecord& record) {
   for (const auto& [key, known] : records_) {
     prints[key] = to_json(known);
   }
-  Result<Output> output = Output::open(file_.string());
+  Result<Output> output = Output::open(file_);
   if (!output) {
     return fail(ErrorKind::internal, output.error().place, output.error().message);
   }

@@ -1,7 +1,6 @@
 // The memory of a batch in its output folder: which outputs are there, and what each was made from.
 #pragma once
 
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -20,7 +19,7 @@ class BatchManifest {
   // Makes the folder if there is none, claims it for this process and those it forks, and reads the
   // manifest. A manifest that is damaged or of another version counts for nothing. Errors are of
   // kind usage: the folder cannot be written, or another batch works in it.
-  [[nodiscard]] static Result<BatchManifest> open(const std::filesystem::path& folder);
+  [[nodiscard]] static Result<BatchManifest> open(const std::string& folder);
 
   // What is known of the print's output.
   [[nodiscard]] std::optional<BatchRecord> find(const std::string& name) const;
@@ -29,12 +28,12 @@ class BatchManifest {
   [[nodiscard]] Status put(const std::string& name, const BatchRecord& record);
 
  private:
-  BatchManifest(std::filesystem::path file, FileDescriptor claim)
+  BatchManifest(std::string file, FileDescriptor claim)
       : file_(std::move(file)), claim_(std::move(claim)) {}
 
   void read();
 
-  std::filesystem::path file_;
+  std::string file_;
   FileDescriptor claim_;
   std::map<std::string, BatchRecord> records_;  // by key_of(name)
 };

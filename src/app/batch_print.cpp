@@ -1,13 +1,9 @@
 #include "batch_print.hpp"
 
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <sys/stat.h>
 
 #include <cerrno>
 #include <exception>
-#include <filesystem>
-#include <system_error>
 #include <utility>
 
 #include "console.hpp"
@@ -16,14 +12,19 @@
 #include "print_run.hpp"
 #include "results.hpp"
 #include "unflex/core/caught.hpp"
+#include "unflex/core/errno_text.hpp"
 #include "unflex/core/sha256.hpp"
+#include "unflex/platform/catching.hpp"
+#include "unflex/platform/folders.hpp"
+#include "unflex/platform/names.hpp"
+#include "unflex/platform/signals.hpp"
 #include "workspace.hpp"
 
 namespace unflex::app {
 namespace {
 
 Result<std::string> hash_of_file(const std::string& name) {
-  const FileDescriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC));
+  const FileDescriptor file = platform::open_to_read(name);
   Sha256 hash;
   for (;;) {
     const tl::expected<std::string, int> block =
@@ -36,7 +37,7 @@ Result<std::string> hash_of_file(const std::string& name) {
       return hash.finish();
     }
     hash.add(*block);
-    if (ending_signal() != 0) {
+    if (platform::ending_signal() != 0) {
       return interrupted(Command::batch);
     }
   }
@@ -70,7 +71,7 @@ Result<std::string> hash_of_settings(const RunConfig& config) {
     text += fmt::format("{}={}\n", row.key, row.value);
   }
   if (const auto profile = filament_profile(config, *settings)) {
-    const Result<std::string> hash = hash_of_file(profile->string());
+    const Result<std::string> hash = hash_of_file(*profile);
     if (!hash) {
       return hash;
     }
@@ -130,11 +131,10 @@ bool is_up_to_date(const RunConfig& config, const BatchOrigin& now,
 }
 
 Status make_folder_of(const std::string& file) {
-  std::error_code failed;
-  std::filesystem::create_directories(std::filesystem::path(file).parent_path(), failed);
-  return failed ? Status(fail(ErrorKind::usage, {file, 0},
-                              fmt::format("cannot make its folder: {}", failed.message())))
-                : Status{};
+  const int error = platform::make_folders(platform::folder_of(file));
+  return error == 0 ? Status{}
+                    : Status(fail(ErrorKind::usage, {file, 0},
+                                  fmt::format("cannot make its folder: {}", errno_text(error))));
 }
 
 BatchFigures figures_of(const report::Report& report) {
@@ -203,20 +203,22 @@ Status work(const RunConfig& config, const std::optional<BatchRecord>& known, Co
 BatchAnswer work_on_batch_print(const RunConfig& config, const std::optional<BatchRecord>& known) {
   BatchAnswer answer;
   Console console(-1);
-  try {
-    if (const Status worked = work(config, known, console, answer); !worked) {
-      console.error(worked.error());
-      answer.error = console.kept().back();
-      answer.exit_code = static_cast<int>(exit_code(worked.error().kind));
-    }
-  } catch (const std::exception& failure) {
-    // Out of memory, mostly.
-    Error error = error_of(failure);
-    error.place.file = config.input;
-    console.error(error);
-    answer = {};
-    answer.error = console.kept().back();
-  }
+  platform::catching(
+      [&] {
+        if (const Status worked = work(config, known, console, answer); !worked) {
+          console.error(worked.error());
+          answer.error = console.kept().back();
+          answer.exit_code = static_cast<int>(exit_code(worked.error().kind));
+        }
+      },
+      [&](const std::exception& failure) {
+        // Out of memory, mostly.
+        Error error = error_of(failure);
+        error.place.file = config.input;
+        console.error(error);
+        answer = {};
+        answer.error = console.kept().back();
+      });
   answer.messages = console.kept();
   return answer;
 }

@@ -1,5 +1,8 @@
 #include "batch_result.hpp"
 
+#include <type_traits>
+#include <utility>
+
 namespace unflex::app {
 
 using report::Json;
@@ -33,20 +36,78 @@ Json to_json(const BatchRecord& record) {
           {"figures", to_json(record.figures)}};
 }
 
-BatchRecord record_from(const Json& json) {
-  const Json& figures = json.at("figures");
-  const Json& max = figures.at("contour_max_mm");
-  const Json& rms = figures.at("contour_rms_mm");
-  return {.origin = {.version = json.at("version"),
-                     .input_sha256 = json.at("input_sha256"),
-                     .settings_sha256 = json.at("settings_sha256"),
-                     .output_sha256 = json.at("output_sha256"),
-                     .report_sha256 = json.at("report_sha256")},
-          .figures = {.max_before_mm = max.at("uncompensated"),
-                      .max_after_mm = max.at("compensated"),
-                      .rms_before_mm = rms.at("uncompensated"),
-                      .rms_after_mm = rms.at("compensated"),
-                      .print_time_s = figures.at("print_time_s")}};
+namespace {
+
+// Takes what an object has under a key, if it is of the right kind.
+template <class Value>
+bool take(const Json& object, const char* key, Value& value) {
+  const auto found = object.find(key);
+  if (found == object.end()) {
+    return false;
+  }
+  if constexpr (std::is_same_v<Value, std::string>) {
+    if (!found->is_string()) {
+      return false;
+    }
+  } else if constexpr (std::is_same_v<Value, bool>) {
+    if (!found->is_boolean()) {
+      return false;
+    }
+  } else if constexpr (std::is_arithmetic_v<Value>) {
+    if (!found->is_number()) {
+      return false;
+    }
+  }
+  value = found->get<Value>();
+  return true;
+}
+
+bool take(const Json& object, const char* key, Json& value) {
+  const auto found = object.find(key);
+  if (found == object.end()) {
+    return false;
+  }
+  value = *found;
+  return true;
+}
+
+bool take_all(const Json& object, const char* key, std::vector<std::string>& values) {
+  Json list;
+  if (!take(object, key, list) || !list.is_array()) {
+    return false;
+  }
+  for (const Json& item : list) {
+    if (!item.is_string()) {
+      return false;
+    }
+    values.push_back(item.get<std::string>());
+  }
+  return true;
+}
+
+// "uncompensated" and "compensated" under a key.
+bool take_pair(const Json& object, const char* key, double& before, double& after) {
+  Json pair;
+  return take(object, key, pair) && take(pair, "uncompensated", before) &&
+         take(pair, "compensated", after);
+}
+
+}  // namespace
+
+std::optional<BatchRecord> record_from(const Json& json) {
+  BatchRecord record;
+  BatchOrigin& origin = record.origin;
+  BatchFigures& is = record.figures;
+  Json figures;
+  const bool is_whole =
+      take(json, "version", origin.version) && take(json, "input_sha256", origin.input_sha256) &&
+      take(json, "settings_sha256", origin.settings_sha256) &&
+      take(json, "output_sha256", origin.output_sha256) &&
+      take(json, "report_sha256", origin.report_sha256) && take(json, "figures", figures) &&
+      take_pair(figures, "contour_max_mm", is.max_before_mm, is.max_after_mm) &&
+      take_pair(figures, "contour_rms_mm", is.rms_before_mm, is.rms_after_mm) &&
+      take(figures, "print_time_s", is.print_time_s);
+  return is_whole ? std::optional(std::move(record)) : std::nullopt;
 }
 
 std::string pack(const BatchAnswer& answer) {
@@ -59,17 +120,21 @@ std::string pack(const BatchAnswer& answer) {
 }
 
 BatchAnswer unpack(const std::string& text) {
-  try {
-    const Json json = Json::parse(text);
-    return {.state = static_cast<BatchState>(json.at("state").get<int>()),
-            .exit_code = json.at("exit_code"),
-            .measured = json.at("measured"),
-            .record = record_from(json.at("record")),
-            .messages = json.at("messages"),
-            .error = json.at("error")};
-  } catch (const Json::exception&) {
+  const Json json = Json::parse(text, nullptr, false);
+  BatchAnswer answer;
+  int state = 0;
+  Json record;
+  const bool is_whole = take(json, "state", state) && take(json, "exit_code", answer.exit_code) &&
+                        take(json, "measured", answer.measured) && take(json, "record", record) &&
+                        take_all(json, "messages", answer.messages) &&
+                        take(json, "error", answer.error);
+  const std::optional<BatchRecord> known = is_whole ? record_from(record) : std::nullopt;
+  if (!known) {
     return {};
   }
+  answer.state = static_cast<BatchState>(state);
+  answer.record = *known;
+  return answer;
 }
 
 }  // namespace unflex::app

@@ -2,6 +2,7 @@
 // into the manifest and into the summary.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,8 +52,8 @@ struct BatchAnswer {
 
 [[nodiscard]] report::Json to_json(const BatchFigures& figures);
 [[nodiscard]] report::Json to_json(const BatchRecord& record);
-// Throws what the JSON library throws if something is missing.
-[[nodiscard]] BatchRecord record_from(const report::Json& json);
+// nullopt if something is missing.
+[[nodiscard]] std::optional<BatchRecord> record_from(const report::Json& json);
 
 // The answer as a text, for the way between processes.
 [[nodiscard]] std::string pack(const BatchAnswer& answer);

@@ -7,7 +7,6 @@
 #include <iterator>
 #include <optional>
 #include <string_view>
-#include <thread>
 #include <utility>
 
 #include "calibration_commands.hpp"
@@ -15,9 +14,13 @@
 #include "command_options.hpp"
 #include "console.hpp"
 #include "unflex/app/run_config.hpp"
+#include "unflex/core/caught.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/core/suggestion.hpp"
+#include "unflex/core/threads.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/platform/catching.hpp"
+#include "unflex/platform/files.hpp"
 
 namespace unflex::app {
 namespace {
@@ -365,6 +368,19 @@ std::string parser_message(const CLI::App& program, const CLI::Error& error) {
                      chosen.words);
 }
 
+// What the program says when the library has thrown while it read the arguments.
+Result<CommandLine> answer_to(const std::exception& thrown, const CLI::App& program) {
+  if (dynamic_cast<const CLI::CallForHelp*>(&thrown) != nullptr) {
+    return CommandLine{std::nullopt, program.help()};
+  }
+  if (dynamic_cast<const CLI::CallForVersion*>(&thrown) != nullptr) {
+    return CommandLine{std::nullopt, fmt::format("{}\n", thrown.what())};
+  }
+  const auto* const error = dynamic_cast<const CLI::Error*>(&thrown);
+  return error != nullptr ? fail(ErrorKind::usage, parser_message(program, *error))
+                          : tl::unexpected(error_of(thrown));
+}
+
 // What the library would take for a value that is missing, or for the input's name.
 Status check_values(const std::vector<std::string>& arguments) {
   for (auto word = arguments.begin(); word != arguments.end(); ++word) {
@@ -374,9 +390,7 @@ Status check_values(const std::vector<std::string>& arguments) {
                                                 one_line(*word)));
     }
     const bool is_last = word + 1 == arguments.end();
-    std::error_code ignored;
-    if (*word == "--faster" && !is_last && parse_number(word[1]) &&
-        !std::filesystem::exists(word[1], ignored)) {
+    if (*word == "--faster" && !is_last && parse_number(word[1]) && !platform::exists(word[1])) {
       return fail(ErrorKind::usage,
                   fmt::format("--faster takes its tolerance behind an equals sign: --faster={}",
                               one_line(word[1])));
@@ -416,7 +430,7 @@ std::string_view version() { return UNFLEX_VERSION; }
 
 Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments) {
   RunConfig config;
-  config.workers = std::clamp(std::thread::hardware_concurrency(), 1U, kMaxWorkers);
+  config.workers = std::clamp(processors(), 1U, kMaxWorkers);
   CLI::App program("Takes the flex out of a 3D printer: pre-compensated G-code from sliced G-code",
                    "unflex");
   program.set_version_flag("--version", fmt::format("unflex {}", version()));
@@ -440,14 +454,13 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
   if (Status values = check_values(arguments); !values) {
     return tl::unexpected(values.error());
   }
-  try {
-    program.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
-  } catch (const CLI::CallForHelp&) {
-    return CommandLine{std::nullopt, program.help()};
-  } catch (const CLI::CallForVersion& text) {
-    return CommandLine{std::nullopt, fmt::format("{}\n", text.what())};
-  } catch (const CLI::Error& error) {
-    return fail(ErrorKind::usage, parser_message(program, error));
+  // What the library throws is its answer, if it is not a plain yes.
+  std::optional<Result<CommandLine>> answer;
+  platform::catching(
+      [&] { program.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend())); },
+      [&](const std::exception& thrown) { answer = answer_to(thrown, program); });
+  if (answer) {
+    return std::move(*answer);
   }
   if (Status completed = complete(config); !completed) {
     return tl::unexpected(completed.error());

@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <map>
 #include <utility>
 
 #include "files.hpp"
+#include "unflex/platform/process.hpp"
 
 namespace unflex::app {
 namespace {
@@ -104,6 +106,11 @@ std::vector<std::string> summarised(const std::vector<std::string>& lines, std::
     result.push_back(fmt::format("unflex: and {} more {}", left, what));
   }
   return result;
+}
+
+Console::Console(int fd) : fd_(fd) {
+  const char* const refused = std::getenv("NO_COLOR");
+  coloured_ = (refused == nullptr || *refused == '\0') && platform::takes_escape_sequences(fd);
 }
 
 void Console::line(std::string_view text) {

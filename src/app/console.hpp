@@ -1,14 +1,12 @@
 // Lines for people: one per message, whatever the message holds.
 #pragma once
 
-#include <unistd.h>
-
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "terminal.hpp"
 #include "unflex/core/error.hpp"
+#include "unflex/platform/descriptors.hpp"
 
 namespace unflex::app {
 
@@ -37,7 +35,7 @@ class Console {
  public:
   // fd: where messages go, −1 to keep them only. What cannot be written there is lost.
   // A terminal gets colours, unless the user does not want any.
-  explicit Console(int fd = STDERR_FILENO) : fd_(fd), coloured_(can_colour(fd)) {}
+  explicit Console(int fd = platform::kStandardError);
 
   void line(std::string_view text);
   void error(const Error& error);
@@ -57,7 +55,7 @@ class Console {
   void say(std::string line, const std::string& shown);
 
   int fd_;
-  bool coloured_;
+  bool coloured_ = false;
   std::vector<std::string> kept_;
 };
 

@@ -3,8 +3,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
+#include <istream>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -17,16 +17,16 @@ namespace unflex::app {
 namespace {
 
 Result<filament::Profile> profile_of(const RunConfig& config, const machine::Settings& settings) {
-  const std::optional<std::filesystem::path> path = filament_profile(config, settings);
+  const std::optional<std::string> path = filament_profile(config, settings);
   if (!path) {
     return filament::Profile(settings.filament_area_mm2());
   }
-  std::ifstream table(*path);
-  if (!table || std::filesystem::is_directory(*path)) {
-    return fail(ErrorKind::usage, {path->string(), 0},
+  const std::unique_ptr<std::istream> table = platform::read_file(*path);
+  if (!*table || platform::is_directory(*path)) {
+    return fail(ErrorKind::usage, {*path, 0},
                 "cannot be read; extruder.filament_profile is to name a table of the filament");
   }
-  return filament::Profile::read(table, path->string());
+  return filament::Profile::read(*table, *path);
 }
 
 std::string summary(const pipeline::FittedPrint& fitted) {
@@ -44,18 +44,18 @@ std::string summary(const pipeline::FittedPrint& fitted) {
 
 }  // namespace
 
-std::optional<std::filesystem::path> filament_profile(const RunConfig& config,
-                                                      const machine::Settings& settings) {
+std::optional<std::string> filament_profile(const RunConfig& config,
+                                            const machine::Settings& settings) {
   if (settings.extruder.filament_profile.empty()) {
     return std::nullopt;
   }
-  const std::filesystem::path name = settings.extruder.filament_profile;
+  const std::string& name = settings.extruder.filament_profile;
   const bool is_from_file =
       config.printer_file && std::ranges::any_of(settings.origins, [&](const auto& origin) {
         return origin.first == "extruder.filament_profile" &&
                origin.second.starts_with(*config.printer_file);
       });
-  return is_from_file ? std::filesystem::path(*config.printer_file).parent_path() / name : name;
+  return is_from_file ? platform::name_beside(*config.printer_file, name) : name;
 }
 
 Result<std::optional<pipeline::FittedPrint>> fit_to_filament(const RunConfig& config,
@@ -70,7 +70,7 @@ Result<std::optional<pipeline::FittedPrint>> fit_to_filament(const RunConfig& co
     return tl::unexpected(profile.error());
   }
   const Status fitted = input.make_seekable().and_then([&] {
-    const std::shared_ptr<TextStore> sliced = platform::file_store(input.path());
+    const std::shared_ptr<TextStore> sliced = input.text();
     return input.replace_text([&](const Input::Write& write) {
       return pipeline::fit_filament(*sliced, input.name(), settings, *profile,
                                     config.command == Command::filament, write)
@@ -97,12 +97,12 @@ Result<ExitCode> run_filament(const RunConfig& config, Console& console) {
   }
   console.warnings(space->fitted->warnings);
   pack_output(config, *space);
-  std::ifstream text(space->input.path(), std::ios::binary);
+  const std::unique_ptr<std::istream> text = space->input.text()->read();
   Status written;
   std::string block(1U << 16U, '\0');
-  while (written &&
-         (text.read(block.data(), static_cast<std::streamsize>(block.size())), text.gcount() > 0)) {
-    written = space->output->write({block.data(), static_cast<std::size_t>(text.gcount())});
+  while (written && (text->read(block.data(), static_cast<std::streamsize>(block.size())),
+                     text->gcount() > 0)) {
+    written = space->output->write({block.data(), static_cast<std::size_t>(text->gcount())});
   }
   return written.and_then([&] { return space->output->seal(); })
       .and_then([&] { return check_inputs(*space); })

@@ -1,8 +1,8 @@
 // Prints whose E is fitted to a filament that is not a full cylinder.
 #pragma once
 
-#include <filesystem>
 #include <optional>
+#include <string>
 
 #include "console.hpp"
 #include "inputs.hpp"
@@ -15,8 +15,8 @@ namespace unflex::app {
 
 // The profile's file, if the settings name one. A name in the printer file counts from that file's
 // folder.
-[[nodiscard]] std::optional<std::filesystem::path> filament_profile(
-    const RunConfig& config, const machine::Settings& settings);
+[[nodiscard]] std::optional<std::string> filament_profile(const RunConfig& config,
+                                                          const machine::Settings& settings);
 
 // Fits the input, if the settings ask for that. nullopt: they do not. Errors are also those of the
 // profile.

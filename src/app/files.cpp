@@ -1,117 +1,67 @@
 #include "files.hpp"
 
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <poll.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
-#include <system_error>
+#include <chrono>
 #include <utility>
-#include <vector>
 
-#include "signals.hpp"
 #include "unflex/app/run_config.hpp"
+#include "unflex/core/errno_text.hpp"
+#include "unflex/platform/folders.hpp"
+#include "unflex/platform/names.hpp"
+#include "unflex/platform/process.hpp"
+#include "unflex/platform/replacing.hpp"
+#include "unflex/platform/signals.hpp"
 
 namespace unflex::app {
 namespace {
 
 // The ending keeps temporary files apart from names that people choose, such as .unflex-backup.
-constexpr std::string_view kTemporaryName = ".unflex-XXXXXX.tmp";
-constexpr std::string_view kTemporaryEnding = ".tmp";
+constexpr std::string_view kBeginning = ".unflex-";
+constexpr std::string_view kEnding = ".tmp";
+constexpr std::size_t kNameLength = kBeginning.size() + 6 + kEnding.size();
 constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
 
 // How often a wait is interrupted to see whether a signal has come just before it.
-constexpr int kPatience_ms = 50;
+constexpr std::chrono::milliseconds kPatience{50};
 
 // Whether to try again what has failed. A signal that does not end the program (a resized window)
 // must not end a read either. A stream may be set not to block, for the sake of someone who shares
-// it; then we wait for it.
-bool try_again(int fd, short events) {
+// it; then `wait` waits for it.
+bool try_again(int fd, bool (*wait)(int, std::chrono::milliseconds)) {
   if (errno == EAGAIN) {
-    pollfd what{fd, events, 0};
-    ::poll(&what, 1, kPatience_ms);  // an error shows when it is tried again
+    static_cast<void>(wait(fd, kPatience));  // an error shows when it is tried again
     errno = EINTR;
   }
-  return errno == EINTR && ending_signal() == 0;
-}
-
-bool exists(const std::string& name) {
-  struct stat status {};
-  return ::lstat(name.c_str(), &status) == 0;
-}
-
-// Whether it may be a file that unflex made: neither a pipe that somebody gave such a name, nor
-// another user's file.
-bool is_ours(int fd) {
-  struct stat status {};
-  return ::fstat(fd, &status) == 0 && S_ISREG(status.st_mode) && status.st_nlink == 1 &&
-         status.st_uid == ::geteuid();
+  return errno == EINTR && platform::ending_signal() == 0;
 }
 
 }  // namespace
 
-FileDescriptor::FileDescriptor(FileDescriptor&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)) {}
-
-FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  return *this;
+tl::expected<TemporaryFile, int> TemporaryFile::create(const std::string& folder) {
+  return platform::make_locked_file(folder, kBeginning, kEnding).map([](platform::LockedFile made) {
+    return TemporaryFile(std::move(made.name), std::move(made.file));
+  });
 }
 
-FileDescriptor::~FileDescriptor() {
-  if (valid()) {
-    ::close(fd_);
-  }
-}
-
-tl::expected<TemporaryFile, int> TemporaryFile::create(const std::filesystem::path& directory) {
-  for (;;) {
-    std::string name = (directory / kTemporaryName).string();
-    FileDescriptor file(
-        ::mkostemps(name.data(), static_cast<int>(kTemporaryEnding.size()), O_CLOEXEC));
-    if (!file.valid()) {
-      return tl::unexpected(errno);
-    }
-    // The lock tells remove_abandoned() that the file is in use, if the file system has locks.
-    // Another process may have found and removed the file before.
-    static_cast<void>(::flock(file.get(), LOCK_EX));
-    if (exists(name)) {
-      return TemporaryFile(std::move(name), std::move(file), ::getpid());
-    }
-  }
-}
-
-bool TemporaryFile::remove_abandoned(const std::filesystem::path& directory) {
-  const std::string prefix(kTemporaryName.substr(0, kTemporaryName.find('X')));
-  std::error_code failed;
-  std::vector<std::filesystem::path> found;
-  for (std::filesystem::directory_iterator entry(directory, failed), end; !failed && entry != end;
-       entry.increment(failed)) {
-    const std::string name = entry->path().filename().string();
-    if (name.size() == kTemporaryName.size() && name.starts_with(prefix) &&
-        name.ends_with(kTemporaryEnding)) {
-      found.push_back(entry->path());
-    }
-  }
+bool TemporaryFile::remove_abandoned(const std::string& folder) {
   bool all_gone = true;
-  for (const std::filesystem::path& path : found) {
-    const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
-    if (file.valid() && !is_ours(file.get())) {
-      continue;
+  for (const platform::FolderEntry& entry : platform::entries_of(folder.empty() ? "." : folder)
+                                                .value_or(std::vector<platform::FolderEntry>{})) {
+    if (entry.name.size() == kNameLength && entry.name.starts_with(kBeginning) &&
+        entry.name.ends_with(kEnding)) {
+      all_gone = platform::remove_unless_locked(platform::joined(folder, entry.name)) !=
+                     platform::Removal::in_use &&
+                 all_gone;
     }
-    all_gone = file.valid() && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0 &&
-               ::unlink(path.c_str()) == 0 && all_gone;
   }
   return all_gone;
 }
 
-TemporaryFile::TemporaryFile(std::filesystem::path path, FileDescriptor fd, pid_t owner)
-    : path_(std::move(path)), fd_(std::move(fd)), owner_(owner) {
-  remove_if_cut_short(path_.string());
+TemporaryFile::TemporaryFile(std::string path, FileDescriptor fd)
+    : path_(std::move(path)), fd_(std::move(fd)), owner_(platform::process_number()) {
+  platform::remove_if_cut_short(path_);
 }
 
 TemporaryFile::TemporaryFile(TemporaryFile&& other) noexcept
@@ -120,29 +70,23 @@ TemporaryFile::TemporaryFile(TemporaryFile&& other) noexcept
       owner_(std::exchange(other.owner_, 0)) {}
 
 TemporaryFile::~TemporaryFile() {
-  if (owner_ == ::getpid()) {
-    unlink();
-  }
-}
-
-void TemporaryFile::unlink() {
-  if (!path_.empty()) {
-    ::unlink(path_.c_str());
+  if (!path_.empty() && owner_ == platform::process_number()) {
+    platform::remove_file(path_);
     release();
   }
 }
 
 void TemporaryFile::release() {
-  keep_if_cut_short(path_.string());
+  platform::keep_if_cut_short(path_);
   path_.clear();
 }
 
 int write_all(int fd, std::string_view data) {
   while (!data.empty()) {
-    const ssize_t written = ::write(fd, data.data(), data.size());
+    const std::ptrdiff_t written = platform::write_bytes(fd, data);
     if (written >= 0) {
       data.remove_prefix(static_cast<std::size_t>(written));
-    } else if (!try_again(fd, POLLOUT)) {
+    } else if (!try_again(fd, platform::wait_to_write)) {
       return errno;
     }
   }
@@ -152,12 +96,12 @@ int write_all(int fd, std::string_view data) {
 tl::expected<std::string, int> read_some(int fd) {
   std::string block(kBlockBytes, '\0');
   for (;;) {
-    const ssize_t got = ::read(fd, block.data(), block.size());
+    const std::ptrdiff_t got = platform::read_bytes(fd, block.data(), block.size());
     if (got >= 0) {
       block.resize(static_cast<std::size_t>(got));
       return block;
     }
-    if (!try_again(fd, POLLIN)) {
+    if (!try_again(fd, platform::wait_to_read)) {
       return tl::unexpected(errno);
     }
   }
@@ -175,7 +119,7 @@ int copy_all(int from, int to) {
     if (const int error = write_all(to, *block); error != 0) {
       return error;
     }
-    if (ending_signal() != 0) {
+    if (platform::ending_signal() != 0) {
       return EINTR;
     }
   }
@@ -183,51 +127,12 @@ int copy_all(int from, int to) {
 
 std::string temporary_error_text(int error) {
   return error == EFBIG ? write_error_text(error)
-                        : errno_text(error) + "; set TMPDIR to another directory";
-}
-
-std::filesystem::path temporary_directory() {
-  const char* const chosen = std::getenv("TMPDIR");
-  return chosen != nullptr && *chosen != '\0' ? chosen : "/tmp";
-}
-
-bool same_file(const std::string& a, const std::string& b) {
-  if (a.empty() || b.empty()) {
-    return false;
-  }
-  std::error_code failed;
-  if (std::filesystem::equivalent(a, b, failed)) {
-    return true;
-  }
-  // At least one does not exist yet: compare where they would be.
-  const auto place = [&failed](const std::string& name) {
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(name, failed), failed);
-  };
-  const std::filesystem::path place_a = place(a);
-  return !failed && place_a == place(b) && !failed;
+                        : fmt::format("{}; set {} to another directory", errno_text(error),
+                                      platform::kTemporaryDirectoryVariable);
 }
 
 std::string name_of_file(const std::string& name, int fd) {
-  if (name != kStandardStream) {
-    return name;
-  }
-  struct stat status {};
-  const bool is_file = ::fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
-  return is_file ? fmt::format("/dev/fd/{}", fd) : "";
-}
-
-bool is_descriptor(const std::filesystem::path& name) {
-  std::error_code failed;
-  std::filesystem::path at = std::filesystem::absolute(name, failed);
-  // Linux follows at most 40 links.
-  for (int links = 0; !failed && links < 40 && std::filesystem::is_symlink(at, failed); ++links) {
-    const std::filesystem::path folder = std::filesystem::canonical(at.parent_path(), failed);
-    if (folder.string().starts_with("/proc/") && folder.filename() == "fd") {
-      return true;
-    }
-    at = folder / std::filesystem::read_symlink(at, failed);
-  }
-  return false;
+  return name == kStandardStream ? platform::name_of_descriptor(fd) : name;
 }
 
 }  // namespace unflex::app

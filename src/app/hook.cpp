@@ -1,12 +1,13 @@
 #include "hook.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <string_view>
 #include <utility>
+
+#include "unflex/platform/names.hpp"
+#include "unflex/platform/process.hpp"
 
 namespace unflex::app {
 namespace {
@@ -33,21 +34,17 @@ Result<std::string> report_beside(const RunConfig& config, const Slicer& slicer)
                             "stand beside it; give --report a whole name",
                             *config.report, *slicer.host));
   }
-  return std::filesystem::path(config.print_name).replace_extension(*config.report).string();
+  return platform::with_ending(config.print_name, *config.report);
 }
 
 }  // namespace
 
 Slicer read_slicer() {
   Slicer slicer;
-  for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) {
-    const std::string_view text = *entry;
-    const std::size_t equals = text.find('=');
-    if (!text.starts_with(kPrefix) || equals == std::string_view::npos) {
+  for (auto& [name, value] : platform::environment()) {
+    if (!name.starts_with(kPrefix)) {
       continue;
     }
-    const std::string name(text.substr(0, equals));
-    std::string value(text.substr(equals + 1));
     if (name == "SLIC3R_PP_HOST") {
       slicer.host = std::move(value);
     } else if (name == "SLIC3R_PP_OUTPUT_NAME" && !value.empty()) {

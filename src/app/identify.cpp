@@ -1,9 +1,7 @@
 #include "identify.hpp"
 
 #include <fmt/core.h>
-#include <sys/mman.h>
 
-#include <cerrno>
 #include <string>
 #include <vector>
 
@@ -15,7 +13,6 @@
 #include "print_run.hpp"
 #include "record_densities.hpp"
 #include "results.hpp"
-#include "unflex/core/errno_text.hpp"
 #include "unflex/machine/machine.hpp"
 #include "unflex/machine/ring_test.hpp"
 #include "workspace.hpp"
@@ -212,14 +209,8 @@ Result<ExitCode> make_test(const RunConfig& config, Console& console) {
   if (!text) {
     return tl::unexpected(text.error());
   }
-  const FileDescriptor file(::memfd_create("unflex-test", MFD_CLOEXEC));
-  if (file.get() < 0) {
-    return fail(ErrorKind::internal, fmt::format("no memory for the test: {}", errno_text(errno)));
-  }
-  if (const int error = write_all(file.get(), *text); error != 0) {
-    return fail(ErrorKind::internal, fmt::format("no memory for the test: {}", errno_text(error)));
-  }
-  print.input = fmt::format("/proc/self/fd/{}", file.get());
+  print.input = print.print_name;
+  print.input_text = *text;
   const Result<PrintOutcome> outcome = work_on_print(print, console);
   if (!outcome) {
     return tl::unexpected(outcome.error());

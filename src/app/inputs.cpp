@@ -1,17 +1,17 @@
 #include "inputs.hpp"
 
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <functional>
 #include <memory>
 #include <utility>
 
-#include "signals.hpp"
 #include "unflex/app/run_config.hpp"
+#include "unflex/core/errno_text.hpp"
+#include "unflex/platform/files.hpp"
+#include "unflex/platform/replacing.hpp"
+#include "unflex/platform/signals.hpp"
 
 namespace unflex::app {
 namespace {
@@ -60,29 +60,33 @@ class TextReader {
   bool ended_ = false;
 };
 
-InputVersion version_of(const struct stat& status) {
-  return {status.st_dev, status.st_ino, status.st_size, status.st_mtim.tv_sec,
-          status.st_mtim.tv_nsec};
-}
-
 }  // namespace
 
 Result<Input> Input::open(const std::string& name) {
   const SourcePlace place{name, 0};
   const bool is_stdin = name == kStandardStream;
-  FileDescriptor fd(is_stdin ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3)
-                             : ::open(name.c_str(), O_RDONLY | O_CLOEXEC));
-  struct stat status {};
-  if (!fd.valid() || ::fstat(fd.get(), &status) != 0) {
-    return fail(ErrorKind::input, place, fmt::format("cannot read: {}", errno_text(errno)));
+  FileDescriptor fd =
+      is_stdin ? FileDescriptor::borrowed(platform::kStandardInput) : platform::open_to_read(name);
+  const tl::expected<platform::FileState, int> state =
+      fd.valid() ? platform::state_of(fd.get()) : tl::unexpected(errno);
+  if (!state) {
+    return fail(ErrorKind::input, place, fmt::format("cannot read: {}", errno_text(state.error())));
   }
-  if (S_ISDIR(status.st_mode)) {
+  if (state->kind == platform::FileKind::folder) {
     return fail(ErrorKind::input, place, "is a directory, not a G-code file");
   }
-  Input input(name, std::move(fd), version_of(status));
+  Input input(name, std::move(fd), *state);
   // Even a file on stdin need not stand at its start, so it is copied too.
-  input.is_stream_ = is_stdin || !S_ISREG(status.st_mode);
+  input.is_stream_ = is_stdin || state->kind != platform::FileKind::file;
   return input;
+}
+
+Result<Input> Input::of_text(const std::string& name, std::string_view text) {
+  Input input(name, {}, {});
+  input.is_stream_ = true;
+  return input.replace_text([&](const Write& write) { return write(text); }).map([&] {
+    return std::move(input);
+  });
 }
 
 tl::unexpected<Error> Input::cannot_read(int error) const {
@@ -90,17 +94,16 @@ tl::unexpected<Error> Input::cannot_read(int error) const {
 }
 
 Status Input::check_unchanged() const {
-  struct stat status {};
   if (is_stream_) {
     return {};
   }
-  if (::stat(file_.c_str(), &status) != 0) {
+  const tl::expected<platform::FileState, int> state = platform::state_of(file_);
+  if (!state) {
     return fail(ErrorKind::input, {name_, 0}, "vanished while it was worked on; run unflex again");
   }
-  return version_of(status) == version_
-             ? Status{}
-             : Status(fail(ErrorKind::input, {name_, 0},
-                           "changed while it was worked on; run unflex again"));
+  return *state == state_ ? Status{}
+                          : Status(fail(ErrorKind::input, {name_, 0},
+                                        "changed while it was worked on; run unflex again"));
 }
 
 Result<std::string> Input::read_block() const {
@@ -124,7 +127,7 @@ Status Input::look_at_kind() {
 
 Result<machine::PrintText> Input::look() {
   if (stream_fd() < 0) {
-    return machine::read_print_text(path(), name_);
+    return machine::read_print_text(*text(), name_);
   }
   const std::unique_ptr<container::Unpacker> unpacker = container::make_unpacker(kind_, name_);
   TextReader reader(unpacker.get(), head_, [this] {
@@ -178,29 +181,24 @@ Status Input::make_seekable() {
 }
 
 Status Input::replace_text(const std::function<Status(const Write&)>& make) {
-  const std::filesystem::path directory = temporary_directory();
-  tl::expected<TemporaryFile, int> copy = TemporaryFile::create(directory);
+  const std::string directory = platform::temporary_directory();
+  // Without a name, nothing is left of the copy, whatever happens.
+  tl::expected<FileDescriptor, int> copy = platform::open_unnamed_file(directory);
   if (!copy) {
-    return fail(ErrorKind::internal, {directory.string(), 0},
+    return fail(ErrorKind::internal, {directory, 0},
                 fmt::format("cannot keep {} here: {}", name_, temporary_error_text(copy.error())));
   }
-  // Without a name, nothing is left of the copy, whatever happens.
-  copy->unlink();
   const Status made = make([&](std::string_view text) -> Status {
-    const int error = ending_signal() != 0 ? EINTR : write_all(copy->fd(), text);
+    const int error = platform::ending_signal() != 0 ? EINTR : write_all(copy->get(), text);
     return error == 0 ? Status{}
                       : Status(fail(ErrorKind::internal, {name_, 0},
-                                    fmt::format("cannot be kept in {}: {}", directory.string(),
+                                    fmt::format("cannot be kept in {}: {}", directory,
                                                 temporary_error_text(error))));
   });
   if (!made) {
     return made;
   }
-  FileDescriptor kept(::fcntl(copy->fd(), F_DUPFD_CLOEXEC, 3));
-  if (!kept.valid()) {
-    return fail(ErrorKind::internal, {name_, 0}, errno_text(errno));
-  }
-  fd_ = std::move(kept);
+  fd_ = std::move(*copy);
   is_copied_ = true;
   return {};
 }
@@ -228,10 +226,9 @@ Status Input::copy_text() {
   return copied;
 }
 
-std::filesystem::path Input::path() const {
-  return is_stream_ || is_copied_
-             ? std::filesystem::path(fmt::format("/proc/self/fd/{}", fd_.get()))
-             : file_;
+std::shared_ptr<TextStore> Input::text() const {
+  return is_stream_ || is_copied_ ? platform::descriptor_text(fd_.get())
+                                  : platform::file_store(file_);
 }
 
 }  // namespace unflex::app

@@ -1,11 +1,8 @@
 // Input files, and streams made into files.
 #pragma once
 
-#include <sys/types.h>
-
-#include <ctime>
-#include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,26 +10,20 @@
 #include "files.hpp"
 #include "unflex/container/container.hpp"
 #include "unflex/core/error.hpp"
+#include "unflex/core/text_store.hpp"
 #include "unflex/machine/print_text.hpp"
+#include "unflex/platform/folders.hpp"
 
 namespace unflex::app {
-
-// The version of a file: a file that is written to or replaced gets another one.
-struct InputVersion {
-  dev_t device = 0;
-  ino_t number = 0;
-  off_t bytes = 0;
-  time_t written_s = 0;
-  long written_ns = 0;
-
-  [[nodiscard]] bool operator==(const InputVersion&) const = default;
-};
 
 class Input {
  public:
   // Checks that the input can be read. A missing file, a directory and the like are errors of
   // kind input.
   [[nodiscard]] static Result<Input> open(const std::string& name);
+
+  // A text that is in no file, under the name that messages call it.
+  [[nodiscard]] static Result<Input> of_text(const std::string& name, std::string_view text);
 
   // Copies what cannot be read twice (stdin, pipes), and the text of what is packed, to a temporary
   // file without a name.
@@ -67,15 +58,15 @@ class Input {
   // The descriptor of an input that cannot be read twice, to read it once; −1 for other inputs.
   [[nodiscard]] int stream_fd() const { return is_stream_ && !is_copied_ ? fd_.get() : -1; }
 
-  // Where to read the input, and what the user calls it.
-  [[nodiscard]] std::filesystem::path path() const;
+  // Where to read the input, as long as this object lives, and what the user calls it.
+  [[nodiscard]] std::shared_ptr<TextStore> text() const;
   [[nodiscard]] const std::string& name() const { return name_; }
   // Messages call the input so from here on.
   void call(std::string name) { name_ = std::move(name); }
 
  private:
-  Input(std::string name, FileDescriptor stream, const InputVersion& version)
-      : file_(name), name_(std::move(name)), fd_(std::move(stream)), version_(version) {}
+  Input(std::string name, FileDescriptor stream, const platform::FileState& state)
+      : file_(name), name_(std::move(name)), fd_(std::move(stream)), state_(state) {}
 
   // Reads as far as it takes to know kind_.
   [[nodiscard]] Status look_at_kind();
@@ -85,10 +76,10 @@ class Input {
   [[nodiscard]] Status copy_text();
   [[nodiscard]] tl::unexpected<Error> cannot_read(int error) const;
 
-  std::filesystem::path file_;
+  std::string file_;
   std::string name_;
   FileDescriptor fd_;
-  InputVersion version_;
+  platform::FileState state_;  // when it was opened
   bool is_stream_ = false;
   bool is_copied_ = false;  // its text is in a temporary file
   container::Kind kind_ = container::Kind::text;

@@ -1,6 +1,5 @@
 #include "log.hpp"
 
-#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/core.h>
 
@@ -10,17 +9,17 @@
 #include <utility>
 
 #include "console.hpp"
+#include "unflex/core/errno_text.hpp"
+#include "unflex/platform/folders.hpp"
 
 namespace unflex::app {
 namespace {
-
-constexpr mode_t kMode = 0666;
 
 // Checks that the log is not a file that is read or replaced.
 Status check_distinct(const RunConfig& config) {
   for (const std::string& other : {config.input, config.output, config.report.value_or(""),
                                    config.printer_file.value_or("")}) {
-    if (other != kStandardStream && same_file(*config.log, other)) {
+    if (other != kStandardStream && platform::same_file(*config.log, other)) {
       return fail(ErrorKind::usage, {*config.log, 0},
                   "is read or written already; give the log a name of its own");
     }
@@ -37,8 +36,7 @@ Result<Log> Log::open(const RunConfig& config) {
   if (Status distinct = check_distinct(config); !distinct) {
     return tl::unexpected(distinct.error());
   }
-  FileDescriptor file(
-      ::open(config.log->c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, kMode));
+  FileDescriptor file = platform::open_to_append(*config.log);
   if (!file.valid()) {
     return fail(ErrorKind::usage, {*config.log, 0},
                 fmt::format("cannot write the log: {}", write_error_text(errno)));

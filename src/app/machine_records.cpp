@@ -3,15 +3,15 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 
 #include "inputs.hpp"
+#include "unflex/core/errno_text.hpp"
+#include "unflex/platform/folders.hpp"
+#include "unflex/platform/names.hpp"
 
 namespace unflex::app {
 namespace {
-
-namespace fs = std::filesystem;
 
 // The part of a file's name that tells the machine; empty if none does.
 std::string machine_in_name(const std::string& name) {
@@ -25,53 +25,63 @@ std::string machine_in_name(const std::string& name) {
   return {};
 }
 
-Result<std::vector<fs::path>> files_in(const std::string& folder) {
-  std::error_code failed;
-  std::vector<fs::path> files;
-  for (fs::recursive_directory_iterator entry(folder, failed), end; !failed && entry != end;
-       entry.increment(failed)) {
-    const std::string ending = entry->path().extension().string();
-    if (entry->is_regular_file() && (ending == ".csv" || ending == ".stdata")) {
-      files.push_back(entry->path());
+struct RecordFile {
+  std::string name;
+  std::string below;  // the folder it is in, below the folder of all records
+};
+
+// Adds the files of a folder and those below it. Returns 0 or the errno.
+int add_files(const std::string& folder, const std::string& below, std::vector<RecordFile>& files) {
+  const auto entries = platform::entries_of(folder);
+  if (!entries) {
+    return entries.error();
+  }
+  for (const platform::FolderEntry& entry : *entries) {
+    const std::string name = platform::joined(folder, entry.name);
+    const std::string ending = platform::ending_of(name);
+    if (entry.kind == platform::FileKind::folder && !entry.is_link) {
+      if (const int error = add_files(name, platform::joined(below, entry.name), files)) {
+        return error;
+      }
+    } else if (entry.kind == platform::FileKind::file &&
+               (ending == ".csv" || ending == ".stdata")) {
+      files.push_back({name, below});
     }
   }
-  if (failed) {
-    return fail(ErrorKind::input, {folder, 0},
-                fmt::format("cannot read the folder: {}", failed.message()));
-  }
-  std::ranges::sort(files);
-  return files;
+  return 0;
 }
 
-Result<std::vector<identify::DataSet>> read_file(const fs::path& file) {
-  Result<Input> input = Input::open(file.string());
+Result<std::vector<identify::DataSet>> read_file(const std::string& file) {
+  Result<Input> input = Input::open(file);
   if (!input) {
     return tl::unexpected(input.error());
   }
   const Result<std::string> bytes = input->read_all();
-  return bytes ? identify::parse_records(*bytes, file.string())
+  return bytes ? identify::parse_records(*bytes, file)
                : Result<std::vector<identify::DataSet>>(tl::unexpected(bytes.error()));
 }
 
 }  // namespace
 
 Result<std::vector<MachineRecords>> read_machines(const std::string& folder) {
-  const Result<std::vector<fs::path>> files = files_in(folder);
-  if (!files) {
-    return tl::unexpected(files.error());
+  std::vector<RecordFile> files;
+  if (const int error = add_files(folder, "", files); error != 0) {
+    return fail(ErrorKind::input, {folder, 0},
+                fmt::format("cannot read the folder: {}", errno_text(error)));
   }
+  std::ranges::sort(files, {}, &RecordFile::name);
   std::map<std::string, MachineRecords> by_name;
-  for (const fs::path& file : *files) {
-    Result<std::vector<identify::DataSet>> sets = read_file(file);
+  for (const RecordFile& file : files) {
+    Result<std::vector<identify::DataSet>> sets = read_file(file.name);
     if (!sets) {
       return tl::unexpected(sets.error());
     }
-    const fs::path below = fs::relative(file.parent_path(), folder);
-    const std::string own = machine_in_name(file.filename().string());
-    std::string name = below == "." ? own : below.generic_string();
-    name += below != "." && !own.empty() ? "/" + own : "";
+    const std::string own = machine_in_name(platform::last_part(file.name));
+    const std::string name = file.below.empty() ? own
+                             : own.empty()      ? file.below
+                                                : file.below + "/" + own;
     MachineRecords& machine = by_name[name];
-    machine.name = name.empty() ? fs::path(folder).filename().string() : name;
+    machine.name = name.empty() ? platform::last_part(folder) : name;
     for (identify::DataSet& set : *sets) {
       if (set.axis) {
         machine.axes[*set.axis == identify::Axis::x ? 0 : 1].push_back(std::move(set));

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <optional>
 
@@ -15,6 +14,7 @@
 #include "results.hpp"
 #include "unflex/identify/axis_model.hpp"
 #include "unflex/pipeline/study_machines.hpp"
+#include "unflex/platform/names.hpp"
 #include "unflex/study/truth.hpp"
 #include "workspace.hpp"
 
@@ -34,7 +34,7 @@ struct KnownAxis {
 
 KnownAxis known_axis(const DataSet& set, Axis axis, const identify::Sweep& sweep) {
   KnownAxis known;
-  known.name = std::filesystem::path(set.name).filename().string();
+  known.name = platform::last_part(set.name);
   const Result<identify::RecordFit> fitted = fit(set, axis, sweep);
   if (fitted && fitted->is_trusted()) {
     known.model = fitted->model;

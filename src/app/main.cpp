@@ -1,7 +1,5 @@
-#include <string>
-#include <vector>
-
 #include "unflex/app/run.hpp"
+#include "unflex/platform/process.hpp"
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -13,9 +11,5 @@ int main(int argc, char** argv) {
   // larger blocks, and a print takes up to a third more memory.
   mallopt(M_MMAP_THRESHOLD, 4 << 20);
 #endif
-  std::vector<std::string> arguments;
-  for (int i = 1; i < argc; ++i) {
-    arguments.emplace_back(argv[i]);
-  }
-  return unflex::app::run_program(arguments);
+  return unflex::app::run_program(unflex::platform::arguments_of(argc, argv));
 }

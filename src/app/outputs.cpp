@@ -1,15 +1,17 @@
 #include "outputs.hpp"
 
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <memory>
 
-#include "signals.hpp"
 #include "unflex/app/run_config.hpp"
+#include "unflex/core/errno_text.hpp"
+#include "unflex/platform/files.hpp"
+#include "unflex/platform/folders.hpp"
+#include "unflex/platform/names.hpp"
+#include "unflex/platform/replacing.hpp"
+#include "unflex/platform/signals.hpp"
 
 namespace unflex::app {
 namespace {
@@ -19,87 +21,58 @@ tl::unexpected<Error> refuse(const std::string& name, std::string message) {
 }
 
 // The directory a file is to be written in, or what speaks against it.
-Result<std::filesystem::path> directory_for(const std::string& name,
-                                            const std::filesystem::path& target) {
-  const std::filesystem::path parent =
-      target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
-  struct stat status {};
-  if (::stat(parent.c_str(), &status) != 0) {
-    return refuse(name, errno == ENOENT ? fmt::format("the directory {} does not exist; create it",
-                                                      parent.string())
-                                        : fmt::format("cannot write: {}", errno_text(errno)));
+Result<std::string> directory_for(const std::string& name, const std::string& target) {
+  const std::string parent = platform::folder_of(target);
+  std::string directory = parent.empty() ? "." : parent;
+  if (const auto state = platform::state_of(directory); !state) {
+    return refuse(name, state.error() == ENOENT
+                            ? fmt::format("the directory {} does not exist; create it", directory)
+                            : fmt::format("cannot write: {}", errno_text(state.error())));
   }
-  return parent;
+  return directory;
 }
 
-// What the name leads to: the file to replace, or an empty path for a stream.
-Result<std::filesystem::path> find_target(const std::string& name) {
-  struct stat status {};
+// What the name leads to: the file to replace, or an empty name for a stream.
+Result<std::string> find_target(const std::string& name) {
   if (name == kStandardStream) {
-    return std::filesystem::path();
+    return std::string();
   }
-  if (::stat(name.c_str(), &status) != 0) {
-    if (errno != ENOENT) {
-      return refuse(name, fmt::format("cannot write: {}", errno_text(errno)));
+  const tl::expected<platform::FileState, int> state = platform::state_of(name);
+  if (!state) {
+    if (state.error() != ENOENT) {
+      return refuse(name, fmt::format("cannot write: {}", errno_text(state.error())));
     }
-    std::error_code failed;
-    if (std::filesystem::is_symlink(name, failed)) {
+    if (platform::is_link(name)) {
       return refuse(name, "is a link that leads nowhere; make what it leads to, or remove it");
     }
     // A missing directory is told apart later, with a remedy.
     return name;
   }
-  if (S_ISDIR(status.st_mode)) {
+  if (state->kind == platform::FileKind::folder) {
     return refuse(name, "is a directory; name a file in it");
   }
-  if (::access(name.c_str(), W_OK) != 0) {
-    return refuse(name, fmt::format("cannot write: {}", write_error_text(errno)));
+  if (const int error = platform::check_writable(name); error != 0) {
+    return refuse(name, fmt::format("cannot write: {}", write_error_text(error)));
   }
-  if (!S_ISREG(status.st_mode)) {
-    return std::filesystem::path();
+  if (state->kind != platform::FileKind::file) {
+    return std::string();
   }
-  if (is_descriptor(name)) {
+  if (platform::leads_to_descriptor(name)) {
     return refuse(name, "leads to a file that is open already; give its name, or - for stdout");
   }
   // A symbolic link stays; the file it points to is replaced.
-  std::error_code failed;
-  std::filesystem::path target = std::filesystem::canonical(name, failed);
-  return failed ? refuse(name, fmt::format("cannot write: {}", failed.message()))
-                : Result<std::filesystem::path>(std::move(target));
-}
-
-mode_t mode_of_new_files() {
-  const mode_t mask = ::umask(0);
-  ::umask(mask);
-  return 0666U & ~mask;
-}
-
-// Gives the temporary file the owner (if that is allowed) and permissions of the file it replaces.
-int take_over_permissions(int fd, const std::filesystem::path& target) {
-  struct stat status {};
-  if (::stat(target.c_str(), &status) != 0) {
-    return ::fchmod(fd, mode_of_new_files()) == 0 ? 0 : errno;
-  }
-  const bool same_owner = ::fchown(fd, status.st_uid, status.st_gid) == 0;
-  if (!same_owner) {
-    // At least the group is kept, for folders that a group shares. Otherwise the rights of the
-    // group would pass to another group.
-    static_cast<void>(::fchown(fd, static_cast<uid_t>(-1), status.st_gid));
-  }
-  // Rights to run as someone must not pass to another owner.
-  const mode_t kept = status.st_mode & (same_owner ? 07777U : 0777U);
-  return ::fchmod(fd, kept) == 0 ? 0 : errno;
+  return platform::canonical_name(name);
 }
 
 }  // namespace
 
 Result<Output> Output::open(const std::string& name) {
-  Result<std::filesystem::path> target = find_target(name);
+  Result<std::string> target = find_target(name);
   if (!target) {
     return tl::unexpected(target.error());
   }
-  const Result<std::filesystem::path> directory =
-      target->empty() ? temporary_directory() : directory_for(name, *target);
+  const Result<std::string> directory =
+      target->empty() ? platform::temporary_directory() : directory_for(name, *target);
   if (!directory) {
     return tl::unexpected(directory.error());
   }
@@ -108,12 +81,11 @@ Result<Output> Output::open(const std::string& name) {
   tl::expected<TemporaryFile, int> temporary = TemporaryFile::create(*directory);
   if (!temporary) {
     const int error = temporary.error();
-    return target->empty()
-               ? fail(ErrorKind::internal, {name, 0},
-                      fmt::format("cannot be kept in {}: {}", directory->string(),
-                                  temporary_error_text(error)))
-               : refuse(name, fmt::format("cannot write to the directory {}: {}",
-                                          directory->string(), write_error_text(error)));
+    return target->empty() ? fail(ErrorKind::internal, {name, 0},
+                                  fmt::format("cannot be kept in {}: {}", *directory,
+                                              temporary_error_text(error)))
+                           : refuse(name, fmt::format("cannot write to the directory {}: {}",
+                                                      *directory, write_error_text(error)));
   }
   return Output(name, std::move(*target), std::move(*temporary));
 }
@@ -140,7 +112,8 @@ Status Output::pack() {
   if (kind_ == container::Kind::text) {
     return {};
   }
-  tl::expected<TemporaryFile, int> packed = TemporaryFile::create(temporary_.path().parent_path());
+  tl::expected<TemporaryFile, int> packed =
+      TemporaryFile::create(platform::folder_of(temporary_.path()));
   if (!packed) {
     return cannot_write(packed.error());
   }
@@ -169,7 +142,7 @@ Status Output::pack_into(int to) {
 }
 
 Status Output::for_each_block(const std::function<Status(std::string_view)>& use) const {
-  const FileDescriptor text(::open(temporary_.path().c_str(), O_RDONLY | O_CLOEXEC));
+  const FileDescriptor text = platform::open_to_read(temporary_.path());
   if (!text.valid()) {
     return cannot_write(errno);
   }
@@ -181,7 +154,7 @@ Status Output::for_each_block(const std::function<Status(std::string_view)>& use
     if (block->empty()) {
       return {};
     }
-    if (ending_signal() != 0) {
+    if (platform::ending_signal() != 0) {
       return cannot_write(EINTR);
     }
     if (Status used = use(*block); !used) {
@@ -194,33 +167,31 @@ Status Output::for_each_block(const std::function<Status(std::string_view)>& use
 // there without the contents.
 Status Output::settle() const {
   const int fd = result().fd();
-  if (const int error = take_over_permissions(fd, target_); error != 0) {
-    return cannot_write(error);
+  int error = platform::take_over_permissions(fd, target_);
+  if (error == 0) {
+    error = platform::sync_file(fd);
   }
-  return ::fsync(fd) == 0 ? Status{} : Status(cannot_write(errno));
+  return error == 0 ? Status{} : Status(cannot_write(error));
 }
 
 Status Output::replace_target() {
   const TemporaryFile& made = result();
-  expect_a_result();
-  if (::rename(made.path().c_str(), target_.c_str()) != 0) {
-    return cannot_write(errno);
+  platform::expect_a_result();
+  if (const int error = platform::replace_file(made.path(), target_); error != 0) {
+    return cannot_write(error);
   }
-  note_result();
-  const std::filesystem::path directory = made.path().parent_path();
+  platform::note_result();
+  const std::string directory = platform::folder_of(made.path());
   (packed_ ? *packed_ : temporary_).release();
-  // The rename itself must survive a power cut. If the directory cannot be synced, it is done all
-  // the same.
-  const FileDescriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder.valid()) {
-    ::fsync(folder.get());
-  }
+  // The new name itself must survive a power cut. If the directory cannot be put on the disk, it is
+  // done all the same.
+  platform::sync_folder(directory);
   return {};
 }
 
 Status Output::open_stream() {
-  stream_ = FileDescriptor(name_ == kStandardStream ? ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3)
-                                                    : ::open(name_.c_str(), O_WRONLY | O_CLOEXEC));
+  stream_ = name_ == kStandardStream ? FileDescriptor::borrowed(platform::kStandardOutput)
+                                     : platform::open_to_write(name_);
   return stream_.valid() ? Status{} : Status(cannot_write(errno));
 }
 
@@ -232,7 +203,7 @@ Result<int> Output::stream_fd() {
 }
 
 Status Output::copy_to_stream() {
-  const FileDescriptor source(::open(result().path().c_str(), O_RDONLY | O_CLOEXEC));
+  const FileDescriptor source = platform::open_to_read(result().path());
   if (!source.valid()) {
     return cannot_write(errno);
   }
@@ -244,7 +215,7 @@ Status Output::copy_to_stream() {
   if (error != 0) {
     return cannot_write(error);
   }
-  note_result();
+  platform::note_result();
   return {};
 }
 

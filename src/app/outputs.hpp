@@ -1,7 +1,6 @@
 // Results that appear whole or not at all.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -31,7 +30,7 @@ class Output {
   [[nodiscard]] bool is_stream() const { return target_.empty(); }
 
   // Where to write until then, always text.
-  [[nodiscard]] const std::filesystem::path& path() const { return temporary_.path(); }
+  [[nodiscard]] const std::string& path() const { return temporary_.path(); }
   [[nodiscard]] Status write(std::string_view text);
 
   // The descriptor of a stream: the caller writes to it at once, packed as asked, and does not
@@ -47,7 +46,7 @@ class Output {
   [[nodiscard]] Status commit();
 
  private:
-  Output(std::string name, std::filesystem::path target, TemporaryFile temporary)
+  Output(std::string name, std::string target, TemporaryFile temporary)
       : name_(std::move(name)), target_(std::move(target)), temporary_(std::move(temporary)) {}
 
   [[nodiscard]] Status pack();
@@ -62,7 +61,7 @@ class Output {
   [[nodiscard]] tl::unexpected<Error> cannot_write(int error) const;
 
   std::string name_;
-  std::filesystem::path target_;  // empty for a stream
+  std::string target_;  // empty for a stream
   TemporaryFile temporary_;
   std::optional<TemporaryFile> packed_;
   container::Kind kind_ = container::Kind::text;

@@ -67,7 +67,7 @@ Status deliver(const RunConfig& config, Workspace& space, ExitCode verdict, bool
                            : is_html(*config.report) ? report::to_html(report)
                                                      : report::to_json(report);
   if (passed_on) {
-    note_result();
+    platform::note_result();
   }
   const bool wanted = space.output && verdict == ExitCode::done && !passed_on;
   return wanted ? deliver_output(space, text) : write_report(space.report, text);

@@ -1,7 +1,6 @@
 #include "printer_init.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
 
@@ -12,6 +11,7 @@
 #include "outputs.hpp"
 #include "results.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/platform/folders.hpp"
 
 namespace unflex::app {
 namespace {
@@ -115,8 +115,8 @@ Result<ExitCode> run_printer_init(const RunConfig& asked, Console& console) {
   if (!input) {
     return tl::unexpected(input.error());
   }
-  if (same_file(name_of_file(config.output, STDOUT_FILENO),
-                name_of_file(config.input, STDIN_FILENO))) {
+  if (platform::same_file(name_of_file(config.output, platform::kStandardOutput),
+                          name_of_file(config.input, platform::kStandardInput))) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is what it is made from too; give it a name of its own");
   }

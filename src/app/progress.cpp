@@ -1,16 +1,14 @@
 #include "progress.hpp"
 
 #include <fmt/core.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "files.hpp"
-#include "signals.hpp"
-#include "terminal.hpp"
+#include "unflex/platform/process.hpp"
+#include "unflex/platform/signals.hpp"
 
 namespace unflex::app {
 namespace {
@@ -22,14 +20,13 @@ constexpr std::size_t kLeastBar = 8;
 constexpr std::string_view kClearLine = "\r\033[K";
 
 std::size_t columns_of(int fd) {
-  winsize size{};
-  const bool known = ::ioctl(fd, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-  return known ? size.ws_col : kDefaultColumns;
+  const unsigned columns = platform::columns_of(fd);
+  return columns > 0 ? columns : kDefaultColumns;
 }
 
 }  // namespace
 
-bool SignalledProgress::cancelled() const { return ending_signal() != 0; }
+bool SignalledProgress::cancelled() const { return platform::ending_signal() != 0; }
 
 ProgressBar::~ProgressBar() {
   if (drawn_) {
@@ -89,11 +86,11 @@ std::string bar_text(std::string_view stage, double fraction, std::string_view l
 }
 
 std::unique_ptr<Progress> make_progress(bool quiet) {
-  if (!quiet && can_redraw(STDERR_FILENO)) {
-    return std::make_unique<ProgressBar>(STDERR_FILENO);
+  if (!quiet && platform::takes_escape_sequences(platform::kStandardError)) {
+    return std::make_unique<ProgressBar>(platform::kStandardError);
   }
   if (!quiet) {
-    return std::make_unique<OneEstimate>(STDERR_FILENO);
+    return std::make_unique<OneEstimate>(platform::kStandardError);
   }
   return std::make_unique<SignalledProgress>();
 }

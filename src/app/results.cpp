@@ -1,12 +1,13 @@
 #include "results.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <cerrno>
 
 #include "files.hpp"
+#include "unflex/core/errno_text.hpp"
 #include "unflex/machine/recommend.hpp"
+#include "unflex/platform/process.hpp"
 
 namespace unflex::app {
 
@@ -90,8 +91,8 @@ Status print_summary(const RunConfig& config, std::string_view text, Console& co
   const bool stdout_taken = config.report == kStandardStream ||
                             (writes_print(config.command) && config.output == kStandardStream);
   if (stdout_taken) {
-    if (::isatty(STDERR_FILENO) == 1) {
-      static_cast<void>(write_all(STDERR_FILENO, text));
+    if (platform::is_terminal(platform::kStandardError)) {
+      static_cast<void>(write_all(platform::kStandardError, text));
     }
     return {};
   }
@@ -99,10 +100,10 @@ Status print_summary(const RunConfig& config, std::string_view text, Console& co
 }
 
 Status write_last(std::string_view text) {
-  const int error = write_all(STDOUT_FILENO, text);
+  const int error = write_all(platform::kStandardOutput, text);
   // If a signal ends the program here, the files are in place already, so no message must say that
   // there are none.
-  const bool is_done = error == EINTR && has_result();
+  const bool is_done = error == EINTR && platform::has_result();
   return error == 0 || is_done
              ? Status{}
              : Status(fail(ErrorKind::internal, {"stdout", 0},

@@ -11,10 +11,10 @@
 #include "console.hpp"
 #include "outputs.hpp"
 #include "progress.hpp"
-#include "signals.hpp"
 #include "unflex/app/run_config.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/platform/signals.hpp"
 
 namespace unflex::app {
 
@@ -32,7 +32,7 @@ auto with_progress(const RunConfig& config, Work work)
     -> decltype(work(std::declval<Progress&>())) {
   const std::unique_ptr<Progress> progress = make_progress(config.quiet);
   auto result = work(*progress);
-  if (ending_signal() != 0) {
+  if (platform::ending_signal() != 0) {
     return interrupted(config.command);
   }
   return result;

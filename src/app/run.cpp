@@ -1,8 +1,5 @@
 #include "unflex/app/run.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <cstdlib>
 #include <exception>
@@ -25,7 +22,6 @@
 #include "printer_line_test.hpp"
 #include "printer_macros.hpp"
 #include "results.hpp"
-#include "signals.hpp"
 #include "tune.hpp"
 #include "unflex/core/caught.hpp"
 #include "unflex/core/lanes.hpp"
@@ -33,6 +29,9 @@
 #include "unflex/pipeline/study_accels.hpp"
 #include "unflex/pipeline/study_fastest.hpp"
 #include "unflex/pipeline/study_print.hpp"
+#include "unflex/platform/catching.hpp"
+#include "unflex/platform/process.hpp"
+#include "unflex/platform/signals.hpp"
 #include "unflex/report/report.hpp"
 #include "unflex/study/accels.hpp"
 #include "unflex/study/fastest.hpp"
@@ -198,16 +197,6 @@ Result<ExitCode> run_accels(const RunConfig& config, Console& console) {
       [](const study::AccelsOutcome& outcome) { return study::to_json(outcome); });
 }
 
-// A descriptor 0, 1 or 2 that was closed would be given to the next file opened, and messages
-// would land in it. /dev/null is opened the wrong way round, so that using it is still an error.
-void reserve_standard_descriptors() {
-  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (::fcntl(fd, F_GETFD) < 0) {
-      static_cast<void>(::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY));
-    }
-  }
-}
-
 Result<ExitCode> run_command(const RunConfig& config, Console& console) {
   switch (config.command) {
     case Command::inspect:
@@ -249,12 +238,13 @@ Result<ExitCode> run_command(const RunConfig& config, Console& console) {
 int run_said(const RunConfig& config, Console& console) {
   const Result<ExitCode> result = run_command(config, console);
   if (!result) {
-    say_last_words_yourself();
+    platform::say_last_words_yourself();
     // If a result is in place, the failure itself is told. Otherwise the result would be taken for
     // missing.
-    const bool ended = ending_signal() != 0 && (!has_result() || config.command == Command::batch);
+    const bool ended = platform::ending_signal() != 0 &&
+                       (!platform::has_result() || config.command == Command::batch);
     console.error(ended ? interrupted(config.command).value() : result.error());
-    return ended ? kSignalExitBase + ending_signal()
+    return ended ? kSignalExitBase + platform::ending_signal()
                  : static_cast<int>(exit_code(result.error().kind));
   }
   return static_cast<int>(*result);
@@ -268,8 +258,8 @@ int refused(const Error& error) {
 }  // namespace
 
 int run(const RunConfig& asked) {
-  catch_signals(error_text(interrupted(asked.command).value()),
-                error_text(interrupted(asked.command, true).value()));
+  platform::catch_signals(error_text(interrupted(asked.command).value()),
+                          error_text(interrupted(asked.command, true).value()));
   const Result<RunConfig> config = with_slicer(asked, read_slicer());
   if (!config) {
     return refused(config.error());
@@ -294,23 +284,23 @@ static bool prefers_two_lanes() {
 }
 
 int run_program(const std::vector<std::string>& arguments) {
-  reserve_standard_descriptors();
+  platform::prepare_standard_streams();
   prefer_two_lanes(prefers_two_lanes());
-  try {
-    const Result<CommandLine> command_line = parse_command_line(arguments);
-    if (!command_line) {
-      return refused(command_line.error());
-    }
-    if (command_line->config) {
-      return run(*command_line->config);
-    }
-    const int error = write_all(STDOUT_FILENO, command_line->text);
-    return static_cast<int>(error == 0 ? ExitCode::done : ExitCode::internal);
-  } catch (const std::exception& failure) {
-    // Out of memory, mostly; the temporary files are gone with the stack.
-    Console().error(error_of(failure));
-    return static_cast<int>(ExitCode::internal);
-  }
+  int code = static_cast<int>(ExitCode::internal);
+  platform::catching(
+      [&] {
+        const Result<CommandLine> command_line = parse_command_line(arguments);
+        if (!command_line) {
+          code = refused(command_line.error());
+        } else if (command_line->config) {
+          code = run(*command_line->config);
+        } else if (write_all(platform::kStandardOutput, command_line->text) == 0) {
+          code = static_cast<int>(ExitCode::done);
+        }
+      },
+      // Out of memory, mostly; the temporary files are gone with the stack.
+      [](const std::exception& failure) { Console().error(error_of(failure)); });
+  return code;
 }
 
 }  // namespace unflex::app

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
+#include <istream>
+#include <memory>
 #include <sstream>
 #include <tuple>
 #include <utility>
@@ -17,10 +18,10 @@ namespace {
 
 // The whole text of an input that can be read twice.
 Result<std::string> read_text(const Input& input) {
-  std::ifstream file(input.path(), std::ios::binary);
+  const std::unique_ptr<std::istream> file = input.text()->read();
   std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) {
+  text << file->rdbuf();
+  if (!*file) {
     return fail(ErrorKind::input, {input.name(), 0}, "cannot read the file");
   }
   return text.str();

@@ -1,7 +1,6 @@
 #include "workspace.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <initializer_list>
 #include <string>
@@ -12,6 +11,7 @@
 #include "results.hpp"
 #include "unflex/platform/descriptors.hpp"
 #include "unflex/platform/files.hpp"
+#include "unflex/platform/folders.hpp"
 
 namespace unflex::app {
 namespace {
@@ -20,22 +20,22 @@ namespace {
 // would a stream that is redirected to such a file.
 Status check_distinct(const RunConfig& config) {
   const bool compensates = writes_print(config.command);
-  const std::string input = name_of_file(config.input, STDIN_FILENO);
-  const std::string output =
-      name_of_file(config.output, compensates ? STDOUT_FILENO : STDIN_FILENO);
+  const std::string input = name_of_file(config.input, platform::kStandardInput);
+  const std::string output = name_of_file(
+      config.output, compensates ? platform::kStandardOutput : platform::kStandardInput);
   const std::string printer_file = config.printer_file.value_or("");
-  if (compensates && !config.in_place && same_file(output, input)) {
+  if (compensates && !config.in_place && platform::same_file(output, input)) {
     return fail(ErrorKind::usage, {config.output, 0},
                 "is the input too; to replace it give --in-place");
   }
-  if (compensates && same_file(config.in_place ? input : output, printer_file)) {
+  if (compensates && platform::same_file(config.in_place ? input : output, printer_file)) {
     return fail(ErrorKind::usage, {config.in_place ? config.input : config.output, 0},
                 "is the printer file too; give the output a name of its own");
   }
   const std::string report =
-      config.report ? name_of_file(*config.report, STDOUT_FILENO) : std::string();
+      config.report ? name_of_file(*config.report, platform::kStandardOutput) : std::string();
   for (const std::string& other : {input, output, printer_file}) {
-    if (same_file(report, other)) {
+    if (platform::same_file(report, other)) {
       return fail(ErrorKind::usage, {*config.report, 0},
                   "is read or written already; give the report a name of its own");
     }
@@ -112,7 +112,8 @@ Result<machine::Settings> load_settings(const RunConfig& config, Input& input) {
 }
 
 Result<Workspace> open_workspace(const RunConfig& config) {
-  Result<Input> input = Input::open(config.input);
+  Result<Input> input = config.input_text ? Input::of_text(config.input, *config.input_text)
+                                          : Input::open(config.input);
   if (!input) {
     return tl::unexpected(input.error());
   }
@@ -158,7 +159,7 @@ void pack_output(const RunConfig& config, Workspace& space) {
 
 Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
   pipeline::Job job;
-  job.input = platform::file_store(space.input.path());
+  job.input = space.input.text();
   job.input_name = space.input.name();
   job.output_name = writes_print(config.command) ? config.print_name : config.output;
   if (space.output) {
@@ -178,7 +179,7 @@ Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
     }
     job.input_head = space.input.head();
   } else if (space.compensated) {
-    job.output = platform::file_store(space.compensated->path());
+    job.output = space.compensated->text();
   }
   job.settings = space.settings;
   job.engine = config.engine;

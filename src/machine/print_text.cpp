@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "unflex/gcode/command.hpp"
-#include "unflex/platform/files.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -44,8 +43,8 @@ std::size_t head_end(std::string_view text) {
   return is_full ? text.rfind('\n') + 1 : std::string_view::npos;
 }
 
-Result<PrintText> read_print_text(const std::string& file, const std::string& name) {
-  const std::unique_ptr<std::istream> stream = platform::read_file(file);
+Result<PrintText> read_print_text(const TextStore& text, const std::string& name) {
+  const std::unique_ptr<std::istream> stream = text.read();
   PrintText print{.name = name, .head = {}, .tail = {}, .tail_line = 1, .is_stream = false};
   std::string block(kBlockBytes, '\0');
   std::size_t lines = 0;

@@ -1,10 +1,5 @@
 #include "wire.hpp"
 
-#include <sys/socket.h>
-#include <sys/types.h>
-
-#include <cerrno>
-#include <cstdint>
 #include <cstring>
 #include <type_traits>
 #include <vector>
@@ -65,23 +60,6 @@ class Reader {
  private:
   std::string_view bytes_;
 };
-
-bool transfer(int socket, char* data, std::size_t size, bool sending) {
-  while (size > 0) {
-    // MSG_NOSIGNAL: a dead peer shall give an error, not SIGPIPE.
-    const ssize_t count =
-        sending ? send(socket, data, size, MSG_NOSIGNAL) : recv(socket, data, size, 0);
-    if (count < 0 && errno == EINTR) {
-      continue;
-    }
-    if (count <= 0) {
-      return false;
-    }
-    data += count;
-    size -= static_cast<std::size_t>(count);
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -159,21 +137,6 @@ Result<compensate::AxisSolution> unpack_solution(std::string_view bytes) {
   solution.objective = reader.value<double>();
   solution.iterations = reader.value<int>();
   return solution;
-}
-
-bool send_message(int socket, std::string_view message) {
-  std::uint64_t size = message.size();
-  return transfer(socket, reinterpret_cast<char*>(&size), sizeof size, true) &&
-         transfer(socket, const_cast<char*>(message.data()), message.size(), true);
-}
-
-bool receive_message(int socket, std::string& message) {
-  std::uint64_t size = 0;
-  if (!transfer(socket, reinterpret_cast<char*>(&size), sizeof size, false)) {
-    return false;
-  }
-  message.resize(size);
-  return transfer(socket, message.data(), message.size(), false);
 }
 
 }  // namespace unflex::pipeline

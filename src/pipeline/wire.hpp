@@ -15,8 +15,4 @@ namespace unflex::pipeline {
 [[nodiscard]] std::string pack(const Result<compensate::AxisSolution>& solution);
 [[nodiscard]] Result<compensate::AxisSolution> unpack_solution(std::string_view bytes);
 
-// A message is its length in eight bytes and its bytes. False when the other side is gone.
-[[nodiscard]] bool send_message(int socket, std::string_view message);
-[[nodiscard]] bool receive_message(int socket, std::string& message);
-
 }  // namespace unflex::pipeline

@@ -1,16 +1,9 @@
 #include "worker_pool.hpp"
 
 #include <fmt/core.h>
-#include <poll.h>
-#include <sys/prctl.h>
-#include <sys/socket.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <csignal>
-#include <cstring>
+#include <chrono>
 #include <exception>
 #include <utility>
 
@@ -19,26 +12,16 @@
 namespace unflex::pipeline {
 namespace {
 
-// The life of a worker: read a window, solve it, answer, until the parent hangs up. Leaves by
-// _exit, so that nothing the parent has open is flushed twice. Lets no exception out, since it
-// would pass through the parent's code and clean up what is the parent's.
-[[noreturn]] void work(int socket, const WorkerPool::EngineFactory& factory) noexcept {
-  // Ctrl-C reaches the whole group; the parent decides when its workers end.
-  std::signal(SIGINT, SIG_IGN);
-  std::signal(SIGTERM, SIG_DFL);
-  try {
-    const auto engine = factory();
-    std::string message;
-    while (receive_message(socket, message)) {
-      if (!send_message(socket, answer(*engine, message))) {
-        break;
-      }
+// The life of a worker: read a window, solve it, answer, until the parent hangs up.
+bool work(int channel, const WorkerPool::EngineFactory& factory) {
+  const auto engine = factory();
+  std::string message;
+  while (platform::receive_message(channel, message)) {
+    if (!platform::send_message(channel, answer(*engine, message))) {
+      break;
     }
-  } catch (const std::exception&) {
-    // Not even the message fits into memory. The parent sees a worker that died.
-    _exit(1);
   }
-  _exit(0);
+  return true;
 }
 
 }  // namespace
@@ -50,12 +33,6 @@ std::string answer(const compensate::Engine& engine, std::string_view window) {
     return pack(Result<compensate::AxisSolution>(fail(ErrorKind::internal, exception.what())));
   }
 }
-
-struct WorkerPool::Worker {
-  pid_t pid = -1;
-  int socket = -1;
-  std::optional<Task> task;  // the window it is solving
-};
 
 WorkerPool::WorkerPool(EngineFactory factory) : factory_(std::move(factory)) {}
 
@@ -71,58 +48,40 @@ Result<WorkerPool> WorkerPool::start(unsigned workers, const EngineFactory& fact
   return pool;
 }
 
-WorkerPool::WorkerPool(WorkerPool&& other) noexcept
-    : factory_(std::move(other.factory_)),
-      workers_(std::exchange(other.workers_, {})),
-      queue_(std::move(other.queue_)),
-      failed_(std::move(other.failed_)),
-      busy_(std::exchange(other.busy_, 0)) {}
-
 WorkerPool::~WorkerPool() {
   for (Worker& worker : workers_) {
-    if (worker.socket >= 0) {
-      close(worker.socket);
-    }
-    if (worker.pid > 0) {
-      if (worker.task) {
-        kill(worker.pid, SIGKILL);
-      }
-      waitpid(worker.pid, nullptr, 0);
-    }
+    end(worker);
   }
 }
 
+// Hangs up, which ends an idle worker; a busy one is killed.
+void WorkerPool::end(Worker& worker) {
+  worker.child.channel = {};
+  if (worker.child.number > 0) {
+    if (worker.task) {
+      platform::kill_child(worker.child);
+    } else {
+      static_cast<void>(platform::wait_for_end(worker.child));
+    }
+  }
+  worker.child = {};
+}
+
 Status WorkerPool::spawn(Worker& worker) {
-  int pair[2];
-  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) {
-    return fail(ErrorKind::internal,
-                fmt::format("cannot open a socket to a solver process: {}", std::strerror(errno)));
-  }
-  const pid_t parent = getpid();
-  const pid_t pid = fork();
-  if (pid < 0) {
-    const int reason = errno;
-    close(pair[0]);
-    close(pair[1]);
-    return fail(ErrorKind::internal,
-                fmt::format("cannot fork a solver process: {}", std::strerror(reason)));
-  }
-  if (pid == 0) {
-    close(pair[0]);
-    for (const Worker& other : workers_) {
-      if (other.socket >= 0) {
-        close(other.socket);
-      }
+  std::vector<int> others;
+  for (const Worker& other : workers_) {
+    if (other.child.channel.valid()) {
+      others.push_back(other.child.channel.get());
     }
-    // Should the parent be killed, the workers go with it.
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != parent) {
-      _exit(0);
-    }
-    work(pair[1], factory_);
   }
-  close(pair[1]);
-  worker = {pid, pair[0], std::nullopt};
+  tl::expected<platform::Child, std::string> child =
+      platform::fork_child([this](int channel) { return work(channel, factory_); },
+                           platform::OnInterrupt::leave_to_parent, others);
+  if (!child) {
+    return fail(ErrorKind::internal, fmt::format("no solver process: {}", child.error()));
+  }
+  worker.child = std::move(*child);
+  worker.task.reset();
   return {};
 }
 
@@ -135,11 +94,11 @@ void WorkerPool::submit(std::size_t ticket, const compensate::AxisWindow& window
 void WorkerPool::feed() {
   for (Worker& worker : workers_) {
     // A worker may die of its window, and its successor of the same window again.
-    while (!queue_.empty() && !worker.task && worker.socket >= 0) {
+    while (!queue_.empty() && !worker.task && worker.child.channel.valid()) {
       worker.task = std::move(queue_.front());
       queue_.pop_front();
       ++busy_;
-      if (!send_message(worker.socket, worker.task->message)) {
+      if (!platform::send_message(worker.child.channel.get(), worker.task->message)) {
         replace(worker);
       }
     }
@@ -148,11 +107,8 @@ void WorkerPool::feed() {
 
 // Replaces a worker that died. Its window is tried once more.
 void WorkerPool::replace(Worker& worker) {
-  close(worker.socket);
-  kill(worker.pid, SIGKILL);
-  waitpid(worker.pid, nullptr, 0);
-  Task task = std::move(*worker.task);
-  worker = {};
+  end(worker);
+  Task task = std::move(*std::exchange(worker.task, std::nullopt));
   --busy_;
   if (task.tried) {
     failed_.push_back(task.ticket);
@@ -171,15 +127,15 @@ std::optional<WorkerPool::Done> WorkerPool::take(int timeout_ms) {
     failed_.pop_front();
     return done;
   }
-  std::vector<pollfd> sockets;
+  std::vector<int> channels;
   std::vector<Worker*> owners;
   for (Worker& worker : workers_) {
     if (worker.task) {
-      sockets.push_back({worker.socket, POLLIN, 0});
+      channels.push_back(worker.child.channel.get());
       owners.push_back(&worker);
     }
   }
-  if (sockets.empty()) {
+  if (channels.empty()) {
     if (queue_.empty()) {
       return std::nullopt;
     }
@@ -187,26 +143,22 @@ std::optional<WorkerPool::Done> WorkerPool::take(int timeout_ms) {
     queue_.pop_front();
     return done;
   }
-  if (poll(sockets.data(), sockets.size(), timeout_ms) <= 0) {
+  const std::vector<std::size_t> ready =
+      platform::ready_channels(channels, std::chrono::milliseconds(timeout_ms));
+  if (ready.empty()) {
     return std::nullopt;
   }
-  for (std::size_t i = 0; i < sockets.size(); ++i) {
-    if (sockets[i].revents == 0) {
-      continue;
-    }
-    Worker& worker = *owners[i];
-    std::string message;
-    if (!receive_message(worker.socket, message)) {
-      replace(worker);
-      return take(timeout_ms);
-    }
-    Done done{worker.task->ticket, unpack_solution(message)};
-    worker.task.reset();
-    --busy_;
-    feed();
-    return done;
+  Worker& worker = *owners[ready.front()];
+  std::string message;
+  if (!platform::receive_message(worker.child.channel.get(), message)) {
+    replace(worker);
+    return take(timeout_ms);
   }
-  return std::nullopt;
+  Done done{worker.task->ticket, unpack_solution(message)};
+  worker.task.reset();
+  --busy_;
+  feed();
+  return done;
 }
 
 }  // namespace unflex::pipeline

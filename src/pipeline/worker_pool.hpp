@@ -12,6 +12,7 @@
 
 #include "unflex/compensate/axis_window.hpp"
 #include "unflex/core/error.hpp"
+#include "unflex/platform/children.hpp"
 
 namespace unflex::pipeline {
 
@@ -31,7 +32,7 @@ class WorkerPool {
   // Forks `workers` processes, each with an engine of its own.
   [[nodiscard]] static Result<WorkerPool> start(unsigned workers, const EngineFactory& factory);
 
-  WorkerPool(WorkerPool&& other) noexcept;
+  WorkerPool(WorkerPool&& other) noexcept = default;
   WorkerPool& operator=(WorkerPool&&) = delete;
   // Ends the workers, at once if they are still busy.
   ~WorkerPool();
@@ -53,10 +54,14 @@ class WorkerPool {
     std::string message;
     bool tried = false;  // a worker died of it
   };
-  struct Worker;  // a process
+  struct Worker {
+    platform::Child child;
+    std::optional<Task> task;  // the window it is solving
+  };
 
   explicit WorkerPool(EngineFactory factory);
   Status spawn(Worker& worker);
+  static void end(Worker& worker);
   void feed();
   void replace(Worker& worker);
 

@@ -10,8 +10,8 @@
 
 #include "batch_files.hpp"
 #include "batch_manifest.hpp"
-#include "batch_processes.hpp"
 #include "batch_summary.hpp"
+#include "batch_workers.hpp"
 
 namespace unflex::app {
 namespace {
@@ -91,17 +91,17 @@ TEST(Answer, SurvivesItsWayBetweenProcesses) {
 }
 
 TEST(Processes, ShareTheWorkersThereAre) {
-  const BatchProcesses eight(8);
+  const BatchWorkers eight(8);
   EXPECT_EQ(eight.workers_for_next(1), 8U);
   EXPECT_EQ(eight.workers_for_next(3), 2U);
   EXPECT_EQ(eight.workers_for_next(100), 1U);
   EXPECT_EQ(eight.workers_for_next(0), 0U);
 }
 
-std::vector<BatchProcesses::Done> take_all(BatchProcesses& processes) {
-  std::vector<BatchProcesses::Done> all;
+std::vector<BatchWorkers::Done> take_all(BatchWorkers& processes) {
+  std::vector<BatchWorkers::Done> all;
   while (processes.any()) {
-    for (BatchProcesses::Done& done : processes.take()) {
+    for (BatchWorkers::Done& done : processes.take()) {
       all.push_back(std::move(done));
     }
   }
@@ -109,7 +109,7 @@ std::vector<BatchProcesses::Done> take_all(BatchProcesses& processes) {
 }
 
 TEST(Processes, GiveBackTheirWorkers) {
-  BatchProcesses processes(3);
+  BatchWorkers processes(3);
   ASSERT_TRUE(processes.start(7, 2, [] {
     BatchAnswer answer;
     answer.state = BatchState::done;
@@ -117,7 +117,7 @@ TEST(Processes, GiveBackTheirWorkers) {
     return answer;
   }));
   EXPECT_EQ(processes.workers_for_next(1), 1U);
-  const std::vector<BatchProcesses::Done> done = take_all(processes);
+  const std::vector<BatchWorkers::Done> done = take_all(processes);
   ASSERT_EQ(done.size(), 1U);
   EXPECT_EQ(done[0].ticket, 7U);
   EXPECT_EQ(done[0].answer.messages.size(), 50'000U);
@@ -125,10 +125,10 @@ TEST(Processes, GiveBackTheirWorkers) {
 }
 
 TEST(Processes, SayOfWhatOneDied) {
-  BatchProcesses processes(2);
+  BatchWorkers processes(2);
   ASSERT_TRUE(processes.start(1, 1, []() -> BatchAnswer { ::abort(); }));
   ASSERT_TRUE(processes.start(2, 1, []() -> BatchAnswer { ::_exit(0); }));
-  std::vector<BatchProcesses::Done> done = take_all(processes);
+  std::vector<BatchWorkers::Done> done = take_all(processes);
   ASSERT_EQ(done.size(), 2U);
   if (done[0].ticket == 2) {
     std::swap(done[0], done[1]);
@@ -140,13 +140,13 @@ TEST(Processes, SayOfWhatOneDied) {
 }
 
 TEST(Processes, OutliveOneThatRunsOutOfMemory) {
-  BatchProcesses processes(2);
+  BatchWorkers processes(2);
   ASSERT_TRUE(processes.start(1, 1, [] {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     return BatchAnswer{};
   }));
   ASSERT_TRUE(processes.start(2, 1, []() -> BatchAnswer { throw std::bad_alloc(); }));
-  const std::vector<BatchProcesses::Done> done = take_all(processes);
+  const std::vector<BatchWorkers::Done> done = take_all(processes);
   ASSERT_EQ(done.size(), 2U);
   EXPECT_EQ(done[0].ticket, 2U);
   EXPECT_THAT(done[0].answer.error, HasSubstr("without an answer"));

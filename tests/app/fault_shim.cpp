@@ -3,7 +3,7 @@
 //
 //   FAULT_LIST=FILE        a line there for each fsync and rename
 //   FAULT_KILL=CALL        die of SIGKILL before the first such call: fsync, rename, fsync-folder
-//   FAULT_FAIL=CALL        the call fails with EIO instead; also fork, pipe2 and socketpair,
+//   FAULT_FAIL=CALL        the call fails with EIO instead; also fork and socketpair,
 //                          and inflate for want of memory
 //   FAULT_SIGNAL=CALL      SIGINT comes before each such call (the calls of FAULT_KILL)
 //   FAULT_CHANGE=FILE      somebody else adds a line to FILE before each rename
@@ -105,10 +105,6 @@ int rename(const char* from, const char* to) noexcept {
 
 pid_t fork() noexcept {
   return asks("FAULT_FAIL", "fork") ? failure() : original<pid_t()>("fork")();
-}
-
-int pipe2(int* ends, int flags) noexcept {
-  return asks("FAULT_FAIL", "pipe2") ? failure() : original<int(int*, int)>("pipe2")(ends, flags);
 }
 
 int socketpair(int domain, int type, int protocol, int* pair) noexcept {

@@ -468,10 +468,11 @@ TEST_F(Faults, OfTheClockChangeNothing) {
 
 TEST_F(Faults, OfStartingProcessesAreTold) {
   const Words solver = kToFile + Words{"--engine", "ipopt"};
-  expect_refusal(run(solver, "", faulty({{"FAULT_FAIL", "socketpair"}})), 4,
-                 "unflex: cannot open a socket to a solver process: Input/output error\n");
+  expect_refusal(
+      run(solver, "", faulty({{"FAULT_FAIL", "socketpair"}})), 4,
+      "unflex: no solver process: cannot open a socket to another process: Input/output error\n");
   expect_refusal(run(solver, "", faulty({{"FAULT_FAIL", "fork"}})), 4,
-                 "unflex: cannot fork a solver process: Input/output error\n");
+                 "unflex: no solver process: cannot fork: Input/output error\n");
 }
 
 TEST_F(Faults, OfAPrintOfABatchThatChangesAreTold) {
@@ -491,7 +492,7 @@ TEST_F(Faults, OfStartingPrintsOfABatchAreTold) {
   write_file(path("in/a.gcode"), small_print());
   const Words batch = {"batch", "in", "-o", "out", "-q", "-j", "1"};
   for (const auto& [call, message] : std::vector<std::pair<std::string, std::string>>{
-           {"pipe2", "unflex: cannot open a pipe: Input/output error\n"},
+           {"socketpair", "unflex: cannot open a socket to another process: Input/output error\n"},
            {"fork", "unflex: cannot fork: Input/output error\n"}}) {
     const Outcome outcome = run(batch, "", faulty({{"FAULT_FAIL", call}}));
     EXPECT_EQ(outcome.exit_code, 4) << outcome.err;

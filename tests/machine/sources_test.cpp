@@ -510,7 +510,7 @@ TEST_F(Sources, OfAPrintAreItsHeadAndItsTailWithTheirLines) {
     text += "G1 X1.234 Y5.678 E9.0\n";
   }
   text += kMarlinBlock;
-  const Result<PrintText> print = read_print_text(write("p.gcode", text), "p.gcode");
+  const Result<PrintText> print = read_print_text(*memory_store(text), "p.gcode");
   ASSERT_TRUE(print);
   EXPECT_EQ(print->head, "; head\nM104 S200\nG1 X1 F600\n");
   EXPECT_TRUE(print->tail.ends_with(kMarlinBlock));
@@ -526,7 +526,7 @@ TEST_F(Sources, OfAPrintWithALongHeadEndWithTheLastLineWithinTheLimit) {
   }
   const std::string head = text.substr(0, text.rfind('\n', kMaxHeadBytes - 1) + 1);
   text += "G1 X1 F600\n";
-  const Result<PrintText> print = read_print_text(write("p.gcode", text), "p.gcode");
+  const Result<PrintText> print = read_print_text(*memory_store(text), "p.gcode");
   ASSERT_TRUE(print);
   EXPECT_EQ(print->head.size(), head.size());
   EXPECT_EQ(head_end(text.substr(0, kMaxHeadBytes - 1)), std::string::npos);
@@ -537,7 +537,7 @@ TEST_F(Sources, OfAPrintWithALongHeadEndWithTheLastLineWithinTheLimit) {
 }
 
 TEST_F(Sources, OfAShortFileAreAllOfIt) {
-  const Result<PrintText> print = read_print_text(write("p.cfg", "[printer]\na: 1\n"), "p.cfg");
+  const Result<PrintText> print = read_print_text(*memory_store("[printer]\na: 1\n"), "p.cfg");
   ASSERT_TRUE(print);
   EXPECT_EQ(print->tail, "[printer]\na: 1\n");
   EXPECT_EQ(print->tail_line, 1);

@@ -1,12 +1,9 @@
 #include "wire.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <limits>
 #include <string>
-#include <thread>
 
 namespace unflex::pipeline {
 namespace {
@@ -78,56 +75,6 @@ TEST(Wire, BringsAnErrorAcrossWithItsMessage) {
   ASSERT_FALSE(there.has_value());
   EXPECT_EQ(there.error().message, "infeasible; no way");
   EXPECT_EQ(there.error().kind, ErrorKind::internal);
-}
-
-class Sockets : public ::testing::Test {
- protected:
-  Sockets() { EXPECT_EQ(socketpair(AF_UNIX, SOCK_STREAM, 0, pair_), 0); }
-  ~Sockets() override {
-    close(pair_[0]);
-    hang_up();
-  }
-  void hang_up() {
-    if (pair_[1] >= 0) {
-      close(pair_[1]);
-      pair_[1] = -1;
-    }
-  }
-
-  int pair_[2] = {-1, -1};
-};
-
-TEST_F(Sockets, CarryMessagesOfAnyLengthInOrder) {
-  const std::string large(3'000'000, 'x');
-  std::thread sender([&] {
-    EXPECT_TRUE(send_message(pair_[0], ""));
-    EXPECT_TRUE(send_message(pair_[0], std::string("a\0b", 3)));
-    EXPECT_TRUE(send_message(pair_[0], large));
-  });
-  std::string message = "left over";
-  EXPECT_TRUE(receive_message(pair_[1], message));
-  EXPECT_EQ(message, "");
-  EXPECT_TRUE(receive_message(pair_[1], message));
-  EXPECT_EQ(message, std::string("a\0b", 3));
-  EXPECT_TRUE(receive_message(pair_[1], message));
-  EXPECT_EQ(message, large);
-  sender.join();
-}
-
-TEST_F(Sockets, ToSomeoneWhoIsGoneFailWithoutASignal) {
-  hang_up();
-  std::string message;
-  EXPECT_FALSE(send_message(pair_[0], "anyone?"));
-  EXPECT_FALSE(receive_message(pair_[0], message));
-}
-
-TEST_F(Sockets, FailWhenAMessageBreaksOff) {
-  const std::uint64_t announced = 100;
-  ASSERT_EQ(write(pair_[1], &announced, sizeof announced), 8);
-  ASSERT_EQ(write(pair_[1], "ten bytes.", 10), 10);
-  hang_up();
-  std::string message;
-  EXPECT_FALSE(receive_message(pair_[0], message));
 }
 
 }  // namespace

@@ -96,6 +96,7 @@ struct RunConfig {
   // empty for the thesis' cases; batch: the folder of the prints; tune: the tower that was printed,
   // empty for the first; hotend: the log, empty where there is none
   std::string input;
+  std::optional<std::string> input_text;  // of an input that is in no file
   // compensate, printer init, printer macros, printer line-test, batch, tune: -o, or the input with
   // --in-place; verify: OUT
   std::string output;

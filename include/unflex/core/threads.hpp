@@ -49,6 +49,12 @@ class Thread {
   std::function<void()> work_;
 };
 
+inline unsigned processors() { return 1; }
+
+// There is nobody to wait for.
+template <class Duration>
+void sleep_for(const Duration& /*time*/) {}
+
 }  // namespace unflex
 
 #else
@@ -83,6 +89,14 @@ class Thread {
  private:
   std::thread thread_;
 };
+
+// How many threads the machine runs at once, or 0 if that is not known.
+inline unsigned processors() { return std::thread::hardware_concurrency(); }
+
+template <class Duration>
+void sleep_for(const Duration& time) {
+  std::this_thread::sleep_for(time);
+}
 
 }  // namespace unflex
 

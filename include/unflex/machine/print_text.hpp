@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/core/text_store.hpp"
 
 namespace unflex::machine {
 
@@ -25,7 +26,7 @@ struct PrintText {
 };
 
 // The head and the tail of a file. Errors are of kind input.
-[[nodiscard]] Result<PrintText> read_print_text(const std::string& file, const std::string& name);
+[[nodiscard]] Result<PrintText> read_print_text(const TextStore& text, const std::string& name);
 
 // Where the head of a print ends that begins like `text`: behind the line of the first move (G0 to
 // G3). If no move comes within kMaxHeadBytes, the head ends behind the last whole line in these

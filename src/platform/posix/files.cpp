@@ -58,8 +58,10 @@ std::vector<std::string> matching_files(const std::string& pattern) {
 }
 
 std::string canonical_name(const std::string& name) {
-  std::error_code ignored;
-  return fs::weakly_canonical(name, ignored).string();
+  std::error_code failed;
+  const fs::path whole = fs::absolute(name, failed);
+  const fs::path canonical = failed ? whole : fs::weakly_canonical(whole, failed);
+  return failed ? name : canonical.string();
 }
 
 std::string name_beside(const std::string& name, std::string_view other) {

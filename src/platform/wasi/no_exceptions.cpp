@@ -1,14 +1,51 @@
-// Debian's C++ library for WebAssembly cannot throw. Whatever would throw, such as memory that ran
-// out, ends the program here.
+// Debian's C++ library for WebAssembly can throw nothing, and nothing can be caught. Its host can:
+// the functions of the module "unflex" below are the host's. What is thrown outside of catching()
+// ends the program.
 #include <cstddef>
+#include <cstdlib>
 #include <typeinfo>
+
+#include "unflex/platform/catching.hpp"
+
+namespace {
+
+const std::exception* thrown_last = nullptr;
+
+// Calls work_of_program(work) and returns 0, or 1 if throw_here() was called meanwhile: the host
+// takes back what is left of the call.
+[[clang::import_module("unflex"), clang::import_name("call_catching")]] int call_catching(
+    const void* work);
+[[noreturn, clang::import_module("unflex"), clang::import_name("throw_here")]] void throw_here();
+
+}  // namespace
 
 extern "C" {
 
-void* __cxa_allocate_exception(std::size_t /*bytes*/) noexcept { __builtin_trap(); }
+[[clang::export_name("work_of_program")]] void work_of_program(const void* work) {
+  (*static_cast<const std::function<void()>*>(work))();
+}
 
-[[noreturn]] void __cxa_throw(void* /*thrown*/, std::type_info* /*type*/,
-                              void (* /*destroy*/)(void*)) {
-  __builtin_trap();
+void* __cxa_allocate_exception(std::size_t bytes) noexcept {
+  // Never given back, since there is little of it. Where memory has run out, this is all there is.
+  alignas(16) static char last_room[1024];
+  void* const room = std::malloc(bytes);
+  return room != nullptr ? room : last_room;
+}
+
+// All that is thrown here has std::exception as its first base.
+[[noreturn]] void __cxa_throw(void* thrown, std::type_info* /*type*/, void (* /*destroy*/)(void*)) {
+  thrown_last = static_cast<const std::exception*>(thrown);
+  throw_here();
 }
 }
+
+namespace unflex::platform {
+
+void catching(const std::function<void()>& work,
+              const std::function<void(const std::exception&)>& caught) {
+  if (call_catching(&work) != 0) {
+    caught(*thrown_last);
+  }
+}
+
+}  // namespace unflex::platform

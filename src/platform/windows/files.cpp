@@ -5,18 +5,12 @@
 #include <fstream>
 #include <system_error>
 
+#include "names.hpp"
+
 namespace unflex::platform {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Names are UTF-8, and the system's are UTF-16.
-fs::path path_of(std::string_view name) { return {std::u8string(name.begin(), name.end())}; }
-
-std::string name_of(const fs::path& path) {
-  const std::u8string name = path.generic_u8string();
-  return {name.begin(), name.end()};
-}
 
 // What stands in square brackets, up to behind the closing one: whether it names the character.
 // Without a closing bracket the opening one stands for itself.
@@ -124,8 +118,10 @@ std::vector<std::string> matching_files(const std::string& pattern) {
 }
 
 std::string canonical_name(const std::string& name) {
-  std::error_code ignored;
-  return name_of(fs::weakly_canonical(path_of(name), ignored));
+  std::error_code failed;
+  const fs::path whole = fs::absolute(path_of(name), failed);
+  const fs::path canonical = failed ? whole : fs::weakly_canonical(whole, failed);
+  return failed ? name : name_of(canonical);
 }
 
 std::string name_beside(const std::string& name, std::string_view other) {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace unflex::app {
+namespace unflex::platform {
 
 // From here on SIGINT, SIGTERM and SIGHUP are remembered instead of killing the process, and
 // writing to a closed pipe or beyond a size limit is an error instead of a signal. A signal that is
@@ -31,4 +31,4 @@ void note_result();
 void remove_if_cut_short(const std::string& file);
 void keep_if_cut_short(const std::string& file);
 
-}  // namespace unflex::app
+}  // namespace unflex::platform

@@ -1,23 +1,21 @@
-// Works on prints side by side, each in a process of its own. Compensating forks workers before its
-// process has any thread, so two prints cannot share a process. And a print whose process crashes,
-// or is killed for want of memory, leaves the others alone.
+// Works on prints side by side: each in a process of its own where the system can fork, and else in
+// a thread. Solving by Ipopt forks workers before its process has any thread, so two prints cannot
+// share a process there. And a print whose process crashes, or is killed for want of memory, leaves
+// the others alone.
 #pragma once
-
-#include <sys/types.h>
 
 #include <chrono>
 #include <cstddef>
 #include <functional>
-#include <string>
+#include <memory>
 #include <vector>
 
 #include "batch_result.hpp"
-#include "files.hpp"
 #include "unflex/core/error.hpp"
 
 namespace unflex::app {
 
-class BatchProcesses {
+class BatchWorkers {
  public:
   using Work = std::function<BatchAnswer()>;
 
@@ -29,17 +27,17 @@ class BatchProcesses {
   };
 
   // workers: how many compute at once, over all prints.
-  explicit BatchProcesses(unsigned workers) : free_workers_(workers) {}
-  BatchProcesses(const BatchProcesses&) = delete;
-  BatchProcesses& operator=(const BatchProcesses&) = delete;
+  explicit BatchWorkers(unsigned workers);
+  BatchWorkers(const BatchWorkers&) = delete;
+  BatchWorkers& operator=(const BatchWorkers&) = delete;
   // Ends the prints under way. Asks them first, so that they remove their temporary files.
-  ~BatchProcesses();
+  ~BatchWorkers();
 
   // How many workers the next of `waiting` prints gets, 0 while none is free. All waiting prints
   // share the free workers.
   [[nodiscard]] unsigned workers_for_next(std::size_t waiting) const;
 
-  // Forks a process, which calls the work. Its answer comes back with the ticket.
+  // Begins the work. Its answer comes back with the ticket.
   [[nodiscard]] Status start(std::size_t ticket, unsigned workers, const Work& work);
 
   [[nodiscard]] bool any() const { return !running_.empty(); }
@@ -48,19 +46,14 @@ class BatchProcesses {
   [[nodiscard]] std::vector<Done> take();
 
  private:
-  struct Process {
-    pid_t pid = -1;
-    std::size_t ticket = 0;
-    unsigned workers = 0;
-    FileDescriptor answer;  // a pipe
-    std::string text;       // packed answer, as far as it has come
-    std::chrono::steady_clock::time_point start;
-  };
+  struct Running;
+  struct Shared;
 
-  [[nodiscard]] Done finish(Process& process);
+  [[nodiscard]] Done finish(Running& print);
 
   unsigned free_workers_;
-  std::vector<Process> running_;
+  std::shared_ptr<Shared> shared_;
+  std::vector<std::unique_ptr<Running>> running_;
 };
 
 }  // namespace unflex::app

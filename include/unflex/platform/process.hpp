@@ -1,0 +1,29 @@
+// The process: its standard streams, its terminal, its environment.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace unflex::platform {
+
+// To be called first. A standard stream that was closed would be given to the next file opened, and
+// messages would land in it; so it is replaced by one whose use is an error. Bytes go through the
+// streams as they are.
+void prepare_standard_streams();
+
+// Arguments behind the program's name, in UTF-8 where the system knows what text is.
+[[nodiscard]] std::vector<std::string> arguments_of(int count, char** arguments);
+
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> environment();
+
+// Tells a process from those it forked.
+[[nodiscard]] long process_number();
+
+[[nodiscard]] bool is_terminal(int descriptor);
+// Whether it is a terminal that moves its cursor and shows colours where escape sequences say so.
+[[nodiscard]] bool takes_escape_sequences(int descriptor);
+// How wide a terminal is; 0 if that is not known.
+[[nodiscard]] unsigned columns_of(int descriptor);
+
+}  // namespace unflex::platform

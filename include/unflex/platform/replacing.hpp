@@ -1,0 +1,57 @@
+// Files that take another's place when they are whole, and files of which nothing is left. Errors
+// are numbers as in errno.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+
+#include "unflex/platform/descriptors.hpp"
+
+namespace unflex::platform {
+
+// Where files may lie that are soon removed, and the environment variable that chooses the place.
+[[nodiscard]] std::string temporary_directory();
+extern const std::string_view kTemporaryDirectoryVariable;
+
+// A file that is kept only while it is open. The descriptor reads and writes.
+[[nodiscard]] tl::expected<FileDescriptor, int> open_unnamed_file(const std::string& folder);
+
+struct LockedFile {
+  std::string name;
+  FileDescriptor file;  // reads and writes
+};
+
+// Makes a file with a name of its own: `beginning`, six letters, `ending`. Others cannot lock it
+// while it is open, if the file system has locks.
+[[nodiscard]] tl::expected<LockedFile, int> make_locked_file(const std::string& folder,
+                                                             std::string_view beginning,
+                                                             std::string_view ending);
+
+enum class Removal { done, in_use, not_ours };
+// Removes a file that this user made and nobody has locked.
+[[nodiscard]] Removal remove_unless_locked(const std::string& name);
+bool remove_file(const std::string& name);
+
+// A claim on a folder, which ends with the descriptor. The error is EWOULDBLOCK if another process
+// has it. What cannot be claimed there, as on network file systems, is given as if it could.
+[[nodiscard]] tl::expected<FileDescriptor, int> claim_folder(const std::string& folder);
+
+// 0 if the file may be written.
+[[nodiscard]] int check_writable(const std::string& name);
+// Gives an open file the owner (if that is allowed) and the permissions of the file that it is to
+// replace, or those of a new file. 0 if that was done.
+[[nodiscard]] int take_over_permissions(int descriptor, const std::string& replaced);
+// Puts what was written on the disk. 0 if that was done.
+[[nodiscard]] int sync_file(int descriptor);
+// One file takes the name of another, in the same folder, at once. 0 if that was done.
+[[nodiscard]] int replace_file(const std::string& from, const std::string& to);
+// Puts names on the disk. What goes wrong has no consequence.
+void sync_folder(const std::string& folder);
+
+// A name of the file that a descriptor was redirected to, "" if it is none.
+[[nodiscard]] std::string name_of_descriptor(int descriptor);
+// Whether a name leads to a file by a descriptor that is open, as /dev/stdout does.
+[[nodiscard]] bool leads_to_descriptor(const std::string& name);
+
+}  // namespace unflex::platform

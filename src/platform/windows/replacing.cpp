@@ -1,0 +1,148 @@
+#include "unflex/platform/replacing.hpp"
+
+#include <io.h>
+#include <windows.h>
+
+#include <cerrno>
+#include <chrono>
+#include <optional>
+#include <random>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "names.hpp"
+#include "open_shared.hpp"
+#include "unflex/platform/folders.hpp"
+#include "unflex/platform/names.hpp"
+
+namespace unflex::platform {
+namespace {
+
+// A slicer, a scanner for viruses or an indexer may hold a file for a moment.
+constexpr int kTries = 50;
+constexpr std::chrono::milliseconds kBetweenTries{100};
+
+HANDLE handle_of(int descriptor) { return reinterpret_cast<HANDLE>(_get_osfhandle(descriptor)); }
+
+std::string six_letters() {
+  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789";
+  std::random_device random;
+  std::string letters(6, ' ');
+  for (char& letter : letters) {
+    letter = kLetters[random() % kLetters.size()];
+  }
+  return letters;
+}
+
+// Makes a file that reads and writes, with a name that nobody has.
+tl::expected<LockedFile, int> make_file(const std::string& folder, std::string_view beginning,
+                                        std::string_view ending, DWORD flags) {
+  for (;;) {
+    std::string name = joined(folder, std::string(beginning).append(six_letters()).append(ending));
+    FileDescriptor file = open_shared(name, GENERIC_READ | GENERIC_WRITE, CREATE_NEW, flags);
+    if (file.valid()) {
+      return LockedFile{std::move(name), std::move(file)};
+    }
+    if (errno != EEXIST) {
+      return tl::unexpected(errno);
+    }
+  }
+}
+
+// Locks a byte far behind what any file holds, since a locked byte cannot be read.
+bool lock(int descriptor) {
+  OVERLAPPED place{};
+  place.OffsetHigh = 0x7fffffff;
+  return LockFileEx(handle_of(descriptor), LOCKFILE_EXCLUSIVE_LOCK | LOCKFILE_FAIL_IMMEDIATELY, 0,
+                    1, 0, &place) != 0;
+}
+
+}  // namespace
+
+const std::string_view kTemporaryDirectoryVariable = "TMP";
+
+std::string temporary_directory() {
+  std::error_code failed;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path(failed);
+  return failed ? "." : name_of(folder);
+}
+
+tl::expected<FileDescriptor, int> open_unnamed_file(const std::string& folder) {
+  return make_file(folder, ".unflex-", ".tmp", FILE_ATTRIBUTE_TEMPORARY | FILE_FLAG_DELETE_ON_CLOSE)
+      .map([](LockedFile made) { return std::move(made.file); });
+}
+
+tl::expected<LockedFile, int> make_locked_file(const std::string& folder,
+                                               std::string_view beginning,
+                                               std::string_view ending) {
+  return make_file(folder, beginning, ending, 0).map([](LockedFile made) {
+    lock(made.file.get());
+    return made;
+  });
+}
+
+Removal remove_unless_locked(const std::string& name) {
+  const FileDescriptor file = open_shared(name, GENERIC_READ, OPEN_EXISTING);
+  const bool is_free = file.valid() && lock(file.get());
+  return is_free && remove_file(name) ? Removal::done : Removal::in_use;
+}
+
+bool remove_file(const std::string& name) { return DeleteFileW(path_of(name).c_str()) != 0; }
+
+// A folder cannot be locked, so a file in it stands for it as long as the claim lasts.
+tl::expected<FileDescriptor, int> claim_folder(const std::string& folder) {
+  FileDescriptor claim = open_shared(joined(folder, ".unflex-batch.lock"), GENERIC_WRITE,
+                                     OPEN_ALWAYS, FILE_FLAG_DELETE_ON_CLOSE);
+  if (!claim.valid()) {
+    return tl::unexpected(
+        errno == EACCES && is_taken(joined(folder, ".unflex-batch.lock")) ? EWOULDBLOCK : errno);
+  }
+  if (!lock(claim.get())) {
+    return tl::unexpected(EWOULDBLOCK);
+  }
+  return claim;
+}
+
+int check_writable(const std::string& name) {
+  return open_shared(name, GENERIC_WRITE, OPEN_EXISTING).valid() ? 0 : errno;
+}
+
+// A new file takes its folder's permissions.
+int take_over_permissions(int /*descriptor*/, const std::string& /*replaced*/) { return 0; }
+
+int sync_file(int descriptor) { return _commit(descriptor) == 0 ? 0 : errno; }
+
+int replace_file(const std::string& from, const std::string& to) {
+  for (int i = 1;; ++i) {
+    if (MoveFileExW(path_of(from).c_str(), path_of(to).c_str(),
+                    MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH) != 0) {
+      return 0;
+    }
+    const int error = last_error();
+    if (i == kTries || (error != EBUSY && error != EACCES)) {
+      return error;
+    }
+    std::this_thread::sleep_for(kBetweenTries);
+  }
+}
+
+// Names are written through as they are given.
+void sync_folder(const std::string& /*folder*/) {}
+
+std::string name_of_descriptor(int descriptor) {
+  const tl::expected<FileState, int> state = state_of(descriptor);
+  if (!state || state->kind != FileKind::file) {
+    return "";
+  }
+  std::wstring name(1U << 15U, L'\0');
+  const DWORD length = GetFinalPathNameByHandleW(handle_of(descriptor), name.data(),
+                                                 static_cast<DWORD>(name.size()), 0);
+  name.resize(length < name.size() ? length : 0);
+  return name_of(name);
+}
+
+// No name does here.
+bool leads_to_descriptor(const std::string& /*name*/) { return false; }
+
+}  // namespace unflex::platform
