@@ -11,7 +11,8 @@ set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 # build: where memory runs out, it traps.
 set(CMAKE_C_FLAGS_INIT "-Wno-deprecated")
 set(CMAKE_CXX_FLAGS_INIT "-Wno-deprecated -fignore-exceptions -isystem ${CMAKE_CURRENT_LIST_DIR}/wasm")
-set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-z,stack-size=1048576")
+# Who catches an exception puts the stack back where it was.
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-z,stack-size=1048576 -Wl,--export=__stack_pointer -s")
 set(CMAKE_EXECUTABLE_SUFFIX .wasm)
 
 set(UNFLEX_THREADS OFF CACHE BOOL "")

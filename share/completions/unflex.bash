@@ -7,7 +7,7 @@ _unflex_options() {
     '') echo '-h --help --version' ;;
     compensate)
       echo "-h --help -o --output --in-place --log --strict $print --faster --timing --max-deviation --engine --check-solver -j --jobs" ;;
-    batch) echo "-h --help -o --output $print --summary --faster --timing --max-deviation --engine --check-solver -j --jobs" ;;
+    batch) echo "-h --help -o --output $print --summary --shard --watch --faster --timing --max-deviation --engine --check-solver -j --jobs" ;;
     verify) echo "-h --help --against --strict $print --faster --max-deviation" ;;
     inspect) echo "-h --help --all --strict $print" ;;
     filament) echo '-h --help -o --output --in-place --strict --printer --set --filament-start-mm -q --quiet' ;;
@@ -46,6 +46,7 @@ _unflex_value() {
     'printer init:-o' | 'printer init:--output') echo 'files *.toml' ;;
     batch: | batch:-o | batch:--output | batch:--report) echo 'folders' ;;
     batch:--summary) echo 'files *.@(json|xml)' ;;
+    batch:--shard) echo 'words auto' ;;
     *:--log) echo 'files *.@(log|txt)' ;;
     *:-o | *:--output | *:--against | *:--like) echo "files $print" ;;
     *:--from | *:--printer) echo "files $printer" ;;

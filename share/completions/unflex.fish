@@ -75,6 +75,8 @@ complete -c unflex -n '__unflex_in batch' -a '(__fish_complete_directories (comm
 complete -c unflex -n '__unflex_in batch' -s o -l output -x -a '(__fish_complete_directories (commandline -ct))' -d 'The folder to write to'
 complete -c unflex -n '__unflex_in batch' -l report -x -a '(__fish_complete_directories (commandline -ct))' -d 'A page for each print, in this folder'
 complete -c unflex -n '__unflex_in batch' -l summary -x -a '(__unflex_files .json .xml)' -d 'Write what became of each print'
+complete -c unflex -n '__unflex_in batch' -l shard -x -a auto -d 'Work on one of several parts, I/N'
+complete -c unflex -n '__unflex_in batch' -l watch -d 'Go on waiting for further prints'
 complete -c unflex -n '__unflex_in verify' -l against -x -a $gcode -d 'The sliced G-code it was made from'
 complete -c unflex -n '__unflex_in filament' -l filament-start-mm -x -d "Where on the filament's profile the print begins, mm"
 complete -c unflex -n '__unflex_in compensate verify inspect filament' -l strict -d 'Take warnings for errors'

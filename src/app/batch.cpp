@@ -12,8 +12,10 @@
 #include "batch_files.hpp"
 #include "batch_manifest.hpp"
 #include "batch_print.hpp"
+#include "batch_shard.hpp"
 #include "batch_summary.hpp"
 #include "batch_workers.hpp"
+#include "new_prints.hpp"
 #include "outputs.hpp"
 #include "results.hpp"
 #include "unflex/core/threads.hpp"
@@ -28,6 +30,7 @@ namespace {
 constexpr int kStateColumns = 9;
 constexpr std::chrono::milliseconds kPatience{100};
 constexpr std::chrono::milliseconds kBetweenSweeps{2};
+constexpr std::chrono::milliseconds kBetweenLooks{2000};
 
 // Settings are checked first, so that what is wrong with them is said once and not for every print.
 Status check_printer_file(const RunConfig& config) {
@@ -82,7 +85,7 @@ Status check_summary(const RunConfig& config, const BatchFiles& files) {
   if (!config.summary) {
     return {};
   }
-  std::vector<std::string> others = {platform::joined(config.output, kManifestName),
+  std::vector<std::string> others = {platform::joined(config.output, manifest_name(config.shard)),
                                      config.printer_file.value_or("")};
   for (const BatchPrint& print : files.prints) {
     others.insert(others.end(), {print.input, print.output, print.report.value_or("")});
@@ -144,13 +147,11 @@ void fail_by(const Error& error, BatchAnswer& answer) {
 
 class Batch {
  public:
-  Batch(const RunConfig& config, BatchFiles files, BatchManifest manifest, Console& console)
-      : config_(&config),
-        files_(std::move(files)),
-        manifest_(std::move(manifest)),
-        console_(&console) {
+  Batch(const RunConfig& config, BatchFiles files, BatchManifest& manifest, Console& console)
+      : config_(&config), files_(std::move(files)), manifest_(&manifest), console_(&console) {
     summary_.input = config.input;
     summary_.output = config.output;
+    summary_.shard = config.shard;
     for (const Diagnostic& remark : files_.passed_by) {
       summary_.passed_by.push_back(to_string(remark));
       console.line(summary_.passed_by.back());
@@ -208,7 +209,7 @@ class Batch {
   Status start(BatchWorkers& processes, std::size_t number, unsigned workers) {
     const BatchPrint& print = files_.prints[number];
     return processes.start(number, workers, [&] {
-      return work_on_batch_print(config_of(*config_, print, workers), manifest_.find(print.name));
+      return work_on_batch_print(config_of(*config_, print, workers), manifest_->find(print.name));
     });
   }
 
@@ -218,7 +219,7 @@ class Batch {
     if (!done.answered) {
       fail_by({ErrorKind::internal, {print.input, 0}, answer.error}, answer);
     } else if (answer.state == BatchState::done) {
-      if (const Status remembered = manifest_.put(print.name, answer.record); !remembered) {
+      if (const Status remembered = manifest_->put(print.name, answer.record); !remembered) {
         // The output is whole, but the next batch will make it once more.
         fail_by(remembered.error(), answer);
       }
@@ -256,10 +257,65 @@ class Batch {
 
   const RunConfig* config_;
   BatchFiles files_;
-  BatchManifest manifest_;
+  BatchManifest* manifest_;
   Console* console_;
   BatchSummary summary_;
 };
+
+// Leaves the prints of the shard. What is wrong with the folder is told by the first shard alone.
+void keep_shard(const RunConfig& config, BatchFiles& files) {
+  if (!config.shard) {
+    return;
+  }
+  std::erase_if(files.prints,
+                [&](const BatchPrint& print) { return !has(*config.shard, print.name); });
+  if (config.shard->number != 1) {
+    files.unreadable.clear();
+    files.passed_by.clear();
+  }
+}
+
+// Waits, but not beyond a signal. False if one has come.
+bool wait_for(std::chrono::milliseconds time) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  while (platform::ending_signal() == 0 && std::chrono::steady_clock::now() < end) {
+    sleep_for(kPatience);
+  }
+  return platform::ending_signal() == 0;
+}
+
+// Works on what comes into the folder until a signal ends it.
+Result<ExitCode> watch(const RunConfig& config, BatchManifest& manifest, Console& console) {
+  NewPrints new_prints;
+  if (!config.quiet) {
+    console.line(fmt::format("unflex: waiting for prints in {}", config.input));
+  }
+  std::string last_error;
+  do {
+    Result<BatchFiles> files = find_prints(config).and_then([&](BatchFiles found) {
+      new_prints.keep_new(found);
+      keep_shard(config, found);
+      return check_printers(config, found).map([&] { return std::move(found); });
+    });
+    if (!files) {
+      // The folder may be away for a while, or two prints may share a name until one is gone.
+      if (const std::string error = to_string(files.error()); error != last_error) {
+        console.error(files.error());
+        last_error = error;
+      }
+      continue;
+    }
+    last_error.clear();
+    if (files->prints.empty() && files->unreadable.empty() && files->passed_by.empty()) {
+      continue;
+    }
+    Batch batch(config, std::move(*files), manifest, console);
+    if (Status worked = batch.work(); !worked && platform::ending_signal() == 0) {
+      console.error(worked.error());
+    }
+  } while (wait_for(kBetweenLooks));
+  return interrupted(Command::batch);
+}
 
 Status write_summary(const RunConfig& config, std::optional<Output>& file,
                      const BatchSummary& summary) {
@@ -286,14 +342,16 @@ Result<ExitCode> run_batch(const RunConfig& config, Console& console) {
   if (!files) {
     return tl::unexpected(files.error());
   }
-  const Status checked = check_printer_file(config)
-                             .and_then([&] { return check_printers(config, *files); })
-                             .and_then([&] { return check_summary(config, *files); });
+  const Status checked =
+      check_printer_file(config)
+          .and_then([&] { return config.watch ? Status{} : check_has_print(config, *files); })
+          .and_then([&] { return check_printers(config, *files); })
+          .and_then([&] { return check_summary(config, *files); });
   if (!checked) {
     return tl::unexpected(checked.error());
   }
   NewFolders folders(config.output);
-  Result<BatchManifest> manifest = BatchManifest::open(config.output);
+  Result<BatchManifest> manifest = BatchManifest::open(config.output, config.shard);
   if (!manifest) {
     return tl::unexpected(manifest.error());
   }
@@ -303,7 +361,11 @@ Result<ExitCode> run_batch(const RunConfig& config, Console& console) {
     return tl::unexpected(summary_file.error());
   }
   folders.keep();
-  Batch batch(config, std::move(*files), std::move(*manifest), console);
+  if (config.watch) {
+    return watch(config, *manifest, console);
+  }
+  keep_shard(config, *files);
+  Batch batch(config, std::move(*files), *manifest, console);
   if (Status worked = batch.work(); !worked) {
     return tl::unexpected(worked.error());
   }

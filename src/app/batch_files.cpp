@@ -222,19 +222,21 @@ std::string name_below(std::string_view folder, std::string_view file) {
   return std::string(file);
 }
 
+Status check_has_print(const RunConfig& config, const BatchFiles& files) {
+  if (!files.prints.empty()) {
+    return {};
+  }
+  return files.unreadable.empty() ? fail(ErrorKind::input, {config.input, 0},
+                                         fmt::format("holds no print ({})", print_suffixes()))
+                                  : tl::unexpected(files.unreadable.front());
+}
+
 Result<BatchFiles> find_prints(const RunConfig& config) {
   if (Status checked = check_folders(config); !checked) {
     return tl::unexpected(checked.error());
   }
   BatchFiles files;
   Finder(config).look(config.input, {}, {}, files);
-  if (files.prints.empty() && !files.unreadable.empty()) {
-    return tl::unexpected(files.unreadable.front());
-  }
-  if (files.prints.empty()) {
-    return fail(ErrorKind::input, {config.input, 0},
-                fmt::format("holds no print ({})", print_suffixes()));
-  }
   std::ranges::sort(files.prints, {}, &BatchPrint::name);
   if (Status distinct = check_distinct(files.prints); !distinct) {
     return tl::unexpected(distinct.error());

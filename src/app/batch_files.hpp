@@ -44,7 +44,9 @@ inline constexpr std::string_view kPrinterFileName = "printer.toml";
 // Looks through the folder config.input, and all below, for prints. The output mirrors it in
 // config.output, pages go to config.report. Names that begin with a dot, links to folders, and the
 // output's and the reports' own folders are passed by. Errors: of kind input if the folder cannot
-// be read or holds no print, of kind usage if an output would replace an input or another output.
+// be read, of kind usage if an output would replace an input or another output.
 [[nodiscard]] Result<BatchFiles> find_prints(const RunConfig& config);
+// An error of kind input if there is none.
+[[nodiscard]] Status check_has_print(const RunConfig& config, const BatchFiles& files);
 
 }  // namespace unflex::app

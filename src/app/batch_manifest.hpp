@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "batch_result.hpp"
 #include "files.hpp"
@@ -13,16 +14,20 @@
 namespace unflex::app {
 
 inline constexpr std::string_view kManifestName = ".unflex-batch.json";
+// Each shard has one of its own: ".unflex-batch.2-of-8.json".
+[[nodiscard]] std::string manifest_name(const std::optional<Shard>& shard);
 
 class BatchManifest {
  public:
-  // Makes the folder if there is none, claims it for this process and those it forks, and reads the
-  // manifest. A manifest that is damaged or of another version counts for nothing. Errors are of
-  // kind usage: the folder cannot be written, or another batch works in it.
-  [[nodiscard]] static Result<BatchManifest> open(const std::string& folder);
+  // Makes the folder if there is none, claims it for this process and those it forks, or, for a
+  // shard, together with other shards. Reads all manifests that are there. One that is damaged or
+  // of another version counts for nothing. Errors are of kind usage: the folder cannot be written,
+  // or another batch works in it.
+  [[nodiscard]] static Result<BatchManifest> open(const std::string& folder,
+                                                  const std::optional<Shard>& shard);
 
-  // What is known of the print's output.
-  [[nodiscard]] std::optional<BatchRecord> find(const std::string& name) const;
+  // What is known of the print's output, by any of the manifests.
+  [[nodiscard]] std::vector<BatchRecord> find(const std::string& name) const;
 
   // Remembers the record, on the disk too before it returns. Errors are of kind internal.
   [[nodiscard]] Status put(const std::string& name, const BatchRecord& record);
@@ -31,11 +36,12 @@ class BatchManifest {
   BatchManifest(std::string file, FileDescriptor claim)
       : file_(std::move(file)), claim_(std::move(claim)) {}
 
-  void read();
+  void read(const std::string& file, bool is_own);
 
   std::string file_;
   FileDescriptor claim_;
   std::map<std::string, BatchRecord> records_;  // by key_of(name)
+  std::multimap<std::string, BatchRecord> records_of_others_;
 };
 
 // A name as text: bytes that are not printable ASCII, and '%', as %XX.

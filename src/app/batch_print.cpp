@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <exception>
 #include <utility>
@@ -114,20 +115,18 @@ Result<BatchOrigin> with_outputs(const RunConfig& config, BatchOrigin origin) {
   return origin;
 }
 
-bool is_up_to_date(const RunConfig& config, const BatchOrigin& now,
-                   const std::optional<BatchRecord>& known) {
-  if (!known || known->origin.version != now.version ||
-      known->origin.input_sha256 != now.input_sha256 ||
-      known->origin.settings_sha256 != now.settings_sha256) {
+bool is_up_to_date(const RunConfig& config, const BatchOrigin& now, const BatchRecord& known) {
+  if (known.origin.version != now.version || known.origin.input_sha256 != now.input_sha256 ||
+      known.origin.settings_sha256 != now.settings_sha256) {
     return false;
   }
-  if (config.max_deviation_mm && !(known->figures.max_after_mm <= *config.max_deviation_mm)) {
+  if (config.max_deviation_mm && !(known.figures.max_after_mm <= *config.max_deviation_mm)) {
     return false;
   }
   // If no report is asked for, an old one does no harm.
   Result<BatchOrigin> there = with_outputs(config, now);
-  return there && there->output_sha256 == known->origin.output_sha256 &&
-         (!config.report || there->report_sha256 == known->origin.report_sha256);
+  return there && there->output_sha256 == known.origin.output_sha256 &&
+         (!config.report || there->report_sha256 == known.origin.report_sha256);
 }
 
 Status make_folder_of(const std::string& file) {
@@ -182,17 +181,19 @@ Status compensate(const RunConfig& config, const BatchOrigin& now, Console& cons
   });
 }
 
-Status work(const RunConfig& config, const std::optional<BatchRecord>& known, Console& console,
+Status work(const RunConfig& config, const std::vector<BatchRecord>& known, Console& console,
             BatchAnswer& answer) {
   const Result<BatchOrigin> now = origin_now(config);
   if (!now) {
     return tl::unexpected(now.error());
   }
-  if (is_up_to_date(config, *now, known)) {
+  const auto current = std::ranges::find_if(
+      known, [&](const BatchRecord& record) { return is_up_to_date(config, *now, record); });
+  if (current != known.end()) {
     answer.state = BatchState::unchanged;
     answer.exit_code = static_cast<int>(ExitCode::done);
     answer.measured = true;
-    answer.record = *known;
+    answer.record = *current;
     return {};
   }
   return compensate(config, *now, console, answer);
@@ -200,7 +201,7 @@ Status work(const RunConfig& config, const std::optional<BatchRecord>& known, Co
 
 }  // namespace
 
-BatchAnswer work_on_batch_print(const RunConfig& config, const std::optional<BatchRecord>& known) {
+BatchAnswer work_on_batch_print(const RunConfig& config, const std::vector<BatchRecord>& known) {
   BatchAnswer answer;
   Console console(-1);
   platform::catching(

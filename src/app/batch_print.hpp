@@ -11,6 +11,6 @@ namespace unflex::app {
 // Compensates the print of `config` (as for `unflex compensate`), unless `known` and the files that
 // are there show that this has been done. Nothing goes to the terminal.
 [[nodiscard]] BatchAnswer work_on_batch_print(const RunConfig& config,
-                                              const std::optional<BatchRecord>& known);
+                                              const std::vector<BatchRecord>& known);
 
 }  // namespace unflex::app

@@ -151,6 +151,9 @@ std::string summary_json(const BatchSummary& summary) {
   json["version"] = version();
   json["input"] = summary.input;
   json["output"] = summary.output;
+  json["shard"] = summary.shard
+                      ? Json(fmt::format("{}/{}", summary.shard->number, summary.shard->count))
+                      : Json();
   json["exit_code"] = summary.exit_code();
   json["wall_s"] = summary.wall_s;
   json["totals"] = totals_json(summary);

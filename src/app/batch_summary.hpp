@@ -1,6 +1,7 @@
 // What a batch tells in the end: a table for people, JSON and JUnit XML for programs.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct BatchRow {
 struct BatchSummary {
   std::string input;
   std::string output;
+  std::optional<Shard> shard;
   std::vector<BatchRow> rows;          // sorted by name
   std::vector<std::string> passed_by;  // what was left out, and why
   double wall_s = 0.0;

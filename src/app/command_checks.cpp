@@ -8,6 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include "batch_shard.hpp"
+
 namespace unflex::app {
 namespace {
 
@@ -205,7 +207,17 @@ Status check_hotend(const RunConfig& config) {
   return {};
 }
 
-Status check_batch(const RunConfig& config) {
+Status check_batch(RunConfig& config) {
+  if (!config.shard_text.empty()) {
+    const Result<Shard> shard = shard_of(config.shard_text, environment_variable);
+    if (!shard) {
+      return tl::unexpected(shard.error());
+    }
+    config.shard = *shard;
+  }
+  if (config.watch && config.summary) {
+    return usage("--watch does not come to an end, so there is no --summary");
+  }
   for (const std::string& folder : {config.input, config.output, config.report.value_or(".")}) {
     if (folder == kStandardStream) {
       return usage("batch works on folders, not on streams; a folder of that name is ./-");

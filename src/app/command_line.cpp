@@ -165,6 +165,11 @@ void add_batch(CLI::App& program, RunConfig& config) {
       ->add_option("--summary", config.summary,
                    "Write what became of each print, FILE.json, or FILE.xml for JUnit")
       ->type_name("FILE");
+  command
+      ->add_option("--shard", config.shard_text,
+                   "Work on the I-th of N parts, I/N; auto: as Slurm or Kubernetes says")
+      ->type_name("I/N");
+  command->add_flag("--watch", config.watch, "Go on waiting for further prints");
   command->add_flag("-q,--quiet", config.quiet, "No table and no progress");
   add_faster(*command, config);
   add_timing(*command, config);

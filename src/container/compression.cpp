@@ -9,11 +9,15 @@ namespace {
 constexpr unsigned kSmallWindowBits = 11;
 constexpr unsigned kLargeWindowBits = 12;
 
+// zlib counts by other types than the C++ library, on Windows by smaller ones; blocks are below 64
+// KiB.
+uLong count(std::size_t bytes) { return static_cast<uLong>(bytes); }
+
 std::optional<std::string> inflate_all(std::string_view packed, std::size_t size) {
   // One byte more than there should be, so that too much data is noticed.
   std::string bytes(size + 1, '\0');
-  uLongf got = bytes.size();
-  uLong taken = packed.size();
+  uLongf got = count(bytes.size());
+  uLong taken = count(packed.size());
   const int outcome = uncompress2(reinterpret_cast<Bytef*>(bytes.data()), &got,
                                   reinterpret_cast<const Bytef*>(packed.data()), &taken);
   if (outcome != Z_OK || got != size || taken != packed.size()) {
@@ -24,10 +28,10 @@ std::optional<std::string> inflate_all(std::string_view packed, std::size_t size
 }
 
 std::string deflate_all(std::string_view bytes) {
-  std::string packed(compressBound(bytes.size()), '\0');
-  uLongf size = packed.size();
+  std::string packed(compressBound(count(bytes.size())), '\0');
+  uLongf size = count(packed.size());
   ::compress(reinterpret_cast<Bytef*>(packed.data()), &size,
-             reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+             reinterpret_cast<const Bytef*>(bytes.data()), count(bytes.size()));
   packed.resize(size);
   return packed;
 }

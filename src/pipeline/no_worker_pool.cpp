@@ -5,11 +5,7 @@
 
 namespace unflex::pipeline {
 
-struct WorkerPool::Worker {};
-
 WorkerPool::WorkerPool(EngineFactory factory) : factory_(std::move(factory)) {}
-
-WorkerPool::WorkerPool(WorkerPool&& other) noexcept : factory_(std::move(other.factory_)) {}
 
 WorkerPool::~WorkerPool() = default;
 

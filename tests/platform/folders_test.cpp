@@ -93,13 +93,18 @@ TEST_F(Folders, SeeThatAFileWasWritten) {
   EXPECT_NE(before, state_of(at("a")));
 }
 
-TEST_F(Folders, AreClaimedOnce) {
+TEST_F(Folders, AreClaimedOnceAloneOrByMany) {
   {
-    const auto claim = claim_folder(folder_);
+    const auto claim = claim_folder(folder_, Claim::alone);
     ASSERT_TRUE(claim);
-    EXPECT_EQ(claim_folder(folder_).error(), EWOULDBLOCK);
+    EXPECT_EQ(claim_folder(folder_, Claim::alone).error(), EWOULDBLOCK);
+    EXPECT_EQ(claim_folder(folder_, Claim::with_others).error(), EWOULDBLOCK);
   }
-  EXPECT_TRUE(claim_folder(folder_));
+  const auto first = claim_folder(folder_, Claim::with_others);
+  const auto second = claim_folder(folder_, Claim::with_others);
+  EXPECT_TRUE(first);
+  EXPECT_TRUE(second);
+  EXPECT_EQ(claim_folder(folder_, Claim::alone).error(), EWOULDBLOCK);
 }
 
 TEST_F(Folders, KeepLockedFilesAlone) {

@@ -90,6 +90,12 @@ struct HotendConfig {
 // timing.method, if the command line has it.
 enum class TimingMethod { as_set, scaled, optimal };
 
+// One of several equal parts of a folder of prints.
+struct Shard {
+  unsigned number = 1;  // from 1 to count
+  unsigned count = 1;
+};
+
 struct RunConfig {
   Command command = Command::compensate;
   // compensate, inspect: IN; verify: the file given to --against; printer init: --from; study: IN,
@@ -108,6 +114,9 @@ struct RunConfig {
   std::vector<std::string> overrides;  // "key=value"
   std::optional<std::string> report;   // a file ending in .json or .html, or "-"; batch: a folder
   std::optional<std::string> summary;  // batch: a file ending in .json or .xml
+  std::string shard_text;              // value of --shard; empty: not given
+  std::optional<Shard> shard;          // batch: the part of the folder that is worked on
+  bool watch = false;                  // batch: wait for further prints
   std::optional<std::string> log;      // compensate: file to which all that was said is added
   // compensate: what messages call the print, and what the slicer that started the program says of
   // the printer (hook.hpp)

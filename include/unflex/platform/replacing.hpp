@@ -33,9 +33,12 @@ enum class Removal { done, in_use, not_ours };
 [[nodiscard]] Removal remove_unless_locked(const std::string& name);
 bool remove_file(const std::string& name);
 
+enum class Claim { alone, with_others };
 // A claim on a folder, which ends with the descriptor. The error is EWOULDBLOCK if another process
-// has it. What cannot be claimed there, as on network file systems, is given as if it could.
-[[nodiscard]] tl::expected<FileDescriptor, int> claim_folder(const std::string& folder);
+// has one that does not go with this. What cannot be claimed there, as on some network file
+// systems, is given as if it could.
+[[nodiscard]] tl::expected<FileDescriptor, int> claim_folder(const std::string& folder,
+                                                             Claim claim);
 
 // 0 if the file may be written.
 [[nodiscard]] int check_writable(const std::string& name);

@@ -87,19 +87,20 @@ Removal remove_unless_locked(const std::string& name) {
 
 bool remove_file(const std::string& name) { return ::unlink(name.c_str()) == 0; }
 
-tl::expected<FileDescriptor, int> claim_folder(const std::string& folder) {
-  FileDescriptor claim(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!claim.valid()) {
+tl::expected<FileDescriptor, int> claim_folder(const std::string& folder, Claim claim) {
+  FileDescriptor claimed(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!claimed.valid()) {
     return tl::unexpected(errno);
   }
+  const int kind = claim == Claim::alone ? LOCK_EX : LOCK_SH;
   int locked = 0;
   do {
-    locked = ::flock(claim.get(), LOCK_EX | LOCK_NB);
+    locked = ::flock(claimed.get(), kind | LOCK_NB);
   } while (locked != 0 && errno == EINTR);
   if (locked != 0 && errno == EWOULDBLOCK) {
     return tl::unexpected(EWOULDBLOCK);
   }
-  return claim;
+  return claimed;
 }
 
 int check_writable(const std::string& name) { return outcome(::access(name.c_str(), W_OK)); }

@@ -65,12 +65,12 @@ Removal remove_unless_locked(const std::string& /*name*/) { return Removal::not_
 
 bool remove_file(const std::string& name) { return ::unlink(name.c_str()) == 0; }
 
-tl::expected<FileDescriptor, int> claim_folder(const std::string& folder) {
-  FileDescriptor claim(::open(folder.c_str(), O_RDONLY | O_DIRECTORY));
-  if (!claim.valid()) {
+tl::expected<FileDescriptor, int> claim_folder(const std::string& folder, Claim /*claim*/) {
+  FileDescriptor claimed(::open(folder.c_str(), O_RDONLY | O_DIRECTORY));
+  if (!claimed.valid()) {
     return tl::unexpected(errno);
   }
-  return claim;
+  return claimed;
 }
 
 // The host tells when it is written.

@@ -51,11 +51,11 @@ tl::expected<LockedFile, int> make_file(const std::string& folder, std::string_v
 }
 
 // Locks a byte far behind what any file holds, since a locked byte cannot be read.
-bool lock(int descriptor) {
+bool lock(int descriptor, Claim claim = Claim::alone) {
   OVERLAPPED place{};
   place.OffsetHigh = 0x7fffffff;
-  return LockFileEx(handle_of(descriptor), LOCKFILE_EXCLUSIVE_LOCK | LOCKFILE_FAIL_IMMEDIATELY, 0,
-                    1, 0, &place) != 0;
+  const DWORD kind = claim == Claim::alone ? LOCKFILE_EXCLUSIVE_LOCK : 0;
+  return LockFileEx(handle_of(descriptor), kind | LOCKFILE_FAIL_IMMEDIATELY, 0, 1, 0, &place) != 0;
 }
 
 }  // namespace
@@ -90,18 +90,17 @@ Removal remove_unless_locked(const std::string& name) {
 
 bool remove_file(const std::string& name) { return DeleteFileW(path_of(name).c_str()) != 0; }
 
-// A folder cannot be locked, so a file in it stands for it as long as the claim lasts.
-tl::expected<FileDescriptor, int> claim_folder(const std::string& folder) {
-  FileDescriptor claim = open_shared(joined(folder, ".unflex-batch.lock"), GENERIC_WRITE,
-                                     OPEN_ALWAYS, FILE_FLAG_DELETE_ON_CLOSE);
-  if (!claim.valid()) {
-    return tl::unexpected(
-        errno == EACCES && is_taken(joined(folder, ".unflex-batch.lock")) ? EWOULDBLOCK : errno);
+// A folder cannot be locked, so a file in it stands for it as long as a claim lasts.
+tl::expected<FileDescriptor, int> claim_folder(const std::string& folder, Claim claim) {
+  FileDescriptor claimed = open_shared(joined(folder, ".unflex-batch.lock"), GENERIC_READ,
+                                       OPEN_ALWAYS, FILE_FLAG_DELETE_ON_CLOSE);
+  if (!claimed.valid()) {
+    return tl::unexpected(errno);
   }
-  if (!lock(claim.get())) {
+  if (!lock(claimed.get(), claim)) {
     return tl::unexpected(EWOULDBLOCK);
   }
-  return claim;
+  return claimed;
 }
 
 int check_writable(const std::string& name) {
