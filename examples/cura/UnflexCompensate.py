@@ -3,12 +3,9 @@
 Put this file into the folder "scripts" of Cura's configuration folder (Help > Show Configuration
 Folder), start Cura anew, and add "Compensate with unflex" under Extensions > Post Processing >
 Modify G-Code, behind all other scripts: they expect a print as it was sliced.
-
-On Windows unflex runs in WSL, which the script starts. Paths may be those of Windows or of WSL.
 """
 
 import os
-import re
 import shlex
 import subprocess
 import tempfile
@@ -28,7 +25,7 @@ class UnflexCompensate(Script):
                 "program":
                 {
                     "label": "unflex",
-                    "description": "The program: a path, or a name to be found in PATH. On Windows a path in WSL, such as /home/me/unflex.",
+                    "description": "The program: a path, or a name to be found in PATH. On Windows such as C:\\\\Users\\\\me\\\\unflex.exe.",
                     "type": "str",
                     "default_value": "unflex"
                 },
@@ -70,15 +67,15 @@ class UnflexCompensate(Script):
             sliced = os.path.join(folder, "print.gcode")
             compensated = os.path.join(folder, "compensated.gcode")
             _write(sliced, text)
-            _unflex(self._program(),
-                    ["compensate", "--quiet"] + self._options() + ["-o", compensated, sliced])
+            _run([self._program(), "compensate", "--quiet"] + self._options() +
+                 ["-o", compensated, sliced])
             return _read(compensated)
 
     def _program(self):
-        return self.getSettingValueByKey("program").strip()
+        # A path that was copied from Windows' Explorer stands in quotes.
+        return os.path.expanduser(self.getSettingValueByKey("program").strip().strip('"'))
 
     def _options(self):
-        # A path that was copied from Windows' Explorer stands in quotes.
         printer = self.getSettingValueByKey("printer").strip().strip('"')
         options = _words(self.getSettingValueByKey("options"))
         return (["--printer", os.path.expanduser(printer)] if printer else []) + options
@@ -103,85 +100,19 @@ def _words(text):
                            .format(text, error)) from error
 
 
-def _unflex(program, arguments):
-    if not _is_windows():
-        return _run([os.path.expanduser(program)] + arguments)
-    wsl = _Wsl()
-    # Without --exec a shell of WSL would read the arguments once more.
-    words = ["--exec"] + [wsl.argument(word) for word in [program] + arguments]
-    return _run(wsl.command() + words)
-
-
 def _run(command):
-    """What the command writes to stdout. Raises RuntimeError with what it says where it fails."""
+    """Raises RuntimeError with what the command says where it fails."""
     try:
-        # By WSL_UTF8 wsl.exe writes its own messages as unflex does; and Cura has no console, so
-        # that wsl.exe would open one.
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        # Cura has no console on Windows, so that the program would open one.
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                               stderr=subprocess.PIPE, check=False,
-                              env=dict(os.environ, WSL_UTF8="1"),
                               creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0))
     except OSError as error:
-        what = ("install WSL and unflex in it" if _is_windows()
-                else "set where unflex is in the script's settings")
-        raise RuntimeError("cannot run {}: {}; {}"
-                           .format(command[0], error.strerror, what)) from error
+        raise RuntimeError("cannot run {}: {}; set where unflex is in the script's settings"
+                           .format(command[0], error.strerror)) from error
     if done.returncode != 0:
-        # wsl.exe writes some messages to stdout.
-        said = _text(done.stderr) or _text(done.stdout)
-        if "execvpe(" in said:
-            said += "; set where unflex is in WSL in the script's settings"
+        said = done.stderr.decode("utf-8", "replace").strip()
         raise RuntimeError(said or "unflex ended with exit code {}".format(done.returncode))
-    return _text(done.stdout)
-
-
-def _text(said):
-    # wsl.exe of before WSL_UTF8 writes UTF-16.
-    return said.decode("utf-16-le" if b"\0" in said else "utf-8", "replace").strip()
-
-
-class _Wsl:
-    """Windows' paths as WSL has them, and the distribution that they are in."""
-
-    def __init__(self):
-        self._roots = {}
-        self._distribution = None
-
-    def command(self):
-        """How to start WSL; to be asked once all paths are known."""
-        return ["wsl.exe"] + (["--distribution", self._distribution] if self._distribution else [])
-
-    def argument(self, word):
-        """The word with a path in it, if it is one or an option with one, as WSL has it."""
-        option = re.match(r"--[\w-]+=", word)
-        begin = option.end() if option else 0
-        return word[:begin] + self._path(word[begin:])
-
-    def _path(self, path):
-        slashed = path.replace("\\", "/")
-        if re.match(r"[A-Za-z]:/", slashed):
-            return self._root(slashed[:1].upper()) + slashed[2:]
-        inside = re.match(r"//(?:wsl\$|wsl\.localhost)/([^/]+)(.*)", slashed, re.IGNORECASE)
-        if inside:
-            self._enter(inside.group(1))
-            return inside.group(2) or "/"
-        if path.startswith("\\\\"):
-            raise RuntimeError("{} is in a network folder, which WSL does not see; copy it to a "
-                               "drive of this computer".format(path))
-        return path
-
-    def _enter(self, distribution):
-        if self._distribution not in (None, distribution):
-            raise RuntimeError("{} and {} are two distributions of WSL; give paths in one of them"
-                               .format(self._distribution, distribution))
-        self._distribution = distribution
-
-    def _root(self, drive):
-        # WSL can be told to have the drives elsewhere than in /mnt.
-        if drive not in self._roots:
-            asked = self.command() + ["--exec", "wslpath", "-a", drive + ":/"]
-            self._roots[drive] = _run(asked).rstrip("/")
-        return self._roots[drive]
 
 
 # Cura's strings have only "\n" as line ends. Bytes in them that are no UTF-8 must come back as they

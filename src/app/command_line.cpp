@@ -440,6 +440,8 @@ Result<CommandLine> parse_command_line(const std::vector<std::string>& arguments
                    "unflex");
   program.set_version_flag("--version", fmt::format("unflex {}", version()));
   program.require_subcommand(1);
+  // Options are the same on every system; commands added below do as this.
+  program.allow_windows_style_options(false);
   add_compensate(program, config);
   add_batch(program, config);
   add_verify(program, config);

@@ -170,14 +170,22 @@ Status Input::make_readable() {
   }
   const bool as_it_comes =
       is_stream_ ? kind_ != container::Kind::bgcode : kind_ == container::Kind::text;
-  return as_it_comes ? Status{} : copy_text();
+  return as_it_comes ? close_file() : copy_text();
 }
 
 Status Input::make_seekable() {
   if (Status known = look_at_kind(); !known) {
     return known;
   }
-  return is_stream_ || kind_ != container::Kind::text ? copy_text() : Status{};
+  return is_stream_ || kind_ != container::Kind::text ? copy_text() : close_file();
+}
+
+// A file is read by its name from here on. Open, it could not be replaced on Windows.
+Status Input::close_file() {
+  if (!is_stream_ && !is_copied_) {
+    fd_ = FileDescriptor();
+  }
+  return {};
 }
 
 Status Input::replace_text(const std::function<Status(const Write&)>& make) {

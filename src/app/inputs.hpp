@@ -72,6 +72,7 @@ class Input {
   [[nodiscard]] Status look_at_kind();
   // What can be read next, empty at the end.
   [[nodiscard]] Result<std::string> read_block() const;
+  Status close_file();
   // Copies all of it as text to a temporary file, which takes the input's place.
   [[nodiscard]] Status copy_text();
   [[nodiscard]] tl::unexpected<Error> cannot_read(int error) const;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <csignal>
+#include <atomic>
 #include <cstring>
 
 #include "signal_calls.hpp"
@@ -16,10 +16,12 @@ namespace {
 constexpr int kSignalExitBase = 128;
 constexpr std::size_t kLongestName = 4096;
 
-volatile std::sig_atomic_t received = 0;
+// Without a lock, since a signal handler reads and writes them.
+std::atomic<int> received = 0;
+static_assert(std::atomic<int>::is_always_lock_free);
 
 struct Slot {
-  volatile std::sig_atomic_t used = 0;
+  std::atomic<int> used = 0;
   long owner = 0;
   std::array<char, kLongestName> file{};
 };
@@ -30,8 +32,8 @@ using Words = std::array<char, 256>;
 Words last_words{};
 Words last_words_with_result{};
 long main_process = 0;
-volatile std::sig_atomic_t expected = 0;
-volatile std::sig_atomic_t in_place = 0;
+std::atomic<int> expected = 0;
+std::atomic<int> in_place = 0;
 
 void keep(const std::string& text, Words& words) {
   const std::size_t length = std::min(text.size(), words.size() - 2);

@@ -3,12 +3,9 @@
 UNFLEX is the program, SCRIPT the file examples/cura/UnflexCompensate.py.
 """
 
-import contextlib
 import importlib.util
 import json
-import ntpath
 import os
-import shutil
 import stat
 import sys
 import tempfile
@@ -57,77 +54,6 @@ def load_script():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-# Stands in for Windows' program of that name: notes what it is asked, and has in FOLDER/mnt/c what
-# is in C:. It knows two distributions, of which the first is the default.
-WSL = r'''#!{python}
-import json, os, subprocess, sys
-
-folder = {folder!r}
-with open(os.path.join(folder, "asked"), "a", encoding="utf-8") as file:
-    file.write(json.dumps(sys.argv[1:]) + "\n")
-arguments = sys.argv[1:]
-if os.environ.get("WSL_UTF8") != "1":
-    sys.exit("WSL_UTF8 is not set")
-if os.path.exists(os.path.join(folder, "no_distribution")):
-    sys.stdout.buffer.write("There is no distribution.\r\n".encode("utf-16-le"))
-    sys.exit(1)
-if arguments[0] == "--distribution":
-    if arguments[1] not in ("Ubuntu", "Debian 12"):
-        sys.exit("there is no " + arguments[1])
-    arguments = arguments[2:]
-if arguments[0] != "--exec":
-    sys.exit("a shell would read the arguments")
-program, arguments = arguments[1], arguments[2:]
-if program == "wslpath":
-    print({{"C:/": "/mnt/c/", "D:/": "/mnt/d"}}[arguments[1]])
-    sys.exit(arguments[0] != "-a")
-if program not in ("unflex", "/home/me/bin/unflex"):
-    sys.exit("<3>WSL ERROR: CreateProcessCommon:640: execvpe(" + program + ") failed: No such file")
-inside = [folder + word if word.startswith(("/mnt/", "/home/")) else
-          word.replace("=/mnt/", "=" + folder + "/mnt/") for word in arguments]
-sys.exit(subprocess.run([{unflex!r}] + inside).returncode)
-'''
-
-
-class Windows:
-    """What a module sees of Windows: os, tempfile and open(), with C: in `folder`/mnt/c."""
-
-    TEMPORARY = r"C:\Users\Zoë Müller\AppData\Local\Temp\unflex-1"
-
-    def __init__(self, folder, module):
-        self.folder = folder
-        os.makedirs(os.path.join(folder, "bin"))
-        wsl = os.path.join(folder, "bin", "wsl.exe")
-        with open(wsl, "w", encoding="utf-8") as file:
-            file.write(WSL.format(python=sys.executable, folder=folder, unflex=UNFLEX))
-        os.chmod(wsl, stat.S_IRWXU)
-        module.os = types.SimpleNamespace(name="nt", path=ntpath, environ=dict(
-            os.environ, PATH=os.path.join(folder, "bin")))
-        module.tempfile = types.SimpleNamespace(TemporaryDirectory=self.temporary_directory)
-        module.open = lambda path, *rest, **named: open(self.place(path), *rest, **named)
-
-    def place(self, path):
-        """Where C:\\… is on this machine."""
-        return os.path.join(self.folder, "mnt", path[0].lower(), *path[3:].split("\\"))
-
-    def write(self, path, text):
-        os.makedirs(os.path.dirname(self.place(path)), exist_ok=True)
-        with open(self.place(path), "w", encoding="utf-8") as file:
-            file.write(text)
-
-    @contextlib.contextmanager
-    def temporary_directory(self, prefix):
-        os.makedirs(self.place(self.TEMPORARY))
-        try:
-            yield self.TEMPORARY
-        finally:
-            shutil.rmtree(self.place(self.TEMPORARY))
-
-    def asked(self):
-        with open(os.path.join(self.folder, "asked"), encoding="utf-8") as file:
-            return [json.loads(line) for line in file]
 
 
 def cura_print(layers):
@@ -246,41 +172,21 @@ class UnflexCompensate(unittest.TestCase):
 
 class OnWindows(unittest.TestCase):
     def setUp(self):
-        self.data = cura_print(2)
         self.module = load_script()
+        self.module.os = types.SimpleNamespace(name="nt", path=os.path, environ=os.environ)
         self.script = self.module.UnflexCompensate()
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.windows = Windows(folder.name, self.module)
-        self.script.values.update(options=" ".join(OPTIONS))
-
-    def unflex(self):
-        """The words behind wsl.exe of the last call."""
-        return self.windows.asked()[-1]
 
     def test_gives_what_the_program_gives_elsewhere(self):
         elsewhere = load_script().UnflexCompensate()
-        elsewhere.values.update(program=UNFLEX, options=" ".join(OPTIONS))
-        self.assertEqual(self.script.execute(list(self.data)), elsewhere.execute(list(self.data)))
-        temporary = "/mnt/c/Users/Zoë Müller/AppData/Local/Temp/unflex-1/"
-        self.assertEqual(self.unflex(), ["--exec", "unflex", "compensate", "--quiet", *OPTIONS, "-o",
-                                         temporary + "compensated.gcode", temporary + "print.gcode"])
-        self.assertFalse(os.path.exists(self.windows.place(Windows.TEMPORARY)))
+        for script in (self.script, elsewhere):
+            script.values.update(program='"{}"'.format(UNFLEX), options=" ".join(OPTIONS))
+        data = cura_print(2)
+        self.assertEqual(self.script.execute(list(data)), elsewhere.execute(list(data)))
 
-    def test_passes_paths_with_spaces_and_other_letters(self):
-        printer = r"C:\Users\Zoë Müller\it's my printer.toml"
-        self.windows.write(printer, "[limits]\nmax_accel_mm_s2 = 1500\n")
-        for options, values in (('--printer "{}"', ""), ('--printer="{}"', ""), ("", "{}"),
-                                ("", '"{}"')):
-            self.script.values.update(
-                printer=values.format(printer),
-                options=" ".join([options.format(printer), r"--log C:\Users\new.log", *OPTIONS]))
-            self.assertIn(";unflex run", "".join(self.script.execute(list(self.data))))
-            self.assertIn("/mnt/c/Users/Zoë Müller/it's my printer.toml",
-                          " ".join(self.unflex()))
-            with open(self.windows.place(r"C:\Users\new.log"), encoding="utf-8") as file:
-                self.assertIn("exit code 0", file.read())
-            os.remove(self.windows.place(r"C:\Users\new.log"))
+    def test_takes_a_path_in_quotes(self):
+        self.script.values.update(printer='"C:\\Users\\Zoë Müller\\it\'s my printer.toml"')
+        self.assertEqual(self.script._options(),
+                         ["--printer", "C:\\Users\\Zoë Müller\\it's my printer.toml"])
 
     def test_splits_options_without_touching_backslashes(self):
         words = self.module._words
@@ -291,52 +197,6 @@ class OnWindows(unittest.TestCase):
         self.assertEqual(words("# \\"), ["#", "\\"])
         with self.assertRaisesRegex(RuntimeError, 'cannot read the options --log "x: No closing'):
             words('--log "x')
-
-    def test_enters_the_distribution_of_a_path(self):
-        os.makedirs(os.path.join(self.windows.folder, "home", "me"))
-        with open(os.path.join(self.windows.folder, "home", "me", "a b.toml"), "w") as file:
-            file.write("[limits]\nmax_accel_mm_s2 = 1500\n")
-        for host in ("wsl$", "wsl.localhost", "WSL.localhost"):
-            self.script.values.update(printer="\\\\" + host + r"\Debian 12\home\me\a b.toml",
-                                      program="/home/me/bin/unflex")
-            self.assertIn(";unflex run", "".join(self.script.execute(list(self.data))))
-            self.assertEqual(self.unflex()[:7], ["--distribution", "Debian 12", "--exec",
-                                                 "/home/me/bin/unflex", "compensate", "--quiet",
-                                                 "--printer"])
-            self.assertEqual(self.unflex()[7], "/home/me/a b.toml")
-        self.script.values.update(program=r"\\wsl$\Ubuntu\home\me\bin\unflex")
-        with self.assertRaisesRegex(RuntimeError, "Ubuntu and Debian 12 are two distributions"):
-            self.script.execute(list(self.data))
-
-    def test_leaves_words_that_are_no_paths_of_windows(self):
-        wsl = self.module._Wsl()
-        for word in ("/home/me/p.cfg", "--set", "dynamics.x.freq_hz=45", "-o", "--report", ".html",
-                     "a:b", "printer.cfg", r"a\b", "--printer=/home/me/C:/p.cfg"):
-            self.assertEqual(wsl.argument(word), word)
-        self.assertEqual(wsl.argument(r"--log=d:\x y\z"), "--log=/mnt/d/x y/z")
-        self.assertEqual(wsl.argument("C:/x"), "/mnt/c/x")
-        self.assertEqual(len(self.windows.asked()), 2)
-        with self.assertRaisesRegex(RuntimeError, r"nas.*is in a network folder"):
-            wsl.argument(r"\\nas\prints\p.cfg")
-
-    def test_raises_and_shows_what_is_said(self):
-        Message.shown.clear()
-        self.script.values.update(printer=r"C:\no\printer.cfg")
-        with self.assertRaisesRegex(RuntimeError, "/mnt/c/no/printer.cfg: cannot read"):
-            self.script.execute(list(self.data))
-        self.assertRegex(Message.shown[0], "^The print is not compensated. .*cannot read")
-        self.script.values.update(printer="", program="unfelx")
-        with self.assertRaisesRegex(RuntimeError, r"execvpe\(unfelx\) failed: No such file; set where"):
-            self.script.execute(list(self.data))
-        with open(os.path.join(self.windows.folder, "no_distribution"), "w"):
-            pass
-        with self.assertRaisesRegex(RuntimeError, r"^There is no distribution\.$"):
-            self.script.execute(list(self.data))
-
-    def test_says_that_wsl_is_missing(self):
-        os.remove(os.path.join(self.windows.folder, "bin", "wsl.exe"))
-        with self.assertRaisesRegex(RuntimeError, "cannot run wsl.exe: No such file.*; install WSL"):
-            self.script.execute(list(self.data))
 
 
 if __name__ == "__main__":

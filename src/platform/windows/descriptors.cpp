@@ -7,8 +7,8 @@
 #include <algorithm>
 
 #include "../close_descriptor.hpp"
-#include "names.hpp"
 #include "open_shared.hpp"
+#include "utf16.hpp"
 
 namespace unflex::platform {
 namespace {
@@ -66,7 +66,8 @@ std::ptrdiff_t write_bytes(int descriptor, std::string_view bytes) {
 }
 
 FileDescriptor open_to_read(const std::string& name) {
-  return open_shared(name, GENERIC_READ, OPEN_EXISTING);
+  // A folder too, which then turns out to be none to read.
+  return open_shared(name, GENERIC_READ, OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS);
 }
 
 FileDescriptor open_to_write(const std::string& name) {

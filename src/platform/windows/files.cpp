@@ -5,7 +5,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "names.hpp"
+#include "utf16.hpp"
 
 namespace unflex::platform {
 namespace {

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <system_error>
 
-#include "names.hpp"
 #include "open_shared.hpp"
 #include "unflex/platform/files.hpp"
+#include "utf16.hpp"
 
 namespace unflex::platform {
 namespace {
@@ -51,7 +51,10 @@ tl::expected<FileState, int> state_of(const std::string& name) {
 }
 
 tl::expected<FileState, int> state_of(int descriptor) {
-  return state_of_handle(reinterpret_cast<HANDLE>(_get_osfhandle(descriptor)));
+  tl::expected<FileState, int> state =
+      state_of_handle(reinterpret_cast<HANDLE>(_get_osfhandle(descriptor)));
+  // Whoever started the program may have opened a standard stream without the right to look at it.
+  return state || descriptor > kStandardError ? state : FileState{};
 }
 
 bool is_link(const std::string& name) {

@@ -10,8 +10,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "names.hpp"
 #include "unflex/platform/descriptors.hpp"
+#include "utf16.hpp"
 
 #ifndef ENABLE_VIRTUAL_TERMINAL_PROCESSING
 #define ENABLE_VIRTUAL_TERMINAL_PROCESSING 4

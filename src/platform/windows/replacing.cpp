@@ -5,16 +5,18 @@
 
 #include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <optional>
 #include <random>
 #include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
-#include "names.hpp"
 #include "open_shared.hpp"
 #include "unflex/platform/folders.hpp"
 #include "unflex/platform/names.hpp"
+#include "utf16.hpp"
 
 namespace unflex::platform {
 namespace {
@@ -56,6 +58,24 @@ bool lock(int descriptor, Claim claim = Claim::alone) {
   place.OffsetHigh = 0x7fffffff;
   const DWORD kind = claim == Claim::alone ? LOCKFILE_EXCLUSIVE_LOCK : 0;
   return LockFileEx(handle_of(descriptor), kind | LOCKFILE_FAIL_IMMEDIATELY, 0, 1, 0, &place) != 0;
+}
+
+// Replaces a file that others have open, where they let it be removed. Windows 10 can do that.
+bool replace_open_file(const std::string& from, const std::string& to) {
+  constexpr DWORD kReplace = 1;  // FILE_RENAME_FLAG_REPLACE_IF_EXISTS
+  constexpr DWORD kPosix = 2;    // FILE_RENAME_FLAG_POSIX_SEMANTICS
+  constexpr auto kRenameInfoEx = static_cast<FILE_INFO_BY_HANDLE_CLASS>(22);
+  const FileDescriptor file = open_shared(from, DELETE, OPEN_EXISTING);
+  const std::wstring name = path_of(to).native();
+  std::vector<char> room(sizeof(FILE_RENAME_INFO) + sizeof(wchar_t) * name.size());
+  auto* const rename = reinterpret_cast<FILE_RENAME_INFO*>(room.data());
+  // Older headers call the flags ReplaceIfExists.
+  constexpr DWORD kFlags = kReplace | kPosix;
+  std::memcpy(rename, &kFlags, sizeof kFlags);
+  rename->FileNameLength = static_cast<DWORD>(sizeof(wchar_t) * name.size());
+  std::memcpy(rename->FileName, name.data(), rename->FileNameLength);
+  return file.valid() && SetFileInformationByHandle(handle_of(file.get()), kRenameInfoEx, rename,
+                                                    static_cast<DWORD>(room.size())) != 0;
 }
 
 }  // namespace
@@ -119,6 +139,9 @@ int replace_file(const std::string& from, const std::string& to) {
       return 0;
     }
     const int error = last_error();
+    if (replace_open_file(from, to)) {
+      return 0;
+    }
     if (i == kTries || (error != EBUSY && error != EACCES)) {
       return error;
     }

@@ -3,7 +3,7 @@
 #include <csignal>
 
 #include "../signal_calls.hpp"
-#include "names.hpp"
+#include "utf16.hpp"
 
 namespace unflex::platform {
 namespace {

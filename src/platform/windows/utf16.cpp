@@ -1,4 +1,4 @@
-#include "names.hpp"
+#include "utf16.hpp"
 
 #include <windows.h>
 
