@@ -1,33 +1,5 @@
-# What `cmake --install` puts where. The component `program` is what runs, with its manual, examples
-# and completions; `development` is the library, its headers and what find_package(unflex) reads.
-include(CMakePackageConfigHelpers)
-
-# --- the library: all modules but the program's own, and unflex::unflex, which stands for them
-set(library_modules ${UNFLEX_MODULES})
-list(REMOVE_ITEM library_modules app)
-add_library(unflex_unflex INTERFACE)
-add_library(unflex::unflex ALIAS unflex_unflex)
-set_target_properties(unflex_unflex PROPERTIES EXPORT_NAME unflex)
-install(TARGETS unflex_unflex EXPORT unflexTargets)
-foreach(module IN LISTS library_modules)
-  set_target_properties(unflex_${module} PROPERTIES EXPORT_NAME ${module})
-  target_link_libraries(unflex_unflex INTERFACE unflex_${module})
-  install(TARGETS unflex_${module} EXPORT unflexTargets ARCHIVE COMPONENT development)
-endforeach()
-
-set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/unflex)
-install(EXPORT unflexTargets NAMESPACE unflex:: DESTINATION ${package_dir} COMPONENT development)
-configure_package_config_file(cmake/unflexConfig.cmake.in
-  ${PROJECT_BINARY_DIR}/package/unflexConfig.cmake INSTALL_DESTINATION ${package_dir})
-# Below 1.0 every minor version may change what is public.
-write_basic_package_version_file(${PROJECT_BINARY_DIR}/package/unflexConfigVersion.cmake
-  COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/package/unflexConfig.cmake
-  ${PROJECT_BINARY_DIR}/package/unflexConfigVersion.cmake cmake/unflexDependencies.cmake
-  DESTINATION ${package_dir} COMPONENT development)
-install(DIRECTORY include/unflex DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
-  FILES_MATCHING PATTERN "*.hpp" PATTERN app EXCLUDE)
-set(UNFLEX_DEVELOPMENT_DOCDIR ${CMAKE_INSTALL_DATADIR}/doc/libunflex-dev)
+# What `cmake --install` puts of the program where, as the component `program`: what runs, with its
+# manual, examples and completions.
 
 # --- manual, examples and the terms under which all this may be used
 find_program(UNFLEX_GZIP gzip REQUIRED)
@@ -46,8 +18,6 @@ install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program
   FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.png")
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program
   PATTERN library EXCLUDE PATTERN quickstart.sh EXCLUDE)
-install(DIRECTORY examples/library DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
-  COMPONENT development)
 
 # Headers of these libraries, by Debian's names of their packages, become part of what is built, and
 # their licences ask to go with it.
@@ -55,8 +25,13 @@ set(copyright_file ${PROJECT_BINARY_DIR}/package/copyright)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS LICENSE)
 file(READ LICENSE copyright)
 string(PREPEND copyright "unflex, with all that its reports are made of (src/report/assets):\n\n")
-foreach(package libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev
-        nlohmann-json3-dev)
+set(parts libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev
+          nlohmann-json3-dev)
+# One program without other files has all of its libraries in it.
+if(CMAKE_CROSSCOMPILING)
+  list(APPEND parts zlib1g-dev libzstd-dev ${UNFLEX_SYSTEM_LIBRARIES})
+endif()
+foreach(package IN LISTS parts)
   string(APPEND copyright "\n\nPart of the program and the library is code of ${package}")
   if(EXISTS /usr/share/doc/${package}/copyright)
     file(READ /usr/share/doc/${package}/copyright terms)
@@ -67,7 +42,6 @@ foreach(package libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplu
 endforeach()
 file(CONFIGURE OUTPUT ${copyright_file} CONTENT "@copyright@" @ONLY)
 install(FILES ${copyright_file} DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
-install(FILES ${copyright_file} DESTINATION ${UNFLEX_DEVELOPMENT_DOCDIR} COMPONENT development)
 
 # --- completions, where the shells look for those of installed programs
 install(FILES share/completions/unflex.bash

@@ -1,5 +1,5 @@
-# `cpack` in the build directory makes Debian packages of what Install.cmake installs: unflex and
-# libunflex-dev.
+# `cpack` in the build directory makes Debian packages of what is installed: unflex and libunflex-dev,
+# or unflex alone where the build is for another processor.
 set(UNFLEX_MAINTAINER "unflex contributors <unflex@unflex.invalid>" CACHE STRING
   "Whom the Debian packages name as maintainer, with an address")
 
@@ -13,7 +13,10 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
   OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
-set(CPACK_COMPONENTS_ALL program development)
+set(CPACK_COMPONENTS_ALL program)
+if(NOT CMAKE_CROSSCOMPILING)
+  list(APPEND CPACK_COMPONENTS_ALL development)
+endif()
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_MAINTAINER "${UNFLEX_MAINTAINER}")
@@ -21,7 +24,13 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME unflex)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
+if(CMAKE_CROSSCOMPILING)
+  # A static program, which needs no library.
+  set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE ${UNFLEX_DEBIAN_ARCHITECTURE})
+  set(CPACK_STRIP_FILES OFF)
+else()
+  set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
+endif()
 set(CPACK_DEBIAN_PROGRAM_DESCRIPTION
 "G-code that takes the flex out of a 3D printer
 The print head of a 3D printer hangs on belts and swings when it takes a
@@ -50,7 +59,9 @@ unflex_gzip(${PROJECT_BINARY_DIR}/package/changelog ${PROJECT_BINARY_DIR}/packag
 target_sources(unflex_manual PRIVATE ${PROJECT_BINARY_DIR}/package/changelog.gz)
 install(FILES ${PROJECT_BINARY_DIR}/package/changelog.gz DESTINATION ${CMAKE_INSTALL_DOCDIR}
   COMPONENT program)
-install(FILES ${PROJECT_BINARY_DIR}/package/changelog.gz DESTINATION ${UNFLEX_DEVELOPMENT_DOCDIR}
-  COMPONENT development)
+if(NOT CMAKE_CROSSCOMPILING)
+  install(FILES ${PROJECT_BINARY_DIR}/package/changelog.gz DESTINATION ${UNFLEX_DEVELOPMENT_DOCDIR}
+    COMPONENT development)
+endif()
 
 include(CPack)

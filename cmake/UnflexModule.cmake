@@ -1,3 +1,9 @@
+# How modules are optimised whose loops take no time, and those that shall build soon. A toolchain for
+# a program that shall be small may say so.
+set(UNFLEX_PLAIN_OPTIMISATION -O2 CACHE STRING "")
+set(UNFLEX_SOON_OPTIMISATION -O1 CACHE STRING "")
+mark_as_advanced(UNFLEX_PLAIN_OPTIMISATION UNFLEX_SOON_OPTIMISATION)
+
 # unflex_module(name [NUMERICAL] SOURCES file... [LINKS target...])
 #
 # NUMERICAL: its loops are worth -O3. The others are compiled with -O2, which takes the compiler less
@@ -20,7 +26,7 @@ function(unflex_module name)
   target_link_libraries(unflex_${name} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE_LINKS})
   unflex_flags(unflex_${name})
   if(NOT ARG_NUMERICAL)
-    target_compile_options(unflex_${name} PRIVATE $<$<CONFIG:Release>:-O2>)
+    target_compile_options(unflex_${name} PRIVATE $<$<CONFIG:Release>:${UNFLEX_PLAIN_OPTIMISATION}>)
   endif()
   # The headers were compiled as fmt wants it. A module may be built with other sanitizers than they
   # are (tests/fuzz/CMakeLists.txt).
@@ -53,7 +59,7 @@ endfunction()
 
 # For what runs so little that building it takes longer: about half as long as with -O3.
 function(unflex_build_soon target)
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:${UNFLEX_SOON_OPTIMISATION}>)
 endfunction()
 
 # unflex_test_library(name file...): what several tests share.

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# install_packages.sh [--tests]
+# install_packages.sh [--tests] [--platforms]
 #
 # Installs the packages that unflex is built from on Debian 12. --tests adds those of its tests, of
-# sanitizers, of fuzzing and of counting lines. Does nothing if all is installed; otherwise it needs
-# root or sudo.
+# sanitizers, of fuzzing and of counting lines; --platforms those that build for other systems and run
+# what they have built. Does nothing if all is installed; otherwise it needs root or sudo.
 set -euo pipefail
 
 packages=(
@@ -31,9 +31,30 @@ test_packages=(
   prusa-slicer python3-jinja2 python3-yaml
 )
 
-if [[ ${1:-} == --tests ]]; then
-  packages+=("${test_packages[@]}")
-fi
+platform_packages=(
+  # WebAssembly, and what runs it.
+  clang-22 lld-22 libc++-22-dev-wasm32 libc++abi-22-dev-wasm32 libclang-rt-22-dev-wasm32 wasi-libc
+  binaryen nodejs
+  # Windows.
+  g++-mingw-w64-x86-64-posix wine wine64
+  # Linux on other processors.
+  g++-aarch64-linux-gnu g++-arm-linux-gnueabihf qemu-user
+  # Libraries that are built along, and packages.
+  dpkg-dev ca-certificates zip
+  # Prints on many machines.
+  slurm-wlm munge
+)
+
+for option in "$@"; do
+  case $option in
+    --tests) packages+=("${test_packages[@]}") ;;
+    --platforms) packages+=("${platform_packages[@]}") ;;
+    *)
+      echo "install_packages.sh: unknown option $option" >&2
+      exit 1
+      ;;
+  esac
+done
 
 if ! command -v dpkg-query >/dev/null; then
   echo "This is not Debian: unflex needs what Debian calls ${packages[*]}" >&2

@@ -11,10 +11,17 @@ set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 # build: where memory runs out, it traps.
 set(CMAKE_C_FLAGS_INIT "-Wno-deprecated")
 set(CMAKE_CXX_FLAGS_INIT "-Wno-deprecated -fignore-exceptions -isystem ${CMAKE_CURRENT_LIST_DIR}/wasm")
-# Who catches an exception puts the stack back where it was.
-set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-z,stack-size=1048576 -Wl,--export=__stack_pointer -s")
+# Who catches an exception calls a function by its place in the table, and puts the stack back where
+# it was. The program is made small later, from functions that are not yet put into each other.
+set(CMAKE_EXE_LINKER_FLAGS_INIT
+  "--no-wasm-opt -Wl,-z,stack-size=1048576 -Wl,--export=__stack_pointer -Wl,--export-table -s")
 set(CMAKE_EXECUTABLE_SUFFIX .wasm)
+# The page has the program in it, so what runs little is made small.
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG" CACHE STRING "")
+set(UNFLEX_PLAIN_OPTIMISATION -Oz CACHE STRING "")
+set(UNFLEX_SOON_OPTIMISATION -Oz CACHE STRING "")
 
 set(UNFLEX_THREADS OFF CACHE BOOL "")
 # clang does not share compiled headers between levels of optimisation.
 set(CMAKE_DISABLE_PRECOMPILE_HEADERS ON CACHE BOOL "")
+set(UNFLEX_SYSTEM_LIBRARIES wasi-libc libc++-22-dev-wasm32 libc++abi-22-dev-wasm32)

@@ -268,10 +268,10 @@ function makeHost({ args, environment, folders, files, streams }) {
   }
 
   const catching = {
-    call_catching(work) {
+    call_catching(place, argument) {
       const stack = program.__stack_pointer.value;
       try {
-        program.work_of_program(work);
+        program.__indirect_function_table.get(place)(argument);
         return 0;
       } catch (error) {
         if (!(error instanceof Thrown)) throw error;

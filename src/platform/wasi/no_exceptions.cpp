@@ -11,19 +11,18 @@ namespace {
 
 const std::exception* thrown_last = nullptr;
 
-// Calls work_of_program(work) and returns 0, or 1 if throw_here() was called meanwhile: the host
-// takes back what is left of the call.
+// Calls the function and returns 0, or 1 if throw_here() was called meanwhile: the host takes back
+// what is left of the call. The function is given as it stands in the table of functions, since one
+// that is exported would set up the whole program anew.
 [[clang::import_module("unflex"), clang::import_name("call_catching")]] int call_catching(
-    const void* work);
+    void (*function)(const void*), const void* argument);
 [[noreturn, clang::import_module("unflex"), clang::import_name("throw_here")]] void throw_here();
+
+void call(const void* work) { (*static_cast<const std::function<void()>*>(work))(); }
 
 }  // namespace
 
 extern "C" {
-
-[[clang::export_name("work_of_program")]] void work_of_program(const void* work) {
-  (*static_cast<const std::function<void()>*>(work))();
-}
 
 void* __cxa_allocate_exception(std::size_t bytes) noexcept {
   // Never given back, since there is little of it. Where memory has run out, this is all there is.
@@ -43,7 +42,7 @@ namespace unflex::platform {
 
 void catching(const std::function<void()>& work,
               const std::function<void(const std::exception&)>& caught) {
-  if (call_catching(&work) != 0) {
+  if (call_catching(call, &work) != 0) {
     caught(*thrown_last);
   }
 }
