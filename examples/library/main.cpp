@@ -11,13 +11,14 @@ int main(int argc, char** argv) {
     return 1;
   }
   unflex::SilentProgress progress;
+  const auto sliced = unflex::platform::file_store(argv[1]);
   const auto report =
-      unflex::machine::read_print_text(argv[1], argv[1])
+      unflex::machine::read_print_text(*sliced, argv[1])
           .and_then([&](const unflex::machine::PrintText& print) {
             return unflex::machine::load({.print = &print, .printer_file = argv[3]});
           })
           .and_then([&](const unflex::machine::Settings& settings) {
-            return unflex::pipeline::compensate({.input = unflex::platform::file_store(argv[1]),
+            return unflex::pipeline::compensate({.input = sliced,
                                                  .input_name = argv[1],
                                                  .output = unflex::platform::file_store(argv[2]),
                                                  .output_name = argv[2],

@@ -143,8 +143,9 @@ TEST_F(FolderOfShards, IsWatchedForWhatComes) {
 }
 
 TEST_F(FolderOfShards, IsWatchedUntilASignalComes) {
-  Program program(directory(), {"batch", "in", "-o", "out", "--watch", "--engine", "banded", "--set",
-                                "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45"});
+  Program program(directory(),
+                  {"batch", "in", "-o", "out", "--watch", "--engine", "banded", "--set",
+                   "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45"});
   const auto comes = [&](const std::string& name) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (!std::filesystem::exists(path(name)) && std::chrono::steady_clock::now() < end) {
