@@ -46,7 +46,8 @@ for platform in "${platforms[@]}"; do
       ;;
     windows)
       rm --force "$out/unflex-$version-windows-x64.zip"
-      zip --quiet --junk-paths "$out/unflex-$version-windows-x64.zip" build-windows/unflex.exe LICENSE
+      zip --quiet --junk-paths "$out/unflex-$version-windows-x64.zip" \
+        build-windows/unflex.exe build-windows/package/copyright
       ;;
     wasm)
       cp build-wasm/unflex.html "$out/unflex.html"
@@ -56,7 +57,8 @@ for platform in "${platforms[@]}"; do
     linux-*)
       name=${platform/linux-static/linux-x64}
       tar --create --gzip --file "$out/unflex-$version-$name.tar.gz" \
-        --transform "s,.*/,unflex-$version/," "build-$platform/unflex" ./LICENSE
+        --transform "s,.*/,unflex-$version/," "build-$platform/unflex" \
+        "build-$platform/package/copyright"
       ;;
   esac
   if [[ $platform == linux-arm64 ]]; then

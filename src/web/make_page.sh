@@ -1,18 +1,23 @@
 #!/usr/bin/env bash
-# make_page.sh PROGRAM.wasm VERSION OUT.html
+# make_page.sh PROGRAM.wasm COPYRIGHT VERSION OUT.html
 #
-# Makes the page of one file: markup, style, scripts and the program.
+# Makes the page of one file: markup, style, scripts, the program and the terms of its parts.
 set -euo pipefail
 
 program=$1
-version=$2
-out=$3
+copyright=$2
+version=$3
+out=$4
 web=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 page=$web/page
 
 work=$(mktemp --directory)
 trap 'rm --recursive --force "$work"' EXIT
-gzip --best --no-name --stdout "$program" | base64 --wrap=0 >"$work/@PROGRAM@"
+packed() {
+  gzip --best --no-name --stdout "$1" | base64 --wrap=0
+}
+packed "$program" >"$work/@PROGRAM@"
+packed "$copyright" >"$work/@COPYRIGHT@"
 # One mark of strictness for all of a script, and none of node's.
 joined() {
   cat "$@" | sed "/^'use strict';$/d; /^if (typeof module === 'object')/d"
@@ -38,7 +43,7 @@ awk -v folder="$work" '
   }
   {
     rest = $0
-    while (match(rest, /@(PROGRAM|WORKER|SCRIPT|VERSION|style\.css)@/)) {
+    while (match(rest, /@(PROGRAM|COPYRIGHT|WORKER|SCRIPT|VERSION|style\.css)@/)) {
       printf "%s", substr(rest, 1, RSTART - 1)
       put(substr(rest, RSTART, RLENGTH))
       rest = substr(rest, RSTART + RLENGTH)

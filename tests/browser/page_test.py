@@ -144,7 +144,7 @@ class Page(unittest.TestCase):
 
     def test_asks_for_a_printer_first(self):
         self.choose("print-files", self.sliced)
-        self.browser.wait_for("document.getElementById('print-status').innerText.includes('which printer')")
+        self.browser.wait_for("document.getElementById('print-status').innerText.includes('First tell')")
 
     def test_shows_messages_for_what_is_no_print(self):
         self.add_printer()

@@ -9,8 +9,6 @@
 
 #include "unflex/platform/descriptors.hpp"
 
-extern char** environ;
-
 namespace unflex::platform {
 
 // /dev/null is opened the wrong way round, so that using it is still an error.
@@ -20,21 +18,6 @@ void prepare_standard_streams() {
       static_cast<void>(::open("/dev/null", fd == kStandardInput ? O_WRONLY : O_RDONLY));
     }
   }
-}
-
-std::vector<std::string> arguments_of(int count, char** arguments) {
-  return {arguments + 1, arguments + count};
-}
-
-std::vector<std::pair<std::string, std::string>> environment() {
-  std::vector<std::pair<std::string, std::string>> variables;
-  for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) {
-    const std::string_view text = *entry;
-    if (const std::size_t equals = text.find('='); equals != std::string_view::npos) {
-      variables.emplace_back(text.substr(0, equals), text.substr(equals + 1));
-    }
-  }
-  return variables;
 }
 
 long process_number() { return ::getpid(); }

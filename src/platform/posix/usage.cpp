@@ -27,10 +27,15 @@ double processor_s() {
 }
 
 double peak_memory_mb() {
-  constexpr double kKilobytesPerMegabyte = 1024.0;
+  // In kilobytes, on macOS in bytes.
+#ifdef __APPLE__
+  constexpr double kPerMegabyte = 1024.0 * 1024.0;
+#else
+  constexpr double kPerMegabyte = 1024.0;
+#endif
   return static_cast<double>(
              std::max(usage_of(RUSAGE_SELF).ru_maxrss, usage_of(RUSAGE_CHILDREN).ru_maxrss)) /
-         kKilobytesPerMegabyte;
+         kPerMegabyte;
 }
 
 }  // namespace unflex::platform

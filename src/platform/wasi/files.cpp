@@ -144,23 +144,32 @@ std::vector<std::string> matching_files(const std::string& pattern) {
   return files;
 }
 
-// There are no links.
+// A name that counts from where one is stays so, since nobody knows where that is. Links are
+// followed in the last part of a name alone.
 std::string canonical_name(const std::string& name) {
+  std::string at = name;
+  std::array<char, 4096> target{};
+  for (int links = 0; links < 40; ++links) {
+    const ssize_t length = ::readlink(at.c_str(), target.data(), target.size());
+    if (length < 0) {
+      break;
+    }
+    at = name_beside(at, {target.data(), static_cast<std::size_t>(length)});
+  }
   std::vector<std::string_view> parts;
-  std::string_view rest = name;
-  while (!rest.empty()) {
+  for (std::string_view rest = at; !rest.empty();) {
     const std::size_t slash = std::min(rest.find('/'), rest.size());
     const std::string_view part = rest.substr(0, slash);
     rest.remove_prefix(std::min(slash + 1, rest.size()));
-    if (part == ".." && !parts.empty()) {
+    if (part == ".." && !parts.empty() && parts.back() != "..") {
       parts.pop_back();
     } else if (!part.empty() && part != ".") {
       parts.push_back(part);
     }
   }
-  std::string result;
+  std::string result = at.starts_with('/') ? "/" : "";
   for (const std::string_view part : parts) {
-    result.append("/").append(part);
+    result.append(result.empty() || result == "/" ? "" : "/").append(part);
   }
   return result;
 }

@@ -2,7 +2,6 @@
 
 #include <dirent.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -11,48 +10,6 @@
 #include "unflex/platform/names.hpp"
 
 namespace unflex::platform {
-namespace {
-
-FileState state_in(const struct stat& status) {
-  const FileKind kind = S_ISREG(status.st_mode)   ? FileKind::file
-                        : S_ISDIR(status.st_mode) ? FileKind::folder
-                                                  : FileKind::other;
-  return {kind,
-          static_cast<std::uint64_t>(status.st_dev),
-          static_cast<std::uint64_t>(status.st_ino),
-          static_cast<std::uint64_t>(status.st_size),
-          status.st_mtim.tv_sec,
-          status.st_mtim.tv_nsec};
-}
-
-}  // namespace
-
-tl::expected<FileState, int> state_of(const std::string& name) {
-  struct stat status {};
-  if (::stat(name.c_str(), &status) != 0) {
-    return tl::unexpected(errno);
-  }
-  return state_in(status);
-}
-
-tl::expected<FileState, int> state_of(int descriptor) {
-  struct stat status {};
-  if (::fstat(descriptor, &status) != 0) {
-    return tl::unexpected(errno);
-  }
-  return state_in(status);
-}
-
-bool is_link(const std::string& name) {
-  struct stat status {};
-  return ::lstat(name.c_str(), &status) == 0 && S_ISLNK(status.st_mode);
-}
-
-bool is_taken(const std::string& name) {
-  struct stat status {};
-  return ::lstat(name.c_str(), &status) == 0;
-}
-
 bool same_file(const std::string& a, const std::string& b) {
   if (a.empty() || b.empty()) {
     return false;
@@ -103,7 +60,5 @@ int make_folders(const std::string& folder) {
   }
   return ::mkdir(folder.c_str(), 0777) == 0 || errno == EEXIST ? 0 : errno;
 }
-
-void remove_empty_folder(const std::string& folder) { ::rmdir(folder.c_str()); }
 
 }  // namespace unflex::platform

@@ -93,36 +93,44 @@ function nozzleOf(motors, { freq, damping }) {
   return path;
 }
 
-// How far a path strays from the two lines, RMS in µm, within 15 mm of the corner.
-function strayed(path, angle) {
-  const turn = (angle * Math.PI) / 180;
-  let sum = 0;
-  let count = 0;
-  for (const [x, y] of path) {
-    if (Math.hypot(x - 100, y - 100) > 15) continue;
-    const along = (x - 100) * Math.cos(turn) + (y - 100) * Math.sin(turn);
-    const second = along > 0 ? Math.abs((y - 100) * Math.cos(turn) - (x - 100) * Math.sin(turn)) : Infinity;
-    const first = x < 100 ? Math.abs(y - 100) : Infinity;
-    const off = Math.min(first, second, Math.hypot(x - 100, y - 100));
-    sum += off * off;
-    ++count;
-  }
-  return 1000 * Math.sqrt(sum / Math.max(count, 1));
+// The place of the sliced path that is nearest to (x, y).
+function nearestOfSliced([x, y], turn) {
+  const along = Math.max(0, (x - 100) * Math.cos(turn) + (y - 100) * Math.sin(turn));
+  const first = [Math.min(x, 100), 100];
+  const second = [100 + along * Math.cos(turn), 100 + along * Math.sin(turn)];
+  const distance = ([a, b]) => Math.hypot(x - a, y - b);
+  return distance(first) < distance(second) ? first : second;
 }
 
-function drawCorner(values, before, after) {
-  const scale = 28;
-  const line = (path, name) => {
-    const near = path.filter(([x, y]) => Math.hypot(x - 100, y - 100) < 9);
-    return `<polyline class="${name}" points="${near.filter((_, i) => i % 4 === 0).map(([x, y]) => `${((x - 100) * scale).toFixed(1)},${((100 - y) * scale).toFixed(1)}`).join(' ')}"/>`;
+// How far a path strays from the sliced one within 15 mm of the corner, RMS in µm.
+function strayed(path, turn) {
+  const near = path.filter(([x, y]) => Math.hypot(x - 100, y - 100) < 15);
+  const sum = near.reduce((total, [x, y]) => {
+    const [a, b] = nearestOfSliced([x, y], turn);
+    return total + (x - a) ** 2 + (y - b) ** 2;
+  }, 0);
+  return 1000 * Math.sqrt(sum / Math.max(near.length, 1));
+}
+
+const exaggeration = 8;
+const pixelsPerMm = 28;
+
+function drawCorner({ angle }, before, after) {
+  const turn = (angle * Math.PI) / 180;
+  const point = ([x, y]) => `${((x - 100) * pixelsPerMm).toFixed(1)},${((100 - y) * pixelsPerMm).toFixed(1)}`;
+  const exaggerated = ([x, y]) => {
+    const [a, b] = nearestOfSliced([x, y], turn);
+    return [a + exaggeration * (x - a), b + exaggeration * (y - b)];
   };
-  const turn = (values.angle * Math.PI) / 180;
-  const sliced = `<polyline class="sliced" points="-250,0 0,0 ${(250 * Math.cos(turn)).toFixed(1)},${(-250 * Math.sin(turn)).toFixed(1)}"/>`;
-  const off = [strayed(before, values.angle), after ? strayed(after, values.angle) : undefined];
-  byId('corner-picture').innerHTML = `<svg viewBox="-260 -260 520 320" role="img" aria-label="The nozzle's path around the corner">${sliced}${line(before, 'before')}${after ? line(after, 'after') : ''}</svg>`;
-  byId('corner-told').textContent = after
-    ? `Off the path near the corner: ${off[0].toFixed(1)} µm RMS as sliced, ${off[1].toFixed(1)} µm with unflex.`
-    : `Off the path near the corner: ${off[0].toFixed(1)} µm RMS as sliced.`;
+  const line = (path, name) => {
+    const near = path.filter(([x, y], i) => i % 4 === 0 && Math.hypot(x - 100, y - 100) < 9);
+    return `<polyline class="${name}" points="${near.map((place) => point(exaggerated(place))).join(' ')}"/>`;
+  };
+  const end = [100 + 9 * Math.cos(turn), 100 + 9 * Math.sin(turn)];
+  const sliced = `<polyline class="sliced" points="${[[91, 100], [100, 100], end].map(point).join(' ')}"/>`;
+  byId('corner-picture').innerHTML = `<svg viewBox="-270 -270 540 330" role="img" aria-label="The nozzle's path around the corner">${sliced}${line(before, 'before')}${after ? line(after, 'after') : ''}</svg>`;
+  const told = `Off the path near the corner: ${strayed(before, turn).toFixed(1)} µm RMS as sliced`;
+  byId('corner-told').textContent = after ? `${told}, ${strayed(after, turn).toFixed(1)} µm with unflex.` : `${told}.`;
 }
 
 async function computeCorner() {

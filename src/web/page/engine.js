@@ -3,13 +3,15 @@
 
 const byId = (id) => document.getElementById(id);
 
+// What lies packed in an element of the page.
+function unpacked(id) {
+  const packed = Uint8Array.from(atob(byId(id).textContent.trim()), (c) => c.charCodeAt(0));
+  return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream('gzip')));
+}
+
 let compiled;
 function program() {
-  compiled ??= (async () => {
-    const packed = Uint8Array.from(atob(byId('program').textContent.trim()), (c) => c.charCodeAt(0));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('gzip'));
-    return WebAssembly.compile(await new Response(stream).arrayBuffer());
-  })();
+  compiled ??= unpacked('program').arrayBuffer().then((bytes) => WebAssembly.compile(bytes));
   return compiled;
 }
 
@@ -71,6 +73,12 @@ function showPage(blob, title) {
   blob.text().then((text) => { frame.srcdoc = text; });
   byId('page-body').replaceChildren(frame);
   dialog.showModal();
+}
+
+async function showTerms() {
+  byId('page-title').textContent = 'Terms';
+  byId('page-body').replaceChildren(element('pre', { class: 'long' }, await unpacked('copyright').text()));
+  byId('page-dialog').showModal();
 }
 
 // Makes a place take files, by dropping and by choosing.

@@ -8,6 +8,7 @@ function showTab(name) {
     const isShown = tab.id === `tab-${name}`;
     tab.setAttribute('aria-selected', String(isShown));
     tab.tabIndex = isShown ? 0 : -1;
+    if (isShown) tab.scrollIntoView({ block: 'nearest', inline: 'nearest' });
     byId(tab.getAttribute('aria-controls')).hidden = !isShown;
   }
   if (name === 'corner' && !byId('corner-picture').firstChild) computeCorner();
@@ -61,6 +62,7 @@ startPrinters();
 startPrints();
 startMeasure();
 startCorner();
+byId('terms').addEventListener('click', showTerms);
 printers.listeners.push(drawCommands);
 drawCommands();
 // What is dropped beside the places for it must not take the page's place.

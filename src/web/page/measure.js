@@ -93,11 +93,11 @@ async function openTower(blob, name) {
   tower.read = {};
   if (!tower.axes.length) {
     byId('tower-bands').replaceChildren(element('p', { class: 'bad' }, `${name} is no tower of unflex.`));
-    byId('tower-next').hidden = true;
+    byId('tower-read').hidden = true;
     return;
   }
   byId('tower-bands').replaceChildren(...tower.axes.map(bandsOf));
-  byId('tower-next').hidden = false;
+  byId('tower-read').hidden = false;
 }
 
 // The bands of a wall from the bed upwards. The first click marks one, the next the other end.

@@ -120,6 +120,7 @@ function drawPrinters() {
         element('button', { type: 'button', onclick: () => printers.remove(name) }, 'Remove')),
       editor);
   }));
+  byId('print-first').hidden = Object.keys(printers.all).length > 0;
   byId('printer-none').hidden = Object.keys(printers.all).length > 0;
   for (const select of document.querySelectorAll('select.printer')) {
     select.replaceChildren(...Object.keys(printers.all).map((name) => element('option', { value: name, selected: name === printers.chosen }, name)));

@@ -34,8 +34,7 @@ function addPrints(files) {
   }
   byId('print-status').replaceChildren();
   if (!printers.chosen) {
-    byId('print-status').append(element('p', { class: 'bad' }, 'First tell which printer it is for: '),
-      element('button', { type: 'button', class: 'primary', onclick: () => showTab('printer') }, 'Add a printer'));
+    byId('print-status').append(element('p', { class: 'bad' }, 'First tell unflex which printer it is for.'));
     return;
   }
   for (const file of prints) queue.waiting.push(makeJob(file));
@@ -181,6 +180,7 @@ function drawFaster(found) {
 
 function startPrints() {
   takesFiles(byId('print-drop'), byId('print-files'), addPrints);
+  byId('print-add').addEventListener('click', () => showTab('printer'));
   takesFiles(byId('faster-drop'), byId('faster-file'), tryFaster);
   const show = () => {
     byId('tolerance-row').hidden = !byId('faster').checked;

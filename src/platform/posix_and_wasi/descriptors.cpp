@@ -1,4 +1,3 @@
-// A read or write waits itself, since there is nothing else to do meanwhile.
 #include "unflex/platform/descriptors.hpp"
 
 #include <fcntl.h>
@@ -7,18 +6,6 @@
 #include "../close_descriptor.hpp"
 
 namespace unflex::platform {
-
-bool wait_to_read(int /*descriptor*/, std::chrono::milliseconds /*most*/) { return true; }
-
-bool wait_to_write(int /*descriptor*/, std::chrono::milliseconds /*most*/) { return true; }
-
-std::ptrdiff_t read_bytes(int descriptor, char* to, std::size_t room) {
-  return ::read(descriptor, to, room);
-}
-
-std::ptrdiff_t write_bytes(int descriptor, std::string_view bytes) {
-  return ::write(descriptor, bytes.data(), bytes.size());
-}
 
 FileDescriptor open_to_read(const std::string& name) {
   return FileDescriptor(::open(name.c_str(), O_RDONLY | O_CLOEXEC));
@@ -34,6 +21,14 @@ FileDescriptor open_to_append(const std::string& name) {
 }
 
 void close_descriptor(int descriptor) { ::close(descriptor); }
+
+std::ptrdiff_t read_bytes(int descriptor, char* to, std::size_t room) {
+  return ::read(descriptor, to, room);
+}
+
+std::ptrdiff_t write_bytes(int descriptor, std::string_view bytes) {
+  return ::write(descriptor, bytes.data(), bytes.size());
+}
 
 std::ptrdiff_t read_bytes_at(int descriptor, char* to, std::size_t room, std::uint64_t at) {
   return ::pread(descriptor, to, room, static_cast<off_t>(at));
