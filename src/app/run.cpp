@@ -284,7 +284,7 @@ static bool prefers_two_lanes() {
 }
 
 int run_program(const std::vector<std::string>& arguments) {
-  platform::prepare_standard_streams();
+  platform::prepare_process();
   prefer_two_lanes(prefers_two_lanes());
   int code = static_cast<int>(ExitCode::internal);
   platform::catching(

@@ -9,8 +9,8 @@ namespace unflex::platform {
 
 // To be called first. A standard stream that was closed would be given to the next file opened, and
 // messages would land in it; so it is replaced by one whose use is an error. Bytes go through the
-// streams as they are.
-void prepare_standard_streams();
+// streams as they are. What a long run needs of memory goes back to the system when it is written.
+void prepare_process();
 
 // Arguments behind the program's name, in UTF-8 where the system knows what text is.
 [[nodiscard]] std::vector<std::string> arguments_of(int count, char** arguments);

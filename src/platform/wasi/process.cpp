@@ -7,7 +7,7 @@
 
 namespace unflex::platform {
 
-void prepare_standard_streams() {}
+void prepare_process() {}
 
 long process_number() { return 1; }
 

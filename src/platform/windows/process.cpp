@@ -24,7 +24,7 @@ HANDLE handle_of(int descriptor) { return reinterpret_cast<HANDLE>(_get_osfhandl
 
 }  // namespace
 
-void prepare_standard_streams() {
+void prepare_process() {
   // A console shows bytes as UTF-8.
   SetConsoleOutputCP(CP_UTF8);
   // A call with a descriptor that is closed would end the program.
