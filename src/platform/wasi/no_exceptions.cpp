@@ -11,18 +11,18 @@ namespace {
 
 const std::exception* thrown_last = nullptr;
 
+void call(const void* work) { (*static_cast<const std::function<void()>*>(work))(); }
+
+}  // namespace
+
+extern "C" {
+
 // Calls the function and returns 0, or 1 if throw_here() was called meanwhile: the host takes back
 // what is left of the call. The function is given as it stands in the table of functions, since one
 // that is exported would set up the whole program anew.
 [[clang::import_module("unflex"), clang::import_name("call_catching")]] int call_catching(
     void (*function)(const void*), const void* argument);
 [[noreturn, clang::import_module("unflex"), clang::import_name("throw_here")]] void throw_here();
-
-void call(const void* work) { (*static_cast<const std::function<void()>*>(work))(); }
-
-}  // namespace
-
-extern "C" {
 
 void* __cxa_allocate_exception(std::size_t bytes) noexcept {
   // Never given back, since there is little of it. Where memory has run out, this is all there is.

@@ -7,7 +7,12 @@
 
 namespace unflex::platform {
 
-void prepare_process() {}
+// The host tells where one is; C's library takes names from there.
+void prepare_process() {
+  if (const char* const place = std::getenv("PWD")) {
+    static_cast<void>(::chdir(place));
+  }
+}
 
 long process_number() { return 1; }
 

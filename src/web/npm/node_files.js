@@ -3,7 +3,6 @@
 
 const fs = require('node:fs');
 const path = require('node:path');
-const { FileError } = require('./wasi.js');
 
 const stateOf = (found) => ({
   type: found.isFile() ? 'file' : found.isDirectory() ? 'folder' : found.isSymbolicLink() ? 'link' : '',
@@ -43,31 +42,50 @@ class NodeFile {
 }
 
 const { constants } = fs;
-const nodeFiles = {
-  join: (folder, name) => path.resolve(folder, name),
-  open(name, { create, exclusive, truncate, write }) {
-    const flags = (write ? constants.O_RDWR : constants.O_RDONLY) |
-      (create ? constants.O_CREAT : 0) | (exclusive ? constants.O_EXCL : 0) |
-      (truncate ? constants.O_TRUNC : 0);
-    try {
-      return new NodeFile(fs.openSync(name, flags, 0o666));
-    } catch (error) {
-      // A device may be only for writing.
-      if (!write || error.code !== 'EACCES') throw error;
-      return new NodeFile(fs.openSync(name, (flags & ~constants.O_RDWR) | constants.O_WRONLY, 0o666));
-    }
-  },
-  stat: (name, follow) => stateOf((follow ? fs.statSync : fs.lstatSync)(name, { bigint: true })),
-  list: (name) => fs.readdirSync(name, { withFileTypes: true }).map((entry) => ({
-    name: entry.name,
-    type: entry.isFile() ? 'file' : entry.isDirectory() ? 'folder' : entry.isSymbolicLink() ? 'link' : '',
-  })),
-  makeFolder: (name) => fs.mkdirSync(name),
-  removeFolder: (name) => fs.rmdirSync(name),
-  remove: (name) => fs.unlinkSync(name),
-  rename: (from, to) => fs.renameSync(from, to),
-  link: (name) => fs.readlinkSync(name),
-};
+
+// How the program calls a folder: Windows' drives lie in its root, "/C:/Users".
+const place = (folder) => (path.sep === '\\' ? `/${folder.replaceAll('\\', '/')}` : folder);
+// A name of Windows that begins with a drive counts for itself, whatever the program has put before it.
+const nameInPlace = (folder, name) =>
+  path.resolve(folder, path.sep === '\\' ? name.replace(/^.*(?=[A-Za-z]:[\\/])/, '') : name);
+
+// noteMade and noteGone are told the names of files that are made to be renamed or removed soon.
+function makeNodeFiles({ noteMade, noteGone }) {
+  return {
+    join: nameInPlace,
+    open(name, { create, exclusive, truncate, write }) {
+      const flags = (write ? constants.O_RDWR : constants.O_RDONLY) |
+        (create ? constants.O_CREAT : 0) | (exclusive ? constants.O_EXCL : 0) |
+        (truncate ? constants.O_TRUNC : 0);
+      let number;
+      try {
+        number = fs.openSync(name, flags, 0o666);
+      } catch (error) {
+        // A device may be only for writing.
+        if (!write || error.code !== 'EACCES') throw error;
+        number = fs.openSync(name, (flags & ~constants.O_RDWR) | constants.O_WRONLY, 0o666);
+      }
+      if (exclusive) noteMade(name);
+      return new NodeFile(number);
+    },
+    stat: (name, follow) => stateOf((follow ? fs.statSync : fs.lstatSync)(name, { bigint: true })),
+    list: (name) => fs.readdirSync(name, { withFileTypes: true }).map((entry) => ({
+      name: entry.name,
+      type: entry.isFile() ? 'file' : entry.isDirectory() ? 'folder' : entry.isSymbolicLink() ? 'link' : '',
+    })),
+    makeFolder: (name) => fs.mkdirSync(name),
+    removeFolder: (name) => fs.rmdirSync(name),
+    remove(name) {
+      fs.unlinkSync(name);
+      noteGone(name);
+    },
+    rename(from, to) {
+      fs.renameSync(from, to);
+      noteGone(from);
+    },
+    link: (name) => fs.readlinkSync(name),
+  };
+}
 
 // A stream may be set not to block; then it is asked again.
 function patiently(call) {
@@ -100,4 +118,4 @@ function nodeStream(number) {
   };
 }
 
-module.exports = { nodeFiles, nodeStream, FileError };
+module.exports = { makeNodeFiles, nodeStream, place };

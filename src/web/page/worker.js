@@ -34,7 +34,7 @@ onmessage = ({ data: { module, args, files, wanted } }) => {
     const streams = makeStreams((progress) => postMessage(progress));
     const host = makeHost({
       args: ['unflex', ...args],
-      environment: { TERM: 'xterm', NO_COLOR: '1', TMPDIR: '/tmp' },
+      environment: { PWD: '/', TERM: 'xterm', NO_COLOR: '1', TMPDIR: '/tmp' },
       folders: { '/': '/' },
       files: memory,
       streams: streams.streams,

@@ -1,6 +1,7 @@
-"""The program for Windows under Wine: windows_test.py UNFLEX UNFLEX.EXE DATA
+"""The program of another platform: program_test.py UNFLEX DATA COMMAND...
 
-UNFLEX is the program of this machine, DATA the folder of test data.
+UNFLEX is the program of this machine, DATA the folder of test data, COMMAND what runs the other
+program, such as wine and unflex.exe.
 """
 
 import os
@@ -12,7 +13,9 @@ import tempfile
 import time
 import unittest
 
-UNFLEX, EXE, DATA = (os.path.abspath(path) for path in sys.argv[1:4])
+UNFLEX, DATA = (os.path.abspath(path) for path in sys.argv[1:3])
+COMMAND = sys.argv[3:]
+IS_WINDOWS = COMMAND[-1].endswith(".exe")
 PRINT = os.path.join(DATA, "pipeline_washer_arcs.gcode")
 SETTINGS = ["-q", "--set", "printer.firmware=klipper", "--set", "dynamics.x.freq_hz=45", "--set",
             "dynamics.y.freq_hz=38"]
@@ -24,7 +27,7 @@ def read(path):
         return file.read()
 
 
-class Windows(unittest.TestCase):
+class Program(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         with tempfile.TemporaryDirectory() as folder:
@@ -39,9 +42,9 @@ class Windows(unittest.TestCase):
         os.chdir(self.folder)
         self.addCleanup(os.chdir, self.was)
 
-    def run_exe(self, *words, text=None, stdin=subprocess.DEVNULL):
+    def run_program(self, *words, text=None, stdin=subprocess.DEVNULL):
         given = {"input": text} if text is not None else {"stdin": stdin}
-        return subprocess.run(["wine", EXE, *words], env=ENVIRONMENT, check=False,
+        return subprocess.run([*COMMAND, *words], env=ENVIRONMENT, check=False,
                               capture_output=True, **given)
 
     def expect(self, done, code, said=b""):
@@ -50,7 +53,7 @@ class Windows(unittest.TestCase):
     def test_names_may_have_any_letters(self):
         os.mkdir("prüf ♥ x")
         shutil.copy(PRINT, "prüf ♥ x/wäsche.gcode")
-        self.expect(self.run_exe("compensate", "prüf ♥ x/wäsche.gcode", "-o", "prüf ♥ x/aus ü.gcode",
+        self.expect(self.run_program("compensate", "prüf ♥ x/wäsche.gcode", "-o", "prüf ♥ x/aus ü.gcode",
                                  *SETTINGS), 0)
         self.assertEqual(read("prüf ♥ x/aus ü.gcode"), self.whole)
         self.assertEqual(sorted(os.listdir("prüf ♥ x")), ["aus ü.gcode", "wäsche.gcode"])
@@ -59,27 +62,27 @@ class Windows(unittest.TestCase):
         folder = os.path.join(*["l" * 60] * 6)
         os.makedirs(folder)
         shutil.copy(PRINT, os.path.join(folder, "a.gcode"))
-        self.expect(self.run_exe("compensate", folder + "/a.gcode", "-o", folder + "/b.gcode",
+        self.expect(self.run_program("compensate", folder + "/a.gcode", "-o", folder + "/b.gcode",
                                  *SETTINGS), 0)
         self.assertEqual(read(os.path.join(folder, "b.gcode")), self.whole)
 
     def test_replaces_in_place_once(self):
         shutil.copy(PRINT, "p.gcode")
         words = ("compensate", "--in-place", "p.gcode", "--log", "l.txt", *SETTINGS)
-        self.expect(self.run_exe(*words), 0)
+        self.expect(self.run_program(*words), 0)
         self.assertEqual(read("p.gcode"), self.whole)
-        self.assertEqual(self.run_exe(*words).returncode, 2)
+        self.assertEqual(self.run_program(*words).returncode, 2)
         self.assertEqual(read("p.gcode"), self.whole)
         self.assertEqual(sorted(os.listdir(".")), ["l.txt", "p.gcode"])
         self.assertNotIn(b"\r", read("l.txt"))
         self.assertIn(b"exit code 2", read("l.txt"))
 
     def test_streams_carry_bytes_as_they_are(self):
-        done = self.run_exe("compensate", "-", "-o", "-", *SETTINGS, text=read(PRINT))
+        done = self.run_program("compensate", "-", "-o", "-", *SETTINGS, text=read(PRINT))
         self.assertEqual(done.returncode, 0)
         self.assertEqual(done.stdout, self.whole)
         with open(PRINT, "rb") as file:
-            done = self.run_exe("compensate", "-", "-o", "-", *SETTINGS, stdin=file)
+            done = self.run_program("compensate", "-", "-o", "-", *SETTINGS, stdin=file)
         self.assertEqual(done.stdout, self.whole)
 
     def test_does_a_folder_once(self):
@@ -87,17 +90,19 @@ class Windows(unittest.TestCase):
         for number in range(3):
             shutil.copy(PRINT, "in/sub/{}.gcode".format(number))
         words = ("batch", "in", "-o", "out", "-j", "2", *SETTINGS[1:])
-        first = self.run_exe(*words)
+        first = self.run_program(*words)
         self.assertEqual(first.returncode, 0)
         self.assertIn(b"3 done, 0 unchanged", first.stdout)
         for number in range(3):
             self.assertEqual(read("out/sub/{}.gcode".format(number)), self.whole)
-        self.assertIn(b"0 done, 3 unchanged", self.run_exe(*words).stdout)
+        self.assertIn(b"0 done, 3 unchanged", self.run_program(*words).stdout)
         self.assertEqual(sorted(os.listdir("out")), [".unflex-batch.json", "sub"])
 
     def test_tells_what_is_wrong(self):
         shutil.copy(PRINT, "p.gcode")
         os.mkdir("in")
+        # Windows takes capitals for small letters.
+        other = "./in/../P.GCODE" if IS_WINDOWS else "./in/../p.gcode"
         for words, code, said in (
                 (("compensate", "no.gcode", "-o", "x.gcode"), 2,
                  b"no.gcode: cannot read: No such file or directory\n"),
@@ -105,18 +110,18 @@ class Windows(unittest.TestCase):
                  b"no/x.gcode: the directory no does not exist; create it\n"),
                 (("compensate", "in", "-o", "x.gcode"), 2,
                  b"in: is a directory, not a G-code file\n"),
-                (("compensate", "p.gcode", "-o", "./in/../P.GCODE"), 1,
-                 b"./in/../P.GCODE: is the input too; to replace it give --in-place\n"),
+                (("compensate", "p.gcode", "-o", other), 1,
+                 other.encode() + b": is the input too; to replace it give --in-place\n"),
                 (("compensate", "p.gcode", "--in-place", "--engine", "ipopt"), 1,
                  b"unflex: Ipopt is not built into this unflex; the banded engine solves\n")):
-            self.expect(self.run_exe(*words, *SETTINGS), code, said)
+            self.expect(self.run_program(*words, *SETTINGS), code, said)
         self.assertEqual(sorted(os.listdir(".")), ["in", "p.gcode"])
 
     def test_ends_when_it_is_interrupted(self):
         with open("long.gcode", "wb") as file:
             file.write(read(PRINT) * 40)
         program = subprocess.Popen(
-            ["wine", EXE, "compensate", "long.gcode", "-o", "out.gcode", *SETTINGS], env=ENVIRONMENT,
+            [*COMMAND, "compensate", "long.gcode", "-o", "out.gcode", *SETTINGS], env=ENVIRONMENT,
             stdin=subprocess.DEVNULL, stderr=subprocess.PIPE)
         end = time.monotonic() + 30
         while len(os.listdir(".")) < 2 and time.monotonic() < end:
