@@ -1,8 +1,9 @@
-# How modules are optimised whose loops take no time, and those that shall build soon. A toolchain for
-# a program that shall be small may say so.
+# How modules are optimised: those whose loops take the time, all others, and those that shall build
+# soon. A toolchain may say something else, such as for a program that shall be small.
+set(UNFLEX_NUMERICAL_OPTIMISATION "" CACHE STRING "")
 set(UNFLEX_PLAIN_OPTIMISATION -O2 CACHE STRING "")
 set(UNFLEX_SOON_OPTIMISATION -O1 CACHE STRING "")
-mark_as_advanced(UNFLEX_PLAIN_OPTIMISATION UNFLEX_SOON_OPTIMISATION)
+mark_as_advanced(UNFLEX_NUMERICAL_OPTIMISATION UNFLEX_PLAIN_OPTIMISATION UNFLEX_SOON_OPTIMISATION)
 
 # unflex_module(name [NUMERICAL] SOURCES file... [LINKS target...])
 #
@@ -25,9 +26,11 @@ function(unflex_module name)
                                                    $<$<NOT:$<BOOL:${UNFLEX_THREADS}>>:UNFLEX_NO_THREADS>)
   target_link_libraries(unflex_${name} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE_LINKS})
   unflex_flags(unflex_${name})
-  if(NOT ARG_NUMERICAL)
-    target_compile_options(unflex_${name} PRIVATE $<$<CONFIG:Release>:${UNFLEX_PLAIN_OPTIMISATION}>)
+  set(kind PLAIN)
+  if(ARG_NUMERICAL)
+    set(kind NUMERICAL)
   endif()
+  target_compile_options(unflex_${name} PRIVATE $<$<CONFIG:Release>:${UNFLEX_${kind}_OPTIMISATION}>)
   # The headers were compiled as fmt wants it. A module may be built with other sanitizers than they
   # are (tests/fuzz/CMakeLists.txt).
   if(fmt::fmt IN_LIST ARG_PRIVATE_LINKS AND NOT UNFLEX_SANITIZE)

@@ -34,7 +34,7 @@ test_packages=(
 platform_packages=(
   # WebAssembly, and what runs it.
   clang-22 lld-22 libc++-22-dev-wasm32 libc++abi-22-dev-wasm32 libclang-rt-22-dev-wasm32 wasi-libc
-  binaryen nodejs
+  binaryen nodejs python3 xz-utils
   # Windows.
   g++-mingw-w64-x86-64-posix wine wine64
   # Linux on other processors.

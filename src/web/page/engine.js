@@ -3,15 +3,37 @@
 
 const byId = (id) => document.getElementById(id);
 
+// The bytes that stand in an element, each four of them as five letters (make_page.sh).
+function bytesIn(id) {
+  const letters = '0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;,=>?@^_`{|}~';
+  const values = new Uint8Array(128);
+  [...letters].forEach((letter, value) => { values[letter.charCodeAt(0)] = value; });
+  const [length, text] = byId(id).textContent.trim().split(' ');
+  const bytes = new DataView(new ArrayBuffer((text.length / 5) * 4));
+  for (let i = 0; i < text.length; i += 5) {
+    let number = 0;
+    for (let k = 0; k < 5; ++k) number = number * 85 + values[text.charCodeAt(i + k)];
+    bytes.setUint32((i / 5) * 4, number);
+  }
+  return new Uint8Array(bytes.buffer, 0, Number(length));
+}
+
 // What lies packed in an element of the page.
-function unpacked(id) {
-  const packed = Uint8Array.from(atob(byId(id).textContent.trim()), (c) => c.charCodeAt(0));
-  return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream('gzip')));
+async function unpacked(id) {
+  const packed = bytesIn(id);
+  const { instance } = await WebAssembly.instantiate(bytesIn('unpack'));
+  const { memory, room_for: roomFor, unpack } = instance.exports;
+  const length = Number(new DataView(packed.buffer, packed.byteOffset).getBigUint64(5, true));
+  const from = roomFor(packed.length);
+  const to = roomFor(length);
+  new Uint8Array(memory.buffer, from, packed.length).set(packed);
+  if (unpack(from, packed.length, to, length) !== 1) throw new Error('The page is damaged.');
+  return new Uint8Array(memory.buffer, to, length);
 }
 
 let compiled;
 function program() {
-  compiled ??= unpacked('program').arrayBuffer().then((bytes) => WebAssembly.compile(bytes));
+  compiled ??= unpacked('program').then((bytes) => WebAssembly.compile(bytes));
   return compiled;
 }
 
@@ -36,7 +58,7 @@ function run(args, { files = {}, wanted = [], onProgress = () => {} } = {}) {
       else end(data);
     };
     worker.postMessage({ module, args, files, wanted });
-  }));
+  })).catch((error) => ({ code: -1, told: '', said: [`This browser cannot run unflex: ${error.message}`], files: {} }));
   result.stop = () => stop?.();
   return result;
 }
@@ -77,7 +99,7 @@ function showPage(blob, title) {
 
 async function showTerms() {
   byId('page-title').textContent = 'Terms';
-  byId('page-body').replaceChildren(element('pre', { class: 'long' }, await unpacked('copyright').text()));
+  byId('page-body').replaceChildren(element('pre', { class: 'long' }, new TextDecoder().decode(await unpacked('copyright'))));
   byId('page-dialog').showModal();
 }
 
