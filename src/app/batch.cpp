@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <numeric>
 #include <optional>
@@ -34,7 +35,8 @@ constexpr std::chrono::milliseconds kBetweenLooks{2000};
 
 // Settings are checked first, so that what is wrong with them is said once and not for every print.
 Status check_printer_file(const RunConfig& config) {
-  const auto state = platform::state_of(config.printer_file.value_or(""));
+  const auto state =
+      config.printer_file ? platform::state_of(*config.printer_file) : tl::unexpected(ENOENT);
   if (state && state->kind != platform::FileKind::file) {
     return fail(ErrorKind::usage, {*config.printer_file, 0},
                 "is read for every print; give --printer a file");

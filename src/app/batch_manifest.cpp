@@ -95,6 +95,9 @@ Result<BatchManifest> BatchManifest::open(const std::string& folder,
 
 void BatchManifest::read(const std::string& file, bool is_own) {
   const std::unique_ptr<std::istream> stream = platform::read_file(file);
+  if (!*stream) {
+    return;
+  }
   const Json json = Json::parse(*stream, nullptr, false);
   if (!json.is_object() || json.value("schema_version", Json()) != kSchemaVersion) {
     return;

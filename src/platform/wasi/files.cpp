@@ -31,11 +31,17 @@ class FileBuffer final : public std::streambuf {
 
  protected:
   int_type underflow() override {
+    if (!is_open()) {
+      return traits_type::eof();
+    }
     const std::size_t count = std::fread(block_.data(), 1, block_.size(), file_);
     setg(block_.data(), block_.data(), block_.data() + count);
     return count == 0 ? traits_type::eof() : traits_type::to_int_type(*gptr());
   }
   std::streamsize xsputn(const char* text, std::streamsize count) override {
+    if (!is_open()) {
+      return 0;
+    }
     forget_read();
     return static_cast<std::streamsize>(
         std::fwrite(text, 1, static_cast<std::size_t>(count), file_));
@@ -47,8 +53,11 @@ class FileBuffer final : public std::streambuf {
     const char text = traits_type::to_char_type(character);
     return xsputn(&text, 1) == 1 ? character : traits_type::eof();
   }
-  int sync() override { return std::fflush(file_); }
+  int sync() override { return is_open() ? std::fflush(file_) : -1; }
   pos_type seekoff(off_type offset, std::ios::seekdir from, std::ios::openmode /*which*/) override {
+    if (!is_open()) {
+      return pos_type(off_type(-1));
+    }
     forget_read();
     const int origin =
         from == std::ios::beg ? SEEK_SET : (from == std::ios::cur ? SEEK_CUR : SEEK_END);
