@@ -20,7 +20,7 @@ COMMITS = 5
 # A change of more files than that is alike in many of them, so only some of these are read.
 MOST = 30
 # Sources for other systems, which this compiler cannot read.
-ELSEWHERE = ("src/platform/windows/", "src/platform/wasi/")
+ELSEWHERE = ("src/platform/windows/", "src/platform/wasi/", "src/web/")
 OPTIONS = ["-std=c++20", "-DFMT_SHARED", '-DUNFLEX_VERSION=""', "-DTOML_HEADER_ONLY=1",
            "-DTOML_EXCEPTIONS=0", f"-I{ROOT}/include",
            f"-I{ROOT}/tests", f"-I{ROOT}/src/pipeline",
