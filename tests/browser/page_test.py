@@ -31,7 +31,7 @@ SHAPER = "[input_shaper]\nshaper_freq_x: 45\nshaper_freq_y: 38\nshaper_type: zv\
 class Page(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.browser = chromium.Chromium(timeout_s=600)
+        cls.browser = chromium.Chromium(timeout_s=240)
         cls.folder = tempfile.TemporaryDirectory()
         cls.write("printer.cfg", CONFIGURATION)
         cls.write("shaper.cfg", SHAPER)
