@@ -166,7 +166,7 @@ class Page(unittest.TestCase):
         self.add_printer()
         self.show("print")
         self.choose("faster-file", self.sliced)
-        self.browser.wait_for("document.getElementById('faster-status').innerText.includes('first four layers')")
+        self.browser.wait_for("document.getElementById('faster-status').textContent.includes('first four layers')")
         self.assertEqual(self.run_script("document.querySelectorAll('#faster-curve circle').length"), 5)
 
     def test_reads_records(self):
