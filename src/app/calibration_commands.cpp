@@ -25,30 +25,27 @@ void add_tower(CLI::App& command, RunConfig& config) {
   const auto tower = [&config]() -> identify::Tower& {
     return config.identify.tower ? *config.identify.tower : config.identify.tower.emplace();
   };
-  command
-      .add_option_function<double>(
-          "--wave-spacing-mm",
-          [tower](double value) {
-            tower().spacing_mm = value;
-            tower().spacing_spread_mm = kShareOfSpacing * value;
-          },
-          "Of a ringing tower: distance from wave to wave")
+  add_number(
+      command, "--wave-spacing-mm",
+      [tower](double value) {
+        tower().spacing_mm = value;
+        tower().spacing_spread_mm = kShareOfSpacing * value;
+      },
+      "Of a ringing tower: distance from wave to wave")
       ->type_name("MM")
       ->check(positive());
-  command
-      .add_option_function<double>(
-          "--speed-mm-s", [tower](double value) { tower().speed_mm_s = value; },
-          "Of a ringing tower: speed its walls were printed at")
+  add_number(
+      command, "--speed-mm-s", [tower](double value) { tower().speed_mm_s = value; },
+      "Of a ringing tower: speed its walls were printed at")
       ->type_name("V")
       ->check(positive());
-  command
-      .add_option_function<double>(
-          "--decay",
-          [tower](double value) {
-            tower().decay = value;
-            tower().decay_spread = kShareOfDecay * (value - 1.0);
-          },
-          "Of a ringing tower: height of a wave over that of the next")
+  add_number(
+      command, "--decay",
+      [tower](double value) {
+        tower().decay = value;
+        tower().decay_spread = kShareOfDecay * (value - 1.0);
+      },
+      "Of a ringing tower: height of a wave over that of the next")
       ->type_name("RATIO")
       ->check(positive());
 }
@@ -95,11 +92,11 @@ void add_identify(CLI::App& program, RunConfig& config) {
   command->add_option("--axis", identify.axis, "The axis they are of, if their names do not tell")
       ->type_name("x|y")
       ->transform(letters);
-  command
-      ->add_option("--freq-start", identify.sweep.start_hz, "Where the sweep began, 5 by default")
+  add_number(*command, "--freq-start", identify.sweep.start_hz,
+             "Where the sweep began, 5 by default")
       ->type_name("HZ")
       ->check(positive());
-  command->add_option("--freq-end", identify.sweep.end_hz, "Where the sweep ended, 133 by default")
+  add_number(*command, "--freq-end", identify.sweep.end_hz, "Where the sweep ended, 133 by default")
       ->type_name("HZ")
       ->check(positive());
   add_tower(*command, config);
@@ -146,17 +143,15 @@ void add_tune(CLI::App& program, RunConfig& config) {
       ->add_option("--like", tune.like,
                    "A sliced print, whose start code and end code the first tower shall have")
       ->type_name("IN");
-  command
-      ->add_option("--nozzle-temp", tune.nozzle_temp_c,
-                   "Without --like: the nozzle's temperature, in degrees Celsius")
+  add_number(*command, "--nozzle-temp", tune.nozzle_temp_c,
+             "Without --like: the nozzle's temperature, in degrees Celsius")
       ->type_name("C")
       ->check(positive());
-  command->add_option("--bed-temp", tune.bed_temp_c, "Without --like: the bed's temperature")
+  add_number(*command, "--bed-temp", tune.bed_temp_c, "Without --like: the bed's temperature")
       ->type_name("C")
       ->check(positive());
-  command
-      ->add_option("--accel", tune.accel_mm_s2,
-                   "Acceleration of the tower, in mm/s^2, where the printer's own is too little")
+  add_number(*command, "--accel", tune.accel_mm_s2,
+             "Acceleration of the tower, in mm/s^2, where the printer's own is too little")
       ->type_name("N")
       ->check(positive());
   add_settings(*command, config);
@@ -177,28 +172,25 @@ void add_hotend(CLI::App& program, RunConfig& config) {
       ->add_option("LOG", config.input,
                    "klippy.log, a serial log, or a table of time, temperature and power")
       ->type_name("");
-  command
-      ->add_option("--power", hotend.full_power,
-                   "What means full power in LOG; by default 255 in a table, 1 in klippy.log, 127 "
-                   "in a serial log")
+  add_number(*command, "--power", hotend.full_power,
+             "What means full power in LOG; by default 255 in a table, 1 in klippy.log, 127 "
+             "in a serial log")
       ->type_name("FULL")
       ->check(positive());
   command
       ->add_option("--heater", hotend.heater,
                    "The heater's section in printer.cfg, extruder by default")
       ->type_name("NAME");
-  command
-      ->add_option("--ambient", hotend.ambient_c,
-                   "Temperature of the hotend without power; without it, found in LOG")
+  add_number(*command, "--ambient", hotend.ambient_c,
+             "Temperature of the hotend without power; without it, found in LOG")
       ->type_name("C")
       ->check(temperature(kWarmestRoom_c));
-  command
-      ->add_option("--ku", hotend.ultimate_gain,
-                   "From a test: the gain at which the temperature keeps swinging, counts of 255 "
-                   "per degree")
+  add_number(*command, "--ku", hotend.ultimate_gain,
+             "From a test: the gain at which the temperature keeps swinging, counts of 255 "
+             "per degree")
       ->type_name("GAIN")
       ->check(positive());
-  command->add_option("--pu", hotend.ultimate_period_s, "From a test: the period of that swing")
+  add_number(*command, "--pu", hotend.ultimate_period_s, "From a test: the period of that swing")
       ->type_name("S")
       ->check(positive());
   command
@@ -211,17 +203,15 @@ void add_hotend(CLI::App& program, RunConfig& config) {
                                           {"zn-pi", hotend::Rule::zn_pi},
                                           {"cc", hotend::Rule::cohen_coon},
                                           {"tl", hotend::Rule::tyreus_luyben}}));
-  command->add_option("--target", hotend.target_c, "Where the simulated step goes, 210 by default")
+  add_number(*command, "--target", hotend.target_c, "Where the simulated step goes, 210 by default")
       ->type_name("C")
       ->check(temperature(kHottest_c));
-  command
-      ->add_option("--flow", hotend.flow_mm3_s,
-                   "Filament that melts, for the simulated load; 10 by default")
+  add_number(*command, "--flow", hotend.flow_mm3_s,
+             "Filament that melts, for the simulated load; 10 by default")
       ->type_name("MM3_S")
       ->check(positive());
-  command
-      ->add_option("--heater-watts", hotend.heater_w,
-                   "What the heater gives at full power, for the load")
+  add_number(*command, "--heater-watts", hotend.heater_w,
+             "What the heater gives at full power, for the load")
       ->type_name("W")
       ->check(positive());
   add_common_options(*command, config, kReportOfModel,

@@ -33,9 +33,8 @@ void add_strict(CLI::App& command, RunConfig& config) {
 }
 
 void add_max_deviation(CLI::App& command, RunConfig& config) {
-  command
-      .add_option("--max-deviation", config.max_deviation_mm,
-                  "Fail with exit code 3 if extruding moves stray further from the path")
+  add_number(command, "--max-deviation", config.max_deviation_mm,
+             "Fail with exit code 3 if extruding moves stray further from the path")
       ->type_name("MM")
       ->check(positive());
 }
@@ -217,9 +216,8 @@ void add_filament(CLI::App& program, RunConfig& config) {
       "filament", "Fit the E of a print to a filament that is not a full cylinder");
   add_print_and_output(*command, config);
   add_settings(*command, config);
-  command
-      ->add_option("--filament-start-mm", config.filament_start_mm,
-                   "Where on the filament's profile the print begins")
+  add_number(*command, "--filament-start-mm", config.filament_start_mm,
+             "Where on the filament's profile the print begins")
       ->type_name("MM");
   command->add_flag("-q,--quiet", config.quiet, "No summary");
   add_strict(*command, config);
@@ -248,17 +246,22 @@ void add_study(CLI::App& program, RunConfig& config) {
   command->add_flag("--at-all-times", config.at_all_times,
                     "With --faster: let no moment exceed it, not even a thousandth");
   command
-      ->add_option("--accel", config.accels_mm_s2,
-                   "With IN: compensate it at these accelerations, as 2500,5000,10000")
+      ->add_option_function<std::vector<std::string>>(
+          "--accel",
+          [&config](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) {
+              config.accels_mm_s2.push_back(*parse_real(text));
+            }
+          },
+          "With IN: compensate it at these accelerations, as 2500,5000,10000")
       ->type_name("MM/S2")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(positive());
   command->add_flag("--scale-m204", config.scale_m204,
                     "With --accel: scale what the print itself sets of acceleration as well");
-  command
-      ->add_option("--keep-rms", config.keep_rms_um,
-                   "With --accel: name the fastest whose RMS error is at most this")
+  add_number(*command, "--keep-rms", config.keep_rms_um,
+             "With --accel: name the fastest whose RMS error is at most this")
       ->type_name("UM")
       ->check(positive());
   add_common_options(*command, config);

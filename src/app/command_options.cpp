@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "unflex/core/number.hpp"
 
@@ -9,10 +10,9 @@ namespace unflex::app {
 
 CLI::Validator positive() {
   return {[](std::string& text) {
-            double value = 0.0;
-            const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
-            return good && value > 0.0 ? std::string{}
-                                       : fmt::format("'{}' is not a number above 0", text);
+            const std::optional<double> value = parse_real(text);
+            return value && *value > 0.0 ? std::string{}
+                                         : fmt::format("'{}' is not a number above 0", text);
           },
           ""};
 }
@@ -38,6 +38,20 @@ CLI::Validator counting_number(unsigned most) {
                         : fmt::format("'{}' is not a whole number from 1 to {}", text, most);
           },
           ""};
+}
+
+CLI::Option* add_number(CLI::App& command, const std::string& name,
+                        std::function<void(double)> take, const std::string& help) {
+  return command.add_option_function<std::string>(
+      name,
+      [take = std::move(take), name](const std::string& text) {
+        const std::optional<double> value = parse_real(text);
+        if (!value) {
+          throw CLI::ConversionError(text, name);
+        }
+        take(*value);
+      },
+      help);
 }
 
 void add_overrides(CLI::App& command, RunConfig& config) {

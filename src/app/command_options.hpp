@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -40,6 +41,18 @@ template <class T>
             return fmt::format("'{}' is none of {}", text, words);
           },
           ""};
+}
+
+// An option with a number, read as unflex reads all numbers. CLI11 would read a long double:
+// systems differ in its last bit, and WASI's library stops the program.
+CLI::Option* add_number(CLI::App& command, const std::string& name,
+                        std::function<void(double)> take, const std::string& help);
+
+template <class T>
+CLI::Option* add_number(CLI::App& command, const std::string& name, T& value,
+                        const std::string& help) {
+  return add_number(
+      command, name, [&value](double number) { value = number; }, help);
 }
 
 // --set.

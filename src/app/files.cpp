@@ -17,10 +17,6 @@
 namespace unflex::app {
 namespace {
 
-// The ending keeps temporary files apart from names that people choose, such as .unflex-backup.
-constexpr std::string_view kBeginning = ".unflex-";
-constexpr std::string_view kEnding = ".tmp";
-constexpr std::size_t kNameLength = kBeginning.size() + 6 + kEnding.size();
 constexpr std::size_t kBlockBytes = std::size_t{1} << 16U;
 
 // How often a wait is interrupted to see whether a signal has come just before it.
@@ -40,7 +36,7 @@ bool try_again(int fd, bool (*wait)(int, std::chrono::milliseconds)) {
 }  // namespace
 
 tl::expected<TemporaryFile, int> TemporaryFile::create(const std::string& folder) {
-  return platform::make_locked_file(folder, kBeginning, kEnding).map([](platform::LockedFile made) {
+  return platform::make_locked_file(folder).map([](platform::LockedFile made) {
     return TemporaryFile(std::move(made.name), std::move(made.file));
   });
 }
@@ -49,8 +45,7 @@ bool TemporaryFile::remove_abandoned(const std::string& folder) {
   bool all_gone = true;
   for (const platform::FolderEntry& entry : platform::entries_of(folder.empty() ? "." : folder)
                                                 .value_or(std::vector<platform::FolderEntry>{})) {
-    if (entry.name.size() == kNameLength && entry.name.starts_with(kBeginning) &&
-        entry.name.ends_with(kEnding)) {
+    if (platform::is_temporary_name(entry.name)) {
       all_gone = platform::remove_unless_locked(platform::joined(folder, entry.name)) !=
                      platform::Removal::in_use &&
                  all_gone;

@@ -188,8 +188,11 @@ class Page(unittest.TestCase):
         self.run_script("for (const wall of document.querySelectorAll('.wall')) {"
                  "  wall.querySelectorAll('.band')[12].click(); wall.querySelectorAll('.band')[17].click(); }")
         self.run_script("document.getElementById('tower-read').click()")
-        self.browser.wait_for("document.getElementById('tower-status').innerText.includes('Hz')")
+        self.browser.wait_for("document.querySelector('#tower-status pre')?.innerText.includes('damping ratios')")
+        self.assertIn("x: 42.52 Hz", self.text("tower-status"))
         self.browser.wait_for("document.querySelector('#tower-status a.primary') !== null")
+        self.show("printer")
+        self.assertIn("X 42.5 Hz, Y 35.", self.text("printer-list"))
 
     def test_shows_a_corner(self):
         self.show("corner")

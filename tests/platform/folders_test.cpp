@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "unflex/platform/descriptors.hpp"
+#include "unflex/platform/names.hpp"
 #include "unflex/platform/replacing.hpp"
 
 namespace unflex::platform {
@@ -108,8 +109,10 @@ TEST_F(Folders, AreClaimedOnceAloneOrByMany) {
 }
 
 TEST_F(Folders, KeepLockedFilesAlone) {
-  auto made = make_locked_file(folder_, ".x-", ".y");
+  auto made = make_locked_file(folder_);
   ASSERT_TRUE(made);
+  EXPECT_TRUE(is_temporary_name(last_part(made->name))) << made->name;
+  EXPECT_FALSE(is_temporary_name(".unflex-backup"));
   EXPECT_EQ(remove_unless_locked(made->name), Removal::in_use);
   EXPECT_TRUE(is_taken(made->name));
   made->file = {};
@@ -142,7 +145,7 @@ TEST_F(Folders, HoldNothingOfAnUnnamedFile) {
 TEST_F(Folders, GiveANewFileThePlaceOfAnother) {
   write("old", "old");
   fs::permissions(at("old"), fs::perms(0640));
-  auto made = make_locked_file(folder_, ".x-", ".y");
+  auto made = make_locked_file(folder_);
   ASSERT_TRUE(made);
   ASSERT_EQ(write_bytes(made->file.get(), "new"), 3);
   ASSERT_EQ(take_over_permissions(made->file.get(), at("old")), 0);

@@ -22,11 +22,11 @@ struct LockedFile {
   FileDescriptor file;  // reads and writes
 };
 
-// Makes a file with a name of its own: `beginning`, six letters, `ending`. Others cannot lock it
-// while it is open, if the file system has locks.
-[[nodiscard]] tl::expected<LockedFile, int> make_locked_file(const std::string& folder,
-                                                             std::string_view beginning,
-                                                             std::string_view ending);
+// Makes a file with a temporary name that nobody has. Others cannot lock it while it is open, if
+// the file system has locks.
+[[nodiscard]] tl::expected<LockedFile, int> make_locked_file(const std::string& folder);
+// Whether a name without folder is one that such a file has: ".unflex-", six letters, ".tmp".
+[[nodiscard]] bool is_temporary_name(std::string_view name);
 
 enum class Removal { done, in_use, not_ours };
 // Removes a file that this user made and nobody has locked.

@@ -6,14 +6,13 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
+#include "../posix_and_wasi/new_file.hpp"
+#include "../temporary_files.hpp"
 #include "unflex/platform/folders.hpp"
-#include "unflex/platform/names.hpp"
 
 namespace unflex::platform {
 namespace {
@@ -34,37 +33,11 @@ mode_t mode_of_new_files() {
   return 0666U & ~mask;
 }
 
-tl::expected<LockedFile, int> make_file(const std::string& folder, std::string_view beginning,
-                                        std::string_view ending) {
-  std::string name = joined(folder, beginning).append("XXXXXX").append(ending);
-  FileDescriptor file(::mkostemps(name.data(), static_cast<int>(ending.size()), O_CLOEXEC));
-  if (!file.valid()) {
-    return tl::unexpected(errno);
-  }
-  return LockedFile{std::move(name), std::move(file)};
-}
-
 }  // namespace
 
-const std::string_view kTemporaryDirectoryVariable = "TMPDIR";
-
-std::string temporary_directory() {
-  const char* const chosen = std::getenv("TMPDIR");
-  return chosen != nullptr && *chosen != '\0' ? chosen : "/tmp";
-}
-
-tl::expected<FileDescriptor, int> open_unnamed_file(const std::string& folder) {
-  return make_file(folder, ".unflex-", ".tmp").map([](LockedFile made) {
-    remove_file(made.name);
-    return std::move(made.file);
-  });
-}
-
-tl::expected<LockedFile, int> make_locked_file(const std::string& folder,
-                                               std::string_view beginning,
-                                               std::string_view ending) {
+tl::expected<LockedFile, int> make_locked_file(const std::string& folder) {
   for (;;) {
-    tl::expected<LockedFile, int> made = make_file(folder, beginning, ending);
+    tl::expected<LockedFile, int> made = make_temporary_file(folder, &make_new_file);
     if (!made) {
       return made;
     }
@@ -84,8 +57,6 @@ Removal remove_unless_locked(const std::string& name) {
   const bool is_free = file.valid() && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0;
   return is_free && remove_file(name) ? Removal::done : Removal::in_use;
 }
-
-bool remove_file(const std::string& name) { return ::unlink(name.c_str()) == 0; }
 
 tl::expected<FileDescriptor, int> claim_folder(const std::string& folder, Claim claim) {
   FileDescriptor claimed(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -119,12 +90,6 @@ int take_over_permissions(int descriptor, const std::string& replaced) {
   // Rights to run as someone must not pass to another owner.
   const mode_t kept = status.st_mode & (same_owner ? 07777U : 0777U);
   return outcome(::fchmod(descriptor, kept));
-}
-
-int sync_file(int descriptor) { return outcome(::fsync(descriptor)); }
-
-int replace_file(const std::string& from, const std::string& to) {
-  return outcome(std::rename(from.c_str(), to.c_str()));
 }
 
 void sync_folder(const std::string& folder) {

@@ -7,12 +7,12 @@
 #include <chrono>
 #include <cstring>
 #include <optional>
-#include <random>
 #include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "../temporary_files.hpp"
 #include "open_shared.hpp"
 #include "unflex/platform/folders.hpp"
 #include "unflex/platform/names.hpp"
@@ -27,29 +27,13 @@ constexpr std::chrono::milliseconds kBetweenTries{100};
 
 HANDLE handle_of(int descriptor) { return reinterpret_cast<HANDLE>(_get_osfhandle(descriptor)); }
 
-std::string six_letters() {
-  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789";
-  std::random_device random;
-  std::string letters(6, ' ');
-  for (char& letter : letters) {
-    letter = kLetters[random() % kLetters.size()];
-  }
-  return letters;
+FileDescriptor make_new_file(const std::string& name) {
+  return open_shared(name, GENERIC_READ | GENERIC_WRITE, CREATE_NEW);
 }
 
-// Makes a file that reads and writes, with a name that nobody has.
-tl::expected<LockedFile, int> make_file(const std::string& folder, std::string_view beginning,
-                                        std::string_view ending, DWORD flags) {
-  for (;;) {
-    std::string name = joined(folder, std::string(beginning).append(six_letters()).append(ending));
-    FileDescriptor file = open_shared(name, GENERIC_READ | GENERIC_WRITE, CREATE_NEW, flags);
-    if (file.valid()) {
-      return LockedFile{std::move(name), std::move(file)};
-    }
-    if (errno != EEXIST) {
-      return tl::unexpected(errno);
-    }
-  }
+FileDescriptor make_passing_file(const std::string& name) {
+  return open_shared(name, GENERIC_READ | GENERIC_WRITE, CREATE_NEW,
+                     FILE_ATTRIBUTE_TEMPORARY | FILE_FLAG_DELETE_ON_CLOSE);
 }
 
 // Locks a byte far behind what any file holds, since a locked byte cannot be read.
@@ -89,14 +73,13 @@ std::string temporary_directory() {
 }
 
 tl::expected<FileDescriptor, int> open_unnamed_file(const std::string& folder) {
-  return make_file(folder, ".unflex-", ".tmp", FILE_ATTRIBUTE_TEMPORARY | FILE_FLAG_DELETE_ON_CLOSE)
-      .map([](LockedFile made) { return std::move(made.file); });
+  return make_temporary_file(folder, &make_passing_file).map([](LockedFile made) {
+    return std::move(made.file);
+  });
 }
 
-tl::expected<LockedFile, int> make_locked_file(const std::string& folder,
-                                               std::string_view beginning,
-                                               std::string_view ending) {
-  return make_file(folder, beginning, ending, 0).map([](LockedFile made) {
+tl::expected<LockedFile, int> make_locked_file(const std::string& folder) {
+  return make_temporary_file(folder, &make_new_file).map([](LockedFile made) {
     lock(made.file.get());
     return made;
   });

@@ -43,14 +43,20 @@ let workerAddress;
 // {code, told, said, files}; stop() of what is returned ends it, and then it resolves to {stopped}.
 function run(args, { files = {}, wanted = [], onProgress = () => {} } = {}) {
   workerAddress ??= URL.createObjectURL(new Blob([byId('worker').textContent], { type: 'text/javascript' }));
-  let stop;
+  const stopped = { stopped: true, code: -1, told: '', said: [], files: {} };
+  let isStopped = false;
+  let stop = () => { isStopped = true; };
   const result = program().then((module) => new Promise((resolve) => {
+    if (isStopped) {
+      resolve(stopped);
+      return;
+    }
     const worker = new Worker(workerAddress);
     const end = (outcome) => {
       worker.terminate();
       resolve(outcome);
     };
-    stop = () => end({ stopped: true, code: -1, told: '', said: [], files: {} });
+    stop = () => end(stopped);
     worker.onerror = (event) => end({ code: -1, told: '', said: [event.message || 'The worker failed.'], files: {} });
     worker.onmessage = ({ data }) => {
       if ('stage' in data) onProgress(data);
@@ -59,7 +65,7 @@ function run(args, { files = {}, wanted = [], onProgress = () => {} } = {}) {
     };
     worker.postMessage({ module, args, files, wanted });
   })).catch((error) => ({ code: -1, told: '', said: [`This browser cannot run unflex: ${error.message}`], files: {} }));
-  result.stop = () => stop?.();
+  result.stop = () => stop();
   return result;
 }
 

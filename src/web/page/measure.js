@@ -53,9 +53,8 @@ async function axesOf(blob) {
 
 async function makeTower() {
   const like = byId('tower-like').files[0];
-  const start = like
-    ? ['--like', `/print/${like.name}`]
-    : ['--nozzle-temp', byId('tower-nozzle').value, '--bed-temp', byId('tower-bed').value];
+  const bed = Number(byId('tower-bed').value) > 0 ? ['--bed-temp', byId('tower-bed').value] : [];
+  const start = like ? ['--like', `/print/${like.name}`] : ['--nozzle-temp', byId('tower-nozzle').value, ...bed];
   const args = [...(byId('tower-pressure').checked ? ['--pressure'] : []), ...start];
   await tune(args, like ? { [`/print/${like.name}`]: like } : {});
 }
@@ -69,9 +68,11 @@ async function tune(args, files) {
   const name = `tower-${Date.now().toString(36)}.gcode`;
   const accel = byId('tower-accel').value;
   status.replaceChildren(element('p', { class: 'quiet', role: 'status' }, 'Computing the tower …'));
+  for (const id of ['tower-make', 'tower-read']) byId(id).disabled = true;
   const done = await run(['tune', ...args, ...(accel ? ['--accel', accel] : []), ...printers.args, '-o', `/made/${name}`, '--report', '/made/tower.html'],
     { files: { '/made/.keep': '', ...files, ...printers.files }, wanted: [`/made/${name}`, '/made/tower.html', '/printer/printer.toml'],
       onProgress: ({ stage, share }) => { status.firstChild.textContent = `${stage} ${(100 * share).toFixed(0)} %`; } });
+  for (const id of ['tower-make', 'tower-read']) byId(id).disabled = false;
   status.replaceChildren();
   if (done.told.trim()) status.append(element('pre', {}, done.told.replaceAll('/made/', '').replaceAll('/printer/', '')));
   if (done.said.length) status.append(messages(done.said));
