@@ -209,10 +209,13 @@ class Batch {
   }
 
   Status start(BatchWorkers& processes, std::size_t number, unsigned workers) {
+    // A thread outlives this call, and the memory changes meanwhile.
     const BatchPrint& print = files_.prints[number];
-    return processes.start(number, workers, [&] {
-      return work_on_batch_print(config_of(*config_, print, workers), manifest_->find(print.name));
-    });
+    return processes.start(
+        number, workers,
+        [one = config_of(*config_, print, workers), known = manifest_->find(print.name)] {
+          return work_on_batch_print(one, known);
+        });
   }
 
   void take(BatchWorkers::Done done) {
@@ -294,11 +297,7 @@ Result<ExitCode> watch(const RunConfig& config, BatchManifest& manifest, Console
   }
   std::string last_error;
   do {
-    Result<BatchFiles> files = find_prints(config).and_then([&](BatchFiles found) {
-      new_prints.keep_new(found);
-      keep_shard(config, found);
-      return check_printers(config, found).map([&] { return std::move(found); });
-    });
+    Result<BatchFiles> files = find_prints(config);
     if (!files) {
       // The folder may be away for a while, or two prints may share a name until one is gone.
       if (const std::string error = to_string(files.error()); error != last_error) {
@@ -308,6 +307,8 @@ Result<ExitCode> watch(const RunConfig& config, BatchManifest& manifest, Console
       continue;
     }
     last_error.clear();
+    new_prints.keep_new(*files, config.printer_file);
+    keep_shard(config, *files);
     if (files->prints.empty() && files->unreadable.empty() && files->passed_by.empty()) {
       continue;
     }

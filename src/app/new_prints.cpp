@@ -4,7 +4,19 @@
 
 namespace unflex::app {
 
-bool NewPrints::take(const std::string& name, const platform::FileState& state) {
+namespace {
+
+std::optional<platform::FileState> state_of(const std::optional<std::string>& name) {
+  if (!name) {
+    return std::nullopt;
+  }
+  const auto state = platform::state_of(*name);
+  return state ? std::optional(*state) : std::nullopt;
+}
+
+}  // namespace
+
+bool NewPrints::take(const std::string& name, const State& state) {
   const auto last = seen_.find(name);
   const auto done = done_.find(name);
   const bool is_settled = last != seen_.end() && last->second == state;
@@ -15,15 +27,16 @@ bool NewPrints::take(const std::string& name, const platform::FileState& state) 
   return true;
 }
 
-void NewPrints::keep_new(BatchFiles& files) {
-  std::map<std::string, platform::FileState> seen;
+void NewPrints::keep_new(BatchFiles& files, const std::optional<std::string>& printer_file) {
+  std::map<std::string, State> seen;
   std::erase_if(files.prints, [&](const BatchPrint& print) {
-    const auto state = platform::state_of(print.input);
-    if (!state) {
+    const auto input = state_of(std::optional(print.input));
+    if (!input) {
       return true;
     }
-    seen[print.name] = *state;
-    return !take(print.name, *state);
+    const State state{*input, state_of(print.printer_file ? print.printer_file : printer_file)};
+    seen[print.name] = state;
+    return !take(print.name, state);
   });
   seen_ = std::move(seen);
   std::erase_if(files.passed_by,

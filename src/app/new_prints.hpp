@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -10,19 +11,27 @@
 
 namespace unflex::app {
 
-// The prints that have come or changed, by looking again and again. One is taken once it has stayed
-// as it is from one look to the next, since an upload takes time.
+// The prints that have come or changed, they or their printer's file, by looking again and again.
+// One is taken once it has stayed as it is from one look to the next, since an upload takes time.
 class NewPrints {
  public:
-  // Leaves the prints to be worked on now, and what has not been told yet.
-  void keep_new(BatchFiles& files);
+  // Leaves the prints to be worked on now, and what has not been told yet. printer_file: of the
+  // prints that have none of their own.
+  void keep_new(BatchFiles& files, const std::optional<std::string>& printer_file);
 
  private:
-  // Whether the print is to be worked on, which it then is not another time.
-  [[nodiscard]] bool take(const std::string& name, const platform::FileState& state);
+  struct State {
+    platform::FileState print;
+    std::optional<platform::FileState> printer;
 
-  std::map<std::string, platform::FileState> seen_;  // at the last look
-  std::map<std::string, platform::FileState> done_;  // when it was worked on
+    [[nodiscard]] bool operator==(const State&) const = default;
+  };
+
+  // Whether the print is to be worked on, which it then is not another time.
+  [[nodiscard]] bool take(const std::string& name, const State& state);
+
+  std::map<std::string, State> seen_;  // at the last look
+  std::map<std::string, State> done_;  // when it was worked on
   std::set<std::string> told_;
 };
 

@@ -131,7 +131,7 @@ TEST_F(FolderOfShards, IsWatchedForWhatComes) {
                               .printer_file = {},
                               .bytes = 0});
     }
-    news.keep_new(files);
+    news.keep_new(files, path("printer.toml"));
     return files.prints.size();
   };
   EXPECT_EQ(look(), 0U);  // may still be written
@@ -140,11 +140,16 @@ TEST_F(FolderOfShards, IsWatchedForWhatComes) {
   write_file(path("in/1.gcode"), small_print() + "; more\n");
   EXPECT_EQ(look(), 0U);
   EXPECT_EQ(look(), 1U);
+  // What failed by its printer's file is tried again when that is mended.
+  write_file(path("printer.toml"), "[printer]\n");
+  EXPECT_EQ(look(), 0U);
+  EXPECT_EQ(look(), 2U);
+  EXPECT_EQ(look(), 0U);
 }
 
 TEST_F(FolderOfShards, IsWatchedUntilASignalComes) {
   Program program(directory(),
-                  {"batch", "in", "-o", "out", "--watch", "--engine", "banded", "--set",
+                  {"batch", "in", "-o", "out", "--watch", "-j", "1", "--engine", "banded", "--set",
                    "dynamics.x.freq_hz=45", "--set", "dynamics.y.freq_hz=45"});
   const auto comes = [&](const std::string& name) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -156,13 +161,20 @@ TEST_F(FolderOfShards, IsWatchedUntilASignalComes) {
   for (int i = 0; i < 6; ++i) {
     EXPECT_TRUE(comes(fmt::format("out/{}.gcode", i)));
   }
+  // A print that fails by a printer's file of its own does not hold up the others.
+  std::filesystem::create_directory(path("in/bad"));
+  write_file(path("in/bad/printer.toml"), "[printer]\nfirmware = \"none\"\n");
+  write_file(path("in/bad/bad.gcode"), small_print() + "; longer, so it comes first\n");
   write_file(path("in/late.gcode"), small_print());
   EXPECT_TRUE(comes("out/late.gcode"));
+  write_file(path("in/bad/printer.toml"), "");
+  EXPECT_TRUE(comes("out/bad/bad.gcode"));
   program.signal(SIGINT);
   const Outcome outcome = program.wait();
   EXPECT_EQ(outcome.exit_code, 128 + SIGINT);
   EXPECT_THAT(outcome.err, HasSubstr("unflex: waiting for prints in in\n"));
   EXPECT_THAT(outcome.err, HasSubstr("late.gcode: "));
+  EXPECT_THAT(outcome.err, HasSubstr("in/bad/printer.toml:2: "));
 }
 
 }  // namespace
