@@ -82,8 +82,8 @@ class StageKernel {
   [[nodiscard]] virtual std::size_t mode_places() const = 0;   // K
   [[nodiscard]] virtual std::size_t model_places() const = 0;  // models, in full lanes
   // y, ẏ, b, ḃ, b̈ and an empty place.
-  [[nodiscard]] std::size_t state_size() const { return 2 * mode_places() + kLanes; }
-  [[nodiscard]] std::size_t base_place() const { return 2 * mode_places(); }
+  [[nodiscard]] virtual std::size_t state_size() const = 0;
+  [[nodiscard]] virtual std::size_t base_place() const = 0;
 
   virtual void assign(const StageModel& model) = 0;
   // z of the next node, for inputs that the end prescribes, or else zero. resting: where the base

@@ -67,6 +67,8 @@ class LaneStages final : public StageKernel {
 
   [[nodiscard]] std::size_t mode_places() const override { return kLanes * groups(); }
   [[nodiscard]] std::size_t model_places() const override { return kLanes * model_groups(); }
+  [[nodiscard]] std::size_t state_size() const override { return 2 * mode_places() + kLanes; }
+  [[nodiscard]] std::size_t base_place() const override { return 2 * mode_places(); }
 
   void assign(const StageModel& model) override {
     const std::size_t k = kLanes * groups();

@@ -19,7 +19,7 @@ class LogHistogram {
       weights_.resize(kCells);
     }
     const std::uint64_t cell = square > kSmallest ? number(square) - kFirst : 0;
-    weights_[std::min(cell, kCells - 1)] += weight;
+    weights_[static_cast<std::size_t>(std::min(cell, kCells - 1))] += weight;
   }
 
   // Where the given fraction of the whole weight is reached, within 1 %. The weight of a cell
