@@ -206,7 +206,7 @@ Result<report::Report> compensate_with(const Job& job, const Engines& engines, P
       return tl::unexpected(status.error());
     }
     if (!job.output_stream) {
-      report.output_bytes = job.output->bytes().value_or(0);
+      report.output_bytes = static_cast<std::size_t>(job.output->bytes().value_or(0));
     }
     if (!warn_of_no_run(job, report)) {
       std::ranges::move(remarks(report.extruded_path, report.unknown_commands, job.input_name),

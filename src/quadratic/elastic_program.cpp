@@ -74,14 +74,14 @@ UNFLEX_INLINE void add_to(const double* __restrict g, double f, double* __restri
 template <int W>
 UNFLEX_INLINE double product(const double* __restrict g, const double* __restrict x) {
   constexpr int kLanes = 4;
+  constexpr int kWhole = W / kLanes * kLanes;
   double sums[kLanes] = {0.0, 0.0, 0.0, 0.0};
-  int i = 0;
-  for (; i + kLanes <= W; i += kLanes) {
+  for (int i = 0; i < kWhole; i += kLanes) {
     for (int lane = 0; lane < kLanes; ++lane) {
       sums[lane] += g[i + lane] * x[i + lane];
     }
   }
-  for (; i < W; ++i) {
+  for (int i = kWhole; i < W; ++i) {
     sums[0] += g[i] * x[i];
   }
   return (sums[0] + sums[2]) + (sums[1] + sums[3]);

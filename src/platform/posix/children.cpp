@@ -136,7 +136,7 @@ bool receive_message(int channel, std::string& message) {
   if (!transfer(channel, reinterpret_cast<char*>(&size), sizeof size, false)) {
     return false;
   }
-  message.resize(size);
+  message.resize(static_cast<std::size_t>(size));
   return transfer(channel, message.data(), message.size(), false);
 }
 
