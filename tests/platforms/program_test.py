@@ -121,7 +121,8 @@ class Program(unittest.TestCase):
         with open("plain.gcode", "w", encoding="utf-8") as file:
             file.write("G28\nM83\nG1 X50 Y50 Z0.2 F6000\nG1 X80 Y50 E1\nG1 X80 Y80 E1\n")
         for most_mm, code in (("9.5", 0), ("1e-6", 3)):
-            done = self.run_program("verify", "plain.gcode", "--max-deviation", most_mm, *SETTINGS)
+            done = self.run_program("compensate", "plain.gcode", "-o", "out.gcode", "--max-deviation",
+                                    most_mm, *SETTINGS)
             self.assertEqual(done.returncode, code, done.stderr)
 
     def test_ends_when_it_is_interrupted(self):
