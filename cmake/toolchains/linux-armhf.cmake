@@ -2,6 +2,6 @@
 set(CMAKE_SYSTEM_PROCESSOR armv7l)
 set(UNFLEX_DEBIAN_ARCHITECTURE armhf)
 set(UNFLEX_COMPILER arm-linux-gnueabihf)
-# GCC would tell of each call that GCC 6 made in another way.
+# Without this GCC remarks on each call that GCC 6 compiled in another way.
 set(CMAKE_CXX_FLAGS_INIT -Wno-psabi)
 include(${CMAKE_CURRENT_LIST_DIR}/linux-cross.cmake)

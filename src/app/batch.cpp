@@ -209,7 +209,7 @@ class Batch {
   }
 
   Status start(BatchWorkers& processes, std::size_t number, unsigned workers) {
-    // A thread outlives this call, and the memory changes meanwhile.
+    // A thread outlives this call, and the manifest changes meanwhile, so it works on copies.
     const BatchPrint& print = files_.prints[number];
     return processes.start(
         number, workers,

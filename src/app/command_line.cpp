@@ -250,7 +250,7 @@ void add_study(CLI::App& program, RunConfig& config) {
           "--accel",
           [&config](const std::vector<std::string>& texts) {
             for (const std::string& text : texts) {
-              config.accels_mm_s2.push_back(*parse_real(text));
+              config.accels_mm_s2.push_back(number_of("--accel", text));
             }
           },
           "With IN: compensate it at these accelerations, as 2500,5000,10000")

@@ -40,17 +40,19 @@ CLI::Validator counting_number(unsigned most) {
           ""};
 }
 
+double number_of(const std::string& option, const std::string& text) {
+  const std::optional<double> value = parse_real(text);
+  if (!value) {
+    throw CLI::ConversionError(text, option);
+  }
+  return *value;
+}
+
 CLI::Option* add_number(CLI::App& command, const std::string& name,
                         std::function<void(double)> take, const std::string& help) {
   return command.add_option_function<std::string>(
       name,
-      [take = std::move(take), name](const std::string& text) {
-        const std::optional<double> value = parse_real(text);
-        if (!value) {
-          throw CLI::ConversionError(text, name);
-        }
-        take(*value);
-      },
+      [take = std::move(take), name](const std::string& text) { take(number_of(name, text)); },
       help);
 }
 

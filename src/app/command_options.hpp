@@ -43,8 +43,11 @@ template <class T>
           ""};
 }
 
-// An option with a number, read as unflex reads all numbers. CLI11 would read a long double:
-// systems differ in its last bit, and WASI's library stops the program.
+// The number that was given to an option. All options with numbers are read by it: CLI11 would read
+// a long double, whose last bit differs between systems, and WASI's library ends the program there.
+[[nodiscard]] double number_of(const std::string& option, const std::string& text);
+
+// An option with a number.
 CLI::Option* add_number(CLI::App& command, const std::string& name,
                         std::function<void(double)> take, const std::string& help);
 

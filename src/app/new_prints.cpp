@@ -3,7 +3,6 @@
 #include <utility>
 
 namespace unflex::app {
-
 namespace {
 
 std::optional<platform::FileState> state_of(const std::optional<std::string>& name) {
@@ -28,13 +27,14 @@ bool NewPrints::take(const std::string& name, const State& state) {
 }
 
 void NewPrints::keep_new(BatchFiles& files, const std::optional<std::string>& printer_file) {
+  const std::optional<platform::FileState> printer_of_all = state_of(printer_file);
   std::map<std::string, State> seen;
   std::erase_if(files.prints, [&](const BatchPrint& print) {
-    const auto input = state_of(std::optional(print.input));
+    const auto input = platform::state_of(print.input);
     if (!input) {
       return true;
     }
-    const State state{*input, state_of(print.printer_file ? print.printer_file : printer_file)};
+    const State state{*input, print.printer_file ? state_of(print.printer_file) : printer_of_all};
     seen[print.name] = state;
     return !take(print.name, state);
   });

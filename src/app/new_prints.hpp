@@ -11,11 +11,11 @@
 
 namespace unflex::app {
 
-// The prints that have come or changed, they or their printer's file, by looking again and again.
-// One is taken once it has stayed as it is from one look to the next, since an upload takes time.
+// Finds prints that are new, that have changed, or whose printer file has changed. A print is taken
+// once it has stayed as it is from one look to the next, since an upload takes time.
 class NewPrints {
  public:
-  // Leaves the prints to be worked on now, and what has not been told yet. printer_file: of the
+  // Leaves the prints to be worked on now, and what has not been told yet. printer_file: for
   // prints that have none of their own.
   void keep_new(BatchFiles& files, const std::optional<std::string>& printer_file);
 
@@ -27,7 +27,7 @@ class NewPrints {
     [[nodiscard]] bool operator==(const State&) const = default;
   };
 
-  // Whether the print is to be worked on, which it then is not another time.
+  // Whether the print is due. If it is, it counts as worked on from now on.
   [[nodiscard]] bool take(const std::string& name, const State& state);
 
   std::map<std::string, State> seen_;  // at the last look

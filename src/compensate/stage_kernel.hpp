@@ -81,7 +81,8 @@ class StageKernel {
 
   [[nodiscard]] virtual std::size_t mode_places() const = 0;   // K
   [[nodiscard]] virtual std::size_t model_places() const = 0;  // models, in full lanes
-  // y, ẏ, b, ḃ, b̈ and an empty place.
+  // y, ẏ, b, ḃ, b̈ and an empty place. It follows from K, and so does base_place(), but each kernel
+  // has both, since its innermost loops ask for them: there the compiler knows what they return.
   [[nodiscard]] virtual std::size_t state_size() const = 0;
   [[nodiscard]] virtual std::size_t base_place() const = 0;
 

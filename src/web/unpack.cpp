@@ -1,5 +1,5 @@
-// Unpacks LZMA in the page, which is a quarter smaller so than by what browsers unpack themselves.
-// A program of its own, by Debian's sources of LZMA, which are in the public domain.
+// Unpacks LZMA in the page. Browsers unpack gzip themselves, but LZMA packs the program smaller.
+// This is a program of its own, with Debian's sources of LZMA, which are in the public domain.
 #include <LzmaDec.h>
 
 #include <cstdlib>

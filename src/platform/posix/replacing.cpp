@@ -10,14 +10,12 @@
 #include <system_error>
 #include <utility>
 
-#include "../posix_and_wasi/new_file.hpp"
+#include "../posix_and_wasi/file_calls.hpp"
 #include "../temporary_files.hpp"
 #include "unflex/platform/folders.hpp"
 
 namespace unflex::platform {
 namespace {
-
-int outcome(int result) { return result == 0 ? 0 : errno; }
 
 // Whether it may be a file that this user made: neither a pipe that somebody gave such a name, nor
 // another user's file.

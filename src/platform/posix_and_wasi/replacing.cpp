@@ -3,20 +3,14 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
 
 #include "../temporary_files.hpp"
-#include "new_file.hpp"
+#include "file_calls.hpp"
 
 namespace unflex::platform {
-namespace {
-
-int outcome(int result) { return result == 0 ? 0 : errno; }
-
-}  // namespace
 
 const std::string_view kTemporaryDirectoryVariable = "TMPDIR";
 

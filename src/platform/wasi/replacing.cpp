@@ -4,7 +4,7 @@
 
 #include <cerrno>
 
-#include "../posix_and_wasi/new_file.hpp"
+#include "../posix_and_wasi/file_calls.hpp"
 #include "../temporary_files.hpp"
 
 namespace unflex::platform {

@@ -68,11 +68,12 @@ async function tune(args, files) {
   const name = `tower-${Date.now().toString(36)}.gcode`;
   const accel = byId('tower-accel').value;
   status.replaceChildren(element('p', { class: 'quiet', role: 'status' }, 'Computing the tower …'));
-  for (const id of ['tower-make', 'tower-read']) byId(id).disabled = true;
+  const setBusy = (isBusy) => ['tower-make', 'tower-read'].forEach((id) => { byId(id).disabled = isBusy; });
+  setBusy(true);
   const done = await run(['tune', ...args, ...(accel ? ['--accel', accel] : []), ...printers.args, '-o', `/made/${name}`, '--report', '/made/tower.html'],
     { files: { '/made/.keep': '', ...files, ...printers.files }, wanted: [`/made/${name}`, '/made/tower.html', '/printer/printer.toml'],
       onProgress: ({ stage, share }) => { status.firstChild.textContent = `${stage} ${(100 * share).toFixed(0)} %`; } });
-  for (const id of ['tower-make', 'tower-read']) byId(id).disabled = false;
+  setBusy(false);
   status.replaceChildren();
   if (done.told.trim()) status.append(element('pre', {}, done.told.replaceAll('/made/', '').replaceAll('/printer/', '')));
   if (done.said.length) status.append(messages(done.said));
