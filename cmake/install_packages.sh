@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# install_packages.sh [--tests] [--platforms]
+# install_packages.sh [--quick-tests] [--tests] [--platforms]
 #
-# Installs the packages that unflex is built from on Debian 12. --tests adds those of its tests, of
-# sanitizers, of fuzzing and of counting lines; --platforms those that build for other systems and run
+# Installs the packages that unflex is built from on Debian 12. --quick-tests adds those of the tests
+# with the label `quick`; --tests those of all tests, of sanitizers, of fuzzing and of counting lines;
+# --platforms those that build for other systems and run
 # what they have built. Does nothing if all is installed; otherwise it needs root or sudo.
 set -euo pipefail
 
@@ -13,17 +14,21 @@ packages=(
   libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libtomlplusplus-dev nlohmann-json3-dev
   libzstd-dev zlib1g-dev
 )
-test_packages=(
+quick_test_packages=(
   libgmock-dev libgtest-dev
   # Results of core/math are held against it.
   libmpfr-dev
-  # Builds are cached, the format of sources is checked, the picture of modules is drawn.
-  ccache clang-format graphviz
+  # Builds are cached, the format of sources is checked, scripts are tests.
+  ccache clang-format python3
+)
+test_packages=(
+  # The picture of modules is drawn.
+  graphviz
   # Another compiler reads what changed, with sanitizers and without; lines that run are counted.
   # Debian's default clang, 14, does not understand the ranges of libstdc++ 12.
   clang-16 libclang-rt-16-dev llvm-16 gcovr
   # Tests look at HTML reports in a real browser.
-  chromium python3
+  chromium
   # Tests make packages, format the manual page and let shells complete command lines.
   dpkg-dev file fish groff man-db mandoc zsh
   # Tests run the hook in a real slicer, read the examples for continuous integration as YAML, and
@@ -47,7 +52,8 @@ platform_packages=(
 
 for option in "$@"; do
   case $option in
-    --tests) packages+=("${test_packages[@]}") ;;
+    --quick-tests) packages+=("${quick_test_packages[@]}") ;;
+    --tests) packages+=("${quick_test_packages[@]}" "${test_packages[@]}") ;;
     --platforms) packages+=("${platform_packages[@]}") ;;
     *)
       echo "install_packages.sh: unknown option $option" >&2

@@ -35,7 +35,7 @@ for platform in "${platforms[@]}"; do
   fi
 done
 if ((${#others[@]} > 0)); then
-  tests/platforms/same_bytes.sh build-native/unflex "$root" "${others[@]}"
+  tests/platforms/same_everywhere.sh build-native/unflex "$root" "${others[@]}"
 fi
 
 for platform in "${platforms[@]}"; do

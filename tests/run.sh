@@ -8,12 +8,24 @@ set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 
+# ctest takes its label as a word of its own alone.
+options=()
+for option in "$@"; do
+  if [[ $option == -L?* ]]; then
+    options+=(-L "${option#-L}")
+  else
+    options+=("$option")
+  fi
+done
+
 target=all
-if [[ " $* " == *" -L quick "* ]]; then
+packages=--tests
+if [[ " ${options[*]} " == *" -L quick "* ]]; then
   target=quick_tests
+  packages=--quick-tests
 fi
 
-"$root/cmake/install_packages.sh" --tests
+"$root/cmake/install_packages.sh" "$packages"
 
 generator=()
 if [[ ! -e $root/build/CMakeCache.txt ]]; then
@@ -23,4 +35,4 @@ cmake "${generator[@]}" -S "$root" -B "$root/build" -DCMAKE_BUILD_TYPE=Release -
   -DUNFLEX_WERROR=ON
 cmake --build "$root/build" --parallel "$(nproc)" --target "$target"
 
-ctest --test-dir "$root/build" --output-on-failure --parallel "$(nproc)" "$@"
+ctest --test-dir "$root/build" --output-on-failure --parallel "$(nproc)" "${options[@]}"

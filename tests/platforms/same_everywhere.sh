@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# same_bytes.sh UNFLEX ROOT [PLATFORM...]
+# same_everywhere.sh UNFLEX ROOT [PLATFORM...]
 #
 # Six small prints through the program UNFLEX of this machine and through those of other platforms,
 # built in ROOT/build-PLATFORM. Each must give the same bytes. Without PLATFORM: all that are built and can be run here.
