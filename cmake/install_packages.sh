@@ -3,8 +3,8 @@
 #
 # Installs the packages that unflex is built from on Debian 12. --quick-tests adds those of the tests
 # with the label `quick`; --tests those of all tests, of sanitizers, of fuzzing and of counting lines;
-# --platforms those that build for other systems and run
-# what they have built. Does nothing if all is installed; otherwise it needs root or sudo.
+# --platforms those that build for other systems and run what they have built. Does nothing if all is
+# installed; otherwise it needs root or sudo.
 set -euo pipefail
 
 packages=(

@@ -4,8 +4,8 @@
 # Whether this tree does what another version does: what is written, said and returned must be the
 # same, byte for byte, for all prints of tests/data, three firmwares, all ways to compensate and all
 # commands (same_bytes.py). OTHER is a revision, which is built first, or a program. WORD: only cases
-# whose names contain it. What the other version did is kept in build/same_bytes, so that the second
-# time takes half as long: eight minutes on two cores, two of them with the WORD wallring.
+# whose names contain it, as wallring, exact or tune. What the other version did is kept in
+# build/same_bytes and not computed again.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)

@@ -18,28 +18,12 @@ cd "$work"
 # --- the prints: three firmwares, timing as sliced and free, a band of frequencies, three modes
 
 axes=(--set dynamics.x.freq_hz=45 --set dynamics.y.freq_hz=38)
+cp "$data/modes.toml" .
 cp "$data/pipeline_washer_arcs.gcode" arcs.gcode
 head --lines=140 "$data/study_fasttower.gcode" >tower.gcode
 head --lines=160 "$data/pipeline_bracket.gcode" >bracket.gcode
 head --lines=110 "$data/pipeline_wallring.gcode" >ring.gcode
 head --lines=130 "$data/pipeline_vase.gcode" >vase.gcode
-cat >modes.toml <<'END'
-schema_version = 1
-[printer]
-firmware = "klipper"
-[limits]
-max_accel_mm_s2 = 5000
-[dynamics]
-freq_error = 0.05
-[dynamics.x]
-mode = [
-  { freq_hz = 41, damping_ratio = 0.06, gain = 0.7 },
-  { freq_hz = 63, damping_ratio = 0.05, gain = 0.2 },
-  { freq_hz = 101, damping_ratio = 0.04, gain = 0.1 },
-]
-[dynamics.y]
-freq_hz = 38
-END
 arguments_of() {
   case $1 in
     band) echo arcs.gcode --set printer.firmware=klipper --set dynamics.freq_error=0.1 "${axes[@]}" ;;
