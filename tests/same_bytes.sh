@@ -17,9 +17,10 @@ if [[ ! -x $other || -d $other ]]; then
   folder=$root/build/same_bytes/$commit
   other=$folder/build/unflex
   if [[ ! -x $other ]]; then
-    mkdir --parents "$folder/source"
-    git -C "$root" archive "$commit" | tar --extract --directory "$folder/source"
-    cmake -G Ninja -S "$folder/source" -B "$folder/build" -DCMAKE_BUILD_TYPE=Release >/dev/null
+    mkdir --parents "$folder"
+    git -C "$root" archive "$commit" | tar --extract --directory "$folder"
+    # With the folders and options of tests/run.sh ccache has most objects.
+    cmake -G Ninja -S "$folder" -B "$folder/build" -DCMAKE_BUILD_TYPE=Release -DUNFLEX_WERROR=ON >/dev/null
     cmake --build "$folder/build" --target unflex
   fi
 fi
