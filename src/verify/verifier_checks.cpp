@@ -39,24 +39,25 @@ double Verifier::filament_tolerance_mm() const {
   const double too_short_mm = firmware.firmware == Firmware::marlin
                                   ? firmware.min_steps_per_segment / firmware.steps_per_mm[gcode::E]
                                   : 0.0;
-  return too_short_mm + kFilamentTolerance_mm * std::max(1.0, output_.filament_factor());
+  return too_short_mm + kFilamentTolerance_mm * std::max(1.0, output_.replay().filament_factor());
 }
 
 void Verifier::check_run(bool compensated) {
-  if (const Excursion::Side* const side = output_excursion_.worse_than(input_excursion_)) {
+  if (const Excursion::Side* const side = output_.excursion().worse_than(input_.excursion())) {
     violations_.in_output(
         side->line, fmt::format("X{:.4f} Y{:.4f} is out of the travel by {:.4f} mm", side->x_mm,
                                 side->y_mm, side->beyond_mm));
   }
-  if (too_much_line_ != 0 && !too_much_in_input_) {
-    violations_.in_output(too_much_line_, "so much filament is too much for so short a way");
+  if (output_.too_much_line() != 0 && input_.too_much_line() == 0) {
+    violations_.in_output(output_.too_much_line(),
+                          "so much filament is too much for so short a way");
   }
-  const double difference_mm = run_pushed_mm_ - filament_.input_mm();
+  const double difference_mm = output_.pushed_in_section_mm() - filament_.input_mm();
   if (std::abs(difference_mm) > filament_tolerance_mm()) {
     violations_.in_output(
-        output_.following().line.number,
+        output_.replay().following().line.number,
         fmt::format("the run before lays {:.5f} mm of filament instead of {:.5f} mm",
-                    run_pushed_mm_, filament_.input_mm()));
+                    output_.pushed_in_section_mm(), filament_.input_mm()));
   }
   totals_.worst_move_extrusion_error_mm =
       std::max({totals_.worst_move_extrusion_error_mm, filament_.worst_move_error_mm(),
@@ -67,8 +68,8 @@ void Verifier::check_run(bool compensated) {
       violations_.in_output(breach.line, std::move(breach.message));
     }
     rules_of_run_.end(rate_, kept_, emitted_.main(), base_.accel_limit_mm_s2());
-    if (path_.end() == section_first_) {
-      violations_.in_output(output_.following().line.number,
+    if (!paths_.has_sliced_moves()) {
+      violations_.in_output(output_.replay().following().line.number,
                             "the run before is not in the sliced file");
     }
   }
@@ -76,8 +77,8 @@ void Verifier::check_run(bool compensated) {
 
 void Verifier::check_flow() {
   constexpr double kMore = 1.01;
-  const FlowStats& flow = output_flow_.section();
-  const double sliced_mm3_s = input_flow_.section().max_mm3_s;
+  const FlowStats& flow = output_.flow().section();
+  const double sliced_mm3_s = input_.flow().section().max_mm3_s;
   if (flow.max_mm3_s <= kMore * std::max(rules_.max_flow_mm3_s, sliced_mm3_s) ||
       (totals_.too_much_flow && flow.max_mm3_s <= totals_.too_much_flow->flow_mm3_s)) {
     return;

@@ -45,11 +45,18 @@ class LineRate {
     }
     return count;
   }
-  // Most lines begun within any 100 ms, per second, since the beginning or forget().
+  // Most lines begun within any 100 ms, per second, since the last forget().
   [[nodiscard]] double max_per_s() const { return static_cast<double>(most_) / kSpan_s; }
   // The line at which max_per_s() was reached; 0: none.
   [[nodiscard]] std::size_t densest_line() const { return most_line_; }
-  void forget() { most_ = most_line_ = 0; }
+  // The largest max_per_s() since the beginning.
+  [[nodiscard]] double largest_per_s() const {
+    return static_cast<double>(std::max(most_ever_, most_)) / kSpan_s;
+  }
+  void forget() {
+    most_ever_ = std::max(most_ever_, most_);
+    most_ = most_line_ = 0;
+  }
   // When the lines of the last 100 ms began, relative to the end of the last move (so below 0).
   [[nodiscard]] std::vector<double> last_begins_s() const {
     std::vector<double> result;
@@ -65,6 +72,7 @@ class LineRate {
   double time_s_ = 0.0;
   std::size_t line_ = 0;
   std::size_t most_ = 0;
+  std::size_t most_ever_ = 0;
   std::size_t most_line_ = 0;
 };
 
