@@ -33,16 +33,16 @@ void BandGain::choose(RunJob& job) {
   offered_s_ += sliced_s;
   if (job.piece.moves.size() >= kFewest && chosen_s_ < kSampled * offered_s_) {
     chosen_s_ += sliced_s;
-    job.narrow_setup = setup_for(*setup_, job.piece, job.nozzle, *settings_).setup;
+    job.search.narrow_setup = setup_for(*setup_, job.piece, job.nozzle, *settings_).setup;
   }
 }
 
 void BandGain::add(const RunJob& job) {
   const double timed_s = planner::duration_s(job.reference());
   timed_s_ += timed_s;
-  if (job.narrow_s) {
+  if (job.search.narrow_s) {
     sampled_s_ += timed_s;
-    narrow_s_ += *job.narrow_s;
+    narrow_s_ += *job.search.narrow_s;
   }
 }
 

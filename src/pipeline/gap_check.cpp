@@ -14,20 +14,20 @@ constexpr double kNothing_mm = 1e-6;
 }  // namespace
 
 void GapCheck::choose(RunJob& job) {
-  for (std::size_t window = 0; window < job.spans.size(); ++window) {
-    for (std::size_t axis = 0; axis < 2 && !job.spans[window].cruise; ++axis) {
+  for (std::size_t window = 0; window < job.windows.spans.size(); ++window) {
+    for (std::size_t axis = 0; axis < 2 && !job.windows.spans[window].cruise; ++axis) {
       const std::uint64_t number = seen_++;
       // Not std::uniform_int_distribution: its numbers differ between libraries.
       const std::uint64_t slot = number < kProbes ? number : random_() % (number + 1);
       if (slot < kProbes) {
-        job.probes.push_back({static_cast<std::size_t>(slot), window, axis, {}, {}});
+        job.windows.probes.push_back({static_cast<std::size_t>(slot), window, axis, {}, {}});
       }
     }
   }
 }
 
 void GapCheck::take(RunJob& job) {
-  for (Probe& probe : job.probes) {
+  for (Probe& probe : job.windows.probes) {
     if (probes_.size() <= probe.slot) {
       probes_.resize(probe.slot + 1);
     }

@@ -102,7 +102,7 @@ bool LayerTimes::needs_more() const {
 
 bool LayerTimes::is_timed(const Layer& layer) {
   return std::ranges::all_of(layer.jobs, [](const std::shared_ptr<RunJob>& job) {
-    return job->prepared || job->is_timed;
+    return job->has_come_to(Stage::timed);
   });
 }
 
@@ -113,7 +113,7 @@ bool LayerTimes::is_known(const Layer& layer) const {
   }
   double known_s = 0.0;
   for (const std::shared_ptr<RunJob>& job : layer.jobs) {
-    if (job->prepared || job->is_timed) {
+    if (job->has_come_to(Stage::timed)) {
       known_s += timed_s(*job);
     }
   }

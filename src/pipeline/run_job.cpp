@@ -18,9 +18,10 @@ namespace {
 
 // The first window that failed, if any did.
 std::string failure_of(const RunJob& job) {
-  for (std::size_t window = 0; window < job.results.size(); ++window) {
+  for (std::size_t window = 0; window < job.windows.results.size(); ++window) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      if (const std::string& failure = job.results[window][axis].failure; !failure.empty()) {
+      if (const std::string& failure = job.windows.results[window][axis].failure;
+          !failure.empty()) {
         return fmt::format("the solver failed on axis {}, window {}: {}", axis == 0 ? 'x' : 'y',
                            window + 1, failure);
       }
@@ -50,11 +51,11 @@ dynamics::BaseTrajectory both_stages(const RunJob& job, dynamics::AxisTrajectory
 // Joins what the solvers have found for the axis.
 dynamics::AxisTrajectory joined(RunJob& job, std::size_t axis) {
   std::vector<dynamics::AxisTrajectory> solutions;
-  for (std::array<AxisResult, 2>& result : job.results) {
+  for (std::array<AxisResult, 2>& result : job.windows.results) {
     solutions.push_back(std::move(result[axis].base));
     job.iterations += static_cast<std::size_t>(result[axis].iterations);
   }
-  return compensate::join(job.spans, solutions);
+  return compensate::join(job.windows.spans, solutions);
 }
 
 // The base optimised for the nominal axes alone.
@@ -67,28 +68,29 @@ std::optional<dynamics::BaseTrajectory> nominal_base(const RunJob& job) {
     setup.contour.reset();
   }
   const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
-  auto windows = compensate::windows(job.course(), job.spans, job.first_stage, setup);
+  auto windows = compensate::windows(job.course(), job.windows.spans, job.first_stage, setup);
   std::vector<dynamics::AxisTrajectory> x;
   std::vector<dynamics::AxisTrajectory> y;
   for (std::size_t i = 0; i < windows.size(); ++i) {
-    auto [of_x, of_y] = compensate::solve(*engine, job.spans[i], windows[i]);
+    auto [of_x, of_y] = compensate::solve(*engine, job.windows.spans[i], windows[i]);
     if (!of_x || !of_y) {
       return std::nullopt;
     }
     x.push_back(std::move(of_x->base));
     y.push_back(std::move(of_y->base));
   }
-  return both_stages(job, compensate::join(job.spans, x), compensate::join(job.spans, y));
+  return both_stages(job, compensate::join(job.windows.spans, x),
+                     compensate::join(job.windows.spans, y));
 }
 
 void measure_robustness(RunJob& job, const verify::NozzleModel& model) {
-  if (!job.compares_nominal) {
+  if (!job.robustness.is_measured) {
     return;
   }
   if (const std::optional<dynamics::BaseTrajectory> nominal = nominal_base(job)) {
     const std::vector<planner::PlannedMove>& plan = job.reference();
-    job.robust = path_error(plan, job.lead_in_s(), job.base, job.nozzle, model);
-    job.nominal = path_error(plan, job.lead_in_s(), *nominal, job.nozzle, model);
+    job.robustness.robust = path_error(plan, job.lead_in_s(), job.base, job.nozzle, model);
+    job.robustness.nominal = path_error(plan, job.lead_in_s(), *nominal, job.nozzle, model);
   }
 }
 
@@ -184,7 +186,13 @@ dynamics::NozzleXY first_stage(const RunJob& job, const verify::NozzleModel& mod
 
 std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
                                               std::size_t count) {
-  return compensate::windows(job.course(), job.spans, first, count, job.first_stage, job.setup);
+  return compensate::windows(job.course(), job.windows.spans, first, count, job.first_stage,
+                             job.setup);
+}
+
+void keep(RunJob& job, std::string reason) {
+  job.failure = std::move(reason);
+  job.stage = Stage::lined;
 }
 
 void keep_timing(RunJob& job, std::string reason) {
@@ -194,16 +202,15 @@ void keep_timing(RunJob& job, std::string reason) {
   }
 }
 
-namespace {
-
-// The timing as sliced, but for F.
 void keep_feed(RunJob& job, const compensate::Engine& engine) {
-  if (std::optional<timing::Timed> timed =
-          timing::within_feed(job.course(), job.setup, job.first_stage, job.bounds, engine)) {
+  if (std::optional<timing::Timed> timed = timing::within_feed(
+          job.course(), job.setup, job.first_stage, job.search.bounds, engine)) {
     job.retimed =
         NewTiming{std::move(timed->moves), counts_of(job.piece.move_counts, timed->pieces)};
   }
 }
+
+namespace {
 
 struct FoundTiming {
   std::optional<timing::Timed> timed;  // unset: none that is faster
@@ -214,13 +221,14 @@ struct FoundTiming {
 FoundTiming find_timing(const RunJob& job, const compensate::Setup& setup,
                         const TimingChoice& choice) {
   const compensate::Course sliced{job.piece.before, job.piece.moves, job.piece.after};
-  FoundTiming found{
-      timing::faster(sliced, setup, job.first_stage, job.bounds, *choice.engine, job.extruder), {}};
+  FoundTiming found{timing::faster(sliced, setup, job.first_stage, job.search.bounds,
+                                   *choice.engine, job.search.extruder),
+                    {}};
   if (!choice.is_optimal) {
     return found;
   }
   tl::expected<timing::Timed, std::string> optimal =
-      timing::optimal(sliced, setup, job.first_stage, job.bounds, job.extruder);
+      timing::optimal(sliced, setup, job.first_stage, job.search.bounds, job.search.extruder);
   // The optimal motion is the shortest among those near it, so the scaled one may be shorter.
   if (!optimal) {
     found.scaled_reason = std::move(optimal.error());
@@ -237,11 +245,12 @@ FoundTiming find_timing(const RunJob& job, const compensate::Setup& setup,
 
 void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
   try {
-    const CountedEngine engine(*choice.engine, job.nodes_timed);
+    const CountedEngine engine(*choice.engine, job.search.nodes);
     const TimingChoice counted{choice.is_optimal, &engine};
-    if (job.narrow_setup) {
-      const FoundTiming narrow = find_timing(job, *job.narrow_setup, counted);
-      job.narrow_s = planner::duration_s(narrow.timed ? narrow.timed->moves : job.piece.moves);
+    if (job.search.narrow_setup) {
+      const FoundTiming narrow = find_timing(job, *job.search.narrow_setup, counted);
+      job.search.narrow_s =
+          planner::duration_s(narrow.timed ? narrow.timed->moves : job.piece.moves);
     }
     if (job.keeps_timing()) {
       keep_feed(job, engine);
@@ -263,7 +272,7 @@ void choose_timing(RunJob& job, const TimingChoice& choice) noexcept {
     job.retimed.reset();
     keep_timing(job, exception.what());
   }
-  job.is_timed = true;
+  job.stage = Stage::timed;
 }
 
 void stretch(RunJob& job) {
@@ -280,96 +289,49 @@ void stretch(RunJob& job) {
 }
 
 void lay_out(RunJob& job) {
-  job.is_laid_out = true;
   job.grid = compensate::node_grid(job.course(), job.setup);
   if (job.has_base()) {
+    job.stage = Stage::solved;
     return;
   }
-  job.spans = compensate::mesh(job.course(), job.grid, job.setup);
-  job.results.resize(job.spans.size());
-  job.missing = 2 * job.spans.size();
+  job.windows.spans = compensate::mesh(job.course(), job.grid, job.setup);
+  job.windows.results.resize(job.windows.spans.size());
+  job.windows.unsolved = 2 * job.windows.spans.size();
+  job.stage = Stage::laid_out;
 }
 
-void solve_windows(RunJob& job, std::size_t first, std::size_t count,
-                   const compensate::Engine& engine) noexcept try {
-  std::vector<compensate::RunWindow> windows = windows_of(job, first, count);
-  for (std::size_t i = 0; i < count; ++i) {
-    compensate::AxisWindow* const problems[] = {&windows[i].x, &windows[i].y};
-    compensate::AxisSolutions solutions =
-        compensate::solve(engine, job.spans[first + i], windows[i]);
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      Result<compensate::AxisSolution>& solution = solutions[axis];
-      for (Probe& probe : job.probes) {
-        if (solution && probe.window == first + i && probe.axis == axis) {
-          set_probe(engine, std::move(*problems[axis]), *solution, probe);
+bool note_solved(RunJob& job, std::size_t axes) {
+  if (job.windows.unsolved.fetch_sub(axes) != axes) {
+    return false;
+  }
+  job.stage = Stage::solved;
+  return true;
+}
+
+bool solve_windows(RunJob& job, std::size_t first, std::size_t count,
+                   const compensate::Engine& engine) noexcept {
+  RunWindows& of_run = job.windows;
+  try {
+    std::vector<compensate::RunWindow> windows = windows_of(job, first, count);
+    for (std::size_t i = 0; i < count; ++i) {
+      compensate::AxisWindow* const problems[] = {&windows[i].x, &windows[i].y};
+      compensate::AxisSolutions solutions =
+          compensate::solve(engine, of_run.spans[first + i], windows[i]);
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        Result<compensate::AxisSolution>& solution = solutions[axis];
+        for (Probe& probe : of_run.probes) {
+          if (solution && probe.window == first + i && probe.axis == axis) {
+            set_probe(engine, std::move(*problems[axis]), *solution, probe);
+          }
         }
+        of_run.results[first + i][axis] = axis_result(std::move(solution));
       }
-      job.results[first + i][axis] = axis_result(std::move(solution));
     }
+  } catch (const std::exception& exception) {
+    // Out of memory, mostly.
+    of_run.results[first][0].failure = exception.what();
   }
-} catch (const std::exception& exception) {
-  // Out of memory, mostly.
-  job.results[first][0].failure = exception.what();
-}
-
-namespace {
-
-// The run of `job` as it was before its timing was chosen. If it keeps its timing, that stays.
-std::unique_ptr<RunJob> untimed(const RunJob& job, const compensate::Setup& setup) {
-  auto run = std::make_unique<RunJob>();
-  run->piece = job.piece;
-  run->nozzle = job.nozzle;
-  run->first_stage = job.first_stage;
-  run->setup = setup;
-  run->sliced_setup = job.sliced_setup;
-  run->bounds = job.bounds;
-  run->extruder = job.extruder;
-  run->accel = job.accel;
-  run->lines_after = job.lines_after;
-  run->compares_nominal = job.compares_nominal;
-  if (job.keeps_timing()) {
-    run->slow_reason = job.slow_reason;
-    run->retimed = job.retimed;
-  }
-  return run;
-}
-
-void solve_all(RunJob& job, const RunRules& rules) {
-  lay_out(job);
-  const std::unique_ptr<compensate::Engine> engine = compensate::make_banded_engine();
-  solve_windows(job, 0, job.spans.size(), *engine);
-  make_lines(job, rules);
-}
-
-}  // namespace
-
-std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules, double accel_share) {
-  std::unique_ptr<RunJob> run = untimed(job, job.setup);
-  run->setup.x.limits.max_accel_mm_s2 *= accel_share;
-  run->setup.y.limits.max_accel_mm_s2 *= accel_share;
-  const std::unique_ptr<compensate::Engine> engine = compensate::make_rough_engine();
-  choose_timing(*run, {.is_optimal = false, .engine = engine.get()});
-  run->stretch = job.stretch;
-  stretch(*run);
-  solve_all(*run, rules);
-  return run;
-}
-
-std::unique_ptr<RunJob> with_reserve(const RunJob& job, const RunRules& rules, double accel_share) {
-  std::unique_ptr<RunJob> run = untimed(job, job.setup);
-  run->setup.x.limits.max_accel_mm_s2 *= accel_share;
-  run->setup.y.limits.max_accel_mm_s2 *= accel_share;
-  solve_all(*run, rules);
-  return run;
-}
-
-std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules) {
-  std::unique_ptr<RunJob> run = untimed(job, job.sliced_setup.value_or(job.setup));
-  if (!run->bounds.empty()) {
-    keep_feed(*run, *compensate::make_rough_engine());
-  }
-  solve_all(*run, rules);
-  return run;
+  return note_solved(job, 2 * count);
 }
 
 void make_lines(RunJob& job, const RunRules& rules) noexcept {
@@ -391,8 +353,8 @@ void make_lines(RunJob& job, const RunRules& rules) noexcept {
   } catch (const std::exception& exception) {
     job.failure = exception.what();
   }
-  job.results.clear();
-  job.prepared = true;
+  job.windows.results.clear();
+  job.stage = Stage::lined;
 }
 
 }  // namespace unflex::pipeline

@@ -24,6 +24,16 @@
 
 namespace unflex::pipeline {
 
+// How far the work on a piece has come. A run goes through all of it, in this order. What is left
+// as sliced is lined at once, as there is nothing to work out.
+enum class Stage {
+  read,
+  timed,     // its timing is chosen, if that is free
+  laid_out,  // it is divided into windows, or its base came with the timing
+  solved,    // all windows are solved
+  lined,     // the base is known and cut into lines, or why the run is kept
+};
+
 // What became of one axis of a window.
 struct AxisResult {
   dynamics::AxisTrajectory base;
@@ -48,9 +58,37 @@ struct NewTiming {
   std::optional<dynamics::BaseTrajectory> base = {};
 };
 
+// How the search for the timing of a run goes, where that is free.
+struct TimingSearch {
+  std::vector<timing::MoveBounds> bounds;    // what each move may do; none: there is no search
+  std::optional<timing::Extruder> extruder;  // only if the timing depends on it
+  // Only for runs of a sample (BandGain): the setup for a narrower band, and how long the run takes
+  // with that.
+  std::optional<compensate::Setup> narrow_setup;
+  std::optional<double> narrow_s;
+  std::atomic<std::size_t> nodes = 0;  // solved so far
+};
+
+// The windows of a run, and what became of them.
+struct RunWindows {
+  std::vector<compensate::WindowSpan> spans;
+  std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
+  std::atomic<std::size_t> unsolved = 0;           // axes of windows
+  std::vector<Probe> probes;
+};
+
+// Contour error of the nominal axes in a run that suits a band of axes.
+struct Robustness {
+  bool is_measured = false;
+  PathError robust;   // on the emitted base
+  PathError nominal;  // on the base optimised for them alone
+};
+
 struct RunJob {
   Piece piece;
+  std::atomic<Stage> stage = Stage::read;
   // What follows is only used for runs and parts of runs.
+  std::string failure;             // why the run is kept
   dynamics::NozzleXY nozzle;       // at its begin, if every run before is compensated
   dynamics::NozzleXY first_stage;  // the same as a state of the setup's axes
   compensate::Setup setup;
@@ -58,47 +96,24 @@ struct RunJob {
   // one setup, since they meet in motion.
   std::optional<compensate::Setup> sliced_setup;
   emit::RunAccel accel;
-  // Only if the timing is free: what each move may do, and the new timing, if there is one.
-  std::vector<timing::MoveBounds> bounds;
-  // Only if the new timing depends on it.
-  std::optional<timing::Extruder> extruder;
-  std::optional<NewTiming> retimed;
-  // Only for runs of a sample (BandGain): the setup for a narrower band, and how long the run takes
-  // with that.
-  std::optional<compensate::Setup> narrow_setup;
-  std::optional<double> narrow_s;
+  TimingSearch search;
+  std::optional<NewTiming> retimed;  // the new timing, if there is one
   std::string scaled_reason;  // why the timing is not the optimal one, where that is asked for
   std::string slow_reason;    // why the timing stays as sliced
-  std::atomic<bool> is_timed = false;
-  std::atomic<std::size_t> nodes_timed = 0;  // solved so far in the search for the timing
   // By how much the new timing is stretched so that the layer lasts long enough; unset: not known
   // yet.
   std::optional<double> stretch;
-  bool is_laid_out = false;  // whether the windows are known, or the base is
   compensate::NodeGrid grid;
-  std::vector<compensate::WindowSpan> spans;
-  std::vector<std::array<AxisResult, 2>> results;  // X and Y, one per span
-  std::vector<Probe> probes;
-  std::size_t queued_nodes = 0;          // nodes as sliced, while the piece is in the queue
-  std::size_t bytes = 0;                 // of its lines, once it is in the queue
-  std::size_t submitted = 0;             // windows given to the solvers
-  int lines_after = 0;                   // Run::lines_after, counted in the sliced lines
-  std::atomic<std::size_t> missing = 0;  // axes of windows not yet solved
-
-  // Results of make_lines(): the base and its lines, or the reason why the run is kept.
+  RunWindows windows;
+  int lines_after = 0;  // Run::lines_after, counted in the sliced lines
+  // Results of make_lines().
   dynamics::BaseTrajectory base;
   emit::RunPlan plan;
   verify::RunDeviation before;  // deviation of the run's sliced moves
-  // Whether to find the base for the nominal axes alone, too.
-  bool compares_nominal = false;
-  // Contour error of the nominal axes, if that is so. `robust`: on the emitted base. `nominal`: on
-  // the base optimised for them alone.
-  PathError robust;
-  PathError nominal;
+  Robustness robustness;
   std::size_t iterations = 0;
-  std::string failure;
-  std::atomic<bool> prepared = false;
 
+  [[nodiscard]] bool has_come_to(Stage at_least) const { return stage >= at_least; }
   // What the nozzle is to follow.
   [[nodiscard]] compensate::Course course() const {
     return {piece.before, reference(), piece.after};
@@ -133,6 +148,9 @@ struct RunRules {
 
 [[nodiscard]] AxisResult axis_result(Result<compensate::AxisSolution> solution);
 
+// There is nothing to work out: the piece is written as it is, for this reason if it is a run.
+void keep(RunJob& job, std::string reason = {});
+
 // The run keeps its timing as sliced.
 void keep_timing(RunJob& job, std::string reason);
 
@@ -142,27 +160,18 @@ struct TimingChoice {
   const compensate::Engine* engine = nullptr;  // for timing::faster()
 };
 
-// Chooses the timing of the run. Throws nothing.
+// The timing as sliced, but for F.
+void keep_feed(RunJob& job, const compensate::Engine& engine);
+
+// Chooses the timing of the run, which is timed then. Throws nothing.
 void choose_timing(RunJob& job, const TimingChoice& choice) noexcept;
 
 // Stretches the timing of the run, which is `stretch` times as long then.
 void stretch(RunJob& job);
 
-// Divides the run, in the timing that it has, into windows. Where its base is known it has none.
+// Divides the run, in the timing that it has, into windows: it is laid out. Where its base is known
+// it has none.
 void lay_out(RunJob& job);
-
-// The run of `job` once more in a scaled timing, with its lines. accel_share: of the acceleration
-// that its motors may have.
-[[nodiscard]] std::unique_ptr<RunJob> scaled(const RunJob& job, const RunRules& rules,
-                                             double accel_share);
-
-// The run of `job` once more, in its timing as sliced, with this share of the acceleration that its
-// motors may have.
-[[nodiscard]] std::unique_ptr<RunJob> with_reserve(const RunJob& job, const RunRules& rules,
-                                                   double accel_share);
-
-// The run of `job` once more, compensated in its timing as sliced, with its lines.
-[[nodiscard]] std::unique_ptr<RunJob> as_sliced(const RunJob& job, const RunRules& rules);
 
 // The job's nozzle, which swings with all the modes of the model, as a state of the axes that the
 // windows are for.
@@ -172,12 +181,15 @@ void lay_out(RunJob& job);
 [[nodiscard]] std::vector<compensate::RunWindow> windows_of(const RunJob& job, std::size_t first,
                                                             std::size_t count);
 
-// Solves these windows. Calls for other windows may run at the same time.
-void solve_windows(RunJob& job, std::size_t first, std::size_t count,
+// Notes that so many more axes of windows are solved. Returns whether they were the last, so that
+// the run is solved.
+bool note_solved(RunJob& job, std::size_t axes);
+
+// Solves these windows. Calls for other windows may run at the same time. Returns note_solved().
+bool solve_windows(RunJob& job, std::size_t first, std::size_t count,
                    const compensate::Engine& engine) noexcept;
 
-// Joins the windows and cuts the base into lines. To be called once all windows are solved. Throws
-// nothing.
+// Joins the windows of a solved run and cuts its base into lines. Throws nothing.
 void make_lines(RunJob& job, const RunRules& rules) noexcept;
 
 }  // namespace unflex::pipeline

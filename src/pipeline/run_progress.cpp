@@ -17,11 +17,11 @@ constexpr double kWindows = 0.9;
 // A search that goes on gets slower and slower on the bar, as nobody knows how many rounds it has.
 double share_timed(const RunJob& job) {
   constexpr double kRounds = 8.0;
-  if (job.is_timed) {
+  if (job.has_come_to(Stage::timed)) {
     return 1.0;
   }
   const double nodes_of_round = 2.0 * static_cast<double>(std::max<std::size_t>(job.grid.count, 1));
-  return 1.0 - math::exp(-static_cast<double>(job.nodes_timed) / (kRounds * nodes_of_round));
+  return 1.0 - math::exp(-static_cast<double>(job.search.nodes) / (kRounds * nodes_of_round));
 }
 
 }  // namespace
@@ -33,16 +33,16 @@ Result<compensate::AxisSolution> CountedEngine::solve(const compensate::AxisWind
 }
 
 double share_done(const RunJob& job) {
-  if (job.prepared) {
+  if (job.has_come_to(Stage::lined)) {
     return 1.0;
   }
-  const bool searches = !job.bounds.empty();
+  const bool searches = !job.search.bounds.empty();
   const double timing = searches ? kTiming * share_timed(job) : 0.0;
-  if (!job.is_laid_out || job.spans.empty()) {
+  if (!job.has_come_to(Stage::laid_out) || job.windows.spans.empty()) {
     return timing;
   }
-  const double windows = 2.0 * static_cast<double>(job.spans.size());
-  const double solved = 1.0 - static_cast<double>(job.missing) / windows;
+  const double windows = 2.0 * static_cast<double>(job.windows.spans.size());
+  const double solved = 1.0 - static_cast<double>(job.windows.unsolved) / windows;
   return timing + (kWindows - timing) * solved;
 }
 

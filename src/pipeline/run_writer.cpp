@@ -19,11 +19,6 @@ constexpr double kFineTolerance = 0.05;
 // Shares of the limits to aim at, for a run that exceeds them, and for a part that must be written.
 constexpr double kLower[] = {0.85, 0.7};
 constexpr double kLowest[] = {0.7, 0.5};
-// Shares of the motors' acceleration for another timing, behind an optimal and behind a scaled one.
-constexpr std::array kScaledAfterOptimal = {1.0, 0.9, 0.8};
-constexpr std::array kScaledAgain = {0.9, 0.8, 0.7};
-// Shares of the motors' acceleration for a base that leaves a reserve to whole steps.
-constexpr std::array kReserves = {0.85, 0.7, 0.55};
 // The lines of this last stretch of a part decide how the printer arrives at the next part.
 constexpr double kLastLines_s = 0.05;
 constexpr double kApart_mm = 1e-3;
@@ -65,56 +60,129 @@ RunWriter::RunWriter(const RunRules& rules, std::string input_name, double max_l
       nozzle_(rules.verify.nozzle, rules.verify.fixed, emitter_.printer().state().input_shaper()),
       path_(rules.emit.fixed.firmware) {}
 
-Result<std::string> RunWriter::write(const RunJob& job) {
-  const Piece& piece = job.piece;
+Result<RunWriter::Written> RunWriter::write(const RunJob& job, const RunJob* tried) {
+  if (!job.piece.is_run) {
+    return keep_lines(job.piece);
+  }
+  if (tried == nullptr) {
+    begin(job.piece);
+  }
   std::string text;
-  if (!piece.is_run) {
-    for (const gcode::Event& event : piece.events) {
-      emitter_.line(event, text);
-    }
-    path_.keep(piece);
-    keep_motion(piece);
+  std::optional<std::string> objection = write_present(job, tried, text);
+  if (!objection) {
+    note_timing(job);
+    path_.compensate(job.piece);
     return text;
   }
+  if (const std::optional<Try> next = next_try(job, *objection)) {
+    return *next;
+  }
+  return write_as_sliced(job, std::move(*objection));
+}
+
+// The lines between runs.
+std::string RunWriter::keep_lines(const Piece& piece) {
+  std::string text;
+  for (const gcode::Event& event : piece.events) {
+    emitter_.line(event, text);
+  }
+  path_.keep(piece);
+  keep_motion(piece);
+  return text;
+}
+
+// The run, or part of a run, is at hand from now on.
+void RunWriter::begin(const Piece& piece) {
   if (piece.begins_run()) {
     last_lines_.clear();
     late_s_ = 0.0;
     run_stands_ = false;
     run_line_ = piece.moves.front().segment.line;
   }
+  tries_.reset();
   NozzleFollower at_run = nozzle_;
   switching_s_ = at_run.begin_run(piece);
   run_nozzle_ = at_run.nozzle();
-  std::optional<std::string> failure =
-      run_stands_ ? "the run's beginning stands as it is" : write_in_time(job, text);
+}
+
+// Writes the run at hand, or that of its present try. Returns why it cannot be written, if so.
+std::optional<std::string> RunWriter::write_present(const RunJob& job, const RunJob* tried,
+                                                    std::string& text) {
+  if (run_stands_) {
+    return "the run's beginning stands as it is";
+  }
+  if (tried == nullptr) {
+    return write_run(job, text);
+  }
+  if (tries_->present().remedy == Remedy::scaled && !tried->retimed) {
+    return "no faster timing was found";
+  }
+  return write_run(*tried, text);
+}
+
+// What to try next after this objection, if there is anything. Otherwise the objection becomes the
+// one for which the sliced lines stand.
+std::optional<Try> RunWriter::next_try(const RunJob& job, std::string& objection) {
+  if (run_stands_) {
+    return std::nullopt;
+  }
+  if (!tries_) {
+    tries_ = Tries(job, objection, rules_->emit.lines.burst_lines > 0);
+  }
+  const std::optional<Try> next = tries_->next();
+  if (next && next->remedy == Remedy::as_sliced) {
+    note_slow(job, tries_->objection());
+  } else if (!next && tries_->has_given() && tries_->present().remedy == Remedy::reserve) {
+    objection = tries_->objection();
+  }
+  return next;
+}
+
+// The run at hand is written: tells what its timing is, if it is not the one that was asked for.
+void RunWriter::note_timing(const RunJob& job) {
+  if (!tries_) {
+    if (job.keeps_timing()) {
+      note_slow(job, job.slow_reason);
+    } else if (!job.scaled_reason.empty()) {
+      note_scaled(job, job.scaled_reason);
+    }
+  } else if (tries_->present().remedy == Remedy::scaled && job.has_base()) {
+    note_scaled(job, tries_->objection());
+  }
+}
+
+// The run at hand cannot be compensated: its original lines stand, if they can.
+Result<std::string> RunWriter::write_as_sliced(const RunJob& job, std::string failure) {
+  const Piece& piece = job.piece;
   const bool in_motion = !last_lines_.empty();
   const bool begins_long_run = piece.begins_run() && !piece.ends_run();
-  if (failure && (in_motion || begins_long_run)) {
+  std::string text;
+  if (in_motion || begins_long_run) {
     // If the first part of a long run stood as sliced, all behind it would have to. In the middle
     // of the motion there is no way back to the sliced lines at all.
-    failure = insist(job, text);
-    if (failure && in_motion) {
-      const std::size_t line = piece.events.front().line.number;
-      blocked_ = {run_line_, piece.moves.back().segment.line,
-                  fmt::format("at line {}: {}", line, *failure)};
-      return fail(
-          ErrorKind::input, {input_name_, line},
-          fmt::format("the lines up to {} cannot be compensated, and the print does not stop "
-                      "before them: {}; write to a file instead of a stream, then unflex "
-                      "can leave the whole motion as it was sliced",
-                      piece.events.back().line.number, *failure));
+    std::optional<std::string> objection = insist(job, text);
+    if (!objection) {
+      path_.compensate(piece);
+      return text;
     }
+    failure = std::move(*objection);
   }
-  if (failure) {
-    text.clear();
-    emitter_.keep(piece.events, text);
-    path_.keep(piece);
-    keep_motion(piece);
-    note_fallback(job, std::move(*failure));
-    run_stands_ = true;
-  } else {
-    path_.compensate(piece);
+  if (in_motion) {
+    const std::size_t line = piece.events.front().line.number;
+    blocked_ = {run_line_, piece.moves.back().segment.line,
+                fmt::format("at line {}: {}", line, failure)};
+    return fail(ErrorKind::input, {input_name_, line},
+                fmt::format("the lines up to {} cannot be compensated, and the print does not stop "
+                            "before them: {}; write to a file instead of a stream, then unflex "
+                            "can leave the whole motion as it was sliced",
+                            piece.events.back().line.number, failure));
   }
+  text.clear();
+  emitter_.keep(piece.events, text);
+  path_.keep(piece);
+  keep_motion(piece);
+  note_fallback(job, std::move(failure));
+  run_stands_ = true;
   return text;
 }
 
@@ -204,52 +272,6 @@ bool RunWriter::fits(const RunJob& job) const {
   return same_place && job.plan.start == emitter_.run_start();
 }
 
-// Writes the run in the timing chosen for it, or else in that as sliced. Returns why its original
-// lines must stand, if so.
-std::optional<std::string> RunWriter::write_in_time(const RunJob& job, std::string& text) {
-  std::optional<std::string> objection = write_run(job, text);
-  if (!objection) {
-    if (job.keeps_timing()) {
-      note_slow(job, job.slow_reason);
-    } else if (!job.scaled_reason.empty()) {
-      note_scaled(job, job.scaled_reason);
-    }
-    return objection;
-  }
-  if (!job.retimed || job.keeps_timing()) {
-    return write_with_reserve(job, std::move(*objection), text);
-  }
-  // Its lines may break a limit: what is rounded swings about what was optimised, and a free timing
-  // takes all that the motors give.
-  for (const double share : job.has_base() ? kScaledAfterOptimal : kScaledAgain) {
-    const std::unique_ptr<RunJob> slower = scaled(job, *rules_, share);
-    if (slower->retimed && !write_run(*slower, text)) {
-      if (job.has_base()) {
-        note_scaled(job, std::move(*objection));
-      }
-      return std::nullopt;
-    }
-  }
-  note_slow(job, std::move(*objection));
-  return write_run(*as_sliced(job, *rules_), text);
-}
-
-// Writes the run with bases that ask less of the motors, since whole steps ask for more than the
-// base does. Returns why its original lines must stand, if so.
-std::optional<std::string> RunWriter::write_with_reserve(const RunJob& job, std::string objection,
-                                                         std::string& text) {
-  const bool counts_steps = rules_->emit.lines.burst_lines > 0;
-  if (!counts_steps || !job.failure.empty()) {
-    return objection;
-  }
-  for (const double share : kReserves) {
-    if (!write_run(*with_reserve(job, *rules_, share), text)) {
-      return std::nullopt;
-    }
-  }
-  return objection;
-}
-
 // Writes the run as compensated text, or returns why its original lines must stand.
 std::optional<std::string> RunWriter::write_run(const RunJob& job, std::string& text) {
   if (!job.failure.empty()) {
@@ -325,8 +347,8 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   written_s_ += planner::duration_s(verdict.replayed) + switching_s_;
   cost_.add(job.reference(), job.lead_in_s(), job.base, verdict.replayed, verdict.wait_s,
             run_nozzle_, rules_->verify.nozzle);
-  robust_.add(job.robust);
-  nominal_.add(job.nominal);
+  robust_.add(job.robustness.robust);
+  nominal_.add(job.robustness.nominal);
   late_s_ += planner::duration_s(verdict.replayed) - planner::duration_s(job.reference()) -
              job.lead_in_s() - verdict.wait_s;
   last_lines_ = piece.ends_run() ? std::vector<gcode::Segment>() : last_lines(verdict.replayed);
@@ -340,7 +362,7 @@ std::optional<std::string> RunWriter::try_run(const RunJob& job, const emit::Run
   note_lines_above_budget(piece);
   emitter_ = std::move(trial);
   report_->runs_compensated += piece.begins_run() ? 1 : 0;
-  report_->windows_solved += compensate::windows_to_solve(job.spans);
+  report_->windows_solved += compensate::windows_to_solve(job.windows.spans);
   return std::nullopt;
 }
 
@@ -365,7 +387,7 @@ void RunWriter::note_stretch(const RunJob& job, std::string reason, std::size_t&
 
 void RunWriter::note_fallback(const RunJob& job, std::string reason) {
   report_->runs_fallback += job.piece.begins_run() ? 1 : 0;
-  report_->windows_fallback += compensate::windows_to_solve(job.spans);
+  report_->windows_fallback += compensate::windows_to_solve(job.windows.spans);
   if (report_->fallbacks.size() < kMostListed) {
     report_->fallbacks.push_back({job.piece.events.front().line.number,
                                   job.piece.events.back().line.number, std::move(reason)});

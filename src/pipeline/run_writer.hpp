@@ -4,12 +4,14 @@
 
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "emission_cost.hpp"
 #include "extruded_path.hpp"
 #include "nozzle_motion.hpp"
 #include "run_job.hpp"
+#include "run_tries.hpp"
 #include "unflex/core/error.hpp"
 #include "unflex/emit/emitter.hpp"
 #include "unflex/report/report.hpp"
@@ -24,9 +26,12 @@ class RunWriter {
   RunWriter(const RunRules& rules, std::string input_name, double max_lines_per_s,
             report::Report& report);
 
-  // The piece as text. For a run, make_lines() must have been called. An error if parts of a run
-  // have been written and the next one cannot be.
-  [[nodiscard]] Result<std::string> write(const RunJob& job);
+  // What becomes of a piece: its text, or what is to be tried with the run first.
+  using Written = std::variant<std::string, Try>;
+
+  // The piece must be lined. `tried` is the run of the try that was asked for last, lined, too. An
+  // error if parts of a run have been written and the next one cannot be.
+  [[nodiscard]] Result<Written> write(const RunJob& job, const RunJob* tried = nullptr);
   // What follows the last piece.
   [[nodiscard]] std::string finish();
 
@@ -46,9 +51,13 @@ class RunWriter {
   [[nodiscard]] emit::RunPlan in_time(const RunJob& job) const;
   [[nodiscard]] std::optional<gcode::Segment> kept_before(const Piece& piece) const;
   [[nodiscard]] bool fits(const RunJob& job) const;
-  std::optional<std::string> write_in_time(const RunJob& job, std::string& text);
-  std::optional<std::string> write_with_reserve(const RunJob& job, std::string objection,
-                                                std::string& text);
+  void begin(const Piece& piece);
+  std::string keep_lines(const Piece& piece);
+  Result<std::string> write_as_sliced(const RunJob& job, std::string failure);
+  void note_timing(const RunJob& job);
+  std::optional<std::string> write_present(const RunJob& job, const RunJob* tried,
+                                           std::string& text);
+  std::optional<Try> next_try(const RunJob& job, std::string& objection);
   std::optional<std::string> write_run(const RunJob& job, std::string& text);
   std::optional<std::string> insist(const RunJob& job, std::string& text);
   std::optional<std::string> try_run(const RunJob& job, const emit::RunPlan& plan,
@@ -75,6 +84,7 @@ class RunWriter {
   verify::LineRate line_rate_;                 // rate of the lines that have been written
   std::vector<gcode::Segment> last_lines_;     // last lines of the previous part of the run
   double late_s_ = 0.0;                        // how late the previous part ended
+  std::optional<Tries> tries_;                 // of the run at hand, once it cannot be written
   bool run_stands_ = false;                    // the first part of the run at hand was kept
   std::size_t run_line_ = 0;                   // first line of the run at hand
   std::optional<verify::BlamedRun> blocked_;

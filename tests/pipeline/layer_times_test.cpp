@@ -21,7 +21,7 @@ std::shared_ptr<RunJob> job(bool is_run, double sliced_s, const std::string& com
   event.line.text = comment + "\n";
   result->piece.events = {event};
   result->piece.move_counts = {1};
-  result->prepared = !is_run;
+  result->stage = is_run ? Stage::read : Stage::lined;
   return result;
 }
 
@@ -29,7 +29,7 @@ void set_time(RunJob& job, double new_s) {
   planner::PlannedMove move;
   move.cruise_s = new_s;
   job.retimed = NewTiming{{move}, {1}};
-  job.is_timed = true;
+  job.stage = Stage::timed;
 }
 
 TEST(LayerTimes, StretchTheRunsOfALayerEvenly) {
@@ -46,7 +46,7 @@ TEST(LayerTimes, StretchTheRunsOfALayerEvenly) {
   EXPECT_EQ(mark->stretch, 1.0);
   set_time(*first, 1.0);
   set_time(*second, 2.0);
-  last->is_timed = true;  // no other timing was found
+  last->stage = Stage::timed;  // no other timing was found
   const auto of_next_layer = job(true, 5.0);
   EXPECT_FALSE(layers.can_settle());
   EXPECT_TRUE(layers.needs_more());
@@ -105,7 +105,7 @@ TEST(LayerTimes, StretchAllPartsOfARunOrNone) {
     layers.add(piece);
   }
   set_time(*begin, 10.0);
-  end->is_timed = true;
+  end->stage = Stage::timed;
   layers.settle();
   // The run counts for the layer in which it begins, which lasts 60 s as sliced.
   ASSERT_TRUE(begin->stretch && end->stretch);
@@ -124,7 +124,7 @@ TEST(LayerTimes, LeaveAKeptRunAndWhatIsBeforeTheFirstLayer) {
   EXPECT_EQ(early->stretch, 1.0);
   const auto kept = job(true, 3.0);
   kept->failure = "kept";
-  kept->prepared = true;
+  kept->stage = Stage::lined;
   const auto run = job(true, 5.0);
   layers.add(kept);
   layers.add(run);

@@ -54,15 +54,34 @@ class Writer : public ::testing::Test {
   }
 
   std::string written(const RunJob& job) {
-    const Result<std::string> text = writer_.write(job);
+    const Result<std::string> text = write(writer_, job);
     EXPECT_TRUE(text.has_value()) << to_string(text.error());
     return text.value_or("");
+  }
+
+  // Writes the piece, with all that is to be tried with it.
+  Result<std::string> write(RunWriter& writer, const RunJob& job) {
+    std::shared_ptr<RunJob> tried;
+    for (;;) {
+      Result<RunWriter::Written> written = writer.write(job, tried.get());
+      if (!written) {
+        return tl::unexpected(written.error());
+      }
+      const Try* const next = std::get_if<Try>(&*written);
+      if (next == nullptr) {
+        return std::get<std::string>(std::move(*written));
+      }
+      tries_.push_back(next->remedy);
+      tried = once_more(job, *next);
+      work_out(*tried, next->remedy, rules_);
+    }
   }
 
   machine::Settings settings_;
   RunRules rules_;
   report::Report report_;
   RunWriter writer_;
+  std::vector<Remedy> tries_;  // that the writer has asked for
 
  private:
   void solve(RunJob& job) {
@@ -74,10 +93,8 @@ class Writer : public ::testing::Test {
     job.setup = std::move(setup.setup);
     job.accel = setup.accel;
     job.first_stage = first_stage(job, rules_.verify.nozzle);
-    job.grid = compensate::node_grid(job.course(), job.setup);
-    job.spans = compensate::mesh(job.course(), job.grid, job.setup);
-    job.results.resize(job.spans.size());
-    solve_windows(job, 0, job.spans.size(), *compensate::make_banded_engine());
+    lay_out(job);
+    EXPECT_TRUE(solve_windows(job, 0, job.windows.spans.size(), *compensate::make_banded_engine()));
     make_lines(job, rules_);
   }
 };
@@ -141,8 +158,8 @@ TEST_F(Writer, PlansARunAgainForTheStateItFinds) {
   static_cast<void>(written(*jobs[0]));
   const std::string as_planned = [&] {
     RunWriter other(rules_, "in.gcode", 1000.0, report_);
-    static_cast<void>(other.write(*jobs[0]));
-    return other.write(job).value_or("");
+    static_cast<void>(write(other, *jobs[0]));
+    return write(other, job).value_or("");
   }();
   job.plan.start.speed_factor = 2.0;
   EXPECT_EQ(written(job), as_planned);
@@ -202,7 +219,7 @@ TEST_F(Writer, EndsWithTheLinesOfAPartThatCannotBeWritten) {
   jobs[2]->failure = "no solution";
   static_cast<void>(written(*jobs[0]));
   EXPECT_THAT(written(*jobs[1]), StartsWith(";unflex test"));
-  const Result<std::string> second = writer_.write(*jobs[2]);
+  const Result<std::string> second = write(writer_, *jobs[2]);
   ASSERT_FALSE(second.has_value());
   EXPECT_EQ(second.error().kind, ErrorKind::input);
   EXPECT_EQ(second.error().place.file, "in.gcode");
@@ -225,6 +242,58 @@ TEST_F(Writer, KeepsAllPartsBehindABeginningThatIsKept) {
   EXPECT_EQ(report_.runs_fallback, 1U);
   EXPECT_THAT(report_.fallbacks, SizeIs(jobs.size() - 1));
   EXPECT_EQ(report_.fallbacks[1].reason, "the run's beginning stands as it is");
+}
+
+std::vector<Try> all(Tries tries) {
+  std::vector<Try> result;
+  while (const std::optional<Try> next = tries.next()) {
+    result.push_back(*next);
+  }
+  return result;
+}
+
+TEST(Tries, EndWithTheTimingAsSlicedWhereItIsFree) {
+  const auto free = std::make_unique<RunJob>();
+  RunJob& job = *free;
+  job.retimed.emplace();
+  std::vector<Try> scaled = all(Tries(job, "too fast", false));
+  ASSERT_THAT(scaled, SizeIs(4));
+  EXPECT_EQ(scaled[0].remedy, Remedy::scaled);
+  EXPECT_LT(scaled[0].accel_share, 1.0);
+  EXPECT_LT(scaled[1].accel_share, scaled[0].accel_share);
+  EXPECT_EQ(scaled[3].remedy, Remedy::as_sliced);
+  // An optimal timing has not been scaled yet, so the first try has all that the motors give.
+  job.retimed = NewTiming{{}, {}, dynamics::BaseTrajectory{}};
+  scaled = all(Tries(job, "too fast", false));
+  ASSERT_THAT(scaled, SizeIs(4));
+  EXPECT_EQ(scaled[0].accel_share, 1.0);
+}
+
+TEST(Tries, LeaveAReserveToWholeSteps) {
+  RunJob job;
+  EXPECT_THAT(all(Tries(job, "too fast", false)), SizeIs(0));
+  const std::vector<Try> reserves = all(Tries(job, "too fast", true));
+  ASSERT_THAT(reserves, SizeIs(3));
+  for (const Try& reserve : reserves) {
+    EXPECT_EQ(reserve.remedy, Remedy::reserve);
+  }
+  // There is no base that could do less.
+  job.failure = "no solution";
+  EXPECT_THAT(all(Tries(job, job.failure, true)), SizeIs(0));
+}
+
+TEST(Tries, WorkOnARunOfTheirOwn) {
+  RunJob job;
+  job.setup.x.limits.max_accel_mm_s2 = 10000.0;
+  job.sliced_setup = job.setup;
+  job.sliced_setup->x.limits.max_accel_mm_s2 = 4000.0;
+  job.stage = Stage::lined;
+  const auto slower = once_more(job, {Remedy::scaled, 0.5});
+  EXPECT_DOUBLE_EQ(slower->setup.x.limits.max_accel_mm_s2, 5000.0);
+  EXPECT_FALSE(slower->has_come_to(Stage::timed));
+  const auto sliced = once_more(job, {Remedy::as_sliced});
+  EXPECT_DOUBLE_EQ(sliced->setup.x.limits.max_accel_mm_s2, 4000.0);
+  EXPECT_DOUBLE_EQ(job.setup.x.limits.max_accel_mm_s2, 10000.0);
 }
 
 }  // namespace

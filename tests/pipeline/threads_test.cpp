@@ -242,7 +242,7 @@ std::vector<std::unique_ptr<RunJob>> jobs(const std::vector<std::size_t>& window
   std::vector<std::unique_ptr<RunJob>> result;
   for (const std::size_t count : windows) {
     result.push_back(std::make_unique<RunJob>());
-    result.back()->spans.resize(count);
+    result.back()->windows.spans.resize(count);
   }
   return result;
 }
@@ -254,10 +254,10 @@ std::vector<std::size_t> chosen(const std::vector<std::size_t>& windows) {
   std::size_t before = 0;
   for (const std::unique_ptr<RunJob>& job : jobs(windows)) {
     check.choose(*job);
-    for (Probe& probe : job->probes) {
+    for (Probe& probe : job->windows.probes) {
       probe.solution.iterations = static_cast<int>(2 * (before + probe.window) + probe.axis);
     }
-    before += job->spans.size();
+    before += job->windows.spans.size();
     check.take(*job);
   }
   std::vector<std::size_t> result;
