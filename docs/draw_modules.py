@@ -4,7 +4,7 @@
 Draws docs/modules.svg, or SVG, with Graphviz from the modules.txt that CMake writes into the build
 directory. Each line of that file is a module and those that it links.
 
-An arrow that follows from two others is left out: who links `pipeline` has `core` as well.
+An arrow that follows from two others is left out: who links `flow` has `core` as well.
 """
 
 import pathlib

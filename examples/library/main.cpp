@@ -1,8 +1,8 @@
 // compensate_file IN OUT PRINTER: what `unflex compensate IN -o OUT --printer PRINTER` writes.
 #include <cstdio>
 
+#include "unflex/flow/flow.hpp"
 #include "unflex/machine/machine.hpp"
-#include "unflex/pipeline/pipeline.hpp"
 #include "unflex/platform/files.hpp"
 
 int main(int argc, char** argv) {
@@ -18,12 +18,12 @@ int main(int argc, char** argv) {
             return unflex::machine::load({.print = &print, .printer_file = argv[3]});
           })
           .and_then([&](const unflex::machine::Settings& settings) {
-            return unflex::pipeline::compensate({.input = sliced,
-                                                 .input_name = argv[1],
-                                                 .output = unflex::platform::file_store(argv[2]),
-                                                 .output_name = argv[2],
-                                                 .settings = settings},
-                                                progress);
+            return unflex::flow::compensate({.input = sliced,
+                                             .input_name = argv[1],
+                                             .output = unflex::platform::file_store(argv[2]),
+                                             .output_name = argv[2],
+                                             .settings = settings},
+                                            progress);
           });
   std::puts(report ? unflex::report::to_text(*report).c_str()
                    : unflex::to_string(report.error()).c_str());

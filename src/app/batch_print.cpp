@@ -44,13 +44,13 @@ Result<std::string> hash_of_file(const std::string& name) {
   }
 }
 
-std::string_view name_of(pipeline::EngineChoice engine) {
+std::string_view name_of(flow::EngineChoice engine) {
   switch (engine) {
-    case pipeline::EngineChoice::banded:
+    case flow::EngineChoice::banded:
       return "banded";
-    case pipeline::EngineChoice::ipopt:
+    case flow::EngineChoice::ipopt:
       return "ipopt";
-    case pipeline::EngineChoice::automatic:
+    case flow::EngineChoice::automatic:
       break;
   }
   return "auto";

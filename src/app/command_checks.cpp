@@ -236,11 +236,11 @@ Status check_batch(RunConfig& config) {
 }  // namespace
 
 Status complete(RunConfig& config) {
-  if (config.check_solver && config.engine == pipeline::EngineChoice::ipopt) {
+  if (config.check_solver && config.engine == flow::EngineChoice::ipopt) {
     return usage("--check-solver: it is Ipopt that checks; leave out --engine ipopt");
   }
-  if (Status built = pipeline::check_built(config.check_solver ? pipeline::EngineChoice::ipopt
-                                                               : config.engine);
+  if (Status built =
+          flow::check_built(config.check_solver ? flow::EngineChoice::ipopt : config.engine);
       !built) {
     return built;
   }

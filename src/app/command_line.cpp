@@ -112,9 +112,9 @@ void take_tolerances(RunConfig& config) {
 void add_engine(CLI::App& command, RunConfig& config, const char* help) {
   command.add_option("--engine", config.engine, help)
       ->type_name("auto|banded|ipopt")
-      ->transform(word_for<pipeline::EngineChoice>({{"auto", pipeline::EngineChoice::automatic},
-                                                    {"banded", pipeline::EngineChoice::banded},
-                                                    {"ipopt", pipeline::EngineChoice::ipopt}}));
+      ->transform(word_for<flow::EngineChoice>({{"auto", flow::EngineChoice::automatic},
+                                                {"banded", flow::EngineChoice::banded},
+                                                {"ipopt", flow::EngineChoice::ipopt}}));
 }
 
 void add_check_solver(CLI::App& command, RunConfig& config) {

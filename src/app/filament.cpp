@@ -29,7 +29,7 @@ Result<filament::Profile> profile_of(const RunConfig& config, const machine::Set
   return filament::Profile::read(*table, *path);
 }
 
-std::string summary(const pipeline::FittedPrint& fitted) {
+std::string summary(const filament::FittedPrint& fitted) {
   const filament::Totals& totals = fitted.totals;
   const bool is_even = totals.most - totals.least < 5e-6;
   const std::string factor = is_even ? fmt::format("{:.5f}", totals.most)
@@ -58,10 +58,10 @@ std::optional<std::string> filament_profile(const RunConfig& config,
   return is_from_file ? platform::name_beside(*config.printer_file, name) : name;
 }
 
-Result<std::optional<pipeline::FittedPrint>> fit_to_filament(const RunConfig& config,
+Result<std::optional<filament::FittedPrint>> fit_to_filament(const RunConfig& config,
                                                              const machine::Settings& settings,
                                                              Input& input) {
-  std::optional<pipeline::FittedPrint> result;
+  std::optional<filament::FittedPrint> result;
   if (!settings.extruder.fits_filament()) {
     return result;
   }
@@ -72,9 +72,9 @@ Result<std::optional<pipeline::FittedPrint>> fit_to_filament(const RunConfig& co
   const Status fitted = input.make_seekable().and_then([&] {
     const std::shared_ptr<TextStore> sliced = input.text();
     return input.replace_text([&](const Input::Write& write) {
-      return pipeline::fit_filament(*sliced, input.name(), settings, *profile,
+      return filament::fit_filament(*sliced, input.name(), settings, *profile,
                                     config.command == Command::filament, write)
-          .map([&](pipeline::FittedPrint print) { result = std::move(print); });
+          .map([&](filament::FittedPrint print) { result = std::move(print); });
     });
   });
   if (!fitted) {

@@ -8,8 +8,8 @@
 #include "inputs.hpp"
 #include "unflex/app/run_config.hpp"
 #include "unflex/core/error.hpp"
+#include "unflex/filament/fit_filament.hpp"
 #include "unflex/machine/machine.hpp"
-#include "unflex/pipeline/filament.hpp"
 
 namespace unflex::app {
 
@@ -20,7 +20,7 @@ namespace unflex::app {
 
 // Fits the input, if the settings ask for that. nullopt: they do not. Errors are also those of the
 // profile.
-[[nodiscard]] Result<std::optional<pipeline::FittedPrint>> fit_to_filament(
+[[nodiscard]] Result<std::optional<filament::FittedPrint>> fit_to_filament(
     const RunConfig& config, const machine::Settings& settings, Input& input);
 
 // unflex filament

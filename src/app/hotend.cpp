@@ -11,7 +11,7 @@
 #include "outputs.hpp"
 #include "results.hpp"
 #include "unflex/machine/machine.hpp"
-#include "unflex/pipeline/temperature.hpp"
+#include "unflex/temperature/temperature.hpp"
 
 namespace unflex::app {
 namespace {
@@ -96,7 +96,7 @@ Status read_printer(const RunConfig& config, HotendTuning& tuning) {
                               key));
     }
   }
-  tuning.plant = pipeline::hotend_plant(model);
+  tuning.plant = temperature::hotend_plant(model);
   if (!tuning.heater_w) {
     tuning.heater_w = model.heater_w;
   }

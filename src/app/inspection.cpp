@@ -14,7 +14,7 @@
 namespace unflex::app {
 namespace {
 
-using pipeline::Inspection;
+using flow::Inspection;
 using report::Json;
 using Sink = std::back_insert_iterator<std::string>;
 

@@ -4,19 +4,19 @@
 #include <string>
 #include <vector>
 
+#include "unflex/flow/flow.hpp"
 #include "unflex/machine/machine.hpp"
-#include "unflex/pipeline/pipeline.hpp"
 #include "unflex/report/report.hpp"
 
 namespace unflex::app {
 
 // all_settings: those at their default, too.
-[[nodiscard]] std::string inspection_text(const pipeline::Inspection& inspection,
+[[nodiscard]] std::string inspection_text(const flow::Inspection& inspection,
                                           const std::string& input,
                                           const machine::Settings& settings, bool all_settings);
 
 // The keys are those of docs/report.md.
-[[nodiscard]] std::string inspection_json(const pipeline::Inspection& inspection,
+[[nodiscard]] std::string inspection_json(const flow::Inspection& inspection,
                                           const std::string& input,
                                           const machine::Settings& settings);
 

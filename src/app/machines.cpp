@@ -13,8 +13,8 @@
 #include "record_densities.hpp"
 #include "results.hpp"
 #include "unflex/identify/axis_model.hpp"
-#include "unflex/pipeline/study_machines.hpp"
 #include "unflex/platform/names.hpp"
+#include "unflex/study/study_machines.hpp"
 #include "unflex/study/truth.hpp"
 #include "workspace.hpp"
 
@@ -174,7 +174,7 @@ Result<ExitCode> run_machines(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  std::vector<pipeline::KnownMachine> known;
+  std::vector<study::KnownMachine> known;
   for (const Candidate& candidate : all) {
     Result<machine::Settings> settings = load_settings(with_axes(config, candidate), space->input);
     if (!settings) {
@@ -183,12 +183,12 @@ Result<ExitCode> run_machines(const RunConfig& config, Console& console) {
     known.push_back({candidate.name, std::move(*settings), machine_axis(candidate.x),
                      machine_axis(candidate.y)});
   }
-  const Result<pipeline::Job> job = job_of(config, *space);
+  const Result<flow::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
   }
   Result<study::MachinesOutcome> outcome = with_progress(
-      config, [&](Progress& progress) { return pipeline::study_machines(*job, known, progress); });
+      config, [&](Progress& progress) { return study::study_machines(*job, known, progress); });
   if (const Status unchanged = check_inputs(*space); !unchanged) {
     return tl::unexpected(unchanged.error());
   }

@@ -95,14 +95,14 @@ Result<PrintOutcome> work_on_print(const RunConfig& config, Console& console) {
       !accepted) {
     return tl::unexpected(accepted.error());
   }
-  const Result<pipeline::Job> job = job_of(config, *space);
+  const Result<flow::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
   }
   const bool passed_on = job->output_stream != nullptr;
   Result<report::Report> report = with_progress(config, [&](Progress& progress) {
-    return config.command == Command::compensate ? pipeline::compensate(*job, progress)
-                                                 : pipeline::verify(*job, progress);
+    return config.command == Command::compensate ? flow::compensate(*job, progress)
+                                                 : flow::verify(*job, progress);
   });
   if (const Status unchanged = check_inputs(*space); !unchanged) {
     return tl::unexpected(unchanged.error());

@@ -26,7 +26,7 @@ inline constexpr int kSignalExitBase = 128;
 // The error of a command that a signal ended. with_result: one of its results is in place.
 [[nodiscard]] tl::unexpected<Error> interrupted(Command command, bool with_result = false);
 
-// Runs one of the pipeline's commands with a progress bar that is gone when it returns.
+// Runs a command on a print with a progress bar that is gone when it returns.
 template <class Work>
 auto with_progress(const RunConfig& config, Work work)
     -> decltype(work(std::declval<Progress&>())) {

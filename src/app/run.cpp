@@ -25,10 +25,7 @@
 #include "tune.hpp"
 #include "unflex/core/caught.hpp"
 #include "unflex/core/lanes.hpp"
-#include "unflex/pipeline/pipeline.hpp"
-#include "unflex/pipeline/study_accels.hpp"
-#include "unflex/pipeline/study_fastest.hpp"
-#include "unflex/pipeline/study_print.hpp"
+#include "unflex/flow/flow.hpp"
 #include "unflex/platform/catching.hpp"
 #include "unflex/platform/process.hpp"
 #include "unflex/platform/signals.hpp"
@@ -36,6 +33,9 @@
 #include "unflex/study/accels.hpp"
 #include "unflex/study/fastest.hpp"
 #include "unflex/study/study.hpp"
+#include "unflex/study/study_accels.hpp"
+#include "unflex/study/study_fastest.hpp"
+#include "unflex/study/study_print.hpp"
 #include "workspace.hpp"
 
 namespace unflex::app {
@@ -46,12 +46,12 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
   if (!space) {
     return tl::unexpected(space.error());
   }
-  const Result<pipeline::Job> job = job_of(config, *space);
+  const Result<flow::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
   }
-  Result<pipeline::Inspection> inspection =
-      with_progress(config, [&](Progress& progress) { return pipeline::inspect(*job, progress); });
+  Result<flow::Inspection> inspection =
+      with_progress(config, [&](Progress& progress) { return flow::inspect(*job, progress); });
   if (const Status unchanged = check_inputs(*space); !unchanged) {
     return tl::unexpected(unchanged.error());
   }
@@ -75,19 +75,19 @@ Result<ExitCode> run_inspect(const RunConfig& config, Console& console) {
 Result<study::Outcome> study_outcome(const RunConfig& config, std::optional<Workspace>& print) {
   const bool traces = config.report && config.report->ends_with(".html");
   if (!print) {
-    const study::Options options{.ipopt = config.engine == pipeline::EngineChoice::ipopt,
+    const study::Options options{.ipopt = config.engine == flow::EngineChoice::ipopt,
                                  .workers = config.workers,
                                  .cases = config.cases,
                                  .traces = traces};
     return with_progress(
         config, [&](Progress& progress) { return study::study_corner(options, progress); });
   }
-  const Result<pipeline::Job> job = job_of(config, *print);
+  const Result<flow::Job> job = job_of(config, *print);
   if (!job) {
     return tl::unexpected(job.error());
   }
   Result<study::Outcome> outcome = with_progress(
-      config, [&](Progress& progress) { return pipeline::study_print(*job, traces, progress); });
+      config, [&](Progress& progress) { return study::study_print(*job, traces, progress); });
   if (const Status unchanged = check_inputs(*print); !unchanged) {
     return tl::unexpected(unchanged.error());
   }
@@ -140,7 +140,7 @@ Result<ExitCode> run_print_study(const RunConfig& config, Console& console,
     return tl::unexpected(space.error());
   }
   space->settings = settings_for(std::move(space->settings));
-  const Result<pipeline::Job> job = job_of(config, *space);
+  const Result<flow::Job> job = job_of(config, *space);
   if (!job) {
     return tl::unexpected(job.error());
   }
@@ -170,9 +170,9 @@ Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
   study::ToleranceRule rule;
   rule.largest_times = config.at_all_times ? 1.0 : rule.largest_times;
   return run_print_study(
-      config, console, pipeline::settings_of_fastest,
-      [&](const pipeline::Job& job, Progress& progress) {
-        return pipeline::study_fastest(job, tolerances_mm, rule, progress);
+      config, console, study::settings_of_fastest,
+      [&](const flow::Job& job, Progress& progress) {
+        return study::study_fastest(job, tolerances_mm, rule, progress);
       },
       [&](const study::FastestOutcome& outcome) {
         const std::string_view name = config.report ? *config.report : std::string_view{};
@@ -186,9 +186,8 @@ Result<ExitCode> run_fastest(const RunConfig& config, Console& console) {
 Result<ExitCode> run_accels(const RunConfig& config, Console& console) {
   return run_print_study(
       config, console, [](machine::Settings settings) { return settings; },
-      [&](const pipeline::Job& job, Progress& progress) {
-        auto outcome =
-            pipeline::study_accels(job, config.accels_mm_s2, config.scale_m204, progress);
+      [&](const flow::Job& job, Progress& progress) {
+        auto outcome = study::study_accels(job, config.accels_mm_s2, config.scale_m204, progress);
         if (outcome && config.keep_rms_um) {
           outcome->keep_rms_mm = 1e-3 * *config.keep_rms_um;
         }

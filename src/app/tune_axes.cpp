@@ -172,7 +172,7 @@ std::string trial_text(std::size_t axis, const tune::Trial& trial) {
 Status write_next(const RunConfig& config, const Printer& printer, std::string& summary) {
   tune::TowerSettings wanted;
   static_cast<tune::TowerPrinter&>(wanted) = tower_printer(printer.site);
-  pipeline::TrueAxes middle;
+  tune::TrueAxes middle;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     wanted.trials[axis] = tune::next_trial(printer.known[axis], wanted.accel_mm_s2);
     const tune::Trial& trial = wanted.trials[axis];
@@ -187,9 +187,9 @@ Status write_next(const RunConfig& config, const Printer& printer, std::string& 
     middle.damping_ratio[axis] = trial.damping_ratio((trial.bands + 1) / 2);
   }
   const tune::Tower tower = tune::tower(wanted);
-  const auto page = [&](const std::vector<pipeline::Band>& bands, Progress& progress) {
-    return pipeline::print_bands(bands, tower, middle, progress)
-        .map([&](const std::vector<std::vector<pipeline::Relief>>& printed) {
+  const auto page = [&](const std::vector<tune::Band>& bands, Progress& progress) {
+    return tune::print_bands(bands, tower, middle, progress)
+        .map([&](const std::vector<std::vector<tune::Relief>>& printed) {
           return tune_page(wanted, tower, printed, middle);
         });
   };
@@ -201,7 +201,7 @@ Status write_next(const RunConfig& config, const Printer& printer, std::string& 
       "bed, and run\nunflex tune {} --read x=FIRST..LAST --read y=FIRST..LAST{} -o NEXT\n",
       config.output, config.output, further_options(config));
   return write_tower(config, printer.site, tower,
-                     pipeline::settings_of_bands(wanted, printer.site.settings), page);
+                     tune::settings_of_bands(wanted, printer.site.settings), page);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 namespace unflex::app {
 namespace {
 
-using pipeline::Relief;
+using tune::Relief;
 
 // A picture of 8 bits per pixel in shades of grey, as a BMP file: all browsers read it, and it
 // needs no packing. Rows are from the bottom up, as bands are.
@@ -78,7 +78,7 @@ std::string picture(const std::vector<std::vector<Relief>>& reliefs, std::size_t
       const std::size_t before = i == 0 ? 0 : i - 1;
       const std::size_t after = std::min(i + 1, width - 1);
       const double slope = 1e-3 * (inward_um[after] - inward_um[before]) /
-                           (pipeline::kRelief_mm * static_cast<double>(after - before));
+                           (tune::kRelief_mm * static_cast<double>(after - before));
       grey.set(i, band, 0.62 + kBrightnessPerSlope * slope);
     }
   }
@@ -87,9 +87,9 @@ std::string picture(const std::vector<std::vector<Relief>>& reliefs, std::size_t
 
 // A wall as wide as it is: light where it is thicker, dark where it is thinner. Each row is a
 // band's ring, as far as its first side goes.
-std::string width_picture(const std::vector<pipeline::RingWidths>& widths, double side_mm) {
+std::string width_picture(const std::vector<tune::RingWidths>& widths, double side_mm) {
   constexpr double kBrightnessPerShare = 1.2;
-  const auto width = static_cast<std::size_t>(side_mm / pipeline::RingWidths::kBin_mm);
+  const auto width = static_cast<std::size_t>(side_mm / tune::RingWidths::kBin_mm);
   GreyPicture grey(width, widths.size());
   for (std::size_t band = 0; band < widths.size(); ++band) {
     const std::vector<double>& errors = widths[band].errors;
@@ -115,7 +115,7 @@ std::string value_text(const tune::Trial& trial, std::size_t band) {
 
 std::string axis_card(std::size_t axis, const tune::TowerSettings& settings,
                       const tune::Tower& tower, const std::vector<std::vector<Relief>>& reliefs,
-                      const pipeline::TrueAxes& axes) {
+                      const tune::TrueAxes& axes) {
   const tune::Trial& trial = settings.trials[axis];
   const char letter = axis == 0 ? 'X' : 'Y';
   const tune::Wall& wall = tower.walls[axis];
@@ -159,8 +159,7 @@ std::string axis_card(std::size_t axis, const tune::TowerSettings& settings,
 }  // namespace
 
 std::string tune_page(const tune::TowerSettings& settings, const tune::Tower& tower,
-                      const std::vector<std::vector<Relief>>& reliefs,
-                      const pipeline::TrueAxes& axes) {
+                      const std::vector<std::vector<Relief>>& reliefs, const tune::TrueAxes& axes) {
   std::string body = fmt::format(
       "<section class=\"card\"><h2>A tower of {} bands</h2>\n"
       "<p>Print the file as it is: on the bed's middle, without input shaping of your own, at 100 "
@@ -178,8 +177,8 @@ std::string tune_page(const tune::TowerSettings& settings, const tune::Tower& to
 }
 
 std::string pressure_page(const tune::PressureTowerSettings& settings, const tune::Tower& tower,
-                          const std::vector<pipeline::RingWidths>& widths,
-                          const pipeline::TrueHotend& hotend) {
+                          const std::vector<tune::RingWidths>& widths,
+                          const tune::TrueHotend& hotend) {
   const tune::PressureTrial& trial = settings.trial;
   const bool is_sum = trial.parameter == tune::PressureParameter::sum;
   const auto value_of = [&](std::size_t band) {

@@ -5,19 +5,19 @@
 #include <string>
 #include <vector>
 
-#include "unflex/pipeline/tune.hpp"
+#include "unflex/tune/bands.hpp"
 
 namespace unflex::app {
 
 // reliefs: those of the tower's walls, by band, on a printer whose axes are `axes`.
 [[nodiscard]] std::string tune_page(const tune::TowerSettings& settings, const tune::Tower& tower,
-                                    const std::vector<std::vector<pipeline::Relief>>& reliefs,
-                                    const pipeline::TrueAxes& axes);
+                                    const std::vector<std::vector<tune::Relief>>& reliefs,
+                                    const tune::TrueAxes& axes);
 
 // The page on a tower for the pressure. widths: those of its bands' outer rings with this hotend.
 [[nodiscard]] std::string pressure_page(const tune::PressureTowerSettings& settings,
                                         const tune::Tower& tower,
-                                        const std::vector<pipeline::RingWidths>& widths,
-                                        const pipeline::TrueHotend& hotend);
+                                        const std::vector<tune::RingWidths>& widths,
+                                        const tune::TrueHotend& hotend);
 
 }  // namespace unflex::app

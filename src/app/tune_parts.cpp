@@ -226,8 +226,8 @@ Status write_tower(const RunConfig& config, const TowerSite& site, const tune::T
     }
     page.emplace(std::move(*opened));
   }
-  const Result<std::vector<pipeline::Band>> bands = with_progress(config, [&](Progress& progress) {
-    return pipeline::compensate_bands(tower, of_bands, config.workers, progress);
+  const Result<std::vector<tune::Band>> bands = with_progress(config, [&](Progress& progress) {
+    return tune::compensate_bands(tower, of_bands, config.workers, progress);
   });
   if (!bands) {
     return tl::unexpected(bands.error());
@@ -242,7 +242,7 @@ Status write_tower(const RunConfig& config, const TowerSite& site, const tune::T
       return written;
     }
   }
-  return output->write(pipeline::join_bands(*bands)).and_then([&] { return output->commit(); });
+  return output->write(tune::join_bands(*bands)).and_then([&] { return output->commit(); });
 }
 
 std::string further_options(const RunConfig& config) {

@@ -11,7 +11,7 @@
 #include "unflex/app/run_config.hpp"
 #include "unflex/machine/machine.hpp"
 #include "unflex/machine/toml_edit.hpp"
-#include "unflex/pipeline/tune.hpp"
+#include "unflex/tune/bands.hpp"
 
 namespace unflex::app {
 
@@ -46,8 +46,8 @@ void lower_accel(const TowerSite& site, double most_mm_s2, tune::TowerPrinter& t
 
 // Compensates the bands and writes the tower to RunConfig::output, and the page that `page` makes
 // of them to RunConfig::report. An error of kind usage if the tower is larger than the bed.
-using PageOf = std::function<Result<std::string>(const std::vector<pipeline::Band>& bands,
-                                                 Progress& progress)>;
+using PageOf =
+    std::function<Result<std::string>(const std::vector<tune::Band>& bands, Progress& progress)>;
 [[nodiscard]] Status write_tower(const RunConfig& config, const TowerSite& site,
                                  const tune::Tower& tower,
                                  const std::vector<machine::Settings>& of_bands,

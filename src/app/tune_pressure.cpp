@@ -122,11 +122,11 @@ Status write_next(const RunConfig& config, const Printer& printer, std::string& 
       wanted);
   const tune::Tower tower = tune::tower(wanted);
   const std::size_t middle = (wanted.trial.bands + 1) / 2;
-  const pipeline::TrueHotend hotend{wanted.trial.advance_s(middle),
-                                    std::max(0.0, wanted.trial.dead_time_s(middle))};
-  const auto page = [&](const std::vector<pipeline::Band>& bands, Progress& progress) {
-    return pipeline::print_bands(bands, hotend, progress)
-        .map([&](const std::vector<pipeline::RingWidths>& printed) {
+  const tune::TrueHotend hotend{wanted.trial.advance_s(middle),
+                                std::max(0.0, wanted.trial.dead_time_s(middle))};
+  const auto page = [&](const std::vector<tune::Band>& bands, Progress& progress) {
+    return tune::print_bands(bands, hotend, progress)
+        .map([&](const std::vector<tune::RingWidths>& printed) {
           return pressure_page(wanted, tower, printed, hotend);
         });
   };
@@ -136,7 +136,7 @@ Status write_next(const RunConfig& config, const Printer& printer, std::string& 
       "unflex tune {} --read pressure=FIRST..LAST{} -o NEXT\n",
       config.output, config.output, further_options(config));
   return write_tower(config, printer.site, tower,
-                     pipeline::settings_of_bands(wanted, printer.site.settings), page);
+                     tune::settings_of_bands(wanted, printer.site.settings), page);
 }
 
 }  // namespace

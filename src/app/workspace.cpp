@@ -136,7 +136,7 @@ Result<Workspace> open_workspace(const RunConfig& config) {
           .and_then([&] { return load_settings(config, space.input); })
           .map([&](machine::Settings settings) { space.settings = std::move(settings); })
           .and_then([&] { return fit_to_filament(config, space.settings, space.input); })
-          .map([&](std::optional<pipeline::FittedPrint> fitted) {
+          .map([&](std::optional<filament::FittedPrint> fitted) {
             space.fitted = std::move(fitted);
           });
   if (!ready) {
@@ -157,8 +157,8 @@ void pack_output(const RunConfig& config, Workspace& space) {
   space.output->pack_as(output_kind(config, space), origin ? &*origin : nullptr);
 }
 
-Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space) {
-  pipeline::Job job;
+Result<flow::Job> job_of(const RunConfig& config, Workspace& space) {
+  flow::Job job;
   job.input = space.input.text();
   job.input_name = space.input.name();
   job.output_name = writes_print(config.command) ? config.print_name : config.output;

@@ -7,16 +7,16 @@
 #include "outputs.hpp"
 #include "unflex/app/run_config.hpp"
 #include "unflex/core/error.hpp"
+#include "unflex/filament/fit_filament.hpp"
+#include "unflex/flow/flow.hpp"
 #include "unflex/machine/machine.hpp"
-#include "unflex/pipeline/filament.hpp"
-#include "unflex/pipeline/pipeline.hpp"
 
 namespace unflex::app {
 
 struct Workspace {
   machine::Settings settings;
   Input input;
-  std::optional<pipeline::FittedPrint> fitted;  // where the input is fitted to its filament
+  std::optional<filament::FittedPrint> fitted;  // where the input is fitted to its filament
   std::optional<Input> compensated;             // only for verify
   std::optional<Output> output;                 // only for compensate
   std::optional<Output> report;
@@ -34,7 +34,7 @@ struct Workspace {
 // Has the output packed like the input, or as its name says.
 void pack_output(const RunConfig& config, Workspace& space);
 
-// The job for the pipeline.
-[[nodiscard]] Result<pipeline::Job> job_of(const RunConfig& config, Workspace& space);
+// The job for flow::compensate().
+[[nodiscard]] Result<flow::Job> job_of(const RunConfig& config, Workspace& space);
 
 }  // namespace unflex::app

@@ -76,7 +76,7 @@ class SectionPaths {
   // then: as far in its section as the emitted nozzle has in its own, or to the end of the last
   // move that the emitted nozzle has passed.
   [[nodiscard]] double sliced_until_s(double emitted_s);
-  // The same for the nozzle of the kept moves.
+  // How far the nozzle of the kept moves has come by then.
   [[nodiscard]] double kept_until_s(double emitted_s);
   // Reads all moves of kept().
   void complete_kept();

@@ -55,7 +55,7 @@ class Track {
   void play(const planner::PlannedMove& pushed, const planner::PlannedMove& laid);
   // For how long the machine stands still for the section's line: a dwell or a switch of filters.
   [[nodiscard]] double rest_of_section_s();
-  // The same of the added barrier that follows the section.
+  // For how long it does so for the added barrier that follows the section.
   [[nodiscard]] double rest_of_following_s() {
     return switching_.stop(replay_.following().switching_s);
   }

@@ -123,7 +123,7 @@ TEST(CommandLine, TellsWhatAnOptionTakes) {
   EXPECT_THAT(refusal({"compensate", "a", "-o", "b", "--engine", "1"}),
               StartsWith("--engine: '1' is none of auto, banded, ipopt;"));
   EXPECT_EQ(read({"compensate", "a", "-o", "b", "--engine", "ipopt"}).engine,
-            pipeline::EngineChoice::ipopt);
+            flow::EngineChoice::ipopt);
   EXPECT_TRUE(read({"compensate", "a", "-o", "b", "--check-solver"}).check_solver);
   EXPECT_THAT(refusal({"compensate", "a", "-o", "b", "--engine", "ipopt", "--check-solver"}),
               StartsWith("--check-solver: it is Ipopt that checks; leave out --engine ipopt"));

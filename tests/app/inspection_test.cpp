@@ -13,8 +13,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-pipeline::Inspection sample() {
-  pipeline::Inspection i;
+flow::Inspection sample() {
+  flow::Inspection i;
   i.dialect = "PrusaSlicer 2.5.0";
   i.lines = 21912;
   i.bytes = 790000;

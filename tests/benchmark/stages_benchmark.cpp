@@ -9,13 +9,15 @@
 #include <vector>
 
 #include "heatshrink.hpp"
-#include "judge.hpp"
-#include "run_job.hpp"
-#include "stage_options.hpp"
 #include "unflex/emit/emitter.hpp"
 #include "unflex/machine/machine.hpp"
+#include "unflex/run/emit_options.hpp"
+#include "unflex/run/judge.hpp"
+#include "unflex/run/run_job.hpp"
+#include "unflex/run/setup.hpp"
+#include "unflex/run/verify_rules.hpp"
 
-namespace unflex::pipeline {
+namespace unflex::flow {
 namespace {
 
 const std::string& print() {
@@ -33,15 +35,16 @@ machine::Settings settings(const std::string& firmware) {
       .value();
 }
 
-RunRules rules_of(const machine::Settings& s) {
-  return {compensate_setup(s), compensate_setup(s), emit_options(s, "benchmark"), verify_rules(s)};
+run::RunRules rules_of(const machine::Settings& s) {
+  return {run::compensate_setup(s), run::compensate_setup(s), run::emit_options(s, "benchmark"),
+          run::verify_rules(s)};
 }
 
-std::vector<Piece> pieces(const RunRules& rules) {
+std::vector<run::Piece> pieces(const run::RunRules& rules) {
   std::istringstream stream(print());
-  PieceReader reader(stream, "print", rules.verify.interpreter, rules.verify.limits,
-                     rules.verify.fixed);
-  std::vector<Piece> result(1);
+  run::PieceReader reader(stream, "print", rules.verify.interpreter, rules.verify.limits,
+                          rules.verify.fixed);
+  std::vector<run::Piece> result(1);
   while (reader.next(result.back()).value()) {
     result.emplace_back();
   }
@@ -50,16 +53,16 @@ std::vector<Piece> pieces(const RunRules& rules) {
 }
 
 // The longest run, ready to be solved.
-std::unique_ptr<RunJob> job_of(const machine::Settings& s, const RunRules& rules) {
-  auto job = std::make_unique<RunJob>();
-  for (Piece& piece : pieces(rules)) {
+std::unique_ptr<run::RunJob> job_of(const machine::Settings& s, const run::RunRules& rules) {
+  auto job = std::make_unique<run::RunJob>();
+  for (run::Piece& piece : pieces(rules)) {
     if (piece.is_run && piece.moves.size() > job->piece.moves.size()) {
       job->piece = std::move(piece);
     }
   }
   job->nozzle = {{job->piece.moves.front().segment.start_mm[gcode::X], 0.0},
                  {job->piece.moves.front().segment.start_mm[gcode::Y], 0.0}};
-  job->setup = setup_for(rules.setup, job->piece, job->nozzle, s).setup;
+  job->setup = run::setup_for(rules.setup, job->piece, job->nozzle, s).setup;
   job->grid = compensate::node_grid(job->course(), rules.setup);
   job->spans = compensate::mesh(job->course(), job->grid, rules.setup);
   job->results.resize(job->spans.size());
@@ -72,9 +75,9 @@ void per(benchmark::State& state, const char* what, double count) {
 }
 
 void ReadAndPlan(benchmark::State& state) {
-  const RunRules rules = rules_of(settings("klipper"));
+  const run::RunRules rules = rules_of(settings("klipper"));
   std::size_t moves = 0;
-  for (const Piece& piece : pieces(rules)) {
+  for (const run::Piece& piece : pieces(rules)) {
     moves += piece.moves.size();
   }
   for (auto _ : state) {
@@ -92,7 +95,7 @@ void Solve(benchmark::State& state, compensate::Engine& engine, double accel) {
   if (accel > 0.0) {
     job->setup.x.limits.max_accel_mm_s2 = job->setup.y.limits.max_accel_mm_s2 = accel;
   }
-  std::vector<compensate::RunWindow> windows = windows_of(*job, 0, job->spans.size());
+  std::vector<compensate::RunWindow> windows = run::windows_of(*job, 0, job->spans.size());
   double nodes = 0.0;
   for (const compensate::RunWindow& window : windows) {
     nodes += 2.0 * static_cast<double>(window.x.nodes());
@@ -116,10 +119,10 @@ BENCHMARK(SolveIpopt)->Arg(0)->Arg(8000)->Unit(benchmark::kMillisecond);
 
 void CutIntoLines(benchmark::State& state, const std::string& firmware) {
   const machine::Settings s = settings(firmware);
-  const RunRules rules = rules_of(s);
+  const run::RunRules rules = rules_of(s);
   const auto job = job_of(s, rules);
-  solve_windows(*job, 0, job->spans.size(), *compensate::make_banded_engine());
-  make_lines(*job, rules);
+  run::solve_windows(*job, 0, job->spans.size(), *compensate::make_banded_engine());
+  run::make_lines(*job, rules);
   for (auto _ : state) {
     benchmark::DoNotOptimize(emit::plan_run(job->run(), job->piece.start, rules.emit));
   }
@@ -130,7 +133,7 @@ BENCHMARK_CAPTURE(CutIntoLines, marlin, "marlin")->Unit(benchmark::kMillisecond)
 
 void Measure(benchmark::State& state) {
   const machine::Settings s = settings("klipper");
-  const RunRules rules = rules_of(s);
+  const run::RunRules rules = rules_of(s);
   const auto job = job_of(s, rules);
   for (auto _ : state) {
     benchmark::DoNotOptimize(
@@ -151,4 +154,4 @@ void PackRepeats(benchmark::State& state) {
 BENCHMARK(PackRepeats)->Range(1 << 16, 1 << 20)->Unit(benchmark::kMillisecond);
 
 }  // namespace
-}  // namespace unflex::pipeline
+}  // namespace unflex::flow

@@ -474,10 +474,10 @@ TEST(Emitter, EndsARunWhereTheFileDoesEvenBetweenGridPoints) {
 TEST(Emitter, TriesARunOnACopyWithoutATrace) {
   const std::string input = kHead + "G1 X10 E1\nG4 P1\n";
   std::istringstream stream(input);
-  pipeline::PieceReader reader(stream, "in", {}, {}, {});
+  run::PieceReader reader(stream, "in", {}, {}, {});
   Emitter emitter(options());
   std::string out;
-  for (pipeline::Piece piece; reader.next(piece).value();) {
+  for (run::Piece piece; reader.next(piece).value();) {
     if (piece.is_run) {
       const dynamics::BaseTrajectory base = testing::plan_as_base(piece.moves);
       Emitter trial = emitter;

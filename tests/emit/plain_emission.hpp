@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "piece_reader.hpp"
 #include "plain_base.hpp"
 #include "unflex/emit/emitter.hpp"
+#include "unflex/run/piece_reader.hpp"
 
 namespace unflex::emit::testing {
 
@@ -28,13 +28,13 @@ struct Emission {
 inline Emission emit(const std::string& input, const EmitOptions& options,
                      const std::function<void(const Boundary&)>& look = nullptr) {
   std::istringstream stream(input);
-  pipeline::PieceReader reader(stream, "input", options.interpreter, options.printer_limits,
-                               options.fixed);
+  run::PieceReader reader(stream, "input", options.interpreter, options.printer_limits,
+                          options.fixed);
   Emitter emitter(options);
   gcode::Interpreter interpreter(options.interpreter);
   planner::Limits limits = options.printer_limits;
   Emission emission;
-  pipeline::Piece piece;
+  run::Piece piece;
   while (reader.next(piece).value()) {
     if (look) {
       look({&emitter, &interpreter.state(), &limits, piece.events.front().line.number});

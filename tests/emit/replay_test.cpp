@@ -73,10 +73,10 @@ std::vector<planner::PlannedMove> planned(const std::string& text, const EmitOpt
 struct Replay {
   Replay(const std::string& text, const EmitOptions& how) {
     std::istringstream stream(text);
-    pipeline::PieceReader reader(stream, "in", how.interpreter, how.printer_limits, how.fixed);
+    run::PieceReader reader(stream, "in", how.interpreter, how.printer_limits, how.fixed);
     Emitter emitter(how);
     std::string out;
-    for (pipeline::Piece piece; reader.next(piece).value();) {
+    for (run::Piece piece; reader.next(piece).value();) {
       if (!piece.is_run) {
         for (const gcode::Event& event : piece.events) {
           emitter.line(event, out);
@@ -106,7 +106,7 @@ struct Replay {
     return worst;
   }
 
-  pipeline::Piece run;
+  run::Piece run;
   std::vector<Stroke> meant;
   std::vector<planner::PlannedMove> moves;
 };

@@ -16,11 +16,11 @@
 #include "playback.hpp"
 #include "program_writer.hpp"
 #include "same_print.hpp"
-#include "stage_options.hpp"
 #include "text_checks.hpp"
+#include "unflex/flow/flow.hpp"
 #include "unflex/gcode/compensable.hpp"
 #include "unflex/gcode/time_note.hpp"
-#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/machine/as_printer.hpp"
 
 namespace unflex::fuzz {
 namespace {
@@ -79,15 +79,15 @@ struct Compensated {
 
 Result<Compensated> run(const std::string& text, const machine::Settings& settings,
                         unsigned workers) {
-  const pipeline::Job job{.input = memory_store(text),
-                          .input_name = "in.gcode",
-                          .output = memory_store(),
-                          .output_name = "out.gcode",
-                          .settings = settings,
-                          .engine = pipeline::EngineChoice::banded,
-                          .workers = workers};
+  const flow::Job job{.input = memory_store(text),
+                      .input_name = "in.gcode",
+                      .output = memory_store(),
+                      .output_name = "out.gcode",
+                      .settings = settings,
+                      .engine = flow::EngineChoice::banded,
+                      .workers = workers};
   SilentProgress progress;
-  return pipeline::compensate(job, progress).map([&](report::Report report) {
+  return flow::compensate(job, progress).map([&](report::Report report) {
     return Compensated{std::move(report),
                        {std::istreambuf_iterator<char>(*job.output->read()), {}}};
   });
@@ -188,8 +188,8 @@ void compensate(std::string_view bytes) {
   Bytes source(bytes);
   const CompensateVariant variant = variant_of(source);
   const machine::Settings settings = settings_of(variant);
-  const PrinterSetup setup{pipeline::interpreter_options(settings),
-                           pipeline::planner_limits(settings), pipeline::firmware_config(settings)};
+  const PrinterSetup setup{machine::interpreter_options(settings),
+                           machine::planner_limits(settings), machine::firmware_config(settings)};
   const std::string print =
       variant.written ? ProgramWriter(setup.interpreter, most_s(variant.firmware)).program(source)
                       : std::string(source.rest());

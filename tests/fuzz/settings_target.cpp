@@ -3,10 +3,12 @@
 #include <vector>
 
 #include "bytes.hpp"
-#include "stage_options.hpp"
 #include "text_checks.hpp"
 #include "unflex/machine/machine.hpp"
 #include "unflex/machine/recommend.hpp"
+#include "unflex/run/emit_options.hpp"
+#include "unflex/run/setup.hpp"
+#include "unflex/run/verify_rules.hpp"
 
 namespace unflex::fuzz {
 namespace {
@@ -42,9 +44,9 @@ Result<machine::Settings> read(Bytes source, As as) {
 
 // Each stage must accept its part of the settings without a number that its types cannot hold.
 void turn_into_options(const machine::Settings& settings) {
-  static_cast<void>(pipeline::compensate_setup(settings));
-  static_cast<void>(pipeline::emit_options(settings, "fuzz"));
-  static_cast<void>(pipeline::verify_rules(settings));
+  static_cast<void>(run::compensate_setup(settings));
+  static_cast<void>(run::emit_options(settings, "fuzz"));
+  static_cast<void>(run::verify_rules(settings));
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ MOST = 30
 ELSEWHERE = ("src/platform/windows/", "src/platform/wasi/", "src/web/")
 OPTIONS = ["-std=c++20", "-DFMT_SHARED", '-DUNFLEX_VERSION=""', "-DTOML_HEADER_ONLY=1",
            "-DTOML_EXCEPTIONS=0", f"-I{ROOT}/include",
-           f"-I{ROOT}/tests", f"-I{ROOT}/src/pipeline",
+           f"-I{ROOT}/tests", f"-I{ROOT}/src/flow",
            "-isystem", "/usr/include/eigen3", "-isystem", "/usr/include/coin",
            "-Wall", "-Wextra", "-Werror", "-Wno-missing-braces"]
 # Headers that take long, read once for all sources.

@@ -29,9 +29,9 @@ PROGRAM = [
     "/usr/share/zsh/vendor-completions/_unflex",
 ]
 DEVELOPMENT = [
-    "/usr/include/unflex/pipeline/pipeline.hpp",
+    "/usr/include/unflex/flow/flow.hpp",
     "/usr/lib/cmake/unflex/unflexConfig.cmake",
-    "/usr/lib/libunflex_pipeline.a",
+    "/usr/lib/libunflex_flow.a",
     "/usr/share/doc/libunflex-dev/copyright",
     "/usr/share/doc/unflex/examples/library/main.cpp",
 ]

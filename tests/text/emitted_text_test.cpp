@@ -10,12 +10,12 @@
 #include "own_limits.hpp"
 #include "same_print.hpp"
 #include "unflex/core/progress.hpp"
-#include "unflex/pipeline/pipeline.hpp"
+#include "unflex/flow/flow.hpp"
 
 namespace unflex::testing {
 namespace {
 
-using pipeline::testing::JobFolder;
+using flow::testing::JobFolder;
 
 constexpr std::array kFirmwares = {Firmware::klipper, Firmware::marlin, Firmware::rrf};
 
@@ -24,10 +24,10 @@ void expect_same_when_compensated(const std::string& gcode, Firmware firmware,
   SCOPED_TRACE(to_string(firmware));
   const std::string sliced = numbered(gcode);
   const JobFolder folder(sliced, {fmt::format("printer.firmware={}", to_string(firmware))});
-  pipeline::Job job = folder.job(2);
-  job.engine = pipeline::EngineChoice::banded;
+  flow::Job job = folder.job(2);
+  job.engine = flow::EngineChoice::banded;
   SilentProgress progress;
-  const Result<report::Report> report = pipeline::compensate(job, progress);
+  const Result<report::Report> report = flow::compensate(job, progress);
   ASSERT_TRUE(report.has_value()) << to_string(report.error());
   EXPECT_GT(report->runs_compensated, 0U);
   const std::string emitted = folder.output();

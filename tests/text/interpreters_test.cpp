@@ -132,7 +132,7 @@ TEST_P(Interpreters, ReadProgramsAlike) {
     SCOPED_TRACE(fmt::format("seed {}", seed));
     interpreter_ = gcode::Interpreter(options());
     machine_ = fresh_machine();
-    read_both(pipeline::testing::random_program(GetParam(), seed).text);
+    read_both(flow::testing::random_program(GetParam(), seed).text);
   }
 }
 

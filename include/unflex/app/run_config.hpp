@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "unflex/core/error.hpp"
+#include "unflex/flow/flow.hpp"
 #include "unflex/hotend/rules.hpp"
 #include "unflex/identify/axis_model.hpp"
 #include "unflex/machine/print_text.hpp"
-#include "unflex/pipeline/pipeline.hpp"
 #include "unflex/tune/trial.hpp"
 
 namespace unflex::app {
@@ -123,7 +123,7 @@ struct RunConfig {
   std::string print_name;
   machine::SlicerVariables slicer_settings;
   std::optional<double> max_deviation_mm;
-  pipeline::EngineChoice engine = pipeline::EngineChoice::automatic;
+  flow::EngineChoice engine = flow::EngineChoice::automatic;
   bool check_solver = false;
   unsigned workers = 1;
   bool quiet = false;

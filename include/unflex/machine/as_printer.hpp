@@ -1,0 +1,36 @@
+// The settings as those want them who play the printer: the interpreter, the planner and the models
+// of the axes and of the hotend.
+#pragma once
+
+#include <vector>
+
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/dynamics/hotend_pressure.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/machine/machine.hpp"
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::machine {
+
+[[nodiscard]] gcode::InterpreterOptions interpreter_options(const Settings& settings);
+[[nodiscard]] planner::Limits planner_limits(const Settings& settings);
+[[nodiscard]] planner::FirmwareConfig firmware_config(const Settings& settings);
+// An advance of 0 is that of the file, or the printer's.
+[[nodiscard]] dynamics::HotendPressure hotend_pressure(const Settings& settings);
+
+// The grid of coordinates where lines do not end on whole steps, mm.
+inline constexpr double kGrid_mm = 1e-4;
+// The grid on which lines end, mm: that one, or steps.
+[[nodiscard]] double grid_mm(const Settings& settings);
+
+[[nodiscard]] dynamics::FlexibleAxis flexible_axis(const std::vector<ModeSettings>& settings);
+[[nodiscard]] dynamics::FlexibleAxis flexible_axis(const AxisDynamics& dynamics);
+// The axis with a second mode behind it; without one if its frequency is 0.
+[[nodiscard]] dynamics::FlexibleAxis behind(const dynamics::FlexibleAxis& axis, double freq_hz,
+                                            double damping_ratio);
+// The axes as they swing. Windows are solved for the axes of `dynamics` alone, without what rings
+// behind them (SecondSettings).
+[[nodiscard]] dynamics::FlexibleAxis nozzle_x(const Settings& settings);
+[[nodiscard]] dynamics::FlexibleAxis nozzle_y(const Settings& settings);
+
+}  // namespace unflex::machine

@@ -1,0 +1,44 @@
+// What each run is worked out with, or why it is kept.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "unflex/machine/machine.hpp"
+#include "unflex/report/report.hpp"
+#include "unflex/run/nozzle_motion.hpp"
+#include "unflex/run/run_job.hpp"
+#include "unflex/run/setup.hpp"
+
+namespace unflex::run {
+
+class Admission {
+ public:
+  // kept: runs that earlier passes blamed. All must outlive the Admission.
+  Admission(const machine::Settings& settings, const RunRules& rules, std::string input_name,
+            const std::vector<verify::BlamedRun>& kept, report::Report& report);
+
+  // The next piece of the file. Afterwards the job is read, timed if its timing stays as sliced, or
+  // lined if the piece is kept.
+  void admit(RunJob& job);
+
+ private:
+  void keep_lines(RunJob& job);
+  double prepare(RunJob& job);
+  dynamics::NozzleXY nozzle_at(const Piece& run);
+  void warn_if_capped(const RunSetup& setup, const Piece& piece);
+  [[nodiscard]] std::vector<std::string> blamed_before(const Piece& piece) const;
+  [[nodiscard]] std::string refusal(const RunJob& job, double asked_accel_mm_s2) const;
+
+  const machine::Settings* settings_;
+  const RunRules* rules_;
+  std::string input_name_;
+  const std::vector<verify::BlamedRun>* kept_;
+  report::Report* report_;
+  // The nozzle after the last piece read, as if every run so far were compensated. Kept motion
+  // leaves a swing, with which the next run starts.
+  NozzleFollower nozzle_;
+  bool told_of_cap_ = false;
+};
+
+}  // namespace unflex::run

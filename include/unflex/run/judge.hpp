@@ -1,0 +1,64 @@
+// Whether a compensated run is better than its original.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/planner/planner.hpp"
+#include "unflex/run/piece_reader.hpp"
+#include "unflex/verify/line_rate.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::run {
+
+// How the nozzle strays from the run, in the timing of `reference`, while the base makes the moves
+// `base`. It is sampled as finely as the nozzle's ringing needs, more coarsely than in a
+// verification.
+[[nodiscard]] verify::RunDeviation deviation_of(const Piece& run,
+                                                const std::vector<planner::PlannedMove>& reference,
+                                                const std::vector<planner::PlannedMove>& base,
+                                                const dynamics::NozzleXY& nozzle,
+                                                const verify::Rules& rules, double lead_in_s);
+
+// How the nozzle strays from the run if its sliced moves are carried out.
+[[nodiscard]] verify::RunDeviation deviation_as_sliced(const Piece& run,
+                                                       const dynamics::NozzleXY& nozzle,
+                                                       const verify::Rules& rules);
+
+// What is around the text, if it is a part of a run or the printer passes into it from kept lines.
+struct InMotion {
+  std::vector<gcode::Segment>
+      lines_before;           // the last lines before the text; none: it begins at rest
+  bool goes_on = false;       // another part follows
+  bool may_be_worse = false;  // by a little, since the part must be written
+  // Where the last move ended that the firmware has made.
+  std::optional<gcode::Position> machine_mm = std::nullopt;
+};
+
+struct Verdict {
+  std::optional<std::string> objection;  // why the original moves must stand
+  bool worse = false;                    // deviates more than the original moves
+  dynamics::NozzleXY nozzle;             // at the end of the run, if there is no objection
+  verify::LineRate rate;                 // with the run's lines counted, if there is no objection
+  std::vector<planner::PlannedMove> replayed;  // the printer's plan of the text
+  double wait_s = 0.0;                         // planner::wait_s() of the run
+};
+
+// How an objection begins that is against no limit.
+inline constexpr std::string_view kWorse = "compensation would be worse: ";
+
+// Replays the text of a compensated run as the printer would, in the state the printer is in before
+// the run. Objects if the run breaks a hard rule, has more lines per second than allowed, or
+// deviates more than its original moves (`before`). rate: has counted the lines before the run.
+[[nodiscard]] Verdict judge(const Piece& run, const std::vector<planner::PlannedMove>& reference,
+                            const verify::RunDeviation& before, std::string_view text,
+                            gcode::Interpreter printer, const planner::Limits& printer_limits,
+                            const dynamics::NozzleXY& nozzle, const verify::Rules& rules,
+                            double lead_in_s, verify::LineRate rate, double max_lines_per_s,
+                            const InMotion& in_motion);
+
+}  // namespace unflex::run

@@ -1,0 +1,41 @@
+// Moves that leave the printer's travel, summed up in one warning: where a print was sliced for
+// another bed, thousands do.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "unflex/core/error.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::run {
+
+class TravelCheck {
+ public:
+  explicit TravelCheck(const verify::TravelLimits& limits);
+
+  void add(const gcode::Event& event);
+  // The warning about all moves added; nullopt if none leaves the travel.
+  [[nodiscard]] std::optional<Diagnostic> warning(const std::string& file) const;
+
+ private:
+  struct Side {
+    double min_mm = 0.0;
+    double max_mm = 0.0;
+    bool min_assumed = false;
+    double under_mm = 0.0;  // how far moves go beyond either end
+    double over_mm = 0.0;
+    [[nodiscard]] bool add(double at_mm);
+    [[nodiscard]] bool is_left() const;
+    [[nodiscard]] double furthest_mm() const;
+  };
+
+  std::array<Side, 2> sides_;  // of X and Y
+  std::size_t moves_ = 0;
+  std::size_t first_line_ = 0;
+};
+
+}  // namespace unflex::run

@@ -1,0 +1,20 @@
+// A print compensated at several accelerations.
+#pragma once
+
+#include <vector>
+
+#include "unflex/core/error.hpp"
+#include "unflex/core/progress.hpp"
+#include "unflex/flow/flow.hpp"
+#include "unflex/study/accels.hpp"
+
+namespace unflex::study {
+
+// Compensates and verifies `job.input` with each of these as limits.max_accel_mm_s2. scale: what
+// the print sets of acceleration is multiplied by the same ratio. What is written stays in memory.
+// Forks its workers first: call it before any thread exists.
+[[nodiscard]] Result<study::AccelsOutcome> study_accels(const flow::Job& job,
+                                                        const std::vector<double>& accels_mm_s2,
+                                                        bool scale, Progress& progress);
+
+}  // namespace unflex::study

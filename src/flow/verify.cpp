@@ -1,0 +1,242 @@
+#include "unflex/verify/verify.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <istream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "printer_facts.hpp"
+#include "report_rows.hpp"
+#include "step_rates.hpp"
+#include "unflex/flow/flow.hpp"
+#include "unflex/gcode/line.hpp"
+#include "unflex/planner/printer_shaper.hpp"
+#include "unflex/platform/usage.hpp"
+#include "unflex/run/own_output.hpp"
+#include "unflex/run/verify_rules.hpp"
+#include "unflex/temperature/temperature.hpp"
+
+namespace unflex::flow {
+namespace {
+
+report::DeviationRow row(const verify::DeviationStats& stats) {
+  return {stats.contour_max_mm,  stats.contour_p99_mm, stats.contour_rms_mm,  stats.tracking_max_mm,
+          stats.tracking_rms_mm, stats.duration_s,     stats.contour_max_line};
+}
+
+report::CornerRow row(const verify::CornerStats& stats) {
+  return {stats.count, stats.rms_mm, stats.p99_mm, stats.max_mm, stats.max_line};
+}
+
+report::WidthRow row(const verify::WidthStats& stats) {
+  return {stats.rms, stats.p99, stats.largest, stats.wide, stats.line};
+}
+
+report::LineRow row(const verify::LineStats& stats) {
+  return {row(stats.width),
+          {stats.edge.rms_mm, stats.edge.p99_mm, stats.edge.max_mm, stats.edge.line},
+          row(stats.other[0]),
+          row(stats.other[1]),
+          row(stats.other[2]),
+          row(stats.other[3]),
+          {stats.first.rms, stats.first.mean},
+          {stats.last.rms, stats.last.mean}};
+}
+
+report::FlowRow row(const verify::FlowStats& stats) {
+  return {stats.max_mm3_s, stats.max_line, stats.max_change_mm3_s2, stats.max_change_line};
+}
+
+// Tells where the hotend may not melt what the output lays.
+std::string too_much_text(const verify::TooMuchFlow& flow, double max_flow_mm3_s,
+                          const std::string& output) {
+  return to_string(Diagnostic{
+      {output, flow.line},
+      fmt::format("the hotend is asked for {:.1f} mm³/s here, {:.1f} as sliced, and "
+                  "extruder.max_flow_mm3_s is {:.1f}; let it print slower, or raise that if the "
+                  "hotend melts more",
+                  flow.flow_mm3_s, flow.sliced_mm3_s, max_flow_mm3_s)});
+}
+
+report::Spread spread(const verify::Deviation& deviation) {
+  return {deviation.extruding.contour_max_mm, deviation.extruding.contour_rms_mm};
+}
+
+report::DeviationRows rows(const verify::Deviation& deviation) {
+  return {row(deviation.extruding), row(deviation.all)};
+}
+
+}  // namespace
+
+void add_performance(std::chrono::steady_clock::time_point begin, report::Report& report) {
+  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.cpu_s = platform::processor_s();
+  report.print_s_per_wall_s = report.reference_time_s / report.wall_s;
+  report.peak_rss_mb = platform::peak_memory_mb();
+}
+
+report::Report new_report(std::string command, const Job& job) {
+  report::Report report;
+  report.command = std::move(command);
+  report.version = UNFLEX_VERSION;
+  report.input = job.input_name;
+  report.output = job.output_name;
+  report.firmware = to_string(job.settings.printer.firmware);
+  report.freq_error = job.settings.freq_error();
+  report.max_flow_mm3_s = job.settings.extruder.max_flow_mm3_s;
+  report.free_timing.tolerance_mm = job.settings.timing.tolerance_um * 1e-3;
+  for (machine::SettingRow& setting : machine::rows(job.settings)) {
+    report.printer.push_back(
+        {std::move(setting.key), std::move(setting.value), std::move(setting.origin)});
+  }
+  report.facts = printer_facts(job.settings);
+  add_step_limits(job.settings, report.step_rates);
+  return report;
+}
+
+std::unique_ptr<record::Recorder> recorder_for(const Job& job, const verify::Rules& rules) {
+  static constexpr std::array kOfSummary = {dynamics::ShaperKind::zv};
+  record::Options options;
+  options.nozzle = rules.nozzle;
+  std::optional<record::PrinterShaper> own = printer_shaper(rules);
+  if (job.all_shapers) {
+    if (own) {
+      own->name = "printer's " + own->name;
+    }
+    options.printer_shaper = std::move(own);
+  } else if (own) {
+    // It acts on the sliced file as that is played. The summary tells of no other.
+    options.shapers = {};
+  } else {
+    options.shapers = kOfSummary;
+  }
+  return std::make_unique<record::Recorder>(options);
+}
+
+verify::Observation observation_of(record::Recorder& recorder, const verify::Rules& rules) {
+  verify::Observation observation{verify::detuned(rules.nozzle), &recorder.observer()};
+  observation.detuned.insert(observation.detuned.end(), rules.plants.begin(), rules.plants.end());
+  return observation;
+}
+
+void add_verification(const verify::VerifyReport& verified, record::Recorder& recorder,
+                      report::Report& report) {
+  report.recording = recorder.finish(verified);
+  report.uncompensated = rows(verified.uncompensated);
+  if (verified.unshaped) {
+    report.unshaped = rows(*verified.unshaped);
+  }
+  report.compensated = rows(verified.compensated);
+  report.uncompensated_corners = row(verified.uncompensated_corners);
+  report.compensated_corners = row(verified.compensated_corners);
+  if (verified.uncompensated_line.length_mm > 0.0) {
+    report.laid_line = {verified.uncompensated_line.length_mm, row(verified.uncompensated_line),
+                        row(verified.compensated_line)};
+  }
+  constexpr std::size_t kErrors = verify::kFrequencyErrors.size();
+  for (std::size_t i = 0; i < verified.detuned.size(); ++i) {
+    const report::Spread before = spread(verified.detuned[i].uncompensated);
+    const report::Spread after = spread(verified.detuned[i].compensated);
+    if (i < kErrors) {
+      report.sensitivity.push_back({verify::kFrequencyErrors[i], before, after});
+    } else {
+      report.plants.push_back({before, after});
+    }
+  }
+  report.reference_time_s = verified.reference_time_s;
+  report.emitted_time_s = verified.emitted_time_s;
+  report.base_max_velocity_mm_s = verified.base_max_velocity_mm_s;
+  report.base_max_accel_mm_s2 = verified.base_max_accel_mm_s2;
+  report.base_max_step_mm_s = verified.base_max_step_mm_s;
+  report.base_accel_limit_mm_s2 = verified.base_accel_limit_mm_s2;
+  report.output_lines = verified.output_lines;
+  report.output_bytes = verified.output_bytes;
+  report.max_lines_per_s = verified.max_lines_per_s;
+  report.segment_ms_median = verified.segment_ms_median;
+  report.worst_run_drift_ms = verified.worst_run_drift_s * 1e3;
+  report.input_extrusion_mm = verified.input_extrusion_mm;
+  report.output_extrusion_mm = verified.output_extrusion_mm;
+  report.worst_move_extrusion_error_mm = verified.worst_move_extrusion_error_mm;
+  const auto lag = [](const verify::LagStats& stats) {
+    return report::Report::FilamentLag{stats.rms_mm, stats.max_mm, stats.max_line};
+  };
+  report.uncompensated_lag = lag(verified.uncompensated_lag);
+  report.compensated_lag = lag(verified.compensated_lag);
+  report.free_timing.contour_p999_mm = verified.compensated.extruding.contour_p999_mm;
+  report.free_timing.speed_p999 = verified.compensated_feed.p999;
+  report.free_timing.speed_max = verified.compensated_feed.max;
+  report.free_timing.speed_max_line = verified.compensated_feed.max_line;
+  report.uncompensated_flow = row(verified.uncompensated_flow);
+  report.compensated_flow = row(verified.compensated_flow);
+  if (verified.flow_difference) {
+    report.flow_difference =
+        report::FlowDifferenceRow{verified.flow_difference->relative,
+                                  verified.flow_difference->line, verified.flow_difference->p99};
+  }
+  if (verified.too_much_flow && report.max_flow_mm3_s) {
+    report.warnings.push_back(
+        too_much_text(*verified.too_much_flow, *report.max_flow_mm3_s, report.output));
+  }
+  add_step_rates(verified.sliced_steps, &verified.emitted_steps, report.step_rates);
+  warn_of_sliced_steps(verified.sliced_step_breaches, report.input, report.warnings);
+  report.runs_compensated = verified.runs;
+  report.violation_count = verified.violation_count;
+  for (const verify::Violation& violation : verified.violations) {
+    report.violations.push_back(
+        to_string(Error{ErrorKind::input, violation.place, violation.message}));
+  }
+}
+
+Status add_verification(const Job& job, Progress& progress, report::Report& report) {
+  const std::unique_ptr<std::istream> input = job.input->read();
+  const std::unique_ptr<std::istream> output = job.output->read();
+  if (!*input) {
+    return fail(ErrorKind::input, {job.input_name, 0}, "cannot read the file");
+  }
+  if (!*output) {
+    return fail(ErrorKind::input, {job.output_name, 0}, "cannot read the file");
+  }
+  const Result<std::optional<std::size_t>> measured_with = run::own_line(*input, job.input_name);
+  if (!measured_with) {
+    return tl::unexpected(measured_with.error());
+  }
+  if (*measured_with) {
+    // Compared with it, the output would look as good as sliced.
+    return tl::unexpected(run::compensated_already(job.input_name, **measured_with));
+  }
+  const Result<std::optional<std::size_t>> own = run::own_line(*output, job.output_name);
+  if (!own) {
+    return tl::unexpected(own.error());
+  }
+  verify::Rules rules = run::verify_rules(job.settings);
+  rules.approaches = own->has_value();
+  const std::unique_ptr<record::Recorder> recorder = recorder_for(job, rules);
+  const Result<verify::VerifyReport> result =
+      verify::verify(*input, job.input_name, *output, job.output_name, rules, progress,
+                     observation_of(*recorder, rules));
+  if (!result) {
+    return tl::unexpected(result.error());
+  }
+  add_verification(*result, *recorder, report);
+  return {};
+}
+
+Result<report::Report> verify(const Job& job, Progress& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  report::Report report = new_report("verify", job);
+  const Status status = add_verification(job, progress, report).and_then([&] {
+    return temperature::follow_temperature(job, temperature::OutputMay::stay, progress, report);
+  });
+  if (!status) {
+    return tl::unexpected(status.error());
+  }
+  add_performance(begin, report);
+  return report;
+}
+
+}  // namespace unflex::flow

@@ -1,0 +1,171 @@
+#include "unflex/machine/as_printer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <numbers>
+
+#include "unflex/planner/rrf_planner.hpp"
+
+namespace unflex::machine {
+namespace {
+
+static_assert(kMostModes == dynamics::kMostModes);
+
+// The longest pause for a swing to die away.
+constexpr double kLongestCalm_s = 0.5;
+
+// Filament per mm of path, in mm, from which on a move has too much. Klipper refuses such a move.
+// The others lay it, so that only what no nozzle can lay is too much.
+double max_extrude_ratio(const Settings& settings) {
+  constexpr double kNoNozzle = 5.0;
+  const double radius_mm = settings.extruder.filament_diameter_mm / 2.0;
+  const double ratio =
+      settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius_mm * radius_mm);
+  return settings.printer.firmware == Firmware::klipper ? ratio : kNoNozzle * ratio;
+}
+
+}  // namespace
+
+double grid_mm(const Settings& settings) {
+  const std::array<double, 4> steps_per_mm = settings.steps_per_mm();
+  return settings.printer.firmware != Firmware::klipper
+             ? 1.0 / std::min(steps_per_mm[gcode::X], steps_per_mm[gcode::Y])
+             : kGrid_mm;
+}
+
+dynamics::FlexibleAxis flexible_axis(const std::vector<ModeSettings>& settings) {
+  std::vector<dynamics::Mode> modes;
+  for (const ModeSettings& mode : settings) {
+    modes.push_back({2.0 * std::numbers::pi * mode.freq_hz, mode.damping_ratio, mode.gain});
+  }
+  return dynamics::FlexibleAxis(modes);
+}
+
+dynamics::FlexibleAxis flexible_axis(const AxisDynamics& dynamics) {
+  return dynamics.modes.empty() ? dynamics::from_frequency(dynamics.freq_hz, dynamics.damping_ratio)
+                                : flexible_axis(dynamics.modes);
+}
+
+dynamics::FlexibleAxis behind(const dynamics::FlexibleAxis& axis, double freq_hz,
+                              double damping_ratio) {
+  return freq_hz > 0.0 ? axis.followed_by(2.0 * std::numbers::pi * freq_hz, damping_ratio) : axis;
+}
+
+dynamics::FlexibleAxis nozzle_x(const Settings& settings) {
+  return behind(flexible_axis(settings.dynamics_x), settings.second.x_freq_hz,
+                settings.second.x_damping_ratio);
+}
+
+dynamics::FlexibleAxis nozzle_y(const Settings& settings) {
+  return behind(flexible_axis(settings.dynamics_y), settings.second.y_freq_hz,
+                settings.second.y_damping_ratio);
+}
+
+gcode::InterpreterOptions interpreter_options(const Settings& settings) {
+  gcode::InterpreterOptions options = gcode::default_options(settings.printer.firmware);
+  options.relative_e = settings.printer.relative_extrusion;
+  options.firmware_retraction = settings.printer.firmware_retraction;
+  options.retract_length_mm = settings.retract_length_mm();
+  options.retract_length_is_told = settings.printer.retract_length_mm.has_value();
+  options.retract_speed_mm_s = settings.retract_speed_mm_s();
+  options.unretract_extra_length_mm = settings.printer.unretract_extra_length_mm;
+  options.unretract_speed_mm_s = settings.unretract_speed_mm_s();
+  options.retract_z_hop_mm = settings.printer.retract_z_hop_mm;
+  options.arc_resolution_mm = settings.printer.arc_resolution_mm;
+  options.marlin_arcs = {
+      .min_segment_mm = settings.printer.min_arc_segment_mm,
+      .max_segment_mm = settings.printer.max_arc_segment_mm,
+      .segments_per_s = settings.printer.arc_segments_per_s,
+      .min_circle_segments = static_cast<int>(settings.printer.min_circle_segments),
+      .correction_interval = static_cast<int>(settings.printer.arc_correction_interval),
+      .circles = settings.printer.arc_p_circles};
+  options.shaper_freq_x_hz = settings.shaper_freq_x_hz();
+  options.shaper_freq_y_hz = settings.shaper_freq_y_hz();
+  options.shaper_unknown_x = settings.shaper_unknown_x();
+  options.shaper_unknown_y = settings.shaper_unknown_y();
+  options.shaper_type = settings.shaper_type_x();
+  options.has_print_jerk = settings.has_print_jerk();
+  options.filament_diameter_mm = settings.extruder.filament_diameter_mm;
+  options.steps_per_mm = settings.steps_per_mm();
+  const double settling_s =
+      std::max(nozzle_x(settings).settling_s(), nozzle_y(settings).settling_s());
+  options.settling_s = std::min(settling_s, kLongestCalm_s);
+  if (settings.writes_pressure() && settings.printer_presses()) {
+    options.advance_of_runs = gcode::RunAdvance::on;
+    options.begins_advanced = settings.pressure.advance_s.value_or(0.0) > 0.0 ||
+                              settings.extruder.pressure_advance_s > 0.0;
+  } else if (settings.writes_pressure()) {
+    options.advance_of_runs = gcode::RunAdvance::off;
+  }
+  options.max_extrude_ratio = max_extrude_ratio(settings);
+  options.max_extrude_dab_mm = settings.extruder.nozzle_diameter_mm * options.max_extrude_ratio;
+  return options;
+}
+
+planner::Limits planner_limits(const Settings& settings) {
+  planner::Limits limits;
+  limits.max_velocity_mm_s = settings.limits.max_velocity_mm_s;
+  limits.max_accel_mm_s2 = settings.limits.max_accel_mm_s2;
+  limits.square_corner_velocity_mm_s = settings.limits.square_corner_velocity_mm_s;
+  limits.minimum_cruise_ratio = settings.limits.minimum_cruise_ratio;
+  limits.accel_to_decel_mm_s2 = (1.0 - limits.minimum_cruise_ratio) * limits.max_accel_mm_s2;
+  limits.axis_max_velocity_mm_s = settings.axis_max_velocity_mm_s();
+  limits.axis_max_accel_mm_s2 = settings.axis_max_accel_mm_s2();
+  limits.axis_jerk_mm_s = settings.print_jerk_mm_s();
+  if (settings.has_print_jerk()) {
+    limits.axis_max_jerk_mm_s = settings.jerk_mm_s();
+  }
+  limits.print_accel_mm_s2 = settings.print_accel_mm_s2();
+  limits.travel_accel_mm_s2 = settings.travel_accel_mm_s2();
+  limits.retract_accel_mm_s2 = settings.retract_accel_mm_s2();
+  limits.junction_deviation_mm = settings.limits.junction_deviation_mm;
+  limits.min_velocity_mm_s = settings.limits.min_velocity_mm_s;
+  limits.min_travel_velocity_mm_s = settings.limits.min_travel_velocity_mm_s;
+  limits.min_segment_time_s = settings.limits.min_segment_time_ms * 1e-3;
+  limits.min_movement_velocity_mm_s = settings.limits.min_movement_velocity_mm_s;
+  limits.jerk_policy = static_cast<int>(settings.limits.jerk_policy);
+  return settings.printer.firmware == Firmware::rrf ? planner::rrf_raised(limits) : limits;
+}
+
+planner::FirmwareConfig firmware_config(const Settings& settings) {
+  planner::FirmwareConfig config;
+  config.firmware = settings.printer.firmware;
+  config.kinematics = settings.kinematics.type;
+  config.max_z_velocity_mm_s = settings.axis_max_velocity_mm_s()[gcode::Z];
+  config.max_z_accel_mm_s2 = settings.axis_max_accel_mm_s2()[gcode::Z];
+  config.max_extrude_only_velocity_mm_s = settings.max_extrude_only_velocity_mm_s();
+  config.max_extrude_only_accel_mm_s2 = settings.max_extrude_only_accel_mm_s2();
+  config.instantaneous_corner_velocity_mm_s = settings.extruder.instantaneous_corner_velocity_mm_s;
+  config.pressure_advance_s = config.firmware == Firmware::marlin
+                                  ? settings.printer.linear_advance_s
+                                  : settings.extruder.pressure_advance_s;
+  config.pressure_advance_smooth_s = settings.extruder.pressure_advance_smooth_s;
+  config.shaper = {settings.shaper_type_x(), settings.shaper_type_y(),
+                   settings.shaper_damping_ratio_x(), settings.shaper_damping_ratio_y()};
+  config.steps_per_mm = settings.steps_per_mm();
+  config.classic_jerk = settings.printer.classic_jerk;
+  config.min_steps_per_segment = static_cast<int>(settings.printer.min_steps_per_segment);
+  config.jd_handle_small_segments = settings.printer.jd_handle_small_segments;
+  config.minimum_planner_speed_mm_s = settings.printer.minimum_planner_speed_mm_s;
+  config.block_buffer_size = config.ring_length = static_cast<int>(settings.queue_length());
+  config.step_clock_hz = settings.printer.step_clock_hz;
+  config.has_print_jerk = config.rounds_phases = settings.has_print_jerk();
+  return config;
+}
+
+dynamics::HotendPressure hotend_pressure(const Settings& settings) {
+  using enum dynamics::PressureShape;
+  const PressureSettings& set = settings.pressure;
+  const auto shape = set.shape == "two_slopes"   ? two_slopes
+                     : set.shape == "tanh"       ? tanh
+                     : set.shape == "reciprocal" ? reciprocal
+                                                 : linear;
+  return {.shape = shape,
+          .advance_s = set.advance_s.value_or(0.0),
+          .offset_mm = set.offset_mm,
+          .knee_mm_s = set.knee_mm_s,
+          .second_advance_s = set.second_advance_s,
+          .dead_time_s = set.dead_time_ms * 1e-3};
+}
+
+}  // namespace unflex::machine

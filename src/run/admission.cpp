@@ -1,0 +1,153 @@
+#include "unflex/run/admission.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+namespace unflex::run {
+namespace {
+
+// The trajectory of a run or part is held as a whole, 48 bytes per node. A run or part with more
+// nodes is kept. Only a single move can make a part so long.
+constexpr std::size_t kMaxRunNodes = 8'000'000;
+// A plan may come out above a limit by rounding.
+constexpr double kRounding = 1.0 + 1e-6;
+
+double largest_motor_accel(const std::vector<planner::PlannedMove>& moves, const Motors& motors) {
+  double largest = 0.0;
+  for (const planner::PlannedMove& move : moves) {
+    if (move.accel_s + move.decel_s > 0.0) {
+      largest =
+          std::max(largest, move.accel_mm_s2 * motors.largest_of_xy(move.direction[gcode::X],
+                                                                    move.direction[gcode::Y],
+                                                                    move.direction[gcode::Z]));
+    }
+  }
+  return largest;
+}
+
+}  // namespace
+
+Admission::Admission(const machine::Settings& settings, const RunRules& rules,
+                     std::string input_name, const std::vector<verify::BlamedRun>& kept,
+                     report::Report& report)
+    : settings_(&settings),
+      rules_(&rules),
+      input_name_(std::move(input_name)),
+      kept_(&kept),
+      report_(&report),
+      nozzle_(rules.verify.nozzle, rules.verify.fixed,
+              gcode::Interpreter(rules.emit.interpreter).state().input_shaper()) {}
+
+void Admission::admit(RunJob& job) {
+  if (!job.piece.is_run) {
+    keep_lines(job);
+    return;
+  }
+  const Piece& piece = job.piece;
+  report_->runs_total += piece.begins_run() ? 1 : 0;
+  const double asked_accel_mm_s2 = prepare(job);
+  const std::vector<std::string> blamed = blamed_before(piece);
+  // A run of free timing gets another chance in the timing as sliced.
+  const std::size_t chances = settings_->is_timing_free() ? 2 : 1;
+  std::string reason = blamed.size() >= chances ? blamed.back() : refusal(job, asked_accel_mm_s2);
+  if (!reason.empty()) {
+    keep(job, std::move(reason));
+    return;
+  }
+  if (!settings_->is_timing_free()) {
+    job.stage = Stage::timed;
+  } else if (piece.begins_run() && piece.ends_run()) {
+    job.sliced_setup = setup_for(rules_->sliced_setup, piece, job.nozzle, *settings_).setup;
+  }
+  if (!blamed.empty()) {
+    keep_timing(job, blamed.back());
+  }
+}
+
+void Admission::keep_lines(RunJob& job) {
+  static_cast<void>(nozzle_.follow(job.piece));
+  for (const gcode::Event& event : job.piece.events) {
+    count_kept_moves(event, rules_->verify.fixed.firmware, report_->kept_moves);
+  }
+  keep(job);
+}
+
+// Sets what the run is worked out with. Returns the largest acceleration that its plan asks for.
+double Admission::prepare(RunJob& job) {
+  const Piece& piece = job.piece;
+  job.nozzle = nozzle_at(piece);
+  RunSetup setup = setup_for(rules_->setup, piece, job.nozzle, *settings_);
+  warn_if_capped(setup, piece);
+  job.setup = std::move(setup.setup);
+  job.accel = setup.accel;
+  job.first_stage = first_stage(job, rules_->verify.nozzle);
+  job.grid = compensate::node_grid(job.course(), job.setup);
+  return setup.asked_accel_mm_s2;
+}
+
+// The nozzle where the run begins. Goes on to the run's end.
+dynamics::NozzleXY Admission::nozzle_at(const Piece& run) {
+  const verify::NozzleModel& model = rules_->verify.nozzle;
+  static_cast<void>(nozzle_.begin_run(run));
+  const dynamics::NozzleXY at_begin = nozzle_.nozzle();
+  const planner::PlannedMove& last = run.moves.back();
+  nozzle_.set(run.ends_run() ? at_rest(last.segment.end_mm, model) : at_end_of(last, model),
+              last.segment.end_mm);
+  return at_begin;
+}
+
+// Why the run cannot be worked out; empty if it can.
+std::string Admission::refusal(const RunJob& job, double asked_accel_mm_s2) const {
+  if (job.piece.cut_off) {
+    return "too many lines without motion stand in a row in the middle of the motion";
+  }
+  const double accel = largest_motor_accel(job.piece.moves, rules_->verify.fixed.motors());
+  const double most_mm_s2 = settings_->base_max_accel_mm_s2(asked_accel_mm_s2);
+  if (accel > kRounding * most_mm_s2) {
+    return fmt::format(
+        "the plan itself accelerates a motor by {:.0f} mm/s², more than base.max_accel_mm_s2, "
+        "{:.0f}; raise that if the motors can",
+        accel, most_mm_s2);
+  }
+  if (job.grid.count > kMaxRunNodes) {
+    return fmt::format("{:.0f} s of motion without a stop are too long to be handled",
+                       static_cast<double>(job.grid.count) * job.setup.period_s);
+  }
+  return {};
+}
+
+// Tells once that the base cannot follow what the print asks as well as the motors could.
+void Admission::warn_if_capped(const RunSetup& setup, const Piece& piece) {
+  // Below this many times the plan's acceleration the error grows.
+  constexpr double kEnough = 2.0;
+  const double wanted_mm_s2 = std::min(kEnough * setup.asked_accel_mm_s2,
+                                       settings_->base_max_accel_mm_s2(setup.asked_accel_mm_s2));
+  if (told_of_cap_ || wanted_mm_s2 <= setup.accel_by_lines_mm_s2) {
+    return;
+  }
+  told_of_cap_ = true;
+  report_->warnings.push_back(to_string(Diagnostic{
+      {input_name_, piece.events.front().line.number},
+      fmt::format("the print asks for {:.0f} mm/s² here, and emit.max_speed_step_mm_s and "
+                  "emit.max_lines_per_s allow the motors no more than {:.0f}; raise the first "
+                  "if the motors can do more",
+                  setup.asked_accel_mm_s2, setup.accel_by_lines_mm_s2)}));
+}
+
+// What earlier passes blamed the run for.
+std::vector<std::string> Admission::blamed_before(const Piece& piece) const {
+  const std::size_t first = piece.moves.front().segment.line;
+  const std::size_t last = piece.moves.back().segment.line;
+  std::vector<std::string> reasons;
+  for (const verify::BlamedRun& run : *kept_) {
+    if (run.first_line <= last && first <= run.last_line) {
+      reasons.push_back(run.reason);
+    }
+  }
+  return reasons;
+}
+
+}  // namespace unflex::run

@@ -1,0 +1,42 @@
+#include "unflex/run/path_error.hpp"
+
+#include <cmath>
+
+#include "plan_walk.hpp"
+#include "unflex/run/nozzle_motion.hpp"
+
+namespace unflex::run {
+
+void PathError::add(const PathError& other) {
+  sum_mm2 += other.sum_mm2;
+  samples += other.samples;
+}
+
+double PathError::rms_mm() const {
+  return samples > 0 ? std::sqrt(sum_mm2 / static_cast<double>(samples)) : 0.0;
+}
+
+PathError path_error(const std::vector<planner::PlannedMove>& plan, double lead_in_s,
+                     const dynamics::BaseTrajectory& base, const dynamics::NozzleXY& start,
+                     const verify::NozzleModel& model) {
+  PathError error;
+  dynamics::NozzleXY nozzle = start;
+  const NozzleOnBase on_base(base, model);
+  PlanWalk sliced(plan);
+  for (std::size_t k = 0; k + 1 < base.nodes() && !sliced.at_end(); ++k) {
+    const double t = static_cast<double>(k + 1) * base.period_s - lead_in_s;
+    on_base.advance(k, nozzle);
+    sliced.to(t, [](const planner::PlannedMove&, double, double) {});
+    if (t > 0.0 && !sliced.at_end() && sliced.move().segment.extruding()) {
+      const gcode::Position planned = sliced.position_mm();
+      const double away_mm =
+          across_mm(sliced.move().segment, nozzle.x.position() - planned[gcode::X],
+                    nozzle.y.position() - planned[gcode::Y]);
+      error.sum_mm2 += away_mm * away_mm;
+      ++error.samples;
+    }
+  }
+  return error;
+}
+
+}  // namespace unflex::run

@@ -1,0 +1,203 @@
+#include "unflex/run/setup.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+#include <utility>
+
+#include "base_limits.hpp"
+#include "unflex/compensate/band.hpp"
+#include "unflex/core/math.hpp"
+#include "unflex/dynamics/flexible_axis.hpp"
+#include "unflex/machine/as_printer.hpp"
+#include "unflex/verify/verify.hpp"
+
+namespace unflex::run {
+namespace {
+
+// All models that the axis may have besides the one it is given as: the plants of the settings or
+// a mode that nobody knows of, and the edges of the band around that one, which share with it what
+// the others leave.
+std::vector<compensate::Plant> plants(const machine::AxisDynamics& dynamics,
+                                      const machine::Settings& settings) {
+  const compensate::Band band{settings.freq_error(), settings.dynamics_error.damping};
+  const dynamics::FlexibleAxis given = machine::flexible_axis(dynamics);
+  std::vector<compensate::Plant> result;
+  double left = 1.0;
+  for (const machine::PlantSettings& plant : dynamics.plants) {
+    result.push_back({machine::flexible_axis(plant.modes), plant.share});
+    left -= plant.share;
+  }
+  if (!band.is_exact() && dynamics.plants.empty() && dynamics.modes.empty()) {
+    result.push_back(compensate::with_unknown_mode(given));
+    left -= result.back().share;
+  }
+  std::ranges::copy(compensate::edges(given, band, left), std::back_inserter(result));
+  return result;
+}
+
+// Pulses against a mode that hangs behind the axis.
+dynamics::ShaperPulses pulses_of(const machine::Settings& settings, double freq_hz,
+                                 double damping_ratio) {
+  using dynamics::ShaperKind;
+  constexpr std::pair<std::string_view, ShaperKind> kKinds[] = {{"zv", ShaperKind::zv},
+                                                                {"mzv", ShaperKind::mzv},
+                                                                {"zvd", ShaperKind::zvd},
+                                                                {"ei", ShaperKind::ei}};
+  for (const auto& [name, kind] : kKinds) {
+    if (freq_hz > 0.0 && name == settings.second.shaper) {
+      return dynamics::shaper_pulses(kind, freq_hz,
+                                     std::min(damping_ratio, dynamics::max_damping_ratio(kind)))
+          .value();
+    }
+  }
+  return {};
+}
+
+compensate::AxisSetup axis_setup(const machine::AxisDynamics& dynamics,
+                                 const std::optional<machine::Range>& travel,
+                                 const machine::Settings& settings) {
+  compensate::AxisSetup setup;
+  setup.axis = machine::flexible_axis(dynamics);
+  setup.plants = plants(dynamics, settings);
+  setup.limits.max_velocity_mm_s = settings.base_max_velocity_mm_s();
+  setup.limits.max_accel_mm_s2 = planned_base_accel_mm_s2(settings, 0.0);
+  if (settings.base.max_jerk_mm_s3 > 0.0) {
+    setup.limits.max_jerk_mm_s3 =
+        settings.base.max_jerk_mm_s3 / (shares_motors(settings) ? 2.0 : 1.0);
+  }
+  if (travel) {
+    setup.limits.min_position_mm = travel->min;
+    setup.limits.max_position_mm = travel->max;
+  }
+  return setup;
+}
+
+double half_period_s(const machine::Settings& settings) {
+  return 0.5 / std::min(settings.dynamics_x.slowest_hz(), settings.dynamics_y.slowest_hz());
+}
+
+// An error of the nozzle that may be seen in a print.
+constexpr double kSeen_mm = 10e-3;
+
+// Whether the nozzle still swings from the motion before when the run begins.
+bool begins_swinging(const Piece& run, const dynamics::NozzleXY& nozzle,
+                     const machine::Settings& settings) {
+  const verify::NozzleModel model{machine::nozzle_x(settings), machine::nozzle_y(settings)};
+  return run.begins_run() &&
+         verify::swing_mm(nozzle, run.moves.front().segment.start_mm, model) >= kSeen_mm;
+}
+
+// Whether the run soon lays filament.
+bool draws_soon(const Piece& run, const machine::Settings& settings) {
+  double start_s = 0.0;
+  for (const planner::PlannedMove& move : run.moves) {
+    if (start_s > half_period_s(settings) || move.segment.extruding()) {
+      return start_s <= half_period_s(settings);
+    }
+    start_s += move.duration_s();
+  }
+  return false;
+}
+
+// A nozzle that accelerates out of a rest needs its base ahead by the lag, at once. Returns how
+// long the base takes to get there, from rest to rest. Returns 0 where nobody would see what is
+// missing: the run begins with travel, or straight and with axes that lag alike, or the lag is
+// small.
+double time_ahead_s(const Piece& run, const compensate::Setup& setup, double soon_s) {
+  constexpr double kStraight = 0.999;  // cosine of the angle
+  const planner::PlannedMove& first = run.moves.front();
+  if (!first.segment.extruding()) {
+    return 0.0;
+  }
+  const double x = first.direction[gcode::X];
+  const double y = first.direction[gcode::Y];
+  const auto lag_mm = [&](const compensate::AxisSetup& axis, double share) {
+    return axis.axis.largest_lag_mm(first.accel_mm_s2 * std::abs(share), 0.0);
+  };
+  const double lag_x_mm = lag_mm(setup.x, x);
+  const double lag_y_mm = lag_mm(setup.y, y);
+  double seen_mm = std::abs(lag_x_mm * std::abs(y) - lag_y_mm * std::abs(x));
+  double start_s = first.duration_s();
+  for (std::size_t i = 1; i < run.moves.size() && start_s < soon_s; ++i) {
+    const auto& next = run.moves[i].direction;
+    if (x * next[gcode::X] + y * next[gcode::Y] < kStraight) {
+      seen_mm = math::hypot(lag_x_mm, lag_y_mm);
+    }
+    start_s += run.moves[i].duration_s();
+  }
+  return seen_mm > kSeen_mm ? 2.0 * std::sqrt(std::max(lag_x_mm / setup.x.limits.max_accel_mm_s2,
+                                                       lag_y_mm / setup.y.limits.max_accel_mm_s2))
+                            : 0.0;
+}
+
+}  // namespace
+
+compensate::Setup compensate_setup(const machine::Settings& settings) {
+  compensate::Setup setup;
+  setup.x = axis_setup(settings.dynamics_x, settings.printer.travel_x_mm, settings);
+  setup.y = axis_setup(settings.dynamics_y, settings.printer.travel_y_mm, settings);
+  setup.x.pulses = pulses_of(settings, settings.second.x_freq_hz, settings.second.x_damping_ratio);
+  setup.y.pulses = pulses_of(settings, settings.second.y_freq_hz, settings.second.y_damping_ratio);
+  setup.shares_motors = shares_motors(settings);
+  setup.period_s = settings.period_ms() * 1e-3;
+  setup.lead_in_s = settings.solve.lead_in_ms * 1e-3;
+  setup.tail_s = settings.tail_s();
+  setup.window_s = settings.solve.window_s;
+  setup.overlap_s = std::clamp(std::max(setup.x.axis.unseen_s(), setup.y.axis.unseen_s()),
+                               settings.solve.overlap_s, settings.solve.window_s);
+  setup.travel_weight = settings.solve.travel_weight;
+  setup.jerk_weight = settings.jerk_weight();
+  // What swings at the end of a run, travel before a wall for instance, is drawn by the next.
+  constexpr double kEndWeight = 10.0;
+  setup.end_weight = kEndWeight;
+  if (settings.along_weight() < 1.0) {
+    // A motion that is free along the path takes longer to settle than one that is not.
+    constexpr double kLeastOverlap_s = 0.2;
+    setup.overlap_s = std::min(std::max(setup.overlap_s, kLeastOverlap_s), setup.window_s);
+    setup.contour = compensate::Contour{.along_weight = settings.along_weight(),
+                                        .tracking_jerk_weight = settings.tracking_jerk_weight(),
+                                        .pairs = compensate::pairs_of(setup.x, setup.y)};
+  }
+  return setup;
+}
+
+RunSetup setup_for(const compensate::Setup& setup, const Piece& run,
+                   const dynamics::NozzleXY& nozzle, const machine::Settings& settings) {
+  RunSetup result;
+  result.setup = setup;
+  for (const planner::PlannedMove& move : run.moves) {
+    result.asked_accel_mm_s2 =
+        std::max(result.asked_accel_mm_s2, std::round(planner::asked_accel_mm_s2(move)));
+  }
+  // To end a swing takes all that the motors give.
+  const bool swings = begins_swinging(run, nozzle, settings);
+  result.accel = {planned_base_accel_mm_s2(settings, result.asked_accel_mm_s2, !swings),
+                  settings.emit_accel_mm_s2(result.asked_accel_mm_s2)};
+  result.accel_by_lines_mm_s2 = accel_by_lines_mm_s2(settings);
+  for (compensate::AxisSetup* const axis : {&result.setup.x, &result.setup.y}) {
+    axis->limits.max_accel_mm_s2 = result.accel.base_mm_s2;
+  }
+  const auto keep_above_zero = [&](gcode::Axis axis, const std::optional<machine::Range>& travel,
+                                   compensate::BaseLimits& limits) {
+    const bool above = std::ranges::all_of(run.moves, [&](const planner::PlannedMove& move) {
+      return move.segment.start_mm[axis] >= 0.0 && move.segment.end_mm[axis] >= 0.0;
+    });
+    if (!travel && above) {
+      limits.min_position_mm = 0.0;
+    }
+  };
+  keep_above_zero(gcode::X, settings.printer.travel_x_mm, result.setup.x.limits);
+  keep_above_zero(gcode::Y, settings.printer.travel_y_mm, result.setup.y.limits);
+  if (run.begins_run()) {
+    const double half_s = half_period_s(settings);
+    const double swing_s = swings && draws_soon(run, settings) ? half_s : 0.0;
+    // The plan begins at a node, where its acceleration may leap.
+    const double nodes = std::ceil(time_ahead_s(run, result.setup, half_s) / setup.period_s);
+    result.setup.lead_in_s = std::max({result.setup.lead_in_s, swing_s, nodes * setup.period_s});
+  }
+  return result;
+}
+
+}  // namespace unflex::run

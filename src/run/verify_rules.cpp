@@ -1,0 +1,82 @@
+#include "unflex/run/verify_rules.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "unflex/machine/as_printer.hpp"
+
+namespace unflex::run {
+namespace {
+
+// The nozzle of each plant: the n-th of both axes, or the axis as given where it has fewer.
+std::vector<verify::NozzleModel> nozzles_of_plants(const machine::Settings& settings,
+                                                   const verify::NozzleModel& nominal) {
+  const std::vector<machine::PlantSettings>& x = settings.dynamics_x.plants;
+  const std::vector<machine::PlantSettings>& y = settings.dynamics_y.plants;
+  const machine::SecondSettings& second = settings.second;
+  std::vector<verify::NozzleModel> nozzles(std::max(x.size(), y.size()), nominal);
+  for (std::size_t i = 0; i < nozzles.size(); ++i) {
+    if (i < x.size()) {
+      nozzles[i].x = machine::behind(machine::flexible_axis(x[i].modes), second.x_freq_hz,
+                                     second.x_damping_ratio);
+    }
+    if (i < y.size()) {
+      nozzles[i].y = machine::behind(machine::flexible_axis(y[i].modes), second.y_freq_hz,
+                                     second.y_damping_ratio);
+    }
+  }
+  return nozzles;
+}
+
+}  // namespace
+
+verify::StepRules step_rules(const machine::Settings& settings) {
+  const machine::StepLimits limits = settings.step_limits();
+  verify::StepRules rules;
+  rules.max_hz = limits.max_hz;
+  rules.max_total_hz = limits.max_total_hz;
+  rules.max_shared_hz = limits.max_shared_hz;
+  for (std::size_t i = 0; i < rules.steps_per_mm.size(); ++i) {
+    rules.steps_per_mm[i] = settings.printer.steps_per_mm[i].value_or(0.0);
+  }
+  return rules;
+}
+
+verify::Rules verify_rules(const machine::Settings& settings) {
+  verify::Rules rules;
+  rules.interpreter = machine::interpreter_options(settings);
+  rules.limits = machine::planner_limits(settings);
+  rules.fixed = machine::firmware_config(settings);
+  rules.nozzle = {machine::nozzle_x(settings), machine::nozzle_y(settings),
+                  settings.verify.step_ms * 1e-3, settings.verify.hold_s};
+  rules.plants = nozzles_of_plants(settings, rules.nozzle);
+  const auto set_range = [](const std::optional<machine::Range>& travel, double& min, double& max,
+                            bool& min_assumed) {
+    min_assumed = !travel;
+    min = travel ? travel->min : 0.0;
+    max = travel ? travel->max : max;
+  };
+  set_range(settings.printer.travel_x_mm, rules.travel.x_min_mm, rules.travel.x_max_mm,
+            rules.travel.x_min_assumed);
+  set_range(settings.printer.travel_y_mm, rules.travel.y_min_mm, rules.travel.y_max_mm,
+            rules.travel.y_min_assumed);
+  rules.base_max_velocity_mm_s = settings.base_max_velocity_mm_s();
+  rules.base_max_accel_mm_s2 = settings.base_max_accel_mm_s2();
+  rules.base_accel_times_plan = settings.base_accel_times_asked();
+  rules.max_lines_per_s = settings.max_lines_per_s();
+  rules.steps = step_rules(settings);
+  rules.tolerance_mm = settings.largest_tolerance_um() * 1e-3;
+  rules.line.hotend = machine::hotend_pressure(settings);
+  rules.line.is_written = settings.writes_pressure();
+  rules.line.width_mm = settings.pressure.line_width_mm;
+  rules.filament_area_mm2 = settings.filament_area_mm2();
+  rules.may_ask_ahead = settings.hotend.ahead;
+  rules.max_flow_mm3_s = settings.extruder.max_flow_mm3_s.value_or(rules.max_flow_mm3_s);
+  if (machine::grid_mm(settings) > machine::kGrid_mm) {
+    constexpr double kShareOfStep = 0.1;
+    rules.leeway.chance_mm = kShareOfStep * machine::grid_mm(settings);
+  }
+  return rules;
+}
+
+}  // namespace unflex::run
