@@ -2,28 +2,23 @@
 
 #include <fmt/core.h>
 
+#include <string>
+
 #include "klipper_macros.hpp"
 #include "outputs.hpp"
 #include "results.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/machine/machine.hpp"
 
 namespace unflex::app {
 namespace {
 
 Result<std::string> macros_of(const machine::Settings& settings) {
-  switch (settings.printer.firmware) {
-    case Firmware::klipper:
-      return klipper_macros();
-    case Firmware::marlin:
-      return fail(ErrorKind::usage,
-                  "printer.firmware is marlin, which has no macros that a pause would call; "
-                  "docs/pausing.md says where to pause");
-    case Firmware::rrf:
-      break;
+  const FirmwareWriting& writing = spec_of(settings.printer.firmware).writing;
+  if (!writing.can_pause_behind_run) {
+    return fail(ErrorKind::usage, std::string(writing.why_no_macros));
   }
-  return fail(ErrorKind::usage,
-              "printer.firmware is rrf, whose pause no macro can defer; docs/pausing.md says where "
-              "to pause");
+  return klipper_macros();
 }
 
 Status write_macros(const RunConfig& config, const std::string& macros) {

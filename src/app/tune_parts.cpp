@@ -12,6 +12,7 @@
 
 #include "inputs.hpp"
 #include "outputs.hpp"
+#include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::app {
 namespace {
@@ -68,7 +69,7 @@ Result<TowerSite> site_of(const RunConfig& config, const machine::PrintText* pri
 }
 
 double accel_mm_s2(const machine::Settings& settings) {
-  if (settings.printer.firmware == Firmware::klipper) {
+  if (!spec_of(settings.printer.firmware).motion.has_axis_limits) {
     return settings.limits.max_accel_mm_s2;
   }
   const std::array<double, 4> axes = settings.axis_max_accel_mm_s2();

@@ -1,17 +1,9 @@
 #include "unflex/core/firmware.hpp"
 
+#include "unflex/core/firmware_spec.hpp"
+
 namespace unflex {
 
-std::string_view to_string(Firmware firmware) {
-  switch (firmware) {
-    case Firmware::klipper:
-      return "klipper";
-    case Firmware::marlin:
-      return "marlin";
-    case Firmware::rrf:
-      return "rrf";
-  }
-  return "";
-}
+std::string_view to_string(Firmware firmware) { return spec_of(firmware).name; }
 
 }  // namespace unflex

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "unflex/core/firmware_spec.hpp"
+
 namespace unflex {
 namespace {
 
@@ -35,7 +37,7 @@ std::string_view to_string(Kinematics kinematics) {
 std::span<const Kinematics> all_kinematics() { return kAll; }
 
 Motors::Motors(Kinematics kinematics, Firmware firmware) {
-  const double lift = firmware == Firmware::rrf ? 3.0 : 1.0;
+  const double lift = spec_of(firmware).motion.corexz_lift;
   switch (kinematics) {
     case Kinematics::cartesian:
       break;

@@ -6,13 +6,17 @@
 #include <vector>
 
 #include "unflex/core/firmware.hpp"
+#include "unflex/emit/run_limits.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
 
 namespace unflex::emit {
 
-// The firmware's name as its makers write it.
-[[nodiscard]] std::string_view brand(Firmware firmware);
+// The command that sets Klipper's limits.
+inline constexpr std::string_view kKlipperLimits = "SET_VELOCITY_LIMIT";
+
+// Sets the limits of a run where each axis has its own.
+void set_axis_limits(const RunLimits& run, planner::Limits& limits);
 
 // The limits of a run, with the acceleration of X, Y and filament raised to `accel_mm_s2`.
 [[nodiscard]] planner::Limits raised(planner::Limits in_run, double accel_mm_s2);
@@ -34,15 +38,6 @@ struct ZLimits {
 // run sets are unknown, so they are always written. Limits that a run leaves to the file are as the
 // file has them, so that no value is written which nobody has said.
 [[nodiscard]] planner::Limits unknown_to_run(Firmware firmware, const planner::Limits& file);
-
-// Whether limits also hold for the move in the line before. RepRapFirmware keeps the last move in a
-// buffer of its own until its queue of moves has room, reads on meanwhile, and obeys limits at once
-// (GCodes/GCodes.cpp, ReadMove; GCodes2.cpp, M201, M203, M566; GCodes5.cpp, M204).
-[[nodiscard]] bool limits_act_early(Firmware firmware);
-
-// Whether E is rounded to whole steps before M221 and M200 scale it, and then once more. Marlin
-// does so line by line (planner.cpp, _populate_block, esteps).
-[[nodiscard]] bool scales_whole_steps_of_e(Firmware firmware);
 
 // The lines, without their endings, that put `wanted` in force. They contain only what differs from
 // `current`.

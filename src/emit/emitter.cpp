@@ -9,6 +9,7 @@
 #include "dialect.hpp"
 #include "filament.hpp"
 #include "strokes.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/compensable.hpp"
@@ -52,7 +53,7 @@ void append_filament(std::string& text, double value) {
 // The places that an axis can have: those that can be written, or whole steps if the firmware
 // rounds to steps.
 AxisGrid axis_grid(const planner::FirmwareConfig& config, gcode::Axis axis, double zero_mm) {
-  if (config.firmware != Firmware::klipper) {
+  if (spec_of(config.firmware).motion.rounds_to_steps) {
     return {0.0, 1.0 / config.steps_per_mm[axis]};
   }
   return {zero_mm, 1.0 / power_of_ten(kPositionDecimals)};
@@ -169,7 +170,7 @@ RunStart run_start(Firmware firmware, const gcode::ModalState& state,
   return {{state.base_mm[X], state.base_mm[Y], state.base_mm[Z]},
           state.speed_factor,
           limits,
-          firmware == Firmware::marlin && state.known[E],
+          spec_of(firmware).reading.sums_e_in_single_precision && state.known[E],
           state.pressure_advance};
 }
 
@@ -208,7 +209,7 @@ void Emitter::run(const Run& run, const RunPlan& plan, std::string& out) {
       // Moves are replaced, those without length too: the base is not where they say.
       const bool stays =
           event.kind != gcode::EventKind::move && !gcode::names_position(event.line.content());
-      if (stays && options_.fixed.firmware == Firmware::marlin) {
+      if (stays && spec_of(options_.fixed.firmware).writing.units_scale_all_words) {
         set_unit(input_.state().unit_mm, out);
       }
       if (stays && move_may_wait() && changes(event, limits_)) {
@@ -260,7 +261,7 @@ std::string Emitter::shaper_left_off() const {
 void Emitter::sign(std::string& out) {
   if (!std::exchange(signed_, true)) {
     write(fmt::format("{} {}: compensated for {}, not to be compensated again", kOwnMark,
-                      options_.version, brand(options_.fixed.firmware)),
+                      options_.version, spec_of(options_.fixed.firmware).brand),
           out);
   }
 }
@@ -301,7 +302,7 @@ void Emitter::set_run_modes(const Run& run, bool joins_file, std::string& out) {
   if (state.absolute_e) {
     write("M83", out);
   }
-  if (scales_whole_steps_of_e(options_.fixed.firmware) &&
+  if (spec_of(options_.fixed.firmware).writing.scales_whole_steps_of_e &&
       (!input_.state().absolute_e || e_is_known())) {
     // A run's lines have so few steps that a factor near one would have no effect. So E is filament
     // as it is laid, and the difference of readings is put right when the run ends.
@@ -400,7 +401,7 @@ void Emitter::write_feed(double feed_mm_s, std::string& out) {
 }
 
 bool Emitter::move_may_wait() const {
-  return move_waits_ && limits_act_early(options_.fixed.firmware);
+  return move_waits_ && spec_of(options_.fixed.firmware).writing.limits_act_early;
 }
 
 // A line without motion is read only when the move before it has left the buffer.

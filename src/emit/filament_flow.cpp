@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::emit {
@@ -26,19 +27,15 @@ constexpr double kSettled = 1.01;
 }  // namespace
 
 double most_flow_step_mm_s(const planner::FirmwareConfig& firmware) {
-  switch (firmware.firmware) {
-    case Firmware::klipper:
-      return kOfLimit * firmware.instantaneous_corner_velocity_mm_s;
-    case Firmware::marlin:
-    case Firmware::rrf:
-      break;
-  }
-  return std::numeric_limits<double>::infinity();
+  return spec_of(firmware.firmware).motion.limits_extruder
+             ? kOfLimit * firmware.instantaneous_corner_velocity_mm_s
+             : std::numeric_limits<double>::infinity();
 }
 
 double drawing_back_mm_s2(const planner::FirmwareConfig& firmware) {
-  return firmware.firmware == Firmware::klipper ? firmware.max_extrude_only_accel_mm_s2
-                                                : std::numeric_limits<double>::infinity();
+  return spec_of(firmware.firmware).motion.limits_extruder
+             ? firmware.max_extrude_only_accel_mm_s2
+             : std::numeric_limits<double>::infinity();
 }
 
 void level_flow(const gcode::Position& start_mm, double most_mm_s, std::span<Stroke> strokes) {

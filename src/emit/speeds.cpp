@@ -22,6 +22,7 @@
 
 #include "dialect.hpp"
 #include "filament_flow.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/core/number.hpp"
 
@@ -221,8 +222,8 @@ class SpeedSolver {
             accel_mm_s2_[i], drawing_back_mm_s2(options.fixed) * distance_mm_[i] / std::abs(de));
       }
       const gcode::Position to = {stroke.x_mm, stroke.y_mm, stroke.z_mm, stroke.e_mm};
-      for (std::size_t axis = 0; options.fixed.firmware == Firmware::marlin && axis < to.size();
-           ++axis) {
+      for (std::size_t axis = 0;
+           spec_of(options.fixed.firmware).motion.counts_step_events && axis < to.size(); ++axis) {
         const double steps_per_mm = options.fixed.steps_per_mm[axis];
         step_events_[i] = std::max(step_events_[i], std::abs(std::round(to[axis] * steps_per_mm) -
                                                              std::round(at[axis] * steps_per_mm)));
@@ -327,7 +328,9 @@ class SpeedSolver {
     }
   }
 
-  [[nodiscard]] bool leaves_out_ramps() const { return options_->fixed.firmware == Firmware::rrf; }
+  [[nodiscard]] bool leaves_out_ramps() const {
+    return spec_of(options_->fixed.firmware).motion.leaves_out_short_ramps;
+  }
 
   // RepRapFirmware leaves out a line's ramp up from the faster of its two ends, and so goes no
   // faster than that end, if the ramp would take less than ten step clocks and gain less than 10 %

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/planner/printer_shaper.hpp"
 #include "unflex/run/verify_rules.hpp"
 
@@ -52,16 +53,10 @@ std::string lines_source(const machine::PrinterSettings& printer) {
   if (printer.transport == "serial") {
     return "a host that waits for each line";
   }
-  switch (printer.firmware) {
-    case Firmware::klipper:
-      return "Klipper from its own storage";
-    case Firmware::marlin:
-      return "Marlin from its card";
-    case Firmware::rrf:
-      break;
-  }
-  return printer.transport == "sbc" ? "RepRapFirmware with its computer"
-                                    : "RepRapFirmware from its card";
+  const FirmwarePrinters& printers = spec_of(printer.firmware).printers;
+  return std::string(printer.transport == "sbc" && !printers.lines_from_sbc.empty()
+                         ? printers.lines_from_sbc
+                         : printers.lines_from);
 }
 
 }  // namespace

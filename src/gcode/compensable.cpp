@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/gcode/command.hpp"
 
 namespace unflex::gcode {
@@ -37,7 +38,7 @@ std::string_view kept_reason(const Segment& segment, Firmware firmware) {
   if (length_xy == 0.0) {
     return segment.delta(Z) == 0.0 ? "extrude only" : "Z move";
   }
-  if (firmware == Firmware::klipper && segment.delta(E) < -kFilamentRoundoff_mm) {
+  if (spec_of(firmware).reading.limits_drawing_back && segment.delta(E) < -kFilamentRoundoff_mm) {
     return "retracting move";
   }
   return std::abs(segment.delta(Z)) <= kMaxSlope * length_xy ? "" : "Z move";

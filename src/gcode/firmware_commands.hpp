@@ -22,12 +22,10 @@ enum class Effect {
   return command.arguments.find("action:") != std::string_view::npos;
 }
 
-// What an M-code without a handler of its own does.
-[[nodiscard]] Effect m_code_effect(Firmware firmware, int number);
-
 // What an extended command of Klipper does. `name` is in upper case.
 [[nodiscard]] Effect extended_effect(std::string_view name);
 
+// What an M-code without a handler of its own does.
 [[nodiscard]] Effect klipper_m_code_effect(int number);
 [[nodiscard]] Effect marlin_m_code_effect(int number);
 [[nodiscard]] Effect rrf_m_code_effect(int number);

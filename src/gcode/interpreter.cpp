@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "firmware_commands.hpp"
+#include "firmware_reader.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/number.hpp"
 
 namespace unflex::gcode {
@@ -61,25 +63,17 @@ bool is_motion(const Command& command) {
 InterpreterOptions default_options(Firmware firmware) {
   InterpreterOptions options;
   options.firmware = firmware;
-  if (firmware == Firmware::marlin) {
-    // Configuration_adv.h: FWRETRACT is off. The other values apply where it is switched on.
-    options.firmware_retraction = false;
-    options.retract_length_mm = 3.0;
-    options.retract_speed_mm_s = 45.0;
-    options.unretract_speed_mm_s = 8.0;
-  } else if (firmware == Firmware::rrf) {
-    // src/Config/Configuration.h: DefaultRetractLength, DefaultRetractSpeed in mm/min.
-    options.retract_length_mm = 2.0;
-    options.retract_speed_mm_s = 1000.0 / kSecondsPerMinute;
-    options.unretract_speed_mm_s = 1000.0 / kSecondsPerMinute;
-    // DefaultAxisDriveStepsPerUnit, DefaultZDriveStepsPerUnit, DefaultEDriveStepsPerUnit.
-    options.steps_per_mm = {80.0, 80.0, 800.0, 420.0};
-  }
+  const FirmwareDefaults& defaults = spec_of(firmware).defaults;
+  options.firmware_retraction = defaults.has_firmware_retraction;
+  options.retract_length_mm = defaults.retract_length_mm;
+  options.retract_speed_mm_s = defaults.retract_speed_mm_s;
+  options.unretract_speed_mm_s = defaults.unretract_speed_mm_s;
+  options.steps_per_mm = defaults.steps_per_mm;
   return options;
 }
 
 bool may_come_on(Firmware firmware, const Shaper& own) {
-  return firmware == Firmware::rrf || own.is_on() || own.is_unknown();
+  return spec_of(firmware).filters.shaper_may_come_on || own.is_on() || own.is_unknown();
 }
 
 double ModalState::filament_factor() const {
@@ -97,12 +91,10 @@ Interpreter::Interpreter(InterpreterOptions options) : options_(std::move(option
   if (options_.begins_advanced) {
     pressure_advance_on_ = true;
   }
-  if (options_.firmware == Firmware::marlin) {
-    state_.g91_covers_e = false;
-    state_.feed_mm_s = 4000.0 / kSecondsPerMinute;  // DEFAULT_FEEDRATE_MM_M
-  } else if (options_.firmware == Firmware::rrf) {
-    state_.g91_covers_e = false;
-    state_.feed_mm_s = 3000.0 / kSecondsPerMinute;  // DefaultFeedRate
+  const FirmwareSpec& spec = spec_of(options_.firmware);
+  state_.g91_covers_e = spec.reading.g91_covers_e;
+  state_.feed_mm_s = spec.reading.first_feed_mm_s;
+  if (spec.filters.shapes_both_axes_alike) {
     const bool shapes = options_.shaper_freq_x_hz > 0.0;
     state_.shaper.kept_freq_hz =
         shapes ? std::optional<double>(options_.shaper_freq_x_hz) : std::nullopt;
@@ -140,18 +132,7 @@ void Interpreter::interpret(Event& event) {
   const std::string_view content = event.line.content();
   parse(content, command_);
   const std::array<bool, 4> known = state_.known;
-  switch (options_.firmware) {
-    case Firmware::klipper:
-      klipper(event);
-      break;
-    case Firmware::marlin:
-      marlin(event, content);
-      break;
-    case Firmware::rrf:
-      rrf(event, content);
-      event.waits_for_buffer = rrf_waits_for_buffer(command_);
-      break;
-  }
+  (this->*reader_of(options_.firmware).read)(event, content);
   if (event.position_lost && is_motion(command_)) {
     note_lost_motion(event, known);
   }
@@ -159,7 +140,7 @@ void Interpreter::interpret(Event& event) {
   swinging_s_ = event.position_lost ? 0.0 : std::max(swinging_s_ - event.dwell_s, 0.0);
 }
 
-void Interpreter::klipper(Event& event) {
+void Interpreter::read_klipper(Event& event, std::string_view /*content*/) {
   const bool is_command =
       command_.kind == CommandKind::traditional || command_.kind == CommandKind::extended;
   if (const std::string_view problem = klipper_misspelling(command_);
@@ -269,7 +250,7 @@ void Interpreter::klipper_m_code(Event& event) {
 }
 
 void Interpreter::other_m_code(Event& event) {
-  switch (m_code_effect(options_.firmware, command_.number)) {
+  switch (reader_of(options_.firmware).m_code_effect(command_.number)) {
     case Effect::passive:
       return;
     case Effect::stop:
@@ -287,7 +268,7 @@ void Interpreter::set_units(bool inches) {
 
 // Marlin's parser.h, axis_unit_factor: after G20 a volume is in cubic inches.
 void Interpreter::update_e_unit() {
-  const bool is_cube = options_.firmware == Firmware::marlin && state_.volumetric;
+  const bool is_cube = spec_of(options_.firmware).reading.cubes_units && state_.volumetric;
   state_.e_unit = is_cube ? state_.unit_mm * state_.unit_mm * state_.unit_mm : state_.unit_mm;
 }
 
@@ -333,7 +314,7 @@ void Interpreter::set_position(Event& event) {
     }
   }
   // Only Klipper takes a bare G92 for all axes.
-  const bool bare = options_.firmware == Firmware::klipper &&
+  const bool bare = spec_of(options_.firmware).reading.bare_g92_sets_all &&
                     std::none_of(named.begin(), named.end(), [](bool is) { return is; });
   for (const Axis axis : {X, Y, Z, E}) {
     if (bare || named[axis]) {

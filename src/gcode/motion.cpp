@@ -8,6 +8,8 @@
 #include <string_view>
 
 #include "arc.hpp"
+#include "firmware_reader.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
@@ -53,11 +55,7 @@ std::optional<Axis> axis_of(char letter) {
 // What is wrong with a speed that is not above zero. Klipper refuses the line (gcode_move.py,
 // cmd_G1), RepRapFirmware goes on at its minimum speed. Marlin does not mind.
 const char* problem_of_feed(double feed, Firmware firmware) {
-  if (feed > 0.0 || firmware == Firmware::marlin) {
-    return nullptr;
-  }
-  return firmware == Firmware::klipper ? "F must be above zero, or Klipper refuses the line"
-                                       : "F must be above zero, or the printer creeps";
+  return feed > 0.0 ? nullptr : spec_of(firmware).reading.bad_feed;
 }
 
 // A line with several commands, or with one word twice, was hardly meant so. Klipper and Marlin
@@ -80,7 +78,7 @@ std::string_view oddity(const Command& command) {
 
 void remark_oddity(Event& event, const Command& command, Firmware firmware) {
   if (const std::string_view remark = oddity(command);
-      firmware != Firmware::rrf && !remark.empty()) {
+      !spec_of(firmware).reading.takes_several_commands && !remark.empty()) {
     event.warnings.emplace_back(remark);
   }
 }
@@ -156,8 +154,8 @@ struct ArcPlane {
 ArcPlane arc_plane(int plane, Firmware firmware) {
   switch (plane) {
     case 18:
-      return firmware == Firmware::klipper ? ArcPlane{X, Z, Y, 'I', 'K'}
-                                           : ArcPlane{Z, X, Y, 'K', 'I'};
+      return spec_of(firmware).reading.xz_by_right_hand ? ArcPlane{Z, X, Y, 'K', 'I'}
+                                                        : ArcPlane{X, Z, Y, 'I', 'K'};
     case 19:
       return {Y, Z, X, 'J', 'K'};
     default:
@@ -208,13 +206,6 @@ double gap_at_end_mm(const Arc& arc) {
                   math::hypot(arc.centre_offset_mm[0], arc.centre_offset_mm[1]));
 }
 
-int whole_circles(const Command& command, const MarlinArcs& rules) {
-  constexpr double kMostCircles = 100.0;
-  return rules.circles
-             ? static_cast<int>(std::clamp(command.value('P').value_or(0.0), 0.0, kMostCircles))
-             : 0;
-}
-
 // What E reads at both ends of the segment, in the firmware's single precision.
 ReadingOfE follow_reading_of_e(const Segment& segment, ModalState& state) {
   // Sums in single precision drift from ours. What differs by more has been set (G10, G11, tools).
@@ -241,10 +232,7 @@ ReadingOfE follow_reading_of_e(const Segment& segment, ModalState& state) {
 std::string too_much_filament(const Segment& segment, Firmware firmware) {
   return fmt::format(
       "{:.4g} mm of filament in {:.4g} mm of path: {}; passed through unchanged, check the line",
-      segment.delta(E), segment.length_mm(),
-      firmware == Firmware::klipper
-          ? "Klipper ends the print at such a move (max_extrude_cross_section)"
-          : "no nozzle takes so much");
+      segment.delta(E), segment.length_mm(), spec_of(firmware).reading.too_much_filament);
 }
 
 }  // namespace
@@ -280,7 +268,7 @@ void Interpreter::note_lost_motion(Event& event, const std::array<bool, 4>& know
 // RepRapFirmware: relative E words do not change the reading that absolute ones refer to
 // (GCodes.cpp, LoadExtrusionAndFeedrateFromGCode, latestVirtualExtruderPosition).
 void Interpreter::keep_reading_of_e(bool e_absolute, double before_mm) {
-  if (options_.firmware == Firmware::rrf && !e_absolute) {
+  if (spec_of(options_.firmware).reading.relative_e_keeps_reading && !e_absolute) {
     state_.base_mm[E] += state_.position_mm[E] - before_mm;
   }
 }
@@ -311,11 +299,11 @@ void Interpreter::linear_move(Event& event) {
 }
 
 void Interpreter::arc_move(Event& event, bool clockwise) {
-  const bool is_klipper = options_.firmware == Firmware::klipper;
-  if (is_klipper && !state_.absolute_xyz) {
+  const FirmwareReading& reading = spec_of(options_.firmware).reading;
+  if (reading.refuses_relative_arcs && !state_.absolute_xyz) {
     return not_understood(event, "an arc in relative mode (G91), which Klipper refuses");
   }
-  if (is_klipper && command_.has('R')) {
+  if (reading.refuses_relative_arcs && command_.has('R')) {
     return not_understood(event, "an arc with R, which Klipper refuses");
   }
   const Target target = read_target(command_, state_, options_.firmware);
@@ -333,18 +321,15 @@ void Interpreter::arc_move(Event& event, bool clockwise) {
   if (!offset) {
     return not_understood(event, "an arc without a centre");
   }
-  if (options_.firmware == Firmware::rrf && command_.has('R') &&
+  if (reading.refuses_short_radius && command_.has('R') &&
       !radius_reaches(command_, state_.unit_mm, arc)) {
     return not_understood(event, "an arc whose radius is too small to reach its end");
   }
   arc.centre_offset_mm = *offset;
   set_feed(target.feed);
   const double feed_mm_s = state_.feed_mm_s * state_.speed_factor;
-  const ArcPieces pieces = is_klipper ? plan_arc(arc, options_.arc_resolution_mm)
-                           : options_.firmware == Firmware::marlin
-                               ? plan_marlin_arc(arc, whole_circles(command_, options_.marlin_arcs),
-                                                 feed_mm_s, options_.marlin_arcs)
-                               : plan_rrf_arc(arc, feed_mm_s);
+  const ArcPieces pieces =
+      reader_of(options_.firmware).plan_arc(arc, feed_mm_s, command_, options_);
   if (!pieces) {
     return not_understood(event, "an arc of too many pieces");
   }
@@ -415,7 +400,7 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
   const double filament_mm = segment.delta(E);
   // Klipper limits what is pulled back in another way.
   const double counted_mm =
-      options_.firmware == Firmware::klipper ? filament_mm : std::abs(filament_mm);
+      spec_of(options_.firmware).reading.counts_drawing_back ? std::abs(filament_mm) : filament_mm;
   segment.too_much_filament = segment.moves_xy() && counted_mm > options_.max_extrude_dab_mm &&
                               counted_mm > options_.max_extrude_ratio * segment.length_mm();
   if (segment.too_much_filament && event.warnings.empty()) {
@@ -429,7 +414,7 @@ void Interpreter::append_segment(Event& event, const Position& target, double fe
     const double least_s = std::max(segment.length_mm(), std::abs(filament_mm)) / feed_mm_s;
     swinging_s_ = std::max(swinging_s_ - least_s, 0.0);
   }
-  if (options_.firmware == Firmware::marlin) {
+  if (spec_of(options_.firmware).reading.sums_e_in_single_precision) {
     segment.reading_of_e = follow_reading_of_e(segment, state_);
   }
   state_.position_mm = segment.end_mm;

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -68,8 +69,8 @@ void Interpreter::lose_position(Event& event) {
   if (options_.advance_of_runs != RunAdvance::on) {
     pressure_advance_on_.reset();
   }
-  if (options_.firmware == Firmware::rrf) {
-    lose_tool();  // a macro may select one
+  if (spec_of(options_.firmware).reading.macros_select_tools) {
+    lose_tool();
   }
 }
 

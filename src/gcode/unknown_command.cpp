@@ -6,6 +6,7 @@
 #include <array>
 
 #include "firmware_commands.hpp"
+#include "firmware_reader.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/rrf_meta.hpp"
 
@@ -37,7 +38,8 @@ bool is_known(const Command& command, Firmware firmware) {
     case 'M':
       return asks_host_to_act(command) ||
              std::ranges::binary_search(kKnownMCodes, command.number) ||
-             (command.subnumber < 0 && m_code_effect(firmware, command.number) != Effect::unknown);
+             (command.subnumber < 0 &&
+              reader_of(firmware).m_code_effect(command.number) != Effect::unknown);
     default:
       return command.letter == 'T';
   }
@@ -50,7 +52,7 @@ std::string unknown_command(const Event& event, Firmware firmware) {
     return {};
   }
   const std::string_view content = event.line.content();
-  if (firmware == Firmware::rrf && meta_command(content) != MetaCommand::none) {
+  if (reader_of(firmware).is_meta_command(content)) {
     return {};
   }
   const Command command = parse(content);

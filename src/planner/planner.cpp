@@ -2,9 +2,18 @@
 
 #include <algorithm>
 
-#include "unflex/planner/klipper_planner.hpp"
-#include "unflex/planner/marlin_planner.hpp"
-#include "unflex/planner/rrf_planner.hpp"
+namespace unflex::firmware {
+
+// The planner of each firmware, in its folder in src/firmware.
+#define UNFLEX_FIRMWARE(name)                                                            \
+  namespace name {                                                                       \
+  std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,          \
+                                                 const planner::FirmwareConfig& config); \
+  }
+UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)
+#undef UNFLEX_FIRMWARE
+
+}  // namespace unflex::firmware
 
 namespace unflex::planner {
 namespace {
@@ -50,9 +59,11 @@ void apply(const gcode::LimitChange& change, Limits& limits) {
 }
 
 std::unique_ptr<Planner> make_planner(const Limits& limits, const FirmwareConfig& config) {
-  if (config.firmware == Firmware::marlin) return std::make_unique<MarlinPlanner>(limits, config);
-  if (config.firmware == Firmware::rrf) return std::make_unique<RrfPlanner>(limits, config);
-  return std::make_unique<KlipperPlanner>(limits, config);
+  using Maker = std::unique_ptr<Planner> (*)(const Limits&, const FirmwareConfig&);
+#define UNFLEX_FIRMWARE(name) &firmware::name::make_planner,
+  static constexpr Maker kMakers[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
+#undef UNFLEX_FIRMWARE
+  return kMakers[static_cast<std::size_t>(config.firmware)](limits, config);
 }
 
 }  // namespace unflex::planner

@@ -3,19 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+
+#include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::planner {
 namespace {
 
 using dynamics::ShaperKind;
 using dynamics::ShaperPulses;
-
-// motion_queuing.py, SDS_CHECK_TIME.
-constexpr double kLeastScan_s = 0.001;
-constexpr double kRrfGrace_s = 0.010;
 
 constexpr std::array<std::pair<std::string_view, ShaperKind>, 10> kKinds = {
     {{"zv", ShaperKind::zv},
@@ -29,27 +28,22 @@ constexpr std::array<std::pair<std::string_view, ShaperKind>, 10> kKinds = {
      {"zvdd", ShaperKind::zvdd},
      {"zvddd", ShaperKind::zvddd}}};
 
-dynamics::Shaper shaper_of(std::string type, Firmware firmware) {
-  std::ranges::transform(type, type.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
+std::optional<dynamics::Shaper> shaper_of(std::string_view type) {
   for (const auto& [name, kind] : kKinds) {
     if (name == type) {
       return kind;
     }
   }
-  if (const auto form = dynamics::mzv_form(type)) {
-    return *form;
-  }
-  switch (firmware) {
-    case Firmware::marlin:
-      return ShaperKind::zv;
-    case Firmware::rrf:
-      return ShaperKind::zvd;
-    case Firmware::klipper:
-      break;
-  }
-  return ShaperKind::mzv;
+  return dynamics::mzv_form(type);
+}
+
+// A type that is not known is taken for the one that the firmware has if none is told.
+dynamics::Shaper shaper_of(std::string type, Firmware firmware) {
+  std::ranges::transform(type, type.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  const std::optional<dynamics::Shaper> shaper = shaper_of(type);
+  return shaper ? *shaper : shaper_of(spec_of(firmware).filters.shaper_type).value();
 }
 
 ShaperPulses pulses(Firmware firmware, double freq_hz, const std::string& type,
@@ -60,7 +54,7 @@ ShaperPulses pulses(Firmware firmware, double freq_hz, const std::string& type,
   const dynamics::Shaper shaper = shaper_of(type, firmware);
   ShaperPulses pulses = *dynamics::shaper_pulses(
       shaper, freq_hz, std::min(damping_ratio, dynamics::max_damping_ratio(shaper.kind)));
-  if (firmware != Firmware::klipper) {
+  if (!spec_of(firmware).filters.shaper_is_centred) {
     const double first_s = pulses.front().time_s;
     for (dynamics::Pulse& pulse : pulses) {
       pulse.time_s -= first_s;
@@ -110,7 +104,7 @@ FirmwareAdvance advance_in_force(const FirmwareConfig& config,
   if (!(advance_s > 0.0)) {
     return {};
   }
-  return {advance_s, config.firmware == Firmware::klipper
+  return {advance_s, spec_of(config.firmware).filters.smooths_advance
                          ? of_file.smooth_s.value_or(config.pressure_advance_smooth_s)
                          : 0.0};
 }
@@ -122,16 +116,12 @@ double switching_s(const FirmwareConfig& config, const Filters& before, const Fi
     return 0.0;
   }
   const Shaping from = shaping(config, before.shaper);
-  switch (config.firmware) {
-    case Firmware::marlin:
-      return from.length_s();
-    case Firmware::rrf:
-      return from.length_s() + kRrfGrace_s;
-    case Firmware::klipper:
-      break;
+  const FirmwareFilters& filters = spec_of(config.firmware).filters;
+  if (filters.least_scan_s == 0.0) {
+    return from.length_s() + filters.switching_grace_s;
   }
-  const auto scan_s = [](double smooth_s, const Shaping& of_filters) {
-    return std::max({kLeastScan_s, of_filters.reach_s(), 0.5 * smooth_s});
+  const auto scan_s = [&](double smooth_s, const Shaping& of_filters) {
+    return std::max({filters.least_scan_s, of_filters.reach_s(), 0.5 * smooth_s});
   };
   return scan_s(smooth_before_s, from) + scan_s(smooth_after_s, shaping(config, after.shaper));
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/kinematics.hpp"
 #include "unflex/machine/as_printer.hpp"
 
@@ -44,7 +45,7 @@ double accel_by_lines_mm_s2(const machine::Settings& settings) {
 }
 
 double min_line_mm(const machine::Settings& settings) {
-  return settings.printer.firmware == Firmware::marlin
+  return spec_of(settings.printer.firmware).motion.skips_short_moves
              ? (settings.printer.min_steps_per_segment + 1.0) * machine::grid_mm(settings)
              : 0.0;
 }

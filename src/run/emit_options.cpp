@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "base_limits.hpp"
+#include "unflex/core/firmware_spec.hpp"
+#include "unflex/emit/run_limits.hpp"
 #include "unflex/machine/as_printer.hpp"
 
 namespace unflex::run {
@@ -14,47 +16,6 @@ namespace {
 constexpr double kBurst_s = 0.1;
 constexpr double kShortest = 0.4;
 
-// The printer's limits inside a compensated run. They leave room above the base's own limits, so
-// that the firmware never slows a line down. Z keeps its limits.
-planner::Limits run_limits(planner::Limits limits, const machine::Settings& settings) {
-  const double velocity = 2.0 * settings.base_max_velocity_mm_s();
-  const double accel = settings.emit_accel_mm_s2();
-  const double corner = settings.emit.square_corner_velocity_mm_s;
-  switch (settings.printer.firmware) {
-    case Firmware::klipper:
-      limits.max_velocity_mm_s = velocity;
-      limits.max_accel_mm_s2 = accel;
-      limits.square_corner_velocity_mm_s = corner;
-      limits.minimum_cruise_ratio = 0.0;
-      limits.accel_to_decel_mm_s2 = accel;
-      return limits;
-    case Firmware::marlin:
-      // The most M205 J takes (Marlin 2.1.2, M200-M205.cpp).
-      limits.junction_deviation_mm = 0.3;
-      limits.min_velocity_mm_s = 0.0;
-      limits.min_travel_velocity_mm_s = 0.0;
-      limits.min_segment_time_s = 0.0;
-      break;
-    case Firmware::rrf:
-      limits.jerk_policy = 1;
-      limits.min_movement_velocity_mm_s = 0.01;  // AbsoluteMinFeedrate
-      for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::E}) {
-        limits.axis_max_jerk_mm_s[axis] = settings.has_print_jerk() ? corner : planner::kNoLimit;
-      }
-      break;
-  }
-  for (const gcode::Axis axis : {gcode::X, gcode::Y, gcode::E}) {
-    limits.axis_max_accel_mm_s2[axis] = accel;
-    limits.axis_jerk_mm_s[axis] = corner;
-    if (axis != gcode::E) {
-      limits.axis_max_velocity_mm_s[axis] = velocity;
-    }
-  }
-  limits.print_accel_mm_s2 = accel;
-  limits.travel_accel_mm_s2 = accel;
-  return limits;
-}
-
 }  // namespace
 
 emit::EmitOptions emit_options(const machine::Settings& settings, std::string version) {
@@ -63,7 +24,11 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   options.has_free_timing = settings.is_timing_free();
   options.printer_limits = machine::planner_limits(settings);
   options.fixed = machine::firmware_config(settings);
-  options.run_limits = run_limits(options.printer_limits, settings);
+  options.run_limits =
+      emit::limits_of_runs(options.fixed, options.printer_limits,
+                           {.velocity_mm_s = 2.0 * settings.base_max_velocity_mm_s(),
+                            .accel_mm_s2 = settings.emit_accel_mm_s2(),
+                            .corner_velocity_mm_s = settings.emit.square_corner_velocity_mm_s});
   options.line_accel_mm_s2 = settings.emit_accel_mm_s2();
   options.pressure = {.is_written = settings.writes_pressure(),
                       .printer_presses = settings.printer_presses(),
@@ -79,7 +44,8 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
   };
   options.lines.reach_x = reach(settings.printer.travel_x_mm);
   options.lines.reach_y = reach(settings.printer.travel_y_mm);
-  if (settings.printer.firmware == Firmware::klipper) {
+  const FirmwareMotion& motion = spec_of(settings.printer.firmware).motion;
+  if (!motion.rounds_to_steps) {
     options.lines.min_line_s = settings.min_line_s();
   } else {
     options.lines.burst_lines = static_cast<int>(settings.max_lines_per_s() * kBurst_s);
@@ -87,7 +53,7 @@ emit::EmitOptions emit_options(const machine::Settings& settings, std::string ve
     options.lines.min_line_s =
         std::max(settings.period_ms() * 1e-3, kShortest / settings.max_lines_per_s());
   }
-  if (settings.printer.firmware == Firmware::marlin) {
+  if (motion.skips_short_moves) {
     options.lines.min_steps = options.fixed.min_steps_per_segment;
     options.lines.min_line_mm = min_line_mm(settings);
     // With classic jerk as high as in a run, each line begins at its own speed.

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/run/nozzle_motion.hpp"
 
 namespace unflex::run {
@@ -177,7 +178,7 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
   const verify::DeviationStats b = before.all.stats();
   const verify::DeviationStats a = after.all.stats();
   if (no_worse(a.tracking_rms_mm, b.tracking_rms_mm, kNothingRms_mm) ||
-      (rules.fixed.firmware != Firmware::klipper &&
+      (spec_of(rules.fixed.firmware).motion.rounds_to_steps &&
        no_worse(swing_after_mm, swing_before_mm + chance, kNothing_mm))) {
     return std::nullopt;
   }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/gcode/command.hpp"
 #include "unflex/gcode/compensable.hpp"
@@ -231,7 +232,7 @@ Result<bool> PieceReader::read_event(gcode::Event& event) {
     feature_ = gcode::feature_by_name(*name);
   }
   // For Marlin a carriage return ends the line, and the interpreter warns.
-  if (firmware_ != Firmware::marlin && line.has_bare_return()) {
+  if (!spec_of(firmware_).reading.return_ends_line && line.has_bare_return()) {
     warn(line.number,
          "a carriage return without a line feed ends no line, neither here nor in the printer: "
          "convert the file's line ends to LF");

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/hotend_command.hpp"
 #include "unflex/gcode/line.hpp"
@@ -109,7 +110,7 @@ class CourseMaker {
   // RepRapFirmware runs the indented lines behind `if` and `while` or does not, and no other line
   // may come among them.
   [[nodiscard]] bool is_in_block(const gcode::Line& line) const {
-    return firmware_ == Firmware::rrf && is_indented(line.content());
+    return spec_of(firmware_).reading.has_blocks && is_indented(line.content());
   }
 
   [[nodiscard]] hotend::Command command_of(const gcode::HotendCommand& asked,

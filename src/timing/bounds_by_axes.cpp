@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/timing/timing.hpp"
 
 namespace unflex::timing {
@@ -26,7 +27,7 @@ MoveBounds bounds_by_axes(const planner::PlannedMove& move, const planner::Limit
                           const planner::FirmwareConfig& config) {
   MoveBounds bounds;
   const gcode::Position& direction = move.direction;
-  if (config.firmware == Firmware::klipper) {
+  if (!spec_of(config.firmware).motion.has_axis_limits) {
     bounds.speed_mm_s = limits.max_velocity_mm_s;
     limit(bounds, direction[Z], config.max_z_velocity_mm_s, config.max_z_accel_mm_s2);
     if (direction[E] < 0.0) {

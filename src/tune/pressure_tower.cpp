@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tower_writer.hpp"
+#include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::tune {
 namespace {
@@ -22,15 +23,7 @@ constexpr double kEven_mm = 36.0;
 constexpr double kLongestRunUp_mm = 12.0;
 
 std::string advance_command(Firmware firmware, double advance_s) {
-  switch (firmware) {
-    case Firmware::klipper:
-      return fmt::format("SET_PRESSURE_ADVANCE ADVANCE={:.6f}\n", advance_s);
-    case Firmware::marlin:
-      return fmt::format("M900 K{:.6f}\n", advance_s);
-    case Firmware::rrf:
-      break;
-  }
-  return fmt::format("M572 D0 S{:.6f}\n", advance_s);
+  return fmt::format("{}{:.6f}\n", spec_of(firmware).writing.advance_command, advance_s);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tower_writer.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::tune {
@@ -38,7 +39,7 @@ double speed_of(const TowerSettings& settings, const Trial& trial) {
 
 // Marlin slows down for the angle between short lines. With whole steps that angle is mostly
 // rounding, and large where lines are short.
-int lines_per_wave(Firmware firmware) { return firmware == Firmware::marlin ? 6 : 16; }
+int lines_per_wave(Firmware firmware) { return spec_of(firmware).motion.slows_at_angles ? 6 : 16; }
 
 // The parts of a wall, one behind the other.
 struct Parts {

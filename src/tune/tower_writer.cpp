@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/core/number.hpp"
 
@@ -36,7 +37,7 @@ constexpr double kClear_mm = 2.0;
 // Sets these limits. Klipper has one for all moves, and Marlin and RepRapFirmware one for each axis
 // besides, which is set only if the tower goes beyond the printer's own.
 std::string accel_commands(Firmware firmware, const AccelLimits& limits, bool with_axes) {
-  if (firmware == Firmware::klipper) {
+  if (!spec_of(firmware).motion.has_axis_limits) {
     return fmt::format("M204 S{:.0f}", limits.print);
   }
   return (with_axes ? fmt::format("M201 X{:.0f} Y{:.0f}\n", limits.x, limits.y) : std::string{}) +

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/command.hpp"
@@ -53,22 +54,13 @@ bool is_known_addition(std::string_view content, Firmware firmware) {
     return true;
   }
   const gcode::Command command = gcode::parse(content);
-  if (firmware != Firmware::klipper) {
-    constexpr std::array<int, 5> kLimits = {201, 203, 204, 205, 593};
-    constexpr std::array<int, 3> kOfMarlin = {200, 221, 900};  // what E means, pressure advance
-    constexpr std::array<int, 2> kOfRrf = {566, 572};
-    const auto is_any_of = [&](const auto& numbers) {
-      return std::ranges::any_of(numbers, [&](int number) { return command.is('M', number); });
-    };
-    if (is_any_of(kLimits) || (firmware == Firmware::marlin && is_any_of(kOfMarlin)) ||
-        (firmware == Firmware::rrf && is_any_of(kOfRrf))) {
-      return true;
-    }
-  } else if (command.kind == gcode::CommandKind::extended) {
-    constexpr std::array<std::string_view, 5> kNames = {"SET_VELOCITY_LIMIT", "SET_INPUT_SHAPER",
-                                                        "SET_PRESSURE_ADVANCE", kCheckpointMacro,
-                                                        kLimitsMacro};
-    return std::ranges::find(kNames, command.name) != kNames.end();
+  const FirmwareWriting& writing = spec_of(firmware).writing;
+  if (command.kind == gcode::CommandKind::extended && !writing.added_names.empty()) {
+    return std::ranges::find(writing.added_names, command.name) != writing.added_names.end();
+  }
+  if (std::ranges::any_of(writing.added_codes,
+                          [&](int number) { return command.is('M', number); })) {
+    return true;
   }
   if (command.is('G', 4)) {
     return only_word(command, 'P') && *command.words.front().value == 0.0;

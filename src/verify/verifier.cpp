@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/verify/endless.hpp"
 
 namespace unflex::verify {
@@ -153,7 +154,7 @@ void Verifier::begin_paths(bool compensated) {
   const double lead_in_s = is_free ? 0.0
                                    : output_.section().lead_in_s +
                                          planner::wait_s(output_.replay().front(), rules_.fixed);
-  const bool is_played_as_planned = rules_.fixed.firmware != Firmware::marlin;
+  const bool is_played_as_planned = spec_of(rules_.fixed.firmware).motion.plays_as_planned;
   paths_.begin_run(is_free                ? Timing::free
                    : is_played_as_planned ? Timing::planned
                                           : Timing::unplanned,
@@ -203,9 +204,9 @@ void Verifier::begin_section(bool compensated) {
 // in steps may owe some.
 double Verifier::owed_filament_mm() const {
   constexpr double kOwedSteps = 1.5;
-  return rules_.fixed.firmware == Firmware::klipper
-             ? filament_tolerance_mm()
-             : kOwedSteps / rules_.fixed.steps_per_mm[gcode::E];
+  return spec_of(rules_.fixed.firmware).motion.rounds_to_steps
+             ? kOwedSteps / rules_.fixed.steps_per_mm[gcode::E]
+             : filament_tolerance_mm();
 }
 
 void Verifier::play_run() {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "regime_check.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "verifier.hpp"
 
 namespace unflex::verify {
@@ -36,7 +37,7 @@ double Verifier::filament_tolerance_mm() const {
   // Marlin lays the filament of a move that is too short for it with the next move, which may be
   // after the run.
   const planner::FirmwareConfig& firmware = rules_.fixed;
-  const double too_short_mm = firmware.firmware == Firmware::marlin
+  const double too_short_mm = spec_of(firmware.firmware).motion.skips_short_moves
                                   ? firmware.min_steps_per_segment / firmware.steps_per_mm[gcode::E]
                                   : 0.0;
   return too_short_mm + kFilamentTolerance_mm * std::max(1.0, output_.replay().filament_factor());

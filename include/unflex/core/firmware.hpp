@@ -3,9 +3,14 @@
 
 #include <string_view>
 
+// Every firmware, once. To add one, name it here and give it a folder in src/firmware.
+#define UNFLEX_FIRMWARES(EACH) EACH(klipper) EACH(marlin) EACH(rrf)
+
 namespace unflex {
 
-enum class Firmware { klipper, marlin, rrf };
+#define UNFLEX_FIRMWARE(name) name,
+enum class Firmware { UNFLEX_FIRMWARES(UNFLEX_FIRMWARE) };
+#undef UNFLEX_FIRMWARE
 
 // As the configuration spells it: "klipper", "marlin", "rrf".
 [[nodiscard]] std::string_view to_string(Firmware firmware);

@@ -313,9 +313,13 @@ class Interpreter {
   // The options, with the changes that M207 and similar commands have made.
   [[nodiscard]] const InterpreterOptions& options() const { return options_; }
 
+  // Each reads the line as one firmware does: entries of its table (FirmwareReader).
+  void read_klipper(Event& event, std::string_view content);
+  void read_marlin(Event& event, std::string_view content);
+  void read_rrf(Event& event, std::string_view content);
+
  private:
   // One handler per command or family of commands; each reads command_ and fills the event.
-  void klipper(Event& event);
   void klipper_traditional(Event& event);
   void klipper_g_code(Event& event);
   void klipper_m_code(Event& event);
@@ -356,7 +360,6 @@ class Interpreter {
   void limit(Event& event, char letter, double scale, double least, std::optional<double>& value);
   void axis_limits(Event& event, double scale, double least, AxisValues& values);
 
-  void marlin(Event& event, std::string_view content);
   void marlin_command(Event& event);
   void marlin_g_code(Event& event);
   void marlin_m_code(Event& event);
@@ -372,7 +375,7 @@ class Interpreter {
   void marlin_fixed_time_motion(Event& event);
   void marlin_dwell(Event& event);
 
-  void rrf(Event& event, std::string_view content);
+  void read_rrf_line(Event& event, std::string_view content);
   bool rrf_meta_line(Event& event, std::string_view content);
   void rrf_conditional_line(Event& event, std::string_view content);
   void rrf_expression(Event& event);

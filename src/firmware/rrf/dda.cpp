@@ -4,11 +4,11 @@
 //
 //   u, v, w   speed at the start, at the top and at the end       a, d   acceleration, deceleration
 //   s         length
-#include "rrf_dda.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
+
+#include "rrf_dda.hpp"
 
 namespace unflex::planner::rrf {
 namespace {

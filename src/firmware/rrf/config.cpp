@@ -1,7 +1,5 @@
 // RepRapFirmware 3.6 and 3.5, src/GCodes, Movement/Kinematics/Kinematics.h (KinematicsType); 3.4
 // for M667, which 3.5 does not know any more.
-#include "rrf_config.hpp"
-
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
@@ -14,6 +12,7 @@
 #include <vector>
 
 #include "command_reader.hpp"
+#include "rrf_config.hpp"
 #include "rrf_heaters.hpp"
 #include "rrf_steps.hpp"
 #include "rrf_travel.hpp"

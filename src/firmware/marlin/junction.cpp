@@ -8,14 +8,13 @@
 //   θ      angle at the junction, 0 for a reversal: cos θ = −u·w
 //   δ      junction deviation
 //   a_j    acceleration along w − u within the limits of the axes
-#include "marlin_junction.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <utility>
 
 #include "marlin_block.hpp"
+#include "marlin_junction.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::planner::marlin {

@@ -1,11 +1,12 @@
 // Marlin computes with 32 bit floats. The number of an arc's pieces can depend on their rounding,
 // so it is computed in 32 bits here too. Places are computed in double.
+#include "arc.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
 
-#include "arc.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::gcode {

@@ -2,15 +2,15 @@
 //
 // Source: RepRapFirmware 3.5.3, src/Movement/DDARing.cpp: CanAddMove, Spin, PrepareMoves;
 // src/Movement/DDA.h; src/Movement/Move.cpp: MoveLoop.
-#include "unflex/planner/rrf_planner.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
 #include <utility>
 
 #include "rrf_dda.hpp"
 #include "rrf_lookahead.hpp"
+#include "unflex/planner/rrf_planner.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -204,3 +204,15 @@ gcode::Position RrfPlanner::on_steps(const gcode::Position& position_mm) const {
 }
 
 }  // namespace unflex::planner
+
+namespace unflex::firmware::rrf {
+
+std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
+                                               const planner::FirmwareConfig& config);
+
+std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
+                                               const planner::FirmwareConfig& config) {
+  return std::make_unique<planner::RrfPlanner>(limits, config);
+}
+
+}  // namespace unflex::firmware::rrf

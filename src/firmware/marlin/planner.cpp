@@ -3,15 +3,15 @@
 // Source: Marlin 2.1.2, src/module/planner.cpp: buffer_segment, _buffer_steps, get_current_block,
 // recalculate and its passes. Trapezoids are made once, when a block begins to run. The firmware
 // makes them anew whenever a speed changes, in the end from the same two speeds.
-#include "unflex/planner/marlin_planner.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "marlin_block.hpp"
 #include "marlin_integers.hpp"
 #include "marlin_trapezoid.hpp"
+#include "unflex/planner/marlin_planner.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -215,3 +215,15 @@ void MarlinPlanner::forward_pass() {
 }
 
 }  // namespace unflex::planner
+
+namespace unflex::firmware::marlin {
+
+std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
+                                               const planner::FirmwareConfig& config);
+
+std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
+                                               const planner::FirmwareConfig& config) {
+  return std::make_unique<planner::MarlinPlanner>(limits, config);
+}
+
+}  // namespace unflex::firmware::marlin

@@ -10,6 +10,7 @@
 
 #include "firmware_commands.hpp"
 #include "printer_number.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/core/own_marks.hpp"
 #include "unflex/gcode/interpreter.hpp"
@@ -181,7 +182,7 @@ void Interpreter::object_label(Event& event) {
     assumed_[axis] = assumed_[axis] || state_.known[axis];
     state_.known[axis] = false;
   }
-  z_left_out_ = options_.firmware == Firmware::marlin;
+  z_left_out_ = spec_of(options_.firmware).reading.labels_leave_out_z;
 }
 
 // kinematics/extruder.py, _set_pressure_advance: a new smoothing time stops the machine, and

@@ -1,11 +1,10 @@
 // Source: RepRapFirmware 3.5.3, src/Movement/DDA.cpp: InitStandardMove (its last part),
 // DoLookahead, MatchSpeeds, IsDecelerationMove.
-#include "rrf_lookahead.hpp"
-
 #include <algorithm>
 #include <cmath>
 
 #include "rrf_dda.hpp"
+#include "rrf_lookahead.hpp"
 
 namespace unflex::planner::rrf {
 namespace {

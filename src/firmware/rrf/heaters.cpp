@@ -1,7 +1,6 @@
-#include "rrf_heaters.hpp"
-
 #include <optional>
 
+#include "rrf_heaters.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/hotend/firmware_words.hpp"
 

@@ -1,5 +1,3 @@
-#include "klipper_reader.hpp"
-
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
@@ -10,6 +8,7 @@
 #include <optional>
 
 #include "klipper_config.hpp"
+#include "klipper_reader.hpp"
 #include "klipper_shaper.hpp"
 #include "text_lines.hpp"
 #include "unflex/dynamics/shapers.hpp"

@@ -1,7 +1,5 @@
 // Marlin 2.1.2 src/gcode, *_report; src/module/settings.cpp. Marlin 1.0:
 // Marlin/ConfigurationStore.cpp, Config_PrintSettings.
-#include "marlin_dump.hpp"
-
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "command_reader.hpp"
+#include "marlin_dump.hpp"
 #include "text_lines.hpp"
 
 namespace unflex::machine {

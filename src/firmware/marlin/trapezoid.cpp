@@ -3,13 +3,13 @@
 //
 //   r_i, r_n, r_f   initial, nominal and final rate, steps/s     a   acceleration, steps/s²
 //   N_a, N_d        steps of the ramps up and down               N   steps of the block
-#include "marlin_trapezoid.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "marlin_integers.hpp"
+#include "marlin_trapezoid.hpp"
+#include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::planner::marlin {
 namespace {
@@ -178,7 +178,7 @@ std::size_t Planner::take_played(std::vector<PlannedMove>& out) {
 }
 
 double first_step_s(const FirmwareConfig& config) {
-  return config.firmware == Firmware::marlin ? 1.0 / marlin::kMinRate : 0.0;
+  return spec_of(config.firmware).motion.first_step_s;
 }
 
 double wait_s(const PlannedMove& first, const FirmwareConfig& config) {

@@ -1,9 +1,8 @@
-#include "unflex/gcode/rrf_meta.hpp"
-
 #include <algorithm>
 #include <array>
 
 #include "characters.hpp"
+#include "unflex/gcode/rrf_meta.hpp"
 
 namespace unflex::gcode {
 namespace {

@@ -67,7 +67,12 @@ std::string_view rrf_misspelling(const Command& command) {
 
 }  // namespace
 
-void Interpreter::rrf(Event& event, std::string_view content) {
+void Interpreter::read_rrf(Event& event, std::string_view content) {
+  read_rrf_line(event, content);
+  event.waits_for_buffer = rrf_waits_for_buffer(command_);
+}
+
+void Interpreter::read_rrf_line(Event& event, std::string_view content) {
   if (rrf_meta_line(event, content)) {
     return;
   }

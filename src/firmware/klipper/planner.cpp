@@ -13,12 +13,13 @@
 //   m_i = min(M_i, m_{i+1} + (1 − r)Δ_i)     s_i with smooth ramps
 // where S and M already hold the forward reach from the start of the stretch. Once m_i is bound by
 // M_i, no later move can change m_i or anything before i.
-#include "unflex/planner/klipper_planner.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
 #include <numbers>
+
+#include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::planner {
 namespace {
@@ -235,3 +236,15 @@ void KlipperPlanner::plan(bool lazy) {
 }
 
 }  // namespace unflex::planner
+
+namespace unflex::firmware::klipper {
+
+std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
+                                               const planner::FirmwareConfig& config);
+
+std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
+                                               const planner::FirmwareConfig& config) {
+  return std::make_unique<planner::KlipperPlanner>(limits, config);
+}
+
+}  // namespace unflex::firmware::klipper

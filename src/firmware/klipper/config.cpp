@@ -1,10 +1,9 @@
-#include "klipper_config.hpp"
-
 #include <fmt/core.h>
 
 #include <algorithm>
 
 #include "file_text.hpp"
+#include "klipper_config.hpp"
 #include "text_lines.hpp"
 #include "unflex/platform/files.hpp"
 

@@ -1,8 +1,7 @@
-#include "rrf_steps.hpp"
-
 #include <fmt/core.h>
 
 #include "command_reader.hpp"
+#include "rrf_steps.hpp"
 #include "unflex/machine/machine.hpp"
 
 namespace unflex::machine {

@@ -1,9 +1,10 @@
+#include "arc.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
 
-#include "arc.hpp"
 #include "unflex/core/math.hpp"
 
 namespace unflex::gcode {

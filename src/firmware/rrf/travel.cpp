@@ -1,11 +1,10 @@
-#include "rrf_travel.hpp"
-
 #include <fmt/core.h>
 
 #include <cctype>
 #include <string>
 
 #include "command_reader.hpp"
+#include "rrf_travel.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/core/text.hpp"
 

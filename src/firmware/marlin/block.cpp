@@ -2,12 +2,11 @@
 //
 // Source: Marlin 2.1.2, src/module/planner.cpp, Planner::_populate_block and
 // refresh_acceleration_rates.
-#include "marlin_block.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "marlin_block.hpp"
 #include "marlin_integers.hpp"
 #include "marlin_junction.hpp"
 

@@ -5,11 +5,11 @@
 // The ratios are those of its choice for one mode of 25 to 110 Hz and damping 0.02 to 0.12 under
 // its own sweep: the middle of the least and the greatest, and half their distance, rounded up, as
 // the error. docs/configuration.md has the table.
-#include "klipper_shaper.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "klipper_shaper.hpp"
 
 namespace unflex::machine {
 namespace {

@@ -7,6 +7,7 @@
 
 #include "characters.hpp"
 #include "firmware_commands.hpp"
+#include "firmware_reader.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
 namespace unflex::gcode {
@@ -45,7 +46,7 @@ std::string_view doubt(std::string_view content, const Command& command) {
 
 }  // namespace
 
-void Interpreter::marlin(Event& event, std::string_view content) {
+void Interpreter::read_marlin(Event& event, std::string_view content) {
   if (event.line.has_bare_return()) {
     return not_understood(event,
                           "a carriage return without a line feed, which ends the line for Marlin");
@@ -72,8 +73,7 @@ void Interpreter::marlin(Event& event, std::string_view content) {
 void Interpreter::marlin_command(Event& event) {
   const bool is_m = command_.letter == 'M';
   if (command_.subnumber > 0) {
-    const bool passive =
-        is_m && m_code_effect(Firmware::marlin, command_.number) == Effect::passive;
+    const bool passive = is_m && marlin_m_code_effect(command_.number) == Effect::passive;
     return passive ? void() : lose_position(event);
   }
   if (command_.letter == 'G') {

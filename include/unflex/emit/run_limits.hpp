@@ -1,0 +1,20 @@
+// The printer's limits inside a compensated run.
+#pragma once
+
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::emit {
+
+// What a run asks of X, Y and the filament.
+struct RunLimits {
+  double velocity_mm_s = 0.0;
+  double accel_mm_s2 = 0.0;
+  double corner_velocity_mm_s = 0.0;
+};
+
+// The limits that let a run have that, so that the firmware never slows a line down. Z keeps those
+// of `limits`.
+[[nodiscard]] planner::Limits limits_of_runs(const planner::FirmwareConfig& config,
+                                             planner::Limits limits, const RunLimits& run);
+
+}  // namespace unflex::emit

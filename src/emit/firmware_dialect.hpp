@@ -1,0 +1,60 @@
+// Limits and filters in a firmware's own commands, as a table of functions. The tables are in
+// src/firmware.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "dialect.hpp"
+#include "unflex/core/firmware.hpp"
+#include "unflex/emit/run_limits.hpp"
+#include "unflex/gcode/interpreter.hpp"
+#include "unflex/planner/planner.hpp"
+
+namespace unflex::emit {
+
+// Which axes' shapers are to be written.
+struct ShaperAxes {
+  bool x = false;
+  bool y = false;
+};
+
+struct FirmwareDialect {
+  // Appends the lines that put `wanted` in force in the place of `current`.
+  void (*limit_lines)(const planner::FirmwareConfig& config, const planner::Limits& wanted,
+                      const planner::Limits& current, std::vector<std::string>& lines);
+  // Sets the limits of a run. What is not set stays as the file has it.
+  void (*set_run_limits)(const planner::FirmwareConfig& config, const RunLimits& run,
+                         planner::Limits& limits);
+  void (*shaper_lines)(const gcode::Shaper& wanted, const gcode::Shaper& current, ShaperAxes axes,
+                       std::vector<std::string>& lines);
+  // The line that sets pressure advance, which is given.
+  std::string (*advance_line)(const gcode::PressureAdvance& wanted);
+  // What to type for these axes to switch their shapers on again.
+  std::string (*unknown_shaper_lines)(ShaperAxes axes);
+};
+
+}  // namespace unflex::emit
+
+namespace unflex::firmware {
+
+#define UNFLEX_FIRMWARE(name)                  \
+  namespace name {                             \
+  extern const emit::FirmwareDialect kDialect; \
+  }
+UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)
+#undef UNFLEX_FIRMWARE
+
+}  // namespace unflex::firmware
+
+namespace unflex::emit {
+
+[[nodiscard]] inline const FirmwareDialect& dialect_of(Firmware firmware) {
+#define UNFLEX_FIRMWARE(name) &firmware::name::kDialect,
+  static constexpr const FirmwareDialect* kDialects[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
+#undef UNFLEX_FIRMWARE
+  return *kDialects[static_cast<std::size_t>(firmware)];
+}
+
+}  // namespace unflex::emit
