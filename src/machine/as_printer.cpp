@@ -4,7 +4,7 @@
 #include <array>
 #include <numbers>
 
-#include "unflex/planner/rrf_planner.hpp"
+#include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -14,21 +14,21 @@ static_assert(kMostModes == dynamics::kMostModes);
 // The longest pause for a swing to die away.
 constexpr double kLongestCalm_s = 0.5;
 
-// Filament per mm of path, in mm, from which on a move has too much. Klipper refuses such a move.
-// The others lay it, so that only what no nozzle can lay is too much.
+// Filament per mm of path, in mm, from which on a move has too much. A firmware that limits the
+// extruder refuses such a move. The others lay it, so that only what no nozzle can lay is too much.
 double max_extrude_ratio(const Settings& settings) {
   constexpr double kNoNozzle = 5.0;
   const double radius_mm = settings.extruder.filament_diameter_mm / 2.0;
   const double ratio =
       settings.max_extrude_cross_section_mm2() / (std::numbers::pi * radius_mm * radius_mm);
-  return settings.printer.firmware == Firmware::klipper ? ratio : kNoNozzle * ratio;
+  return settings.spec().motion.limits_extruder ? ratio : kNoNozzle * ratio;
 }
 
 }  // namespace
 
 double grid_mm(const Settings& settings) {
   const std::array<double, 4> steps_per_mm = settings.steps_per_mm();
-  return settings.printer.firmware != Firmware::klipper
+  return settings.spec().motion.rounds_to_steps
              ? 1.0 / std::min(steps_per_mm[gcode::X], steps_per_mm[gcode::Y])
              : kGrid_mm;
 }
@@ -124,7 +124,7 @@ planner::Limits planner_limits(const Settings& settings) {
   limits.min_segment_time_s = settings.limits.min_segment_time_ms * 1e-3;
   limits.min_movement_velocity_mm_s = settings.limits.min_movement_velocity_mm_s;
   limits.jerk_policy = static_cast<int>(settings.limits.jerk_policy);
-  return settings.printer.firmware == Firmware::rrf ? planner::rrf_raised(limits) : limits;
+  return planner::as_accepted(settings.printer.firmware, limits);
 }
 
 planner::FirmwareConfig firmware_config(const Settings& settings) {
@@ -136,7 +136,7 @@ planner::FirmwareConfig firmware_config(const Settings& settings) {
   config.max_extrude_only_velocity_mm_s = settings.max_extrude_only_velocity_mm_s();
   config.max_extrude_only_accel_mm_s2 = settings.max_extrude_only_accel_mm_s2();
   config.instantaneous_corner_velocity_mm_s = settings.extruder.instantaneous_corner_velocity_mm_s;
-  config.pressure_advance_s = config.firmware == Firmware::marlin
+  config.pressure_advance_s = settings.spec().filters.has_linear_advance
                                   ? settings.printer.linear_advance_s
                                   : settings.extruder.pressure_advance_s;
   config.pressure_advance_smooth_s = settings.extruder.pressure_advance_smooth_s;

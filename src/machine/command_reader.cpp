@@ -7,6 +7,8 @@
 #include <cctype>
 #include <vector>
 
+#include "unflex/core/firmware_spec.hpp"
+
 namespace unflex::machine {
 namespace {
 
@@ -14,7 +16,7 @@ gcode::InterpreterOptions options_of(Firmware firmware) {
   gcode::InterpreterOptions options = gcode::default_options(firmware);
   options.firmware_retraction = true;
   // Before 3.6 there is only one jerk. Settings::print_jerk_mm_s() takes care of that.
-  options.has_print_jerk = firmware == Firmware::rrf;
+  options.has_print_jerk = spec_of(firmware).motion.has_two_jerks;
   return options;
 }
 
@@ -90,8 +92,7 @@ bool CommandReader::take(const std::string& text, const gcode::Command& command,
     }
   }
   constexpr std::string_view kJerk = "limits.jerk_";
-  const bool is_print_jerk =
-      interpreter_.options().firmware == Firmware::rrf && command.number == 205;
+  const bool is_print_jerk = interpreter_.options().has_print_jerk && command.number == 205;
   for (const LimitValue& limit : limit_values(*event.limits)) {
     reading.add(is_print_jerk ? "limits.print_jerk_" + limit.key.substr(kJerk.size()) : limit.key,
                 as_written(limit.value), place);

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "test_place.hpp"
+#include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -25,33 +26,24 @@ constexpr double kRow_mm = 2.0;
 // The shortest line of the test. Marlin joins lines of too few steps to the next
 // (MIN_STEPS_PER_SEGMENT).
 double least_line_mm(const Settings& settings) {
-  switch (settings.printer.firmware) {
-    case Firmware::marlin:
-      return (settings.printer.min_steps_per_segment + 1.0) / settings.steps_per_mm()[0];
-    case Firmware::rrf:
-      return 1.0 / settings.steps_per_mm()[0];
-    case Firmware::klipper:
-      break;
+  const FirmwareMotion& motion = settings.spec().motion;
+  if (motion.rounds_to_steps) {
+    const double more = motion.skips_short_moves ? settings.printer.min_steps_per_segment : 0.0;
+    return (more + 1.0) / settings.steps_per_mm()[0];
   }
   return 1e-3;
 }
 
 double acceleration_mm_s2(const Settings& settings) {
-  switch (settings.printer.firmware) {
-    case Firmware::marlin:
-    case Firmware::rrf:
-      return std::min(settings.axis_max_accel_mm_s2()[0], settings.travel_accel_mm_s2());
-    case Firmware::klipper:
-      break;
-  }
-  return settings.limits.max_accel_mm_s2;
+  return settings.spec().motion.has_axis_limits
+             ? std::min(settings.axis_max_accel_mm_s2()[0], settings.travel_accel_mm_s2())
+             : settings.limits.max_accel_mm_s2;
 }
 
 // How many lines the firmware can brake over; Klipper's queue is as long as it needs.
 std::optional<double> lines_ahead(const Settings& settings) {
-  return settings.printer.firmware == Firmware::klipper
-             ? std::nullopt
-             : std::optional(settings.queue_length() / 2.0);
+  return settings.spec().motion.has_short_queue ? std::optional(settings.queue_length() / 2.0)
+                                                : std::nullopt;
 }
 
 double rounds(const LineTestStage& stage) {

@@ -17,6 +17,7 @@
 #include "slicer_reader.hpp"
 #include "source_kind.hpp"
 #include "toml_reader.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/utf8.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
@@ -179,14 +180,14 @@ void note_odd_dampings(Draft& draft) {
 // those of motors. config.g and printer.cfg tell it.
 void note_assumed_kinematics(Draft& draft) {
   constexpr std::string_view kKey = "kinematics.type";
-  if (draft.settings.printer.firmware != Firmware::marlin || draft.places[*find_key(kKey)]) {
+  if (draft.settings.spec().printers.is_told_kinematics || draft.places[*find_key(kKey)]) {
     return;
   }
   draft.settings.notes.push_back(
       {{draft.printer_file, 0},
-       fmt::format("nothing tells which motors of this Marlin move what, and cartesian is assumed; "
+       fmt::format("nothing tells which motors of this {} move what, and cartesian is assumed; "
                    "set {} to that, or to what the printer is, such as corexy",
-                   kKey)});
+                   draft.settings.spec().brand, kKey)});
 }
 
 // Firmwares that limit motors hold X to the limits of a Z motor that moves it too, and runs leave
@@ -196,7 +197,7 @@ void note_slow_z_motor(Draft& draft) {
   constexpr std::size_t kZ = 2;
   constexpr std::string_view kKey = "limits.max_z_accel_mm_s2";
   const double z_mm_s2 = s.axis_max_accel_mm_s2()[kZ];
-  if (s.printer.firmware == Firmware::klipper || s.kinematics.type != Kinematics::corexz ||
+  if (!s.spec().motion.has_axis_limits || s.kinematics.type != Kinematics::corexz ||
       z_mm_s2 >= s.base_max_accel_mm_s2()) {
     return;
   }
@@ -238,7 +239,7 @@ void tell_notes(Draft& draft) {
 // mistake, but slicers say what the axis can do.
 void bound_z(const Reading& slicer, Draft& draft) {
   const Settings& s = draft.settings;
-  if (s.printer.firmware != Firmware::klipper) {
+  if (s.spec().motion.has_axis_limits) {
     return;
   }
   constexpr std::size_t kZ = 2;

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "test_place.hpp"
+#include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -25,22 +27,16 @@ using Around = std::pair<std::string, std::string>;
 
 // nullopt if the firmware has none.
 std::optional<Around> around(Firmware firmware, char axis, double speed_mm_s) {
-  const std::string name = fmt::format("unflex_{}_{:.0f}", axis, speed_mm_s);
-  switch (firmware) {
-    case Firmware::klipper: {
-      const std::string command = fmt::format("ACCELEROMETER_MEASURE NAME={}\n", name);
-      return Around{command, command};
-    }
-    case Firmware::rrf: {
-      const double samples =
-          std::ceil(kSamplesPerSecond * (kStroke_mm / speed_mm_s + kRest_ms * 1e-3));
-      // A1 waits until the next move begins.
-      return Around{fmt::format("M956 P0 S{:.0f} A1 F\"{}.csv\"\n", samples, name), ""};
-    }
-    case Firmware::marlin:
-      break;
+  const FirmwareWriting& writing = spec_of(firmware).writing;
+  if (writing.record_before.empty()) {
+    return std::nullopt;
   }
-  return std::nullopt;
+  const std::string name = fmt::format("unflex_{}_{:.0f}", axis, speed_mm_s);
+  const double samples = std::ceil(kSamplesPerSecond * (kStroke_mm / speed_mm_s + kRest_ms * 1e-3));
+  const auto filled = [&](std::string_view form) {
+    return fmt::format(fmt::runtime(form), fmt::arg("name", name), fmt::arg("samples", samples));
+  };
+  return Around{filled(writing.record_before), filled(writing.record_after)};
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <limits>
 #include <numbers>
 
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/machine/machine.hpp"
 #include "validate.hpp"
@@ -49,70 +50,38 @@ std::array<double, 4> or_default(const AxisOptions& own, const std::array<double
 
 // The default of M204 P and T.
 double default_command_accel(const Settings& settings) {
-  // RepRapFirmware's DefaultPrintingAcceleration, above whatever M201 allows.
-  constexpr double kRrfNoLimit_mm_s2 = 50000.0;
-  return settings.printer.firmware == Firmware::rrf ? kRrfNoLimit_mm_s2
-                                                    : settings.limits.max_accel_mm_s2;
+  return settings.spec().defaults.command_accel_mm_s2.value_or(settings.limits.max_accel_mm_s2);
 }
 
-double by_firmware(Firmware firmware, double klipper, double marlin, double rrf) {
-  return firmware == Firmware::klipper ? klipper : firmware == Firmware::marlin ? marlin : rrf;
-}
-
-// The damping ratio of a shaper for which none is given: Klipper's shaper_defs.py,
-// DEFAULT_DAMPING_RATIO; Marlin's Configuration_adv.h, SHAPING_ZETA_X; RepRapFirmware's
-// AxisShaper.h, DefaultDamping.
-constexpr double kKlipperDampingRatio = 0.1;
-constexpr double kMarlinDampingRatio = 0.15;
-constexpr double kRrfDampingRatio = 0.1;
-
-// emit.accel_mm_s2 of Klipper and Marlin.
+// emit.accel_mm_s2 where it does not follow the base.
 constexpr double kEmitAccel_mm_s2 = 1e6;
 
 }  // namespace
 
-// Defaults: Marlin 2.1.2 Configuration.h (DEFAULT_*) and Configuration_adv.h; RepRapFirmware 3.6
-// src/Config/Configuration.h (Default*).
+const FirmwareSpec& Settings::spec() const { return spec_of(printer.firmware); }
+
 std::array<double, 4> Settings::axis_max_velocity_mm_s() const {
   const double v = limits.max_velocity_mm_s;
-  return or_default(limits.axis_max_velocity_mm_s, [&]() -> std::array<double, 4> {
-    switch (printer.firmware) {
-      case Firmware::marlin:
-        return {v, v, 5.0, 25.0};
-      case Firmware::rrf:
-        return {v, v, 20.0, 100.0};
-      case Firmware::klipper:
-        break;
-    }
-    return {v, v, v, v};
-  }());
+  const FirmwareDefaults& defaults = spec().defaults;
+  return or_default(limits.axis_max_velocity_mm_s, {v, v, defaults.max_z_velocity_mm_s.value_or(v),
+                                                    defaults.max_e_velocity_mm_s.value_or(v)});
 }
 
 std::array<double, 4> Settings::axis_max_accel_mm_s2() const {
   const double a = limits.max_accel_mm_s2;
-  return or_default(limits.axis_max_accel_mm_s2, [&]() -> std::array<double, 4> {
-    switch (printer.firmware) {
-      case Firmware::marlin:
-        return {a, a, 100.0, 10000.0};
-      case Firmware::rrf:
-        return {a, a, 200.0, 500.0};
-      case Firmware::klipper:
-        break;
-    }
-    return {a, a, a, a};
-  }());
+  const FirmwareDefaults& defaults = spec().defaults;
+  return or_default(limits.axis_max_accel_mm_s2, {a, a, defaults.max_z_accel_mm_s2.value_or(a),
+                                                  defaults.max_e_accel_mm_s2.value_or(a)});
 }
 
 std::array<double, 4> Settings::jerk_mm_s() const {
-  return or_default(limits.jerk_mm_s, printer.firmware == Firmware::rrf
-                                          ? std::array{15.0, 15.0, 10.0, 5.0}
-                                          : std::array{10.0, 10.0, 0.3, 5.0});
+  return or_default(limits.jerk_mm_s, spec().defaults.jerk_mm_s);
 }
 
 // Movement/Move.cpp, SetInstantDv: the jerk of prints is at most that of M566. Before 3.6 there is
 // one jerk, which both M205 and M566 set; unknown versions are taken to be that old.
 std::array<double, 4> Settings::print_jerk_mm_s() const {
-  if (printer.firmware != Firmware::rrf) {
+  if (!spec().motion.has_two_jerks) {
     return jerk_mm_s();
   }
   std::array<double, 4> values = or_default(limits.print_jerk_mm_s, jerk_mm_s());
@@ -124,34 +93,27 @@ std::array<double, 4> Settings::print_jerk_mm_s() const {
 }
 
 bool Settings::has_print_jerk() const {
-  return printer.firmware == Firmware::rrf && is_at_least(printer.version, 3, 6);
+  return spec().motion.has_two_jerks && is_at_least(printer.version, 3, 6);
 }
 
 std::array<double, 4> Settings::steps_per_mm() const {
-  return or_default(printer.steps_per_mm, printer.firmware == Firmware::rrf
-                                              ? std::array{80.0, 80.0, 800.0, 420.0}
-                                              : std::array{80.0, 80.0, 400.0, 500.0});
+  return or_default(printer.steps_per_mm, spec().defaults.steps_per_mm);
 }
 
 double Settings::queue_length() const {
-  return printer.queue_length.value_or(printer.firmware == Firmware::rrf ? 60.0 : 16.0);
+  return printer.queue_length.value_or(spec().defaults.queue_length);
 }
 
-// Klipper: extras/firmware_retraction.py. Marlin: Configuration_adv.h, RETRACT_LENGTH,
-// RETRACT_FEEDRATE, RETRACT_RECOVER_FEEDRATE. RepRapFirmware: Config/Configuration.h,
-// DefaultRetractLength, DefaultRetractSpeed.
 double Settings::retract_length_mm() const {
-  return printer.retract_length_mm.value_or(by_firmware(printer.firmware, 0.0, 3.0, 2.0));
+  return printer.retract_length_mm.value_or(spec().defaults.retract_length_mm);
 }
 
 double Settings::retract_speed_mm_s() const {
-  return printer.retract_speed_mm_s.value_or(
-      by_firmware(printer.firmware, 20.0, 45.0, 1000.0 / 60.0));
+  return printer.retract_speed_mm_s.value_or(spec().defaults.retract_speed_mm_s);
 }
 
 double Settings::unretract_speed_mm_s() const {
-  return printer.unretract_speed_mm_s.value_or(
-      by_firmware(printer.firmware, 10.0, 8.0, 1000.0 / 60.0));
+  return printer.unretract_speed_mm_s.value_or(spec().defaults.unretract_speed_mm_s);
 }
 
 double Settings::print_accel_mm_s2() const {
@@ -172,8 +134,10 @@ double Settings::max_lines_per_s() const {
     if (printer.transport == "serial") {
       return 100.0;
     }
-    const bool is_sbc = printer.transport == "sbc" && printer.firmware == Firmware::rrf;
-    return is_sbc ? 250.0 : by_firmware(printer.firmware, 1000.0, 200.0, 500.0);
+    const FirmwareDefaults& defaults = spec().defaults;
+    return printer.transport == "sbc"
+               ? defaults.max_lines_per_s_of_sbc.value_or(defaults.max_lines_per_s)
+               : defaults.max_lines_per_s;
   };
   return emit.max_lines_per_s.value_or(by_transport());
 }
@@ -209,13 +173,13 @@ double Settings::max_extrude_only_accel_mm_s2() const {
 }
 
 bool Settings::printer_presses() const {
-  return printer.firmware == Firmware::klipper && pressure.shape == kLinearPressure;
+  return spec().filters.advances_in_runs && pressure.shape == kLinearPressure;
 }
 
 bool Settings::writes_pressure() const { return pressure.written.value_or(printer_presses()); }
 
 double Settings::most_of_motor() const {
-  if (printer.firmware != Firmware::klipper) {
+  if (spec().motion.has_axis_limits) {
     return 1.0;
   }
   double most = 0.0;
@@ -228,18 +192,17 @@ double Settings::most_of_motor() const {
 
 double Settings::motor_max_velocity_mm_s() const {
   const auto [x, y, z, e] = axis_max_velocity_mm_s();
-  return printer.firmware == Firmware::klipper ? most_of_motor() * limits.max_velocity_mm_s
-                                               : std::min(x, y);
+  return spec().motion.has_axis_limits ? std::min(x, y)
+                                       : most_of_motor() * limits.max_velocity_mm_s;
 }
 
 double Settings::motor_max_accel_mm_s2() const {
   const auto [x, y, z, e] = axis_max_accel_mm_s2();
-  return printer.firmware == Firmware::klipper ? most_of_motor() * limits.max_accel_mm_s2
-                                               : std::min(x, y);
+  return spec().motion.has_axis_limits ? std::min(x, y) : most_of_motor() * limits.max_accel_mm_s2;
 }
 
 std::string_view Settings::motor_max_accel_key() const {
-  if (printer.firmware != Firmware::klipper) {
+  if (spec().motion.has_axis_limits) {
     const auto [x, y, z, e] = axis_max_accel_mm_s2();
     const AxisOptions& set = limits.axis_max_accel_mm_s2;
     if (set[0] && x <= y) {
@@ -277,8 +240,8 @@ double Settings::base_max_accel_mm_s2(double asked_mm_s2) const {
   if (base.max_accel_mm_s2) {
     return *base.max_accel_mm_s2;
   }
-  // RepRapFirmware's emit.accel_mm_s2 follows this limit, that of the others bounds it.
-  const bool bounded = emit.accel_mm_s2 || printer.firmware != Firmware::rrf;
+  // Where emit.accel_mm_s2 does not follow this limit, it bounds it.
+  const bool bounded = emit.accel_mm_s2 || !spec().defaults.emit_accel_follows_base;
   const double most = bounded ? emit.accel_mm_s2.value_or(kEmitAccel_mm_s2) / kEmitAccelFactor
                               : std::numeric_limits<double>::infinity();
   return std::max(base_accel_times_asked() * limits.max_accel_mm_s2,
@@ -323,9 +286,8 @@ std::string AxisDynamics::description() const {
 // Marlin the largest error is 36 µm with 2 ms, 14 µm with the 5 ms of a line, and 14 µm with 11 ms.
 double Settings::tail_s() const {
   constexpr double kLeast_s = 2e-3;
-  const double shortest_s = printer.firmware == Firmware::klipper
-                                ? kLeast_s
-                                : std::max(kLeast_s, 1.0 / max_lines_per_s());
+  const double shortest_s =
+      spec().motion.rounds_to_steps ? std::max(kLeast_s, 1.0 / max_lines_per_s()) : kLeast_s;
   if (solve.tail_ms) {
     return *solve.tail_ms * 1e-3;
   }
@@ -397,7 +359,7 @@ double Settings::tracking_jerk_weight() const {
 
 double Settings::emit_accel_mm_s2(double asked_mm_s2) const {
   // RepRapFirmware leaves out short ramps. The lower its acceleration, the fewer it leaves out.
-  return emit.accel_mm_s2.value_or(printer.firmware == Firmware::rrf
+  return emit.accel_mm_s2.value_or(spec().defaults.emit_accel_follows_base
                                        ? kEmitAccelFactor * base_max_accel_mm_s2(asked_mm_s2)
                                        : kEmitAccel_mm_s2);
 }
@@ -416,20 +378,9 @@ double Settings::tolerance_um() const {
   return emit.tolerance_um.value_or(kPerHz * std::min(dynamics_x.freq_hz, dynamics_y.freq_hz));
 }
 
-// Klipper's input_shaper.py; Marlin has no other; RepRapFirmware's AxisShaper::Configure.
 std::string Settings::shaper_type_x() const {
-  if (printer.input_shaper_type != "auto") {
-    return printer.input_shaper_type;
-  }
-  switch (printer.firmware) {
-    case Firmware::marlin:
-      return "zv";
-    case Firmware::rrf:
-      return "zvd";
-    case Firmware::klipper:
-      break;
-  }
-  return "mzv";
+  return printer.input_shaper_type == "auto" ? std::string(spec().filters.shaper_type)
+                                             : printer.input_shaper_type;
 }
 
 std::string Settings::shaper_type_y() const {
@@ -437,21 +388,18 @@ std::string Settings::shaper_type_y() const {
 }
 
 double Settings::shaper_damping_ratio_x() const {
-  return printer.input_shaper_damping_ratio_x.value_or(
-      by_firmware(printer.firmware, kKlipperDampingRatio, kMarlinDampingRatio, kRrfDampingRatio));
+  return printer.input_shaper_damping_ratio_x.value_or(spec().filters.shaper_damping_ratio);
 }
 
 double Settings::shaper_damping_ratio_y() const {
-  return printer.input_shaper_damping_ratio_y.value_or(
-      by_firmware(printer.firmware, kKlipperDampingRatio, kMarlinDampingRatio, kRrfDampingRatio));
+  return printer.input_shaper_damping_ratio_y.value_or(spec().filters.shaper_damping_ratio);
 }
 
 double Settings::shaper_freq_x_hz() const { return printer.input_shaper_freq_x_hz.value_or(0.0); }
 
-// RepRapFirmware has one shaper for both axes.
 double Settings::shaper_freq_y_hz() const {
   return printer.input_shaper_freq_y_hz.value_or(
-      printer.firmware == Firmware::rrf ? shaper_freq_x_hz() : 0.0);
+      spec().filters.shapes_both_axes_alike ? shaper_freq_x_hz() : 0.0);
 }
 
 // Any printer may have a shaper. On the Snapmaker J1 the command that switches it off does harm
@@ -461,7 +409,7 @@ bool Settings::shaper_unknown_x() const {
 }
 
 bool Settings::shaper_unknown_y() const {
-  const bool is_as_x = printer.firmware == Firmware::rrf && printer.input_shaper_freq_x_hz;
+  const bool is_as_x = spec().filters.shapes_both_axes_alike && printer.input_shaper_freq_x_hz;
   return !printer.input_shaper_freq_y_hz && !is_as_x && printer.variant != "snapmaker_j1";
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "text_lines.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/command.hpp"
 #include "variants.hpp"
@@ -100,7 +101,8 @@ class Reader {
     if (!named) {
       return std::move(reading_);
     }
-    const std::size_t macro = *named == Firmware::marlin ? klipper_line(print_->head) : 0;
+    const std::size_t macro =
+        spec_of(*named).printers.may_be_called_otherwise ? klipper_line(print_->head) : 0;
     const Firmware meant = macro != 0 ? Firmware::klipper : *named;
     const SourcePlace place = option("gcode_flavor")->place;
     if (!runs) {
@@ -117,7 +119,7 @@ class Reader {
     const Firmware firmware = runs.value_or(meant);
     const SlicerOption* const usage = option("machine_limits_usage");
     if ((!runs || *named == firmware) && (usage == nullptr || usage->text != "ignore")) {
-      firmware == Firmware::klipper ? klipper_limits() : axis_limits(firmware);
+      spec_of(firmware).motion.has_axis_limits ? axis_limits(firmware) : klipper_limits();
     }
     return std::move(reading_);
   }
@@ -229,7 +231,7 @@ class Reader {
     const std::string travel = "machine_max_acceleration_travel";
     add("limits.print_accel_mm_s2", number(print), print);
     add("limits.travel_accel_mm_s2", number(travel), travel);
-    if (firmware == Firmware::marlin) {
+    if (spec_of(firmware).printers.has_retract_accel) {
       const std::string retract = "machine_max_acceleration_retracting";
       add("limits.retract_accel_mm_s2", number(retract), retract);
       junctions();

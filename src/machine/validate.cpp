@@ -12,6 +12,7 @@
 
 #include "key_table.hpp"
 #include "toml_reader.hpp"
+#include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/math.hpp"
 #include "unflex/core/number.hpp"
 #include "unflex/gcode/feature.hpp"
@@ -175,12 +176,12 @@ Status resolve_axis(Draft& draft, const std::string& section, const MassSpringDa
 Status check_printer(const Draft& draft) {
   const Settings& s = draft.settings;
   constexpr std::size_t kZ = 2;
-  const bool klipper = s.printer.firmware == Firmware::klipper;
-  if (klipper && s.axis_max_velocity_mm_s()[kZ] > s.limits.max_velocity_mm_s) {
+  const bool has_one_limit = !s.spec().motion.has_axis_limits;
+  if (has_one_limit && s.axis_max_velocity_mm_s()[kZ] > s.limits.max_velocity_mm_s) {
     return conflict(draft, {"limits.max_z_velocity_mm_s", "limits.max_velocity_mm_s"},
                     "limits.max_z_velocity_mm_s must not exceed limits.max_velocity_mm_s");
   }
-  if (klipper && s.axis_max_accel_mm_s2()[kZ] > s.limits.max_accel_mm_s2) {
+  if (has_one_limit && s.axis_max_accel_mm_s2()[kZ] > s.limits.max_accel_mm_s2) {
     return conflict(draft, {"limits.max_z_accel_mm_s2", "limits.max_accel_mm_s2"},
                     "limits.max_z_accel_mm_s2 must not exceed limits.max_accel_mm_s2");
   }
@@ -201,7 +202,7 @@ Status check_printer(const Draft& draft) {
                                 "printer.max_arc_segment_mm, {}",
                                 s.printer.min_arc_segment_mm, s.printer.max_arc_segment_mm));
   }
-  const double least_extra_mm = klipper ? 0.0 : -s.retract_length_mm();
+  const double least_extra_mm = s.spec().defaults.unretracts_less ? -s.retract_length_mm() : 0.0;
   if (s.printer.unretract_extra_length_mm < least_extra_mm) {
     return conflict(draft, {"printer.unretract_extra_length_mm"},
                     fmt::format("printer.unretract_extra_length_mm is {}, but must be at least {}",
@@ -222,7 +223,7 @@ Status check_printer(const Draft& draft) {
 // Checks that M593 of RepRapFirmware takes the shaper (AxisShaper::Configure).
 Status check_shaper(const Draft& draft) {
   const Settings& s = draft.settings;
-  if (s.printer.firmware != Firmware::rrf) {
+  if (!s.spec().filters.shapes_both_axes_alike) {
     return {};
   }
   const double freq_hz = s.shaper_freq_x_hz();
@@ -260,13 +261,12 @@ Status check_kinematics(const Draft& draft) {
     case Kinematics::corexz:
       return {};
     case Kinematics::hybrid_corexy:
-      if (s.printer.firmware == Firmware::marlin) {
-        return refuse("Marlin's MARKFORGED_XY limits by x + y in places and by x - y in others");
-      }
-      return {};
+      return s.spec().printers.hybrid_corexy_refusal.empty()
+                 ? Status{}
+                 : refuse(s.spec().printers.hybrid_corexy_refusal);
     case Kinematics::hybrid_corexy_inverted:
     case Kinematics::hybrid_corexz:
-      if (s.printer.firmware != Firmware::klipper) {
+      if (!s.spec().printers.has_all_kinematics) {
         return refuse("Klipper alone has");
       }
       return {};
@@ -307,7 +307,7 @@ Status check_emission(const Draft& draft) {
                     readable(s.emit_accel_mm_s2()), readable(least_accel), kEmitAccelFactor));
   }
   // On the other firmwares lines end on whole steps, too coarse for this key.
-  if (s.printer.firmware == Firmware::klipper && place_of(draft, "emit.max_speed_step_mm_s") &&
+  if (!s.spec().motion.rounds_to_steps && place_of(draft, "emit.max_speed_step_mm_s") &&
       s.emit.max_speed_step_mm_s < s.least_speed_step_mm_s()) {
     return conflict(
         draft, {"emit.max_speed_step_mm_s"},
@@ -322,7 +322,7 @@ Status check_emission(const Draft& draft) {
         draft, {"emit.square_corner_velocity_mm_s", "limits.square_corner_velocity_mm_s"},
         "emit.square_corner_velocity_mm_s must not be below limits.square_corner_velocity_mm_s");
   }
-  if (s.emit.checkpoints && s.printer.firmware != Firmware::klipper) {
+  if (s.emit.checkpoints && !s.spec().writing.can_pause_behind_run) {
     return conflict(draft, {"emit.checkpoints", "printer.firmware"},
                     fmt::format("emit.checkpoints is true, but printer.firmware is {}, on which no "
                                 "pause can wait for a run's end; set it to false, docs/pausing.md "

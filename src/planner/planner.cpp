@@ -9,6 +9,7 @@ namespace unflex::firmware {
   namespace name {                                                                       \
   std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,          \
                                                  const planner::FirmwareConfig& config); \
+  planner::Limits as_accepted(planner::Limits limits);                                   \
   }
 UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)
 #undef UNFLEX_FIRMWARE
@@ -56,6 +57,14 @@ void apply(const gcode::LimitChange& change, Limits& limits) {
   put(change.min_segment_time_s, limits.min_segment_time_s);
   put(change.min_movement_velocity_mm_s, limits.min_movement_velocity_mm_s);
   put(change.jerk_policy, limits.jerk_policy);
+}
+
+Limits as_accepted(Firmware firmware, const Limits& limits) {
+  using Acceptance = Limits (*)(Limits);
+#define UNFLEX_FIRMWARE(name) &firmware::name::as_accepted,
+  static constexpr Acceptance kAcceptances[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
+#undef UNFLEX_FIRMWARE
+  return kAcceptances[static_cast<std::size_t>(firmware)](limits);
 }
 
 std::unique_ptr<Planner> make_planner(const Limits& limits, const FirmwareConfig& config) {

@@ -65,8 +65,7 @@ double allowance_mm_s(const planner::PlannedMove& move, const planner::FirmwareC
 
 void check_speeds(const planner::PlannedMove& move, const Given& given,
                   const planner::FirmwareConfig& fixed) {
-  const planner::Limits limits =
-      fixed.firmware == Firmware::rrf ? planner::rrf_raised(given.limits) : given.limits;
+  const planner::Limits limits = planner::as_accepted(fixed.firmware, given.limits);
   const std::string place = fmt::format("line {}: ", move.segment.line);
   if (fixed.firmware == Firmware::klipper) {
     const double fastest = move.kinematic

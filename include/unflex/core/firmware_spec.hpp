@@ -61,6 +61,7 @@ struct FirmwareFilters {
   double switching_grace_s = 0.0;       // how much longer than its pulses a switch takes
   // The least half of the time that is scanned for steps where filters are switched; 0: none is.
   double least_scan_s = 0.0;
+  bool has_linear_advance = false;  // printer.linear_advance_s is its pressure advance
   bool smooths_advance = false;
   bool advances_in_runs = false;  // its own pressure advance can serve in compensated runs
 };

@@ -16,6 +16,10 @@
 #include "unflex/gcode/feature.hpp"
 #include "unflex/machine/print_text.hpp"
 
+namespace unflex {
+struct FirmwareSpec;
+}
+
 namespace unflex::machine {
 
 struct Range {
@@ -345,6 +349,9 @@ struct Settings {
   [[nodiscard]] bool is_timing_free() const { return timing.tolerance_um > 0.0; }
   // How far the nozzle may stray wherever it is allowed most; 0: the timing is as sliced.
   [[nodiscard]] double largest_tolerance_um() const;
+
+  // What is special about the firmware (core/firmware_spec.hpp).
+  [[nodiscard]] const FirmwareSpec& spec() const;
 
   // The values behind unset options, by the firmware's own formulas and defaults.
   [[nodiscard]] std::array<double, 4> axis_max_velocity_mm_s() const;

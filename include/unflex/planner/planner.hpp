@@ -235,6 +235,10 @@ class Planner {
   Limits limits_;
 };
 
+// The limits that the firmware takes where it is told these: RepRapFirmware has a least value of
+// each.
+[[nodiscard]] Limits as_accepted(Firmware firmware, const Limits& limits);
+
 // The planner of config.firmware.
 [[nodiscard]] std::unique_ptr<Planner> make_planner(const Limits& limits,
                                                     const FirmwareConfig& config);

@@ -18,6 +18,7 @@
 #include <iterator>
 #include <memory>
 #include <numbers>
+#include <utility>
 
 #include "unflex/planner/klipper_planner.hpp"
 
@@ -239,6 +240,8 @@ void KlipperPlanner::plan(bool lazy) {
 
 namespace unflex::firmware::klipper {
 
+planner::Limits as_accepted(planner::Limits limits);
+
 std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
                                                const planner::FirmwareConfig& config);
 
@@ -246,5 +249,7 @@ std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
                                                const planner::FirmwareConfig& config) {
   return std::make_unique<planner::KlipperPlanner>(limits, config);
 }
+
+planner::Limits as_accepted(planner::Limits limits) { return limits; }
 
 }  // namespace unflex::firmware::klipper

@@ -218,6 +218,8 @@ void MarlinPlanner::forward_pass() {
 
 namespace unflex::firmware::marlin {
 
+planner::Limits as_accepted(planner::Limits limits);
+
 std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
                                                const planner::FirmwareConfig& config);
 
@@ -225,5 +227,7 @@ std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
                                                const planner::FirmwareConfig& config) {
   return std::make_unique<planner::MarlinPlanner>(limits, config);
 }
+
+planner::Limits as_accepted(planner::Limits limits) { return limits; }
 
 }  // namespace unflex::firmware::marlin

@@ -29,7 +29,7 @@ extern constexpr FirmwareSpec kSpec = {
                .slows_at_angles = true,
                .counts_step_events = true,
                .first_step_s = 1.0 / kMinRate},
-    .filters = {.shaper_type = "zv", .shaper_damping_ratio = 0.15},
+    .filters = {.shaper_type = "zv", .shaper_damping_ratio = 0.15, .has_linear_advance = true},
     .writing = {.advance_command = "M900 K",
                 .scales_whole_steps_of_e = true,
                 .units_scale_all_words = true,

@@ -207,12 +207,18 @@ gcode::Position RrfPlanner::on_steps(const gcode::Position& position_mm) const {
 
 namespace unflex::firmware::rrf {
 
+planner::Limits as_accepted(planner::Limits limits);
+
 std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
                                                const planner::FirmwareConfig& config);
 
 std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
                                                const planner::FirmwareConfig& config) {
   return std::make_unique<planner::RrfPlanner>(limits, config);
+}
+
+planner::Limits as_accepted(planner::Limits limits) {
+  return planner::rrf_raised(std::move(limits));
 }
 
 }  // namespace unflex::firmware::rrf
