@@ -26,7 +26,7 @@ install(FILES ${PROJECT_BINARY_DIR}/package/unflexConfig.cmake
   ${PROJECT_BINARY_DIR}/package/unflexConfigVersion.cmake cmake/unflexDependencies.cmake
   DESTINATION ${package_dir} COMPONENT development)
 install(DIRECTORY include/unflex DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
-  FILES_MATCHING PATTERN "*.hpp" PATTERN app EXCLUDE)
+  FILES_MATCHING PATTERN "*.hpp")
 set(UNFLEX_DEVELOPMENT_DOCDIR ${CMAKE_INSTALL_DATADIR}/doc/libunflex-dev)
 install(DIRECTORY examples/library DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
   COMPONENT development)

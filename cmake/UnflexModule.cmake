@@ -11,13 +11,15 @@ mark_as_advanced(UNFLEX_NUMERICAL_OPTIMISATION UNFLEX_PLAIN_OPTIMISATION UNFLEX_
 # time.
 #
 # Declares the static library unflex_<name> (alias unflex::<name>) from the sources of
-# src/<name>, with its public headers in include/unflex/<name>.
+# src/<name>. Headers for other modules are in src/<name>/include/unflex/<name>, and those for users of
+# the library in include/unflex/<name>.
 function(unflex_module name)
   cmake_parse_arguments(ARG "NUMERICAL" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   add_library(unflex_${name} STATIC ${ARG_SOURCES})
   add_library(unflex::${name} ALIAS unflex_${name})
   target_include_directories(unflex_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+    $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(unflex_${name} PUBLIC cxx_std_20)
   # Eigen would sum by as many numbers at once as the processor's registers hold, so in another order

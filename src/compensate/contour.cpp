@@ -14,9 +14,9 @@ namespace unflex::compensate {
 namespace {
 
 constexpr int kRounds = 5;
-// In so many rounds the nearest place is looked for as far as the contour reaches.
+// The first rounds, in which the nearest place is looked for as far as the contour reaches.
 constexpr int kWideRounds = 2;
-// What q may still move by when it counts as found.
+// q counts as found once a round moves it by no more.
 constexpr double kSettled_mm = 3e-4;
 constexpr double kCornerReach_s = 1e-3;
 

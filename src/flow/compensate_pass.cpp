@@ -21,6 +21,7 @@
 #include "unflex/run/admission.hpp"
 #include "unflex/run/band_gain.hpp"
 #include "unflex/run/emit_options.hpp"
+#include "unflex/run/judge.hpp"
 #include "unflex/run/layer_times.hpp"
 #include "unflex/run/move_bounds.hpp"
 #include "unflex/run/nominal_sample.hpp"
@@ -59,7 +60,10 @@ machine::Settings as_sliced(machine::Settings settings) {
 verify::Rules rules_of_pass(const Job& job, bool last) {
   verify::Rules rules = run::verify_rules(job.settings);
   if (job.output_stream || last) {
-    rules.leeway = {2.2, 5e-3, 30e-3, rules.leeway.chance_mm};
+    rules.leeway = {.times = run::kLeewayTimes,
+                    .rms_mm = run::kLeewayRms_mm,
+                    .max_mm = run::kLeeway_mm,
+                    .chance_mm = rules.leeway.chance_mm};
   }
   return rules;
 }

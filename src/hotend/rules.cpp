@@ -1,16 +1,19 @@
 // Notation of the header, and k, T_i, T_d of the ideal form; λ is the closed loop's time constant.
 // Where a rule wants one lag, τ and θ' are those of the half rule, and r = θ'/τ.
 //
-// Skogestad, Simple analytic rules for model reduction and PID controller tuning, Journal of
-// Process
-//   Control 13 (2003): k = τ₁ / (K (λ + θ)), T_i = min(τ₁, 4(λ + θ)), T_d = τ₂ in the series form,
-//   with λ = θ. f = 1 + T_d/T_i makes the ideal form of it: k f, T_i f, T_d/f (eq. 36).
-// Cohen and Coon, Theoretical consideration of retarded control, Transactions of the ASME 75
-// (1953). Ziegler and Nichols, Optimum settings for automatic controllers, Transactions of the ASME
-// 64 (1942). Tyreus and Luyben, Tuning PI controllers for integrator/dead time processes,
-// Industrial &
-//   Engineering Chemistry Research 31 (1992); with the derivative of Luyben and Luyben, Essentials
-//   of Process Control (1997).
+// clang-format off
+// Skogestad, Simple analytic rules for model reduction and PID controller tuning,
+//   Journal of Process Control 13 (2003): k = τ₁ / (K (λ + θ)), T_i = min(τ₁, 4(λ + θ)),
+//   T_d = τ₂ in the series form, with λ = θ. f = 1 + T_d/T_i makes the ideal form of it:
+//   k f, T_i f, T_d/f (eq. 36).
+// Cohen and Coon, Theoretical consideration of retarded control,
+//   Transactions of the ASME 75 (1953).
+// Ziegler and Nichols, Optimum settings for automatic controllers,
+//   Transactions of the ASME 64 (1942).
+// Tyreus and Luyben, Tuning PI controllers for integrator/dead time processes,
+//   Industrial & Engineering Chemistry Research 31 (1992); with the derivative of
+//   Luyben and Luyben, Essentials of Process Control (1997).
+// clang-format on
 #include "unflex/hotend/rules.hpp"
 
 #include <fmt/core.h>

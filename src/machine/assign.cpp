@@ -61,7 +61,7 @@ std::string store(const Value& value, const Key& key, std::optional<bool>& targe
 
 std::string store(const Value& value, const Key& key, Firmware& target) {
   if (const auto* text = std::get_if<std::string>(&value.content)) {
-    for (const Firmware firmware : {Firmware::klipper, Firmware::marlin, Firmware::rrf}) {
+    for (const Firmware firmware : kFirmwares) {
       if (*text == to_string(firmware)) {
         target = firmware;
         return {};

@@ -24,7 +24,7 @@ constexpr double kSteady_mm = 1e-4;
 // so far, it is measured kFine times in the interval.
 constexpr double kNearPeak = 0.16;
 constexpr int kFine = 8;
-// So many intervals lie between the last state of a machine and the last moment measured.
+// Lag, in intervals, between the newest nozzle state and the moment that is measured.
 constexpr double kMargin = 2.0;
 
 // The shapers that printers use most. The others would crowd the figure.

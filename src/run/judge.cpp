@@ -188,13 +188,10 @@ std::optional<std::string> worse(const verify::RunDeviation& before,
 
 // Whether the print can bear the deviation `after` although it is worse.
 bool is_bearable(const verify::RunDeviation& before, const verify::RunDeviation& after) {
-  constexpr double kBearableRms_mm = 5e-3;
-  constexpr double kBearable_mm = 25e-3;
-  constexpr double kTimes = 2.0;
   const verify::DeviationStats b = before.all.stats();
   const verify::DeviationStats a = after.all.stats();
-  return a.contour_rms_mm <= std::max(kTimes * b.contour_rms_mm, kBearableRms_mm) &&
-         a.contour_max_mm <= std::max(kTimes * b.contour_max_mm, kBearable_mm);
+  return a.contour_rms_mm <= std::max(kBearableTimes * b.contour_rms_mm, kBearableRms_mm) &&
+         a.contour_max_mm <= std::max(kBearableTimes * b.contour_max_mm, kBearable_mm);
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ constexpr double kMostSpeedFactor = 1.05;
 constexpr double kLeastSpeed_mm_s = 1.0;
 // The share of the tolerance that is aimed at.
 constexpr double kAim = 0.97;
-// The nozzle's speed relative to F, likewise.
+// The nozzle's speed relative to F that is aimed at.
 constexpr double kAimOfFeed = 1.014;
 // How far in time the width depends on accelerations, on either side.
 constexpr double kWidthReach_s = 0.02;

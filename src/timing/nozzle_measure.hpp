@@ -45,7 +45,7 @@ struct AxesModel {
 // How many times its tolerance each model's nozzle may stray on each piece. Empty: once.
 using Allowances = std::vector<std::vector<double>>;
 
-// What counts as kept, of an error relative to the tolerance and of a speed relative to F.
+// Largest error / tolerance, and largest speed / F, that still count as kept.
 inline constexpr double kKept = 1.05;
 inline constexpr double kKeptFeed = 1.0195;
 

@@ -46,7 +46,7 @@ constexpr double kOfError = 4e-3;
 constexpr double kOfAccel = 1e-2;
 constexpr double kOfStep = 1e-6;
 constexpr double kOfEvenClock = 1e5;
-// ρ, in node periods for a row that is broken by all of its bound.
+// ρ: cost, in node periods, of exceeding a bound by 100 %.
 constexpr double kPrice = 30.0;
 constexpr double kTimesForTrust = 100.0;
 // T′ at least.

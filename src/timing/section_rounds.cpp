@@ -22,7 +22,8 @@ constexpr double kBroken = 1.1;
 constexpr double kTrustToSlow = 0.1;
 
 constexpr Excess kAim{0.985, 1.0, 1.0};
-// What counts as kept, what rows are tightened for, and by how much at most.
+// Largest excess that still counts as kept; excess above which rows are tightened; how far they are
+// tightened at most.
 constexpr Excess kKept{1.025, 1.03, 1.015};
 constexpr Excess kTightenAbove{1.01, 1.0, 1.013};
 constexpr Excess kTightest{0.8, 0.6, 0.95};

@@ -56,7 +56,7 @@ class SectionRounds {
   double largest_trust_;
   std::vector<Excess> factors_;  // per period
   std::vector<Excess> excess_;   // likewise, as shown
-  std::vector<double> broken_;   // the largest of it
+  std::vector<double> broken_;   // largest excess of each period
   Excess worst_;
   double last_broken_ = 0.0;  // the largest of all, a round before
   double end_excess_ = 0.0;

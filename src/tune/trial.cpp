@@ -33,7 +33,7 @@ constexpr int kMostWaves = 8;
 // The zone shall be so many times as wide as the other value's error alone would close.
 constexpr double kWiderThanOther = 1.4;
 constexpr double kNarrowestZone = 0.02;
-// Bands reach so many halves of a zone beyond what the value may be.
+// Bands extend kBeyond half-zones past the value's uncertainty.
 constexpr double kBeyond = 1.3;
 constexpr double kStepsPerHalfZone = 5.0;
 constexpr double kMostBands = 41.0;

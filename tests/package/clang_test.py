@@ -6,6 +6,7 @@ those sources that the last commits or the working tree have changed.
 """
 
 import concurrent.futures
+import glob
 import os
 import shutil
 import subprocess
@@ -22,8 +23,10 @@ MOST = 30
 # Sources for other systems, which this compiler cannot read.
 ELSEWHERE = ("src/platform/windows/", "src/platform/wasi/", "src/web/")
 OPTIONS = ["-std=c++20", "-DFMT_SHARED", '-DUNFLEX_VERSION=""', "-DTOML_HEADER_ONLY=1",
-           "-DTOML_EXCEPTIONS=0", f"-I{ROOT}/include",
-           f"-I{ROOT}/tests", f"-I{ROOT}/src/flow",
+           "-DTOML_EXCEPTIONS=0", f"-I{ROOT}/include", f"-I{ROOT}/tests",
+           # Files in src/firmware belong to these modules.
+           *(f"-I{ROOT}/src/{name}" for name in ("flow", "gcode", "planner", "emit", "machine", "firmware")),
+           *(f"-I{folder}" for folder in sorted(glob.glob(f"{ROOT}/src/*/include"))),
            "-isystem", "/usr/include/eigen3", "-isystem", "/usr/include/coin",
            "-Wall", "-Wextra", "-Werror", "-Wno-missing-braces"]
 # Headers that take long, read once for all sources.
@@ -51,8 +54,10 @@ def changed_sources():
 
 
 def public_headers():
-    top = os.path.join(ROOT, "include")
-    return sorted(os.path.join(where, name) for where, _, names in os.walk(top) for name in names)
+    """Those for users of the library, and those that modules have for each other."""
+    tops = [os.path.join(ROOT, "include"), *glob.glob(os.path.join(ROOT, "src", "*", "include"))]
+    return sorted(os.path.join(where, name) for top in tops
+                  for where, _, names in os.walk(top) for name in names)
 
 
 class Sources(unittest.TestCase):

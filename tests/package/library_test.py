@@ -5,6 +5,7 @@ the compiler CXX, and compares its output for a print of DATA with that of the p
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -61,6 +62,30 @@ class Library(unittest.TestCase):
         self.assertGreater(os.path.getsize(ours), os.path.getsize(source))
         with open(ours, "rb") as first, open(theirs, "rb") as second:
             self.assertEqual(first.read(), second.read())
+
+    def test_the_example_of_the_page_compiles_and_runs(self):
+        with open(os.path.join(os.path.dirname(EXAMPLES), "docs", "library.md"),
+                  encoding="utf-8") as page:
+            example = re.search(r"```cpp\n(.*?)```", page.read(), re.DOTALL).group(1)
+        source = os.path.join(self.folder, "page_example")
+        os.mkdir(source)
+        with open(os.path.join(source, "main.cpp"), "w", encoding="utf-8") as file:
+            file.write(example)
+        with open(os.path.join(source, "CMakeLists.txt"), "w", encoding="utf-8") as file:
+            file.write("cmake_minimum_required(VERSION 3.25)\nproject(page_example LANGUAGES CXX)\n"
+                       "find_package(unflex 0.1 CONFIG REQUIRED)\n"
+                       "add_executable(page_example main.cpp)\n"
+                       "target_link_libraries(page_example PRIVATE unflex::unflex)\n")
+        build = os.path.join(source, "build")
+        for words in (("cmake", "-S", source, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}",
+                       f"-DCMAKE_CXX_COMPILER={CXX}"), ("cmake", "--build", build)):
+            done = run(*words)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        print_file = os.path.join(DATA, "pipeline_washer_arcs.gcode")
+        written = os.path.join(source, "out.gcode")
+        done = run(os.path.join(build, "page_example"), print_file, written)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertGreater(os.path.getsize(written), os.path.getsize(print_file))
 
     def test_the_installed_program_runs(self):
         here = run(UNFLEX, "--version")

@@ -17,7 +17,7 @@ SYSTEM = re.compile(
     r"csignal|filesystem|fstream|thread|mutex|condition_variable|future|semaphore|stop_token)>")
 SYSTEM_NAMES = re.compile(r"\b(_WIN32|__APPLE__|__linux__|__wasi__|__wasm__|__unix__|__GLIBC__)\b")
 # Threads, and what stands in for them; wide registers, which only some compilers know.
-EXCEPTIONS = {"include/unflex/core/threads.hpp", "include/unflex/core/lanes.hpp"}
+EXCEPTIONS = {"src/core/include/unflex/core/threads.hpp", "src/core/include/unflex/core/lanes.hpp"}
 
 
 class Sources(unittest.TestCase):

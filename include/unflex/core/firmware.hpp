@@ -12,6 +12,10 @@ namespace unflex {
 enum class Firmware { UNFLEX_FIRMWARES(UNFLEX_FIRMWARE) };
 #undef UNFLEX_FIRMWARE
 
+#define UNFLEX_FIRMWARE(name) Firmware::name,
+inline constexpr Firmware kFirmwares[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
+#undef UNFLEX_FIRMWARE
+
 // As the configuration spells it: "klipper", "marlin", "rrf".
 [[nodiscard]] std::string_view to_string(Firmware firmware);
 

@@ -350,6 +350,11 @@ struct Settings {
   // How far the nozzle may stray wherever it is allowed most; 0: the timing is as sliced.
   [[nodiscard]] double largest_tolerance_um() const;
 
+  // Whether values that were set in code are what a printer file may hold: each in its range, and
+  // all in keeping with each other. An error of kind usage that names the keys. load() has checked
+  // it.
+  [[nodiscard]] Status validate() const;
+
   // What is special about the firmware (core/firmware_spec.hpp).
   [[nodiscard]] const FirmwareSpec& spec() const;
 

@@ -38,17 +38,16 @@ struct LogOptions {
   std::string heater = "extruder";
 };
 
-// Reads a log. Its kind is told by its text:
+// Reads a log. Its text tells its kind:
 //
+// clang-format off
 // * klippy.log: lines "Stats 1234.5: ... extruder: target=200 temp=199.7 pwm=0.345 ..."
-// (heaters.py,
-//   Heater.stats()).
+//   (heaters.py, Heater.stats()).
 // * A serial log, as OctoPrint writes it: "2024-01-01 12:00:00,123 - Recv: T:199.7 /200.0 @:87".
-// Lines
-//   without temperature and power are left out.
+//   Lines without temperature and power are left out.
 // * Otherwise a table with a header that names time, temperature and power in any order, among
-// other
-//   columns, separated by commas, semicolons or tabs. Time is in s.
+//   other columns, separated by commas, semicolons or tabs. Time is in s.
+// clang-format on
 //
 // What hosts log may contain hours and restarts. The stretch without a gap whose temperature varies
 // most is taken, an hour of it at most.

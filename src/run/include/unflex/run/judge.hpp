@@ -48,6 +48,16 @@ struct Verdict {
   double wait_s = 0.0;                         // planner::wait_s() of the run
 };
 
+// How much worse than its sliced moves a part may be that must be written: so many times, and below
+// these errors in any case (is_bearable() in judge.cpp). Verification measures more finely, and so
+// it leaves a little more.
+inline constexpr double kBearableTimes = 2.0;
+inline constexpr double kBearableRms_mm = 5e-3;
+inline constexpr double kBearable_mm = 25e-3;
+inline constexpr double kLeewayTimes = 2.2;
+inline constexpr double kLeewayRms_mm = kBearableRms_mm;
+inline constexpr double kLeeway_mm = 30e-3;
+
 // How an objection begins that is against no limit.
 inline constexpr std::string_view kWorse = "compensation would be worse: ";
 

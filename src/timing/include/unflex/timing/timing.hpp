@@ -33,7 +33,7 @@ struct MoveBounds {
   // Where it begins and ends.
   double start_speed_mm_s = std::numeric_limits<double>::infinity();
   double end_speed_mm_s = std::numeric_limits<double>::infinity();
-  // That of the nozzle itself, where this is below F; in travel that of the base, too.
+  // Largest speed of the nozzle, if that is lower than F; in travel that of the base, too.
   double nozzle_speed_mm_s = std::numeric_limits<double>::infinity();
   // Largest e for each model that the axes may have, where filament is laid, and the largest swing
   // at the end of a run.

@@ -43,8 +43,8 @@ class Fitter {
 
   // Appends what replaces the line: the line itself, or the line with another E. Before some lines
   // comes a G92, so that E reads in the printer what the file expects. Lines come in the order of
-  // the file. Errors are of kind
-  // input: the line was fitted before, Klipper would refuse it, or its E cannot be replaced.
+  // the file. Errors are of kind input: the
+  // line was fitted before, Klipper would refuse it, or its E cannot be replaced.
   [[nodiscard]] Status fit(const gcode::Line& line, std::string& text);
 
   // What the last line meant in the sliced file, and the state after it.
