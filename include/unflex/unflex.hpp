@@ -5,7 +5,7 @@
 //   settings.dynamics_y.freq_hz = 38.0;
 //   std::ifstream sliced("in.gcode");
 //   std::ofstream output("out.gcode");
-//   const auto report = unflex::compensate(sliced, output, settings);
+//   const auto report = unflex::flow::compensate(sliced, output, settings);
 #pragma once
 
 #include <istream>
@@ -21,13 +21,13 @@
 #include "unflex/platform/files.hpp"
 #include "unflex/report/report.hpp"
 
-namespace unflex {
+namespace unflex::flow {
 
-// Compensates the sliced print and writes it, as flow::compensate() does with a job of one worker.
+// Compensates the sliced print and writes it, as compensate() does with a job of one worker.
 // Both texts are held in memory meanwhile, and nothing is written unless all went well. Errors: the
-// settings are not valid (Settings::validate()); those of flow::compensate(); a stream cannot be
+// settings are not valid (Settings::validate()); those of compensate(); a stream cannot be
 // read or written. Only a report with violation_count 0 says that the output may be printed.
 [[nodiscard]] Result<report::Report> compensate(std::istream& sliced, std::ostream& output,
                                                 const machine::Settings& settings);
 
-}  // namespace unflex
+}  // namespace unflex::flow

@@ -1,37 +1,41 @@
 #include "dialect.hpp"
 
-#include <array>
+#include <algorithm>
 #include <utility>
+#include <variant>
 
 #include "command_line.hpp"
 #include "firmware_dialect.hpp"
 #include "unflex/core/firmware_spec.hpp"
 #include "unflex/core/own_marks.hpp"
+#include "unflex/planner/limit_rows.hpp"
 
 namespace unflex::emit {
 namespace {
 
 using planner::Limits;
 
-constexpr std::array kUnknownAxes = {kUnknown, kUnknown, kUnknown, kUnknown};
-constexpr Limits kUnknownLimits = {.max_velocity_mm_s = kUnknown,
-                                   .max_accel_mm_s2 = kUnknown,
-                                   .square_corner_velocity_mm_s = kUnknown,
-                                   .minimum_cruise_ratio = kUnknown,
-                                   .accel_to_decel_mm_s2 = kUnknown,
-                                   .axis_max_velocity_mm_s = kUnknownAxes,
-                                   .axis_max_accel_mm_s2 = kUnknownAxes,
-                                   .axis_jerk_mm_s = kUnknownAxes,
-                                   .print_accel_mm_s2 = kUnknown,
-                                   .travel_accel_mm_s2 = kUnknown,
-                                   .retract_accel_mm_s2 = kUnknown,
-                                   .junction_deviation_mm = kUnknown,
-                                   .min_velocity_mm_s = kUnknown,
-                                   .min_travel_velocity_mm_s = kUnknown,
-                                   .min_segment_time_s = kUnknown,
-                                   .min_movement_velocity_mm_s = kUnknown,
-                                   .jerk_policy = -1,
-                                   .axis_max_jerk_mm_s = kUnknownAxes};
+void forget(const planner::SharedLimit& limit, Limits& limits) {
+  limits.*limit.in_force = kUnknown;
+}
+
+void forget(const planner::AxisLimit& limit, Limits& limits) {
+  (limits.*limit.in_force).fill(kUnknown);
+}
+
+void forget(const planner::ChoiceLimit& limit, Limits& limits) {
+  constexpr int kNone = -1;
+  limits.*limit.in_force = kNone;
+}
+
+// Each is unequal to any wanted limit.
+Limits unknown_limits() {
+  Limits limits;
+  for (const planner::LimitRow& row : planner::limit_rows()) {
+    std::visit([&](const auto& limit) { forget(limit, limits); }, row.member);
+  }
+  return limits;
+}
 
 }  // namespace
 
@@ -84,7 +88,7 @@ ZLimits z_limits(const planner::FirmwareConfig& config, const Limits& in_run) {
 }
 
 Limits unknown_to_run(Firmware firmware, const Limits& file) {
-  return limits_in_run(firmware, file, kUnknownLimits);
+  return limits_in_run(firmware, file, unknown_limits());
 }
 
 std::vector<std::string> limit_lines(const planner::FirmwareConfig& config, const Limits& wanted,

@@ -5,7 +5,7 @@
 
 #include "unflex/unflex.hpp"
 
-namespace unflex {
+namespace unflex::flow {
 namespace {
 
 constexpr const char* kInputName = "the sliced print";
@@ -24,12 +24,12 @@ Result<report::Report> compensate(std::istream& sliced, std::ostream& output,
   }
   const std::shared_ptr<TextStore> written = memory_store();
   SilentProgress progress;
-  Result<report::Report> report = flow::compensate({.input = memory_store(std::move(text)),
-                                                    .input_name = kInputName,
-                                                    .output = written,
-                                                    .output_name = kOutputName,
-                                                    .settings = settings},
-                                                   progress);
+  Result<report::Report> report = compensate(Job{.input = memory_store(std::move(text)),
+                                                 .input_name = kInputName,
+                                                 .output = written,
+                                                 .output_name = kOutputName,
+                                                 .settings = settings},
+                                             progress);
   if (!report) {
     return report;
   }
@@ -40,4 +40,4 @@ Result<report::Report> compensate(std::istream& sliced, std::ostream& output,
   return report;
 }
 
-}  // namespace unflex
+}  // namespace unflex::flow

@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "unflex/planner/limit_rows.hpp"
 
 namespace unflex::machine {
 namespace {
@@ -13,49 +17,50 @@ constexpr std::array kAxes = {'x', 'y', 'z', 'e'};
 
 class Collector {
  public:
-  void add(std::string key, std::optional<double> value, double scale = 1.0) {
-    if (value) {
-      values.push_back({std::move(key), *value * scale});
-    }
+  explicit Collector(const gcode::LimitChange& change) : change_(&change) {
+    // RepRapFirmware may have two jerks; the keys of jerk then take M566's.
+    const gcode::AxisValues& most = change.axis_max_jerk_mm_s;
+    sets_most_jerk_ =
+        std::ranges::any_of(most, [](const auto& value) { return value.has_value(); });
   }
 
-  // name: with {} for the axis.
-  void add(std::string_view name, const gcode::AxisValues& of_axes) {
+  void add(const planner::LimitRow& row) {
+    std::visit([&](const auto& member) { add(row, member); }, row.member);
+  }
+  std::vector<LimitValue> take() { return std::move(values_); }
+
+ private:
+  void add(const planner::LimitRow& row, const planner::AxisLimit& member) {
+    const bool is_jerk = member.change == &gcode::LimitChange::axis_jerk_mm_s;
+    const gcode::AxisValues& values =
+        is_jerk && sets_most_jerk_ ? change_->axis_max_jerk_mm_s : change_->*member.change;
     for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
-      add(fmt::format(fmt::runtime(name), kAxes[axis]), of_axes[axis]);
+      if (values[axis]) {
+        values_.push_back({fmt::format(fmt::runtime(row.key), kAxes[axis]), *values[axis]});
+      }
+    }
+  }
+  void add(const planner::LimitRow& row, const auto& member) {
+    if (const auto& value = change_->*member.change) {
+      values_.push_back({std::string(row.key), static_cast<double>(*value) * row.per_unit});
     }
   }
 
-  std::vector<LimitValue> values;
+  const gcode::LimitChange* change_;
+  bool sets_most_jerk_;
+  std::vector<LimitValue> values_;
 };
 
 }  // namespace
 
 std::vector<LimitValue> limit_values(const gcode::LimitChange& change) {
-  constexpr double kMsPerSecond = 1e3;
-  Collector c;
-  c.add("limits.max_velocity_mm_s", change.max_velocity_mm_s);
-  c.add("limits.max_accel_mm_s2", change.max_accel_mm_s2);
-  c.add("limits.square_corner_velocity_mm_s", change.square_corner_velocity_mm_s);
-  c.add("limits.minimum_cruise_ratio", change.minimum_cruise_ratio);
-  c.add("limits.max_{}_velocity_mm_s", change.axis_max_velocity_mm_s);
-  c.add("limits.max_{}_accel_mm_s2", change.axis_max_accel_mm_s2);
-  // RepRapFirmware may have two jerks; these keys then take M566's.
-  const bool is_max = std::ranges::any_of(change.axis_max_jerk_mm_s,
-                                          [](const auto& value) { return value.has_value(); });
-  c.add("limits.jerk_{}_mm_s", is_max ? change.axis_max_jerk_mm_s : change.axis_jerk_mm_s);
-  c.add("limits.print_accel_mm_s2", change.print_accel_mm_s2);
-  c.add("limits.travel_accel_mm_s2", change.travel_accel_mm_s2);
-  c.add("limits.retract_accel_mm_s2", change.retract_accel_mm_s2);
-  c.add("limits.junction_deviation_mm", change.junction_deviation_mm);
-  c.add("limits.min_velocity_mm_s", change.min_velocity_mm_s);
-  c.add("limits.min_travel_velocity_mm_s", change.min_travel_velocity_mm_s);
-  c.add("limits.min_segment_time_ms", change.min_segment_time_s, kMsPerSecond);
-  c.add("limits.min_movement_velocity_mm_s", change.min_movement_velocity_mm_s);
-  if (change.jerk_policy) {
-    c.add("limits.jerk_policy", static_cast<double>(*change.jerk_policy));
+  Collector collector(change);
+  for (const planner::LimitRow& row : planner::limit_rows()) {
+    if (!row.key.empty()) {
+      collector.add(row);
+    }
   }
-  return std::move(c.values);
+  return collector.take();
 }
 
 }  // namespace unflex::machine

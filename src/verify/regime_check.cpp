@@ -2,9 +2,14 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <string_view>
+#include <variant>
+
+#include "unflex/planner/limit_rows.hpp"
 
 namespace unflex::verify {
 namespace {
@@ -68,50 +73,51 @@ std::string modal_difference(const gcode::ModalState& input, const gcode::ModalS
   return differences.text();
 }
 
-std::string limits_difference(const planner::Limits& input, const planner::Limits& output) {
-  Differences differences;
-  differences.compare_relative("maximum velocity", input.max_velocity_mm_s,
-                               output.max_velocity_mm_s);
-  differences.compare_relative("maximum acceleration", input.max_accel_mm_s2,
-                               output.max_accel_mm_s2);
-  differences.compare_relative("square corner velocity", input.square_corner_velocity_mm_s,
-                               output.square_corner_velocity_mm_s);
-  differences.compare_relative("minimum cruise ratio", input.minimum_cruise_ratio,
-                               output.minimum_cruise_ratio);
-  differences.compare_relative("acceleration to deceleration", input.accel_to_decel_mm_s2,
-                               output.accel_to_decel_mm_s2);
+namespace {
+
+using Rows = std::span<const planner::LimitRow>;
+
+bool is_of_axes(const planner::LimitRow& row) {
+  return std::holds_alternative<planner::AxisLimit>(row.member);
+}
+
+// Rows of axes, axis by axis.
+void compare_axes(Rows rows, const planner::Limits& input, const planner::Limits& output,
+                  Differences& differences) {
   constexpr std::array<std::string_view, 4> kAxes = {"X", "Y", "Z", "E"};
   for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
-    differences.compare_relative(fmt::format("maximum velocity of {}", kAxes[axis]),
-                                 input.axis_max_velocity_mm_s[axis],
-                                 output.axis_max_velocity_mm_s[axis]);
-    differences.compare_relative(fmt::format("maximum acceleration of {}", kAxes[axis]),
-                                 input.axis_max_accel_mm_s2[axis],
-                                 output.axis_max_accel_mm_s2[axis]);
-    differences.compare_relative(fmt::format("jerk of {}", kAxes[axis]), input.axis_jerk_mm_s[axis],
-                                 output.axis_jerk_mm_s[axis]);
-    if (input.axis_max_jerk_mm_s[axis] != output.axis_max_jerk_mm_s[axis]) {
-      differences.compare_relative(fmt::format("most jerk of {}", kAxes[axis]),
-                                   input.axis_max_jerk_mm_s[axis], output.axis_max_jerk_mm_s[axis]);
+    for (const planner::LimitRow& row : rows) {
+      const auto member = std::get<planner::AxisLimit>(row.member).in_force;
+      const double before = (input.*member)[axis];
+      const double after = (output.*member)[axis];
+      // Both may be infinite.
+      if (before != after) {
+        differences.compare_relative(fmt::format(fmt::runtime(row.word), kAxes[axis]), before,
+                                     after);
+      }
     }
   }
-  differences.compare_relative("acceleration of prints", input.print_accel_mm_s2,
-                               output.print_accel_mm_s2);
-  differences.compare_relative("acceleration of travel", input.travel_accel_mm_s2,
-                               output.travel_accel_mm_s2);
-  differences.compare_relative("acceleration of retraction", input.retract_accel_mm_s2,
-                               output.retract_accel_mm_s2);
-  differences.compare_relative("junction deviation", input.junction_deviation_mm,
-                               output.junction_deviation_mm);
-  differences.compare_relative("minimum velocity", input.min_velocity_mm_s,
-                               output.min_velocity_mm_s);
-  differences.compare_relative("minimum velocity of travel", input.min_travel_velocity_mm_s,
-                               output.min_travel_velocity_mm_s);
-  differences.compare_relative("minimum segment time", input.min_segment_time_s,
-                               output.min_segment_time_s);
-  differences.compare_relative("minimum speed of movement", input.min_movement_velocity_mm_s,
-                               output.min_movement_velocity_mm_s);
-  differences.compare(input.jerk_policy == output.jerk_policy, "jerk policy");
+}
+
+}  // namespace
+
+std::string limits_difference(const planner::Limits& input, const planner::Limits& output) {
+  Differences differences;
+  const Rows rows = planner::limit_rows();
+  for (auto row = rows.begin(); row != rows.end();) {
+    if (is_of_axes(*row)) {
+      const auto end = std::find_if_not(row, rows.end(), is_of_axes);
+      compare_axes({row, end}, input, output, differences);
+      row = end;
+      continue;
+    }
+    if (const auto* shared = std::get_if<planner::SharedLimit>(&row->member)) {
+      differences.compare_relative(row->word, input.*shared->in_force, output.*shared->in_force);
+    } else if (const auto* choice = std::get_if<planner::ChoiceLimit>(&row->member)) {
+      differences.compare(input.*choice->in_force == output.*choice->in_force, row->word);
+    }
+    ++row;
+  }
   return differences.text();
 }
 
