@@ -23,7 +23,7 @@ MOST = 30
 # Sources for other systems, which this compiler cannot read.
 ELSEWHERE = ("src/platform/windows/", "src/platform/wasi/", "src/web/")
 OPTIONS = ["-std=c++20", "-DFMT_SHARED", '-DUNFLEX_VERSION=""', "-DTOML_HEADER_ONLY=1",
-           "-DTOML_EXCEPTIONS=0", f"-I{ROOT}/include", f"-I{ROOT}/tests",
+           "-DTOML_EXCEPTIONS=0", f"-I{ROOT}/include", f"-I{ROOT}/tests", f"-I{ROOT}/tests/text",
            # Files in src/firmware belong to these modules.
            *(f"-I{ROOT}/src/{name}" for name in ("flow", "gcode", "planner", "emit", "machine", "firmware")),
            *(f"-I{folder}" for folder in sorted(glob.glob(f"{ROOT}/src/*/include"))),
