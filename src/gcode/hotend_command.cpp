@@ -1,5 +1,7 @@
 #include "unflex/gcode/hotend_command.hpp"
 
+#include <fmt/core.h>
+
 #include "firmware_reader.hpp"
 #include "unflex/core/number.hpp"
 

@@ -21,7 +21,6 @@ namespace {
 
 constexpr std::array<char, 4> kAxisLetters = {'X', 'Y', 'Z', 'E'};
 constexpr double kMmPerInch = 25.4;
-constexpr double kSecondsPerMinute = 60.0;
 // An event keeps room for so many segments from line to line.
 constexpr std::size_t kKeptSegments = 4;
 
