@@ -21,6 +21,8 @@ function(unflex_module name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
     $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  # For its files in src/firmware.
+  target_include_directories(unflex_${name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
   target_compile_features(unflex_${name} PUBLIC cxx_std_20)
   # Eigen would sum by as many numbers at once as the processor's registers hold, so in another order
   # on another processor. Wide registers are used in unflex/core/lanes.hpp, in one order.

@@ -1,5 +1,7 @@
 #include "dialect.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <utility>
 #include <variant>
@@ -115,7 +117,10 @@ std::vector<std::string> shaper_lines(Firmware firmware, const gcode::Shaper& wa
 }
 
 std::string advance_line(Firmware firmware, const gcode::PressureAdvance& wanted) {
-  return dialect_of(firmware).advance_line(wanted);
+  const auto own_form = dialect_of(firmware).advance_line;
+  return own_form != nullptr ? own_form(wanted)
+                             : fmt::format("{}{}", spec_of(firmware).writing.advance_command,
+                                           wanted.advance_s.value());
 }
 
 std::string unknown_shaper_lines(Firmware firmware, const gcode::Shaper& wanted,

@@ -2,12 +2,11 @@
 // src/firmware.
 #pragma once
 
-#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "dialect.hpp"
-#include "unflex/core/firmware.hpp"
+#include "unflex/core/firmware_tables.hpp"
 #include "unflex/emit/run_limits.hpp"
 #include "unflex/gcode/interpreter.hpp"
 #include "unflex/planner/planner.hpp"
@@ -29,32 +28,22 @@ struct FirmwareDialect {
                          planner::Limits& limits);
   void (*shaper_lines)(const gcode::Shaper& wanted, const gcode::Shaper& current, ShaperAxes axes,
                        std::vector<std::string>& lines);
-  // The line that sets pressure advance, which is given.
-  std::string (*advance_line)(const gcode::PressureAdvance& wanted);
+  // The line that sets pressure advance; null: the command of the spec with the advance behind it.
+  std::string (*advance_line)(const gcode::PressureAdvance& wanted) = nullptr;
   // What to type for these axes to switch their shapers on again.
   std::string (*unknown_shaper_lines)(ShaperAxes axes);
 };
 
 }  // namespace unflex::emit
 
-namespace unflex::firmware {
-
-#define UNFLEX_FIRMWARE(name)                  \
-  namespace name {                             \
-  extern const emit::FirmwareDialect kDialect; \
-  }
-UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)
-#undef UNFLEX_FIRMWARE
-
-}  // namespace unflex::firmware
+namespace unflex {
+UNFLEX_FIRMWARE_TABLES(emit::FirmwareDialect, kDialect)
+}
 
 namespace unflex::emit {
 
 [[nodiscard]] inline const FirmwareDialect& dialect_of(Firmware firmware) {
-#define UNFLEX_FIRMWARE(name) &firmware::name::kDialect,
-  static constexpr const FirmwareDialect* kDialects[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
-#undef UNFLEX_FIRMWARE
-  return *kDialects[static_cast<std::size_t>(firmware)];
+  return UNFLEX_TABLE_OF(firmware, kDialect);
 }
 
 }  // namespace unflex::emit

@@ -1,13 +1,12 @@
 // What each firmware does with lines, as a table of functions. The tables are in src/firmware.
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <string_view>
 
 #include "arc.hpp"
 #include "firmware_commands.hpp"
-#include "unflex/core/firmware.hpp"
+#include "unflex/core/firmware_tables.hpp"
 #include "unflex/gcode/hotend_command.hpp"
 #include "unflex/gcode/interpreter.hpp"
 
@@ -22,32 +21,22 @@ struct FirmwareReader {
   ArcPieces (*plan_arc)(const Arc& arc, double feed_mm_s, const Command& command,
                         const InterpreterOptions& options);
   std::optional<HotendCommand> (*hotend_command)(const Command& command);
-  // The tool that a command selects which is no T.
+  // The tool that a command other than T selects.
   std::optional<int> (*selected_tool)(const Command& command);
-  // Whether the line is none that a printer carries out, but steers which ones are.
+  // Whether the line is no command but decides which lines are carried out.
   bool (*is_meta_command)(std::string_view content);
 };
 
 }  // namespace unflex::gcode
 
-namespace unflex::firmware {
-
-#define UNFLEX_FIRMWARE(name)                 \
-  namespace name {                            \
-  extern const gcode::FirmwareReader kReader; \
-  }
-UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)
-#undef UNFLEX_FIRMWARE
-
-}  // namespace unflex::firmware
+namespace unflex {
+UNFLEX_FIRMWARE_TABLES(gcode::FirmwareReader, kReader)
+}
 
 namespace unflex::gcode {
 
 [[nodiscard]] inline const FirmwareReader& reader_of(Firmware firmware) {
-#define UNFLEX_FIRMWARE(name) &firmware::name::kReader,
-  static constexpr const FirmwareReader* kReaders[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
-#undef UNFLEX_FIRMWARE
-  return *kReaders[static_cast<std::size_t>(firmware)];
+  return UNFLEX_TABLE_OF(firmware, kReader);
 }
 
 }  // namespace unflex::gcode

@@ -102,7 +102,7 @@ class Reader {
       return std::move(reading_);
     }
     const std::size_t macro =
-        spec_of(*named).printers.may_be_called_otherwise ? klipper_line(print_->head) : 0;
+        spec_of(*named).printers.names_klipper_too ? klipper_line(print_->head) : 0;
     const Firmware meant = macro != 0 ? Firmware::klipper : *named;
     const SourcePlace place = option("gcode_flavor")->place;
     if (!runs) {

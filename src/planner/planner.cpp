@@ -2,21 +2,8 @@
 
 #include <algorithm>
 
+#include "firmware_planner.hpp"
 #include "unflex/planner/limit_rows.hpp"
-
-namespace unflex::firmware {
-
-// The planner of each firmware, in its folder in src/firmware.
-#define UNFLEX_FIRMWARE(name)                                                            \
-  namespace name {                                                                       \
-  std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,          \
-                                                 const planner::FirmwareConfig& config); \
-  planner::Limits as_accepted(planner::Limits limits);                                   \
-  }
-UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)
-#undef UNFLEX_FIRMWARE
-
-}  // namespace unflex::firmware
 
 namespace unflex::planner {
 namespace {
@@ -48,19 +35,11 @@ void apply(const gcode::LimitChange& change, Limits& limits) {
 }
 
 Limits as_accepted(Firmware firmware, const Limits& limits) {
-  using Acceptance = Limits (*)(Limits);
-#define UNFLEX_FIRMWARE(name) &firmware::name::as_accepted,
-  static constexpr Acceptance kAcceptances[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
-#undef UNFLEX_FIRMWARE
-  return kAcceptances[static_cast<std::size_t>(firmware)](limits);
+  return UNFLEX_TABLE_OF(firmware, kPlanner).as_accepted(limits);
 }
 
 std::unique_ptr<Planner> make_planner(const Limits& limits, const FirmwareConfig& config) {
-  using Maker = std::unique_ptr<Planner> (*)(const Limits&, const FirmwareConfig&);
-#define UNFLEX_FIRMWARE(name) &firmware::name::make_planner,
-  static constexpr Maker kMakers[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
-#undef UNFLEX_FIRMWARE
-  return kMakers[static_cast<std::size_t>(config.firmware)](limits, config);
+  return UNFLEX_TABLE_OF(config.firmware, kPlanner).make(limits, config);
 }
 
 }  // namespace unflex::planner

@@ -53,9 +53,10 @@ class Track {
   void begin_section();
   // A move is played. What comes out of the nozzle meanwhile may differ from what the file pushes.
   void play(const planner::PlannedMove& pushed, const planner::PlannedMove& laid);
-  // For how long the machine stands still for the section's line: a dwell or a switch of filters.
+  // Counts the stop for the section's line, a dwell or a switch of filters, and returns how long
+  // the machine stands still for it.
   [[nodiscard]] double rest_of_section_s();
-  // For how long it does so for the added barrier that follows the section.
+  // Counts the stop for the added barrier that follows the section, in the same way.
   [[nodiscard]] double rest_of_following_s() {
     return switching_.stop(replay_.following().switching_s);
   }

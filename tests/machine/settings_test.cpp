@@ -10,6 +10,7 @@
 #include <numbers>
 #include <regex>
 
+#include "paths.hpp"
 #include "unflex/machine/machine.hpp"
 #include "unflex/machine/recommend.hpp"
 
@@ -32,6 +33,40 @@ TEST(Settings, HoldNoZeroWithASign) {
       parse("[printer]\nunretract_extra_length_mm = -0.0\n", "printer.toml", {});
   ASSERT_TRUE(settings.has_value());
   EXPECT_FALSE(std::signbit(settings->printer.unretract_extra_length_mm));
+}
+
+TEST(Settings, ThatWereReadAreValid) {
+  const std::string examples = test_paths::kExamples;
+  for (const std::string& name :
+       {examples + "/printer.toml", std::string(test_paths::kData) + "/modes.toml"}) {
+    const Result<Settings> settings = load(name, {});
+    ASSERT_TRUE(settings) << to_string(settings.error());
+    const Status valid = settings->validate();
+    EXPECT_TRUE(valid) << name << ": " << to_string(valid.error());
+  }
+  EXPECT_TRUE(Settings{}.validate());
+}
+
+// In code nothing hinders any value.
+TEST(Settings, ThatWereSetInCodeAreChecked) {
+  const auto complaint = [](const auto& change) {
+    Settings settings;
+    change(settings);
+    const Status valid = settings.validate();
+    return valid ? std::string("none") : valid.error().message;
+  };
+  EXPECT_EQ(complaint([](Settings& s) { s.limits.max_accel_mm_s2 = -1.0; }),
+            "limits.max_accel_mm_s2 is -1, but must be > 0");
+  EXPECT_THAT(complaint([](Settings& s) { s.dynamics_y.freq_hz = std::nan(""); }),
+              HasSubstr("dynamics.y.freq_hz must be a finite number"));
+  EXPECT_THAT(complaint([](Settings& s) { s.printer.transport = "pigeon"; }),
+              HasSubstr("printer.transport must be one of"));
+  EXPECT_THAT(complaint([](Settings& s) {
+                s.printer.travel_x_mm = Range{200.0, 0.0};
+              }),
+              HasSubstr("printer.travel_x_mm"));
+  EXPECT_THAT(complaint([](Settings& s) { s.solve.overlap_s = 2.0 * s.solve.window_s; }),
+              HasSubstr("solve.overlap_s must not exceed solve.window_s"));
 }
 
 std::string origin(const Settings& settings, std::string_view key) {

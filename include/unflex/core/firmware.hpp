@@ -3,8 +3,12 @@
 
 #include <string_view>
 
-// Every firmware, once. To add one, name it here and give it a folder in src/firmware.
-#define UNFLEX_FIRMWARES(EACH) EACH(klipper) EACH(marlin) EACH(rrf)
+// Every firmware, once: EACH(name, ...). To add one, name it here and give it a folder in
+// src/firmware.
+#define UNFLEX_FIRMWARES(EACH, ...)        \
+  EACH(klipper __VA_OPT__(, ) __VA_ARGS__) \
+  EACH(marlin __VA_OPT__(, ) __VA_ARGS__)  \
+  EACH(rrf __VA_OPT__(, ) __VA_ARGS__)
 
 namespace unflex {
 

@@ -20,6 +20,7 @@
 #include <numbers>
 #include <utility>
 
+#include "firmware_planner.hpp"
 #include "unflex/planner/klipper_planner.hpp"
 
 namespace unflex::planner {
@@ -240,16 +241,11 @@ void KlipperPlanner::plan(bool lazy) {
 
 namespace unflex::firmware::klipper {
 
-planner::Limits as_accepted(planner::Limits limits);
-
-std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
-                                               const planner::FirmwareConfig& config);
-
-std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
-                                               const planner::FirmwareConfig& config) {
-  return std::make_unique<planner::KlipperPlanner>(limits, config);
-}
-
-planner::Limits as_accepted(planner::Limits limits) { return limits; }
+extern constexpr planner::FirmwarePlanner kPlanner = {
+    .make = [](const planner::Limits& limits,
+               const planner::FirmwareConfig& config) -> std::unique_ptr<planner::Planner> {
+      return std::make_unique<planner::KlipperPlanner>(limits, config);
+    },
+    .as_accepted = [](planner::Limits limits) { return limits; }};
 
 }  // namespace unflex::firmware::klipper

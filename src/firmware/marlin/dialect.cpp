@@ -65,10 +65,6 @@ void shaper_lines(const Shaper& wanted, const Shaper& /*current*/, ShaperAxes ax
   }
 }
 
-std::string advance_line(const gcode::PressureAdvance& wanted) {
-  return fmt::format("{}{}", kSpec.writing.advance_command, wanted.advance_s.value());
-}
-
 std::string unknown_shaper_lines(ShaperAxes axes) {
   return fmt::format("{}{}{}", axes.x ? "M593 X F..." : "", axes.x && axes.y ? " and " : "",
                      axes.y ? "M593 Y F..." : "");
@@ -79,7 +75,6 @@ std::string unknown_shaper_lines(ShaperAxes axes) {
 extern constexpr emit::FirmwareDialect kDialect = {.limit_lines = limit_lines,
                                                    .set_run_limits = set_run_limits,
                                                    .shaper_lines = shaper_lines,
-                                                   .advance_line = advance_line,
                                                    .unknown_shaper_lines = unknown_shaper_lines};
 
 }  // namespace unflex::firmware::marlin

@@ -1,4 +1,4 @@
-// Numbers as the firmware's 32-bit processors convert them (ARM, VCVT).
+// Numbers of the firmware, and how its 32-bit processors convert them (ARM, VCVT).
 #pragma once
 
 #include <cmath>
@@ -6,6 +6,9 @@
 #include <limits>
 
 namespace unflex::planner::marlin {
+
+// Steps per second of a block that begins at rest (stepper.h, MINIMAL_STEP_RATE).
+inline constexpr std::uint32_t kMinRate = 120;
 
 // Rounds towards zero. A value that the type cannot hold becomes the nearest that it can, and NaN
 // becomes 0.

@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "firmware_planner.hpp"
 #include "marlin_block.hpp"
 #include "marlin_integers.hpp"
 #include "marlin_trapezoid.hpp"
@@ -218,16 +219,11 @@ void MarlinPlanner::forward_pass() {
 
 namespace unflex::firmware::marlin {
 
-planner::Limits as_accepted(planner::Limits limits);
-
-std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
-                                               const planner::FirmwareConfig& config);
-
-std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
-                                               const planner::FirmwareConfig& config) {
-  return std::make_unique<planner::MarlinPlanner>(limits, config);
-}
-
-planner::Limits as_accepted(planner::Limits limits) { return limits; }
+extern constexpr planner::FirmwarePlanner kPlanner = {
+    .make = [](const planner::Limits& limits,
+               const planner::FirmwareConfig& config) -> std::unique_ptr<planner::Planner> {
+      return std::make_unique<planner::MarlinPlanner>(limits, config);
+    },
+    .as_accepted = [](planner::Limits limits) { return limits; }};
 
 }  // namespace unflex::firmware::marlin

@@ -1,5 +1,6 @@
 #include <array>
 
+#include "marlin_integers.hpp"
 #include "unflex/core/firmware_spec.hpp"
 
 namespace unflex::firmware::marlin {
@@ -7,8 +8,6 @@ namespace {
 
 // Limits, the shaper, what E means, and pressure advance.
 constexpr std::array kAddedCodes = {201, 203, 204, 205, 593, 200, 221, 900};
-// Steps per second of a block that begins at rest (stepper.h, MINIMAL_STEP_RATE).
-constexpr double kMinRate = 120.0;
 
 }  // namespace
 
@@ -28,7 +27,7 @@ extern constexpr FirmwareSpec kSpec = {
                .plays_as_planned = false,
                .slows_at_angles = true,
                .counts_step_events = true,
-               .first_step_s = 1.0 / kMinRate},
+               .first_step_s = 1.0 / planner::marlin::kMinRate},
     .filters = {.shaper_type = "zv", .shaper_damping_ratio = 0.15, .has_linear_advance = true},
     .writing = {.advance_command = "M900 K",
                 .scales_whole_steps_of_e = true,
@@ -48,7 +47,7 @@ extern constexpr FirmwareSpec kSpec = {
                  .unretract_speed_mm_s = 8.0,
                  .max_lines_per_s = 200.0},
     .printers = {.is_told_kinematics = false,
-                 .may_be_called_otherwise = true,
+                 .names_klipper_too = true,
                  .has_retract_accel = true,
                  .hybrid_corexy_refusal =
                      "Marlin's MARKFORGED_XY limits by x + y in places and by x - y in others",

@@ -14,9 +14,6 @@
 namespace unflex::planner::marlin {
 namespace {
 
-// MINIMAL_STEP_RATE, steps/s.
-constexpr std::uint32_t kMinRate = 120;
-
 float square(float x) { return x * x; }
 double square(double x) { return x * x; }
 

@@ -85,9 +85,9 @@ std::string shaper_line(const Shaper& wanted) {
   if (!settings.custom_words.empty()) {
     return "M593 " + settings.custom_words;
   }
-  // "zvd" is what RepRapFirmware takes when it is told no type (AxisShaper::Configure).
   std::string line = fmt::format(
-      "M593 P\"{}\" F{}", settings.type_x.empty() ? "zvd" : settings.type_x, wanted.freq_x_hz);
+      "M593 P\"{}\" F{}", settings.type_x.empty() ? kSpec.filters.shaper_type : settings.type_x,
+      wanted.freq_x_hz);
   if (settings.damping_ratio_x) {
     line += fmt::format(" S{}", *settings.damping_ratio_x);
   }
@@ -101,10 +101,6 @@ void shaper_lines(const Shaper& wanted, const Shaper& current, ShaperAxes axes,
   }
 }
 
-std::string advance_line(const gcode::PressureAdvance& wanted) {
-  return fmt::format("{}{}", kSpec.writing.advance_command, wanted.advance_s.value());
-}
-
 std::string unknown_shaper_lines(ShaperAxes /*axes*/) { return "M593 P\"...\" F..."; }
 
 }  // namespace
@@ -112,7 +108,6 @@ std::string unknown_shaper_lines(ShaperAxes /*axes*/) { return "M593 P\"...\" F.
 extern constexpr emit::FirmwareDialect kDialect = {.limit_lines = limit_lines,
                                                    .set_run_limits = set_run_limits,
                                                    .shaper_lines = shaper_lines,
-                                                   .advance_line = advance_line,
                                                    .unknown_shaper_lines = unknown_shaper_lines};
 
 }  // namespace unflex::firmware::rrf

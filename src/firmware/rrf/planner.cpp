@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "firmware_planner.hpp"
 #include "rrf_dda.hpp"
 #include "rrf_lookahead.hpp"
 #include "unflex/planner/rrf_planner.hpp"
@@ -207,18 +208,11 @@ gcode::Position RrfPlanner::on_steps(const gcode::Position& position_mm) const {
 
 namespace unflex::firmware::rrf {
 
-planner::Limits as_accepted(planner::Limits limits);
-
-std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
-                                               const planner::FirmwareConfig& config);
-
-std::unique_ptr<planner::Planner> make_planner(const planner::Limits& limits,
-                                               const planner::FirmwareConfig& config) {
-  return std::make_unique<planner::RrfPlanner>(limits, config);
-}
-
-planner::Limits as_accepted(planner::Limits limits) {
-  return planner::rrf_raised(std::move(limits));
-}
+extern constexpr planner::FirmwarePlanner kPlanner = {
+    .make = [](const planner::Limits& limits,
+               const planner::FirmwareConfig& config) -> std::unique_ptr<planner::Planner> {
+      return std::make_unique<planner::RrfPlanner>(limits, config);
+    },
+    .as_accepted = planner::rrf_raised};
 
 }  // namespace unflex::firmware::rrf

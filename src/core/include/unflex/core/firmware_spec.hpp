@@ -1,54 +1,55 @@
-// What is special about each firmware, as plain values. What a firmware does with G-code, motion
-// and limits is in tables of functions beside these: gcode/firmware_reader.hpp, planner/planner.hpp
-// and emit's dialect. All of one firmware is in its folder in src/firmware.
+// What is special about each firmware, as plain values. What it does with lines, motion and limits
+// is in tables of functions: gcode/firmware_reader.hpp, planner/firmware_planner.hpp and
+// emit/firmware_dialect.hpp. All tables of a firmware are in its folder in src/firmware.
 #pragma once
 
 #include <array>
 #include <optional>
 #include <span>
 #include <string_view>
-#include <utility>
 
 #include "unflex/core/firmware.hpp"
+#include "unflex/core/firmware_tables.hpp"
 
 namespace unflex {
 
 // How it reads lines.
 struct FirmwareReading {
-  const char* bad_feed = nullptr;  // what to tell of an F that is not above zero; null: nothing
+  const char* bad_feed = nullptr;       // what is wrong with F0; null: nothing is
   bool takes_several_commands = false;  // a line may have more than one command
   bool return_ends_line = false;        // a carriage return without a line feed
   bool has_blocks = false;              // indented lines belong to an `if` or `while`
   bool bare_g92_sets_all = false;       // G92 without words is for all axes
   bool g91_covers_e = true;
   bool cubes_units = false;               // after G20 a volume is in cubic inches
-  bool relative_e_keeps_reading = false;  // what absolute E words refer to
+  bool relative_e_keeps_reading = false;  // relative E words leave the reading of E alone
   bool sums_e_in_single_precision = false;
   bool xz_by_right_hand = true;        // G18 takes Z before X
-  bool refuses_relative_arcs = false;  // and arcs with R
-  bool refuses_short_radius = false;   // an R that does not reach the end
-  bool counts_drawing_back = true;     // filament that is drawn back counts for too much filament
+  bool refuses_relative_arcs = false;  // it refuses arcs under G91, and arcs with R
+  bool refuses_short_radius = false;   // it refuses an R that does not reach the end
+  bool counts_drawing_back = true;     // a move may draw back too much filament, too
   std::string_view too_much_filament = "no nozzle takes so much";
-  bool limits_drawing_back = false;  // in moves in X and Y, as if nothing else moved
-  bool labels_leave_out_z = false;   // behind the label of an object Z may be left out
+  bool limits_drawing_back = false;  // a move that draws back is limited by the extruder
+  bool labels_leave_out_z = false;   // behind an object's label a move of Z may be missing
   bool macros_select_tools = false;  // a macro may select another tool
   double first_feed_mm_s = 25.0;     // until the first F
 };
 
 // How it moves.
 struct FirmwareMotion {
-  bool rounds_to_steps = true;     // lines begin and end on whole steps
-  bool has_axis_limits = true;     // each axis has limits of its own, not all motion together
-  bool limits_extruder = false;    // jumps of flow, and acceleration where filament is drawn back
+  bool rounds_to_steps = true;  // lines begin and end on whole steps
+  bool has_axis_limits = true;  // each axis has limits of its own, not all motion together
+  bool limits_extruder =
+      false;  // it limits jumps of flow, and acceleration while filament is drawn back
   bool has_short_queue = true;     // the lookahead is no longer than the queue of lines
-  bool skips_short_moves = false;  // of too few steps; they are made with the next one
+  bool skips_short_moves = false;  // a move of too few steps is made with the next one
   bool plays_as_planned = true;
-  bool slows_at_angles = false;     // between short lines, by the junction deviation
+  bool slows_at_angles = false;     // the angle between short lines limits the speed
   bool counts_step_events = false;  // each line's clock goes by its steps
   bool leaves_out_short_ramps = false;
   double first_step_s = 0.0;   // how long the first step from rest waits
   double corexz_lift = 1.0;    // travel of the Z part of a CoreXZ's motors, per mm
-  bool has_two_jerks = false;  // one of them for prints alone
+  bool has_two_jerks = false;  // one of two jerks is for prints alone
 };
 
 // Its input shaper and its pressure advance.
@@ -59,7 +60,8 @@ struct FirmwareFilters {
   bool shapes_both_axes_alike = false;  // there is one shaper
   bool shaper_may_come_on = false;      // a macro may switch it on, whatever is configured
   double switching_grace_s = 0.0;       // how much longer than its pulses a switch takes
-  // The least half of the time that is scanned for steps where filters are switched; 0: none is.
+  // Where filters are switched, the firmware scans for steps this long before and after, at least;
+  // 0: it does not scan.
   double least_scan_s = 0.0;
   bool has_linear_advance = false;  // printer.linear_advance_s is its pressure advance
   bool smooths_advance = false;
@@ -69,11 +71,11 @@ struct FirmwareFilters {
 // How it is written to.
 struct FirmwareWriting {
   std::string_view advance_command = {};  // followed by the advance in s
-  bool limits_act_early = false;          // also on the move in the line before
+  bool limits_act_early = false;          // limits also hold for the move in the line before
   bool scales_whole_steps_of_e = false;
-  bool units_scale_all_words = false;   // also those of lines without motion
+  bool units_scale_all_words = false;   // G20 also scales words of lines without motion
   bool can_pause_behind_run = false;    // macros let a pause wait for a run's end
-  std::string_view why_no_macros = {};  // what to tell who asks for such macros
+  std::string_view why_no_macros = {};  // the error for who asks for such macros
   // The codes (M) and names of commands that unflex adds.
   std::span<const int> added_codes = {};
   std::span<const std::string_view> added_names = {};
@@ -104,10 +106,10 @@ struct FirmwareDefaults {
 
 // What is known of printers that run it.
 struct FirmwarePrinters {
-  bool is_told_kinematics = true;        // what the printer tells says which motors move what
-  bool may_be_called_otherwise = false;  // slicers take its name for Klipper, too
-  bool has_retract_accel = false;        // M204 R
-  std::string_view hybrid_corexy_refusal = {};  // why it cannot plan for that; empty: it can
+  bool is_told_kinematics = true;  // the printer tells which motors move what
+  bool names_klipper_too = false;  // slicers also give its name to printers with Klipper
+  bool has_retract_accel = false;  // M204 R
+  std::string_view hybrid_corexy_refusal = {};  // why it cannot plan for one; empty: it can
   bool has_all_kinematics = false;
   std::string_view lines_from = {};  // where lines come from, unless a host sends them
   std::string_view lines_from_sbc = {};
@@ -124,18 +126,10 @@ struct FirmwareSpec {
   FirmwarePrinters printers = {};
 };
 
-#define UNFLEX_FIRMWARE(name)      \
-  namespace firmware::name {       \
-  extern const FirmwareSpec kSpec; \
-  }
-UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)
-#undef UNFLEX_FIRMWARE
+UNFLEX_FIRMWARE_TABLES(FirmwareSpec, kSpec)
 
 [[nodiscard]] inline const FirmwareSpec& spec_of(Firmware firmware) {
-#define UNFLEX_FIRMWARE(name) &firmware::name::kSpec,
-  static constexpr const FirmwareSpec* kSpecs[] = {UNFLEX_FIRMWARES(UNFLEX_FIRMWARE)};
-#undef UNFLEX_FIRMWARE
-  return *kSpecs[static_cast<std::size_t>(firmware)];
+  return UNFLEX_TABLE_OF(firmware, kSpec);
 }
 
 }  // namespace unflex

@@ -48,9 +48,9 @@ struct Verdict {
   double wait_s = 0.0;                         // planner::wait_s() of the run
 };
 
-// How much worse than its sliced moves a part may be that must be written: so many times, and below
-// these errors in any case (is_bearable() in judge.cpp). Verification measures more finely, and so
-// it leaves a little more.
+// A part that must be written may have errors up to kBearableTimes those of its sliced moves, or up
+// to kBearable where that is more. Verification measures more finely than judge(), so its bounds,
+// kLeeway, are a little wider.
 inline constexpr double kBearableTimes = 2.0;
 inline constexpr double kBearableRms_mm = 5e-3;
 inline constexpr double kBearable_mm = 25e-3;
