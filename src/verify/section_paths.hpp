@@ -17,12 +17,12 @@
 
 namespace unflex::verify {
 
-// What the time of a section's emitted moves has to do with that of its sliced moves.
+// How the time of a section's emitted moves relates to that of its sliced moves.
 enum class Timing {
   kept,       // no compensated run: both files have the same moves
-  planned,    // a run that lasts as long as it is planned
-  unplanned,  // a run of such a plan, where the firmware carries out the sliced moves otherwise
-  free,       // a run of another duration: its reference is passed as the emitted file gets on
+  planned,    // the run lasts as long as planned
+  unplanned,  // so it does, but the firmware carries out the sliced moves in other times (Marlin)
+  free,       // the run lasts otherwise: the reference moves on as the emitted file does
 };
 
 class SectionPaths {
@@ -47,7 +47,6 @@ class SectionPaths {
   // free run may be off in the end.
   void begin_run(Timing timing, double lead_in_s, double owed_mm);
 
-  [[nodiscard]] Timing timing() const { return timing_; }
   [[nodiscard]] bool is_run() const { return timing_ != Timing::kept; }
   [[nodiscard]] bool is_free() const { return timing_ == Timing::free; }
   // Whether the sliced moves of the run have a clock of their own.
@@ -60,7 +59,7 @@ class SectionPaths {
   [[nodiscard]] ReferencePath& sliced() { return sliced_; }
   // What the emitted file's nozzle is measured against.
   [[nodiscard]] ReferencePath& emitted() { return is_run() ? run_ : sliced_; }
-  // What the nozzle is measured against for which the run's sliced moves are kept.
+  // The path of the nozzle that would follow the run's sliced moves.
   [[nodiscard]] ReferencePath& kept() { return has_own_clock() ? resting_ : run_; }
 
   // The next move of the emitted file; false at the section's end.

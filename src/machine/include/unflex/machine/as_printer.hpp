@@ -1,5 +1,5 @@
-// The settings as those want them who play the printer: the interpreter, the planner and the models
-// of the axes and of the hotend.
+// The settings in the form that the interpreter, the planner and the models of axes and hotend
+// take.
 #pragma once
 
 #include <vector>
